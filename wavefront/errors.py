@@ -1,0 +1,78 @@
+"""The one error type that users meet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+class SceneError(ValueError):
+    """A scene, file or argument that cannot be rendered.
+
+    The message names what is wrong, where it is, the value found and the limit.
+    """
+
+
+def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
+    """Return `value` as a float64 array of `shape` (None matches any length).
+
+    Raises
+    ------
+    SceneError
+        If the shape differs, the value is not numeric, or an element is not finite.
+    """
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise SceneError(f"{name} must be numeric, got {value!r}") from error
+    fits = array.ndim == len(shape) and all(
+        want is None or have == want for have, want in zip(array.shape, shape, strict=True)
+    )
+    if not fits:
+        wanted = "(" + ", ".join("n" if want is None else str(want) for want in shape) + ")"
+        raise SceneError(f"{name} must have shape {wanted}, got {array.shape}")
+    bad = np.argwhere(~np.isfinite(array))
+    if len(bad):
+        where = "".join(f"[{i}]" for i in bad[0])
+        raise SceneError(f"{name}{where} is {array[tuple(bad[0])]}; it must be finite")
+    return array
+
+
+def number(
+    name: str, value: Any, holds: Callable[[float], bool] = lambda x: True, limit: str = "finite"
+) -> float:
+    """Return `value` as a finite float for which `holds` is true.
+
+    Raises
+    ------
+    SceneError
+        Naming `name`, the value and `limit`.
+    """
+    try:
+        result = float(value)
+    except (TypeError, ValueError) as error:
+        raise SceneError(f"{name} must be a number, got {value!r}") from error
+    if not np.isfinite(result) or not holds(result):
+        raise SceneError(f"{name} is {value!r}; it must be {limit}")
+    return result
+
+
+def rgb(name: str, value: ArrayLike, high: float = np.inf) -> NDArray[np.float32]:
+    """Return a colour as a (3, 1) float32 column; a scalar means grey.
+
+    Raises
+    ------
+    SceneError
+        If it is not one or three finite numbers in [0, `high`].
+    """
+    scalar = np.ndim(value) == 0
+    array = finite_array(name, value, () if scalar else (3,))
+    bad = np.flatnonzero(~((array >= 0) & (array <= high)))
+    if len(bad):
+        where = "" if scalar else f"[{bad[0]}]"
+        limit = "at least 0" if np.isinf(high) else f"in [0, {high:g}]"
+        raise SceneError(f"{name}{where} is {array.flat[bad[0]]:g}; it must be {limit}")
+    return np.broadcast_to(array.astype(np.float32).reshape(-1, 1), (3, 1)).copy()

@@ -1,0 +1,51 @@
+"""Algebra of (3, n) float32 vectors.
+
+Every sum is written out by component, so that the bits of one column never depend on how many
+columns stand beside it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float32]
+Ints = NDArray[np.intp]
+Bools = NDArray[np.bool_]
+
+f4 = np.float32
+
+
+def dot(a: Floats, b: Floats) -> Floats:
+    """Dot product of (3, n) columns -> (n,)."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Floats, b: Floats) -> Floats:
+    """Cross product of (3, n) columns -> (3, n)."""
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape), f4)
+    np.subtract(a[1] * b[2], a[2] * b[1], out=out[0])
+    np.subtract(a[2] * b[0], a[0] * b[2], out=out[1])
+    np.subtract(a[0] * b[1], a[1] * b[0], out=out[2])
+    return out
+
+
+def length(a: Floats) -> Floats:
+    """Euclidean length of (3, n) columns -> (n,)."""
+    return np.sqrt(dot(a, a))
+
+
+def normalize(a: Floats) -> Floats:
+    """Scale (3, n) columns to unit length; a zero column stays zero."""
+    size = length(a)
+    return a / np.where(size > 0, size, f4(1))
+
+
+def luminance(rgb: Floats) -> Floats:
+    """Relative luminance of linear Rec. 709 RGB, (3, n) -> (n,) (ITU-R BT.709)."""
+    return f4(0.2126) * rgb[0] + f4(0.7152) * rgb[1] + f4(0.0722) * rgb[2]
+
+
+def column(value: object) -> Floats:
+    """Three numbers as a (3, 1) float32 column."""
+    return np.asarray(value, f4).reshape(3, 1)
