@@ -1,0 +1,1 @@
+"""Ray queries: which surface a ray meets first, and whether anything blocks it."""

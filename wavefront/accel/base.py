@@ -1,0 +1,46 @@
+"""The contract of an accelerator: the one place where ray queries plug in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from ..vec import Bools, Floats, Ints
+
+
+@dataclass(slots=True)
+class Geometry:
+    """What rays can hit, in float32 relative to the scene's centre.
+
+    Primitive ids count the triangles first, then the spheres.
+    """
+
+    triangles: Floats  # (m, 3, 3) vertices: triangle, corner, xyz
+    centers: Floats  # (3, k) sphere centres
+    radii: Floats  # (k,) sphere radii
+
+
+@dataclass(slots=True)
+class Intersections:
+    """The nearest surface along each ray."""
+
+    t: Floats  # (n,) distance along the direction, inf on a miss
+    prim: Ints  # (n,) primitive id, -1 on a miss
+    b1: Floats  # (n,) barycentric weight of the second vertex; 0 on spheres
+    b2: Floats  # (n,) barycentric weight of the third vertex; 0 on spheres
+
+
+class Accelerator(Protocol):
+    """Answers ray queries. Results are the same bits for any batch size or order of rays."""
+
+    name: str
+
+    def closest(self, origin: Floats, direction: Floats, leaving: Ints) -> Intersections:
+        """Find the nearest hit with t > 0 of rays (3, n); ties go to the lowest id.
+
+        `leaving` (n,) names the primitive each ray starts on, -1 for none: a triangle is not hit
+        again by the ray that leaves it, and of a sphere only the far side can be.
+        """
+
+    def occluded(self, origin: Floats, direction: Floats, distance: Floats, leaving: Ints) -> Bools:
+        """Tell whether anything is hit with 0 < t < `distance` (n,)."""
