@@ -1,0 +1,85 @@
+"""The contract of every material.
+
+Directions are in the local shading frame: z is the shading normal on the side of `wo`, so
+`wo[2] > 0` always; `wi[2] > 0` is reflection and `wi[2] < 0` transmission. The renderer turns
+the frame, so no material does. All arrays hold live columns only.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from copy import copy
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
+from ..state import Surface
+from ..vec import Bools, Floats
+
+
+class Spatial(ABC):
+    """A material parameter that varies over surfaces, such as a texture."""
+
+    @abstractmethod
+    def at(self, surface: Surface) -> Floats:
+        """Return the values at the hit points: (3, n) for a colour, (n,) for a scalar."""
+
+
+@dataclass(slots=True)
+class BsdfSample:
+    """One sampled direction per column. A zero weight means that there is no sample."""
+
+    wi: Floats  # (3, n) sampled direction, local frame
+    weight: Floats  # (3, n) f(wo, wi)·|cosθi| / pdf
+    pdf: Floats  # (n,) solid-angle density; of a delta lobe, the probability that it was chosen
+    specular: Bools  # (n,) the direction came from a delta lobe
+    eta: Floats | None = None  # (n,) ior beyond / ior before where light crosses, 1 elsewhere
+
+
+class Bsdf(ABC):
+    """A material: how a surface scatters light.
+
+    A subclass gives `f`; it may give a `sample_f` and its `pdf` that follow `f` more closely than
+    the cosine-weighted ones here. Parameters are attributes: constants of shape (3, 1) or (1,),
+    or `Spatial` ones, which `bind` replaces by their values at the hit points.
+    """
+
+    transmissive: ClassVar[bool] = False  # light can cross the surface
+    dimensions: ClassVar[int] = 2  # rows of u that sample_f reads
+    specular: bool = False  # every lobe is a delta: f and pdf are 0, light sampling is skipped
+
+    def bind(self, surface: Surface) -> Self:
+        """Return this material with its spatial parameters looked up at `surface` (n columns)."""
+        varying = {name: value for name, value in vars(self).items() if isinstance(value, Spatial)}
+        if not varying:
+            return self
+        bound = copy(self)
+        for name, value in varying.items():
+            setattr(bound, name, value.at(surface))
+        return bound
+
+    @abstractmethod
+    def f(self, wo: Floats, wi: Floats) -> Floats:
+        """BSDF value without the cosine, (3, n), in 1/sr. Delta lobes contribute 0."""
+
+    def pdf(self, wo: Floats, wi: Floats) -> Floats:
+        """Solid-angle density with which `sample_f` draws `wi`, (n,). Delta lobes contribute 0."""
+        return np.where(wo[2] > 0, cosine_hemisphere_pdf(wi), np.float32(0))
+
+    def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
+        """Return `f` and `pdf` together, for materials where they share work."""
+        return self.f(wo, wi), self.pdf(wo, wi)
+
+    def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
+        """Draw a direction per column from uniform numbers `u` (`dimensions`, n) in [0, 1)."""
+        wi = cosine_hemisphere(u)
+        pdf = self.pdf(wo, wi)
+        return BsdfSample(wi, weigh(self.f(wo, wi), wi, pdf), pdf, np.zeros(len(pdf), np.bool_))
+
+
+def weigh(f: Floats, wi: Floats, pdf: Floats) -> Floats:
+    """f·|cosθ|/pdf, and 0 (no sample) where the pdf is 0: (3, n)."""
+    scale = np.abs(wi[2]) / np.where(pdf > 0, pdf, np.float32(1))
+    return f * np.where(pdf > 0, scale, np.float32(0))

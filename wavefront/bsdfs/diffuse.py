@@ -1,0 +1,46 @@
+"""Lambertian reflection."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
+from ..vec import Floats, f4
+from .base import Bsdf, BsdfSample
+from .parameter import Colour, colour
+
+INV_PI = f4(1 / np.pi)
+
+
+class Diffuse(Bsdf):
+    """A matte surface that looks equally bright from everywhere: f = reflectance/π.
+
+    Parameters
+    ----------
+    reflectance
+        Part of the light that is reflected, per channel, in [0, 1]: a number, three numbers,
+        or a texture.
+
+    Raises
+    ------
+    SceneError
+        If the reflectance is outside [0, 1] or not finite.
+    """
+
+    def __init__(self, reflectance: Colour = 0.5) -> None:
+        self.reflectance = colour("Diffuse reflectance", reflectance)
+
+    def f(self, wo: Floats, wi: Floats) -> Floats:
+        """Return reflectance/π above the surface, (3, n)."""
+        return self.reflectance * np.where(wi[2] > 0, INV_PI, f4(0))
+
+    def pdf(self, wo: Floats, wi: Floats) -> Floats:
+        """Return cosθ/π, (n,)."""
+        return cosine_hemisphere_pdf(wi)
+
+    def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
+        """Draw cosine-weighted directions; the weight is the reflectance itself."""
+        wi = cosine_hemisphere(u)
+        pdf = cosine_hemisphere_pdf(wi)
+        weight = self.reflectance * np.where(pdf > 0, f4(1), f4(0))
+        return BsdfSample(wi, weight, pdf, np.zeros(len(pdf), np.bool_))

@@ -1,0 +1,1 @@
+"""Lights, and how one of them is chosen."""

@@ -1,0 +1,55 @@
+"""The contract of every light.
+
+A light record holds k lights of one kind, a column each (`Columns`). The methods work on n
+lanes: on a record with one column that is shared by all lanes, or on one that `take` gathered to
+a column per lane. Positions are relative to the scene's centre. Every pdf is in solid angle.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..state import Columns
+from ..vec import Floats
+
+
+@dataclass(slots=True)
+class LightSample(Columns):
+    """Light arriving at a point from one sampled direction. A pdf of 0 means no sample."""
+
+    wi: Floats  # (3, n) unit direction from the point to the light
+    radiance: Floats  # (3, n) W·sr⁻¹·m⁻² (of a delta light: irradiance per unit cosine)
+    pdf: Floats  # (n,) solid-angle density, 1/sr (of a delta light: 1)
+    distance: Floats  # (n,) to the sampled point, scene units; inf for a light at infinity
+
+
+class Light(Columns, ABC):
+    """k lights of one kind."""
+
+    __slots__ = ()
+    delta: ClassVar[bool] = False  # no BSDF sample can meet it: its samples take no MIS weight
+
+    @abstractmethod
+    def sample_li(self, point: Floats, u: Floats) -> LightSample:
+        """Sample a direction from points (3, n) to the light with u (2, n)."""
+
+    @abstractmethod
+    def pdf_li(self, point: Floats, wi: Floats) -> Floats:
+        """Density with which `sample_li` draws wi (3, n), (n,); 0 where the ray misses the light."""
+
+    @abstractmethod
+    def le(self, wi: Floats) -> Floats:
+        """Radiance (3, n) carried against wi by rays that meet the light; 0 from a side that is dark."""
+
+    @abstractmethod
+    def power(self, scene_radius: float) -> NDArray[np.float64]:
+        """Estimate the emitted power of each light, (k,), the mean of the channels, W."""
+
+    @abstractmethod
+    def moved(self, offset: NDArray[np.float64]) -> Self:
+        """Return the lights displaced by `offset` (3,)."""

@@ -1,0 +1,108 @@
+"""The records that travel round the loop: structures of arrays, one column per path.
+
+Each field is declared once, with its shape and unit; `take`, `concatenate` and `len` are derived.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
+from functools import cache
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .frame import Frame
+from .vec import Bools, Floats, Ints
+
+Words = NDArray[np.uint32]
+
+
+@cache
+def _names(record: type) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(record))
+
+
+class Columns:
+    """Base of dataclasses whose fields are arrays with one column (last axis) per element.
+
+    A field that is None is absent and stays absent.
+    """
+
+    __slots__ = ()
+
+    def _values(self) -> Iterator[tuple[str, Any]]:
+        for name in _names(type(self)):
+            yield name, getattr(self, name)
+
+    def __len__(self) -> int:
+        """Return the number of columns."""
+        return int(next(value.shape[-1] for _, value in self._values() if value is not None))
+
+    def take(self, index: Ints) -> Self:
+        """Gather columns `index` (m,) of every field into a new record."""
+        out = object.__new__(type(self))
+        for name, value in self._values():
+            object.__setattr__(out, name, None if value is None else value.take(index, -1))
+        return out
+
+    @classmethod
+    def concatenate(cls, records: Sequence[Self]) -> Self:
+        """Join the columns of several records of one type."""
+        out = object.__new__(cls)
+        for name in _names(cls):
+            values = [getattr(record, name) for record in records]
+            joined = None if values[0] is None else np.concatenate(values, axis=-1)
+            object.__setattr__(out, name, joined)
+        return out
+
+
+@dataclass(slots=True)
+class Paths(Columns):
+    """Live paths: where each is, where it goes, and what it has gathered on the way."""
+
+    slot: Ints  # (n,) column of the radiance buffer that this path owns
+    pixel: Words  # (n,) row-major pixel index: first part of the random-number address
+    sample: Words  # (n,) sample index within the pixel: second part of the address
+    origin: Floats  # (3, n) start of the current ray, scene units
+    direction: Floats  # (3, n) unit direction of the current ray
+    leaving: Ints  # (n,) primitive that the ray starts on, -1 for none
+    throughput: Floats  # (3, n) product of BSDF weights since the camera
+    pdf: Floats  # (n,) density of the last BSDF sample, 1/sr; unused where specular
+    specular: Bools  # (n,) the last direction came from a delta lobe or from the camera
+    eta2: Floats  # (n,) square of the relative refractive index crossed so far
+
+
+@dataclass(slots=True)
+class Hits(Columns):
+    """What each ray met first."""
+
+    t: Floats  # (n,) distance along the ray, scene units; inf on a miss
+    prim: Ints  # (n,) primitive id, -1 on a miss
+    b1: Floats  # (n,) barycentric weight of the second vertex
+    b2: Floats  # (n,) barycentric weight of the third vertex
+
+    @property
+    def found(self) -> Ints:
+        """Indices of the lanes that hit something."""
+        return np.flatnonzero(self.prim >= 0)
+
+
+@dataclass(slots=True)
+class Surface(Columns):
+    """Geometry at hit points. Normals face the side that the ray came from."""
+
+    point: Floats  # (3, n) hit point, scene units
+    error: Floats  # (n,) bound on the rounding error of `point`, scene units
+    ng: Floats  # (3, n) unit geometric normal, on the side of wo
+    ns: Floats  # (3, n) unit shading normal, on the side of wo
+    wo: Floats  # (3, n) unit direction towards the ray's origin, world frame
+    prim: Ints  # (n,) primitive id
+    material: Ints  # (n,) row of the scene's material table
+    inside: Bools  # (n,) the ray came from the back side of the surface
+    uv: Floats | None = None  # (2, n) texture coordinates; None when nothing in the scene needs them
+
+    def frame(self) -> Frame:
+        """Return the shading frames, z = ns."""
+        return Frame.from_normal(self.ns)
