@@ -1,0 +1,1 @@
+"""Files: meshes and materials in, images in and out."""

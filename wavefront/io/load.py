@@ -1,0 +1,243 @@
+"""Scenes and meshes from files, and from trimesh objects. The only file that imports trimesh."""
+
+from __future__ import annotations
+
+import os
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..bsdfs.base import Bsdf
+from ..errors import SceneError, finite_array
+from ..scene import Scene
+from ..shapes import Mesh
+from . import headers, mtl, obj
+from .files import beside, decode, read_bytes
+from .repair import Raw, build, warn
+
+if TYPE_CHECKING:
+    import trimesh
+
+EXTENSIONS = (".obj", ".ply", ".stl", ".glb", ".gltf")
+PathLike = str | os.PathLike[str]
+
+
+def load(path: PathLike, *, strict: bool = False) -> Scene:
+    """Read a scene: .obj (with its .mtl), .ply, .stl, .glb, .gltf.
+
+    Parameters
+    ----------
+    path
+        The file. Files that it refers to are read only from its own folder.
+    strict
+        Refuse what would otherwise be repaired or left out with a warning.
+
+    Raises
+    ------
+    SceneError
+        Naming the file, the line or element, the value and the limit.
+    """
+    return Scene(load_meshes(path, strict=strict))
+
+
+def load_mesh(
+    path: PathLike,
+    material: Bsdf | None = None,
+    transform: ArrayLike | None = None,
+    *,
+    strict: bool = False,
+) -> Mesh:
+    """Read all geometry of a file as one mesh.
+
+    Parameters
+    ----------
+    path
+        As for `load`.
+    material
+        What the mesh is made of. Without it, the material and the emission of the file, which must
+        then have only one.
+    transform
+        (4, 4) matrix applied to the vertices.
+    strict
+        As for `load`.
+
+    Raises
+    ------
+    SceneError
+        As for `load`.
+    """
+    meshes = load_meshes(path, strict=strict, materials=material is None)
+    return join(meshes, Path(path).stem, material, transform)
+
+
+def load_meshes(path: PathLike, *, strict: bool = False, materials: bool = True) -> list[Mesh]:
+    """Read the meshes of a file, one for each material and node; arguments as for `load`."""
+    name = os.fspath(path)
+    extension = Path(name).suffix.lower()
+    if extension not in EXTENSIONS:
+        raise SceneError(f"{name}: extension {extension!r} is not one of {', '.join(EXTENSIONS)}")
+    data = read_bytes(path)
+    if not data:
+        raise SceneError(f"{name}: is empty")
+    try:
+        raws = _read(path, extension, data, strict, materials)
+        meshes = [mesh for raw in raws if (mesh := build(name, raw, strict)) is not None]
+    except MemoryError as error:
+        raise SceneError(f"{name}: does not fit in memory") from error
+    if not meshes:
+        raise SceneError(f"{name}: has no faces")
+    return meshes
+
+
+def from_trimesh(geometry: Any) -> Scene:
+    """Turn a `trimesh.Trimesh` or `trimesh.Scene` into a scene, as if it had been read from a file.
+
+    Normals are used where the object holds them: given by its file, or computed because somebody
+    asked for `vertex_normals`. Trimesh's own exporters follow the same rule.
+
+    Raises
+    ------
+    SceneError
+        If it is something else, or has no faces.
+    """
+    meshes = [mesh for raw in _raws(geometry) if (mesh := build("trimesh object", raw)) is not None]
+    if not meshes:
+        raise SceneError("trimesh object: has no faces")
+    return Scene(meshes)
+
+
+def join(
+    meshes: list[Mesh], name: str, material: Bsdf | None = None, transform: ArrayLike | None = None
+) -> Mesh:
+    """Return one mesh with the triangles of all.
+
+    Raises
+    ------
+    SceneError
+        If there are several materials and `material` does not say which to use.
+    """
+    if material is None and len({id(mesh.material) for mesh in meshes}) > 1:
+        raise SceneError(f"{name}: has {len(meshes)} materials; pass one, or use wf.load")
+    matrix = np.eye(4) if transform is None else finite_array("transform", transform, (4, 4))
+    starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
+    vertices = np.concatenate([mesh.vertices for mesh in meshes])
+    faces = np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts[:-1], strict=True)])
+    normals = _joined([mesh.normals for mesh in meshes])
+    uvs = _joined([mesh.uvs for mesh in meshes])
+    raw = Raw(name, *moved(matrix, vertices, faces, normals), uvs=uvs)
+    raw.material = meshes[0].material if material is None else material
+    raw.emission = meshes[0].emission[:, 0] if material is None and meshes[0].emission is not None else None
+    mesh = build(name, raw)
+    if mesh is None:
+        raise SceneError(f"{name}: transform leaves no face with an area")
+    return mesh
+
+
+def moved(
+    matrix: np.ndarray, vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Apply a (4, 4) affine matrix; a reflection also turns the faces, so that fronts stay fronts."""
+    linear, shift = matrix[:3, :3], matrix[:3, 3]
+    if np.array_equal(matrix, np.eye(4)):
+        return vertices, faces, normals
+    determinant = np.linalg.det(linear)
+    if determinant == 0:
+        raise SceneError("transform is singular; it must be invertible")
+    if determinant < 0:
+        faces = faces[:, ::-1]
+    if normals is not None:
+        normals = normals @ np.linalg.inv(linear)
+    return vertices @ linear.T + shift, faces, normals
+
+
+def _joined(parts: list[np.ndarray | None]) -> np.ndarray | None:
+    """Concatenate what every part has."""
+    there = [part for part in parts if part is not None]
+    return np.concatenate(there) if len(there) == len(parts) else None
+
+
+def _read(path: PathLike, extension: str, data: bytes, strict: bool, materials: bool) -> list[Raw]:
+    if extension == ".obj":
+        return _read_obj(path, data, strict, materials)
+    headers.check(os.fspath(path), extension, data)
+    return _raws(_trimesh_scene(path, data, extension))
+
+
+def _read_obj(path: PathLike, data: bytes, strict: bool, materials: bool) -> list[Raw]:
+    parsed = obj.parse(path, decode(data))
+    if parsed.ignored:
+        listed = ", ".join(f"{keyword} (line {line})" for keyword, line in parsed.ignored.items())
+        warn(f"{os.fspath(path)}: not honoured: {listed}", strict)
+    looks = _libraries(path, parsed.libraries, strict) if materials else {}
+    raws = []
+    for group in parsed.groups:
+        raw = Raw(group.material or "", group.vertices, group.faces, group.normals, group.uvs, group.lines)
+        look = looks.get(group.material or "")
+        if look is not None:
+            raw.material, raw.emission = look.material, look.emission
+        raws.append(raw)
+    absent = [raw.name for raw in raws if raw.name and raw.name not in looks]
+    if looks and absent:
+        warn(f"{os.fspath(path)}: not in its material files: {', '.join(map(repr, absent))}", strict)
+    return raws
+
+
+def _libraries(path: PathLike, libraries: list[str], strict: bool) -> dict[str, mtl.Look]:
+    """Read the material files; a missing one is announced and left out."""
+    looks: dict[str, mtl.Look] = {}
+    for library in dict.fromkeys(libraries):
+        file = beside(path, library)
+        if not file.exists():
+            warn(f"{os.fspath(path)}: material file {library!r} is missing", strict)
+            continue
+        looks.update(mtl.looks(mtl.parse(file, decode(read_bytes(file)), strict), strict))
+    return looks
+
+
+def _trimesh_scene(path: PathLike, data: bytes, extension: str) -> trimesh.Scene:
+    """Let trimesh read bytes; whatever it raises becomes a SceneError."""
+    import trimesh
+
+    name = os.fspath(path)
+    try:
+        resolver = trimesh.resolvers.FilePathResolver(name)
+        return trimesh.load_scene(
+            BytesIO(data), file_type=extension[1:], resolver=resolver, process=False, allow_remote=False
+        )
+    except MemoryError:
+        raise
+    except Exception as error:
+        raise SceneError(f"{name}: not a readable {extension[1:]} file: {error!r}") from error
+
+
+def _raws(geometry: Any) -> list[Raw]:
+    import trimesh
+
+    if isinstance(geometry, trimesh.Trimesh):
+        return [_raw(geometry, str(geometry.metadata.get("name") or ""), np.eye(4))]
+    if not isinstance(geometry, trimesh.Scene):
+        raise SceneError(f"expected a trimesh.Trimesh or trimesh.Scene, got {type(geometry).__name__}")
+    raws = []
+    for node in geometry.graph.nodes_geometry:
+        matrix, key = geometry.graph[node]
+        mesh = geometry.geometry[key]
+        if isinstance(mesh, trimesh.Trimesh):
+            raws.append(_raw(mesh, str(key), np.asarray(matrix, np.float64)))
+    # trimesh lists the groups of an OBJ file last first
+    if geometry.source is not None and geometry.source.file_type == "obj":
+        raws.reverse()
+    return raws
+
+
+def _raw(mesh: trimesh.Trimesh, name: str, matrix: np.ndarray) -> Raw:
+    # asking for `vertex_normals` would compute them; the cache tells whether they are there
+    normals = np.asarray(mesh.vertex_normals) if "vertex_normals" in mesh._cache.cache else None
+    uvs = getattr(mesh.visual, "uv", None)
+    vertices = np.asarray(mesh.vertices, np.float64)
+    if uvs is not None and (np.ndim(uvs) != 2 or len(uvs) != len(vertices)):
+        uvs = None
+    placed = moved(matrix, vertices, np.asarray(mesh.faces), normals)
+    return Raw(name, *placed, uvs=None if uvs is None else np.asarray(uvs, np.float64)[:, :2])

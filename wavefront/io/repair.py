@@ -1,0 +1,139 @@
+"""Checks and repairs on the way from a file's arrays to a `Mesh`. A repair is always announced."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..bsdfs import Bsdf
+from ..errors import SceneError
+from ..shapes import Mesh
+
+FLOAT32_MAX = float(np.finfo(np.float32).max)
+FLAT = 1e-14  # a face is degenerate if twice its area is below this part of its longest edge squared
+
+Table = NDArray[np.float64]
+Faces = NDArray[np.intp]
+
+
+def warn(message: str, strict: bool) -> None:
+    """Announce a repair; when strict, refuse instead with a SceneError."""
+    if strict:
+        raise SceneError(message)
+    warnings.warn(message, UserWarning, stacklevel=2)
+
+
+@dataclass
+class Raw:
+    """A mesh as a file gives it."""
+
+    name: str
+    vertices: Table  # (n, 3)
+    faces: Faces  # (m, 3)
+    normals: Table | None = None  # (n, 3); a row of zeros means none
+    uvs: Table | None = None  # (n, 2)
+    lines: Faces | None = None  # (m,) line of the file for each face
+    material: Bsdf | None = None
+    emission: ArrayLike | None = None
+
+
+def build(source: str, raw: Raw, strict: bool = False) -> Mesh | None:
+    """Return a sound mesh, or None when no face is left.
+
+    Parameters
+    ----------
+    source
+        File name, for messages.
+    raw
+        What the file gives.
+    strict
+        Refuse what would otherwise be repaired with a warning.
+
+    Raises
+    ------
+    SceneError
+        If an index is out of range, or `strict` and anything needs repair.
+    """
+    label = f"{source}: {raw.name!r}" if raw.name else source
+    vertices = np.asarray(raw.vertices, np.float64).reshape(-1, 3)
+    faces = np.asarray(raw.faces).reshape(-1, 3).astype(np.intp)
+    _check_indices(label, faces, len(vertices))
+    sound = (np.abs(vertices) <= FLOAT32_MAX).all(axis=1)  # false for NaN
+    vertices = np.where(sound[:, None], vertices, 0.0)
+    keep = sound[faces].all(axis=1)
+    _report(label, raw, ~keep, "with a vertex that is not finite or beyond float32", strict)
+    flat = keep & ~_has_area(vertices, faces)
+    _report(label, raw, flat, "of zero area", strict)
+    faces = faces[keep & ~flat]
+    if not len(faces):
+        return None
+    return Mesh(
+        vertices,
+        faces,
+        normals=_normals(label, raw.normals, vertices, faces, strict),
+        uvs=_uvs(label, raw.uvs, strict),
+        material=raw.material,
+        emission=raw.emission,
+        name=raw.name or "mesh",
+    )
+
+
+def _check_indices(label: str, faces: Faces, count: int) -> None:
+    bad = np.argwhere((faces < 0) | (faces >= count))
+    if len(bad):
+        i, j = bad[0]
+        raise SceneError(f"{label}: face {i} uses vertex {faces[i, j]}; it must be in [0, {count - 1}]")
+
+
+def _report(label: str, raw: Raw, bad: NDArray[np.bool_], what: str, strict: bool) -> None:
+    found = np.flatnonzero(bad)
+    if not len(found):
+        return
+    first = f"face {found[0]}" if raw.lines is None else f"line {raw.lines[found[0]]}"
+    warn(f"{label}: {'has' if strict else 'dropped'} {len(found)} faces {what}, first: {first}", strict)
+
+
+def _has_area(vertices: Table, faces: Faces) -> NDArray[np.bool_]:
+    edges = vertices[np.roll(faces, -1, axis=1)] - vertices[faces]
+    longest = np.abs(edges).max(axis=(1, 2))
+    # divided by the longest edge first, so that squares neither overflow nor vanish
+    unit = edges / np.where(longest > 0, longest, 1)[:, None, None]
+    return np.abs(np.cross(unit[:, 0], unit[:, 1])).max(axis=1) > FLAT
+
+
+def _normals(label: str, normals: Table | None, vertices: Table, faces: Faces, strict: bool) -> Table | None:
+    """Return unit normals; vertices without one get that of a face that uses them."""
+    if normals is None:
+        return None
+    normals = np.array(normals, np.float64)
+    broken = ~np.isfinite(normals).all(axis=1)
+    if broken.any():
+        warn(f"{label}: {int(broken.sum())} normals are not finite, first: vertex {broken.argmax()}", strict)
+        normals[broken] = 0
+    largest = np.abs(normals).max(axis=1)
+    absent = largest == 0
+    if absent.any():
+        corner = vertices[faces]
+        scale = np.abs(corner).max()
+        flat = np.cross((corner[:, 1] - corner[:, 0]) / scale, (corner[:, 2] - corner[:, 0]) / scale)
+        own = np.zeros_like(normals)
+        own[faces.ravel()] = np.repeat(flat, 3, axis=0)
+        normals[absent] = own[absent]
+        largest = np.abs(normals).max(axis=1)
+    normals /= np.where(largest > 0, largest, 1)[:, None]
+    size = np.sqrt((normals**2).sum(axis=1))
+    return normals / np.where(size > 0, size, 1)[:, None]
+
+
+def _uvs(label: str, uvs: Table | None, strict: bool) -> Table | None:
+    if uvs is None:
+        return None
+    uvs = np.array(uvs, np.float64)
+    broken = ~np.isfinite(uvs).all(axis=1)
+    if broken.any():
+        warn(f"{label}: {int(broken.sum())} uvs are not finite, first: vertex {broken.argmax()}", strict)
+        uvs[broken] = 0
+    return uvs
