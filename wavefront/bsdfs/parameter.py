@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import number, rgb
+from ..errors import SceneError, number, rgb
 from ..vec import f4
 from .base import Spatial
 
@@ -16,9 +16,14 @@ Colour: TypeAlias = ArrayLike | Spatial
 Scalar: TypeAlias = float | Spatial
 
 
-def colour(name: str, value: Colour, high: float = 1.0) -> Any:
+def colour(name: str, value: Colour, high: float = 1.0, *, above_zero: bool = False) -> Any:
     """Return a colour as (3, 1) float32 within [0, `high`], or the `Spatial` unchanged."""
-    return value if isinstance(value, Spatial) else rgb(name, value, high)
+    if isinstance(value, Spatial):
+        return value
+    result = rgb(name, value, high)
+    if above_zero and not (result > 0).all():
+        raise SceneError(f"{name} is {value!r}; it must be more than 0")
+    return result
 
 
 def scalar(

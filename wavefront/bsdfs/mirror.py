@@ -1,0 +1,51 @@
+"""Perfect mirror reflection."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..vec import Floats
+from .base import Bsdf, BsdfSample
+from .parameter import Colour, colour
+
+
+class Mirror(Bsdf):
+    """A mirror that reflects the same part of the light at every angle.
+
+    Parameters
+    ----------
+    reflectance
+        Part of the light that is reflected, per channel, in [0, 1]: a number, three numbers,
+        or a texture.
+
+    Raises
+    ------
+    SceneError
+        If the reflectance is outside [0, 1] or not finite.
+    """
+
+    specular = True
+
+    def __init__(self, reflectance: Colour = 1.0) -> None:
+        self.reflectance = colour("Mirror reflectance", reflectance)
+
+    def f(self, wo: Floats, wi: Floats) -> Floats:
+        """Return 0, (3, n): no two given directions mirror each other."""
+        return np.zeros_like(wi)
+
+    def pdf(self, wo: Floats, wi: Floats) -> Floats:
+        """Return 0, (n,)."""
+        return np.zeros_like(wi[2])
+
+    def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
+        """Return the mirrored direction."""
+        n = wo.shape[1]
+        weight = np.broadcast_to(self.reflectance, wo.shape)
+        return BsdfSample(mirrored(wo), weight, np.ones_like(wo[2]), np.ones(n, np.bool_))
+
+
+def mirrored(wo: Floats) -> Floats:
+    """Mirror directions (3, n) at the z axis."""
+    wi = -wo
+    wi[2] = wo[2]
+    return wi
