@@ -195,13 +195,25 @@ def _encode_8bit(path: str | os.PathLike[str], pixels: Floats, gamma: float | st
 def _decode_8bit(data: bytes) -> Floats:
     import imageio.v3 as iio
 
+    check_size(*_size_8bit(data))
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the decoder warns of large images; the limit here is MAX_PIXELS
-        shape = iio.improps(data, plugin="pillow", index=0).shape
-        check_size(shape[0], shape[1])
+        warnings.simplefilter("ignore")  # the decoder warns of large images; the limit here is our own
         pixels = iio.imread(data, plugin="pillow", index=0)
     scale = {"uint8": 255, "uint16": 65535, "bool": 1}[pixels.dtype.name]
     return np.atleast_3d(pixels).astype(np.float32) / np.float32(scale)
+
+
+def _size_8bit(data: bytes) -> tuple[int, int]:
+    """Return (height, width) from the header of a png or jpg, before anything is decoded."""
+    if data.startswith(b"\x89PNG\r\n\x1a\n"):
+        return int.from_bytes(data[20:24], "big"), int.from_bytes(data[16:20], "big")
+    at = 2 if data.startswith(b"\xff\xd8") else len(data)
+    while at + 9 <= len(data) and data[at] == 0xFF:
+        marker, length = data[at + 1], int.from_bytes(data[at + 2 : at + 4], "big")
+        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):  # a start of frame
+            return int.from_bytes(data[at + 5 : at + 7], "big"), int.from_bytes(data[at + 7 : at + 9], "big")
+        at += 1 if marker == 0xFF else 2 + length
+    raise SceneError("not a readable png or jpg image: its header is damaged")
 
 
 def _encode_exr(channels: Mapping[str, NDArray[Any]], attributes: Mapping[str, Attribute]) -> bytes:
