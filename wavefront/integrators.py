@@ -1,0 +1,113 @@
+"""The four estimators of the light that reaches the camera: one ladder, simplest first.
+
+Each takes a wave of paths round the loop intersect → shade → bounce-sample → compact and returns
+the radiance of every path's slot, (3, n). `max_bounces` counts scattering events: with 0 only
+light seen directly is found, with 1 direct light as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+import numpy as np
+
+from .sampling.sampler import Sampler
+from .scene import CompiledScene
+from .stages.bounce import bounce_sample
+from .stages.compact import compact, roulette
+from .stages.intersect import intersect
+from .stages.shade import direct, emitted, mis_weighted, shading
+from .stages.surface import interact
+from .state import Paths
+from .vec import Floats, Ints, f4
+
+Integrator: TypeAlias = Callable[[CompiledScene, Paths, Sampler, int], Floats]
+
+
+def li_naive(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: int) -> Floats:
+    """Follow BSDF samples only; light is found by chance."""
+    L = np.zeros((3, len(paths)), f4)
+    for bounce in range(max_bounces + 1):
+        hits = intersect(scene, paths)
+        light = emitted(scene, paths, hits)
+        deposit(L, paths, light.lanes, light.radiance)
+        paths, hits = compact(paths, hits, hits.found)
+        if bounce == max_bounces or not len(paths):
+            break
+        shade = shading(scene, interact(scene, paths, hits))
+        paths = bounce_sample(paths, shade, sampler, bounce)
+        paths = roulette(paths, sampler, bounce)
+    return L
+
+
+def li_direct_simple(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: int) -> Floats:
+    """Emission and one light sample at the first surface that is not specular."""
+    L = np.zeros((3, len(paths)), f4)
+    for bounce in range(max_bounces + 1):
+        hits = intersect(scene, paths)
+        light = emitted(scene, paths, hits)
+        deposit(L, paths, light.lanes, light.radiance)
+        paths, hits = compact(paths, hits, hits.found)
+        if bounce == max_bounces or not len(paths):
+            break
+        shade = shading(scene, interact(scene, paths, hits))
+        deposit_all(L, paths, direct(scene, paths, shade, sampler, bounce, mis=False))
+        paths = bounce_sample(paths, shade, sampler, bounce)
+        paths = paths.take(np.flatnonzero(paths.specular))
+    return L
+
+
+def li_direct_mis(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: int) -> Floats:
+    """Emission at the first surface that is not specular, and direct light by two samples.
+
+    One sample comes from the lights and one from the BSDF, weighted by the power heuristic.
+    """
+    L = np.zeros((3, len(paths)), f4)
+    for bounce in range(max_bounces + 1):
+        hits = intersect(scene, paths)
+        light = emitted(scene, paths, hits)
+        deposit(L, paths, light.lanes, mis_weighted(scene, paths, light))
+        paths, hits = compact(paths, hits, np.flatnonzero((hits.prim >= 0) & paths.specular))
+        if bounce == max_bounces or not len(paths):
+            break
+        shade = shading(scene, interact(scene, paths, hits))
+        deposit_all(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
+        paths = bounce_sample(paths, shade, sampler, bounce)
+    return L
+
+
+def li_full(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: int) -> Floats:
+    """Direct light by two samples at every bounce, and with it all indirect light."""
+    L = np.zeros((3, len(paths)), f4)
+    for bounce in range(max_bounces + 1):
+        hits = intersect(scene, paths)
+        light = emitted(scene, paths, hits)
+        deposit(L, paths, light.lanes, mis_weighted(scene, paths, light))
+        paths, hits = compact(paths, hits, hits.found)
+        if bounce == max_bounces or not len(paths):
+            break
+        shade = shading(scene, interact(scene, paths, hits))
+        deposit_all(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
+        paths = bounce_sample(paths, shade, sampler, bounce)
+        paths = roulette(paths, sampler, bounce)
+    return L
+
+
+INTEGRATORS: dict[str, Integrator] = {
+    "naive": li_naive,
+    "direct_simple": li_direct_simple,
+    "direct_mis": li_direct_mis,
+    "full": li_full,
+}
+
+
+def deposit(L: Floats, paths: Paths, lanes: Ints, radiance: Floats) -> None:
+    """Add radiance (3, k), met by the paths of the given lanes, to their slots of L."""
+    if lanes.size:
+        L[:, paths.slot.take(lanes)] += paths.throughput.take(lanes, 1) * radiance
+
+
+def deposit_all(L: Floats, paths: Paths, radiance: Floats) -> None:
+    """Add radiance (3, n), found by every path, to their slots of L."""
+    L[:, paths.slot] += paths.throughput * radiance

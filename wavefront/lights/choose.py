@@ -1,0 +1,90 @@
+"""All lights of a scene in one table, and the choice of one of them per vertex."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ..sampling.discrete import Discrete
+from ..vec import Bools, Floats, Ints, f4
+from .base import Light, LightSample
+
+
+class LightTable:
+    """Lights of several kinds, numbered through: kind by kind, column by column.
+
+    One light is chosen with a probability proportional to its estimated power; that probability
+    is part of every pdf returned here.
+
+    Parameters
+    ----------
+    kinds
+        One record per kind of light; a record holds all lights of that kind.
+    scene_radius
+        Radius of the scene's bounding sphere, scene units.
+    """
+
+    def __init__(self, kinds: Sequence[Light], scene_radius: float) -> None:
+        self.kinds = tuple(kinds)
+        self.starts = np.cumsum([0, *(len(kind) for kind in kinds)])
+        self.kind_of = np.repeat(np.arange(len(kinds)), [len(kind) for kind in kinds])
+        self.delta_of = np.array([kind.delta for kind in kinds], np.bool_)[self.kind_of]
+        power = [kind.power(scene_radius) for kind in kinds]
+        weights = np.concatenate(power) if power else np.zeros(0)
+        self.choice = Discrete(weights) if weights.any() else None  # None: nothing shines
+
+    def __len__(self) -> int:
+        """Return the number of lights."""
+        return int(self.starts[-1])
+
+    def sample_li(self, point: Floats, u_choice: Floats, u: Floats) -> tuple[LightSample, Bools]:
+        """Choose a light for each point (3, n) with u_choice (n,) and sample it with u (2, n).
+
+        Returns
+        -------
+        sample
+            The light arriving; its pdf includes the probability of the choice.
+        delta
+            (n,) whether the light is one that no BSDF sample can meet.
+        """
+        assert self.choice is not None
+        light, chance, _ = self.choice.sample(u_choice)
+        if len(self) == 1:
+            sample = self.kinds[0].sample_li(point, u)
+        else:
+            sample = self._sample_each(light, point, u)
+        sample.pdf = sample.pdf * chance
+        return sample, self.delta_of.take(light)
+
+    def pdf_li(self, light: Ints, point: Floats, wi: Floats) -> Floats:
+        """Density with which `sample_li` draws wi (3, n) towards the lights numbered `light` (n,)."""
+        assert self.choice is not None
+        pdf = np.empty(len(light), f4)
+        for kind, rows in self._by_kind(light):
+            pdf[rows] = kind.pdf_li(point.take(rows, 1), wi.take(rows, 1))
+        return pdf * self.choice.pmf(light)
+
+    def le(self, light: Ints, wi: Floats) -> Floats:
+        """Radiance (3, n) of the lights numbered `light` (n,) against wi (3, n)."""
+        radiance = np.empty_like(wi)
+        for kind, rows in self._by_kind(light):
+            radiance[:, rows] = kind.le(wi.take(rows, 1))
+        return radiance
+
+    def _sample_each(self, light: Ints, point: Floats, u: Floats) -> LightSample:
+        n = len(light)
+        out = LightSample(np.empty((3, n), f4), np.empty((3, n), f4), np.empty(n, f4), np.empty(n, f4))
+        for kind, rows in self._by_kind(light):
+            part = kind.sample_li(point.take(rows, 1), u.take(rows, 1))
+            out.wi[:, rows], out.radiance[:, rows] = part.wi, part.radiance
+            out.pdf[rows], out.distance[rows] = part.pdf, part.distance
+        return out
+
+    def _by_kind(self, light: Ints) -> Iterator[tuple[Light, Ints]]:
+        """Yield, per kind that occurs, its lights gathered to a column per lane, and those lanes."""
+        kind_of = self.kind_of.take(light)
+        for number, kind in enumerate(self.kinds):
+            rows = np.flatnonzero(kind_of == number)
+            if rows.size:
+                yield kind.take(light.take(rows) - self.starts[number]), rows

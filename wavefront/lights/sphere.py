@@ -1,0 +1,75 @@
+"""Emitting spheres, sampled by the cone that they fill."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..frame import Frame
+from ..sampling.warp import uniform_cone, uniform_sphere
+from ..vec import Floats, dot, f4
+from .base import Light, LightSample, just_before
+
+UNIFORM_SPHERE_PDF = f4(1 / (4 * np.pi))
+TWO_PI = f4(2 * np.pi)
+
+
+@dataclass(slots=True)
+class SphereLights(Light):
+    """k spheres that emit on both sides."""
+
+    center: Floats  # (3, k) scene units
+    radius: Floats  # (k,) scene units
+    radiance: Floats  # (3, k) W·sr⁻¹·m⁻²
+
+    def sample_li(self, point: Floats, u: Floats) -> LightSample:
+        """Draw a direction uniformly in the cone of the sphere, or of all directions from inside.
+
+        Source: Shirley, Wang and Zimmerman 1996, "Monte Carlo Techniques for Direct Lighting", §3.2.
+        """
+        axis, distance = self._towards(point)
+        height, outside = self._cone(distance)
+        in_cone = Frame.from_normal(axis).to_world(uniform_cone(u, np.where(outside, height, f4(1))))
+        wi = np.where(outside, in_cone, uniform_sphere(u)).astype(f4)
+        along = distance * dot(axis, wi)
+        squared = self.radius**2 - np.maximum(distance**2 - along**2, f4(0))
+        half_chord = np.sqrt(np.maximum(squared, f4(0)))
+        reach = np.where(outside, along - half_chord, along + half_chord)
+        target = point + wi * reach
+        pdf = np.where(outside, f4(1) / (TWO_PI * height), UNIFORM_SPHERE_PDF)
+        before = just_before(reach, half_chord / self.radius, point, target)
+        return LightSample(wi, np.broadcast_to(self.radiance, wi.shape), pdf, before)
+
+    def pdf_li(self, point: Floats, wi: Floats) -> Floats:
+        """Return 1/(solid angle of the sphere) inside its cone."""
+        axis, distance = self._towards(point)
+        height, outside = self._cone(distance)
+        away = wi - axis
+        meets = f4(0.5) * dot(away, away) <= height * f4(1 + 2**-20)  # 1 − cosθ without cancellation
+        cone = np.where(meets, f4(1) / (TWO_PI * height), f4(0))
+        return np.where(outside, cone, UNIFORM_SPHERE_PDF)
+
+    def le(self, wi: Floats) -> Floats:
+        """Return the radiance, (3, n)."""
+        return np.broadcast_to(self.radiance, wi.shape)
+
+    def power(self, scene_radius: float) -> NDArray[np.float64]:
+        """4πr²·π·L of the outside."""
+        return 4 * np.pi**2 * self.radius.astype(np.float64) ** 2 * self.radiance.mean(0, dtype=np.float64)
+
+    def _towards(self, point: Floats) -> tuple[Floats, Floats]:
+        """Return the unit axis (3, n) and the distance (n,) to the centre."""
+        axis = self.center - point
+        distance = np.sqrt(dot(axis, axis))
+        axis = axis / np.where(distance > 0, distance, f4(1))
+        axis[2] += np.where(distance > 0, f4(0), f4(1))  # any axis will do at the centre
+        return axis, distance
+
+    def _cone(self, distance: Floats) -> tuple[Floats, np.ndarray]:
+        """Return 1 − cosθmax (n,), kept above 0, and whether the point is outside the sphere."""
+        outside = distance > self.radius
+        sin2 = (self.radius / np.where(outside, distance, self.radius)) ** 2
+        cos = np.sqrt(np.maximum(f4(1) - sin2, f4(0)))
+        return np.maximum(sin2 / (f4(1) + cos), f4(1e-30)), outside

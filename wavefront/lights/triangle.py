@@ -1,0 +1,75 @@
+"""Emitting triangles: every mesh with an emission becomes a set of these."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..sampling.warp import uniform_triangle
+from ..vec import Floats, cross, dot, f4
+from .base import Light, LightSample, just_before
+
+
+@dataclass(slots=True)
+class TriangleLights(Light):
+    """k triangles that emit from their front side, sampled uniformly by area."""
+
+    corner: Floats  # (3, k) first vertex, scene units
+    edge1: Floats  # (3, k) to the second vertex
+    edge2: Floats  # (3, k) to the third vertex
+    normal: Floats  # (3, k) unit normal of the front side
+    area: Floats  # (k,) squared scene units
+    radiance: Floats  # (3, k) W·sr⁻¹·m⁻²
+
+    @classmethod
+    def from_triangles(cls, triangles: NDArray[np.float64], radiance: Floats) -> Self:
+        """Build from vertices (k, 3, 3), relative to the scene's centre, and one radiance (3, 1)."""
+        edge1 = (triangles[:, 1] - triangles[:, 0]).T
+        edge2 = (triangles[:, 2] - triangles[:, 0]).T
+        normal = np.cross(edge1, edge2, axis=0)
+        twice = np.linalg.norm(normal, axis=0)
+        rows = [np.ascontiguousarray(v, f4) for v in (triangles[:, 0].T, edge1, edge2, normal / twice)]
+        return cls(*rows, (twice / 2).astype(f4), np.repeat(radiance, len(triangles), 1))
+
+    def sample_li(self, point: Floats, u: Floats) -> LightSample:
+        """Pick a point uniformly by area; its density in solid angle is d²/(A·cosθ)."""
+        b = uniform_triangle(u)
+        target = self.corner + self.edge1 * b[0] + self.edge2 * b[1]
+        wi = target - point
+        d2 = dot(wi, wi)
+        distance = np.sqrt(d2)
+        wi /= np.where(distance > 0, distance, f4(1))
+        cos_light = -dot(self.normal, wi)
+        lit = cos_light > 0
+        pdf = np.where(lit, d2, f4(0)) / (np.where(lit, cos_light, f4(1)) * self.area)
+        radiance = np.broadcast_to(self.radiance, wi.shape)
+        return LightSample(wi, radiance, pdf, just_before(distance, cos_light, point, target))
+
+    def pdf_li(self, point: Floats, wi: Floats) -> Floats:
+        """Return d²/(A·cosθ) where the ray meets the front side.
+
+        The hit test is Möller and Trumbore 1997, "Fast, Minimum Storage Ray/Triangle Intersection".
+        """
+        p = cross(wi, self.edge2)
+        det = dot(self.edge1, p)
+        front = det > 0
+        inverse = f4(1) / np.where(front, det, f4(1))
+        away = point - self.corner
+        b1 = dot(away, p) * inverse
+        q = cross(away, self.edge1)
+        b2 = dot(wi, q) * inverse
+        t = dot(self.edge2, q) * inverse
+        meets = front & (t > 0) & (b1 >= 0) & (b2 >= 0) & (b1 + b2 <= 1)
+        cos_light = -dot(self.normal, wi)
+        return np.where(meets, t * t, f4(0)) / (np.where(meets, cos_light, f4(1)) * self.area)
+
+    def le(self, wi: Floats) -> Floats:
+        """Return the radiance on rays that come upon the front side, (3, n)."""
+        return self.radiance * (dot(self.normal, wi) < 0)
+
+    def power(self, scene_radius: float) -> NDArray[np.float64]:
+        """π·A·L."""
+        return np.pi * self.area * self.radiance.mean(0, dtype=np.float64)

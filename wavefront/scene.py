@@ -1,0 +1,332 @@
+"""Scenes: what the user puts together, and the flat arrays that a render works on."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Sequence
+from copy import copy
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .accel.base import Accelerator, Geometry
+from .bsdfs import Bsdf, Spatial
+from .camera import Camera
+from .errors import SceneError
+from .lights import Environment, Light, LightTable, PointLight, SphereLights, TriangleLights
+from .shapes import Mesh, Sphere
+from .state import Surface
+from .vec import Floats, Ints, f4
+
+Shape: TypeAlias = Mesh | Sphere
+UserLight: TypeAlias = PointLight | Environment
+
+
+class Scene:
+    """Shapes, lights and a camera.
+
+    Parameters
+    ----------
+    shapes
+        `Mesh` and `Sphere` objects; one with an emission is a light.
+    lights
+        `PointLight` and `Environment` objects, at most one `Environment`. A scene where nothing
+        shines is rendered in a neutral environment, with a warning.
+    camera
+        Without one the scene is framed.
+
+    Raises
+    ------
+    SceneError
+        If there is no shape, or an element is of the wrong type.
+    """
+
+    def __init__(
+        self, shapes: Iterable[Shape] | Shape, lights: Iterable[UserLight] = (), camera: Camera | None = None
+    ) -> None:
+        self.shapes: list[Shape] = [shapes] if isinstance(shapes, Mesh | Sphere) else list(shapes)
+        self.lights: list[UserLight] = list(lights)
+        self.camera = camera
+        _check_types("shapes", self.shapes, (Mesh, Sphere))
+        _check_types("lights", self.lights, (PointLight, Environment))
+        if not self.shapes:
+            raise SceneError("the scene has no shapes")
+        if sum(isinstance(light, Environment) for light in self.lights) > 1:
+            raise SceneError("the scene has more than one Environment; at most one is allowed")
+        if camera is not None and not isinstance(camera, Camera):
+            raise SceneError(f"camera must be a wf.Camera, got {camera!r}")
+
+    def __repr__(self) -> str:
+        """Count what the scene holds."""
+        return f"<Scene: {len(self.shapes)} shapes, {len(self.lights)} lights, camera={self.camera is not None}>"
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Lower and upper corner of all shapes, (2, 3), scene units."""
+        boxes = np.stack([shape.bounds for shape in self.shapes])
+        return np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
+
+    @property
+    def emits(self) -> bool:
+        """Whether anything in the scene shines."""
+        return bool(self.lights) or any(shape.emission is not None for shape in self.shapes)
+
+    def framing_camera(self, fov: float = 40, size: tuple[int, int] = (512, 512)) -> Camera:
+        """Return a camera that sees the whole scene from the front, a little above and to the right."""
+        low, high = self.bounds
+        radius = float(np.linalg.norm(high - low)) / 2 or 1.0
+        narrow = min(1.0, size[0] / size[1])
+        half = np.arctan(np.tan(np.radians(fov) / 2) * narrow)
+        view = np.array([0.35, 0.3, 1.0])
+        eye = (low + high) / 2 + view / np.linalg.norm(view) * radius / np.sin(half)
+        return Camera.look_at(eye, (low + high) / 2, fov=fov, size=size)
+
+
+def _check_types(name: str, items: Sequence[object], types: tuple[type, ...]) -> None:
+    for i, item in enumerate(items):
+        if not isinstance(item, types):
+            allowed = ", ".join("wf." + kind.__name__ for kind in types)
+            raise SceneError(f"{name}[{i}] is {item!r}; it must be one of {allowed}")
+
+
+@dataclass(slots=True)
+class Palette(Spatial):
+    """A parameter of many alike materials, one column each, looked up by the material's number."""
+
+    table: Floats  # (c, materials)
+
+    def at(self, surface: Surface) -> Floats:
+        """Return the column of each hit point's material."""
+        return self.table.take(surface.material, -1)
+
+
+@dataclass(slots=True)
+class Materials:
+    """The materials of a scene, gathered into groups that are shaded together."""
+
+    group_of: Ints  # (materials,) the group of each material
+    groups: tuple[Bsdf, ...]
+
+    @property
+    def specular(self) -> NDArray[np.bool_]:
+        """Whether each group has only delta lobes, (groups,)."""
+        return np.array([group.specular for group in self.groups], np.bool_)
+
+
+@dataclass(slots=True)
+class CompiledScene:
+    """A scene as flat arrays, relative to its centre. Triangles come first, then spheres."""
+
+    centre: NDArray[np.float64]  # (3,) scene units
+    radius: float  # of the bounding sphere, scene units
+    accelerator: Accelerator
+    triangles: int  # number of triangles
+    normals: Floats  # (3, m) unit geometric normals of the triangles
+    corner_normals: tuple[Floats, Floats, Floats] | None  # 3 × (3, m); None when no mesh is smooth
+    corner_uvs: tuple[Floats, Floats, Floats] | None  # 3 × (2, m); None when no material needs them
+    sphere_centers: Floats  # (3, k)
+    sphere_radii: Floats  # (k,)
+    material_of: Ints  # (m + k,) material of each primitive
+    light_of: Ints  # (m + k,) light of each primitive, -1 for none
+    materials: Materials
+    lights: LightTable
+    environment: int  # number of the environment light, -1 for none
+
+
+def compile_scene(scene: Scene, make_accelerator: Any) -> CompiledScene:
+    """Gather a scene into flat arrays.
+
+    Parameters
+    ----------
+    scene
+        What to render.
+    make_accelerator
+        Called with the `Geometry`; returns the `Accelerator`.
+
+    Raises
+    ------
+    SceneError
+        If an emitting shape has no area.
+    """
+    low, high = scene.bounds
+    centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
+    meshes = [shape for shape in scene.shapes if isinstance(shape, Mesh)]
+    spheres = [shape for shape in scene.shapes if isinstance(shape, Sphere)]
+    corners = [(mesh.vertices - centre)[mesh.faces] for mesh in meshes]
+    triangles = np.concatenate(corners) if corners else np.zeros((0, 3, 3))
+    user_materials, material_of = _number_materials(meshes, spheres)
+    lights, light_of, environment = _gather_lights(scene, meshes, spheres, corners, centre, radius)
+    centers = np.array([s.center - centre for s in spheres]).reshape(-1, 3).T.astype(f4)
+    radii = np.array([s.radius for s in spheres]).astype(f4)
+    geometry = Geometry(np.ascontiguousarray(triangles, f4), np.ascontiguousarray(centers), radii)
+    needs_uv = any(_is_textured(material) for material in user_materials)
+    return CompiledScene(
+        centre=centre,
+        radius=radius,
+        accelerator=make_accelerator(geometry),
+        triangles=len(triangles),
+        normals=_face_normals(triangles),
+        corner_normals=_corner_normals(meshes, triangles),
+        corner_uvs=_corner_uvs(meshes) if needs_uv else None,
+        sphere_centers=geometry.centers,
+        sphere_radii=geometry.radii,
+        material_of=material_of,
+        light_of=light_of,
+        materials=group_materials(user_materials),
+        lights=lights,
+        environment=environment,
+    )
+
+
+def group_materials(materials: Sequence[Bsdf]) -> Materials:
+    """Merge materials that differ only in the values of constant parameters into one group each.
+
+    The merged material finds its values in a `Palette`, so a scene of a hundred plain colours is
+    shaded as one group.
+    """
+    members: dict[object, list[int]] = {}
+    for number, material in enumerate(materials):
+        members.setdefault(_group_key(material), []).append(number)
+    group_of = np.empty(len(materials), np.intp)
+    for group, numbers in enumerate(members.values()):
+        group_of[numbers] = group
+    return Materials(group_of, tuple(_merge(materials, numbers) for numbers in members.values()))
+
+
+def _is_constant(value: object) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype == f4 and value.shape in ((3, 1), (1,))
+
+
+def _group_key(material: Bsdf) -> object:
+    """Materials with equal keys may be merged; one with a texture stands alone."""
+    parameters = vars(material)
+    if not all(_is_constant(v) or isinstance(v, bool | int | float | str) for v in parameters.values()):
+        return id(material)
+    shapes = tuple((k, v.shape if _is_constant(v) else v) for k, v in sorted(parameters.items()))
+    return type(material), material.specular, shapes
+
+
+def _merge(materials: Sequence[Bsdf], numbers: list[int]) -> Bsdf:
+    first = materials[numbers[0]]
+    if len(numbers) == 1:
+        return first
+    merged = copy(first)
+    for name, value in vars(first).items():
+        values = [getattr(materials[number], name) for number in numbers]
+        if _is_constant(value) and not all(np.array_equal(value, other) for other in values):
+            table = np.zeros((*value.shape[:-1], len(materials)), f4)
+            table[..., numbers] = np.concatenate(values, -1)
+            setattr(merged, name, Palette(table))
+    return merged
+
+
+def _is_textured(material: Bsdf) -> bool:
+    return any(isinstance(v, Spatial) or (isinstance(v, Bsdf) and _is_textured(v)) for v in vars(material).values())
+
+
+def _number_materials(meshes: Sequence[Mesh], spheres: Sequence[Sphere]) -> tuple[list[Bsdf], Ints]:
+    """Return the distinct materials, and the number of each primitive's."""
+    numbers: dict[int, int] = {}
+    materials: list[Bsdf] = []
+    of_shape: list[int] = []
+    for shape in (*meshes, *spheres):
+        if id(shape.material) not in numbers:
+            numbers[id(shape.material)] = len(materials)
+            materials.append(shape.material)
+        of_shape.append(numbers[id(shape.material)])
+    counts = [len(mesh.faces) for mesh in meshes] + [1] * len(spheres)
+    return materials, np.repeat(np.array(of_shape, np.intp), counts)
+
+
+def _face_normals(triangles: NDArray[np.float64]) -> Floats:
+    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    size = np.linalg.norm(normal, axis=1, keepdims=True)
+    return np.ascontiguousarray((normal / np.where(size > 0, size, 1)).T, f4)
+
+
+def _corner_normals(
+    meshes: Sequence[Mesh], triangles: NDArray[np.float64]
+) -> tuple[Floats, Floats, Floats] | None:
+    """Return the shading normals at the three corners; flat meshes and zero normals get the face's."""
+    if all(mesh.normals is None for mesh in meshes):
+        return None
+    corners = np.repeat(_face_normals(triangles).T[:, None, :], 3, 1)
+    start = 0
+    for mesh in meshes:
+        if mesh.normals is not None:
+            given = mesh.normals[mesh.faces]
+            size = np.linalg.norm(given, axis=2, keepdims=True)
+            part = corners[start : start + len(mesh.faces)]
+            np.copyto(part, (given / np.where(size > 0, size, 1)).astype(f4), where=size > 0)
+        start += len(mesh.faces)
+    a, b, c = (np.ascontiguousarray(corners[:, i].T, f4) for i in range(3))
+    return a, b, c
+
+
+def _corner_uvs(meshes: Sequence[Mesh]) -> tuple[Floats, Floats, Floats]:
+    parts = [np.zeros((len(m.faces), 3, 2)) if m.uvs is None else m.uvs[m.faces] for m in meshes]
+    corners = np.concatenate(parts) if parts else np.zeros((0, 3, 2))
+    a, b, c = (np.ascontiguousarray(corners[:, i].T, f4) for i in range(3))
+    return a, b, c
+
+
+def _gather_lights(
+    scene: Scene,
+    meshes: Sequence[Mesh],
+    spheres: Sequence[Sphere],
+    corners: Sequence[NDArray[np.float64]],
+    centre: NDArray[np.float64],
+    radius: float,
+) -> tuple[LightTable, Ints, int]:
+    """Return the table of lights, the light of each primitive, and the number of the environment."""
+    user_lights = list(scene.lights)
+    if not scene.emits:
+        warnings.warn("the scene has no light; rendering it in Environment(1.0)", stacklevel=4)
+        user_lights = [Environment(1.0)]
+    kinds: list[Light] = []
+    light_of = np.full(sum(map(len, corners)) + len(spheres), -1, np.intp)
+    count = 0
+
+    def add(kind: type[Light], records: list[Any]) -> None:
+        nonlocal count
+        if records:
+            kinds.append(kind.concatenate(records))
+            count += len(kinds[-1])
+
+    records, start = [], 0
+    for mesh, triangles in zip(meshes, corners, strict=True):
+        if mesh.emission is not None:
+            shining = _with_area(mesh, triangles)
+            light_of[start + shining] = count + sum(map(len, records)) + np.arange(len(shining))
+            records.append(TriangleLights.from_triangles(triangles[shining], mesh.emission))
+        start += len(triangles)
+    add(TriangleLights, records)
+    emitting = np.array([sphere.emission is not None for sphere in spheres], np.bool_)
+    light_of[start + np.flatnonzero(emitting)] = count + np.arange(emitting.sum())
+    add(
+        SphereLights,
+        [
+            SphereLights((s.center - centre).astype(f4).reshape(3, 1), np.array([s.radius], f4), s.emission)
+            for s in spheres
+            if s.emission is not None
+        ],
+    )
+    points = [light.record(centre) for light in user_lights if isinstance(light, PointLight)]
+    if points:
+        add(type(points[0]), points)
+    around = [light.record(centre) for light in user_lights if isinstance(light, Environment)]
+    environment = count if around else -1
+    if around:
+        add(type(around[0]), around)
+    return LightTable(kinds, radius), light_of, environment
+
+
+def _with_area(mesh: Mesh, triangles: NDArray[np.float64]) -> Ints:
+    """Return the faces of an emitting mesh that have an area."""
+    edges = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    shining = np.flatnonzero((edges != 0).any(1))
+    if not len(shining):
+        raise SceneError(f"{mesh.name}: a light must have an area; all {len(mesh.faces)} faces have none")
+    return shining

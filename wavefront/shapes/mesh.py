@@ -1,0 +1,150 @@
+"""Triangle meshes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..bsdfs import Bsdf, Diffuse
+from ..errors import SceneError, finite_array, rgb
+
+FLOAT32_MAX = float(np.finfo(np.float32).max)
+
+
+class Mesh:
+    """Triangles that share vertices.
+
+    Parameters
+    ----------
+    vertices
+        (n, 3) positions, scene units; kept in float64.
+    faces
+        (m, 3) vertex indices, counter-clockwise seen from the front.
+    normals
+        (n, 3) shading normals; without them the facets are flat.
+    uvs
+        (n, 2) texture coordinates.
+    material
+        How the surface scatters light.
+    emission
+        Radiance that leaves the front side, W·sr⁻¹·m⁻²: one number or three.
+    name
+        Used in messages.
+
+    Raises
+    ------
+    SceneError
+        If an array has a wrong shape, a value is not finite, an index is out of range, or there
+        is no face.
+    """
+
+    def __init__(
+        self,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        *,
+        normals: ArrayLike | None = None,
+        uvs: ArrayLike | None = None,
+        material: Bsdf | None = None,
+        emission: ArrayLike | None = None,
+        name: str = "mesh",
+    ) -> None:
+        self.name = name
+        self.vertices = finite_array(f"{name}: vertices", vertices, (None, 3))
+        self.faces = _faces(name, faces, len(self.vertices))
+        self.normals = _per_vertex(f"{name}: normals", normals, len(self.vertices), 3)
+        self.uvs = _per_vertex(f"{name}: uvs", uvs, len(self.vertices), 2)
+        self.material = check_material(name, material)
+        self.emission = None if emission is None else rgb(f"{name}: emission", emission)
+        _check_range(name, self.vertices)
+
+    def __repr__(self) -> str:
+        """Name the mesh and its size."""
+        return f"<Mesh {self.name!r}: {len(self.vertices)} vertices, {len(self.faces)} faces>"
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Lower and upper corner, (2, 3), of the vertices that faces use."""
+        used = self.vertices[self.faces.ravel()]
+        return np.stack([used.min(0), used.max(0)])
+
+
+def Rectangle(
+    corner: ArrayLike,
+    edge_u: ArrayLike,
+    edge_v: ArrayLike,
+    *,
+    material: Bsdf | None = None,
+    emission: ArrayLike | None = None,
+    name: str = "rectangle",
+) -> Mesh:
+    """Return a parallelogram as a mesh of two triangles; the front is where edge_u × edge_v points.
+
+    Parameters
+    ----------
+    corner, edge_u, edge_v
+        (3,) a corner and the two edges that leave it, scene units.
+    material, emission, name
+        As for `Mesh`.
+
+    Raises
+    ------
+    SceneError
+        If an argument is malformed, or the edges are parallel.
+    """
+    origin = finite_array(f"{name}: corner", corner, (3,))
+    u = finite_array(f"{name}: edge_u", edge_u, (3,))
+    v = finite_array(f"{name}: edge_v", edge_v, (3,))
+    if not np.linalg.norm(np.cross(u, v)) > 0:
+        raise SceneError(f"{name}: edge_u {u.tolist()} and edge_v {v.tolist()} span no area")
+    return Mesh(
+        np.stack([origin, origin + u, origin + u + v, origin + v]),
+        [[0, 1, 2], [0, 2, 3]],
+        uvs=[[0, 0], [1, 0], [1, 1], [0, 1]],
+        material=material,
+        emission=emission,
+        name=name,
+    )
+
+
+def check_material(name: str, material: Bsdf | None) -> Bsdf:
+    """Return the material, a grey `Diffuse` by default.
+
+    Raises
+    ------
+    SceneError
+        If it is not a `Bsdf`.
+    """
+    if material is None:
+        return Diffuse(0.5)
+    if not isinstance(material, Bsdf):
+        raise SceneError(f"{name}: material must be a material such as wf.Diffuse(0.5), got {material!r}")
+    return material
+
+
+def _faces(name: str, faces: ArrayLike, count: int) -> NDArray[np.intp]:
+    array = np.asarray(faces)
+    if array.size == 0:
+        raise SceneError(f"{name}: has no faces")
+    if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "iu":
+        raise SceneError(
+            f"{name}: faces must be integers of shape (m, 3), got {array.dtype} of shape {array.shape}"
+        )
+    bad = np.argwhere((array < 0) | (array >= count))
+    if len(bad):
+        i, j = bad[0]
+        raise SceneError(f"{name}: faces[{i}][{j}] is {array[i, j]}; it must be in [0, {count - 1}]")
+    return array.astype(np.intp)
+
+
+def _per_vertex(name: str, values: ArrayLike | None, count: int, width: int) -> NDArray[np.float64] | None:
+    return None if values is None else finite_array(name, values, (count, width))
+
+
+def _check_range(name: str, vertices: NDArray[np.float64]) -> None:
+    bad = np.argwhere(np.abs(vertices) > FLOAT32_MAX)
+    if len(bad):
+        i, j = bad[0]
+        raise SceneError(
+            f"{name}: vertices[{i}][{j}] is {vertices[i, j]:g}; its size must be at most {FLOAT32_MAX:.3g}"
+        )

@@ -1,0 +1,57 @@
+"""Analytic spheres."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..bsdfs import Bsdf
+from ..errors import finite_array, number, rgb
+from .mesh import check_material
+
+
+class Sphere:
+    """A sphere, intersected exactly.
+
+    Parameters
+    ----------
+    center
+        (3,) scene units.
+    radius
+        Scene units, above 0.
+    material
+        How the surface scatters light; its outside is the front.
+    emission
+        Radiance W·sr⁻¹·m⁻², one number or three; it leaves the surface on both sides.
+    name
+        Used in messages.
+
+    Raises
+    ------
+    SceneError
+        If an argument is malformed.
+    """
+
+    def __init__(
+        self,
+        center: ArrayLike,
+        radius: float,
+        *,
+        material: Bsdf | None = None,
+        emission: ArrayLike | None = None,
+        name: str = "sphere",
+    ) -> None:
+        self.name = name
+        self.center = finite_array(f"{name}: center", center, (3,))
+        self.radius = number(f"{name}: radius", radius, lambda x: x > 0, "above 0")
+        self.material = check_material(name, material)
+        self.emission = None if emission is None else rgb(f"{name}: emission", emission)
+
+    def __repr__(self) -> str:
+        """Name the sphere, its place and size."""
+        return f"<Sphere {self.name!r}: center {self.center.tolist()}, radius {self.radius:g}>"
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Lower and upper corner, (2, 3)."""
+        return np.stack([self.center - self.radius, self.center + self.radius])

@@ -1,0 +1,58 @@
+"""The next direction of each path."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..sampling.sampler import Dimension, Sampler
+from ..state import Paths
+from ..vec import dot, f4
+from .shade import Shading, same_side
+from .surface import leave
+
+
+def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -> Paths:
+    """Sample the BSDF at each point and return the paths that go on.
+
+    A sample of weight 0 ends its path, and so does one for which shading and geometric normal
+    disagree on the side.
+    """
+    n = len(paths)
+    surface = shade.surface
+    wi, weight = np.empty((3, n), f4), np.empty((3, n), f4)
+    pdf, specular, eta2 = np.empty(n, f4), np.empty(n, np.bool_), paths.eta2.copy()
+    u = _numbers(paths, shade, sampler, bounce)
+    for lanes, bsdf in shade.groups:
+        sample = bsdf.sample_f(shade.wo.take(lanes, 1), u[: bsdf.dimensions].take(lanes, 1))
+        wi[:, lanes], weight[:, lanes] = sample.wi, sample.weight
+        pdf[lanes], specular[lanes] = sample.pdf, sample.specular
+        if sample.eta is not None:
+            eta2[lanes] *= sample.eta**2
+    direction = shade.frame.to_world(wi)
+    cos_g = dot(surface.ng, direction)
+    alive = np.flatnonzero(same_side(wi, cos_g) & (weight.max(0) > 0))
+    onward = Paths(
+        slot=paths.slot,
+        pixel=paths.pixel,
+        sample=paths.sample,
+        origin=leave(surface, direction, cos_g),
+        direction=direction,
+        leaving=surface.prim,
+        throughput=paths.throughput * weight,
+        pdf=pdf,
+        specular=specular,
+        eta2=eta2,
+    )
+    return onward if alive.size == n else onward.take(alive)
+
+
+def _numbers(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -> np.ndarray:
+    """Draw as many numbers as the materials present read: 2 for the direction, a third for the lobe."""
+    address = paths.pixel, paths.sample, bounce
+    rows = max((bsdf.dimensions for _, bsdf in shade.groups), default=0)
+    u = np.empty((max(rows, 2), len(paths)), f4)
+    if rows:
+        u[:2] = sampler.draw_2d(*address, Dimension.DIRECTION)
+    if rows > 2:
+        u[2] = sampler.draw_1d(*address, Dimension.LOBE)
+    return u

@@ -1,0 +1,39 @@
+"""Camera samples become paths."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..camera import Camera
+from ..sampling.sampler import Dimension, Sampler
+from ..scene import CompiledScene
+from ..state import Paths, Words
+from ..vec import f4
+
+
+def generate(scene: CompiledScene, camera: Camera, sampler: Sampler, pixel: Words, sample: Words) -> Paths:
+    """Start a path at a random place within each pixel (box filter by sampling).
+
+    Parameters
+    ----------
+    pixel, sample
+        (n,) row-major pixel index and sample index: the address of each path.
+    """
+    width, n = camera.size[0], len(pixel)
+    jitter = sampler.draw_2d(pixel, sample, 0, Dimension.PIXEL)
+    row = pixel // np.uint32(width)
+    x = (pixel - row * np.uint32(width)).astype(f4) + jitter[0]
+    y = row.astype(f4) + jitter[1]
+    origin, direction = camera.rays(x, y, scene.centre)
+    return Paths(
+        slot=np.arange(n),
+        pixel=pixel,
+        sample=sample,
+        origin=origin,
+        direction=direction,
+        leaving=np.full(n, -1, np.intp),
+        throughput=np.ones((3, n), f4),
+        pdf=np.ones(n, f4),
+        specular=np.ones(n, np.bool_),
+        eta2=np.ones(n, f4),
+    )

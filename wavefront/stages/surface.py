@@ -1,0 +1,105 @@
+"""From a hit to the geometry of the surface there, and off it again."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..scene import CompiledScene
+from ..state import Hits, Paths, Surface
+from ..vec import Floats, Ints, dot, f4, normalize
+
+# o + t·d carries at most three roundings of half an ulp (2⁻²⁴) of its terms; this is five times that.
+POINT_ERROR = f4(2**-21)
+MIN_COS = f4(1e-3)  # the least cosine between wo and the shading normal
+
+
+def interact(scene: CompiledScene, paths: Paths, hits: Hits) -> Surface:
+    """Gather the geometry at hits; every path must have one."""
+    point = paths.origin + paths.direction * hits.t
+    error = POINT_ERROR * (np.abs(point).max(0) + hits.t)
+    wo = -paths.direction
+    ng = normals(scene, hits.prim, point)
+    ns = _shading_normals(scene, hits, ng)
+    facing = dot(ng, wo)
+    inside = facing < 0
+    side = np.where(inside, f4(-1), f4(1))
+    ng = ng * side
+    ns = ng if ns is None else _towards(wo, ns * side)
+    uv = None if scene.corner_uvs is None else _uv(scene, hits, point)
+    material = scene.material_of.take(hits.prim)
+    return Surface(point, error, ng, ns, wo, hits.prim, material, inside, uv)
+
+
+def normals(scene: CompiledScene, prim: Ints, point: Floats) -> Floats:
+    """Unit geometric normals (3, n) of the front side at points on primitives.
+
+    Points on spheres are moved onto the sphere, in place.
+    """
+    if not len(scene.sphere_radii):
+        return scene.normals.take(prim, 1)
+    if not scene.triangles:
+        return _onto_sphere(scene, prim, point)
+    ng = scene.normals.take(np.minimum(prim, scene.triangles - 1), 1)
+    round_ = np.flatnonzero(prim >= scene.triangles)
+    if round_.size:
+        on = point.take(round_, 1)
+        ng[:, round_] = _onto_sphere(scene, prim.take(round_) - scene.triangles, on)
+        point[:, round_] = on
+    return ng
+
+
+def leave(surface: Surface, wi: Floats, cos_g: Floats) -> Floats:
+    """Origins (3, n) of rays that leave the surface along wi: moved off it by the point's error.
+
+    `cos_g` (n,) is the dot product of wi and the geometric normal; its sign tells the side.
+    """
+    return surface.point + surface.ng * np.copysign(surface.error, cos_g)
+
+
+def _onto_sphere(scene: CompiledScene, sphere: Ints, point: Floats) -> Floats:
+    center = scene.sphere_centers.take(sphere, 1)
+    normal = normalize(point - center)
+    np.add(center, normal * scene.sphere_radii.take(sphere), out=point)
+    return normal
+
+
+def _shading_normals(scene: CompiledScene, hits: Hits, ng: Floats) -> Floats | None:
+    """Interpolate the corners' normals, (3, n); None when the scene has only flat facets."""
+    if scene.corner_normals is None:
+        return None
+    ns = normalize(_interpolate(scene.corner_normals, hits, scene.triangles))
+    flat = (hits.prim >= scene.triangles) | ~(dot(ns, ng) > 0)
+    np.copyto(ns, ng, where=flat)
+    return ns
+
+
+def _interpolate(corners: tuple[Floats, Floats, Floats], hits: Hits, triangles: int) -> Floats:
+    prim = np.minimum(hits.prim, triangles - 1)
+    a, b, c = (corner.take(prim, 1) for corner in corners)
+    return a * (f4(1) - hits.b1 - hits.b2) + b * hits.b1 + c * hits.b2
+
+
+def _towards(wo: Floats, ns: Floats) -> Floats:
+    """Bend shading normals that look away from wo until they make a small positive cosine with it."""
+    cos = dot(ns, wo)
+    away = np.flatnonzero(cos < MIN_COS)
+    if away.size:
+        ns[:, away] = normalize(ns.take(away, 1) + wo.take(away, 1) * (MIN_COS - cos.take(away)))
+        ns[:, away] = normalize(ns.take(away, 1) + wo.take(away, 1) * MIN_COS)
+    return ns
+
+
+def _uv(scene: CompiledScene, hits: Hits, point: Floats) -> Floats:
+    """Texture coordinates (2, n): interpolated on triangles, longitude and latitude on spheres."""
+    assert scene.corner_uvs is not None
+    if scene.triangles:
+        uv = _interpolate(scene.corner_uvs, hits, scene.triangles)
+    else:
+        uv = np.empty((2, len(hits.prim)), f4)
+    round_ = np.flatnonzero(hits.prim >= scene.triangles)
+    if round_.size:
+        sphere = hits.prim.take(round_) - scene.triangles
+        normal = normalize(point.take(round_, 1) - scene.sphere_centers.take(sphere, 1))
+        uv[0, round_] = np.arctan2(normal[0], normal[2]) * f4(0.5 / np.pi) + f4(0.5)
+        uv[1, round_] = f4(1) - np.arccos(np.clip(normal[1], f4(-1), f4(1))) * f4(1 / np.pi)
+    return uv
