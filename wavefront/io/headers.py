@@ -1,4 +1,4 @@
-"""Refuse PLY and STL files whose headers promise more than the file holds, before anything is allocated."""
+"""Refuse archives, and PLY and STL files whose headers promise more than the file holds."""
 
 from __future__ import annotations
 
@@ -15,13 +15,15 @@ SIZES = {
 
 
 def check(name: str, extension: str, data: bytes) -> None:
-    """Check the header of a .ply or .stl; other files pass.
+    """Look at the first bytes of a file, before anything is allocated.
 
     Raises
     ------
     SceneError
-        If the counts in the header need more bytes than there are.
+        If the file is empty or an archive, or if a .ply or .stl claims more than it holds.
     """
+    if not data:
+        raise SceneError(f"{name}: is empty")
     if data[:4] in (b"PK\x03\x04", b"PK\x05\x06") or data[:2] == b"\x1f\x8b":
         raise SceneError(f"{name}: is an archive; unpack it first")
     if extension == ".ply":

@@ -80,8 +80,7 @@ def load_meshes(path: PathLike, *, strict: bool = False, materials: bool = True)
     if extension not in EXTENSIONS:
         raise SceneError(f"{name}: extension {extension!r} is not one of {', '.join(EXTENSIONS)}")
     data = read_bytes(path)
-    if not data:
-        raise SceneError(f"{name}: is empty")
+    headers.check(name, extension, data)
     try:
         raws = _read(path, extension, data, strict, materials)
         meshes = [mesh for raw in raws if (mesh := build(name, raw, strict)) is not None]
@@ -143,6 +142,8 @@ def moved(
     linear, shift = matrix[:3, :3], matrix[:3, 3]
     if np.array_equal(matrix, np.eye(4)):
         return vertices, faces, normals
+    if not np.array_equal(matrix[3], [0, 0, 0, 1]):
+        raise SceneError(f"transform has the last row {matrix[3].tolist()}; it must be [0, 0, 0, 1]")
     determinant = np.linalg.det(linear)
     if determinant == 0:
         raise SceneError("transform is singular; it must be invertible")
@@ -162,7 +163,6 @@ def _joined(parts: list[np.ndarray | None]) -> np.ndarray | None:
 def _read(path: PathLike, extension: str, data: bytes, strict: bool, materials: bool) -> list[Raw]:
     if extension == ".obj":
         return _read_obj(path, data, strict, materials)
-    headers.check(os.fspath(path), extension, data)
     return _raws(_trimesh_scene(path, data, extension))
 
 
@@ -226,8 +226,8 @@ def _raws(geometry: Any) -> list[Raw]:
         mesh = geometry.geometry[key]
         if isinstance(mesh, trimesh.Trimesh):
             raws.append(_raw(mesh, str(key), np.asarray(matrix, np.float64)))
-    # trimesh lists the groups of an OBJ file last first
-    if geometry.source is not None and geometry.source.file_type == "obj":
+    # trimesh lists what these files hold last first
+    if geometry.source is not None and geometry.source.file_type in ("obj", "glb", "gltf"):
         raws.reverse()
     return raws
 

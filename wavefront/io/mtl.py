@@ -32,7 +32,7 @@ MIRROR = (3, 5, 8)
 GLASS_IOR = 1.5
 MATTE = 0.5  # reflectance where a file gives none
 # values that change nothing
-NEUTRAL = {"ka": 0.0, "ks": 0.0, "tf": 1.0, "d": 1.0, "tr": 0.0, "sharpness": 60.0}
+NEUTRAL = {"ka": 0.0, "kd": 0.0, "ks": 0.0, "tf": 1.0, "d": 1.0, "tr": 0.0, "sharpness": 60.0}
 
 Colour = NDArray[np.float64]
 

@@ -1,0 +1,612 @@
+"""Meshes and materials from files that the test writes, and every complaint about bad ones."""
+
+import os
+import struct
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from wavefront.bsdfs.dielectric import Dielectric
+from wavefront.bsdfs.diffuse import Diffuse
+from wavefront.bsdfs.mirror import Mirror
+from wavefront.errors import SceneError
+from wavefront.io.load import from_trimesh, load, load_mesh, load_meshes
+
+DATA = Path(__file__).parents[2] / "shared" / "data"
+
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+
+
+@pytest.fixture
+def write(tmp_path):
+    """Write files into one folder; return the path of the first."""
+
+    def write_files(text, name="scene.obj", **others):
+        for file, content in {name: text, **{k.replace("_", "."): v for k, v in others.items()}}.items():
+            data = content if isinstance(content, bytes) else content.encode()
+            (tmp_path / file).write_bytes(data)
+        return tmp_path / name
+
+    return write_files
+
+
+def soup(mesh, values=None):
+    """What the corners of the faces have, (m, 3, ·)."""
+    return (mesh.vertices if values is None else values)[mesh.faces]
+
+
+def test_triangle(write):
+    (mesh,) = load_meshes(write("v 0 0 0\nv 1 0 0\nv 0 1 0.1\nf 1 2 3\n"))
+    assert np.array_equal(mesh.vertices, [[0, 0, 0], [1, 0, 0], [0, 1, 0.1]])
+    assert np.array_equal(mesh.faces, [[0, 1, 2]])
+    assert mesh.normals is None
+    assert mesh.uvs is None
+    assert mesh.material.reflectance.ravel() == pytest.approx([0.5] * 3)
+
+
+def test_load_gives_a_scene(write):
+    scene = load(write(SQUARE + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\nusemtl a\nf 1 2 4\n"))
+    assert [(shape.name, len(shape.faces)) for shape in scene.shapes] == [("a", 2), ("b", 1)]
+
+
+@pytest.mark.parametrize(
+    "face",
+    [
+        "1 2 3 4",
+        "-4 -3 -2 -1",
+        "1/ 2/ 3/ 4/",
+        "1// 2// 3// 4//",
+        "\t1  2\t3 4 ",
+        "1 2 \\\n3 4",
+        "1 2 3 4 # quad",
+    ],
+)
+def test_quad_in_every_spelling(write, face):
+    (mesh,) = load_meshes(write(f"{SQUARE}f {face}\n"))
+    assert np.array_equal(soup(mesh)[:, :, :2], [[[0, 0], [1, 0], [1, 1]], [[1, 1], [0, 1], [0, 0]]])
+
+
+def test_polygon_is_a_fan(write):
+    angles = np.arange(7) * 2 * np.pi / 7
+    rows = "".join(f"v {np.cos(a):.17g} {np.sin(a):.17g} 0\n" for a in angles)
+    (mesh,) = load_meshes(write(rows + "f 1 2 3 4 5 6 7\n"))
+    assert len(mesh.faces) == 5
+    a, b, c = soup(mesh).transpose(1, 0, 2)
+    areas = np.cross(b - a, c - a)[:, 2] / 2
+    assert (areas > 0).all()
+    assert areas.sum() == pytest.approx(7 / 2 * np.sin(2 * np.pi / 7))
+
+
+def test_indices_count_back_from_their_own_line(write):
+    (mesh,) = load_meshes(
+        write("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 5 0 0\nv 6 0 0\nv 5 1 0\nf -3 -2 -1\n")
+    )
+    assert np.array_equal(soup(mesh)[:, 0], [[0, 0, 0], [5, 0, 0]])
+
+
+def test_normals_and_uvs_follow_their_own_indices(write):
+    text = SQUARE + "vt 0 0\nvt 1 0\nvt 0.5 1\nvn 0 0 2\nvn 0 3 4\nf 1/1/1 2/2/1 3/3/2\nf 1/3/2 3/2/1 4/1/1\n"
+    (mesh,) = load_meshes(write(text))
+    assert np.array_equal(soup(mesh)[:, :, :2], [[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]])
+    assert np.array_equal(soup(mesh, mesh.uvs), [[[0, 0], [1, 0], [0.5, 1]], [[0.5, 1], [1, 0], [0, 0]]])
+    assert soup(mesh, mesh.normals) == pytest.approx(
+        np.array([[[0, 0, 1], [0, 0, 1], [0, 0.6, 0.8]], [[0, 0.6, 0.8], [0, 0, 1], [0, 0, 1]]])
+    )
+
+
+def test_vertices_are_shared_where_all_indices_agree(write):
+    (mesh,) = load_meshes(write(SQUARE + "vn 0 0 1\nf 1//1 2//1 3//1\nf 1//1 3//1 4//1\n"))
+    assert len(mesh.vertices) == 4
+
+
+def test_faces_without_normals_among_others_are_flat(write):
+    text = SQUARE + "v 0 0 1\nvn 0 1 0\nf 1//1 2//1 3//1\nf 1 3 4\nf 1 4 5\n"
+    (mesh,) = load_meshes(write(text))
+    assert np.array_equal(soup(mesh, mesh.normals)[:, 0], [[0, 1, 0], [0, 0, 1], [1, 0, 0]])
+    assert np.array_equal(soup(mesh, mesh.normals)[1], [[0, 0, 1]] * 3)
+
+
+def test_a_normal_of_zero_length_is_replaced(write):
+    (mesh,) = load_meshes(write(SQUARE + "vn 0 0 0\nf 1//1 2//1 3//1\n"))
+    assert np.array_equal(mesh.normals, [[0, 0, 1]] * 3)
+
+
+def test_faces_of_mixed_forms_keep_their_uvs(write):
+    (mesh,) = load_meshes(write(SQUARE + "vt 0.25 0.75\nf 1/1 2/1 3/1\nf 1 3 4\n"))
+    assert np.array_equal(soup(mesh, mesh.uvs)[0], [[0.25, 0.75]] * 3)
+    assert np.array_equal(soup(mesh, mesh.uvs)[1], [[0, 0]] * 3)
+
+
+def test_vertices_keep_all_their_digits(write):
+    (mesh,) = load_meshes(write("v 1234567.125 1e-30 0.1\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"))
+    assert mesh.vertices[0].tolist() == [1234567.125, 1e-30, 0.1]
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1"])
+def test_encodings_and_line_ends(write, encoding):
+    text = (SQUARE + "usemtl Fläche\nf 1 2 3\n").replace("\n", "\r\n")
+    (mesh,) = load_meshes(write(text.encode(encoding)))
+    assert (mesh.name, len(mesh.faces)) == ("Fläche", 1)
+
+
+@pytest.mark.parametrize("name", [b"caf\xe9.obj", "図.OBJ".encode(), b"a b.obj"])
+def test_file_names(tmp_path, name):
+    path = os.path.join(os.fsencode(tmp_path), name)
+    try:
+        with open(path, "w") as file:
+            file.write(SQUARE + "f 1 2 3\n")
+    except OSError:
+        pytest.skip("the file system wants UTF-8 names")
+    assert len(load_meshes(os.fsdecode(path))[0].faces) == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (SQUARE + "f 0 1 2\n", r"scene\.obj line 5: f uses v 0; it must be in \[1, 4\]"),
+        (SQUARE + "\nf 1 2 5\n", r"line 6: f uses v 5; it must be in \[1, 4\]"),
+        (SQUARE + "f -5 1 2\n", r"line 5: f uses v -5; .*\[-4, -1\] counting back"),
+        (SQUARE + "f 1/1 2/1 3/1\n", r"line 5: f uses vt 1; it must be left out"),
+        (SQUARE + "vn 0 0 1\nf 1//1 2//2 3//1\n", r"line 6: f uses vn 2; it must be in \[1, 1\]"),
+        (SQUARE + "f 1 2\n", r"line 5: f has 2 corners \('1 2'\); it needs at least 3"),
+        (SQUARE + "f\n", r"line 5: f has 0 corners"),
+        (SQUARE + "f 1 2 x\n", r"line 5: f holds 'x'; a corner is v, v/vt"),
+        (SQUARE + "f 1 2 3.5\n", r"line 5: f holds '3\.5'"),
+        (SQUARE + "f 1/1/1/1 2 3\n", r"line 5: f holds '1/1/1/1'"),
+        (SQUARE + "f /1 2 3\n", r"line 5: f holds '/1'"),
+        (SQUARE + "f 99999999999999999999 2 3\n", r"line 5: f holds '99999999999999999999'"),
+        ("v 0 0\n" + SQUARE + "f 1 2 3\n", r"line 1: v has 2 numbers \('0 0'\); it must have at least 3"),
+        (SQUARE + "v 1 2 zero\nf 1 2 3\n", r"line 5: v holds 'zero', which is not a number"),
+        (SQUARE + "vn 0 1\nf 1 2 3\n", r"line 5: vn has 2 numbers"),
+        (SQUARE, r"scene\.obj: has no faces"),
+        ("", r"scene\.obj: is empty"),
+        (b"\x00\x01\x02\x03\xff" * 9, r"scene\.obj"),
+        ("<html>\n", r"line 1: '<html>' is not OBJ"),
+    ],
+)
+def test_defects_are_named_with_their_line(write, text, message):
+    with pytest.raises(SceneError, match=message):
+        load_meshes(write(text))
+
+
+@pytest.mark.parametrize("cut", range(60, 5, -3))
+def test_a_truncated_file_is_an_error_or_a_shorter_mesh(write, cut):
+    text = SQUARE + "f 1 2 3\nf 1 3 4\nf 2 3 4\n"
+    whole = soup(load_meshes(write(text))[0])
+    try:
+        (mesh,) = load_meshes(write(text[:cut]))
+    except SceneError:
+        return
+    assert np.array_equal(soup(mesh), whole[: len(mesh.faces)])
+
+
+BAD_FACES = {
+    "nan": ("v nan 0 0\n", "vertex that is not finite"),
+    "inf": ("v 0 -inf 0\n", "vertex that is not finite"),
+    "huge": ("v 1e39 0 0\n", "beyond float32"),
+    "flat": ("v 2 0 0\n", "of zero area"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_FACES)
+def test_bad_faces_are_dropped_and_counted(write, case):
+    row, message = BAD_FACES[case]
+    path = write(SQUARE + row + "usemtl a\nf 1 2 3\nf 1 2 5\nf 5 2 1\n")
+    with pytest.warns(UserWarning, match=rf"scene\.obj: 'a': dropped 2 faces .*{message}.*, first: line 8"):
+        (mesh,) = load_meshes(path)
+    assert len(mesh.faces) == 1
+    with pytest.raises(SceneError, match=rf"has 2 faces .*{message}.*, first: line 8"):
+        load_meshes(path, strict=True)
+
+
+def test_nothing_left_is_an_error(write):
+    path = write(SQUARE + "f 1 1 2\n")
+    with pytest.raises(SceneError, match="has no faces"), pytest.warns(UserWarning, match="dropped 1 faces"):
+        load_meshes(path)
+
+
+@pytest.mark.parametrize("scale", [1e-30, 1e-6, 1, 1e6, 1e30])
+@pytest.mark.parametrize("shift", [0.0, 1e5])
+def test_thin_and_tiny_faces_stay(write, scale, shift):
+    rows = np.array([[0, 0, 0], [1, 0, 0], [0, 1e-5, 0]]) * scale + shift * scale
+    path = write("".join("v {:.17g} {:.17g} {:.17g}\n".format(*row) for row in rows) + "f 1 2 3\n")
+    assert len(load_meshes(path)[0].faces) == 1
+
+
+def test_not_finite_normals_and_uvs_are_announced(write):
+    path = write(SQUARE + "vt nan 0\nvt 0 0\nvn inf 0 0\nvn 0 0 1\nf 1/1/1 2/2/2 3/2/2\n")
+    with (
+        pytest.warns(UserWarning, match="1 normals are not finite, first: vertex 0"),
+        pytest.warns(UserWarning, match="1 uvs are not finite, first: vertex 0"),
+    ):
+        (mesh,) = load_meshes(path)
+    assert np.array_equal(mesh.normals, [[0, 0, 1]] * 3)
+    with pytest.raises(SceneError, match="1 normals are not finite"):
+        load_meshes(path, strict=True)
+
+
+def test_what_is_not_read_is_named_once(write):
+    path = write(SQUARE + "f 1 2 3\nl 1 2\nl 2 3\np 1\ncurv2 1 2\n")
+    with pytest.warns(
+        UserWarning, match=r"not honoured: l \(line 6\), p \(line 8\), curv2 \(line 9\)"
+    ) as record:
+        load_meshes(path)
+    assert len(record) == 1
+    with pytest.raises(SceneError, match="not honoured"):
+        load_meshes(path, strict=True)
+
+
+# ---- files that are no files ------------------------------------------------------------------
+
+
+def test_missing_folder_extension(tmp_path):
+    with pytest.raises(SceneError, match=r"no\.obj: there is no such file"):
+        load(tmp_path / "no.obj")
+    (tmp_path / "d.obj").mkdir()
+    with pytest.raises(SceneError, match=r"d\.obj: is a folder"):
+        load(tmp_path / "d.obj")
+    for name in ("a.zip", "a.fbx", "a"):
+        (tmp_path / name).write_text("x")
+        with pytest.raises(SceneError, match=r"is not one of \.obj, \.ply, \.stl, \.glb, \.gltf"):
+            load(tmp_path / name)
+
+
+@pytest.mark.parametrize("extension", ["ply", "stl", "glb", "gltf", "obj"])
+def test_archives_are_refused_under_any_name(write, extension):
+    with pytest.raises(SceneError, match="is an archive"):
+        load_meshes(write(b"PK\x03\x04" + bytes(200), f"a.{extension}"))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes")
+def test_pipes_and_devices_are_refused(tmp_path):
+    os.mkfifo(tmp_path / "a.obj")
+    with pytest.raises(SceneError, match="is a device or pipe"):
+        load(tmp_path / "a.obj")
+    (tmp_path / "b.stl").symlink_to("/dev/zero")
+    with pytest.raises(SceneError, match="is a device or pipe"):
+        load(tmp_path / "b.stl")
+
+
+# ---- materials --------------------------------------------------------------------------------
+
+
+def one(write, mtl, **kwargs):
+    """Load a triangle with the material `m` of some MTL text."""
+    path = write(f"mtllib s.mtl\n{SQUARE}usemtl m\nf 1 2 3\n", s_mtl=f"newmtl m\n{mtl}\n")
+    (mesh,) = load_meshes(path, **kwargs)
+    return mesh
+
+
+def test_kd_and_ke(write):
+    mesh = one(write, "Kd 0.1 0.2 0.3\nKe 4 5 6")
+    assert isinstance(mesh.material, Diffuse)
+    assert mesh.material.reflectance.ravel() == pytest.approx([0.1, 0.2, 0.3])
+    assert mesh.emission.ravel().tolist() == [4, 5, 6]
+    assert one(write, "Kd 0.1").emission is None
+    assert one(write, "Ke 0 0 0").emission is None
+
+
+@pytest.mark.parametrize("illum", [4, 6, 7, 9])
+def test_glass(write, illum):
+    mesh = one(write, f"Kd 1 1 1\nNi 1.33\nTf 0.5 1 1\nillum {illum}")
+    assert isinstance(mesh.material, Dielectric)
+    assert mesh.material.ior == pytest.approx(1.33)
+    assert mesh.material.transmittance.ravel() == pytest.approx([0.5, 1, 1])
+    assert one(write, f"illum {illum}").material.ior == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize("illum", [3, 5, 8])
+def test_mirror(write, illum):
+    mesh = one(write, f"Kd 0 0 0\nKs 0.9 0.8 0.7\nillum {illum}")
+    assert isinstance(mesh.material, Mirror)
+    assert mesh.material.reflectance.ravel() == pytest.approx([0.9, 0.8, 0.7])
+    assert isinstance(one(write, f"Kd 1 1 1\nKs 0 0 0\nillum {illum}").material, Diffuse)
+
+
+@pytest.mark.parametrize(
+    ("lines", "kind"),
+    [
+        ("d 1", Diffuse),
+        ("Tr 0", Diffuse),
+        ("Tr 1", Diffuse),  # MeshLab's way to say opaque
+        ("d 1\nTr 1\nNi 1.5", Diffuse),
+        ("d 1\nTr 0\nNi 1.5", Diffuse),
+        ("d 0.1\nNi 1.5", Dielectric),
+        ("Tr 0.9\nNi 1.5", Dielectric),
+    ],
+)
+def test_opacity(write, lines, kind):
+    assert type(one(write, f"Kd 0.5 0.5 0.5\n{lines}").material) is kind
+
+
+def test_colours_outside_their_range_are_clamped(write):
+    with pytest.warns(UserWarning, match=r"s\.mtl line 2: Kd is 1\.5 -1 0\.5; it must be in \[0, 1\]"):
+        mesh = one(write, "Kd 1.5 -1 0.5")
+    assert mesh.material.reflectance.ravel().tolist() == [1, 0, 0.5]
+    with pytest.raises(SceneError, match=r"s\.mtl line 2: Kd"):
+        one(write, "Kd 1.5 -1 0.5", strict=True)
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ("Kd red", r"s\.mtl line 2: Kd is 'red'; it must be numbers"),
+        ("Kd nan 0 0", r"line 2: Kd is 'nan 0 0'; it must be finite"),
+        ("Kd 0 0", r"line 2: Kd has 2 numbers; a colour has 1 or 3"),
+        ("Kd", r"line 2: Kd is ''"),
+        ("illum 4\nNi 0", r"line 3: Ni is 0; an index must be above 0"),
+        ("illum 4\nNi -1", r"line 3: Ni is -1"),
+    ],
+)
+def test_malformed_values_are_errors(write, lines, message):
+    with pytest.raises(SceneError, match=message):
+        one(write, lines)
+
+
+def test_a_property_before_newmtl(write):
+    path = write(f"mtllib s.mtl\n{SQUARE}f 1 2 3\n", s_mtl="Kd 1 1 1\n")
+    with pytest.raises(SceneError, match=r"s\.mtl line 1: Kd stands before the first newmtl"):
+        load_meshes(path)
+
+
+def test_names_with_spaces_and_several_libraries(write):
+    path = write(
+        f"mtllib a b.mtl\nmtllib c.mtl\n{SQUARE}usemtl my red  \nf 1 2 3\nusemtl other\nf 1 3 4\n",
+        **{"a b_mtl": "newmtl my red\nKd 1 0 0\n", "c_mtl": "newmtl\tother\nKd 0 1 0\n"},
+    )
+    red, other = load_meshes(path)
+    assert red.material.reflectance.ravel().tolist() == [1, 0, 0]
+    assert other.material.reflectance.ravel().tolist() == [0, 1, 0]
+
+
+def test_a_missing_library_and_a_missing_material(write):
+    with pytest.warns(UserWarning, match=r"scene\.obj: material file 'no\.mtl' is missing"):
+        load_meshes(write(f"mtllib no.mtl\n{SQUARE}usemtl m\nf 1 2 3\n"))
+    path = write(f"mtllib s.mtl\n{SQUARE}usemtl x\nf 1 2 3\n", s_mtl="newmtl m\n")
+    with pytest.warns(UserWarning, match=r"scene\.obj: not in its material files: 'x'"):
+        load_meshes(path)
+    with pytest.raises(SceneError, match="not in its material files"):
+        load_meshes(path, strict=True)
+
+
+@pytest.mark.parametrize(
+    "reference", ["../s.mtl", "/etc/hostname", "C:\\s.mtl", "http://example.org/s.mtl", "..\\s.mtl"]
+)
+def test_libraries_outside_the_folder_are_refused(write, reference):
+    with pytest.raises(SceneError, match=r"scene\.obj: refers to "):
+        load_meshes(write(f"mtllib {reference}\n{SQUARE}f 1 2 3\n"))
+
+
+def test_a_library_behind_a_symlink_is_refused(write, tmp_path):
+    inside = tmp_path / "scene"
+    inside.mkdir()
+    (tmp_path / "s.mtl").write_text("newmtl m\n")
+    (inside / "s.mtl").symlink_to(tmp_path / "s.mtl")
+    (inside / "a.obj").write_text(f"mtllib s.mtl\n{SQUARE}f 1 2 3\n")
+    with pytest.raises(SceneError, match="outside its folder"):
+        load_meshes(inside / "a.obj")
+
+
+def test_a_library_in_a_folder_below(write, tmp_path):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "s.mtl").write_text("newmtl m\nKd 1 0 0\n")
+    (mesh,) = load_meshes(write(f"mtllib sub\\s.mtl\n{SQUARE}usemtl m\nf 1 2 3\n"))
+    assert mesh.material.reflectance.ravel().tolist() == [1, 0, 0]
+
+
+# ---- PLY, STL, in memory ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("extension", ["ply", "stl", "glb", "obj"])
+def test_a_file_equals_the_object_in_memory(tmp_path, extension):
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.7)
+    path = tmp_path / f"ball.{extension}"
+    ball.export(path)
+    (mesh,) = load_meshes(path)
+    (again,) = from_trimesh(trimesh.load(path, process=False)).shapes
+    assert np.array_equal(soup(mesh), soup(again))
+    for a, b in ((mesh.normals, again.normals), (mesh.uvs, again.uvs)):
+        assert (a is None) == (b is None)
+        assert a is None or np.array_equal(soup(mesh, a), soup(again, b))
+    assert soup(mesh) == pytest.approx(ball.triangles, abs=1e-6)
+
+
+def test_a_scene_in_memory_equals_its_file(tmp_path):
+    scene = trimesh.Scene()
+    turn = trimesh.transformations.rotation_matrix(0.3, [1, 2, 3], [0, 0, 1])
+    mirror = np.diag([-1.0, 1, 2, 1])
+    box = trimesh.creation.box()
+    scene.add_geometry(box, node_name="a", geom_name="box", transform=turn)
+    scene.add_geometry(box, node_name="b", geom_name="box", transform=mirror)
+    scene.add_geometry(trimesh.creation.icosphere(1), node_name="c", geom_name="ball")
+    scene.export(tmp_path / "s.glb")
+    found, again = load_meshes(tmp_path / "s.glb"), from_trimesh(trimesh.load(tmp_path / "s.glb")).shapes
+    direct = from_trimesh(scene).shapes
+    assert len(found) == len(again) == len(direct) == 3
+    for a, b, c in zip(found, again, direct, strict=True):
+        assert np.array_equal(soup(a), soup(b))
+        assert soup(a) == pytest.approx(soup(c), abs=1e-6)
+
+
+def test_a_reflected_instance_keeps_its_front():
+    scene = trimesh.Scene()
+    scene.add_geometry(trimesh.creation.box(), transform=np.diag([-1.0, 1, 1, 1]))
+    (mesh,) = from_trimesh(scene).shapes
+    a, b, c = soup(mesh).transpose(1, 0, 2)
+    assert (np.cross(b - a, c - a) * (a + b + c)).sum(axis=1).min() > 0
+
+
+def test_from_trimesh_takes_normals_that_are_there():
+    flat, smooth = trimesh.creation.icosphere(1), trimesh.creation.icosphere(1)
+    smooth.vertex_normals = smooth.vertices
+    assert from_trimesh(flat).shapes[0].normals is None
+    assert from_trimesh(smooth).shapes[0].normals == pytest.approx(smooth.vertices)
+
+
+def test_from_trimesh_refuses_other_things():
+    with pytest.raises(SceneError, match=r"expected a trimesh\.Trimesh or trimesh\.Scene, got list"):
+        from_trimesh([1, 2])
+    with pytest.raises(SceneError, match="has no faces"):
+        from_trimesh(trimesh.Scene())
+
+
+def ply(count, body, extra=""):
+    xyz = "property float x\nproperty float y\nproperty float z\n"
+    return (
+        f"ply\nformat ascii 1.0\nelement vertex 3\n{xyz}{extra}"
+        f"element face {count}\nproperty list uchar int vertex_indices\nend_header\n{body}"
+    )
+
+
+def test_ply(write):
+    (mesh,) = load_meshes(write(ply(1, "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"), "a.ply"))
+    assert np.array_equal(soup(mesh)[0], [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    normals = "property float nx\nproperty float ny\nproperty float nz\n"
+    (mesh,) = load_meshes(write(ply(1, "0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 0 0 1 0\n3 0 1 2\n", normals), "a.ply"))
+    assert np.array_equal(mesh.normals, [[0, 0, 1], [0, 0, 1], [0, 1, 0]])
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (ply(1, "0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n"), r"a\.ply"),
+        (ply(10**12, "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"), r"a\.ply: claims 1000000000000 of face, at least"),
+        (ply(1, "0 0 0\n1 0"), r"a\.ply: claims"),
+        (ply("x", ""), r"a\.ply line 7: 'element face x' is not an element"),
+        (ply(1, "").replace("uchar int", "quad int"), r"a\.ply"),
+        (ply(1, "").replace("uchar int", "uchar quad"), r"a\.ply"),
+        ("ply\nformat ascii 1.0\n", r"a\.ply: not a PLY file: its header is damaged"),
+        ("hello", r"a\.ply: not a PLY file"),
+    ],
+)
+def test_damaged_ply(write, data, message):
+    with pytest.raises(SceneError, match=message):
+        load_meshes(write(data, "a.ply"))
+
+
+def stl(count, faces):
+    return bytes(80) + struct.pack("<I", count) + b"".join(struct.pack("<12fH", *f, 0) for f in faces)
+
+
+FACET = (0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0)
+
+
+def test_stl(write):
+    (mesh,) = load_meshes(write(stl(1, [FACET]), "a.stl"))
+    assert np.array_equal(soup(mesh)[0], [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    assert mesh.normals is None
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (stl(2**32 - 1, [FACET]), r"a\.stl: claims 4294967295 faces, 214748364834 bytes; it has 134"),
+        (stl(2, [FACET, FACET])[:-1], r"a\.stl: claims 2 faces, 184 bytes; it has 183"),
+        (b"\0" * 50, r"a\.stl: has 50 bytes"),
+        ("solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n", r"a\.stl: ends early"),
+        (stl(0, []), r"a\.stl"),
+    ],
+)
+def test_damaged_stl(write, data, message):
+    with pytest.raises(SceneError, match=message):
+        load_meshes(write(data, "a.stl"))
+
+
+@pytest.mark.parametrize("extension", ["glb", "gltf"])
+def test_damaged_gltf(write, extension):
+    with pytest.raises(SceneError, match=rf"a\.{extension}"):
+        load_meshes(write(b"glTF" + bytes(10), f"a.{extension}"))
+
+
+# ---- load_mesh --------------------------------------------------------------------------------
+
+
+def test_load_mesh_joins_and_places(write):
+    path = write(SQUARE + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n")
+    glass = Dielectric(1.5)
+    matrix = np.array([[0, -2, 0, 5], [2, 0, 0, 0], [0, 0, 2, 0], [0, 0, 0, 1.0]])
+    mesh = load_mesh(path, glass, matrix)
+    assert mesh.material is glass
+    assert mesh.emission is None
+    assert mesh.name == "scene"
+    assert np.array_equal(soup(mesh)[0], [[5, 0, 0], [5, 2, 0], [3, 2, 0]])
+    assert len(mesh.faces) == 2
+
+
+def test_load_mesh_without_material_takes_the_file_s(write):
+    path = write(f"mtllib s.mtl\n{SQUARE}usemtl m\nf 1 2 3\n", s_mtl="newmtl m\nKd 1 0 0\nKe 2 2 2\n")
+    mesh = load_mesh(path)
+    assert mesh.material.reflectance.ravel().tolist() == [1, 0, 0]
+    assert mesh.emission.ravel().tolist() == [2, 2, 2]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert load_mesh(path, Diffuse(0.25)).emission is None
+
+
+def test_load_mesh_asks_which_material(write):
+    path = write(
+        f"mtllib s.mtl\n{SQUARE}usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n",
+        s_mtl="newmtl a\nKd 1 0 0\nnewmtl b\nKd 0 1 0\n",
+    )
+    with pytest.raises(SceneError, match=r"has 2 materials; pass one, or use wf\.load"):
+        load_mesh(path)
+
+
+def test_load_mesh_turns_normals(write):
+    path = write(SQUARE + "vn 0.6 0 0.8\nf 1//1 2//1 3//1\n")
+    mesh = load_mesh(path, transform=np.diag([2.0, 1, 1, 1]))
+    expected = np.array([0.3, 0, 0.8]) / np.hypot(0.3, 0.8)
+    assert mesh.normals == pytest.approx(np.tile(expected, (3, 1)))
+    mirrored = load_mesh(path, transform=np.diag([-1.0, 1, 1, 1]))
+    a, b, c = soup(mirrored)[0]
+    assert np.cross(b - a, c - a)[2] > 0
+    assert mirrored.normals[0] == pytest.approx([-0.6, 0, 0.8])
+
+
+@pytest.mark.parametrize(
+    ("transform", "message"),
+    [
+        (np.eye(3), r"transform must have shape \(4, 4\), got \(3, 3\)"),
+        (np.full((4, 4), np.nan), r"transform\[0\]\[0\] is nan"),
+        (np.diag([1.0, 1, 0, 1]), "transform is singular"),
+        (np.diag([1.0, 1, 1, 2]), "last row"),
+    ],
+)
+def test_load_mesh_refuses_transforms(write, transform, message):
+    with pytest.raises(SceneError, match=message):
+        load_mesh(write(SQUARE + "f 1 2 3\n"), transform=transform)
+
+
+# ---- real files -------------------------------------------------------------------------------
+
+REAL = {
+    "cow.obj": 5804,
+    "suzanne.obj": 968,
+    "teapot.obj": 6320,
+    "rocker-arm.obj": 20088,
+    "bunny.obj": 2000,
+    "fuze.obj": 1000,
+    "cornell/walls.obj": 6,
+    "cornell/sphere1.obj": 1088,
+    "BoxTextured.glb": 12,
+    "Duck.glb": 4212,
+}
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="the real files are not here")
+@pytest.mark.parametrize("name", REAL)
+@pytest.mark.filterwarnings("ignore:.*(not honoured|is missing)")
+def test_real_files_equal_what_trimesh_holds(name):
+    found = load_meshes(DATA / name)
+    assert sum(len(mesh.faces) for mesh in found) == REAL[name]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        held = trimesh.load(DATA / name, process=False)
+    for a, b in zip(found, from_trimesh(held).shapes, strict=True):
+        assert np.array_equal(soup(a), soup(b))
+        for x, y in ((a.normals, b.normals), (a.uvs, b.uvs)):
+            assert (x is None) == (y is None)
+            assert x is None or np.array_equal(soup(a, x), soup(b, y))
