@@ -112,6 +112,14 @@ def read_image(path: str | os.PathLike[str]) -> Floats:
         Naming the file: missing, of another kind, corrupt, truncated, or larger than
         `files.MAX_PIXELS`.
     """
+    codes = read_codes(path)
+    if codes.dtype == np.float32:
+        return codes
+    return codes.astype(np.float32) / np.float32(np.iinfo(codes.dtype).max)
+
+
+def read_codes(path: str | os.PathLike[str]) -> NDArray[Any]:
+    """Return what `read_image` does, but 8- and 16-bit values as they are stored, (H, W, C)."""
     extension = _extension(path, READABLE)
     data = read_bytes(path)
     readers = {".exr": _decode_exr, ".hdr": rgbe.decode, ".npy": _decode_npy}
@@ -192,15 +200,18 @@ def _encode_8bit(path: str | os.PathLike[str], pixels: Floats, gamma: float | st
     return bytes(iio.imwrite("<bytes>", coded, extension=".jpg", plugin="pillow", quality=95, subsampling=0))
 
 
-def _decode_8bit(data: bytes) -> Floats:
+def _decode_8bit(data: bytes) -> NDArray[Any]:
     import imageio.v3 as iio
 
     check_size(*_size_8bit(data))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the decoder warns of large images; the limit here is our own
         pixels = iio.imread(data, plugin="pillow", index=0)
-    scale = {"uint8": 255, "uint16": 65535, "bool": 1}[pixels.dtype.name]
-    return np.atleast_3d(pixels).astype(np.float32) / np.float32(scale)
+    if pixels.dtype == np.bool_:
+        pixels = pixels * np.uint8(255)
+    if pixels.dtype not in (np.uint8, np.uint16):
+        raise SceneError(f"holds {pixels.dtype} values; only 8 and 16 bits are read")
+    return np.atleast_3d(pixels)
 
 
 def _size_8bit(data: bytes) -> tuple[int, int]:

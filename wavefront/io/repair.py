@@ -61,9 +61,9 @@ def build(source: str, raw: Raw, strict: bool = False) -> Mesh | None:
     vertices = np.asarray(raw.vertices, np.float64).reshape(-1, 3)
     faces = np.asarray(raw.faces).reshape(-1, 3).astype(np.intp)
     _check_indices(label, faces, len(vertices))
-    sound = (np.abs(vertices) <= FLOAT32_MAX).all(axis=1)  # false for NaN
+    sound = np.all(np.abs(vertices) <= FLOAT32_MAX, axis=1)  # false for NaN
     vertices = np.where(sound[:, None], vertices, 0.0)
-    keep = sound[faces].all(axis=1)
+    keep: NDArray[np.bool_] = np.all(sound[faces], axis=1)
     _report(label, raw, ~keep, "with a vertex that is not finite or beyond float32", strict)
     flat = keep & ~_has_area(vertices, faces)
     _report(label, raw, flat, "of zero area", strict)
