@@ -15,11 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..state import Columns
-from ..vec import Floats, f4
-
-# A sampled point on a light, and the point it is seen from, carry a few roundings each.
-POSITION_ERROR = f4(2**-20)
-
+from ..vec import Floats
 
 @dataclass(slots=True)
 class LightSample(Columns):
@@ -28,7 +24,8 @@ class LightSample(Columns):
     wi: Floats  # (3, n) unit direction from the point to the light
     radiance: Floats  # (3, n) W·sr⁻¹·m⁻² (of a delta light: irradiance per unit cosine)
     pdf: Floats  # (n,) solid-angle density, 1/sr (of a delta light: 1)
-    distance: Floats  # (n,) to just before the light, scene units; inf for a light at infinity
+    distance: Floats  # (n,) to the sampled point, scene units; inf for a light at infinity
+    cos_light: Floats  # (n,) cosine between the ray and the light's normal; 1 where it has none
 
 
 class Light(Columns, ABC):
@@ -52,14 +49,3 @@ class Light(Columns, ABC):
     @abstractmethod
     def power(self, scene_radius: float) -> NDArray[np.float64]:
         """Estimate the emitted power of each light, (k,), the mean of the channels, W."""
-
-
-def just_before(distance: Floats, cos_light: Floats, point: Floats, target: Floats) -> Floats:
-    """Shorten `distance` (n,) so that a shadow ray ends before the surface it aims at.
-
-    Both ends are known to a rounding error proportional to their coordinates; seen at the angle
-    `cos_light` (n,) that error is 1/cos_light times as long along the ray. Returns (n,), at least 0.
-    """
-    size = np.abs(point).max(0) + np.abs(target).max(0)
-    slack = POSITION_ERROR * size / np.maximum(cos_light, POSITION_ERROR)
-    return np.maximum(distance - slack, f4(0))

@@ -74,11 +74,11 @@ class LightTable:
 
     def _sample_each(self, light: Ints, point: Floats, u: Floats) -> LightSample:
         n = len(light)
-        out = LightSample(np.empty((3, n), f4), np.empty((3, n), f4), np.empty(n, f4), np.empty(n, f4))
+        out = LightSample(np.empty((3, n), f4), np.empty((3, n), f4), *np.empty((3, n), f4))
         for kind, rows in self._by_kind(light):
             part = kind.sample_li(point.take(rows, 1), u.take(rows, 1))
             out.wi[:, rows], out.radiance[:, rows] = part.wi, part.radiance
-            out.pdf[rows], out.distance[rows] = part.pdf, part.distance
+            out.pdf[rows], out.distance[rows], out.cos_light[rows] = part.pdf, part.distance, part.cos_light
         return out
 
     def _by_kind(self, light: Ints) -> Iterator[tuple[Light, Ints]]:

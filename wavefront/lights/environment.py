@@ -25,8 +25,9 @@ class ConstantEnvironment(Light):
         """Draw a direction uniformly on the sphere."""
         wi = uniform_sphere(u)
         n = wi.shape[1]
-        pdf = np.full(n, UNIFORM_SPHERE_PDF, f4)
-        return LightSample(wi, np.broadcast_to(self.radiance, wi.shape), pdf, np.full(n, np.inf, f4))
+        radiance = np.broadcast_to(self.radiance, wi.shape)
+        pdf, distance = np.full(n, UNIFORM_SPHERE_PDF, f4), np.full(n, np.inf, f4)
+        return LightSample(wi, radiance, pdf, distance, np.ones(n, f4))
 
     def pdf_li(self, point: Floats, wi: Floats) -> Floats:
         """Return 1/4π."""

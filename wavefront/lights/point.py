@@ -29,7 +29,7 @@ class PointLights(Light):
         safe = np.where(lit, d2, f4(1))
         distance = np.sqrt(safe)
         pdf = np.where(lit, f4(1), f4(0))
-        return LightSample(away / distance, self.intensity / safe, pdf, distance)
+        return LightSample(away / distance, self.intensity / safe, pdf, distance, np.ones_like(distance))
 
     def pdf_li(self, point: Floats, wi: Floats) -> Floats:
         """Return 0: no sampled direction can meet a point."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..frame import Frame
 from ..sampling.warp import uniform_cone, uniform_sphere
 from ..vec import Floats, dot, f4
-from .base import Light, LightSample, just_before
+from .base import Light, LightSample
 
 UNIFORM_SPHERE_PDF = f4(1 / (4 * np.pi))
 TWO_PI = f4(2 * np.pi)
@@ -37,10 +37,9 @@ class SphereLights(Light):
         squared = self.radius**2 - np.maximum(distance**2 - along**2, f4(0))
         half_chord = np.sqrt(np.maximum(squared, f4(0)))
         reach = np.where(outside, along - half_chord, along + half_chord)
-        target = point + wi * reach
         pdf = np.where(outside, f4(1) / (TWO_PI * height), UNIFORM_SPHERE_PDF)
-        before = just_before(reach, half_chord / self.radius, point, target)
-        return LightSample(wi, np.broadcast_to(self.radiance, wi.shape), pdf, before)
+        radiance = np.broadcast_to(self.radiance, wi.shape)
+        return LightSample(wi, radiance, pdf, reach, half_chord / self.radius)
 
     def pdf_li(self, point: Floats, wi: Floats) -> Floats:
         """Return 1/(solid angle of the sphere) inside its cone."""

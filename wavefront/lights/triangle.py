@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..sampling.warp import uniform_triangle
 from ..vec import Floats, cross, dot, f4
-from .base import Light, LightSample, just_before
+from .base import Light, LightSample
 
 
 @dataclass(slots=True)
@@ -46,7 +46,7 @@ class TriangleLights(Light):
         lit = cos_light > 0
         pdf = np.where(lit, d2, f4(0)) / (np.where(lit, cos_light, f4(1)) * self.area)
         radiance = np.broadcast_to(self.radiance, wi.shape)
-        return LightSample(wi, radiance, pdf, just_before(distance, cos_light, point, target))
+        return LightSample(wi, radiance, pdf, distance, cos_light)
 
     def pdf_li(self, point: Floats, wi: Floats) -> Floats:
         """Return d²/(A·cosθ) where the ray meets the front side.

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from ..lights import LightSample
 from ..scene import CompiledScene
 from ..state import Hits, Paths, Surface
-from ..vec import Bools, Floats, dot
+from ..vec import Bools, Floats, dot, f4
 from .surface import leave
+
+TARGET_ERROR = f4(2**-20)  # rounding of a sampled point on a light, relative to its distance
 
 
 def intersect(scene: CompiledScene, paths: Paths) -> Hits:
@@ -14,7 +19,18 @@ def intersect(scene: CompiledScene, paths: Paths) -> Hits:
     return Hits(found.t, found.prim, found.b1, found.b2)
 
 
-def visible(scene: CompiledScene, surface: Surface, wi: Floats, distance: Floats) -> Bools:
-    """Tell whether nothing stands between each point and `distance` (n,) along wi (3, n)."""
-    origin = leave(surface, wi, dot(surface.ng, wi))
-    return ~scene.accelerator.occluded(origin, wi, distance, surface.prim)
+def visible(scene: CompiledScene, surface: Surface, light: LightSample) -> Bools:
+    """Tell whether nothing stands between each point and the sampled point on its light, (n,)."""
+    origin = leave(surface, light.wi, dot(surface.ng, light.wi))
+    return ~scene.accelerator.occluded(origin, light.wi, _reach(surface, light), surface.prim)
+
+
+def _reach(surface: Surface, light: LightSample) -> Floats:
+    """Length (n,) of shadow rays, which end just before the light.
+
+    Both ends are off by a known error; along a ray that meets the light's surface under a small
+    cosine an error is 1/cosine times as long.
+    """
+    grazing = f4(1) / np.maximum(light.cos_light, f4(2) * TARGET_ERROR)
+    shortened = light.distance * (f4(1) - TARGET_ERROR * grazing) - f4(2) * surface.error * grazing
+    return np.maximum(shortened, f4(0))

@@ -91,7 +91,7 @@ def direct(scene: CompiledScene, paths: Paths, shade: Shading, sampler: Sampler,
     light, f, pdf, delta = light.take(ok), f.take(ok, 1), pdf.take(ok), delta.take(ok)
     weight = np.where(delta, f4(1), power_heuristic(light.pdf, pdf)) if mis else f4(1)
     arriving = f * light.radiance * (weight / light.pdf)
-    seen = np.flatnonzero(visible(scene, surface.take(ok), light.wi, light.distance))
+    seen = np.flatnonzero(visible(scene, surface.take(ok), light))
     radiance[:, ok.take(seen)] = arriving.take(seen, 1)
     return radiance
 
