@@ -102,7 +102,7 @@ def render(
 
     width, height = camera.size
     film = Film(width, height)
-    bad = BadSamples()
+    bad, interrupted = BadSamples(), False
     with _bar(progress, width * height * spp) as advance:
         try:
             for piece, wave in run_ordered(trace, plan(width * height, spp, wave_size), threads):
@@ -110,6 +110,7 @@ def render(
                 film.add(piece.first_pixel, wave.radiance)
                 advance(piece.lanes)
         except KeyboardInterrupt:
+            interrupted = True
             warnings.warn(
                 f"interrupted: {film.count.sum() / (width * height * spp):.0%} of the samples are in the picture",
                 stacklevel=2,
@@ -124,6 +125,7 @@ def render(
         "workers": threads,
         "seconds": time.perf_counter() - begin,
         "bad_samples": bad.count,
+        "interrupted": interrupted,
         "version": version("wavefront"),
     }
     return film.image(int(film.count.max()), metadata)

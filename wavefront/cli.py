@@ -1,0 +1,166 @@
+"""`wavefront render` and `wavefront info`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from collections.abc import Sequence
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from .camera import Camera
+from .errors import SceneError
+from .film import Image
+from .integrators import INTEGRATORS
+from .io.images import check_writable
+from .io.load import load
+from .render import render
+from .sampling.sampler import SAMPLERS
+from .scene import Scene
+from .shapes import Mesh
+
+INTERRUPTED = 130  # 128 + SIGINT, as shells report it
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; return the exit status."""
+    options = _parser().parse_args(arguments)
+    warnings.showwarning = _show_warning
+    try:
+        status: int = options.run(options)
+    except (SceneError, OSError) as error:
+        print(f"wavefront: error: {error}", file=sys.stderr)
+        return 2
+    return status
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="wavefront", description="A path tracer in whole-array NumPy.")
+    parser.add_argument("--version", action="version", version=version("wavefront"))
+    commands = parser.add_subparsers(required=True, metavar="command")
+    _add_render(commands)
+    info = commands.add_parser("info", help="say what a scene file holds")
+    info.add_argument("scene", help="obj, ply, stl, glb or gltf file")
+    info.set_defaults(run=_info)
+    return parser
+
+
+def _add_render(commands: Any) -> None:
+    command = commands.add_parser(
+        "render", help="render a scene file", formatter_class=argparse.ArgumentDefaultsHelpFormatter
+    )
+    command.add_argument("scene", help="obj, ply, stl, glb or gltf file")
+    command.add_argument("-o", "--output", default="out.png", help="png, jpg, exr, hdr or npy file to write")
+    command.add_argument("--spp", type=int, default=100, help="samples per pixel")
+    command.add_argument("--size", type=_size, help="WIDTHxHEIGHT in pixels (default: the camera's, or 512x512)")
+    command.add_argument("--integrator", choices=INTEGRATORS, default="full", help="estimator of light")
+    command.add_argument("--max-bounces", type=int, default=12, help="scattering events along a path")
+    command.add_argument("--sampler", choices=SAMPLERS, default="sobol", help="source of random numbers")
+    command.add_argument("--seed", type=int, default=0, help="same seed, same picture")
+    command.add_argument("--accel", default="auto", help="ray queries: auto, numpy or embree")
+    command.add_argument("--workers", type=int, help="threads (default: one per core)")
+    command.add_argument("--origin", type=_vector, help="camera position X,Y,Z")
+    command.add_argument("--target", type=_vector, help="point that the camera looks at X,Y,Z")
+    command.add_argument("--up", type=_vector, default=(0.0, 1.0, 0.0), help="what is up in the picture X,Y,Z")
+    command.add_argument("--fov", type=float, default=40.0, help="vertical field of view, degrees")
+    command.add_argument("--gamma", type=_gamma, default=2.2, help='for png and jpg: a number or "srgb"')
+    command.add_argument("--exposure", type=float, default=0.0, help="stops, applied when saving")
+    command.add_argument("--quiet", action="store_true", help="no progress bar")
+    command.set_defaults(run=_render)
+
+
+def _render(options: argparse.Namespace) -> int:
+    check_writable(options.output)
+    scene = load(options.scene)
+    scene.camera = _camera(scene, options)
+    interrupted = False
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        image = render(
+            scene,
+            options.spp,
+            integrator=options.integrator,
+            max_bounces=options.max_bounces,
+            seed=options.seed,
+            sampler=options.sampler,
+            accel=options.accel,
+            workers=options.workers,
+            progress=False if options.quiet else None,
+        )
+    for warning in caught:
+        _show_warning(warning.message)
+    interrupted = image.metadata["interrupted"]
+    image.save(options.output, gamma=options.gamma, exposure=options.exposure)
+    print(_summary(image, options.output))
+    return INTERRUPTED if interrupted else 0
+
+
+def _camera(scene: Scene, options: argparse.Namespace) -> Camera:
+    """Return the camera that the options describe, else the file's, else one that frames the scene."""
+    size = options.size or (scene.camera.size if scene.camera else (512, 512))
+    if options.origin is None and options.target is None:
+        return scene.camera.resized(size) if scene.camera else scene.framing_camera(options.fov, size)
+    if options.origin is None:
+        raise SceneError("--target needs --origin")
+    middle = scene.bounds.mean(0) if options.target is None else options.target
+    return Camera.look_at(options.origin, middle, options.up, fov=options.fov, size=size)
+
+
+def _summary(image: Image, path: str) -> str:
+    height, width = image.rgb.shape[:2]
+    seconds = image.metadata["seconds"]
+    rate = width * height * image.spp / max(seconds, 1e-9) / 1e6
+    return f"{path}: {width}x{height}, {image.spp} spp in {seconds:.1f} s ({rate:.2f} million samples/s)"
+
+
+def _info(options: argparse.Namespace) -> int:
+    scene = load(options.scene)
+    low, high = scene.bounds
+    faces = sum(len(shape.faces) for shape in scene.shapes if isinstance(shape, Mesh))
+    print(f"{options.scene}: {len(scene.shapes)} shapes, {faces} triangles, {len(scene.lights)} lights")
+    print(f"bounds: {_triple(low)} to {_triple(high)}")
+    print(f"camera: {'in the file' if scene.camera else 'none; the scene will be framed'}")
+    for shape in scene.shapes:
+        glow = "" if shape.emission is None else ", emits"
+        print(f"  {shape!r} {type(shape.material).__name__}{glow}")
+    return 0
+
+
+def _triple(values: np.ndarray) -> str:
+    return "(" + ", ".join(f"{value:.6g}" for value in values) + ")"
+
+
+def _show_warning(message: Warning | str, *_: object) -> None:
+    print(f"wavefront: warning: {message}", file=sys.stderr)
+
+
+def _size(text: str) -> tuple[int, int]:
+    try:
+        width, height = (int(part) for part in text.lower().split("x"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not WIDTHxHEIGHT, such as 640x480") from None
+    return width, height
+
+
+def _vector(text: str) -> tuple[float, float, float]:
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not X,Y,Z, such as 0,1.5,4") from None
+    return x, y, z
+
+
+def _gamma(text: str) -> float | str:
+    if text == "srgb":
+        return text
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'{text!r} is neither a number nor "srgb"') from None
+
+
+if __name__ == "__main__":
+    sys.exit(main())
