@@ -378,21 +378,31 @@ def gamma_q(a: float, x: float) -> float:
 def chi_square(observed: Ints, expected: Doubles) -> tuple[float, int, float]:
     """χ² statistic, degrees of freedom and p-value; cells below 5 expected are pooled.
 
-    The cells must cover every outcome, so that both sums are the number of samples.
+    The cells must cover every outcome, so that both sums are the number of samples. If even the
+    pool expects less than 5, its count is compared with the Poisson distribution instead; there
+    10⁻⁵ of all samples are allowed for, as rounding puts some just beyond the edge of a density.
     """
-    order = np.argsort(expected)
-    observed, expected = observed[order], np.maximum(expected[order], 0.0)
-    first = int(np.searchsorted(expected, 5.0))
-    while 0 < first < len(expected) and expected[:first].sum() < 5:
-        first += 1
-    if first:
-        observed = np.append(observed[:first].sum(), observed[first:])
-        expected = np.append(expected[:first].sum(), expected[first:])
-    if expected[0] <= 0:
-        return (0.0, 0, 1.0) if observed[0] == 0 else (math.inf, 0, 0.0)
+    rare = expected < 5
+    pool, pooled = float(expected[rare].sum()), int(observed[rare].sum())
+    stray = 1.0
+    observed, expected = observed[~rare], expected[~rare]
+    if pool >= 5:
+        observed, expected = np.append(observed, pooled), np.append(expected, pool)
+    elif pooled:
+        allowed = pool + 1e-5 * (float(expected.sum()) + pool)
+        stray = 1 - gamma_q(pooled, max(allowed, 1e-300))  # P(X ≥ pooled)
     statistic = float(((observed - expected) ** 2 / expected).sum())
     freedom = len(expected) - 1
-    return statistic, freedom, gamma_q(freedom / 2, statistic / 2) if freedom else 1.0
+    p = gamma_q(freedom / 2, statistic / 2) if freedom > 0 else 1.0
+    return statistic, max(freedom, 0), p if stray == 1 else min(1.0, 2 * min(p, stray))
+
+
+def _chi_square_p(observed: Ints, expected: Doubles, missing: int, lost: float) -> float:
+    """p-value of χ² over all cells, over rows and over columns: sums show a slope that cells hide."""
+    counts, means = observed.reshape(ROWS, COLUMNS), expected.reshape(ROWS, COLUMNS)
+    views = [(counts.ravel(), means.ravel()), (counts.sum(1), means.sum(1)), (counts.sum(0), means.sum(0))]
+    p = [chi_square(np.append(o, missing), np.append(e, lost))[2] for o, e in views]
+    return min(1.0, 3 * min(p))
 
 
 def binomial_p(count: int, trials: int, probability: float) -> float:
@@ -436,9 +446,8 @@ def _compare(
     report.near("integral of pdf", where, integral, fraction, 1e-4 + 4.5 * noise + unresolved)
     if singular > 0:
         report.at_most("sum of probabilities", where, singular + integral, 1 + 1e-4 + unresolved)
-    outcomes = np.append(observed, missing)
-    statistic = chi_square(outcomes, np.append(expected, max(1 - integral, 0.0)) * total)
-    report.significant("chi-square", where, statistic[2], alpha)
+    lost = max(1 - integral, 0.0) * total
+    report.significant("chi-square", where, _chi_square_p(observed, expected * total, missing, lost), alpha)
 
 
 # --- Materials ----------------------------------------------------------------------------------------
@@ -494,7 +503,7 @@ def check_bsdf(
     samples: int = 1_000_000,
     angles: Sequence[float] = (0.0, 30.0, 60.0, 80.0, 89.0),
     reciprocal: bool = True,
-    max_albedo: float = 1.0,
+    albedo: tuple[float, float] = (0.0, 1.0),
     significance: float = 1e-3,
     seed: int = 0,
 ) -> Report:
@@ -510,8 +519,9 @@ def check_bsdf(
         Angles between `wo` and the normal, degrees in [0, 90).
     reciprocal
         Whether f(wo, wi)·η² = f(wi, wo) is expected, with η = ior beyond / before (1 in reflection).
-    max_albedo
-        Largest part of the light that may leave again, per channel.
+    albedo
+        Least and largest part of the light that may leave again, per channel: (1, 1) for a
+        material that absorbs nothing.
     significance
         Probability that a correct material fails any of the statistical checks.
     seed
@@ -534,7 +544,7 @@ def check_bsdf(
     for number, (inside, angle) in enumerate((s, a) for s in sides for a in angles):
         view = _View(bsdf, _direction(angle, 0.7 + number), inside)
         rng = np.random.default_rng([seed, number])
-        _check_view(report, view, rng, samples, alpha, max_albedo)
+        _check_view(report, view, rng, samples, alpha, albedo)
         if reciprocal and not any(not c.passed for c in report.checks.values()):
             _check_reciprocity(report, view, rng)
     return report.raise_if_failed()
@@ -566,7 +576,7 @@ def _check_view(
     rng: np.random.Generator,
     samples: int,
     alpha: float,
-    max_albedo: float,
+    albedo: tuple[float, float],
 ) -> None:
     where = str(view)
     dimensions = view.bsdf.dimensions
@@ -590,8 +600,12 @@ def _check_view(
     _check_support(report, view, rng, drawn_points)
     mean = total / samples
     noise = np.sqrt(np.maximum(squares / samples - mean**2, 0) / samples)
-    worst = int(np.argmax(mean - 4.5 * noise))
-    report.at_most("albedo", where, float(mean[worst]), max_albedo + 1e-3 + 4.5 * float(noise[worst]))
+    slack = 1e-3 + 4.5 * noise
+    high, low = int(np.argmax(mean - slack)), int(np.argmin(mean + slack))
+    report.at_most("albedo", where, float(mean[high]), albedo[1] + float(slack[high]))
+    if albedo[0] > 0:
+        text = f"at least {albedo[0] - slack[low]:.6g}"
+        report.add("albedo (least)", where, mean[low], text, float((albedo[0] - mean[low]) / slack[low]))
     for lobe in lobes:
         copies = max(1, round(lobe.count / (samples * lobe.probability)))  # lobes that look the same
         p = binomial_p(lobe.count, samples, min(1.0, copies * lobe.probability))

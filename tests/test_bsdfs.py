@@ -1,0 +1,180 @@
+"""Every material under the one contract: what is in `bsdfs.ALL` is checked here."""
+
+import numpy as np
+import pytest
+
+from wavefront import bsdfs, testing
+from wavefront.bsdfs import Conductor, Dielectric, Diffuse, Mirror, Spatial
+from wavefront.errors import SceneError
+from wavefront.state import Surface
+
+F4 = np.float32
+
+# Arguments for each material, in full and in the corners of its parameters.
+EXAMPLES = {
+    Diffuse: [{"reflectance": 0.5}, {"reflectance": (1, 0.5, 0)}],
+    Mirror: [{}, {"reflectance": (0.9, 0.5, 0)}],
+    Dielectric: [
+        {},
+        {"ior": 1.0},
+        {"ior": 1 / 1.33},
+        {"ior": 2.4, "reflectance": (1, 0.5, 0.2), "transmittance": (0.2, 0.9, 1)},
+    ],
+    Conductor: [{"eta": 2, "k": 4}, {"eta": (0.15, 0.4, 1.4), "k": (3.5, 2.4, 1.6)}],
+}
+# Materials that absorb nothing.
+LOSSLESS = [Mirror(), Diffuse(1.0), Dielectric(), Dielectric(1 / 1.33)]
+
+CASES = [(kind, arguments) for kind, examples in EXAMPLES.items() for arguments in examples]
+NAMES = [f"{kind.__name__}-{'-'.join(map(str, arguments.values()))}" for kind, arguments in CASES]
+
+
+class Constant(Spatial):
+    """A texture of one value."""
+
+    def __init__(self, value):
+        self.value = value
+
+    def at(self, surface):
+        n = len(surface)
+        if np.ndim(self.value) == 0:
+            return np.full(n, self.value, F4)
+        return np.repeat(np.array(self.value, F4).reshape(3, 1), n, 1)
+
+
+def varying(bsdf, name, value):
+    """A texture of a parameter's value, a colour where the material keeps a colour."""
+    if not isinstance(value, float | tuple):
+        return value
+    is_colour = getattr(getattr(bsdf, name), "ndim", 0) == 2
+    return Constant(np.broadcast_to(value, 3) if is_colour else value)
+
+
+def surface(wo, inside=False):
+    n = wo.shape[1]
+    normal = np.repeat(np.array([[0], [0], [1]], F4), n, 1)
+    zero, index = np.zeros(n, F4), np.zeros(n, np.intp)
+    return Surface(np.zeros((3, n), F4), zero, normal, normal, wo, index, index, np.full(n, inside))
+
+
+def directions(n, seed=0, upper=True):
+    v = np.random.default_rng(seed).normal(size=(3, n))
+    v /= np.linalg.norm(v, axis=0)
+    if upper:
+        v[2] = np.abs(v[2])
+    return v.astype(F4)
+
+
+def uniforms(bsdf, n, seed=1):
+    return np.random.default_rng(seed).random((bsdf.dimensions, n), dtype=F4)
+
+
+def test_every_material_has_examples():
+    assert set(EXAMPLES) == set(bsdfs.ALL)
+
+
+def test_every_material_is_public():
+    assert {kind.__name__ for kind in bsdfs.ALL} <= set(bsdfs.__all__)
+
+
+@pytest.mark.parametrize(("kind", "arguments"), CASES, ids=NAMES)
+def test_contract(kind, arguments):
+    testing.check_bsdf(kind(**arguments), samples=100_000)
+
+
+@pytest.mark.parametrize("bsdf", LOSSLESS, ids=lambda b: type(b).__name__)
+def test_nothing_is_lost(bsdf):
+    testing.check_bsdf(bsdf, samples=100_000, albedo=(1, 1))
+
+
+@pytest.mark.parametrize(("kind", "arguments"), CASES, ids=NAMES)
+def test_textures_of_one_value_equal_the_value(kind, arguments):
+    plain = kind(**arguments)
+    textured = kind(**{name: varying(plain, name, value) for name, value in arguments.items()})
+    wo, wi, u = directions(500), directions(500, 2, upper=False), uniforms(plain, 500)
+    for inside in (False, True):
+        a, b = plain.bind(surface(wo, inside)), textured.bind(surface(wo, inside))
+        assert a.f(wo, wi) == pytest.approx(b.f(wo, wi), rel=1e-6)
+        assert a.pdf(wo, wi) == pytest.approx(b.pdf(wo, wi), rel=1e-6)
+        one, two = a.sample_f(wo, u), b.sample_f(wo, u)
+        assert one.wi == pytest.approx(two.wi, rel=1e-6)
+        assert one.weight == pytest.approx(two.weight, rel=1e-6)
+
+
+@pytest.mark.parametrize(("kind", "arguments"), CASES, ids=NAMES)
+@pytest.mark.parametrize("n", [0, 1])
+def test_few_lanes(kind, arguments, n):
+    bsdf = kind(**arguments)
+    wo, wi = directions(n), directions(n, 3)
+    bound = bsdf.bind(surface(wo))
+    sample = bound.sample_f(wo, uniforms(bsdf, n))
+    assert sample.wi.shape == sample.weight.shape == bound.f(wo, wi).shape == (3, n)
+    assert sample.pdf.shape == sample.specular.shape == bound.pdf(wo, wi).shape == (n,)
+
+
+@pytest.mark.parametrize(("kind", "arguments"), CASES, ids=NAMES)
+def test_corners_of_the_random_numbers(kind, arguments):
+    bsdf = kind(**arguments)
+    last = np.nextafter(F4(1), F4(0))
+    corners = (
+        np.stack(np.meshgrid(*[[0, 0.5, last]] * bsdf.dimensions)).reshape(bsdf.dimensions, -1).astype(F4)
+    )
+    for z in (1, 0.5, 1e-3, 1e-6):
+        wo = np.repeat(np.array([[np.sqrt(1 - z * z)], [0], [z]], F4), corners.shape[1], 1)
+        for inside in (False, True):
+            bound = bsdf.bind(surface(wo, inside))
+            sample = bound.sample_f(wo, corners)
+            values = np.concatenate([sample.wi, sample.weight, sample.pdf[None], bound.f(wo, sample.wi)])
+            assert np.isfinite(values).all()
+            assert (sample.weight >= 0).all()
+
+
+def test_dielectric_knows_its_side():
+    glass = Dielectric(1.5)
+    wo = directions(4)
+    at = surface(wo)
+    at.inside = np.array([False, True, False, True])
+    assert glass.bind(at).eta == pytest.approx([1.5, 1 / 1.5, 1.5, 1 / 1.5])
+    assert glass.eta == pytest.approx([1.5])
+
+
+def test_index_1_goes_straight_through():
+    wo = directions(1000)
+    for inside in (False, True):
+        clear = Dielectric(1.0).bind(surface(wo, inside))
+        sample = clear.sample_f(wo, uniforms(clear, 1000))
+        assert sample.wi == pytest.approx(-wo, abs=1e-7)
+        assert (sample.weight == 1).all()
+        assert (sample.pdf == 1).all()
+
+
+def test_mirror_reflects_in_the_normal():
+    wo = directions(100)
+    sample = Mirror((0.1, 0.2, 0.3)).sample_f(wo, np.zeros((2, 100), F4))
+    assert (sample.wi == wo * np.array([[-1], [-1], [1]])).all()
+    assert sample.weight[:, 7] == pytest.approx([0.1, 0.2, 0.3])
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Diffuse(1.5), r"Diffuse reflectance is 1.5; it must be in \[0, 1\]"),
+        (lambda: Diffuse((0.5, -0.1, 0)), r"Diffuse reflectance\[1\] is -0.1; it must be in \[0, 1\]"),
+        (lambda: Diffuse((0.5, 0.1)), r"Diffuse reflectance must have shape \(3\), got \(2,\)"),
+        (lambda: Diffuse("red"), "Diffuse reflectance must be numeric, got 'red'"),
+        (lambda: Diffuse(np.nan), "Diffuse reflectance is nan; it must be finite"),
+        (lambda: Mirror(2), r"Mirror reflectance is 2; it must be in \[0, 1\]"),
+        (lambda: Dielectric(0), "Dielectric ior is 0; it must be more than 0"),
+        (lambda: Dielectric(-1.5), "Dielectric ior is -1.5; it must be more than 0"),
+        (lambda: Dielectric(np.inf), "Dielectric ior is inf; it must be more than 0"),
+        (lambda: Dielectric("glass"), "Dielectric ior must be a number, got 'glass'"),
+        (lambda: Dielectric(transmittance=3), r"Dielectric transmittance is 3; it must be in \[0, 1\]"),
+        (lambda: Dielectric(reflectance=-1), r"Dielectric reflectance is -1; it must be in \[0, 1\]"),
+        (lambda: Conductor(0, 1), "Conductor eta is 0; it must be more than 0"),
+        (lambda: Conductor((1, 0, 1), 1), r"Conductor eta is \(1, 0, 1\); it must be more than 0"),
+        (lambda: Conductor(1, -1), "Conductor k is -1; it must be at least 0"),
+    ],
+)
+def test_bad_parameters_are_named(make, message):
+    with pytest.raises(SceneError, match=message):
+        make()
