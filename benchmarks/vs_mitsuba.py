@@ -85,7 +85,9 @@ def compare(
     theirs = np.array(mi.render(mitsuba_scene(mi, folder, size, max_bounces + 1), spp=spp))
     end = time.perf_counter()
     print(f"{size[0]}x{size[1]}, {spp} spp, max_bounces {max_bounces}")
-    print(f"wavefront ({ours.metadata['accelerator']}) {middle - begin:.1f} s; {variant} {end - middle:.1f} s")
+    print(
+        f"wavefront ({ours.metadata['accelerator']}) {middle - begin:.1f} s; {variant} {end - middle:.1f} s"
+    )
     print("channel  wavefront   mitsuba     ratio")
     for channel, a, b in zip("RGB", ours.rgb.mean((0, 1)), theirs.mean((0, 1)), strict=True):
         print(f"{channel}        {a:.6f}   {b:.6f}   {a / b:.5f}")
@@ -93,7 +95,9 @@ def compare(
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--data", type=Path, required=True, help="folder that holds cornell/*.obj")
     parser.add_argument("--spp", type=int, default=256)
     parser.add_argument("--size", default="400x300")
@@ -112,5 +116,7 @@ if __name__ == "__main__":
         options.accel,
     )
     difference = np.abs(mine.rgb - other) * 10
-    wf.Image(np.concatenate([mine.rgb, other, difference], 1).astype(np.float32), options.spp).save(options.out)
+    wf.Image(np.concatenate([mine.rgb, other, difference], 1).astype(np.float32), options.spp).save(
+        options.out
+    )
     print(f"wrote {options.out}: wavefront, mitsuba, ten times the difference")

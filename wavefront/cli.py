@@ -28,7 +28,7 @@ INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
     options = _parser().parse_args(arguments)
-    warnings.showwarning = _show_warning
+    warnings.showwarning = lambda message, *_: _show_warning(message)
     try:
         status: int = options.run(options)
     except (SceneError, OSError) as error:
@@ -55,7 +55,9 @@ def _add_render(commands: Any) -> None:
     command.add_argument("scene", help="obj, ply, stl, glb or gltf file")
     command.add_argument("-o", "--output", default="out.png", help="png, jpg, exr, hdr or npy file to write")
     command.add_argument("--spp", type=int, default=100, help="samples per pixel")
-    command.add_argument("--size", type=_size, help="WIDTHxHEIGHT in pixels (default: the camera's, or 512x512)")
+    command.add_argument(
+        "--size", type=_size, help="WIDTHxHEIGHT in pixels (default: the camera's, or 512x512)"
+    )
     command.add_argument("--integrator", choices=INTEGRATORS, default="full", help="estimator of light")
     command.add_argument("--max-bounces", type=int, default=12, help="scattering events along a path")
     command.add_argument("--sampler", choices=SAMPLERS, default="sobol", help="source of random numbers")
@@ -64,7 +66,9 @@ def _add_render(commands: Any) -> None:
     command.add_argument("--workers", type=int, help="threads (default: one per core)")
     command.add_argument("--origin", type=_vector, help="camera position X,Y,Z")
     command.add_argument("--target", type=_vector, help="point that the camera looks at X,Y,Z")
-    command.add_argument("--up", type=_vector, default=(0.0, 1.0, 0.0), help="what is up in the picture X,Y,Z")
+    command.add_argument(
+        "--up", type=_vector, default=(0.0, 1.0, 0.0), help="what is up in the picture X,Y,Z"
+    )
     command.add_argument("--fov", type=float, default=40.0, help="vertical field of view, degrees")
     command.add_argument("--gamma", type=_gamma, default=2.2, help='for png and jpg: a number or "srgb"')
     command.add_argument("--exposure", type=float, default=0.0, help="stops, applied when saving")
@@ -133,7 +137,7 @@ def _triple(values: np.ndarray) -> str:
     return "(" + ", ".join(f"{value:.6g}" for value in values) + ")"
 
 
-def _show_warning(message: Warning | str, *_: object) -> None:
+def _show_warning(message: Warning | str) -> None:
     print(f"wavefront: warning: {message}", file=sys.stderr)
 
 

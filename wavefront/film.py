@@ -75,9 +75,7 @@ class Image:
         """Return `rgb`."""
         return np.array(self.rgb, dtype=dtype, copy=copy)
 
-    def save(
-        self, path: str | os.PathLike[str], gamma: float | str = 2.2, exposure: float = 0.0
-    ) -> None:
+    def save(self, path: str | os.PathLike[str], gamma: float | str = 2.2, exposure: float = 0.0) -> None:
         """Write the picture by its extension: png or jpg for display; exr, hdr and npy linear.
 
         Parameters

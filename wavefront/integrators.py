@@ -17,10 +17,10 @@ from .scene import CompiledScene
 from .stages.bounce import bounce_sample
 from .stages.compact import compact, roulette
 from .stages.intersect import intersect
-from .stages.shade import direct, emitted, mis_weighted, shading
+from .stages.shade import Arrival, direct, emitted, mis_weighted, shading
 from .stages.surface import interact
 from .state import Paths
-from .vec import Floats, Ints, f4
+from .vec import Floats, f4
 
 Integrator: TypeAlias = Callable[[CompiledScene, Paths, Sampler, int], Floats]
 
@@ -31,7 +31,7 @@ def li_naive(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: 
     for bounce in range(max_bounces + 1):
         hits = intersect(scene, paths)
         light = emitted(scene, paths, hits)
-        deposit(L, paths, light.lanes, light.radiance)
+        deposit(L, paths, light)
         paths, hits = compact(paths, hits, hits.found)
         if bounce == max_bounces or not len(paths):
             break
@@ -47,12 +47,12 @@ def li_direct_simple(scene: CompiledScene, paths: Paths, sampler: Sampler, max_b
     for bounce in range(max_bounces + 1):
         hits = intersect(scene, paths)
         light = emitted(scene, paths, hits)
-        deposit(L, paths, light.lanes, light.radiance)
+        deposit(L, paths, light)
         paths, hits = compact(paths, hits, hits.found)
         if bounce == max_bounces or not len(paths):
             break
         shade = shading(scene, interact(scene, paths, hits))
-        deposit_all(L, paths, direct(scene, paths, shade, sampler, bounce, mis=False))
+        deposit(L, paths, direct(scene, paths, shade, sampler, bounce, mis=False))
         paths = bounce_sample(paths, shade, sampler, bounce)
         paths = paths.take(np.flatnonzero(paths.specular))
     return L
@@ -67,12 +67,12 @@ def li_direct_mis(scene: CompiledScene, paths: Paths, sampler: Sampler, max_boun
     for bounce in range(max_bounces + 1):
         hits = intersect(scene, paths)
         light = emitted(scene, paths, hits)
-        deposit(L, paths, light.lanes, mis_weighted(scene, paths, light))
+        deposit(L, paths, mis_weighted(scene, paths, light))
         paths, hits = compact(paths, hits, np.flatnonzero((hits.prim >= 0) & paths.specular))
         if bounce == max_bounces or not len(paths):
             break
         shade = shading(scene, interact(scene, paths, hits))
-        deposit_all(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
+        deposit(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
         paths = bounce_sample(paths, shade, sampler, bounce)
     return L
 
@@ -83,12 +83,12 @@ def li_full(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: i
     for bounce in range(max_bounces + 1):
         hits = intersect(scene, paths)
         light = emitted(scene, paths, hits)
-        deposit(L, paths, light.lanes, mis_weighted(scene, paths, light))
+        deposit(L, paths, mis_weighted(scene, paths, light))
         paths, hits = compact(paths, hits, hits.found)
         if bounce == max_bounces or not len(paths):
             break
         shade = shading(scene, interact(scene, paths, hits))
-        deposit_all(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
+        deposit(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
         paths = bounce_sample(paths, shade, sampler, bounce)
         paths = roulette(paths, sampler, bounce)
     return L
@@ -102,12 +102,7 @@ INTEGRATORS: dict[str, Integrator] = {
 }
 
 
-def deposit(L: Floats, paths: Paths, lanes: Ints, radiance: Floats) -> None:
-    """Add radiance (3, k), met by the paths of the given lanes, to their slots of L."""
-    if lanes.size:
-        L[:, paths.slot.take(lanes)] += paths.throughput.take(lanes, 1) * radiance
-
-
-def deposit_all(L: Floats, paths: Paths, radiance: Floats) -> None:
-    """Add radiance (3, n), found by every path, to their slots of L."""
-    L[:, paths.slot] += paths.throughput * radiance
+def deposit(L: Floats, paths: Paths, light: Arrival) -> None:
+    """Add light that arrives on some lanes, carried on by their paths, to the slots of L."""
+    if light.lanes.size:
+        L[:, paths.slot.take(light.lanes)] += paths.throughput.take(light.lanes, 1) * light.radiance

@@ -111,10 +111,8 @@ def render(
                 advance(piece.lanes)
         except KeyboardInterrupt:
             interrupted = True
-            warnings.warn(
-                f"interrupted: {film.count.sum() / (width * height * spp):.0%} of the samples are in the picture",
-                stacklevel=2,
-            )
+            done = film.count.sum() / (width * height * spp)
+            warnings.warn(f"interrupted: the picture holds {done:.0%} of its samples", stacklevel=2)
     bad.report(int(film.count.sum()))
     metadata = {
         "integrator": integrator,
@@ -176,9 +174,7 @@ def trace_piece(
     """Take one wave of paths from the camera to its radiance."""
     pixels = np.arange(piece.first_pixel, piece.first_pixel + piece.pixels, dtype=np.uint32)
     samples = np.arange(piece.first_sample, piece.first_sample + piece.samples, dtype=np.uint32)
-    paths = generate(
-        scene, camera, sampler, np.tile(pixels, piece.samples), np.repeat(samples, piece.pixels)
-    )
+    paths = generate(scene, camera, sampler, np.tile(pixels, piece.samples), np.repeat(samples, piece.pixels))
     radiance = estimate(scene, paths, sampler, max_bounces)
     bad = np.flatnonzero(~np.isfinite(radiance).all(0))
     radiance[:, bad] = 0

@@ -60,7 +60,9 @@ class Scene:
 
     def __repr__(self) -> str:
         """Count what the scene holds."""
-        return f"<Scene: {len(self.shapes)} shapes, {len(self.lights)} lights, camera={self.camera is not None}>"
+        return (
+            f"<Scene: {len(self.shapes)} shapes, {len(self.lights)} lights, camera={self.camera is not None}>"
+        )
 
     @property
     def bounds(self) -> NDArray[np.float64]:
@@ -223,7 +225,9 @@ def _merge(materials: Sequence[Bsdf], numbers: list[int]) -> Bsdf:
 
 
 def _is_textured(material: Bsdf) -> bool:
-    return any(isinstance(v, Spatial) or (isinstance(v, Bsdf) and _is_textured(v)) for v in vars(material).values())
+    return any(
+        isinstance(v, Spatial) or (isinstance(v, Bsdf) and _is_textured(v)) for v in vars(material).values()
+    )
 
 
 def _number_materials(meshes: Sequence[Mesh], spheres: Sequence[Sphere]) -> tuple[list[Bsdf], Ints]:
@@ -231,7 +235,8 @@ def _number_materials(meshes: Sequence[Mesh], spheres: Sequence[Sphere]) -> tupl
     numbers: dict[int, int] = {}
     materials: list[Bsdf] = []
     of_shape: list[int] = []
-    for shape in (*meshes, *spheres):
+    shapes: list[Shape] = [*meshes, *spheres]
+    for shape in shapes:
         if id(shape.material) not in numbers:
             numbers[id(shape.material)] = len(materials)
             materials.append(shape.material)
@@ -286,7 +291,7 @@ def _gather_lights(
         warnings.warn("the scene has no light; rendering it in Environment(1.0)", stacklevel=4)
         user_lights = [Environment(1.0)]
     kinds: list[Light] = []
-    light_of = np.full(sum(map(len, corners)) + len(spheres), -1, np.intp)
+    light_of = np.full(sum(len(part) for part in corners) + len(spheres), -1, np.intp)
     count = 0
 
     def add(kind: type[Light], records: list[Any]) -> None:
@@ -295,11 +300,12 @@ def _gather_lights(
             kinds.append(kind.concatenate(records))
             count += len(kinds[-1])
 
-    records, start = [], 0
+    records: list[TriangleLights] = []
+    start = 0
     for mesh, triangles in zip(meshes, corners, strict=True):
         if mesh.emission is not None:
             shining = _with_area(mesh, triangles)
-            light_of[start + shining] = count + sum(map(len, records)) + np.arange(len(shining))
+            light_of[start + shining] = count + sum(len(part) for part in records) + np.arange(len(shining))
             records.append(TriangleLights.from_triangles(triangles[shining], mesh.emission))
         start += len(triangles)
     add(TriangleLights, records)

@@ -33,7 +33,8 @@ class Columns:
     __slots__ = ()
 
     def _values(self) -> Iterator[tuple[str, Any]]:
-        for name in _names(type(self)):
+        record: Any = type(self)
+        for name in _names(record):
             yield name, getattr(self, name)
 
     def __len__(self) -> int:
@@ -51,7 +52,8 @@ class Columns:
     def concatenate(cls, records: Sequence[Self]) -> Self:
         """Join the columns of several records of one type."""
         out = object.__new__(cls)
-        for name in _names(cls):
+        record: Any = cls
+        for name in _names(record):
             values = [getattr(record, name) for record in records]
             joined = None if values[0] is None else np.concatenate(values, axis=-1)
             object.__setattr__(out, name, joined)

@@ -6,14 +6,27 @@ columns stand beside it.
 
 from __future__ import annotations
 
+from typing import Any, TypeAlias, TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float32]
+Floats = NDArray[np.floating[Any]]  # float32; the stubs lose the width in arithmetic
 Ints = NDArray[np.intp]
 Bools = NDArray[np.bool_]
 
+Lanes: TypeAlias = Ints | slice  # some columns by index, or all of them: ALL
+
 f4 = np.float32
+ALL = slice(None)
+
+
+Array = TypeVar("Array", bound=NDArray[Any])
+
+
+def columns(a: Array, lanes: Lanes) -> Array:
+    """Columns `lanes` of (..., n); the array itself, not a copy, for all of them."""
+    return a if isinstance(lanes, slice) else a.take(lanes, -1)  # type: ignore[return-value]
 
 
 def dot(a: Floats, b: Floats) -> Floats:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..state import Columns
 from ..vec import Floats
 
+
 @dataclass(slots=True)
 class LightSample(Columns):
     """Light arriving at a point from one sampled direction. A pdf of 0 means no sample."""

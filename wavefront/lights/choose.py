@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ..sampling.discrete import Discrete
-from ..vec import Bools, Floats, Ints, f4
+from ..vec import ALL, Bools, Floats, Ints, Lanes, columns, f4
 from .base import Light, LightSample
 
 
@@ -50,10 +50,7 @@ class LightTable:
         """
         assert self.choice is not None
         light, chance, _ = self.choice.sample(u_choice)
-        if len(self) == 1:
-            sample = self.kinds[0].sample_li(point, u)
-        else:
-            sample = self._sample_each(light, point, u)
+        sample = self._sample_each(light, point, u)
         sample.pdf = sample.pdf * chance
         return sample, self.delta_of.take(light)
 
@@ -62,29 +59,39 @@ class LightTable:
         assert self.choice is not None
         pdf = np.empty(len(light), f4)
         for kind, rows in self._by_kind(light):
-            pdf[rows] = kind.pdf_li(point.take(rows, 1), wi.take(rows, 1))
+            pdf[rows] = kind.pdf_li(columns(point, rows), columns(wi, rows))
         return pdf * self.choice.pmf(light)
 
     def le(self, light: Ints, wi: Floats) -> Floats:
         """Radiance (3, n) of the lights numbered `light` (n,) against wi (3, n)."""
         radiance = np.empty_like(wi)
         for kind, rows in self._by_kind(light):
-            radiance[:, rows] = kind.le(wi.take(rows, 1))
+            radiance[:, rows] = kind.le(columns(wi, rows))
         return radiance
 
     def _sample_each(self, light: Ints, point: Floats, u: Floats) -> LightSample:
+        if len(self.kinds) == 1:
+            return self._gathered(0, light).sample_li(point, u)
         n = len(light)
         out = LightSample(np.empty((3, n), f4), np.empty((3, n), f4), *np.empty((3, n), f4))
         for kind, rows in self._by_kind(light):
-            part = kind.sample_li(point.take(rows, 1), u.take(rows, 1))
+            part = kind.sample_li(columns(point, rows), columns(u, rows))
             out.wi[:, rows], out.radiance[:, rows] = part.wi, part.radiance
             out.pdf[rows], out.distance[rows], out.cos_light[rows] = part.pdf, part.distance, part.cos_light
         return out
 
-    def _by_kind(self, light: Ints) -> Iterator[tuple[Light, Ints]]:
+    def _gathered(self, number: int, light: Ints) -> Light:
+        """Return the lights, all of one kind, with a column per lane."""
+        kind = self.kinds[number]
+        return kind if len(kind) == 1 else kind.take(light - self.starts[number])
+
+    def _by_kind(self, light: Ints) -> Iterator[tuple[Light, Lanes]]:
         """Yield, per kind that occurs, its lights gathered to a column per lane, and those lanes."""
+        if len(self.kinds) == 1:
+            yield self._gathered(0, light), ALL
+            return
         kind_of = self.kind_of.take(light)
-        for number, kind in enumerate(self.kinds):
+        for number in range(len(self.kinds)):
             rows = np.flatnonzero(kind_of == number)
             if rows.size:
-                yield kind.take(light.take(rows) - self.starts[number]), rows
+                yield self._gathered(number, light.take(rows)), rows

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,14 +24,16 @@ class TriangleLights(Light):
     radiance: Floats  # (3, k) W·sr⁻¹·m⁻²
 
     @classmethod
-    def from_triangles(cls, triangles: NDArray[np.float64], radiance: Floats) -> Self:
+    def from_triangles(cls, triangles: NDArray[np.float64], radiance: Floats) -> TriangleLights:
         """Build from vertices (k, 3, 3), relative to the scene's centre, and one radiance (3, 1)."""
         edge1 = (triangles[:, 1] - triangles[:, 0]).T
         edge2 = (triangles[:, 2] - triangles[:, 0]).T
         normal = np.cross(edge1, edge2, axis=0)
         twice = np.linalg.norm(normal, axis=0)
-        rows = [np.ascontiguousarray(v, f4) for v in (triangles[:, 0].T, edge1, edge2, normal / twice)]
-        return cls(*rows, (twice / 2).astype(f4), np.repeat(radiance, len(triangles), 1))
+        corner, u, v, n = (
+            np.ascontiguousarray(rows, f4) for rows in (triangles[:, 0].T, edge1, edge2, normal / twice)
+        )
+        return cls(corner, u, v, n, (twice / 2).astype(f4), np.repeat(radiance, len(triangles), 1))
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
         """Pick a point uniformly by area; its density in solid angle is d²/(A·cosθ)."""

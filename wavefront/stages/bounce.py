@@ -6,7 +6,7 @@ import numpy as np
 
 from ..sampling.sampler import Dimension, Sampler
 from ..state import Paths
-from ..vec import dot, f4
+from ..vec import columns, dot, f4
 from .shade import Shading, same_side
 from .surface import leave
 
@@ -23,7 +23,7 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
     pdf, specular, eta2 = np.empty(n, f4), np.empty(n, np.bool_), paths.eta2.copy()
     u = _numbers(paths, shade, sampler, bounce)
     for lanes, bsdf in shade.groups:
-        sample = bsdf.sample_f(shade.wo.take(lanes, 1), u[: bsdf.dimensions].take(lanes, 1))
+        sample = bsdf.sample_f(columns(shade.wo, lanes), columns(u[: bsdf.dimensions], lanes))
         wi[:, lanes], weight[:, lanes] = sample.wi, sample.weight
         pdf[lanes], specular[lanes] = sample.pdf, sample.specular
         if sample.eta is not None:

@@ -12,17 +12,23 @@ from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
 from ..scene import CompiledScene
 from ..state import Hits, Paths, Surface
-from ..vec import Bools, Floats, Ints, dot, f4
+from ..vec import ALL, Bools, Floats, Ints, Lanes, columns, dot, f4
 from .intersect import visible
 
 
 @dataclass(slots=True)
-class Emission:
-    """Light met by rays: only the lanes that meet some."""
+class Arrival:
+    """Light that arrives on some lanes."""
 
     lanes: Ints  # (k,)
-    light: Ints  # (k,) number of the light
     radiance: Floats  # (3, k) W·sr⁻¹·m⁻²
+
+
+@dataclass(slots=True)
+class Emission(Arrival):
+    """Light met by rays: only the lanes that meet some."""
+
+    light: Ints  # (k,) number of the light
 
 
 @dataclass(slots=True)
@@ -32,7 +38,7 @@ class Shading:
     surface: Surface
     frame: Frame
     wo: Floats  # (3, n) local frame
-    groups: list[tuple[Ints, Bsdf]]  # lanes of each group, and its material bound to them
+    groups: list[tuple[Lanes, Bsdf]]  # lanes of each group, and its material bound to them
 
 
 def emitted(scene: CompiledScene, paths: Paths, hits: Hits) -> Emission:
@@ -41,15 +47,15 @@ def emitted(scene: CompiledScene, paths: Paths, hits: Hits) -> Emission:
     lanes = np.flatnonzero(light >= 0)
     light = light.take(lanes)
     radiance = scene.lights.le(light, paths.direction.take(lanes, 1))
-    return Emission(lanes, light, radiance)
+    return Emission(lanes, radiance, light)
 
 
-def mis_weighted(scene: CompiledScene, paths: Paths, emission: Emission) -> Floats:
-    """Return the emission (3, k) weighted against light sampling; in full after a delta lobe."""
+def mis_weighted(scene: CompiledScene, paths: Paths, emission: Emission) -> Arrival:
+    """Return the emission weighted against light sampling; in full after a delta lobe."""
     before = paths.take(emission.lanes)
     pdf_light = scene.lights.pdf_li(emission.light, before.origin, before.direction)
     weight = np.where(before.specular, f4(1), power_heuristic(before.pdf, pdf_light))
-    return emission.radiance * weight
+    return Arrival(emission.lanes, emission.radiance * weight)
 
 
 def shading(scene: CompiledScene, surface: Surface) -> Shading:
@@ -58,7 +64,7 @@ def shading(scene: CompiledScene, surface: Surface) -> Shading:
     wo = frame.to_local(surface.wo)
     materials = scene.materials
     if len(materials.groups) == 1:
-        groups = [(np.arange(len(surface)), materials.groups[0].bind(surface))]
+        groups: list[tuple[Lanes, Bsdf]] = [(ALL, materials.groups[0].bind(surface))]
     else:
         groups = []
         group_of = materials.group_of.take(surface.material)
@@ -69,31 +75,28 @@ def shading(scene: CompiledScene, surface: Surface) -> Shading:
     return Shading(surface, frame, wo, groups)
 
 
-def direct(scene: CompiledScene, paths: Paths, shade: Shading, sampler: Sampler, bounce: int, mis: bool) -> Floats:
-    """Return the light (3, n) that one sampled light sends to each point and on along wo.
+def direct(
+    scene: CompiledScene, paths: Paths, shade: Shading, sampler: Sampler, bounce: int, mis: bool
+) -> Arrival:
+    """Return the light that one sampled light sends to each point and on along wo.
 
     With `mis` it is weighted by the power heuristic against BSDF sampling. Surfaces that have
     only delta lobes get none.
     """
-    radiance = np.zeros((3, len(paths)), f4)
-    if scene.lights.choice is None:
-        return radiance
+    if scene.lights.choice is None or all(bsdf.specular for _, bsdf in shade.groups):
+        return Arrival(np.zeros(0, np.intp), np.zeros((3, 0), f4))
     surface = shade.surface
     address = paths.pixel, paths.sample, bounce
     u_choice = sampler.draw_1d(*address, Dimension.LIGHT)
     u_point = sampler.draw_2d(*address, Dimension.LIGHT_POINT)
     light, delta = scene.lights.sample_li(surface.point, u_choice, u_point)
-    f, pdf = evaluate(shade, shade.frame.to_local(light.wi), dot(surface.ng, light.wi))
-    # f holds the cosine from here on
-    ok = np.flatnonzero((light.pdf > 0) & (f.max(0) > 0))
-    if not ok.size:
-        return radiance
-    light, f, pdf, delta = light.take(ok), f.take(ok, 1), pdf.take(ok), delta.take(ok)
+    f_cos, pdf = evaluate(shade, shade.frame.to_local(light.wi), dot(surface.ng, light.wi))
+    lanes = np.flatnonzero((light.pdf > 0) & (f_cos.max(0) > 0))
+    light, f_cos, pdf, delta = light.take(lanes), f_cos.take(lanes, 1), pdf.take(lanes), delta.take(lanes)
     weight = np.where(delta, f4(1), power_heuristic(light.pdf, pdf)) if mis else f4(1)
-    arriving = f * light.radiance * (weight / light.pdf)
-    seen = np.flatnonzero(visible(scene, surface.take(ok), light))
-    radiance[:, ok.take(seen)] = arriving.take(seen, 1)
-    return radiance
+    radiance = f_cos * light.radiance * (weight / light.pdf)
+    seen = np.flatnonzero(visible(scene, surface.take(lanes), light))
+    return Arrival(lanes.take(seen), radiance.take(seen, 1))
 
 
 def evaluate(shade: Shading, wi: Floats, cos_g: Floats) -> tuple[Floats, Floats]:
@@ -107,7 +110,7 @@ def evaluate(shade: Shading, wi: Floats, cos_g: Floats) -> tuple[Floats, Floats]
     for lanes, bsdf in shade.groups:
         if bsdf.specular:
             continue
-        part_f, part_pdf = bsdf.evaluate(shade.wo.take(lanes, 1), wi.take(lanes, 1))
+        part_f, part_pdf = bsdf.evaluate(columns(shade.wo, lanes), columns(wi, lanes))
         f[:, lanes], pdf[lanes] = part_f, part_pdf
     f *= np.where(same_side(wi, cos_g), np.abs(wi[2]), f4(0))
     return f, pdf
