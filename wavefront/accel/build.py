@@ -1,0 +1,167 @@
+"""Build a tree of boxes over primitives, level by level, in whole-array operations.
+
+Every pass splits all nodes of one level at once: primitives are sorted by node and position, and each
+node is cut where the surface area heuristic is lowest (Goldsmith and Salmon 1987; binned as in Wald,
+"On fast construction of SAH-based bounding volume hierarchies", 2007). As leaves are matrices of a
+fixed number of rows, a leaf costs the same however full it is: cuts lie at multiples of the leaf size.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..vec import Floats, Ints, f4
+
+EMPTY = f4(3e38)  # the box that no ray meets runs from EMPTY to -EMPTY
+MAX_CUTS = 16  # cuts tried per node and axis
+
+
+@dataclass(slots=True)
+class Tree:
+    """A wide tree. A child code c >= 0 is inner node c, c < 0 is leaf -1 - c."""
+
+    low: Floats  # (nodes, width, 3) lower corners of the children's boxes, EMPTY where there is none
+    high: Floats  # (nodes, width, 3) upper corners, -EMPTY where there is none
+    child: NDArray[np.int32]  # (nodes, width) child codes, 0 where there is none
+    prim: Ints  # (leaves, leaf size) primitives of each leaf, -1 where there is none
+    cost: float  # SAH: expected boxes and leaves visited by a random line through the root's box
+
+
+def build_tree(low: Floats, high: Floats, leaf_size: int, width: int) -> Tree:
+    """Build over boxes `low`, `high` (3, m), m > 0. `width` is a power of two."""
+    m = low.shape[1]
+    order = np.arange(m)
+    start, count = np.zeros(1, np.intp), np.full(1, m)
+    levels: list[tuple[Ints, Ints]] = []  # per level: parent and rank of each piece
+    nodes, leaves = 0, 0
+    lows, highs, children, members = [], [], [], []
+    area_sum = 0.0
+    while start.size:
+        parents = start.size
+        parent = np.arange(parents)
+        for _ in range(width.bit_length() - 1):
+            order, start, count, parent = _split(order, start, count, parent, low, high, leaf_size)
+        piece_low = np.minimum.reduceat(low.take(order, 1), start, 1) if start.size else low[:, :0]
+        piece_high = np.maximum.reduceat(high.take(order, 1), start, 1)
+        rank = np.arange(start.size) - np.searchsorted(parent, parent)
+        leaf = count <= leaf_size
+        code = np.where(leaf, -leaves - np.cumsum(leaf), nodes + parents - 1 + np.cumsum(~leaf))
+        box = np.full((2, parents, width, 3), EMPTY, f4)
+        box[1] = -EMPTY
+        box[0, parent, rank], box[1, parent, rank] = piece_low.T, piece_high.T
+        slots = np.zeros((parents, width), np.int32)
+        slots[parent, rank] = code
+        area_sum += float(_area(piece_low, piece_high).sum())
+        lows.append(box[0])
+        highs.append(box[1])
+        children.append(slots)
+        members.append(_leaf_members(order, start[leaf], count[leaf], leaf_size))
+        nodes += parents
+        leaves += int(leaf.sum())
+        inner = np.flatnonzero(~leaf)
+        order, start, count = _keep(order, start, count, inner)
+    del levels
+    root_area = float(_area(low.min(1, keepdims=True), high.max(1, keepdims=True))[0])
+    return Tree(
+        np.concatenate(lows),
+        np.concatenate(highs),
+        np.concatenate(children),
+        np.concatenate(members),
+        area_sum / root_area if root_area > 0 else float(leaves),
+    )
+
+
+def _area(low: Floats, high: Floats) -> Floats:
+    """Half the surface area of boxes (3, ...)."""
+    x, y, z = np.maximum(high - low, 0)
+    return x * y + y * z + z * x
+
+
+def _leaf_members(order: Ints, start: Ints, count: Ints, leaf_size: int) -> Ints:
+    """Primitives of each leaf, sorted, -1 beyond its count -> (leaves, leaf_size)."""
+    column = np.arange(leaf_size)
+    used = column < count[:, None]
+    at = np.where(used, start[:, None] + column, 0)
+    return np.where(used, order.take(at), -1)
+
+
+def _keep(order: Ints, start: Ints, count: Ints, chosen: Ints) -> tuple[Ints, Ints, Ints]:
+    """Drop the primitives of all segments but the chosen ones."""
+    start, count = start.take(chosen), count.take(chosen)
+    ends = np.cumsum(count)
+    begins = ends - count
+    at = np.arange(int(count.sum())) + np.repeat(start - begins, count)
+    return order.take(at), begins, count
+
+
+def _split(
+    order: Ints, start: Ints, count: Ints, parent: Ints, low: Floats, high: Floats, leaf_size: int
+) -> tuple[Ints, Ints, Ints, Ints]:
+    """Cut every segment of more than `leaf_size` primitives in two."""
+    large = np.flatnonzero(count > leaf_size)
+    if not large.size:
+        return order, start, count, parent
+    ids, begin, size = _keep(order, start, count, large)
+    best_cost = np.full(large.size, np.inf)
+    best_cut = np.zeros(large.size, np.intp)
+    best_ids = ids.copy()
+    owner = np.repeat(np.arange(large.size), size)
+    for axis in range(3):
+        middle = low[axis].take(ids) + high[axis].take(ids)
+        sorted_ids = ids.take(_argsort_within(owner, middle))
+        cost, cut = _best_cut(sorted_ids, begin, size, low, high, leaf_size)
+        better = cost < best_cost
+        best_cost = np.where(better, cost, best_cost)
+        best_cut = np.where(better, cut, best_cut)
+        best_ids = np.where(better.take(owner), sorted_ids, best_ids)
+    new_order = order.copy()
+    new_order[np.arange(ids.size) + np.repeat(start.take(large) - begin, size)] = best_ids
+    cuts = np.zeros(start.size, np.intp)
+    cuts[large] = best_cut
+    repeat = np.where(cuts > 0, 2, 1)
+    second = np.cumsum(repeat)[large] - 1
+    new_start, new_count, new_parent = (np.repeat(x, repeat) for x in (start, count, parent))
+    new_count[second - 1] = best_cut
+    new_start[second] += best_cut
+    new_count[second] -= best_cut
+    return new_order, new_start, new_count, new_parent
+
+
+def _argsort_within(owner: Ints, key: Floats) -> Ints:
+    """Sort by (owner, key), ties by position: one sort of 64-bit words."""
+    bits = key.view(np.int32).astype(np.int64)
+    ordered = np.where(bits < 0, ~bits & 0x7FFFFFFF, bits | 0x80000000)
+    ordered = np.where(bits < 0, 0x7FFFFFFF - (bits & 0x7FFFFFFF), ordered)
+    return np.argsort((owner.astype(np.int64) << 32) | ordered, kind="stable")
+
+
+def _best_cut(
+    ids: Ints, begin: Ints, size: Ints, low: Floats, high: Floats, leaf_size: int
+) -> tuple[NDArray[np.float64], Ints]:
+    """Find each segment's best cut of its sorted `ids`: cost and number of primitives before it."""
+    step = leaf_size * -(-size // (leaf_size * MAX_CUTS))
+    chunks = -(-size // step)
+    total = int(chunks.sum())
+    owner = np.repeat(np.arange(size.size), chunks)
+    rank = np.arange(total) - np.repeat(np.cumsum(chunks) - chunks, chunks)
+    at = begin.take(owner) + rank * step.take(owner)
+    box = np.full((2, 3, size.size, MAX_CUTS), EMPTY, f4)
+    box[1] = -EMPTY
+    for axis in range(3):
+        box[0, axis, owner, rank] = np.minimum.reduceat(low[axis].take(ids), at)
+        box[1, axis, owner, rank] = np.maximum.reduceat(high[axis].take(ids), at)
+    left = _area(np.minimum.accumulate(box[0], 2), np.maximum.accumulate(box[1], 2))
+    right = _area(
+        np.minimum.accumulate(box[0, :, :, ::-1], 2)[:, :, ::-1],
+        np.maximum.accumulate(box[1, :, :, ::-1], 2)[:, :, ::-1],
+    )
+    before = np.arange(1, MAX_CUTS) * step[:, None]
+    after = size[:, None] - before
+    leaves_before, leaves_after = before // leaf_size, -(-after // leaf_size)
+    cost = left[:, :-1].astype(np.float64) * leaves_before + right[:, 1:] * leaves_after
+    cost = np.where(after > 0, cost, np.inf)
+    best = cost.argmin(1)
+    return cost[np.arange(size.size), best], (best + 1) * step

@@ -1,0 +1,289 @@
+"""The accelerator in NumPy: triangles and spheres by matrix products, decisions element by element."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..vec import Bools, Floats, Ints, f4
+from . import sphere, triangle
+from .base import Geometry, Intersections
+from .traverse import (
+    BLOCK,
+    BLOCK_SHIFT,
+    CHUNK,
+    LINE,
+    NO_HIT,
+    Ball,
+    Lanes,
+    Words,
+    blocks,
+    bounding_ball,
+    prepare,
+    slab_table,
+    stream_tree,
+    trace,
+)
+from .triangle import ROUNDOFF, Doubles
+
+BATCH = 1 << 17  # rays traced at a time
+SMALL = 128  # up to so many primitives, all are tested without a tree
+WIDTH = 16
+
+# Records candidates: leaf slots or primitives (k,), lanes (k,), filter values (k,).
+Candidates = Callable[[Ints, Ints, Floats], None]
+
+
+class _Closest:
+    """The nearest hit of each lane so far, as one sortable word: bits of t, then the primitive."""
+
+    def __init__(self, lanes: Lanes) -> None:
+        self.speed = lanes.speed
+        self.begin = lanes.begin
+        self.key = np.full(lanes.speed.size + 1, NO_HIT, np.int64)
+
+    def add(self, lane: Ints, prim: Ints, t: Doubles) -> None:
+        """Record hits of lanes (k,) at t; those with t <= 0, NaN or inf are none."""
+        rounded = t.astype(f4)
+        valid = (rounded > 0) & (rounded < np.inf)
+        key = (rounded.view(np.int32).astype(np.int64) << 32) | prim
+        np.minimum.at(self.key, lane, np.where(valid, key, NO_HIT))
+
+    def bound(self, lane: Ints) -> Floats:
+        """Return how far lanes still look, in unit direction; rounded up."""
+        t = (self.key.take(lane) >> 32).astype(np.int32).view(f4)
+        return _slab_distance(t, lane, self.speed, self.begin)
+
+    def wants(self, lane: Ints) -> Bools | None:
+        """Tell which lanes still look; None for all."""
+        return None
+
+
+class _Occluded:
+    """Which lanes are blocked so far."""
+
+    def __init__(self, lanes: Lanes, distance: Floats) -> None:
+        self.speed, self.begin = lanes.speed, lanes.begin
+        self.distance = distance
+        self.left = np.append(distance, f4(0))  # -1 once blocked
+        self.blocked = np.zeros(distance.size, bool)
+
+    def add(self, lane: Ints, prim: Ints, t: Doubles) -> None:
+        """Block the lanes (k,) with 0 < t < distance."""
+        rounded = t.astype(f4)
+        lane = lane.compress((rounded > 0) & (rounded < self.distance.take(lane)))
+        self.blocked[lane] = True
+        self.left[lane] = -np.inf
+
+    def bound(self, lane: Ints) -> Floats:
+        """Return how far lanes still look, in unit direction; -inf once blocked."""
+        return _slab_distance(self.left.take(lane), lane, self.speed, self.begin)
+
+
+def _slab_distance(t: Floats, lane: Ints, speed: Floats, begin: Doubles | None) -> Floats:
+    """Turn t into the slabs' distances, rounded up."""
+    far = t * speed.take(lane, mode="clip") * f4(1 + 4 * ROUNDOFF)
+    if begin is None:
+        return far
+    start = begin.take(lane, mode="clip")
+    return (far - start + 8 * ROUNDOFF * np.abs(start)).astype(f4)
+
+
+class _Triangles:
+    """Triangles (m, 3, 3) without degenerate ones, behind a filter and perhaps a tree."""
+
+    def __init__(self, triangles: Floats, ball: Ball, leaf_size: int) -> None:
+        self.table = triangle.triangle_table(triangles)
+        self.ids = np.flatnonzero(triangle.has_area(triangles))
+        self.ball = ball
+        solid = triangles.take(self.ids, 0)
+        self.tree = None
+        if len(solid) <= SMALL:
+            self.rows = triangle.edge_rows(solid, ball.center, ball.radius).reshape(-1, 6)
+            return
+        low = np.ascontiguousarray(solid.min(1).T)
+        high = np.ascontiguousarray(solid.max(1).T)
+        self.tree, _ = stream_tree(low, high, leaf_size, WIDTH, ball)
+        rows = triangle.edge_rows(solid, ball.center, ball.radius)
+        slot = self.tree.prim.reshape(-1, leaf_size)
+        leaves = rows.take(np.maximum(slot, 0), 1)  # (3, leaves, leaf_size, 6)
+        leaves[:, slot < 0] = np.nan
+        self.tree.leaves = np.ascontiguousarray(leaves.transpose(1, 0, 2, 3)).reshape(len(slot), -1, 6)
+        self.tree.prim = self.ids.take(self.tree.prim)
+
+    def search(self, lanes: Lanes, found: _Closest | _Occluded) -> None:
+        """Give all hits that may matter to `found`."""
+        if self.tree is None:
+            self._search_all(lanes, found)
+            return
+        tree = self.tree
+        table = slab_table(lanes, self.ball)
+
+        def visit(leaf: Ints, lane: Ints) -> None:
+            size = tree.leaf_size
+            for leaves, block_lanes in blocks(leaf, lane, len(table) - 1, CHUNK // (3 * size * BLOCK)):
+                rays = table.take(block_lanes, 0).reshape(-1, BLOCK, 16)[:, :, LINE]
+                edges = tree.leaves.take(leaves, 0) @ rays.transpose(0, 2, 1)
+                value = _one_sign(edges.reshape(-1, 3, size, BLOCK))
+                at = np.flatnonzero(value >= -1)
+                pair = at >> BLOCK_SHIFT
+                block = pair // size
+                slot = leaves.take(block) * size + (pair & (size - 1))
+                lane = block_lanes.take(block * BLOCK + (at & (BLOCK - 1)))
+                self._decide(lanes, found, tree.prim.take(slot), lane, value.ravel().take(at))
+
+        trace(tree, table, found.bound, visit)
+
+    def _search_all(self, lanes: Lanes, found: _Closest | _Occluded) -> None:
+        if not self.ids.size:
+            return
+        n, m = lanes.speed.size, self.ids.size
+        step = max(64, min(4096, CHUNK // (3 * m)))
+        for at in range(0, n, step):
+            edges = self.rows @ lanes.line[:, at : at + step]
+            value = _one_sign(edges.reshape(1, 3, m, -1))
+            hit = np.flatnonzero(value >= -1)
+            slot, lane = np.divmod(hit, value.shape[-1])
+            self._decide(lanes, found, self.ids.take(slot), lane + at, value.ravel().take(hit))
+
+    def _decide(
+        self, lanes: Lanes, found: _Closest | _Occluded, prim: Ints, lane: Ints, value: Floats
+    ) -> None:
+        """Decide candidates: triangles (k,), lanes (k,) and the filter's values (k,)."""
+        keep = np.flatnonzero(prim != lanes.leaving.take(lane))
+        prim, lane, value = prim.take(keep), lane.take(keep), value.take(keep)
+        origin = lanes.origin.take(lane, 1).astype(np.float64)
+        direction = lanes.direction.take(lane, 1).astype(np.float64)
+        t = triangle.plane_distance(self.table, prim, origin, direction)
+        unsure = np.flatnonzero(~(value > 1))
+        if unsure.size:
+            rays = prim.take(unsure), origin.take(unsure, 1), direction.take(unsure, 1)
+            inside = triangle.hits_watertight(self.table, *rays)
+            clamped = triangle.clamp_to_triangle(self.table, *rays, t.take(unsure))
+            t[unsure] = np.where(inside, clamped, np.inf)
+        found.add(lane, prim, t)
+
+
+class _Spheres:
+    """Spheres behind a filter and perhaps a tree; primitive ids start at `first`."""
+
+    def __init__(self, centers: Floats, radii: Floats, ball: Ball, first: int, leaf_size: int) -> None:
+        self.centers, self.radii = centers.astype(np.float64), radii.astype(np.float64)
+        self.ball, self.first = ball, first
+        rows = sphere.sphere_rows(self.centers, self.radii, ball.center, ball.radius)
+        self.tree = None
+        self.rows = rows
+        if radii.size <= SMALL:
+            return
+        self.tree, _ = stream_tree(centers - radii, centers + radii, leaf_size, WIDTH, ball)
+        slot = self.tree.prim.reshape(-1, leaf_size)
+        leaves = rows.take(np.maximum(slot, 0), 0)
+        leaves[slot < 0] = np.nan
+        self.tree.leaves = leaves
+
+    def search(self, lanes: Lanes, found: _Closest | _Occluded) -> None:
+        """Give all hits that may matter to `found`."""
+        if not self.radii.size:
+            return
+        features = sphere.line_features(lanes.line[:3], lanes.line[3:])
+        if self.tree is None:
+            n, k = lanes.speed.size, self.radii.size
+            step = max(64, min(4096, CHUNK // k))
+            for at in range(0, n, step):
+                value = self.rows @ features[:, at : at + step]
+                hit = np.flatnonzero(value >= -1)
+                slot, lane = np.divmod(hit, value.shape[-1])
+                self._decide(lanes, found, slot, lane + at)
+            return
+        tree = self.tree
+        table = slab_table(lanes, self.ball)
+        columns = np.full((len(table), 12), np.nan, f4)
+        columns[:-1, :11] = features.T
+
+        def visit(leaf: Ints, lane: Ints) -> None:
+            size = tree.leaf_size
+            for leaves, block_lanes in blocks(leaf, lane, len(table) - 1, CHUNK // (size * BLOCK)):
+                rays = columns.take(block_lanes, 0).reshape(-1, BLOCK, 12)[:, :, :11]
+                value = tree.leaves.take(leaves, 0) @ rays.transpose(0, 2, 1)
+                at = np.flatnonzero(value >= -1)
+                pair = at >> BLOCK_SHIFT
+                block = pair // size
+                slot = leaves.take(block) * size + (pair & (size - 1))
+                lane = block_lanes.take(block * BLOCK + (at & (BLOCK - 1)))
+                self._decide(lanes, found, tree.prim.take(slot), lane)
+
+        trace(tree, table, found.bound, visit)
+
+    def _decide(self, lanes: Lanes, found: _Closest | _Occluded, prim: Ints, lane: Ints) -> None:
+        """Decide candidates: spheres (k,) and lanes (k,)."""
+        origin = lanes.origin.take(lane, 1).astype(np.float64)
+        direction = lanes.direction.take(lane, 1).astype(np.float64)
+        ids = prim + self.first
+        center, radius = sphere.spheres_of(self.centers, self.radii, prim)
+        leaves = lanes.leaving.take(lane) == ids
+        t = sphere.sphere_distance(center, radius, origin, direction, leaves)
+        found.add(lane, ids, t)
+
+
+def _one_sign(edges: Floats) -> Floats:
+    """Edge functions (b, 3, m, k) -> min(w0 w1, w1 w2): above 0 where the three have one sign."""
+    first = np.multiply(edges[:, 0], edges[:, 1], out=edges[:, 0])
+    last = np.multiply(edges[:, 1], edges[:, 2], out=edges[:, 2])
+    return np.minimum(first, last, out=first)
+
+
+class NumpyAccelerator:
+    """Ray queries in NumPy alone; see base.Accelerator."""
+
+    name = "numpy"
+
+    def __init__(self, geometry: Geometry, leaf_size: int = 64) -> None:
+        triangles, centers, radii = geometry.triangles, geometry.centers, geometry.radii
+        self._first_sphere = len(triangles)
+        corners = np.concatenate([triangles.reshape(-1, 3).T, centers - radii, centers + radii], 1)
+        self._ball = bounding_ball(corners, corners) if corners.size else Ball(np.zeros(3, f4), 1.0)
+        with np.errstate(all="ignore"):
+            self._triangles = _Triangles(triangles, self._ball, leaf_size)
+            self._spheres = _Spheres(centers, radii, self._ball, len(triangles), leaf_size)
+
+    def closest(self, origin: Floats, direction: Floats, leaving: Ints) -> Intersections:
+        """Find the nearest hit with t > 0 of rays (3, n); ties go to the lowest id."""
+        n = origin.shape[1]
+        hits = Intersections(np.empty(n, f4), np.empty(n, np.intp), np.empty(n, f4), np.empty(n, f4))
+        for at in range(0, n, BATCH):
+            part = slice(at, at + BATCH)
+            with np.errstate(all="ignore"):
+                lanes = prepare(origin[:, part], direction[:, part], leaving[part], self._ball)
+                found = _Closest(lanes)
+                self._triangles.search(lanes, found)
+                self._spheres.search(lanes, found)
+                self._report(lanes, found.key[:-1], hits, part)
+        return hits
+
+    def occluded(self, origin: Floats, direction: Floats, distance: Floats, leaving: Ints) -> Bools:
+        """Tell whether anything is hit with 0 < t < `distance` (n,)."""
+        blocked = np.empty(origin.shape[1], bool)
+        for at in range(0, blocked.size, BATCH):
+            part = slice(at, at + BATCH)
+            with np.errstate(all="ignore"):
+                lanes = prepare(origin[:, part], direction[:, part], leaving[part], self._ball)
+                found = _Occluded(lanes, distance[part])
+                self._triangles.search(lanes, found)
+                self._spheres.search(lanes, found)
+            blocked[part] = found.blocked
+        return blocked
+
+    def _report(self, lanes: Lanes, key: Words, hits: Intersections, part: slice) -> None:
+        """Unpack keys (n,) and compute the barycentrics of triangles."""
+        hits.t[part] = (key >> 32).astype(np.int32).view(f4)
+        prim = key & 0xFFFFFFFF
+        missed = key == NO_HIT
+        b1, b2 = hits.b1[part], hits.b2[part]
+        b1[...] = 0
+        b2[...] = 0
+        on = np.flatnonzero((prim < self._first_sphere) & ~missed)
+        origin = lanes.origin.take(on, 1).astype(np.float64)
+        direction = lanes.direction.take(on, 1).astype(np.float64)
+        b1[on], b2[on] = triangle.barycentrics(self._triangles.table, prim.take(on), origin, direction)
+        hits.prim[part] = np.where(missed, -1, prim)

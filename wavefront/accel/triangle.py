@@ -1,0 +1,155 @@
+"""Rays against triangles, one (ray, triangle) pair per element: who is hit, where, and how far.
+
+Two tests share this file. `edge_rows` serves the fast one: the sign of an edge function is the sign
+of the product of the ray's and the edge's Plücker coordinates, six numbers each, so a matrix product
+tests all rays against all edges in float32. It only sorts pairs into *misses*, *hits*, and a thin
+*unsure* band that is wider than its rounding error. `hits_watertight` decides the unsure ones by signs
+that are exact, so that no ray slips between two triangles and the result never depends on how BLAS
+happened to round.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..vec import Bools, Floats, Ints, f4
+
+Doubles = NDArray[np.float64]
+
+ROUNDOFF = 2.0**-24  # half an ulp of float32
+
+
+@dataclass(slots=True)
+class TriangleTable:
+    """What the element-by-element decision reads, float64, one column per triangle (m)."""
+
+    corners: Doubles  # (9, m) x, y, z of the first, second and third vertex
+    plane: Doubles  # (4, m) normal n = (b - a) × (c - a), and n·a
+    second: Doubles  # (4, m) weight of the second vertex at p is second[:3]·p + second[3]
+    third: Doubles  # (4, m) the same for the third vertex
+
+
+def triangle_table(triangles: Floats) -> TriangleTable:
+    """Precompute planes and barycentric gradients of triangles (m, 3, 3)."""
+    corners = np.ascontiguousarray(triangles.reshape(-1, 9).T, np.float64)
+    a, b, c = corners[:3], corners[3:6], corners[6:]
+    normal = np.cross(b - a, c - a, axis=0)
+    with np.errstate(all="ignore"):
+        size2 = (normal * normal).sum(0)
+        second = np.cross(c - a, normal, axis=0) / size2
+        third = np.cross(normal, b - a, axis=0) / size2
+    return TriangleTable(
+        corners,
+        np.concatenate([normal, (normal * a).sum(0)[None]]),
+        np.concatenate([second, -(second * a).sum(0)[None]]),
+        np.concatenate([third, -(third * a).sum(0)[None]]),
+    )
+
+
+def has_area(triangles: Floats) -> Bools:
+    """Tell which triangles (m, 3, 3) are not degenerate; a degenerate one is never hit."""
+    a, b, c = np.ascontiguousarray(triangles.transpose(1, 2, 0), np.float64)
+    normal = np.cross(b - a, c - a, axis=0)
+    with np.errstate(all="ignore"):
+        size2 = (normal * normal).sum(0)
+    return (size2 > 0) & np.isfinite(size2)
+
+
+def edge_rows(triangles: Floats, center: Floats, radius: float) -> Floats:
+    """Return the Plücker rows of the three edges of triangles (m, 3, 3) -> (3, m, 6) float32.
+
+    With a ray as (d, (o - center) × d), |d| = 1, the product w of a row and a ray is the volume
+    spanned by ray and edge: the ray passes inside if the three have one sign (Shoemake, "Plücker
+    coordinate tutorial", 1998). `radius` bounds the distance of all vertices from `center` (3,).
+
+    Rows are scaled so that one threshold serves every triangle: a ray that truly hits has
+    min(w0 w1, w1 w2) > -1, and if that is above 1, it truly hits. For an error of at most e in each w,
+    and as hits have 0 <= |w| <= 2A (twice the area), the products are above -e (2A + e).
+    """
+    corner = triangles.transpose(1, 0, 2) - np.asarray(center, np.float64)
+    following = corner[[1, 2, 0]]
+    direction = following - corner
+    moment = np.cross(corner, following)
+    span = np.linalg.norm(direction, axis=2)
+    # By Wilkinson's bounds on six-term sums, with (o - center) rounded at a distance up to 2 radius.
+    error = ROUNDOFF * (12 * np.linalg.norm(moment, axis=2) + 40 * radius * span).max(0)
+    area2 = np.linalg.norm(np.cross(direction[0], direction[1]), axis=1)
+    with np.errstate(all="ignore"):
+        scale = 1 / np.sqrt(error * (area2 + error))
+    rows = np.concatenate([moment, direction], 2) * scale[:, None]
+    return rows.astype(f4)
+
+
+def hits_watertight(table: TriangleTable, prim: Ints, origin: Doubles, direction: Doubles) -> Bools:
+    """Decide for pairs of triangle `prim` (k,) and ray (3, k) whether the ray's line passes inside.
+
+    Woop, Benthin, Wald, "Watertight ray/triangle intersection", JCGT 2(1), 2013: shear space so that
+    the ray runs along z, and test the origin against the projected edges. The projected vertices are
+    rounded to float32, so that in float64 their products are exact and so is the sign of a difference
+    of two: the triangles of a mesh stay a mesh, without gaps.
+    """
+    axis = np.abs(direction).argmax(0)
+    lane = np.arange(prim.size)
+    z, x, y = axis, (axis + 1) % 3, (axis + 2) % 3
+    slope_x = direction[x, lane] / direction[z, lane]
+    slope_y = direction[y, lane] / direction[z, lane]
+    projected = []
+    for corner in range(3):
+        vertex = table.corners[3 * corner : 3 * corner + 3].take(prim, 1) - origin
+        depth = vertex[z, lane]
+        px = (vertex[x, lane] - slope_x * depth).astype(f4).astype(np.float64)
+        py = (vertex[y, lane] - slope_y * depth).astype(f4).astype(np.float64)
+        projected.append((px, py))
+    (ax, ay), (bx, by), (cx, cy) = projected
+    u = cx * by - cy * bx
+    v = ax * cy - ay * cx
+    w = bx * ay - by * ax
+    low = np.minimum(np.minimum(u, v), w)
+    high = np.maximum(np.maximum(u, v), w)
+    return ((low >= 0) & (high > 0)) | ((high <= 0) & (low < 0))
+
+
+def plane_distance(table: TriangleTable, prim: Ints, origin: Doubles, direction: Doubles) -> Doubles:
+    """Distance t to the planes of triangles `prim` (k,) along rays (3, k), float64."""
+    nx, ny, nz, offset = (row.take(prim) for row in table.plane)
+    top = offset - (nx * origin[0] + ny * origin[1] + nz * origin[2])
+    return top / (nx * direction[0] + ny * direction[1] + nz * direction[2])
+
+
+def clamp_to_triangle(
+    table: TriangleTable, prim: Ints, origin: Doubles, direction: Doubles, t: Doubles
+) -> Doubles:
+    """Keep t (k,) within the stretch of the ray (3, k) beside its triangle.
+
+    A ray that runs in a triangle's plane has a plane distance of 0/0. The margin leaves every ray that
+    crosses the plane at a measurable angle alone.
+    """
+    depths = []
+    for corner in range(3):
+        x, y, z = table.corners[3 * corner : 3 * corner + 3].take(prim, 1) - origin
+        depths.append(x * direction[0] + y * direction[1] + z * direction[2])
+    size2 = direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2
+    low = np.minimum(np.minimum(depths[0], depths[1]), depths[2]) / size2
+    high = np.maximum(np.maximum(depths[0], depths[1]), depths[2]) / size2
+    margin = 1e-6 * (high - low) + 1e-9 * np.maximum(np.abs(low), np.abs(high))
+    return np.clip(t, low - margin, high + margin)
+
+
+def barycentrics(
+    table: TriangleTable, prim: Ints, origin: Doubles, direction: Doubles
+) -> tuple[Floats, Floats]:
+    """Weights (k,) of the second and third vertex where rays (3, k) cross triangles `prim` (k,)."""
+    t = plane_distance(table, prim, origin, direction)
+    x = origin[0] + t * direction[0]
+    y = origin[1] + t * direction[1]
+    z = origin[2] + t * direction[2]
+    weights = []
+    for gradient in (table.second, table.third):
+        gx, gy, gz, constant = (row.take(prim) for row in gradient)
+        weight = (gx * x + gy * y + gz * z + constant).astype(f4)
+        weights.append(np.minimum(np.maximum(weight, f4(0), out=weight), f4(1), out=weight))
+    b1, b2 = weights
+    return b1, np.minimum(b2, 1 - b1, out=b2)
