@@ -121,18 +121,25 @@ def read_image(path: str | os.PathLike[str]) -> Floats:
 def read_codes(path: str | os.PathLike[str]) -> NDArray[Any]:
     """Return what `read_image` does, but 8- and 16-bit values as they are stored, (H, W, C)."""
     extension = _extension(path, READABLE)
-    data = read_bytes(path)
+    return _decode(os.fspath(path), extension, read_bytes(path))
+
+
+def decode_codes(data: bytes, name: str) -> NDArray[Any]:
+    """Return the stored values (H, W, C) of a png or jpg in memory; `name` is for messages."""
+    return _decode(name, ".png", data)
+
+
+def _decode(name: str, extension: str, data: bytes) -> NDArray[Any]:
     readers = {".exr": _decode_exr, ".hdr": rgbe.decode, ".npy": _decode_npy}
     try:
-        pixels = readers.get(extension, _decode_8bit)(data)
+        return readers.get(extension, _decode_8bit)(data)
     except SceneError as error:
-        raise SceneError(f"{os.fspath(path)}: {error}") from error
+        raise SceneError(f"{name}: {error}") from error
     except MemoryError as error:
-        raise SceneError(f"{os.fspath(path)}: does not fit in memory") from error
+        raise SceneError(f"{name}: does not fit in memory") from error
     # the decoders raise whatever comes to their mind on damaged bytes
     except Exception as error:
-        raise SceneError(f"{os.fspath(path)}: not a readable {extension[1:]} image: {error}") from error
-    return pixels
+        raise SceneError(f"{name}: not a readable {extension[1:]} image: {error}") from error
 
 
 def srgb_to_linear(values: Floats) -> Floats:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,12 +12,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..bsdfs.base import Bsdf
+from ..bsdfs import Bsdf
+from ..camera import Camera
 from ..errors import SceneError, finite_array
+from ..lights import PointLight
 from ..scene import Scene
 from ..shapes import Mesh
-from . import headers, mtl, obj
+from . import gltf, headers, mtl, obj, visuals
+from .appearance import Look
 from .files import beside, decode, read_bytes
+from .gltf_materials import Materials
 from .repair import Raw, build, warn
 
 if TYPE_CHECKING:
@@ -40,7 +46,8 @@ def load(path: PathLike, *, strict: bool = False) -> Scene:
     SceneError
         Naming the file, the line or element, the value and the limit.
     """
-    return Scene(load_meshes(path, strict=strict))
+    name, contents = _contents(path, strict, materials=True)
+    return Scene(_meshes(name, contents.raws, strict), contents.lights, contents.camera)
 
 
 def load_mesh(
@@ -75,20 +82,8 @@ def load_mesh(
 
 def load_meshes(path: PathLike, *, strict: bool = False, materials: bool = True) -> list[Mesh]:
     """Read the meshes of a file, one for each material and node; arguments as for `load`."""
-    name = os.fspath(path)
-    extension = Path(name).suffix.lower()
-    if extension not in EXTENSIONS:
-        raise SceneError(f"{name}: extension {extension!r} is not one of {', '.join(EXTENSIONS)}")
-    data = read_bytes(path)
-    headers.check(name, extension, data)
-    try:
-        raws = _read(path, extension, data, strict, materials)
-        meshes = [mesh for raw in raws if (mesh := build(name, raw, strict)) is not None]
-    except MemoryError as error:
-        raise SceneError(f"{name}: does not fit in memory") from error
-    if not meshes:
-        raise SceneError(f"{name}: has no faces")
-    return meshes
+    name, contents = _contents(path, strict, materials)
+    return _meshes(name, contents.raws, strict)
 
 
 def from_trimesh(geometry: Any) -> Scene:
@@ -102,10 +97,8 @@ def from_trimesh(geometry: Any) -> Scene:
     SceneError
         If it is something else, or has no faces.
     """
-    meshes = [mesh for raw in _raws(geometry) if (mesh := build("trimesh object", raw)) is not None]
-    if not meshes:
-        raise SceneError("trimesh object: has no faces")
-    return Scene(meshes)
+    raws = _raws(geometry, "trimesh object", strict=False)
+    return Scene(_meshes("trimesh object", raws, strict=False))
 
 
 def join(
@@ -121,6 +114,8 @@ def join(
     if material is None and len({id(mesh.material) for mesh in meshes}) > 1:
         raise SceneError(f"{name}: has {len(meshes)} materials; pass one, or use wf.load")
     matrix = np.eye(4) if transform is None else finite_array("transform", transform, (4, 4))
+    if np.linalg.det(matrix) == 0:
+        raise SceneError("transform is singular; it must be invertible")
     starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
     vertices = np.concatenate([mesh.vertices for mesh in meshes])
     faces = np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts[:-1], strict=True)])
@@ -144,13 +139,14 @@ def moved(
         return vertices, faces, normals
     if not np.array_equal(matrix[3], [0, 0, 0, 1]):
         raise SceneError(f"transform has the last row {matrix[3].tolist()}; it must be [0, 0, 0, 1]")
-    determinant = np.linalg.det(linear)
-    if determinant == 0:
-        raise SceneError("transform is singular; it must be invertible")
-    if determinant < 0:
+    mirrored = np.linalg.det(linear) < 0
+    if mirrored:
         faces = faces[:, ::-1]
     if normals is not None:
-        normals = normals @ np.linalg.inv(linear)
+        # the matrix of cofactors turns normals also where a flat thing is scaled by 0 across
+        a, b, c = linear.T
+        cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+        normals = normals @ (-cofactors if mirrored else cofactors).T
     return vertices @ linear.T + shift, faces, normals
 
 
@@ -160,10 +156,62 @@ def _joined(parts: list[np.ndarray | None]) -> np.ndarray | None:
     return np.concatenate(there) if len(there) == len(parts) else None
 
 
-def _read(path: PathLike, extension: str, data: bytes, strict: bool, materials: bool) -> list[Raw]:
-    if extension == ".obj":
-        return _read_obj(path, data, strict, materials)
-    return _raws(_trimesh_scene(path, data, extension))
+@dataclass
+class Contents:
+    """What a file holds."""
+
+    raws: list[Raw]
+    lights: Sequence[PointLight] = ()
+    camera: Camera | None = None
+
+
+def _contents(path: PathLike, strict: bool, materials: bool) -> tuple[str, Contents]:
+    """Read a file of any kind; also return its name for messages."""
+    name = os.fspath(path)
+    extension = Path(name).suffix.lower()
+    if extension not in EXTENSIONS:
+        raise SceneError(f"{name}: extension {extension!r} is not one of {', '.join(EXTENSIONS)}")
+    data = read_bytes(path)
+    headers.check(name, extension, data)
+    try:
+        if extension == ".obj":
+            return name, Contents(_read_obj(path, data, strict, materials))
+        if extension in (".glb", ".gltf"):
+            return name, _read_gltf(path, data, strict, materials)
+        return name, Contents(_raws(_trimesh_scene(path, data, extension), name, strict))
+    except MemoryError as error:
+        raise SceneError(f"{name}: does not fit in memory") from error
+
+
+def _meshes(name: str, raws: list[Raw], strict: bool) -> list[Mesh]:
+    meshes = [mesh for raw in raws if (mesh := build(name, raw, strict)) is not None]
+    if not meshes:
+        raise SceneError(f"{name}: has no faces")
+    return meshes
+
+
+def _read_gltf(path: PathLike, data: bytes, strict: bool, materials: bool) -> Contents:
+    name = os.fspath(path)
+    try:
+        document = gltf.Document(path, data)
+        found = gltf.contents(document)
+        looks = Materials(document)
+        raws = []
+        for raw, number, matrix in found.raws:
+            if materials and number is not None:  # without one, the mesh is as plain as in memory
+                look = looks.look(number)
+                raw.material, raw.emission = look.material, look.emission
+            raw.vertices, raw.faces, raw.normals = moved(matrix, raw.vertices, raw.faces, raw.normals)
+            raws.append(raw)
+    except (SceneError, MemoryError):
+        raise
+    # the JSON may hold anything anywhere: a list for a number, text for a list
+    except (TypeError, KeyError, AttributeError, IndexError, ValueError, OverflowError) as error:
+        raise SceneError(f"{name}: not glTF: {type(error).__name__}: {error}") from error
+    if document.lost and materials:
+        listed = ", ".join(f"{what} ({where})" for what, where in document.lost.items())
+        warn(f"{name}: not honoured: {listed}", strict)
+    return Contents(raws, found.lights, found.camera)
 
 
 def _read_obj(path: PathLike, data: bytes, strict: bool, materials: bool) -> list[Raw]:
@@ -185,9 +233,9 @@ def _read_obj(path: PathLike, data: bytes, strict: bool, materials: bool) -> lis
     return raws
 
 
-def _libraries(path: PathLike, libraries: list[str], strict: bool) -> dict[str, mtl.Look]:
+def _libraries(path: PathLike, libraries: list[str], strict: bool) -> dict[str, Look]:
     """Read the material files; a missing one is announced and left out."""
-    looks: dict[str, mtl.Look] = {}
+    looks: dict[str, Look] = {}
     for library in dict.fromkeys(libraries):
         file = beside(path, library)
         if not file.exists():
@@ -213,23 +261,38 @@ def _trimesh_scene(path: PathLike, data: bytes, extension: str) -> trimesh.Scene
         raise SceneError(f"{name}: not a readable {extension[1:]} file: {error!r}") from error
 
 
-def _raws(geometry: Any) -> list[Raw]:
+def _raws(geometry: Any, source: str, strict: bool) -> list[Raw]:
+    """Return the meshes of a trimesh object, placed and with materials."""
     import trimesh
 
+    looks = _Visuals()
+    raws = []
+    for mesh, name, matrix in _placed(geometry, trimesh):
+        raw = _raw(mesh, name, matrix)
+        looks.dress(raw, mesh)
+        raws.append(raw)
+    if looks.lost:
+        listed = ", ".join(f"{what} (mesh {where!r})" for what, where in looks.lost.items())
+        warn(f"{source}: not honoured: {listed}", strict)
+    return raws
+
+
+def _placed(geometry: Any, trimesh: Any) -> list[tuple[Any, str, np.ndarray]]:
+    """Return every mesh with its name and its matrix to world space."""
     if isinstance(geometry, trimesh.Trimesh):
-        return [_raw(geometry, str(geometry.metadata.get("name") or ""), np.eye(4))]
+        return [(geometry, str(geometry.metadata.get("name") or ""), np.eye(4))]
     if not isinstance(geometry, trimesh.Scene):
         raise SceneError(f"expected a trimesh.Trimesh or trimesh.Scene, got {type(geometry).__name__}")
-    raws = []
+    out = []
     for node in geometry.graph.nodes_geometry:
         matrix, key = geometry.graph[node]
         mesh = geometry.geometry[key]
         if isinstance(mesh, trimesh.Trimesh):
-            raws.append(_raw(mesh, str(key), np.asarray(matrix, np.float64)))
+            out.append((mesh, str(key), np.asarray(matrix, np.float64)))
     # trimesh lists what these files hold last first
     if geometry.source is not None and geometry.source.file_type in ("obj", "glb", "gltf"):
-        raws.reverse()
-    return raws
+        out.reverse()
+    return out
 
 
 def _raw(mesh: trimesh.Trimesh, name: str, matrix: np.ndarray) -> Raw:
@@ -241,3 +304,28 @@ def _raw(mesh: trimesh.Trimesh, name: str, matrix: np.ndarray) -> Raw:
         uvs = None
     placed = moved(matrix, vertices, np.asarray(mesh.faces), normals)
     return Raw(name, *placed, uvs=None if uvs is None else np.asarray(uvs, np.float64)[:, :2])
+
+
+class _Visuals:
+    """The looks of trimesh visuals, each made once, and what is lost of them."""
+
+    def __init__(self) -> None:
+        self._looks: dict[int, Look] = {}
+        self.lost: dict[str, str] = {}  # what -> where first
+
+    def dress(self, raw: Raw, mesh: trimesh.Trimesh) -> None:
+        """Give a raw mesh its material and emission."""
+        visual: Any = mesh.visual
+        if visual.kind in ("vertex", "face"):
+            self.lost.setdefault(f"{visual.kind} colours", raw.name)
+        if "color" in getattr(visual, "vertex_attributes", {}):
+            self.lost.setdefault("vertex colours", raw.name)
+        material = getattr(visual, "material", None)
+        if material is None:
+            return
+        if id(material) not in self._looks:
+            self._looks[id(material)] = visuals.look(material, f"trimesh material {material.name!r}")
+        look = self._looks[id(material)]
+        raw.material, raw.emission = look.material, look.emission
+        for what in look.lost:
+            self.lost.setdefault(what, raw.name)

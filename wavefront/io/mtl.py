@@ -2,29 +2,35 @@
 
 How an MTL material is read:
 
-- `Ke` is emission. `Kd` is the reflectance of a matte surface.
+- `Ke` is emission. `Kd` is the reflectance of a matte surface, multiplied by `map_Kd`; a black `Kd`
+  beside a `map_Kd` counts as white, since some exporters write that.
 - `illum` 4, 6, 7 and 9 are glass with the index `Ni` (1.5 when absent), tinted by `Tf`.
-- `illum` 3, 5 and 8 are mirrors of reflectance `Ks`, if `Ks` is not black.
+- `illum` 3, 5 and 8 are mirrors of reflectance `Ks`, if `Ks` is not black and there is no `Pr` or `Pm`.
+- `Pr Pm Ps Pc Pcr aniso` and their maps, `norm` and `map_d` (the PBR extension) are the parameters of
+  the same names of `Principled`.
 - Opacity is `d`; without a `d` it is 1 - `Tr`, except that `Tr 1` alone means opaque: that is how
   MeshLab writes it, and a material that cannot be seen has no other use. A surface that is less
   than opaque and has an index `Ni` other than 1 is glass.
+- Images are sRGB where they are colours, data elsewhere. The options -s -o -clamp -mm -imfchan are read.
 
-Whatever else a file asks for is named in one warning per file.
+Whatever else a file asks for is named in one warning per file: `Ks` and `Ns` among it, for files set
+them to anything, and a highlight made of them is a guess.
 """
 
 from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bsdfs.base import Bsdf
-from ..bsdfs.dielectric import Dielectric
-from ..bsdfs.diffuse import Diffuse
-from ..bsdfs.mirror import Mirror
+from ..bsdfs import Bsdf, Dielectric, Diffuse, Mirror
 from ..errors import SceneError
+from ..textures import Texture
+from .appearance import Look, emission, realise
+from .files import beside
 from .repair import warn
 
 GLASS = (4, 6, 7, 9)
@@ -34,15 +40,21 @@ MATTE = 0.5  # reflectance where a file gives none
 # values that change nothing
 NEUTRAL = {"ka": 0.0, "kd": 0.0, "ks": 0.0, "tf": 1.0, "d": 1.0, "tr": 0.0, "sharpness": 60.0}
 
+# keyword of a number, of the map that goes with it, and what Principled calls it
+PBR = (
+    ("pr", "map_pr", "roughness"),
+    ("pm", "map_pm", "metallic"),
+    ("ps", "map_ps", "sheen"),
+    ("pc", "map_pc", "clearcoat"),
+    ("pcr", "map_pcr", "clearcoat_roughness"),
+    ("aniso", "map_aniso", "anisotropy"),
+)
+# options of a map that take this many words; those not named here take up to three numbers
+OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-mm": 2}
+OPTIONS |= {"-texres": 1, "-type": 1, "-bm": 1}
+CHANNELS: dict[str, Any] = {"r": 0, "g": 1, "b": 2, "m": 3, "l": "luminance"}
+
 Colour = NDArray[np.float64]
-
-
-@dataclass
-class Look:
-    """What a surface looks like."""
-
-    material: Bsdf
-    emission: Colour | None  # (3,) radiance
 
 
 @dataclass
@@ -53,12 +65,14 @@ class Entry:
     name: str
     lines: dict[str, tuple[str, int, str]] = field(default_factory=dict)
     read: set[str] = field(default_factory=set)  # keywords that the look honours
+    idle_options: set[str] = field(default_factory=set)  # options of maps that are not honoured
+    images: dict[str, NDArray[np.uint8]] = field(default_factory=dict)  # maps that are there already
     strict: bool = False
 
     def where(self, key: str) -> str:
-        """Name file, line and keyword for a message."""
+        """Name file, line (where there is one) and keyword for a message."""
         keyword, number, _ = self.lines[key]
-        return f"{self.file} line {number}: {keyword}"
+        return f"{self.file} line {number}: {keyword}" if number else f"{self.file}: {keyword}"
 
     def numbers(self, key: str) -> list[float] | None:
         """Return the finite numbers of a line, None if there is no such line."""
@@ -94,6 +108,51 @@ class Entry:
                 f"{self.where(key)} is {self.lines[key][2]}; it must be {limit} and was clamped", self.strict
             )
         return limited
+
+    def texture(self, key: str, scale: Any = 1.0, kind: str = "colour") -> Texture | None:
+        """Return the texture of a map of the kind "colour", "scalar" or "normal", None if there is none."""
+        if key not in self.lines:
+            return None
+        options, name = _map(self, key)
+        if not name:
+            raise SceneError(f"{self.where(key)} names no file")
+        self.read.add(key)
+        base, gain = self._option(options, "-mm", [0.0, 1.0])
+        if kind == "normal":  # texels 0 to 1 become components -1 to 1
+            base, gain = -1.0, 2.0
+        try:
+            return Texture(
+                self.images[key] if key in self.images else beside(self.file, name),
+                srgb=kind == "colour",
+                wrap="clamp" if options.get("-clamp") == ["on"] else "repeat",
+                transform=self._placing(options),
+                channel=self._channel(options) if kind == "scalar" else None,
+                scale=np.asarray(scale) * gain,
+                offset=np.asarray(scale) * base,
+            )
+        except SceneError as error:
+            raise SceneError(f"{self.where(key)}: {error}") from error
+
+    def _option(self, options: dict[str, list[str]], name: str, default: list[float]) -> list[float]:
+        try:
+            found = [float(word) for word in options.get(name, [])]
+        except ValueError:
+            raise SceneError(
+                f"{self.file}: {name} is {' '.join(options[name])!r}; it must be numbers"
+            ) from None
+        return found + default[len(found) :]
+
+    def _placing(self, options: dict[str, list[str]]) -> Colour | None:
+        if "-s" not in options and "-o" not in options:
+            return None
+        scale, offset = self._option(options, "-s", [1.0] * 3), self._option(options, "-o", [0.0] * 3)
+        return np.array([[scale[0], 0, offset[0]], [0, scale[1], offset[1]], [0, 0, 1]])
+
+    def _channel(self, options: dict[str, list[str]]) -> Any:
+        word = options.get("-imfchan", ["l"])[0]
+        if word not in CHANNELS:
+            raise SceneError(f"{self.file}: -imfchan is {word!r}; it must be one of {', '.join(CHANNELS)}")
+        return CHANNELS[word]
 
     def unread(self) -> list[str]:
         """Return the keywords, as written, that ask for something the look does not give."""
@@ -156,7 +215,7 @@ def looks(entries: dict[str, Entry], strict: bool = False) -> dict[str, Look]:
     unread: dict[str, str] = {}
     for name, entry in entries.items():
         out[name] = look(entry)
-        for keyword in entry.unread():
+        for keyword in (*entry.unread(), *sorted(entry.idle_options), *out[name].lost):
             unread.setdefault(keyword, name)
     if unread:
         file = next(iter(entries.values())).file
@@ -167,27 +226,94 @@ def looks(entries: dict[str, Entry], strict: bool = False) -> dict[str, Look]:
 
 def look(entry: Entry) -> Look:
     """Turn one entry into a look; what is used is marked in `entry.read`."""
-    emission = entry.colour("ke", 0.0, high=np.inf)
-    return Look(_material(entry), emission if emission.any() else None)
+    factor = entry.colour("ke", 0.0, high=np.inf)
+    if "map_ke" in entry.lines and not factor.any():
+        factor = np.ones(3)
+    radiance, lost = emission(factor, entry.texture("map_ke"))
+    material, more = _material(entry)
+    return Look(material, radiance, lost + more)
 
 
-def _material(entry: Entry) -> Bsdf:
+def _material(entry: Entry) -> tuple[Bsdf, list[str]]:
     illum = int(entry.number("illum", 2))
     ior = entry.number("ni", 1.0)
-    if illum in GLASS or (opacity(entry) < 1 and ior != 1):
+    physical = any(key in entry.lines for keys in PBR for key in keys[:2])
+    if illum in GLASS or (opacity(entry) < 1 and ior != 1 and "map_d" not in entry.lines):
         return _glass(entry)
-    if illum in MIRROR and "ks" in entry.lines and entry.colour("ks", 0.0).any():
-        return Mirror(entry.colour("ks", 0.0))
-    return Diffuse(entry.colour("kd", MATTE))
+    if illum in MIRROR and not physical and "ks" in entry.lines and entry.colour("ks", 0.0).any():
+        return Mirror(entry.colour("ks", 0.0)), []
+    wanted = _wanted(entry)
+    if len(wanted) == 1:
+        return Diffuse(wanted["base_color"]), []
+    # the shine of the default would be an invention where the file does not speak of it
+    material, lost = realise({"roughness": 1.0, **wanted})
+    return material, [name for name in lost if name in wanted]
 
 
-def _glass(entry: Entry) -> Bsdf:
+def _wanted(entry: Entry) -> dict[str, Any]:
+    """Return the parameters of `Principled` that a file asks for."""
+    wanted: dict[str, Any] = {"base_color": _base(entry)}
+    for key, image, name in PBR:
+        factor = entry.number(key, 1.0)
+        if not 0 <= factor <= 1:
+            warn(f"{entry.where(key)} is {factor:g}; it must be in [0, 1] and was clamped", entry.strict)
+            factor = min(max(factor, 0.0), 1.0)
+        texture = entry.texture(image, factor, "scalar")
+        if texture is not None or (key in entry.lines and (factor or name == "roughness")):
+            wanted[name] = factor if texture is None else texture
+    alpha = opacity(entry)
+    texture = entry.texture("map_d", alpha, "scalar")
+    if texture is not None or alpha < 1:
+        wanted["alpha"] = alpha if texture is None else texture
+    entry.read.update(("d", "tr"))
+    normals = entry.texture("norm", kind="normal")
+    if normals is not None:
+        wanted["normal_map"] = normals
+    return wanted
+
+
+def _base(entry: Entry) -> Any:
+    colour = entry.colour("kd", 1.0 if "map_kd" in entry.lines else MATTE)
+    if "map_kd" not in entry.lines:
+        return colour
+    return entry.texture("map_kd", colour if colour.any() else 1.0)
+
+
+def _glass(entry: Entry) -> tuple[Bsdf, list[str]]:
     opacity(entry)
     ior = entry.number("ni", GLASS_IOR)
     if ior <= 0:
         raise SceneError(f"{entry.where('ni')} is {ior:g}; an index must be above 0")
     entry.read.update(("d", "tr", "kd"))  # glass has no matte part: files give it a Kd all the same
-    return Dielectric(ior, transmittance=entry.colour("tf", 1.0))
+    return Dielectric(ior, transmittance=entry.colour("tf", 1.0)), []
+
+
+def _map(entry: Entry, key: str) -> tuple[dict[str, list[str]], str]:
+    """Split the rest of a map line into its options and the file name, which may hold spaces."""
+    rest = entry.lines[key][2]
+    options: dict[str, list[str]] = {}
+    while rest.startswith("-"):
+        option, _, rest = rest.partition(" ")
+        words, count = rest.split(), OPTIONS.get(option)
+        if count is None:
+            count = 0
+            while count < 3 and count < len(words) and _is_number(words[count]):
+                count += 1
+            if option not in ("-s", "-o", "-t"):
+                raise SceneError(f"{entry.where(key)} has the option {option!r}, which is not known")
+        options[option] = words[:count]
+        rest = (rest.split(None, count) + [""] * (count + 1))[count].strip()
+    for option in options.keys() - {"-s", "-o", "-mm", "-clamp", "-imfchan"}:
+        entry.idle_options.add(f"{option} of {entry.lines[key][0]}")
+    return options, rest
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def opacity(entry: Entry) -> float:

@@ -1,0 +1,401 @@
+"""glTF 2.0 (.gltf, .glb): geometry, nodes, cameras and lights.
+
+Source: Khronos Group, glTF 2.0 specification and the ratified KHR extensions. Everything is read
+from the JSON itself, so numbers are exact and every index is checked.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import os
+import struct
+from dataclasses import dataclass, field
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Camera
+from ..errors import SceneError
+from ..lights import PointLight
+from .files import beside, read_bytes
+from .repair import Raw
+
+COMPONENTS: dict[int, type[np.generic]] = {
+    5120: np.int8,
+    5121: np.uint8,
+    5122: np.int16,
+    5123: np.uint16,
+    5125: np.uint32,
+    5126: np.float32,
+}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+TRIANGLES, STRIP, FAN = 4, 5, 6
+MAX_ELEMENTS = 2**28  # in one accessor, whatever backs it
+HEIGHT = 512  # pixels of a camera's picture; files give its shape only
+Matrix = NDArray[np.float64]
+
+
+class Document:
+    """The JSON of a file and the bytes that it refers to. Lookups that fail name the file and the element."""
+
+    def __init__(self, path: str | os.PathLike[str], data: bytes) -> None:
+        self.path = path
+        self.name = os.fspath(path)
+        text, self._binary = _chunks(self.name, data) if data[:4] == b"glTF" else (data, None)
+        try:
+            self.json = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise SceneError(f"{self.name}: not glTF: its JSON is damaged: {error}") from error
+        if not isinstance(self.json, dict):
+            raise SceneError(f"{self.name}: not glTF: its JSON is a {type(self.json).__name__}")
+        version = str(self.json.get("asset", {}).get("version", ""))
+        if not version.startswith("2"):
+            raise SceneError(f"{self.name}: is glTF version {version!r}; only version 2 is read")
+        self._buffers: dict[int, bytes] = {}
+        self.lost: dict[str, str] = {}  # what is not honoured -> where it was first met
+
+    def lose(self, what: str, where: str) -> None:
+        """Note a property that is not honoured."""
+        self.lost.setdefault(what, where)
+
+    def get(self, kind: str, index: Any) -> dict[str, Any]:
+        """Return element `index` of the array `kind`."""
+        items = self.json.get(kind, [])
+        if not isinstance(index, int) or not 0 <= index < len(items):
+            raise SceneError(f"{self.name}: {kind}[{index!r}] does not exist; there are {len(items)}")
+        if not isinstance(items[index], dict):
+            raise SceneError(f"{self.name}: {kind}[{index}] is not an object")
+        return items[index]
+
+    def uri(self, uri: str, where: str) -> bytes:
+        """Return what a URI holds: data in the file itself, or a file beside it."""
+        if not uri.startswith("data:"):
+            return read_bytes(beside(self.path, unquote(uri)))
+        try:
+            return base64.b64decode(uri.partition(",")[2], validate=True)
+        except (binascii.Error, ValueError) as error:
+            raise SceneError(f"{self.name}: {where} has damaged base64 data: {error}") from error
+
+    def buffer(self, index: int) -> bytes:
+        """Return the bytes of a buffer."""
+        if index not in self._buffers:
+            item = self.get("buffers", index)
+            if "uri" in item:
+                data = self.uri(item["uri"], f"buffers[{index}]")
+            elif index == 0 and self._binary is not None:
+                data = self._binary
+            else:
+                raise SceneError(f"{self.name}: buffers[{index}] has no data")
+            if len(data) < item.get("byteLength", 0):
+                raise SceneError(
+                    f"{self.name}: buffers[{index}] has {len(data)} bytes; it claims {item['byteLength']}"
+                )
+            self._buffers[index] = data
+        return self._buffers[index]
+
+    def view(self, index: int) -> tuple[bytes, int, int, int]:
+        """Return (buffer, first byte, end, stride or 0) of a buffer view."""
+        item = self.get("bufferViews", index)
+        data = self.buffer(item.get("buffer", -1))
+        start, length = _count(item.get("byteOffset", 0)), _count(item.get("byteLength", 0))
+        if start + length > len(data):
+            raise SceneError(
+                f"{self.name}: bufferViews[{index}] ends at byte {start + length}; its buffer has {len(data)}"
+            )
+        return data, start, start + length, _count(item.get("byteStride", 0))
+
+    def accessor(self, index: int) -> NDArray[Any]:
+        """Return the elements of an accessor, (count, width); normalised integers become float32."""
+        item = self.get("accessors", index)
+        where = f"{self.name}: accessors[{index}]"
+        kind, width = COMPONENTS.get(item.get("componentType", 0)), WIDTHS.get(item.get("type", ""))
+        count = _count(item.get("count", 0))
+        if kind is None or width is None:
+            raise SceneError(
+                f"{where} is {item.get('type')!r} of {item.get('componentType')!r}, which glTF does not have"
+            )
+        if count * width > MAX_ELEMENTS:
+            raise SceneError(f"{where} has {count} elements; the limit is {MAX_ELEMENTS // width}")
+        if "bufferView" in item:
+            values = self._strided(item["bufferView"], item.get("byteOffset", 0), count, width, kind, where)
+        else:
+            values = np.zeros((count, width), kind)
+        if "sparse" in item:
+            values = self._sparse(item["sparse"], values, where)
+        return _normalised(values) if item.get("normalized") else values
+
+    def _strided(
+        self, view: int, offset: int, count: int, width: int, kind: type[np.generic], where: str
+    ) -> NDArray[Any]:
+        data, start, end, stride = self.view(view)
+        size = np.dtype(kind).itemsize * width
+        stride = stride or size
+        start += _count(offset)
+        if count and start + (count - 1) * stride + size > end:
+            raise SceneError(f"{where} has {count} elements, which its buffer view cannot hold")
+        if not count:
+            return np.zeros((0, width), kind)
+        return np.ndarray((count, width), kind, data, start, (stride, np.dtype(kind).itemsize)).copy()
+
+    def _sparse(self, sparse: dict[str, Any], values: NDArray[Any], where: str) -> NDArray[Any]:
+        count = _count(sparse.get("count", 0))
+        at, new = sparse["indices"], sparse["values"]
+        kind = COMPONENTS.get(at.get("componentType", 0), np.uint32)
+        index = self._strided(at["bufferView"], at.get("byteOffset", 0), count, 1, kind, where)[:, 0]
+        if count and index.max() >= len(values):
+            raise SceneError(f"{where} replaces element {index.max()}; it has {len(values)}")
+        values = values.copy()
+        width = values.shape[1]
+        values[index] = self._strided(
+            new["bufferView"], new.get("byteOffset", 0), count, width, values.dtype.type, where
+        )
+        return values
+
+
+@dataclass
+class Contents:
+    """What a file holds, in world space."""
+
+    raws: list[tuple[Raw, int | None, Matrix]] = field(default_factory=list)  # mesh, material, placement
+    lights: list[PointLight] = field(default_factory=list)
+    camera: Camera | None = None
+
+
+def contents(document: Document) -> Contents:
+    """Walk the nodes of the default scene.
+
+    Raises
+    ------
+    SceneError
+        If an element is missing or malformed.
+    """
+    out = Contents()
+    for node, matrix in _walk(document):
+        if "mesh" in node:
+            out.raws += [(raw, material, matrix) for raw, material in _primitives(document, node["mesh"])]
+        if "camera" in node:
+            _add_camera(document, out, node["camera"], matrix)
+        if "skin" in node:
+            document.lose("skin", f"node {node.get('name', '?')!r}")
+        light = node.get("extensions", {}).get("KHR_lights_punctual", {}).get("light")
+        if light is not None:
+            _add_light(document, out, light, matrix)
+    if document.json.get("animations"):
+        document.lose("animations", "the file")
+    # the walk meets the last node first, as trimesh does
+    out.raws.reverse()
+    return out
+
+
+def _walk(document: Document) -> list[tuple[dict[str, Any], Matrix]]:
+    """Return every node of the scene with its matrix from local to world, (4, 4)."""
+    if "scenes" in document.json:
+        roots = document.get("scenes", document.json.get("scene", 0)).get("nodes", [])
+    else:
+        nodes = document.json.get("nodes", [])
+        children = {child for node in nodes for child in node.get("children", [])}
+        roots = [i for i in range(len(nodes)) if i not in children]
+    stack = [(index, np.eye(4)) for index in roots]
+    seen: set[int] = set()
+    out = []
+    while stack:
+        index, parent = stack.pop()
+        node = document.get("nodes", index)
+        if index in seen:
+            raise SceneError(f"{document.name}: nodes[{index}] is reached twice; nodes must form a tree")
+        seen.add(index)
+        matrix = parent @ _local(document, index, node)
+        out.append((node, matrix))
+        stack += [(child, matrix) for child in node.get("children", [])]
+    return out
+
+
+def _local(document: Document, index: int, node: dict[str, Any]) -> Matrix:
+    """Return a node's own matrix: given, or translation · rotation · scale."""
+    where = f"{document.name}: nodes[{index}]"
+    if "matrix" in node:
+        return floats(where + ".matrix", node["matrix"], 16).reshape(4, 4).T
+    matrix = np.eye(4)
+    matrix[:3, 3] = floats(where + ".translation", node.get("translation", [0, 0, 0]), 3)
+    rotation = np.eye(4)
+    rotation[:3, :3] = _rotation(floats(where + ".rotation", node.get("rotation", [0, 0, 0, 1]), 4))
+    scale = floats(where + ".scale", node.get("scale", [1, 1, 1]), 3)
+    return matrix @ rotation @ np.diag([*scale, 1.0])
+
+
+def _rotation(quaternion: Matrix) -> Matrix:
+    """Return the (3, 3) matrix of a quaternion x, y, z, w; zero means no rotation."""
+    size = float(quaternion @ quaternion)
+    if size == 0:
+        return np.eye(3)
+    x, y, z, w = quaternion * np.sqrt(2 / size)
+    return np.array(
+        [
+            [1 - y * y - z * z, x * y - z * w, x * z + y * w],
+            [x * y + z * w, 1 - x * x - z * z, y * z - x * w],
+            [x * z - y * w, y * z + x * w, 1 - x * x - y * y],
+        ]
+    )
+
+
+def _primitives(document: Document, index: int) -> list[tuple[Raw, int | None]]:
+    """Return the parts of a mesh with the numbers of their materials."""
+    mesh = document.get("meshes", index)
+    name = str(mesh.get("name", f"mesh{index}"))
+    if "weights" in mesh or any("targets" in part for part in mesh.get("primitives", [])):
+        document.lose("morph targets", f"mesh {name!r}")
+    out = []
+    for number, part in enumerate(mesh.get("primitives", [])):
+        mode = part.get("mode", TRIANGLES)
+        if mode not in (TRIANGLES, STRIP, FAN):
+            document.lose("points and lines", f"mesh {name!r}")
+            continue
+        label = name if len(mesh["primitives"]) == 1 else f"{name}_{number}"
+        out.append((_primitive(document, part, mode, label), part.get("material")))
+    return out
+
+
+def _primitive(document: Document, part: dict[str, Any], mode: int, name: str) -> Raw:
+    where = f"{document.name}: {name!r}"
+    attributes = part.get("attributes", {})
+    if "KHR_draco_mesh_compression" in part.get("extensions", {}) or "POSITION" not in attributes:
+        raise SceneError(f"{where} has no POSITION that can be read")
+    vertices = _attribute(document, attributes, "POSITION", 3, where)
+    assert vertices is not None
+    if "indices" in part:
+        indices = document.accessor(part["indices"])[:, 0]
+        if indices.dtype.kind != "u":
+            raise SceneError(f"{where} has indices of type {indices.dtype}; they must be unsigned")
+    else:
+        indices = np.arange(len(vertices))
+    uvs = _attribute(document, attributes, "TEXCOORD_0", 2, where, len(vertices))
+    if uvs is not None:
+        uvs[:, 1] = 1 - uvs[:, 1]  # glTF counts v downwards
+    for extra in ("COLOR_0", "TEXCOORD_1"):
+        if extra in attributes:
+            document.lose(extra, f"mesh {name!r}")
+    normals = _attribute(document, attributes, "NORMAL", 3, where, len(vertices))
+    return Raw(
+        name,
+        vertices.astype(np.float64),
+        _triangles(where, indices.astype(np.intp), mode),
+        None if normals is None else normals.astype(np.float64),
+        None if uvs is None else uvs.astype(np.float64),
+    )
+
+
+def _attribute(
+    document: Document, attributes: dict[str, Any], key: str, width: int, where: str, count: int | None = None
+) -> NDArray[Any] | None:
+    if key not in attributes:
+        return None
+    values = document.accessor(attributes[key])
+    if values.shape[1] != width:
+        raise SceneError(f"{where} has {key} with {values.shape[1]} components; it must have {width}")
+    if count is not None and len(values) != count:
+        raise SceneError(f"{where} has {len(values)} of {key}; it has {count} vertices")
+    return values
+
+
+def _triangles(where: str, indices: NDArray[np.intp], mode: int) -> NDArray[np.intp]:
+    """Return faces (m, 3) of a list, strip or fan of triangles."""
+    if mode == TRIANGLES:
+        if len(indices) % 3:
+            raise SceneError(f"{where} has {len(indices)} indices; triangles need a multiple of 3")
+        return indices.reshape(-1, 3)
+    if len(indices) < 3:
+        raise SceneError(f"{where} has {len(indices)} indices; a strip or fan needs at least 3")
+    if mode == FAN:
+        first = np.full(len(indices) - 2, indices[0])
+        return np.stack([first, indices[1:-1], indices[2:]], axis=1)
+    faces = np.stack([indices[:-2], indices[1:-1], indices[2:]], axis=1)
+    faces[1::2] = faces[1::2, [1, 0, 2]]  # every second triangle of a strip runs the other way
+    return faces
+
+
+def _add_camera(document: Document, out: Contents, index: int, matrix: Matrix) -> None:
+    camera = document.get("cameras", index)
+    if camera.get("type") != "perspective" or out.camera is not None:
+        what = "further cameras" if out.camera is not None else f"{camera.get('type')} camera"
+        document.lose(what, f"cameras[{index}]")
+        return
+    lens = camera.get("perspective", {})
+    where = f"{document.name}: cameras[{index}]"
+    fov = floats(where + ".yfov", [lens.get("yfov", 0)], 1)[0]
+    aspect = floats(where + ".aspectRatio", [lens.get("aspectRatio", 1)], 1)[0]
+    if not 0 < fov < np.pi or not 1e-3 < aspect < 1e2:
+        raise SceneError(f"{where} has yfov {fov:g} and aspectRatio {aspect:g}; both must be above 0")
+    origin = matrix[:3, 3]
+    out.camera = Camera.look_at(
+        origin,
+        origin - matrix[:3, 2] / np.linalg.norm(matrix[:3, 2]),
+        matrix[:3, 1],
+        fov=float(np.degrees(fov)),
+        size=(max(1, round(HEIGHT * aspect)), HEIGHT),
+    )
+
+
+def _add_light(document: Document, out: Contents, index: int, matrix: Matrix) -> None:
+    """Add a light of KHR_lights_punctual; candela are taken for W/sr."""
+    lights = document.json.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", [])
+    if not isinstance(index, int) or not 0 <= index < len(lights):
+        raise SceneError(f"{document.name}: light {index!r} does not exist; there are {len(lights)}")
+    light = lights[index]
+    if light.get("type") != "point":
+        document.lose(f"{light.get('type')} light", f"light {index}")
+        return
+    if "range" in light:
+        document.lose("range of a light", f"light {index}")
+    where = f"{document.name}: light {index}"
+    colour = floats(where + " color", light.get("color", [1, 1, 1]), 3)
+    intensity = floats(where + " intensity", [light.get("intensity", 1)], 1)
+    out.lights.append(PointLight(matrix[:3, 3], colour * intensity))
+
+
+def floats(where: str, value: Any, count: int) -> Matrix:
+    """Return `count` finite numbers of the JSON, or raise a SceneError that names them."""
+    good = isinstance(value, list) and len(value) == count
+    if not good or not all(
+        isinstance(x, int | float) and not isinstance(x, bool) and np.isfinite(x) for x in value
+    ):
+        raise SceneError(f"{where} is {value!r}; it must be {count} finite numbers")
+    return np.array(value, np.float64)
+
+
+def _count(value: Any) -> int:
+    if not isinstance(value, int) or value < 0:
+        raise SceneError(f"{value!r} stands where glTF has a count of bytes or elements")
+    return value
+
+
+def _normalised(values: NDArray[Any]) -> NDArray[Any]:
+    if values.dtype.kind == "f":
+        return values
+    scaled = values.astype(np.float32) / np.float32(np.iinfo(values.dtype).max)
+    return np.maximum(scaled, np.float32(-1))
+
+
+def _chunks(name: str, data: bytes) -> tuple[bytes, bytes | None]:
+    """Split a .glb into its JSON and its binary chunk."""
+    if len(data) < 20:
+        raise SceneError(f"{name}: ends early: {len(data)} bytes")
+    version, length = struct.unpack_from("<II", data, 4)
+    if version != 2:
+        raise SceneError(f"{name}: is glTF version {version}; only version 2 is read")
+    if length > len(data):
+        raise SceneError(f"{name}: claims {length} bytes; it has {len(data)}")
+    parts: dict[bytes, bytes] = {}
+    at = 12
+    while at + 8 <= length:
+        size, kind = struct.unpack_from("<I4s", data, at)
+        if at + 8 + size > length:
+            raise SceneError(f"{name}: a chunk claims {size} bytes; {length - at - 8} are there")
+        parts.setdefault(kind, data[at + 8 : at + 8 + size])
+        at += 8 + size
+    if b"JSON" not in parts:
+        raise SceneError(f"{name}: has no JSON chunk")
+    return parts[b"JSON"], parts.get(b"BIN\0")

@@ -1,0 +1,284 @@
+"""Materials and textures of glTF: metallic-roughness and its KHR extensions, from the JSON's own floats."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from ..textures import Texture
+from .appearance import Look, emission, realise
+from .gltf import Document, floats
+from .images import decode_codes
+
+WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
+NEAREST = (9728, 9984, 9986)
+# extensions whose every property is looked at here or in gltf.py
+KNOWN = frozenset(
+    "KHR_" + name
+    for name in (
+        "lights_punctual",
+        "materials_clearcoat",
+        "materials_emissive_strength",
+        "materials_ior",
+        "materials_sheen",
+        "materials_specular",
+        "materials_transmission",
+        "materials_volume",
+        "mesh_quantization",
+        "texture_transform",
+    )
+)
+FLIP = np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]])  # between v downwards and v upwards
+
+
+class Materials:
+    """The materials of a document, each made once."""
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+        self._looks: dict[int, Look] = {}
+        self._images: dict[int, NDArray[Any]] = {}
+        _check_extensions(document)
+
+    def look(self, index: int) -> Look:
+        """Return what material `index` looks like."""
+        if index not in self._looks:
+            item = self._document.get("materials", index)
+            where = f"materials[{index}]" + (f" {item['name']!r}" if "name" in item else "")
+            look = self._looks[index] = _Reader(self, item, where).look()
+            for what in look.lost:
+                self._document.lose(what, where)
+        return self._looks[index]
+
+    def texture(self, info: Any, where: str, **arguments: Any) -> Texture:
+        """Return a texture for a texture-info object of the JSON."""
+        document = self._document
+        if not isinstance(info, dict):
+            raise SceneError(f"{document.name}: {where} is {info!r}; it must be an object")
+        item = document.get("textures", info.get("index"))
+        if "source" not in item:
+            listed = ", ".join(item.get("extensions", {})) or "nothing"
+            raise SceneError(f"{document.name}: {where}: its image is given by {listed}, which is not read")
+        move = info.get("extensions", {}).get("KHR_texture_transform", {})
+        if move.get("texCoord", info.get("texCoord", 0)) != 0:
+            document.lose("second set of texture coordinates", where)
+        sampler = document.get("samplers", item["sampler"]) if "sampler" in item else {}
+        return Texture(
+            self._image(item["source"]),
+            wrap=(_wrap(sampler, "wrapS"), _wrap(sampler, "wrapT")),
+            filter="nearest" if sampler.get("magFilter") in NEAREST else "bilinear",
+            transform=_uv_matrix(document, move, where) if move else None,
+            **arguments,
+        )
+
+    def _image(self, index: int) -> NDArray[Any]:
+        """Return the stored values of an image, (H, W, C), decoded once."""
+        if index not in self._images:
+            document = self._document
+            item = document.get("images", index)
+            name = f"{document.name}: images[{index}]" + (f" {item['name']!r}" if "name" in item else "")
+            if "bufferView" in item:
+                data, start, end, _ = document.view(item["bufferView"])
+                content = data[start:end]
+            elif isinstance(item.get("uri"), str):
+                content = document.uri(item["uri"], f"images[{index}]")
+                name = name if item["uri"].startswith("data:") else f"{name} ({item['uri']})"
+            else:
+                raise SceneError(f"{name} has neither a uri nor a bufferView")
+            self._images[index] = decode_codes(content, name)
+        return self._images[index]
+
+
+class _Reader:
+    """Reads one material."""
+
+    def __init__(self, materials: Materials, item: dict[str, Any], where: str) -> None:
+        self._materials, self._item, self._where = materials, item, where
+        self._file = materials._document.name
+        self._wanted: dict[str, Any] = {}
+        self._lost: list[str] = []
+
+    def look(self) -> Look:
+        """Return the look of the material."""
+        self._metallic_roughness(self._item.get("pbrMetallicRoughness", {}))
+        self._maps()
+        extensions = self._item.get("extensions", {})
+        self._ior(extensions.get("KHR_materials_ior"))
+        self._transmission(extensions.get("KHR_materials_transmission"))
+        self._clearcoat(extensions.get("KHR_materials_clearcoat"))
+        self._sheen(extensions.get("KHR_materials_sheen"))
+        self._specular(extensions.get("KHR_materials_specular"))
+        self._volume(extensions.get("KHR_materials_volume"))
+        self._lost += [name for name in extensions if name not in KNOWN]
+        radiance = self._emission(extensions.get("KHR_materials_emissive_strength", {}))
+        material, lost = realise(self._wanted)
+        return Look(material, radiance, self._lost + lost)
+
+    def _number(self, group: dict[str, Any], key: str, default: float, high: float = 1.0) -> float:
+        value = floats(f"{self._file}: {self._where}.{key}", [group.get(key, default)], 1)[0]
+        if not 0 <= value <= high:
+            raise SceneError(f"{self._file}: {self._where}.{key} is {value:g}; it must be in [0, {high:g}]")
+        return float(value)
+
+    def _colour(
+        self, group: dict[str, Any], key: str, default: list[float], high: float = 1.0
+    ) -> NDArray[np.float64]:
+        value = floats(f"{self._file}: {self._where}.{key}", group.get(key, default), len(default))
+        if (value < 0).any() or (value > high).any():
+            raise SceneError(
+                f"{self._file}: {self._where}.{key} is {value.tolist()}; it must be in [0, {high:g}]"
+            )
+        return value
+
+    def _texture(self, group: dict[str, Any], key: str, **arguments: Any) -> Texture | None:
+        return (
+            self._materials.texture(group[key], f"{self._where}.{key}", **arguments) if key in group else None
+        )
+
+    def _scalar(self, group: dict[str, Any], factor: str, texture: str, channel: int, default: float) -> Any:
+        """Return a factor, or the texture that it scales."""
+        value = self._number(group, factor, default)
+        found = self._texture(group, texture, srgb=False, channel=channel, scale=value) if value else None
+        return value if found is None else found
+
+    def _want(self, name: str, value: Any, neutral: float) -> None:
+        if isinstance(value, Texture) or value != neutral:
+            self._wanted[name] = value
+
+    def _metallic_roughness(self, group: dict[str, Any]) -> None:
+        factor = self._colour(group, "baseColorFactor", [1.0, 1.0, 1.0, 1.0])
+        base = self._texture(group, "baseColorTexture", scale=factor[:3])
+        self._wanted["base_color"] = factor[:3] if base is None else base
+        self._alpha(group, float(factor[3]), base)
+        metallic = self._scalar(group, "metallicFactor", "metallicRoughnessTexture", 2, 1.0)
+        self._want("metallic", metallic, 0.0)
+        self._wanted["roughness"] = self._scalar(group, "roughnessFactor", "metallicRoughnessTexture", 1, 1.0)
+
+    def _alpha(self, group: dict[str, Any], factor: float, base: Texture | None) -> None:
+        mode = self._item.get("alphaMode", "OPAQUE")
+        if mode not in ("OPAQUE", "MASK", "BLEND"):
+            raise SceneError(
+                f"{self._file}: {self._where}.alphaMode is {mode!r}; it must be OPAQUE, MASK or BLEND"
+            )
+        if mode == "OPAQUE":
+            return
+        alpha: Any = factor
+        if base is not None and base.channels == 4:
+            alpha = self._texture(group, "baseColorTexture", srgb=False, channel=3, scale=factor)
+        self._want("alpha", alpha, 1.0)
+        if mode == "MASK" and "alpha" in self._wanted:
+            self._wanted["alpha_cutoff"] = self._number(self._item, "alphaCutoff", 0.5, high=np.inf)
+
+    def _maps(self) -> None:
+        if "normalTexture" in self._item:
+            info = self._item["normalTexture"]
+            scale = floats(f"{self._file}: {self._where}.normalTexture.scale", [info.get("scale", 1)], 1)[0]
+            # texels 0 to 1 become components -1 to 1; x and y are scaled
+            self._wanted["normal_map"] = self._texture(
+                self._item,
+                "normalTexture",
+                srgb=False,
+                scale=[2 * scale, 2 * scale, 2],
+                offset=[-scale, -scale, -1],
+            )
+        if "occlusionTexture" in self._item:
+            self._lost.append("occlusionTexture")
+
+    def _ior(self, group: dict[str, Any] | None) -> None:
+        if group is None:
+            return
+        ior = self._number(group, "ior", 1.5, high=np.inf)
+        if ior < 1:  # 0 stands for infinity: everything is reflected
+            self._lost.append(f"ior {ior:g}")
+        else:
+            self._want("ior", ior, 1.5)
+
+    def _transmission(self, group: dict[str, Any] | None) -> None:
+        if group is not None:
+            self._want(
+                "transmission", self._scalar(group, "transmissionFactor", "transmissionTexture", 0, 0.0), 0.0
+            )
+
+    def _clearcoat(self, group: dict[str, Any] | None) -> None:
+        if group is None:
+            return
+        self._want("clearcoat", self._scalar(group, "clearcoatFactor", "clearcoatTexture", 0, 0.0), 0.0)
+        if "clearcoat" not in self._wanted:
+            return
+        rough = self._scalar(group, "clearcoatRoughnessFactor", "clearcoatRoughnessTexture", 1, 0.0)
+        self._wanted["clearcoat_roughness"] = rough
+        if "clearcoatNormalTexture" in group:
+            self._lost.append("clearcoatNormalTexture")
+
+    def _sheen(self, group: dict[str, Any] | None) -> None:
+        if group is None:
+            return
+        factor = self._colour(group, "sheenColorFactor", [0.0, 0.0, 0.0])
+        if not factor.any():
+            return
+        texture = self._texture(group, "sheenColorTexture", scale=factor)
+        self._wanted["sheen_color"] = factor if texture is None else texture
+        self._wanted["sheen_roughness"] = self._scalar(
+            group, "sheenRoughnessFactor", "sheenRoughnessTexture", 3, 0.0
+        )
+
+    def _specular(self, group: dict[str, Any] | None) -> None:
+        if group is None:
+            return
+        self._want("specular", self._scalar(group, "specularFactor", "specularTexture", 3, 1.0), 1.0)
+        factor = self._colour(group, "specularColorFactor", [1.0, 1.0, 1.0], high=np.inf)
+        texture = self._texture(group, "specularColorTexture", scale=factor)
+        if texture is not None or (factor != 1).any():
+            self._wanted["specular_color"] = factor if texture is None else texture
+
+    def _volume(self, group: dict[str, Any] | None) -> None:
+        """Beer–Lambert: `attenuationColor` is what is left after `attenuationDistance`."""
+        if group is None:
+            return
+        colour = self._colour(group, "attenuationColor", [1.0, 1.0, 1.0])
+        if "attenuationDistance" in group and (colour < 1).any():
+            distance = self._number(group, "attenuationDistance", 1.0, high=np.inf)
+            if distance == 0:
+                raise SceneError(f"{self._file}: {self._where}.attenuationDistance is 0; it must be above 0")
+            self._wanted["absorption"] = -np.log(np.maximum(colour, 1e-6)) / distance
+
+    def _emission(self, strength: dict[str, Any]) -> NDArray[np.float64] | None:
+        factor = self._colour(self._item, "emissiveFactor", [0.0, 0.0, 0.0])
+        factor = factor * self._number(strength, "emissiveStrength", 1.0, high=np.inf)
+        texture = self._texture(self._item, "emissiveTexture") if factor.any() else None
+        radiance, lost = emission(factor, texture)
+        self._lost += lost
+        if radiance is not None and self._item.get("doubleSided"):
+            self._lost.append("emission from back sides")
+        return radiance
+
+
+def _check_extensions(document: Document) -> None:
+    for name in document.json.get("extensionsRequired", []):
+        if name not in KNOWN and name != "KHR_materials_unlit":
+            raise SceneError(f"{document.name}: requires {name}, which is not read")
+    for name in document.json.get("extensionsUsed", []):
+        if name not in KNOWN:
+            document.lose(name, "the file")
+
+
+def _wrap(sampler: dict[str, Any], key: str) -> Any:
+    return WRAPS.get(sampler.get(key, 10497), "repeat")
+
+
+def _uv_matrix(document: Document, move: dict[str, Any], where: str) -> NDArray[np.float64]:
+    """Return KHR_texture_transform as a matrix for v upwards."""
+    place = f"{document.name}: {where} KHR_texture_transform"
+    offset = floats(place + " offset", move.get("offset", [0, 0]), 2)
+    scale = floats(place + " scale", move.get("scale", [1, 1]), 2)
+    angle = floats(place + " rotation", [move.get("rotation", 0)], 1)[0]
+    cos, sin = np.cos(angle), np.sin(angle)
+    # the signs follow the extension's example (a quarter turn that lands in the lower left), which
+    # is how viewers do it; the GLSL beside that example turns the other way
+    moved = np.array(
+        [[cos * scale[0], sin * scale[1], offset[0]], [-sin * scale[0], cos * scale[1], offset[1]], [0, 0, 1]]
+    )
+    return FLIP @ moved @ FLIP

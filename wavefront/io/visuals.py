@@ -1,0 +1,78 @@
+"""Materials of trimesh objects, read as their files would be."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bsdfs import Diffuse
+from ..textures import Texture
+from . import mtl
+from .appearance import Look, emission, realise
+from .mtl import MATTE
+
+
+def look(material: Any, where: str) -> Look:
+    """Return the look of a trimesh `PBRMaterial` or `SimpleMaterial`; `where` is for messages."""
+    if hasattr(material, "baseColorFactor"):
+        return _pbr(material)
+    if hasattr(material, "diffuse"):
+        return _simple(material, where)
+    return Look(Diffuse(MATTE), None, [type(material).__name__])
+
+
+def pixels(image: Any) -> NDArray[np.uint8]:
+    """Return the stored values (H, W, C) of a PIL image."""
+    if image.mode not in ("L", "LA", "RGB", "RGBA"):
+        image = image.convert("RGBA" if "transparency" in image.info else "RGB")
+    codes = np.asarray(image)
+    return codes[:, :, None] if codes.ndim == 2 else codes
+
+
+def _pbr(material: Any) -> Look:
+    """Read glTF's model; trimesh rounds its colours to 8 bits, and they are linear."""
+    factor = np.ones(4) if material.baseColorFactor is None else np.asarray(material.baseColorFactor) / 255.0
+    wanted: dict[str, Any] = {"base_color": factor[:3]}
+    codes = None if material.baseColorTexture is None else pixels(material.baseColorTexture)
+    if codes is not None:
+        wanted["base_color"] = Texture(codes, scale=factor[:3])
+    if material.alphaMode in ("MASK", "BLEND"):
+        alpha: Any = float(factor[3])
+        if codes is not None and codes.shape[2] == 4:
+            alpha = Texture(codes, srgb=False, channel=3, scale=alpha)
+        if isinstance(alpha, Texture) or alpha != 1:
+            wanted["alpha"] = alpha
+            if material.alphaMode == "MASK":
+                wanted["alpha_cutoff"] = 0.5 if material.alphaCutoff is None else float(material.alphaCutoff)
+    metallic = 1.0 if material.metallicFactor is None else float(material.metallicFactor)
+    roughness = 1.0 if material.roughnessFactor is None else float(material.roughnessFactor)
+    both = None if material.metallicRoughnessTexture is None else pixels(material.metallicRoughnessTexture)
+    if metallic:
+        wanted["metallic"] = metallic if both is None else Texture(both, False, channel=2, scale=metallic)
+    wanted["roughness"] = roughness if both is None else Texture(both, False, channel=1, scale=roughness)
+    if material.normalTexture is not None:
+        wanted["normal_map"] = Texture(pixels(material.normalTexture), False, scale=2, offset=-1)
+    glow = np.zeros(3) if material.emissiveFactor is None else np.asarray(material.emissiveFactor, np.float64)
+    image = None if material.emissiveTexture is None else Texture(pixels(material.emissiveTexture))
+    radiance, dark = emission(glow, image)
+    made, lost = realise(wanted)
+    occluded = ["occlusionTexture"] if material.occlusionTexture is not None else []
+    return Look(made, radiance, occluded + dark + lost)
+
+
+def _simple(material: Any, where: str) -> Look:
+    """Read an MTL material: trimesh keeps its lines as lists of words."""
+    entry = mtl.Entry(where, str(material.name or ""))
+    lines = {key: value for key, value in material.kwargs.items() if key != "name"}
+    lines.setdefault("kd", np.asarray(material.diffuse)[:3] / 255.0)
+    for key, value in lines.items():
+        words = value if isinstance(value, list | tuple | np.ndarray) else [value]
+        entry.lines[key.lower()] = (key, 0, " ".join(str(word) for word in words))
+    if material.image is not None:
+        entry.images["map_kd"] = pixels(material.image)
+        entry.lines["map_kd"] = ("map_kd", 0, "image")
+    found = mtl.look(entry)
+    found.lost = [*entry.unread(), *found.lost]
+    return found
