@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 import scenes
 from scenes import Case, each
-from significance import assert_mean, measure
+from significance import Mean, assert_mean, measure, repeat
+
+import wavefront as wf
+from wavefront.lights import LightTable, TriangleLights
+from wavefront.sampling import warp
+from wavefront.sampling.sampler import Dimension, make_sampler
+from wavefront.stages import compact
+from wavefront.vec import f4
 
 
 def run(case: Case, integrator: str, **options):
@@ -56,3 +63,81 @@ def test_disk_is_fine_enough(x: float, expected: float) -> None:
     rim = mesh.vertices[:-1] - (x, 0, 0)
     assert abs(scenes.polygon_irradiance(rim) / expected - 1) < 1e-4
     assert abs(scenes.disk_irradiance(1, 2, x) / expected - 1) < 1e-5
+
+
+@pytest.mark.parametrize("integrator", scenes.ALL)
+def test_field_of_view(integrator: str) -> None:
+    """A square of half-size 0.5 at distance 1 fills a quarter of a picture of 90 degrees."""
+    light = wf.Rectangle((-0.5, -0.5, -1), (1, 0, 0), (0, 1, 0), material=scenes.BLACK, emission=1.0)
+    camera = wf.Camera.look_at((0, 0, 0), (0, 0, -1), fov=90, size=(10, 10))
+    runs = repeat(wf.Scene([light], camera=camera), 64, integrator=integrator, max_bounces=0)
+    assert_mean(Mean.of(runs.mean((1, 2, 3))), 0.25, 0.001)
+    inside = np.zeros((10, 10), bool)
+    inside[3:7, 3:7] = True
+    assert (runs[:, inside] == 1).all()
+    assert (runs[:, [0, 1, 8, 9]] == 0).all()
+
+
+@pytest.mark.parametrize("build", [scenes.glass_ball, scenes.glass_box])
+@pytest.mark.parametrize("integrator", scenes.ALL)
+def test_lossless_glass_vanishes(build, integrator: str, monkeypatch) -> None:
+    """In an environment of 1 every sample is 1, whatever way it takes; roulette keeps the mean."""
+    options = {"integrator": integrator, "max_bounces": 1000}
+    runs = repeat(build(), 64, **options)
+    assert_mean(Mean.of(runs.mean((1, 2, 3))), 1.0, 0.0005)
+    monkeypatch.setattr(compact, "ROULETTE_AFTER", 1000)
+    assert repeat(build(), 64, runs=1, **options) == pytest.approx(1.0, abs=2e-5)
+
+
+def test_mirrors_take_part_of_the_light_each_time() -> None:
+    """Nine scattering events are one too few to leave a corridor of ten mirrors."""
+    scene = scenes.corridor(0.9, 10)
+    assert measure(scene, 1, integrator="direct_simple", max_bounces=9).value == 0
+    assert measure(scene, 1, integrator="direct_simple", max_bounces=10).value == pytest.approx(
+        0.9**10, rel=1e-6
+    )
+
+
+# --- Sampling and solid angles (cases 17 and 18) -------------------------------------------------
+
+
+def numbers(sampler: str, n: int = 1 << 16) -> np.ndarray:
+    """64 batches of points in the unit square, (2, 64 n)."""
+    pixel, sample = np.repeat(np.arange(64, dtype=np.uint32), n), np.tile(np.arange(n, dtype=np.uint32), 64)
+    return make_sampler(sampler, 1).draw_2d(pixel, sample, 2, Dimension.DIRECTION)
+
+
+MOMENTS = {
+    "cosine hemisphere, cos": (lambda u: warp.cosine_hemisphere(u)[2], 2 / 3),
+    "cosine hemisphere, cos²": (lambda u: warp.cosine_hemisphere(u)[2] ** 2, 1 / 2),
+    "uniform hemisphere, cos": (lambda u: warp.uniform_hemisphere(u)[2], 1 / 2),
+    "sphere, z²": (lambda u: warp.uniform_sphere(u)[2] ** 2, 1 / 3),
+    "disk, r²": (lambda u: (warp.uniform_disk(u) ** 2).sum(0), 1 / 2),
+}
+TRIANGLE_FACING_ORIGIN = {
+    "octant": ([[[1, 0, 0], [0, 0, 1], [0, 1, 0]]], np.pi / 2),
+    "rectangle": (scenes.panel((-1, -1), (1, 1), 1).vertices[[[0, 1, 2], [0, 2, 3]]], 2.094395),
+}
+
+
+@pytest.mark.parametrize("sampler", ["sobol", "independent"])
+@pytest.mark.parametrize("name", MOMENTS)
+def test_moments_of_warps(name: str, sampler: str) -> None:
+    """Means of cosines and squares over hemisphere, sphere and disk."""
+    value, expected = MOMENTS[name]
+    batches = value(numbers(sampler, 1 << 13)).reshape(64, -1).mean(1, dtype=np.float64)
+    assert_mean(Mean.of(batches), expected, 0.002)
+
+
+@pytest.mark.parametrize("sampler", ["sobol", "independent"])
+@pytest.mark.parametrize("name", TRIANGLE_FACING_ORIGIN)
+def test_solid_angles(name: str, sampler: str) -> None:
+    """The mean of 1/pdf over a light's samples is the solid angle that it fills."""
+    triangles, expected = TRIANGLE_FACING_ORIGIN[name]
+    light = TriangleLights.from_triangles(np.asarray(triangles, float), np.ones((3, 1), f4))
+    table = LightTable([light], 1.0)
+    u = numbers(sampler, 1 << 12)
+    choice = np.roll(u[1], 1234)
+    sample, _ = table.sample_li(np.zeros_like(u[[0, 0, 0]]), choice, u)
+    batches = (1 / sample.pdf.astype(float)).reshape(64, -1).mean(1)
+    assert_mean(Mean.of(batches), expected, 0.002)

@@ -1,0 +1,88 @@
+"""The four estimators against each other, where they estimate the same thing."""
+
+from functools import cache
+from itertools import combinations
+
+import numpy as np
+import pytest
+import scenes
+from significance import Mean, assert_same_images, repeat
+
+import wavefront as wf
+from wavefront.stages import compact as compact_stage
+
+DIRECT_SPP = {"naive": 256, "direct_simple": 96, "direct_mis": 64, "full": 64}
+
+
+@cache
+def room(integrator: str, max_bounces: int, spp: int, sampler: str = "sobol"):
+    """Runs of the room with a mirror and a glass sphere; every estimator has seeds of its own."""
+    first_seed = 1000 * scenes.ALL.index(integrator)
+    options = {"integrator": integrator, "max_bounces": max_bounces, "sampler": sampler}
+    return repeat(scenes.room(), spp, first_seed=first_seed, **options)
+
+
+@pytest.mark.parametrize(("a", "b"), list(combinations(scenes.ALL, 2)))
+def test_direct_light_agrees(a: str, b: str) -> None:
+    """With one scattering event all four estimate emission and direct light."""
+    assert_same_images(room(a, 1, DIRECT_SPP[a]), room(b, 1, DIRECT_SPP[b]), 0.002)
+
+
+def test_direct_light_behind_mirrors_and_glass_agrees() -> None:
+    """Both direct estimators follow specular surfaces to the first that is not."""
+    a, b = room("direct_simple", 8, 96), room("direct_mis", 8, 64)
+    assert_same_images(a, b, 0.002)
+    assert a.mean() > 1.05 * room("direct_simple", 1, 96).mean()
+
+
+@pytest.mark.parametrize("max_bounces", [2, 8])
+def test_indirect_light_agrees(max_bounces: int) -> None:
+    """Naive and full, with light that took several bounces, caustics among it."""
+    naive, full = room("naive", max_bounces, 256), room("full", max_bounces, 128)
+    assert_same_images(naive, full, 0.003)
+
+
+def test_independent_numbers_agree() -> None:
+    """Plain random numbers give the same picture as Sobol points."""
+    assert_same_images(room("full", 8, 128), room("full", 8, 256, "independent"), 0.004)
+
+
+@pytest.mark.parametrize("integrator", scenes.INDIRECT)
+@pytest.mark.parametrize("after", [0, 1000])
+def test_roulette_changes_nothing_but_noise(integrator: str, after: int, monkeypatch) -> None:
+    """From the first bounce on, or never."""
+    usual = room(integrator, 8, 256 if integrator == "naive" else 128)
+    monkeypatch.setattr(compact_stage, "ROULETTE_AFTER", after)
+    options = {"integrator": integrator, "max_bounces": 8, "first_seed": 9000}
+    other = repeat(scenes.room(), 256 if integrator == "naive" else 128, **options)
+    assert_same_images(usual, other, 0.004)
+
+
+def test_full_has_a_tenth_of_the_variance_of_naive() -> None:
+    """On the Cornell box at equal spp."""
+    variance = {}
+    for integrator in scenes.INDIRECT:
+        runs = repeat(scenes.cornell_box(), 64, runs=8, integrator=integrator)
+        variance[integrator] = runs.var(0, ddof=1).mean()
+    assert variance["full"] < 0.1 * variance["naive"]
+
+
+@pytest.mark.parametrize("integrator", scenes.SAMPLING_LIGHTS)
+def test_no_bounce_shows_only_lights(integrator: str) -> None:
+    """Nothing is lit, but the lights and the environment are seen."""
+    image = wf.render(scenes.everything((33, 25)), 1, integrator=integrator, max_bounces=0, progress=False)
+    seen = np.unique(image.rgb.reshape(-1, 3).round(5), axis=0)
+    lights = np.array([[0, 0, 0], [0.2, 0.3, 0.5], [0.5, 1, 2], [3, 2.5, 2]])
+    assert all(np.abs(lights - value).sum(1).min() < 1e-4 for value in seen)
+
+
+@pytest.mark.parametrize("integrator", scenes.INDIRECT)
+def test_every_bounce_adds_its_own_light(integrator: str) -> None:
+    """The light of exactly k bounces of a furnace of 0.5 is 2^-k; the same numbers give the rest."""
+    scene = scenes.furnace(0.5)
+    means = [
+        Mean.of(wf.render(scene, 256, integrator=integrator, max_bounces=k, progress=False).rgb.astype(float))
+        for k in range(4)
+    ]
+    steps = np.diff([0, *(mean.value for mean in means)])
+    assert steps == pytest.approx([1, 0.5, 0.25, 0.125], rel=0.01)
