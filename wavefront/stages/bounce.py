@@ -12,10 +12,10 @@ from .surface import leave
 
 
 def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -> Paths:
-    """Sample the BSDF at each point and return the paths that go on.
+    """Sample the BSDF at each point and return the paths as they leave it.
 
-    A sample of weight 0 ends its path, and so does one for which shading and geometric normal
-    disagree on the side.
+    The throughput is 0 where there is no sample, and where shading and geometric normal disagree
+    on the side of the sampled direction.
     """
     n = len(paths)
     surface = shade.surface
@@ -30,12 +30,12 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
             eta2[lanes] *= sample.eta**2
     direction = shade.frame.to_world(wi)
     cos_g = dot(surface.ng, direction)
-    alive = np.flatnonzero(same_side(wi, cos_g) & (weight.max(0) > 0))
-    onward = Paths(
+    weight *= same_side(wi, cos_g)
+    return Paths(
         slot=paths.slot,
         pixel=paths.pixel,
         sample=paths.sample,
-        origin=leave(surface, direction, cos_g),
+        origin=leave(surface.point, surface.error, surface.ng, direction),
         direction=direction,
         leaving=surface.prim,
         throughput=paths.throughput * weight,
@@ -43,7 +43,6 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         specular=specular,
         eta2=eta2,
     )
-    return onward if alive.size == n else onward.take(alive)
 
 
 def _numbers(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -> np.ndarray:

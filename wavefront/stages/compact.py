@@ -6,10 +6,11 @@ import numpy as np
 
 from ..sampling.sampler import Dimension, Sampler
 from ..state import Hits, Paths
-from ..vec import Ints, f4
+from ..vec import Bools, Ints, f4
 
 ROULETTE_AFTER = 3  # scattering events before paths may be ended
 MAX_SURVIVAL = f4(0.95)
+SMALLEST = np.finfo(f4).tiny  # keeps the division finite on lanes that end anyway
 
 
 def compact(paths: Paths, hits: Hits, lanes: Ints) -> tuple[Paths, Hits]:
@@ -19,18 +20,21 @@ def compact(paths: Paths, hits: Hits, lanes: Ints) -> tuple[Paths, Hits]:
     return paths.take(lanes), hits.take(lanes)
 
 
-def roulette(paths: Paths, sampler: Sampler, bounce: int) -> Paths:
-    """End paths that carry little, and make the survivors carry more, so that the mean stays.
+def carrying(paths: Paths) -> Bools:
+    """Tell which paths still carry anything, (n,)."""
+    return paths.throughput.max(0) > 0
+
+
+def roulette(paths: Paths, sampler: Sampler, bounce: int) -> Ints:
+    """Choose the lanes that live on, and make them carry more, so that the mean stays.
 
     The chance to survive is the largest channel of the throughput, with the compression of
     radiance by refraction taken out (E. Veach, thesis 1997, §10.4.1; pbrt-v4, §13.2.1), at most
-    0.95.
+    0.95. In the first events only paths that carry nothing end.
     """
     if bounce < ROULETTE_AFTER or not len(paths):
-        return paths
+        return np.flatnonzero(carrying(paths))
     chance = np.minimum(paths.throughput.max(0) * paths.eta2, MAX_SURVIVAL)
     u = sampler.draw_1d(paths.pixel, paths.sample, bounce, Dimension.ROULETTE)
-    alive = np.flatnonzero(u < chance)
-    survivors = paths.take(alive)
-    survivors.throughput = survivors.throughput / chance.take(alive)
-    return survivors
+    paths.throughput /= np.maximum(chance, SMALLEST)
+    return np.flatnonzero(u < chance)

@@ -95,7 +95,7 @@ def direct(
     light, f_cos, pdf, delta = light.take(lanes), f_cos.take(lanes, 1), pdf.take(lanes), delta.take(lanes)
     weight = np.where(delta, f4(1), power_heuristic(light.pdf, pdf)) if mis else f4(1)
     radiance = f_cos * light.radiance * (weight / light.pdf)
-    seen = np.flatnonzero(visible(scene, surface.take(lanes), light))
+    seen = np.flatnonzero(visible(scene, surface, lanes, light))
     return Arrival(lanes.take(seen), radiance.take(seen, 1))
 
 
@@ -106,13 +106,17 @@ def evaluate(shade: Shading, wi: Floats, cos_g: Floats) -> tuple[Floats, Floats]
     comes from: where the two normals disagree there is no light, so none leaks through.
     """
     n = wi.shape[1]
+    cos = np.where(same_side(wi, cos_g), np.abs(wi[2]), f4(0))
+    if len(shade.groups) == 1:
+        f, pdf = shade.groups[0][1].evaluate(shade.wo, wi)
+        return f * cos, pdf
     f, pdf = np.zeros((3, n), f4), np.zeros(n, f4)
     for lanes, bsdf in shade.groups:
         if bsdf.specular:
             continue
         part_f, part_pdf = bsdf.evaluate(columns(shade.wo, lanes), columns(wi, lanes))
         f[:, lanes], pdf[lanes] = part_f, part_pdf
-    f *= np.where(same_side(wi, cos_g), np.abs(wi[2]), f4(0))
+    f *= cos
     return f, pdf
 
 

@@ -48,12 +48,9 @@ def normals(scene: CompiledScene, prim: Ints, point: Floats) -> Floats:
     return ng
 
 
-def leave(surface: Surface, wi: Floats, cos_g: Floats) -> Floats:
-    """Origins (3, n) of rays that leave the surface along wi: moved off it by the point's error.
-
-    `cos_g` (n,) is the dot product of wi and the geometric normal; its sign tells the side.
-    """
-    return surface.point + surface.ng * np.copysign(surface.error, cos_g)
+def leave(point: Floats, error: Floats, ng: Floats, wi: Floats) -> Floats:
+    """Origins (3, n) of rays that leave a surface along wi: moved off it by the point's error (n,)."""
+    return point + ng * np.copysign(error, dot(ng, wi))
 
 
 def _onto_sphere(scene: CompiledScene, sphere: Ints, point: Floats) -> Floats:
