@@ -105,7 +105,7 @@ def image_size(size: tuple[int, int]) -> tuple[int, int]:
     try:
         width, height = size
         whole = int(width) == width and int(height) == height
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise SceneError(f"size must be (width, height), got {size!r}") from error
     if not whole or not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
         raise SceneError(f"size is {size!r}; both must be whole numbers from 1 to {MAX_SIDE}")

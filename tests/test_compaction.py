@@ -1,0 +1,139 @@
+"""Records of columns: take, concatenate, compact and roulette keep every column whole."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+import strategies
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wavefront.sampling.sampler import make_sampler
+from wavefront.stages import compact as stage
+from wavefront.state import Hits, Paths, Surface
+from wavefront.vec import f4
+
+SHAPES = {
+    Paths: {"origin": 3, "direction": 3, "throughput": 3},
+    Hits: {},
+    Surface: {"point": 3, "ng": 3, "ns": 3, "wo": 3, "uv": 2},
+}
+KINDS = {
+    **dict.fromkeys(("slot", "leaving", "prim", "material"), np.intp),
+    **dict.fromkeys(("pixel", "sample"), np.uint32),
+    **dict.fromkeys(("specular", "inside"), np.bool_),
+}
+
+
+def record(kind: type, n: int, seed: int = 0, absent: tuple[str, ...] = ()):
+    """A record of n columns, every one different."""
+    rng = np.random.default_rng(seed)
+    values = {}
+    for field in fields(kind):
+        rows = SHAPES[kind].get(field.name)
+        shape = (n,) if rows is None else (rows, n)
+        values[field.name] = (rng.random(shape) * 1000).astype(KINDS.get(field.name, f4))
+    return kind(**{**values, **dict.fromkeys(absent)})
+
+
+def same(a, b) -> bool:
+    """Whether two records have the same bits."""
+    return all(
+        (x is None and y is None)
+        or (x.dtype == y.dtype and x.shape == y.shape and x.tobytes() == y.tobytes())
+        for x, y in ((getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
+    )
+
+
+kinds = st.sampled_from([Paths, Hits, Surface])
+
+
+@given(kinds, st.integers(1, 12), st.data())
+def test_take_takes_every_field(kind: type, n: int, data) -> None:
+    """Column i of the result is column index[i] of the record, in every field."""
+    whole, index = record(kind, n), data.draw(strategies.index_lists(n))
+    part = whole.take(index)
+    assert len(part) == len(index)
+    for field in fields(kind):
+        before, after = getattr(whole, field.name), getattr(part, field.name)
+        assert after.dtype == before.dtype
+        assert (after == before[..., index]).all()
+
+
+@given(kinds, st.integers(2, 12), st.data())
+def test_concatenate_undoes_cutting(kind: type, n: int, data) -> None:
+    """Two halves make the whole again."""
+    whole, cut = record(kind, n), data.draw(st.integers(1, n - 1))
+    halves = whole.take(np.arange(cut)), whole.take(np.arange(cut, n))
+    assert same(kind.concatenate(halves), whole)
+
+
+@given(st.integers(1, 12), st.data())
+def test_compact_keeps_paths_and_hits_together(n: int, data) -> None:
+    """The same lanes of both; all lanes cost nothing."""
+    paths, hits = record(Paths, n, 1), record(Hits, n, 2)
+    lanes = np.flatnonzero(data.draw(st.lists(st.booleans(), min_size=n, max_size=n)))
+    kept_paths, kept_hits = stage.compact(paths, hits, lanes)
+    assert same(kept_paths, paths.take(lanes))
+    assert same(kept_hits, hits.take(lanes))
+
+
+def test_absent_fields_stay_absent() -> None:
+    """None is neither taken nor joined."""
+    surface = record(Surface, 4, absent=("uv",))
+    assert len(surface) == 4
+    assert surface.take(np.array([2, 2])).uv is None
+    assert Surface.concatenate([surface, surface]).uv is None
+
+
+def test_found_are_the_lanes_that_hit() -> None:
+    """A miss has no primitive."""
+    hits = record(Hits, 4)
+    hits.prim = np.array([3, -1, 0, -1])
+    assert hits.found.tolist() == [0, 2]
+
+
+def carrying(throughput: float, eta2: float, n: int) -> Paths:
+    """Paths of n different addresses, all alike."""
+    paths = record(Paths, n)
+    paths.pixel, paths.sample = np.arange(n, dtype=np.uint32), np.zeros(n, np.uint32)
+    paths.throughput, paths.eta2 = np.full((3, n), throughput, f4), np.full(n, eta2, f4)
+    return paths
+
+
+def survivors(paths: Paths, bounce: int = stage.ROULETTE_AFTER) -> Paths:
+    """The paths that roulette leaves."""
+    return paths.take(stage.roulette(paths, make_sampler("independent"), bounce))
+
+
+@pytest.mark.parametrize("throughput", [0.9, 0.5, 0.05])
+def test_roulette_keeps_the_mean(throughput: float) -> None:
+    """A path survives with the chance of its throughput and then carries more by as much."""
+    n = 1 << 16
+    left = survivors(carrying(throughput, 1, n))
+    assert len(left) / n == pytest.approx(throughput, abs=4 * np.sqrt(throughput * (1 - throughput) / n))
+    assert left.throughput == pytest.approx(1, rel=1e-6)
+
+
+def test_roulette_takes_some_of_the_strongest() -> None:
+    """No path lives for ever."""
+    n = 1 << 16
+    left = survivors(carrying(1, 1, n))
+    assert len(left) / n == pytest.approx(0.95, abs=0.004)
+    assert left.throughput == pytest.approx(1 / 0.95, rel=1e-6)
+
+
+def test_roulette_waits() -> None:
+    """In the first bounces only paths that carry nothing end."""
+    paths = carrying(0.01, 1, 100)
+    paths.throughput[:, ::2] = 0
+    left = survivors(paths, stage.ROULETTE_AFTER - 1)
+    assert left.pixel.tolist() == list(range(1, 100, 2))
+    assert left.throughput == pytest.approx(0.01)
+    assert len(survivors(paths)) <= 50
+
+
+def test_roulette_looks_through_refraction() -> None:
+    """Radiance that glass has compressed by η² is no reason to end a path."""
+    left = survivors(carrying(0.5 / 2.25, 2.25, 1 << 14))
+    assert len(left) / (1 << 14) == pytest.approx(0.5, abs=0.02)
