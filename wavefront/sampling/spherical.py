@@ -1,0 +1,222 @@
+"""Uniform sampling of the solid angle that a triangle or a rectangle covers.
+
+Each record prepares what a sample and its density share, a column per lane.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..vec import Floats, cross, dot, f4, normalize
+
+Doubles = NDArray[np.float64]
+
+
+def solid_angle_triangle(a: Floats, b: Floats, c: Floats) -> Floats:
+    """Solid angle (n,) in sr of the triangle with unit directions a, b, c (3, n) to its corners.
+
+    The determinant is taken of differences of the corners, which keeps it exact to rounding of
+    the input when the triangle is small.
+
+    Source: A. Van Oosterom and J. Strackee, The Solid Angle of a Plane Triangle, 1983, eq. 8.
+    """
+    volume = np.abs(dot(a, cross(b - a, c - a)))
+    return f4(2) * np.arctan2(volume, f4(1) + dot(a, b) + dot(a, c) + dot(b, c))
+
+
+def solid_angle_rectangle(corner: Floats, edge_u: Floats, edge_v: Floats) -> Floats:
+    """Solid angle (n,) in sr of a parallelogram: `corner` (3, n) from the point, edges (3, n or 1)."""
+    a, b = normalize(corner), normalize(corner + edge_u)
+    c, d = normalize(corner + edge_u + edge_v), normalize(corner + edge_v)
+    return solid_angle_triangle(a, b, c) + solid_angle_triangle(a, c, d)
+
+
+@dataclass(slots=True)
+class SphericalTriangle:
+    """Triangles on the unit sphere, sampled uniformly in solid angle.
+
+    Accurate as long as the corners, as float32 directions, describe the triangle: below about
+    1e-3 rad across, sample its area instead.
+
+    Source: J. Arvo, Stratified Sampling of Spherical Triangles, SIGGRAPH 1995, in the form without
+    angles of C. Peters, BRDF Importance Sampling for Polygonal Lights, SIGGRAPH 2021, section 4.
+    """
+
+    a: Floats  # (3, n) unit direction to the first corner
+    b: Floats  # (3, n) unit direction to the second corner, where the slices meet
+    c: Floats  # (3, n) unit direction to the third corner
+    volume: Floats  # (n,) determinant of a, b, c, signed
+    rest: Floats  # (n,) a·c + b·c
+    base: Floats  # (n,) 1 + a·b
+    half_angle: Floats  # (n,) half of the solid angle, with the sign of `volume`
+
+    @classmethod
+    def of(cls, a: Floats, b: Floats, c: Floats) -> Self:
+        """Prepare the triangles with unit directions a, b, c (3, n) to their corners."""
+        volume = dot(a, cross(b - a, c - a))
+        rest = dot(a, c) + dot(b, c)
+        base = f4(1) + dot(a, b)
+        return cls(a, b, c, volume, rest, base, np.arctan2(volume, base + rest))
+
+    @property
+    def solid_angle(self) -> Floats:
+        """Solid angle, (n,), sr."""
+        return f4(2) * np.abs(self.half_angle)
+
+    def pdf(self) -> Floats:
+        """Density within the triangle, (n,), 1/sr; 0 where the triangle covers nothing."""
+        return _reciprocal(self.solid_angle)
+
+    def sample(self, u: Floats) -> Floats:
+        """Unit directions (3, n) from u (2, n)."""
+        return normalize(_between(self.b, self._on_edge(u[0]), u[1]))
+
+    def inverse(self, w: Floats) -> Floats:
+        """Return the u (2, n) that `sample` maps to w (3, n)."""
+        on_edge = normalize(cross(cross(self.b, w), cross(self.c, self.a)))
+        on_edge *= np.where(dot(on_edge, self.a + self.c) < 0, f4(-1), f4(1))
+        near, far = w - self.b, on_edge - self.b
+        out = np.empty((2, w.shape[1]), f4)
+        np.multiply(solid_angle_triangle(self.a, self.b, on_edge), self.pdf(), out=out[0])
+        np.multiply(dot(near, near), _reciprocal(dot(far, far)), out=out[1])
+        return out
+
+    def _on_edge(self, share: Floats) -> Floats:
+        """Points (3, n) of edge a–c such that triangle a, b, x has `share` (n,) of the solid angle.
+
+        With x the reflection of a about α·a + β·c, the formula for the solid angle of a, b, x is
+        linear in α and β.
+        """
+        angle = share * self.half_angle
+        cos, sin = np.cos(angle), np.sin(angle)
+        alpha = self.volume * cos - self.rest * sin
+        beta = self.base * sin
+        edge = self.c - self.a
+        rise = dot(edge, self.a)
+        along = alpha + beta + beta * rise
+        across = (edge - rise * self.a) * beta
+        across2 = dot(across, across)
+        scale = f4(2) * _reciprocal(along * along + across2)
+        return self.a + (along * across - across2 * self.a) * scale
+
+
+@dataclass(slots=True)
+class SphericalRectangle:
+    """Rectangles seen from a point each, sampled uniformly in solid angle.
+
+    In the rectangle's frame, at distance z, the part up to x covers F(x) − F(x₀) with
+    F = asin(b₁c) − asin(b₀c), c = x/√(x² + z²), bᵢ = yᵢ/√(yᵢ² + z²); solved for c this is
+    c = sin F/√(b₀² + b₁² − 2b₀b₁ cos F). It is in float64, because F is a small difference.
+
+    Source: C. Ureña, M. Fajardo, A. King, An Area-Preserving Parametrization for Spherical
+    Rectangles, EGSR 2013, with a form of its eq. 8 that needs no case for the sign of x.
+    """
+
+    x_axis: Floats  # (3, n or 1) unit vector along the first edge
+    y_axis: Floats  # (3, n or 1) unit vector along the second edge
+    z_axis: Floats  # (3, n or 1) unit normal
+    height: Floats  # (n,) signed distance of the plane along z_axis
+    x: tuple[Doubles, Doubles]  # (n,) each: bounds along x_axis
+    y: tuple[Doubles, Doubles]  # (n,) each: bounds along y_axis
+    z: Doubles  # (n,) distance of the plane
+    b: tuple[Doubles, Doubles]  # (n,) each: yᵢ/√(yᵢ² + z²)
+    start: Doubles  # (n,) F at the lower bound of x
+    angle: Doubles  # (n,) solid angle, sr
+
+    @classmethod
+    def of(cls, corner: Floats, edge_u: Floats, edge_v: Floats) -> Self:
+        """Prepare rectangles.
+
+        Parameters
+        ----------
+        corner
+            (3, n) vector from the point to one corner.
+        edge_u, edge_v
+            (3, n) or (3, 1) perpendicular edges that leave that corner.
+        """
+        x_axis, y_axis = normalize(edge_u), normalize(edge_v)
+        z_axis = cross(x_axis, y_axis)
+        height = dot(corner, z_axis)
+        x0, y0 = _dot64(corner, x_axis), _dot64(corner, y_axis)
+        x = (x0, x0 + _dot64(edge_u, x_axis))
+        y = (y0, y0 + _dot64(edge_v, y_axis))
+        z = np.abs(height.astype(np.float64))
+        b = (_sine(y[0], z), _sine(y[1], z))
+        start = _swept(b, _sine(x[0], z))
+        angle = np.where(z > 0, _swept(b, _sine(x[1], z)) - start, 0.0)
+        return cls(x_axis, y_axis, z_axis, height, x, y, z, b, start, angle)
+
+    @property
+    def solid_angle(self) -> Floats:
+        """Solid angle, (n,), sr."""
+        return self.angle.astype(f4)
+
+    def pdf(self) -> Floats:
+        """Density within the rectangle, (n,), 1/sr; 0 where it covers nothing."""
+        return _reciprocal(self.solid_angle)
+
+    def sample(self, u: Floats) -> Floats:
+        """Vectors (3, n) from the point to points of the rectangle, from u (2, n)."""
+        swept = self.start + u[0] * self.angle
+        b0, b1 = self.b
+        half = np.sin(0.5 * swept)
+        size = np.sqrt((b1 - b0) ** 2 + 4 * b0 * b1 * half * half)
+        x = _from_sine(np.sin(swept) / np.where(size > 0, size, 1.0), self.z, self.x)
+        depth = np.sqrt(x * x + self.z * self.z)
+        h0, h1 = _sine(self.y[0], depth), _sine(self.y[1], depth)
+        y = _from_sine(h0 + u[1] * (h1 - h0), depth, self.y)
+        return x.astype(f4) * self.x_axis + y.astype(f4) * self.y_axis + self.height * self.z_axis
+
+    def inverse(self, w: Floats) -> Floats:
+        """Return the u (2, n) that `sample` maps to vectors along w (3, n)."""
+        scale = self.z / np.abs(_dot64(w, self.z_axis))
+        x, y = _dot64(w, self.x_axis) * scale, _dot64(w, self.y_axis) * scale
+        depth = np.sqrt(x * x + self.z * self.z)
+        h0, h1 = _sine(self.y[0], depth), _sine(self.y[1], depth)
+        out = np.empty((2, w.shape[1]), f4)
+        out[0] = (_swept(self.b, _sine(x, self.z)) - self.start) / self.angle
+        out[1] = (_sine(y, depth) - h0) / (h1 - h0)
+        return out
+
+
+def _between(start: Floats, end: Floats, u: Floats) -> Floats:
+    """Unit vectors (3, n) on the arcs from `start` to `end` (3, n), 1 − cosine proportional to u (n,).
+
+    Written as steps from `start`, so that a short arc keeps its digits.
+    """
+    chord = end - start
+    depth = f4(0.5) * dot(chord, chord)  # 1 − cosine of the whole arc
+    t = np.sqrt(u * (f4(2) - u * depth) * _reciprocal(f4(2) - depth))
+    return start + t * chord + (depth * (t - u)) * start
+
+
+def _reciprocal(x: Floats) -> Floats:
+    """1/x, and 0 where x (n,) is not positive."""
+    return np.where(x > 0, f4(1) / np.where(x > 0, x, f4(1)), f4(0))
+
+
+def _dot64(a: Floats, b: Floats) -> Doubles:
+    """Dot product of (3, n) columns in float64, (n,)."""
+    p, q = a.astype(np.float64), b.astype(np.float64)
+    return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
+
+
+def _sine(side: Doubles, height: Doubles) -> Doubles:
+    """side/√(side² + height²), (n,), and 0 where both are 0."""
+    size = np.sqrt(side * side + height * height)
+    return side / np.where(size > 0, size, 1.0)
+
+
+def _from_sine(sine: Doubles, height: Doubles, bounds: tuple[Doubles, Doubles]) -> Doubles:
+    """Side (n,) with this sine at `height`, kept within `bounds` against rounding."""
+    cosine = np.sqrt(np.maximum(1 - sine * sine, 1e-300))
+    return np.clip(sine * height / cosine, bounds[0], bounds[1])
+
+
+def _swept(b: tuple[Doubles, Doubles], c: Doubles) -> Doubles:
+    """Solid angle F (n,) between x = 0 and x, signed, where c = x/√(x² + z²)."""
+    return np.arcsin(b[1] * c) - np.arcsin(b[0] * c)
