@@ -329,14 +329,15 @@ def _add_camera(document: Document, out: Contents, index: int, matrix: Matrix) -
     aspect = floats(where + ".aspectRatio", [lens.get("aspectRatio", 1)], 1)[0]
     if not 0 < fov < np.pi or not 1e-3 < aspect < 1e2:
         raise SceneError(f"{where} has yfov {fov:g} and aspectRatio {aspect:g}; both must be above 0")
+    out.camera = camera_at(matrix, float(np.degrees(fov)), float(aspect))
+
+
+def camera_at(matrix: Matrix, fov: float, aspect: float) -> Camera:
+    """Return a camera from its matrix to world space (it looks along -z, y is up), fov in degrees."""
     origin = matrix[:3, 3]
-    out.camera = Camera.look_at(
-        origin,
-        origin - matrix[:3, 2] / np.linalg.norm(matrix[:3, 2]),
-        matrix[:3, 1],
-        fov=float(np.degrees(fov)),
-        size=(max(1, round(HEIGHT * aspect)), HEIGHT),
-    )
+    ahead = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
+    size = (max(1, round(HEIGHT * aspect)), HEIGHT)
+    return Camera.look_at(origin, origin - ahead, matrix[:3, 1], fov=fov, size=size)
 
 
 def _add_light(document: Document, out: Contents, index: int, matrix: Matrix) -> None:

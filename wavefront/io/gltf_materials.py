@@ -175,7 +175,8 @@ class _Reader:
     def _maps(self) -> None:
         if "normalTexture" in self._item:
             info = self._item["normalTexture"]
-            scale = floats(f"{self._file}: {self._where}.normalTexture.scale", [info.get("scale", 1)], 1)[0]
+            given = info.get("scale", 1) if isinstance(info, dict) else 1
+            scale = floats(f"{self._file}: {self._where}.normalTexture.scale", [given], 1)[0]
             # texels 0 to 1 become components -1 to 1; x and y are scaled
             self._wanted["normal_map"] = self._texture(
                 self._item,

@@ -98,7 +98,7 @@ def from_trimesh(geometry: Any) -> Scene:
         If it is something else, or has no faces.
     """
     raws = _raws(geometry, "trimesh object", strict=False)
-    return Scene(_meshes("trimesh object", raws, strict=False))
+    return Scene(_meshes("trimesh object", raws, strict=False), camera=_camera(geometry))
 
 
 def join(
@@ -295,6 +295,19 @@ def _placed(geometry: Any, trimesh: Any) -> list[tuple[Any, str, np.ndarray]]:
     return out
 
 
+def _camera(geometry: Any) -> Camera | None:
+    """Return the camera that somebody gave a trimesh scene."""
+    if not getattr(geometry, "has_camera", False):
+        return None
+    if geometry.source is not None and geometry.source.file_type in ("glb", "gltf"):
+        # trimesh reads it without the nodes above it, so it stands in the wrong place
+        warn("trimesh object: not honoured: the camera of its glTF file; wf.load reads it", strict=False)
+        return None
+    width, height = geometry.camera.resolution
+    matrix = np.asarray(geometry.camera_transform, np.float64)
+    return gltf.camera_at(matrix, float(geometry.camera.fov[1]), float(width / height))
+
+
 def _raw(mesh: trimesh.Trimesh, name: str, matrix: np.ndarray) -> Raw:
     # asking for `vertex_normals` would compute them; the cache tells whether they are there
     normals = np.asarray(mesh.vertex_normals) if "vertex_normals" in mesh._cache.cache else None
@@ -321,7 +334,7 @@ class _Visuals:
         if "color" in getattr(visual, "vertex_attributes", {}):
             self.lost.setdefault("vertex colours", raw.name)
         material = getattr(visual, "material", None)
-        if material is None:
+        if material is None or visuals.is_blank(material):
             return
         if id(material) not in self._looks:
             self._looks[id(material)] = visuals.look(material, f"trimesh material {material.name!r}")

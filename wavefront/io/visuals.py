@@ -23,6 +23,15 @@ def look(material: Any, where: str) -> Look:
     return Look(Diffuse(MATTE), None, [type(material).__name__])
 
 
+def is_blank(material: Any) -> bool:
+    """Tell whether trimesh made a material up for a mesh that has texture coordinates and nothing more."""
+    image = getattr(material, "image", None)
+    plain = getattr(material, "kwargs", None) == {} and material.name in (None, "", "material_0")
+    return (
+        plain and image is not None and max(image.size) <= 2 and not np.ptp(pixels(image), axis=(0, 1)).any()
+    )
+
+
 def pixels(image: Any) -> NDArray[np.uint8]:
     """Return the stored values (H, W, C) of a PIL image."""
     if image.mode not in ("L", "LA", "RGB", "RGBA"):

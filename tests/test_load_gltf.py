@@ -1,0 +1,681 @@
+"""glTF: geometry, nodes, materials, textures, lights and cameras, on small files written here."""
+
+import base64
+import io
+import json
+import struct
+import warnings
+from pathlib import Path
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+import trimesh
+
+from wavefront.bsdfs import Dielectric, Diffuse, Mirror
+from wavefront.errors import SceneError
+from wavefront.io import appearance
+from wavefront.io.images import srgb_to_linear
+from wavefront.io.load import from_trimesh, load, load_meshes
+from wavefront.textures import Texture
+
+DATA = Path(__file__).parents[2] / "shared" / "data"
+TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+CODES = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
+TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+
+
+class Builder:
+    """Writes the smallest glTF that says what a test needs."""
+
+    def __init__(self):
+        self.json = {
+            "asset": {"version": "2.0"},
+            "scene": 0,
+            "scenes": [{"nodes": [0]}],
+            "nodes": [{"mesh": 0}],
+        }
+        self.json |= {"accessors": [], "bufferViews": [], "meshes": []}
+        self.binary = b""
+
+    def view(self, data, **extra):
+        self.json["bufferViews"].append(
+            {"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(data), **extra}
+        )
+        self.binary += data + bytes(-len(data) % 4)
+        return len(self.json["bufferViews"]) - 1
+
+    def accessor(self, values, **extra):
+        values = np.asarray(values)
+        values = values[:, None] if values.ndim == 1 else values
+        item = {
+            "componentType": CODES[values.dtype.name],
+            "count": len(values),
+            "type": TYPES[values.shape[1]],
+        }
+        self.json["accessors"].append({"bufferView": self.view(values.tobytes()), **item, **extra})
+        return len(self.json["accessors"]) - 1
+
+    def mesh(self, attributes=None, indices=None, **part):
+        attributes = {"POSITION": TRIANGLE} if attributes is None else attributes
+        part = {
+            "attributes": {k: v if isinstance(v, int) else self.accessor(v) for k, v in attributes.items()}
+        } | part
+        if indices is not None:
+            part["indices"] = self.accessor(indices)
+        self.json["meshes"].append({"primitives": [part]})
+        return self
+
+    def image(self, codes):
+        """Add a PNG as a texture and return its number."""
+        data = io.BytesIO()
+        iio.imwrite(data, codes, extension=".png")
+        images = self.json.setdefault("images", [])
+        images.append({"bufferView": self.view(data.getvalue()), "mimeType": "image/png"})
+        textures = self.json.setdefault("textures", [])
+        textures.append({"source": len(images) - 1})
+        return {"index": len(textures) - 1}
+
+    def material(self, **material):
+        """Add a textured triangle with a material."""
+        self.json["materials"] = [material]
+        return self.mesh({"POSITION": TRIANGLE, "TEXCOORD_0": TRIANGLE[:, :2]}, material=0)
+
+    def gltf(self, path):
+        uri = "data:application/octet-stream;base64," + base64.b64encode(self.binary).decode()
+        path.write_text(json.dumps(self.json | {"buffers": [{"byteLength": len(self.binary), "uri": uri}]}))
+        return path
+
+    def glb(self, path):
+        text = json.dumps(self.json | {"buffers": [{"byteLength": len(self.binary)}]}).encode()
+        text += b" " * (-len(text) % 4)
+        body = struct.pack("<I4s", len(text), b"JSON") + text
+        body += struct.pack("<I4s", len(self.binary), b"BIN\0") + self.binary
+        path.write_bytes(b"glTF" + struct.pack("<II", 2, 12 + len(body)) + body)
+        return path
+
+
+@pytest.fixture
+def build():
+    return Builder()
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "a.gltf"
+
+
+def soup(mesh, values=None):
+    return (mesh.vertices if values is None else values)[mesh.faces]
+
+
+# ---- geometry -----------------------------------------------------------------------------------
+
+
+def test_triangle_in_both_containers(build, tmp_path):
+    build.mesh(
+        {
+            "POSITION": TRIANGLE,
+            "NORMAL": np.tile(np.float32([[0, 0, 1]]), (3, 1)),
+            "TEXCOORD_0": np.float32([[0, 0.25], [1, 0.25], [0, 1]]),
+        },
+        np.array([0, 1, 2], np.uint8),
+    )
+    for file in (build.gltf(tmp_path / "a.gltf"), build.glb(tmp_path / "a.glb")):
+        (mesh,) = load_meshes(file)
+        assert np.array_equal(soup(mesh)[0], TRIANGLE)
+        assert np.array_equal(mesh.normals, [[0, 0, 1]] * 3)
+        assert np.array_equal(mesh.uvs, [[0, 0.75], [1, 0.75], [0, 0]])  # v upwards
+        assert mesh.material.reflectance.ravel() == pytest.approx([0.5] * 3)
+
+
+def test_an_external_buffer_with_a_space_in_its_name(build, path):
+    build.mesh()
+    (path.parent / "b c.bin").write_bytes(build.binary)
+    build.json["buffers"] = [{"byteLength": len(build.binary), "uri": "b%20c.bin"}]
+    path.write_text(json.dumps(build.json))
+    assert np.array_equal(soup(load_meshes(path)[0])[0], TRIANGLE)
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.uint32])
+def test_index_types(build, path, kind):
+    build.mesh(indices=np.array([2, 0, 1], kind))
+    assert np.array_equal(soup(load_meshes(build.gltf(path))[0])[0], TRIANGLE[[2, 0, 1]])
+
+
+@pytest.mark.parametrize(("mode", "expected"), [(5, [[0, 1, 2], [2, 1, 3]]), (6, [[0, 1, 2], [0, 2, 3]])])
+def test_strips_and_fans(build, path, mode, expected):
+    corners = np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
+    build.mesh({"POSITION": corners}, np.arange(4, dtype=np.uint16), mode=mode).gltf(path)
+    assert np.array_equal(soup(load_meshes(path)[0]), corners[expected])
+
+
+def test_interleaved_and_offset_views(build, path):
+    rows = np.zeros((3, 5), np.float32)
+    rows[:, :3], rows[:, 3:] = TRIANGLE, [[0, 0], [1, 0], [0, 1]]
+    view = build.view(rows.tobytes(), byteStride=20)
+    common = {"bufferView": view, "componentType": 5126, "count": 3}
+    build.json["accessors"] = [{**common, "type": "VEC3"}, {**common, "type": "VEC2", "byteOffset": 12}]
+    build.mesh({"POSITION": 0, "TEXCOORD_0": 1}).gltf(path)
+    (mesh,) = load_meshes(path)
+    assert np.array_equal(soup(mesh)[0], TRIANGLE)
+    assert np.array_equal(mesh.uvs, [[0, 1], [1, 1], [0, 0]])
+
+
+def test_sparse_and_normalised_accessors(build, path):
+    build.accessor(TRIANGLE)
+    at, new = build.view(np.array([2], np.uint16).tobytes()), build.view(np.float32([[0, 5, 0]]).tobytes())
+    build.json["accessors"][0]["sparse"] = {
+        "count": 1,
+        "indices": {"bufferView": at, "componentType": 5123},
+        "values": {"bufferView": new},
+    }
+    uvs = build.accessor(np.array([[0, 0], [65535, 0], [0, 13107]], np.uint16), normalized=True)
+    build.mesh({"POSITION": 0, "TEXCOORD_0": uvs}).gltf(path)
+    (mesh,) = load_meshes(path)
+    assert np.array_equal(soup(mesh)[0], [[0, 0, 0], [1, 0, 0], [0, 5, 0]])
+    assert mesh.uvs == pytest.approx(np.array([[0, 1], [1, 1], [0, 0.8]]))
+
+
+def test_nodes_place_and_repeat_meshes(build, path):
+    half = np.sqrt(0.5)
+    build.json["nodes"] = [
+        {"children": [1, 2], "translation": [10, 0, 0]},
+        {"mesh": 0, "rotation": [0, 0, half, half], "scale": [2, 1, 1], "translation": [0, 1, 0]},
+        {"mesh": 0, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0, 0, 0, 3, 1]},
+    ]
+    build.mesh({"POSITION": TRIANGLE, "NORMAL": np.tile(np.float32([[0, 0.6, 0.8]]), (3, 1))}).gltf(path)
+    turned, mirrored = load_meshes(path)
+    assert soup(turned)[0] == pytest.approx(np.array([[10, 1, 0], [10, 3, 0], [9, 1, 0]]))
+    assert turned.normals[0] == pytest.approx([-0.6, 0, 0.8])
+    a, b, c = soup(mirrored)[0]
+    assert np.cross(b - a, c - a)[2] < 0
+    assert mirrored.normals[0] == pytest.approx([0, 0.6, -0.8])
+    assert {tuple(p) for p in soup(mirrored)[0]} == {(10, 0, 3), (11, 0, 3), (10, 1, 3)}
+
+
+def test_a_flat_thing_may_be_scaled_by_0_across(build, path):
+    build.json["nodes"][0]["scale"] = [1, 1, 0]
+    build.mesh({"POSITION": TRIANGLE, "NORMAL": np.tile(np.float32([[0, 0, 1]]), (3, 1))}).gltf(path)
+    assert np.array_equal(load_meshes(path)[0].normals, [[0, 0, 1]] * 3)
+
+
+# ---- cameras and lights ---------------------------------------------------------------------------
+
+
+def test_camera(build, path):
+    half = np.sqrt(0.5)
+    build.json["nodes"] += [
+        {"camera": 0, "translation": [1, 2, 3], "rotation": [0, half, 0, half], "scale": [2] * 3}
+    ]
+    build.json["scenes"][0]["nodes"] = [0, 1]
+    build.json["cameras"] = [
+        {"type": "perspective", "perspective": {"yfov": 0.5, "aspectRatio": 1.5, "znear": 1}}
+    ]
+    camera = load(build.mesh().gltf(path)).camera
+    assert camera.origin == pytest.approx([1, 2, 3])
+    assert camera.rotation[:, 2] == pytest.approx([1, 0, 0])  # it looks along its own -z
+    assert camera.rotation[:, 1] == pytest.approx([0, 1, 0])
+    assert camera.fov == pytest.approx(np.degrees(0.5))
+    assert camera.size == (768, 512)
+
+
+def test_point_light(build, path):
+    build.json["nodes"] += [{"translation": [0, 2, 0], "extensions": {"KHR_lights_punctual": {"light": 0}}}]
+    build.json["scenes"][0]["nodes"] = [0, 1]
+    light = {"type": "point", "color": [1, 0.5, 0], "intensity": 8}
+    build.json["extensions"] = {"KHR_lights_punctual": {"lights": [light]}}
+    build.json["extensionsUsed"] = ["KHR_lights_punctual"]
+    (found,) = load(build.mesh().gltf(path)).lights
+    assert found.position.tolist() == [0, 2, 0]
+    assert found.intensity.ravel().tolist() == [8, 4, 0]
+
+
+# ---- materials ------------------------------------------------------------------------------------
+
+
+class Recorder(Diffuse):
+    """Stands for Principled and takes everything."""
+
+    def __init__(
+        self, base_color, metallic=0, roughness=0.5, ior=1.5, transmission=0, clearcoat=0,
+        clearcoat_roughness=0, sheen_color=0, sheen_roughness=0, specular=1, specular_color=1, alpha=1,
+        alpha_cutoff=None, normal_map=None, absorption=0, sheen=0, anisotropy=0,
+    ):  # fmt: skip
+        self.given = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
+        super().__init__(0.5)
+
+
+@pytest.fixture
+def given(monkeypatch, build, path):
+    """Load a material as the parameters that `Principled` would be given."""
+    monkeypatch.setattr(appearance.bsdfs, "Principled", Recorder, raising=False)
+
+    def load_given(**material):
+        (mesh,) = load_meshes(build.material(**material).gltf(path))
+        return mesh.material.given | {"emission": mesh.emission}
+
+    return load_given
+
+
+def at(texture, u, v):
+    return texture.lookup(np.float32([[u], [v]]))[..., 0]
+
+
+def test_factors_are_exact(given):
+    found = given(
+        pbrMetallicRoughness={
+            "baseColorFactor": [0.8, 0.123456789, 0, 1],
+            "metallicFactor": 0.3,
+            "roughnessFactor": 0.7,
+        }
+    )
+    assert found["base_color"].tolist() == [0.8, 0.123456789, 0]
+    assert (found["metallic"], found["roughness"]) == (0.3, 0.7)
+
+
+def test_defaults_are_those_of_the_specification(given):
+    found = given()
+    assert found["base_color"].tolist() == [1, 1, 1]
+    assert (found["metallic"], found["roughness"], found["ior"], found["emission"]) == (1, 1, 1.5, None)
+
+
+def test_textures(given, build):
+    codes = np.zeros((2, 2, 3), np.uint8)
+    codes[0, 0] = [255, 188, 0]  # top left: u = v = 0 in glTF
+    base, data = build.image(codes), build.image(codes)
+    found = given(
+        pbrMetallicRoughness={
+            "baseColorTexture": base,
+            "baseColorFactor": [0.5, 1, 1, 1],
+            "metallicRoughnessTexture": data,
+            "roughnessFactor": 0.5,
+            "metallicFactor": 0.25,
+        }
+    )
+    assert at(found["base_color"], 0.25, 0.75) == pytest.approx(
+        [0.5, float(srgb_to_linear(np.float32(188 / 255))), 0]
+    )
+    assert at(found["base_color"], 0.25, 0.25).tolist() == [0, 0, 0]
+    assert at(found["roughness"], 0.25, 0.75) == pytest.approx(0.5 * 188 / 255)
+    assert at(found["metallic"], 0.25, 0.75) == 0
+
+
+def test_one_image_is_decoded_once(given, build):
+    both = build.image(np.zeros((4, 4, 3), np.uint8))
+    found = given(pbrMetallicRoughness={"metallicRoughnessTexture": both})
+    assert np.shares_memory(found["metallic"]._texels, found["roughness"]._texels)
+
+
+def test_samplers(given, build):
+    info = build.image(np.uint8([[[255, 0, 0], [0, 255, 0]]]))
+    build.json["samplers"] = [{"wrapS": 33071, "wrapT": 33648, "magFilter": 9728}]
+    build.json["textures"][0]["sampler"] = 0
+    base = given(pbrMetallicRoughness={"baseColorTexture": info})["base_color"]
+    assert (base.wrap, base.filter) == (("clamp", "mirror"), "nearest")
+    assert at(base, 7.0, 0.5).tolist() == [0, 1, 0]
+    del build.json["samplers"], build.json["textures"][0]["sampler"]
+
+
+def test_texture_transform_by_the_example_of_its_specification(given, build):
+    # "utilizes only the lower left quadrant of the source image, rotated clockwise 90°"
+    rng = np.random.default_rng(0)
+    info = build.image(rng.integers(0, 256, (4, 4, 3), np.uint8))
+    info["extensions"] = {
+        "KHR_texture_transform": {"offset": [0, 1], "rotation": np.pi / 2, "scale": [0.5, 0.5]}
+    }
+    base = given(pbrMetallicRoughness={"baseColorTexture": info})["base_color"]
+    plain = Texture(base._texels.reshape(4, 4, 3))
+    for s, t in rng.random((10, 2)):  # s, t: glTF's own coordinates, t downwards
+        moved = 0.5 * t, 1 - 0.5 * s
+        assert moved[0] <= 0.5 <= moved[1]
+        assert at(base, s, 1 - t) == pytest.approx(at(plain, moved[0], 1 - moved[1]), abs=1e-5)
+
+
+def test_normal_map(given, build):
+    info = build.image(np.uint8([[[128, 255, 255]]])) | {"scale": 0.5}
+    found = at(given(normalTexture=info)["normal_map"], 0.5, 0.5)
+    assert found == pytest.approx([0.5 * (2 * 128 / 255 - 1), 0.5, 1], abs=1e-6)
+
+
+@pytest.mark.parametrize("mode", ["OPAQUE", "MASK", "BLEND"])
+def test_alpha(given, build, mode):
+    info = build.image(np.uint8([[[255, 255, 255, 51]]]))
+    factor = {"baseColorTexture": info, "baseColorFactor": [1, 1, 1, 0.5]}
+    found = given(pbrMetallicRoughness=factor, alphaMode=mode, alphaCutoff=0.3)
+    if mode == "OPAQUE":
+        assert found["alpha"] == 1
+    else:
+        assert at(found["alpha"], 0.5, 0.5) == pytest.approx(0.1)
+        assert found["alpha_cutoff"] == (0.3 if mode == "MASK" else None)
+
+
+def test_emission_and_its_strength(given):
+    strength = {"KHR_materials_emissive_strength": {"emissiveStrength": 10}}
+    assert given(emissiveFactor=[1, 0.5, 0], extensions=strength)["emission"].ravel().tolist() == [10, 5, 0]
+
+
+def test_textured_emission_is_averaged_with_a_warning(given, build):
+    info = build.image(np.uint8([[[255, 255, 255], [0, 0, 0]]]))
+    with pytest.warns(
+        UserWarning, match=r"not honoured: emission texture \(its mean is used\) \(materials\[0\]\)"
+    ):
+        found = given(emissiveFactor=[1, 0.5, 0], emissiveTexture=info)
+    assert found["emission"].ravel().tolist() == [0.5, 0.25, 0]
+
+
+@pytest.mark.parametrize(
+    ("extension", "expected"),
+    [
+        ({"KHR_materials_ior": {"ior": 1.33}}, {"ior": 1.33}),
+        ({"KHR_materials_transmission": {"transmissionFactor": 0.9}}, {"transmission": 0.9}),
+        (
+            {"KHR_materials_clearcoat": {"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.1}},
+            {"clearcoat": 0.5, "clearcoat_roughness": 0.1},
+        ),
+        (
+            {"KHR_materials_sheen": {"sheenColorFactor": [1, 0, 0], "sheenRoughnessFactor": 0.3}},
+            {"sheen_roughness": 0.3},
+        ),
+        ({"KHR_materials_specular": {"specularFactor": 0.2}}, {"specular": 0.2}),
+    ],
+)
+def test_extensions(given, extension, expected):
+    found = given(extensions=extension)
+    assert {k: found[k] for k in expected} == expected
+
+
+def test_volume_is_beer_lambert(given):
+    volume = {"thicknessFactor": 1, "attenuationColor": [0.5, 1, 1], "attenuationDistance": 2}
+    found = given(extensions={"KHR_materials_volume": volume})
+    assert np.exp(-2 * found["absorption"]) == pytest.approx([0.5, 1, 1])
+
+
+def test_extension_textures(given, build):
+    info = build.image(np.uint8([[[51, 102, 153, 204]]]))
+    found = given(
+        extensions={
+            "KHR_materials_transmission": {"transmissionFactor": 1, "transmissionTexture": info},
+            "KHR_materials_clearcoat": {
+                "clearcoatFactor": 1,
+                "clearcoatTexture": info,
+                "clearcoatRoughnessFactor": 0.5,
+                "clearcoatRoughnessTexture": info,
+            },
+            "KHR_materials_specular": {"specularTexture": info},
+        }
+    )
+    expected = {"transmission": 0.2, "clearcoat": 0.2, "clearcoat_roughness": 0.2, "specular": 0.8}
+    assert {k: float(at(found[k], 0.5, 0.5)) for k in expected} == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("material", "kind"),
+    [
+        ({"pbrMetallicRoughness": {"metallicFactor": 0}}, Diffuse),
+        ({"pbrMetallicRoughness": {"metallicFactor": 1, "roughnessFactor": 0}}, Mirror),
+        (
+            {
+                "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0},
+                "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}},
+            },
+            Dielectric,
+        ),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:.*not honoured. roughness")
+def test_the_simple_materials_stand_in(build, path, monkeypatch, material, kind):
+    monkeypatch.delattr(appearance.bsdfs, "Principled", raising=False)
+    (mesh,) = load_meshes(build.material(**material).gltf(path))
+    assert type(mesh.material) is kind
+
+
+# ---- what is not honoured is named once ---------------------------------------------------------
+
+
+def lose_animation(b):
+    b.json["animations"] = [{}]
+
+
+def lose_spot(b):
+    b.json["nodes"][0]["extensions"] = {"KHR_lights_punctual": {"light": 0}}
+    b.json["extensions"] = {"KHR_lights_punctual": {"lights": [{"type": "spot"}]}}
+
+
+def lose_camera(b):
+    b.json["nodes"][0]["camera"] = 0
+    b.json["cameras"] = [{"type": "orthographic", "orthographic": {}}]
+
+
+def lose_colours(b):
+    colours = b.accessor(np.ones((3, 3), np.float32))
+    b.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = colours
+
+
+def lose_targets(b):
+    b.json["meshes"][0]["primitives"][0]["targets"] = [{}]
+
+
+def lose_lines(b):
+    b.json["meshes"][0]["primitives"].append({"mode": 1, "attributes": {"POSITION": 0}})
+
+
+def lose_extension(b):
+    b.json["extensionsUsed"] = ["KHR_materials_iridescence"]
+
+
+@pytest.mark.parametrize(
+    ("lose", "message"),
+    [
+        (lose_animation, r"animations \(the file\)"),
+        (lose_spot, r"spot light \(light 0\)"),
+        (lose_camera, r"orthographic camera \(cameras\[0\]\)"),
+        (lose_colours, r"COLOR_0 \(mesh 'mesh0'\)"),
+        (lose_targets, r"morph targets \(mesh 'mesh0'\)"),
+        (lose_lines, r"points and lines \(mesh 'mesh0'\)"),
+        (lose_extension, r"KHR_materials_iridescence \(the file\)"),
+    ],
+)
+def test_what_is_not_honoured_is_named(build, path, lose, message):
+    lose(build.mesh())
+    build.gltf(path)
+    with pytest.warns(UserWarning, match=r"a\.gltf: not honoured: " + message) as record:
+        load(path)
+    assert len(record) == 1
+    with pytest.raises(SceneError, match="not honoured"):
+        load(path, strict=True)
+
+
+# ---- defects --------------------------------------------------------------------------------------
+
+
+def broken(**changes):
+    """Change the JSON of a good file at dotted places."""
+
+    def change(b):
+        for place, value in changes.items():
+            *parents, last = place.split("__")
+            at = b.json
+            for key in parents:
+                at = at[int(key) if key.isdigit() else key]
+            at[int(last) if last.isdigit() else last] = value
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (broken(asset__version="1.0"), r"a\.gltf: is glTF version '1\.0'; only version 2 is read"),
+        (broken(scene=3), r"scenes\[3\] does not exist; there are 1"),
+        (broken(scenes__0__nodes=[7]), r"nodes\[7\] does not exist"),
+        (broken(nodes__0__mesh=-1), r"meshes\[-1\] does not exist"),
+        (broken(nodes__0__mesh="x"), r"meshes\['x'\] does not exist"),
+        (broken(nodes__0__children=[0]), r"nodes\[0\] is reached twice; nodes must form a tree"),
+        (broken(nodes__0__scale=[1, 2]), r"nodes\[0\]\.scale is \[1, 2\]; it must be 3 finite numbers"),
+        (broken(nodes__0__translation=[1, 2, float("nan")]), r"nodes\[0\]\.translation"),
+        (broken(nodes__0__matrix=[0] * 16), r"last row|faces of zero area|has no faces"),
+        (broken(nodes=5), r"a\.gltf"),
+        (broken(nodes__0=None), r"nodes\[0\] is not an object"),
+        (broken(accessors__0__count=4), r"accessors\[0\] has 4 elements, which its buffer view cannot hold"),
+        (broken(accessors__0__count=10**15), r"accessors\[0\] has 1000000000000000 elements; the limit is"),
+        (broken(accessors__0__count=-3), r"-3 stands where glTF has a count"),
+        (broken(accessors__0__type="VEC2"), r"has POSITION with 2 components; it must have 3"),
+        (broken(accessors__0__type="VEC9"), r"accessors\[0\] is 'VEC9' of 5126, which glTF does not have"),
+        (broken(accessors__0__componentType=9), r"accessors\[0\] is 'VEC3' of 9"),
+        (broken(accessors__1__componentType=5126, accessors__1__count=1), r"indices of type float32"),
+        (
+            broken(bufferViews__0__byteLength=10**9),
+            r"bufferViews\[0\] ends at byte 1000000000; its buffer has",
+        ),
+        (broken(bufferViews__0__buffer=2), r"buffers\[2\] does not exist"),
+        (broken(meshes__0__primitives__0__material=0), r"materials\[0\] does not exist"),
+        (broken(meshes__0__primitives__0__attributes={}), r"'mesh0' has no POSITION"),
+        (broken(meshes__0__primitives=7), r"a\.gltf"),
+        (broken(extensionsRequired=["KHR_draco_mesh_compression"]), r"requires KHR_draco_mesh_compression"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:.*dropped")
+def test_defects(build, path, change, message):
+    build.mesh(indices=np.array([0, 1, 2], np.uint16))
+    build.json["buffers"] = []
+    change(build)
+    build.gltf(path)
+    with pytest.raises(SceneError, match=message):
+        load(path)
+
+
+def test_an_index_out_of_range(build, path):
+    build.mesh(indices=np.array([0, 1, 3], np.uint16)).gltf(path)
+    with pytest.raises(SceneError, match=r"'mesh0': face 0 uses vertex 3; it must be in \[0, 2\]"):
+        load(path)
+
+
+@pytest.mark.parametrize(
+    ("indices", "mode", "message"),
+    [
+        ([0, 1], 4, "has 2 indices; triangles need a multiple of 3"),
+        ([0, 1], 5, "a strip or fan needs at least 3"),
+    ],
+)
+def test_too_few_indices(build, path, indices, mode, message):
+    build.mesh(indices=np.array(indices, np.uint16), mode=mode).gltf(path)
+    with pytest.raises(SceneError, match=message):
+        load(path)
+
+
+@pytest.mark.parametrize(
+    ("material", "message"),
+    [
+        (
+            {"pbrMetallicRoughness": {"metallicFactor": 2}},
+            r"materials\[0\]\.metallicFactor is 2; it must be in \[0, 1\]",
+        ),
+        (
+            {"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1]}},
+            r"baseColorFactor is \[1, 1, 1\]; it must be 4",
+        ),
+        ({"pbrMetallicRoughness": {"baseColorFactor": [2, 1, 1, 1]}}, r"baseColorFactor is .* in \[0, 1\]"),
+        ({"emissiveFactor": [-1, 0, 0]}, r"emissiveFactor"),
+        ({"alphaMode": "GLASS"}, r"alphaMode is 'GLASS'; it must be OPAQUE, MASK or BLEND"),
+        ({"name": "red", "normalTexture": {"index": 3}}, r"textures\[3\] does not exist"),
+        ({"normalTexture": 3}, r"materials\[0\]\.normalTexture is 3; it must be an object"),
+    ],
+)
+def test_defects_of_materials(build, path, material, message):
+    build.material(**material).gltf(path)
+    with pytest.raises(SceneError, match=message):
+        load(path)
+
+
+@pytest.mark.parametrize(
+    "uri", ["../t.png", "/t.png", "http://example.org/t.png", "sub/../../t.png", "%2e%2e/t.png"]
+)
+def test_images_outside_the_folder_are_refused(build, path, uri):
+    build.json |= {"images": [{"uri": uri}], "textures": [{"source": 0}]}
+    build.material(pbrMetallicRoughness={"baseColorTexture": {"index": 0}}).gltf(path)
+    with pytest.raises(SceneError, match=r"a\.gltf: refers to"):
+        load(path)
+
+
+def test_missing_and_damaged_images_are_named(build, path):
+    build.json |= {"images": [{"uri": "t.png"}], "textures": [{"source": 0}]}
+    build.material(pbrMetallicRoughness={"baseColorTexture": {"index": 0}}).gltf(path)
+    with pytest.raises(SceneError, match=r"t\.png: there is no such file"):
+        load(path)
+    (path.parent / "t.png").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(30))
+    with pytest.raises(SceneError, match=r"images\[0\] \(t\.png\): "):
+        load(path)
+
+
+@pytest.mark.parametrize("part", [0.1, 0.3, 0.6, 0.95, 0.999])
+def test_truncated_glb(build, tmp_path, part):
+    path = build.mesh().glb(tmp_path / "a.glb")
+    data = path.read_bytes()
+    path.write_bytes(data[: int(len(data) * part)])
+    with pytest.raises(SceneError, match=r"a\.glb: "):
+        load(path)
+
+
+def test_damaged_base64_and_short_buffers(build, path):
+    build.mesh().gltf(path)
+    text = path.read_text()
+    path.write_text(text.replace("base64,", "base64,%%%"))
+    with pytest.raises(SceneError, match=r"buffers\[0\] has damaged base64 data"):
+        load(path)
+    path.write_text(text.replace('"buffers": [{"byteLength": 36', '"buffers": [{"byteLength": 99'))
+    with pytest.raises(SceneError, match=r"buffers\[0\] has 36 bytes; it claims 99"):
+        load(path)
+
+
+# ---- in memory equals the file --------------------------------------------------------------------
+
+
+def same(a, b):
+    if isinstance(a, Texture):
+        points = np.random.default_rng(0).random((2, 100), np.float32)
+        return isinstance(b, Texture) and np.array_equal(a.lookup(points), b.lookup(points))
+    return np.array_equal(np.asarray(a), np.asarray(b))
+
+
+@pytest.mark.filterwarnings("ignore:.*not honoured")
+def test_a_textured_object_in_memory_equals_its_file(tmp_path):
+    from PIL import Image
+
+    codes = np.random.default_rng(0).integers(0, 256, (8, 8, 3), np.uint8)
+    plane = trimesh.Trimesh(
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]], process=False
+    )
+    material = trimesh.visual.material.PBRMaterial(
+        baseColorTexture=Image.fromarray(codes),
+        baseColorFactor=[255, 51, 0, 255],
+        metallicFactor=0.0,
+        roughnessFactor=1.0,
+        emissiveFactor=[1.0, 0.0, 0.5],
+    )
+    plane.visual = trimesh.visual.TextureVisuals(uv=plane.vertices[:, :2], material=material)
+    plane.export(tmp_path / "a.glb")
+    (mesh,) = load_meshes(tmp_path / "a.glb")
+    for other in (plane, trimesh.load(tmp_path / "a.glb")):
+        (held,) = from_trimesh(other).shapes
+        assert np.array_equal(soup(mesh), soup(held))
+        assert np.array_equal(soup(mesh, mesh.uvs), soup(held, held.uvs))
+        assert same(mesh.emission, held.emission)
+        assert same(mesh.material.reflectance, held.material.reflectance)
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="the real files are not here")
+@pytest.mark.parametrize("name", ["BoxTextured.glb", "Duck.glb", "fuze.obj"])
+@pytest.mark.filterwarnings("ignore:.*not honoured")
+def test_textures_of_real_files(name):
+    scene = load(DATA / name)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        held = trimesh.load(DATA / name, process=False)
+    for a, b in zip(scene.shapes, from_trimesh(held).shapes, strict=True):
+        assert isinstance(a.material.reflectance, Texture)
+        assert same(a.material.reflectance, b.material.reflectance)
+    if name == "Duck.glb":
+        # the camera hangs below a node that scales by 0.01
+        assert scene.camera.origin == pytest.approx([4.00113, 4.63264, -4.31078], rel=1e-5)
+        assert scene.camera.size == (768, 512)
