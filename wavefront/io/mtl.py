@@ -78,7 +78,7 @@ class Entry:
         """Return the finite numbers of a line, None if there is no such line."""
         if key not in self.lines:
             return None
-        rest = self.lines[key][2]
+        rest = self.lines[key][2].partition("#")[0].strip()
         try:
             values = [float(word) for word in rest.split()]
         except ValueError:

@@ -1,0 +1,201 @@
+"""MTL maps, their options, and the PBR extension."""
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+
+from wavefront.bsdfs import Dielectric, Diffuse
+from wavefront.errors import SceneError
+from wavefront.io import appearance
+from wavefront.io.images import srgb_to_linear
+from wavefront.io.load import load_meshes
+from wavefront.textures import Texture
+
+CODES = np.random.default_rng(0).integers(0, 256, (4, 8, 3), np.uint8)
+POINTS = np.random.default_rng(1).random((2, 40), np.float32)
+
+
+@pytest.fixture
+def one(tmp_path):
+    """Load a textured triangle whose material has the given lines, beside an image `t.png`."""
+    iio.imwrite(tmp_path / "t.png", CODES)
+
+    def load_one(*lines, **arguments):
+        (tmp_path / "s.mtl").write_text("\n".join(["newmtl m", *lines]))
+        text = "mtllib s.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n"
+        (tmp_path / "a.obj").write_text(text)
+        (mesh,) = load_meshes(tmp_path / "a.obj", **arguments)
+        return mesh
+
+    return load_one
+
+
+class Recorder(Diffuse):
+    """Stands for Principled and takes everything."""
+
+    def __init__(
+        self, base_color, metallic=0, roughness=0.5, sheen=0, clearcoat=0, clearcoat_roughness=0,
+        anisotropy=0, alpha=1, normal_map=None,
+    ):  # fmt: skip
+        self.given = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
+        super().__init__(0.5)
+
+
+@pytest.fixture
+def given(monkeypatch, one):
+    """Load a material as the parameters that `Principled` would be given."""
+    monkeypatch.setattr(appearance.bsdfs, "Principled", Recorder, raising=False)
+    return lambda *lines: one(*lines).material.given
+
+
+def same(texture, **arguments):
+    """Tell whether a texture is the image with these arguments."""
+    return np.array_equal(texture.lookup(POINTS), Texture(CODES, **arguments).lookup(POINTS))
+
+
+def test_map_kd_is_multiplied_by_kd(one):
+    assert same(one("Kd 1 0.5 0", "map_Kd t.png").material.reflectance, scale=[1, 0.5, 0])
+    assert same(one("map_Kd t.png").material.reflectance)
+    assert same(one("Kd 0 0 0", "map_Kd t.png").material.reflectance)
+
+
+@pytest.mark.parametrize("name", ["a b.png", "1 2 3.png", "sub\\c.png", "sub/c.png", "ü#1.png"])
+def test_names_of_images(one, tmp_path, name):
+    (tmp_path / "sub").mkdir()
+    iio.imwrite(tmp_path / name.replace("\\", "/"), CODES)
+    assert same(one(f"map_Kd {name}").material.reflectance)
+    assert same(one(f"map_Kd -s 1 1 1 {name}").material.reflectance)
+
+
+def test_options_place_the_image(one):
+    found = one("map_Kd -s 2 3 1 -o 0.25 0.5 t.png").material.reflectance
+    assert same(found, transform=[[2, 0, 0.25], [0, 3, 0.5], [0, 0, 1]])
+    assert same(one("map_Kd -s 2 t.png").material.reflectance, transform=np.diag([2.0, 1, 1]))
+    clamped = one("map_Kd -clamp on -o 0.7 t.png").material.reflectance
+    assert same(clamped, wrap="clamp", transform=[[1, 0, 0.7], [0, 1, 0], [0, 0, 1]])
+    assert same(
+        one("Kd 0.5 0.5 0.5", "map_Kd -mm 0.25 0.5 t.png").material.reflectance, scale=0.25, offset=0.125
+    )
+
+
+def test_options_without_effect_are_named(one):
+    with pytest.warns(
+        UserWarning, match=r"not honoured: -blendu of map_Kd \(material 'm'\), -texres of map_Kd"
+    ):
+        assert same(one("map_Kd -blendu off -texres 512 t.png").material.reflectance)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("map_Kd -foo 1 t.png", r"s\.mtl line 2: map_Kd has the option '-foo', which is not known"),
+        ("map_Kd -s 2", r"line 2: map_Kd names no file"),
+        ("map_Kd -mm a b t.png", r"-mm is 'a b'; it must be numbers"),
+        ("map_Pr -imfchan q t.png", r"-imfchan is 'q'; it must be one of r, g, b, m, l"),
+        (
+            "map_Pr -imfchan m t.png",
+            r"line 2: map_Pr: channel is 3; texture 't\.png' has the channels 0 to 2",
+        ),
+        ("map_Kd no.png", r"line 2: map_Kd: .*no\.png: there is no such file"),
+        ("map_Kd t.tga", r"line 2: map_Kd: .*t\.tga: extension '\.tga' is not one of"),
+        (
+            "map_Kd ../t.png",
+            r"line 2: map_Kd: .*s\.mtl: refers to '\.\./t\.png', which is outside its folder",
+        ),
+        ("map_Kd C:\\t.png", r"absolute path is not followed"),
+    ],
+)
+def test_defects_of_maps(one, line, message):
+    with pytest.raises(SceneError, match=message):
+        one(line)
+
+
+def test_the_pbr_extension(given):
+    found = given("Kd 0.2 0.4 0.6", "Pr 0.3", "Pm 0.9", "Ps 0.1", "Pc 0.5", "Pcr 0.25", "aniso 0.75")
+    assert found.pop("base_color").tolist() == [0.2, 0.4, 0.6]
+    assert found == {
+        "roughness": 0.3,
+        "metallic": 0.9,
+        "sheen": 0.1,
+        "clearcoat": 0.5,
+        "clearcoat_roughness": 0.25,
+        "anisotropy": 0.75,
+        "alpha": 1,
+        "normal_map": None,
+    }
+
+
+def test_pbr_maps(given):
+    found = given("map_Pr t.png", "Pm 0.5", "map_Pm -imfchan b t.png", "norm t.png")
+    assert same(found["roughness"], srgb=False, channel="luminance")
+    assert same(found["metallic"], srgb=False, channel=2, scale=0.5)
+    assert same(found["normal_map"], srgb=False, scale=2, offset=-1)
+
+
+def test_roughness_0_is_kept_and_absent_roughness_is_matte(given):
+    assert given("Pr 0")["roughness"] == 0
+    assert given("norm t.png")["roughness"] == 1
+
+
+def test_parts_outside_their_range_are_clamped(given):
+    with pytest.warns(
+        UserWarning, match=r"s\.mtl line 2: Pr is 1\.5; it must be in \[0, 1\] and was clamped"
+    ):
+        assert given("Pr 1.5")["roughness"] == 1
+
+
+def test_alpha(given):
+    assert given("d 0.25")["alpha"] == 0.25
+    assert given("Tr 0.25")["alpha"] == 0.75
+    found = given("d 0.5", "Ni 1.5", "map_d t.png")  # a cut-out, not glass
+    assert same(found["alpha"], srgb=False, channel="luminance", scale=0.5)
+
+
+def test_map_ke(one):
+    mean = srgb_to_linear(CODES / np.float32(255)).mean((0, 1))
+    with pytest.warns(UserWarning, match="emission texture"):
+        mesh = one("Ke 4 2 1", "map_Ke t.png")
+    assert mesh.emission.ravel() == pytest.approx(mean * [4, 2, 1], rel=1e-5)
+    with pytest.warns(UserWarning, match="emission texture"):
+        assert one("map_Ke t.png").emission.ravel() == pytest.approx(mean, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("lines", "named"),
+    [
+        (["Ka 0.2 0.2 0.2"], "Ka"),
+        (["Ks 0.5 0.5 0.5", "Ns 100"], "Ks"),
+        (["map_Bump -bm 0.2 t.png"], "map_Bump"),
+        (["disp t.png"], "disp"),
+        (["refl -type sphere t.png"], "refl"),
+        (["Tf 0.5 0.5 0.5"], "Tf"),
+        (["map_Ks t.png"], "map_Ks"),
+        (["anisor 0.5"], "anisor"),
+    ],
+)
+def test_what_is_not_honoured_is_named(one, lines, named):
+    with pytest.warns(UserWarning, match=rf"s\.mtl: not honoured: {named} \(material 'm'\)$") as record:
+        one("Kd 0.5 0.5 0.5", *lines)
+    assert len(record) == 1
+    with pytest.raises(SceneError, match="not honoured"):
+        one("Kd 0.5 0.5 0.5", *lines, strict=True)
+
+
+def test_values_that_change_nothing_are_quiet(one):
+    one("Ka 0 0 0", "Kd 0.5 0.5 0.5", "Ks 0.000000 0.000000 0.000000", "Ns 96", "Ni 1.45", "d 1.0", "illum 2")
+    one("Kd 0.5 0.5 0.5", "Tf 1 1 1", "Tr 0", "illum 1", "sharpness 60")
+
+
+def test_comments_may_follow_numbers(one):
+    assert one("# a comment", "Kd 1 0 0 # red").material.reflectance.ravel().tolist() == [1, 0, 0]
+
+
+def test_glass_keeps_a_kd_quiet(one):
+    mesh = one("Kd 0.8 0.8 0.8", "Ni 1.5", "d 0.1", "illum 4")
+    assert isinstance(mesh.material, Dielectric)
+
+
+@pytest.mark.filterwarnings("ignore:.*not honoured")
+def test_the_simple_materials_stand_in(one, monkeypatch):
+    monkeypatch.delattr(appearance.bsdfs, "Principled", raising=False)
+    assert isinstance(one("Kd 0.5 0.5 0.5", "Pr 0.3").material, Diffuse)
