@@ -1,0 +1,180 @@
+"""Samples per second on the Cornell box: this project beside other renderers, measured in turn.
+
+python benchmarks/cornell_peers.py [--bpy-python PATH] [--prototype PATH] [--repeat 5]
+
+Needs `pip install wavefront[bench]`. Cycles joins when --bpy-python names a Python that has `bpy`
+installed; --prototype names a script with a function render(res=, spp=). 256x256, 64 spp, eight
+path edges, all cores, scene set-up and compilation left out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+import wavefront as wf
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
+from cornell_box import cornell_box
+
+SIZE, MAX_BOUNCES = 256, 7
+
+
+def ours(spp: int, accel: str) -> Callable[[], np.ndarray]:
+    """Return a function that renders with wavefront."""
+    scene = cornell_box(SIZE)
+    return lambda: wf.render(scene, spp, max_bounces=MAX_BOUNCES, accel=accel, progress=False).rgb
+
+
+def mitsuba_box(mi: Any, sampler: str, spp: int) -> Any:
+    """Describe the same box to Mitsuba 3, mesh by mesh from the same arrays."""
+    scene = cornell_box(SIZE)
+    description: dict[str, Any] = {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": MAX_BOUNCES + 1},
+        "sensor": {
+            "type": "perspective",
+            "fov": 39.3077,
+            "to_world": mi.ScalarTransform4f().look_at(origin=(0, 0, 3.9), target=(0, 0, 0), up=(0, 1, 0)),
+            "film": {
+                "type": "hdrfilm",
+                "width": SIZE,
+                "height": SIZE,
+                "rfilter": {"type": "box"},
+                "pixel_format": "rgb",
+            },
+            "sampler": {"type": sampler, "sample_count": spp},
+        },
+    }
+    for i, shape in enumerate(scene.shapes):
+        colour = {"type": "rgb", "value": shape.material.reflectance.ravel().tolist()}
+        properties = mi.Properties()
+        properties["bsdf"] = mi.load_dict(
+            {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": colour}}
+        )
+        if shape.emission is not None:
+            radiance = {"type": "rgb", "value": shape.emission.ravel().tolist()}
+            properties["emitter"] = mi.load_dict({"type": "area", "radiance": radiance})
+        mesh = mi.Mesh(f"shape{i}", len(shape.vertices), len(shape.faces), props=properties)
+        parameters = mi.traverse(mesh)
+        parameters["vertex_positions"] = shape.vertices.ravel().astype(np.float32)
+        parameters["faces"] = shape.faces.ravel().astype(np.uint32)
+        parameters.update()
+        description[f"shape{i}"] = mesh
+    return mi.load_dict(description)
+
+
+def mitsuba(spp: int, variant: str) -> Callable[[], np.ndarray]:
+    """Return a function that renders with Mitsuba, warmed up."""
+    import mitsuba as mi
+
+    mi.set_variant(variant)
+    scene = mitsuba_box(mi, "independent", spp)
+    np.array(mi.render(scene, spp=1))
+    return lambda: np.array(mi.render(scene, spp=spp))
+
+
+class Cycles:
+    """A Cycles process that renders once per call."""
+
+    def __init__(self, python: str, spp: int, threads: int) -> None:
+        script = Path(__file__).with_name("cycles_cornell.py")
+        self.process = subprocess.Popen(
+            [python, str(script)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+        shapes = [
+            {
+                "name": f"{shape.name}{i}",
+                "vertices": shape.vertices.tolist(),
+                "faces": shape.faces.tolist(),
+                "colour": shape.material.reflectance.ravel().tolist(),
+                "emission": None if shape.emission is None else shape.emission.ravel().tolist(),
+            }
+            for i, shape in enumerate(cornell_box(SIZE).shapes)
+        ]
+        job = {"shapes": shapes, "size": SIZE, "spp": spp, "threads": threads, "max_bounces": MAX_BOUNCES}
+        self._say(json.dumps(job))
+        self.seconds()
+
+    def seconds(self) -> float:
+        """Render, and return the seconds that Cycles took."""
+        self._say("again")
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            if line.startswith("SECONDS"):
+                return float(line.split()[1])
+        raise RuntimeError("Cycles stopped without an answer")
+
+    def _say(self, line: str) -> None:
+        assert self.process.stdin is not None
+        self.process.stdin.write(line + "\n")
+        self.process.stdin.flush()
+
+
+def prototype(path: str, spp: int) -> Callable[[], np.ndarray]:
+    """Return a function that calls render() of the script at `path`."""
+    sys.path.insert(0, str(Path(path).parent))
+    spec = importlib.util.spec_from_file_location("prototype", path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+
+    def render() -> np.ndarray:
+        with np.errstate(all="ignore"):
+            return np.asarray(module.render(res=SIZE, spp=spp))
+
+    return render
+
+
+def clock(render: Callable[[], Any]) -> Callable[[], float]:
+    """Return a function that gives the seconds of one render."""
+
+    def seconds() -> float:
+        begin = time.perf_counter()
+        render()
+        return time.perf_counter() - begin
+
+    return seconds
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--spp", type=int, default=64)
+    parser.add_argument("--repeat", type=int, default=5)
+    parser.add_argument("--bpy-python", help="a Python that has bpy")
+    parser.add_argument("--prototype", help="path of a script with render(res=, spp=)")
+    options = parser.parse_args()
+    sides = {
+        "wavefront numpy": clock(ours(options.spp, "numpy")),
+        "wavefront embree": clock(ours(options.spp, "embree")),
+        "mitsuba scalar_rgb": clock(mitsuba(options.spp, "scalar_rgb")),
+    }
+    if options.bpy_python:
+        sides["cycles"] = Cycles(options.bpy_python, options.spp, wf.parallel.worker_count(None)).seconds
+    if options.prototype:
+        sides["prototype"] = clock(prototype(options.prototype, options.spp))
+    times: dict[str, list[float]] = {name: [] for name in sides}
+    for _ in range(options.repeat):
+        for name, seconds in sides.items():
+            times[name].append(seconds())
+    samples = SIZE * SIZE * options.spp / 1e6
+    base = median(times["wavefront numpy"])
+    print(f"{'':20}{'million samples/s':>18}{'wavefront numpy is':>20}")
+    for name, values in times.items():
+        print(f"{name:20}{samples / median(values):18.2f}{median(values) / base:19.2f}x")
