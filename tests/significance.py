@@ -39,9 +39,14 @@ class Mean:
         return f"{self.value:.6g} ± {self.error:.2g}"
 
 
+def render(scene: wf.Scene, spp: int, **options) -> wf.Image:
+    """Render on one thread with the accelerator that is always there."""
+    return wf.render(scene, spp, **{"workers": 1, "progress": False, "accel": "numpy", **options})
+
+
 def measure(scene: wf.Scene, spp: int, **options) -> Mean:
     """Render a camera whose pixels all see one thing: each is an independent batch."""
-    image = wf.render(scene, spp=spp, workers=1, progress=False, **options)
+    image = render(scene, spp, **options)
     return Mean.of(image.rgb.reshape(-1, 3).mean(1, dtype=np.float64))
 
 
@@ -62,10 +67,7 @@ def assert_mean(mean: Mean, expected: float, max_error: float, sigmas: float | N
 
 def repeat(scene: wf.Scene, spp: int, runs: int = 16, first_seed: int = 0, **options) -> Doubles:
     """Render with several seeds: (runs, H, W, 3)."""
-    images = [
-        wf.render(scene, spp=spp, seed=first_seed + k, workers=1, progress=False, **options).rgb
-        for k in range(runs)
-    ]
+    images = [render(scene, spp, seed=first_seed + k, **options).rgb for k in range(runs)]
     return np.stack(images).astype(np.float64)
 
 

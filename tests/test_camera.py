@@ -5,6 +5,7 @@ import pytest
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
+from significance import render
 
 import wavefront as wf
 from wavefront.vec import f4, length
@@ -73,7 +74,7 @@ def test_every_pixel_sees_its_own_place() -> None:
         for (x, y), c in colours.items()
     ]
     camera = wf.Camera.look_at((0, 0, 1), (0, 0, 0), fov=60, size=(4, 4))
-    rgb = wf.render(wf.Scene(quarters, camera=camera), 1, max_bounces=0, progress=False).rgb
+    rgb = render(wf.Scene(quarters, camera=camera), 1, max_bounces=0).rgb
     assert rgb[0, 0].tolist() == [1, 0, 0]  # top left: x < 0, y > 0
     assert rgb[0, 3].tolist() == [0, 1, 0]
     assert rgb[3, 0].tolist() == [0, 0, 1]

@@ -6,9 +6,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 import scenes
-from significance import Mean, assert_same_images, repeat
+from significance import Mean, assert_same_images, render, repeat
 
-import wavefront as wf
 from wavefront.stages import compact as compact_stage
 
 DIRECT_SPP = {"naive": 256, "direct_simple": 96, "direct_mis": 64, "full": 64}
@@ -70,7 +69,7 @@ def test_full_has_a_tenth_of_the_variance_of_naive() -> None:
 @pytest.mark.parametrize("integrator", scenes.SAMPLING_LIGHTS)
 def test_no_bounce_shows_only_lights(integrator: str) -> None:
     """Nothing is lit, but the lights and the environment are seen."""
-    image = wf.render(scenes.everything((33, 25)), 1, integrator=integrator, max_bounces=0, progress=False)
+    image = render(scenes.everything((33, 25)), 1, integrator=integrator, max_bounces=0)
     seen = np.unique(image.rgb.reshape(-1, 3).round(5), axis=0)
     lights = np.array([[0, 0, 0], [0.2, 0.3, 0.5], [0.5, 1, 2], [3, 2.5, 2]])
     assert all(np.abs(lights - value).sum(1).min() < 1e-4 for value in seen)
@@ -81,8 +80,7 @@ def test_every_bounce_adds_its_own_light(integrator: str) -> None:
     """The light of exactly k bounces of a furnace of 0.5 is 2^-k; the same numbers give the rest."""
     scene = scenes.furnace(0.5)
     means = [
-        Mean.of(wf.render(scene, 256, integrator=integrator, max_bounces=k, progress=False).rgb.astype(float))
-        for k in range(4)
+        Mean.of(render(scene, 256, integrator=integrator, max_bounces=k).rgb.astype(float)) for k in range(4)
     ]
     steps = np.diff([0, *(mean.value for mean in means)])
     assert steps == pytest.approx([1, 0.5, 0.25, 0.125], rel=0.01)
