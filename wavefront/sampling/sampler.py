@@ -7,6 +7,7 @@ All arithmetic is whole-array and modulo 2³² or 2⁶⁴.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from enum import IntEnum
 from functools import lru_cache
 
@@ -23,7 +24,11 @@ u4 = np.uint32
 u8 = np.uint64
 
 _MASK64 = (1 << 64) - 1
+_GOLDEN = 0x9E3779B97F4A7C15  # 2⁶⁴ over the golden ratio, SplitMix64's step
 _UNIT = f4(2.0**-24)  # one step of a 24-bit fraction: the largest number is 1 − 2⁻²⁴, exact in float32
+
+VARIANTS = 16  # shuffled and scrambled copies of the Sobol sequence per stream; a power of two
+BLOCK = 256  # consecutive samples per table; a power of two
 
 
 class Dimension(IntEnum):
@@ -70,54 +75,66 @@ class Sampler(ABC):
 class IndependentSampler(Sampler):
     """Independent uniform numbers from a counter-based hash.
 
-    The 64-bit word (pixel, sample) goes through a bijective finaliser, keyed per
+    The 64-bit word (pixel, sample) goes through a bijective hash that is keyed per
     (seed, bounce, dimension); its upper and lower halves are the two coordinates.
     """
 
     def draw_1d(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Floats:
         """Numbers in [0, 1), (n,)."""
-        return _fraction(self._hash(pixel, sample, bounce, dimension) >> u8(32))
+        word = self._hash(pixel, sample, bounce, dimension)
+        return _high_fraction(word, np.empty(len(word), f4))
 
     def draw_2d(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Floats:
         """Points in [0, 1)², (2, n)."""
         word = self._hash(pixel, sample, bounce, dimension)
-        return np.stack([_fraction(word >> u8(32)), _fraction(word & u8(0xFFFFFFFF))])
+        out = np.empty((2, len(word)), f4)
+        _fraction(word.astype(u4), out[1])  # the lower half
+        _high_fraction(word, out[0])
+        return out
 
     def _hash(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Longs:
         """64 random bits per lane, (n,)."""
         word = pixel.astype(u8)
         word <<= u8(32)
         word |= sample
-        return _mix_lanes(word, *_keys(self.seed, bounce, dimension)[:2])
+        return _mix_longs(word, *_stream(self.seed, bounce, dimension).longs)
 
 
 class SobolSampler(Sampler):
     """Padded two-dimensional Sobol points, shuffled and Owen-scrambled per pixel and stream.
 
-    Every aligned block of 2ᵐ samples of one pixel and stream is a (0, m, 2)-net. The
-    samples may number up to 2³².
+    Every aligned block of 2ᵐ samples of one pixel and stream is a (0, m, 2)-net, so any number
+    of samples is well spread; there may be up to 2³².
 
-    Source: B. Burley, Practical Hash-based Owen Scrambling, JCGT 9(4), 2020.
+    A stream (bounce, dimension) has `VARIANTS` shuffled and Owen-scrambled copies of the Sobol
+    sequence. A hash of the pixel chooses one of them, and gives a word per coordinate that is
+    XORed to it. An Owen scramble followed by an XOR is distributed as an Owen scramble, so each
+    pixel has that scramble's error and a set of points of its own, while the costly part is done
+    once per table and not once per path.
+
+    Source: B. Burley, Practical Hash-based Owen Scrambling, JCGT 9(4), 2020 (padding, shuffling
+    and scrambling by hash); A. Owen, Randomly Permuted (t,m,s)-Nets and (t,s)-Sequences, 1995.
     """
 
     def draw_1d(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Floats:
-        """Numbers in [0, 1), (n,)."""
-        seeds = self._seeds(pixel, bounce, dimension)
-        index = _shuffled(sample, seeds)
-        return _fraction(_reverse(_laine_karras(index, _reseed(seeds, 0x9E3779B9))))
+        """Numbers in [0, 1), (n,): the first coordinate of `draw_2d`."""
+        stream = _stream(self.seed, bounce, dimension)
+        word = _mix_words(pixel, stream.words[0], stream.words[1])
+        x = _points(stream, sample, word & u4(VARIANTS - 1), 1)[0]
+        x ^= word
+        return _fraction(x, np.empty(len(x), f4))
 
     def draw_2d(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Floats:
         """Points in [0, 1)², (2, n)."""
-        seeds = self._seeds(pixel, bounce, dimension)
-        index = _shuffled(sample, seeds)
-        x = _laine_karras(index, _reseed(seeds, 0x9E3779B9))
-        y = _laine_karras(_pascal(index), _reseed(seeds, 0x85EBCA77))
-        return np.stack([_fraction(_reverse(x)), _fraction(_reverse(y))])
-
-    def _seeds(self, pixel: Words, bounce: int, dimension: int) -> Words:
-        """32 random bits per pixel and stream, (n,)."""
-        key = _keys(self.seed, bounce, dimension)[2]
-        return _mix_words(pixel ^ key)
+        stream = _stream(self.seed, bounce, dimension)
+        word = _mix_words(pixel, stream.words[0], stream.words[1])
+        x, y = _points(stream, sample, word & u4(VARIANTS - 1), 2)
+        x ^= word
+        y ^= _mix_again(word, stream.words[2])
+        out = np.empty((2, len(x)), f4)
+        _fraction(x, out[0])
+        _fraction(y, out[1])
+        return out
 
 
 SAMPLERS: dict[str, type[Sampler]] = {"independent": IndependentSampler, "sobol": SobolSampler}
@@ -143,44 +160,134 @@ def _mix64(x: int) -> int:
     return x ^ (x >> 31)
 
 
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """Random keys of one stream, (seed, bounce, dimension)."""
+
+    longs: tuple[np.uint64, np.uint64]
+    words: tuple[np.uint32, np.uint32, np.uint32, np.uint32]
+
+
 @lru_cache(maxsize=4096)
-def _keys(seed: int, bounce: int, dimension: int) -> tuple[np.uint64, np.uint64, np.uint32]:
-    """Random keys of one stream."""
-    state = _mix64(seed + 0x9E3779B97F4A7C15 & _MASK64)
-    state = _mix64(state ^ _mix64((bounce << 32 | dimension) + 0x632BE59BD9B4E019 & _MASK64))
-    first = _mix64(state + 0x9E3779B97F4A7C15 & _MASK64)
-    second = _mix64(state + 2 * 0x9E3779B97F4A7C15 & _MASK64)
-    return u8(first), u8(second), u4(first >> 32)
+def _stream(seed: int, bounce: int, dimension: int) -> Stream:
+    """Hash an address into keys. Every bit of each part counts."""
+    state = _mix64(seed)
+    for part in (bounce, dimension):
+        state = _mix64((state ^ part) + _GOLDEN & _MASK64)
+    keys = [_mix64(state + i * _GOLDEN & _MASK64) for i in range(1, 5)]
+    words = [half for key in keys[2:] for half in (u4(key >> 32), u4(key & 0xFFFFFFFF))]
+    return Stream((u8(keys[0]), u8(keys[1])), (words[0], words[1], words[2], words[3]))
 
 
-def _mix_lanes(x: Longs, key: np.uint64, tweak: np.uint64) -> Longs:
-    """SplitMix64's output function on lanes (n,), in place, keyed before and between the rounds.
+def _mix_longs(x: Longs, key: np.uint64, tweak: np.uint64) -> Longs:
+    """SplitMix64's output function on lanes (n,), in place, keyed before and between its rounds.
 
-    The second key keeps two streams from being one permutation of another by an XOR of addresses.
+    The second key keeps two streams from holding the same numbers at addresses that differ by
+    one XOR.
     """
+    shifted = np.empty_like(x)
     x ^= key
-    x ^= x >> u8(30)
+    x ^= np.right_shift(x, u8(30), out=shifted)
     x *= u8(0xBF58476D1CE4E5B9)
     x += tweak
-    x ^= x >> u8(27)
+    x ^= np.right_shift(x, u8(27), out=shifted)
     x *= u8(0x94D049BB133111EB)
-    x ^= x >> u8(31)
+    x ^= np.right_shift(x, u8(31), out=shifted)
     return x
 
 
-def _mix_words(x: Words) -> Words:
-    """Bijective 32-bit hash of lanes (n,), in place (C. Wellons, lowbias32)."""
-    x ^= x >> u4(16)
+def _mix_words(x: Words, key: np.uint32, tweak: np.uint32) -> Words:
+    """Bijective 32-bit hash of lanes (n,), keyed like `_mix_longs`.
+
+    Source: C. Wellons, Prospecting for Hash Functions, 2018, lowbias32.
+    """
+    x = x ^ key
+    shifted = x >> u4(16)
+    x ^= shifted
     x *= u4(0x7FEB352D)
-    x ^= x >> u4(15)
+    x += tweak
+    x ^= np.right_shift(x, u4(15), out=shifted)
     x *= u4(0x846CA68B)
-    x ^= x >> u4(16)
+    x ^= np.right_shift(x, u4(16), out=shifted)
     return x
 
 
-def _reseed(seeds: Words, constant: int) -> Words:
-    """Another word of 32 random bits from `seeds` (n,)."""
-    return _mix_words(seeds ^ u4(constant))
+def _mix_again(x: Words, key: np.uint32) -> Words:
+    """Second word of 32 random bits, in place, from the random bits x (n,)."""
+    x += key
+    x *= u4(0x9E3779B1)
+    shifted = x >> u4(15)
+    x ^= shifted
+    x *= u4(0x85EBCA77)
+    x ^= np.right_shift(x, u4(16), out=shifted)
+    return x
+
+
+def _points(stream: Stream, sample: Words, variant: Words, coordinates: int) -> list[Words]:
+    """Points `sample` (n,) of copies `variant` (n,) of a stream's sequence.
+
+    Returns the first `coordinates` coordinates as 32-bit fractions, (n,) each. Waves of a few
+    consecutive samples, which is what a renderer traces, read them from a table.
+    """
+    first, last = (int(sample.min()), int(sample.max())) if len(sample) else (0, 0)
+    block = first // BLOCK
+    if last // BLOCK != block:
+        return list(_sequence(stream, sample, variant)[:coordinates])
+    table = _table(stream, block)
+    if first == last:
+        index = variant.astype(np.intp)
+        table = table[:, (first - block * BLOCK) * VARIANTS :][:, :VARIANTS]
+    else:
+        index = ((sample - u4(block * BLOCK)) * u4(VARIANTS) + variant).astype(np.intp)
+    return [row.take(index) for row in table[:coordinates]]
+
+
+@lru_cache(maxsize=256)
+def _table(stream: Stream, block: int) -> Words:
+    """Points of all copies of a stream's sequence, (2, BLOCK·VARIANTS), sample by sample."""
+    sample = np.arange(BLOCK, dtype=u4).repeat(VARIANTS) + u4(block * BLOCK)
+    variant = np.tile(np.arange(VARIANTS, dtype=u4), BLOCK)
+    table = _sequence(stream, sample, variant)
+    table.flags.writeable = False  # the cache hands out one array to all
+    return table
+
+
+def _sequence(stream: Stream, sample: Words, variant: Words) -> Words:
+    """Shuffled and Owen-scrambled Sobol points as 32-bit fractions, (2, n)."""
+    counter = np.arange(3 * VARIANTS, dtype=u4)
+    seeds = _mix_words(_mix_words(counter, stream.words[3], stream.words[0]), *stream.words[1:3])
+    shuffle, scramble_x, scramble_y = seeds.reshape(3, VARIANTS).take(variant, axis=1)
+    index = _reverse(_owen(_reverse(sample), shuffle))
+    # The first coordinate is the reversed index, so that two of its reversals cancel.
+    x = _reverse(_owen(index, scramble_x))
+    y = _reverse(_owen(_pascal(index), scramble_y))
+    return np.stack([x, y])
+
+
+def _owen(x: Words, seed: Words) -> Words:
+    """Owen-scramble bit-reversed fractions x (n,): each bit is flipped by a hash of those below it.
+
+    Source: S. Laine and T. Karras, Stratified Sampling for Stochastic Transparency, EGSR 2011,
+    with the steps and constants of N. Vegdahl, Building a Better LK Hash, 2021.
+    """
+    x = x ^ x * u4(0x3D20ADEA)
+    x += seed
+    x *= (seed >> u4(16)) | u4(1)
+    x ^= x * u4(0x05526C56)
+    x ^= x * u4(0x53A22864)
+    return x
+
+
+def _pascal(index: Words) -> Words:
+    """Second Sobol coordinate of `index` (n,), its bits reversed.
+
+    The generator matrix is Pascal's triangle modulo 2: bit i of the result is the XOR of the bits
+    j of the index for which i is a subset of j, a transform of five steps.
+    """
+    x = index ^ (index >> u4(16))
+    for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
+        x ^= (x >> u4(shift)) & u4(mask)
+    return x
 
 
 def _reverse(x: Words) -> Words:
@@ -191,37 +298,17 @@ def _reverse(x: Words) -> Words:
     return x
 
 
-def _laine_karras(x: Words, seed: Words) -> Words:
-    """Owen-scramble bit-reversed fractions (n,): each bit is flipped by a hash of those below it.
-
-    Source: S. Laine and T. Karras, Stratified Sampling for Stochastic Transparency, EGSR 2011,
-    with the constants of N. Vegdahl, Building a Better LK Hash, 2021.
-    """
-    x = x ^ x * u4(0x3D20ADEA)
-    x += seed
-    x *= (seed >> u4(16)) | u4(1)
-    x ^= x * u4(0x05526C56)
-    x ^= x * u4(0x53A22864)
-    return x
+def _fraction(word: Words, out: Floats) -> Floats:
+    """The top 24 bits of `word` (n,), which is overwritten, as a number in [0, 1)."""
+    word >>= u4(8)
+    np.copyto(out, word.view(np.int32), casting="unsafe")  # signed converts twice as fast
+    out *= _UNIT
+    return out
 
 
-def _shuffled(sample: Words, seed: Words) -> Words:
-    """Permute sample indices (n,) such that every aligned block of 2ᵐ maps to such a block."""
-    return _reverse(_laine_karras(_reverse(sample), seed))
-
-
-def _pascal(index: Words) -> Words:
-    """Second Sobol coordinate of `index` (n,), its bits reversed.
-
-    The generator matrix is Pascal's triangle modulo 2: bit i of the result is the XOR of the bits
-    j of the index with i a subset of j, a transform of five steps.
-    """
-    x = index ^ (index >> u4(16))
-    for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
-        x ^= (x >> u4(shift)) & u4(mask)
-    return x
-
-
-def _fraction(word: Words | Longs) -> Floats:
-    """The top 24 of 32 bits (n,) as a number in [0, 1), (n,) float32."""
-    return (word.astype(u4) >> u4(8)).view(np.int32).astype(f4) * _UNIT
+def _high_fraction(word: Longs, out: Floats) -> Floats:
+    """The top 24 bits of `word` (n,), which is overwritten, as a number in [0, 1)."""
+    word >>= u8(40)
+    np.copyto(out, word.view(np.int64), casting="unsafe")
+    out *= _UNIT
+    return out
