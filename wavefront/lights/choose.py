@@ -56,7 +56,8 @@ class LightTable:
 
     def pdf_li(self, light: Ints, point: Floats, wi: Floats) -> Floats:
         """Density with which `sample_li` draws wi (3, n) towards the lights numbered `light` (n,)."""
-        assert self.choice is not None
+        if self.choice is None:
+            return np.zeros(len(light), f4)
         pdf = np.empty(len(light), f4)
         for kind, rows in self._by_kind(light):
             pdf[rows] = kind.pdf_li(columns(point, rows), columns(wi, rows))

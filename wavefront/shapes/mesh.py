@@ -9,6 +9,7 @@ from ..bsdfs import Bsdf, Diffuse
 from ..errors import SceneError, finite_array, rgb
 
 FLOAT32_MAX = float(np.finfo(np.float32).max)
+FLOAT32_MIN = float(np.finfo(np.float32).tiny)
 
 
 class Mesh:
@@ -123,7 +124,12 @@ def check_material(name: str, material: Bsdf | None) -> Bsdf:
 
 
 def _faces(name: str, faces: ArrayLike, count: int) -> NDArray[np.intp]:
-    array = np.asarray(faces)
+    try:
+        array = np.asarray(faces)
+    except ValueError as error:
+        raise SceneError(
+            f"{name}: faces must be integers of shape (m, 3), got rows of several lengths"
+        ) from error
     if array.size == 0:
         raise SceneError(f"{name}: has no faces")
     if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "iu":

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..bsdfs import Bsdf
-from ..errors import finite_array, number, rgb
-from .mesh import check_material
+from ..errors import SceneError, finite_array, number, rgb
+from .mesh import FLOAT32_MAX, FLOAT32_MIN, check_material
 
 
 class Sphere:
@@ -43,7 +43,18 @@ class Sphere:
     ) -> None:
         self.name = name
         self.center = finite_array(f"{name}: center", center, (3,))
-        self.radius = number(f"{name}: radius", radius, lambda x: x > 0, "above 0")
+        self.radius = number(
+            f"{name}: radius",
+            radius,
+            lambda x: FLOAT32_MIN <= x <= FLOAT32_MAX,
+            f"above 0, from {FLOAT32_MIN:.3g} to {FLOAT32_MAX:.3g}",
+        )
+        beyond = np.flatnonzero(np.abs(self.center) > FLOAT32_MAX)
+        if len(beyond):
+            i = beyond[0]
+            raise SceneError(
+                f"{name}: center[{i}] is {self.center[i]:g}; its size must be at most {FLOAT32_MAX:.3g}"
+            )
         self.material = check_material(name, material)
         self.emission = None if emission is None else rgb(f"{name}: emission", emission)
 
