@@ -157,6 +157,7 @@ def test_file_names(tmp_path, name):
         (SQUARE + "f 1 2 3.5\n", r"line 5: f holds '3\.5'"),
         (SQUARE + "f 1/1/1/1 2 3\n", r"line 5: f holds '1/1/1/1'"),
         (SQUARE + "f /1 2 3\n", r"line 5: f holds '/1'"),
+        (SQUARE + "f 1/1 /1 2/1 3/1\n", r"line 5: f holds '/1'"),
         (SQUARE + "f 99999999999999999999 2 3\n", r"line 5: f holds '99999999999999999999'"),
         ("v 0 0\n" + SQUARE + "f 1 2 3\n", r"line 1: v has 2 numbers \('0 0'\); it must have at least 3"),
         (SQUARE + "v 1 2 zero\nf 1 2 3\n", r"line 5: v holds 'zero', which is not a number"),
@@ -475,7 +476,16 @@ def test_ply(write):
         (ply(1, "0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n"), r"a\.ply"),
         (ply(10**12, "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"), r"a\.ply: claims 1000000000000 of face, at least"),
         (ply(1, "0 0 0\n1 0"), r"a\.ply: claims"),
-        (ply("x", ""), r"a\.ply line 7: 'element face x' is not an element"),
+        (ply(1, "0 0 0\n1 0\n0 1 0\n3 0 1 2\n"), r"a\.ply line 11: vertex has 2 words; it must have 3"),
+        (ply(1, "0 0 0\n1 0 0 5\n0 1 0\n3 0 1 2\n"), r"a\.ply line 11: vertex has 4 words; it must have 3"),
+        (ply(1, "0 0 0\n1 0 x\n0 1 0\n3 0 1 2\n"), r"a\.ply: not a readable ply file"),
+        (ply(1, "0 0 0\n1 0 0\n0 1 0\n3 0 1\n"), r"a\.ply line 13: face has 3 words; it must have 4"),
+        (ply(1, "0 0 0\n1 0 0\n0 1 0\n3 0 1.5 2\n"), r"a\.ply line 13: '0 1\.5 2' are not whole numbers"),
+        (ply(1, "0 0 0\n1 0 0\n0 1 0\nx 0 1 2\n"), r"a\.ply line 13: a list of face has the length 'x'"),
+        (ply(1, "0 0 0\n1 0 0\n0 1 0\n2 0 1\n"), r"a\.ply: claims 1 of face; 0 can be read"),
+        (ply(2, "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"), r"a\.ply: claims 2 of face; 1 are there"),
+        (ply("8²", "").encode("latin-1"), r"a\.ply line 7: 'element face 8²' is not part of a PLY header"),
+        (ply("x", ""), r"a\.ply line 7: 'element face x' is not part of a PLY header"),
         (ply(1, "").replace("uchar int", "quad int"), r"a\.ply"),
         (ply(1, "").replace("uchar int", "uchar quad"), r"a\.ply"),
         ("ply\nformat ascii 1.0\n", r"a\.ply: not a PLY file: its header is damaged"),
@@ -500,6 +510,25 @@ def test_stl(write):
     assert mesh.normals is None
 
 
+def test_stl_as_text(write):
+    facet = (
+        "facet normal 0 0 1\n outer loop\n  vertex 0 0 {0}\n  VERTEX 1 0 {0}\n  vertex 0 1e0 {0}\n"
+        " endloop\nendfacet\n"
+    )
+    text = (
+        f"solid one\n{facet.format(0)}{facet.format(1)}endsolid one\nsolid two\n{facet.format(2)}endsolid\n"
+    )
+    one, two = load_meshes(write(text, "a.stl"))
+    assert (one.name, two.name) == ("one", "two")
+    assert np.array_equal(soup(one)[1], [[0, 0, 1], [1, 0, 1], [0, 1, 1]])
+    assert np.array_equal(soup(two)[0], [[0, 0, 2], [1, 0, 2], [0, 1, 2]])
+
+
+def test_a_binary_stl_may_say_solid(write):
+    (mesh,) = load_meshes(write(b"solid" + stl(1, [FACET])[5:], "a.stl"))
+    assert len(mesh.faces) == 1
+
+
 @pytest.mark.parametrize(
     ("data", "message"),
     [
@@ -507,7 +536,17 @@ def test_stl(write):
         (stl(2, [FACET, FACET])[:-1], r"a\.stl: claims 2 faces, 184 bytes; it has 183"),
         (b"\0" * 50, r"a\.stl: has 50 bytes"),
         ("solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n", r"a\.stl: ends early"),
-        (stl(0, []), r"a\.stl"),
+        (stl(0, []), r"a\.stl: has no faces"),
+        (
+            "solid a\nvertex 0 0 0\nvertex 1 0\nvertex 0 1 0\nendsolid\n",
+            r"a\.stl line 3: vertex is '1 0'; it must be 3",
+        ),
+        (
+            "solid a\nvertex 0 0 0\nvertex 1 0 x\nvertex 0 1 0\nendsolid\n",
+            r"a\.stl line 3: vertex is '1 0 x'",
+        ),
+        ("solid a\nvertex 0 0 0\nvertex 1 0 0\nendsolid\n", r"a\.stl: solid 'a' has 2 vertices"),
+        ("solid a\nhello\nendsolid\n", r"a\.stl line 2: 'hello' is not STL"),
     ],
 )
 def test_damaged_stl(write, data, message):

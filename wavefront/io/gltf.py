@@ -22,7 +22,7 @@ from ..camera import Camera
 from ..errors import SceneError
 from ..lights import PointLight
 from .files import beside, read_bytes
-from .repair import Raw
+from .repair import Raw, wide
 
 COMPONENTS: dict[int, type[np.generic]] = {
     5120: np.int8,
@@ -274,17 +274,18 @@ def _primitive(document: Document, part: dict[str, Any], mode: int, name: str) -
         indices = np.arange(len(vertices))
     uvs = _attribute(document, attributes, "TEXCOORD_0", 2, where, len(vertices))
     if uvs is not None:
-        uvs[:, 1] = 1 - uvs[:, 1]  # glTF counts v downwards
+        with np.errstate(invalid="ignore"):
+            uvs[:, 1] = 1 - uvs[:, 1]  # glTF counts v downwards
     for extra in ("COLOR_0", "TEXCOORD_1"):
         if extra in attributes:
             document.lose(extra, f"mesh {name!r}")
     normals = _attribute(document, attributes, "NORMAL", 3, where, len(vertices))
     return Raw(
         name,
-        vertices.astype(np.float64),
+        wide(vertices),
         _triangles(where, indices.astype(np.intp), mode),
-        None if normals is None else normals.astype(np.float64),
-        None if uvs is None else uvs.astype(np.float64),
+        None if normals is None else wide(normals),
+        None if uvs is None else wide(uvs),
     )
 
 

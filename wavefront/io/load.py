@@ -18,7 +18,7 @@ from ..errors import SceneError, finite_array
 from ..lights import PointLight
 from ..scene import Scene
 from ..shapes import Mesh
-from . import gltf, headers, mtl, obj, visuals
+from . import gltf, mtl, obj, ply, stl, visuals
 from .appearance import Look
 from .files import beside, decode, read_bytes
 from .gltf_materials import Materials
@@ -172,15 +172,25 @@ def _contents(path: PathLike, strict: bool, materials: bool) -> tuple[str, Conte
     if extension not in EXTENSIONS:
         raise SceneError(f"{name}: extension {extension!r} is not one of {', '.join(EXTENSIONS)}")
     data = read_bytes(path)
-    headers.check(name, extension, data)
+    _refuse(name, data)
     try:
         if extension == ".obj":
             return name, Contents(_read_obj(path, data, strict, materials))
         if extension in (".glb", ".gltf"):
             return name, _read_gltf(path, data, strict, materials)
-        return name, Contents(_raws(_trimesh_scene(path, data, extension), name, strict))
+        if extension == ".stl":
+            return name, Contents(stl.parse(name, data))
+        return name, Contents(_read_ply(name, data, strict))
     except MemoryError as error:
         raise SceneError(f"{name}: does not fit in memory") from error
+
+
+def _refuse(name: str, data: bytes) -> None:
+    """Refuse files that are empty, or archives under another name."""
+    if not data:
+        raise SceneError(f"{name}: is empty")
+    if data[:4] in (b"PK\x03\x04", b"PK\x05\x06") or data[:2] == b"\x1f\x8b":
+        raise SceneError(f"{name}: is an archive; unpack it first")
 
 
 def _meshes(name: str, raws: list[Raw], strict: bool) -> list[Mesh]:
@@ -245,20 +255,23 @@ def _libraries(path: PathLike, libraries: list[str], strict: bool) -> dict[str, 
     return looks
 
 
-def _trimesh_scene(path: PathLike, data: bytes, extension: str) -> trimesh.Scene:
-    """Let trimesh read bytes; whatever it raises becomes a SceneError."""
+def _read_ply(name: str, data: bytes, strict: bool) -> list[Raw]:
+    """Let trimesh read a PLY file; whatever it raises becomes a SceneError, what it leaves out, too."""
     import trimesh
 
-    name = os.fspath(path)
+    claimed = ply.check(name, data)
     try:
-        resolver = trimesh.resolvers.FilePathResolver(name)
-        return trimesh.load_scene(
-            BytesIO(data), file_type=extension[1:], resolver=resolver, process=False, allow_remote=False
-        )
+        with np.errstate(all="ignore"):
+            found = trimesh.load_scene(BytesIO(data), file_type="ply", process=False)
     except MemoryError:
         raise
     except Exception as error:
-        raise SceneError(f"{name}: not a readable {extension[1:]} file: {error!r}") from error
+        raise SceneError(f"{name}: not a readable ply file: {error!r}") from error
+    raws = _raws(found, name, strict)
+    faces = sum(len(raw.faces) for raw in raws)
+    if faces < claimed.get("face", 0):
+        raise SceneError(f"{name}: claims {claimed['face']} of face; {faces} can be read")
+    return raws
 
 
 def _raws(geometry: Any, source: str, strict: bool) -> list[Raw]:

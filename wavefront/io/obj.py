@@ -194,8 +194,8 @@ def _corners(name: str, lines: list[Line]) -> NDArray[np.int64]:
             raise ValueError
         for count in np.unique(slashes):
             chosen = np.flatnonzero(slashes == count)
-            joined = "/".join(words[i] for i in chosen.tolist())
-            parts = joined.replace("//", f"/{MISSING}/").split("/")
+            joined = " ".join(words[i] for i in chosen.tolist())
+            parts = joined.replace("//", f"/{MISSING}/").replace(" ", "/").split("/")
             out[chosen, : count + 1] = np.array(list(map(int, parts)), np.int64).reshape(-1, count + 1)
     except (ValueError, OverflowError):
         raise SceneError(_not_corners(name, lines)) from None

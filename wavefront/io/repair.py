@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +25,12 @@ def warn(message: str, strict: bool) -> None:
     if strict:
         raise SceneError(message)
     warnings.warn(message, UserWarning, stacklevel=2)
+
+
+def wide(values: NDArray[Any]) -> Table:
+    """Return numbers as float64. A signalling NaN is one like any other, and is dealt with later."""
+    with np.errstate(invalid="ignore"):
+        return values.astype(np.float64)
 
 
 @dataclass

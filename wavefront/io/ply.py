@@ -1,0 +1,103 @@
+"""What a PLY file claims, checked against what it holds. The reading itself is left to trimesh."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from ..errors import SceneError
+
+SIZES = {
+    "char": 1, "uchar": 1, "int8": 1, "uint8": 1,
+    "short": 2, "ushort": 2, "int16": 2, "uint16": 2,
+    "int": 4, "uint": 4, "int32": 4, "uint32": 4, "float": 4, "float32": 4,
+    "double": 8, "float64": 8,
+}  # fmt: skip
+
+
+@dataclass
+class Element:
+    """One kind of element of the header."""
+
+    name: str
+    count: int
+    size: int = 0  # least bytes of one
+    words: int = 0  # words of one in a text; of a list, only its length
+    lists: int = 0  # how many of its properties are lists
+
+
+def check(name: str, data: bytes) -> dict[str, int]:
+    """Return how many of each element a PLY file has, after checking that it can hold them.
+
+    Raises
+    ------
+    SceneError
+        If the header is damaged, claims more than there is, or a line of a text is malformed.
+    """
+    end = re.search(rb"end_header[^\n]*\n", data[: 1 << 20])
+    if not data.startswith(b"ply") or end is None:
+        raise SceneError(f"{name}: not a PLY file: its header is damaged")
+    header = data[: end.start()].decode("latin-1")
+    elements = _elements(name, header)
+    text, need, there = "format ascii" in header, 0, len(data) - end.end()
+    for element in elements:
+        need += element.count * (2 * element.words if text else element.size)
+        if need > there + 1:
+            raise SceneError(
+                f"{name}: claims {element.count} of {element.name}, at least {need} bytes; {there} are there"
+            )
+    if text:
+        _check_lines(name, elements, data[end.end() :].decode("latin-1"), header.count("\n") + 2)
+    return {element.name: element.count for element in elements}
+
+
+def _elements(name: str, header: str) -> list[Element]:
+    out: list[Element] = []
+    for number, line in enumerate(header.split("\n"), 1):
+        match line.split():
+            case ["element", kind, count] if _is_count(count):
+                out.append(Element(kind, int(count)))
+            case ["property", "list", length, kind, _] if out and length in SIZES and kind in SIZES:
+                out[-1].size += SIZES[length]
+                out[-1].words += 1
+                out[-1].lists += 1
+            case ["property", kind, _] if out and kind in SIZES:
+                out[-1].size += SIZES[kind]
+                out[-1].words += 1
+            case ["element" | "property", *_]:
+                raise SceneError(f"{name} line {number}: {line.strip()!r} is not part of a PLY header")
+    return out
+
+
+def _check_lines(name: str, elements: list[Element], body: str, first: int) -> None:
+    """Check that every line of a text has the words that its element needs."""
+    lines = [
+        (number, words) for number, line in enumerate(body.split("\n"), first) if (words := line.split())
+    ]
+    at = 0
+    for element in elements:
+        rows = lines[at : at + element.count]
+        if len(rows) < element.count:
+            raise SceneError(f"{name}: claims {element.count} of {element.name}; {len(rows)} are there")
+        if element.lists < 2:
+            for number, words in rows:
+                _check_words(name, element, number, words)
+        at += element.count
+
+
+def _check_words(name: str, element: Element, number: int, words: list[str]) -> None:
+    """One list stands first, as in every face that is written; its length says how many words follow."""
+    need = element.words
+    if element.lists:
+        if not _is_count(words[0]):
+            raise SceneError(f"{name} line {number}: a list of {element.name} has the length {words[0]!r}")
+        need += int(words[0])
+        indices = words[1 : 1 + int(words[0])]
+        if not all(_is_count(word.lstrip("+-")) for word in indices):
+            raise SceneError(f"{name} line {number}: {' '.join(indices)!r} are not whole numbers")
+    if len(words) != need:
+        raise SceneError(f"{name} line {number}: {element.name} has {len(words)} words; it must have {need}")
+
+
+def _is_count(word: str) -> bool:
+    return word.isdecimal() and len(word) <= 18
