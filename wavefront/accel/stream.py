@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..vec import Bools, Floats, Ints, f4
 from . import sphere, triangle
@@ -21,18 +23,39 @@ from .traverse import (
     blocks,
     bounding_ball,
     prepare,
+    scratch,
     slab_table,
     stream_tree,
     trace,
 )
 from .triangle import ROUNDOFF, Doubles
 
-BATCH = 1 << 17  # rays traced at a time
+BATCH = 1 << 15  # rays traced at a time: their temporaries stay in the cache
+DECIDE = 1 << 13  # candidates decided at a time
 SMALL = 128  # up to so many primitives, all are tested without a tree
-WIDTH = 16
+WIDTH = 32
 
-# Records candidates: leaf slots or primitives (k,), lanes (k,), filter values (k,).
-Candidates = Callable[[Ints, Ints, Floats], None]
+
+class Candidates:
+    """Collects small arrays of candidates, so that they are decided a few thousand at a time."""
+
+    def __init__(self, decide: Callable[..., None]) -> None:
+        self.decide = decide
+        self.parts: list[tuple[NDArray[Any], ...]] = []
+        self.count = 0
+
+    def add(self, *columns: NDArray[Any]) -> None:
+        """Add candidates, arrays of (k,) each."""
+        self.parts.append(columns)
+        self.count += columns[0].size
+        if self.count >= DECIDE:
+            self.flush()
+
+    def flush(self) -> None:
+        """Decide what has been collected."""
+        if self.count:
+            self.decide(*(np.concatenate(column) for column in zip(*self.parts, strict=True)))
+        self.parts, self.count = [], 0
 
 
 class _Closest:
@@ -101,6 +124,8 @@ class _Triangles:
         self.tree = None
         if len(solid) <= SMALL:
             self.rows = triangle.edge_rows(solid, ball.center, ball.radius).reshape(-1, 6)
+            self.side = triangle.side_rows(solid, ball.center, ball.radius)
+            self.slots = self.ids
             return
         low = np.ascontiguousarray(solid.min(1).T)
         high = np.ascontiguousarray(solid.max(1).T)
@@ -110,7 +135,7 @@ class _Triangles:
         leaves = rows.take(np.maximum(slot, 0), 1)  # (3, leaves, leaf_size, 6)
         leaves[:, slot < 0] = np.nan
         self.tree.leaves = np.ascontiguousarray(leaves.transpose(1, 0, 2, 3)).reshape(len(slot), -1, 6)
-        self.tree.prim = self.ids.take(self.tree.prim)
+        self.slots = self.ids.take(self.tree.prim)
 
     def search(self, lanes: Lanes, found: _Closest | _Occluded) -> None:
         """Give all hits that may matter to `found`."""
@@ -120,39 +145,58 @@ class _Triangles:
         tree = self.tree
         table = slab_table(lanes, self.ball)
 
-        def visit(leaf: Ints, lane: Ints) -> None:
-            size = tree.leaf_size
-            for leaves, block_lanes in blocks(leaf, lane, len(table) - 1, CHUNK // (3 * size * BLOCK)):
-                rays = table.take(block_lanes, 0).reshape(-1, BLOCK, 16)[:, :, LINE]
-                edges = tree.leaves.take(leaves, 0) @ rays.transpose(0, 2, 1)
-                value = _one_sign(edges.reshape(-1, 3, size, BLOCK))
-                at = np.flatnonzero(value >= -1)
-                pair = at >> BLOCK_SHIFT
-                block = pair // size
-                slot = leaves.take(block) * size + (pair & (size - 1))
-                lane = block_lanes.take(block * BLOCK + (at & (BLOCK - 1)))
-                self._decide(lanes, found, tree.prim.take(slot), lane, value.ravel().take(at))
+        trace(tree, table, found.bound, lambda leaf, lane: self._visit(table, lanes, found, leaf, lane))
 
-        trace(tree, table, found.bound, visit)
+    def _visit(
+        self, table: Floats, lanes: Lanes, found: _Closest | _Occluded, leaf: Ints, lane: Ints
+    ) -> None:
+        """Test pairs of leaf and lane."""
+        tree = self.tree
+        assert tree is not None
+        size = tree.leaf_size
+        batch = Candidates(lambda *found_: self._decide(lanes, found, *found_))
+        for leaves, block_lanes in blocks(leaf, lane, len(table) - 1, CHUNK // (3 * size * BLOCK)):
+            rays = table.take(block_lanes, 0).reshape(-1, BLOCK, 16)[:, :, LINE]
+            shape = (leaves.size, 3 * size, BLOCK)
+            matrices = np.take(tree.leaves, leaves, 0, out=scratch("leaves", (*shape[:2], 6)), mode="clip")
+            edges = np.matmul(matrices, rays.transpose(0, 2, 1), out=scratch("product", shape))
+            value = _one_sign(edges.reshape(-1, 3, size, BLOCK))
+            at = np.flatnonzero(np.greater_equal(value, -1, out=scratch("mask", value.shape, np.bool_)))
+            pair = at >> BLOCK_SHIFT
+            block = pair // size
+            slot = leaves.take(block) * size + (pair & (size - 1))
+            lane = block_lanes.take((block << BLOCK_SHIFT) + (at & (BLOCK - 1)))
+            batch.add(slot, lane, value[block, pair & (size - 1), at & (BLOCK - 1)])
+        batch.flush()
 
     def _search_all(self, lanes: Lanes, found: _Closest | _Occluded) -> None:
         if not self.ids.size:
             return
         n, m = lanes.speed.size, self.ids.size
+        batch = Candidates(lambda *found_: self._decide(lanes, found, *found_))
         step = max(64, min(4096, CHUNK // (3 * m)))
         for at in range(0, n, step):
-            edges = self.rows @ lanes.line[:, at : at + step]
-            value = _one_sign(edges.reshape(1, 3, m, -1))
-            hit = np.flatnonzero(value >= -1)
-            slot, lane = np.divmod(hit, value.shape[-1])
-            self._decide(lanes, found, self.ids.take(slot), lane + at, value.ravel().take(hit))
+            k = min(step, n - at)
+            line = lanes.line[:, at : at + k]
+            edges = np.matmul(self.rows, line, out=scratch("product", (3 * m, k)))
+            value = _one_sign(edges.reshape(1, 3, m, k))[0]
+            if lanes.local is not None:
+                side = np.matmul(self.side, lanes.local[:, at : at + k], out=scratch("side", (m, k)))
+                side *= edges[m : 2 * m]
+                np.minimum(value, side, out=value)
+            hit = np.flatnonzero(np.greater_equal(value, -1, out=scratch("mask", (m, k), np.bool_)))
+            slot, lane = np.divmod(hit, k)
+            batch.add(slot, lane + at, value.reshape(-1).take(hit))
+        batch.flush()
 
     def _decide(
-        self, lanes: Lanes, found: _Closest | _Occluded, prim: Ints, lane: Ints, value: Floats
+        self, lanes: Lanes, found: _Closest | _Occluded, slot: Ints, lane: Ints, value: Floats
     ) -> None:
-        """Decide candidates: triangles (k,), lanes (k,) and the filter's values (k,)."""
+        """Decide candidates: slots (k,) of the filter, lanes (k,) and the filter's values (k,)."""
+        prim = self.slots.take(slot)
         keep = np.flatnonzero(prim != lanes.leaving.take(lane))
-        prim, lane, value = prim.take(keep), lane.take(keep), value.take(keep)
+        if keep.size < prim.size:
+            prim, lane, value = prim.take(keep), lane.take(keep), value.take(keep)
         origin = lanes.origin.take(lane, 1).astype(np.float64)
         direction = lanes.direction.take(lane, 1).astype(np.float64)
         t = triangle.plane_distance(self.table, prim, origin, direction)

@@ -10,6 +10,8 @@ that have found their hit drop out before the next round.
 
 from __future__ import annotations
 
+import math
+import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -31,6 +33,19 @@ NO_HIT = (0x7F800000 << 32) | 0x7FFFFFFF  # key of a miss: t = inf
 Words = NDArray[np.int64]
 # Called with the leaf slots (k,), the lanes (k,) and the filter's values (k,) of candidates.
 Decide = Callable[[Ints, Ints, Floats], None]
+
+
+_memory = threading.local()
+
+
+def scratch(name: str, shape: tuple[int, ...], dtype: type = f4) -> NDArray[Any]:
+    """Return this thread's buffer `name`, uninitialised; its last use ends here."""
+    size = math.prod(shape)
+    held = getattr(_memory, name, None)
+    if held is None or held.size < size:
+        held = np.empty(size, dtype)
+        setattr(_memory, name, held)
+    return held[:size].reshape(shape)
 
 
 @dataclass(slots=True)
@@ -58,7 +73,8 @@ class Lanes:
     leaving: Ints  # (n,)
     line: Floats  # (6, n) Plücker coordinates: unit direction d, then (o - center) × d
     speed: Floats  # (n,) length of `direction`
-    begin: Doubles | None  # (n,) where the slab distances start, None for 0 (see prepare)
+    local: Floats | None  # (4, n) o - center, 1; None if some origin is far away
+    begin: Doubles | None  # (n,) where the slab distances start, None if none is (see prepare)
 
 
 def prepare(origin: Floats, direction: Floats, leaving: Ints, ball: Ball) -> Lanes:
@@ -82,8 +98,12 @@ def prepare(origin: Floats, direction: Floats, leaving: Ints, ball: Ball) -> Lan
     line[3] = y * uz - z * uy
     line[4] = z * ux - x * uz
     line[5] = x * uy - y * ux
-    begin = -(x * ux + y * uy + z * uz) if far else None
-    return Lanes(origin, direction, leaving, line, speed.astype(f4), begin)
+    if far:
+        begin = -(x * ux + y * uy + z * uz)
+        return Lanes(origin, direction, leaving, line, speed.astype(f4), None, begin)
+    homogeneous = np.ones((4, speed.size), f4)
+    homogeneous[:3] = local
+    return Lanes(origin, direction, leaving, line, speed, homogeneous, None)
 
 
 def slab_table(lanes: Lanes, ball: Ball) -> Floats:
@@ -160,7 +180,7 @@ def trace(
     """
     n = len(table) - 1
     code, lane, near = _root_pairs(tree, table, bound(np.arange(n)))
-    bits = np.maximum(near, f4(0)).view(np.int32).astype(np.int64)
+    bits = near.view(np.int32).astype(np.int64)
     key = (lane << 32) | (bits & ~np.int64(tree.width - 1)) | code
     key.sort()
     owner = key >> 32
@@ -193,10 +213,12 @@ def _root_pairs(tree: StreamTree, table: Floats, far: Floats) -> tuple[Ints, Int
     parts = []
     for at in range(0, n, step):
         stop = min(n, at + step)
-        planes = (tree.slabs[0] @ table[at:stop, SLAB].T).reshape(1, 6, width, -1)
+        planes = np.matmul(
+            tree.slabs[0], table[at:stop, SLAB].T, out=scratch("product", (6 * width, stop - at))
+        ).reshape(1, 6, width, -1)
         hit, near = _boxes_met(planes, far[None, at:stop])
         slot, lane = np.divmod(hit, stop - at)
-        parts.append((slot, lane + at, near.ravel().take(hit)))
+        parts.append((slot, lane + at, near.reshape(-1).take(hit)))
     if not parts:
         empty = np.zeros(0, np.intp)
         return empty, empty, np.zeros(0, f4)
@@ -206,12 +228,14 @@ def _root_pairs(tree: StreamTree, table: Floats, far: Floats) -> tuple[Ints, Int
 
 def _boxes_met(planes: Floats, far: Floats) -> tuple[Ints, Floats]:
     """Slab distances (blocks, 6, width, rays) -> flat indices of met boxes, near distances."""
-    near = np.maximum(planes[:, 0], planes[:, 1])
+    near, leave = planes[:, 0], planes[:, 3]
+    np.maximum(near, planes[:, 1], out=near)
     np.maximum(near, planes[:, 2], out=near)
-    leave = np.minimum(planes[:, 3], planes[:, 4])
+    np.maximum(near, f4(0), out=near)
+    np.minimum(leave, planes[:, 4], out=leave)
     np.minimum(leave, planes[:, 5], out=leave)
-    met = near <= np.minimum(leave, far[:, None], out=planes[:, 3])
-    met &= leave >= 0
+    np.minimum(leave, far[:, None], out=leave)
+    met = np.less_equal(near, leave, out=scratch("mask", near.shape, np.bool_))
     return np.flatnonzero(met), near
 
 
@@ -246,7 +270,9 @@ def _expand(
     codes, lanes = [], []
     for nodes, block_lanes in blocks(node, lane, len(table) - 1, CHUNK // (6 * width * BLOCK)):
         rays = table.take(block_lanes, 0).reshape(-1, BLOCK, 16)[:, :, SLAB]
-        planes = tree.slabs.take(nodes, 0) @ rays.transpose(0, 2, 1)
+        shape = (nodes.size, 6 * width, BLOCK)
+        matrices = np.take(tree.slabs, nodes, 0, out=scratch("nodes", (*shape[:2], 9)), mode="clip")
+        planes = np.matmul(matrices, rays.transpose(0, 2, 1), out=scratch("product", shape))
         far = bound(block_lanes).reshape(-1, BLOCK)
         hit, _ = _boxes_met(planes.reshape(-1, 6, width, BLOCK), far)
         pair = hit >> BLOCK_SHIFT

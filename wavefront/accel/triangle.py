@@ -73,14 +73,40 @@ def edge_rows(triangles: Floats, center: Floats, radius: float) -> Floats:
     following = corner[[1, 2, 0]]
     direction = following - corner
     moment = np.cross(corner, following)
+    _, scale = _edge_error(corner, radius)
+    rows = np.concatenate([moment, direction], 2) * scale[:, None]
+    return rows.astype(f4)
+
+
+def side_rows(triangles: Floats, center: Floats, radius: float) -> Floats:
+    """Return rows (m, 4) that tell on which side of triangles (m, 3, 3) a ray starts.
+
+    The product with (o - center, 1) has the sign of the edge functions if the triangle's plane lies
+    ahead of the ray. It is scaled so that its product with w1 (see `edge_rows`) is above -1 for every
+    true hit from within two radii of the centre, and above 1 only if the two signs agree.
+    """
+    corner = triangles.transpose(1, 0, 2) - np.asarray(center, np.float64)
+    normal = np.cross(corner[1] - corner[0], corner[2] - corner[0])
+    offset = (normal * corner[0]).sum(1)
+    rows = np.concatenate([-normal, offset[:, None]], 1)
+    area2 = np.linalg.norm(normal, axis=1)
+    edge_error, edge_scale = _edge_error(corner, radius)
+    error = ROUNDOFF * 40 * radius * area2
+    slack = error * (area2 + edge_error) + edge_error * (3 * radius * area2 + error)
+    with np.errstate(all="ignore"):
+        return (rows / (slack * edge_scale)[:, None]).astype(f4)
+
+
+def _edge_error(corner: Doubles, radius: float) -> tuple[Doubles, Doubles]:
+    """Bound the float32 error of edge functions of corners (3, m, 3), and the scale of their rows."""
+    direction = corner[[1, 2, 0]] - corner
+    moment = np.cross(corner, corner[[1, 2, 0]])
     span = np.linalg.norm(direction, axis=2)
     # By Wilkinson's bounds on six-term sums, with (o - center) rounded at a distance up to 2 radius.
     error = ROUNDOFF * (12 * np.linalg.norm(moment, axis=2) + 40 * radius * span).max(0)
     area2 = np.linalg.norm(np.cross(direction[0], direction[1]), axis=1)
     with np.errstate(all="ignore"):
-        scale = 1 / np.sqrt(error * (area2 + error))
-    rows = np.concatenate([moment, direction], 2) * scale[:, None]
-    return rows.astype(f4)
+        return error, 1 / np.sqrt(error * (area2 + error))
 
 
 def hits_watertight(table: TriangleTable, prim: Ints, origin: Doubles, direction: Doubles) -> Bools:
