@@ -18,7 +18,7 @@ from ..errors import SceneError, finite_array
 from ..lights import PointLight
 from ..scene import Scene
 from ..shapes import Mesh
-from . import gltf, mtl, obj, ply, stl, visuals
+from . import gltf, headers, mtl, obj, stl, visuals
 from .appearance import Look
 from .files import beside, decode, read_bytes
 from .gltf_materials import Materials
@@ -259,7 +259,7 @@ def _read_ply(name: str, data: bytes, strict: bool) -> list[Raw]:
     """Let trimesh read a PLY file; whatever it raises becomes a SceneError, what it leaves out, too."""
     import trimesh
 
-    claimed = ply.check(name, data)
+    claimed = headers.check_ply(name, data)
     try:
         with np.errstate(all="ignore"):
             found = trimesh.load_scene(BytesIO(data), file_type="ply", process=False)

@@ -26,7 +26,7 @@ class Element:
     lists: int = 0  # how many of its properties are lists
 
 
-def check(name: str, data: bytes) -> dict[str, int]:
+def check_ply(name: str, data: bytes) -> dict[str, int]:
     """Return how many of each element a PLY file has, after checking that it can hold them.
 
     Raises
