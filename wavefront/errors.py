@@ -76,3 +76,24 @@ def rgb(name: str, value: ArrayLike, high: float = np.inf) -> NDArray[np.float32
         limit = "at least 0" if np.isinf(high) else f"in [0, {high:g}]"
         raise SceneError(f"{name}{where} is {array.flat[bad[0]]:g}; it must be {limit}")
     return np.broadcast_to(array.astype(np.float32).reshape(-1, 1), (3, 1)).copy()
+
+
+def rotation_matrix(name: str, value: ArrayLike, tolerance: float = 1e-4) -> NDArray[np.float64]:
+    """Return a (3, 3) rotation; one that is off by rounding is replaced by the nearest exact one.
+
+    Raises
+    ------
+    SceneError
+        If it scales, shears or mirrors: if an element of MᵀM − 1 exceeds `tolerance`, or det M < 0.
+    """
+    matrix = finite_array(name, value, (3, 3))
+    off = float(np.abs(matrix.T @ matrix - np.eye(3)).max())
+    if not off <= tolerance:
+        raise SceneError(
+            f"{name} must be a rotation, without scale or shear: "
+            f"an element of MᵀM − 1 is {off:.3g}, at most {tolerance:g} is rounding"
+        )
+    if np.linalg.det(matrix) < 0:
+        raise SceneError(f"{name} must be a rotation; it mirrors: its determinant is -1")
+    left, _, right = np.linalg.svd(matrix)
+    return matrix if off < 1e-12 else np.asarray(left @ right)

@@ -17,14 +17,16 @@ def generate(scene: CompiledScene, camera: Camera, sampler: Sampler, pixel: Word
     Parameters
     ----------
     pixel, sample
-        (n,) row-major pixel index and sample index: the address of each path.
+        (n,) row-major pixel index, within the camera's window, and sample index.
     """
-    width, n = camera.size[0], len(pixel)
+    width, n = camera.film[0], len(pixel)
+    pixel = camera.address(pixel)
     jitter = sampler.draw_2d(pixel, sample, 0, Dimension.PIXEL)
     row = pixel // np.uint32(width)
     x = (pixel - row * np.uint32(width)).astype(f4) + jitter[0]
     y = row.astype(f4) + jitter[1]
-    origin, direction = camera.rays(x, y, scene.centre)
+    lens = sampler.draw_2d(pixel, sample, 0, Dimension.LENS) if camera.uses_lens else None
+    origin, direction = camera.rays(x, y, scene.centre, lens)
     return Paths(
         slot=np.arange(n),
         pixel=pixel,

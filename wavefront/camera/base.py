@@ -1,0 +1,376 @@
+"""The camera: where it stands, what it projects, and which part of the picture is rendered."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import SceneError, finite_array, rotation_matrix
+from ..state import Words
+from ..vec import Floats, column, normalize
+from .projection import Orthographic, Panorama, Perspective, Projection
+
+MAX_SIDE = 65_536  # pixels; a row-major pixel index then fits in 32 bits
+Window = tuple[int, int, int, int]
+
+
+class Camera:
+    """A camera. Use `Camera.look_at` or one of the other class methods.
+
+    Attributes
+    ----------
+    origin
+        (3,) position, scene units.
+    rotation
+        (3, 3) columns: right, up and backward in world space.
+    projection
+        How film points become rays.
+    film
+        (width, height) in pixels of the whole picture.
+    window
+        (x0, y0, x1, y1) in pixels of the whole picture: the part that is rendered, without column
+        x1 and row y1.
+    """
+
+    def __init__(
+        self,
+        origin: ArrayLike,
+        rotation: ArrayLike,
+        projection: Projection,
+        size: tuple[int, int],
+        crop: Window | None = None,
+    ) -> None:
+        self.origin = finite_array("Camera origin", origin, (3,))
+        self.rotation = rotation_matrix("Camera rotation", rotation)
+        self.projection = projection
+        self.film = image_size(size)
+        self.window = _window(crop, self.film)
+
+    # --- Ways to make one -----------------------------------------------------------------------
+
+    @classmethod
+    def look_at(
+        cls,
+        origin: ArrayLike,
+        target: ArrayLike,
+        up: ArrayLike = (0, 1, 0),
+        *,
+        fov: float = 40,
+        size: tuple[int, int] = (512, 512),
+        aperture: float = 0,
+        focus: float | None = None,
+        shift: tuple[float, float] = (0, 0),
+        crop: Window | None = None,
+    ) -> Camera:
+        """Place a camera at `origin` that looks at `target`.
+
+        Parameters
+        ----------
+        origin, target, up
+            (3,) position, the point in the middle of the picture, and what is up in it.
+        fov
+            Vertical field of view, degrees.
+        size
+            (width, height) in pixels.
+        aperture
+            Diameter of the lens, scene units; 0 is a pinhole, with everything sharp.
+        focus
+            Distance of the sharp plane along the view axis, scene units; the target's by default.
+        shift
+            Moves the film (right, up) in its plane, as fractions of the picture's width and
+            height: the view moves without a change of perspective.
+        crop
+            (x0, y0, x1, y1) in pixels from the left and the top: renders only that window, and in
+            it the very pixels of the whole picture.
+
+        Raises
+        ------
+        SceneError
+            If origin and target coincide, up is parallel to the view, or an argument is out of range.
+        """
+        eye, axes, distance = _look(origin, target, up)
+        focus = distance if focus is None else focus
+        return cls(eye, axes, Perspective(fov, shift=shift, aperture=aperture, focus=focus), size, crop)
+
+    @classmethod
+    def from_matrix(
+        cls,
+        cam_to_world: ArrayLike,
+        *,
+        fov: float = 40,
+        size: tuple[int, int] = (512, 512),
+        convention: Literal["opengl", "opencv"] = "opengl",
+        aperture: float = 0,
+        focus: float | None = None,
+        shift: tuple[float, float] = (0, 0),
+        crop: Window | None = None,
+    ) -> Camera:
+        """Place a camera by its matrix to world space.
+
+        Parameters
+        ----------
+        cam_to_world
+            (4, 4) or (3, 4): rotation and position.
+        fov, size, aperture, focus, shift, crop
+            As for `look_at`; with an aperture, `focus` must be given.
+        convention
+            What the axes of camera space mean. "opengl", as in glTF and Blender: x right, y up,
+            looking along -z. "opencv": x right, y down, looking along +z.
+
+        Raises
+        ------
+        SceneError
+            If the matrix scales, shears or mirrors, or an argument is out of range.
+        """
+        if convention not in ("opengl", "opencv"):
+            raise SceneError(f"convention is {convention!r}; it must be 'opengl' or 'opencv'")
+        axes, eye = _rigid("cam_to_world", cam_to_world)
+        if convention == "opencv":
+            axes = axes * (1, -1, -1)
+        return cls(eye, axes, Perspective(fov, shift=shift, aperture=aperture, focus=focus), size, crop)
+
+    @classmethod
+    def from_intrinsics(
+        cls,
+        K: ArrayLike,
+        R: ArrayLike,
+        t: ArrayLike,
+        size: tuple[int, int],
+        *,
+        aperture: float = 0,
+        focus: float | None = None,
+        crop: Window | None = None,
+    ) -> Camera:
+        """Place a calibrated camera in OpenCV's convention: x right, y down, z forward.
+
+        A world point X is seen at the film point K·(R·X + t), divided by its third component.
+
+        Parameters
+        ----------
+        K
+            (3, 3) intrinsics [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] in pixels. The upper left pixel
+            has its centre at (0.5, 0.5): a principal point in the middle is (width/2, height/2).
+            Where a calibration counts centres from (0, 0), add 0.5 to cx and cy.
+        R, t
+            (3, 3) rotation and (3,) translation from world to camera space.
+        size
+            (width, height) in pixels.
+        aperture, focus, crop
+            As for `from_matrix`.
+
+        Raises
+        ------
+        SceneError
+            If K has another form (a skew, say), R is no rotation, or an argument is out of range.
+        """
+        width, height = image_size(size)
+        k = finite_array("K", K, (3, 3))
+        (fx, skew, cx), (zero, fy, cy), last = k.tolist()
+        if zero != 0 or last != [0, 0, 1] or not (fx > 0 and fy > 0):
+            raise SceneError(f"K must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], fx, fy > 0; got {k.tolist()}")
+        if skew != 0:
+            raise SceneError(f"K[0][1] is {skew:g}; pixels with a skew are not supported")
+        axes = rotation_matrix("R", R)
+        eye = -axes.T @ finite_array("t", t, (3,))
+        lens = Perspective(
+            2 * float(np.degrees(np.arctan(height / 2 / fy))),
+            shift=(0.5 - cx / width, cy / height - 0.5),
+            pixel_aspect=fy / fx,
+            aperture=aperture,
+            focus=focus,
+        )
+        return cls(eye, axes.T * (1, -1, -1), lens, size, crop)
+
+    @classmethod
+    def orthographic(
+        cls,
+        origin: ArrayLike,
+        target: ArrayLike,
+        up: ArrayLike = (0, 1, 0),
+        *,
+        height: float,
+        size: tuple[int, int] = (512, 512),
+        crop: Window | None = None,
+    ) -> Camera:
+        """Place a camera whose rays are parallel; it sees what lies ahead of the film at `origin`.
+
+        Parameters
+        ----------
+        origin, target, up, size, crop
+            As for `look_at`.
+        height
+            Of the picture, scene units.
+
+        Raises
+        ------
+        SceneError
+            As for `look_at`.
+        """
+        eye, axes, _ = _look(origin, target, up)
+        return cls(eye, axes, Orthographic(height), size, crop)
+
+    @classmethod
+    def panorama(
+        cls,
+        origin: ArrayLike,
+        target: ArrayLike | None = None,
+        up: ArrayLike = (0, 1, 0),
+        *,
+        size: tuple[int, int] = (1024, 512),
+        crop: Window | None = None,
+    ) -> Camera:
+        """Place a camera that sees all directions: 360° of longitude by 180° of latitude.
+
+        Parameters
+        ----------
+        origin, up, size, crop
+            As for `look_at`. Pixels are square where the width is twice the height.
+        target
+            (3,) the point in the middle of the picture. Without one the camera looks along +z,
+            and the picture can be used as an `Environment` as it is.
+
+        Raises
+        ------
+        SceneError
+            As for `look_at`.
+        """
+        if target is None:
+            return cls(origin, _axes(np.array([0.0, 0.0, -1.0]), up), Panorama(), size, crop)
+        eye, axes, _ = _look(origin, target, up)
+        return cls(eye, axes, Panorama(), size, crop)
+
+    def resized(self, size: tuple[int, int]) -> Camera:
+        """Return the same camera for another (width, height), without a crop."""
+        return Camera(self.origin, self.rotation, self.projection, size)
+
+    def cropped(self, crop: Window) -> Camera:
+        """Return the same camera that renders only the window (x0, y0, x1, y1) of the whole picture."""
+        return Camera(self.origin, self.rotation, self.projection, self.film, crop)
+
+    # --- What a render asks ---------------------------------------------------------------------
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) in pixels of what is rendered."""
+        x0, y0, x1, y1 = self.window
+        return x1 - x0, y1 - y0
+
+    @property
+    def fov(self) -> float:
+        """Vertical field of view of the whole picture, degrees; of a perspective camera only."""
+        if not isinstance(self.projection, Perspective):
+            raise AttributeError(f"a camera with {type(self.projection).__name__} rays has no fov")
+        return self.projection.fov
+
+    @property
+    def uses_lens(self) -> bool:
+        """Whether rays start at sampled points of a lens."""
+        return self.projection.uses_lens
+
+    def address(self, pixel: Words) -> Words:
+        """Row-major index (n,) in the whole picture of pixels (n,) that are numbered in the window."""
+        if self.size == self.film:
+            return pixel
+        x0, y0, _, _ = self.window
+        width, whole = np.uint32(self.size[0]), np.uint32(self.film[0])
+        row = pixel // width
+        return ((row + np.uint32(y0)) * whole + (pixel - row * width + np.uint32(x0))).astype(np.uint32)
+
+    def rays(
+        self, x: Floats, y: Floats, centre: NDArray[np.float64], lens: Floats | None = None
+    ) -> tuple[Floats, Floats]:
+        """Return origins and unit directions (3, n) of rays through film points.
+
+        Parameters
+        ----------
+        x, y
+            (n,) film position in pixels, from the left and from the top of the whole picture.
+        centre
+            (3,) the scene's centre, to which the origins are relative.
+        lens
+            (2, n) numbers in [0, 1) that choose the point on the lens; without them rays go
+            through its middle.
+        """
+        offset, direction = self.projection.rays(x, y, self.film, lens)
+        eye = column(self.origin - centre)
+        towards = normalize(self._turned(direction))
+        origin = np.repeat(eye, len(x), 1) if offset is None else eye + self._turned(offset)
+        return origin, towards if towards.shape[1] == len(x) else np.repeat(towards, len(x), 1)
+
+    def _turned(self, v: Floats) -> Floats:
+        """Camera space (3, n) -> world space (3, n)."""
+        right, up, backward = (column(axis) for axis in self.rotation.T)
+        return right * v[0] + up * v[1] + backward * v[2]
+
+
+def _look(origin: ArrayLike, target: ArrayLike, up: ArrayLike) -> tuple[NDArray[Any], NDArray[Any], float]:
+    """Return the position, the axes (3, 3) as columns, and the distance of the target."""
+    eye = finite_array("Camera origin", origin, (3,))
+    backward = eye - finite_array("Camera target", target, (3,))
+    distance = float(np.linalg.norm(backward))
+    if not distance > 0:
+        raise SceneError(f"Camera origin and target are both {eye.tolist()}; they must differ")
+    return eye, _axes(backward / distance, up), distance
+
+
+def _axes(backward: NDArray[np.float64], up: ArrayLike) -> NDArray[np.float64]:
+    """Return the axes right, up and backward, (3, 3), as columns."""
+    upward = finite_array("Camera up", up, (3,))
+    right = np.cross(upward, backward)
+    if not np.linalg.norm(right) > 1e-9 * np.linalg.norm(upward):
+        raise SceneError(f"Camera up {upward.tolist()} must not be zero or parallel to the view")
+    right = right / np.linalg.norm(right)
+    return np.stack([right, np.cross(backward, right), backward], 1)
+
+
+def _rigid(name: str, value: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return rotation (3, 3) and position (3,) of a (4, 4) or (3, 4) matrix."""
+    rows = 3 if np.shape(value) == (3, 4) else 4
+    matrix = finite_array(name, value, (rows, 4))
+    if rows == 4 and matrix[3].tolist() != [0, 0, 0, 1]:
+        raise SceneError(f"{name}[3] is {matrix[3].tolist()}; it must be [0, 0, 0, 1]")
+    return rotation_matrix(f"{name}[:3, :3]", matrix[:3, :3]), matrix[:3, 3]
+
+
+def image_size(size: tuple[int, int]) -> tuple[int, int]:
+    """Return (width, height) as ints.
+
+    Raises
+    ------
+    SceneError
+        If they are not two whole numbers from 1 to 65536.
+    """
+    try:
+        width, height = size
+        whole = int(width) == width and int(height) == height
+    except (TypeError, ValueError, OverflowError) as error:
+        raise SceneError(f"size must be (width, height), got {size!r}") from error
+    if not whole or not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
+        raise SceneError(f"size is {size!r}; both must be whole numbers from 1 to {MAX_SIDE}")
+    return int(width), int(height)
+
+
+def _window(crop: Window | None, film: tuple[int, int]) -> Window:
+    """Return the window that is rendered.
+
+    Raises
+    ------
+    SceneError
+        If it is not four whole numbers, is empty, or leaves the picture.
+    """
+    width, height = film
+    if crop is None:
+        return 0, 0, width, height
+    try:
+        x0, y0, x1, y1 = (int(side) for side in crop)
+        whole = all(int(side) == side for side in crop)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise SceneError(f"crop must be (x0, y0, x1, y1), got {crop!r}") from error
+    if not whole or not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
+        raise SceneError(
+            f"crop is {crop!r}; it must be whole numbers (x0, y0, x1, y1) with "
+            f"0 <= x0 < x1 <= {width} and 0 <= y0 < y1 <= {height}"
+        )
+    return x0, y0, x1, y1

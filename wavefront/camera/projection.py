@@ -1,0 +1,154 @@
+"""How a camera maps its film to rays: one contract, one class for each kind of lens.
+
+Camera space has x to the right, y up and z backward: the camera looks along -z. Film points are
+in pixels of the whole picture, x from the left and y from the top; pixel (column, row) covers
+[column, column + 1] × [row, row + 1], so that its centre lies at + 0.5.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import SceneError, finite_array, number
+from ..sampling.warp import uniform_disk
+from ..vec import Floats, column, f4
+
+Size = tuple[int, int]
+
+
+class Projection(ABC):
+    """The contract: film points to rays in camera space."""
+
+    uses_lens: bool = False  # rays start at a sampled point of a lens
+
+    @abstractmethod
+    def rays(self, x: Floats, y: Floats, film: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
+        """Return where rays start and where they go, in camera space.
+
+        Parameters
+        ----------
+        x, y
+            (n,) film position in pixels.
+        film
+            (width, height) of the whole picture in pixels.
+        lens
+            (2, n) numbers in [0, 1) that choose the point on the lens; None for its middle.
+
+        Returns
+        -------
+        offset
+            (3, n) start relative to the camera, scene units; None when all start at the camera.
+        direction
+            (3, n) or (3, 1), of any length above 0.
+        """
+
+
+class Perspective(Projection):
+    """A pinhole, or a thin lens that is sharp at one distance.
+
+    Parameters
+    ----------
+    fov
+        Vertical field of view, degrees.
+    shift
+        How far the film is moved in its plane, (right, up), as fractions of its width and height:
+        with (0.5, 0) the view axis meets the left edge of the picture.
+    pixel_aspect
+        Width of a pixel over its height.
+    aperture
+        Diameter of the lens, scene units; 0 is a pinhole.
+    focus
+        Distance of the sharp plane, measured along the view axis, scene units.
+
+    Notes
+    -----
+    A point at distance z from a lens of diameter A that is in focus at f is spread in the plane of
+    focus over a disk of diameter A·|z − f|/z, the circle of confusion.
+
+    Raises
+    ------
+    SceneError
+        If an argument is out of range.
+    """
+
+    def __init__(
+        self,
+        fov: float,
+        *,
+        shift: Sequence[float] = (0.0, 0.0),
+        pixel_aspect: float = 1.0,
+        aperture: float = 0.0,
+        focus: float | None = None,
+    ) -> None:
+        self.fov = number("Camera fov", fov, lambda x: 0 < x < 180, "above 0 and below 180 degrees")
+        self.shift = finite_array("Camera shift", shift, (2,))
+        self.pixel_aspect = number("Camera pixel_aspect", pixel_aspect, lambda x: x > 0, "above 0")
+        self.aperture = number("Camera aperture", aperture, lambda x: x >= 0, "at least 0")
+        if focus is None and self.aperture > 0:
+            raise SceneError(f"Camera aperture is {aperture!r}; a lens needs a focus distance: give focus")
+        self.focus = 1.0 if focus is None else number("Camera focus", focus, lambda x: x > 0, "above 0")
+        self.uses_lens = self.aperture > 0
+
+    def rays(self, x: Floats, y: Floats, film: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
+        """Aim through the film, or from a point of the lens at where the middle's ray is in focus."""
+        width, height = film
+        pitch = 2 * np.tan(np.radians(self.fov) / 2) / height
+        direction = np.empty((3, len(x)), f4)
+        np.multiply(x - f4(width * (0.5 - self.shift[0])), f4(pitch * self.pixel_aspect), out=direction[0])
+        np.multiply(f4(height * (0.5 + self.shift[1])) - y, f4(pitch), out=direction[1])
+        direction[2] = -1
+        if lens is None or not self.uses_lens:
+            return None, direction
+        offset = np.zeros_like(direction)
+        np.multiply(uniform_disk(lens), f4(self.aperture / 2), out=offset[:2])
+        direction[:2] -= offset[:2] * f4(1 / self.focus)
+        return offset, direction
+
+
+class Orthographic(Projection):
+    """Parallel rays.
+
+    Parameters
+    ----------
+    height
+        Of the picture, scene units.
+
+    Raises
+    ------
+    SceneError
+        If the height is not above 0.
+    """
+
+    def __init__(self, height: float) -> None:
+        self.height = number("Camera height", height, lambda x: x > 0, "above 0")
+
+    def rays(self, x: Floats, y: Floats, film: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
+        """Start on the film, and go straight ahead."""
+        width, height = film
+        pitch = f4(self.height / height)
+        offset = np.zeros((3, len(x)), f4)
+        np.multiply(x - f4(width / 2), pitch, out=offset[0])
+        np.multiply(f4(height / 2) - y, pitch, out=offset[1])
+        return offset, column((0, 0, -1))
+
+
+class Panorama(Projection):
+    """All directions, by longitude and latitude: 360° across and 180° down the picture.
+
+    It is the map of `wf.Environment`: what a camera that looks along +z renders is an environment.
+    """
+
+    def rays(self, x: Floats, y: Floats, film: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
+        """Turn by longitude to the right and by latitude up."""
+        width, height = film
+        longitude = (x - f4(width / 2)) * f4(2 * np.pi / width)
+        latitude = (f4(height / 2) - y) * f4(np.pi / height)
+        level = np.cos(latitude)
+        direction = np.empty((3, len(x)), f4)
+        np.multiply(np.sin(longitude), level, out=direction[0])
+        np.sin(latitude, out=direction[1])
+        np.multiply(np.cos(longitude), -level, out=direction[2])
+        return None, direction
