@@ -416,8 +416,11 @@ def test_extension_textures(given, build):
         ({"pbrMetallicRoughness": {"metallicFactor": 1, "roughnessFactor": 0}}, Mirror),
         (
             {
-                "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0},
-                "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}},
+                "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.5},
+                "extensions": {
+                    "KHR_materials_transmission": {"transmissionFactor": 1},
+                    "KHR_materials_volume": {"attenuationColor": [0.5, 1, 1], "attenuationDistance": 2},
+                },
             },
             Dielectric,
         ),
@@ -428,6 +431,9 @@ def test_the_simple_materials_stand_in(build, path, monkeypatch, material, kind)
     monkeypatch.delattr(appearance.bsdfs, "Principled", raising=False)
     (mesh,) = load_meshes(build.material(**material).gltf(path))
     assert type(mesh.material) is kind
+    if kind is Dielectric:
+        assert mesh.material.roughness == pytest.approx([0.5])
+        assert mesh.material.absorption.ravel() == pytest.approx([np.log(2) / 2, 0, 0])
 
 
 # ---- what is not honoured is named once ---------------------------------------------------------

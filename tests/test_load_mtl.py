@@ -193,6 +193,7 @@ def test_comments_may_follow_numbers(one):
 def test_glass_keeps_a_kd_quiet(one):
     mesh = one("Kd 0.8 0.8 0.8", "Ni 1.5", "d 0.1", "illum 4")
     assert isinstance(mesh.material, Dielectric)
+    assert one("Pr 0.3", "illum 4").material.roughness == pytest.approx([0.3])
 
 
 @pytest.mark.filterwarnings("ignore:.*not honoured")

@@ -66,7 +66,7 @@ class Texture(Spatial):
     ) -> None:
         codes, self.name = _codes(source)
         self.size = (codes.shape[1], codes.shape[0])  # (width, height)
-        self._stride = codes.shape[2]
+        self.channels = self._stride = codes.shape[2]  # of the image
         self._texels = codes.reshape(-1)  # 8-bit images stay 8-bit: a quarter of the memory
         self._channels = _pick(self.name, channel, self._stride)
         self._tables = [_table(codes.dtype, srgb and not _is_alpha(c, self._stride)) for c in self._channels]

@@ -46,8 +46,13 @@ def _plain(wanted: dict[str, Any]) -> tuple[Bsdf, list[str]]:
     """Choose among the simple materials."""
     base = wanted["base_color"]
     if _number(wanted, "transmission", 0.0) > 0.5:
-        material: Bsdf = Dielectric(wanted.get("ior", 1.5), transmittance=base)
-        return material, _others(wanted, "base_color", "transmission", "ior")
+        material: Bsdf = Dielectric(
+            wanted.get("ior", 1.5),
+            wanted.get("roughness", 0.0),
+            transmittance=base,
+            absorption=wanted.get("absorption", 0.0),
+        )
+        return material, _others(wanted, "base_color", "transmission", "ior", "roughness", "absorption")
     if _number(wanted, "metallic", 0.0) > 0.5 and _number(wanted, "roughness", 1.0) < SMOOTH:
         return Mirror(base), _others(wanted, "base_color", "metallic", "roughness")
     return Diffuse(base), _others(wanted, "base_color")

@@ -4,7 +4,7 @@ How an MTL material is read:
 
 - `Ke` is emission. `Kd` is the reflectance of a matte surface, multiplied by `map_Kd`; a black `Kd`
   beside a `map_Kd` counts as white, since some exporters write that.
-- `illum` 4, 6, 7 and 9 are glass with the index `Ni` (1.5 when absent), tinted by `Tf`.
+- `illum` 4, 6, 7 and 9 are glass with the index `Ni` (1.5 when absent), tinted by `Tf`, rough by `Pr`.
 - `illum` 3, 5 and 8 are mirrors of reflectance `Ks`, if `Ks` is not black and there is no `Pr` or `Pm`.
 - `Pr Pm Ps Pc Pcr aniso` and their maps, `norm` and `map_d` (the PBR extension) are the parameters of
   the same names of `Principled`.
@@ -254,10 +254,7 @@ def _wanted(entry: Entry) -> dict[str, Any]:
     """Return the parameters of `Principled` that a file asks for."""
     wanted: dict[str, Any] = {"base_color": _base(entry)}
     for key, image, name in PBR:
-        factor = entry.number(key, 1.0)
-        if not 0 <= factor <= 1:
-            warn(f"{entry.where(key)} is {factor:g}; it must be in [0, 1] and was clamped", entry.strict)
-            factor = min(max(factor, 0.0), 1.0)
+        factor = _part(entry, key, 1.0)
         texture = entry.texture(image, factor, "scalar")
         if texture is not None or (key in entry.lines and (factor or name == "roughness")):
             wanted[name] = factor if texture is None else texture
@@ -285,7 +282,15 @@ def _glass(entry: Entry) -> tuple[Bsdf, list[str]]:
     if ior <= 0:
         raise SceneError(f"{entry.where('ni')} is {ior:g}; an index must be above 0")
     entry.read.update(("d", "tr", "kd"))  # glass has no matte part: files give it a Kd all the same
-    return Dielectric(ior, transmittance=entry.colour("tf", 1.0)), []
+    return Dielectric(ior, _part(entry, "pr", 0.0), transmittance=entry.colour("tf", 1.0)), []
+
+
+def _part(entry: Entry, key: str, default: float) -> float:
+    """Return a number in [0, 1], clamped with a warning."""
+    value = entry.number(key, default)
+    if not 0 <= value <= 1:
+        warn(f"{entry.where(key)} is {value:g}; it must be in [0, 1] and was clamped", entry.strict)
+    return min(max(value, 0.0), 1.0)
 
 
 def _map(entry: Entry, key: str) -> tuple[dict[str, list[str]], str]:
