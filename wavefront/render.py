@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -15,6 +15,7 @@ import numpy as np
 from tqdm import tqdm
 
 from .accel import make_accelerator
+from .accel.choose import CHOICES
 from .camera import Camera
 from .errors import SceneError
 from .film import Film, Image
@@ -88,7 +89,9 @@ def render(
     spp = _whole("spp", spp, 1, MAX_SPP)
     max_bounces = _whole("max_bounces", max_bounces, 0, 2**16)
     wave_size = _whole("wave_size", wave_size, 1, 2**24)
-    estimate = _integrator(integrator)
+    estimate = INTEGRATORS[_one_of("integrator", integrator, INTEGRATORS)]
+    accel = _one_of("accel", accel, CHOICES)
+    make_sampler(sampler, seed)  # checks both before the scene is read
     threads = worker_count(workers)
     subject = as_scene(scene)
     camera = subject.camera or subject.framing_camera()
@@ -235,10 +238,10 @@ def as_scene(subject: Any) -> Scene:
     )
 
 
-def _integrator(name: str) -> Integrator:
-    if name not in INTEGRATORS:
-        raise SceneError(f"integrator is {name!r}; it must be one of {', '.join(INTEGRATORS)}")
-    return INTEGRATORS[name]
+def _one_of(name: str, value: Any, choices: Collection[str]) -> str:
+    if not isinstance(value, str) or value not in choices:
+        raise SceneError(f"{name} is {value!r}; it must be one of {', '.join(choices)}")
+    return value
 
 
 def _whole(name: str, value: Any, low: int, high: int) -> int:

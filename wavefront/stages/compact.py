@@ -21,8 +21,8 @@ def compact(paths: Paths, hits: Hits, lanes: Ints) -> tuple[Paths, Hits]:
 
 
 def carrying(paths: Paths) -> Bools:
-    """Tell which paths still carry anything, (n,)."""
-    return paths.throughput.max(0) > 0
+    """Tell which paths still carry anything, (n,); NaN is kept, so that it is met and counted."""
+    return paths.throughput.max(0) != 0
 
 
 def roulette(paths: Paths, sampler: Sampler, bounce: int) -> Ints:
@@ -37,4 +37,4 @@ def roulette(paths: Paths, sampler: Sampler, bounce: int) -> Ints:
     chance = np.minimum(paths.throughput.max(0) * paths.eta2, MAX_SURVIVAL)
     u = sampler.draw_1d(paths.pixel, paths.sample, bounce, Dimension.ROULETTE)
     paths.throughput /= np.maximum(chance, SMALLEST)
-    return np.flatnonzero(u < chance)
+    return np.flatnonzero(~(u >= chance))  # NaN lives on, to be counted

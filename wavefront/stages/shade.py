@@ -91,7 +91,7 @@ def direct(
     u_point = sampler.draw_2d(*address, Dimension.LIGHT_POINT)
     light, delta = scene.lights.sample_li(surface.point, u_choice, u_point)
     f_cos, pdf = evaluate(shade, shade.frame.to_local(light.wi), dot(surface.ng, light.wi))
-    lanes = np.flatnonzero((light.pdf > 0) & (f_cos.max(0) > 0))
+    lanes = np.flatnonzero((light.pdf > 0) & (f_cos.max(0) != 0))  # NaN stays, to be counted
     light, f_cos, pdf, delta = light.take(lanes), f_cos.take(lanes, 1), pdf.take(lanes), delta.take(lanes)
     weight = np.where(delta, f4(1), power_heuristic(light.pdf, pdf)) if mis else f4(1)
     radiance = f_cos * light.radiance * (weight / light.pdf)
