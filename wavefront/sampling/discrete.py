@@ -120,9 +120,8 @@ class Distribution2D:
         flat = row * width + column
         share = self._share.ravel().take(flat)
         start = self._cdf.take(flat) - row - share
-        rest_x = np.clip((u[0] - start) / share, 0, _BELOW_ONE)
-        x = np.minimum(((column + rest_x) / width).astype(f4), _BELOW_ONE)
-        y = np.minimum(((row + rest_y.astype(np.float64)) / height).astype(f4), _BELOW_ONE)
+        x = _within_cell(column, (u[0] - start) / share, width)
+        y = _within_cell(row, rest_y, height)
         return x, y, self._density.take(flat)
 
     def pdf(self, x: Floats, y: Floats) -> Floats:
@@ -131,3 +130,13 @@ class Distribution2D:
         column = np.clip((x * f4(width)).astype(np.intp), 0, width - 1)
         row = np.clip((y * f4(height)).astype(np.intp), 0, height - 1)
         return self._density.take(row * width + column)
+
+
+def _within_cell(cell: Ints, rest: NDArray[np.floating], cells: int) -> Floats:
+    """Coordinate (n,) in [0, 1) at `rest` (n,) of the way through `cell` (n,).
+
+    Kept off the border by more than rounding, so that the coordinate is in the cell for `pdf` too,
+    whose neighbour may have no weight.
+    """
+    margin = cells * 2.0**-22
+    return ((cell + np.clip(rest, margin, 1 - margin, dtype=np.float64)) / cells).astype(f4)

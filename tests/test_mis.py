@@ -1,0 +1,91 @@
+"""Weights of multiple importance sampling: exact values, extremes, and that they sum to one."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wavefront.sampling.mis import balance_heuristic, power_heuristic
+
+heuristics = pytest.mark.parametrize("heuristic", [power_heuristic, balance_heuristic])
+densities = st.one_of(
+    st.just(0.0),
+    st.just(float("inf")),
+    st.floats(2.0**-100, 2.0**100, width=32),
+    st.floats(2.0**-126, 2.0**127, width=32),
+)
+
+
+def weight(heuristic, pdf, other):
+    return heuristic(np.array([pdf], np.float32), np.array([other], np.float32))[0]
+
+
+@pytest.mark.parametrize(
+    ("pdf", "other", "power", "balance"),
+    [
+        (1, 1, 0.5, 0.5),
+        (1, 2, 0.2, 1 / 3),
+        (3, 1, 0.9, 0.75),
+        (1, 0, 1, 1),
+        (0, 1, 0, 0),
+        (0, 0, 0, 0),
+        (np.inf, 1, 1, 1),
+        (1, np.inf, 0, 0),
+        (np.inf, np.inf, 0.5, 0.5),
+        (0, np.inf, 0, 0),
+        (np.inf, 0, 1, 1),
+        (1e30, 1e30, 0.5, 0.5),
+        (1e-30, 1e-30, 0.5, 0.5),
+        (3e-30, 1e-30, 0.9, 0.75),
+        (1e30, 3e30, 0.1, 0.25),
+        (1e30, 1e-30, 1, 1),
+        (1e-30, 1e30, 0, 0),
+    ],
+)
+def test_exact_values(pdf, other, power, balance):
+    assert weight(power_heuristic, pdf, other) == pytest.approx(power, abs=1e-6)
+    assert weight(balance_heuristic, pdf, other) == pytest.approx(balance, abs=1e-6)
+
+
+@heuristics
+@given(a=densities, b=densities)
+def test_the_two_weights_sum_to_one(heuristic, a, b):
+    first, second = weight(heuristic, a, b), weight(heuristic, b, a)
+    assert 0 <= first <= 1
+    if a == b == 0:
+        assert first == second == 0
+    else:
+        assert first + second == pytest.approx(1, abs=1e-6)
+
+
+@heuristics
+@given(a=st.floats(2.0**-60, 2.0**60, width=32), b=st.floats(2.0**-60, 2.0**60, width=32))
+def test_the_likelier_technique_weighs_more(heuristic, a, b):
+    assert (weight(heuristic, a, b) >= weight(heuristic, b, a)) == (a >= b) or a == pytest.approx(b, rel=1e-6)
+
+
+@heuristics
+def test_arrays_keep_their_type_and_inputs(heuristic):
+    pdf, other = np.float32([0, 1, 2, np.inf]), np.float32([0, 3, 0, np.inf])
+    before = pdf.copy(), other.copy()
+    result = heuristic(pdf, other)
+    assert result.dtype == np.float32
+    assert result.shape == pdf.shape
+    assert (pdf == before[0]).all()
+    assert (other == before[1]).all()
+
+
+@heuristics
+def test_a_scalar_stands_for_all_lanes(heuristic):
+    assert heuristic(np.float32([1, 2]), np.float32(0)).tolist() == [1, 1]
+
+
+def test_the_estimator_is_unbiased():
+    """∫₀¹ 3x² dx = 1 from a uniform and a linear technique together, midpoints in place of u."""
+    u = (np.arange(100_000, dtype=np.float32) + np.float32(0.5)) / np.float32(100_000)
+    total = 0.0
+    for x, own in ((u, lambda x: np.ones_like(x)), (np.sqrt(u), lambda x: 2 * x)):
+        pdf = own(x)
+        other = 2 * x if own(x)[0] == 1 else np.ones_like(x)
+        total += float(np.mean(power_heuristic(pdf, other) * 3 * x * x / pdf, dtype=np.float64))
+    assert total == pytest.approx(1, abs=1e-5)

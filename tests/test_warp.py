@@ -1,0 +1,467 @@
+"""Warps: round trips, densities by quadrature and chi-square, moments, and solid angles."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from wavefront.sampling import warp
+from wavefront.sampling.spherical import (
+    SphericalRectangle,
+    SphericalTriangle,
+    solid_angle_rectangle,
+    solid_angle_triangle,
+)
+
+BELOW_ONE = float(np.float32(1 - 2.0**-24))
+TURN = 2 * np.pi
+
+numbers = st.floats(0, BELOW_ONE, width=32)
+inner = st.floats(2.0**-10, 1 - 2.0**-10, width=32)
+
+
+def f4(*values: object) -> np.ndarray:
+    return np.array(values, np.float32)
+
+
+def square(n: int) -> np.ndarray:
+    """Midpoints (2, n²) of a grid over the unit square, float32."""
+    even = ((np.arange(n) + 0.5) / n).astype(np.float32)
+    return np.stack([part.ravel() for part in np.meshgrid(even, even)])
+
+
+def random_square(seed: int, n: int = 1_000_000) -> np.ndarray:
+    return np.random.default_rng(seed).random((2, n), np.float32)
+
+
+def directions(z: np.ndarray, phi: np.ndarray) -> np.ndarray:
+    """Unit vectors (3, n) at heights z and azimuths phi, float32."""
+    radius = np.sqrt(np.maximum(0, 1 - z * z))
+    return f4(radius * np.cos(phi), radius * np.sin(phi), z)
+
+
+@dataclass
+class Case:
+    """A warp of the sphere with its density as a function of direction."""
+
+    sample: Callable
+    pdf: Callable
+    inverse: Callable
+    bottom: float  # lowest z that it reaches
+
+
+CONE = np.float32(0.3)
+SPHERICAL = {
+    "cosine_hemisphere": Case(
+        warp.cosine_hemisphere, warp.cosine_hemisphere_pdf, warp.cosine_hemisphere_inverse, 0
+    ),
+    "uniform_hemisphere": Case(
+        warp.uniform_hemisphere, warp.uniform_hemisphere_pdf, warp.uniform_hemisphere_inverse, 0
+    ),
+    "uniform_sphere": Case(warp.uniform_sphere, warp.uniform_sphere_pdf, warp.uniform_sphere_inverse, -1),
+    "uniform_cone": Case(
+        lambda u: warp.uniform_cone(u, CONE),
+        lambda w: np.where(w[2] >= 1 - CONE, warp.uniform_cone_pdf(CONE), 0),
+        lambda w: warp.uniform_cone_inverse(w, CONE),
+        1 - float(CONE),
+    ),
+}
+spherical = pytest.mark.parametrize("name", SPHERICAL)
+
+
+# Directions
+
+
+@spherical
+@given(a=numbers, b=inner)
+def test_directions_round_trip(name, a, b):
+    case, u = SPHERICAL[name], f4([a], [b])
+    w = case.sample(u)
+    assert w.dtype == np.float32
+    assert w.shape == (3, 1)
+    assert np.linalg.norm(w.astype(float)) == pytest.approx(1, abs=5e-7)
+    back = case.inverse(w)
+    assert back.dtype == np.float32
+    assert back[1] == pytest.approx(b, abs=2e-6)
+    assert abs((float(back[0, 0]) - a + 0.5) % 1 - 0.5) < 1e-5  # azimuths 0 and 1 are one
+
+
+@spherical
+def test_corners_of_the_square_give_unit_directions(name):
+    case = SPHERICAL[name]
+    w = case.sample(f4([0, 0, BELOW_ONE, BELOW_ONE], [0, BELOW_ONE, 0, BELOW_ONE]))
+    assert np.linalg.norm(w.astype(float), axis=0) == pytest.approx(1, abs=5e-7)
+    assert (w[2] >= case.bottom - 1e-7).all()
+    back = case.inverse(w)
+    assert (back >= 0).all()
+    assert (back[0] < 1).all()
+
+
+@spherical
+def test_density_of_directions_integrates_to_one(name):
+    """Midpoint rule over (z, φ); the z range is split where the density jumps."""
+    case = SPHERICAL[name]
+    total = 0.0
+    for low, high in ((-1, case.bottom), (case.bottom, 1)):
+        z = low + (high - low) * (np.arange(400) + 0.5) / 400
+        z, phi = (part.ravel() for part in np.meshgrid(z, TURN * (np.arange(16) + 0.5) / 16))
+        total += (high - low) * TURN * np.mean(case.pdf(directions(z, phi)), dtype=np.float64)
+    assert total == pytest.approx(1, abs=1e-4)
+
+
+@spherical
+def test_directions_follow_their_density(name):
+    """Chi-square over 20 × 40 cells of (z, φ), 1e6 samples, expectations by quadrature."""
+    case = SPHERICAL[name]
+    w = case.sample(random_square(1)).astype(np.float64)
+    z_edges = np.linspace(case.bottom, 1, 21)
+    row = np.clip(np.searchsorted(z_edges, w[2], side="right") - 1, 0, 19)
+    column = np.clip((np.arctan2(w[1], w[0]) % TURN / TURN * 40).astype(int), 0, 39)
+    observed = np.bincount(row * 40 + column, minlength=800)
+    fine = z_edges[:-1, None] + np.diff(z_edges)[:, None] * (np.arange(32) + 0.5) / 32
+    phi = TURN * (np.arange(40) + 0.5) / 40
+    z = fine.ravel().repeat(40)
+    density = case.pdf(directions(z, np.tile(phi, 640))).astype(np.float64).reshape(20, 32, 40).mean(axis=1)
+    expected = 1e6 * density * np.diff(z_edges)[:, None] * TURN / 40
+    check_counts(observed, expected.ravel())
+
+
+def check_counts(observed: np.ndarray, expected: np.ndarray) -> None:
+    """Chi-square test; cells that expect fewer than 5 are pooled."""
+    assert expected.sum() == pytest.approx(observed.sum(), rel=1e-4)
+    small = expected < 5
+    observed, expected = observed.astype(float), expected * (observed.sum() / expected.sum())
+    if small.any():
+        observed = np.append(observed[~small], observed[small].sum())
+        expected = np.append(expected[~small], expected[small].sum())
+    assert stats.chisquare(observed, expected).pvalue > 1e-3
+
+
+def mean(values: np.ndarray) -> float:
+    return float(np.mean(values, dtype=np.float64))
+
+
+def test_moments():
+    """Reference values 17: cosine 2/3 and 1/2, hemisphere 1/2, sphere 1/3, disk 1/2."""
+    u = square(1000)
+    z = warp.cosine_hemisphere(u)[2]
+    assert mean(z) == pytest.approx(2 / 3, abs=1e-5)
+    assert mean(z * z) == pytest.approx(1 / 2, abs=1e-5)
+    assert mean(warp.uniform_hemisphere(u)[2]) == pytest.approx(1 / 2, abs=1e-5)
+    assert mean(warp.uniform_sphere(u)[2] ** 2) == pytest.approx(1 / 3, abs=1e-5)
+    assert mean((warp.uniform_disk(u) ** 2).sum(axis=0)) == pytest.approx(1 / 2, abs=1e-5)
+
+
+def test_cosine_hemisphere_is_the_closed_form():
+    u = random_square(5, 1000)
+    r1, r2 = u.astype(np.float64)
+    expected = [np.cos(TURN * r1) * np.sqrt(1 - r2), np.sin(TURN * r1) * np.sqrt(1 - r2), np.sqrt(r2)]
+    assert warp.cosine_hemisphere(u) == pytest.approx(np.array(expected), abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["cosine_hemisphere", "uniform_hemisphere"])
+def test_hemispheres_have_no_density_below(name):
+    assert (SPHERICAL[name].pdf(f4([0, 0.6], [0, 0], [-1, -0.8])) == 0).all()
+
+
+@given(exponent=st.floats(-12, 0), a=numbers, b=inner)
+def test_tiny_cones_keep_their_digits(exponent, a, b):
+    size = np.float32(10.0**exponent)
+    w = warp.uniform_cone(f4([a], [b]), size)
+    sine = np.hypot(*w[:2].astype(np.float64))
+    depth = b * float(size)
+    assert sine == pytest.approx(np.sqrt(depth * (2 - depth)), rel=1e-5)
+    assert warp.uniform_cone_inverse(w, size)[1] == pytest.approx(b, rel=1e-4)
+    assert float(warp.uniform_cone_pdf(size)) * TURN * float(size) == pytest.approx(1, rel=1e-6)
+
+
+def test_cones_per_lane_and_the_empty_cone():
+    size = f4(0, 1, 2)
+    assert warp.uniform_cone(square(3)[:, :3], size).shape == (3, 3)
+    assert warp.uniform_cone_pdf(size) == pytest.approx([0, 1 / TURN, 0.5 / TURN])
+
+
+# Flat shapes
+
+
+FLAT = {
+    "disk": (warp.uniform_disk, warp.uniform_disk_pdf, warp.uniform_disk_inverse),
+    "triangle": (warp.uniform_triangle, warp.uniform_triangle_pdf, warp.uniform_triangle_inverse),
+}
+flat = pytest.mark.parametrize("name", FLAT)
+
+
+@flat
+@given(a=numbers, b=numbers)
+def test_points_round_trip(name, a, b):
+    sample, pdf, inverse = FLAT[name]
+    p = sample(f4([a], [b]))
+    assert p.dtype == np.float32
+    assert p.shape == (2, 1)
+    assert inverse(p)[:, 0] == pytest.approx([a, b], abs=1e-6)
+    if name == "disk":
+        assert np.hypot(*p.astype(float)) <= 1 + 2e-7
+    else:
+        assert (p >= 0).all()
+        assert p.sum() <= 1
+        assert pdf(p) == 2
+
+
+@flat
+def test_density_of_points_integrates_to_one(name):
+    p = f4(*(square(2000) * 2 - 1))
+    assert 4 * mean(FLAT[name][1](p)) == pytest.approx(1, abs=1e-3)
+
+
+def test_points_of_the_disk_are_uniform():
+    p = warp.uniform_disk(random_square(2)).astype(np.float64)
+    ring = np.minimum(((p**2).sum(axis=0) * 20).astype(int), 19)
+    sector = np.clip((np.arctan2(p[1], p[0]) % TURN / TURN * 40).astype(int), 0, 39)
+    check_counts(np.bincount(ring * 40 + sector, minlength=800), np.full(800, 1e6 / 800))
+
+
+def test_points_of_the_triangle_are_uniform():
+    """Cells of equal area: in b1 by its marginal, in b2 relative to what b1 leaves."""
+    b1, b2 = warp.uniform_triangle(random_square(3)).astype(np.float64)
+    row = np.minimum(((1 - (1 - b1) ** 2) * 20).astype(int), 19)
+    column = np.clip((b2 / np.maximum(1 - b1, 1e-12) * 40).astype(int), 0, 39)
+    check_counts(np.bincount(row * 40 + column, minlength=800), np.full(800, 1e6 / 800))
+
+
+def test_densities_vanish_outside():
+    assert (warp.uniform_disk_pdf(f4([1.1, -0.8], [0, 0.8])) == 0).all()
+    assert (warp.uniform_triangle_pdf(f4([-0.1, 0.2, 0.6], [0.2, -0.1, 0.6])) == 0).all()
+
+
+# Pixel filters
+
+
+FILTERS = {
+    "tent": (warp.tent, warp.tent_pdf, warp.tent_inverse, {"radius": 1.5}, 1.5**2 / 6),
+    "gaussian": (
+        warp.gaussian,
+        warp.gaussian_pdf,
+        warp.gaussian_inverse,
+        {"sigma": 0.5, "radius": 1.0},
+        float(stats.truncnorm(-2, 2, scale=0.5).var()),
+    ),
+}
+filters = pytest.mark.parametrize("name", FILTERS)
+
+
+@filters
+@given(u=numbers)
+def test_filters_round_trip(name, u):
+    sample, _, inverse, shape, _ = FILTERS[name]
+    x = sample(f4(u), **shape)
+    assert x.dtype == np.float32
+    assert abs(x[0]) <= shape["radius"]
+    assert inverse(x, **shape)[0] == pytest.approx(u, abs=1e-6)
+
+
+@filters
+def test_filters_integrate_to_one_and_have_their_variance(name):
+    sample, pdf, _, shape, variance = FILTERS[name]
+    x = ((np.arange(100_000) + 0.5) / 25_000 - 2).astype(np.float32)
+    assert 4 * mean(pdf(x, **shape)) == pytest.approx(1, abs=1e-4)
+    offsets = sample(((np.arange(100_000) + 0.5) / 100_000).astype(np.float32), **shape)
+    assert mean(offsets) == pytest.approx(0, abs=1e-5)
+    assert mean(offsets**2) == pytest.approx(variance, rel=1e-4)
+
+
+@filters
+def test_filters_follow_their_density(name):
+    sample, pdf, _, shape, _ = FILTERS[name]
+    radius = shape["radius"]
+    x = sample(random_square(7)[0], **shape)
+    observed = np.histogram(x, 800, (-radius, radius))[0]
+    fine = (((np.arange(800 * 16) + 0.5) / (800 * 16)) * 2 - 1).astype(np.float32) * np.float32(radius)
+    expected = pdf(fine, **shape).astype(np.float64).reshape(800, 16).mean(axis=1) * 2 * radius / 800 * 1e6
+    check_counts(observed, expected)
+
+
+def test_error_functions_against_scipy():
+    from scipy.special import erf, erfinv
+
+    x = np.linspace(-4, 4, 2001, dtype=np.float32)
+    assert warp._erf(x) == pytest.approx(erf(x.astype(np.float64)), abs=3e-7)
+    y = np.concatenate([np.linspace(-0.9999, 0.9999, 2001), [0.99999, 0.999999]]).astype(np.float32)
+    assert warp._erfinv(y) == pytest.approx(erfinv(y.astype(np.float64)), rel=1e-5, abs=1e-7)
+
+
+# Solid angles
+
+
+def corners(*rows: tuple[float, float, float]) -> list[np.ndarray]:
+    """Unit directions, (3, 1) each."""
+    return [f4(*row).reshape(3, 1) / np.linalg.norm(row).astype(np.float32) for row in rows]
+
+
+def test_solid_angles_of_reference():
+    """Reference values 18: an octant π/2; a 2 × 2 rectangle at height 1 2.094395."""
+    octant = corners((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    assert solid_angle_triangle(*octant)[0] == pytest.approx(np.pi / 2, abs=1e-6)
+    assert SphericalTriangle.of(*octant).solid_angle[0] == pytest.approx(np.pi / 2, abs=1e-6)
+    rectangle = [f4(*row).reshape(3, 1) for row in ((-1, -1, 1), (2, 0, 0), (0, 2, 0))]
+    assert solid_angle_rectangle(*rectangle)[0] == pytest.approx(2.094395, abs=1e-6)
+    assert SphericalRectangle.of(*rectangle).solid_angle[0] == pytest.approx(2.094395, abs=1e-6)
+
+
+@pytest.mark.parametrize("size", [1e-1, 1e-2, 1e-3, 1e-4])
+def test_small_triangles_have_the_area_over_the_squared_distance(size):
+    """Seen face on, against float64 on the same corners: no digits are lost to the size."""
+    a, b, c = corners((0.6, 0, 0.8), (0.6 + 0.8 * size, 0, 0.8 - 0.6 * size), (0.6, size, 0.8))
+    exact = np.abs(np.linalg.det(np.concatenate([a, b, c], axis=1).astype(np.float64)))
+    exact = 2 * np.arctan2(
+        exact, 1 + sum(float((p.astype(float) * q).sum()) for p, q in ((a, b), (a, c), (b, c)))
+    )
+    assert solid_angle_triangle(a, b, c)[0] == pytest.approx(exact, rel=2e-6)
+    assert SphericalTriangle.of(c, b, a).solid_angle[0] == pytest.approx(exact, rel=2e-6)
+    assert exact == pytest.approx(size**2 / 2, rel=2 * size + 1e-3)
+
+
+def test_large_triangles_pass_half_of_the_sphere():
+    """Three corners just below the equator cover almost half of the sphere, and no sample leaves it."""
+    a, b, c = corners(*[(np.cos(t), np.sin(t), -0.2) for t in (0, TURN / 3, 2 * TURN / 3)])
+    below = solid_angle_triangle(a, b, c)[0]
+    assert 0 < below < TURN
+    triangle = SphericalTriangle.of(a, b, c)
+    w = triangle.sample(square(50))
+    assert (w[2] < 0).all()
+
+
+TRIANGLES = {
+    "octant": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    "clockwise": ((0, 0, 1), (0, 1, 0), (1, 0, 0)),
+    "slanted": ((0.9, 0.1, 0.4), (0.2, 0.8, 0.5), (-0.5, -0.3, 0.6)),
+    "large": ((1, 0.1, -0.1), (-0.6, 1, 0.1), (-0.6, -1, 0.2)),
+    "small": ((1, 0, 0), (1, 0.02, 0), (1, 0.01, 0.02)),
+}
+triangles = pytest.mark.parametrize("name", TRIANGLES)
+
+RECTANGLES = {
+    "facing": ((-1, -1, 1), (2, 0, 0), (0, 2, 0)),
+    "behind": ((-1, -1, -1), (0, 2, 0), (2, 0, 0)),
+    "aside": ((1, 0.5, 0.7), (0.8, 0, 0.6), (0, 2, 0)),
+    "grazing": ((0.1, -3, 0.05), (5, 0, 0), (0, 6, 0)),
+    "far": ((10, -40, 90), (1, 0, 0), (0, 0, 2)),
+}
+rectangles = pytest.mark.parametrize("name", RECTANGLES)
+
+
+def triangle_of(name: str) -> SphericalTriangle:
+    return SphericalTriangle.of(*corners(*TRIANGLES[name]))
+
+
+def rectangle_of(name: str) -> SphericalRectangle:
+    return SphericalRectangle.of(*(f4(*row).reshape(3, 1) for row in RECTANGLES[name]))
+
+
+@triangles
+def test_directions_to_triangles_round_trip(name):
+    triangle, u = triangle_of(name), square(40)
+    w = triangle.sample(u)
+    assert w.dtype == np.float32
+    assert np.linalg.norm(w.astype(float), axis=0) == pytest.approx(1, abs=5e-7)
+    assert triangle.inverse(w) == pytest.approx(u, abs=2e-3 if name == "small" else 5e-5)
+
+
+@triangles
+def test_directions_lie_in_the_triangle(name):
+    a, b, c = (corner[:, 0].astype(np.float64) for corner in corners(*TRIANGLES[name]))
+    w = triangle_of(name).sample(square(40)).astype(np.float64).T
+    turn = np.sign(np.dot(np.cross(a, b), c))
+    for p, q in ((a, b), (b, c), (c, a)):
+        assert (turn * w @ np.cross(p, q) > -2e-7).all()
+
+
+@rectangles
+def test_points_of_rectangles_round_trip(name):
+    rectangle, u = rectangle_of(name), square(40)
+    w = rectangle.sample(u)
+    assert w.dtype == np.float32
+    assert rectangle.inverse(w) == pytest.approx(u, abs=2e-5)
+    assert rectangle.inverse(w * np.float32(3)) == pytest.approx(u, abs=2e-5)
+
+
+@rectangles
+def test_points_lie_in_the_rectangle(name):
+    corner, edge_u, edge_v = (np.array(row, float)[:, None] for row in RECTANGLES[name])
+    p = (
+        rectangle_of(name).sample(np.concatenate([square(40), f4([0, BELOW_ONE], [0, BELOW_ONE])], axis=1))
+        - corner
+    )
+    reach = np.linalg.norm(corner) * 1e-6
+    for edge in (edge_u, edge_v):
+        along = (p * edge).sum(axis=0) / np.linalg.norm(edge)
+        assert along.min() > -reach
+        assert along.max() < np.linalg.norm(edge) + reach
+    assert np.abs((p * np.cross(edge_u, edge_v, axis=0)).sum(axis=0)).max() < 10 * reach
+
+
+@triangles
+def test_directions_to_triangles_are_uniform(name):
+    """Chi-square in the plane through the corners, where a solid angle is an area × cos/distance²."""
+    a, b, c = (corner[:, 0].astype(np.float64) for corner in corners(*TRIANGLES[name]))
+    w = triangle_of(name).sample(random_square(11)).astype(np.float64)
+    weights = np.linalg.solve(np.stack([a, b, c], axis=1), w)  # w = αa + βb + γc
+    b1, b2 = weights[1:] / weights.sum(axis=0)
+    # Cells of equal barycentric area, as for the flat triangle; expectations by quadrature.
+    row = np.clip(((1 - (1 - b1) ** 2) * 20).astype(int), 0, 19)
+    column = np.clip((b2 / np.maximum(1 - b1, 1e-12) * 40).astype(int), 0, 39)
+    observed = np.bincount(row * 40 + column, minlength=800)
+    s, t = ((np.arange(k * 16) + 0.5) / (k * 16) for k in (20, 40))
+    s, t = np.meshgrid(1 - np.sqrt(1 - s), t, indexing="ij")
+    p = a[:, None, None] * (1 - s - t * (1 - s)) + b[:, None, None] * s + c[:, None, None] * (t * (1 - s))
+    density = np.linalg.norm(p, axis=0) ** -3  # cos/distance², up to a constant
+    expected = density.reshape(20, 16, 40, 16).mean(axis=(1, 3))
+    expected *= np.abs(np.linalg.det(np.stack([a, b, c]))) / 2 / 800  # dω = det/|p|³ · dA over 2·area
+    assert expected.sum() == pytest.approx(float(triangle_of(name).solid_angle[0]), rel=1e-3)
+    check_counts(observed, (expected / expected.sum() * 1e6).ravel())
+
+
+@rectangles
+def test_points_of_rectangles_are_uniform_in_solid_angle(name):
+    corner, edge_u, edge_v = (np.array(row, float) for row in RECTANGLES[name])
+    p = rectangle_of(name).sample(random_square(12)).astype(np.float64) - corner[:, None]
+    row = np.clip((edge_u @ p / (edge_u @ edge_u) * 20).astype(int), 0, 19)
+    column = np.clip((edge_v @ p / (edge_v @ edge_v) * 40).astype(int), 0, 39)
+    observed = np.bincount(row * 40 + column, minlength=800)
+    s, t = ((np.arange(k * 32) + 0.5) / (k * 32) for k in (20, 40))
+    s, t = np.meshgrid(s, t, indexing="ij")
+    q = corner[:, None, None] + edge_u[:, None, None] * s + edge_v[:, None, None] * t
+    density = np.abs(corner @ np.cross(edge_u, edge_v)) * np.linalg.norm(q, axis=0) ** -3
+    expected = density.reshape(20, 32, 40, 32).mean(axis=(1, 3)) / 800
+    assert expected.sum() == pytest.approx(float(rectangle_of(name).solid_angle[0]), rel=1e-3)
+    check_counts(observed, (expected / expected.sum() * 1e6).ravel())
+
+
+def test_shapes_that_cover_nothing_have_no_density():
+    flat = SphericalTriangle.of(*corners((1, 0, 0), (1, 0.5, 0), (1, 1, 0)))
+    assert flat.pdf()[0] == 0 or flat.solid_angle[0] < 1e-6
+    point = SphericalTriangle.of(*corners((1, 0, 0), (1, 0, 0), (1, 0, 0)))
+    assert point.pdf()[0] == 0
+    assert np.isfinite(point.sample(square(2)[:, :1])).all()
+    edge_on = SphericalRectangle.of(*(f4(*row).reshape(3, 1) for row in ((1, 1, 0), (1, 0, 0), (0, 1, 0))))
+    assert edge_on.pdf()[0] == 0
+    assert np.isfinite(edge_on.sample(square(2)[:, :1])).all()
+
+
+def test_a_shape_per_lane():
+    """Lanes are independent: many shapes at once give the bits of one at a time."""
+    u = random_square(9, 5)
+    stacked = [
+        np.concatenate(parts, axis=1)
+        for parts in zip(*(corners(*t) for t in TRIANGLES.values()), strict=True)
+    ]
+    together = SphericalTriangle.of(*stacked).sample(u)
+    for i, name in enumerate(TRIANGLES):
+        assert (triangle_of(name).sample(u[:, i : i + 1])[:, 0] == together[:, i]).all()
+    stacked = [f4(*column).T.copy() for column in zip(*RECTANGLES.values(), strict=True)]
+    together = SphericalRectangle.of(*stacked).sample(u)
+    for i, name in enumerate(RECTANGLES):
+        assert (rectangle_of(name).sample(u[:, i : i + 1])[:, 0] == together[:, i]).all()
