@@ -5,7 +5,22 @@ from .conductor import Conductor
 from .dielectric import Dielectric
 from .diffuse import Diffuse
 from .mirror import Mirror
+from .mix import Mix
+from .oren_nayar import OrenNayar
+from .thin import ThinDielectric
 
-ALL = (Diffuse, Mirror, Dielectric, Conductor)
+ALL = (Diffuse, Mirror, Dielectric, Conductor, OrenNayar, ThinDielectric, Mix)
 
-__all__ = ["ALL", "Bsdf", "BsdfSample", "Conductor", "Dielectric", "Diffuse", "Mirror", "Spatial"]
+__all__ = [
+    "ALL",
+    "Bsdf",
+    "BsdfSample",
+    "Conductor",
+    "Dielectric",
+    "Diffuse",
+    "Mirror",
+    "Mix",
+    "OrenNayar",
+    "Spatial",
+    "ThinDielectric",
+]

@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from copy import copy
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
@@ -46,8 +46,8 @@ class Bsdf(ABC):
     or `Spatial` ones, which `bind` replaces by their values at the hit points.
     """
 
-    transmissive: ClassVar[bool] = False  # light can cross the surface
-    dimensions: ClassVar[int] = 2  # rows of u that sample_f reads
+    transmissive: bool = False  # light can cross the surface
+    dimensions: int = 2  # rows of u that sample_f reads
     specular: bool = False  # every lobe is a delta: f and pdf are 0, light sampling is skipped
 
     def bind(self, surface: Surface) -> Self:

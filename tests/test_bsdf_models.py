@@ -1,0 +1,223 @@
+"""Microfacet, rough matte and metal models against published numbers."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wavefront.bsdfs import Conductor, Dielectric, Diffuse, OrenNayar, ThinDielectric
+from wavefront.bsdfs.conductor import METALS
+from wavefront.bsdfs.fresnel import fresnel_conductor
+from wavefront.bsdfs.microfacet import mirror_lobe, normal_density, stretched, visible_normals
+from wavefront.testing import check_bsdf
+
+F4 = np.float32
+LAST = np.nextafter(F4(1), F4(0))
+
+
+def toward(mu, n=1):
+    """wo (3, n) of cosine mu."""
+    return np.repeat(np.array([[np.sqrt(1 - mu * mu)], [0], [mu]], F4), n, 1)
+
+
+def stratified(rows, side=1024, seed=0):
+    """Jittered u (rows, side²): two rows on a grid, the others shuffled."""
+    rng = np.random.default_rng(seed)
+    n = side * side
+    k = np.arange(n)
+    grid = [(k % side + rng.random(n)) / side, (k // side + rng.random(n)) / side]
+    other = [(rng.permutation(n) + rng.random(n)) / n for _ in range(rows - 2)]
+    return np.minimum(np.array(grid + other, F4), LAST)
+
+
+def upper_hemisphere(side):
+    """Directions (3, side²) at the midpoints of equal solid angles; each stands for 2π/side²."""
+    z, phi = np.meshgrid((np.arange(side) + 0.5) / side, 2 * np.pi * (np.arange(side) + 0.5) / side)
+    r = np.sqrt(1 - z**2)
+    return np.stack([r * np.cos(phi), r * np.sin(phi), z]).reshape(3, -1).astype(F4)
+
+
+def albedo(bsdf, mu, inside=False):
+    """Part of the energy that leaves again."""
+    if inside:
+        bsdf.eta = 1 / bsdf.ior
+    u = stratified(bsdf.dimensions)
+    sample = bsdf.sample_f(toward(mu, u.shape[1]), u)
+    energy = sample.weight[0].astype(float)
+    return (energy if sample.eta is None else energy * sample.eta.astype(float) ** 2).mean()
+
+
+GGX = {
+    (0.1, 1): 0.988304,
+    (0.5, 1): 0.687849,
+    (1, 1): 0.306853,
+    (0.1, 0.5): 0.969205,
+    (0.5, 0.5): 0.698251,
+    (1, 0.5): 0.450694,
+    (0.1, 0.1): 0.883455,
+    (0.5, 0.1): 0.860105,
+    (1, 0.1): 0.760210,
+}
+
+
+@pytest.mark.parametrize(("alpha", "mu"), GGX)
+def test_ggx_directional_albedo(alpha, mu):
+    perfect = Conductor(1e-6, 1e4, np.sqrt(alpha))  # reflects all at every angle
+    assert albedo(perfect, mu) == pytest.approx(GGX[alpha, mu], abs=5e-5)
+
+
+@pytest.mark.parametrize(("alpha", "mu"), GGX)
+def test_weak_furnace(alpha, mu):
+    # ∫ D·G1/(4μ) dω over the whole sphere is 1: reflections of visible normals, none lost.
+    side = 2000
+    z, phi = np.meshgrid((np.arange(side) + 0.5) / side, 2 * np.pi * (np.arange(side) + 0.5) / side)
+    r = np.sqrt(1 - z**2)
+    m = np.stack([r * np.cos(phi), r * np.sin(phi), z]).reshape(3, -1)
+    d = normal_density(m, (m * m).sum(0), alpha)
+    wo = toward(mu).astype(float)
+    facing = np.maximum((wo * m).sum(0), 0)
+    visible = d * facing * 2 / (wo[2] + stretched(wo, alpha))
+    assert visible.mean() * 2 * np.pi == pytest.approx(1, abs=2e-3 if alpha < 0.2 else 2e-4)
+    projected = d * m[2]
+    assert projected.mean() * 2 * np.pi == pytest.approx(1, abs=2e-3 if alpha < 0.2 else 2e-4)
+
+
+@given(
+    alpha=st.floats(float(F4(1e-3)), 1, width=32),
+    mu=st.floats(float(F4(1e-4)), 1, width=32),
+    u=st.tuples(st.floats(0, float(LAST), width=32), st.floats(0, float(LAST), width=32)),
+)
+def test_visible_normals_are_visible(alpha, mu, u):
+    wo = toward(mu)
+    m = visible_normals(wo, F4(alpha), np.array(u, F4).reshape(2, 1))
+    assert np.isfinite(m).all()
+    assert np.linalg.norm(m.astype(float)) == pytest.approx(1, abs=1e-6)
+    assert m[2] >= 0
+    assert (wo * m).sum() >= -1e-6
+
+
+@given(alpha=st.floats(1e-3, 1), mu=st.floats(1e-3, 1), nu=st.floats(1e-3, 1), phi=st.floats(0, 7))
+def test_mirror_lobe_is_reciprocal_and_finite(alpha, mu, nu, phi):
+    wo = toward(mu)
+    r = np.sqrt(1 - nu * nu)
+    wi = np.array([[r * np.cos(phi)], [r * np.sin(phi)], [nu]], F4)
+    forth, pdf, cos = mirror_lobe(wo, wi, F4(alpha))
+    back, _, _ = mirror_lobe(wi, wo, F4(alpha))
+    assert forth == pytest.approx(back, rel=1e-5)
+    assert np.isfinite(forth).all()
+    assert np.isfinite(pdf).all()
+    assert 0 <= cos[0] <= 1
+
+
+@given(ior=st.floats(0.4, 3), roughness=st.floats(0, 1), mu=st.floats(1e-5, 1), inside=st.booleans())
+def test_dielectric_samples_keep_their_promises(ior, roughness, mu, inside):
+    glass = Dielectric(ior, roughness)
+    glass.eta = 1 / glass.ior if inside else glass.ior
+    rng = np.random.default_rng(0)
+    wo = toward(mu, 200)
+    sample = glass.sample_f(wo, rng.random((3, 200), dtype=F4))
+    assert np.isfinite(sample.weight).all()
+    energy = sample.weight * sample.eta**2
+    assert (energy <= 1 + 2e-3).all()
+    assert (np.abs(np.linalg.norm(sample.wi.astype(float), axis=0) - 1) < 2e-6).all()
+
+
+@pytest.mark.parametrize(
+    ("roughness", "outside", "inside"),
+    [
+        (0.0, 0, 0),
+        (0.1**0.5, 0.0012, 0.0110),
+        (0.5, 0.0080, 0.0708),
+        (0.5**0.5, 0.0320, 0.2461),
+        (1.0, 0.1066, 0.5829),
+    ],
+)
+def test_rough_glass_loses_what_its_documentation_says(roughness, outside, inside):
+    assert 1 - albedo(Dielectric(1.5, roughness), 1.0) == pytest.approx(outside, abs=3e-4)
+    assert 1 - albedo(Dielectric(1.5, roughness), 1.0, inside=True) == pytest.approx(inside, abs=1e-3)
+
+
+def test_rough_glass_becomes_smooth_glass():
+    rough, smooth = Dielectric(1.5, 0.032), Dielectric(1.5)
+    u = stratified(3, 64)
+    for mu in (1, 0.5, 0.1):
+        wo = toward(mu, u.shape[1])
+        a, b = rough.sample_f(wo, u), smooth.sample_f(wo, u)
+        up = a.wi[2] > 0
+        assert up.mean() == pytest.approx((b.wi[2] > 0).mean(), abs=5e-3)
+        assert a.wi[:, up].mean(1) == pytest.approx(b.wi[:, b.wi[2] > 0].mean(1), abs=5e-3)
+        assert a.wi[:, ~up].mean(1) == pytest.approx(b.wi[:, b.wi[2] < 0].mean(1), abs=5e-3)
+
+
+@pytest.mark.parametrize(("angle", "value"), [(0, 0.784483), (45, 0.851128), (75, 0.918104)])
+def test_oren_nayar_albedo(angle, value):
+    wi = upper_hemisphere(1500)
+    wo = np.repeat(toward(np.cos(np.radians(angle))), wi.shape[1], 1)
+    f = OrenNayar(1.0, 0.5).f(wo, wi)[0].astype(float)
+    assert (f * wi[2]).mean() * 2 * np.pi == pytest.approx(value, abs=2e-5)
+
+
+@pytest.mark.parametrize("mu", [1.0, 0.5, 0.05, 1e-3])
+@pytest.mark.parametrize("sigma", [0.1, 0.5, 1.0])
+def test_eon_preserves_energy_at_every_angle(sigma, mu):
+    wi = upper_hemisphere(1500)
+    wo = np.repeat(toward(mu), wi.shape[1], 1)
+    f = OrenNayar(1.0, sigma, energy_preserving=True).f(wo, wi)[0].astype(float)
+    assert (f * wi[2]).mean() * 2 * np.pi == pytest.approx(1, abs=1e-4)
+
+
+def test_sigma_0_is_diffuse():
+    wi = upper_hemisphere(50)
+    wo = np.repeat(toward(0.3), wi.shape[1], 1)
+    for preserving in (False, True):
+        matte = OrenNayar(0.7, 0.0, energy_preserving=preserving)
+        assert matte.f(wo, wi) == pytest.approx(Diffuse(0.7).f(wo, wi), rel=1e-5)
+
+
+def test_thin_sheet_reflects_the_series_of_its_faces():
+    wo = toward(1.0, 1000)
+    u = np.full((3, 1000), 0.5, F4)
+    sheet = ThinDielectric(1.5).sample_f(wo, u)
+    assert (sheet.wi == -wo).all()
+    assert sheet.pdf == pytest.approx(0.923077, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "colour"),
+    [
+        ("gold", (0.97, 0.75, 0.37)),
+        ("silver", (0.99, 0.98, 0.98)),
+        ("copper", (0.92, 0.62, 0.52)),
+        ("aluminium", (0.91, 0.92, 0.92)),
+        ("iron", (0.53, 0.51, 0.49)),
+        ("chromium", (0.55, 0.56, 0.56)),
+        ("titanium", (0.61, 0.58, 0.54)),
+        ("platinum", (0.67, 0.64, 0.58)),
+        ("nickel", (0.69, 0.64, 0.56)),
+    ],
+)
+def test_colour_of_metals(name, colour):
+    metal = Conductor.named(name)
+    seen = fresnel_conductor(np.ones(1, F4), metal.eta, metal.k)[:, 0]
+    assert seen == pytest.approx(colour, abs=0.006)
+
+
+def test_every_metal_has_a_colour_test():
+    tested = test_colour_of_metals.pytestmark[0].args[1]
+    assert {name for name, _ in tested} == set(METALS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12))
+def test_random_parameters(seed):
+    rng = np.random.default_rng(seed)
+    roughness = float(rng.choice([0, 1e-3, 0.032, rng.random(), 1]))
+    ior = float(rng.uniform(0.5, 2.5))
+    angles = (0.0, float(rng.uniform(0, 89)), 89.5)
+    for bsdf in (
+        Conductor(rng.uniform(0.1, 3, 3), rng.uniform(0, 6, 3), roughness),
+        Dielectric(ior, roughness),
+        ThinDielectric(ior, roughness),
+        OrenNayar(rng.random(3), float(rng.uniform(0, 1.5))),
+    ):
+        check_bsdf(bsdf, angles=angles, seed=seed, samples=500_000)

@@ -1,0 +1,94 @@
+"""A surface that is one material here and another there."""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import Self
+
+import numpy as np
+
+from ..errors import SceneError
+from ..state import Surface
+from ..vec import Floats, f4
+from .base import Bsdf, BsdfSample, weigh
+from .parameter import Scalar, scalar
+
+BELOW_1 = np.nextafter(f4(1), f4(0))
+
+
+class Mix(Bsdf):
+    """A blend of two materials: (1 − weight)·first + weight·second.
+
+    Parameters
+    ----------
+    first, second
+        The materials; either may itself be a `Mix`.
+    weight
+        Part of the second, in [0, 1]: a number or a texture.
+
+    Raises
+    ------
+    SceneError
+        If the weight is outside [0, 1], or something else than a material is given.
+    """
+
+    dimensions = 3
+
+    def __init__(self, first: Bsdf, second: Bsdf, weight: Scalar = 0.5) -> None:
+        for name, value in (("first", first), ("second", second)):
+            if not isinstance(value, Bsdf):
+                raise SceneError(f"Mix {name} must be a material, got {value!r}")
+        self.first, self.second = first, second
+        self.weight = scalar("Mix weight", weight)
+        self.transmissive = first.transmissive or second.transmissive
+        self.specular = first.specular and second.specular
+
+    def bind(self, surface: Surface) -> Self:
+        """Look up the weight, and the parameters of both materials."""
+        bound = copy(super().bind(surface))
+        bound.first, bound.second = self.first.bind(surface), self.second.bind(surface)
+        return bound
+
+    def f(self, wo: Floats, wi: Floats) -> Floats:
+        """Return the blended value, (3, n)."""
+        return self._blend(self.first.f(wo, wi), self.second.f(wo, wi))
+
+    def pdf(self, wo: Floats, wi: Floats) -> Floats:
+        """Return the blended density, (n,)."""
+        return self._blend(self.first.pdf(wo, wi), self.second.pdf(wo, wi))
+
+    def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
+        """Return `f` and `pdf` of both materials, blended."""
+        f1, pdf1 = self.first.evaluate(wo, wi)
+        f2, pdf2 = self.second.evaluate(wo, wi)
+        return self._blend(f1, f2), self._blend(pdf1, pdf2)
+
+    def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
+        """Choose a material by u[2], use the rest of u[2] again, and weigh by both.
+
+        A sample of a delta lobe keeps its weight: the other material has no value there.
+        """
+        chance = np.broadcast_to(self.weight, wo[2].shape)
+        second = u[2] < chance
+        low = np.where(second, f4(0), chance)
+        size = np.where(second, chance, f4(1) - chance)
+        again = u.copy()
+        again[2] = np.minimum((u[2] - low) / np.where(size > 0, size, f4(1)), BELOW_1)
+        one, two = self.first.sample_f(wo, again), self.second.sample_f(wo, again)
+        wi = np.where(second, two.wi, one.wi)
+        specular = np.where(second, two.specular, one.specular)
+        chosen = np.where(second, two.pdf, one.pdf)
+        f, density = self.evaluate(wo, wi)
+        pdf = np.where(specular, chosen * size, np.where(chosen > 0, density, f4(0)))
+        weight = np.where(specular, np.where(second, two.weight, one.weight), weigh(f, wi, pdf))
+        eta = _eta(one, two, second) if self.transmissive else None
+        return BsdfSample(wi, weight, pdf, specular, eta)
+
+    def _blend(self, first: Floats, second: Floats) -> Floats:
+        return first + (second - first) * self.weight
+
+
+def _eta(one: BsdfSample, two: BsdfSample, second: np.ndarray) -> Floats:
+    """Relative index of the chosen samples, (n,)."""
+    ones = np.ones_like(one.pdf)
+    return np.where(second, ones if two.eta is None else two.eta, ones if one.eta is None else one.eta)

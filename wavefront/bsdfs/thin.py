@@ -1,0 +1,97 @@
+"""Clear sheets too thin to bend light: window panes, bubbles, leaves of plastic."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..vec import Floats, dot, f4
+from .base import Bsdf, BsdfSample, weigh
+from .fresnel import fresnel_dielectric
+from .microfacet import alpha_of, is_smooth, mirror_lobe, reflect, visible_normals
+from .mirror import mirrored
+from .parameter import Colour, Scalar, colour, scalar
+
+
+class ThinDielectric(Bsdf):
+    """A sheet of clear material without thickness: it reflects, and lets light straight through.
+
+    All reflections between its two faces are summed: with R of one face it reflects 2R/(1 + R)
+    (Hecht, *Optics*, §9.6, without interference). Seen alike from both sides. A rough sheet
+    scatters what it lets through as widely as what it reflects, as glTF's
+    KHR_materials_transmission has it.
+
+    Parameters
+    ----------
+    ior
+        Refractive index of the material relative to what surrounds it, more than 0.
+    roughness
+        In [0, 1]; α = roughness² (GGX). 0, like anything with α < 0.001, is perfectly smooth.
+    reflectance, transmittance
+        Tints of the reflected and of the transmitted light per channel, in [0, 1].
+
+    Raises
+    ------
+    SceneError
+        If a parameter is out of its range or not finite.
+    """
+
+    transmissive = True
+    dimensions = 3
+
+    def __init__(
+        self,
+        ior: Scalar = 1.5,
+        roughness: Scalar = 0.0,
+        *,
+        reflectance: Colour = 1.0,
+        transmittance: Colour = 1.0,
+    ) -> None:
+        self.ior = scalar("ThinDielectric ior", ior, lambda x: x > 0, "more than 0")
+        self.roughness = scalar("ThinDielectric roughness", roughness)
+        self.reflectance = colour("ThinDielectric reflectance", reflectance)
+        self.transmittance = colour("ThinDielectric transmittance", transmittance)
+        self.specular = is_smooth(self.roughness)
+
+    def f(self, wo: Floats, wi: Floats) -> Floats:
+        """Return the rough sheet's value, (3, n); 0 for a smooth one."""
+        return self.evaluate(wo, wi)[0]
+
+    def pdf(self, wo: Floats, wi: Floats) -> Floats:
+        """Return the density of `sample_f`, (n,); 0 for a smooth sheet."""
+        return self.evaluate(wo, wi)[1]
+
+    def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
+        """Return `f` and `pdf`: below the sheet the lobe above it, mirrored."""
+        if self.specular:
+            return np.zeros_like(wi), np.zeros_like(wi[2])
+        upper = wi.copy()
+        upper[2] = np.abs(wi[2])
+        value, density, cos = mirror_lobe(wo, upper, alpha_of(self.roughness))
+        reflected = self._reflected(cos)
+        above = wi[2] > 0
+        part = np.where(above, reflected, f4(1) - reflected)
+        return np.where(above, self.reflectance, self.transmittance) * (value * part), density * part
+
+    def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
+        """Reflect with the probability of the sheet's reflectance (by u[2]), else go through."""
+        if self.specular:
+            wi, cos = mirrored(wo), wo[2]
+        else:
+            m = visible_normals(wo, alpha_of(self.roughness), u)
+            wi, cos = reflect(wo, m), np.maximum(dot(wo, m), f4(0))
+        reflected = self._reflected(cos)
+        reflects = u[2] < reflected
+        valid = wi[2] > 0
+        wi[2] *= np.where(reflects, f4(1), f4(-1))
+        if self.specular:
+            weight = np.where(reflects, self.reflectance, self.transmittance)
+            pdf = np.where(reflects, reflected, f4(1) - reflected)
+            return BsdfSample(wi, weight, pdf, np.ones(len(pdf), np.bool_))
+        f, pdf = self.evaluate(wo, wi)
+        pdf = np.where(valid, pdf, f4(0))
+        return BsdfSample(wi, weigh(f, wi, pdf), pdf, np.zeros(len(pdf), np.bool_))
+
+    def _reflected(self, cos: Floats) -> Floats:
+        """Part of the light that the sheet reflects, (n,)."""
+        face, _ = fresnel_dielectric(cos, self.ior)
+        return f4(2) * face / (f4(1) + face)
