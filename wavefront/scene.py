@@ -15,7 +15,16 @@ from .accel.base import Accelerator, Geometry
 from .bsdfs import Bsdf, Spatial
 from .camera import Camera
 from .errors import SceneError
-from .lights import Environment, Light, LightTable, PointLight, SphereLights, TriangleLights
+from .lights import (
+    Environment,
+    Light,
+    LightTable,
+    PointLight,
+    RectangleLights,
+    SphereLights,
+    TriangleLights,
+    first_of_pairs,
+)
 from .shapes import Mesh, Sphere
 from .state import Surface
 from .vec import Floats, Ints, f4
@@ -300,15 +309,14 @@ def _gather_lights(
             kinds.append(kind.concatenate(records))
             count += len(kinds[-1])
 
-    records: list[TriangleLights] = []
-    start = 0
-    for mesh, triangles in zip(meshes, corners, strict=True):
-        if mesh.emission is not None:
-            shining = _with_area(mesh, triangles)
-            light_of[start + shining] = count + sum(len(part) for part in records) + np.arange(len(shining))
-            records.append(TriangleLights.from_triangles(triangles[shining], mesh.emission))
-        start += len(triangles)
-    add(TriangleLights, records)
+    rectangles, triangle_lights = _area_lights(meshes, corners)
+    for faces, _ in (*rectangles, *triangle_lights):
+        light_of[faces] = count + np.arange(faces.shape[1])
+        count += faces.shape[1]
+    count = 0
+    add(RectangleLights, [record for _, record in rectangles])
+    add(TriangleLights, [record for _, record in triangle_lights])
+    start = sum(len(part) for part in corners)
     emitting = np.array([sphere.emission is not None for sphere in spheres], np.bool_)
     light_of[start + np.flatnonzero(emitting)] = count + np.arange(emitting.sum())
     add(
@@ -327,6 +335,30 @@ def _gather_lights(
     if around:
         add(type(around[0]), around)
     return LightTable(kinds, radius), light_of, environment
+
+
+def _area_lights(
+    meshes: Sequence[Mesh], corners: Sequence[NDArray[np.float64]]
+) -> tuple[list[tuple[Ints, RectangleLights]], list[tuple[Ints, TriangleLights]]]:
+    """Return the emitting rectangles and triangles of all meshes.
+
+    With each record come its faces: (2, k) for rectangles, (1, k) for triangles.
+    """
+    rectangles, triangles = [], []
+    start = 0
+    for mesh, part in zip(meshes, corners, strict=True):
+        if mesh.emission is not None:
+            shining = _with_area(mesh, part)
+            first = first_of_pairs(part[shining])
+            pairs = shining[np.stack([first, first + 1])]
+            alone = np.setdiff1d(shining, pairs)
+            if first.size:
+                rectangles.append((start + pairs, RectangleLights.from_pairs(part[pairs[0]], mesh.emission)))
+            if alone.size:
+                single = TriangleLights.from_triangles(part[alone], mesh.emission)
+                triangles.append((start + alone[None], single))
+        start += len(part)
+    return rectangles, triangles
 
 
 def _with_area(mesh: Mesh, triangles: NDArray[np.float64]) -> Ints:

@@ -4,6 +4,7 @@ from .base import Light, LightSample
 from .choose import LightTable
 from .environment import ConstantEnvironment, Environment
 from .point import PointLight, PointLights
+from .rectangle import RectangleLights, first_of_pairs
 from .sphere import SphereLights
 from .triangle import TriangleLights
 
@@ -15,6 +16,8 @@ __all__ = [
     "LightTable",
     "PointLight",
     "PointLights",
+    "RectangleLights",
     "SphereLights",
     "TriangleLights",
+    "first_of_pairs",
 ]

@@ -1,0 +1,124 @@
+"""Emitting rectangles: pairs of triangles that make one are sampled as a whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..sampling.spherical import SphericalRectangle
+from ..vec import Bools, Floats, Ints, dot, f4
+from .base import Light, LightSample
+
+NEAR = f4(2)  # squared distance, in areas, within which solid angle is sampled
+SQUARE = 1e-6  # how far, relative to its sides, a pair of triangles may be from a rectangle
+
+
+@dataclass(slots=True)
+class RectangleLights(Light):
+    """k rectangles that emit from their front side."""
+
+    corner: Floats  # (3, k) scene units
+    edge_u: Floats  # (3, k) from the corner; edge_u × edge_v is the front
+    edge_v: Floats  # (3, k) from the corner, perpendicular to edge_u
+    normal: Floats  # (3, k) unit normal of the front side
+    radiance: Floats  # (3, k) W·sr⁻¹·m⁻²
+
+    @classmethod
+    def from_pairs(cls, triangles: NDArray[np.float64], radiance: Floats) -> RectangleLights:
+        """Build from the first triangle of each pair, (k, 3, 3), and one radiance (3, 1).
+
+        The corners of a pair are p, p + u, p + u + v and p, p + u + v, p + v.
+        """
+        corner, edge_u = triangles[:, 0].T, (triangles[:, 1] - triangles[:, 0]).T
+        edge_v = (triangles[:, 2] - triangles[:, 1]).T
+        normal = np.cross(edge_u, edge_v, axis=0)
+        normal /= np.linalg.norm(normal, axis=0)
+        p, u, v, n = (np.ascontiguousarray(rows, f4) for rows in (corner, edge_u, edge_v, normal))
+        return cls(p, u, v, n, np.repeat(radiance, len(triangles), 1))
+
+    def sample_li(self, point: Floats, u: Floats) -> LightSample:
+        """Draw a point uniformly by area, or from nearby a direction uniformly in solid angle."""
+        target = self.corner + self.edge_u * u[0] + self.edge_v * u[1]
+        wi = target - point
+        d2 = dot(wi, wi)
+        near = np.flatnonzero(self._near(point))
+        if near.size:
+            away = self._seen(point, near).sample(u.take(near, 1))
+            wi[:, near], d2[near] = away, dot(away, away)
+        distance = np.sqrt(d2)
+        wi /= np.where(distance > 0, distance, f4(1))
+        cos_light = -dot(self.normal, wi)
+        pdf = self._pdf(point, near, d2, cos_light)
+        return LightSample(wi, np.broadcast_to(self.radiance, wi.shape), pdf, distance, cos_light)
+
+    def pdf_li(self, point: Floats, wi: Floats) -> Floats:
+        """Return the density of `sample_li` where the ray meets the front side."""
+        away = self.corner - point
+        cos_light = -dot(self.normal, wi)
+        height = -dot(self.normal, away)
+        front = (cos_light > 0) & (height > 0)
+        t = height / np.where(front, cos_light, f4(1))
+        on_plane = wi * t - away
+        meets = front & _within(on_plane, self.edge_u) & _within(on_plane, self.edge_v)
+        pdf = self._pdf(point, np.flatnonzero(self._near(point)), t * t, cos_light)
+        return np.where(meets, pdf, f4(0))
+
+    def _pdf(self, point: Floats, near: Ints, d2: Floats, cos_light: Floats) -> Floats:
+        """Return d²/(A·cosθ), and on the lanes `near` 1/(solid angle); 0 behind the rectangle."""
+        front = cos_light > 0
+        pdf = np.where(front, d2, f4(0)) / (np.where(front, cos_light, f4(1)) * self._area())
+        if near.size:
+            pdf[near] = np.where(front.take(near), self._seen(point, near).pdf(), f4(0))
+        return pdf
+
+    def _area(self) -> Floats:
+        return np.sqrt(dot(self.edge_u, self.edge_u) * dot(self.edge_v, self.edge_v))
+
+    def _near(self, point: Floats) -> Bools:
+        """Tell which points are close to the middle, for the rectangle's size, (n,).
+
+        From afar both densities are alike, and sampling the area costs a seventh.
+        """
+        away = self.corner + f4(0.5) * (self.edge_u + self.edge_v) - point
+        return dot(away, away) < NEAR * self._area()
+
+    def _seen(self, point: Floats, lanes: Ints) -> SphericalRectangle:
+        """Return the rectangles as seen from the points of some lanes."""
+        one = self if len(self) == 1 else self.take(lanes)
+        return SphericalRectangle.of(one.corner - point.take(lanes, 1), one.edge_u, one.edge_v)
+
+    def le(self, wi: Floats) -> Floats:
+        """Return the radiance on rays that come upon the front side, (3, n)."""
+        return self.radiance * (dot(self.normal, wi) < 0)
+
+    def power(self, scene_radius: float) -> NDArray[np.float64]:
+        """π·A·L."""
+        sides = dot(self.edge_u, self.edge_u).astype(float), dot(self.edge_v, self.edge_v).astype(float)
+        return np.pi * np.sqrt(sides[0] * sides[1]) * self.radiance.mean(0, dtype=np.float64)
+
+
+def first_of_pairs(triangles: NDArray[np.float64]) -> Ints:
+    """Find consecutive triangles (m, 3, 3) that make a rectangle: indices (k,) of the first of each.
+
+    They share the diagonal from the first corner of both to the third of the first and the second
+    of the second, as `Rectangle` and fans of quadrilaterals lay them out.
+    """
+    a, b, c = (triangles[:-1, i] for i in range(3))
+    d = triangles[1:, 2]
+    shared = (triangles[1:, 0] == a).all(1) & (triangles[1:, 1] == c).all(1)
+    u, v = b - a, c - b
+    size_u, size_v = np.linalg.norm(u, axis=1), np.linalg.norm(v, axis=1)
+    closes = np.linalg.norm(d - a - v, axis=1) <= SQUARE * (size_u + size_v)
+    square = np.abs((u * v).sum(1)) <= SQUARE * size_u * size_v
+    found = np.flatnonzero(shared & closes & square & (size_u > 0) & (size_v > 0))
+    # in a run of pairs that overlap, every other one stands
+    place = np.arange(len(found))
+    starts = np.append(True, np.diff(found) > 1)[: len(found)]
+    return found[(place - np.maximum.accumulate(np.where(starts, place, 0))) % 2 == 0]
+
+
+def _within(p: Floats, edge: Floats) -> Bools:
+    along = dot(p, edge)
+    return (along >= 0) & (along <= dot(edge, edge))
