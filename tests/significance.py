@@ -50,16 +50,18 @@ def measure(scene: wf.Scene, spp: int, **options) -> Mean:
     return Mean.of(image.rgb.reshape(-1, 3).mean(1, dtype=np.float64))
 
 
-def assert_mean(mean: Mean, expected: float, max_error: float, sigmas: float | None = None) -> None:
+def assert_mean(
+    mean: Mean, expected: float, max_error: float, sigmas: float | None = None, rounding: float = ROUNDING
+) -> None:
     """Student's t test of a mean against its exact value.
 
     `max_error` bounds the standard error, relative to the value. `sigmas` replaces the critical
-    value that belongs to ALPHA.
+    value that belongs to ALPHA. `rounding` is what float32 may do, relative.
     """
     assert mean.error <= max_error * expected, f"too noisy: {mean}, must be within {max_error:.2%}"
     critical = sigmas or float(stats.t.ppf(1 - ALPHA / 2, mean.batches - 1))
     off = abs(mean.value - expected)
-    assert off <= critical * mean.error + ROUNDING * expected, (
+    assert off <= critical * mean.error + rounding * expected, (
         f"expected {expected:.6g}, got {mean}: {off / max(mean.error, 1e-30):.1f} standard errors, "
         f"{mean.value / expected - 1:+.3%}"
     )
