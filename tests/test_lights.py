@@ -45,7 +45,7 @@ LIGHTS = {
 }
 
 
-@pytest.mark.parametrize("name", LIGHTS)
+@pytest.mark.parametrize("name", [name for name in LIGHTS if name != "spheres"])  # theirs is in test_testing
 def test_lights_keep_their_contract(name: str) -> None:
     """Distribution, pdf, radiance and distance, by the published check."""
     make, points = LIGHTS[name]
