@@ -3,49 +3,177 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .io.images import to_8bit, write_image
-from .vec import Floats
+from .state import Words
+from .vec import Floats, Lanes
+
+Doubles = NDArray[np.float64]
+
+BATCHES = 8  # at most; the standard error has 4 to 8 of them to compare
+EPSILON = 1e-2  # of the squared mean of a picture, added to squares that errors are divided by
+OUTLIERS = 1e-3  # part of the pixels whose error counts no more than that of the worst other one
+CHUNK = 65_536  # pixels that are summed up together when a picture is made
 
 
 class Film:
-    """Sums of samples per pixel.
+    """Sums of samples per pixel, and what is needed to tell how noisy they are.
 
     The samples of a pixel are added one after the other in the order of their index, in float64,
     so the picture does not depend on how a render was cut into pieces.
+
+    The samples of a stratified sampler depend on each other, so their own scatter says little of
+    the error of their mean. Consecutive samples therefore form batches of `batch_size`, a power of
+    two that doubles as samples come, so that 4 to 8 batches are full from the eighth sample on.
+    Aligned blocks of Sobol points are stratified like their beginning, and so the scatter of the
+    batches' means shows the gain within a batch. It does not show the gain between batches: the
+    error is over-estimated, by about a tenth in a Cornell box, by more where a scene is smooth.
+
+    Memory is 176 bytes per pixel, whatever the number of samples.
     """
 
     def __init__(self, width: int, height: int) -> None:
+        pixels = width * height
         self.size = width, height
-        self.total = np.zeros((3, width * height))
-        self.count = np.zeros(width * height, np.int64)
+        self.count = np.zeros(pixels, np.int64)
+        self.total = np.zeros((3, pixels))  # of full batches
+        self.open = np.zeros((3, pixels))  # of the batch that is not yet full
+        self.squares = np.zeros((3, pixels))  # sum of squared samples
+        self.batches = np.zeros((BATCHES, 3, pixels), np.float32)  # sums of full batches
 
-    def add(self, first_pixel: int, radiance: Floats) -> None:
-        """Add samples of consecutive pixels.
+    def add(self, pixels: Words, radiance: Floats) -> None:
+        """Add samples.
 
         Parameters
         ----------
-        first_pixel
-            Row-major index.
+        pixels
+            (k,) row-major indices in rising order, of pixels with equally many samples so far.
         radiance
-            (3, samples, pixels): the next samples of each pixel.
+            (3, samples, k): the next samples of each pixel.
         """
-        _, samples, pixels = radiance.shape
-        span = slice(first_pixel, first_pixel + pixels)
-        terms = np.concatenate([self.total[:, None, span], radiance], axis=1, dtype=np.float64)
-        # cumsum adds strictly in order, where sum would pair terms up by the array's layout
-        self.total[:, span] = np.cumsum(terms, axis=1)[:, -1]
-        self.count[span] += samples
+        lanes = _span(pixels)
+        count, samples = int(self.count[pixels[0]]), radiance.shape[1]
+        filling, squares = self.open[:, lanes], self.squares[:, lanes]  # views of a span, else copies
+        start = 0
+        while start < samples:
+            size = batch_size(count + 1)
+            if size > 1 and 2 * count == BATCHES * size:
+                self._pair_batches(lanes)
+            stop = min(samples, start + size - count % size)
+            rows = radiance[:, start:stop].astype(np.float64)
+            _add_in_order(filling, rows)
+            _add_in_order(squares, np.square(rows, out=rows))
+            count += stop - start
+            start = stop
+            if count % size == 0:
+                self.total[:, lanes] += filling
+                self.batches[count // size - 1][:, lanes] = filling
+                filling[:] = 0
+        if not isinstance(lanes, slice):
+            self.open[:, lanes], self.squares[:, lanes] = filling, squares
+        self.count[lanes] = count
 
-    def image(self, spp: int, metadata: dict[str, Any]) -> Image:
-        """Divide by the number of samples; a pixel without any is black."""
+    def _pair_batches(self, lanes: Lanes) -> None:
+        """Join neighbours, so that half as many batches are twice as long."""
+        for half in range(BATCHES // 2):
+            pair = self.batches[2 * half : 2 * half + 2, :, lanes]
+            self.batches[half][:, lanes] = pair[0] + pair[1]
+
+    def mean(self, span: slice = slice(None)) -> Doubles:
+        """Means of the samples of pixels, (3, k); 0 where there is none."""
+        return (self.total[:, span] + self.open[:, span]) / np.maximum(self.count[span], 1)
+
+    def variance(self, span: slice = slice(None)) -> Doubles:
+        """Estimate the variance of one sample of each pixel, (3, k); NaN for fewer than two."""
+        count = self.count[span]
+        spread = self.squares[:, span] - count * np.square(self.mean(span))
+        return np.where(count > 1, np.maximum(spread, 0), np.nan) / np.maximum(count - 1, 1)
+
+    def squared_error(self, span: slice = slice(None)) -> Doubles:
+        """Estimate the variance of `mean` from batches, (3, k); NaN for fewer than two samples."""
+        counts = self.count[span]
+        error = np.full((3, counts.size), np.nan)
+        for count in np.unique(counts[counts > 1]).tolist():
+            lanes = np.flatnonzero(counts == count)
+            size = batch_size(count)
+            used = count // size
+            batch_means = self.batches[:used, :, span][:, :, lanes] / np.float64(size)
+            error[:, lanes] = batch_means.var(0, ddof=1) * (size / count)
+        return error
+
+    def relative_variance(self) -> Doubles:
+        """Estimate the squared relative error of each pixel, the mean of its channels, (pixels,).
+
+        Relative to the square of the channel plus `EPSILON` of the picture's squared mean, so that
+        black pixels do not count for much. The worst `OUTLIERS` of the pixels count no more
+        than the worst of the others: fireflies must not decide on a whole picture.
+        """
+        pixels = self.count.size
+        floor = EPSILON * (self._overall_mean() ** 2) or 1.0
+        out = np.empty(pixels)
+        for span in self._chunks():
+            out[span] = (self.squared_error(span) / (np.square(self.mean(span)) + floor)).mean(0)
+        worst = pixels - 1 - int(OUTLIERS * pixels)
+        return np.minimum(out, np.partition(out, worst)[worst])
+
+    def noise(self) -> float:
+        """Estimate the relative error of the picture: what `render(noise=...)` brings down."""
+        return float(np.sqrt(self.relative_variance().mean()))
+
+    def _overall_mean(self) -> float:
+        return float(sum(self.mean(span).sum() for span in self._chunks()) / (3 * self.count.size))
+
+    def _chunks(self) -> Iterator[slice]:
+        """Cut the pixels up, so that temporary arrays stay small."""
+        for start in range(0, self.count.size, CHUNK):
+            yield slice(start, min(start + CHUNK, self.count.size))
+
+    def image(self, metadata: dict[str, Any]) -> Image:
+        """Make a picture of what there is; a pixel without samples is black."""
         width, height = self.size
-        mean = self.total / np.maximum(self.count, 1)
-        return Image(mean.T.reshape(height, width, 3).astype(np.float32), spp, metadata)
+        rgb, variance, error = (np.empty((width * height, 3), np.float32) for _ in range(3))
+        for span in self._chunks():
+            rgb[span] = self.mean(span).T
+            variance[span] = self.variance(span).T
+            error[span] = np.sqrt(self.squared_error(span)).T
+        shape = height, width, 3
+        return Image(
+            rgb.reshape(shape),
+            round(float(self.count.mean())),
+            metadata,
+            counts=self.count.reshape(height, width),
+            variance=variance.reshape(shape),
+            standard_error=error.reshape(shape),
+        )
+
+
+def batch_size(count: int) -> int:
+    """Samples per batch of a pixel that has `count` samples: a power of two."""
+    return 1 << max(0, (count - 1).bit_length() - (BATCHES - 1).bit_length())
+
+
+def _span(pixels: Words) -> Lanes:
+    """Return rising indices as a slice where they have no gaps: much faster to add to."""
+    first, last = int(pixels[0]), int(pixels[-1])
+    return slice(first, last + 1) if last - first + 1 == pixels.size else pixels.astype(np.intp)
+
+
+def _add_in_order(sums: Doubles, rows: Doubles) -> None:
+    """Add rows (3, n, k) to sums (3, k), strictly one after the other.
+
+    A sum along the axis would pair terms up by the array's layout, and so round differently.
+    """
+    if rows.shape[1] < rows.shape[2]:
+        for row in rows.swapaxes(0, 1):
+            sums += row
+    else:
+        terms = np.concatenate([sums[:, None], rows], axis=1)
+        sums[:] = np.cumsum(terms, axis=1)[:, -1]
 
 
 class Image:
@@ -56,15 +184,37 @@ class Image:
     rgb
         (H, W, 3) float32 linear radiance; row 0 is the top.
     spp
-        Samples per pixel.
+        Samples per pixel; the rounded mean where pixels differ.
     metadata
         What was rendered and how: integrator, seed, accelerator, seconds, ...
+    counts
+        (H, W) int64 samples of each pixel.
+    variance
+        (H, W, 3) float32 estimated variance of one sample; NaN where there are fewer than two.
+    standard_error
+        (H, W, 3) float32 estimated standard error of `rgb`, from the scatter of 4 to 8 batches of
+        samples, so that the gain of stratified sampling shows in it, if not all of it; NaN where
+        there are fewer than two samples.
+
+    The last three are None in an image that was not rendered.
     """
 
-    def __init__(self, rgb: NDArray[np.float32], spp: int, metadata: dict[str, Any] | None = None) -> None:
+    def __init__(
+        self,
+        rgb: NDArray[np.float32],
+        spp: int = 0,
+        metadata: dict[str, Any] | None = None,
+        *,
+        counts: NDArray[np.int64] | None = None,
+        variance: NDArray[np.float32] | None = None,
+        standard_error: NDArray[np.float32] | None = None,
+    ) -> None:
         self.rgb = rgb
         self.spp = spp
         self.metadata = dict(metadata or {})
+        self.counts = counts
+        self.variance = variance
+        self.standard_error = standard_error
 
     def __repr__(self) -> str:
         """Give the size and the sample count."""

@@ -5,40 +5,39 @@ from __future__ import annotations
 import os
 import time
 import warnings
-from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass
+from collections.abc import Collection
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
 from .accel import make_accelerator
 from .accel.choose import CHOICES
-from .camera import Camera
-from .errors import SceneError
+from .errors import SceneError, number
 from .film import Film, Image
-from .integrators import INTEGRATORS, Integrator
+from .filters import FILTERS
+from .integrators import INTEGRATORS
 from .io.load import from_trimesh, load
 from .lights import PointLight
 from .parallel import run_ordered, worker_count
-from .sampling.sampler import Sampler, make_sampler
-from .scene import CompiledScene, Scene, compile_scene
+from .progress import Bar, Progress
+from .sampling.sampler import make_sampler
+from .scene import Scene, compile_scene
 from .shapes import Mesh, Sphere
-from .stages.generate import generate
-from .vec import Floats, Ints
+from .stopping import Clock, passes
+from .work import BadSamples, plan, trace_piece
 
 WAVE_LANES = 65_536  # paths that go round the loop together
+DEFAULT_SPP = 100
 MAX_SPP = 2**32  # a sample's index is 32 bits of its address
-MAX_BAD_SAMPLES = 1e-4  # part of all samples that may be lost to NaN before it is an error
-
-Progress: TypeAlias = Callable[[int, int], object] | bool | None
+MAX_SPP_FOR_NOISE = 2**16  # where only `noise` was given
 
 
 def render(
     scene: Any,
-    spp: int = 100,
+    spp: int | None = None,
     *,
     integrator: str = "full",
     max_bounces: int = 12,
@@ -46,6 +45,9 @@ def render(
     sampler: str = "sobol",
     accel: str = "auto",
     workers: int | None = None,
+    noise: float | None = None,
+    seconds: float | None = None,
+    filter: str = "box",
     wave_size: int = WAVE_LANES,
     progress: Progress = None,
 ) -> Image:
@@ -57,24 +59,36 @@ def render(
         A `Scene`, the path of a mesh file, a `trimesh.Trimesh` or `trimesh.Scene`, or a pair
         (vertices, faces).
     spp
-        Samples per pixel, at least 1.
+        Samples per pixel, at least 1; by default 100. With `noise` or `seconds` the most that a
+        pixel gets; by default then 65536, and with `seconds` as many as there is time for.
     integrator
         "full", "direct_mis", "direct_simple" or "naive".
     max_bounces
         Scattering events along a path: 0 shows only light seen directly, 1 direct light.
     seed
-        The same seed gives the same picture, bit for bit.
+        The same seed gives the same picture, bit for bit, unless `seconds` is given.
     sampler
         "sobol" or "independent".
     accel
         Ray queries by "numpy", by "embree" (extra `wavefront[embree]`), or "auto".
     workers
         Threads; by default one per core.
+    noise
+        Go on until the estimated relative error of the picture is no more than this: 0.02 means
+        2 %. It is the root of the relative MSE that `compare` would find against a converged
+        picture. Noisy parts get more samples than calm ones, and every pixel at least 32.
+    seconds
+        Go on until this time is used, scene setup included; at least for one sample per pixel.
+        With `noise` as well, whichever comes first.
+    filter
+        How the samples of a pixel are spread: "box" (evenly over the pixel), "tent" (radius 1
+        pixel) or "gaussian" (σ 0.5 pixels, cut off at 1.5 from the centre).
     wave_size
         The most paths that are traced together by one worker; the picture does not depend on it.
     progress
         By default a bar appears when a render takes over two seconds. False shows none; a
-        function is called with the numbers of samples done and in all.
+        function is called with how much is done and how much there is at most: samples, or
+        seconds where `seconds` is given.
 
     Returns
     -------
@@ -86,132 +100,64 @@ def render(
     SceneError
         If an argument or the scene is malformed. It is a ValueError.
     """
-    spp = _whole("spp", spp, 1, MAX_SPP)
+    begin = time.perf_counter()
+    spp = _most_samples(spp, noise, seconds)
     max_bounces = _whole("max_bounces", max_bounces, 0, 2**16)
     wave_size = _whole("wave_size", wave_size, 1, 2**24)
     estimate = INTEGRATORS[_one_of("integrator", integrator, INTEGRATORS)]
+    spread = FILTERS[_one_of("filter", filter, FILTERS)]
     accel = _one_of("accel", accel, CHOICES)
     make_sampler(sampler, seed)  # checks both before the scene is read
     threads = worker_count(workers)
     subject = as_scene(scene)
     camera = subject.camera or subject.framing_camera()
-    draw = make_sampler(sampler, seed, camera.size[0])
+    draw = make_sampler(sampler, seed, camera.film[0])
     _warn_unseen_lights(subject, integrator)
-    begin = time.perf_counter()
     compiled = compile_scene(subject, lambda geometry: make_accelerator(geometry, accel))
+    trace = partial(trace_piece, compiled, camera, draw, spread, estimate, max_bounces)
 
-    def trace(piece: Piece) -> Wave:
-        return trace_piece(compiled, camera, draw, estimate, max_bounces, piece)
-
-    width, height = camera.size
-    film = Film(width, height)
-    bad, interrupted = BadSamples(), False
-    with _bar(progress, width * height * spp) as advance:
+    film, clock = Film(*camera.size), Clock(begin, seconds, wave_size, threads)
+    bad, rays, interrupted = BadSamples(), 0, False
+    with Bar(progress, film.count.size * spp, seconds) as bar:
         try:
-            for piece, wave in run_ordered(trace, plan(width * height, spp, wave_size), threads):
-                bad.note(piece, wave)
-                film.add(piece.first_pixel, wave.radiance)
-                advance(piece.lanes)
+            for step in passes(film, spp, noise):
+                pieces = clock.in_time(plan(step.pixels, step.first, step.last, clock.wave_size))
+                for piece, wave in run_ordered(trace, pieces, threads):
+                    film.add(piece.pixels, wave.radiance)
+                    bad.note(piece, wave)
+                    rays += wave.rays
+                    clock.note(piece, wave.seconds)
+                    bar.advance(piece.lanes, clock.elapsed)
+                if clock.up:
+                    break
         except KeyboardInterrupt:
             interrupted = True
-            done = film.count.sum() / (width * height * spp)
-            warnings.warn(f"interrupted: the picture holds {done:.0%} of its samples", stacklevel=2)
-    bad.report(int(film.count.sum()))
-    metadata = {
-        "integrator": integrator,
-        "max_bounces": max_bounces,
-        "seed": seed,
-        "sampler": sampler,
-        "accelerator": compiled.accelerator.name,
-        "workers": threads,
-        "seconds": time.perf_counter() - begin,
-        "bad_samples": bad.count,
-        "interrupted": interrupted,
-        "version": version("wavefront"),
-    }
-    return film.image(int(film.count.max()), metadata)
-
-
-@dataclass(frozen=True, slots=True)
-class Piece:
-    """A piece of work: a block of addresses, consecutive pixels × consecutive samples."""
-
-    first_pixel: int
-    pixels: int
-    first_sample: int
-    samples: int
-
-    @property
-    def lanes(self) -> int:
-        """Number of paths."""
-        return self.pixels * self.samples
-
-
-@dataclass(slots=True)
-class Wave:
-    """What a piece of work came to."""
-
-    radiance: Floats  # (3, samples, pixels)
-    bad: Ints  # lanes whose radiance was not finite; it is 0 there
-
-
-def plan(pixels: int, spp: int, wave_size: int) -> Iterator[Piece]:
-    """Cut a render into pieces of at most `wave_size` paths; each pixel's samples come in order."""
-    width = min(pixels, wave_size)
-    depth = max(1, wave_size // width)
-    for first_sample in range(0, spp, depth):
-        for first_pixel in range(0, pixels, width):
-            yield Piece(
-                first_pixel, min(width, pixels - first_pixel), first_sample, min(depth, spp - first_sample)
-            )
-
-
-def trace_piece(
-    scene: CompiledScene,
-    camera: Camera,
-    sampler: Sampler,
-    estimate: Integrator,
-    max_bounces: int,
-    piece: Piece,
-) -> Wave:
-    """Take one wave of paths from the camera to its radiance."""
-    pixels = np.arange(piece.first_pixel, piece.first_pixel + piece.pixels, dtype=np.uint32)
-    samples = np.arange(piece.first_sample, piece.first_sample + piece.samples, dtype=np.uint32)
-    paths = generate(scene, camera, sampler, np.tile(pixels, piece.samples), np.repeat(samples, piece.pixels))
-    radiance = estimate(scene, paths, sampler, max_bounces)
-    bad = np.flatnonzero(~np.isfinite(radiance).all(0))
-    radiance[:, bad] = 0
-    return Wave(radiance.reshape(3, piece.samples, piece.pixels), bad)
-
-
-class BadSamples:
-    """Counts samples that were not finite; none is dropped in silence."""
-
-    def __init__(self) -> None:
-        self.count = 0
-        self.first = ""
-
-    def note(self, piece: Piece, wave: Wave) -> None:
-        """Count the bad lanes of a wave and remember the first of all."""
-        if wave.bad.size and not self.count:
-            sample, pixel = divmod(int(wave.bad[0]), piece.pixels)
-            self.first = f"pixel {piece.first_pixel + pixel}, sample {piece.first_sample + sample}"
-        self.count += wave.bad.size
-
-    def report(self, samples: int) -> None:
-        """Warn of bad samples.
-
-        Raises
-        ------
-        SceneError
-            If they are more than 1e-4 of all.
-        """
-        if not self.count:
-            return
-        message = f"{self.count} of {samples} samples were not finite and count as black; first: {self.first}"
-        if self.count > MAX_BAD_SAMPLES * samples:
-            raise SceneError(message)
-        warnings.warn(message, stacklevel=3)
+            so_far = f"{film.count.mean():.4g} samples per pixel"
+            if noise is None and seconds is None:
+                so_far = f"{film.count.mean() / spp:.0%} of its samples"
+            warnings.warn(f"interrupted: the picture holds {so_far}", stacklevel=2)
+    samples = int(film.count.sum())
+    bad.report(samples)
+    return film.image(
+        {
+            "integrator": integrator,
+            "max_bounces": max_bounces,
+            "seed": seed,
+            "sampler": sampler,
+            "filter": filter,
+            "accelerator": compiled.accelerator.name,
+            "workers": threads,
+            "seconds": clock.elapsed,
+            "spp": samples / film.count.size,
+            "samples": samples,
+            "rays": rays,
+            "noise": film.noise(),
+            "bad_samples": bad.count,
+            "interrupted": interrupted,
+            "version": version("wavefront"),
+            "numpy": np.__version__,
+        }
+    )
 
 
 def as_scene(subject: Any) -> Scene:
@@ -244,6 +190,18 @@ def _one_of(name: str, value: Any, choices: Collection[str]) -> str:
     return value
 
 
+def _most_samples(spp: int | None, noise: float | None, seconds: float | None) -> int:
+    """Return the most samples that a pixel may get; check all that says when to stop."""
+    for name, value in (("noise", noise), ("seconds", seconds)):
+        if value is not None:
+            number(name, value, lambda x: x > 0, "above 0")
+    if spp is not None:
+        return _whole("spp", spp, 1, MAX_SPP)
+    if seconds is not None:
+        return MAX_SPP
+    return DEFAULT_SPP if noise is None else MAX_SPP_FOR_NOISE
+
+
 def _whole(name: str, value: Any, low: int, high: int) -> int:
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not whole or not low <= value <= high:
@@ -254,25 +212,3 @@ def _whole(name: str, value: Any, low: int, high: int) -> int:
 def _warn_unseen_lights(scene: Scene, integrator: str) -> None:
     if integrator == "naive" and any(isinstance(light, PointLight) for light in scene.lights):
         warnings.warn("the naive integrator cannot find point lights; they stay dark", stacklevel=3)
-
-
-class _bar:
-    """Shows progress, or calls the user's function with it."""
-
-    def __init__(self, progress: Progress, total: int) -> None:
-        self._callback = progress if callable(progress) else None
-        shown = progress is None or progress is True
-        self._bar = tqdm(total=total, unit="sample", unit_scale=True, delay=2, disable=not shown)
-        self._total, self._done = total, 0
-
-    def __enter__(self) -> Callable[[int], None]:
-        return self._advance
-
-    def __exit__(self, *error: object) -> None:
-        self._bar.close()
-
-    def _advance(self, samples: int) -> None:
-        self._done += samples
-        self._bar.update(samples)
-        if self._callback:
-            self._callback(self._done, self._total)

@@ -5,23 +5,28 @@ from __future__ import annotations
 import numpy as np
 
 from ..camera import Camera
+from ..filters import Filter, box
 from ..sampling.sampler import Dimension, Sampler
 from ..scene import CompiledScene
 from ..state import Paths, Words
 from ..vec import f4
 
 
-def generate(scene: CompiledScene, camera: Camera, sampler: Sampler, pixel: Words, sample: Words) -> Paths:
-    """Start a path at a random place within each pixel (box filter by sampling).
+def generate(
+    scene: CompiledScene, camera: Camera, sampler: Sampler, pixel: Words, sample: Words, filter: Filter = box
+) -> Paths:
+    """Start a path at a random place in or around each pixel.
 
     Parameters
     ----------
     pixel, sample
         (n,) row-major pixel index, within the camera's window, and sample index.
+    filter
+        Where in and around its pixel a sample falls.
     """
     width, n = camera.film[0], len(pixel)
     pixel = camera.address(pixel)
-    jitter = sampler.draw_2d(pixel, sample, 0, Dimension.PIXEL)
+    jitter = filter(sampler.draw_2d(pixel, sample, 0, Dimension.PIXEL))
     row = pixel // np.uint32(width)
     x = (pixel - row * np.uint32(width)).astype(f4) + jitter[0]
     y = row.astype(f4) + jitter[1]

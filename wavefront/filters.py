@@ -1,0 +1,39 @@
+"""Reconstruction filters, by where in and around its pixel a sample falls.
+
+A sample counts only for its own pixel and with weight 1; how its position is distributed is the
+filter. So samples of different pixels share nothing, and no filter has negative lobes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+import numpy as np
+
+from .sampling import warp
+from .vec import Floats, f4
+
+Filter: TypeAlias = Callable[[Floats], Floats]
+
+TENT_RADIUS = 1.0  # pixels from the centre to where the tent ends
+GAUSSIAN_SIGMA = 0.5  # pixels
+GAUSSIAN_RADIUS = 1.5  # pixels from the centre to where the Gaussian is cut off
+
+
+def box(u: Floats) -> Floats:
+    """Fill the pixel evenly: u (2, n) in [0, 1)² is the position from its corner, (2, n) pixels."""
+    return u
+
+
+def tent(u: Floats) -> Floats:
+    """Fall linearly from the pixel's centre to nothing at `TENT_RADIUS`, in both directions."""
+    return np.stack([f4(0.5) + warp.tent(row, TENT_RADIUS) for row in u])
+
+
+def gaussian(u: Floats) -> Floats:
+    """Follow a normal distribution of `GAUSSIAN_SIGMA` around the centre, cut at `GAUSSIAN_RADIUS`."""
+    return np.stack([f4(0.5) + warp.gaussian(row, GAUSSIAN_SIGMA, GAUSSIAN_RADIUS) for row in u])
+
+
+FILTERS: dict[str, Filter] = {"box": box, "tent": tent, "gaussian": gaussian}

@@ -1,0 +1,133 @@
+"""Pieces of work: which samples of which pixels, and what tracing them comes to."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .accel.base import Accelerator, Intersections
+from .camera import Camera
+from .errors import SceneError
+from .filters import Filter
+from .integrators import Integrator
+from .sampling.sampler import Sampler
+from .scene import CompiledScene
+from .stages.generate import generate
+from .state import Words
+from .vec import Bools, Floats, Ints
+
+MAX_BAD_SAMPLES = 1e-4  # part of all samples that may be lost to NaN before it is an error
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A piece of work: a block of addresses, some pixels × consecutive samples."""
+
+    pixels: Words  # (k,) row-major indices, rising
+    first_sample: int
+    samples: int
+
+    @property
+    def lanes(self) -> int:
+        """Number of paths."""
+        return self.pixels.size * self.samples
+
+
+@dataclass(slots=True)
+class Wave:
+    """What a piece of work came to."""
+
+    radiance: Floats  # (3, samples, pixels)
+    bad: Ints  # lanes whose radiance was not finite; it is 0 there
+    rays: int  # queries of the accelerator
+    seconds: float  # that it took its worker
+
+
+def trace_piece(
+    scene: CompiledScene,
+    camera: Camera,
+    sampler: Sampler,
+    filter: Filter,
+    estimate: Integrator,
+    max_bounces: int,
+    piece: Piece,
+) -> Wave:
+    """Take one wave of paths from the camera to its radiance."""
+    begin = time.perf_counter()
+    k, n = piece.pixels.size, piece.samples
+    samples = np.arange(piece.first_sample, piece.first_sample + n, dtype=np.uint32)
+    counter = RayCounter(scene.accelerator)
+    scene = replace(scene, accelerator=counter)
+    paths = generate(scene, camera, sampler, np.tile(piece.pixels, n), np.repeat(samples, k), filter)
+    radiance = estimate(scene, paths, sampler, max_bounces)
+    bad = np.flatnonzero(~np.isfinite(radiance).all(0))
+    radiance[:, bad] = 0
+    return Wave(radiance.reshape(3, n, k), bad, counter.rays, time.perf_counter() - begin)
+
+
+class RayCounter:
+    """An accelerator that counts the rays of one wave on their way to another accelerator."""
+
+    def __init__(self, accelerator: Accelerator) -> None:
+        self.name = accelerator.name
+        self.rays = 0
+        self._accelerator = accelerator
+
+    def closest(self, origin: Floats, direction: Floats, leaving: Ints) -> Intersections:
+        """Find the nearest hits of rays (3, n)."""
+        self.rays += origin.shape[1]
+        return self._accelerator.closest(origin, direction, leaving)
+
+    def occluded(self, origin: Floats, direction: Floats, distance: Floats, leaving: Ints) -> Bools:
+        """Tell whether anything is in the way of rays (3, n)."""
+        self.rays += origin.shape[1]
+        return self._accelerator.occluded(origin, direction, distance, leaving)
+
+
+def plan(pixels: Words, first: int, last: int, wave_size: Callable[[], int]) -> Iterator[Piece]:
+    """Cut samples `first` to `last` of some pixels into pieces.
+
+    Every pixel's samples come in order. No piece has more paths than `wave_size` says when a sweep
+    over the pixels begins.
+    """
+    while first < last:
+        lanes = wave_size()
+        width = min(pixels.size, lanes)
+        depth = min(max(1, lanes // width), last - first)
+        for start in range(0, pixels.size, width):
+            yield Piece(pixels[start : start + width], first, depth)
+        first += depth
+
+
+class BadSamples:
+    """Counts samples that were not finite; none is dropped in silence."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.first = ""
+
+    def note(self, piece: Piece, wave: Wave) -> None:
+        """Count the bad lanes of a wave and remember the first of all."""
+        if wave.bad.size and not self.count:
+            sample, pixel = divmod(int(wave.bad[0]), piece.pixels.size)
+            self.first = f"pixel {piece.pixels[pixel]}, sample {piece.first_sample + sample}"
+        self.count += wave.bad.size
+
+    def report(self, samples: int) -> None:
+        """Warn of bad samples.
+
+        Raises
+        ------
+        SceneError
+            If they are more than 1e-4 of all.
+        """
+        if not self.count:
+            return
+        message = f"{self.count} of {samples} samples were not finite and count as black; first: {self.first}"
+        if self.count > MAX_BAD_SAMPLES * samples:
+            raise SceneError(message)
+        warnings.warn(message, stacklevel=3)
