@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .camera import Camera
+from .camera import Camera, image_size
 from .errors import SceneError
 from .film import Image
 from .integrators import INTEGRATORS
@@ -23,18 +23,35 @@ from .scene import Scene
 from .shapes import Mesh
 
 INTERRUPTED = 130  # 128 + SIGINT, as shells report it
+VECTOR_OPTIONS = ("--origin", "--target", "--up")
+FOV = 40.0  # degrees
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
-    options = _parser().parse_args(arguments)
-    warnings.showwarning = lambda message, *_: _show_warning(message)
-    try:
-        status: int = options.run(options)
-    except (SceneError, OSError) as error:
-        print(f"wavefront: error: {error}", file=sys.stderr)
-        return 2
+    options = _parser().parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", UserWarning)
+        warnings.showwarning = lambda message, *_: _show_warning(message)
+        try:
+            status: int = options.run(options)
+        except (SceneError, OSError) as error:
+            print(f"wavefront: error: {error}", file=sys.stderr)
+            return 2
+        except KeyboardInterrupt:
+            return INTERRUPTED
     return status
+
+
+def _joined(arguments: Sequence[str]) -> list[str]:
+    """Join a vector to its option, since argparse takes "-1,2,3" for an option of its own."""
+    joined: list[str] = []
+    for argument in arguments:
+        if joined and joined[-1] in VECTOR_OPTIONS and argument[:1] == "-" and "," in argument:
+            joined[-1] += "=" + argument
+        else:
+            joined.append(argument)
+    return joined
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -64,14 +81,15 @@ def _add_render(commands: Any) -> None:
     command.add_argument("--seed", type=int, default=0, help="same seed, same picture")
     command.add_argument("--accel", default="auto", help="ray queries: auto, numpy or embree")
     command.add_argument("--workers", type=int, help="threads (default: one per core)")
-    command.add_argument("--origin", type=_vector, help="camera position X,Y,Z")
-    command.add_argument("--target", type=_vector, help="point that the camera looks at X,Y,Z")
+    where = {"type": _vector, "metavar": "X,Y,Z"}
+    command.add_argument("--origin", **where, help="camera position; replaces the file's camera")
     command.add_argument(
-        "--up", type=_vector, default=(0.0, 1.0, 0.0), help="what is up in the picture X,Y,Z"
+        "--target", **where, help="point that the camera looks at (default: the scene's middle)"
     )
-    command.add_argument("--fov", type=float, default=40.0, help="vertical field of view, degrees")
+    command.add_argument("--up", **where, help="what is up in the picture (default: 0,1,0)")
+    command.add_argument("--fov", type=_fov, help=f"vertical field of view, degrees (default: {FOV:g})")
     command.add_argument("--gamma", type=_gamma, default=2.2, help='for png and jpg: a number or "srgb"')
-    command.add_argument("--exposure", type=float, default=0.0, help="stops, applied when saving")
+    command.add_argument("--exposure", type=_finite, default=0.0, help="stops, applied when saving")
     command.add_argument("--quiet", action="store_true", help="no progress bar")
     command.set_defaults(run=_render)
 
@@ -80,7 +98,6 @@ def _render(options: argparse.Namespace) -> int:
     check_writable(options.output)
     scene = load(options.scene)
     scene.camera = _camera(scene, options)
-    interrupted = False
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         image = render(
@@ -105,12 +122,18 @@ def _render(options: argparse.Namespace) -> int:
 def _camera(scene: Scene, options: argparse.Namespace) -> Camera:
     """Return the camera that the options describe, else the file's, else one that frames the scene."""
     size = options.size or (scene.camera.size if scene.camera else (512, 512))
-    if options.origin is None and options.target is None:
-        return scene.camera.resized(size) if scene.camera else scene.framing_camera(options.fov, size)
-    if options.origin is None:
-        raise SceneError("--target needs --origin")
-    middle = scene.bounds.mean(0) if options.target is None else options.target
-    return Camera.look_at(options.origin, middle, options.up, fov=options.fov, size=size)
+    fov = FOV if options.fov is None else options.fov
+    if options.origin is not None:
+        target = scene.bounds.mean(0) if options.target is None else options.target
+        up = options.up or (0.0, 1.0, 0.0)
+        return Camera.look_at(options.origin, target, up, fov=fov, size=size)
+    if options.target is not None or options.up is not None:
+        raise SceneError("--target and --up need --origin")
+    if scene.camera is None:
+        return scene.framing_camera(fov, size)
+    if options.fov is not None:
+        raise SceneError(f"--fov needs --origin: {options.scene} has a camera of its own")
+    return scene.camera.resized(size)
 
 
 def _summary(image: Image, path: str) -> str:
@@ -146,7 +169,17 @@ def _size(text: str) -> tuple[int, int]:
         width, height = (int(part) for part in text.lower().split("x"))
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not WIDTHxHEIGHT, such as 640x480") from None
-    return width, height
+    try:
+        return image_size((width, height))
+    except SceneError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _fov(text: str) -> float:
+    fov = _finite(text)
+    if not 0 < fov < 180:
+        raise argparse.ArgumentTypeError(f"{text!r} is not above 0 and below 180 degrees")
+    return fov
 
 
 def _vector(text: str) -> tuple[float, float, float]:
@@ -161,9 +194,19 @@ def _gamma(text: str) -> float | str:
     if text == "srgb":
         return text
     try:
-        return float(text)
+        gamma = _finite(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f'{text!r} is neither a number nor "srgb"') from None
+        gamma = 0.0
+    if gamma <= 0:
+        raise argparse.ArgumentTypeError(f'{text!r} is neither a number above 0 nor "srgb"')
+    return gamma
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not np.isfinite(number):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number")
+    return number
 
 
 if __name__ == "__main__":

@@ -1,0 +1,283 @@
+"""The command line: what it writes, what it says, and what it refuses before any work."""
+
+import subprocess
+import sys
+from importlib.metadata import version
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+
+from wavefront import cli
+from wavefront.cli import main
+from wavefront.io.images import read_image
+
+SQUARE = """
+mtllib square.mtl
+v -1 0 -1
+v -1 0 1
+v 1 0 1
+v 1 0 -1
+usemtl red
+f 1 2 3 4
+v -0.5 2 -0.5
+v 0.5 2 -0.5
+v 0.5 2 0.5
+v -0.5 2 0.5
+usemtl lamp
+f 5 6 7 8
+"""
+MATERIALS = "newmtl red\nKd 0.8 0.1 0.1\nnewmtl lamp\nKd 0 0 0\nKe 6 6 6\n"
+TRIANGLE = b'{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}], "nodes": [{"mesh": 0}, \
+{"camera": 0, "translation": [0, 0, 4]}], "cameras": [{"type": "perspective", "perspective": {"yfov": 0.7, \
+"aspectRatio": 2.0, "znear": 0.1}}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}], \
+"accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [-1, -1, 0], \
+"max": [1, 1, 0]}], "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36, \
+"uri": "data.bin"}]}'
+
+
+@pytest.fixture
+def obj(tmp_path):
+    (tmp_path / "square.mtl").write_text(MATERIALS)
+    path = tmp_path / "square.obj"
+    path.write_text(SQUARE)
+    return str(path)
+
+
+@pytest.fixture
+def gltf(tmp_path):
+    """A triangle and a camera four units in front of it."""
+    corners = np.array([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], "<f4")
+    (tmp_path / "data.bin").write_bytes(corners.tobytes())
+    path = tmp_path / "triangle.gltf"
+    path.write_bytes(TRIANGLE)
+    return str(path)
+
+
+@pytest.fixture
+def fast(tmp_path):
+    """Options of a small render, and where it goes."""
+    output = tmp_path / "picture.npy"
+    return output, ["-o", str(output), "--spp", "2", "--size", "8x6", "--quiet"]
+
+
+@pytest.fixture
+def no_render(monkeypatch):
+    """Fail the test when a render begins."""
+
+    def refuse(*args, **kwargs):
+        pytest.fail("rendered before the mistake was reported")
+
+    monkeypatch.setattr(cli, "render", refuse)
+
+
+def error_of(capsys, arguments):
+    """Run, expect status 2 and an empty stdout, and return the message."""
+    try:
+        status = main(arguments)
+    except SystemExit as stop:  # argparse
+        status = stop.code
+    out, err = capsys.readouterr()
+    assert status == 2
+    assert out == ""
+    assert "Traceback" not in err
+    return err
+
+
+def test_render_writes_the_picture_and_says_so(obj, fast, capsys):
+    output, options = fast
+    assert main(["render", obj, *options, "--origin", "0,1,4"]) == 0
+    out, err = capsys.readouterr()
+    picture = np.load(output)
+    assert picture.shape == (6, 8, 3)
+    assert picture.max() > 0
+    assert "8x6, 2 spp" in out
+    assert err == ""
+
+
+def test_module_runs_as_a_program(obj, fast):
+    output, options = fast
+    command = [sys.executable, "-m", "wavefront.cli", "render", obj, *options, "--integrator", "direct_mis"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert output.exists()
+
+
+def test_same_options_same_bytes(obj, fast):
+    output, options = fast
+    main(["render", obj, *options, "--workers", "1"])
+    once = output.read_bytes()
+    main(["render", obj, *options, "--workers", "2"])
+    assert output.read_bytes() == once
+    main(["render", obj, *options, "--seed", "7"])
+    assert output.read_bytes() != once
+
+
+def test_info_names_what_the_file_holds(obj, capsys):
+    assert main(["info", obj]) == 0
+    out = capsys.readouterr().out
+    assert "2 shapes, 4 triangles" in out
+    assert "(-1, 0, -1) to (1, 2, 1)" in out
+    assert "red" in out
+    assert out.count("emits") == 1
+
+
+def test_version_and_help(capsys):
+    for option, text in (("--version", version("wavefront")), ("--help", "render")):
+        with pytest.raises(SystemExit) as stop:
+            main([option])
+        assert stop.value.code == 0
+        assert text in capsys.readouterr().out
+
+
+def test_a_scene_without_light_is_rendered_with_a_warning(tmp_path, fast, capsys):
+    (tmp_path / "dark.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    assert main(["render", str(tmp_path / "dark.obj"), *fast[1]]) == 0
+    assert "wavefront: warning: the scene has no light" in capsys.readouterr().err
+
+
+# --- Cameras ---------------------------------------------------------------------------------------
+
+
+def test_camera_options_place_the_camera(obj, fast):
+    output, options = fast
+    main(["render", obj, *options, "--origin", "0,1,0", "--target", "0,0,0", "--up", "0,0,-1", "--fov", "20"])
+    red, green, _ = np.load(output).mean((0, 1))
+    assert red > 4 * green  # nothing but the red floor
+    main(["render", obj, *options, "--origin", "0,1,0", "--target", "0,9,0", "--up=0,0,-1", "--fov", "20"])
+    np.testing.assert_allclose(np.load(output), 6)  # nothing but the lamp
+
+
+def test_negative_vectors_need_no_equals_sign(obj, fast):
+    output, options = fast
+    view = ["--target", "-0.5,0,-.5", "--up", "-1,0,0"]
+    assert main(["render", obj, *options, "--origin", "-0.5,1,-.5", *view]) == 0
+    spaced = output.read_bytes()
+    joined = [f"{a}={b}" for a, b in (("--origin", "-0.5,1,-.5"), tuple(view[:2]), tuple(view[2:]))]
+    assert main(["render", obj, *options, *joined]) == 0
+    assert output.read_bytes() == spaced
+
+
+def test_the_camera_of_the_file_is_used_and_resized(gltf, tmp_path, capsys):
+    output = tmp_path / "picture.npy"
+    assert main(["render", gltf, "-o", str(output), "--spp", "2", "--size", "12x6", "--quiet"]) == 0
+    picture = np.load(output)
+    assert picture.shape == (6, 12, 3)
+    assert picture[3, 6, 0] != pytest.approx(1)  # the triangle in the middle, before the even grey
+    assert picture[0, 0, 0] == pytest.approx(1)
+    main(["info", gltf])
+    assert "camera: in the file" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--target", "0,0,0"], "--target and --up need --origin"),
+        (["--up", "0,0,1"], "--target and --up need --origin"),
+        (["--origin", "0,1,0", "--target", "0,1,0"], "must differ"),
+        (["--origin", "0,1"], "is not X,Y,Z"),
+        (["--origin", "nan,1,0"], "finite"),
+        (["--origin", "0,1,3", "--fov", "0"], "not above 0 and below 180"),
+        (["--fov", "180"], "not above 0 and below 180"),
+        (["--fov", "0"], "not above 0 and below 180"),
+    ],
+)
+def test_wrong_cameras(obj, fast, capsys, no_render, options, message):
+    assert message in error_of(capsys, ["render", obj, *fast[1], *options])
+
+
+def test_fov_does_not_silently_yield_to_the_camera_of_the_file(gltf, fast, capsys, no_render):
+    assert "has a camera of its own" in error_of(capsys, ["render", gltf, *fast[1], "--fov", "20"])
+
+
+# --- Output ----------------------------------------------------------------------------------------
+
+
+def test_gamma_and_exposure_reach_the_file(obj, tmp_path):
+    def render(name, *options):
+        path = tmp_path / name
+        common = ["--spp", "4", "--size", "8x6", "--quiet", "--origin", "0,1,3"]
+        assert main(["render", obj, "-o", str(path), *common, *options]) == 0
+        return path
+
+    linear = np.clip(np.load(render("a.npy")), 0, 1)
+    for gamma in (1.0, 2.2):
+        codes = iio.imread(render("a.png", "--gamma", str(gamma)))
+        np.testing.assert_allclose(codes, 255 * linear ** (1 / gamma), atol=0.51)
+    curve = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    np.testing.assert_allclose(iio.imread(render("a.png", "--gamma", "srgb")), 255 * curve, atol=0.51)
+    brighter = read_image(render("b.npy", "--exposure", "1"))
+    np.testing.assert_allclose(np.clip(brighter / 2, 0, 1), linear, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--size", "640"], "is not WIDTHxHEIGHT"),
+        (["--size", "4x3x2"], "is not WIDTHxHEIGHT"),
+        (["--size", "ax3"], "is not WIDTHxHEIGHT"),
+        (["--gamma", "0"], "neither a number above 0"),
+        (["--gamma", "linear"], "neither a number above 0"),
+        (["--exposure", "nan"], "not a finite number"),
+        (["--integrator", "best"], "invalid choice: 'best'"),
+        (["--sampler", "best"], "invalid choice: 'best'"),
+        (["--spp", "many"], "invalid int value"),
+        (["-o", "picture.bmp"], "picture.bmp"),
+        (["-o", "picture"], "picture"),
+        (["-o", "no/such/folder/picture.png"], "no/such/folder"),
+        (["--size", "0x5"], "must be whole numbers from 1"),
+    ],
+)
+def test_wrong_options_are_refused_before_rendering(obj, fast, capsys, no_render, options, message):
+    assert message in error_of(capsys, ["render", obj, *fast[1], *options])
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--spp", "0"], "spp is 0"),
+        (["--spp", "-3"], "spp is -3"),
+        (["--max-bounces", "-1"], "max_bounces is -1"),
+        (["--seed", "-1"], "seed is -1"),
+        (["--workers", "0"], "workers is 0"),
+        (["--accel", "gpu"], "gpu"),
+    ],
+)
+def test_wrong_numbers_leave_no_picture(obj, fast, capsys, options, message):
+    assert message in error_of(capsys, ["render", obj, *fast[1], *options])
+    assert not fast[0].exists()
+
+
+@pytest.mark.parametrize("command", ["render", "info"])
+def test_wrong_files(tmp_path, capsys, no_render, command):
+    assert "missing.obj" in error_of(capsys, [command, str(tmp_path / "missing.obj")])
+    (tmp_path / "scene.blend").write_bytes(b"BLENDER")
+    assert "scene.blend" in error_of(capsys, [command, str(tmp_path / "scene.blend")])
+    (tmp_path / "bad.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n")
+    assert "bad.obj" in error_of(capsys, [command, str(tmp_path / "bad.obj")])
+
+
+def test_no_command_is_an_error(capsys):
+    assert "usage" in error_of(capsys, [])
+
+
+def test_ctrl_c_while_loading_gives_130(obj, fast, monkeypatch):
+    def interrupt(path):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "load", interrupt)
+    assert main(["render", obj, *fast[1]]) == 130
+
+
+def test_an_interrupted_render_is_saved_and_gives_130(obj, fast, monkeypatch):
+    output, options = fast
+    render = cli.render
+
+    def interrupted(*args, **kwargs):
+        image = render(*args, **kwargs)
+        image.metadata["interrupted"] = True
+        return image
+
+    monkeypatch.setattr(cli, "render", interrupted)
+    assert main(["render", obj, *options]) == 130
+    assert output.exists()
