@@ -7,6 +7,7 @@ from .errors import SceneError
 from .film import Image
 from .io.load import from_trimesh, load, load_mesh
 from .lights import Environment, PointLight
+from .metrics import Comparison, compare
 from .render import render
 from .scene import Scene
 from .shapes import Mesh, Rectangle, Sphere
@@ -15,6 +16,7 @@ __all__ = [
     "Bsdf",
     "BsdfSample",
     "Camera",
+    "Comparison",
     "Conductor",
     "Dielectric",
     "Diffuse",
@@ -27,6 +29,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "Sphere",
+    "compare",
     "from_trimesh",
     "load",
     "load_mesh",

@@ -1,4 +1,4 @@
-"""`wavefront render` and `wavefront info`."""
+"""`wavefront render`, `wavefront info` and `wavefront compare`."""
 
 from __future__ import annotations
 
@@ -14,10 +14,12 @@ import numpy as np
 from .camera import Camera, image_size
 from .errors import SceneError
 from .film import Image
+from .filters import FILTERS
 from .integrators import INTEGRATORS
 from .io.images import check_writable
 from .io.load import load
-from .render import render
+from .metrics import compare
+from .render import DEFAULT_SPP, render
 from .sampling.sampler import SAMPLERS
 from .scene import Scene
 from .shapes import Mesh
@@ -62,16 +64,33 @@ def _parser() -> argparse.ArgumentParser:
     info = commands.add_parser("info", help="say what a scene file holds")
     info.add_argument("scene", help="obj, ply, stl, glb or gltf file")
     info.set_defaults(run=_info)
+    measure = commands.add_parser("compare", help="say how far a picture is from a reference")
+    measure.add_argument("picture", help="png, jpg, exr, hdr or npy file")
+    measure.add_argument("reference", help="the same, of the same size")
+    measure.add_argument("-o", "--output", help="where to write the absolute difference")
+    measure.set_defaults(run=_compare)
     return parser
 
 
+class _Help(argparse.ArgumentDefaultsHelpFormatter):
+    """Names defaults where there are any."""
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        return action.help if action.default is None else super()._get_help_string(action)
+
+
 def _add_render(commands: Any) -> None:
-    command = commands.add_parser(
-        "render", help="render a scene file", formatter_class=argparse.ArgumentDefaultsHelpFormatter
-    )
+    command = commands.add_parser("render", help="render a scene file", formatter_class=_Help)
     command.add_argument("scene", help="obj, ply, stl, glb or gltf file")
     command.add_argument("-o", "--output", default="out.png", help="png, jpg, exr, hdr or npy file to write")
-    command.add_argument("--spp", type=int, default=100, help="samples per pixel")
+    command.add_argument(
+        "--spp",
+        type=int,
+        help=f"samples per pixel (default: {DEFAULT_SPP}); the most there may be with --noise or --seconds",
+    )
+    command.add_argument("--noise", type=float, help="go on to this relative error, such as 0.02")
+    command.add_argument("--seconds", type=float, help="go on until this time is used")
+    command.add_argument("--filter", choices=FILTERS, default="box", help="spread of samples over a pixel")
     command.add_argument(
         "--size", type=_size, help="WIDTHxHEIGHT in pixels (default: the camera's, or 512x512)"
     )
@@ -109,6 +128,9 @@ def _render(options: argparse.Namespace) -> int:
             sampler=options.sampler,
             accel=options.accel,
             workers=options.workers,
+            noise=options.noise,
+            seconds=options.seconds,
+            filter=options.filter,
             progress=False if options.quiet else None,
         )
     for warning in caught:
@@ -138,9 +160,12 @@ def _camera(scene: Scene, options: argparse.Namespace) -> Camera:
 
 def _summary(image: Image, path: str) -> str:
     height, width = image.rgb.shape[:2]
-    seconds = image.metadata["seconds"]
-    rate = width * height * image.spp / max(seconds, 1e-9) / 1e6
-    return f"{path}: {width}x{height}, {image.spp} spp in {seconds:.1f} s ({rate:.2f} million samples/s)"
+    seconds, noise = image.metadata["seconds"], image.metadata["noise"]
+    rate = image.metadata["samples"] / max(seconds, 1e-9) / 1e6
+    return (
+        f"{path}: {width}x{height}, {image.spp} spp in {seconds:.1f} s ({rate:.2f} million samples/s), "
+        f"estimated error {'unknown' if np.isnan(noise) else f'{noise:.2%}'}"
+    )
 
 
 def _info(options: argparse.Namespace) -> int:
@@ -153,6 +178,16 @@ def _info(options: argparse.Namespace) -> int:
     for shape in scene.shapes:
         glow = "" if shape.emission is None else ", emits"
         print(f"  {shape!r} {type(shape.material).__name__}{glow}")
+    return 0
+
+
+def _compare(options: argparse.Namespace) -> int:
+    if options.output:
+        check_writable(options.output)
+    result = compare(options.picture, options.reference)
+    print(result)
+    if options.output:
+        result.difference.save(options.output)
     return 0
 
 
