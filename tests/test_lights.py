@@ -68,7 +68,7 @@ def test_light_columns_do_not_depend_on_their_neighbours(name: str) -> None:
 # --- Choice ---------------------------------------------------------------------------------------
 
 
-def table() -> LightTable:
+def table(choice: str = "place") -> LightTable:
     """All kinds of light together."""
     kinds = [
         triangles(),
@@ -76,27 +76,31 @@ def table() -> LightTable:
         PointLights(column(1, 2, 3), column(4, 5, 6)),
         ConstantEnvironment(column(1, 2, 3)),
     ]
-    return LightTable(kinds, scene_radius=2.0)
+    return LightTable(kinds, 2.0 / np.sqrt(3), choice)
 
 
 def test_choice_is_proportional_to_power() -> None:
     """π·A·L of a triangle, 4π²r²L of a sphere, 4πI of a point, 4π²R²L of an environment."""
-    lights = table()
+    lights = table("power")
     area = triangles().area.astype(float)
     power = np.concatenate(
         [np.pi * area * 2, 4 * np.pi**2 * np.array([0.8, 0.3]) ** 2, [4 * np.pi * 5, 4 * np.pi**2 * 8]]
     )
     assert len(lights) == 6
-    assert lights.choice.pmf(np.arange(6)) == pytest.approx(power / power.sum(), rel=1e-5)
+    assert lights.choice.pmf(np.arange(6), np.zeros((3, 6), f4)) == pytest.approx(
+        power / power.sum(), rel=1e-5
+    )
 
 
-def test_samples_of_a_table_are_those_of_the_chosen_light() -> None:
+@pytest.mark.parametrize("choice", ["place", "power", "uniform"])
+def test_samples_of_a_table_are_those_of_the_chosen_light(choice: str) -> None:
     """Every light is chosen as often as its probability says, which is part of the pdf."""
-    lights, n = table(), 1 << 16
+    lights, n = table(choice), 1 << 16
     point, u_choice, u = np.zeros((3, n), f4), (np.arange(n, dtype=f4) + f4(0.5)) / n, RNG.random((2, n), f4)
     sample, delta = lights.sample_li(point, u_choice, u)
-    chosen, chance, _ = lights.choice.sample(u_choice)
-    assert np.bincount(chosen, minlength=6) / n == pytest.approx(lights.choice.probability, abs=2 / n)
+    chosen, chance = lights.choice.sample(point, u_choice)
+    expected = lights.choice.pmf(np.arange(6), np.zeros((3, 6), f4))
+    assert np.bincount(chosen, minlength=6) / n == pytest.approx(expected, abs=2 / n)
     assert (delta == (chosen == 4)).all()
     some = np.flatnonzero((chosen != 4) & (sample.pdf > 0))
     again = lights.pdf_li(chosen[some], point[:, some], sample.wi[:, some])
@@ -110,7 +114,7 @@ def test_samples_of_a_table_are_those_of_the_chosen_light() -> None:
 def test_a_dark_light_is_never_chosen() -> None:
     """Its power is 0."""
     lights = LightTable([PointLights(np.zeros((3, 2), f4), np.array([[0, 1]] * 3, f4))], 1.0)
-    chosen, chance, _ = lights.choice.sample(RNG.random(1000, f4))
+    chosen, chance = lights.choice.sample(RNG.random((3, 1000), f4), RNG.random(1000, f4))
     assert (chosen == 1).all()
     assert (chance == 1).all()
 

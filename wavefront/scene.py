@@ -146,7 +146,7 @@ class CompiledScene:
     environment: int  # number of the environment light, -1 for none
 
 
-def compile_scene(scene: Scene, make_accelerator: Any) -> CompiledScene:
+def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "place") -> CompiledScene:
     """Gather a scene into flat arrays.
 
     Parameters
@@ -155,11 +155,13 @@ def compile_scene(scene: Scene, make_accelerator: Any) -> CompiledScene:
         What to render.
     make_accelerator
         Called with the `Geometry`; returns the `Accelerator`.
+    light_choice
+        How one light of many is chosen: "place", "power" or "uniform".
 
     Raises
     ------
     SceneError
-        If an emitting shape has no area.
+        If an emitting shape has no area, or the choice is unknown.
     """
     low, high = scene.bounds
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
@@ -168,7 +170,9 @@ def compile_scene(scene: Scene, make_accelerator: Any) -> CompiledScene:
     corners = [(mesh.vertices - centre)[mesh.faces] for mesh in meshes]
     triangles = np.concatenate(corners) if corners else np.zeros((0, 3, 3))
     user_materials, material_of = _number_materials(meshes, spheres)
-    lights, light_of, environment = _gather_lights(scene, meshes, spheres, corners, centre, radius)
+    lights, light_of, environment = _gather_lights(
+        scene, meshes, spheres, corners, centre, (high - low) / 2, light_choice
+    )
     centers = np.array([s.center - centre for s in spheres]).reshape(-1, 3).T.astype(f4)
     radii = np.array([s.radius for s in spheres]).astype(f4)
     geometry = Geometry(np.ascontiguousarray(triangles, f4), np.ascontiguousarray(centers), radii)
@@ -292,7 +296,8 @@ def _gather_lights(
     spheres: Sequence[Sphere],
     corners: Sequence[NDArray[np.float64]],
     centre: NDArray[np.float64],
-    radius: float,
+    half_size: NDArray[np.float64],
+    choice: str,
 ) -> tuple[LightTable, Ints, int]:
     """Return the table of lights, the light of each primitive, and the number of the environment."""
     user_lights = list(scene.lights)
@@ -334,7 +339,7 @@ def _gather_lights(
     environment = count if around else -1
     if around:
         add(type(around[0]), around)
-    return LightTable(kinds, radius), light_of, environment
+    return LightTable(kinds, half_size, choice), light_of, environment
 
 
 def _area_lights(

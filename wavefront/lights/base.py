@@ -50,3 +50,48 @@ class Light(Columns, ABC):
     @abstractmethod
     def power(self, scene_radius: float) -> NDArray[np.float64]:
         """Estimate the emitted power of each light, (k,), the mean of the channels, W."""
+
+    def irradiance(
+        self, centre: NDArray[np.float64], radius: float, scene_radius: float
+    ) -> NDArray[np.float64]:
+        """Estimate what each light brings to balls of space, W/m²; it guides the choice of a light.
+
+        Parameters
+        ----------
+        centre
+            (3, c) centres of the balls.
+        radius
+            Their radius, scene units.
+        scene_radius
+            Radius of the scene's bounding sphere.
+
+        Returns
+        -------
+        (c, k) irradiance, the mean of the channels. Here: that of a light which shines on the whole
+        scene alike.
+        """
+        alike = self.power(scene_radius) / (4 * np.pi * max(scene_radius, 1e-30) ** 2)
+        return np.broadcast_to(alike, (centre.shape[1], len(alike)))
+
+
+def facing_area(
+    centre: NDArray[np.float64],
+    radius: float,
+    middle: Floats,
+    normal: Floats,
+    size: Floats,
+    strength: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Irradiance at most that one-sided areas bring to balls of space, (c, k).
+
+    Parameters
+    ----------
+    centre, radius
+        (3, c) and scalar: the balls.
+    middle, normal, size, strength
+        (3, k), (3, k), (k,), (k,): the areas' middle, front normal, width, and radiance times area.
+    """
+    away = centre[:, :, None] - middle[:, None, :]
+    height = np.maximum((away * normal[:, None, :]).sum(0) + radius + size, 0)
+    distance = np.sqrt(np.maximum((away**2).sum(0), np.maximum(size, radius) ** 2))
+    return strength * np.minimum(height / distance, 1) / distance**2

@@ -5,38 +5,66 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from ..sampling.discrete import Discrete
+from ..errors import SceneError
 from ..vec import ALL, Bools, Floats, Ints, Lanes, columns, f4
 from .base import Light, LightSample
+from .choice import ByPlace, EverywhereAlike, LightChoice
+
+CHOICES = ("place", "power", "uniform")
 
 
 class LightTable:
     """Lights of several kinds, numbered through: kind by kind, column by column.
 
-    One light is chosen with a probability proportional to its estimated power; that probability
-    is part of every pdf returned here.
+    One light is chosen per point; the probability of the choice is part of every pdf returned here.
 
     Parameters
     ----------
     kinds
         One record per kind of light; a record holds all lights of that kind.
-    scene_radius
-        Radius of the scene's bounding sphere, scene units.
+    half_size
+        Half of the scene's extent along each axis (3,), or along all; scene units. The scene's
+        middle is the origin.
+    choice
+        "place" weighs lights by what they bring to a point's surroundings, "power" by their
+        estimated power alone, "uniform" not at all.
+
+    Raises
+    ------
+    SceneError
+        If the choice is unknown.
     """
 
-    def __init__(self, kinds: Sequence[Light], scene_radius: float) -> None:
+    def __init__(self, kinds: Sequence[Light], half_size: ArrayLike, choice: str = "place") -> None:
         self.kinds = tuple(kinds)
         self.starts = np.cumsum([0, *(len(kind) for kind in kinds)])
         self.kind_of = np.repeat(np.arange(len(kinds)), [len(kind) for kind in kinds])
         self.delta_of = np.array([kind.delta for kind in kinds], np.bool_)[self.kind_of]
-        power = [kind.power(scene_radius) for kind in kinds]
-        weights = np.concatenate(power) if power else np.zeros(0)
-        self.choice = Discrete(weights) if weights.any() else None  # None: nothing shines
+        self.choice = self._make_choice(np.broadcast_to(np.asarray(half_size, float), 3), choice)
 
     def __len__(self) -> int:
         """Return the number of lights."""
         return int(self.starts[-1])
+
+    def _make_choice(self, half_size: NDArray[np.float64], choice: str) -> LightChoice | None:
+        """Return the choice by name; None when nothing shines."""
+        if choice not in CHOICES:
+            raise SceneError(f"light_choice is {choice!r}; it must be one of {', '.join(CHOICES)}")
+        scene_radius = float(np.linalg.norm(half_size))
+        power = np.concatenate([np.zeros(0), *(kind.power(scene_radius) for kind in self.kinds)])
+        if not power.any():
+            return None
+        if choice == "uniform":
+            return EverywhereAlike((power > 0).astype(float))
+        if choice == "power" or np.count_nonzero(power) == 1:
+            return EverywhereAlike(power)
+
+        def irradiance(centre: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
+            return np.concatenate([kind.irradiance(centre, radius, scene_radius) for kind in self.kinds], 1)
+
+        return ByPlace(-half_size, half_size, irradiance, power)
 
     def sample_li(self, point: Floats, u_choice: Floats, u: Floats) -> tuple[LightSample, Bools]:
         """Choose a light for each point (3, n) with u_choice (n,) and sample it with u (2, n).
@@ -49,7 +77,7 @@ class LightTable:
             (n,) whether the light is one that no BSDF sample can meet.
         """
         assert self.choice is not None
-        light, chance, _ = self.choice.sample(u_choice)
+        light, chance = self.choice.sample(point, u_choice)
         sample = self._sample_each(light, point, u)
         sample.pdf = sample.pdf * chance
         return sample, self.delta_of.take(light)
@@ -61,7 +89,7 @@ class LightTable:
         pdf = np.empty(len(light), f4)
         for kind, rows in self._by_kind(light):
             pdf[rows] = kind.pdf_li(columns(point, rows), columns(wi, rows))
-        return pdf * self.choice.pmf(light)
+        return pdf * self.choice.pmf(light, point)
 
     def le(self, light: Ints, wi: Floats) -> Floats:
         """Radiance (3, n) of the lights numbered `light` (n,) against wi (3, n)."""

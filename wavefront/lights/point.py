@@ -43,6 +43,13 @@ class PointLights(Light):
         """4πI."""
         return 4 * np.pi * self.intensity.mean(0, dtype=np.float64)
 
+    def irradiance(
+        self, centre: NDArray[np.float64], radius: float, scene_radius: float
+    ) -> NDArray[np.float64]:
+        """I/d², with d at least the radius of the ball; (c, k)."""
+        away = self.position[:, None, :] - centre[:, :, None]
+        return self.intensity.mean(0, dtype=np.float64) / np.maximum((away**2).sum(0), radius**2)
+
 
 class PointLight:
     """A point that shines equally in all directions.

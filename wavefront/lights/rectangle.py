@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..sampling.spherical import SphericalRectangle
 from ..vec import Bools, Floats, Ints, dot, f4
-from .base import Light, LightSample
+from .base import Light, LightSample, facing_area
 
 NEAR = f4(2)  # squared distance, in areas, within which solid angle is sampled
 SQUARE = 1e-6  # how far, relative to its sides, a pair of triangles may be from a rectangle
@@ -95,8 +95,15 @@ class RectangleLights(Light):
 
     def power(self, scene_radius: float) -> NDArray[np.float64]:
         """π·A·L."""
-        sides = dot(self.edge_u, self.edge_u).astype(float), dot(self.edge_v, self.edge_v).astype(float)
-        return np.pi * np.sqrt(sides[0] * sides[1]) * self.radiance.mean(0, dtype=np.float64)
+        return np.pi * self._area() * self.radiance.mean(0, dtype=np.float64)
+
+    def irradiance(
+        self, centre: NDArray[np.float64], radius: float, scene_radius: float
+    ) -> NDArray[np.float64]:
+        """L·A·cosθ/d² of a small area at the middle; (c, k)."""
+        middle = self.corner + (self.edge_u + self.edge_v) / 2
+        strength = self._area() * self.radiance.mean(0, dtype=np.float64)
+        return facing_area(centre, radius, middle, self.normal, np.sqrt(self._area()), strength)
 
 
 def first_of_pairs(triangles: NDArray[np.float64]) -> Ints:

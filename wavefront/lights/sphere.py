@@ -58,6 +58,15 @@ class SphereLights(Light):
         """4πr²·π·L of the outside."""
         return 4 * np.pi**2 * self.radius.astype(np.float64) ** 2 * self.radiance.mean(0, dtype=np.float64)
 
+    def irradiance(
+        self, centre: NDArray[np.float64], radius: float, scene_radius: float
+    ) -> NDArray[np.float64]:
+        """π·L·(r/d)², with d at least r and the radius of the ball; (c, k)."""
+        away = self.center[:, None, :] - centre[:, :, None]
+        size = self.radius.astype(np.float64)
+        strength = np.pi * size**2 * self.radiance.mean(0, dtype=np.float64)
+        return strength / np.maximum((away**2).sum(0), np.maximum(size, radius) ** 2)
+
     def _towards(self, point: Floats) -> tuple[Floats, Floats]:
         """Return the unit axis (3, n) and the distance (n,) to the centre."""
         axis = self.center - point

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..sampling.warp import uniform_triangle
 from ..vec import Floats, cross, dot, f4
-from .base import Light, LightSample
+from .base import Light, LightSample, facing_area
 
 
 @dataclass(slots=True)
@@ -74,3 +74,11 @@ class TriangleLights(Light):
     def power(self, scene_radius: float) -> NDArray[np.float64]:
         """π·A·L."""
         return np.pi * self.area * self.radiance.mean(0, dtype=np.float64)
+
+    def irradiance(
+        self, centre: NDArray[np.float64], radius: float, scene_radius: float
+    ) -> NDArray[np.float64]:
+        """L·A·cosθ/d² of a small area at the middle; (c, k)."""
+        middle = self.corner + (self.edge1 + self.edge2) / 3
+        strength = self.area * self.radiance.mean(0, dtype=np.float64)
+        return facing_area(centre, radius, middle, self.normal, np.sqrt(self.area), strength)
