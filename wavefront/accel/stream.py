@@ -22,6 +22,7 @@ from .traverse import (
     Words,
     blocks,
     bounding_ball,
+    flat_true,
     prepare,
     scratch,
     slab_table,
@@ -30,7 +31,7 @@ from .traverse import (
 )
 from .triangle import ROUNDOFF, Doubles
 
-BATCH = 1 << 15  # rays traced at a time: their temporaries stay in the cache
+BATCH = 1 << 14  # rays traced at a time without a tree: their temporaries stay in the cache
 DECIDE = 1 << 13  # candidates decided at a time
 SMALL = 128  # up to so many primitives, all are tested without a tree
 WIDTH = 32
@@ -154,20 +155,38 @@ class _Triangles:
         tree = self.tree
         assert tree is not None
         size = tree.leaf_size
-        batch = Candidates(lambda *found_: self._decide(lanes, found, *found_))
-        for leaves, block_lanes in blocks(leaf, lane, len(table) - 1, CHUNK // (3 * size * BLOCK)):
-            rays = table.take(block_lanes, 0).reshape(-1, BLOCK, 16)[:, :, LINE]
-            shape = (leaves.size, 3 * size, BLOCK)
-            matrices = np.take(tree.leaves, leaves, 0, out=scratch("leaves", (*shape[:2], 6)), mode="clip")
-            edges = np.matmul(matrices, rays.transpose(0, 2, 1), out=scratch("product", shape))
-            value = _one_sign(edges.reshape(-1, 3, size, BLOCK))
-            at = np.flatnonzero(np.greater_equal(value, -1, out=scratch("mask", value.shape, np.bool_)))
-            pair = at >> BLOCK_SHIFT
-            block = pair // size
-            slot = leaves.take(block) * size + (pair & (size - 1))
-            lane = block_lanes.take((block << BLOCK_SHIFT) + (at & (BLOCK - 1)))
-            batch.add(slot, lane, value[block, pair & (size - 1), at & (BLOCK - 1)])
+        leaves, block_lanes = blocks(leaf, lane, len(table) - 1)
+        step = max(1, CHUNK // (3 * size * BLOCK))
+        rays = table.take(block_lanes, 0).reshape(-1, BLOCK, 16)[:, :, LINE].transpose(0, 2, 1)
+        batch = Candidates(lambda at, value: self._decide_pairs(lanes, found, leaves, block_lanes, at, value))
+        for start in range(0, leaves.size, step):
+            chosen = leaves[start : start + step]
+            shape = (chosen.size, 3 * size, BLOCK)
+            matrices = np.take(tree.leaves, chosen, 0, scratch("leaves", (*shape[:2], 6)), "clip")
+            edges = np.matmul(matrices, rays[start : start + step], out=scratch("product", shape))
+            value = _one_sign(edges.reshape(-1, 3, size, BLOCK), scratch("value", (chosen.size, size, BLOCK)))
+            at = flat_true(np.greater_equal(value, -1, out=scratch("mask", value.shape, np.bool_)))
+            value = value.reshape(-1).take(at)
+            at += start * (size * BLOCK)
+            batch.add(at, value)
         batch.flush()
+
+    def _decide_pairs(
+        self,
+        lanes: Lanes,
+        found: _Closest | _Occluded,
+        leaves: Ints,
+        block_lanes: Ints,
+        at: Ints,
+        value: Floats,
+    ) -> None:
+        """Decide candidates at flat places `at` (k,) of the product (blocks, leaf size, BLOCK)."""
+        assert self.tree is not None
+        size = self.tree.leaf_size
+        pair = at >> BLOCK_SHIFT
+        block = pair // size
+        slot = leaves.take(block) * size + (pair & (size - 1))
+        self._decide(lanes, found, slot, block_lanes.take((block << BLOCK_SHIFT) + (at & (BLOCK - 1))), value)
 
     def _search_all(self, lanes: Lanes, found: _Closest | _Occluded) -> None:
         if not self.ids.size:
@@ -179,12 +198,12 @@ class _Triangles:
             k = min(step, n - at)
             line = lanes.line[:, at : at + k]
             edges = np.matmul(self.rows, line, out=scratch("product", (3 * m, k)))
-            value = _one_sign(edges.reshape(1, 3, m, k))[0]
+            value = _one_sign(edges.reshape(1, 3, m, k), scratch("value", (1, m, k)))[0]
             if lanes.local is not None:
                 side = np.matmul(self.side, lanes.local[:, at : at + k], out=scratch("side", (m, k)))
                 side *= edges[m : 2 * m]
                 np.minimum(value, side, out=value)
-            hit = np.flatnonzero(np.greater_equal(value, -1, out=scratch("mask", (m, k), np.bool_)))
+            hit = flat_true(np.greater_equal(value, -1, out=scratch("mask", (m, k), np.bool_)))
             slot, lane = np.divmod(hit, k)
             batch.add(slot, lane + at, value.reshape(-1).take(hit))
         batch.flush()
@@ -236,7 +255,7 @@ class _Spheres:
             step = max(64, min(4096, CHUNK // k))
             for at in range(0, n, step):
                 value = self.rows @ features[:, at : at + step]
-                hit = np.flatnonzero(value >= -1)
+                hit = flat_true(value >= -1)
                 slot, lane = np.divmod(hit, value.shape[-1])
                 self._decide(lanes, found, slot, lane + at)
             return
@@ -247,14 +266,17 @@ class _Spheres:
 
         def visit(leaf: Ints, lane: Ints) -> None:
             size = tree.leaf_size
-            for leaves, block_lanes in blocks(leaf, lane, len(table) - 1, CHUNK // (size * BLOCK)):
-                rays = columns.take(block_lanes, 0).reshape(-1, BLOCK, 12)[:, :, :11]
-                value = tree.leaves.take(leaves, 0) @ rays.transpose(0, 2, 1)
-                at = np.flatnonzero(value >= -1)
+            leaves, block_lanes = blocks(leaf, lane, len(table) - 1)
+            rays = columns.take(block_lanes, 0).reshape(-1, BLOCK, 12)[:, :, :11].transpose(0, 2, 1)
+            step = max(1, CHUNK // (size * BLOCK))
+            for start in range(0, leaves.size, step):
+                chosen = leaves[start : start + step]
+                value = np.matmul(tree.leaves.take(chosen, 0), rays[start : start + step])
+                at = flat_true(value >= -1)
                 pair = at >> BLOCK_SHIFT
                 block = pair // size
-                slot = leaves.take(block) * size + (pair & (size - 1))
-                lane = block_lanes.take(block * BLOCK + (at & (BLOCK - 1)))
+                slot = chosen.take(block) * size + (pair & (size - 1))
+                lane = block_lanes.take(((block + start) << BLOCK_SHIFT) + (at & (BLOCK - 1)))
                 self._decide(lanes, found, tree.prim.take(slot), lane)
 
         trace(tree, table, found.bound, visit)
@@ -270,11 +292,21 @@ class _Spheres:
         found.add(lane, ids, t)
 
 
-def _one_sign(edges: Floats) -> Floats:
-    """Edge functions (b, 3, m, k) -> min(w0 w1, w1 w2): above 0 where the three have one sign."""
+def _one_sign(edges: Floats, out: Floats) -> Floats:
+    """Edge functions (b, 3, m, k) -> min(w0 w1, w1 w2): above 0 where the three have one sign.
+
+    Overwrites the first and last.
+    """
     first = np.multiply(edges[:, 0], edges[:, 1], out=edges[:, 0])
     last = np.multiply(edges[:, 1], edges[:, 2], out=edges[:, 2])
-    return np.minimum(first, last, out=first)
+    return np.minimum(first, last, out=out)
+
+
+def _batch_size(leaves: int) -> int:
+    """Rays to trace at a time: enough to fill the blocks of each leaf, few enough for the cache."""
+    if not leaves:
+        return BATCH
+    return 2 * BATCH if leaves < 1024 else 16 * BATCH
 
 
 class NumpyAccelerator:
@@ -290,13 +322,15 @@ class NumpyAccelerator:
         with np.errstate(all="ignore"):
             self._triangles = _Triangles(triangles, self._ball, leaf_size)
             self._spheres = _Spheres(centers, radii, self._ball, len(triangles), leaf_size)
+        leaves = sum(len(part.tree.leaves) for part in (self._triangles, self._spheres) if part.tree)
+        self._batch = _batch_size(leaves)
 
     def closest(self, origin: Floats, direction: Floats, leaving: Ints) -> Intersections:
         """Find the nearest hit with t > 0 of rays (3, n); ties go to the lowest id."""
         n = origin.shape[1]
         hits = Intersections(np.empty(n, f4), np.empty(n, np.intp), np.empty(n, f4), np.empty(n, f4))
-        for at in range(0, n, BATCH):
-            part = slice(at, at + BATCH)
+        for at in range(0, n, self._batch):
+            part = slice(at, at + self._batch)
             with np.errstate(all="ignore"):
                 lanes = prepare(origin[:, part], direction[:, part], leaving[part], self._ball)
                 found = _Closest(lanes)
@@ -308,8 +342,8 @@ class NumpyAccelerator:
     def occluded(self, origin: Floats, direction: Floats, distance: Floats, leaving: Ints) -> Bools:
         """Tell whether anything is hit with 0 < t < `distance` (n,)."""
         blocked = np.empty(origin.shape[1], bool)
-        for at in range(0, blocked.size, BATCH):
-            part = slice(at, at + BATCH)
+        for at in range(0, blocked.size, self._batch):
+            part = slice(at, at + self._batch)
             with np.errstate(all="ignore"):
                 lanes = prepare(origin[:, part], direction[:, part], leaving[part], self._ball)
                 found = _Occluded(lanes, distance[part])
@@ -327,7 +361,8 @@ class NumpyAccelerator:
         b1[...] = 0
         b2[...] = 0
         on = np.flatnonzero((prim < self._first_sphere) & ~missed)
-        origin = lanes.origin.take(on, 1).astype(np.float64)
-        direction = lanes.direction.take(on, 1).astype(np.float64)
+        everywhere = on.size == key.size
+        origin = (lanes.origin if everywhere else lanes.origin.take(on, 1)).astype(np.float64)
+        direction = (lanes.direction if everywhere else lanes.direction.take(on, 1)).astype(np.float64)
         b1[on], b2[on] = triangle.barycentrics(self._triangles.table, prim.take(on), origin, direction)
         hits.prim[part] = np.where(missed, -1, prim)

@@ -12,14 +12,14 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..vec import Floats, Ints, f4
+from ..vec import Bools, Floats, Ints, f4
 from .build import Tree, build_tree
 from .triangle import ROUNDOFF, Doubles
 
@@ -46,6 +46,11 @@ def scratch(name: str, shape: tuple[int, ...], dtype: type = f4) -> NDArray[Any]
         held = np.empty(size, dtype)
         setattr(_memory, name, held)
     return held[:size].reshape(shape)
+
+
+def flat_true(mask: Bools) -> Ints:
+    """Return the flat indices of what is true in a contiguous mask."""
+    return mask.reshape(-1).nonzero()[0]
 
 
 @dataclass(slots=True)
@@ -184,7 +189,7 @@ def trace(
     key = (lane << 32) | (bits & ~np.int64(tree.width - 1)) | code
     key.sort()
     owner = key >> 32
-    first = np.flatnonzero(np.diff(owner, prepend=-1))
+    first = _firsts(owner)
     last = np.append(first[1:], key.size)
     at = first
     for round_ in range(ROUNDS + 1):
@@ -236,7 +241,7 @@ def _boxes_met(planes: Floats, far: Floats) -> tuple[Ints, Floats]:
     np.minimum(leave, planes[:, 5], out=leave)
     np.minimum(leave, far[:, None], out=leave)
     met = np.less_equal(near, leave, out=scratch("mask", near.shape, np.bool_))
-    return np.flatnonzero(met), near
+    return flat_true(met), near
 
 
 def _descend(
@@ -267,40 +272,47 @@ def _expand(
 ) -> tuple[Ints, Ints]:
     """Pairs of inner node and lane -> pairs of met child's code and lane."""
     width = tree.width
-    codes, lanes = [], []
-    for nodes, block_lanes in blocks(node, lane, len(table) - 1, CHUNK // (6 * width * BLOCK)):
-        rays = table.take(block_lanes, 0).reshape(-1, BLOCK, 16)[:, :, SLAB]
-        shape = (nodes.size, 6 * width, BLOCK)
-        matrices = np.take(tree.slabs, nodes, 0, out=scratch("nodes", (*shape[:2], 9)), mode="clip")
-        planes = np.matmul(matrices, rays.transpose(0, 2, 1), out=scratch("product", shape))
-        far = bound(block_lanes).reshape(-1, BLOCK)
-        hit, _ = _boxes_met(planes.reshape(-1, 6, width, BLOCK), far)
-        pair = hit >> BLOCK_SHIFT
-        block, slot = pair // width, pair & (width - 1)
-        codes.append(tree.child.take(nodes.take(block) * width + slot))
-        lanes.append(block_lanes.take(block * BLOCK + (hit & (BLOCK - 1))))
-    return np.concatenate(codes), np.concatenate(lanes)
+    nodes, block_lanes = blocks(node, lane, len(table) - 1)
+    rays = table.take(block_lanes, 0).reshape(-1, BLOCK, 16)[:, :, SLAB].transpose(0, 2, 1)
+    far = bound(block_lanes).reshape(-1, BLOCK)
+    step = max(1, CHUNK // (6 * width * BLOCK))
+    hits = []
+    for start in range(0, nodes.size, step):
+        part = slice(start, start + step)
+        shape = (nodes[part].size, 6 * width, BLOCK)
+        matrices = np.take(tree.slabs, nodes[part], 0, scratch("nodes", (*shape[:2], 9)), "clip")
+        planes = np.matmul(matrices, rays[part], out=scratch("product", shape))
+        hit, _ = _boxes_met(planes.reshape(-1, 6, width, BLOCK), far[part])
+        hit += start * (width * BLOCK)
+        hits.append(hit)
+    hit = np.concatenate(hits)
+    pair = hit >> BLOCK_SHIFT
+    block = pair // width
+    code = tree.child.take(nodes.take(block) * width + (pair & (width - 1)))
+    return code, block_lanes.take((block << BLOCK_SHIFT) + (hit & (BLOCK - 1)))
 
 
-def blocks(node: Ints, lane: Ints, unused: int, at_once: int) -> Iterator[tuple[Ints, Ints]]:
+def blocks(node: Ints, lane: Ints, unused: int) -> tuple[Ints, Ints]:
     """Sort pairs by node and cut them into blocks of one node and BLOCK lanes each.
 
-    Yields the nodes (b,) and lanes (b * BLOCK,) of at most `at_once` blocks; places that are left over
-    hold lane `unused`.
+    Returns the nodes (b,) and lanes (b * BLOCK,); places that are left over hold lane `unused`.
     """
-    if not node.size:
-        return
     key = (node << 32) | lane
     key.sort()
     node, lane = key >> 32, key & 0xFFFFFFFF
-    first = np.flatnonzero(np.diff(node, prepend=-1))
+    first = _firsts(node)
     count = np.diff(first, append=node.size)
-    needed = -(-count // BLOCK)
+    needed = (count + (BLOCK - 1)) >> BLOCK_SHIFT
     begin = np.cumsum(needed) - needed
-    place = np.arange(node.size) + np.repeat(begin * BLOCK - first, count)
+    place = np.arange(node.size) + np.repeat((begin << BLOCK_SHIFT) - first, count)
     lanes = np.full(int(needed.sum()) * BLOCK, unused)
     lanes[place] = lane
-    nodes = np.repeat(node.take(first), needed)
-    for at in range(0, nodes.size, max(1, at_once)):
-        stop = at + max(1, at_once)
-        yield nodes[at:stop], lanes[at * BLOCK : stop * BLOCK]
+    return np.repeat(node.take(first), needed), lanes
+
+
+def _firsts(values: Ints) -> Ints:
+    """Return where runs of equal values begin."""
+    begins = np.empty(values.size, bool)
+    begins[:1] = True
+    np.not_equal(values[1:], values[:-1], out=begins[1:])
+    return flat_true(begins)

@@ -69,7 +69,7 @@ def edge_rows(triangles: Floats, center: Floats, radius: float) -> Floats:
     min(w0 w1, w1 w2) > -1, and if that is above 1, it truly hits. For an error of at most e in each w,
     and as hits have 0 <= |w| <= 2A (twice the area), the products are above -e (2A + e).
     """
-    corner = triangles.transpose(1, 0, 2) - np.asarray(center, np.float64)
+    corner: Doubles = triangles.transpose(1, 0, 2).astype(np.float64) - center
     following = corner[[1, 2, 0]]
     direction = following - corner
     moment = np.cross(corner, following)
@@ -85,7 +85,7 @@ def side_rows(triangles: Floats, center: Floats, radius: float) -> Floats:
     ahead of the ray. It is scaled so that its product with w1 (see `edge_rows`) is above -1 for every
     true hit from within two radii of the centre, and above 1 only if the two signs agree.
     """
-    corner = triangles.transpose(1, 0, 2) - np.asarray(center, np.float64)
+    corner: Doubles = triangles.transpose(1, 0, 2).astype(np.float64) - center
     normal = np.cross(corner[1] - corner[0], corner[2] - corner[0])
     offset = (normal * corner[0]).sum(1)
     rows = np.concatenate([-normal, offset[:, None]], 1)
