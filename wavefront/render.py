@@ -21,6 +21,7 @@ from .filters import FILTERS
 from .integrators import INTEGRATORS
 from .io.load import from_trimesh, load
 from .lights import PointLight
+from .lights.choose import CHOICES as LIGHT_CHOICES
 from .parallel import run_ordered, worker_count
 from .progress import Bar, Progress
 from .sampling.sampler import make_sampler
@@ -48,6 +49,7 @@ def render(
     noise: float | None = None,
     seconds: float | None = None,
     filter: str = "box",
+    light_choice: str = "place",
     wave_size: int = WAVE_LANES,
     progress: Progress = None,
 ) -> Image:
@@ -83,6 +85,9 @@ def render(
     filter
         How the samples of a pixel are spread: "box" (evenly over the pixel), "tent" (radius 1
         pixel) or "gaussian" (σ 0.5 pixels, cut off at 1.5 from the centre).
+    light_choice
+        How one light of many is chosen at a point: "place" weighs what each brings there, "power"
+        its power alone, "uniform" nothing.
     wave_size
         The most paths that are traced together by one worker; the picture does not depend on it.
     progress
@@ -107,13 +112,14 @@ def render(
     estimate = INTEGRATORS[_one_of("integrator", integrator, INTEGRATORS)]
     spread = FILTERS[_one_of("filter", filter, FILTERS)]
     accel = _one_of("accel", accel, CHOICES)
+    light_choice = _one_of("light_choice", light_choice, LIGHT_CHOICES)
     make_sampler(sampler, seed)  # checks both before the scene is read
     threads = worker_count(workers)
     subject = as_scene(scene)
     camera = subject.camera or subject.framing_camera()
     draw = make_sampler(sampler, seed, camera.film[0])
     _warn_unseen_lights(subject, integrator)
-    compiled = compile_scene(subject, lambda geometry: make_accelerator(geometry, accel))
+    compiled = compile_scene(subject, lambda geometry: make_accelerator(geometry, accel), light_choice)
     trace = partial(trace_piece, compiled, camera, draw, spread, estimate, max_bounces)
 
     film, clock = Film(*camera.size), Clock(begin, seconds, wave_size, threads)
