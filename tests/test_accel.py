@@ -284,7 +284,7 @@ def test_rays_along_axes_with_either_zero(subdivisions: int) -> None:
             direction[axis] = np.where(np.arange(n) % 2, 1, -1)
             hits = accelerator.closest(origin, direction, nothing(n))
             assert (hits.prim >= 0).all()
-            assert (hits.t < 1.01).all()
+            assert (hits.t < 1.41).all()
 
 
 def test_rays_on_the_faces_of_boxes() -> None:
@@ -417,7 +417,7 @@ def test_embree_agrees() -> None:
     )
     np.testing.assert_array_equal(np.isfinite(ours.t), np.isfinite(theirs.t))
     hit = np.isfinite(ours.t)
-    np.testing.assert_allclose(ours.t[hit], theirs.t[hit], rtol=2e-6)
+    np.testing.assert_allclose(ours.t[hit], theirs.t[hit], rtol=2e-6, atol=1e-7)
     assert (ours.prim != theirs.prim).sum() <= 2  # on an edge
     same = ours.prim == theirs.prim
     np.testing.assert_allclose(ours.b1[same], theirs.b1[same], atol=1e-4)

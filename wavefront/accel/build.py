@@ -76,7 +76,8 @@ def build_tree(low: Floats, high: Floats, leaf_size: int, width: int) -> Tree:
 
 def _area(low: Floats, high: Floats) -> Floats:
     """Half the surface area of boxes (3, ...)."""
-    x, y, z = np.maximum(high - low, 0)
+    with np.errstate(over="ignore"):  # of empty boxes
+        x, y, z = np.maximum(high - low, 0)
     return x * y + y * z + z * x
 
 

@@ -87,7 +87,7 @@ def prepare(origin: Floats, direction: Floats, leaving: Ints, ball: Ball) -> Lan
 
     They are float32 while all origins are within two radii. Beyond, o - center loses what matters, and
     they are computed in float64; as distances from far away lose it too, those rays' slab distances
-    count from the point nearest to the centre.
+    count from two radii before the point nearest to the centre.
     """
     center = ball.center[:, None]
     local: NDArray[Any] = origin - center
@@ -104,7 +104,7 @@ def prepare(origin: Floats, direction: Floats, leaving: Ints, ball: Ball) -> Lan
     line[4] = z * ux - x * uz
     line[5] = x * uy - y * ux
     if far:
-        begin = -(x * ux + y * uy + z * uz)
+        begin = -(x * ux + y * uy + z * uz) - 2 * ball.radius
         return Lanes(origin, direction, leaving, line, speed.astype(f4), None, begin)
     homogeneous = np.ones((4, speed.size), f4)
     homogeneous[:3] = local
