@@ -47,7 +47,8 @@ def furnaces(size: int) -> list[tuple[str, wf.Scene, float]]:
         # light that has bounced k times is the emission times reflectance^k: the sum is 1/(1-reflectance)
         ("closed box, Le = 1, reflectance 0.5", wf.Scene(box(0.5), camera=inside(size)), 2.0),
         ("closed box, Le = 1, reflectance 0.8", wf.Scene(box(0.8), camera=inside(size)), 5.0),
-        # the light at the centre sends irradiance pi to the whole wall; of it 0.5/pi comes back, again and again
+        # the light at the centre sends irradiance pi to the whole wall; half of
+        # it is scattered, evenly, again and again
         (
             "unit sphere from inside, point light pi",
             wf.Scene([wf.Sphere((0, 0, 0), 1, material=grey)], [point], inside(size)),

@@ -1,0 +1,91 @@
+"""Every Python block of the README and the documents runs, and no link leads nowhere."""
+
+import re
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wavefront as wf
+
+ROOT = Path(__file__).parents[1]
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"\]\(([^)#]+)(#[^)]*)?\)")
+MOST_SPP = 1
+
+
+def blocks():
+    for document in DOCUMENTS:
+        for number, match in enumerate(BLOCK.finditer(document.read_text("utf-8"))):
+            line = document.read_text("utf-8")[: match.start(1)].count("\n") + 1
+            name = f"{document.name}-{number}"
+            yield pytest.param(document, line, match[1], id=name)
+
+
+@pytest.mark.parametrize(("document", "line", "code"), list(blocks()))
+def test_block_runs(document, line, code, tmp_path, monkeypatch):
+    render = wf.render
+
+    def quick(scene, spp=MOST_SPP, **options):
+        return render(scene, min(spp, MOST_SPP), progress=False, **options)
+
+    monkeypatch.setattr(wf, "render", quick)
+    monkeypatch.chdir(tmp_path)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="the scene has no light")
+        exec(compile("\n" * (line - 1) + code, str(document), "exec"), {"__name__": "__main__"})
+    for picture in tmp_path.iterdir():
+        assert picture.stat().st_size > 100
+
+
+def test_there_are_blocks_to_run():
+    assert len(list(blocks())) >= 9
+
+
+@pytest.mark.parametrize("document", [*DOCUMENTS, ROOT / "CHANGELOG.md"], ids=lambda path: path.name)
+def test_links_lead_somewhere(document):
+    links = [match[1] for match in LINK.finditer(document.read_text("utf-8"))]
+    missing = [link for link in links if ":" not in link and not (document.parent / link).exists()]
+    assert missing == []
+
+
+def test_every_public_name_is_written_about():
+    text = "\n".join(document.read_text("utf-8") for document in DOCUMENTS)
+    missing = [name for name in wf.__all__ if not re.search(rf"\b{name}\b", text)]
+    assert missing == []
+
+
+def test_names_in_the_documents_exist():
+    text = "\n".join(document.read_text("utf-8") for document in DOCUMENTS)
+    for dotted in set(re.findall(r"\bwf((?:\.[A-Za-z_]\w*)+)", text)):
+        thing = wf
+        for part in dotted[1:].split("."):
+            assert hasattr(thing, part), f"wf{dotted}"
+            thing = getattr(thing, part)
+
+
+def test_commands_of_the_readme_are_single_lines():
+    lines = (ROOT / "README.md").read_text("utf-8").splitlines()
+    for name in ("render", "tests"):
+        at = lines.index(f"<!-- command: {name} -->")
+        assert lines[at + 1] == "```sh"
+        assert lines[at + 2].startswith("python3 -m venv .venv && .venv/bin/pip install -q ")
+        assert lines[at + 3] == "```"
+
+
+def test_pictures_are_small_and_are_pictures():
+    pictures = sorted((ROOT / "docs").glob("*.png"))
+    assert pictures
+    for picture in pictures:
+        assert picture.stat().st_size < 300_000, picture.name
+        assert picture.read_bytes().startswith(b"\x89PNG"), picture.name
+
+
+def test_the_conventions_hold_for_the_constant_environment():
+    """The claim on conventions.md: a floor of reflectance 0.5 in an environment of 1 is 0.5."""
+    floor = wf.Rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2), material=wf.Diffuse(0.5))
+    camera = wf.Camera.look_at((0, 1, 0), (0, 0, 0), up=(0, 0, -1), fov=20, size=(8, 8))
+    image = wf.render(wf.Scene(floor, [wf.Environment(1)], camera), spp=64, progress=False)
+    assert np.abs(image.rgb.mean() - 0.5) < 0.01
