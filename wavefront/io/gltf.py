@@ -319,26 +319,49 @@ def _triangles(where: str, indices: NDArray[np.intp], mode: int) -> NDArray[np.i
 
 
 def _add_camera(document: Document, out: Contents, index: int, matrix: Matrix) -> None:
-    camera = document.get("cameras", index)
-    if camera.get("type") != "perspective" or out.camera is not None:
-        what = "further cameras" if out.camera is not None else f"{camera.get('type')} camera"
-        document.lose(what, f"cameras[{index}]")
+    if out.camera is not None:
+        document.lose("further cameras", f"cameras[{index}]")
         return
-    lens = camera.get("perspective", {})
-    where = f"{document.name}: cameras[{index}]"
-    fov = floats(where + ".yfov", [lens.get("yfov", 0)], 1)[0]
-    aspect = floats(where + ".aspectRatio", [lens.get("aspectRatio", 1)], 1)[0]
-    if not 0 < fov < np.pi or not 1e-3 < aspect < 1e2:
-        raise SceneError(f"{where} has yfov {fov:g} and aspectRatio {aspect:g}; both must be above 0")
-    out.camera = camera_at(matrix, float(np.degrees(fov)), float(aspect))
+    try:
+        out.camera = _camera(document.get("cameras", index), matrix)
+    except SceneError as error:
+        raise SceneError(f"{document.name}: cameras[{index}]: {error}") from error
+
+
+def _camera(camera: dict[str, Any], matrix: Matrix) -> Camera:
+    kind = str(camera.get("type"))
+    lens = camera.get(kind, {})
+    if kind == "perspective":
+        fov, aspect = _positive(lens, "yfov", None), _positive(lens, "aspectRatio", 1)
+        return camera_at(matrix, float(np.degrees(fov)), aspect)
+    if kind == "orthographic":
+        half_width, half_height = _positive(lens, "xmag", None), _positive(lens, "ymag", None)
+        size = _size(half_width / half_height)
+        return Camera.orthographic(*_pose(matrix), height=2 * half_height, size=size)
+    raise SceneError(f"type is {kind!r}; it must be 'perspective' or 'orthographic'")
 
 
 def camera_at(matrix: Matrix, fov: float, aspect: float) -> Camera:
     """Return a camera from its matrix to world space (it looks along -z, y is up), fov in degrees."""
+    origin, target, up = _pose(matrix)
+    return Camera.look_at(origin, target, up, fov=fov, size=_size(aspect))
+
+
+def _pose(matrix: Matrix) -> tuple[Matrix, Matrix, Matrix]:
+    """Return where a camera is, what it looks at, and what is up; a scale of its node has no say."""
     origin = matrix[:3, 3]
-    ahead = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
-    size = (max(1, round(HEIGHT * aspect)), HEIGHT)
-    return Camera.look_at(origin, origin - ahead, matrix[:3, 1], fov=fov, size=size)
+    return origin, origin - matrix[:3, 2] / (np.linalg.norm(matrix[:3, 2]) or 1.0), matrix[:3, 1]
+
+
+def _size(aspect: float) -> tuple[int, int]:
+    return max(1, round(HEIGHT * aspect)), HEIGHT
+
+
+def _positive(lens: dict[str, Any], key: str, default: float | None) -> float:
+    value = float(floats(key, [lens.get(key, default)], 1)[0])
+    if not 0 < value < 1e30:
+        raise SceneError(f"{key} is {value:g}; it must be above 0")
+    return value
 
 
 def _add_light(document: Document, out: Contents, index: int, matrix: Matrix) -> None:
