@@ -203,6 +203,21 @@ def test_point_light_at_grazing_angles(scale: float, degrees: float) -> None:
     assert image.rgb == pytest.approx(expected, rel=2e-4 if degrees < 89.5 else 2e-3)
 
 
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize("ratio", [2, 15, 150, 1500])
+@pytest.mark.parametrize("integrator", ["direct_simple", "full"])
+def test_sphere_lights_near_and_far(ratio: float, scale: float, integrator: str) -> None:
+    """π(R/d)²cosθ, also for a sphere as small as the sun: shadow rays never end within it."""
+    towards = np.array([-1.0, 0.8, -0.3])
+    distance = np.linalg.norm(towards)
+    light = wf.Sphere(towards * scale, distance / ratio * scale, material=scenes.BLACK, emission=ratio**2)
+    scene = wf.Scene(
+        [scenes.floor(half=3 * scale), light], camera=scenes.probe((0, 0, 0), scenes.EYE * scale)
+    )
+    expected = np.pi * 0.8 / distance * scenes.ALBEDO / np.pi
+    assert_mean(measure(scene, 256, integrator=integrator, max_bounces=1), expected, 0.002, rounding=1e-4)
+
+
 def ball(n: int = 24) -> wf.Mesh:
     """A convex closed mesh of 2n² triangles round the origin, with flat facets."""
     v, u = np.meshgrid(np.linspace(0, np.pi, n + 1), np.arange(2 * n) * np.pi / n, indexing="ij")

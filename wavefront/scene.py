@@ -55,11 +55,9 @@ class Scene:
     def __init__(
         self, shapes: Iterable[Shape] | Shape, lights: Iterable[UserLight] = (), camera: Camera | None = None
     ) -> None:
-        self.shapes: list[Shape] = [shapes] if isinstance(shapes, Mesh | Sphere) else list(shapes)
-        self.lights: list[UserLight] = list(lights)
+        self.shapes: list[Shape] = _list_of("shapes", shapes, (Mesh, Sphere))
+        self.lights: list[UserLight] = _list_of("lights", lights, (PointLight, Environment))
         self.camera = camera
-        _check_types("shapes", self.shapes, (Mesh, Sphere))
-        _check_types("lights", self.lights, (PointLight, Environment))
         if not self.shapes:
             raise SceneError("the scene has no shapes")
         if sum(isinstance(light, Environment) for light in self.lights) > 1:
@@ -95,11 +93,18 @@ class Scene:
         return Camera.look_at(eye, (low + high) / 2, fov=fov, size=size)
 
 
-def _check_types(name: str, items: Sequence[object], types: tuple[type, ...]) -> None:
-    for i, item in enumerate(items):
+def _list_of(name: str, items: Any, types: tuple[type, ...]) -> list[Any]:
+    """Return the items, or a lone one, as a list, all of the given types."""
+    allowed = ", ".join("wf." + kind.__name__ for kind in types)
+    if isinstance(items, types):
+        return [items]
+    if isinstance(items, str) or not isinstance(items, Iterable):
+        raise SceneError(f"{name} must be a list of {allowed}, got {items!r}")
+    listed = list(items)
+    for i, item in enumerate(listed):
         if not isinstance(item, types):
-            allowed = ", ".join("wf." + kind.__name__ for kind in types)
             raise SceneError(f"{name}[{i}] is {item!r}; it must be one of {allowed}")
+    return listed
 
 
 @dataclass(slots=True)

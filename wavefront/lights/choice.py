@@ -104,7 +104,7 @@ def _grid(low: Doubles, high: Doubles, cells: int) -> tuple[Doubles, tuple[int, 
     """Return the corner, the counts and the cell size (3,) of a grid of nearly cubic cells."""
     extent = np.maximum(high - low, 1e-3 * max(float((high - low).max()), 1e-30))
     side = (extent.prod() / cells) ** (1 / 3)
-    counts = np.clip(np.floor(extent / side), 1, cells).astype(int)
+    counts = np.clip(np.floor(extent / side + 1e-6), 1, cells).astype(int)  # the same at every scale
     while counts.prod() > cells:
         counts[np.argmax(counts)] -= 1
     return low, (int(counts[0]), int(counts[1]), int(counts[2])), extent / counts

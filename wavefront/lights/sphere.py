@@ -34,8 +34,8 @@ class SphereLights(Light):
         in_cone = Frame.from_normal(axis).to_world(uniform_cone(u, np.where(outside, height, f4(1))))
         wi = np.where(outside, in_cone, uniform_sphere(u)).astype(f4)
         along = distance * dot(axis, wi)
-        squared = self.radius**2 - np.maximum(distance**2 - along**2, f4(0))
-        half_chord = np.sqrt(np.maximum(squared, f4(0)))
+        beside = axis * distance - wi * along  # from the ray to the centre; d² − along² would cancel
+        half_chord = np.sqrt(np.maximum(self.radius**2 - dot(beside, beside), f4(0)))
         reach = np.where(outside, along - half_chord, along + half_chord)
         pdf = np.where(outside, f4(1) / (TWO_PI * height), UNIFORM_SPHERE_PDF)
         radiance = np.broadcast_to(self.radiance, wi.shape)
