@@ -35,7 +35,6 @@ def build_tree(low: Floats, high: Floats, leaf_size: int, width: int) -> Tree:
     m = low.shape[1]
     order = np.arange(m)
     start, count = np.zeros(1, np.intp), np.full(1, m)
-    levels: list[tuple[Ints, Ints]] = []  # per level: parent and rank of each piece
     nodes, leaves = 0, 0
     lows, highs, children, members = [], [], [], []
     area_sum = 0.0
@@ -63,7 +62,6 @@ def build_tree(low: Floats, high: Floats, leaf_size: int, width: int) -> Tree:
         leaves += int(leaf.sum())
         inner = np.flatnonzero(~leaf)
         order, start, count = _keep(order, start, count, inner)
-    del levels
     root_area = float(_area(low.min(1, keepdims=True), high.max(1, keepdims=True))[0])
     return Tree(
         np.concatenate(lows),
@@ -132,11 +130,11 @@ def _split(
 
 
 def _argsort_within(owner: Ints, key: Floats) -> Ints:
-    """Sort by (owner, key), ties by position: one sort of 64-bit words."""
-    bits = key.view(np.int32).astype(np.int64)
-    ordered = np.where(bits < 0, ~bits & 0x7FFFFFFF, bits | 0x80000000)
-    ordered = np.where(bits < 0, 0x7FFFFFFF - (bits & 0x7FFFFFFF), ordered)
-    return np.argsort((owner.astype(np.int64) << 32) | ordered, kind="stable")
+    """Sort by (owner, key): one sort of 64-bit words, as float32 bits order like integers but for sign."""
+    bits = key.view(np.int32)
+    ordered = np.where(bits < 0, bits ^ np.int32(0x7FFFFFFF), bits).astype(np.int64) + (1 << 31)
+    ordered |= owner << 32
+    return np.argsort(ordered)
 
 
 def _best_cut(

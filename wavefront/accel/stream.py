@@ -34,7 +34,8 @@ from .triangle import ROUNDOFF, Doubles
 BATCH = 1 << 14  # rays traced at a time without a tree: their temporaries stay in the cache
 DECIDE = 1 << 13  # candidates decided at a time
 SMALL = 128  # up to so many primitives, all are tested without a tree
-WIDTH = 32
+WIDTH = 32  # children of a node
+LEAF_SIZE = 64  # triangles or spheres of a leaf
 
 
 class Candidates:
@@ -314,7 +315,7 @@ class NumpyAccelerator:
 
     name = "numpy"
 
-    def __init__(self, geometry: Geometry, leaf_size: int = 64) -> None:
+    def __init__(self, geometry: Geometry, leaf_size: int = LEAF_SIZE) -> None:
         triangles, centers, radii = geometry.triangles, geometry.centers, geometry.radii
         self._first_sphere = len(triangles)
         corners = np.concatenate([triangles.reshape(-1, 3).T, centers - radii, centers + radii], 1)
