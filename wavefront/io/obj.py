@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
+from itertools import repeat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,12 +110,12 @@ def _joined(text: str) -> list[str]:
             lines[i] = lines[i][:-1] + " " + lines[i + 1]
             lines[i + 1] = ""
     # a name may hold a #, so only whole-line comments and those behind numbers go
-    return [_bare(line.strip()) for line in lines]
+    return [_bare(line) if "#" in line else line for line in map(str.strip, lines)]
 
 
 def _bare(line: str) -> str:
     at = line.find("#")
-    if at < 0 or (at and line.startswith(("usemtl", "mtllib", "o ", "g "))):
+    if at and line.startswith(("usemtl", "mtllib", "o ", "g ")):
         return line
     return line[:at].rstrip()
 
@@ -186,15 +187,17 @@ def _group(
 
 def _corners(name: str, lines: list[Line]) -> NDArray[np.int64]:
     """Indices (v, vt, vn) of every corner as written, (k, 3), `MISSING` where there is none."""
-    words = [word.rstrip("/") for _, rest in lines for word in rest.split()]
-    slashes = np.array([word.count("/") for word in words])
+    words = " ".join(rest for _, rest in lines).split()
+    if any(map(str.endswith, words, repeat("/"))):
+        words = [word.rstrip("/") for word in words]
+    slashes = np.fromiter(map(str.count, words, repeat("/")), np.intp, len(words))
     out = np.full((len(words), 3), MISSING, np.int64)
     try:
         if slashes.max() > 2:
             raise ValueError
         for count in np.unique(slashes):
             chosen = np.flatnonzero(slashes == count)
-            joined = " ".join(words[i] for i in chosen.tolist())
+            joined = " ".join(words if len(chosen) == len(words) else map(words.__getitem__, chosen.tolist()))
             parts = joined.replace("//", f"/{MISSING}/").replace(" ", "/").split("/")
             out[chosen, : count + 1] = np.array(list(map(int, parts)), np.int64).reshape(-1, count + 1)
     except (ValueError, OverflowError):
