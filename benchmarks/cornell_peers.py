@@ -21,6 +21,7 @@ from statistics import median
 from typing import Any
 
 import numpy as np
+from mitsuba_scene import to_mitsuba
 
 import wavefront as wf
 
@@ -36,50 +37,12 @@ def ours(spp: int, accel: str) -> Callable[[], np.ndarray]:
     return lambda: wf.render(scene, spp, max_bounces=MAX_BOUNCES, accel=accel, progress=False).rgb
 
 
-def mitsuba_box(mi: Any, sampler: str, spp: int) -> Any:
-    """Describe the same box to Mitsuba 3, mesh by mesh from the same arrays."""
-    scene = cornell_box(SIZE)
-    description: dict[str, Any] = {
-        "type": "scene",
-        "integrator": {"type": "path", "max_depth": MAX_BOUNCES + 1},
-        "sensor": {
-            "type": "perspective",
-            "fov": 39.3077,
-            "to_world": mi.ScalarTransform4f().look_at(origin=(0, 0, 3.9), target=(0, 0, 0), up=(0, 1, 0)),
-            "film": {
-                "type": "hdrfilm",
-                "width": SIZE,
-                "height": SIZE,
-                "rfilter": {"type": "box"},
-                "pixel_format": "rgb",
-            },
-            "sampler": {"type": sampler, "sample_count": spp},
-        },
-    }
-    for i, shape in enumerate(scene.shapes):
-        colour = {"type": "rgb", "value": shape.material.reflectance.ravel().tolist()}
-        properties = mi.Properties()
-        properties["bsdf"] = mi.load_dict(
-            {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": colour}}
-        )
-        if shape.emission is not None:
-            radiance = {"type": "rgb", "value": shape.emission.ravel().tolist()}
-            properties["emitter"] = mi.load_dict({"type": "area", "radiance": radiance})
-        mesh = mi.Mesh(f"shape{i}", len(shape.vertices), len(shape.faces), props=properties)
-        parameters = mi.traverse(mesh)
-        parameters["vertex_positions"] = shape.vertices.ravel().astype(np.float32)
-        parameters["faces"] = shape.faces.ravel().astype(np.uint32)
-        parameters.update()
-        description[f"shape{i}"] = mesh
-    return mi.load_dict(description)
-
-
 def mitsuba(spp: int, variant: str) -> Callable[[], np.ndarray]:
     """Return a function that renders with Mitsuba, warmed up."""
     import mitsuba as mi
 
     mi.set_variant(variant)
-    scene = mitsuba_box(mi, "independent", spp)
+    scene = to_mitsuba(mi, cornell_box(SIZE), MAX_BOUNCES)
     np.array(mi.render(scene, spp=1))
     return lambda: np.array(mi.render(scene, spp=spp))
 

@@ -1,0 +1,103 @@
+"""Describe a wavefront scene to Mitsuba 3, mesh by mesh from the same arrays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import wavefront as wf
+
+
+def to_mitsuba(
+    mi: Any, scene: wf.Scene, max_bounces: int, sampler: str = "independent", spp: int = 16
+) -> Any:
+    """Return the scene as Mitsuba loads it; materials and lights that have no twin raise ValueError."""
+    camera = scene.camera or scene.framing_camera()
+    description: dict[str, Any] = {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": max_bounces + 1},
+        "sensor": {
+            "type": "perspective",
+            "fov": camera.fov,
+            "fov_axis": "y",
+            "to_world": mi.ScalarTransform4f().look_at(
+                origin=camera.origin.tolist(),
+                target=(camera.origin - camera.rotation[:, 2]).tolist(),
+                up=camera.rotation[:, 1].tolist(),
+            ),
+            "film": {
+                "type": "hdrfilm",
+                "width": camera.size[0],
+                "height": camera.size[1],
+                "rfilter": {"type": "box"},
+                "pixel_format": "rgb",
+            },
+            "sampler": {"type": sampler, "sample_count": spp},
+        },
+    }
+    for i, shape in enumerate(scene.shapes):
+        description[f"shape{i}"] = _sphere(shape) if isinstance(shape, wf.Sphere) else _mesh(mi, shape, i)
+    for i, light in enumerate(scene.lights):
+        description[f"light{i}"] = _light(light)
+    return mi.load_dict(description)
+
+
+def _rgb(values: np.ndarray) -> dict[str, Any]:
+    return {"type": "rgb", "value": np.ravel(values).astype(float).tolist()}
+
+
+def _bsdf(material: wf.Bsdf) -> dict[str, Any]:
+    if isinstance(material, wf.Diffuse):
+        inner: dict[str, Any] = {"type": "diffuse", "reflectance": _rgb(material.reflectance)}
+    elif isinstance(material, wf.Mirror):
+        inner = {"type": "conductor", "specular_reflectance": _rgb(material.reflectance)}
+    elif isinstance(material, wf.Conductor):
+        inner = {"type": "conductor", "eta": _rgb(material.eta), "k": _rgb(material.k)}
+        if not material.specular:
+            alpha = float(material.roughness[0]) ** 2
+            inner |= {"type": "roughconductor", "alpha": alpha, "distribution": "ggx"}
+    elif isinstance(material, wf.Dielectric) and material.specular:
+        return {"type": "dielectric", "int_ior": float(material.ior[0]), "ext_ior": 1.0}
+    else:
+        raise ValueError(f"no twin in Mitsuba for {material!r}")
+    return {"type": "twosided", "bsdf": inner}
+
+
+def _mesh(mi: Any, shape: wf.Mesh, number: int) -> Any:
+    properties = mi.Properties()
+    properties["bsdf"] = mi.load_dict(_bsdf(shape.material))
+    properties["face_normals"] = shape.normals is None
+    if shape.emission is not None:
+        properties["emitter"] = mi.load_dict({"type": "area", "radiance": _rgb(shape.emission)})
+    smooth = shape.normals is not None
+    mesh = mi.Mesh(
+        f"shape{number}", len(shape.vertices), len(shape.faces), has_vertex_normals=smooth, props=properties
+    )
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = shape.vertices.ravel().astype(np.float32)
+    parameters["faces"] = shape.faces.ravel().astype(np.uint32)
+    if shape.normals is not None:
+        parameters["vertex_normals"] = shape.normals.ravel().astype(np.float32)
+    parameters.update()
+    return mesh
+
+
+def _sphere(shape: wf.Sphere) -> dict[str, Any]:
+    made = {
+        "type": "sphere",
+        "center": shape.center.tolist(),
+        "radius": shape.radius,
+        "bsdf": _bsdf(shape.material),
+    }
+    if shape.emission is not None:
+        made["emitter"] = {"type": "area", "radiance": _rgb(shape.emission)}
+    return made
+
+
+def _light(light: Any) -> dict[str, Any]:
+    if isinstance(light, wf.PointLight):
+        return {"type": "point", "position": light.position.tolist(), "intensity": _rgb(light.intensity)}
+    if isinstance(light, wf.Environment):
+        return {"type": "constant", "radiance": _rgb(light.radiance)}
+    raise ValueError(f"no twin in Mitsuba for {light!r}")
