@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wavefront.bsdfs import Conductor, Dielectric, Diffuse, OrenNayar, ThinDielectric
+from wavefront.bsdfs import Conductor, Dielectric, Diffuse, OrenNayar, Principled, ThinDielectric
 from wavefront.bsdfs.conductor import METALS
 from wavefront.bsdfs.fresnel import fresnel_conductor
 from wavefront.bsdfs.microfacet import mirror_lobe, normal_density, stretched, visible_normals
@@ -207,6 +207,60 @@ def test_every_metal_has_a_colour_test():
     assert {name for name, _ in tested} == set(METALS)
 
 
+def appendix_b(base_color, metallic, roughness, wo, wi):
+    """The BRDF of the glTF 2.0 specification, appendix B, in float64, above the surface."""
+    v, l = wo.astype(float), wi.astype(float)
+    h = v + l
+    h /= np.linalg.norm(h, axis=0)
+    a2 = roughness**4
+    d = a2 / (np.pi * (h[2] ** 2 * (a2 - 1) + 1) ** 2)
+    root_v, root_l = (np.sqrt(a2 + (1 - a2) * w[2] ** 2) for w in (v, l))
+    specular = d * 0.5 / (v[2] * root_l + l[2] * root_v)
+    away = (1 - np.abs((v * h).sum(0))) ** 5
+    colour = np.array(base_color, float).reshape(3, 1)
+    fresnel = 0.04 + 0.96 * away
+    dielectric = (1 - fresnel) * colour / np.pi + fresnel * specular
+    metal = (colour + (1 - colour) * away) * specular
+    return (1 - metallic) * dielectric + metallic * metal
+
+
+@pytest.mark.parametrize("metallic", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize("roughness", [0.2, 0.5, 1.0])
+def test_principled_holds_the_gltf_material(metallic, roughness):
+    rng = np.random.default_rng(3)
+    wo, wi = rng.normal(size=(2, 3, 10_000)).astype(F4)
+    wo[2], wi[2] = np.abs(wo[2]), np.abs(wi[2])
+    wo, wi = (w / np.linalg.norm(w, axis=0) for w in (wo, wi))
+    exact = appendix_b((0.9, 0.5, 0.1), metallic, roughness, wo, wi)
+    literal = Principled((0.9, 0.5, 0.1), metallic, roughness, conserve_energy=False).f(wo, wi)
+    assert literal == pytest.approx(exact, rel=1e-4)
+    if metallic == 1:
+        assert Principled((0.9, 0.5, 0.1), 1, roughness).f(wo, wi) == pytest.approx(exact, rel=1e-4)
+
+
+@pytest.mark.parametrize("mu", [1.0, 0.5, 0.1, 0.02])
+@pytest.mark.parametrize("roughness", [0.1, 0.5, 1.0])
+def test_white_plastic_reflects_all_light(roughness, mu):
+    assert albedo(Principled(1.0, 0, roughness), mu) == pytest.approx(1, abs=4e-3)
+
+
+def test_parts_of_principled_agree_with_the_materials_of_their_own():
+    rng = np.random.default_rng(4)
+    wo, wi = rng.normal(size=(2, 3, 5000)).astype(F4)
+    wo[2] = np.abs(wo[2])
+    wo, wi = (w / np.linalg.norm(w, axis=0) for w in (wo, wi))
+    for whole, part in (
+        (Principled((1, 0.5, 0.2), 0, 0.5, 1.4, 1.0), Dielectric(1.4, 0.5, transmittance=(1, 0.5, 0.2))),
+        (
+            Principled((1, 0.5, 0.2), 0, 0.5, 1.4, 1.0, thin=True),
+            ThinDielectric(1.4, 0.5, transmittance=(1, 0.5, 0.2)),
+        ),
+        (Principled(0.3, 0, 0.5, specular=0.0), Diffuse(0.3)),
+    ):
+        for ours, theirs in zip(whole.evaluate(wo, wi), part.evaluate(wo, wi), strict=True):
+            assert ours == pytest.approx(theirs, rel=1e-5, abs=1e-7)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_random_parameters(seed):
@@ -219,5 +273,7 @@ def test_random_parameters(seed):
         Dielectric(ior, roughness),
         ThinDielectric(ior, roughness),
         OrenNayar(rng.random(3), float(rng.uniform(0, 1.5))),
+        Principled(rng.random(3), rng.random(), roughness, ior, rng.random(), clearcoat=rng.random()),
+        Principled(rng.random(3), 0.0, roughness, ior, sheen=rng.random(), sheen_color=rng.random(3)),
     ):
         check_bsdf(bsdf, angles=angles, seed=seed, samples=500_000)

@@ -11,6 +11,7 @@ from wavefront.bsdfs import (
     Mirror,
     Mix,
     OrenNayar,
+    Principled,
     Spatial,
     ThinDielectric,
 )
@@ -49,6 +50,26 @@ EXAMPLES = {
         {},
         {"ior": 1.7, "roughness": 0.3, "transmittance": (1, 0.5, 0)},
         {"roughness": 1.0},
+    ],
+    Principled: [
+        {},
+        {"base_color": (0.9, 0.5, 0.1), "metallic": 1.0, "roughness": 0.3},
+        {"base_color": 1.0, "roughness": 0.0},
+        {"base_color": 0.0, "roughness": 1.0, "specular": 0.0},
+        {"base_color": (1, 0.5, 0.2), "metallic": 0.2, "roughness": 0.3, "transmission": 0.6},
+        {"base_color": (1, 0.5, 0.2), "transmission": 0.7, "thin": True, "ior": 1.3},
+        {"base_color": 1.0, "roughness": 0.4, "transmission": 1.0, "ior": 1.0},
+        {"base_color": 1.0, "clearcoat": 1.0, "clearcoat_roughness": 0.2},
+        {"base_color": (0.2, 0.1, 0.8), "sheen": 1.0, "sheen_color": (1, 0.5, 0.5), "sheen_roughness": 0.1},
+        {
+            "base_color": (1, 0.5, 0.2),
+            "metallic": 0.2,
+            "transmission": 0.5,
+            "clearcoat": 0.7,
+            "sheen": 0.5,
+            "specular": 0.5,
+            "specular_color": (1, 0.9, 0.2),
+        },
     ],
     Mix: [
         {"first": Diffuse(0.8), "second": Mirror(0.9), "weight": 0.3},
@@ -91,7 +112,7 @@ def varying(bsdf, name, value):
     """A texture of a parameter's value, a colour where the material keeps a colour."""
     if not isinstance(value, float | tuple):
         return value
-    is_colour = getattr(getattr(bsdf, name), "ndim", 0) == 2
+    is_colour = getattr(getattr(bsdf, name, None), "ndim", 0) == 2
     return Constant(np.broadcast_to(value, 3) if is_colour else value)
 
 
@@ -231,6 +252,19 @@ def test_mirror_reflects_in_the_normal():
         (lambda: OrenNayar(2), r"OrenNayar reflectance is 2; it must be in \[0, 1\]"),
         (lambda: OrenNayar(0.5, 1.6), r"OrenNayar sigma is 1.6; it must be in \[0, π/2\]"),
         (lambda: OrenNayar(0.5, 1.2, energy_preserving=True), "sigma is 1.2; it must be in .* energy"),
+        (lambda: Principled(2), r"Principled base_color is 2; it must be in \[0, 1\]"),
+        (lambda: Principled(metallic=2), r"Principled metallic is 2; it must be in \[0, 1\]"),
+        (lambda: Principled(roughness=-1), r"Principled roughness is -1; it must be in \[0, 1\]"),
+        (lambda: Principled(ior=0), "Principled ior is 0; it must be more than 0"),
+        (lambda: Principled(transmission=2), r"Principled transmission is 2; it must be in"),
+        (lambda: Principled(clearcoat=2), "Principled clearcoat is 2; it must be in"),
+        (lambda: Principled(clearcoat_roughness=2), "Principled clearcoat_roughness is 2; it must be in"),
+        (lambda: Principled(sheen=2), "Principled sheen is 2; it must be in"),
+        (lambda: Principled(sheen_color=(0, 0, 2)), r"Principled sheen_color\[2\] is 2; it must be in"),
+        (lambda: Principled(sheen_roughness=2), "Principled sheen_roughness is 2; it must be in"),
+        (lambda: Principled(specular=2), "Principled specular is 2; it must be in"),
+        (lambda: Principled(specular_color=2), "Principled specular_color is 2; it must be in"),
+        (lambda: Principled(absorption=-1), "Principled absorption is -1; it must be at least 0"),
         (lambda: Mix(Diffuse(), 0.5), "Mix second must be a material, got 0.5"),
         (lambda: Mix(None, Diffuse()), "Mix first must be a material, got None"),
         (lambda: Mix(Diffuse(), Mirror(), 1.5), r"Mix weight is 1.5; it must be in \[0, 1\]"),

@@ -7,9 +7,10 @@ from .diffuse import Diffuse
 from .mirror import Mirror
 from .mix import Mix
 from .oren_nayar import OrenNayar
+from .principled import Principled
 from .thin import ThinDielectric
 
-ALL = (Diffuse, Mirror, Dielectric, Conductor, OrenNayar, ThinDielectric, Mix)
+ALL = (Diffuse, Mirror, Dielectric, Conductor, OrenNayar, ThinDielectric, Principled, Mix)
 
 __all__ = [
     "ALL",
@@ -21,6 +22,7 @@ __all__ = [
     "Mirror",
     "Mix",
     "OrenNayar",
+    "Principled",
     "Spatial",
     "ThinDielectric",
 ]

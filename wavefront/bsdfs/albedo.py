@@ -1,0 +1,66 @@
+"""Tables of how much light a layer reflects from each direction, made when first needed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+
+from ..vec import Floats, dot, f4
+from .microfacet import alpha_of, reflect, stretched, visible_normals
+
+SIZE = 32  # rows of roughness in [0, 1], and columns of the square root of the cosine in [0, 1]
+SIDE = 32  # a direction's integral takes SIDE² samples
+
+
+def lookup(table: Floats, roughness: Floats, cos: Floats) -> Floats:
+    """Bilinear value of a table (SIZE, SIZE) at roughness and cosine (n,), (n,)."""
+    y = np.clip(roughness, f4(0), f4(1)) * f4(SIZE - 1)
+    x = np.sqrt(np.clip(cos, f4(0), f4(1))) * f4(SIZE - 1)
+    j, i = np.minimum(y.astype(np.intp), SIZE - 2), np.minimum(x.astype(np.intp), SIZE - 2)
+    y, x = y - j.astype(f4), x - i.astype(f4)
+    corner = j * SIZE + i
+    flat = table.ravel()
+    low = flat.take(corner) * (f4(1) - x) + flat.take(corner + 1) * x
+    high = flat.take(corner + SIZE) * (f4(1) - x) + flat.take(corner + SIZE + 1) * x
+    return low * (f4(1) - y) + high * y
+
+
+def cosine_mean(table: Floats) -> Floats:
+    """Mean over the hemisphere, ∫ 2μ·table dμ, of each row (SIZE, SIZE), as a table of equal columns."""
+    root = np.linspace(0, 1, 16 * (SIZE - 1) + 1)  # 16 midpoints in each linear piece
+    middle = (root[:-1] + root[1:]) / 2
+    hats = np.stack([np.interp(middle, np.linspace(0, 1, SIZE), row) for row in np.eye(SIZE)])
+    weight = (hats * 4 * middle**3).mean(1)  # 2μ dμ = 4x³ dx
+    return np.repeat((table @ weight).astype(f4)[:, None], SIZE, 1)
+
+
+def tabulate(row: Callable[[Floats, Floats, Floats], tuple[Floats, ...]]) -> tuple[Floats, ...]:
+    """Average what `row` gives for wo (3, m), roughness (1,) and u (2, m) over u: tables (SIZE, SIZE)."""
+    mu = np.maximum(np.linspace(0, 1, SIZE) ** 2, 1e-4)
+    wo = np.stack([np.sqrt(1 - mu * mu), 0 * mu, mu]).astype(f4).repeat(SIDE * SIDE, 1)
+    u = (np.indices((SIDE, SIDE)).reshape(2, -1) + 0.5) / SIDE
+    u = np.tile(u.astype(f4), SIZE)
+    roughness = np.linspace(0, 1, SIZE, dtype=f4)
+    rows = [row(wo, roughness[k : k + 1], u) for k in range(SIZE)]
+    means = [[v.reshape(SIZE, -1).mean(1, dtype=np.float64) for v in values] for values in rows]
+    return tuple(np.array(table, f4) for table in zip(*means, strict=True))
+
+
+@cache
+def gloss_tables() -> tuple[Floats, Floats, Floats, Floats]:
+    """Albedo of GGX with Schlick's Fresnel, as F0·A + F90·B: A, B, and their cosine-weighted means."""
+
+    def row(wo: Floats, roughness: Floats, u: Floats) -> tuple[Floats, Floats]:
+        alpha = alpha_of(roughness)
+        m = visible_normals(wo, alpha, u)
+        wi = reflect(wo, m)
+        zi = np.maximum(wi[2], f4(0))
+        so, si = stretched(wo, alpha), stretched(wi, alpha)
+        shown = zi * (wo[2] + so) / (wo[2] * si + zi * so)  # G2/G1
+        weight = (f4(1) - np.minimum(dot(wo, m), f4(1))) ** 5
+        return shown * (f4(1) - weight), shown * weight
+
+    a, b = tabulate(row)
+    return a, b, cosine_mean(a), cosine_mean(b)

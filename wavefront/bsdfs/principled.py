@@ -1,0 +1,294 @@
+"""The material of most asset files: glTF's metallic-roughness model and its extensions."""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
+from ..state import Surface
+from ..vec import Bools, Floats, dot, f4, luminance
+from .albedo import gloss_tables, lookup
+from .base import Bsdf, BsdfSample, Spatial, weigh
+from .dielectric import LEAST_BEND
+from .fresnel import fresnel_dielectric
+from .microfacet import INV_PI, alpha_of, mirror_lobe, reflect, refract, refraction_lobe, visible_normals
+from .parameter import Colour, Scalar, colour, scalar
+from .sheen import sheen_albedo, sheen_lobe
+
+COAT_F0 = 0.04
+
+
+class Chances(NamedTuple):
+    """Probabilities of the lobes that `sample_f` chooses from; they depend on wo only. Each (n,)."""
+
+    gloss: Floats  # reflection in the surface's microfacets
+    glass: Floats  # reflection or refraction in them, by Fresnel
+    coat: Floats  # reflection in the clear coat
+    matte: Floats  # cosine-weighted
+
+
+class Principled(Bsdf):
+    """Metal, plastic, glass, cloth and varnish by a few intuitive parameters.
+
+    With only `base_color`, `metallic` and `roughness` this is the metallic-roughness material of
+    the glTF 2.0 specification, appendix B: mix(dielectric, metal, metallic) with Schlick's Fresnel,
+    GGX with α = roughness², height-correlated Smith shadowing and a Lambertian base. The others
+    follow glTF's extensions KHR_materials_ior, _specular, _transmission, _volume, _clearcoat and
+    _sheen, except that
+    - the matte base gets the light that the gloss leaves over by the albedo of the gloss, so that a
+      white surface reflects all light and no more; the appendix's mix by Fresnel in the half vector,
+      which reflects up to 1.9 times the light at grazing angles, comes with `conserve_energy=False`;
+    - where light is transmitted, Fresnel's equations replace Schlick's approximation, which knows
+      no total internal reflection;
+    - the base under a clear coat is darkened for both directions, which keeps it reciprocal.
+
+    Parameters
+    ----------
+    base_color
+        Albedo of the base, colour of the metal, and tint of transmitted light, in [0, 1].
+    metallic
+        From 0 (dielectric) to 1 (metal).
+    roughness
+        In [0, 1]; α = roughness², at least 0.001: it has no delta lobe.
+    ior
+        Refractive index, more than 0; where light is transmitted at least 0.001 away from 1.
+    transmission
+        Part of the base that is clear instead of matte, in [0, 1].
+    thin
+        The surface is a sheet of its own, which does not bend light (glTF without a volume).
+    clearcoat, clearcoat_roughness
+        Strength of a clear varnish of index 1.5, and its roughness, in [0, 1].
+    sheen, sheen_color, sheen_roughness
+        Strength, colour and roughness of cloth fibres, in [0, 1].
+    specular, specular_color
+        Strength and tint of the dielectric's reflection, in [0, 1].
+    absorption
+        What the inside absorbs, per channel and scene unit, as for `Dielectric`.
+    conserve_energy
+        Lay the gloss over the matte base so that no light is gained; False follows glTF's appendix
+        to the letter.
+
+    Raises
+    ------
+    SceneError
+        If a parameter is out of its range or not finite.
+    """
+
+    dimensions = 3
+
+    def __init__(
+        self,
+        base_color: Colour = 0.8,
+        metallic: Scalar = 0.0,
+        roughness: Scalar = 0.5,
+        ior: Scalar = 1.5,
+        transmission: Scalar = 0.0,
+        *,
+        thin: bool = False,
+        clearcoat: Scalar = 0.0,
+        clearcoat_roughness: Scalar = 0.03,
+        sheen: Scalar = 0.0,
+        sheen_color: Colour = 1.0,
+        sheen_roughness: Scalar = 0.3,
+        specular: Scalar = 1.0,
+        specular_color: Colour = 1.0,
+        absorption: Colour = 0.0,
+        conserve_energy: bool = True,
+    ) -> None:
+        self.base_color = colour("Principled base_color", base_color)
+        self.metallic = scalar("Principled metallic", metallic)
+        self.roughness = scalar("Principled roughness", roughness)
+        self.ior = scalar("Principled ior", ior, lambda x: x > 0, "more than 0")
+        self.transmission = scalar("Principled transmission", transmission)
+        self.thin = thin
+        self.clearcoat = scalar("Principled clearcoat", clearcoat)
+        self.clearcoat_roughness = scalar("Principled clearcoat_roughness", clearcoat_roughness)
+        self.sheen = scalar("Principled sheen", sheen)
+        self.sheen_color = colour("Principled sheen_color", sheen_color)
+        self.sheen_roughness = scalar("Principled sheen_roughness", sheen_roughness)
+        self.specular_weight = scalar("Principled specular", specular)
+        self.specular_color = colour("Principled specular_color", specular_color)
+        self.absorption = colour("Principled absorption", absorption, np.inf)
+        self.conserve_energy = conserve_energy
+        self.transmissive = _used(self.transmission)
+        self._coated = _used(self.clearcoat)
+        self._cloth = _used(self.sheen)
+        self.inside: Bools | None = None  # (n,) wo is inside; unbound, it is outside
+
+    def bind(self, surface: Surface) -> Self:
+        """Look the parameters up, and remember on which side `wo` is."""
+        bound = super().bind(surface)
+        if self.transmissive and not self.thin:
+            bound = copy(bound)
+            bound.inside = surface.inside
+        return bound
+
+    def f(self, wo: Floats, wi: Floats) -> Floats:
+        """Return the sum of all lobes, (3, n)."""
+        return self.evaluate(wo, wi)[0]
+
+    def pdf(self, wo: Floats, wi: Floats) -> Floats:
+        """Return the density of `sample_f`, (n,)."""
+        return self.evaluate(wo, wi)[1]
+
+    def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
+        """Return `f` and `pdf`: the base, then sheen and coat laid over it."""
+        chances = self._chances(wo)
+        f, pdf = self._base(wo, wi, chances)
+        if self._cloth:
+            f = self._under_sheen(wo, wi) * f + self._sheen(wo, wi)
+        if self._coated:
+            value, density, cos = mirror_lobe(wo, wi, alpha_of(self.clearcoat_roughness))
+            through = self._through_coat(wo[2]) * self._through_coat(np.abs(wi[2]))
+            f = f * through + value * self.clearcoat * _schlick(COAT_F0, cos)
+            pdf = pdf + chances.coat * density
+        return f, pdf
+
+    def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
+        """Choose a lobe by u[2], draw from it, and weigh by the density of all."""
+        gloss, glass, coat, _ = self._chances(wo)
+        facet = gloss + glass
+        coated = (u[2] >= facet) & (u[2] < facet + coat)
+        alpha = alpha_of(self.roughness)
+        if self._coated:
+            alpha = np.where(coated, alpha_of(self.clearcoat_roughness), alpha)
+        m = visible_normals(wo, alpha, u)
+        wi = np.where(u[2] < facet + coat, reflect(wo, m), cosine_hemisphere(u))
+        crosses = np.zeros(wo.shape[1], np.bool_)
+        eta = None
+        if self.transmissive:
+            cos = np.maximum(dot(wo, m), f4(0))
+            reflected, cos_refracted = self._fresnel(cos)
+            crosses = (u[2] >= gloss + glass * reflected) & (u[2] < facet)
+            index = self._eta()
+            wi = np.where(crosses, self._across(wo, wi, m, cos, cos_refracted, index), wi)
+            eta = np.where(crosses, index, f4(1))
+        f, pdf = self.evaluate(wo, wi)
+        pdf = np.where((wi[2] < 0) == crosses, pdf, f4(0))
+        return BsdfSample(wi, weigh(f, wi, pdf), pdf, np.zeros(len(pdf), np.bool_), eta)
+
+    def _base(self, wo: Floats, wi: Floats, chances: Chances) -> tuple[Floats, Floats]:
+        """Metal, matte, gloss and glass: value (3, n) and their part of the density (n,)."""
+        alpha = alpha_of(self.roughness)
+        value, density, cos = mirror_lobe(wo, wi, alpha)
+        opaque = (f4(1) - self.metallic) * (f4(1) - self.transmission)
+        weight = _fifth(cos)
+        gloss = self._dielectric(weight)
+        metal = self.base_color + (f4(1) - self.base_color) * weight
+        below = self._under_gloss(wo, wi) if self.conserve_energy else f4(1) - gloss.max(0)
+        matte = opaque * below * np.where(wi[2] > 0, INV_PI, f4(0))
+        f = (metal * self.metallic + gloss * opaque) * value + self.base_color * matte
+        pdf = chances.gloss * density + chances.matte * cosine_hemisphere_pdf(wi)
+        if not self.transmissive:
+            return f, pdf
+        clear = (f4(1) - self.metallic) * self.transmission
+        reflected, _ = self._fresnel(cos)
+        through, through_density = self._through(wo, wi, alpha)
+        f = f + (value * reflected * clear) + self.base_color * (through * clear)
+        return f, pdf + chances.glass * (density * reflected + through_density)
+
+    def _through(self, wo: Floats, wi: Floats, alpha: Floats) -> tuple[Floats, Floats]:
+        """Transmission with its Fresnel factor: value (n,) and density (n,)."""
+        if self.thin:
+            value, density, cos = mirror_lobe(wo, wi * np.array([[1], [1], [-1]], f4), alpha)
+        else:
+            value, density, cos, _ = refraction_lobe(wo, wi, alpha, self._eta())
+        passed = f4(1) - self._fresnel(cos)[0]
+        return value * passed, density * passed
+
+    def _across(
+        self, wo: Floats, wi: Floats, m: Floats, cos: Floats, cos_refracted: Floats, eta: Floats
+    ) -> Floats:
+        """Return where light crosses to: refracted, or for a sheet the reflection wi turned over."""
+        if self.thin:
+            return wi * np.array([[1], [1], [-1]], f4)
+        return refract(wo, m, cos, cos_refracted, eta)
+
+    def _fresnel(self, cos: Floats) -> tuple[Floats, Floats]:
+        """Exact reflectance of the clear part, and the refracted cosine, each (n,)."""
+        if not self.thin:
+            return fresnel_dielectric(cos, self._eta())
+        face, refracted = fresnel_dielectric(cos, self.ior)
+        return f4(2) * face / (f4(1) + face), refracted
+
+    def _eta(self) -> Floats:
+        """Index beyond / before, (n,) or (1,); 1 for a sheet, and never quite 1 otherwise."""
+        if self.thin:
+            return np.ones(1, f4)
+        away = self.ior - f4(1)
+        bent = np.where(np.abs(away) < LEAST_BEND, f4(1 + LEAST_BEND), self.ior)
+        return bent if self.inside is None else np.where(self.inside, f4(1) / bent, bent)
+
+    def _under_gloss(self, wo: Floats, wi: Floats) -> Floats:
+        """Part of the light that reaches the matte base and leaves it again, (n,).
+
+        Source: C. Kulla and A. Conty 2017, "Revisiting Physically Based Shading at Imageworks":
+        (1 − E(wo))·(1 − E(wi))/(1 − mean E), with E the albedo of the gloss.
+        """
+        a, b, mean_a, mean_b = gloss_tables()
+        f0 = self._dielectric(np.zeros(1, f4)).max(0)
+        f90 = self.specular_weight
+        passed = [
+            f4(1) - f0 * lookup(first, self.roughness, cos) - f90 * lookup(second, self.roughness, cos)
+            for first, second, cos in ((a, b, wo[2]), (a, b, np.abs(wi[2])), (mean_a, mean_b, wo[2]))
+        ]
+        return passed[0] * passed[1] / np.maximum(passed[2], f4(1e-3))
+
+    def _dielectric(self, weight: Floats) -> Floats:
+        """Schlick's reflectance of the opaque dielectric, (3, n), at weight = (1 − cosθ)⁵."""
+        f0 = ((self.ior - f4(1)) / (self.ior + f4(1))) ** 2
+        tinted = np.minimum(self.specular_color * f0, f4(1)) * self.specular_weight
+        return tinted + (self.specular_weight - tinted) * weight
+
+    def _sheen(self, wo: Floats, wi: Floats) -> Floats:
+        return self.sheen_color * (self.sheen * sheen_lobe(wo, wi, self.sheen_roughness))
+
+    def _under_sheen(self, wo: Floats, wi: Floats) -> Floats:
+        """Part of the light that passes the fibres, (n,), the lesser of both directions (reciprocal)."""
+        strength = self.sheen * self.sheen_color.max(0)
+        seen = np.maximum(
+            sheen_albedo(wo[2], self.sheen_roughness), sheen_albedo(np.abs(wi[2]), self.sheen_roughness)
+        )
+        return np.maximum(f4(1) - strength * seen, f4(0))
+
+    def _through_coat(self, cos: Floats) -> Floats:
+        return f4(1) - self.clearcoat * _schlick(COAT_F0, cos)
+
+    def _chances(self, wo: Floats) -> Chances:
+        """Share the samples out by about what each lobe reflects; none that has any value gets 0."""
+        weight = _fifth(wo[2])
+        opaque = (f4(1) - self.metallic) * (f4(1) - self.transmission)
+        seen = luminance(self._dielectric(weight))
+        metal = luminance(self.base_color + (f4(1) - self.base_color) * weight)
+        floor = f4(0.1)  # at grazing reflections Fresnel is far higher than at wo
+        gloss = self.metallic * (metal + floor) + opaque * (seen + floor * (self.specular_weight > 0))
+        matte = opaque * (luminance(self.base_color) + (self.base_color > 0).any(0) * f4(0.01))
+        glass = (f4(1) - self.metallic) * self.transmission
+        if self._cloth:
+            matte = matte + self.sheen * self.sheen_color.max(0) * (f4(0.2) + weight)
+        coat = self.clearcoat * (floor + _schlick(COAT_F0, wo[2])) if self._coated else f4(0)
+        total = gloss + glass + coat + matte
+        share = f4(1) / np.where(total > 0, total, f4(1))
+        full = np.broadcast_to
+        shape = wo[2].shape
+        return Chances(*(full(part * share, shape) for part in (gloss, glass, coat, matte)))
+
+
+def _used(parameter: Any) -> bool:
+    """Tell whether a strength is ever above 0."""
+    return isinstance(parameter, Spatial) or bool((parameter > 0).any())
+
+
+def _fifth(cos: Floats) -> Floats:
+    """(1 − cosθ)⁵ (C. Schlick 1994, "An Inexpensive BRDF Model", eq. 15)."""
+    away = np.maximum(f4(1) - cos, f4(0))
+    square = away * away
+    return square * square * away
+
+
+def _schlick(f0: float, cos: Floats) -> Floats:
+    """Schlick's reflectance from f0 at normal incidence, (n,)."""
+    return f4(f0) + f4(1 - f0) * _fifth(cos)
