@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -141,16 +142,22 @@ class _Triangles:
 
     def search(self, lanes: Lanes, found: _Closest | _Occluded) -> None:
         """Give all hits that may matter to `found`."""
+        doubts = Candidates(partial(self._decide_doubts, lanes, found))
         if self.tree is None:
-            self._search_all(lanes, found)
-            return
-        tree = self.tree
-        table = slab_table(lanes, self.ball)
-
-        trace(tree, table, found.bound, lambda leaf, lane: self._visit(table, lanes, found, leaf, lane))
+            self._search_all(lanes, found, doubts)
+        else:
+            table = slab_table(lanes, self.ball)
+            trace(self.tree, table, found.bound, partial(self._visit, table, lanes, found, doubts))
+        doubts.flush()
 
     def _visit(
-        self, table: Floats, lanes: Lanes, found: _Closest | _Occluded, leaf: Ints, lane: Ints
+        self,
+        table: Floats,
+        lanes: Lanes,
+        found: _Closest | _Occluded,
+        doubts: Candidates,
+        leaf: Ints,
+        lane: Ints,
     ) -> None:
         """Test pairs of leaf and lane."""
         tree = self.tree
@@ -159,7 +166,7 @@ class _Triangles:
         leaves, block_lanes = blocks(leaf, lane, len(table) - 1)
         step = max(1, CHUNK // (3 * size * BLOCK))
         rays = table.take(block_lanes, 0).reshape(-1, BLOCK, 16)[:, :, LINE].transpose(0, 2, 1)
-        batch = Candidates(lambda at, value: self._decide_pairs(lanes, found, leaves, block_lanes, at, value))
+        batch = Candidates(partial(self._decide_pairs, lanes, found, doubts, leaves, block_lanes))
         for start in range(0, leaves.size, step):
             chosen = leaves[start : start + step]
             shape = (chosen.size, 3 * size, BLOCK)
@@ -176,6 +183,7 @@ class _Triangles:
         self,
         lanes: Lanes,
         found: _Closest | _Occluded,
+        doubts: Candidates,
         leaves: Ints,
         block_lanes: Ints,
         at: Ints,
@@ -187,13 +195,14 @@ class _Triangles:
         pair = at >> BLOCK_SHIFT
         block = pair // size
         slot = leaves.take(block) * size + (pair & (size - 1))
-        self._decide(lanes, found, slot, block_lanes.take((block << BLOCK_SHIFT) + (at & (BLOCK - 1))), value)
+        lane = block_lanes.take((block << BLOCK_SHIFT) + (at & (BLOCK - 1)))
+        self._decide(lanes, found, doubts, slot, lane, value)
 
-    def _search_all(self, lanes: Lanes, found: _Closest | _Occluded) -> None:
+    def _search_all(self, lanes: Lanes, found: _Closest | _Occluded, doubts: Candidates) -> None:
         if not self.ids.size:
             return
         n, m = lanes.speed.size, self.ids.size
-        batch = Candidates(lambda *found_: self._decide(lanes, found, *found_))
+        batch = Candidates(partial(self._decide, lanes, found, doubts))
         step = max(64, min(4096, CHUNK // (3 * m)))
         for at in range(0, n, step):
             k = min(step, n - at)
@@ -210,7 +219,13 @@ class _Triangles:
         batch.flush()
 
     def _decide(
-        self, lanes: Lanes, found: _Closest | _Occluded, slot: Ints, lane: Ints, value: Floats
+        self,
+        lanes: Lanes,
+        found: _Closest | _Occluded,
+        doubts: Candidates,
+        slot: Ints,
+        lane: Ints,
+        value: Floats,
     ) -> None:
         """Decide candidates: slots (k,) of the filter, lanes (k,) and the filter's values (k,)."""
         prim = self.slots.take(slot)
@@ -220,13 +235,21 @@ class _Triangles:
         origin = lanes.origin.take(lane, 1).astype(np.float64)
         direction = lanes.direction.take(lane, 1).astype(np.float64)
         t = triangle.plane_distance(self.table, prim, origin, direction)
-        unsure = np.flatnonzero(~(value > 1))
+        sure = value > 1
+        unsure = np.flatnonzero(~sure)
         if unsure.size:
-            rays = prim.take(unsure), origin.take(unsure, 1), direction.take(unsure, 1)
-            inside = triangle.hits_watertight(self.table, *rays)
-            clamped = triangle.clamp_to_triangle(self.table, *rays, t.take(unsure))
-            t[unsure] = np.where(inside, clamped, np.inf)
+            doubts.add(prim.take(unsure), lane.take(unsure))
+            t = np.where(sure, t, np.inf)
         found.add(lane, prim, t)
+
+    def _decide_doubts(self, lanes: Lanes, found: _Closest | _Occluded, prim: Ints, lane: Ints) -> None:
+        """Decide the few pairs (k,) that the filter cannot."""
+        origin = lanes.origin.take(lane, 1).astype(np.float64)
+        direction = lanes.direction.take(lane, 1).astype(np.float64)
+        rays = prim, origin, direction
+        t = triangle.plane_distance(self.table, *rays)
+        t = triangle.clamp_to_triangle(self.table, *rays, t)
+        found.add(lane, prim, np.where(triangle.hits_watertight(self.table, *rays), t, np.inf))
 
 
 class _Spheres:
