@@ -1,6 +1,7 @@
 """glTF: geometry, nodes, materials, textures, lights and cameras, on small files written here."""
 
 import base64
+import inspect
 import io
 import json
 import struct
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from wavefront.bsdfs import Dielectric, Diffuse, Mirror
+from wavefront.bsdfs import Dielectric, Diffuse, Principled, ThinDielectric
 from wavefront.errors import SceneError
 from wavefront.io import appearance
 from wavefront.io.images import srgb_to_linear
@@ -220,6 +221,37 @@ def test_camera(build, path):
     assert camera.size == (768, 512)
 
 
+def test_orthographic_camera(build, path):
+    build.json["nodes"][0]["camera"] = 0
+    build.json["cameras"] = [
+        {"type": "orthographic", "orthographic": {"xmag": 3, "ymag": 2, "znear": 0, "zfar": 9}}
+    ]
+    camera = load(build.mesh().gltf(path)).camera
+    assert camera.size == (768, 512)
+    origin, direction = camera.rays(np.float32([0, 768]), np.float32([0, 512]), np.zeros(3))
+    assert np.abs(origin[:2, 0] - origin[:2, 1]) == pytest.approx([6, 4])
+    assert direction[:, 0] == pytest.approx([0, 0, -1])
+
+
+@pytest.mark.parametrize(
+    ("camera", "message"),
+    [
+        ({"type": "perspective"}, r"a\.gltf: cameras\[0\]: yfov is \[None\]"),
+        (
+            {"type": "perspective", "perspective": {"yfov": -1}},
+            r"cameras\[0\]: yfov is -1; it must be above 0",
+        ),
+        ({"type": "perspective", "perspective": {"yfov": 4}}, r"a\.gltf: cameras\[0\]: .*fov is 229"),
+        ({"type": "fisheye"}, r"cameras\[0\]: type is 'fisheye'; it must be 'perspective' or 'orthographic'"),
+    ],
+)
+def test_defects_of_cameras(build, path, camera, message):
+    build.json["nodes"][0]["camera"] = 0
+    build.json["cameras"] = [camera]
+    with pytest.raises(SceneError, match=message):
+        load(build.mesh().gltf(path))
+
+
 def test_point_light(build, path):
     build.json["nodes"] += [{"translation": [0, 2, 0], "extensions": {"KHR_lights_punctual": {"light": 0}}}]
     build.json["scenes"][0]["nodes"] = [0, 1]
@@ -240,7 +272,7 @@ class Recorder(Diffuse):
     def __init__(
         self, base_color, metallic=0, roughness=0.5, ior=1.5, transmission=0, clearcoat=0,
         clearcoat_roughness=0, sheen_color=0, sheen_roughness=0, specular=1, specular_color=1, alpha=1,
-        alpha_cutoff=None, normal_map=None, absorption=0, sheen=0, anisotropy=0,
+        alpha_cutoff=None, normal_map=None, absorption=0, sheen=0, anisotropy=0, thin=False,
     ):  # fmt: skip
         self.given = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
         super().__init__(0.5)
@@ -249,7 +281,8 @@ class Recorder(Diffuse):
 @pytest.fixture
 def given(monkeypatch, build, path):
     """Load a material as the parameters that `Principled` would be given."""
-    monkeypatch.setattr(appearance.bsdfs, "Principled", Recorder, raising=False)
+    monkeypatch.setattr(appearance, "Principled", Recorder)
+    monkeypatch.setattr(appearance, "PARAMETERS", frozenset(inspect.signature(Recorder).parameters))
 
     def load_given(**material):
         (mesh,) = load_meshes(build.material(**material).gltf(path))
@@ -368,14 +401,14 @@ def test_textured_emission_is_averaged_with_a_warning(given, build):
     ("extension", "expected"),
     [
         ({"KHR_materials_ior": {"ior": 1.33}}, {"ior": 1.33}),
-        ({"KHR_materials_transmission": {"transmissionFactor": 0.9}}, {"transmission": 0.9}),
+        ({"KHR_materials_transmission": {"transmissionFactor": 0.9}}, {"transmission": 0.9, "thin": True}),
         (
             {"KHR_materials_clearcoat": {"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.1}},
             {"clearcoat": 0.5, "clearcoat_roughness": 0.1},
         ),
         (
             {"KHR_materials_sheen": {"sheenColorFactor": [1, 0, 0], "sheenRoughnessFactor": 0.3}},
-            {"sheen_roughness": 0.3},
+            {"sheen": 1, "sheen_roughness": 0.3},
         ),
         ({"KHR_materials_specular": {"specularFactor": 0.2}}, {"specular": 0.2}),
     ],
@@ -409,31 +442,44 @@ def test_extension_textures(given, build):
     assert {k: float(at(found[k], 0.5, 0.5)) for k in expected} == pytest.approx(expected)
 
 
-@pytest.mark.parametrize(
-    ("material", "kind"),
-    [
-        ({"pbrMetallicRoughness": {"metallicFactor": 0}}, Diffuse),
-        ({"pbrMetallicRoughness": {"metallicFactor": 1, "roughnessFactor": 0}}, Mirror),
-        (
-            {
-                "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.5},
-                "extensions": {
-                    "KHR_materials_transmission": {"transmissionFactor": 1},
-                    "KHR_materials_volume": {"attenuationColor": [0.5, 1, 1], "attenuationDistance": 2},
-                },
-            },
-            Dielectric,
-        ),
-    ],
-)
-@pytest.mark.filterwarnings("ignore:.*not honoured. roughness")
-def test_the_simple_materials_stand_in(build, path, monkeypatch, material, kind):
-    monkeypatch.delattr(appearance.bsdfs, "Principled", raising=False)
-    (mesh,) = load_meshes(build.material(**material).gltf(path))
-    assert type(mesh.material) is kind
-    if kind is Dielectric:
-        assert mesh.material.roughness == pytest.approx([0.5])
-        assert mesh.material.absorption.ravel() == pytest.approx([np.log(2) / 2, 0, 0])
+GLASS = {
+    "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.25, "baseColorFactor": [1, 0.5, 0, 1]},
+    "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}},
+}
+VOLUME = {"thicknessFactor": 1, "attenuationColor": [0.5, 1, 1], "attenuationDistance": 2}
+
+
+def test_a_sheet_without_thickness_is_thin(build, path):
+    (mesh,) = load_meshes(build.material(**GLASS).gltf(path))
+    assert type(mesh.material) is ThinDielectric
+    assert mesh.material.roughness == pytest.approx([0.25])
+    assert mesh.material.transmittance.ravel() == pytest.approx([1, 0.5, 0])
+
+
+def test_a_volume_is_glass_that_absorbs(build, path):
+    extensions = {**GLASS["extensions"], "KHR_materials_volume": VOLUME, "KHR_materials_ior": {"ior": 1.33}}
+    (mesh,) = load_meshes(build.material(**GLASS | {"extensions": extensions}).gltf(path))
+    assert type(mesh.material) is Dielectric
+    assert mesh.material.ior == pytest.approx([1.33])
+    assert mesh.material.absorption.ravel() == pytest.approx([np.log(2) / 2, 0, 0])
+
+
+def test_everything_else_is_principled(build, path):
+    group = {"metallicFactor": 0.25, "roughnessFactor": 0.75, "baseColorFactor": [1, 0.5, 0, 1]}
+    (mesh,) = load_meshes(build.material(pbrMetallicRoughness=group).gltf(path))
+    assert type(mesh.material) is Principled
+    assert mesh.material.metallic == pytest.approx([0.25])
+    assert mesh.material.roughness == pytest.approx([0.75])
+    assert mesh.material.base_color.ravel() == pytest.approx([1, 0.5, 0])
+
+
+def test_what_principled_refuses_is_named(build, path, monkeypatch):
+    def refuse(**parameters):
+        raise SceneError("Principled ior is 1")
+
+    monkeypatch.setattr(appearance, "Principled", refuse)
+    with pytest.raises(SceneError, match=r"a\.gltf: materials\[0\] 'air': Principled ior is 1"):
+        load(build.material(name="air").gltf(path))
 
 
 # ---- what is not honoured is named once ---------------------------------------------------------
@@ -449,8 +495,9 @@ def lose_spot(b):
 
 
 def lose_camera(b):
-    b.json["nodes"][0]["camera"] = 0
-    b.json["cameras"] = [{"type": "orthographic", "orthographic": {}}]
+    b.json["nodes"] += [{"camera": 0}, {"camera": 0}]
+    b.json["scenes"][0]["nodes"] = [0, 1, 2]
+    b.json["cameras"] = [{"type": "perspective", "perspective": {"yfov": 1}}]
 
 
 def lose_colours(b):
@@ -475,7 +522,7 @@ def lose_extension(b):
     [
         (lose_animation, r"animations \(the file\)"),
         (lose_spot, r"spot light \(light 0\)"),
-        (lose_camera, r"orthographic camera \(cameras\[0\]\)"),
+        (lose_camera, r"further cameras \(cameras\[0\]\)"),
         (lose_colours, r"COLOR_0 \(mesh 'mesh0'\)"),
         (lose_targets, r"morph targets \(mesh 'mesh0'\)"),
         (lose_lines, r"points and lines \(mesh 'mesh0'\)"),
@@ -667,7 +714,7 @@ def test_a_textured_object_in_memory_equals_its_file(tmp_path):
         assert np.array_equal(soup(mesh), soup(held))
         assert np.array_equal(soup(mesh, mesh.uvs), soup(held, held.uvs))
         assert same(mesh.emission, held.emission)
-        assert same(mesh.material.reflectance, held.material.reflectance)
+        assert same(mesh.material.base_color, held.material.base_color)
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="the real files are not here")
@@ -679,8 +726,9 @@ def test_textures_of_real_files(name):
         warnings.simplefilter("ignore", DeprecationWarning)
         held = trimesh.load(DATA / name, process=False)
     for a, b in zip(scene.shapes, from_trimesh(held).shapes, strict=True):
-        assert isinstance(a.material.reflectance, Texture)
-        assert same(a.material.reflectance, b.material.reflectance)
+        (key,) = vars(a.material).keys() & {"base_color", "reflectance"}
+        assert isinstance(getattr(a.material, key), Texture)
+        assert same(getattr(a.material, key), getattr(b.material, key))
     if name == "Duck.glb":
         # the camera hangs below a node that scales by 0.01
         assert scene.camera.origin == pytest.approx([4.00113, 4.63264, -4.31078], rel=1e-5)

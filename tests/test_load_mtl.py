@@ -1,10 +1,12 @@
 """MTL maps, their options, and the PBR extension."""
 
+import inspect
+
 import imageio.v3 as iio
 import numpy as np
 import pytest
 
-from wavefront.bsdfs import Dielectric, Diffuse
+from wavefront.bsdfs import Dielectric, Diffuse, Principled
 from wavefront.errors import SceneError
 from wavefront.io import appearance
 from wavefront.io.images import srgb_to_linear
@@ -35,7 +37,7 @@ class Recorder(Diffuse):
 
     def __init__(
         self, base_color, metallic=0, roughness=0.5, sheen=0, clearcoat=0, clearcoat_roughness=0,
-        anisotropy=0, alpha=1, normal_map=None,
+        anisotropy=0, alpha=1, normal_map=None, specular=1,
     ):  # fmt: skip
         self.given = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
         super().__init__(0.5)
@@ -44,7 +46,8 @@ class Recorder(Diffuse):
 @pytest.fixture
 def given(monkeypatch, one):
     """Load a material as the parameters that `Principled` would be given."""
-    monkeypatch.setattr(appearance.bsdfs, "Principled", Recorder, raising=False)
+    monkeypatch.setattr(appearance, "Principled", Recorder)
+    monkeypatch.setattr(appearance, "PARAMETERS", frozenset(inspect.signature(Recorder).parameters))
     return lambda *lines: one(*lines).material.given
 
 
@@ -122,6 +125,7 @@ def test_the_pbr_extension(given):
         "anisotropy": 0.75,
         "alpha": 1,
         "normal_map": None,
+        "specular": 1,
     }
 
 
@@ -134,7 +138,8 @@ def test_pbr_maps(given):
 
 def test_roughness_0_is_kept_and_absent_roughness_is_matte(given):
     assert given("Pr 0")["roughness"] == 0
-    assert given("norm t.png")["roughness"] == 1
+    matte = given("norm t.png")
+    assert (matte["roughness"], matte["specular"]) == (1, 0)
 
 
 def test_parts_outside_their_range_are_clamped(given):
@@ -196,7 +201,7 @@ def test_glass_keeps_a_kd_quiet(one):
     assert one("Pr 0.3", "illum 4").material.roughness == pytest.approx([0.3])
 
 
-@pytest.mark.filterwarnings("ignore:.*not honoured")
-def test_the_simple_materials_stand_in(one, monkeypatch):
-    monkeypatch.delattr(appearance.bsdfs, "Principled", raising=False)
-    assert isinstance(one("Kd 0.5 0.5 0.5", "Pr 0.3").material, Diffuse)
+def test_the_pbr_extension_is_principled(one):
+    found = one("Kd 0.5 0.5 0.5", "Pr 0.3", "Pm 1").material
+    assert isinstance(found, Principled)
+    assert (found.roughness, found.metallic) == (pytest.approx([0.3]), pytest.approx([1]))

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import bsdfs
-from ..bsdfs import Bsdf, Dielectric, Diffuse, Mirror
+from ..bsdfs import Bsdf, Dielectric, Diffuse, Principled, ThinDielectric
 from ..textures import Texture
 
-SMOOTH = 0.05  # a metal less rough than this is taken for a mirror when nothing better is there
+PARAMETERS = frozenset(inspect.signature(Principled).parameters)
+GLASS = frozenset(("base_color", "transmission", "ior", "roughness", "absorption", "thin"))
 
 
 @dataclass
@@ -26,45 +26,30 @@ class Look:
 
 
 def realise(wanted: dict[str, Any]) -> tuple[Bsdf, list[str]]:
-    """Return a material, and the names of the parameters that it cannot have.
+    """Return a material, and the names of what is wanted in vain.
 
     Parameters
     ----------
     wanted
-        Parameters of `Principled` by name, as far as they are not neutral; `base_color` is always
-        there. Values are numbers, colours or textures.
+        Parameters of `Principled`, and others that it may get, by name, as far as they are not
+        neutral. `base_color` is always there. Values are numbers, colours or textures.
     """
-    principled = getattr(bsdfs, "Principled", None)
-    if principled is None:
-        return _plain(wanted)
-    known = inspect.signature(principled).parameters
-    taken = {name: value for name, value in wanted.items() if name in known}
-    return principled(**taken), [name for name in wanted if name not in known]
+    lost = [name for name in wanted if name not in PARAMETERS]
+    known = {name: value for name, value in wanted.items() if name in PARAMETERS}
+    if known.keys() == {"base_color"}:
+        return Diffuse(known["base_color"]), lost
+    # what is all glass is better off with the materials that know nothing else: they can be smooth
+    transmission = known.get("transmission", 0.0)
+    if known.keys() <= GLASS and not isinstance(transmission, Texture) and transmission == 1:
+        return _glass(known), lost
+    return Principled(**known), lost
 
 
-def _plain(wanted: dict[str, Any]) -> tuple[Bsdf, list[str]]:
-    """Choose among the simple materials."""
-    base = wanted["base_color"]
-    if _number(wanted, "transmission", 0.0) > 0.5:
-        material: Bsdf = Dielectric(
-            wanted.get("ior", 1.5),
-            wanted.get("roughness", 0.0),
-            transmittance=base,
-            absorption=wanted.get("absorption", 0.0),
-        )
-        return material, _others(wanted, "base_color", "transmission", "ior", "roughness", "absorption")
-    if _number(wanted, "metallic", 0.0) > 0.5 and _number(wanted, "roughness", 1.0) < SMOOTH:
-        return Mirror(base), _others(wanted, "base_color", "metallic", "roughness")
-    return Diffuse(base), _others(wanted, "base_color")
-
-
-def _number(wanted: dict[str, Any], name: str, default: float) -> float:
-    value = wanted.get(name, default)
-    return float(value.mean()) if isinstance(value, Texture) else float(value)
-
-
-def _others(wanted: dict[str, Any], *used: str) -> list[str]:
-    return [name for name in wanted if name not in used]
+def _glass(known: dict[str, Any]) -> Bsdf:
+    ior, roughness, tint = known.get("ior", 1.5), known.get("roughness", 0.5), known["base_color"]
+    if known.get("thin"):
+        return ThinDielectric(ior, roughness, transmittance=tint)
+    return Dielectric(ior, roughness, transmittance=tint, absorption=known.get("absorption", 0.0))
 
 
 def emission(

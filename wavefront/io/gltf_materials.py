@@ -107,14 +107,19 @@ class _Reader:
         self._maps()
         extensions = self._item.get("extensions", {})
         self._ior(extensions.get("KHR_materials_ior"))
-        self._transmission(extensions.get("KHR_materials_transmission"))
+        self._transmission(
+            extensions.get("KHR_materials_transmission"), extensions.get("KHR_materials_volume")
+        )
         self._clearcoat(extensions.get("KHR_materials_clearcoat"))
         self._sheen(extensions.get("KHR_materials_sheen"))
         self._specular(extensions.get("KHR_materials_specular"))
         self._volume(extensions.get("KHR_materials_volume"))
         self._lost += [name for name in extensions if name not in KNOWN]
         radiance = self._emission(extensions.get("KHR_materials_emissive_strength", {}))
-        material, lost = realise(self._wanted)
+        try:
+            material, lost = realise(self._wanted)
+        except SceneError as error:
+            raise SceneError(f"{self._file}: {self._where}: {error}") from error
         return Look(material, radiance, self._lost + lost)
 
     def _number(self, group: dict[str, Any], key: str, default: float, high: float = 1.0) -> float:
@@ -197,11 +202,15 @@ class _Reader:
         else:
             self._want("ior", ior, 1.5)
 
-    def _transmission(self, group: dict[str, Any] | None) -> None:
-        if group is not None:
-            self._want(
-                "transmission", self._scalar(group, "transmissionFactor", "transmissionTexture", 0, 0.0), 0.0
-            )
+    def _transmission(self, group: dict[str, Any] | None, volume: dict[str, Any] | None) -> None:
+        if group is None:
+            return
+        self._want(
+            "transmission", self._scalar(group, "transmissionFactor", "transmissionTexture", 0, 0.0), 0.0
+        )
+        thick = volume is not None and self._number(volume, "thicknessFactor", 0.0, high=np.inf) > 0
+        if "transmission" in self._wanted and not thick:
+            self._wanted["thin"] = True
 
     def _clearcoat(self, group: dict[str, Any] | None) -> None:
         if group is None:
@@ -221,6 +230,7 @@ class _Reader:
         if not factor.any():
             return
         texture = self._texture(group, "sheenColorTexture", scale=factor)
+        self._wanted["sheen"] = 1.0
         self._wanted["sheen_color"] = factor if texture is None else texture
         self._wanted["sheen_roughness"] = self._scalar(
             group, "sheenRoughnessFactor", "sheenRoughnessTexture", 3, 0.0
@@ -231,6 +241,9 @@ class _Reader:
             return
         self._want("specular", self._scalar(group, "specularFactor", "specularTexture", 3, 1.0), 1.0)
         factor = self._colour(group, "specularColorFactor", [1.0, 1.0, 1.0], high=np.inf)
+        if (factor > 1).any():
+            self._lost.append("specularColorFactor above 1")
+            factor = np.minimum(factor, 1.0)
         texture = self._texture(group, "specularColorTexture", scale=factor)
         if texture is not None or (factor != 1).any():
             self._wanted["specular_color"] = factor if texture is None else texture

@@ -74,6 +74,10 @@ class Entry:
         keyword, number, _ = self.lines[key]
         return f"{self.file} line {number}: {keyword}" if number else f"{self.file}: {keyword}"
 
+    def has(self, *keys: str) -> bool:
+        """Tell whether any of the keywords is there."""
+        return any(key in self.lines for key in keys)
+
     def numbers(self, key: str) -> list[float] | None:
         """Return the finite numbers of a line, None if there is no such line."""
         if key not in self.lines:
@@ -237,17 +241,17 @@ def look(entry: Entry) -> Look:
 def _material(entry: Entry) -> tuple[Bsdf, list[str]]:
     illum = int(entry.number("illum", 2))
     ior = entry.number("ni", 1.0)
-    physical = any(key in entry.lines for keys in PBR for key in keys[:2])
+    physical = entry.has(*(key for keys in PBR for key in keys[:2]))
     if illum in GLASS or (opacity(entry) < 1 and ior != 1 and "map_d" not in entry.lines):
         return _glass(entry)
     if illum in MIRROR and not physical and "ks" in entry.lines and entry.colour("ks", 0.0).any():
         return Mirror(entry.colour("ks", 0.0)), []
     wanted = _wanted(entry)
-    if len(wanted) == 1:
-        return Diffuse(wanted["base_color"]), []
-    # the shine of the default would be an invention where the file does not speak of it
-    material, lost = realise({"roughness": 1.0, **wanted})
-    return material, [name for name in lost if name in wanted]
+    material, lost = realise(wanted)
+    if type(material) is not Diffuse and not entry.has("pr", "map_pr", "pm", "map_pm"):
+        # a shine of its default kind would be an invention where the file does not speak of it
+        material, lost = realise({**wanted, "roughness": 1.0, "specular": 0.0})
+    return material, lost
 
 
 def _wanted(entry: Entry) -> dict[str, Any]:
