@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scenes
 from scenes import Case, each
-from significance import Mean, assert_mean, measure, repeat
+from significance import ROUNDING, Mean, assert_mean, measure, repeat
 
 import wavefront as wf
 from wavefront.lights import LightTable, TriangleLights
@@ -40,8 +40,14 @@ def test_indirect_light(case: Case, integrator: str) -> None:
 
 @pytest.mark.parametrize(**each(scenes.SPECULAR_CASES))
 def test_specular_light(case: Case, integrator: str) -> None:
-    """Glass, metal and mirrors, through which every integrator sees."""
-    assert_mean(run(case, integrator), case.expected, case.max_error)
+    """Glass, metal and mirrors, through which every integrator sees.
+
+    Stratified numbers may choose a lobe equally often in all 64 batches, which then show no spread;
+    what happens to ten of all samples may go unseen in one of 2e4 renders (e^-10).
+    """
+    spp = case.naive_spp if integrator == "naive" else case.spp
+    unseen = 10 / (64 * spp * case.expected)
+    assert_mean(run(case, integrator), case.expected, case.max_error, rounding=ROUNDING + unseen)
 
 
 @pytest.mark.parametrize("case", scenes.DIRECT_CASES, ids=str)
