@@ -6,11 +6,11 @@ from .camera import Camera
 from .errors import SceneError
 from .film import Image
 from .io.load import from_trimesh, load, load_mesh
-from .lights import Environment, PointLight
+from .lights import DirectionalLight, Environment, PointLight, SpotLight
 from .metrics import Comparison, compare
 from .render import render
 from .scene import Scene
-from .shapes import Mesh, Rectangle, Sphere
+from .shapes import Disk, Mesh, Rectangle, Sphere
 
 __all__ = [
     "Bsdf",
@@ -20,6 +20,8 @@ __all__ = [
     "Conductor",
     "Dielectric",
     "Diffuse",
+    "DirectionalLight",
+    "Disk",
     "Environment",
     "Image",
     "Mesh",
@@ -29,6 +31,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "Sphere",
+    "SpotLight",
     "compare",
     "from_trimesh",
     "load",

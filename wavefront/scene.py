@@ -16,12 +16,16 @@ from .bsdfs import Bsdf, Spatial
 from .camera import Camera
 from .errors import SceneError
 from .lights import (
+    DirectionalLight,
     Environment,
+    InfiniteLight,
     Light,
     LightTable,
     PointLight,
     RectangleLights,
+    Sky,
     SphereLights,
+    SpotLight,
     TriangleLights,
     first_of_pairs,
 )
@@ -30,7 +34,7 @@ from .state import Surface
 from .vec import Floats, Ints, f4
 
 Shape: TypeAlias = Mesh | Sphere
-UserLight: TypeAlias = PointLight | Environment
+UserLight: TypeAlias = PointLight | SpotLight | DirectionalLight | Environment
 
 
 class Scene:
@@ -41,8 +45,9 @@ class Scene:
     shapes
         `Mesh` and `Sphere` objects; one with an emission is a light.
     lights
-        `PointLight` and `Environment` objects, at most one `Environment`. A scene where nothing
-        shines is rendered in a neutral environment, with a warning.
+        `PointLight`, `SpotLight`, `DirectionalLight` and `Environment` objects, at most one
+        `Environment`. A scene where nothing shines is rendered in a neutral environment, with a
+        warning.
     camera
         Without one the scene is framed.
 
@@ -56,7 +61,9 @@ class Scene:
         self, shapes: Iterable[Shape] | Shape, lights: Iterable[UserLight] = (), camera: Camera | None = None
     ) -> None:
         self.shapes: list[Shape] = _list_of("shapes", shapes, (Mesh, Sphere))
-        self.lights: list[UserLight] = _list_of("lights", lights, (PointLight, Environment))
+        self.lights: list[UserLight] = _list_of(
+            "lights", lights, (PointLight, Environment, SpotLight, DirectionalLight)
+        )
         self.camera = camera
         if not self.shapes:
             raise SceneError("the scene has no shapes")
@@ -148,7 +155,7 @@ class CompiledScene:
     light_of: Ints  # (m + k,) light of each primitive, -1 for none
     materials: Materials
     lights: LightTable
-    environment: int  # number of the environment light, -1 for none
+    environment: int  # number of the light that rays meet where they leave the scene, -1 for none
 
 
 def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "place") -> CompiledScene:
@@ -304,7 +311,7 @@ def _gather_lights(
     half_size: NDArray[np.float64],
     choice: str,
 ) -> tuple[LightTable, Ints, int]:
-    """Return the table of lights, the light of each primitive, and the number of the environment."""
+    """Return the table of lights, the light of each primitive, and that of rays that hit nothing."""
     user_lights = list(scene.lights)
     if not scene.emits:
         warnings.warn("the scene has no light; rendering it in Environment(1.0)", stacklevel=4)
@@ -337,13 +344,19 @@ def _gather_lights(
             if s.emission is not None
         ],
     )
-    points = [light.record(centre) for light in user_lights if isinstance(light, PointLight)]
-    if points:
-        add(type(points[0]), points)
-    around = [light.record(centre) for light in user_lights if isinstance(light, Environment)]
-    environment = count if around else -1
-    if around:
-        add(type(around[0]), around)
+    groups: dict[type[Light], list[Any]] = {}
+    infinite: list[InfiniteLight] = []
+    for light in user_lights:
+        record = light.record(centre)
+        if isinstance(record, InfiniteLight):
+            infinite.append(record)
+        else:
+            groups.setdefault(type(record), []).append(record)
+    for kind, alike in groups.items():
+        add(kind, alike)
+    environment = count if infinite else -1
+    if infinite:
+        kinds.append(Sky.of(infinite))
     return LightTable(kinds, half_size, choice), light_of, environment
 
 

@@ -2,22 +2,34 @@
 
 from .base import Light, LightSample
 from .choose import LightTable
+from .directional import DirectionalLight, DirectionalLights, SunLight
 from .environment import ConstantEnvironment, Environment
+from .image import ImageEnvironment
+from .infinite import InfiniteLight, Sky
 from .point import PointLight, PointLights
 from .rectangle import RectangleLights, first_of_pairs
 from .sphere import SphereLights
+from .spot import SpotLight, SpotLights
 from .triangle import TriangleLights
 
 __all__ = [
     "ConstantEnvironment",
+    "DirectionalLight",
+    "DirectionalLights",
     "Environment",
+    "ImageEnvironment",
+    "InfiniteLight",
     "Light",
     "LightSample",
     "LightTable",
     "PointLight",
     "PointLights",
     "RectangleLights",
+    "Sky",
     "SphereLights",
+    "SpotLight",
+    "SpotLights",
+    "SunLight",
     "TriangleLights",
     "first_of_pairs",
 ]

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import rgb
+from ..errors import SceneError, rgb, rotation_matrix
 from ..sampling.warp import uniform_sphere
 from ..vec import Floats, f4
-from .base import Light, LightSample
+from .base import LightSample
+from .image import ImageEnvironment, environment_pixels
+from .infinite import InfiniteLight, at_infinity, through_scene
 
 UNIFORM_SPHERE_PDF = f4(1 / (4 * np.pi))
 
 
 @dataclass(slots=True)
-class ConstantEnvironment(Light):
+class ConstantEnvironment(InfiniteLight):
     """The same radiance from every direction."""
 
     radiance: Floats  # (3, 1) W·sr⁻¹·m⁻²
@@ -24,10 +28,8 @@ class ConstantEnvironment(Light):
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
         """Draw a direction uniformly on the sphere."""
         wi = uniform_sphere(u)
-        n = wi.shape[1]
         radiance = np.broadcast_to(self.radiance, wi.shape)
-        pdf, distance = np.full(n, UNIFORM_SPHERE_PDF, f4), np.full(n, np.inf, f4)
-        return LightSample(wi, radiance, pdf, distance, np.ones(n, f4))
+        return at_infinity(wi, radiance, np.full(wi.shape[1], UNIFORM_SPHERE_PDF, f4))
 
     def pdf_li(self, point: Floats, wi: Floats) -> Floats:
         """Return 1/4π."""
@@ -39,7 +41,7 @@ class ConstantEnvironment(Light):
 
     def power(self, scene_radius: float) -> NDArray[np.float64]:
         """4π·L through the disk of the scene, πR²."""
-        return 4 * np.pi**2 * scene_radius**2 * self.radiance.mean(0, dtype=np.float64)
+        return through_scene(4 * np.pi * self.radiance.mean(0, dtype=np.float64), scene_radius)
 
 
 class Environment:
@@ -48,17 +50,53 @@ class Environment:
     Parameters
     ----------
     radiance
-        W·sr⁻¹·m⁻², one number or three.
+        W·sr⁻¹·m⁻²: one number or three for the same from all around; or an image, a file (exr,
+        hdr, npy, png, jpg) or an array (H, W, 3), top row first. Pictures of 8 and 16 bits are
+        decoded from sRGB and count from 0 to 1; all others are linear. Alpha is not used.
+    transform
+        (3, 3) rotation to world space from the environment's.
+    filter
+        "bilinear" between the centres of the image's pixels, or "nearest".
+
+    Attributes
+    ----------
+    radiance
+        (3, 1) W·sr⁻¹·m⁻²; of an image, the mean over all directions.
+
+    Notes
+    -----
+    An image shows all directions by longitude and latitude, seen from within: its top row is +y,
+    its middle is +z, its left half is +x and its right half -x. That is how OpenEXR defines such
+    an image, and how Mitsuba 3 and `Camera.panorama` lay it out. In Blender the middle is +x, with
+    z up; for a scene that it exported with y up, the same view takes the transform
+    [[0, 0, 1], [0, 1, 0], [-1, 0, 0]].
+
+    Directions are drawn by the image's luminance, which takes about 28 bytes of memory a pixel.
 
     Raises
     ------
     SceneError
-        If the radiance is malformed.
+        If the radiance is malformed or not finite, an image is all black, or the transform is not
+        a rotation.
     """
 
-    def __init__(self, radiance: ArrayLike = 1.0) -> None:
-        self.radiance = rgb("Environment radiance", radiance)
+    def __init__(
+        self,
+        radiance: ArrayLike | str | os.PathLike[str] = 1.0,
+        *,
+        transform: ArrayLike | None = None,
+        filter: Literal["bilinear", "nearest"] = "bilinear",
+    ) -> None:
+        if filter not in ("bilinear", "nearest"):
+            raise SceneError(f"filter is {filter!r}; it must be 'bilinear' or 'nearest'")
+        turn = None if transform is None else rotation_matrix("Environment transform", transform)
+        self._image: ImageEnvironment | None = None
+        if isinstance(radiance, str | os.PathLike) or np.ndim(radiance) > 1:
+            self._image = ImageEnvironment.of(environment_pixels(radiance), filter, turn)
+            self.radiance: Floats = self._image.mean
+        else:
+            self.radiance = rgb("Environment radiance", radiance)
 
-    def record(self, centre: NDArray[np.float64]) -> ConstantEnvironment:
+    def record(self, centre: NDArray[np.float64]) -> InfiniteLight:
         """Return the light as a record of one column."""
-        return ConstantEnvironment(self.radiance)
+        return ConstantEnvironment(self.radiance) if self._image is None else self._image

@@ -1,0 +1,150 @@
+"""Light from one direction, infinitely far away: delta, or a small disk of the sky such as the sun."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import SceneError, finite_array, number, rgb
+from ..frame import Frame
+from ..sampling.warp import uniform_cone
+from ..vec import Floats, column, dot, f4
+from .base import Light, LightSample
+from .infinite import InfiniteLight, at_infinity, facing_irradiance, through_scene, turned
+
+TWO_PI = f4(2 * np.pi)
+MIN_ANGLE = 0.01  # degrees; float32 directions cannot tell a smaller disk's edge to a percent
+
+
+@dataclass(slots=True)
+class DirectionalLights(Light):
+    """k lights whose rays are parallel."""
+
+    delta: ClassVar[bool] = True
+    towards: Floats  # (3, k) unit direction to the light
+    facing: Floats  # (3, k) W·m⁻² on a surface that faces the light
+
+    def sample_li(self, point: Floats, u: Floats) -> LightSample:
+        """Return the direction; the radiance is the irradiance of a surface that faces it."""
+        wi = np.broadcast_to(self.towards, point.shape)
+        return at_infinity(wi, np.broadcast_to(self.facing, point.shape), np.ones(point.shape[1], f4))
+
+    def pdf_li(self, point: Floats, wi: Floats) -> Floats:
+        """Return 0: no sampled direction is exactly the light's."""
+        return np.zeros(wi.shape[1], f4)
+
+    def le(self, wi: Floats) -> Floats:
+        """Return 0: the light is never seen."""
+        return np.zeros_like(wi)
+
+    def power(self, scene_radius: float) -> NDArray[np.float64]:
+        """E through the disk of the scene, πR²."""
+        return through_scene(self.facing.mean(0, dtype=np.float64), scene_radius)
+
+    def irradiance(
+        self, centre: NDArray[np.float64], radius: float, scene_radius: float
+    ) -> NDArray[np.float64]:
+        """E, everywhere; (c, k)."""
+        return facing_irradiance(self, centre)
+
+
+@dataclass(slots=True)
+class SunLight(InfiniteLight):
+    """A disk of constant radiance at infinity, sampled uniformly in solid angle."""
+
+    axes: Floats  # (3, 3) columns of a frame whose third points to the middle of the disk
+    height: Floats  # (1,) 1 − cos of the angular radius
+    radiance: Floats  # (3, 1) W·sr⁻¹·m⁻²
+
+    def sample_li(self, point: Floats, u: Floats) -> LightSample:
+        """Draw a direction uniformly in the cone."""
+        wi = turned(self.axes, uniform_cone(u, self.height))
+        pdf = np.broadcast_to(f4(1) / (TWO_PI * self.height), wi.shape[1:])
+        return at_infinity(wi, np.broadcast_to(self.radiance, wi.shape), pdf)
+
+    def pdf_li(self, point: Floats, wi: Floats) -> Floats:
+        """Return 1/(solid angle of the disk) within it."""
+        return np.where(self._meets(wi), f4(1) / (TWO_PI * self.height), f4(0))
+
+    def le(self, wi: Floats) -> Floats:
+        """Return the radiance within the disk, (3, n)."""
+        return self.radiance * self._meets(wi)
+
+    def power(self, scene_radius: float) -> NDArray[np.float64]:
+        """π·sin²·L through the disk of the scene, πR²."""
+        height = self.height.astype(np.float64)
+        irradiance = np.pi * height * (2 - height) * self.radiance.mean(0, dtype=np.float64)
+        return through_scene(irradiance, scene_radius)
+
+    def irradiance(
+        self, centre: NDArray[np.float64], radius: float, scene_radius: float
+    ) -> NDArray[np.float64]:
+        """E, everywhere; (c, k)."""
+        return facing_irradiance(self, centre)
+
+    def _meets(self, wi: Floats) -> NDArray[np.bool_]:
+        away = wi - column(self.axes[:, 2])
+        return f4(0.5) * dot(away, away) <= self.height  # 1 − cosθ without cancellation
+
+
+class DirectionalLight:
+    """Light from one direction, infinitely far away, such as the sun's.
+
+    Parameters
+    ----------
+    direction
+        (3,) in which the light travels, of any length.
+    irradiance
+        W·m⁻² on a surface that faces the light, one number or three; where it comes in at the
+        angle θ it gives irradiance·cosθ.
+    angle
+        Angular diameter in degrees, the sun's is 0.53. With 0 the rays are parallel, shadows are
+        sharp and the light itself is never seen, not even in a mirror. With more it is a disk of
+        the sky of radiance irradiance/(π·sin²(angle/2)), which is seen where rays leave the scene.
+
+    Raises
+    ------
+    SceneError
+        If an argument is malformed, the direction is zero, or the angle is neither 0 nor from
+        0.01 to 180.
+    """
+
+    def __init__(self, direction: ArrayLike, irradiance: ArrayLike, *, angle: float = 0.0) -> None:
+        self.direction = unit("DirectionalLight direction", direction)
+        self.irradiance = rgb("DirectionalLight irradiance", irradiance)
+        self.angle = number(
+            "DirectionalLight angle",
+            angle,
+            lambda x: x == 0 or MIN_ANGLE <= x <= 180,
+            f"0, or from {MIN_ANGLE} to 180 degrees",
+        )
+
+    def record(self, centre: NDArray[np.float64]) -> DirectionalLights | SunLight:
+        """Return the light as a record of one column."""
+        towards = (-self.direction).astype(f4).reshape(3, 1)
+        if self.angle == 0:
+            return DirectionalLights(towards, self.irradiance)
+        radius = np.radians(self.angle) / 2
+        frame = Frame.from_normal(towards)
+        axes = np.concatenate([frame.x, frame.y, frame.z], axis=1)
+        height = np.array([2 * np.sin(radius / 2) ** 2], f4)
+        return SunLight(axes, height, (self.irradiance / (np.pi * np.sin(radius) ** 2)).astype(f4))
+
+
+def unit(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """Return a (3,) direction scaled to unit length.
+
+    Raises
+    ------
+    SceneError
+        If it is malformed or zero.
+    """
+    vector = finite_array(name, value, (3,))
+    largest = np.abs(vector).max()
+    if not largest > 0:
+        raise SceneError(f"{name} is {vector.tolist()}; it must not be zero")
+    vector = vector / largest
+    return np.asarray(vector / np.linalg.norm(vector))

@@ -1,0 +1,185 @@
+"""An environment given by an image."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from ..io.images import check_size, read_codes, srgb_to_linear
+from ..sampling.discrete import Distribution2D
+from ..textures import Texture
+from ..vec import Floats, f4, luminance
+from .base import LightSample
+from .infinite import InfiniteLight, at_infinity, through_scene, turned
+
+INV_PI = f4(1 / np.pi)
+INV_TWO_PI = f4(0.5 / np.pi)
+TWO_PI = f4(2 * np.pi)
+
+
+@dataclass(slots=True)
+class ImageEnvironment(InfiniteLight):
+    """Radiance from a latitude–longitude image, sampled texel by texel.
+
+    A texel is chosen with a probability proportional to the luminance of its mean times its solid
+    angle, and a direction within it uniformly in solid angle.
+    """
+
+    image: Texture  # top row up, the middle column towards +z, columns turning from +x to -x
+    texels: Distribution2D  # over columns and rows; uniform within a texel
+    density: Floats  # (H,) 1/(2π·H·Δcosθ) of each row: density over the unit square -> 1/sr
+    top: NDArray[np.float64]  # (H,) cosθ of the upper edge of each row
+    step: NDArray[np.float64]  # (H,) Δcosθ from the upper edge of each row to the lower
+    mean: Floats  # (3, 1) radiance, averaged over all directions
+    rotation: Floats | None  # (3, 3) to world from environment; None where they are the same
+
+    @classmethod
+    def of(cls, pixels: Floats, filter: str, rotation: NDArray[np.float64] | None) -> Self:
+        """Prepare an image (H, W, 3), finite and at least 0, top row first.
+
+        Raises
+        ------
+        SceneError
+            If every pixel is black, or there is no such filter.
+        """
+        height = len(pixels)
+        image = Texture(pixels, wrap=("repeat", "clamp"), filter=filter)  # type: ignore[arg-type]
+        middle = np.pi / height * (np.arange(height) + 0.5)
+        step = 2 * np.sin(middle) * np.sin(np.pi / (2 * height))  # cos of one edge − cos of the next
+        texels = pixels.astype(np.float64) if filter == "nearest" else _spread(pixels)
+        shares = texels * (step / (2 * pixels.shape[1]))[:, None, None]  # of the sphere
+        weights = luminance(np.moveaxis(shares, -1, 0))
+        if not weights.any():
+            raise SceneError("every pixel of the Environment is black; Environment(0) is darkness")
+        return cls(
+            image=image,
+            texels=Distribution2D(weights),
+            density=(1 / (2 * np.pi * height * step)).astype(f4),
+            top=np.cos(middle - np.pi / (2 * height)),
+            step=step,
+            mean=shares.sum((0, 1)).astype(f4).reshape(3, 1),
+            rotation=None if rotation is None else rotation.astype(f4),
+        )
+
+    def sample_li(self, point: Floats, u: Floats) -> LightSample:
+        """Choose a texel, and a direction uniformly within it."""
+        height = len(self.step)
+        x, y, over_square = self.texels.sample(u)
+        scaled = y * f4(height)
+        row = np.minimum(scaled.astype(np.intp), height - 1)
+        # float64: near the poles cosθ itself is far coarser in float32 than the rows
+        cos = self.top.take(row) - (scaled - row) * self.step.take(row)
+        sin = np.sqrt(np.maximum((1 - cos) * (1 + cos), 0)).astype(f4)
+        longitude = TWO_PI * (f4(0.5) - x)
+        wi = np.empty((3, len(x)), f4)
+        np.multiply(np.sin(longitude), sin, out=wi[0])
+        wi[1] = cos
+        np.multiply(np.cos(longitude), sin, out=wi[2])
+        v = np.arctan2(sin, wi[1]) * INV_PI
+        radiance = self._lookup(x, v)
+        if self.rotation is not None:
+            wi = turned(self.rotation, wi)
+        return at_infinity(wi, radiance, over_square * self.density.take(row))
+
+    def pdf_li(self, point: Floats, wi: Floats) -> Floats:
+        """Return the density of the texel in direction wi."""
+        x, y = self._place(wi)
+        row = np.minimum((y * f4(len(self.density))).astype(np.intp), len(self.density) - 1)
+        return self.texels.pdf(x, y) * self.density.take(row)
+
+    def le(self, wi: Floats) -> Floats:
+        """Return the radiance of the image in direction wi, (3, n)."""
+        return self._lookup(*self._place(wi))
+
+    def power(self, scene_radius: float) -> NDArray[np.float64]:
+        """4π times the mean radiance, through the disk of the scene, πR²."""
+        return through_scene(4 * np.pi * self.mean.mean(0, dtype=np.float64), scene_radius)
+
+    def _place(self, wi: Floats) -> tuple[Floats, Floats]:
+        """Return where directions (3, n) lie in the image, from the left and the top, in [0, 1]."""
+        local = wi if self.rotation is None else turned(self.rotation.T, wi)
+        x = f4(0.5) - np.arctan2(local[0], local[2]) * INV_TWO_PI
+        level = np.sqrt(local[0] * local[0] + local[2] * local[2])
+        return x, np.arctan2(level, local[1]) * INV_PI
+
+    def _lookup(self, x: Floats, y: Floats) -> Floats:
+        return self.image.lookup(np.stack([x, f4(1) - y]))
+
+
+def _spread(pixels: Floats) -> NDArray[np.float64]:
+    """Mean of the bilinear lookup within each texel: its neighbours count ⅛, itself ¾, both ways.
+
+    It is positive wherever the lookup is.
+    """
+    texels = pixels.astype(np.float64)
+    texels = 0.75 * texels + 0.125 * (np.roll(texels, 1, 1) + np.roll(texels, -1, 1))
+    above, below = np.vstack([texels[:1], texels[:-1]]), np.vstack([texels[1:], texels[-1:]])
+    return 0.75 * texels + 0.125 * (above + below)
+
+
+def environment_pixels(source: Any) -> Floats:
+    """Return an environment's image as linear radiance, (H, W, 3) float32, finite and at least 0.
+
+    Parameters
+    ----------
+    source
+        A file, or an array (H, W) or (H, W, 1 to 4). 8- and 16-bit values count from 0 to 1 and
+        are decoded from sRGB; others are linear. Alpha is not used.
+
+    Raises
+    ------
+    SceneError
+        If it is no image, or a pixel is not finite.
+    """
+    if isinstance(source, str | os.PathLike):
+        codes, name = read_codes(source), f"Environment {Path(source).name!r}"
+    else:
+        codes, name = np.asarray(source), "Environment image"
+    if codes.ndim == 2:
+        codes = codes[:, :, None]
+    if codes.ndim != 3 or not 1 <= codes.shape[2] <= 4 or codes.dtype.kind not in "uif":
+        raise SceneError(f"{name} is {codes.dtype} of shape {codes.shape}; it must be (H, W, 3)")
+    check_size(codes.shape[0], codes.shape[1])
+    with np.errstate(over="ignore"):  # an overflow is infinite, and is reported below
+        pixels = codes.astype(f4)
+    if codes.dtype in (np.uint8, np.uint16):
+        pixels /= f4(np.iinfo(codes.dtype).max)
+    if codes.shape[2] in (2, 4):
+        clear = int((pixels[..., -1] != 1).sum())
+        if clear:
+            warnings.warn(f"{name}: {clear} pixels are transparent; alpha is not used", stacklevel=4)
+        pixels = pixels[..., :-1]
+    pixels = np.array(np.broadcast_to(pixels, (*pixels.shape[:2], 3)))
+    _check_finite(name, pixels)
+    if codes.dtype in (np.uint8, np.uint16):
+        return srgb_to_linear(pixels)
+    return _without_negative(name, pixels)
+
+
+def _check_finite(name: str, pixels: Floats) -> None:
+    bad = np.argwhere(~np.isfinite(pixels).all(2))
+    if len(bad):
+        row, column = bad[0]
+        raise SceneError(
+            f"{name}: {len(bad)} pixels are not finite in float32, first: row {row}, column {column}, "
+            f"{pixels[row, column].tolist()}"
+        )
+
+
+def _without_negative(name: str, pixels: Floats) -> Floats:
+    bad = np.argwhere((pixels < 0).any(2))
+    if len(bad):
+        row, column = bad[0]
+        warnings.warn(
+            f"{name}: {len(bad)} pixels are negative and count as 0, first: row {row}, column {column}, "
+            f"{pixels[row, column].tolist()}",
+            stacklevel=5,
+        )
+    return np.maximum(pixels, f4(0))

@@ -1,0 +1,112 @@
+"""Lights at infinity, which rays meet where they leave the scene, and how several make one sky."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..sampling.discrete import Discrete
+from ..vec import Floats, Ints, column, f4
+from .base import Light, LightSample
+
+
+class InfiniteLight(Light):
+    """A light that rays meet where they leave the scene. A record holds one, shared by all lanes."""
+
+    __slots__ = ()
+
+    def __len__(self) -> int:
+        """Return 1."""
+        return 1
+
+    def take(self, index: Ints) -> Self:
+        """Return the one light: every lane has the same."""
+        return self
+
+    @classmethod
+    def concatenate(cls, records: Sequence[Self]) -> Self:
+        """Return the one light; several are joined by `Sky`."""
+        (record,) = records
+        return record
+
+
+@dataclass(slots=True)
+class Sky(InfiniteLight):
+    """The sum of several lights at infinity, sampled one at a time by their power.
+
+    Its pdf is the mixture's, so that each sample is weighed against all ways to draw it
+    (E. Veach, thesis 1997, §9.2.2: the one-sample model with the balance heuristic).
+    """
+
+    parts: tuple[InfiniteLight, ...]
+    choice: Discrete
+
+    @classmethod
+    def of(cls, parts: Sequence[InfiniteLight]) -> InfiniteLight:
+        """Join lights at infinity; one alone stays as it is."""
+        if len(parts) == 1:
+            return parts[0]
+        power = np.concatenate([part.power(1.0) for part in parts])
+        return cls(tuple(parts), Discrete(power if power.any() else np.ones_like(power)))
+
+    def sample_li(self, point: Floats, u: Floats) -> LightSample:
+        """Choose a part with u[0], and sample it with what is left of u."""
+        index, _, rest = self.choice.sample(u[0])
+        stretched = np.stack([rest, u[1]])
+        wi = np.empty((3, u.shape[1]), f4)
+        for k, part in enumerate(self.parts):
+            lanes = np.flatnonzero(index == k)
+            if lanes.size:
+                wi[:, lanes] = part.sample_li(point.take(lanes, 1), stretched.take(lanes, 1)).wi
+        return at_infinity(wi, self.le(wi), self.pdf_li(point, wi))
+
+    def pdf_li(self, point: Floats, wi: Floats) -> Floats:
+        """Return the sum of the parts' densities, each times the chance of the part."""
+        chances = self.choice.pmf(np.arange(len(self.parts)))
+        pdf = np.zeros(wi.shape[1], f4)
+        for part, chance in zip(self.parts, chances, strict=True):
+            pdf += chance * part.pdf_li(point, wi)
+        return pdf
+
+    def le(self, wi: Floats) -> Floats:
+        """Return the sum of the parts' radiances, (3, n)."""
+        radiance = np.zeros_like(wi)
+        for part in self.parts:
+            radiance += part.le(wi)
+        return radiance
+
+    def power(self, scene_radius: float) -> NDArray[np.float64]:
+        """Return the sum of the parts' powers."""
+        return np.sum([part.power(scene_radius) for part in self.parts], axis=0)
+
+    def irradiance(
+        self, centre: NDArray[np.float64], radius: float, scene_radius: float
+    ) -> NDArray[np.float64]:
+        """Return the sum of what the parts bring, (c, 1)."""
+        return np.sum([part.irradiance(centre, radius, scene_radius) for part in self.parts], axis=0)
+
+
+def at_infinity(wi: Floats, radiance: Floats, pdf: Floats) -> LightSample:
+    """Return a sample of light that comes from infinitely far away along wi (3, n)."""
+    n = wi.shape[1]
+    return LightSample(wi, radiance, pdf, np.full(n, np.inf, f4), np.ones(n, f4))
+
+
+def through_scene(irradiance: NDArray[np.float64], scene_radius: float) -> NDArray[np.float64]:
+    """Power of light with this `irradiance` (k,) through the disk that the scene covers, (k,)."""
+    return np.pi * scene_radius**2 * irradiance
+
+
+def facing_irradiance(light: Light, centre: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What lights from one direction bring to surfaces that face them, (c, k), at c places."""
+    alike = light.power(1.0) / np.pi
+    return np.broadcast_to(alike, (centre.shape[1], len(alike)))
+
+
+def turned(axes: Floats, v: Floats) -> Floats:
+    """Return the axes, columns of (3, 3), weighted by the components of v (3, n): (3, n)."""
+    return column(axes[:, 0]) * v[0] + column(axes[:, 1]) * v[1] + column(axes[:, 2]) * v[2]

@@ -1,0 +1,144 @@
+"""Spot lights: points that shine into a cone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import SceneError, finite_array, number, rgb
+from ..vec import Floats, dot, f4
+from .base import Light, LightSample
+from .directional import unit
+
+
+@dataclass(slots=True)
+class SpotLights(Light):
+    """k points that shine into a cone each."""
+
+    delta: ClassVar[bool] = True
+    position: Floats  # (3, k) scene units
+    axis: Floats  # (3, k) unit direction in which the light shines
+    outer: Floats  # (k,) 1 − cos of the angle at which the light ends
+    slope: Floats  # (k,) 1/(cos of the angle at which it begins to fall − cos of where it ends)
+    intensity: Floats  # (3, k) W/sr on the axis
+
+    def sample_li(self, point: Floats, u: Floats) -> LightSample:
+        """Return the direction to the light; radiance is I·falloff/d²."""
+        away = self.position - point
+        d2 = dot(away, away)
+        apart = d2 > 0
+        safe = np.where(apart, d2, f4(1))
+        distance = np.sqrt(safe)
+        wi = away / distance
+        strength = self._falloff(wi)
+        pdf = np.where(apart & (strength > 0), f4(1), f4(0))
+        return LightSample(wi, self.intensity * (strength / safe), pdf, distance, np.ones_like(distance))
+
+    def pdf_li(self, point: Floats, wi: Floats) -> Floats:
+        """Return 0: no sampled direction can meet a point."""
+        return np.zeros(wi.shape[1], f4)
+
+    def le(self, wi: Floats) -> Floats:
+        """Return 0: a point is never seen."""
+        return np.zeros_like(wi)
+
+    def power(self, scene_radius: float) -> NDArray[np.float64]:
+        """2πI·(h_inner + (h_outer − h_inner)/3), the integral of the falloff; h = 1 − cos."""
+        outer = self.outer.astype(np.float64)
+        solid_angle = 2 * np.pi * (outer - 2 / 3 / self.slope)
+        return solid_angle * self.intensity.mean(0, dtype=np.float64)
+
+    def irradiance(
+        self, centre: NDArray[np.float64], radius: float, scene_radius: float
+    ) -> NDArray[np.float64]:
+        """I·falloff/d² at most, with the falloff at the part of the ball nearest to the axis; (c, k)."""
+        away = centre[:, :, None] - self.position[:, None, :]
+        distance = np.sqrt((away**2).sum(0))
+        far = np.maximum(distance, 1e-30)
+        angle = np.arccos(np.clip((away * self.axis[:, None, :]).sum(0) / far, -1, 1))
+        nearest = angle - np.arcsin(np.minimum(radius / far, 1))
+        nearest = np.where(distance > radius, np.maximum(nearest, 0), 0)
+        ramp = np.clip((self.outer - (1 - np.cos(nearest))) * self.slope, 0, 1)
+        return self.intensity.mean(0, dtype=np.float64) * ramp**2 / np.maximum(distance, radius) ** 2
+
+    def _falloff(self, wi: Floats) -> Floats:
+        """Part (n,) of the intensity that leaves against wi (3, n).
+
+        Source: glTF 2.0, KHR_lights_punctual, "Inner and Outer Cone Angles": the square of a ramp
+        in the cosine. Here 1 − cos takes the cosine's place, so that narrow cones keep their digits.
+        """
+        off = wi + self.axis
+        ramp = np.clip((self.outer - f4(0.5) * dot(off, off)) * self.slope, f4(0), f4(1))
+        return ramp * ramp
+
+
+class SpotLight:
+    """A point that shines into a cone.
+
+    Parameters
+    ----------
+    position
+        (3,) scene units.
+    intensity
+        W/sr on the axis, one number or three; at distance d it gives irradiance I·cosθ/d².
+    target, direction
+        (3,) a point on the axis, or the direction of the axis: give one of them.
+    angle
+        Full angle of the cone, degrees; beyond it there is no light.
+    blend
+        Part of the cone's angle, from the edge inwards, in which the light falls off: 0 is a hard
+        edge, with 1 it falls off from the axis on.
+
+    Notes
+    -----
+    `angle` and `blend` are Blender's "Spot Size" and "Blend". The cone of glTF has
+    angle = 2·outerConeAngle (in degrees) and blend = 1 − innerConeAngle/outerConeAngle.
+
+    Raises
+    ------
+    SceneError
+        If an argument is malformed or out of range.
+    """
+
+    def __init__(
+        self,
+        position: ArrayLike,
+        intensity: ArrayLike,
+        *,
+        target: ArrayLike | None = None,
+        direction: ArrayLike | None = None,
+        angle: float = 45.0,
+        blend: float = 0.15,
+    ) -> None:
+        self.position = finite_array("SpotLight position", position, (3,))
+        self.intensity = rgb("SpotLight intensity", intensity)
+        if (target is None) == (direction is None):
+            raise SceneError("SpotLight needs a target or a direction, and not both")
+        if target is not None:
+            aim = finite_array("SpotLight target", target, (3,)) - self.position
+            if not aim.any():
+                raise SceneError(f"SpotLight position and target are both {self.position.tolist()}")
+            self.direction = unit("SpotLight target", aim)
+        else:
+            self.direction = unit("SpotLight direction", direction)  # type: ignore[arg-type]
+        self.angle = number(
+            "SpotLight angle", angle, lambda x: 0 < x <= 180, "above 0 and at most 180 degrees"
+        )
+        self.blend = number("SpotLight blend", blend, lambda x: 0 <= x <= 1, "in [0, 1]")
+
+    def record(self, centre: NDArray[np.float64]) -> SpotLights:
+        """Return the light as a record of one column, relative to `centre` (3,)."""
+        half = np.radians(self.angle) / 2
+        outer = 2 * np.sin(half / 2) ** 2
+        inner = 2 * np.sin(half * (1 - self.blend) / 2) ** 2
+        width = max(outer - inner, 1e-6 * outer)  # a hard edge is a very steep ramp
+        return SpotLights(
+            (self.position - centre).astype(f4).reshape(3, 1),
+            self.direction.astype(f4).reshape(3, 1),
+            np.array([outer], f4),
+            np.array([1 / width], f4),
+            self.intensity,
+        )
