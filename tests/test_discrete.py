@@ -81,6 +81,25 @@ def test_a_lone_weight_takes_all(weights):
     assert rest == pytest.approx([0, 0.5, 1], abs=1e-6)
 
 
+def test_no_number_below_one_passes_the_last_item():
+    """Ten times 0.1 sums to less than 1 in float64; the items after it have no weight."""
+    index, _, _ = Discrete([0.1] * 10 + [0, 0]).sample(np.array([np.nextafter(1.0, 0.0)]))
+    assert index[0] == 9
+
+
+def test_the_rest_stays_below_one():
+    """float32(0.9) is below 0.9 by so little that the ratio rounds to 1."""
+    index, _, rest = Discrete([0.9, 0.1]).sample(np.float32([0.9]))
+    assert index[0] == 0
+    assert rest[0] == BELOW_ONE
+
+
+def test_sums_of_huge_and_tiny_weights():
+    assert (Discrete([1e308] * 10).pmf(np.arange(10)) == np.float32(0.1)).all()
+    assert (Discrete([5e-324] * 10).pmf(np.arange(10)) == np.float32(0.1)).all()
+    assert Distribution2D(np.full((3, 4), 1e308)).pdf(np.float32([0.5]), np.float32([0.5]))[0] == 1
+
+
 def test_many_items():
     """Among a million equal items, each can be reached and the cumulative sum does not drift."""
     k = 1_000_000

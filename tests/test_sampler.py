@@ -203,6 +203,17 @@ def test_independent_neighbours_are_independent(step):
             assert stats.chisquare(joint).pvalue > 1e-4
 
 
+def test_streams_are_not_one_stream_at_other_addresses():
+    """With a key at the input alone, stream b would be stream a at an XOR of the address."""
+    a, b = (module._stream(1, 2, dimension).longs for dimension in (3, 4))
+    word = np.arange(64, dtype=np.uint64) << np.uint64(32)
+    moved = word ^ a[0] ^ b[0]
+    assert (module._mix_longs(word.copy(), *a) != module._mix_longs(moved, *b)).all()
+    a, b = (module._stream(1, 2, dimension).words for dimension in (3, 4))
+    pixel = np.arange(64, dtype=np.uint32)
+    assert (module._mix_words(pixel, a[0], a[1]) != module._mix_words(pixel ^ a[0] ^ b[0], b[0], b[1])).all()
+
+
 def test_coordinates_of_a_point_are_uncorrelated():
     x, y = shifted(IndependentSampler(6), 0, 0, 0, 0)
     assert abs(np.corrcoef(x, y)[0, 1]) < 4.5 / np.sqrt(len(x))
@@ -309,6 +320,16 @@ def test_owen_scrambling_flips_each_bit_half_of_the_time():
         assert np.abs(bits.mean(axis=0) - 0.5).max() < 0.06
         pairs = bits[:, 1:] ^ bits[:, :-1]
         assert np.abs(pairs.mean(axis=0) - 0.5).max() < 0.06
+
+
+@pytest.mark.parametrize("bit", [0, 1, 2, 4, 8, 16, 24])
+def test_owen_scrambling_avalanches_upwards(bit):
+    """Words that differ in one bit get independent flips in all bits above it."""
+    seed = module._mix_words(np.arange(1 << 14, dtype=np.uint32), np.uint32(1), np.uint32(2))
+    for word in (0, 0x12345678):
+        a, b = (module._owen(np.full(len(seed), w, np.uint32), seed) for w in (word, word ^ (1 << bit)))
+        differ = ((a ^ b)[:, None] >> np.arange(bit + 1, 32, dtype=np.uint32)) & 1
+        assert np.abs(differ.mean(axis=0) - 0.5).max() < 0.02
 
 
 # What it is good for

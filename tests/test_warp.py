@@ -217,6 +217,14 @@ def test_density_of_points_integrates_to_one(name):
     assert 4 * mean(FLAT[name][1](p)) == pytest.approx(1, abs=1e-3)
 
 
+def test_the_centre_and_the_diagonals_of_the_disk():
+    """Where the concentric map changes its formula, and where it would divide 0 by 0."""
+    u = f4([0.5, 0, 1, 0, 0.5, 0], [0.5, 0, 0, 0.5, 0, 1])
+    h = np.sqrt(0.5)
+    expected = f4([0, -h, h, -1, 0, -h], [0, -h, -h, 0, -1, h])
+    assert warp.uniform_disk(u) == pytest.approx(expected, abs=1e-6)
+
+
 def test_points_of_the_disk_are_uniform():
     p = warp.uniform_disk(random_square(2)).astype(np.float64)
     ring = np.minimum(((p**2).sum(axis=0) * 20).astype(int), 19)
@@ -282,6 +290,12 @@ def test_filters_follow_their_density(name):
     fine = (((np.arange(800 * 16) + 0.5) / (800 * 16)) * 2 - 1).astype(np.float32) * np.float32(radius)
     expected = pdf(fine, **shape).astype(np.float64).reshape(800, 16).mean(axis=1) * 2 * radius / 800 * 1e6
     check_counts(observed, expected)
+
+
+@pytest.mark.parametrize("sigma", [0.1, 0.3, 0.5, 0.7, 1, 3])
+@pytest.mark.parametrize("radius", [0.5, 0.7, 1, 1.5, 2])
+def test_gaussian_offsets_stay_within_the_radius(sigma, radius):
+    assert np.abs(warp.gaussian(f4(0, BELOW_ONE), sigma, radius)).max() <= np.float32(radius)
 
 
 def test_error_functions_against_scipy():
@@ -449,6 +463,18 @@ def test_shapes_that_cover_nothing_have_no_density():
     edge_on = SphericalRectangle.of(*(f4(*row).reshape(3, 1) for row in ((1, 1, 0), (1, 0, 0), (0, 1, 0))))
     assert edge_on.pdf()[0] == 0
     assert np.isfinite(edge_on.sample(square(2)[:, :1])).all()
+    within = SphericalRectangle.of(*(f4(*row).reshape(3, 1) for row in ((-1, -1, 0), (2, 0, 0), (0, 2, 0))))
+    assert within.pdf()[0] == 0
+
+
+def test_points_stay_in_a_rectangle_that_touches_the_plane_of_sight():
+    """At 1e-12 above the plane the tangent amplifies rounding without bound."""
+    rectangle = SphericalRectangle.of(
+        *(f4(*row).reshape(3, 1) for row in ((1, -1, 1e-12), (2, 0, 0), (0, 2, 0)))
+    )
+    x, y, _ = rectangle.sample(square(40))
+    assert ((x >= 1) & (x <= 3)).all()
+    assert ((y >= -1) & (y <= 1)).all()
 
 
 def test_a_shape_per_lane():

@@ -44,8 +44,7 @@ class Discrete:
         array = array / array.max()  # keeps the sum of huge or tiny weights in range
         self.probability: NDArray[np.float64] = array / array.sum()
         self._cdf = np.cumsum(self.probability)
-        self._last = int(np.flatnonzero(array)[-1])
-        self._cdf[self._last :] = 1.0
+        self._cdf[np.flatnonzero(array)[-1] :] = 1.0  # no u below 1 passes the last item with weight
         self._pmf = self.probability.astype(f4)
 
     def __len__(self) -> int:
@@ -71,7 +70,6 @@ class Discrete:
         if len(self) == 1:
             return np.zeros(u.shape, np.intp), np.ones(u.shape, f4), u
         index = np.searchsorted(self._cdf, u, side="right")
-        np.minimum(index, self._last, out=index)
         start = self._cdf.take(index) - self.probability.take(index)
         rest = ((u - start) / self.probability.take(index)).astype(f4)
         return index, self._pmf.take(index), np.clip(rest, f4(0), _BELOW_ONE)
@@ -96,10 +94,8 @@ class Distribution2D:
         # One flat cumulative sum with row r in (r, r + 1]: a single sorted table serves all rows.
         total = array.sum(axis=1, keepdims=True)
         self._share = np.divide(array, total, out=np.zeros_like(array), where=total > 0)
+        # Rounding leaves a row's last sum within 1e-11 of r + 1, and a float32 u is 6e-8 below 1.
         within = np.cumsum(self._share, axis=1)
-        last = array.shape[1] - 1 - np.argmax(array[:, ::-1] > 0, axis=1)
-        within[np.arange(array.shape[1]) >= last[:, None]] = 1.0
-        self._last = last
         self._cdf = (within + np.arange(array.shape[0])[:, None]).ravel()
         self._density = (array / array.mean()).astype(f4).ravel()
 
@@ -116,8 +112,7 @@ class Distribution2D:
         height, width = self.shape
         row, _, rest_y = self._rows.sample(u[1])
         flat = np.searchsorted(self._cdf, row + u[0].astype(np.float64), side="right")
-        column = np.minimum(flat - row * width, self._last.take(row))
-        flat = row * width + column
+        column = flat - row * width
         share = self._share.ravel().take(flat)
         start = self._cdf.take(flat) - row - share
         x = _within_cell(column, (u[0] - start) / share, width)

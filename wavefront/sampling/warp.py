@@ -17,6 +17,7 @@ INV_FOUR_PI = f4(0.25 / np.pi)
 HALF_PI = f4(np.pi / 2)
 QUARTER_PI = f4(np.pi / 4)
 _TINY = f4(1e-30)  # keeps 0/0 away
+_BELOW_ONE = 1 - 2.0**-24
 
 
 def cosine_hemisphere(u: Floats) -> Floats:
@@ -210,7 +211,8 @@ def tent_inverse(x: Floats, radius: float = 1.0) -> Floats:
 def gaussian(u: Floats, sigma: float = 0.5, radius: float = 1.5) -> Floats:
     """Offsets (n,) of a normal distribution cut off at ±radius, from u (n,)."""
     inside = math.erf(radius / (sigma * math.sqrt(2)))
-    x = _erfinv((f4(2) * u - f4(1)) * f4(inside)) * f4(sigma * math.sqrt(2))
+    span = f4(min(inside, _BELOW_ONE))  # the inverse of ±1 is infinite
+    x = _erfinv((f4(2) * u - f4(1)) * span) * f4(sigma * math.sqrt(2))
     return np.clip(x, f4(-radius), f4(radius))
 
 
