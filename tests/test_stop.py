@@ -1,0 +1,240 @@
+"""Stopping by noise or time: right errors, no bias, the same bits, and the time that was given."""
+
+import numpy as np
+import pytest
+import scenes
+from significance import render
+
+import wavefront as wf
+from wavefront import stopping
+from wavefront.film import Film
+from wavefront.stopping import MIN_SPP, Clock, next_stop, passes
+from wavefront.vec import f4
+from wavefront.work import plan
+
+
+def lit(size: tuple[int, int] = (24, 16)) -> wf.Scene:
+    """A ball on a floor under a panel; the sky around them is black."""
+    panel = wf.Rectangle((-1, 2, -1), (2, 0, 0), (0, 0, 2), emission=3.0)
+    camera = wf.Camera.look_at((0, 2, 4), (0, 0.4, 0), size=size)
+    return wf.Scene([scenes.floor(), panel, wf.Sphere((0, 0.5, 0), 0.5)], camera=camera)
+
+
+def shiny(size: tuple[int, int] = (16, 12)) -> wf.Scene:
+    """A glass ball and a mirror in a coloured environment, beside a small light."""
+    balls = [
+        wf.Sphere((-0.6, 0.5, 0), 0.5, material=wf.Dielectric(1.5)),
+        wf.Sphere((0.6, 0.5, 0), 0.5, material=wf.Mirror(0.9)),
+        wf.Sphere((0, 2, 1), 0.4, emission=(6, 5, 4)),
+    ]
+    camera = wf.Camera.look_at((0, 1.5, 4), (0, 0.4, 0), size=size)
+    return wf.Scene([scenes.floor(), *balls], [wf.Environment((0.3, 0.4, 0.5))], camera)
+
+
+SCENES = {"lit": lit, "shiny": shiny}
+
+# --- Noise ----------------------------------------------------------------------------------------
+
+
+def test_decisions_come_at_fixed_counts() -> None:
+    """At powers of two and halfway between, from 32 on."""
+    found = [0]
+    while found[-1] < 300:
+        found.append(next_stop(found[-1]))
+    assert found == [0, 32, 48, 64, 96, 128, 192, 256, 384]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_noise_is_the_true_error(name: str) -> None:
+    """`noise=0.02` is a relative error between 1 and 3 % against the converged picture."""
+    scene = SCENES[name]((16, 12))
+    converged = render(scene, 4096, seed=99, accel="auto", workers=None)
+    assert converged.metadata["noise"] < 0.007
+    image = render(scene, None, noise=0.02, accel="auto", workers=None)
+    assert image.metadata["noise"] <= 0.02
+    assert 0.01 < wf.compare(image, converged).relative_mse ** 0.5 < 0.03
+    assert image.counts.min() >= MIN_SPP
+    assert image.spp == round(image.counts.mean())
+
+
+def test_noisy_parts_get_more_samples() -> None:
+    """The black sky gets the least; every tile is treated as one."""
+    image = render(lit(), None, noise=0.04)
+    assert len(np.unique(image.counts)) >= 3
+    assert image.counts[:, 0].min() == MIN_SPP
+    tiles = image.counts.reshape(2, 8, 3, 8)
+    assert (tiles == tiles[:, :1, :, :1]).all()
+
+
+@pytest.mark.parametrize("cut", [{"workers": 3}, {"wave_size": 100}, {"wave_size": 3000, "workers": 2}])
+def test_noise_gives_the_same_bits(cut: dict) -> None:
+    """Whatever the workers and the wave size."""
+    expected = render(lit(), None, noise=0.08)
+    image = render(lit(), None, noise=0.08, **cut)
+    assert image.metadata["samples"] == expected.metadata["samples"]
+    for part in ("rgb", "counts", "variance", "standard_error"):
+        assert getattr(image, part).tobytes() == getattr(expected, part).tobytes(), part
+
+
+def test_samples_are_a_bound() -> None:
+    """None gets more, however noisy; and where noise is reached early they are not used up."""
+    assert (render(lit(), 7, noise=1e-6).counts == 7).all()
+    assert render(lit(), 40, noise=1e-6).counts.max() == 40
+    assert (render(lit(), 4096, noise=0.9).counts == MIN_SPP).all()
+    assert (render(lit((4, 4)), None).counts == 100).all()
+
+
+def test_pieces_go_on_where_pixels_stopped() -> None:
+    """A pixel's samples in an adaptive picture are the first of those it has in a plain one."""
+    image = render(lit(), None, noise=0.05)
+    for count in np.unique(image.counts):
+        plain = render(lit(), int(count))
+        there = image.counts == count
+        assert (image.rgb[there] == plain.rgb[there]).all()
+        assert (image.standard_error[there] == plain.standard_error[there]).all()
+
+
+def adaptive_means(runs: int) -> np.ndarray:
+    """Mean of pictures with mean 1, sampled adaptively: (runs,).
+
+    Half of the light comes from one sample in twenty, so a pixel that has not met one looks done.
+    """
+    rng = np.random.default_rng(0)
+    means = []
+    for _ in range(runs):
+        film = Film(32, 32)
+        for step in passes(film, 1024, 0.15):
+            bright = rng.random((1, step.last - step.first, step.pixels.size), np.float32) < 0.05
+            film.add(step.pixels, (f4(0.5) + f4(10) * bright).repeat(3, 0))
+        means.append(film.mean().mean())
+    return np.array(means)
+
+
+def test_adaptive_sampling_has_no_bias_worth_mentioning(monkeypatch) -> None:
+    """Below 0.2 % of the mean; deciding pixel by pixel would have much more, and this would see it."""
+    means = adaptive_means(40)
+    error = means.std(ddof=1) / len(means) ** 0.5
+    assert error < 0.0008
+    assert abs(means.mean() - 1) < 0.002
+    monkeypatch.setattr(stopping, "TILE", 1)
+    assert adaptive_means(2).mean() < 0.95
+
+
+# --- Time -----------------------------------------------------------------------------------------
+
+
+class Machine:
+    """Workers that take a known time for a wave, and a clock to match."""
+
+    def __init__(self, per_path: float, per_wave: float, workers: int) -> None:
+        self.now, self.per_path, self.per_wave, self.workers = 0.0, per_path, per_wave, workers
+
+    def run(self, pixels: int, seconds: float, setup: float = 0.0, slower: float = 1.0) -> np.ndarray:
+        """Return samples of each pixel when work is handed out as `render` does it."""
+        counts = np.zeros(pixels, int)
+        clock = Clock(0.0, seconds, 65_536, self.workers)
+        self.now = setup
+        free = [self.now] * self.workers
+        queue: list = []
+        everything = np.arange(pixels, dtype=np.uint32)
+
+        def finish() -> None:
+            piece, spent, end = queue.pop(0)
+            self.now = max(self.now, end)
+            counts[piece.pixels] += piece.samples
+            clock.note(piece, spent)
+
+        for piece in clock.in_time(plan(everything, 0, 10**9, clock.wave_size)):
+            spent = self.per_wave + self.per_path * piece.lanes
+            spent *= slower if self.now > seconds / 2 else 1
+            worker = int(np.argmin(free))
+            free[worker] = max(free[worker], self.now) + spent
+            queue.append((piece, spent, free[worker]))
+            if len(queue) > 2 * self.workers:
+                finish()
+        while queue:
+            finish()
+        assert clock.up
+        return counts
+
+
+@pytest.mark.parametrize("slower", [1.0, 1.3, 0.7])
+@pytest.mark.parametrize("workers", [1, 4])
+@pytest.mark.parametrize("per_path", [5e-7, 4e-6, 3e-5])
+@pytest.mark.parametrize("seconds", [3.0, 20.0])
+def test_time_is_used_and_kept(
+    seconds: float, per_path: float, workers: int, slower: float, monkeypatch
+) -> None:
+    """Within 10 %, on fast and slow machines and where speed changes on the way."""
+    machine = Machine(per_path, 2e-3, workers)
+    monkeypatch.setattr(stopping.time, "perf_counter", lambda: machine.now)
+    counts = machine.run(10_000, seconds, setup=seconds / 20, slower=slower)
+    assert 0.9 * seconds <= machine.now <= 1.1 * seconds
+    assert counts.min() >= 1
+
+
+def test_every_pixel_gets_a_sample(monkeypatch) -> None:
+    """Even where there was no time for it."""
+    machine = Machine(1e-3, 1e-3, 2)
+    monkeypatch.setattr(stopping.time, "perf_counter", lambda: machine.now)
+    counts = machine.run(50_000, 0.5)
+    assert counts.min() == 1
+    assert counts.mean() < 1.5
+
+
+def test_seconds_end_a_render() -> None:
+    """With an image that is whole; `spp` and `noise` may end it before."""
+    image = render(lit((8, 8)), None, seconds=0.3, workers=2)
+    assert image.counts.min() >= 1
+    assert image.metadata["seconds"] > 0.2
+    assert (render(lit((8, 8)), 3, seconds=1000).counts == 3).all()
+    assert render(lit((8, 8)), None, seconds=1000, noise=0.5).metadata["noise"] <= 0.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SCENES)
+def test_ten_seconds_are_ten_seconds(name: str) -> None:
+    """Within 10 %, on a machine that has nothing else to do."""
+    image = wf.render(SCENES[name]((256, 256)), seconds=10, progress=False)
+    assert 9 <= image.metadata["seconds"] <= 11
+
+
+# --- Arguments, progress, Ctrl-C ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["noise", "seconds"])
+@pytest.mark.parametrize("value", [0, -1, np.nan, np.inf, "much"])
+def test_bad_limits_are_named(name: str, value) -> None:
+    """Before any work."""
+    with pytest.raises(wf.SceneError, match=f"{name} (is|must be)"):
+        wf.render(None, **{name: value})
+
+
+def test_progress_counts_samples_or_seconds() -> None:
+    """Samples against the most there may be; seconds against the time there is."""
+    calls: list = []
+    image = render(lit((8, 8)), 500, noise=0.3, progress=lambda *call: calls.append(call))
+    assert calls[-1] == (image.metadata["samples"], 500 * 64)
+    calls.clear()
+    render(lit((8, 8)), None, seconds=0.2, progress=lambda *call: calls.append(call))
+    done, total = np.array(calls).T
+    assert (total == 0.2).all()
+    assert (np.diff(done) >= 0).all()
+    assert 0 < done[-1] <= 0.2
+
+
+def test_ctrl_c_in_an_adaptive_pass_gives_the_picture_so_far() -> None:
+    """What was traced counts, and the counts say how much that is."""
+    size = 24 * 16
+
+    def stop(done: float, total: float) -> None:
+        if done > 40 * size:
+            raise KeyboardInterrupt
+
+    with pytest.warns(UserWarning, match=r"interrupted: the picture holds 4\d\.\d+ samples per pixel"):
+        image = render(lit(), None, noise=1e-3, wave_size=100, progress=stop)
+    assert image.metadata["interrupted"]
+    assert set(np.unique(image.counts)) <= set(range(32, 49))
+    assert image.metadata["samples"] == image.counts.sum() > 40 * size
+    plain = render(lit(), 32)
+    assert (image.rgb[image.counts == 32] == plain.rgb[image.counts == 32]).all()
