@@ -446,8 +446,8 @@ SPECULAR_CASES = [
             lambda degrees=degrees: metal_surface(degrees),
             expected,
             ALL if degrees == 45 else ("full",),
-            spp=4,
-            naive_spp=4,
+            spp=1024,
+            naive_spp=1024,
         )
         for degrees, expected in ((0, 0.68), (45, 0.672879), (60, 0.656533), (80, 0.658843))
     ),
