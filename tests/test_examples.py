@@ -16,6 +16,8 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 SHAPES = {  # the picture of --size 24, (height, width)
     "cornell_box": (24, 24),
     "course_spheres": (24, 24),
+    "depth_of_field": (13, 24),
+    "environment": (13, 24),
     "estimators": (24, 96),
     "furnace": (24, 120),
     "own_material": (15, 24),

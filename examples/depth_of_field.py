@@ -1,0 +1,44 @@
+"""Depth of field: a row of spheres that runs into the distance, of which the middle one is sharp.
+
+python examples/depth_of_field.py [out.png] [--spp 64] [--size 640] [--aperture 0.5] [--focus 12]
+"""
+
+from __future__ import annotations
+
+import argparse
+import colorsys
+
+import numpy as np
+
+import wavefront as wf
+
+EYE, AHEAD = np.array([0.0, 1.6, 12.0]), np.array([0.475, 0.7, -1.9])
+
+
+def scene(size: int = 640, aperture: float = 0.5, focus: float | None = None) -> wf.Scene:
+    """Return the row; without a focus the camera is focused on the middle sphere, its target."""
+    spheres = []
+    for k in range(-2, 5):
+        colour = colorsys.hsv_to_rgb(0.08 + (k + 2) / 9, 0.75, 0.8)
+        spheres.append(wf.Sphere((0.95 * (k - 0.5), 0.7, -1.9 * k), 0.7, material=wf.Diffuse(colour)))
+    lamps = [wf.Sphere((2.5 * x, 2.6, -16), 0.06, emission=120.0) for x in range(-3, 4)]
+    ground = wf.Rectangle((-40, 0, 40), (80, 0, 0), (0, 0, -80), material=wf.Diffuse(0.5), name="ground")
+    sun = wf.DirectionalLight((-0.6, -1, -0.5), (2.4, 2.2, 1.9), angle=2)
+    camera = wf.Camera.look_at(
+        EYE, AHEAD, fov=24, size=(size, size * 9 // 16), aperture=aperture, focus=focus
+    )
+    return wf.Scene([ground, *spheres, *lamps], [wf.Environment((0.25, 0.3, 0.4)), sun], camera)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("output", nargs="?", default="depth_of_field.png")
+    parser.add_argument("--spp", type=int, default=64)
+    parser.add_argument("--size", type=int, default=640)
+    parser.add_argument("--aperture", type=float, default=0.5, help="diameter of the lens, 0 for a pinhole")
+    parser.add_argument(
+        "--focus", type=float, help="distance of the sharp plane (default: the middle sphere)"
+    )
+    options = parser.parse_args()
+    wf.render(scene(options.size, options.aperture, options.focus), options.spp).save(options.output)
+    print(f"wrote {options.output}")
