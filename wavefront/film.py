@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .io.images import to_8bit, write_image
 from .state import Words
-from .vec import Floats, Lanes
+from .vec import ALL, Floats, Lanes, columns
 
 Doubles = NDArray[np.float64]
 
@@ -101,10 +101,11 @@ class Film:
         counts = self.count[span]
         error = np.full((3, counts.size), np.nan)
         for count in np.unique(counts[counts > 1]).tolist():
-            lanes = np.flatnonzero(counts == count)
+            alike = counts == count
+            lanes = ALL if alike.all() else np.flatnonzero(alike)
             size = batch_size(count)
             used = count // size
-            batch_means = self.batches[:used, :, span][:, :, lanes] / np.float64(size)
+            batch_means = columns(self.batches[:used, :, span], lanes) / np.float64(size)
             error[:, lanes] = batch_means.var(0, ddof=1) * (size / count)
         return error
 
