@@ -436,3 +436,16 @@ def test_embree_that_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert make_accelerator(geometry(), "auto").name == "numpy"
     with pytest.raises(SceneError, match=r"pip install wavefront\[embree\]"):
         make_accelerator(geometry(), "embree")
+
+
+def test_rays_that_leave_a_sphere_anywhere_on_it_meet_only_its_far_side() -> None:
+    rng = np.random.default_rng(19)
+    normal = rng.normal(size=(3, 5000))
+    normal /= np.linalg.norm(normal, axis=0)
+    origin, direction = (0.7 * normal).astype(f4), rng.normal(size=(3, 5000)).astype(f4)
+    direction /= np.linalg.norm(direction, axis=0)
+    accelerator = make_accelerator(geometry((), [(0, 0, 0)], [0.7]), "numpy")
+    hits = accelerator.closest(origin, direction, np.zeros(5000, np.intp))
+    chord = -2 * (origin.astype(float) * direction).sum(0)
+    np.testing.assert_array_equal(np.isfinite(hits.t), chord > 0)
+    np.testing.assert_allclose(hits.t[chord > 0], chord[chord > 0], rtol=1e-5)
