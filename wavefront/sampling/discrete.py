@@ -12,6 +12,7 @@ from ..errors import SceneError
 from ..vec import Floats, Ints, f4
 
 _BELOW_ONE = f4(1 - 2.0**-24)
+_LARGE = 1 << 19  # items from which a guide table is kept short, for memory
 
 
 def _checked(name: str, weights: ArrayLike, ndim: int) -> NDArray[np.float64]:
@@ -30,6 +31,79 @@ def _checked(name: str, weights: ArrayLike, ndim: int) -> NDArray[np.float64]:
     return array
 
 
+class _Inversion:
+    """Finds the item whose share of [0, 1) holds u, in one of several rows of k items.
+
+    A guide table gives the item at which the search starts, for each of a power of two of cells of
+    [0, 1), so that most lanes need no search at all.
+
+    Source: H.-C. Chen and Y. Asau, On Generating Random Variates from an Empirical Distribution,
+    1974 (guide tables).
+
+    Parameters
+    ----------
+    probability
+        (rows, k): each row sums to 1, or is all 0 and never searched.
+    """
+
+    def __init__(self, probability: NDArray[np.float64]) -> None:
+        rows, items = probability.shape
+        self._probability = probability.ravel()
+        upto = np.cumsum(probability, axis=1)
+        self._start = (upto - probability).ravel()
+        # Rounded up, a float32 edge splits float32 numbers exactly as the float64 sum does, and a
+        # row's last one is 1 whatever its rounding error.
+        edge = _rounded_up(upto)
+        self._edge = edge.ravel()
+        self._sorted = (edge + np.arange(rows, dtype=np.float64)[:, None]).ravel()
+        cells_per_item = 8 if rows * items <= _LARGE else 1
+        self._cells = 1 << (cells_per_item * items - 1).bit_length()
+        self._first = _first_items(edge, self._cells)
+
+    def find(self, u: Floats, row: Ints | None = None) -> tuple[Ints, Floats]:
+        """Items for u (n,) in [0, 1), of rows `row` (n,), of the first by default.
+
+        Returns
+        -------
+        flat
+            (n,) intp: row·k + item.
+        rest
+            (n,) u stretched over the item's share, in [0, 1).
+        """
+        cell = (u * f4(self._cells)).astype(np.intp)
+        if row is not None:
+            cell += row * self._cells
+        flat = self._first.take(cell).astype(np.intp)
+        short = np.flatnonzero(self._edge.take(flat) <= u)
+        for _ in range(2):  # most of the others end at the next item or the one after
+            flat[short] += 1
+            short = short[self._edge.take(flat[short]) <= u[short]]
+        if len(short):
+            target = u[short].astype(np.float64)
+            if row is not None:
+                target += row[short]
+            flat[short] = np.searchsorted(self._sorted, target, side="right")
+        rest = (u - self._start.take(flat)) / self._probability.take(flat)
+        return flat, np.clip(rest, 0, _BELOW_ONE).astype(f4)
+
+
+def _rounded_up(x: NDArray[np.float64]) -> Floats:
+    """The smallest float32 that is not below x, at most 1."""
+    near = np.minimum(x, 1).astype(f4)
+    np.nextafter(near, f4(2), out=near, where=near < x)
+    return np.minimum(near, f4(1), out=near)
+
+
+def _first_items(edge: Floats, cells: int) -> NDArray[np.int32]:
+    """For each row and each cell c, the flat index of the first item that ends beyond c/cells."""
+    rows, items = edge.shape
+    ends = np.ceil(edge * f4(cells)).astype(np.intp)  # exact: cells is a power of two
+    ends += np.arange(rows)[:, None] * (cells + 1)
+    counts = np.bincount(ends.ravel(), minlength=rows * (cells + 1)).reshape(rows, cells + 1)
+    first = np.cumsum(counts, axis=1)[:, :cells] + np.arange(rows)[:, None] * items
+    return first.astype(np.int32).ravel()
+
+
 class Discrete:
     """A choice among k items with probabilities proportional to `weights` (k,).
 
@@ -43,8 +117,7 @@ class Discrete:
         array = _checked("weights", weights, 1)
         array = array / array.max()  # keeps the sum of huge or tiny weights in range
         self.probability: NDArray[np.float64] = array / array.sum()
-        self._cdf = np.cumsum(self.probability)
-        self._cdf[np.flatnonzero(array)[-1] :] = 1.0  # no u below 1 passes the last item with weight
+        self._inversion = _Inversion(self.probability[None])
         self._pmf = self.probability.astype(f4)
 
     def __len__(self) -> int:
@@ -69,10 +142,8 @@ class Discrete:
         """
         if len(self) == 1:
             return np.zeros(u.shape, np.intp), np.ones(u.shape, f4), u
-        index = np.searchsorted(self._cdf, u, side="right")
-        start = self._cdf.take(index) - self.probability.take(index)
-        rest = ((u - start) / self.probability.take(index)).astype(f4)
-        return index, self._pmf.take(index), np.clip(rest, f4(0), _BELOW_ONE)
+        index, rest = self._inversion.find(u)
+        return index, self._pmf.take(index), rest
 
 
 class Distribution2D:
@@ -91,12 +162,8 @@ class Distribution2D:
         array = array / array.max()
         self.shape = array.shape
         self._rows = Discrete(array.sum(axis=1))
-        # One flat cumulative sum with row r in (r, r + 1]: a single sorted table serves all rows.
         total = array.sum(axis=1, keepdims=True)
-        self._share = np.divide(array, total, out=np.zeros_like(array), where=total > 0)
-        # Rounding leaves a row's last sum within 1e-11 of r + 1, and a float32 u is 6e-8 below 1.
-        within = np.cumsum(self._share, axis=1)
-        self._cdf = (within + np.arange(array.shape[0])[:, None]).ravel()
+        self._columns = _Inversion(np.divide(array, total, out=np.zeros_like(array), where=total > 0))
         self._density = (array / array.mean()).astype(f4).ravel()
 
     def sample(self, u: Floats) -> tuple[Floats, Floats, Floats]:
@@ -111,11 +178,8 @@ class Distribution2D:
         """
         height, width = self.shape
         row, _, rest_y = self._rows.sample(u[1])
-        flat = np.searchsorted(self._cdf, row + u[0].astype(np.float64), side="right")
-        column = flat - row * width
-        share = self._share.ravel().take(flat)
-        start = self._cdf.take(flat) - row - share
-        x = _within_cell(column, (u[0] - start) / share, width)
+        flat, rest_x = self._columns.find(u[0], row)
+        x = _within_cell(flat - row * width, rest_x, width)
         y = _within_cell(row, rest_y, height)
         return x, y, self._density.take(flat)
 
@@ -127,7 +191,7 @@ class Distribution2D:
         return self._density.take(row * width + column)
 
 
-def _within_cell(cell: Ints, rest: NDArray[np.floating], cells: int) -> Floats:
+def _within_cell(cell: Ints, rest: Floats, cells: int) -> Floats:
     """Coordinate (n,) in [0, 1) at `rest` (n,) of the way through `cell` (n,).
 
     Kept off the border by more than rounding, so that the coordinate is in the cell for `pdf` too,
