@@ -249,8 +249,11 @@ class _Integrator:
             fine = parts.sum(0)
             error, edge = np.abs(fine - coarse), edges.reshape(2, -1).sum(0)
             keep = _least(error, tolerance / 5) | (error <= 2e-5 * fine)
-            missed = self._missed(home, peak)
-            split = missed | ~keep | ~_least(edge, tolerance)
+            area = np.maximum((boxes[1] - boxes[0]) * (boxes[3] - boxes[2]) * self.chart.area, 1e-300)
+            highest = self._highest(home, len(fine))
+            missed = highest > 3 * peak
+            # Two coarse integrals agree by chance on a lobe that fills a small part of a box.
+            split = missed | (highest > 9 * fine / area) | ~keep | ~_least(edge, tolerance)
             if level == 59 or np.count_nonzero(split) > 30_000:
                 unresolved, split = float((error + edge)[split].sum()), np.zeros_like(split)
             np.add.at(total, owner[~split], fine[~split])
@@ -288,12 +291,12 @@ class _Integrator:
             edge[part] = np.where((values == 0).any((1, 2)), 0.02 * peak[part] * area, 0)
         return out, peak, across, edge
 
-    def _missed(self, home: Ints, peak: Doubles) -> Bools:
-        """Tell in which boxes a sample lies far above all nodes, (m,)."""
-        highest = np.zeros(len(peak))
+    def _highest(self, home: Ints, boxes: int) -> Doubles:
+        """Return the largest density among the samples of each box, (boxes,)."""
+        highest = np.zeros(boxes)
         inside = home >= 0
         np.maximum.at(highest, home[inside], self.height[inside])
-        return highest > 3 * peak
+        return highest
 
     def _descend(self, home: Ints, boxes: Doubles, across: Bools, split: Bools) -> Ints:
         """Follow the samples into the halves of the split boxes; −1 in boxes that are done."""
