@@ -408,6 +408,14 @@ def glass_box() -> wf.Scene:
     return wf.Scene([cube], [wf.Environment(1.0)], camera)
 
 
+def through_glass(degrees: float, refracted: float) -> wf.Scene:
+    """A glass plane over a narrow light in the dark, where Snell's law sends the ray."""
+    theta, x = np.radians(degrees), -np.tan(np.radians(refracted))
+    light = wf.Rectangle((x - 0.002, -1, -5), (0, 0, 10), (0.004, 0, 0), material=BLACK, emission=1.0)
+    camera = probe(HERE, (np.sin(theta), np.cos(theta), 0))
+    return wf.Scene([floor(wf.Dielectric(1.5)), light], camera=camera)
+
+
 ETA2 = 1.5**2
 SPECULAR_CASES = [
     *(
@@ -439,6 +447,12 @@ SPECULAR_CASES = [
             naive_spp=1024,
         )
         for degrees, expected in ((10, 0.040083), (30, 0.055190), (40, 0.245291))
+    ),
+    Case(
+        "Snell at 45",
+        lambda: through_glass(45, 28.125506),
+        (1 - 0.050240) / ETA2,
+        naive_spp=1024,
     ),
     *(
         Case(

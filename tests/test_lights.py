@@ -140,10 +140,18 @@ def test_many_lights_add_up(integrator: str) -> None:
 # --- Sides and shadows ----------------------------------------------------------------------------
 
 
+ONE_SIDED = {
+    "rectangle": scenes.panel((-1, -1), (1, 1), 1),
+    "triangle": wf.Mesh(
+        [[-2, 1, -2], [4, 1, -2], [-2, 1, 4]], [[0, 1, 2]], material=scenes.BLACK, emission=1.0
+    ),
+}
+
+
+@pytest.mark.parametrize("panel", ONE_SIDED.values(), ids=ONE_SIDED)
 @pytest.mark.parametrize("integrator", scenes.ALL)
-def test_a_mesh_shines_from_its_front_only(integrator: str) -> None:
+def test_a_mesh_shines_from_its_front_only(integrator: str, panel: wf.Mesh) -> None:
     """Seen from behind it is black, and it lights nothing there."""
-    panel = scenes.panel((-1, -1), (1, 1), 1)
     below = wf.Camera.look_at((0, 0.1, 0), (0, 1, 0), (1, 0, 0), fov=1e-3, size=(2, 2))
     above = wf.Camera.look_at((0, 3, 0), (0, 1, 0), (1, 0, 0), fov=1e-3, size=(2, 2))
     roof = wf.Rectangle((-5, 2, -5), (10, 0, 0), (0, 0, 10))  # faces down, onto the back of the panel
