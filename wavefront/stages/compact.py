@@ -9,7 +9,6 @@ from ..state import Hits, Paths
 from ..vec import Bools, Ints, f4
 
 ROULETTE_AFTER = 3  # scattering events before paths may be ended
-MAX_SURVIVAL = f4(0.95)
 SMALLEST = np.finfo(f4).tiny  # keeps the division finite on lanes that end anyway
 
 
@@ -28,13 +27,14 @@ def carrying(paths: Paths) -> Bools:
 def roulette(paths: Paths, sampler: Sampler, bounce: int) -> Ints:
     """Choose the lanes that live on, and make them carry more, so that the mean stays.
 
-    The chance to survive is the largest channel of the throughput, with the compression of
-    radiance by refraction taken out (E. Veach, thesis 1997, §10.4.1; pbrt-v4, §13.2.1), at most
-    0.95. In the first events only paths that carry nothing end.
+    The chance to survive is the root of the largest channel of the throughput, with the
+    compression of radiance by refraction taken out (E. Veach, thesis 1997, §10.4.1; pbrt-v4,
+    §13.2.1). The root ends fewer paths than the throughput itself, and raises the variance less.
+    In the first events only paths that carry nothing end.
     """
     if bounce < ROULETTE_AFTER or not len(paths):
         return np.flatnonzero(carrying(paths))
-    chance = np.minimum(paths.throughput.max(0) * paths.eta2, MAX_SURVIVAL)
+    chance = np.minimum(np.sqrt(paths.throughput.max(0) * paths.eta2), f4(1))
     u = sampler.draw_1d(paths.pixel, paths.sample, bounce, Dimension.ROULETTE)
     paths.throughput /= np.maximum(chance, SMALLEST)
     return np.flatnonzero(~(u >= chance))  # NaN lives on, to be counted
