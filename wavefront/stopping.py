@@ -15,7 +15,7 @@ from .work import Piece
 
 MIN_SPP = 32  # before anything is decided by an error estimate
 TILE = 8  # pixels; decisions are made for squares of this side
-FIRST_WAVE = 16_384  # lanes, while the speed is unknown
+FIRST_WAVE = 4096  # lanes, while the speed is unknown
 SHORT, LONG = 1 / 60, 1 / 20  # parts of the time there is that a wave should take
 SMOOTHING = 0.3  # weight of the latest wave in what a path is expected to cost
 
@@ -131,7 +131,7 @@ class Clock:
         if spent < SHORT * self._seconds:
             self._size = max(self._size, min(self._largest, 2 * piece.lanes))
         elif spent > LONG * self._seconds:
-            self._size = min(self._size, max(1, piece.lanes // 2))
+            self._size = min(self._size, max(1, int(piece.lanes * LONG * self._seconds / spent)))
 
     def _late(self, lanes: int) -> bool:
         """Tell whether `lanes` more paths after those under way would come too late."""
