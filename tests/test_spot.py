@@ -81,6 +81,22 @@ def test_power_is_the_integral_of_the_intensity(angle: float, blend: float) -> N
     assert light.record(ORIGIN).power(1.0) == pytest.approx(power, rel=2e-3)
 
 
+@given(st.floats(1, 180), st.floats(0, 1), st.integers(0, 1000))
+def test_no_place_is_thought_darker_than_it_is(angle: float, blend: float, seed: int) -> None:
+    """The estimate that guides the choice of a light bounds what reaches a ball of space outside it."""
+    rng = np.random.default_rng(seed)
+    light = wf.SpotLight((0, 0, 0), 5.0, direction=(0, -1, 0), angle=angle, blend=blend).record(ORIGIN)
+    centre, radius = rng.normal(size=(3, 1)) * 2, 0.4
+    offsets = rng.normal(size=(3, 200))
+    points = centre + radius * offsets / np.maximum(np.linalg.norm(offsets, axis=0), 1)
+    sample = light.sample_li(points.astype(f4), np.zeros((2, 200), f4))
+    d = np.maximum(np.linalg.norm(points, axis=0), np.linalg.norm(centre) + 1e-9)  # as from the middle
+    leaving = sample.radiance[0] * sample.pdf * sample.distance**2
+    assert (leaving / d**2 <= light.irradiance(centre, radius, 9.0)[0, 0] * (1 + 1e-3) + 1e-6).all() or (
+        np.linalg.norm(centre) < radius
+    )
+
+
 def test_many_lights_of_all_kinds() -> None:
     """Each is chosen by its power, and all add up."""
     lights = [
