@@ -18,6 +18,7 @@ class Geometry:
     triangles: Floats  # (m, 3, 3) vertices: triangle, corner, xyz
     centers: Floats  # (3, k) sphere centres
     radii: Floats  # (k,) sphere radii
+    weights: bool = True  # whether barycentric weights are needed; without them b1 and b2 are 0
 
 
 @dataclass(slots=True)

@@ -32,8 +32,9 @@ from .traverse import (
 )
 from .triangle import ROUNDOFF, Doubles
 
-BATCH = 1 << 14  # rays traced at a time without a tree: their temporaries stay in the cache
-DECIDE = 1 << 13  # candidates decided at a time
+BATCH = 1 << 16  # rays traced at a time without a tree
+DECIDE = 1 << 14  # candidates decided at a time
+SMALL_CHUNK = 1 << 19  # elements of one product there: with small ones, threads wait for each other
 SMALL = 128  # up to so many primitives, all are tested without a tree
 WIDTH = 32  # children of a node
 LEAF_SIZE = 64  # triangles or spheres of a leaf
@@ -203,7 +204,7 @@ class _Triangles:
             return
         n, m = lanes.speed.size, self.ids.size
         batch = Candidates(partial(self._decide, lanes, found, doubts))
-        step = max(64, min(4096, CHUNK // (3 * m)))
+        step = max(64, SMALL_CHUNK // (3 * m))
         for at in range(0, n, step):
             k = min(step, n - at)
             line = lanes.line[:, at : at + k]
@@ -229,17 +230,15 @@ class _Triangles:
     ) -> None:
         """Decide candidates: slots (k,) of the filter, lanes (k,) and the filter's values (k,)."""
         prim = self.slots.take(slot)
-        keep = np.flatnonzero(prim != lanes.leaving.take(lane))
-        if keep.size < prim.size:
-            prim, lane, value = prim.take(keep), lane.take(keep), value.take(keep)
         origin = lanes.origin.take(lane, 1).astype(np.float64)
         direction = lanes.direction.take(lane, 1).astype(np.float64)
         t = triangle.plane_distance(self.table, prim, origin, direction)
-        sure = value > 1
-        unsure = np.flatnonzero(~sure)
+        left = prim == lanes.leaving.take(lane)
+        t[left] = np.inf
+        unsure = np.flatnonzero((value <= 1) & ~left)
         if unsure.size:
             doubts.add(prim.take(unsure), lane.take(unsure))
-            t = np.where(sure, t, np.inf)
+            t[unsure] = np.inf
         found.add(lane, prim, t)
 
     def _decide_doubts(self, lanes: Lanes, found: _Closest | _Occluded, prim: Ints, lane: Ints) -> None:
@@ -276,7 +275,7 @@ class _Spheres:
         features = sphere.line_features(lanes.line[:3], lanes.line[3:])
         if self.tree is None:
             n, k = lanes.speed.size, self.radii.size
-            step = max(64, min(4096, CHUNK // k))
+            step = max(64, SMALL_CHUNK // k)
             for at in range(0, n, step):
                 value = self.rows @ features[:, at : at + step]
                 hit = flat_true(value >= -1)
@@ -330,7 +329,7 @@ def _batch_size(leaves: int) -> int:
     """Rays to trace at a time: enough to fill the blocks of each leaf, few enough for the cache."""
     if not leaves:
         return BATCH
-    return 2 * BATCH if leaves < 1024 else 16 * BATCH
+    return 1 << 15 if leaves < 1024 else 1 << 18
 
 
 class NumpyAccelerator:
@@ -341,6 +340,7 @@ class NumpyAccelerator:
     def __init__(self, geometry: Geometry, leaf_size: int = LEAF_SIZE) -> None:
         triangles, centers, radii = geometry.triangles, geometry.centers, geometry.radii
         self._first_sphere = len(triangles)
+        self._weights = geometry.weights
         corners = np.concatenate([triangles.reshape(-1, 3).T, centers - radii, centers + radii], 1)
         self._ball = bounding_ball(corners, corners) if corners.size else Ball(np.zeros(3, f4), 1.0)
         with np.errstate(all="ignore"):
@@ -384,9 +384,11 @@ class NumpyAccelerator:
         b1, b2 = hits.b1[part], hits.b2[part]
         b1[...] = 0
         b2[...] = 0
+        hits.prim[part] = np.where(missed, -1, prim)
+        if not self._weights:
+            return
         on = np.flatnonzero((prim < self._first_sphere) & ~missed)
         everywhere = on.size == key.size
         origin = (lanes.origin if everywhere else lanes.origin.take(on, 1)).astype(np.float64)
         direction = (lanes.direction if everywhere else lanes.direction.take(on, 1)).astype(np.float64)
         b1[on], b2[on] = triangle.barycentrics(self._triangles.table, prim.take(on), origin, direction)
-        hits.prim[part] = np.where(missed, -1, prim)

@@ -25,7 +25,7 @@ from .triangle import ROUNDOFF, Doubles
 
 BLOCK = 32  # rays that share one copy of a node's matrix
 BLOCK_SHIFT = 5
-CHUNK = 1 << 18  # elements of one product, to stay in the cache
+CHUNK = 1 << 18  # elements of one product
 ROUNDS = 8  # children of the root that a ray takes one at a time; then all that are left
 SLAB, LINE = slice(0, 9), slice(9, 15)  # columns of Lanes.table
 NO_HIT = (0x7F800000 << 32) | 0x7FFFFFFF  # key of a miss: t = inf
