@@ -92,7 +92,8 @@ def prototype(path: str, spp: int) -> Callable[[], np.ndarray]:
     """Return a function that calls render() of the script at `path`."""
     sys.path.insert(0, str(Path(path).parent))
     spec = importlib.util.spec_from_file_location("prototype", path)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
 

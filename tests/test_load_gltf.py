@@ -18,6 +18,7 @@ from wavefront.errors import SceneError
 from wavefront.io import appearance
 from wavefront.io.images import srgb_to_linear
 from wavefront.io.load import from_trimesh, load, load_meshes
+from wavefront.lights import DirectionalLight, SpotLight
 from wavefront.textures import Texture
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
@@ -482,6 +483,39 @@ def test_what_principled_refuses_is_named(build, path, monkeypatch):
         load(build.material(name="air").gltf(path))
 
 
+def test_spot_lights(build, path):
+    """Cone angles become the whole angle in degrees and the share over which it fades; it looks down -z."""
+    b = build.mesh()
+    cone = {"innerConeAngle": 0.3, "outerConeAngle": 0.6}
+    punctual(b, type="spot", color=[1, 0.5, 0.25], intensity=8, spot=cone)
+    b.json["nodes"][0]["translation"] = [1, 2, 3]
+    (light,) = load(b.gltf(path)).lights
+    assert isinstance(light, SpotLight)
+    assert light.position == pytest.approx([1, 2, 3])
+    assert light.direction == pytest.approx([0, 0, -1])
+    assert light.intensity.ravel() == pytest.approx([8, 4, 2])
+    assert (light.angle, light.blend) == pytest.approx((np.degrees(1.2), 0.5))
+
+
+def test_directional_lights(build, path):
+    """Lux become irradiance; the light travels down the node's -z."""
+    b = build.mesh()
+    punctual(b, type="directional", intensity=3)
+    b.json["nodes"][0]["rotation"] = [np.sqrt(0.5), 0, 0, np.sqrt(0.5)]  # a quarter turn about x
+    (light,) = load(b.gltf(path)).lights
+    assert isinstance(light, DirectionalLight)
+    assert light.direction == pytest.approx([0, 1, 0], abs=1e-6)
+    assert light.irradiance.ravel() == pytest.approx([3, 3, 3])
+
+
+def test_a_cone_that_opens_inwards_is_an_error(build, path):
+    """The message gives both angles."""
+    b = build.mesh()
+    punctual(b, type="spot", spot={"innerConeAngle": 0.7, "outerConeAngle": 0.6})
+    with pytest.raises(SceneError, match=r"light 0: cone angles are 0\.7 and 0\.6; 0 <= inner < outer"):
+        load(b.gltf(path))
+
+
 # ---- what is not honoured is named once ---------------------------------------------------------
 
 
@@ -489,9 +523,14 @@ def lose_animation(b):
     b.json["animations"] = [{}]
 
 
-def lose_spot(b):
+def punctual(b, **light):
+    """Put one light of KHR_lights_punctual on the first node."""
     b.json["nodes"][0]["extensions"] = {"KHR_lights_punctual": {"light": 0}}
-    b.json["extensions"] = {"KHR_lights_punctual": {"lights": [{"type": "spot"}]}}
+    b.json["extensions"] = {"KHR_lights_punctual": {"lights": [light]}}
+
+
+def lose_light(b):
+    punctual(b, type="area")
 
 
 def lose_camera(b):
@@ -521,7 +560,7 @@ def lose_extension(b):
     ("lose", "message"),
     [
         (lose_animation, r"animations \(the file\)"),
-        (lose_spot, r"spot light \(light 0\)"),
+        (lose_light, r"area light \(light 0\)"),
         (lose_camera, r"further cameras \(cameras\[0\]\)"),
         (lose_colours, r"COLOR_0 \(mesh 'mesh0'\)"),
         (lose_targets, r"morph targets \(mesh 'mesh0'\)"),

@@ -1,7 +1,18 @@
 """wavefront: a physically based path tracer in whole-array NumPy."""
 
 from . import testing
-from .bsdfs import Bsdf, BsdfSample, Conductor, Dielectric, Diffuse, Mirror
+from .bsdfs import (
+    Bsdf,
+    BsdfSample,
+    Conductor,
+    Dielectric,
+    Diffuse,
+    Mirror,
+    Mix,
+    OrenNayar,
+    Principled,
+    ThinDielectric,
+)
 from .camera import Camera
 from .errors import SceneError
 from .film import Image
@@ -11,6 +22,7 @@ from .metrics import Comparison, compare
 from .render import render
 from .scene import Scene
 from .shapes import Disk, Mesh, Rectangle, Sphere
+from .textures import Texture
 
 __all__ = [
     "Bsdf",
@@ -26,12 +38,17 @@ __all__ = [
     "Image",
     "Mesh",
     "Mirror",
+    "Mix",
+    "OrenNayar",
     "PointLight",
+    "Principled",
     "Rectangle",
     "Scene",
     "SceneError",
     "Sphere",
     "SpotLight",
+    "Texture",
+    "ThinDielectric",
     "compare",
     "from_trimesh",
     "load",

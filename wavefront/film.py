@@ -239,7 +239,7 @@ class Image:
         gamma
             png and jpg hold value^(1/gamma); "srgb" is the exact sRGB curve.
         exposure
-            Stops (factors of 2) applied before encoding png and jpg.
+            Stops (factors of 2) by which the picture is brightened first, in every format.
 
         Raises
         ------

@@ -14,6 +14,7 @@ import numpy as np
 
 from .sampling.sampler import Sampler
 from .scene import CompiledScene
+from .stages.absorb import absorb
 from .stages.bounce import bounce_sample
 from .stages.compact import carrying, compact, roulette
 from .stages.intersect import intersect
@@ -35,7 +36,9 @@ def li_naive(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: 
         paths, hits = compact(paths, hits, hits.found)
         if bounce == max_bounces or not len(paths):
             break
-        shade = shading(scene, interact(scene, paths, hits))
+        surface = interact(scene, paths, hits)
+        absorb(scene, paths, hits, surface)
+        shade = shading(scene, surface)
         paths = bounce_sample(paths, shade, sampler, bounce)
         paths = paths.take(roulette(paths, sampler, bounce))
     return L
@@ -51,7 +54,9 @@ def li_direct_simple(scene: CompiledScene, paths: Paths, sampler: Sampler, max_b
         paths, hits = compact(paths, hits, hits.found)
         if bounce == max_bounces or not len(paths):
             break
-        shade = shading(scene, interact(scene, paths, hits))
+        surface = interact(scene, paths, hits)
+        absorb(scene, paths, hits, surface)
+        shade = shading(scene, surface)
         deposit(L, paths, direct(scene, paths, shade, sampler, bounce, mis=False))
         paths = bounce_sample(paths, shade, sampler, bounce)
         paths = paths.take(np.flatnonzero(paths.specular & carrying(paths)))
@@ -71,7 +76,9 @@ def li_direct_mis(scene: CompiledScene, paths: Paths, sampler: Sampler, max_boun
         paths, hits = compact(paths, hits, np.flatnonzero((hits.prim >= 0) & paths.specular))
         if bounce == max_bounces or not len(paths):
             break
-        shade = shading(scene, interact(scene, paths, hits))
+        surface = interact(scene, paths, hits)
+        absorb(scene, paths, hits, surface)
+        shade = shading(scene, surface)
         deposit(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
         paths = bounce_sample(paths, shade, sampler, bounce)
         paths = paths.take(np.flatnonzero(carrying(paths)))
@@ -88,7 +95,9 @@ def li_full(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: i
         paths, hits = compact(paths, hits, hits.found)
         if bounce == max_bounces or not len(paths):
             break
-        shade = shading(scene, interact(scene, paths, hits))
+        surface = interact(scene, paths, hits)
+        absorb(scene, paths, hits, surface)
+        shade = shading(scene, surface)
         deposit(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
         paths = bounce_sample(paths, shade, sampler, bounce)
         paths = paths.take(roulette(paths, sampler, bounce))

@@ -20,7 +20,7 @@ from .film import Film, Image
 from .filters import FILTERS
 from .integrators import INTEGRATORS
 from .io.load import from_trimesh, load
-from .lights import PointLight
+from .lights import DirectionalLight, PointLight, SpotLight
 from .lights.choose import CHOICES as LIGHT_CHOICES
 from .parallel import run_ordered, worker_count
 from .progress import Bar, Progress
@@ -216,5 +216,12 @@ def _whole(name: str, value: Any, low: int, high: int) -> int:
 
 
 def _warn_unseen_lights(scene: Scene, integrator: str) -> None:
-    if integrator == "naive" and any(isinstance(light, PointLight) for light in scene.lights):
-        warnings.warn("the naive integrator cannot find point lights; they stay dark", stacklevel=3)
+    unseen = [
+        light
+        for light in scene.lights
+        if isinstance(light, PointLight | SpotLight)
+        or (isinstance(light, DirectionalLight) and light.angle == 0)
+    ]
+    if integrator == "naive" and unseen:
+        kinds = ", ".join(sorted({type(light).__name__ for light in unseen}))
+        warnings.warn(f"the naive integrator cannot find lights without size ({kinds})", stacklevel=3)

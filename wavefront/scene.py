@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from .accel.base import Accelerator, Geometry
 from .bsdfs import Bsdf, Spatial
 from .camera import Camera
-from .errors import SceneError
+from .camera.base import image_size
+from .errors import SceneError, number
 from .lights import (
     DirectionalLight,
     Environment,
@@ -90,7 +91,15 @@ class Scene:
         return bool(self.lights) or any(shape.emission is not None for shape in self.shapes)
 
     def framing_camera(self, fov: float = 40, size: tuple[int, int] = (512, 512)) -> Camera:
-        """Return a camera that sees the whole scene from the front, a little above and to the right."""
+        """Return a camera that sees the whole scene from the front, a little above and to the right.
+
+        Raises
+        ------
+        SceneError
+            If the field of view or the size is out of range.
+        """
+        size = image_size(size)
+        fov = number("Camera fov", fov, lambda x: 0 < x < 180, "above 0 and below 180 degrees")
         low, high = self.bounds
         radius = float(np.linalg.norm(high - low)) / 2 or 1.0
         narrow = min(1.0, size[0] / size[1])
@@ -154,6 +163,7 @@ class CompiledScene:
     material_of: Ints  # (m + k,) material of each primitive
     light_of: Ints  # (m + k,) light of each primitive, -1 for none
     materials: Materials
+    absorption: Floats | None  # (3, materials) per scene unit; None when nothing absorbs
     lights: LightTable
     environment: int  # number of the light that rays meet where they leave the scene, -1 for none
 
@@ -187,8 +197,10 @@ def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "plac
     )
     centers = np.array([s.center - centre for s in spheres]).reshape(-1, 3).T.astype(f4)
     radii = np.array([s.radius for s in spheres]).astype(f4)
-    geometry = Geometry(np.ascontiguousarray(triangles, f4), np.ascontiguousarray(centers), radii)
     needs_uv = any(_is_textured(material) for material in user_materials)
+    smooth = any(mesh.normals is not None for mesh in meshes)
+    triangles32 = np.ascontiguousarray(triangles, f4)
+    geometry = Geometry(triangles32, np.ascontiguousarray(centers), radii, weights=needs_uv or smooth)
     return CompiledScene(
         centre=centre,
         radius=radius,
@@ -202,6 +214,7 @@ def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "plac
         material_of=material_of,
         light_of=light_of,
         materials=group_materials(user_materials),
+        absorption=_absorption(user_materials),
         lights=lights,
         environment=environment,
     )
@@ -214,12 +227,29 @@ def group_materials(materials: Sequence[Bsdf]) -> Materials:
     shaded as one group.
     """
     members: dict[object, list[int]] = {}
-    for number, material in enumerate(materials):
-        members.setdefault(_group_key(material), []).append(number)
+    for i, material in enumerate(materials):
+        members.setdefault(_group_key(material), []).append(i)
     group_of = np.empty(len(materials), np.intp)
     for group, numbers in enumerate(members.values()):
         group_of[numbers] = group
     return Materials(group_of, tuple(_merge(materials, numbers) for numbers in members.values()))
+
+
+def _absorption(materials: Sequence[Bsdf]) -> Floats | None:
+    """Return the absorption behind the surfaces of each material, (3, materials), if there is any.
+
+    Raises
+    ------
+    SceneError
+        If one is a texture: it belongs to the space inside, not to the surface.
+    """
+    table = np.zeros((3, len(materials)), f4)
+    for i, material in enumerate(materials):
+        value = getattr(material, "absorption", 0.0)
+        if isinstance(value, Spatial):
+            raise SceneError(f"{type(material).__name__} absorption must be a colour, not a texture")
+        table[:, i] = np.ravel(value)
+    return table if table.any() else None
 
 
 def _is_constant(value: object) -> bool:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..camera import Camera
 from ..errors import SceneError
-from ..lights import PointLight
+from ..lights import DirectionalLight, PointLight, SpotLight
 from .files import beside, read_bytes
 from .repair import Raw, wide
 
@@ -161,7 +161,7 @@ class Contents:
     """What a file holds, in world space."""
 
     raws: list[tuple[Raw, int | None, Matrix]] = field(default_factory=list)  # mesh, material, placement
-    lights: list[PointLight] = field(default_factory=list)
+    lights: list[DirectionalLight | PointLight | SpotLight] = field(default_factory=list)
     camera: Camera | None = None
 
 
@@ -370,15 +370,29 @@ def _add_light(document: Document, out: Contents, index: int, matrix: Matrix) ->
     if not isinstance(index, int) or not 0 <= index < len(lights):
         raise SceneError(f"{document.name}: light {index!r} does not exist; there are {len(lights)}")
     light = lights[index]
-    if light.get("type") != "point":
-        document.lose(f"{light.get('type')} light", f"light {index}")
-        return
     if "range" in light:
         document.lose("range of a light", f"light {index}")
     where = f"{document.name}: light {index}"
     colour = floats(where + " color", light.get("color", [1, 1, 1]), 3)
-    intensity = floats(where + " intensity", [light.get("intensity", 1)], 1)
-    out.lights.append(PointLight(matrix[:3, 3], colour * intensity))
+    strength = colour * floats(where + " intensity", [light.get("intensity", 1)], 1)
+    place, forward = matrix[:3, 3], -matrix[:3, 2]
+    if light.get("type") == "point":
+        out.lights.append(PointLight(place, strength))
+    elif light.get("type") == "directional":
+        out.lights.append(DirectionalLight(forward, strength))
+    elif light.get("type") == "spot":
+        spot = light.get("spot", {})
+        inner, outer = floats(
+            where + " cone", [spot.get("innerConeAngle", 0), spot.get("outerConeAngle", np.pi / 4)], 2
+        )
+        if not 0 <= inner < outer <= np.pi / 2:
+            raise SceneError(f"{where}: cone angles are {inner:g} and {outer:g}; 0 <= inner < outer <= π/2")
+        angle = float(np.degrees(2 * outer))
+        out.lights.append(
+            SpotLight(place, strength, direction=forward, angle=angle, blend=float(1 - inner / outer))
+        )
+    else:
+        document.lose(f"{light.get('type')} light", f"light {index}")
 
 
 def floats(where: str, value: Any, count: int) -> Matrix:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from ..bsdfs import Bsdf
 from ..camera import Camera
 from ..errors import SceneError, finite_array
-from ..lights import PointLight
+from ..lights import DirectionalLight, PointLight, SpotLight
 from ..scene import Scene
 from ..shapes import Mesh
 from . import gltf, headers, mtl, obj, stl, visuals
@@ -161,7 +161,7 @@ class Contents:
     """What a file holds."""
 
     raws: list[Raw]
-    lights: Sequence[PointLight] = ()
+    lights: Sequence[DirectionalLight | PointLight | SpotLight] = ()
     camera: Camera | None = None
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from ..sampling.sampler import Dimension, Sampler
 from ..state import Paths
 from ..vec import columns, dot, f4
-from .shade import Shading, same_side
+from .shade import Shading
 from .surface import leave
 
 
@@ -30,7 +30,8 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
             eta2[lanes] *= sample.eta**2
     direction = shade.frame.to_world(wi)
     cos_g = dot(surface.ng, direction)
-    weight *= same_side(wi, cos_g)
+    sides = wi[2] * cos_g
+    weight *= np.where(np.isnan(sides), sides, sides > 0)  # NaN stays, to be counted
     return Paths(
         slot=paths.slot,
         pixel=paths.pixel,

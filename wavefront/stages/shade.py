@@ -12,8 +12,9 @@ from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
 from ..scene import CompiledScene
 from ..state import Hits, Paths, Surface
-from ..vec import ALL, Bools, Floats, Ints, Lanes, columns, dot, f4
+from ..vec import ALL, Floats, Ints, Lanes, columns, dot, f4
 from .intersect import visible
+from .surface import leave
 
 
 @dataclass(slots=True)
@@ -89,7 +90,9 @@ def direct(
     address = paths.pixel, paths.sample, bounce
     u_choice = sampler.draw_1d(*address, Dimension.LIGHT)
     u_point = sampler.draw_2d(*address, Dimension.LIGHT_POINT)
-    light, delta = scene.lights.sample_li(surface.point, u_choice, u_point)
+    # from where a reflected ray would start, so that mis_weighted finds the same densities
+    start = leave(surface.point, surface.error, surface.ng, surface.ng)
+    light, delta = scene.lights.sample_li(start, u_choice, u_point)
     f_cos, pdf = evaluate(shade, shade.frame.to_local(light.wi), dot(surface.ng, light.wi))
     lanes = np.flatnonzero((light.pdf > 0) & (f_cos.max(0) != 0))  # NaN stays, to be counted
     light, f_cos, pdf, delta = light.take(lanes), f_cos.take(lanes, 1), pdf.take(lanes), delta.take(lanes)
@@ -106,7 +109,7 @@ def evaluate(shade: Shading, wi: Floats, cos_g: Floats) -> tuple[Floats, Floats]
     comes from: where the two normals disagree there is no light, so none leaks through.
     """
     n = wi.shape[1]
-    cos = np.where(same_side(wi, cos_g), np.abs(wi[2]), f4(0))
+    cos = np.where(wi[2] * cos_g > 0, np.abs(wi[2]), f4(0))
     if len(shade.groups) == 1:
         f, pdf = shade.groups[0][1].evaluate(shade.wo, wi)
         return f * cos, pdf
@@ -118,8 +121,3 @@ def evaluate(shade: Shading, wi: Floats, cos_g: Floats) -> tuple[Floats, Floats]
         f[:, lanes], pdf[lanes] = part_f, part_pdf
     f *= cos
     return f, pdf
-
-
-def same_side(wi: Floats, cos_g: Floats) -> Bools:
-    """Tell where shading and geometric normal agree on the side of local directions wi, (n,)."""
-    return wi[2] * cos_g > 0
