@@ -50,6 +50,25 @@ def test_specular_light(case: Case, integrator: str) -> None:
     assert_mean(run(case, integrator), case.expected, case.max_error, rounding=ROUNDING + unseen)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("after", [3, 1000], ids=["roulette", "no roulette"])
+@pytest.mark.parametrize("filter", ["box", "tent", "gaussian"])
+@pytest.mark.parametrize("sampler", ["sobol", "independent"])
+@pytest.mark.parametrize(
+    "case",
+    [*scenes.DIRECT_CASES, *scenes.TRIANGLE_CASES, *scenes.INDIRECT_CASES, *scenes.SPECULAR_CASES],
+    ids=str,
+)
+def test_every_case_by_every_sampler_and_filter(
+    case: Case, sampler: str, filter: str, after: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The means stay what they are, whatever numbers and filter are used, with roulette and without."""
+    monkeypatch.setattr(compact, "ROULETTE_AFTER", after)
+    unseen = 10 / (64 * case.spp * case.expected)
+    measured = run(case, case.integrators[-1], sampler=sampler, filter=filter)
+    assert_mean(measured, case.expected, 3 * case.max_error, rounding=ROUNDING + unseen)
+
+
 @pytest.mark.parametrize("case", scenes.DIRECT_CASES, ids=str)
 def test_independent_numbers(case: Case) -> None:
     """The plain random sampler agrees too, so nothing rests on the structure of the other."""

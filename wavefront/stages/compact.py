@@ -8,7 +8,7 @@ from ..sampling.sampler import Dimension, Sampler
 from ..state import Hits, Paths
 from ..vec import Bools, Ints, f4
 
-ROULETTE_AFTER = 3  # scattering events before paths may be ended
+ROULETTE_AFTER = 2  # scattering events before paths may be ended
 SMALLEST = np.finfo(f4).tiny  # keeps the division finite on lanes that end anyway
 
 

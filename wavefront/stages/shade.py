@@ -71,6 +71,8 @@ def shading(scene: CompiledScene, surface: Surface) -> Shading:
         group_of = materials.group_of.take(surface.material)
         for number, bsdf in enumerate(materials.groups):
             lanes = np.flatnonzero(group_of == number)
+            if lanes.size == len(surface):
+                return Shading(surface, frame, wo, [(ALL, bsdf.bind(surface))])
             if lanes.size:
                 groups.append((lanes, bsdf.bind(surface.take(lanes))))
     return Shading(surface, frame, wo, groups)
