@@ -70,7 +70,7 @@ def render(
     seed
         The same seed gives the same picture, bit for bit, unless `seconds` is given.
     sampler
-        "sobol" or "independent".
+        "sobol"; "bluenoise", whose error at few samples is even to the eye; or "independent".
     accel
         Ray queries by "numpy", by "embree" (extra `wavefront[embree]`), or "auto".
     workers
