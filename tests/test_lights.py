@@ -276,6 +276,6 @@ def test_compiled_environment_is_found_by_escaping_rays() -> None:
     """Its number is the last of the table."""
     scene = wf.Scene([scenes.floor()], [wf.Environment(0.5), wf.PointLight((0, 1, 0), 1)])
     made = compile_scene(scene, lambda geometry: make_accelerator(geometry, "numpy"))
-    assert made.environment == 1
+    assert made.light_of[-1] == 1
     radiance = made.lights.le(np.array([1, 1]), np.eye(3, 2).astype(f4))
     assert (radiance == 0.5).all()

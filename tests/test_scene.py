@@ -114,7 +114,7 @@ def test_a_scene_without_light_gets_an_environment() -> None:
     """And a warning."""
     with pytest.warns(UserWarning, match=r"the scene has no light; rendering it in Environment\(1.0\)"):
         scene = compiled(wf.Sphere(**BALL))
-    assert scene.environment == 0
+    assert scene.light_of[-1] == 0
 
 
 def test_a_dark_light_is_still_a_light() -> None:
@@ -153,9 +153,8 @@ def test_primitives_know_their_material_and_light() -> None:
     scene = compiled(dark, glow, lamp, wf.Sphere(**BALL), lights=[wf.PointLight(**POINT), wf.Environment()])
     assert scene.triangles == 3
     assert scene.material_of.tolist() == [0, 1, 1, 2, 3]
-    assert scene.light_of.tolist() == [-1, 0, 1, 2, -1]
+    assert scene.light_of.tolist() == [-1, 0, 1, 2, -1, 4]
     assert len(scene.lights) == 5
-    assert scene.environment == 4
     assert scene.lights.delta_of.tolist() == [False, False, False, True, False]
 
 

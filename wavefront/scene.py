@@ -161,11 +161,10 @@ class CompiledScene:
     sphere_centers: Floats  # (3, k)
     sphere_radii: Floats  # (k,)
     material_of: Ints  # (m + k,) material of each primitive
-    light_of: Ints  # (m + k,) light of each primitive, -1 for none
+    light_of: Ints  # (m + k + 1,) light of each primitive, and at the end that of a miss; -1 for none
     materials: Materials
     absorption: Floats | None  # (3, materials) per scene unit; None when nothing absorbs
     lights: LightTable
-    environment: int  # number of the light that rays meet where they leave the scene, -1 for none
 
 
 def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "place") -> CompiledScene:
@@ -212,11 +211,10 @@ def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "plac
         sphere_centers=geometry.centers,
         sphere_radii=geometry.radii,
         material_of=material_of,
-        light_of=light_of,
+        light_of=np.append(light_of, environment),
         materials=group_materials(user_materials),
         absorption=_absorption(user_materials),
         lights=lights,
-        environment=environment,
     )
 
 

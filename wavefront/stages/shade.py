@@ -44,7 +44,7 @@ class Shading:
 
 def emitted(scene: CompiledScene, paths: Paths, hits: Hits) -> Emission:
     """Return the light that the paths' rays meet: emitting surfaces, and the environment on a miss."""
-    light = np.append(scene.light_of, scene.environment).take(hits.prim)  # -1 takes the last
+    light = scene.light_of.take(hits.prim)  # a miss, -1, takes the last entry
     lanes = np.flatnonzero(light >= 0)
     light = light.take(lanes)
     radiance = scene.lights.le(light, paths.direction.take(lanes, 1))
