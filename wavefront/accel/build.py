@@ -8,6 +8,7 @@ fixed number of rows, a leaf costs the same however full it is: cuts lie at mult
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,15 +29,25 @@ class Tree:
     child: NDArray[np.int32]  # (nodes, width) child codes, 0 where there is none
     prim: Ints  # (leaves, leaf size) primitives of each leaf, -1 where there is none
     cost: float  # SAH: expected boxes and leaves visited by a random line through the root's box
+    shape: NDArray[np.float64] | None  # (nodes, width, k) what `fit` made of each child
 
 
-def build_tree(low: Floats, high: Floats, leaf_size: int, width: int) -> Tree:
-    """Build over boxes `low`, `high` (3, m), m > 0. `width` is a power of two."""
+def build_tree(
+    low: Floats,
+    high: Floats,
+    leaf_size: int,
+    width: int,
+    fit: Callable[[Ints, Ints], NDArray[np.float64]] | None = None,
+) -> Tree:
+    """Build over boxes `low`, `high` (3, m), m > 0. `width` is a power of two.
+
+    `fit` turns segments (order, starts) of primitives into rows of numbers, to be kept for each child.
+    """
     m = low.shape[1]
     order = np.arange(m)
     start, count = np.zeros(1, np.intp), np.full(1, m)
     nodes, leaves = 0, 0
-    lows, highs, children, members = [], [], [], []
+    lows, highs, children, members, shapes = [], [], [], [], []
     area_sum = 0.0
     while start.size:
         parents = start.size
@@ -53,6 +64,11 @@ def build_tree(low: Floats, high: Floats, leaf_size: int, width: int) -> Tree:
         box[0, parent, rank], box[1, parent, rank] = piece_low.T, piece_high.T
         slots = np.zeros((parents, width), np.int32)
         slots[parent, rank] = code
+        if fit is not None:
+            fitted = fit(order, start)
+            shape = np.ones((parents, width, fitted.shape[1]))
+            shape[parent, rank] = fitted
+            shapes.append(shape)
         area_sum += float(_area(piece_low, piece_high).sum())
         lows.append(box[0])
         highs.append(box[1])
@@ -69,6 +85,7 @@ def build_tree(low: Floats, high: Floats, leaf_size: int, width: int) -> Tree:
         np.concatenate(children),
         np.concatenate(members),
         area_sum / root_area if root_area > 0 else float(leaves),
+        np.concatenate(shapes) if shapes else None,
     )
 
 

@@ -16,7 +16,6 @@ from .traverse import (
     BLOCK,
     BLOCK_SHIFT,
     CHUNK,
-    LINE,
     NO_HIT,
     Ball,
     Lanes,
@@ -26,7 +25,6 @@ from .traverse import (
     flat_true,
     prepare,
     scratch,
-    slab_table,
     stream_tree,
     trace,
 )
@@ -37,7 +35,7 @@ DECIDE = 1 << 14  # candidates decided at a time
 SMALL_CHUNK = 1 << 19  # elements of one product there: with small ones, threads wait for each other
 SMALL = 128  # up to so many primitives, all are tested without a tree
 WIDTH = 32  # children of a node
-LEAF_SIZE = 64  # triangles or spheres of a leaf
+LEAF_SIZE = 32  # triangles or spheres of a leaf
 
 
 class Candidates:
@@ -65,10 +63,10 @@ class Candidates:
 class _Closest:
     """The nearest hit of each lane so far, as one sortable word: bits of t, then the primitive."""
 
-    def __init__(self, lanes: Lanes) -> None:
-        self.speed = lanes.speed
-        self.begin = lanes.begin
-        self.key = np.full(lanes.speed.size + 1, NO_HIT, np.int64)
+    def __init__(self, lanes: Lanes, ball: Ball) -> None:
+        self.lanes, self.scale = lanes, f4(1 / ball.radius)
+        self.key = np.full(lanes.count + 1, NO_HIT, np.int64)
+        self.reach = np.full(lanes.count + 1, np.inf, f4)  # how far lanes still look, as trace wants it
 
     def add(self, lane: Ints, prim: Ints, t: Doubles) -> None:
         """Record hits of lanes (k,) at t; those with t <= 0, NaN or inf are none."""
@@ -76,24 +74,18 @@ class _Closest:
         valid = (rounded > 0) & (rounded < np.inf)
         key = (rounded.view(np.int32).astype(np.int64) << 32) | prim
         np.minimum.at(self.key, lane, np.where(valid, key, NO_HIT))
-
-    def bound(self, lane: Ints) -> Floats:
-        """Return how far lanes still look, in unit direction; rounded up."""
-        t = (self.key.take(lane) >> 32).astype(np.int32).view(f4)
-        return _slab_distance(t, lane, self.speed, self.begin)
-
-    def wants(self, lane: Ints) -> Bools | None:
-        """Tell which lanes still look; None for all."""
-        return None
+        nearest = (self.key.take(lane) >> 32).astype(np.int32).view(f4)
+        self.reach[lane] = _reach(
+            nearest, self.lanes.speed.take(lane), self.lanes.begin.take(lane), self.scale
+        )
 
 
 class _Occluded:
     """Which lanes are blocked so far."""
 
-    def __init__(self, lanes: Lanes, distance: Floats) -> None:
-        self.speed, self.begin = lanes.speed, lanes.begin
+    def __init__(self, lanes: Lanes, ball: Ball, distance: Floats) -> None:
         self.distance = distance
-        self.left = np.append(distance, f4(0))  # -1 once blocked
+        self.reach = np.append(_reach(distance, lanes.speed, lanes.begin, f4(1 / ball.radius)), f4(0))
         self.blocked = np.zeros(distance.size, bool)
 
     def add(self, lane: Ints, prim: Ints, t: Doubles) -> None:
@@ -101,20 +93,13 @@ class _Occluded:
         rounded = t.astype(f4)
         lane = lane.compress((rounded > 0) & (rounded < self.distance.take(lane)))
         self.blocked[lane] = True
-        self.left[lane] = -np.inf
-
-    def bound(self, lane: Ints) -> Floats:
-        """Return how far lanes still look, in unit direction; -inf once blocked."""
-        return _slab_distance(self.left.take(lane), lane, self.speed, self.begin)
+        self.reach[lane] = -np.inf  # looks no further
 
 
-def _slab_distance(t: Floats, lane: Ints, speed: Floats, begin: Doubles | None) -> Floats:
-    """Turn t into the slabs' distances, rounded up."""
-    far = t * speed.take(lane, mode="clip") * f4(1 + 4 * ROUNDOFF)
-    if begin is None:
-        return far
-    start = begin.take(lane, mode="clip")
-    return (far - start + 8 * ROUNDOFF * np.abs(start)).astype(f4)
+def _reach(t: Floats, speed: Floats, begin: Floats | Doubles, scale: np.float32) -> Floats:
+    """Turn t into distances from the point next to the centre, in units of the ball's radius; rounded up."""
+    far = t * speed
+    return ((far + begin + 8 * ROUNDOFF * (far + np.abs(begin))) * scale + f4(1e-6)).astype(f4)
 
 
 class _Triangles:
@@ -131,9 +116,7 @@ class _Triangles:
             self.side = triangle.side_rows(solid, ball.center, ball.radius)
             self.slots = self.ids
             return
-        low = np.ascontiguousarray(solid.min(1).T)
-        high = np.ascontiguousarray(solid.max(1).T)
-        self.tree, _ = stream_tree(low, high, leaf_size, WIDTH, ball)
+        self.tree = stream_tree(np.ascontiguousarray(solid.transpose(1, 2, 0)), leaf_size, WIDTH, ball)
         rows = triangle.edge_rows(solid, ball.center, ball.radius)
         slot = self.tree.prim.reshape(-1, leaf_size)
         leaves = rows.take(np.maximum(slot, 0), 1)  # (3, leaves, leaf_size, 6)
@@ -147,13 +130,11 @@ class _Triangles:
         if self.tree is None:
             self._search_all(lanes, found, doubts)
         else:
-            table = slab_table(lanes, self.ball)
-            trace(self.tree, table, found.bound, partial(self._visit, table, lanes, found, doubts))
+            trace(self.tree, lanes, found.reach, partial(self._visit, lanes, found, doubts))
         doubts.flush()
 
     def _visit(
         self,
-        table: Floats,
         lanes: Lanes,
         found: _Closest | _Occluded,
         doubts: Candidates,
@@ -164,15 +145,18 @@ class _Triangles:
         tree = self.tree
         assert tree is not None
         size = tree.leaf_size
-        leaves, block_lanes = blocks(leaf, lane, len(table) - 1)
+        leaves, block_lanes = blocks(leaf, lane, lanes.count)
         step = max(1, CHUNK // (3 * size * BLOCK))
-        rays = table.take(block_lanes, 0).reshape(-1, BLOCK, 16)[:, :, LINE].transpose(0, 2, 1)
         batch = Candidates(partial(self._decide_pairs, lanes, found, doubts, leaves, block_lanes))
         for start in range(0, leaves.size, step):
             chosen = leaves[start : start + step]
             shape = (chosen.size, 3 * size, BLOCK)
             matrices = np.take(tree.leaves, chosen, 0, scratch("leaves", (*shape[:2], 6)), "clip")
-            edges = np.matmul(matrices, rays[start : start + step], out=scratch("product", shape))
+            some = block_lanes[start * BLOCK : (start + chosen.size) * BLOCK]
+            rays = scratch("rays", (chosen.size, 6, BLOCK))
+            for row in range(6):
+                rays[:, row] = lanes.line[row].take(some).reshape(-1, BLOCK)
+            edges = np.matmul(matrices, rays, out=scratch("product", shape))
             value = _one_sign(edges.reshape(-1, 3, size, BLOCK), scratch("value", (chosen.size, size, BLOCK)))
             at = flat_true(np.greater_equal(value, -1, out=scratch("mask", value.shape, np.bool_)))
             value = value.reshape(-1).take(at)
@@ -262,7 +246,8 @@ class _Spheres:
         self.rows = rows
         if radii.size <= SMALL:
             return
-        self.tree, _ = stream_tree(centers - radii, centers + radii, leaf_size, WIDTH, ball)
+        signs = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), -1).reshape(8, 3, 1)
+        self.tree = stream_tree((self.centers + signs * self.radii).astype(f4), leaf_size, WIDTH, ball)
         slot = self.tree.prim.reshape(-1, leaf_size)
         leaves = rows.take(np.maximum(slot, 0), 0)
         leaves[slot < 0] = np.nan
@@ -272,7 +257,7 @@ class _Spheres:
         """Give all hits that may matter to `found`."""
         if not self.radii.size:
             return
-        features = sphere.line_features(lanes.line[:3], lanes.line[3:])
+        features = sphere.line_features(lanes.line[:3, :-1], lanes.line[3:, :-1])
         if self.tree is None:
             n, k = lanes.speed.size, self.radii.size
             step = max(64, SMALL_CHUNK // k)
@@ -283,13 +268,12 @@ class _Spheres:
                 self._decide(lanes, found, slot, lane + at)
             return
         tree = self.tree
-        table = slab_table(lanes, self.ball)
-        columns = np.full((len(table), 12), np.nan, f4)
+        columns = np.full((lanes.count + 1, 12), np.nan, f4)
         columns[:-1, :11] = features.T
 
         def visit(leaf: Ints, lane: Ints) -> None:
             size = tree.leaf_size
-            leaves, block_lanes = blocks(leaf, lane, len(table) - 1)
+            leaves, block_lanes = blocks(leaf, lane, lanes.count)
             rays = columns.take(block_lanes, 0).reshape(-1, BLOCK, 12)[:, :, :11].transpose(0, 2, 1)
             step = max(1, CHUNK // (size * BLOCK))
             for start in range(0, leaves.size, step):
@@ -302,7 +286,7 @@ class _Spheres:
                 lane = block_lanes.take(((block + start) << BLOCK_SHIFT) + (at & (BLOCK - 1)))
                 self._decide(lanes, found, tree.prim.take(slot), lane)
 
-        trace(tree, table, found.bound, visit)
+        trace(tree, lanes, found.reach, visit)
 
     def _decide(self, lanes: Lanes, found: _Closest | _Occluded, prim: Ints, lane: Ints) -> None:
         """Decide candidates: spheres (k,) and lanes (k,)."""
@@ -329,7 +313,7 @@ def _batch_size(leaves: int) -> int:
     """Rays to trace at a time: enough to fill the blocks of each leaf, few enough for the cache."""
     if not leaves:
         return BATCH
-    return 1 << 15 if leaves < 1024 else 1 << 18
+    return 1 << 15 if leaves < 256 else 1 << 16 if leaves < 2048 else 1 << 18
 
 
 class NumpyAccelerator:
@@ -357,7 +341,7 @@ class NumpyAccelerator:
             part = slice(at, at + self._batch)
             with np.errstate(all="ignore"):
                 lanes = prepare(origin[:, part], direction[:, part], leaving[part], self._ball)
-                found = _Closest(lanes)
+                found = _Closest(lanes, self._ball)
                 self._triangles.search(lanes, found)
                 self._spheres.search(lanes, found)
                 self._report(lanes, found.key[:-1], hits, part)
@@ -370,7 +354,7 @@ class NumpyAccelerator:
             part = slice(at, at + self._batch)
             with np.errstate(all="ignore"):
                 lanes = prepare(origin[:, part], direction[:, part], leaving[part], self._ball)
-                found = _Occluded(lanes, distance[part])
+                found = _Occluded(lanes, self._ball, distance[part])
                 self._triangles.search(lanes, found)
                 self._spheres.search(lanes, found)
             blocked[part] = found.blocked

@@ -1,7 +1,8 @@
 """Trace streams of rays through a tree whose nodes are matrices.
 
-A node is a matrix, and its rays are the columns of another. An inner node's product gives the distances
-at which the rays enter and leave the slabs of its children's boxes; a leaf's product gives the edge
+A node is a matrix, and its rays are the columns of another. Around each child lies an ellipsoid, and a line
+meets an ellipsoid where a quadratic form in its Plücker coordinates is not negative: an inner node's
+product has one row per child, on the 21 products of two coordinates. A leaf's product gives the edge
 functions of its triangles. Pairs of (node, ray) are sorted by node, cut into blocks of `BLOCK` rays, and
 all blocks go through one batched product, so that the number of NumPy calls does not grow with the
 number of nodes. The root's children are taken nearest first, each ray in its own order, so that rays
@@ -14,20 +15,21 @@ import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..vec import Bools, Floats, Ints, f4
-from .build import Tree, build_tree
+from .build import build_tree
 from .triangle import ROUNDOFF, Doubles
 
 BLOCK = 32  # rays that share one copy of a node's matrix
 BLOCK_SHIFT = 5
 CHUNK = 1 << 18  # elements of one product
-ROUNDS = 8  # children of the root that a ray takes one at a time; then all that are left
-SLAB, LINE = slice(0, 9), slice(9, 15)  # columns of Lanes.table
+ROUNDS = (1, 1, 1, 2)  # children of the root that a ray takes in each round; then all that are left
+TOP = 128  # children of the root at most: those of its children join it while so many fit
 NO_HIT = (0x7F800000 << 32) | 0x7FFFFFFF  # key of a miss: t = inf
 
 Words = NDArray[np.int64]
@@ -76,18 +78,22 @@ class Lanes:
     origin: Floats  # (3, n) as given
     direction: Floats  # (3, n) as given
     leaving: Ints  # (n,)
-    line: Floats  # (6, n) Plücker coordinates: unit direction d, then (o - center) × d
+    line: Floats  # (6, n + 1) Plücker coordinates: unit direction d, then (o - center) × d; the last is NaN
     speed: Floats  # (n,) length of `direction`
     local: Floats | None  # (4, n) o - center, 1; None if some origin is far away
-    begin: Doubles | None  # (n,) where the slab distances start, None if none is (see prepare)
+    begin: Floats | Doubles  # (n,) where rays start, as a distance from the point next to the centre
+
+    @property
+    def count(self) -> int:
+        """Number of rays."""
+        return self.speed.size
 
 
 def prepare(origin: Floats, direction: Floats, leaving: Ints, ball: Ball) -> Lanes:
     """Compute Plücker coordinates of rays (3, n) about the ball's centre.
 
     They are float32 while all origins are within two radii. Beyond, o - center loses what matters, and
-    they are computed in float64; as distances from far away lose it too, those rays' slab distances
-    count from two radii before the point nearest to the centre.
+    they are computed in float64.
     """
     center = ball.center[:, None]
     local: NDArray[Any] = origin - center
@@ -96,134 +102,230 @@ def prepare(origin: Floats, direction: Floats, leaving: Ints, ball: Ball) -> Lan
     if far:
         local, d = origin.astype(np.float64) - center, direction.astype(np.float64)
     speed = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
-    line = np.empty((6, speed.size), f4)
+    line = np.empty((6, speed.size + 1), f4)
+    line[:, -1] = np.nan
+    part = line[:, :-1]
     ux, uy, uz = d / speed
     x, y, z = local
-    line[0], line[1], line[2] = ux, uy, uz
-    line[3] = y * uz - z * uy
-    line[4] = z * ux - x * uz
-    line[5] = x * uy - y * ux
+    part[0], part[1], part[2] = ux, uy, uz
+    part[3] = y * uz - z * uy
+    part[4] = z * ux - x * uz
+    part[5] = x * uy - y * ux
+    begin = x * ux + y * uy + z * uz
     if far:
-        begin = -(x * ux + y * uy + z * uz) - 2 * ball.radius
         return Lanes(origin, direction, leaving, line, speed.astype(f4), None, begin)
     homogeneous = np.ones((4, speed.size), f4)
     homogeneous[:3] = local
-    return Lanes(origin, direction, leaving, line, speed, homogeneous, None)
-
-
-def slab_table(lanes: Lanes, ball: Ball) -> Floats:
-    """Return one row of 16 numbers per ray, and a last row of NaN for the unused places of blocks.
-
-    1/d, |1/d|, -o/d for slabs; d and moment for edges. Columns of zero direction become tiny ones: the
-    boxes are padded by far more than such a ray drifts.
-    """
-    n = lanes.speed.size
-    table = np.empty((n + 1, 16), f4)
-    unit = lanes.line[:3]
-    safe = np.where(np.abs(unit) < 1e-12, np.copysign(f4(1e-12), unit), unit)
-    inverse = 1 / safe
-    if lanes.begin is None:
-        local = lanes.origin - ball.center[:, None]
-    else:
-        local = lanes.origin.astype(np.float64) - ball.center[:, None] + lanes.begin * unit
-    table[:n, 0:3] = inverse.T
-    table[:n, 3:6] = np.abs(inverse).T
-    table[:n, 6:9] = (-local * inverse).T
-    table[:n, 9:15] = lanes.line.T
-    table[:n, 15] = 0
-    table[n] = np.nan
-    return table
+    return Lanes(origin, direction, leaving, line, speed, homogeneous, begin)
 
 
 @dataclass(slots=True)
 class StreamTree:
-    """A tree as matrices."""
+    """A tree as matrices. Lengths are in units of the ball's radius, places relative to its centre."""
 
-    slabs: Floats  # (nodes, 6 width, 9) near x, y, z and far x, y, z of each child
+    root: Floats  # (top, 21) quadrics of the root's children, see quadric_rows
+    top: Ints  # (top,) their slots
+    quadrics: Floats  # (nodes, width, 21) quadrics of each child, about the node's centre
+    center: Floats  # (nodes, 3) where a node's moments are taken about
+    ball: Floats  # (nodes * width, 4) centre and radius of a ball around each child
     child: Ints  # (nodes * width,) child codes as in build.Tree
     leaves: Floats  # (leaves, rows, columns) the filter's matrices
     prim: Ints  # (leaves * leaf size,) primitive of each leaf slot
     width: int
     leaf_size: int
     cost: float
+    scale: np.float32  # 1 / the ball's radius
 
 
-def stream_tree(low: Floats, high: Floats, leaf_size: int, width: int, ball: Ball) -> tuple[StreamTree, Tree]:
-    """Build the tree and its slab matrices; the caller fills in `leaves`."""
-    tree = build_tree(low, high, leaf_size, width)
-    absent = tree.low > tree.high
-    middle = np.where(absent, 0, (tree.low.astype(np.float64) + tree.high) / 2 - ball.center)
-    pad = 64 * ROUNDOFF * ball.radius
-    half = np.where(absent, -8 * ball.radius, (tree.high.astype(np.float64) - tree.low) / 2 + pad)
-    slabs = np.zeros((len(tree.low), 2, 3, width, 9), f4)
+def stream_tree(points: Floats, leaf_size: int, width: int, ball: Ball) -> StreamTree:
+    """Build the tree and its quadrics over primitives within points (corners, 3, m).
+
+    The caller fills in `leaves`.
+    """
+    low, high = points.min(0), points.max(0)
+    local = ((points - ball.center[:, None].astype(np.float64)) / ball.radius).astype(f4)
+    tree = build_tree(low, high, leaf_size, width, partial(fit_ellipsoids, local))
+    assert tree.shape is not None
+    absent = tree.low[..., 0] > tree.high[..., 0]
+    nodes = len(absent)
+    center = np.zeros((nodes, 3))
+    inner = np.flatnonzero(~absent & (tree.child >= 0))
+    shapes = tree.shape.reshape(-1, 12)
+    center[tree.child.ravel()[inner]] = shapes[inner, :3]
+    reach = np.ones(nodes)
+    reach[tree.child.ravel()[inner]] = np.linalg.norm(shapes[inner, 3:], axis=1)
+    quadrics = quadric_rows(tree.shape, center, reach)
+    quadrics[absent] = 0
     for axis in range(3):
-        for side, sign in enumerate((-1, 1)):
-            slabs[:, side, axis, :, axis] = middle[..., axis]
-            slabs[:, side, axis, :, 3 + axis] = sign * half[..., axis]
-            slabs[:, side, axis, :, 6 + axis] = 1
-    result = StreamTree(
-        slabs.reshape(-1, 6 * width, 9),
-        tree.child.ravel().astype(np.intp),
-        np.empty((0, 0, 0), f4),
-        tree.prim.ravel(),
-        width,
-        leaf_size,
-        tree.cost,
-    )
-    return result, tree
+        quadrics[absent, PAIRS.index((axis, axis))] = -1
+    balls = np.empty((nodes * width, 4), f4)
+    balls[:, :3] = shapes[:, :3]
+    axes = shapes[:, 3:].reshape(-1, 3, 3)
+    balls[:, 3] = np.sqrt((axes * axes).sum(1).max(1)) * (1 + 1e-6) + 2e-5
+    top = np.flatnonzero(~absent[0])
+    child = tree.child.ravel().astype(np.intp)
+    while True:
+        inside = child.take(top) > 0
+        below = (child.take(top[inside])[:, None] * width + np.arange(width)).ravel()
+        wider = np.concatenate([top[~inside], below[~absent.ravel()[below]]])
+        if not inside.any() or wider.size > TOP:
+            break
+        top = wider
+    root = quadric_rows(shapes[None, top], np.zeros((1, 3)), np.ones(1))[0]
+    scale = f4(1 / ball.radius)
+    leaves = np.empty((0, 0, 0), f4)
+    return StreamTree(
+        root, top, quadrics, center.astype(f4), balls, child, leaves, tree.prim.ravel(), width, leaf_size,
+        tree.cost, scale,
+    )  # fmt: skip
 
 
-def trace(
-    tree: StreamTree,
-    table: Floats,
-    bound: Callable[[Ints], Floats],
-    visit: Callable[[Ints, Ints], None],
-) -> None:
+def fit_ellipsoids(points: Floats, order: Ints, start: Ints) -> Doubles:
+    """Fit ellipsoids around segments of primitives within points (corners, 3, m) -> (segments, 12).
+
+    Centre, then the three half axes, as columns of a matrix: the principal axes of the points, scaled to
+    their extent along each, and then until all points are inside.
+    """
+    count = np.diff(start, append=order.size)
+    owner = np.repeat(np.arange(start.size), count)
+    chosen = points.take(order, 2)
+    weight = 1 / (count * len(points))
+    mean = np.add.reduceat(chosen.sum(0, dtype=np.float64), start, 1) * weight
+    chosen -= mean.astype(f4).take(owner, 1)
+    spread = np.empty((start.size, 3, 3))
+    for i in range(3):
+        for j in range(i + 1):
+            product = (chosen[:, i] * chosen[:, j]).sum(0)
+            spread[:, i, j] = spread[:, j, i] = np.add.reduceat(product, start) * weight
+    axes = np.linalg.eigh(spread)[1]  # columns
+    along = []
+    half = np.empty((3, start.size))
+    shift = np.empty((3, start.size))
+    for axis in range(3):
+        x, y, z = axes[:, :, axis].astype(f4).T.take(owner, 1)
+        value = chosen[:, 0] * x + chosen[:, 1] * y + chosen[:, 2] * z
+        low = np.minimum.reduceat(value.min(0), start)
+        high = np.maximum.reduceat(value.max(0), start)
+        shift[axis] = middle = ((low + high) / 2).astype(f4)
+        half[axis] = (high - low) / 2 + 2e-6
+        value -= middle.astype(f4).take(owner)
+        along.append(value)
+    half = np.maximum(half, np.maximum(0.02 * half.max(0), 1e-5))
+    norm: Floats = np.zeros(chosen.shape[::2], f4)
+    for axis in range(3):
+        value = along[axis]
+        value *= (1 / half[axis]).astype(f4).take(owner)
+        value *= value
+        norm = norm + value
+    grow = np.sqrt(np.maximum.reduceat(norm.max(0), start).astype(np.float64)) * (1 + 2e-4)
+    shape = np.empty((start.size, 12))
+    shape[:, :3] = mean.T.astype(f4) + np.einsum("sij,js->si", axes, shift)
+    shape[:, 3:] = (axes * (half * grow).T[:, None]).reshape(-1, 9)
+    return shape
+
+
+PAIRS = [(i, j) for i in range(6) for j in range(i, 6)]
+
+
+def quadric_rows(shape: Doubles, center: Doubles, reach: Doubles) -> Floats:
+    """Quadratic forms in Plücker coordinates: not below 0 where a line meets an ellipsoid.
+
+    With half axes S and centre c: |adj(S) d|² - |Sᵀ (m - c × d)|² >= 0, as the map that turns the
+    ellipsoid into the unit ball turns directions d into S⁻¹ d and moments m by the cofactors of S⁻¹.
+    `shape` (nodes, width, 12), as in fit_ellipsoids; moments are about `center` (nodes, 3), and lines pass it
+    within `reach`. Rows are enlarged by a bound of the error of float32, so that no line is lost.
+    """
+    c = shape[..., :3] - center[:, None]
+    s = shape[..., 3:].reshape(*shape.shape[:2], 3, 3)
+    size2 = (s * s).sum(-2)
+    size = np.sort(np.sqrt(size2), -1)
+    unit = 1 / (size[..., 1] * size[..., 2])  # rows are scaled for |adj(S) d| <= 1
+    spread = s @ s.swapaxes(-1, -2) * (unit * unit)[..., None, None]
+    adjoint = np.cross(s[..., [1, 2, 0]], s[..., [2, 0, 1]], axis=-2) * unit[..., None, None]
+    cross = np.zeros_like(s)  # c × d = cross @ d
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        cross[..., i, j], cross[..., j, i] = -c[..., k], c[..., k]
+    form = np.empty((*s.shape[:2], 6, 6))
+    form[..., :3, :3] = adjoint @ adjoint.swapaxes(-1, -2) - cross.swapaxes(-1, -2) @ spread @ cross
+    form[..., 3:, 3:] = -spread
+    form[..., 3:, :3] = spread @ cross
+    form[..., :3, 3:] = form[..., 3:, :3].swapaxes(-1, -2)
+    moment = np.ones((len(s), 6)) * reach[:, None] * 1.01 + 1e-5
+    moment[:, :3] = 1
+    magnitude = (np.abs(form) * moment[:, None, :, None] * moment[:, None, None, :]).sum((-1, -2))
+    largest = size[..., 2] * unit
+    moment_error = 50 * ROUNDOFF
+    rounding = 30 * ROUNDOFF * magnitude + 2 * largest * moment_error + (largest * moment_error) ** 2
+    rounding += 2 * (1 + np.linalg.norm(c, axis=-1) * largest) * 4 * ROUNDOFF
+    rows = np.stack([form[..., i, j] * (1 if i == j else 2) for i, j in PAIRS], -1)
+    for i in range(3):
+        rows[..., PAIRS.index((i, i))] += 1.1 * rounding
+    return rows.astype(f4)
+
+
+def trace(tree: StreamTree, lanes: Lanes, reach: Floats, visit: Callable[[Ints, Ints], None]) -> None:
     """Take rays through the tree, near children of the root first.
 
-    `bound(lanes)` returns how far (unit direction) rays still look; `visit(leaves, lanes)` tests.
+    `reach` (n + 1,) is how far rays still look, updated by `visit(leaves, lanes)`, which tests.
     """
-    n = len(table) - 1
-    code, lane, near = _root_pairs(tree, table, bound(np.arange(n)))
+    line = lanes.line.copy()
+    line[3:] *= tree.scale
+    begin = np.append((lanes.begin * tree.scale - np.abs(lanes.begin * tree.scale) * 1e-6).astype(f4), f4(0))
+    codes = tree.child.take(tree.top)
+    mask = (1 << (tree.top.size - 1).bit_length()) - 1
+    slot, lane, near = _root_pairs(tree, line, begin, reach)
     bits = near.view(np.int32).astype(np.int64)
-    key = (lane << 32) | (bits & ~np.int64(tree.width - 1)) | code
+    bits &= ~mask
+    bits |= slot
+    bits |= lane << 32
+    key = bits
     key.sort()
     owner = key >> 32
-    first = _firsts(owner)
-    last = np.append(first[1:], key.size)
-    at = first
-    for round_ in range(ROUNDS + 1):
+    at = _firsts(owner)
+    last = np.append(at[1:], key.size)
+    for taken in (*ROUNDS, 1 << 30):
         if not at.size:
             return
-        if round_ == ROUNDS:
-            at = np.arange(int((last - at).sum())) + np.repeat(
-                at - np.cumsum(last - at) + (last - at), last - at
-            )
-        chosen = key.take(at)
-        lanes = chosen >> 32
-        close = (chosen & 0xFFFFFFFF & ~np.int64(tree.width - 1)).astype(np.int32).view(f4)
-        looking = np.flatnonzero(close <= bound(lanes))
-        codes = tree.child.take(chosen.take(looking) & (tree.width - 1))
-        _descend(tree, table, codes, lanes.take(looking), bound, visit)
-        if round_ == ROUNDS:
-            return
-        more = looking.compress(at.take(looking) + 1 < last.take(looking))
-        at, last = at.take(more) + 1, last.take(more)
+        count = np.minimum(last - at, taken)
+        ends = np.cumsum(count)
+        place = at
+        if taken > 1:
+            place = np.arange(int(ends[-1])) + np.repeat(at - ends + count, count)
+        chosen = key.take(place)
+        lane = chosen >> 32
+        close = (chosen & (0xFFFFFFFF ^ mask)).astype(np.int32).view(f4) - OFFSET
+        looking = np.flatnonzero(close <= reach.take(lane))
+        code = codes.take(chosen.take(looking) & mask)
+        _descend(tree, line, begin, reach, code, lane.take(looking), visit)
+        at = at + count
+        more = np.flatnonzero(at < last)
+        at, last = at.take(more), last.take(more)
 
 
-def _root_pairs(tree: StreamTree, table: Floats, far: Floats) -> tuple[Ints, Ints, Floats]:
-    """All rays against the root's children -> child slot, lane, near distance of pairs."""
-    n, width = len(table) - 1, tree.width
-    step = max(1, CHUNK // (6 * width))
+OFFSET = f4(4)  # makes distances positive, so that their bits sort like numbers
+
+
+def _root_pairs(tree: StreamTree, line: Floats, begin: Floats, reach: Floats) -> tuple[Ints, Ints, Floats]:
+    """All rays against the root's children -> child, lane, near distance + OFFSET of pairs."""
+    n, width = line.shape[1] - 1, tree.top.size
+    step = max(256, CHUNK // width)
     parts = []
+    balls = np.ascontiguousarray(tree.ball.take(tree.top, 0))
     for at in range(0, n, step):
-        stop = min(n, at + step)
-        planes = np.matmul(
-            tree.slabs[0], table[at:stop, SLAB].T, out=scratch("product", (6 * width, stop - at))
-        ).reshape(1, 6, width, -1)
-        hit, near = _boxes_met(planes, far[None, at:stop])
-        slot, lane = np.divmod(hit, stop - at)
-        parts.append((slot, lane + at, near.reshape(-1).take(hit)))
+        k = min(n - at, step)
+        part = line[:, at : at + k]
+        features = scratch("features", (21, k))
+        _features(part, features)
+        value = np.matmul(tree.root, features, out=scratch("product", (width, k)))
+        hit = flat_true(np.greater_equal(value, 0, out=scratch("mask", value.shape, np.bool_)))
+        along = np.matmul(balls[:, :3], part[:3], out=value).reshape(-1).take(hit)
+        slot = hit // k
+        lane = hit - slot * k + at
+        radius = balls[:, 3].take(slot)
+        near = along - radius
+        met = np.flatnonzero((along + radius >= begin.take(lane)) & (near <= reach.take(lane)))
+        near += OFFSET
+        parts.append((slot.take(met), lane.take(met), near.take(met)))
     if not parts:
         empty = np.zeros(0, np.intp)
         return empty, empty, np.zeros(0, f4)
@@ -231,25 +333,19 @@ def _root_pairs(tree: StreamTree, table: Floats, far: Floats) -> tuple[Ints, Int
     return np.concatenate(slots), np.concatenate(lanes), np.concatenate(nears)
 
 
-def _boxes_met(planes: Floats, far: Floats) -> tuple[Ints, Floats]:
-    """Slab distances (blocks, 6, width, rays) -> flat indices of met boxes, near distances."""
-    near, leave = planes[:, 0], planes[:, 3]
-    np.maximum(near, planes[:, 1], out=near)
-    np.maximum(near, planes[:, 2], out=near)
-    np.maximum(near, f4(0), out=near)
-    np.minimum(leave, planes[:, 4], out=leave)
-    np.minimum(leave, planes[:, 5], out=leave)
-    np.minimum(leave, far[:, None], out=leave)
-    met = np.less_equal(near, leave, out=scratch("mask", near.shape, np.bool_))
-    return flat_true(met), near
+def _features(line: Floats, out: Floats) -> None:
+    """Products of all pairs of Plücker coordinates (6, ...) -> (21, ...)."""
+    for row, (i, j) in enumerate(PAIRS):
+        np.multiply(line[i], line[j], out=out[row])
 
 
 def _descend(
     tree: StreamTree,
-    table: Floats,
+    line: Floats,
+    begin: Floats,
+    reach: Floats,
     code: Ints,
     lane: Ints,
-    bound: Callable[[Ints], Floats],
     visit: Callable[[Ints, Ints], None],
 ) -> None:
     """Take pairs of child code and lane down to the leaves, level by level."""
@@ -257,39 +353,58 @@ def _descend(
     while code.size:
         is_leaf = code < 0
         at = np.flatnonzero(is_leaf)
-        leaf_codes.append(-1 - code.take(at))
-        leaf_lanes.append(lane.take(at))
-        at = np.flatnonzero(~is_leaf)
-        if not at.size:
+        if at.size == code.size:
+            leaf_codes.append(-1 - code)
+            leaf_lanes.append(lane)
             break
-        code, lane = _expand(tree, table, code.take(at), lane.take(at), bound)
+        if at.size:
+            leaf_codes.append(-1 - code.take(at))
+            leaf_lanes.append(lane.take(at))
+            at = np.flatnonzero(~is_leaf)
+            code, lane = code.take(at), lane.take(at)
+        code, lane = _expand(tree, line, begin, reach, code, lane)
     if leaf_codes:
         visit(np.concatenate(leaf_codes), np.concatenate(leaf_lanes))
 
 
 def _expand(
-    tree: StreamTree, table: Floats, node: Ints, lane: Ints, bound: Callable[[Ints], Floats]
+    tree: StreamTree, line: Floats, begin: Floats, reach: Floats, node: Ints, lane: Ints
 ) -> tuple[Ints, Ints]:
     """Pairs of inner node and lane -> pairs of met child's code and lane."""
     width = tree.width
-    nodes, block_lanes = blocks(node, lane, len(table) - 1)
-    rays = table.take(block_lanes, 0).reshape(-1, BLOCK, 16)[:, :, SLAB].transpose(0, 2, 1)
-    far = bound(block_lanes).reshape(-1, BLOCK)
-    step = max(1, CHUNK // (6 * width * BLOCK))
-    hits = []
+    nodes, block_lanes = blocks(node, lane, line.shape[1] - 1)
+    step = max(1, CHUNK // (width * BLOCK))
+    codes, lanes = [], []
     for start in range(0, nodes.size, step):
-        part = slice(start, start + step)
-        shape = (nodes[part].size, 6 * width, BLOCK)
-        matrices = np.take(tree.slabs, nodes[part], 0, scratch("nodes", (*shape[:2], 9)), "clip")
-        planes = np.matmul(matrices, rays[part], out=scratch("product", shape))
-        hit, _ = _boxes_met(planes.reshape(-1, 6, width, BLOCK), far[part])
-        hit += start * (width * BLOCK)
-        hits.append(hit)
-    hit = np.concatenate(hits)
-    pair = hit >> BLOCK_SHIFT
-    block = pair // width
-    code = tree.child.take(nodes.take(block) * width + (pair & (width - 1)))
-    return code, block_lanes.take((block << BLOCK_SHIFT) + (hit & (BLOCK - 1)))
+        chosen = nodes[start : start + step]
+        k = chosen.size
+        some = block_lanes[start * BLOCK : (start + k) * BLOCK]
+        rays = scratch("rays", (6, k, BLOCK))
+        for row in range(6):
+            np.take(line[row], some, 0, rays[row].reshape(-1), "clip")
+        dx, dy, dz = rays[:3]
+        cx, cy, cz = tree.center.take(chosen, 0).T[:, :, None]
+        rays[3] -= cy * dz - cz * dy
+        rays[4] -= cz * dx - cx * dz
+        rays[5] -= cx * dy - cy * dx
+        features = scratch("features", (k, 21, BLOCK))
+        _features(rays, features.transpose(1, 0, 2))
+        matrices = np.take(tree.quadrics, chosen, 0, scratch("nodes", (k, width, 21)), "clip")
+        value = np.matmul(matrices, features, out=scratch("product", (k, width, BLOCK)))
+        hit = flat_true(np.greater_equal(value, 0, out=scratch("mask", value.shape, np.bool_)))
+        pair = hit >> BLOCK_SHIFT
+        block = pair // width
+        slot = chosen.take(block) * width + (pair & (width - 1))
+        place = (block << BLOCK_SHIFT) + (hit & (BLOCK - 1))
+        lane = some.take(place)
+        x, y, z, radius = tree.ball.take(slot, 0).T
+        flat = rays.reshape(6, -1)
+        along = x * flat[0].take(place) + y * flat[1].take(place) + z * flat[2].take(place)
+        met = (along + radius >= begin.take(lane)) & (along - radius <= reach.take(lane))
+        met_at = np.flatnonzero(met)
+        codes.append(tree.child.take(slot.take(met_at)))
+        lanes.append(lane.take(met_at))
+    return np.concatenate(codes), np.concatenate(lanes)
 
 
 def blocks(node: Ints, lane: Ints, unused: int) -> tuple[Ints, Ints]:
