@@ -18,9 +18,9 @@ from .stages.absorb import absorb
 from .stages.bounce import bounce_sample
 from .stages.compact import carrying, compact, roulette
 from .stages.intersect import intersect
-from .stages.shade import Arrival, direct, emitted, mis_weighted, shading
+from .stages.shade import Arrival, Shading, direct, emitted, mis_weighted, shading
 from .stages.surface import interact
-from .state import Paths
+from .state import Hits, Paths
 from .vec import Floats, f4
 
 Integrator: TypeAlias = Callable[[CompiledScene, Paths, Sampler, int], Floats]
@@ -36,9 +36,7 @@ def li_naive(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: 
         paths, hits = compact(paths, hits, hits.found)
         if bounce == max_bounces or not len(paths):
             break
-        surface = interact(scene, paths, hits)
-        absorb(scene, paths, hits, surface)
-        shade = shading(scene, surface)
+        shade = arrive(scene, paths, hits)
         paths = bounce_sample(paths, shade, sampler, bounce)
         paths = paths.take(roulette(paths, sampler, bounce))
     return L
@@ -54,9 +52,7 @@ def li_direct_simple(scene: CompiledScene, paths: Paths, sampler: Sampler, max_b
         paths, hits = compact(paths, hits, hits.found)
         if bounce == max_bounces or not len(paths):
             break
-        surface = interact(scene, paths, hits)
-        absorb(scene, paths, hits, surface)
-        shade = shading(scene, surface)
+        shade = arrive(scene, paths, hits)
         deposit(L, paths, direct(scene, paths, shade, sampler, bounce, mis=False))
         paths = bounce_sample(paths, shade, sampler, bounce)
         paths = paths.take(np.flatnonzero(paths.specular & carrying(paths)))
@@ -76,9 +72,7 @@ def li_direct_mis(scene: CompiledScene, paths: Paths, sampler: Sampler, max_boun
         paths, hits = compact(paths, hits, np.flatnonzero((hits.prim >= 0) & paths.specular))
         if bounce == max_bounces or not len(paths):
             break
-        surface = interact(scene, paths, hits)
-        absorb(scene, paths, hits, surface)
-        shade = shading(scene, surface)
+        shade = arrive(scene, paths, hits)
         deposit(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
         paths = bounce_sample(paths, shade, sampler, bounce)
         paths = paths.take(np.flatnonzero(carrying(paths)))
@@ -95,9 +89,7 @@ def li_full(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: i
         paths, hits = compact(paths, hits, hits.found)
         if bounce == max_bounces or not len(paths):
             break
-        surface = interact(scene, paths, hits)
-        absorb(scene, paths, hits, surface)
-        shade = shading(scene, surface)
+        shade = arrive(scene, paths, hits)
         deposit(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
         paths = bounce_sample(paths, shade, sampler, bounce)
         paths = paths.take(roulette(paths, sampler, bounce))
@@ -110,6 +102,13 @@ INTEGRATORS: dict[str, Integrator] = {
     "direct_mis": li_direct_mis,
     "full": li_full,
 }
+
+
+def arrive(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
+    """Weaken the paths by the matter they came through, and make their surfaces ready to shade."""
+    surface = interact(scene, paths, hits)
+    absorb(scene, paths, hits, surface)
+    return shading(scene, surface)
 
 
 def deposit(L: Floats, paths: Paths, light: Arrival) -> None:

@@ -141,11 +141,6 @@ class Materials:
     group_of: Ints  # (materials,) the group of each material
     groups: tuple[Bsdf, ...]
 
-    @property
-    def specular(self) -> NDArray[np.bool_]:
-        """Whether each group has only delta lobes, (groups,)."""
-        return np.array([group.specular for group in self.groups], np.bool_)
-
 
 @dataclass(slots=True)
 class CompiledScene:
