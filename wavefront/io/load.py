@@ -18,6 +18,7 @@ from ..errors import SceneError, finite_array
 from ..lights import DirectionalLight, PointLight, SpotLight
 from ..scene import Scene
 from ..shapes import Mesh
+from ..shapes.transform import moved
 from . import gltf, headers, mtl, obj, stl, visuals
 from .appearance import Look
 from .files import beside, decode, read_bytes
@@ -128,26 +129,6 @@ def join(
     if mesh is None:
         raise SceneError(f"{name}: transform leaves no face with an area")
     return mesh
-
-
-def moved(
-    matrix: np.ndarray, vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray | None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-    """Apply a (4, 4) affine matrix; a reflection also turns the faces, so that fronts stay fronts."""
-    linear, shift = matrix[:3, :3], matrix[:3, 3]
-    if np.array_equal(matrix, np.eye(4)):
-        return vertices, faces, normals
-    if not np.array_equal(matrix[3], [0, 0, 0, 1]):
-        raise SceneError(f"transform has the last row {matrix[3].tolist()}; it must be [0, 0, 0, 1]")
-    mirrored = np.linalg.det(linear) < 0
-    if mirrored:
-        faces = faces[:, ::-1]
-    if normals is not None:
-        # the matrix of cofactors turns normals also where a flat thing is scaled by 0 across
-        a, b, c = linear.T
-        cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
-        normals = normals @ (-cofactors if mirrored else cofactors).T
-    return vertices @ linear.T + shift, faces, normals
 
 
 def _joined(parts: list[np.ndarray | None]) -> np.ndarray | None:
