@@ -23,6 +23,7 @@ from .render import render
 from .scene import Scene
 from .shapes import Disk, Mesh, Rectangle, Sphere
 from .textures import Texture
+from .vertex_colors import VertexColors
 
 __all__ = [
     "Bsdf",
@@ -49,6 +50,7 @@ __all__ = [
     "SpotLight",
     "Texture",
     "ThinDielectric",
+    "VertexColors",
     "compare",
     "from_trimesh",
     "load",

@@ -31,6 +31,7 @@ from .lights import (
     first_of_pairs,
 )
 from .shapes import Mesh, Sphere
+from .shapes.attributes import ATTRIBUTES, Corners, corner_values
 from .state import Surface
 from .vec import Floats, Ints, f4
 
@@ -152,7 +153,7 @@ class CompiledScene:
     triangles: int  # number of triangles
     normals: Floats  # (3, m) unit geometric normals of the triangles
     corner_normals: tuple[Floats, Floats, Floats] | None  # 3 × (3, m); None when no mesh is smooth
-    corner_uvs: tuple[Floats, Floats, Floats] | None  # 3 × (2, m); None when no material needs them
+    attributes: dict[str, Corners]  # by field of `Surface`, those that a material reads; 3 × (width, m)
     sphere_centers: Floats  # (3, k)
     sphere_radii: Floats  # (k,)
     material_of: Ints  # (m + k,) material of each primitive
@@ -191,10 +192,10 @@ def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "plac
     )
     centers = np.array([s.center - centre for s in spheres]).reshape(-1, 3).T.astype(f4)
     radii = np.array([s.radius for s in spheres]).astype(f4)
-    needs_uv = any(_is_textured(material) for material in user_materials)
+    attributes = {name: corner_values(name, meshes) for name in _attributes_read(meshes, spheres)}
     smooth = any(mesh.normals is not None for mesh in meshes)
     triangles32 = np.ascontiguousarray(triangles, f4)
-    geometry = Geometry(triangles32, np.ascontiguousarray(centers), radii, weights=needs_uv or smooth)
+    geometry = Geometry(triangles32, np.ascontiguousarray(centers), radii, weights=bool(attributes) or smooth)
     return CompiledScene(
         centre=centre,
         radius=radius,
@@ -202,7 +203,7 @@ def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "plac
         triangles=len(triangles),
         normals=_face_normals(triangles),
         corner_normals=_corner_normals(meshes, triangles),
-        corner_uvs=_corner_uvs(meshes) if needs_uv else None,
+        attributes=attributes,
         sphere_centers=geometry.centers,
         sphere_radii=geometry.radii,
         material_of=material_of,
@@ -272,10 +273,43 @@ def _merge(materials: Sequence[Bsdf], numbers: list[int]) -> Bsdf:
     return merged
 
 
-def _is_textured(material: Bsdf) -> bool:
-    return any(
-        isinstance(v, Spatial) or (isinstance(v, Bsdf) and _is_textured(v)) for v in vars(material).values()
-    )
+def _attributes_read(meshes: Sequence[Mesh], spheres: Sequence[Sphere]) -> list[str]:
+    """Return the names of what materials read; warn of meshes that lack what theirs reads.
+
+    Raises
+    ------
+    SceneError
+        If a parameter reads what does not exist.
+    """
+    lacking: dict[str, list[str]] = {}
+    shapes: list[Shape] = [*meshes, *spheres]
+    for shape in shapes:
+        for name in sorted(_reads(shape.material)):
+            if name not in ATTRIBUTES:
+                known = ", ".join(ATTRIBUTES)
+                raise SceneError(f"{shape.name}: its material reads {name!r}; it must be one of {known}")
+            without = lacking.setdefault(name, [])
+            if isinstance(shape, Mesh) and ATTRIBUTES[name].of_mesh(shape) is None:
+                without.append(shape.name)
+    for name, without in lacking.items():
+        if without:
+            warnings.warn(
+                f"{len(without)} meshes lack the {ATTRIBUTES[name].title} that their materials read, "
+                f"first: {without[0]!r}",
+                stacklevel=5,
+            )
+    return sorted(lacking)
+
+
+def _reads(material: Bsdf) -> set[str]:
+    """Return the names of the attributes that the parameters of a material read."""
+    out: set[str] = set()
+    for value in vars(material).values():
+        if isinstance(value, Spatial):
+            out.update(value.reads)
+        elif isinstance(value, Bsdf):
+            out.update(_reads(value))
+    return out
 
 
 def _number_materials(meshes: Sequence[Mesh], spheres: Sequence[Sphere]) -> tuple[list[Bsdf], Ints]:
@@ -314,13 +348,6 @@ def _corner_normals(
             part = corners[start : start + len(mesh.faces)]
             np.copyto(part, (given / np.where(size > 0, size, 1)).astype(f4), where=size > 0)
         start += len(mesh.faces)
-    a, b, c = (np.ascontiguousarray(corners[:, i].T, f4) for i in range(3))
-    return a, b, c
-
-
-def _corner_uvs(meshes: Sequence[Mesh]) -> tuple[Floats, Floats, Floats]:
-    parts = [np.zeros((len(m.faces), 3, 2)) if m.uvs is None else m.uvs[m.faces] for m in meshes]
-    corners = np.concatenate(parts) if parts else np.zeros((0, 3, 2))
     a, b, c = (np.ascontiguousarray(corners[:, i].T, f4) for i in range(3))
     return a, b, c
 

@@ -103,7 +103,10 @@ class Surface(Columns):
     prim: Ints  # (n,) primitive id
     material: Ints  # (n,) row of the scene's material table
     inside: Bools  # (n,) the ray came from the back side of the surface
-    uv: Floats | None = None  # (2, n) texture coordinates; None when nothing in the scene needs them
+    # what varies over a shape, if a material of the scene reads it; shapes/attributes.py fills it in
+    uv: Floats | None = None  # (2, n) texture coordinates
+    uv1: Floats | None = None  # (2, n) the second set of texture coordinates
+    color: Floats | None = None  # (4, n) linear RGB and opacity, given per vertex
 
     def frame(self) -> Frame:
         """Return the shading frames, z = ns."""

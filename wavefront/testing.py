@@ -581,8 +581,9 @@ def _surface(wo: Floats, inside: Bools) -> Surface:
     n = wo.shape[1]
     normal = np.repeat(np.array([[0], [0], [1]], f4), n, 1)
     zero, uv = np.zeros(n, f4), np.repeat(np.array([[0.3], [0.6]], f4), n, 1)
+    color = np.repeat(np.array([[0.8], [0.5], [0.3], [0.6]], f4), n, 1)
     index = np.zeros(n, np.intp)
-    return Surface(np.zeros((3, n), f4), zero, normal, normal, wo, index, index, inside, uv)
+    return Surface(np.zeros((3, n), f4), zero, normal, normal, wo, index, index, inside, uv, uv, color)
 
 
 def _uniform_sphere(rng: np.random.Generator, n: int) -> Floats:

@@ -17,6 +17,7 @@ from .vec import Floats, Ints, f4
 
 Wrap: TypeAlias = Literal["repeat", "mirror", "clamp"]
 Channel: TypeAlias = int | Literal["luminance"]
+UV_SETS = ("uv", "uv1")  # the fields of Surface
 LUMINANCE = (f4(0.2126), f4(0.7152), f4(0.0722))  # ITU-R BT.709
 
 
@@ -45,6 +46,8 @@ class Texture(Spatial):
         three channels, or the first where there are one or two.
     scale, offset
         One number, or three for a colour.
+    uv_set
+        Which texture coordinates of the mesh to use: 0 for its `uvs`, 1 for its `uvs1`.
 
     Raises
     ------
@@ -63,6 +66,7 @@ class Texture(Spatial):
         channel: Channel | None = None,
         scale: ArrayLike = 1.0,
         offset: ArrayLike = 0.0,
+        uv_set: Literal[0, 1] = 0,
     ) -> None:
         codes, self.name = _codes(source)
         self.size = (codes.shape[1], codes.shape[0])  # (width, height)
@@ -77,6 +81,8 @@ class Texture(Spatial):
         self.transform = None if transform is None else finite_array("transform", transform, (3, 3))
         self.scale = _factor("scale", scale, self.scalar)
         self.offset = _factor("offset", offset, self.scalar)
+        self.uv_set = _one_of("uv_set", uv_set, (0, 1))
+        self.reads = (UV_SETS[self.uv_set],)
 
     def __repr__(self) -> str:
         """Name the image and its size."""
@@ -84,9 +90,10 @@ class Texture(Spatial):
 
     def at(self, surface: Surface) -> Floats:
         """Return the values at hit points: (3, n), or (n,) when one channel was chosen."""
-        if surface.uv is None:
+        uv: Floats | None = getattr(surface, UV_SETS[self.uv_set])
+        if uv is None:
             raise SceneError(f"texture {self.name!r}: the surface has no texture coordinates")
-        return self.lookup(surface.uv)
+        return self.lookup(uv)
 
     def lookup(self, uv: Floats) -> Floats:
         """Return the values at texture coordinates (2, n): (3, n), or (n,) for one channel."""
@@ -201,9 +208,9 @@ def _factor(name: str, value: ArrayLike, scalar: bool) -> Floats:
     return np.broadcast_to(array.astype(f4).reshape(-1, 1), (3, 1)).copy()
 
 
-def _one_of(name: str, value: Any, allowed: tuple[str, ...]) -> Any:
+def _one_of(name: str, value: Any, allowed: tuple[str | int, ...]) -> Any:
     if value not in allowed:
-        raise SceneError(f"{name} is {value!r}; it must be one of {', '.join(allowed)}")
+        raise SceneError(f"{name} is {value!r}; it must be one of {', '.join(map(str, allowed))}")
     return value
 
 

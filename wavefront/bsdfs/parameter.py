@@ -1,4 +1,7 @@
-"""Turn what a user passes as a material parameter into constants of fixed shape, or keep a texture."""
+"""Turn what a user passes as a material parameter into constants of fixed shape, or keep a texture.
+
+A texture of numbers serves as a grey colour, and a texture of colours as a number by its luminance.
+"""
 
 from __future__ import annotations
 
@@ -9,17 +12,45 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import SceneError, number, rgb
-from ..vec import f4
+from ..state import Surface
+from ..vec import Floats, f4, luminance
 from .base import Spatial
 
 Colour: TypeAlias = ArrayLike | Spatial
 Scalar: TypeAlias = float | Spatial
 
 
+class Grey(Spatial):
+    """Colours with three equal channels."""
+
+    scalar = False
+
+    def __init__(self, numbers: Spatial) -> None:
+        self.numbers, self.reads = numbers, numbers.reads
+
+    def at(self, surface: Surface) -> Floats:
+        """Return the numbers as colours, (3, n)."""
+        values = self.numbers.at(surface)
+        return np.broadcast_to(values, (3, *values.shape))
+
+
+class Luminance(Spatial):
+    """Numbers from colours."""
+
+    scalar = True
+
+    def __init__(self, colours: Spatial) -> None:
+        self.colours, self.reads = colours, colours.reads
+
+    def at(self, surface: Surface) -> Floats:
+        """Return the luminance of the colours, (n,)."""
+        return luminance(self.colours.at(surface))
+
+
 def colour(name: str, value: Colour, high: float = 1.0, *, above_zero: bool = False) -> Any:
-    """Return a colour as (3, 1) float32 within [0, `high`], or the `Spatial` unchanged."""
+    """Return a colour as (3, 1) float32 within [0, `high`], or a `Spatial` that gives colours."""
     if isinstance(value, Spatial):
-        return value
+        return Grey(value) if value.scalar else value
     result = rgb(name, value, high)
     if above_zero and not (result > 0).all():
         raise SceneError(f"{name} is {value!r}; it must be more than 0")
@@ -32,5 +63,7 @@ def scalar(
     holds: Callable[[float], bool] = lambda x: 0 <= x <= 1,
     limit: str = "in [0, 1]",
 ) -> Any:
-    """Return a number as (1,) float32 for which `holds` is true, or the `Spatial` unchanged."""
-    return value if isinstance(value, Spatial) else np.array([number(name, value, holds, limit)], f4)
+    """Return a number as (1,) float32 for which `holds` is true, or a `Spatial` that gives numbers."""
+    if isinstance(value, Spatial):
+        return Luminance(value) if value.scalar is False else value
+    return np.array([number(name, value, holds, limit)], f4)

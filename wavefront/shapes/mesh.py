@@ -23,8 +23,11 @@ class Mesh:
         (m, 3) vertex indices, counter-clockwise seen from the front.
     normals
         (n, 3) shading normals; without them the facets are flat.
-    uvs
-        (n, 2) texture coordinates.
+    uvs, uvs1
+        (n, 2) texture coordinates, and a second set of them.
+    colors
+        (n, 3) linear RGB, or (n, 4) with opacity, in [0, 1]. A material shows them by a parameter
+        `VertexColors`.
     material
         How the surface scatters light.
     emission
@@ -46,6 +49,8 @@ class Mesh:
         *,
         normals: ArrayLike | None = None,
         uvs: ArrayLike | None = None,
+        uvs1: ArrayLike | None = None,
+        colors: ArrayLike | None = None,
         material: Bsdf | None = None,
         emission: ArrayLike | None = None,
         name: str = "mesh",
@@ -55,6 +60,8 @@ class Mesh:
         self.faces = _faces(name, faces, len(self.vertices))
         self.normals = _per_vertex(f"{name}: normals", normals, len(self.vertices), 3)
         self.uvs = _per_vertex(f"{name}: uvs", uvs, len(self.vertices), 2)
+        self.uvs1 = _per_vertex(f"{name}: uvs1", uvs1, len(self.vertices), 2)
+        self.colors = _colors(f"{name}: colors", colors, len(self.vertices))
         self.material = check_material(name, material)
         self.emission = None if emission is None else rgb(f"{name}: emission", emission)
         _check_range(name, self.vertices)
@@ -145,6 +152,20 @@ def _faces(name: str, faces: ArrayLike, count: int) -> NDArray[np.intp]:
 
 def _per_vertex(name: str, values: ArrayLike | None, count: int, width: int) -> NDArray[np.float64] | None:
     return None if values is None else finite_array(name, values, (count, width))
+
+
+def _colors(name: str, values: ArrayLike | None, count: int) -> NDArray[np.float64] | None:
+    """Return (n, 4) colours in [0, 1]; without an opacity they are opaque."""
+    if values is None:
+        return None
+    array = finite_array(name, values, (count, None))
+    if array.shape[1] not in (3, 4):
+        raise SceneError(f"{name} has {array.shape[1]} numbers per vertex; it must have 3 or 4")
+    bad = np.argwhere((array < 0) | (array > 1))
+    if len(bad):
+        i, j = bad[0]
+        raise SceneError(f"{name}[{i}][{j}] is {array[i, j]:g}; it must be in [0, 1]")
+    return array if array.shape[1] == 4 else np.column_stack([array, np.ones(count)])
 
 
 def _check_range(name: str, vertices: NDArray[np.float64]) -> None:

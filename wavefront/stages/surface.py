@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..scene import CompiledScene
+from ..shapes.attributes import ATTRIBUTES, Corners
 from ..state import Hits, Paths, Surface
 from ..vec import Floats, Ints, dot, f4, normalize
 
@@ -25,9 +26,11 @@ def interact(scene: CompiledScene, paths: Paths, hits: Hits) -> Surface:
     side = np.where(inside, f4(-1), f4(1))
     ng = ng * side
     ns = ng if ns is None else _towards(wo, ns * side)
-    uv = None if scene.corner_uvs is None else _uv(scene, hits, point)
     material = scene.material_of.take(hits.prim)
-    return Surface(point, error, ng, ns, wo, hits.prim, material, inside, uv)
+    surface = Surface(point, error, ng, ns, wo, hits.prim, material, inside)
+    for name, corners in scene.attributes.items():
+        setattr(surface, name, _attribute(scene, name, corners, hits, point))
+    return surface
 
 
 def normals(scene: CompiledScene, prim: Ints, point: Floats) -> Floats:
@@ -70,7 +73,21 @@ def _shading_normals(scene: CompiledScene, hits: Hits, ng: Floats) -> Floats | N
     return ns
 
 
-def _interpolate(corners: tuple[Floats, Floats, Floats], hits: Hits, triangles: int) -> Floats:
+def _attribute(scene: CompiledScene, name: str, corners: Corners, hits: Hits, point: Floats) -> Floats:
+    """Return what varies over shapes at hits: interpolated on triangles, computed on spheres."""
+    if scene.triangles:
+        values = _interpolate(corners, hits, scene.triangles)
+    else:
+        values = np.empty((len(corners[0]), len(hits.prim)), f4)
+    round_ = np.flatnonzero(hits.prim >= scene.triangles)
+    if round_.size:
+        sphere = hits.prim.take(round_) - scene.triangles
+        normal = normalize(point.take(round_, 1) - scene.sphere_centers.take(sphere, 1))
+        values[:, round_] = ATTRIBUTES[name].on_spheres(normal)
+    return values
+
+
+def _interpolate(corners: Corners, hits: Hits, triangles: int) -> Floats:
     prim = np.minimum(hits.prim, triangles - 1)
     a, b, c = (corner.take(prim, 1) for corner in corners)
     return a * (f4(1) - hits.b1 - hits.b2) + b * hits.b1 + c * hits.b2
@@ -84,19 +101,3 @@ def _towards(wo: Floats, ns: Floats) -> Floats:
         ns[:, away] = normalize(ns.take(away, 1) + wo.take(away, 1) * (MIN_COS - cos.take(away)))
         ns[:, away] = normalize(ns.take(away, 1) + wo.take(away, 1) * MIN_COS)
     return ns
-
-
-def _uv(scene: CompiledScene, hits: Hits, point: Floats) -> Floats:
-    """Texture coordinates (2, n): interpolated on triangles, longitude and latitude on spheres."""
-    assert scene.corner_uvs is not None
-    if scene.triangles:
-        uv = _interpolate(scene.corner_uvs, hits, scene.triangles)
-    else:
-        uv = np.empty((2, len(hits.prim)), f4)
-    round_ = np.flatnonzero(hits.prim >= scene.triangles)
-    if round_.size:
-        sphere = hits.prim.take(round_) - scene.triangles
-        normal = normalize(point.take(round_, 1) - scene.sphere_centers.take(sphere, 1))
-        uv[0, round_] = np.arctan2(normal[0], normal[2]) * f4(0.5 / np.pi) + f4(0.5)
-        uv[1, round_] = f4(1) - np.arccos(np.clip(normal[1], f4(-1), f4(1))) * f4(1 / np.pi)
-    return uv

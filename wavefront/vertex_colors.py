@@ -1,0 +1,51 @@
+"""The colours that a mesh gives at its vertices, as a material parameter."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .bsdfs.base import Spatial
+from .bsdfs.parameter import Colour, colour, scalar
+from .errors import SceneError
+from .state import Surface
+from .vec import Floats
+
+
+class VertexColors(Spatial):
+    """The interpolated `colors` of the mesh, wherever a material takes a colour or a number.
+
+    A mesh without colours, or a sphere, counts as white and opaque.
+
+    Parameters
+    ----------
+    times
+        What the colours are multiplied with, in [0, 1]: a colour, a number or a texture.
+    channel
+        Which channel to use as a number: 0 to 2 for red, green and blue, 3 for the opacity. None
+        gives a colour.
+
+    Raises
+    ------
+    SceneError
+        If `times` is out of range, or the channel is none of these.
+    """
+
+    def __init__(self, times: Colour = 1.0, channel: int | None = None) -> None:
+        if channel not in (None, 0, 1, 2, 3):
+            raise SceneError(f"VertexColors channel is {channel!r}; it must be from 0 to 3, or None")
+        self.channel = channel
+        self.scalar = channel is not None
+        factor: Any = times
+        self.times = (scalar if self.scalar else colour)("VertexColors times", factor)
+        self.reads = ("color", *(self.times.reads if isinstance(self.times, Spatial) else ()))
+
+    def __repr__(self) -> str:
+        """Say what is multiplied."""
+        return f"VertexColors({self.times!r}, channel={self.channel!r})"
+
+    def at(self, surface: Surface) -> Floats:
+        """Return the values at hit points: (3, n), or (n,) when one channel was chosen."""
+        if surface.color is None:
+            raise SceneError("VertexColors: the surface has no vertex colours")
+        values = surface.color[:3] if self.channel is None else surface.color[self.channel]
+        return values * (self.times.at(surface) if isinstance(self.times, Spatial) else self.times)
