@@ -12,8 +12,13 @@ import trimesh
 from wavefront.bsdfs.dielectric import Dielectric
 from wavefront.bsdfs.diffuse import Diffuse
 from wavefront.bsdfs.mirror import Mirror
+from wavefront.camera import Camera
 from wavefront.errors import SceneError
 from wavefront.io.load import from_trimesh, load, load_mesh, load_meshes
+from wavefront.lights import Environment
+from wavefront.render import render
+from wavefront.scene import Scene
+from wavefront.vertex_colors import VertexColors
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 
@@ -413,6 +418,107 @@ def test_a_file_equals_the_object_in_memory(tmp_path, extension):
         assert (a is None) == (b is None)
         assert a is None or np.array_equal(soup(mesh, a), soup(again, b))
     assert soup(mesh) == pytest.approx(ball.triangles, abs=1e-6)
+
+
+# ---- vertex colours ---------------------------------------------------------------------------
+
+CODES = np.array([[255, 0, 0], [0, 188, 0], [0, 0, 100], [10, 11, 12]])
+LINEAR = np.where(CODES / 255 <= 0.04045, CODES / 255 / 12.92, ((CODES / 255 + 0.055) / 1.055) ** 2.4)
+
+
+def coloured_ply(colours, *properties):
+    """A square with colours in ASCII PLY."""
+    lines = ["ply", "format ascii 1.0", "element vertex 4", *(f"property float {x}" for x in "xyz")]
+    lines += [*(f"property {p}" for p in properties), "element face 2"]
+    lines += ["property list uchar int vertex_indices", "end_header"]
+    places = ["0 0 0", "1 0 0", "1 1 0", "0 1 0"]
+    lines += [f"{place} {' '.join(map(str, row))}" for place, row in zip(places, colours, strict=True)]
+    return "\n".join([*lines, "3 0 1 2", "3 0 2 3", ""])
+
+
+BYTES = ("uchar red", "uchar green", "uchar blue")
+
+
+def test_ply_colours_are_srgb(write):
+    (mesh,) = load_meshes(write(coloured_ply(CODES, *BYTES), "a.ply"))
+    assert mesh.colors == pytest.approx(np.column_stack([LINEAR, np.ones(4)]), rel=1e-5)
+    assert isinstance(mesh.material.reflectance, VertexColors)
+    clear = np.column_stack([CODES, [0, 51, 102, 255]])
+    (mesh,) = load_meshes(write(coloured_ply(clear, *BYTES, "uchar alpha"), "a.ply"))
+    assert mesh.colors[:, 3].tolist() == [0, 0.2, 0.4, 1]
+    floats = ("float red", "float green", "float blue")
+    (mesh,) = load_meshes(write(coloured_ply(CODES / 255, *floats), "a.ply"))
+    assert mesh.colors[:, :3] == pytest.approx(LINEAR, rel=1e-5)
+
+
+def test_ply_colours_beside_texture_coordinates_are_named(write):
+    rows = np.column_stack([CODES, [0, 1, 1, 0], [0, 0, 1, 1]])
+    text = coloured_ply(rows, *BYTES, "float s", "float t")
+    with pytest.warns(UserWarning, match="not honoured: vertex colours"):
+        (mesh,) = load_meshes(write(text, "a.ply"))
+    assert mesh.colors is None
+
+
+def obj_with_colours(colours=CODES / 255):
+    places = ["0 0 0", "1 0 0", "1 1 0", "0 1 0"]
+    rows = [f"v {place} {' '.join(map(str, row))}" for place, row in zip(places, colours, strict=True)]
+    return "\n".join([*rows, ""])
+
+
+def test_obj_colours_are_srgb(write):
+    (mesh,) = load_meshes(write(obj_with_colours() + "f 1 2 3\nf 1 3 4\n"))
+    assert mesh.colors == pytest.approx(np.column_stack([LINEAR, np.ones(4)]), rel=1e-5)
+    material = "newmtl m\nKd 0.5 1 1\n"
+    text = "mtllib s.mtl\n" + obj_with_colours() + "usemtl m\nf 1 2 3\n"
+    (mesh,) = load_meshes(write(text, s_mtl=material))
+    assert mesh.material.reflectance.times.ravel().tolist() == [0.5, 1, 1]
+    with pytest.warns(UserWarning, match=r"not honoured: vertex colours \(material 'm'\)"):
+        (mesh,) = load_meshes(write(text, s_mtl="newmtl m\nillum 4\n"))
+    assert isinstance(mesh.material, Dielectric)
+
+
+def test_obj_colours_that_are_wanting_or_too_large_are_announced(write):
+    some = obj_with_colours(CODES / 200)[:-1].rsplit(" ", 3)[0] + "\nf 1 2 3\nf 1 3 4\n"
+    with (
+        pytest.warns(UserWarning, match="1 vertex colours are not finite, first: vertex 3"),
+        pytest.warns(
+            UserWarning, match=r"1 vertex colours are outside \[0, 1\] and were clamped, first: ver"
+        ),
+    ):
+        (mesh,) = load_meshes(write(some))
+    assert mesh.colors[0].tolist() == [1, 0, 0, 1]
+    assert mesh.colors[3].tolist() == [1, 1, 1, 1]
+
+
+@pytest.mark.parametrize("extension", ["ply", "obj"])
+@pytest.mark.parametrize("by", [trimesh.load, trimesh.load_mesh, trimesh.load_scene])
+def test_vertex_colours_in_memory_render_as_their_file(tmp_path, extension, by):
+    ball = trimesh.creation.icosphere(subdivisions=1)
+    ball.visual.vertex_colors = np.random.default_rng(0).integers(0, 256, (42, 3), np.uint8)
+    path = tmp_path / f"ball.{extension}"
+    ball.export(path)
+    camera = Camera.look_at((0, 0, 5), (0, 0, 0), fov=25, size=(8, 8))
+    pictures = [
+        render(Scene(scene.shapes, [Environment(1.0)], camera), 2, workers=1, progress=False).rgb
+        for scene in (load(path), from_trimesh(by(path, process=False)), from_trimesh(ball))
+    ]
+    assert np.ptp(pictures[0], axis=(0, 1)).min() > 0.1
+    assert np.array_equal(pictures[0], pictures[1])
+    assert pictures[0] == pytest.approx(pictures[2], abs=1e-3)
+
+
+def test_face_colours_are_named():
+    box = trimesh.creation.box()
+    box.visual.face_colors = np.zeros((12, 4), np.uint8)
+    with pytest.warns(UserWarning, match="not honoured: face colours"):
+        from_trimesh(box)
+
+
+def test_load_mesh_keeps_colours_and_the_second_uvs(write):
+    mesh = load_mesh(write(obj_with_colours() + "f 1 2 3\nf 1 3 4\n"))
+    assert mesh.colors[:, :3] == pytest.approx(LINEAR, rel=1e-5)
+    assert isinstance(mesh.material.reflectance, VertexColors)
+    assert load_mesh(write(obj_with_colours() + "f 1 2 3\n"), Diffuse(0.5)).colors is not None
 
 
 def test_a_scene_in_memory_equals_its_file(tmp_path):

@@ -20,6 +20,7 @@ from wavefront.io.images import srgb_to_linear
 from wavefront.io.load import from_trimesh, load, load_meshes
 from wavefront.lights import DirectionalLight, SpotLight
 from wavefront.textures import Texture
+from wavefront.vertex_colors import VertexColors
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
@@ -541,7 +542,7 @@ def lose_camera(b):
 
 def lose_colours(b):
     colours = b.accessor(np.ones((3, 3), np.float32))
-    b.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = colours
+    b.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_1"] = colours
 
 
 def lose_targets(b):
@@ -562,7 +563,7 @@ def lose_extension(b):
         (lose_animation, r"animations \(the file\)"),
         (lose_light, r"area light \(light 0\)"),
         (lose_camera, r"further cameras \(cameras\[0\]\)"),
-        (lose_colours, r"COLOR_0 \(mesh 'mesh0'\)"),
+        (lose_colours, r"COLOR_1 \(mesh 'mesh0'\)"),
         (lose_targets, r"morph targets \(mesh 'mesh0'\)"),
         (lose_lines, r"points and lines \(mesh 'mesh0'\)"),
         (lose_extension, r"KHR_materials_iridescence \(the file\)"),
@@ -576,6 +577,103 @@ def test_what_is_not_honoured_is_named(build, path, lose, message):
     assert len(record) == 1
     with pytest.raises(SceneError, match="not honoured"):
         load(path, strict=True)
+
+
+# ---- vertex colours and a second set of texture coordinates -----------------------------------------
+
+COLORS = np.array([[1, 0.5, 0.25], [0, 1, 0.125], [0.3, 0.1, 1]], np.float32)
+
+
+@pytest.mark.parametrize(
+    ("colors", "extra", "expected"),
+    [
+        (COLORS, {}, np.column_stack([COLORS, np.ones(3)])),
+        (np.column_stack([COLORS, COLORS[:, 0]]), {}, np.column_stack([COLORS, COLORS[:, 0]])),
+        (np.uint8([[255, 51, 0, 102]] * 3), {"normalized": True}, [[1, 0.2, 0, 0.4]] * 3),
+        (np.uint16([[65535, 13107, 0]] * 3), {"normalized": True}, [[1, 0.2, 0, 1]] * 3),
+    ],
+)
+def test_vertex_colours_are_linear(build, path, colors, extra, expected):
+    build.mesh({"POSITION": TRIANGLE, "COLOR_0": build.accessor(colors, **extra)}).gltf(path)
+    (mesh,) = load_meshes(path)
+    assert mesh.colors == pytest.approx(np.array(expected))
+    assert isinstance(mesh.material, Diffuse)
+    assert isinstance(mesh.material.reflectance, VertexColors)
+    assert mesh.material.reflectance.times.ravel().tolist() == [1, 1, 1]
+
+
+def test_vertex_colours_multiply_the_base_colour(build, path):
+    info = build.image(np.uint8([[[255, 0, 0], [0, 255, 0]]]))
+    factor = {"baseColorFactor": [0.5, 1, 1, 1]}
+    build.json["materials"] = [
+        {"pbrMetallicRoughness": {"metallicFactor": 0, **factor}},
+        {"pbrMetallicRoughness": {"baseColorTexture": info, **factor}},
+    ]
+    corners = {"POSITION": TRIANGLE, "TEXCOORD_0": TRIANGLE[:, :2]}
+    for colored, material in ((True, 0), (True, 0), (False, 0), (True, 1)):
+        build.mesh(corners | ({"COLOR_0": COLORS} if colored else {}), material=material)
+    build.json["nodes"] = [{"mesh": i} for i in range(4)]
+    build.json["scenes"][0]["nodes"] = [0, 1, 2, 3]
+    first, second, plain, textured = load_meshes(build.gltf(path))
+    assert first.material is second.material  # made once
+    assert first.material.base_color.times.ravel().tolist() == [0.5, 1, 1]
+    assert plain.material.base_color.ravel().tolist() == [0.5, 1, 1]
+    assert isinstance(textured.material.base_color.times, Texture)
+
+
+def test_vertex_colours_on_glass_are_named(build, path):
+    build.material(
+        pbrMetallicRoughness={"metallicFactor": 0},
+        extensions={"KHR_materials_transmission": {"transmissionFactor": 1}},
+    )
+    build.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = build.accessor(COLORS)
+    with pytest.warns(UserWarning, match=r"not honoured: vertex colours \(mesh 'mesh0'\)"):
+        (mesh,) = load_meshes(build.gltf(path))
+    assert isinstance(mesh.material, ThinDielectric)
+
+
+def test_vertex_colours_out_of_range_are_clamped(build, path):
+    beyond = np.float32([[2, 0, 0], [0, -1, 0], [0, 0, 0]])
+    build.mesh({"POSITION": TRIANGLE, "COLOR_0": beyond})
+    build.gltf(path)
+    with pytest.warns(
+        UserWarning, match=r"2 vertex colours are outside \[0, 1\] and were clamped, first: vertex 0"
+    ):
+        (mesh,) = load_meshes(path)
+    assert mesh.colors.tolist() == [[1, 0, 0, 1], [0, 0, 0, 1], [0, 0, 0, 1]]
+    with pytest.raises(SceneError, match="outside"):
+        load(path, strict=True)
+
+
+def test_a_second_set_of_texture_coordinates(build, path):
+    info = build.image(np.uint8([[[255, 0, 0], [0, 255, 0]]]))
+    second = np.float32([[0.25, 0], [0.5, 0.75], [1, 1]])
+    moved = {"extensions": {"KHR_texture_transform": {"texCoord": 1, "scale": [2, 2]}}}
+    for extra, expected in (({}, 0), ({"texCoord": 1}, 1), (moved | {"texCoord": 0}, 1)):
+        again = Builder()
+        again.__dict__ |= {"json": json.loads(json.dumps(build.json)), "binary": build.binary}
+        again.json["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": info | extra}}]
+        corners = {"POSITION": TRIANGLE, "TEXCOORD_0": TRIANGLE[:, :2], "TEXCOORD_1": second}
+        (mesh,) = load_meshes(again.mesh(corners, material=0).gltf(path))
+        assert mesh.uvs1 == pytest.approx(second * [1, -1] + [0, 1])
+        assert mesh.material.base_color.uv_set == expected
+
+
+@pytest.mark.parametrize("extra", ["attribute", "texture"])
+def test_a_third_set_of_texture_coordinates_is_named(build, path, extra):
+    info = build.image(np.zeros((1, 1, 3), np.uint8)) | ({"texCoord": 2} if extra == "texture" else {})
+    build.material(pbrMetallicRoughness={"baseColorTexture": info})
+    if extra == "attribute":
+        third = build.accessor(TRIANGLE[:, :2])
+        build.json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_2"] = third
+    with pytest.warns(UserWarning, match=r"not honoured: TEXCOORD_2 \(m"):
+        load_meshes(build.gltf(path))
+
+
+def test_colours_with_two_components_are_refused(build, path):
+    build.mesh({"POSITION": TRIANGLE, "COLOR_0": COLORS[:, :2]})
+    with pytest.raises(SceneError, match="has COLOR_0 with 2 components; it must have 3 or 4"):
+        load(build.gltf(path))
 
 
 # ---- defects --------------------------------------------------------------------------------------
@@ -754,6 +852,32 @@ def test_a_textured_object_in_memory_equals_its_file(tmp_path):
         assert np.array_equal(soup(mesh, mesh.uvs), soup(held, held.uvs))
         assert same(mesh.emission, held.emission)
         assert same(mesh.material.base_color, held.material.base_color)
+
+
+@pytest.mark.parametrize("dressed", [False, True], ids=["plain", "material"])
+def test_vertex_colours_in_memory_equal_their_glb(tmp_path, dressed):
+    plane = trimesh.Trimesh(TRIANGLE, [[0, 1, 2]], process=False)
+    codes = np.random.default_rng(5).integers(0, 256, (3, 4), np.uint8)
+    if dressed:
+        material = trimesh.visual.material.PBRMaterial(baseColorFactor=[255, 0, 51, 255], metallicFactor=0.0)
+        plane.visual = trimesh.visual.TextureVisuals(material=material)
+        plane.visual.vertex_attributes["color"] = codes
+    else:
+        plane.visual.vertex_colors = codes
+    plane.export(tmp_path / "a.glb")
+    (mesh,) = load_meshes(tmp_path / "a.glb")
+    assert mesh.colors == pytest.approx(codes / 255)
+    held = trimesh.load_scene(tmp_path / "a.glb")
+    for other in (held,) if dressed else (held, held.to_mesh()):  # which drops colours beside a material
+        (again,) = from_trimesh(other).shapes
+        assert np.array_equal(mesh.colors, again.colors)
+        assert np.array_equal(base(mesh).times, base(again).times)
+
+
+def base(mesh):
+    """The base colour of a mesh's material."""
+    (key,) = vars(mesh.material).keys() & {"base_color", "reflectance"}
+    return getattr(mesh.material, key)
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="the real files are not here")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from copy import copy
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,8 +12,11 @@ from numpy.typing import NDArray
 
 from ..bsdfs import Bsdf, Dielectric, Diffuse, Principled, ThinDielectric
 from ..textures import Texture
+from ..vertex_colors import VertexColors
+from .repair import Raw
 
 PARAMETERS = frozenset(inspect.signature(Principled).parameters)
+BASES: dict[type[Bsdf], str] = {Diffuse: "reflectance", Principled: "base_color"}
 GLASS = frozenset(("base_color", "transmission", "ior", "roughness", "absorption", "thin"))
 
 
@@ -23,6 +27,35 @@ class Look:
     material: Bsdf
     emission: NDArray[np.float64] | None = None  # (3,) radiance
     lost: list[str] = field(default_factory=list)  # what the file asks for in vain
+    tinted: Look | None = None  # the same with its base colour multiplied by vertex colours, once made
+
+
+COLOURED = Look(Diffuse(VertexColors()))  # of a mesh that has vertex colours and no material
+
+
+def dress(raw: Raw, look: Look | None) -> bool:
+    """Give a mesh its material and emission, and the material the mesh's vertex colours.
+
+    Returns False if the material has no base colour that they could multiply.
+    """
+    honoured = True
+    if raw.colors is not None:
+        look, honoured = (COLOURED, True) if look is None else _tinted(look)
+    if look is not None:
+        raw.material, raw.emission = look.material, look.emission
+    return honoured
+
+
+def _tinted(look: Look) -> tuple[Look, bool]:
+    name = next((name for kind, name in BASES.items() if isinstance(look.material, kind)), None)
+    if name is None:
+        return look, False
+    if look.tinted is None:
+        material = copy(look.material)
+        base = getattr(material, name)
+        setattr(material, name, VertexColors(base.ravel() if isinstance(base, np.ndarray) else base))
+        look.tinted = Look(material, look.emission)
+    return look.tinted, True
 
 
 def realise(wanted: dict[str, Any]) -> tuple[Bsdf, list[str]]:

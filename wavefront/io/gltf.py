@@ -33,6 +33,7 @@ COMPONENTS: dict[int, type[np.generic]] = {
     5126: np.float32,
 }
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+READ = ("TEXCOORD_0", "TEXCOORD_1", "COLOR_0")  # of the numbered attributes of a mesh
 TRIANGLES, STRIP, FAN = 4, 5, 6
 MAX_ELEMENTS = 2**28  # in one accessor, whatever backs it
 HEIGHT = 512  # pixels of a camera's picture; files give its shape only
@@ -273,11 +274,14 @@ def _primitive(document: Document, part: dict[str, Any], mode: int, name: str) -
     else:
         indices = np.arange(len(vertices))
     uvs = _attribute(document, attributes, "TEXCOORD_0", 2, where, len(vertices))
-    if uvs is not None:
-        with np.errstate(invalid="ignore"):
-            uvs[:, 1] = 1 - uvs[:, 1]  # glTF counts v downwards
-    for extra in ("COLOR_0", "TEXCOORD_1"):
-        if extra in attributes:
+    uvs1 = _attribute(document, attributes, "TEXCOORD_1", 2, where, len(vertices))
+    for coordinates in (uvs, uvs1):
+        if coordinates is not None:
+            with np.errstate(invalid="ignore"):
+                coordinates[:, 1] = 1 - coordinates[:, 1]  # glTF counts v downwards
+    colors = _attribute(document, attributes, "COLOR_0", (3, 4), where, len(vertices))
+    for extra in attributes:
+        if extra.startswith(("COLOR_", "TEXCOORD_")) and extra not in READ:
             document.lose(extra, f"mesh {name!r}")
     normals = _attribute(document, attributes, "NORMAL", 3, where, len(vertices))
     return Raw(
@@ -286,17 +290,26 @@ def _primitive(document: Document, part: dict[str, Any], mode: int, name: str) -
         _triangles(where, indices.astype(np.intp), mode),
         None if normals is None else wide(normals),
         None if uvs is None else wide(uvs),
+        None if uvs1 is None else wide(uvs1),
+        None if colors is None else wide(colors),
     )
 
 
 def _attribute(
-    document: Document, attributes: dict[str, Any], key: str, width: int, where: str, count: int | None = None
+    document: Document,
+    attributes: dict[str, Any],
+    key: str,
+    widths: int | tuple[int, ...],
+    where: str,
+    count: int | None = None,
 ) -> NDArray[Any] | None:
     if key not in attributes:
         return None
     values = document.accessor(attributes[key])
-    if values.shape[1] != width:
-        raise SceneError(f"{where} has {key} with {values.shape[1]} components; it must have {width}")
+    allowed = (widths,) if isinstance(widths, int) else widths
+    if values.shape[1] not in allowed:
+        listed = " or ".join(map(str, allowed))
+        raise SceneError(f"{where} has {key} with {values.shape[1]} components; it must have {listed}")
     if count is not None and len(values) != count:
         raise SceneError(f"{where} has {len(values)} of {key}; it has {count} vertices")
     return values

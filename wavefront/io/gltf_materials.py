@@ -63,14 +63,16 @@ class Materials:
             listed = ", ".join(item.get("extensions", {})) or "nothing"
             raise SceneError(f"{document.name}: {where}: its image is given by {listed}, which is not read")
         move = info.get("extensions", {}).get("KHR_texture_transform", {})
-        if move.get("texCoord", info.get("texCoord", 0)) != 0:
-            document.lose("second set of texture coordinates", where)
+        uv_set = move.get("texCoord", info.get("texCoord", 0))
+        if uv_set not in (0, 1):
+            document.lose(f"TEXCOORD_{uv_set}", where)
         sampler = document.get("samplers", item["sampler"]) if "sampler" in item else {}
         return Texture(
             self._image(item["source"]),
             wrap=(_wrap(sampler, "wrapS"), _wrap(sampler, "wrapT")),
             filter="nearest" if sampler.get("magFilter") in NEAREST else "bilinear",
             transform=_uv_matrix(document, move, where) if move else None,
+            uv_set=1 if uv_set == 1 else 0,
             **arguments,
         )
 

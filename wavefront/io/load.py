@@ -20,7 +20,7 @@ from ..scene import Scene
 from ..shapes import Mesh
 from ..shapes.transform import moved
 from . import gltf, headers, mtl, obj, stl, visuals
-from .appearance import Look
+from .appearance import Look, dress
 from .files import beside, decode, read_bytes
 from .gltf_materials import Materials
 from .repair import Raw, build, warn
@@ -121,8 +121,10 @@ def join(
     vertices = np.concatenate([mesh.vertices for mesh in meshes])
     faces = np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts[:-1], strict=True)])
     normals = _joined([mesh.normals for mesh in meshes])
-    uvs = _joined([mesh.uvs for mesh in meshes])
-    raw = Raw(name, *moved(matrix, vertices, faces, normals), uvs=uvs)
+    raw = Raw(name, *moved(matrix, vertices, faces, normals))
+    raw.uvs = _joined([mesh.uvs for mesh in meshes])
+    raw.uvs1 = _joined([mesh.uvs1 for mesh in meshes])
+    raw.colors = _joined([mesh.colors for mesh in meshes])
     raw.material = meshes[0].material if material is None else material
     raw.emission = meshes[0].emission[:, 0] if material is None and meshes[0].emission is not None else None
     mesh = build(name, raw)
@@ -189,9 +191,9 @@ def _read_gltf(path: PathLike, data: bytes, strict: bool, materials: bool) -> Co
         looks = Materials(document)
         raws = []
         for raw, number, matrix in found.raws:
-            if materials and number is not None:  # without one, the mesh is as plain as in memory
-                look = looks.look(number)
-                raw.material, raw.emission = look.material, look.emission
+            # without a material, the mesh is as plain as in memory
+            if materials and not dress(raw, None if number is None else looks.look(number)):
+                document.lose("vertex colours", f"mesh {raw.name!r}")
             raw.vertices, raw.faces, raw.normals = moved(matrix, raw.vertices, raw.faces, raw.normals)
             raws.append(raw)
     except (SceneError, MemoryError):
@@ -213,10 +215,11 @@ def _read_obj(path: PathLike, data: bytes, strict: bool, materials: bool) -> lis
     looks = _libraries(path, parsed.libraries, strict) if materials else {}
     raws = []
     for group in parsed.groups:
-        raw = Raw(group.material or "", group.vertices, group.faces, group.normals, group.uvs, group.lines)
-        look = looks.get(group.material or "")
-        if look is not None:
-            raw.material, raw.emission = look.material, look.emission
+        raw = Raw(group.material or "", group.vertices, group.faces, group.normals, group.uvs)
+        raw.lines = group.lines
+        raw.colors = None if group.colors is None else visuals.from_srgb(group.colors)
+        if materials and not dress(raw, looks.get(raw.name)):
+            warn(f"{os.fspath(path)}: not honoured: vertex colours (material {raw.name!r})", strict)
         raws.append(raw)
     absent = [raw.name for raw in raws if raw.name and raw.name not in looks]
     if looks and absent:
@@ -309,8 +312,10 @@ def _raw(mesh: trimesh.Trimesh, name: str, matrix: np.ndarray) -> Raw:
     vertices = np.asarray(mesh.vertices, np.float64)
     if uvs is not None and (np.ndim(uvs) != 2 or len(uvs) != len(vertices)):
         uvs = None
-    placed = moved(matrix, vertices, np.asarray(mesh.faces), normals)
-    return Raw(name, *placed, uvs=None if uvs is None else np.asarray(uvs, np.float64)[:, :2])
+    raw = Raw(name, *moved(matrix, vertices, np.asarray(mesh.faces), normals))
+    raw.uvs = None if uvs is None else np.asarray(uvs, np.float64)[:, :2]
+    raw.colors = visuals.vertex_colours(mesh)
+    return raw
 
 
 class _Visuals:
@@ -323,16 +328,18 @@ class _Visuals:
     def dress(self, raw: Raw, mesh: trimesh.Trimesh) -> None:
         """Give a raw mesh its material and emission."""
         visual: Any = mesh.visual
-        if visual.kind in ("vertex", "face"):
-            self.lost.setdefault(f"{visual.kind} colours", raw.name)
-        if "color" in getattr(visual, "vertex_attributes", {}):
+        if visual.kind == "face":
+            self.lost.setdefault("face colours", raw.name)
+        look = self._look(getattr(visual, "material", None))
+        for what in look.lost if look is not None else ():
+            self.lost.setdefault(what, raw.name)
+        dropped = raw.colors is None and visuals.drops_colours(mesh)
+        if not dress(raw, look) or dropped:
             self.lost.setdefault("vertex colours", raw.name)
-        material = getattr(visual, "material", None)
+
+    def _look(self, material: Any) -> Look | None:
         if material is None or visuals.is_blank(material):
-            return
+            return None
         if id(material) not in self._looks:
             self._looks[id(material)] = visuals.look(material, f"trimesh material {material.name!r}")
-        look = self._looks[id(material)]
-        raw.material, raw.emission = look.material, look.emission
-        for what in look.lost:
-            self.lost.setdefault(what, raw.name)
+        return self._looks[id(material)]

@@ -17,6 +17,7 @@ from ..errors import SceneError
 
 MISSING = np.iinfo(np.int64).min  # an index that a face corner does not give
 KINDS = ("v", "vt", "vn")
+FILL = {"v": np.nan, "vt": 0.0, "vn": 0.0}  # what a line leaves out: of v, that is its colour
 LEAST = {"v": 3, "vt": 1, "vn": 3}  # how many numbers a line must have
 IGNORED = frozenset(
     ("o", "g", "s", "mg", "usemap", "lod", "shadow_obj", "trace_obj", "bevel", "c_interp", "d_interp")
@@ -36,6 +37,7 @@ class Group:
     lines: NDArray[np.intp]  # (m,) line of the file that each triangle comes from
     normals: Table | None  # (n, 3); zero where the file gives none
     uvs: Table | None  # (n, 2)
+    colors: Table | None  # (n, 3) as written, sRGB; NaN where a line has none
 
 
 @dataclass
@@ -72,8 +74,6 @@ def parse(path: str | os.PathLike[str], text: str) -> Obj:
     groups = [_group(name, key, faces, tables, rows) for key, faces in lines.faces.items()]
     if not groups:
         raise SceneError(f"{name}: has no faces")
-    if tables["v"].shape[1] >= 6:
-        lines.ignored["vertex colours of v"] = lines.tables["v"][0][0]
     return Obj(groups, lines.libraries, lines.ignored)
 
 
@@ -121,7 +121,7 @@ def _bare(line: str) -> str:
 
 
 def _table(name: str, kind: str, lines: list[Line]) -> Table:
-    """Numbers of all lines of one kind, (n, columns); short lines are filled with zeros."""
+    """Numbers of all lines of one kind, (n, columns); short lines are filled up."""
     if not lines:
         return np.empty((0, LEAST[kind]))
     widths = np.array([len(rest.split()) for _, rest in lines])
@@ -137,7 +137,7 @@ def _table(name: str, kind: str, lines: list[Line]) -> Table:
     except ValueError:
         raise SceneError(_not_numbers(name, kind, lines)) from None
     columns = np.arange(widths.max())
-    out = np.zeros((len(lines), len(columns)))
+    out = np.full((len(lines), len(columns)), FILL[kind])
     out[columns < widths[:, None]] = values
     return out
 
@@ -182,6 +182,7 @@ def _group(
         numbers[parent],
         _optional(tables["vn"], unique[:, 2], 3),
         _optional(tables["vt"], unique[:, 1], 2),
+        tables["v"][unique[:, 0], 3:6] if tables["v"].shape[1] >= 6 else None,
     )
 
 

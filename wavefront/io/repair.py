@@ -42,6 +42,8 @@ class Raw:
     faces: Faces  # (m, 3)
     normals: Table | None = None  # (n, 3); a row of zeros means none
     uvs: Table | None = None  # (n, 2)
+    uvs1: Table | None = None  # (n, 2)
+    colors: Table | None = None  # (n, 3 or 4) linear
     lines: Faces | None = None  # (m,) line of the file for each face
     material: Bsdf | None = None
     emission: ArrayLike | None = None
@@ -81,7 +83,9 @@ def build(source: str, raw: Raw, strict: bool = False) -> Mesh | None:
         vertices,
         faces,
         normals=_normals(label, raw.normals, vertices, faces, strict),
-        uvs=_uvs(label, raw.uvs, strict),
+        uvs=_finite(label, "uvs", raw.uvs, 0.0, strict),
+        uvs1=_finite(label, "second uvs", raw.uvs1, 0.0, strict),
+        colors=_colors(label, raw.colors, strict),
         material=raw.material,
         emission=raw.emission,
         name=raw.name or "mesh",
@@ -135,12 +139,27 @@ def _normals(label: str, normals: Table | None, vertices: Table, faces: Faces, s
     return normals / np.where(size > 0, size, 1)[:, None]
 
 
-def _uvs(label: str, uvs: Table | None, strict: bool) -> Table | None:
-    if uvs is None:
+def _finite(label: str, what: str, values: Table | None, otherwise: float, strict: bool) -> Table | None:
+    """Return values per vertex, where they are not finite replaced by `otherwise`."""
+    if values is None:
         return None
-    uvs = np.array(uvs, np.float64)
-    broken = ~np.isfinite(uvs).all(axis=1)
+    values = np.array(values, np.float64)
+    broken = ~np.isfinite(values).all(axis=1)
     if broken.any():
-        warn(f"{label}: {int(broken.sum())} uvs are not finite, first: vertex {broken.argmax()}", strict)
-        uvs[broken] = 0
-    return uvs
+        warn(f"{label}: {int(broken.sum())} {what} are not finite, first: vertex {broken.argmax()}", strict)
+        values[broken] = otherwise
+    return values
+
+
+def _colors(label: str, colors: Table | None, strict: bool) -> Table | None:
+    colors = _finite(label, "vertex colours", colors, 1.0, strict)
+    if colors is None:
+        return None
+    beyond = ((colors < 0) | (colors > 1)).any(axis=1)
+    if beyond.any():
+        warn(
+            f"{label}: {int(beyond.sum())} vertex colours are outside [0, 1] and were clamped, "
+            f"first: vertex {beyond.argmax()}",
+            strict,
+        )
+    return np.clip(colors, 0, 1)

@@ -9,9 +9,12 @@ from numpy.typing import NDArray
 
 from ..bsdfs import Diffuse
 from ..textures import Texture
+from ..vec import f4
 from . import mtl
 from .appearance import Look, emission, realise
+from .images import srgb_to_linear
 from .mtl import MATTE
+from .repair import Table
 
 
 def look(material: Any, where: str) -> Look:
@@ -21,6 +24,42 @@ def look(material: Any, where: str) -> Look:
     if hasattr(material, "diffuse"):
         return _simple(material, where)
     return Look(Diffuse(MATTE), None, [type(material).__name__])
+
+
+def vertex_colours(mesh: Any) -> Table | None:
+    """Return the vertex colours of a trimesh mesh, linear (n, 4), if it has any.
+
+    Those of glTF files are linear. All others are sRGB: so programs show them, and so files like
+    PLY mean them.
+    """
+    visual = mesh.visual
+    if visual.kind == "vertex":
+        codes = np.asarray(visual.vertex_colors)
+        linear = "from_gltf_primitive" in mesh.metadata  # trimesh says so of every mesh of glTF
+    elif "color" in getattr(visual, "vertex_attributes", {}):
+        codes = np.asarray(visual.vertex_attributes["color"])  # with a material; only glTF has that
+        linear = True
+    else:
+        return None
+    if codes.ndim != 2 or codes.shape[1] not in (3, 4) or len(codes) != len(mesh.vertices):
+        return None
+    if linear:
+        unit = f4(np.iinfo(codes.dtype).max) if codes.dtype.kind == "u" else f4(1)
+        return (codes.astype(f4) / unit).astype(np.float64)
+    return np.column_stack([from_srgb(codes[:, :3] / 255.0), codes[:, 3:] / 255.0])
+
+
+def drops_colours(mesh: Any) -> bool:
+    """Tell whether trimesh left out the colours of a PLY file, as it does beside texture coordinates."""
+    raw = mesh.metadata.get("_ply_raw", {}).get("vertex", {})
+    return "red" in raw.get("properties", {})
+
+
+def from_srgb(colours: Table) -> Table:
+    """Decode colours (n, k) to linear ones, rounded to 8 bits; those outside [0, 1] are kept as they are."""
+    inside = (colours >= 0) & (colours <= 1)
+    codes = np.rint(np.where(inside, colours, 0) * 255).astype(f4)
+    return np.where(inside, srgb_to_linear(codes / f4(255)), colours)
 
 
 def is_blank(material: Any) -> bool:
