@@ -28,6 +28,7 @@ from cornell_box import cornell_box
 
 STAGES = (
     "intersect",
+    "pass_through",
     "emitted",
     "mis_weighted",
     "interact",

@@ -14,7 +14,7 @@ from wavefront.state import Hits, Paths, Surface
 from wavefront.vec import f4
 
 SHAPES = {
-    Paths: {"origin": 3, "direction": 3, "throughput": 3},
+    Paths: {"origin": 3, "direction": 3, "throughput": 3, "vertex": 3},
     Hits: {},
     Surface: {"point": 3, "ng": 3, "ns": 3, "wo": 3, "uv": 2},
 }

@@ -97,11 +97,12 @@ def test_samples_of_a_table_are_those_of_the_chosen_light(choice: str) -> None:
     """Every light is chosen as often as its probability says, which is part of the pdf."""
     lights, n = table(choice), 1 << 16
     point, u_choice, u = np.zeros((3, n), f4), (np.arange(n, dtype=f4) + f4(0.5)) / n, RNG.random((2, n), f4)
-    sample, delta = lights.sample_li(point, u_choice, u)
+    sample, light = lights.sample_li(point, u_choice, u)
     chosen, chance = lights.choice.sample(point, u_choice)
     expected = lights.choice.pmf(np.arange(6), np.zeros((3, 6), f4))
     assert np.bincount(chosen, minlength=6) / n == pytest.approx(expected, abs=2 / n)
-    assert (delta == (chosen == 4)).all()
+    assert (light == chosen).all()
+    assert (lights.delta_of[light] == (chosen == 4)).all()
     some = np.flatnonzero((chosen != 4) & (sample.pdf > 0))
     again = lights.pdf_li(chosen[some], point[:, some], sample.wi[:, some])
     assert np.median(np.abs(again / sample.pdf[some] - 1)) < 1e-5

@@ -273,8 +273,8 @@ class Recorder(Diffuse):
 
     def __init__(
         self, base_color, metallic=0, roughness=0.5, ior=1.5, transmission=0, clearcoat=0,
-        clearcoat_roughness=0, sheen_color=0, sheen_roughness=0, specular=1, specular_color=1, alpha=1,
-        alpha_cutoff=None, normal_map=None, absorption=0, sheen=0, anisotropy=0, thin=False,
+        clearcoat_roughness=0, sheen_color=0, sheen_roughness=0, specular=1, specular_color=1,
+        normal_map=None, absorption=0, sheen=0, anisotropy=0, thin=False,
     ):  # fmt: skip
         self.given = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
         super().__init__(0.5)
@@ -288,7 +288,7 @@ def given(monkeypatch, build, path):
 
     def load_given(**material):
         (mesh,) = load_meshes(build.material(**material).gltf(path))
-        return mesh.material.given | {"emission": mesh.emission}
+        return mesh.material.given | {"emission": mesh.emission, "opacity": mesh.material.opacity}
 
     return load_given
 
@@ -379,10 +379,10 @@ def test_alpha(given, build, mode):
     factor = {"baseColorTexture": info, "baseColorFactor": [1, 1, 1, 0.5]}
     found = given(pbrMetallicRoughness=factor, alphaMode=mode, alphaCutoff=0.3)
     if mode == "OPAQUE":
-        assert found["alpha"] == 1
+        assert found["opacity"] is None
     else:
-        assert at(found["alpha"], 0.5, 0.5) == pytest.approx(0.1)
-        assert found["alpha_cutoff"] == (0.3 if mode == "MASK" else None)
+        assert at(found["opacity"].alpha, 0.5, 0.5) == pytest.approx(0.1)
+        assert found["opacity"].cutoff == (0.3 if mode == "MASK" else None)
 
 
 def test_emission_and_its_strength(given):

@@ -37,7 +37,7 @@ class Recorder(Diffuse):
 
     def __init__(
         self, base_color, metallic=0, roughness=0.5, sheen=0, clearcoat=0, clearcoat_roughness=0,
-        anisotropy=0, alpha=1, normal_map=None, specular=1,
+        anisotropy=0, normal_map=None, specular=1,
     ):  # fmt: skip
         self.given = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
         super().__init__(0.5)
@@ -123,7 +123,6 @@ def test_the_pbr_extension(given):
         "clearcoat": 0.5,
         "clearcoat_roughness": 0.25,
         "anisotropy": 0.75,
-        "alpha": 1,
         "normal_map": None,
         "specular": 1,
     }
@@ -149,11 +148,16 @@ def test_parts_outside_their_range_are_clamped(given):
         assert given("Pr 1.5")["roughness"] == 1
 
 
-def test_alpha(given):
-    assert given("d 0.25")["alpha"] == 0.25
-    assert given("Tr 0.25")["alpha"] == 0.75
-    found = given("d 0.5", "Ni 1.5", "map_d t.png")  # a cut-out, not glass
-    assert same(found["alpha"], srgb=False, channel="luminance", scale=0.5)
+def test_alpha(one):
+    assert one("d 0.25").material.opacity.constant == 0.25
+    assert one("Tr 0.25").material.opacity.constant == 0.75
+    assert one("d 0.5", "Pr 0.3").material.opacity.constant == 0.5
+    assert one("d 0.5", "Ks 1 1 1", "illum 3").material.opacity.constant == 0.5
+    assert one("Kd 1 1 1").material.opacity is None
+    found = one("d 0.5", "Ni 1.5", "map_d t.png").material  # a cut-out, not glass
+    assert isinstance(found, Diffuse)
+    assert same(found.opacity.alpha, srgb=False, channel="luminance", scale=0.5)
+    assert found.opacity.cutoff is None
 
 
 def test_map_ke(one):

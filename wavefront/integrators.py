@@ -1,8 +1,8 @@
 """The four estimators of the light that reaches the camera: one ladder, simplest first.
 
-Each takes a wave of paths round the loop intersect → shade → bounce-sample → compact and returns
-the radiance of every path's slot, (3, n). `max_bounces` counts scattering events: with 0 only
-light seen directly is found, with 1 direct light as well.
+Each takes a wave of paths round the loop intersect → pass through → shade → bounce-sample → compact
+and returns the radiance of every path's slot, (3, n). `max_bounces` counts scattering events: with 0
+only light seen directly is found, with 1 direct light as well.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from .stages.absorb import absorb
 from .stages.bounce import bounce_sample
 from .stages.compact import carrying, compact, roulette
 from .stages.intersect import intersect
+from .stages.passing import pass_through
 from .stages.shade import Arrival, Shading, direct, emitted, mis_weighted, shading
 from .stages.surface import interact
 from .state import Hits, Paths
@@ -31,6 +32,7 @@ def li_naive(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: 
     L = np.zeros((3, len(paths)), f4)
     for bounce in range(max_bounces + 1):
         hits = intersect(scene, paths)
+        paths, hits = pass_through(scene, paths, hits, sampler, bounce)
         light = emitted(scene, paths, hits)
         deposit(L, paths, light)
         paths, hits = compact(paths, hits, hits.found)
@@ -47,6 +49,7 @@ def li_direct_simple(scene: CompiledScene, paths: Paths, sampler: Sampler, max_b
     L = np.zeros((3, len(paths)), f4)
     for bounce in range(max_bounces + 1):
         hits = intersect(scene, paths)
+        paths, hits = pass_through(scene, paths, hits, sampler, bounce)
         light = emitted(scene, paths, hits)
         deposit(L, paths, light)
         paths, hits = compact(paths, hits, hits.found)
@@ -67,6 +70,7 @@ def li_direct_mis(scene: CompiledScene, paths: Paths, sampler: Sampler, max_boun
     L = np.zeros((3, len(paths)), f4)
     for bounce in range(max_bounces + 1):
         hits = intersect(scene, paths)
+        paths, hits = pass_through(scene, paths, hits, sampler, bounce)
         light = emitted(scene, paths, hits)
         deposit(L, paths, mis_weighted(scene, paths, light))
         paths, hits = compact(paths, hits, np.flatnonzero((hits.prim >= 0) & paths.specular))
@@ -84,6 +88,7 @@ def li_full(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: i
     L = np.zeros((3, len(paths)), f4)
     for bounce in range(max_bounces + 1):
         hits = intersect(scene, paths)
+        paths, hits = pass_through(scene, paths, hits, sampler, bounce)
         light = emitted(scene, paths, hits)
         deposit(L, paths, mis_weighted(scene, paths, light))
         paths, hits = compact(paths, hits, hits.found)
@@ -107,7 +112,7 @@ INTEGRATORS: dict[str, Integrator] = {
 def arrive(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
     """Weaken the paths by the matter they came through, and make their surfaces ready to shade."""
     surface = interact(scene, paths, hits)
-    absorb(scene, paths, hits, surface)
+    absorb(scene, paths.throughput, hits, surface)
     return shading(scene, surface)
 
 

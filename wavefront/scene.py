@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .accel.base import Accelerator, Geometry
-from .bsdfs import Bsdf, Spatial
+from .bsdfs import Bsdf, Opacity, Spatial
 from .camera import Camera
 from .camera.base import image_size
 from .errors import SceneError, number
@@ -33,7 +33,7 @@ from .lights import (
 from .shapes import Mesh, Sphere
 from .shapes.attributes import ATTRIBUTES, Corners, corner_values
 from .state import Surface
-from .vec import Floats, Ints, f4
+from .vec import Bools, Floats, Ints, f4
 
 Shape: TypeAlias = Mesh | Sphere
 UserLight: TypeAlias = PointLight | SpotLight | DirectionalLight | Environment
@@ -144,6 +144,24 @@ class Materials:
 
 
 @dataclass(slots=True)
+class Opacities:
+    """Which surfaces are only partly there, and how much of them is."""
+
+    partly: Bools  # (m + k + 1,) of each primitive, and at the end False for a miss
+    constant: Floats  # (materials,) opacity of each material; 1 where it varies
+    varying: list[tuple[int, Opacity]]  # materials whose opacity varies
+
+    def at(self, surface: Surface) -> Floats:
+        """Return the part of the light that meets surfaces, (n,), in [0, 1]."""
+        found = self.constant.take(surface.material)
+        for material, opacity in self.varying:
+            lanes = np.flatnonzero(surface.material == material)
+            if lanes.size:
+                found[lanes] = opacity.at(surface.take(lanes))
+        return found
+
+
+@dataclass(slots=True)
 class CompiledScene:
     """A scene as flat arrays, relative to its centre. Triangles come first, then spheres."""
 
@@ -160,7 +178,9 @@ class CompiledScene:
     light_of: Ints  # (m + k + 1,) light of each primitive, and at the end that of a miss; -1 for none
     materials: Materials
     absorption: Floats | None  # (3, materials) per scene unit; None when nothing absorbs
+    opacities: Opacities | None  # None when every surface is all there
     lights: LightTable
+    uneven: Ints | None  # (lights,) triangle of a light that does not shine evenly, else -1; None: all do
 
 
 def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "place") -> CompiledScene:
@@ -178,7 +198,7 @@ def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "plac
     Raises
     ------
     SceneError
-        If an emitting shape has no area, or the choice is unknown.
+        If an emitting shape has no area, an emitting sphere has an alpha, or the choice is unknown.
     """
     low, high = scene.bounds
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
@@ -195,6 +215,7 @@ def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "plac
     attributes = {name: corner_values(name, meshes) for name in _attributes_read(meshes, spheres)}
     smooth = any(mesh.normals is not None for mesh in meshes)
     triangles32 = np.ascontiguousarray(triangles, f4)
+    opacities = _opacities(user_materials, material_of)
     geometry = Geometry(triangles32, np.ascontiguousarray(centers), radii, weights=bool(attributes) or smooth)
     return CompiledScene(
         centre=centre,
@@ -210,7 +231,9 @@ def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "plac
         light_of=np.append(light_of, environment),
         materials=group_materials(user_materials),
         absorption=_absorption(user_materials),
+        opacities=opacities,
         lights=lights,
+        uneven=None if opacities is None else _uneven(len(lights), light_of, opacities.partly[:-1]),
     )
 
 
@@ -246,13 +269,29 @@ def _absorption(materials: Sequence[Bsdf]) -> Floats | None:
     return table if table.any() else None
 
 
+def _opacities(materials: Sequence[Bsdf], material_of: Ints) -> Opacities | None:
+    """Return how much of the surfaces is there, None when all of them are."""
+    partly = np.array([material.opacity is not None for material in materials], np.bool_)
+    if not partly.any():
+        return None
+    constant, varying = np.ones(len(materials), f4), []
+    for i, material in enumerate(materials):
+        if material.opacity is None:
+            continue
+        if material.opacity.constant is None:
+            varying.append((i, material.opacity))
+        else:
+            constant[i] = material.opacity.constant
+    return Opacities(np.append(partly.take(material_of), False), constant, varying)
+
+
 def _is_constant(value: object) -> bool:
     return isinstance(value, np.ndarray) and value.dtype == f4 and value.shape in ((3, 1), (1,))
 
 
 def _group_key(material: Bsdf) -> object:
     """Materials with equal keys may be merged; one with a texture stands alone."""
-    parameters = vars(material)
+    parameters = {name: value for name, value in vars(material).items() if name != "opacity"}
     if not all(_is_constant(v) or isinstance(v, bool | int | float | str) for v in parameters.values()):
         return id(material)
     shapes = tuple((k, v.shape if _is_constant(v) else v) for k, v in sorted(parameters.items()))
@@ -301,13 +340,13 @@ def _attributes_read(meshes: Sequence[Mesh], spheres: Sequence[Sphere]) -> list[
     return sorted(lacking)
 
 
-def _reads(material: Bsdf) -> set[str]:
+def _reads(material: Bsdf | Opacity) -> set[str]:
     """Return the names of the attributes that the parameters of a material read."""
     out: set[str] = set()
     for value in vars(material).values():
         if isinstance(value, Spatial):
             out.update(value.reads)
-        elif isinstance(value, Bsdf):
+        elif isinstance(value, Bsdf | Opacity):
             out.update(_reads(value))
     return out
 
@@ -383,6 +422,11 @@ def _gather_lights(
     count = 0
     add(RectangleLights, [record for _, record in rectangles])
     add(TriangleLights, [record for _, record in triangle_lights])
+    for sphere in spheres:
+        if sphere.emission is not None and sphere.material.opacity is not None:
+            raise SceneError(
+                f"{sphere.name}: a sphere that shines must be all there; its material has an alpha"
+            )
     start = sum(len(part) for part in corners)
     emitting = np.array([sphere.emission is not None for sphere in spheres], np.bool_)
     light_of[start + np.flatnonzero(emitting)] = count + np.arange(emitting.sum())
@@ -410,11 +454,22 @@ def _gather_lights(
     return LightTable(kinds, half_size, choice), light_of, environment
 
 
+def _uneven(lights: int, light_of: Ints, partly: Bools) -> Ints | None:
+    """Return the triangle of each light whose surface is only partly there, else -1; None for none."""
+    prims = np.flatnonzero((light_of >= 0) & partly)
+    if not prims.size:
+        return None
+    out = np.full(lights, -1, np.intp)
+    out[light_of.take(prims)] = prims
+    return out
+
+
 def _area_lights(
     meshes: Sequence[Mesh], corners: Sequence[NDArray[np.float64]]
 ) -> tuple[list[tuple[Ints, RectangleLights]], list[tuple[Ints, TriangleLights]]]:
     """Return the emitting rectangles and triangles of all meshes.
 
+    Only what shines evenly is taken for rectangles, as their points have no barycentric weights.
     With each record come its faces: (2, k) for rectangles, (1, k) for triangles.
     """
     rectangles, triangles = [], []
@@ -423,6 +478,8 @@ def _area_lights(
         if mesh.emission is not None:
             shining = _with_area(mesh, part)
             first = first_of_pairs(part[shining])
+            if mesh.material.opacity is not None:
+                first = first[:0]
             pairs = shining[np.stack([first, first + 1])]
             alone = np.setdiff1d(shining, pairs)
             if first.size:

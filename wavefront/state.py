@@ -48,6 +48,12 @@ class Columns:
             object.__setattr__(out, name, None if value is None else value.take(index, -1))
         return out
 
+    def put(self, index: Ints, columns: Self) -> None:
+        """Write the columns of another record over columns `index` (m,) of this one, in place."""
+        for (_, value), (_, new) in zip(self._values(), columns._values(), strict=True):
+            if value is not None:
+                value[..., index] = new
+
     @classmethod
     def concatenate(cls, records: Sequence[Self]) -> Self:
         """Join the columns of several records of one type."""
@@ -61,19 +67,26 @@ class Columns:
 
 
 @dataclass(slots=True)
-class Paths(Columns):
-    """Live paths: where each is, where it goes, and what it has gathered on the way."""
+class Rays(Columns):
+    """What an accelerator is asked."""
+
+    origin: Floats  # (3, n) start of the ray, scene units
+    direction: Floats  # (3, n) unit direction
+    leaving: Ints  # (n,) primitive that the ray starts on, -1 for none
+
+
+@dataclass(slots=True)
+class Paths(Rays):
+    """Live paths: the ray that each follows, and what it has gathered on the way."""
 
     slot: Ints  # (n,) column of the radiance buffer that this path owns
     pixel: Words  # (n,) row-major pixel index: first part of the random-number address
     sample: Words  # (n,) sample index within the pixel: second part of the address
-    origin: Floats  # (3, n) start of the current ray, scene units
-    direction: Floats  # (3, n) unit direction of the current ray
-    leaving: Ints  # (n,) primitive that the ray starts on, -1 for none
     throughput: Floats  # (3, n) product of BSDF weights since the camera
     pdf: Floats  # (n,) density of the last BSDF sample, 1/sr; unused where specular
     specular: Bools  # (n,) the last direction came from a delta lobe or from the camera
     eta2: Floats  # (n,) square of the relative refractive index crossed so far
+    vertex: Floats | None = None  # (3, n) where the paths last scattered; None where that is `origin`
 
 
 @dataclass(slots=True)

@@ -1,13 +1,15 @@
 """Materials. Adding one is a file here and a line below; the parametrised tests find it there."""
 
-from .base import Bsdf, BsdfSample, Spatial
+from .base import Bsdf, BsdfSample
 from .conductor import Conductor
 from .dielectric import Dielectric
 from .diffuse import Diffuse
 from .mirror import Mirror
 from .mix import Mix
+from .opacity import Opacity
 from .oren_nayar import OrenNayar
 from .principled import Principled
+from .spatial import Spatial
 from .thin import ThinDielectric
 
 ALL = (Diffuse, Mirror, Dielectric, Conductor, OrenNayar, ThinDielectric, Principled, Mix)
@@ -21,6 +23,7 @@ __all__ = [
     "Diffuse",
     "Mirror",
     "Mix",
+    "Opacity",
     "OrenNayar",
     "Principled",
     "Spatial",

@@ -17,17 +17,9 @@ import numpy as np
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..state import Surface
 from ..vec import Bools, Floats
-
-
-class Spatial(ABC):
-    """A material parameter that varies over surfaces, such as a texture."""
-
-    reads: tuple[str, ...] = ("uv",)  # fields of `Surface` that `at` needs: "uv", "uv1", "color"
-    scalar: bool | None = None  # `at` returns numbers (n,), not colours; None: what the parameter is
-
-    @abstractmethod
-    def at(self, surface: Surface) -> Floats:
-        """Return the values at the hit points: (3, n) for a colour, (n,) for a scalar."""
+from .opacity import Opacity, opacity
+from .parameter import Scalar
+from .spatial import Spatial
 
 
 @dataclass(slots=True)
@@ -52,6 +44,27 @@ class Bsdf(ABC):
     transmissive: bool = False  # light can cross the surface
     dimensions: int = 2  # rows of u that sample_f reads
     specular: bool = False  # every lobe is a delta: f and pdf are 0, light sampling is skipped
+    opacity: Opacity | None = None  # how much of the surface is there; None: all. The renderer sees to it
+
+    def with_alpha(self, alpha: Scalar, cutoff: float | None = None) -> Self:
+        """Return this material for a surface that is only partly there.
+
+        Parameters
+        ----------
+        alpha
+            Part of the light that meets the surface, in [0, 1]: a number, or a `Texture` of one
+            channel. The rest goes straight on as if there were nothing, and so do shadow rays.
+        cutoff
+            If given, the surface is all there where alpha is at least this, and nothing elsewhere.
+
+        Raises
+        ------
+        SceneError
+                If an argument is out of its range.
+        """
+        partly = copy(self)
+        partly.opacity = opacity(type(self).__name__, alpha, cutoff)
+        return partly
 
     def bind(self, surface: Surface) -> Self:
         """Return this material with its spatial parameters looked up at `surface` (n columns)."""

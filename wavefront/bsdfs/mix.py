@@ -29,7 +29,8 @@ class Mix(Bsdf):
     Raises
     ------
     SceneError
-        If the weight is outside [0, 1], or something else than a material is given.
+        If the weight is outside [0, 1], something else than a material is given, or a material has
+        an alpha of its own.
     """
 
     dimensions = 3
@@ -38,6 +39,8 @@ class Mix(Bsdf):
         for name, value in (("first", first), ("second", second)):
             if not isinstance(value, Bsdf):
                 raise SceneError(f"Mix {name} must be a material, got {value!r}")
+            if value.opacity is not None:
+                raise SceneError(f"Mix {name} has an alpha; give it to the Mix, by with_alpha")
         self.first, self.second = first, second
         self.weight = scalar("Mix weight", weight)
         self.transmissive = first.transmissive or second.transmissive

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..errors import SceneError, number, rgb
 from ..state import Surface
 from ..vec import Floats, f4, luminance
-from .base import Spatial
+from .spatial import Spatial
 
 Colour: TypeAlias = ArrayLike | Spatial
 Scalar: TypeAlias = float | Spatial

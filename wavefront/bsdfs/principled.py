@@ -15,6 +15,7 @@ from .base import Bsdf, BsdfSample, Spatial, weigh
 from .dielectric import LEAST_BEND
 from .fresnel import fresnel_dielectric
 from .microfacet import INV_PI, alpha_of, mirror_lobe, reflect, refract, refraction_lobe, visible_normals
+from .opacity import opacity
 from .parameter import Colour, Scalar, colour, scalar
 from .sheen import sheen_albedo, sheen_lobe
 
@@ -67,6 +68,8 @@ class Principled(Bsdf):
         Strength and tint of the dielectric's reflection, in [0, 1].
     absorption
         What the inside absorbs, per channel and scene unit, as for `Dielectric`.
+    alpha, alpha_cutoff
+        How much of the surface is there, as by `with_alpha`.
     conserve_energy
         Lay the gloss over the matte base so that no light is gained; False follows glTF's appendix
         to the letter.
@@ -96,6 +99,8 @@ class Principled(Bsdf):
         specular: Scalar = 1.0,
         specular_color: Colour = 1.0,
         absorption: Colour = 0.0,
+        alpha: Scalar = 1.0,
+        alpha_cutoff: float | None = None,
         conserve_energy: bool = True,
     ) -> None:
         self.base_color = colour("Principled base_color", base_color)
@@ -112,6 +117,7 @@ class Principled(Bsdf):
         self.specular_weight = scalar("Principled specular", specular)
         self.specular_color = colour("Principled specular_color", specular_color)
         self.absorption = colour("Principled absorption", absorption, np.inf)
+        self.opacity = opacity("Principled", alpha, alpha_cutoff)
         self.conserve_energy = conserve_energy
         self.transmissive = _used(self.transmission)
         self._coated = _used(self.clearcoat)

@@ -65,8 +65,16 @@ def realise(wanted: dict[str, Any]) -> tuple[Bsdf, list[str]]:
     ----------
     wanted
         Parameters of `Principled`, and others that it may get, by name, as far as they are not
-        neutral. `base_color` is always there. Values are numbers, colours or textures.
+        neutral; `alpha` may be. `base_color` is always there. Values are numbers, colours or textures.
     """
+    wanted = dict(wanted)
+    alpha, cutoff = wanted.pop("alpha", 1.0), wanted.pop("alpha_cutoff", None)
+    material, lost = _solid(wanted)
+    return material.with_alpha(alpha, cutoff), lost
+
+
+def _solid(wanted: dict[str, Any]) -> tuple[Bsdf, list[str]]:
+    """Return a material that is all there, and the names of what is wanted in vain."""
     lost = [name for name in wanted if name not in PARAMETERS]
     known = {name: value for name, value in wanted.items() if name in PARAMETERS}
     if known.keys() == {"base_color"}:

@@ -245,7 +245,7 @@ def _material(entry: Entry) -> tuple[Bsdf, list[str]]:
     if illum in GLASS or (opacity(entry) < 1 and ior != 1 and "map_d" not in entry.lines):
         return _glass(entry)
     if illum in MIRROR and not physical and "ks" in entry.lines and entry.colour("ks", 0.0).any():
-        return Mirror(entry.colour("ks", 0.0)), []
+        return Mirror(entry.colour("ks", 0.0)).with_alpha(_alpha(entry)), []
     wanted = _wanted(entry)
     material, lost = realise(wanted)
     if type(material) is not Diffuse and not entry.has("pr", "map_pr", "pm", "map_pm"):
@@ -262,15 +262,19 @@ def _wanted(entry: Entry) -> dict[str, Any]:
         texture = entry.texture(image, factor, "scalar")
         if texture is not None or (key in entry.lines and (factor or name == "roughness")):
             wanted[name] = factor if texture is None else texture
-    alpha = opacity(entry)
-    texture = entry.texture("map_d", alpha, "scalar")
-    if texture is not None or alpha < 1:
-        wanted["alpha"] = alpha if texture is None else texture
-    entry.read.update(("d", "tr"))
+    wanted["alpha"] = _alpha(entry)
     normals = entry.texture("norm", kind="normal")
     if normals is not None:
         wanted["normal_map"] = normals
     return wanted
+
+
+def _alpha(entry: Entry) -> Any:
+    """Return how much of the surface is there: a number or a texture."""
+    factor = opacity(entry)
+    entry.read.update(("d", "tr"))
+    texture = entry.texture("map_d", factor, "scalar")
+    return factor if texture is None else texture
 
 
 def _base(entry: Entry) -> Any:

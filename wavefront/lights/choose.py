@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError
-from ..vec import ALL, Bools, Floats, Ints, Lanes, columns, f4
+from ..vec import ALL, Floats, Ints, Lanes, columns, f4
 from .base import Light, LightSample
 from .choice import ByPlace, EverywhereAlike, LightChoice
 
@@ -66,21 +66,21 @@ class LightTable:
 
         return ByPlace(-half_size, half_size, irradiance, power)
 
-    def sample_li(self, point: Floats, u_choice: Floats, u: Floats) -> tuple[LightSample, Bools]:
+    def sample_li(self, point: Floats, u_choice: Floats, u: Floats) -> tuple[LightSample, Ints]:
         """Choose a light for each point (3, n) with u_choice (n,) and sample it with u (2, n).
 
         Returns
         -------
         sample
             The light arriving; its pdf includes the probability of the choice.
-        delta
-            (n,) whether the light is one that no BSDF sample can meet.
+        light
+            (n,) numbers of the chosen lights.
         """
         assert self.choice is not None
         light, chance = self.choice.sample(point, u_choice)
         sample = self._sample_each(light, point, u)
         sample.pdf = sample.pdf * chance
-        return sample, self.delta_of.take(light)
+        return sample, light
 
     def pdf_li(self, light: Ints, point: Floats, wi: Floats) -> Floats:
         """Density with which `sample_li` draws wi (3, n) towards the lights numbered `light` (n,)."""

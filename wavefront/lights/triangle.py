@@ -37,7 +37,7 @@ class TriangleLights(Light):
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
         """Pick a point uniformly by area; its density in solid angle is d²/(A·cosθ)."""
-        b = uniform_triangle(u)
+        b = self.weights(u)
         target = self.corner + self.edge1 * b[0] + self.edge2 * b[1]
         wi = target - point
         d2 = dot(wi, wi)
@@ -48,6 +48,11 @@ class TriangleLights(Light):
         pdf = np.where(lit, d2, f4(0)) / (np.where(lit, cos_light, f4(1)) * self.area)
         radiance = np.broadcast_to(self.radiance, wi.shape)
         return LightSample(wi, radiance, pdf, distance, cos_light)
+
+    @staticmethod
+    def weights(u: Floats) -> Floats:
+        """Barycentric weights b1, b2 (2, n) of the points that `sample_li` picks with u (2, n)."""
+        return uniform_triangle(u)
 
     def pdf_li(self, point: Floats, wi: Floats) -> Floats:
         """Return d²/(A·cosθ) where the ray meets the front side.

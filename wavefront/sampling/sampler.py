@@ -41,7 +41,7 @@ class Dimension(IntEnum):
     LOBE = 4  # 1-D: which lobe of the BSDF
     DIRECTION = 5  # 2-D: direction within the lobe
     ROULETTE = 6  # 1-D: whether the path goes on
-    OPACITY = 7  # 1-D: whether the surface is there
+    OPACITY = 7  # 1-D: whether the surface is there; 8, 9, ... for the next ones along the same ray
 
 
 class Sampler(ABC):

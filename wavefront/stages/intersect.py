@@ -2,39 +2,56 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..lights import LightSample
 from ..scene import CompiledScene
-from ..state import Hits, Paths, Surface
+from ..state import Hits, Rays, Surface
 from ..vec import Bools, Floats, Ints, f4
 from .surface import leave
 
 TARGET_ERROR = f4(2**-20)  # rounding of a sampled point on a light, relative to its distance
 
 
-def intersect(scene: CompiledScene, paths: Paths) -> Hits:
-    """Find what each path's ray meets first."""
-    found = scene.accelerator.closest(paths.origin, paths.direction, paths.leaving)
+@dataclass(slots=True)
+class ShadowRays(Rays):
+    """Rays from points towards sampled points on lights."""
+
+    error: Floats  # (n,) bound on the rounding error of where they start, scene units
+    distance: Floats  # (n,) to the sampled point, scene units; inf for a light at infinity
+    cos_light: Floats  # (n,) cosine between the ray and the light's normal; 1 where it has none
+
+
+def intersect(scene: CompiledScene, rays: Rays) -> Hits:
+    """Find what each ray meets first."""
+    found = scene.accelerator.closest(rays.origin, rays.direction, rays.leaving)
     return Hits(found.t, found.prim, found.b1, found.b2)
 
 
-def visible(scene: CompiledScene, surface: Surface, lanes: Ints, light: LightSample) -> Bools:
-    """Tell whether nothing stands between points and the sampled points on their lights, (k,).
+def shadow_rays(surface: Surface, lanes: Ints, light: LightSample) -> ShadowRays:
+    """Return rays (k,) from points to the sampled points on their lights.
 
     `lanes` (k,) are the columns of `surface` that the columns of `light` belong to.
     """
     point, error = surface.point.take(lanes, 1), surface.error.take(lanes)
     origin = leave(point, error, surface.ng.take(lanes, 1), light.wi)
-    return ~scene.accelerator.occluded(origin, light.wi, _reach(error, light), surface.prim.take(lanes))
+    leaving = surface.prim.take(lanes)
+    return ShadowRays(origin, light.wi, leaving, error, light.distance, light.cos_light)
 
 
-def _reach(error: Floats, light: LightSample) -> Floats:
+def visible(scene: CompiledScene, rays: ShadowRays) -> Bools:
+    """Tell whether nothing stands between points and the sampled points on their lights, (k,)."""
+    return ~scene.accelerator.occluded(rays.origin, rays.direction, reach(rays), rays.leaving)
+
+
+def reach(rays: ShadowRays) -> Floats:
     """Length (n,) of shadow rays, which end just before the light.
 
     Both ends are off by a known error; along a ray that meets the light's surface under a small
     cosine an error is 1/cosine times as long.
     """
-    grazing = f4(1) / np.maximum(light.cos_light, f4(2) * TARGET_ERROR)
-    shortened = light.distance * (f4(1) - TARGET_ERROR * grazing) - f4(2) * error * grazing
+    grazing = f4(1) / np.maximum(rays.cos_light, f4(2) * TARGET_ERROR)
+    shortened = rays.distance * (f4(1) - TARGET_ERROR * grazing) - f4(2) * rays.error * grazing
     return np.maximum(shortened, f4(0))

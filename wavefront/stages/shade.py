@@ -13,7 +13,9 @@ from ..sampling.sampler import Dimension, Sampler
 from ..scene import CompiledScene
 from ..state import Hits, Paths, Surface
 from ..vec import ALL, Floats, Ints, Lanes, columns, dot, f4
-from .intersect import visible
+from .intersect import shadow_rays, visible
+from .passing import let_through
+from .shine import shine
 from .surface import leave
 
 
@@ -54,7 +56,8 @@ def emitted(scene: CompiledScene, paths: Paths, hits: Hits) -> Emission:
 def mis_weighted(scene: CompiledScene, paths: Paths, emission: Emission) -> Arrival:
     """Return the emission weighted against light sampling; in full after a delta lobe."""
     before = paths.take(emission.lanes)
-    pdf_light = scene.lights.pdf_li(emission.light, before.origin, before.direction)
+    start = before.origin if before.vertex is None else before.vertex
+    pdf_light = scene.lights.pdf_li(emission.light, start, before.direction)
     weight = np.where(before.specular, f4(1), power_heuristic(before.pdf, pdf_light))
     return Arrival(emission.lanes, emission.radiance * weight)
 
@@ -94,13 +97,19 @@ def direct(
     u_point = sampler.draw_2d(*address, Dimension.LIGHT_POINT)
     # from where a reflected ray would start, so that mis_weighted finds the same densities
     start = leave(surface.point, surface.error, surface.ng, surface.ng)
-    light, delta = scene.lights.sample_li(start, u_choice, u_point)
+    light, number = scene.lights.sample_li(start, u_choice, u_point)
     f_cos, pdf = evaluate(shade, shade.frame.to_local(light.wi), dot(surface.ng, light.wi))
     lanes = np.flatnonzero((light.pdf > 0) & (f_cos.max(0) != 0))  # NaN stays, to be counted
-    light, f_cos, pdf, delta = light.take(lanes), f_cos.take(lanes, 1), pdf.take(lanes), delta.take(lanes)
+    light, number, f_cos, pdf = light.take(lanes), number.take(lanes), f_cos.take(lanes, 1), pdf.take(lanes)
+    delta = scene.lights.delta_of.take(number)
     weight = np.where(delta, f4(1), power_heuristic(light.pdf, pdf)) if mis else f4(1)
     radiance = f_cos * light.radiance * (weight / light.pdf)
-    seen = np.flatnonzero(visible(scene, surface, lanes, light))
+    rays = shadow_rays(surface, lanes, light)
+    if scene.uneven is not None:
+        radiance *= shine(scene, rays, number, u_point.take(lanes, 1))
+    if scene.opacities is not None:
+        return Arrival(lanes, radiance * let_through(scene, rays))
+    seen = np.flatnonzero(visible(scene, rays))
     return Arrival(lanes.take(seen), radiance.take(seen, 1))
 
 

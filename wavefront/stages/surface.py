@@ -6,7 +6,7 @@ import numpy as np
 
 from ..scene import CompiledScene
 from ..shapes.attributes import ATTRIBUTES, Corners
-from ..state import Hits, Paths, Surface
+from ..state import Hits, Rays, Surface
 from ..vec import Floats, Ints, dot, f4, normalize
 
 # o + t·d carries at most three roundings of half an ulp (2⁻²⁴) of its terms; this is five times that.
@@ -14,11 +14,11 @@ POINT_ERROR = f4(2**-21)
 MIN_COS = f4(1e-3)  # the least cosine between wo and the shading normal
 
 
-def interact(scene: CompiledScene, paths: Paths, hits: Hits) -> Surface:
-    """Gather the geometry at hits; every path must have one."""
-    point = paths.origin + paths.direction * hits.t
+def interact(scene: CompiledScene, rays: Rays, hits: Hits) -> Surface:
+    """Gather the geometry at hits; every ray must have one."""
+    point = rays.origin + rays.direction * hits.t
     error = POINT_ERROR * (np.abs(point).max(0) + hits.t)
-    wo = -paths.direction
+    wo = -rays.direction
     ng = normals(scene, hits.prim, point)
     ns = _shading_normals(scene, hits, ng)
     facing = dot(ng, wo)

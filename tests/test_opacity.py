@@ -1,0 +1,298 @@
+"""Surfaces that are only partly there, for paths and for shadow rays alike."""
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+from scenes import ALBEDO, ALL, BLACK, EYE, HERE, floor, panel, polygon_irradiance, probe
+from significance import SIDE, assert_mean, assert_same_images, measure, render, repeat
+from test_load_gltf import Builder
+
+import wavefront as wf
+from wavefront.accel import make_accelerator
+from wavefront.accel.embree import installed
+from wavefront.bsdfs import Principled
+from wavefront.scene import compile_scene
+
+NO_EMBREE = pytest.mark.skipif(not installed(), reason="no embreex")
+ACCELERATORS = ["numpy", pytest.param("embree", marks=NO_EMBREE)]
+PAIRS = [*((integrator, "numpy") for integrator in ALL), pytest.param("full", "embree", marks=NO_EMBREE)]
+UP = (0, 0, 1)  # of cameras that look along y
+HALF = np.array([[0.0, 1.0]], np.float32)  # nothing at u < ½, all there at u > ½
+
+
+def veil(alpha, y: float = 1.0, half: float = 20.0, cutoff: float | None = None, **rest) -> wf.Mesh:
+    """A square that faces down, only partly there; u runs along x."""
+    material = rest.pop("material", BLACK).with_alpha(alpha, cutoff)
+    return wf.Rectangle(
+        (-half, y, -half), (2 * half, 0, 0), (0, 0, 2 * half), material=material, name="veil", **rest
+    )
+
+
+def mask(values, **arguments) -> wf.Texture:
+    """A texture of opacities, with hard edges."""
+    return wf.Texture(np.asarray(values, np.float32), filter="nearest", channel=0, **arguments)
+
+
+LAMP = panel((-0.5, -0.4), (0.6, 0.7), 2.0)
+UNSHADED = polygon_irradiance([(-0.5, 2, -0.4), (-0.5, 2, 0.7), (0.6, 2, 0.7), (0.6, 2, -0.4)])
+
+
+def lit(*things, lamp: wf.Mesh = LAMP) -> wf.Scene:
+    """A floor under a lamp and other things, seen at the origin from close by."""
+    return wf.Scene([floor(), lamp, *things], camera=probe(HERE, 0.1 * EYE))
+
+
+# --- In front of things ----------------------------------------------------------------------------
+
+
+def before_a_wall(alpha: float) -> wf.Scene:
+    """A sheet that reflects 0.5 before a wall of 2, seen head on."""
+    sheet = wf.Rectangle((-9, -9, 0), (18, 0, 0), (0, 18, 0), material=wf.Diffuse(0.5).with_alpha(alpha))
+    wall = wf.Rectangle((-9, -9, -1), (18, 0, 0), (0, 18, 0), material=BLACK, emission=2.0)
+    camera = wf.Camera.look_at((0.3, 0.2, 5), (0.3, 0.2, 0), fov=1e-6, size=(SIDE, SIDE))
+    return wf.Scene([sheet, wall], [wf.Environment(1.0)], camera)
+
+
+@pytest.mark.parametrize(("integrator", "accel"), PAIRS)
+def test_a_sheet_before_a_wall(integrator: str, accel: str) -> None:
+    """The part alpha of the sheet, and of the wall what is left."""
+    for alpha in (0.0, 0.3, 1.0):
+        mean = measure(before_a_wall(alpha), 1024, integrator=integrator, accel=accel, max_bounces=1)
+        unseen = 10 / (64 * 1024)  # numbers may be spread so evenly that the batches show no difference
+        assert_mean(mean, (1 - alpha) * 2 + alpha * 0.5, 0.006, rounding=unseen)
+
+
+@pytest.mark.parametrize("sampler", ["sobol", "independent", "bluenoise"])
+def test_each_sheet_decides_for_itself(sampler: str) -> None:
+    """Three sheets let (1 - alpha)³ through; one random number for all of them would let more."""
+    wall = before_a_wall(0.0).shapes[1]
+    sheets = [
+        wf.Rectangle((-9, -9, z), (18, 0, 0), (0, 18, 0), material=BLACK.with_alpha(0.4)) for z in range(3)
+    ]
+    scene = wf.Scene([*sheets, wall], camera=before_a_wall(0.0).camera)
+    mean = measure(scene, 4096, integrator="naive", max_bounces=0, sampler=sampler)
+    assert_mean(mean, 2 * 0.6**3, 0.005, rounding=10 / (64 * 4096 * 0.6**3))
+
+
+def test_a_sphere_is_passed_twice() -> None:
+    """Its near and its far side, by the camera and within the wall's light."""
+    ball = wf.Sphere((0.3, 0.2, 2), 0.7, material=BLACK.with_alpha(0.3))
+    scene = before_a_wall(0.0)
+    scene.shapes[0] = ball
+    assert_mean(measure(scene, 4096, max_bounces=1), 2 * 0.7**2, 0.003, rounding=10 / (64 * 4096 * 0.49))
+
+
+def test_what_is_not_there_is_no_event() -> None:
+    """Fifty sheets before a light and no bounce allowed."""
+    sheets = [veil(0.0, y) for y in np.linspace(0.1, 1.9, 50)]
+    scene = wf.Scene([*sheets, LAMP], camera=probe((0, 2, 0), HERE))
+    for integrator in ALL:
+        assert (render(scene, 1, integrator=integrator, max_bounces=0).rgb == 1).all()
+
+
+@pytest.mark.parametrize("integrator", ALL)
+def test_the_environment_behind(integrator: str) -> None:
+    """What passes everything meets the light at infinity, weighted as from where it scattered."""
+    scene = wf.Scene([floor(), veil(0.25, half=1e4)], [wf.Environment(1.0)], probe(HERE, 0.1 * EYE))
+    assert_mean(measure(scene, 1024, integrator=integrator, max_bounces=1), 0.75 * ALBEDO, 0.003)
+
+
+# --- Shadows ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("integrator", "accel"), PAIRS)
+def test_shadow_of_sheets(integrator: str, accel: str) -> None:
+    """Two sheets, and a lamp seen through them by both kinds of samples."""
+    scene = lit(veil(0.3, 0.5), veil(0.5, 1.0))
+    spp = 4096 if integrator == "naive" else 1024
+    mean = measure(scene, spp, integrator=integrator, accel=accel, max_bounces=1)
+    assert_mean(mean, 0.7 * 0.5 * UNSHADED * ALBEDO / np.pi, 0.02 if integrator == "naive" else 0.004)
+
+
+@pytest.mark.parametrize("integrator", ALL)
+def test_shadow_of_a_sphere(integrator: str) -> None:
+    """Light crosses it twice."""
+    ball = wf.Sphere((0, 1, 0), 0.7, material=BLACK.with_alpha(0.3))
+    lamp = panel((-0.3, -0.3), (0.3, 0.3), 2.0)
+    whole = polygon_irradiance([(-0.3, 2, -0.3), (-0.3, 2, 0.3), (0.3, 2, 0.3), (0.3, 2, -0.3)])
+    spp = 16384 if integrator == "naive" else 256
+    mean = measure(lit(ball, lamp=lamp), spp, integrator=integrator, max_bounces=1)
+    assert_mean(mean, 0.49 * whole * ALBEDO / np.pi, 0.02)
+
+
+@pytest.mark.parametrize("integrator", ALL)
+def test_half_of_a_lamp_through_a_cut_out(integrator: str) -> None:
+    """A sheet that is not there where x < 0 hides the other half exactly."""
+    left = polygon_irradiance([(-0.5, 2, -0.4), (-0.5, 2, 0.7), (0, 2, 0.7), (0, 2, -0.4)])
+    spp = 4096 if integrator == "naive" else 1024
+    mean = measure(lit(veil(mask(HALF))), spp, integrator=integrator, max_bounces=1)
+    assert_mean(mean, left * ALBEDO / np.pi, 0.02)
+
+
+def test_a_wall_behind_a_veil_still_hides() -> None:
+    """Whichever comes first."""
+    for y in (0.5, 1.5):
+        scene = lit(veil(0.3, 1.0), veil(1.0, y))
+        assert not render(scene, 16, max_bounces=1, integrator="direct_simple").rgb.any()
+
+
+@pytest.mark.parametrize("accel", ACCELERATORS)
+@pytest.mark.parametrize("cutoff", [None, 0.5])
+def test_shadow_of_a_checkerboard(cutoff: float | None, accel: str) -> None:
+    """Parallel light through 4 × 4 squares of 0.2 and 0.7 draws them on the floor."""
+    squares = np.where(np.indices((4, 4)).sum(0) % 2, 0.2, 0.7)
+    sheet = veil(mask(squares), half=2.0, cutoff=cutoff)
+    camera = wf.Camera.orthographic((0, 0.5, 0), HERE, UP, height=4, size=(32, 32))
+    scene = wf.Scene([floor(), sheet], [wf.DirectionalLight((0, -1, 0), np.pi)], camera)
+    image = render(scene, 4, max_bounces=1, accel=accel).rgb
+    passed = 1 - (squares if cutoff is None else squares >= cutoff)
+    # the camera looks down with z up in the picture: u grows with x, to the left; v with z, upwards
+    assert image[..., 0] == pytest.approx(np.kron(passed[:, ::-1], np.ones((8, 8))) * ALBEDO, rel=1e-5)
+
+
+@pytest.mark.parametrize("integrator", ALL)
+def test_a_lamp_that_is_partly_there(integrator: str) -> None:
+    """By light samples and by paths it shines as much as is there of it, evenly or not."""
+    left = polygon_irradiance([(-0.5, 2, -0.4), (-0.5, 2, 0.7), (0.05, 2, 0.7), (0.05, 2, -0.4)])
+    for alpha, expected in ((0.4, 0.4 * UNSHADED), (mask(1 - HALF), left)):
+        lamp = wf.Rectangle(
+            (-0.5, 2, -0.4), (1.1, 0, 0), (0, 0, 1.1), material=BLACK.with_alpha(alpha), emission=1.0
+        )
+        spp = 4096 if integrator == "naive" else 1024
+        mean = measure(lit(lamp=lamp), spp, integrator=integrator, max_bounces=1)
+        assert_mean(mean, expected * ALBEDO / np.pi, 0.02)
+
+
+def test_absorption_goes_on_behind_holes() -> None:
+    """What enters coloured glass where its surface is not there is weakened like the rest."""
+    glass = wf.Dielectric(1.0, absorption=(0.2, 1.0, 3.0)).with_alpha(0.5)
+    plate = [
+        wf.Rectangle((-50, 1, -50), (0, 0, 100), (100, 0, 0), material=glass),
+        wf.Rectangle((-50, 0.5, -50), (100, 0, 0), (0, 0, 100), material=glass),
+    ]
+    expected = np.exp(-0.5 * np.array([0.2, 1, 3]))
+    camera = wf.Camera.look_at((0, 5, 0), HERE, UP, fov=1e-6, size=(2, 2))
+    seen = render(wf.Scene(plate, [wf.Environment(1.0)], camera), 64, max_bounces=8).rgb
+    assert seen == pytest.approx(np.broadcast_to(expected, seen.shape), rel=1e-4)
+    above = wf.Scene([floor(), *plate], [wf.PointLight((0, 2, 0), 4.0)], probe(HERE, 0.1 * EYE))
+    shadow = render(above, 4, max_bounces=1).rgb
+    assert shadow == pytest.approx(np.broadcast_to(expected * 0.25 * ALBEDO / np.pi, shadow.shape), rel=1e-4)
+
+
+# --- Estimators, waves and workers -------------------------------------------------------------------
+
+
+def leaves(size: tuple[int, int] = (16, 8)) -> wf.Scene:
+    """A shelf of leaves cut out of squares, a veil and a glass ball, before a lamp."""
+    rng, above = np.random.default_rng(3), np.array([0, 1.2, 0])
+    leaf = mask(rng.random((6, 6)))
+    shapes: list[wf.Mesh | wf.Sphere] = [floor(), panel((-1, -1), (1, 1), 3.0, emission=4.0)]
+    for material in (
+        wf.Diffuse((0.3, 0.6, 0.2)).with_alpha(leaf, cutoff=0.5),
+        wf.Principled((0.6, 0.3, 0.2), roughness=0.4, alpha=leaf),
+        wf.Diffuse(0.7).with_alpha(0.4),
+    ):
+        for corner, u, v in rng.normal(size=(8, 3, 3)):
+            shapes.append(wf.Rectangle(corner + above, u, v, material=material))
+    shapes.append(wf.Sphere((0.4, 0.6, 0.8), 0.5, material=wf.Dielectric(1.5).with_alpha(0.7)))
+    camera = wf.Camera.look_at((0, 1.5, 6), (0, 1, 0), fov=40, size=size)
+    return wf.Scene(shapes, [wf.Environment(0.2)], camera)
+
+
+def test_estimators_agree() -> None:
+    """All light through leaves, by chance and by light samples."""
+    naive = repeat(leaves(), 64, integrator="naive", max_bounces=4)
+    full = repeat(leaves(), 16, integrator="full", max_bounces=4, first_seed=100)
+    assert_same_images(naive, full, 0.02)
+
+
+@pytest.mark.parametrize("cut", [{"wave_size": 1}, {"wave_size": 64}, {"wave_size": 50, "workers": 3}])
+@pytest.mark.parametrize("integrator", ["naive", "full"])
+def test_waves_and_workers_change_no_bit(integrator: str, cut: dict) -> None:
+    """Numbers go by surfaces along a ray, not by who asks for them."""
+    scene = leaves((6, 5))
+    whole = render(scene, 3, integrator=integrator).rgb
+    assert render(scene, 3, integrator=integrator, **cut).rgb.tobytes() == whole.tobytes()
+
+
+def test_what_is_all_there_costs_nothing() -> None:
+    """Opacities of 1 leave no trace in the compiled scene, and cost no material its group."""
+    for material in (wf.Principled(0.5, alpha=1.0), wf.Diffuse(0.5).with_alpha(1.0)):
+        assert material.opacity is None
+        compiled = compile_scene(lit(wf.Sphere(HERE, 0.1, material=material)), numpy)
+        assert compiled.opacities is compiled.uneven is None
+    plain, clear = wf.Diffuse(0.5), wf.Diffuse(0.2).with_alpha(0.5)
+    balls = [wf.Sphere((x, 5, 0), 0.1, material=m) for x, m in enumerate((plain, clear, wf.Diffuse(0.1)))]
+    assert len(compile_scene(lit(*balls), numpy).materials.groups) == 1
+
+
+def numpy(geometry):
+    """The accelerator that is always there."""
+    return make_accelerator(geometry, "numpy")
+
+
+# --- From files ------------------------------------------------------------------------------------
+
+
+def behind(mesh: wf.Mesh) -> float:
+    """How much of a lamp below shows through a mesh at z = 0 in the unit square, away from its edges."""
+    lamp = wf.Rectangle((-9, -9, -1), (18, 0, 0), (0, 18, 0), material=BLACK, emission=1.0)
+    camera = wf.Camera.orthographic((0.25, 0.25, 1), (0.25, 0.25, 0), height=0.2, size=(SIDE, SIDE))
+    return float(render(wf.Scene([mesh, lamp], camera=camera), 256, max_bounces=0).rgb.mean())
+
+
+@pytest.mark.parametrize(
+    ("mode", "factor", "clear"),
+    [("BLEND", 1.0, 0.6), ("BLEND", 0.5, 0.8), ("MASK", 1.0, 0.0), ("MASK", 0.5, 1.0)],
+)
+def test_gltf(tmp_path, mode: str, factor: float, clear: float) -> None:
+    """The alpha of the image, 0.4, times the factor; a mask of 0.3."""
+    build = Builder()
+    info = build.image(np.full((2, 2, 4), (255, 0, 0, 102), np.uint8))
+    group = {"baseColorTexture": info, "baseColorFactor": [1, 1, 1, factor]}
+    build.material(pbrMetallicRoughness=group, alphaMode=mode, alphaCutoff=0.3)
+    (mesh,) = wf.load(build.gltf(tmp_path / "a.gltf"), strict=True).shapes
+    assert isinstance(mesh.material, Principled)
+    assert behind(mesh) == pytest.approx(clear, abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("lines", "clear"), [("d 0.3", 0.7), ("Tr 0.3", 0.3), ("map_d t.png", 0.6), ("d 0.5\nmap_d t.png", 0.8)]
+)
+def test_mtl(tmp_path, lines: str, clear: float) -> None:
+    """The number, the image, or both multiplied."""
+    iio.imwrite(tmp_path / "t.png", np.full((2, 2), 102, np.uint8))
+    (tmp_path / "s.mtl").write_text(f"newmtl m\nKd 0.5 0.5 0.5\n{lines}\n")
+    text = "mtllib s.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n"
+    (tmp_path / "a.obj").write_text(text)
+    (mesh,) = wf.load(tmp_path / "a.obj", strict=True).shapes
+    assert behind(mesh) == pytest.approx(clear, abs=0.005)
+
+
+# --- Complaints ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: wf.Diffuse(0.5).with_alpha(1.5), r"Diffuse alpha is 1\.5; it must be in \[0, 1\]"),
+        (lambda: wf.Principled(alpha=-0.1), r"Principled alpha is -0\.1; it must be in \[0, 1\]"),
+        (lambda: wf.Mirror().with_alpha(0.5, cutoff=-1), r"Mirror alpha_cutoff is -1; it must be at least 0"),
+        (
+            lambda: wf.Diffuse(0.5).with_alpha(wf.Texture(np.ones((2, 2, 4), np.float32))),
+            r"Diffuse alpha is <Texture 'array': 2 × 2>, which gives colours; choose one channel by channel=",
+        ),
+        (
+            lambda: wf.Mix(wf.Diffuse(0.5), wf.Diffuse(0.1).with_alpha(0.5)),
+            "Mix second has an alpha; give it to the Mix, by with_alpha",
+        ),
+        (
+            lambda: render(wf.Scene([wf.Sphere(HERE, 1, material=BLACK.with_alpha(0.5), emission=1.0)]), 1),
+            "sphere: a sphere that shines must be all there; its material has an alpha",
+        ),
+    ],
+)
+def test_complaints(make, message: str) -> None:
+    """Name, value and limit."""
+    with pytest.raises(wf.SceneError, match=message):
+        make()

@@ -1,0 +1,19 @@
+"""What varies over surfaces."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+from ..state import Surface
+from ..vec import Floats
+
+
+class Spatial(ABC):
+    """A material parameter that varies over surfaces, such as a texture."""
+
+    reads: tuple[str, ...] = ("uv",)  # fields of `Surface` that `at` needs: "uv", "uv1", "color"
+    scalar: bool | None = None  # `at` returns numbers (n,), not colours; None: what the parameter is
+
+    @abstractmethod
+    def at(self, surface: Surface) -> Floats:
+        """Return the values at the hit points: (3, n) for a colour, (n,) for a scalar."""
