@@ -19,6 +19,7 @@ from .integrators import INTEGRATORS
 from .io.images import check_writable
 from .io.load import load
 from .metrics import compare
+from .parallel import EXECUTORS
 from .render import DEFAULT_SPP, render
 from .sampling.sampler import SAMPLERS
 from .scene import Scene
@@ -99,7 +100,8 @@ def _add_render(commands: Any) -> None:
     command.add_argument("--sampler", choices=SAMPLERS, default="sobol", help="source of random numbers")
     command.add_argument("--seed", type=int, default=0, help="same seed, same picture")
     command.add_argument("--accel", default="auto", help="ray queries: auto, numpy or embree")
-    command.add_argument("--workers", type=int, help="threads (default: one per core)")
+    command.add_argument("--workers", type=int, help="waves traced at once (default: one per core)")
+    command.add_argument("--executor", choices=EXECUTORS, help="what workers are (default: the faster here)")
     where = {"type": _vector, "metavar": "X,Y,Z"}
     command.add_argument("--origin", **where, help="camera position; replaces the file's camera")
     command.add_argument(
@@ -128,6 +130,7 @@ def _render(options: argparse.Namespace) -> int:
             sampler=options.sampler,
             accel=options.accel,
             workers=options.workers,
+            executor=options.executor,
             noise=options.noise,
             seconds=options.seconds,
             filter=options.filter,

@@ -36,6 +36,11 @@ class Piece:
         """Number of paths."""
         return self.pixels.size * self.samples
 
+    def __str__(self) -> str:
+        """Name the block in an error message."""
+        last = self.first_sample + self.samples - 1
+        return f"samples {self.first_sample} to {last} of {self.pixels.size} pixels from {self.pixels[0]} on"
+
 
 @dataclass(slots=True)
 class Wave:
