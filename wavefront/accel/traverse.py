@@ -80,7 +80,8 @@ class Lanes:
     leaving: Ints  # (n,)
     line: Floats  # (6, n + 1) Plücker coordinates: unit direction d, then (o - center) × d; the last is NaN
     speed: Floats  # (n,) length of `direction`
-    local: Floats | None  # (4, n) o - center, 1; None if some origin is far away
+    start: Floats | None  # (4, n) o - center, 1; None if some origin is far away
+    end: Floats | None  # (4, n) the same of where rays end; None if they have no end, or start is None
     begin: Floats | Doubles  # (n,) where rays start, as a distance from the point next to the centre
 
     @property
@@ -89,8 +90,10 @@ class Lanes:
         return self.speed.size
 
 
-def prepare(origin: Floats, direction: Floats, leaving: Ints, ball: Ball) -> Lanes:
-    """Compute Plücker coordinates of rays (3, n) about the ball's centre.
+def prepare(
+    origin: Floats, direction: Floats, leaving: Ints, ball: Ball, distance: Floats | None = None
+) -> Lanes:
+    """Compute Plücker coordinates of rays (3, n) about the ball's centre, which end at `distance` (n,).
 
     They are float32 while all origins are within two radii. Beyond, o - center loses what matters, and
     they are computed in float64.
@@ -113,10 +116,15 @@ def prepare(origin: Floats, direction: Floats, leaving: Ints, ball: Ball) -> Lan
     part[5] = x * uy - y * ux
     begin = x * ux + y * uy + z * uz
     if far:
-        return Lanes(origin, direction, leaving, line, speed.astype(f4), None, begin)
-    homogeneous = np.ones((4, speed.size), f4)
-    homogeneous[:3] = local
-    return Lanes(origin, direction, leaving, line, speed, homogeneous, begin)
+        return Lanes(origin, direction, leaving, line, speed.astype(f4), None, None, begin)
+    start = np.ones((4, speed.size), f4)
+    start[:3] = local
+    end = None
+    if distance is not None:
+        end = np.ones((4, speed.size), f4)
+        np.multiply(part[:3], np.minimum(distance * speed, f4(3 * ball.radius)), out=end[:3])
+        end[:3] += local
+    return Lanes(origin, direction, leaving, line, speed, start, end, begin)
 
 
 @dataclass(slots=True)
@@ -263,11 +271,14 @@ def quadric_rows(shape: Doubles, center: Doubles, reach: Doubles) -> Floats:
     return rows.astype(f4)
 
 
-def trace(tree: StreamTree, lanes: Lanes, reach: Floats, visit: Callable[[Ints, Ints], None]) -> None:
+def trace(
+    tree: StreamTree, lanes: Lanes, reach_now: Callable[[], Floats], visit: Callable[[Ints, Ints], None]
+) -> None:
     """Take rays through the tree, near children of the root first.
 
-    `reach` (n + 1,) is how far rays still look, updated by `visit(leaves, lanes)`, which tests.
+    `reach_now()` (n + 1,) is how far rays still look, less after `visit(leaves, lanes)`, which tests.
     """
+    reach = reach_now()
     line = lanes.line.copy()
     line[3:] *= tree.scale
     begin = np.append((lanes.begin * tree.scale - np.abs(lanes.begin * tree.scale) * 1e-6).astype(f4), f4(0))
@@ -297,6 +308,7 @@ def trace(tree: StreamTree, lanes: Lanes, reach: Floats, visit: Callable[[Ints, 
         looking = np.flatnonzero(close <= reach.take(lane))
         code = codes.take(chosen.take(looking) & mask)
         _descend(tree, line, begin, reach, code, lane.take(looking), visit)
+        reach = reach_now()
         at = at + count
         more = np.flatnonzero(at < last)
         at, last = at.take(more), last.take(more)

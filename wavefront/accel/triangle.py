@@ -58,19 +58,20 @@ def has_area(triangles: Floats) -> Bools:
     return (size2 > 0) & np.isfinite(size2)
 
 
-def edge_rows(triangles: Floats, center: Floats, radius: float) -> Floats:
-    """Return the Plücker rows of the three edges of triangles (m, 3, 3) -> (3, m, 6) float32.
+def edge_rows(corners: Floats, center: Floats, radius: float) -> Floats:
+    """Return the Plücker rows of the edges of convex polygons, corners (e, m, 3) -> (e, m, 6) float32.
 
     With a ray as (d, (o - center) × d), |d| = 1, the product w of a row and a ray is the volume
-    spanned by ray and edge: the ray passes inside if the three have one sign (Shoemake, "Plücker
-    coordinate tutorial", 1998). `radius` bounds the distance of all vertices from `center` (3,).
+    spanned by ray and edge: the ray passes inside if all have one sign (Shoemake, "Plücker
+    coordinate tutorial", 1998). `radius` bounds the distance of all corners from `center` (3,).
 
-    Rows are scaled so that one threshold serves every triangle: a ray that truly hits has
-    min(w0 w1, w1 w2) > -1, and if that is above 1, it truly hits. For an error of at most e in each w,
-    and as hits have 0 <= |w| <= 2A (twice the area), the products are above -e (2A + e).
+    Rows are scaled so that one threshold serves every polygon: a ray that truly hits has
+    products w0 w1, w1 w2 ... of neighbours > -1, and if they are above 1, it truly hits. For an error
+    of at most e in each w, and as hits have 0 <= |w| <= 2A (twice the area), the products are above
+    -e (2A + e).
     """
-    corner: Doubles = triangles.transpose(1, 0, 2).astype(np.float64) - center
-    following = corner[[1, 2, 0]]
+    corner: Doubles = corners.astype(np.float64) - center
+    following = np.roll(corner, -1, 0)
     direction = following - corner
     moment = np.cross(corner, following)
     _, scale = _edge_error(corner, radius)
@@ -78,35 +79,71 @@ def edge_rows(triangles: Floats, center: Floats, radius: float) -> Floats:
     return rows.astype(f4)
 
 
-def side_rows(triangles: Floats, center: Floats, radius: float) -> Floats:
-    """Return rows (m, 4) that tell on which side of triangles (m, 3, 3) a ray starts.
+def side_rows(corners: Floats, center: Floats, radius: float) -> Floats:
+    """Return rows (m, 4) that tell on which side of flat polygons, corners (e, m, 3), a point lies.
 
-    The product with (o - center, 1) has the sign of the edge functions if the triangle's plane lies
-    ahead of the ray. It is scaled so that its product with w1 (see `edge_rows`) is above -1 for every
-    true hit from within two radii of the centre, and above 1 only if the two signs agree.
+    The product with (p - center, 1) has the sign of the edge functions of a ray if the polygon's plane
+    lies ahead of p. It is scaled so that its product with w1 (see `edge_rows`) is above -1 for
+    every true hit that does, with p within five radii of the centre.
     """
-    corner: Doubles = triangles.transpose(1, 0, 2).astype(np.float64) - center
+    corner: Doubles = corners.astype(np.float64) - center
     normal = np.cross(corner[1] - corner[0], corner[2] - corner[0])
     offset = (normal * corner[0]).sum(1)
     rows = np.concatenate([-normal, offset[:, None]], 1)
-    area2 = np.linalg.norm(normal, axis=1)
+    size = np.linalg.norm(normal, axis=1)
     edge_error, edge_scale = _edge_error(corner, radius)
-    error = ROUNDOFF * 40 * radius * area2
-    slack = error * (area2 + edge_error) + edge_error * (3 * radius * area2 + error)
+    area2 = _twice_area(corner)
+    # 60 roundings: of a sum of four terms, and of p where it is a point along a ray.
+    error = ROUNDOFF * 60 * radius * size + _unevenness(corner) * size
+    slack = error * (area2 + edge_error) + edge_error * (6 * radius * size + error)
     with np.errstate(all="ignore"):
         return (rows / (slack * edge_scale)[:, None]).astype(f4)
 
 
 def _edge_error(corner: Doubles, radius: float) -> tuple[Doubles, Doubles]:
-    """Bound the float32 error of edge functions of corners (3, m, 3), and the scale of their rows."""
-    direction = corner[[1, 2, 0]] - corner
-    moment = np.cross(corner, corner[[1, 2, 0]])
-    span = np.linalg.norm(direction, axis=2)
+    """Bound the float32 error of edge functions of corners (e, m, 3), and the scale of their rows."""
+    following = np.roll(corner, -1, 0)
+    moment = np.cross(corner, following)
+    span = np.linalg.norm(following - corner, axis=2)
     # By Wilkinson's bounds on six-term sums, with (o - center) rounded at a distance up to 2 radius.
     error = ROUNDOFF * (12 * np.linalg.norm(moment, axis=2) + 40 * radius * span).max(0)
-    area2 = np.linalg.norm(np.cross(direction[0], direction[1]), axis=1)
+    error += _unevenness(corner) * span.sum(0)
+    area2 = _twice_area(corner)
     with np.errstate(all="ignore"):
         return error, 1 / np.sqrt(error * (area2 + error))
+
+
+def _twice_area(corner: Doubles) -> Doubles:
+    """Twice the area of triangles or quadrilaterals (e, m, 3)."""
+    across = corner[-1] - corner[1] if len(corner) == 4 else corner[2] - corner[1]
+    return np.linalg.norm(np.cross(corner[2] - corner[0], across), axis=1)
+
+
+def _unevenness(corner: Doubles) -> Doubles | float:
+    """How far a corner of a quadrilateral may be from the plane of the others; 0 for triangles."""
+    if len(corner) == 3:
+        return 0.0
+    a, b, c, d = corner
+    halves = np.cross(b - a, c - a), np.cross(c - a, d - a)
+    volume = np.abs((halves[0] * (d - a)).sum(1))
+    with np.errstate(all="ignore"):
+        return volume / np.minimum(*(np.linalg.norm(half, axis=1) for half in halves))
+
+
+def one_sign(edges: Floats, out: Floats) -> Floats:
+    """Edge functions (b, e, m, k) -> the least of w0 w1, w1 w2 ..., above 0 where all have one sign.
+
+    Overwrites all edges but the second.
+    """
+    count = edges.shape[1]
+    products = []
+    for edge in (*range(count - 1, 1, -1), 0):
+        neighbour = 1 if edge == 0 else edge - 1
+        products.append(np.multiply(edges[:, edge], edges[:, neighbour], out=edges[:, edge]))
+    np.minimum(products[0], products[1], out=out)
+    for product in products[2:]:
+        np.minimum(out, product, out=out)
+    return out
 
 
 def hits_watertight(table: TriangleTable, prim: Ints, origin: Doubles, direction: Doubles) -> Bools:

@@ -1,0 +1,184 @@
+"""Quadrilaterals: pairs of triangles that one test serves must be hit like the triangles they are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_accel import PLACES, aimed_rays, brute_force, geometry, nothing, random_rays
+
+from wavefront.accel import Accelerator, make_accelerator
+from wavefront.accel.quads import find_quads
+
+f4 = np.float32
+SQUARE = np.array([(0.0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
+
+
+def fan(*corners: np.ndarray) -> np.ndarray:
+    """Two triangles for each quadrilateral (4, 3)."""
+    return np.array([[q[[0, 1, 2]], q[[0, 2, 3]]] for q in corners]).reshape(-1, 3, 3)
+
+
+def turn(seed: int) -> np.ndarray:
+    q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    return q * np.sign(np.diag(r))
+
+
+def box(half: tuple[float, float, float] = (1, 1, 1), seed: int = 0) -> np.ndarray:
+    """A turned box of six quadrilaterals (12, 3, 3)."""
+    corner = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half @ turn(seed).T
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return fan(*(corner[list(q)] for q in quads))
+
+
+def trapezoids(count: int, seed: int) -> np.ndarray:
+    """Convex plane quadrilaterals anywhere, of all kinds of shapes."""
+    rng = np.random.default_rng(seed)
+    angle = np.sort(rng.uniform(0, 2 * np.pi, (count, 4)), 1)
+    flat = np.stack([np.cos(angle) * rng.uniform(0.1, 2), np.sin(angle), 0 * angle], -1)
+    placed = [q @ turn(seed + i).T + rng.uniform(-1, 1, 3) for i, q in enumerate(flat)]
+    return fan(*placed)
+
+
+# --- finding them ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_faces_of_a_box_are_found(seed: int) -> None:
+    """Though its turned corners are not quite in one plane in float32."""
+    np.testing.assert_array_equal(find_quads(box((1, 0.3, 2), seed).astype(f4)), range(0, 12, 2))
+
+
+@pytest.mark.parametrize(
+    "bent",
+    [
+        [(0.0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 1e-6)],
+        [(0.0, 0, 0), (1, 0, 0), (1, 1, 0), (0.6, 0.4, 0)],
+        [(0.0, 0, 0), (1, 0, 0), (1, 1, 0), (0.5, 0.5, 0)],
+        [(0.0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0)],
+        [(0.0, 0, 0), (1, 0, 0), (1, 1, 0), (2, 0.5, 0)],
+    ],
+    ids=["bent", "dented", "three in a line", "no first half", "folded"],
+)
+def test_others_are_not(bent: list) -> None:
+    """They stay two triangles."""
+    assert find_quads(fan(np.array(bent)).astype(f4)).size == 0
+
+
+def test_a_strip_is_paired_once() -> None:
+    """A regular hexagon is a fan of four: two pairs, not three."""
+    angle = np.arange(6) * np.pi / 3
+    ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1)
+    triangles = np.array([ring[[0, k, k + 1]] for k in range(1, 5)])
+    np.testing.assert_array_equal(find_quads(triangles.astype(f4)), [0, 2])
+
+
+def test_a_triangle_between_quadrilaterals_stays_alone() -> None:
+    """Pairs begin anywhere."""
+    triangles = np.concatenate([fan(SQUARE), SQUARE[None, :3] + 5, fan(SQUARE + 9)])
+    np.testing.assert_array_equal(find_quads(triangles.astype(f4)), [0, 3])
+
+
+# --- rays -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("scale", "offset"), PLACES)
+@pytest.mark.parametrize("seed", range(3))
+def test_no_ray_escapes_a_box(seed: int, scale: float, offset: float) -> None:
+    """Aimed at corners, edges, diagonals and anywhere, from inside."""
+    triangles = (box((1, 0.8, 1.2), seed) * scale + offset).astype(f4)
+    origin, direction = aimed_rays(triangles.astype(float), 30_000, 1)
+    target = origin + direction
+    centre = triangles.mean((0, 1), dtype=float)[:, None]
+    origin = ((origin - centre) * 0.5 + centre).astype(f4)  # within the box
+    hits = make_accelerator(geometry(triangles), "numpy").closest(origin, target - origin, nothing(30_000))
+    assert (hits.prim < 0).sum() == 0
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(st.integers(1, 40), st.integers(0, 10**6), st.sampled_from([0.0, 3.0]))
+def test_quadrilaterals_agree_with_brute_force(count: int, seed: int, far: float) -> None:
+    """Which half is hit, where, and how far, but for the corners' own rounding."""
+    triangles = trapezoids(count, seed).astype(f4)
+    size = 1 + 20 * far
+    origin, direction = random_rays(200, seed + 1, 1.5 + 20 * far)
+    hits = make_accelerator(geometry(triangles), "numpy").closest(origin, direction, nothing(200))
+    t, weight = brute_force(triangles, origin, direction)
+    clear = ~((np.abs(weight) < 1e-5) | ((weight >= 0) & (np.abs(t) < 1e-6 * size))).any(0)
+    nearest = np.where((weight >= 0) & (t > 0), t, np.inf)
+    prim = np.where(np.isfinite(nearest.min(0)), nearest.argmin(0), -1)
+    np.testing.assert_array_equal(hits.prim[clear], prim[clear])
+    hit = np.flatnonzero(clear & (prim >= 0))
+    corner = triangles[prim[hit]].astype(float)
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    cosine = np.abs((normal.T * direction[:, hit]).sum(0)) / np.linalg.norm(normal, axis=1)
+    allowed = 2.0**-23 * (np.abs(triangles).max() / cosine + nearest.min(0)[hit])
+    assert (np.abs(hits.t[hit] - nearest.min(0)[hit]) <= allowed).all()
+    b1, b2 = hits.b1[hit, None].astype(float), hits.b2[hit, None].astype(float)
+    point = corner[:, 0] * (1 - b1 - b2) + corner[:, 1] * b1 + corner[:, 2] * b2
+    wanted = (origin + nearest.min(0) * direction.astype(float))[:, hit].T
+    assert (np.abs(point - wanted).max(1) <= 2e-5 * size + 4 * allowed).all()
+
+
+def room() -> Accelerator:
+    triangles = np.concatenate([box((1, 1, 1)), box((0.3, 0.4, 0.2), 3), box((0.2, 0.2, 0.6), 4) + 0.4])
+    return make_accelerator(geometry(triangles, [(0.6, 0, 0)], [0.2]), "numpy")
+
+
+@pytest.mark.parametrize("size", [1, 7, 64, 4096])
+def test_batches_have_the_same_bits(size: int) -> None:
+    """However many rays are tested at once."""
+    accelerator = room()
+    n = 300 if size == 1 else 9000
+    origin, direction = random_rays(n, 6)
+    origin[:, ::5] = 0
+    leaving = np.random.default_rng(7).integers(-1, 37, n)
+    distance = np.full(n, 0.7, f4)
+    whole = accelerator.closest(origin, direction, leaving)
+    blocked = accelerator.occluded(origin, direction, distance, leaving)
+    for at in range(0, n, size):
+        p = slice(at, at + size)
+        part = accelerator.closest(origin[:, p], direction[:, p], leaving[p])
+        for name in ("t", "prim", "b1", "b2"):
+            np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[p])
+        part_blocked = accelerator.occluded(origin[:, p], direction[:, p], distance[p], leaving[p])
+        np.testing.assert_array_equal(part_blocked, blocked[p])
+
+
+def test_neither_half_is_hit_by_a_ray_that_leaves_the_other() -> None:
+    """They are one plane."""
+    accelerator = make_accelerator(geometry(fan(SQUARE, SQUARE + (0, 0, 1))), "numpy")
+    origin = np.array([[0.7, 0.3, -1], [0.3, 0.7, -1]], f4).T.copy()
+    direction = np.array([[0, 0, 1.0]] * 2, f4).T.copy()
+    for leaving in (0, 1):
+        hits = accelerator.closest(origin, direction, np.full(2, leaving))
+        np.testing.assert_array_equal(hits.prim, [2, 3])
+    np.testing.assert_array_equal(accelerator.closest(origin, direction, nothing(2)).prim, [0, 1])
+    np.testing.assert_array_equal(accelerator.closest(origin, direction, np.full(2, 2)).prim, [0, 1])
+
+
+@pytest.mark.parametrize("reach", [1.0, 1e-3, 30.0, np.inf])
+def test_shadow_rays_end_where_they_end(reach: float) -> None:
+    """A ray is blocked if the closest hit is nearer than its end, also when the end is on a surface."""
+    accelerator = room()
+    n = 20_000
+    origin, direction = random_rays(n, 11, 0.9)
+    direction *= np.random.default_rng(3).uniform(0.1, 10, n).astype(f4)
+    t = accelerator.closest(origin, direction, nothing(n)).t
+    at_random = np.random.default_rng(12).uniform(0, 2, n) * reach
+    for distance in (at_random.astype(f4), t, np.nextafter(t, f4(np.inf)), np.nextafter(t, f4(0))):
+        blocked = accelerator.occluded(origin, direction, distance, nothing(n))
+        np.testing.assert_array_equal(blocked, t < distance)
+    assert 0 < (t < at_random).sum()
+
+
+def test_ties_of_halves_with_others_go_to_the_lowest_id() -> None:
+    """A triangle between two quadrilaterals in the same place."""
+    triangles = np.concatenate([fan(SQUARE), SQUARE[None, [0, 1, 2]], fan(SQUARE)])
+    accelerator = make_accelerator(geometry(triangles), "numpy")
+    rng = np.random.default_rng(1)
+    origin = np.stack([*rng.random((2, 500)), np.full(500, 2.0)]).astype(f4)
+    direction = np.tile(np.array([[0], [0], [-1]], f4), 500)
+    prim = accelerator.closest(origin, direction, nothing(500)).prim
+    np.testing.assert_array_equal(prim, np.where(origin[1] > origin[0], 1, 0))

@@ -1,0 +1,64 @@
+"""Decide element by element which candidates of the triangles' filters are hits, and where."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..vec import Floats, Ints
+from . import triangle
+from .found import Candidates, Found
+from .traverse import Lanes
+from .triangle import TriangleTable
+
+
+class TriangleDecisions:
+    """Decisions of one batch of rays; hits go to `found`.
+
+    Parameters
+    ----------
+    table
+        The triangles.
+    lanes, found
+        The rays, and what they have found.
+    partner
+        (m,) the other half of the quadrilateral that starts with a triangle, -1 for none. Absent where
+        the filter knows no quadrilaterals.
+    """
+
+    def __init__(self, table: TriangleTable, lanes: Lanes, found: Found, partner: Ints | None = None) -> None:
+        self.table, self.lanes, self.found, self.partner = table, lanes, found, partner
+        self._doubts = Candidates(self._decide_doubts)
+
+    def decide(self, prim: Ints, lane: Ints, value: Floats) -> None:
+        """Decide candidates: triangles (k,), lanes (k,) and the filter's values (k,), sure hits above 1.
+
+        Triangles that the rays leave must not be among them.
+        """
+        origin = self.lanes.origin.take(lane, 1).astype(np.float64)
+        direction = self.lanes.direction.take(lane, 1).astype(np.float64)
+        t = triangle.plane_distance(self.table, prim, origin, direction)
+        unsure = np.flatnonzero(value <= 1)
+        if unsure.size:
+            self._doubt(prim.take(unsure), lane.take(unsure))
+            t[unsure] = np.inf
+        self.found.add(lane, prim, t)
+
+    def finish(self) -> None:
+        """Decide what is left."""
+        self._doubts.flush()
+
+    def _doubt(self, prim: Ints, lane: Ints) -> None:
+        self._doubts.add(prim, lane)
+        if self.partner is not None:
+            other = self.partner.take(prim)
+            halves = np.flatnonzero(other >= 0)
+            self._doubts.add(other.take(halves), lane.take(halves))
+
+    def _decide_doubts(self, prim: Ints, lane: Ints) -> None:
+        """Decide the few pairs (k,) that the filter cannot."""
+        origin = self.lanes.origin.take(lane, 1).astype(np.float64)
+        direction = self.lanes.direction.take(lane, 1).astype(np.float64)
+        rays = prim, origin, direction
+        t = triangle.plane_distance(self.table, *rays)
+        t = triangle.clamp_to_triangle(self.table, *rays, t)
+        self.found.add(lane, prim, np.where(triangle.hits_watertight(self.table, *rays), t, np.inf))

@@ -1,0 +1,92 @@
+"""What a batch of rays has found so far, and the candidates still to be decided."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..vec import Floats, Ints, f4
+from .traverse import NO_HIT, Ball, Lanes
+from .triangle import ROUNDOFF, Doubles
+
+DECIDE = 1 << 14  # candidates decided at a time
+
+
+class Found(Protocol):
+    """Takes hits, and says how far rays still look."""
+
+    def add(self, lane: Ints, prim: Ints, t: Doubles) -> None:
+        """Take hits of lanes (k,) at t; those with t <= 0, NaN or inf are none."""
+
+    def reach(self) -> Floats:
+        """Return how far each of n rays looks, as `traverse.trace` wants it, (n + 1,)."""
+
+
+class Closest:
+    """The nearest hit of each lane so far, as one sortable word: bits of t, then the primitive."""
+
+    def __init__(self, lanes: Lanes, ball: Ball) -> None:
+        self.lanes, self.ball = lanes, ball
+        self.key = np.full(lanes.count, NO_HIT, np.int64)
+
+    def add(self, lane: Ints, prim: Ints, t: Doubles) -> None:
+        """Record hits of lanes (k,) at t; those with t <= 0, NaN or inf are none."""
+        rounded = t.astype(f4)
+        valid = (rounded > 0) & (rounded < np.inf)
+        key = (rounded.view(np.int32).astype(np.int64) << 32) | prim
+        np.minimum.at(self.key, lane, np.where(valid, key, NO_HIT))
+
+    def reach(self) -> Floats:
+        """Look no further than the nearest hit."""
+        return _reach((self.key >> 32).astype(np.int32).view(f4), self.lanes, self.ball)
+
+
+class Occluded:
+    """Which lanes are blocked so far."""
+
+    def __init__(self, lanes: Lanes, ball: Ball, distance: Floats) -> None:
+        self.lanes, self.ball, self.distance = lanes, ball, distance
+        self.blocked = np.zeros(distance.size, bool)
+
+    def add(self, lane: Ints, prim: Ints, t: Doubles) -> None:
+        """Block the lanes (k,) with 0 < t < distance."""
+        rounded = t.astype(f4)
+        self.blocked[lane.compress((rounded > 0) & (rounded < self.distance.take(lane)))] = True
+
+    def reach(self) -> Floats:
+        """Look as far as the distance, and no more when blocked."""
+        return _reach(np.where(self.blocked, f4(-np.inf), self.distance), self.lanes, self.ball)
+
+
+def _reach(t: Floats, lanes: Lanes, ball: Ball) -> Floats:
+    """Turn t into distances from the point next to the centre, in units of the ball's radius; rounded up."""
+    far = t * lanes.speed
+    out = np.zeros(t.size + 1, f4)
+    out[:-1] = (far + lanes.begin + 8 * ROUNDOFF * (far + np.abs(lanes.begin))) * f4(1 / ball.radius)
+    out[:-1] += f4(1e-6)
+    return out
+
+
+class Candidates:
+    """Collects small arrays of candidates, so that they are decided a few thousand at a time."""
+
+    def __init__(self, decide: Callable[..., None]) -> None:
+        self.decide = decide
+        self.parts: list[tuple[NDArray[Any], ...]] = []
+        self.count = 0
+
+    def add(self, *columns: NDArray[Any]) -> None:
+        """Add candidates, arrays of (k,) each."""
+        self.parts.append(columns)
+        self.count += columns[0].size
+        if self.count >= DECIDE:
+            self.flush()
+
+    def flush(self) -> None:
+        """Decide what has been collected."""
+        if self.count:
+            self.decide(*(np.concatenate(column) for column in zip(*self.parts, strict=True)))
+        self.parts, self.count = [], 0
