@@ -423,6 +423,47 @@ def test_embree_agrees() -> None:
     np.testing.assert_allclose(ours.b1[same], theirs.b1[same], atol=1e-4)
 
 
+@pytest.mark.skipif(not installed(), reason="no embreex")
+@pytest.mark.parametrize(
+    "name", ["bunny.obj", "cow.obj", "suzanne.obj", "teapot.obj", "rocker-arm.obj", "generated"]
+)
+def test_hit_for_hit_against_embree(name: str) -> None:
+    """The two differ only where a ray meets an edge within float32's rounding, or two triangles at once."""
+    if name == "generated":
+        rng = np.random.default_rng(4)
+        triangles = (sphere_mesh(5) * rng.uniform(0.8, 1, 3)).astype(f4)
+        triangles = np.concatenate([triangles, triangles[:, ::-1] * f4(0.5)])
+    elif (DATA / name).exists():
+        triangles = np.asarray(trimesh.load(DATA / name, force="mesh", process=False).triangles, f4)
+    else:
+        pytest.skip("the data meshes are not here")
+    n = 100_000
+    center, size = triangles.mean((0, 1), dtype=float), float(np.ptp(triangles, axis=(0, 1)).max())
+    origin, direction = random_rays(n, 20)
+    origin = (origin * size + center[:, None]).astype(f4)
+    ours, theirs = (
+        make_accelerator(geometry(triangles), a).closest(origin, direction, nothing(n))
+        for a in ("numpy", "embree")
+    )
+    with np.errstate(invalid="ignore"):
+        far = ~(np.abs(ours.t - theirs.t) <= 2e-6 * ours.t + 1e-6 * size)
+    differ = np.flatnonzero((far | (ours.prim != theirs.prim)) & ((ours.prim >= 0) | (theirs.prim >= 0)))
+    explained = 0
+    for ray in differ:
+        hits = [prim for prim in (ours.prim[ray], theirs.prim[ray]) if prim >= 0]
+        t, weight = brute_force(triangles[hits], origin[:, ray, None], direction[:, ray, None])
+        corner = triangles[hits].astype(float)
+        normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+        cosine = np.abs(normal @ direction[:, ray]) / np.linalg.norm(normal, axis=1)
+        length = np.linalg.norm(corner - np.roll(corner, 1, 1), axis=2).min(1)
+        graze = (np.abs(weight[:, 0]) < 2e-6 * size / (length * cosine)).any()
+        tie = len(hits) == 2 and abs(t[0, 0] - t[1, 0]) < 1e-6 * size / cosine.min()
+        explained += bool(graze or tie)
+    print(f"{name}: {len(triangles)} triangles, {n} rays, {differ.size} at an edge or a tie")
+    assert explained == differ.size
+    assert differ.size < 1e-3 * n
+
+
 def test_names() -> None:
     assert make_accelerator(geometry(), "numpy").name == "numpy"
     assert make_accelerator(geometry(), "auto").name == ("embree" if installed() else "numpy")

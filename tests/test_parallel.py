@@ -1,42 +1,71 @@
-"""Threads: results in order, few under way, errors and early stops clean."""
+"""Workers: results in order, few under way, errors, deaths and early stops clean."""
 
+from __future__ import annotations
+
+import multiprocessing
 import os
+import signal
+import subprocess
+import sys
 import threading
 import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
+import numpy as np
 import pytest
+import scenes
 
 import wavefront as wf
-from wavefront.parallel import run_ordered, worker_count
+from wavefront.parallel import MIN_PATHS, Workers, choose_executor, worker_count
+
+LINUX = sys.platform.startswith("linux")
+EXECUTORS = ["threads", pytest.param("processes", marks=pytest.mark.skipif(not LINUX, reason="needs fork"))]
+processes = pytest.mark.skipif(not LINUX, reason="needs fork")
 
 
+def run(work: Callable[[int], int], pieces: range, workers: int, executor: str) -> list[tuple[int, int]]:
+    with Workers(work, workers, executor) as crew:
+        return list(crew.run(pieces))
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
 @pytest.mark.parametrize("workers", [1, 2, 3, 8])
-def test_results_come_in_order(workers: int) -> None:
+def test_results_come_in_order(workers: int, executor: str) -> None:
     """However long each piece takes."""
 
     def work(piece: int) -> int:
         time.sleep(0.003 * (piece % 3))
         return piece * piece
 
-    assert list(run_ordered(work, range(20), workers)) == [(k, k * k) for k in range(20)]
+    assert run(work, range(20), workers, executor) == [(k, k * k) for k in range(20)]
 
 
-def test_few_pieces_are_taken_ahead() -> None:
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_several_runs_share_the_workers(executor: str) -> None:
+    """The second starts none anew."""
+    with Workers(lambda k: (k, os.getpid(), threading.get_ident()), 2, executor) as crew:
+        seen = [{result[1:] for _, result in crew.run(range(20))} for _ in range(2)]
+    assert len(seen[0] | seen[1]) <= 2
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_few_pieces_are_taken_ahead(executor: str) -> None:
     """A generator of a million pieces is not drained before the first result is used."""
     taken = []
 
-    def pieces():
+    def pieces() -> Iterator[int]:
         for k in range(1_000_000):
             taken.append(k)
             yield k
 
-    results = run_ordered(lambda k: k, pieces(), 2)
-    assert next(results) == (0, 0)
-    assert len(taken) <= 6
-    results.close()
+    with Workers(abs, 2, executor) as crew:
+        assert next(crew.run(pieces())) == (0, 0)
+        assert len(taken) <= 6
 
 
-def test_an_error_in_a_piece_reaches_the_caller() -> None:
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_an_error_in_a_piece_reaches_the_caller(executor: str) -> None:
     """As it was raised."""
 
     def work(piece: int) -> int:
@@ -45,20 +74,98 @@ def test_an_error_in_a_piece_reaches_the_caller() -> None:
         return piece
 
     with pytest.raises(ValueError, match="piece 3 failed"):
-        list(run_ordered(work, range(10), 2))
+        run(work, range(10), 2, executor)
 
 
-def test_no_thread_is_left() -> None:
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_no_worker_is_left(executor: str) -> None:
     """Neither after the end nor after an early stop."""
     before = threading.active_count()
-    list(run_ordered(lambda k: k, range(10), 3))
-    results = run_ordered(lambda k: k, range(10), 3)
-    next(results)
-    results.close()
-    deadline = time.monotonic() + 5
-    while threading.active_count() > before and time.monotonic() < deadline:
-        time.sleep(0.01)
+    run(abs, range(10), 3, executor)
+    with Workers(abs, 3, executor) as crew:
+        next(crew.run(range(10)))
     assert threading.active_count() == before
+    assert not multiprocessing.active_children()
+
+
+@processes
+def test_processes_are_processes() -> None:
+    """As many as asked for, and none of them this one."""
+    with Workers(lambda k: time.sleep(0.05) or os.getpid(), 3, "processes") as crew:
+        pids = {pid for _, pid in crew.run(range(30))}
+    assert len(pids) == 3
+    assert os.getpid() not in pids
+
+
+@processes
+def test_pieces_of_a_process_that_dies_are_done_again(tmp_path: Path) -> None:
+    """By new ones; nothing is missing."""
+
+    def work(piece: int) -> int:
+        if piece in (4, 11):
+            try:
+                (tmp_path / str(piece)).touch(exist_ok=False)
+            except FileExistsError:
+                return piece
+            os.kill(os.getpid(), signal.SIGKILL)
+        return piece
+
+    assert run(work, range(20), 2, "processes") == [(k, k) for k in range(20)]
+
+
+@processes
+def test_processes_that_die_again_and_again_are_an_error() -> None:
+    """It names the piece."""
+
+    def work(piece: int) -> int:
+        if piece == 5:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return piece
+
+    with pytest.raises(wf.SceneError, match=r"worker processes died 3 times, at last with \d .*memory"):
+        run(work, range(8), 2, "processes")
+    assert not multiprocessing.active_children()
+
+
+@processes
+def test_ctrl_c_reaches_the_parent_alone() -> None:
+    """A terminal sends it to all; workers finish what they do."""
+
+    def work(piece: int) -> int:
+        os.kill(os.getpid(), signal.SIGINT)
+        return piece
+
+    assert run(work, range(6), 2, "processes") == [(k, k) for k in range(6)]
+
+
+@processes
+def test_workers_end_with_their_parent(tmp_path: Path) -> None:
+    """Even if it is killed."""
+    script = (
+        "import os, sys, time\n"
+        "from wavefront.parallel import Workers\n"
+        "with Workers(lambda k: time.sleep(0.2) or os.getpid(), 2, 'processes') as crew:\n"
+        "    for _, pid in crew.run(range(1000)):\n"
+        "        print(pid, flush=True)\n"
+    )
+    parent = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    assert parent.stdout is not None
+    pids = {int(parent.stdout.readline()) for _ in range(4)}
+    parent.kill()
+    parent.wait()
+    parent.stdout.close()
+    deadline = time.monotonic() + 10
+    while pids and time.monotonic() < deadline:
+        time.sleep(0.05)
+        pids = {pid for pid in pids if _runs(pid)}
+    assert not pids
+
+
+def _runs(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
 
 
 def test_default_is_one_worker_per_core() -> None:
@@ -68,7 +175,89 @@ def test_default_is_one_worker_per_core() -> None:
 
 
 @pytest.mark.parametrize("workers", [0, -1, 1.5, True, "2"])
-def test_bad_worker_counts_are_named(workers) -> None:
+def test_bad_worker_counts_are_named(workers: object) -> None:
     """With the value and the limit."""
     with pytest.raises(wf.SceneError, match=f"workers is {workers!r}.*at least 1"):
         worker_count(workers)
+
+
+# --- which executor -------------------------------------------------------------------------------
+
+
+@processes
+def test_much_work_goes_to_processes() -> None:
+    """Little, or that of one worker, to threads."""
+    assert choose_executor(None, 2, MIN_PATHS) == "processes"
+    assert choose_executor(None, 2, MIN_PATHS - 1) == "threads"
+    assert choose_executor(None, 1, MIN_PATHS) == "threads"
+    assert choose_executor("threads", 2, MIN_PATHS) == "threads"
+    assert choose_executor("processes", 1, 1) == "processes"
+
+
+def test_without_a_global_lock_threads_are_as_fast(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in the free-threaded builds of Python."""
+    monkeypatch.setattr(sys, "_is_gil_enabled", lambda: False, raising=False)
+    assert choose_executor(None, 2, MIN_PATHS) == "threads"
+
+
+def test_where_nothing_can_be_forked_workers_are_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And asking for processes is an error that says why."""
+    monkeypatch.setattr(sys, "platform", "darwin")
+    assert choose_executor(None, 2, MIN_PATHS) == "threads"
+    with pytest.raises(
+        wf.SceneError, match=r"executor is 'processes', but .* not safe on darwin; use 'threads'"
+    ):
+        choose_executor("processes", 2, MIN_PATHS)
+
+
+@processes
+def test_a_daemon_has_threads() -> None:
+    """multiprocessing allows it no children."""
+    daemon = multiprocessing.current_process()
+    daemon._config["daemon"] = True  # type: ignore[attr-defined]
+    try:
+        assert choose_executor(None, 2, MIN_PATHS) == "threads"
+        with pytest.raises(wf.SceneError, match=r"daemon of multiprocessing.*use 'threads'"):
+            choose_executor("processes", 2, MIN_PATHS)
+    finally:
+        del daemon._config["daemon"]  # type: ignore[attr-defined]
+
+
+def test_unknown_executors_are_named() -> None:
+    """With what there is."""
+    with pytest.raises(wf.SceneError, match="executor is 'dask'; it must be one of processes, threads"):
+        wf.render(scenes.everything(), 1, executor="dask")
+
+
+# --- pictures -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("accel", ["numpy", "auto"])
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_the_executor_changes_no_bit(executor: str, accel: str) -> None:
+    """And is named in the picture."""
+    options = {"accel": accel, "progress": False, "wave_size": 500}
+    image = wf.render(scenes.everything(), 8, workers=2, executor=executor, **options)
+    alone = wf.render(scenes.everything(), 8, workers=1, executor="threads", **options)
+    assert image.rgb.tobytes() == alone.rgb.tobytes()
+    assert image.metadata["executor"] == executor
+    assert image.metadata["rays"] == alone.metadata["rays"]
+
+
+@processes
+def test_ctrl_c_stops_processes() -> None:
+    """The picture so far is the same as with threads, and no process is left."""
+
+    def stop(done: int, total: int) -> None:
+        if done >= 4 * 300:
+            raise KeyboardInterrupt
+
+    pictures = []
+    for executor in ("processes", "threads"):
+        with pytest.warns(UserWarning, match="interrupted"):
+            image = wf.render(
+                scenes.everything(), 64, wave_size=300, workers=2, executor=executor, progress=stop
+            )
+        pictures.append(np.asarray(image).tobytes())
+    assert pictures[0] == pictures[1]
+    assert not multiprocessing.active_children()

@@ -1,5 +1,6 @@
 """render(): the same bits however the work is cut, arguments, warnings, faults and stops."""
 
+import sys
 from functools import cache
 from importlib import import_module
 
@@ -59,6 +60,34 @@ def test_workers_change_no_bit(workers: int, sampler: str) -> None:
     """Results are added in the order of the work, not of its completion."""
     image = render(scenes.everything(), SPP, sampler=sampler, workers=workers, wave_size=50)
     assert image.rgb.tobytes() == whole("full", sampler)
+
+
+@cache
+def many_triangles() -> wf.Scene:
+    """5 120 triangles of glass and metal in a lit room of quadrilaterals."""
+    ball = trimesh.creation.icosphere(subdivisions=4)
+    faces = np.array_split(ball.faces, 2)
+    glass = wf.Mesh(ball.vertices * 0.6, faces[0], material=wf.Dielectric(1.5))
+    metal = wf.Mesh(ball.vertices * 0.6, faces[1], material=wf.Conductor.named("gold", roughness=0.3))
+    light = wf.Rectangle((-0.5, 0.99, -0.5), (1, 0, 0), (0, 0, 1), emission=8.0)
+    floor = wf.Rectangle((-1, -1, 1), (2, 0, 0), (0, 0, -2))
+    camera = wf.Camera.look_at((0, 0.3, 3), (0, 0, 0), fov=45, size=(10, 8))
+    return wf.Scene([glass, metal, light, floor], [wf.Environment(0.1)], camera=camera)
+
+
+@cache
+def many_triangles_whole() -> bytes:
+    return render(many_triangles(), 2, accel="numpy").rgb.tobytes()
+
+
+@pytest.mark.parametrize("workers", [1, 2, 3, 8])
+@pytest.mark.parametrize("wave_size", [1, 7, 64, 4096, None])
+def test_a_mesh_has_the_same_bits_in_any_wave_on_any_worker(wave_size: int | None, workers: int) -> None:
+    """The tree sorts rays into blocks, and none of them sees its neighbours."""
+    cut = {} if wave_size is None else {"wave_size": wave_size}
+    executor = "processes" if workers == 2 and sys.platform == "linux" else "threads"
+    image = render(many_triangles(), 2, accel="numpy", workers=workers, executor=executor, **cut)
+    assert image.rgb.tobytes() == many_triangles_whole()
 
 
 def test_seeds_change_the_picture() -> None:
