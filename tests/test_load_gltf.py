@@ -19,6 +19,7 @@ from wavefront.io import appearance
 from wavefront.io.images import srgb_to_linear
 from wavefront.io.load import from_trimesh, load, load_meshes
 from wavefront.lights import DirectionalLight, SpotLight
+from wavefront.relief import NormalMap
 from wavefront.textures import Texture
 from wavefront.vertex_colors import VertexColors
 
@@ -274,7 +275,7 @@ class Recorder(Diffuse):
     def __init__(
         self, base_color, metallic=0, roughness=0.5, ior=1.5, transmission=0, clearcoat=0,
         clearcoat_roughness=0, sheen_color=0, sheen_roughness=0, specular=1, specular_color=1,
-        normal_map=None, absorption=0, sheen=0, anisotropy=0, thin=False,
+        absorption=0, sheen=0, anisotropy=0, thin=False,
     ):  # fmt: skip
         self.given = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
         super().__init__(0.5)
@@ -367,10 +368,25 @@ def test_texture_transform_by_the_example_of_its_specification(given, build):
         assert at(base, s, 1 - t) == pytest.approx(at(plain, moved[0], 1 - moved[1]), abs=1e-5)
 
 
-def test_normal_map(given, build):
-    info = build.image(np.uint8([[[128, 255, 255]]])) | {"scale": 0.5}
-    found = at(given(normalTexture=info)["normal_map"], 0.5, 0.5)
-    assert found == pytest.approx([0.5 * (2 * 128 / 255 - 1), 0.5, 1], abs=1e-6)
+@pytest.mark.parametrize("material", [{}, {"pbrMetallicRoughness": {"metallicFactor": 0}}])
+@pytest.mark.parametrize("glass", [False, True])
+def test_normal_map(build, path, material, glass):
+    codes = np.uint8([[[128, 255, 255]]])
+    info = build.image(codes) | {"scale": 0.5, "texCoord": 1}
+    extensions = {"KHR_materials_transmission": {"transmissionFactor": 1}} if glass else {}
+    (mesh,) = load_meshes(build.material(**material, normalTexture=info, extensions=extensions).gltf(path))
+    relief = mesh.material.relief
+    assert isinstance(relief, NormalMap)
+    assert (relief.strength, relief.texture.uv_set) == (0.5, 1)
+    assert at(relief.texture, 0.5, 0.5) == pytest.approx(codes[0, 0] / 255)
+
+
+def test_bad_normal_maps(build, path):
+    info = build.image(np.zeros((1, 1), np.uint8)) | {"scale": "big"}
+    for message in (r"normalTexture\.scale is \['big'\]", r"normalTexture: NormalMap: .* gives numbers"):
+        with pytest.raises(SceneError, match=rf"materials\[0\]\.{message}"):
+            load(build.material(normalTexture=info).gltf(path))
+        info["scale"] = 1
 
 
 @pytest.mark.parametrize("mode", ["OPAQUE", "MASK", "BLEND"])
@@ -842,6 +858,7 @@ def test_a_textured_object_in_memory_equals_its_file(tmp_path):
         metallicFactor=0.0,
         roughnessFactor=1.0,
         emissiveFactor=[1.0, 0.0, 0.5],
+        normalTexture=Image.fromarray(codes[::-1]),
     )
     plane.visual = trimesh.visual.TextureVisuals(uv=plane.vertices[:, :2], material=material)
     plane.export(tmp_path / "a.glb")
@@ -852,6 +869,7 @@ def test_a_textured_object_in_memory_equals_its_file(tmp_path):
         assert np.array_equal(soup(mesh, mesh.uvs), soup(held, held.uvs))
         assert same(mesh.emission, held.emission)
         assert same(mesh.material.base_color, held.material.base_color)
+        assert same(mesh.material.relief.texture, held.material.relief.texture)
 
 
 @pytest.mark.parametrize("dressed", [False, True], ids=["plain", "material"])

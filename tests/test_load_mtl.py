@@ -5,12 +5,14 @@ import inspect
 import imageio.v3 as iio
 import numpy as np
 import pytest
+import trimesh
 
 from wavefront.bsdfs import Dielectric, Diffuse, Principled
 from wavefront.errors import SceneError
 from wavefront.io import appearance
 from wavefront.io.images import srgb_to_linear
-from wavefront.io.load import load_meshes
+from wavefront.io.load import from_trimesh, load_meshes
+from wavefront.relief import BumpMap, NormalMap
 from wavefront.textures import Texture
 
 CODES = np.random.default_rng(0).integers(0, 256, (4, 8, 3), np.uint8)
@@ -37,7 +39,7 @@ class Recorder(Diffuse):
 
     def __init__(
         self, base_color, metallic=0, roughness=0.5, sheen=0, clearcoat=0, clearcoat_roughness=0,
-        anisotropy=0, normal_map=None, specular=1,
+        anisotropy=0, specular=1,
     ):  # fmt: skip
         self.given = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
         super().__init__(0.5)
@@ -123,21 +125,80 @@ def test_the_pbr_extension(given):
         "clearcoat": 0.5,
         "clearcoat_roughness": 0.25,
         "anisotropy": 0.75,
-        "normal_map": None,
         "specular": 1,
     }
 
 
 def test_pbr_maps(given):
-    found = given("map_Pr t.png", "Pm 0.5", "map_Pm -imfchan b t.png", "norm t.png")
+    found = given("map_Pr t.png", "Pm 0.5", "map_Pm -imfchan b t.png")
     assert same(found["roughness"], srgb=False, channel="luminance")
     assert same(found["metallic"], srgb=False, channel=2, scale=0.5)
-    assert same(found["normal_map"], srgb=False, scale=2, offset=-1)
+
+
+@pytest.mark.parametrize(
+    "lines", [["Kd 1 0 0"], ["Pr 0.3", "Pm 1"], ["illum 7", "Ni 1.5"], ["illum 3", "Ks 1 1 1"]]
+)
+def test_norm_is_a_normal_map_of_any_material(one, lines):
+    relief = one(*lines, "norm -bm 0.5 -s 2 2 t.png").material.relief
+    assert isinstance(relief, NormalMap)
+    assert relief.strength == 0.5
+    assert same(relief.texture, srgb=False, transform=np.diag([2.0, 2, 1]))
+    assert one(*lines).material.relief is None
+
+
+@pytest.mark.parametrize("keyword", ["bump", "map_bump", "map_Bump"])
+def test_bump_is_a_map_of_heights(one, keyword):
+    relief = one(f"{keyword} -bm 0.2 -mm 0.1 2 t.png").material.relief
+    assert isinstance(relief, BumpMap)
+    assert relief.height == np.float32(0.2)
+    assert same(relief.texture, srgb=False, channel="luminance", scale=2, offset=0.1)
+    chosen = one(f"{keyword} -imfchan g t.png").material.relief
+    assert chosen.height == 1
+    assert same(chosen.texture, srgb=False, channel=1)
+
+
+def test_a_bump_map_that_looks_like_normals_is_one(one, tmp_path):
+    codes = np.random.default_rng(1).normal([128, 128, 240], 8, (16, 16, 3)).clip(0, 255).astype(np.uint8)
+    iio.imwrite(tmp_path / "n.png", codes)
+    relief = one("map_Bump -bm 0.7 n.png").material.relief
+    assert isinstance(relief, NormalMap)
+    assert relief.strength == np.float32(0.7)
+    assert isinstance(one("map_Bump -imfchan b n.png").material.relief, BumpMap)
+    iio.imwrite(tmp_path / "n.png", codes[..., 2])
+    assert isinstance(one("map_Bump n.png").material.relief, BumpMap)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("norm no.png", r"s\.mtl line 2: norm: .*no\.png: there is no such file"),
+        ("bump -bm x t.png", r"s\.mtl line 2: bump: .*-bm is 'x'; it must be numbers|-bm is 'x'"),
+        ("norm -s 0 t.png", r"s\.mtl line 2: norm: NormalMap: the transform of .* is singular"),
+        ("bump -bm nan t.png", r"s\.mtl line 2: bump: BumpMap height is nan"),
+    ],
+)
+def test_defects_of_reliefs(one, line, message):
+    with pytest.raises(SceneError, match=message):
+        one(line)
+
+
+@pytest.mark.filterwarnings(r"ignore:.*s\.mtl. not honoured")
+@pytest.mark.parametrize(
+    "line", ["map_Pr t.png", "map_Ke t.png", "map_d t.png", "norm t.png", "map_Bump t.png"]
+)
+def test_images_that_trimesh_leaves_out_are_named(one, tmp_path, monkeypatch, line):
+    one("Kd 1 0.5 0", "map_Kd t.png", line)
+    monkeypatch.chdir(tmp_path)  # where t.png is: it is not looked for
+    held = trimesh.load(tmp_path / "a.obj", process=False)
+    with pytest.warns(UserWarning, match=f"not honoured: {line.split()[0].lower()}"):
+        (mesh,) = from_trimesh(held).shapes
+    assert isinstance(mesh.material, Diffuse)
+    assert mesh.emission is None
 
 
 def test_roughness_0_is_kept_and_absent_roughness_is_matte(given):
     assert given("Pr 0")["roughness"] == 0
-    matte = given("norm t.png")
+    matte = given("Ps 0.5")
     assert (matte["roughness"], matte["specular"]) == (1, 0)
 
 
@@ -174,7 +235,7 @@ def test_map_ke(one):
     [
         (["Ka 0.2 0.2 0.2"], "Ka"),
         (["Ks 0.5 0.5 0.5", "Ns 100"], "Ks"),
-        (["map_Bump -bm 0.2 t.png"], "map_Bump"),
+        (["norm t.png", "map_Bump t.png"], "map_Bump"),
         (["disp t.png"], "disp"),
         (["refl -type sphere t.png"], "refl"),
         (["Tf 0.5 0.5 0.5"], "Tf"),

@@ -19,6 +19,7 @@ from .film import Image
 from .io.load import from_trimesh, load, load_mesh
 from .lights import DirectionalLight, Environment, PointLight, SpotLight
 from .metrics import Comparison, compare
+from .relief import BumpMap, NormalMap
 from .render import render
 from .scene import Scene
 from .shapes import Disk, Mesh, Rectangle, Sphere
@@ -28,6 +29,7 @@ from .vertex_colors import VertexColors
 __all__ = [
     "Bsdf",
     "BsdfSample",
+    "BumpMap",
     "Camera",
     "Comparison",
     "Conductor",
@@ -40,6 +42,7 @@ __all__ = [
     "Mesh",
     "Mirror",
     "Mix",
+    "NormalMap",
     "OrenNayar",
     "PointLight",
     "Principled",

@@ -19,6 +19,7 @@ from .stages.bounce import bounce_sample
 from .stages.compact import carrying, compact, roulette
 from .stages.intersect import intersect
 from .stages.passing import pass_through
+from .stages.relief import tilt
 from .stages.shade import Arrival, Shading, direct, emitted, mis_weighted, shading
 from .stages.surface import interact
 from .state import Hits, Paths
@@ -112,6 +113,7 @@ INTEGRATORS: dict[str, Integrator] = {
 def arrive(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
     """Weaken the paths by the matter they came through, and make their surfaces ready to shade."""
     surface = interact(scene, paths, hits)
+    tilt(scene, surface)
     absorb(scene, paths.throughput, hits, surface)
     return shading(scene, surface)
 

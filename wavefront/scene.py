@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .accel.base import Accelerator, Geometry
-from .bsdfs import Bsdf, Opacity, Spatial
+from .bsdfs import Bsdf, Opacity, Relief, Spatial
 from .camera import Camera
 from .camera.base import image_size
 from .errors import SceneError, number
@@ -141,6 +141,7 @@ class Materials:
 
     group_of: Ints  # (materials,) the group of each material
     groups: tuple[Bsdf, ...]
+    reliefs: tuple[tuple[int, Relief], ...]  # the groups that have one, with it
 
 
 @dataclass(slots=True)
@@ -249,7 +250,9 @@ def group_materials(materials: Sequence[Bsdf]) -> Materials:
     group_of = np.empty(len(materials), np.intp)
     for group, numbers in enumerate(members.values()):
         group_of[numbers] = group
-    return Materials(group_of, tuple(_merge(materials, numbers) for numbers in members.values()))
+    groups = tuple(_merge(materials, numbers) for numbers in members.values())
+    reliefs = tuple((number, bsdf.relief) for number, bsdf in enumerate(groups) if bsdf.relief is not None)
+    return Materials(group_of, groups, reliefs)
 
 
 def _absorption(materials: Sequence[Bsdf]) -> Floats | None:
@@ -320,31 +323,31 @@ def _attributes_read(meshes: Sequence[Mesh], spheres: Sequence[Sphere]) -> list[
     SceneError
         If a parameter reads what does not exist.
     """
-    lacking: dict[str, list[str]] = {}
+    read: set[str] = set()
+    lacking: dict[str, dict[int, str]] = {}  # what -> the meshes that lack it, by identity, with their names
     shapes: list[Shape] = [*meshes, *spheres]
     for shape in shapes:
         for name in sorted(_reads(shape.material)):
             if name not in ATTRIBUTES:
                 known = ", ".join(ATTRIBUTES)
                 raise SceneError(f"{shape.name}: its material reads {name!r}; it must be one of {known}")
-            without = lacking.setdefault(name, [])
-            if isinstance(shape, Mesh) and ATTRIBUTES[name].of_mesh(shape) is None:
-                without.append(shape.name)
-    for name, without in lacking.items():
-        if without:
-            warnings.warn(
-                f"{len(without)} meshes lack the {ATTRIBUTES[name].title} that their materials read, "
-                f"first: {without[0]!r}",
-                stacklevel=5,
-            )
-    return sorted(lacking)
+            read.add(name)
+            if isinstance(shape, Mesh) and ATTRIBUTES[name].given(shape) is None:
+                lacking.setdefault(ATTRIBUTES[name].title, {})[id(shape)] = shape.name
+    for title, names in lacking.items():
+        warnings.warn(
+            f"{len(names)} meshes lack the {title} that their materials read, "
+            f"first: {next(iter(names.values()))!r}",
+            stacklevel=5,
+        )
+    return sorted(read)
 
 
 def _reads(material: Bsdf | Opacity) -> set[str]:
     """Return the names of the attributes that the parameters of a material read."""
     out: set[str] = set()
     for value in vars(material).values():
-        if isinstance(value, Spatial):
+        if isinstance(value, Spatial | Relief):
             out.update(value.reads)
         elif isinstance(value, Bsdf | Opacity):
             out.update(_reads(value))

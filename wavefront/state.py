@@ -120,6 +120,8 @@ class Surface(Columns):
     uv: Floats | None = None  # (2, n) texture coordinates
     uv1: Floats | None = None  # (2, n) the second set of texture coordinates
     color: Floats | None = None  # (4, n) linear RGB and opacity, given per vertex
+    tangents: Floats | None = None  # (6, n) how the point moves with u and with v, scene units
+    tangents1: Floats | None = None  # (6, n) the same for uv1
 
     def frame(self) -> Frame:
         """Return the shading frames, z = ns."""

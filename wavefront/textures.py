@@ -74,6 +74,7 @@ class Texture(Spatial):
         self._texels = codes.reshape(-1)  # 8-bit images stay 8-bit: a quarter of the memory
         self._channels = _pick(self.name, channel, self._stride)
         self._tables = [_table(codes.dtype, srgb and not _is_alpha(c, self._stride)) for c in self._channels]
+        self.srgb = srgb and codes.dtype.kind == "u"
         self._grey = channel == "luminance"
         self.scalar = channel is not None
         self.wrap = _pair(wrap)
@@ -97,11 +98,33 @@ class Texture(Spatial):
 
     def lookup(self, uv: Floats) -> Floats:
         """Return the values at texture coordinates (2, n): (3, n), or (n,) for one channel."""
+        x, y = self._texel_space(uv)
+        rows = self._nearest(x, y) if self.filter == "nearest" else self._bilinear(x, y)
+        return self._shaped(rows)
+
+    def gradient(self, uv: Floats) -> Floats:
+        """Return the slopes of one channel along u and v, (2, n), per unit of uv (2, n).
+
+        Differences of bilinear lookups half a texel to either side: they vary without steps.
+        """
+        x, y = self._texel_space(uv)
+        half = f4(0.5)
+        across = self._shaped(self._bilinear(x + half, y)) - self._shaped(self._bilinear(x - half, y))
+        up = self._shaped(self._bilinear(x, y - half)) - self._shaped(self._bilinear(x, y + half))
+        u, v = uv if self.transform is None else _transformed(self.transform, uv)
+        across *= _unwrapped_slope(u, self.wrap[0]) * f4(self.size[0])
+        up *= _unwrapped_slope(v, self.wrap[1]) * f4(self.size[1])
+        if self.transform is None:
+            return np.stack([across, up])
+        m = self.transform.astype(f4)
+        return np.stack([across * m[0, 0] + up * m[1, 0], across * m[0, 1] + up * m[1, 1]])
+
+    def _texel_space(self, uv: Floats) -> tuple[Floats, Floats]:
+        """Return texture coordinates (2, n) in texels from the left and from the top."""
         u, v = uv if self.transform is None else _transformed(self.transform, uv)
         x = _unwrapped(u, self.wrap[0]) * f4(self.size[0])
         y = (f4(1) - _unwrapped(v, self.wrap[1])) * f4(self.size[1])
-        rows = self._nearest(x, y) if self.filter == "nearest" else self._bilinear(x, y)
-        return self._shaped(rows)
+        return x, y
 
     def mean(self) -> Floats:
         """Return the average over the image: (3,), or () for one channel."""
@@ -234,6 +257,15 @@ def _unwrapped(t: Floats, wrap: str) -> Floats:
     if wrap == "repeat":
         return t - np.floor(t)
     return f4(1) - np.abs(f4(1) - (t - f4(2) * np.floor(t * f4(0.5))))
+
+
+def _unwrapped_slope(t: Floats, wrap: str) -> Floats:
+    """Return the derivative of `_unwrapped`."""
+    if wrap == "clamp":
+        return ((t >= 0) & (t <= 1)).astype(f4)
+    if wrap == "repeat":
+        return np.ones_like(t)
+    return np.where(t - f4(2) * np.floor(t * f4(0.5)) < f4(1), f4(1), f4(-1))
 
 
 def _neighbours(x: Floats, size: int, wrap: str) -> tuple[Ints, Ints, Floats]:

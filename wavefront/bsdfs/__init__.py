@@ -9,6 +9,7 @@ from .mix import Mix
 from .opacity import Opacity
 from .oren_nayar import OrenNayar
 from .principled import Principled
+from .relief import Relief
 from .spatial import Spatial
 from .thin import ThinDielectric
 
@@ -26,6 +27,7 @@ __all__ = [
     "Opacity",
     "OrenNayar",
     "Principled",
+    "Relief",
     "Spatial",
     "ThinDielectric",
 ]

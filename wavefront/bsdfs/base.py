@@ -14,11 +14,13 @@ from typing import Self
 
 import numpy as np
 
+from ..errors import SceneError
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..state import Surface
 from ..vec import Bools, Floats
 from .opacity import Opacity, opacity
 from .parameter import Scalar
+from .relief import Relief
 from .spatial import Spatial
 
 
@@ -45,6 +47,7 @@ class Bsdf(ABC):
     dimensions: int = 2  # rows of u that sample_f reads
     specular: bool = False  # every lobe is a delta: f and pdf are 0, light sampling is skipped
     opacity: Opacity | None = None  # how much of the surface is there; None: all. The renderer sees to it
+    relief: Relief | None = None  # tilts the shading normals. The renderer sees to it, no material does
 
     def with_alpha(self, alpha: Scalar, cutoff: float | None = None) -> Self:
         """Return this material for a surface that is only partly there.
@@ -65,6 +68,20 @@ class Bsdf(ABC):
         partly = copy(self)
         partly.opacity = opacity(type(self).__name__, alpha, cutoff)
         return partly
+
+    def with_relief(self, relief: Relief) -> Self:
+        """Return this material with a `NormalMap` or `BumpMap`.
+
+        Raises
+        ------
+        SceneError
+            If it is something else.
+        """
+        if not isinstance(relief, Relief):
+            raise SceneError(f"relief must be a NormalMap or a BumpMap, got {relief!r}")
+        carved = copy(self)
+        carved.relief = relief
+        return carved
 
     def bind(self, surface: Surface) -> Self:
         """Return this material with its spatial parameters looked up at `surface` (n columns)."""

@@ -30,7 +30,7 @@ class Mix(Bsdf):
     ------
     SceneError
         If the weight is outside [0, 1], something else than a material is given, or a material has
-        an alpha of its own.
+        an alpha or a relief of its own.
     """
 
     dimensions = 3
@@ -41,6 +41,8 @@ class Mix(Bsdf):
                 raise SceneError(f"Mix {name} must be a material, got {value!r}")
             if value.opacity is not None:
                 raise SceneError(f"Mix {name} has an alpha; give it to the Mix, by with_alpha")
+            if value.relief is not None:
+                raise SceneError(f"Mix {name} has a relief; give it to the Mix, by with_relief")
         self.first, self.second = first, second
         self.weight = scalar("Mix weight", weight)
         self.transmissive = first.transmissive or second.transmissive

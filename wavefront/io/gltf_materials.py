@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
+from ..relief import NormalMap
 from ..textures import Texture
 from .appearance import Look, emission, realise
 from .gltf import Document, floats
@@ -106,7 +107,7 @@ class _Reader:
     def look(self) -> Look:
         """Return the look of the material."""
         self._metallic_roughness(self._item.get("pbrMetallicRoughness", {}))
-        self._maps()
+        relief = self._relief()
         extensions = self._item.get("extensions", {})
         self._ior(extensions.get("KHR_materials_ior"))
         self._transmission(
@@ -120,6 +121,7 @@ class _Reader:
         radiance = self._emission(extensions.get("KHR_materials_emissive_strength", {}))
         try:
             material, lost = realise(self._wanted)
+            material = material if relief is None else material.with_relief(relief)
         except SceneError as error:
             raise SceneError(f"{self._file}: {self._where}: {error}") from error
         return Look(material, radiance, self._lost + lost)
@@ -179,21 +181,18 @@ class _Reader:
         if mode == "MASK" and "alpha" in self._wanted:
             self._wanted["alpha_cutoff"] = self._number(self._item, "alphaCutoff", 0.5, high=np.inf)
 
-    def _maps(self) -> None:
-        if "normalTexture" in self._item:
-            info = self._item["normalTexture"]
-            given = info.get("scale", 1) if isinstance(info, dict) else 1
-            scale = floats(f"{self._file}: {self._where}.normalTexture.scale", [given], 1)[0]
-            # texels 0 to 1 become components -1 to 1; x and y are scaled
-            self._wanted["normal_map"] = self._texture(
-                self._item,
-                "normalTexture",
-                srgb=False,
-                scale=[2 * scale, 2 * scale, 2],
-                offset=[-scale, -scale, -1],
-            )
+    def _relief(self) -> NormalMap | None:
         if "occlusionTexture" in self._item:
             self._lost.append("occlusionTexture")
+        texture = self._texture(self._item, "normalTexture", srgb=False)
+        if texture is None:
+            return None
+        where = f"{self._file}: {self._where}.normalTexture"
+        scale = floats(f"{where}.scale", [self._item["normalTexture"].get("scale", 1)], 1)[0]
+        try:
+            return NormalMap(texture, scale)
+        except SceneError as error:
+            raise SceneError(f"{where}: {error}") from error
 
     def _ior(self, group: dict[str, Any] | None) -> None:
         if group is None:

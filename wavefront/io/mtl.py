@@ -11,7 +11,10 @@ How an MTL material is read:
 - Opacity is `d`; without a `d` it is 1 - `Tr`, except that `Tr 1` alone means opaque: that is how
   MeshLab writes it, and a material that cannot be seen has no other use. A surface that is less
   than opaque and has an index `Ni` other than 1 is glass.
-- Images are sRGB where they are colours, data elsewhere. The options -s -o -clamp -mm -imfchan are read.
+- `norm` is a normal map. `bump`, or `map_Bump`, holds heights, of which 1 is `-bm` (1 when absent) scene
+  units; but an image that looks like a normal map is one, for that is how Blender writes them, and
+  `-bm` is then its strength.
+- Images are sRGB where they are colours, data elsewhere. The options -s -o -clamp -mm -imfchan -bm are read.
 
 Whatever else a file asks for is named in one warning per file: `Ks` and `Ns` among it, for files set
 them to anything, and a highlight made of them is a guess.
@@ -20,14 +23,16 @@ them to anything, and a highlight made of them is a guess.
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bsdfs import Bsdf, Dielectric, Diffuse, Mirror
+from ..bsdfs import Bsdf, Dielectric, Diffuse, Mirror, Relief
 from ..errors import SceneError
+from ..relief import BumpMap, NormalMap
 from ..textures import Texture
 from .appearance import Look, emission, realise
 from .files import beside
@@ -52,6 +57,8 @@ PBR = (
 # options of a map that take this many words; those not named here take up to three numbers
 OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-mm": 2}
 OPTIONS |= {"-texres": 1, "-type": 1, "-bm": 1}
+READ = frozenset(("-s", "-o", "-mm", "-clamp", "-imfchan"))
+RELIEFS = ("norm", "map_bump", "bump")  # keywords whose maps have a multiplier, -bm
 CHANNELS: dict[str, Any] = {"r": 0, "g": 1, "b": 2, "m": 3, "l": "luminance"}
 
 Colour = NDArray[np.float64]
@@ -114,7 +121,7 @@ class Entry:
         return limited
 
     def texture(self, key: str, scale: Any = 1.0, kind: str = "colour") -> Texture | None:
-        """Return the texture of a map of the kind "colour", "scalar" or "normal", None if there is none."""
+        """Return the texture of a map of the kind "colour", "scalar" or "data", None if there is none."""
         if key not in self.lines:
             return None
         options, name = _map(self, key)
@@ -122,8 +129,6 @@ class Entry:
             raise SceneError(f"{self.where(key)} names no file")
         self.read.add(key)
         base, gain = self._option(options, "-mm", [0.0, 1.0])
-        if kind == "normal":  # texels 0 to 1 become components -1 to 1
-            base, gain = -1.0, 2.0
         try:
             return Texture(
                 self.images[key] if key in self.images else beside(self.file, name),
@@ -136,6 +141,11 @@ class Entry:
             )
         except SceneError as error:
             raise SceneError(f"{self.where(key)}: {error}") from error
+
+    def multiplier(self, key: str) -> float:
+        """Return the option -bm of a map."""
+        options, _ = _map(self, key)
+        return self._option(options, "-bm", [1.0])[0]
 
     def _option(self, options: dict[str, list[str]], name: str, default: list[float]) -> list[float]:
         try:
@@ -235,6 +245,8 @@ def look(entry: Entry) -> Look:
         factor = np.ones(3)
     radiance, lost = emission(factor, entry.texture("map_ke"))
     material, more = _material(entry)
+    relief = _relief(entry)
+    material = material if relief is None else material.with_relief(relief)
     return Look(material, radiance, lost + more)
 
 
@@ -263,9 +275,6 @@ def _wanted(entry: Entry) -> dict[str, Any]:
         if texture is not None or (key in entry.lines and (factor or name == "roughness")):
             wanted[name] = factor if texture is None else texture
     wanted["alpha"] = _alpha(entry)
-    normals = entry.texture("norm", kind="normal")
-    if normals is not None:
-        wanted["normal_map"] = normals
     return wanted
 
 
@@ -275,6 +284,48 @@ def _alpha(entry: Entry) -> Any:
     entry.read.update(("d", "tr"))
     texture = entry.texture("map_d", factor, "scalar")
     return factor if texture is None else texture
+
+
+def _relief(entry: Entry) -> Relief | None:
+    """Return what tilts the normals: `norm` before `bump`, of which only one is read."""
+    if "norm" in entry.lines:
+        return _made(entry, "norm", _normal_map)
+    for key in ("map_bump", "bump"):
+        if key in entry.lines:
+            return _made(entry, key, _normal_map if _looks_like_normals(entry, key) else _bump_map)
+    return None
+
+
+def _made(entry: Entry, key: str, make: Callable[[Entry, str], Relief]) -> Relief:
+    try:
+        return make(entry, key)
+    except SceneError as error:
+        where = entry.where(key)
+        raise error if where in str(error) else SceneError(f"{where}: {error}") from error
+
+
+def _normal_map(entry: Entry, key: str) -> NormalMap:
+    texture = entry.texture(key, kind="data")
+    assert texture is not None
+    return NormalMap(texture, entry.multiplier(key))
+
+
+def _bump_map(entry: Entry, key: str) -> BumpMap:
+    texture = entry.texture(key, kind="scalar")
+    assert texture is not None
+    return BumpMap(texture, entry.multiplier(key))
+
+
+def _looks_like_normals(entry: Entry, key: str) -> bool:
+    """Tell whether an image is on average the bluish (0.5, 0.5, 1) of normals that hardly tilt."""
+    if "-imfchan" in _map(entry, key)[0]:
+        return False
+    texture = entry.texture(key, kind="data")
+    assert texture is not None
+    if texture.channels < 3:
+        return False
+    red, green, blue = texture.mean()
+    return abs(red - 0.5) < 0.1 and abs(green - 0.5) < 0.1 and blue > 0.75
 
 
 def _base(entry: Entry) -> Any:
@@ -316,7 +367,8 @@ def _map(entry: Entry, key: str) -> tuple[dict[str, list[str]], str]:
                 raise SceneError(f"{entry.where(key)} has the option {option!r}, which is not known")
         options[option] = words[:count]
         rest = (rest.split(None, count) + [""] * (count + 1))[count].strip()
-    for option in options.keys() - {"-s", "-o", "-mm", "-clamp", "-imfchan"}:
+    read = READ | {"-bm"} if key in RELIEFS else READ
+    for option in options.keys() - read:
         entry.idle_options.add(f"{option} of {entry.lines[key][0]}")
     return options, rest
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bsdfs import Diffuse
+from ..relief import NormalMap
 from ..textures import Texture
 from ..vec import f4
 from . import mtl
@@ -100,12 +101,12 @@ def _pbr(material: Any) -> Look:
     if metallic:
         wanted["metallic"] = metallic if both is None else Texture(both, False, channel=2, scale=metallic)
     wanted["roughness"] = roughness if both is None else Texture(both, False, channel=1, scale=roughness)
-    if material.normalTexture is not None:
-        wanted["normal_map"] = Texture(pixels(material.normalTexture), False, scale=2, offset=-1)
     glow = np.zeros(3) if material.emissiveFactor is None else np.asarray(material.emissiveFactor, np.float64)
     image = None if material.emissiveTexture is None else Texture(pixels(material.emissiveTexture))
     radiance, dark = emission(glow, image)
     made, lost = realise(wanted)
+    if material.normalTexture is not None:  # trimesh keeps no scale of it
+        made = made.with_relief(NormalMap(Texture(pixels(material.normalTexture), False)))
     occluded = ["occlusionTexture"] if material.occlusionTexture is not None else []
     return Look(made, radiance, occluded + dark + lost)
 
@@ -121,6 +122,13 @@ def _simple(material: Any, where: str) -> Look:
     if material.image is not None:
         entry.images["map_kd"] = pixels(material.image)
         entry.lines["map_kd"] = ("map_kd", 0, "image")
+    # of the other images trimesh keeps the names alone, and no folder to look for them
+    gone = [key for key in entry.lines if _is_map(key) and key not in entry.images]
+    gone = [entry.lines.pop(key)[0] for key in gone]
     found = mtl.look(entry)
-    found.lost = [*entry.unread(), *found.lost]
+    found.lost = [*gone, *entry.unread(), *found.lost]
     return found
+
+
+def _is_map(key: str) -> bool:
+    return key.startswith("map_") or key in mtl.RELIEFS

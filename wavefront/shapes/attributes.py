@@ -1,4 +1,4 @@
-"""What varies over a shape besides its place and normal: texture coordinates, vertex colours.
+"""What varies over a shape besides its place and normal: texture coordinates, vertex colours, tangents.
 
 An attribute is interpolated over the triangles from its values at their corners, and computed on
 spheres. Only those are kept that a material of the scene reads, by the name of the field of
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..vec import Floats, f4
 from .mesh import Mesh
+from .tangents import mesh_tangents
 
 Corners: TypeAlias = tuple[Floats, Floats, Floats]  # (width, m) values at the three corners of triangles
 
@@ -26,11 +27,12 @@ class Attribute:
 
     title: str  # for messages
     default: tuple[float, ...]  # what a mesh without it has everywhere
-    of_mesh: Callable[[Mesh], NDArray[np.float64] | None]  # (vertices, width)
-    on_spheres: Callable[[Floats], Floats]  # from unit normals (3, n), pointing outwards: (width, n)
+    given: Callable[[Mesh], NDArray[np.float64] | None]  # what the user gives for it
+    corners: Callable[[Mesh], NDArray[np.float64]]  # (m, 3, width), if it is given
+    on_spheres: Callable[[Floats, Floats], Floats]  # from outward unit normals (3, n) and radii: (width, n)
 
 
-def sphere_uv(normal: Floats) -> Floats:
+def sphere_uv(normal: Floats, radius: Floats) -> Floats:
     """Longitude and latitude as texture coordinates, (2, n)."""
     uv = np.empty((2, normal.shape[1]), f4)
     uv[0] = np.arctan2(normal[0], normal[2]) * f4(0.5 / np.pi) + f4(0.5)
@@ -38,14 +40,48 @@ def sphere_uv(normal: Floats) -> Floats:
     return uv
 
 
+def sphere_tangents(normal: Floats, radius: Floats) -> Floats:
+    """Derivatives of the point by longitude and latitude as texture coordinates, (6, n)."""
+    x, y, z = normal
+    out = np.zeros((6, normal.shape[1]), f4)
+    around, up = f4(2 * np.pi) * radius, f4(np.pi) * radius
+    ring = np.sqrt(x * x + z * z)
+    inverse = f4(1) / np.where(ring > 0, ring, f4(1))
+    out[0], out[2] = z * around, -x * around
+    out[3], out[4], out[5] = -x * y * inverse * up, ring * up, -y * z * inverse * up
+    return out
+
+
+def sphere_color(normal: Floats, radius: Floats) -> Floats:
+    """White and opaque, (4, n)."""
+    return np.ones((4, normal.shape[1]), f4)
+
+
+def _per_vertex(
+    title: str,
+    default: tuple[float, ...],
+    given: Callable[[Mesh], NDArray[np.float64] | None],
+    on_spheres: Callable[[Floats, Floats], Floats],
+) -> Attribute:
+    def corners(mesh: Mesh) -> NDArray[np.float64]:
+        values = given(mesh)
+        assert values is not None
+        return values[mesh.faces]
+
+    return Attribute(title, default, given, corners, on_spheres)
+
+
+UV, UV1 = "texture coordinates (uvs)", "second texture coordinates (uvs1)"
+NONE = (0.0,) * 6
 ATTRIBUTES = {
-    "uv": Attribute("texture coordinates (uvs)", (0, 0), lambda mesh: mesh.uvs, sphere_uv),
-    "uv1": Attribute("second texture coordinates (uvs1)", (0, 0), lambda mesh: mesh.uvs1, sphere_uv),
-    "color": Attribute(
-        "vertex colours (colors)",
-        (1, 1, 1, 1),
-        lambda mesh: mesh.colors,
-        lambda normal: np.ones((4, normal.shape[1]), f4),
+    "uv": _per_vertex(UV, (0, 0), lambda mesh: mesh.uvs, sphere_uv),
+    "uv1": _per_vertex(UV1, (0, 0), lambda mesh: mesh.uvs1, sphere_uv),
+    "color": _per_vertex("vertex colours (colors)", (1, 1, 1, 1), lambda mesh: mesh.colors, sphere_color),
+    "tangents": Attribute(
+        UV, NONE, lambda mesh: mesh.uvs, lambda mesh: mesh_tangents(mesh, mesh.uvs), sphere_tangents
+    ),
+    "tangents1": Attribute(
+        UV1, NONE, lambda mesh: mesh.uvs1, lambda mesh: mesh_tangents(mesh, mesh.uvs1), sphere_tangents
     ),
 }
 
@@ -57,10 +93,10 @@ def corner_values(name: str, meshes: Sequence[Mesh]) -> Corners:
     corners = np.empty((3, width, sum(len(mesh.faces) for mesh in meshes)), f4)
     start = 0
     for mesh in meshes:
-        values, end = attribute.of_mesh(mesh), start + len(mesh.faces)
-        if values is None:
+        end = start + len(mesh.faces)
+        if attribute.given(mesh) is None:
             corners[:, :, start:end] = np.array(attribute.default).reshape(1, width, 1)
         else:
-            corners[:, :, start:end] = values[mesh.faces].transpose(1, 2, 0)
+            corners[:, :, start:end] = attribute.corners(mesh).transpose(1, 2, 0)
         start = end
     return corners[0], corners[1], corners[2]

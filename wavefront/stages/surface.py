@@ -25,7 +25,7 @@ def interact(scene: CompiledScene, rays: Rays, hits: Hits) -> Surface:
     inside = facing < 0
     side = np.where(inside, f4(-1), f4(1))
     ng = ng * side
-    ns = ng if ns is None else _towards(wo, ns * side)
+    ns = ng if ns is None else towards(wo, ns * side)
     material = scene.material_of.take(hits.prim)
     surface = Surface(point, error, ng, ns, wo, hits.prim, material, inside)
     for name, corners in scene.attributes.items():
@@ -56,6 +56,16 @@ def leave(point: Floats, error: Floats, ng: Floats, wi: Floats) -> Floats:
     return point + ng * np.copysign(error, dot(ng, wi))
 
 
+def towards(wo: Floats, ns: Floats) -> Floats:
+    """Bend shading normals that look away from wo until they make a small positive cosine with it."""
+    cos = dot(ns, wo)
+    away = np.flatnonzero(cos < MIN_COS)
+    if away.size:
+        ns[:, away] = normalize(ns.take(away, 1) + wo.take(away, 1) * (MIN_COS - cos.take(away)))
+        ns[:, away] = normalize(ns.take(away, 1) + wo.take(away, 1) * MIN_COS)
+    return ns
+
+
 def _onto_sphere(scene: CompiledScene, sphere: Ints, point: Floats) -> Floats:
     center = scene.sphere_centers.take(sphere, 1)
     normal = normalize(point - center)
@@ -83,7 +93,7 @@ def _attribute(scene: CompiledScene, name: str, corners: Corners, hits: Hits, po
     if round_.size:
         sphere = hits.prim.take(round_) - scene.triangles
         normal = normalize(point.take(round_, 1) - scene.sphere_centers.take(sphere, 1))
-        values[:, round_] = ATTRIBUTES[name].on_spheres(normal)
+        values[:, round_] = ATTRIBUTES[name].on_spheres(normal, scene.sphere_radii.take(sphere))
     return values
 
 
@@ -91,13 +101,3 @@ def _interpolate(corners: Corners, hits: Hits, triangles: int) -> Floats:
     prim = np.minimum(hits.prim, triangles - 1)
     a, b, c = (corner.take(prim, 1) for corner in corners)
     return a * (f4(1) - hits.b1 - hits.b2) + b * hits.b1 + c * hits.b2
-
-
-def _towards(wo: Floats, ns: Floats) -> Floats:
-    """Bend shading normals that look away from wo until they make a small positive cosine with it."""
-    cos = dot(ns, wo)
-    away = np.flatnonzero(cos < MIN_COS)
-    if away.size:
-        ns[:, away] = normalize(ns.take(away, 1) + wo.take(away, 1) * (MIN_COS - cos.take(away)))
-        ns[:, away] = normalize(ns.take(away, 1) + wo.take(away, 1) * MIN_COS)
-    return ns

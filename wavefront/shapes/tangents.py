@@ -1,0 +1,63 @@
+"""How the points of a mesh move with its texture coordinates."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .mesh import Mesh
+
+Doubles = NDArray[np.float64]
+
+
+def mesh_tangents(mesh: Mesh, uvs: Doubles | None) -> Doubles:
+    """Return dP/du and dP/dv at the corners of the faces, (m, 3, 6), scene units.
+
+    They are constant on the facets of a flat mesh. On a smooth one they are averaged around each
+    vertex over the faces that share it and are not mirrored against each other, weighted by their
+    angles there, as in M. Mikkelsen 2008, "Simulation of Wrinkled Surfaces Revisited", section 3.4
+    (MikkTSpace). Zero where the texture coordinates of a face span no area.
+    """
+    flat = np.zeros((len(mesh.faces), 6))
+    if uvs is None:
+        return np.repeat(flat[:, None], 3, 1)
+    corner, uv = mesh.vertices[mesh.faces], uvs[mesh.faces]
+    along, across = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    (du1, dv1), (du2, dv2) = (uv[:, 1] - uv[:, 0]).T, (uv[:, 2] - uv[:, 0]).T
+    area = du1 * dv2 - du2 * dv1
+    sound = np.flatnonzero(area)
+    for k, (a, b) in enumerate(((dv2, -dv1), (-du2, du1))):
+        columns = along * a[:, None] + across * b[:, None]
+        flat[sound, 3 * k : 3 * k + 3] = columns[sound] / area[sound, None]
+    if mesh.normals is None:
+        return np.repeat(flat[:, None], 3, 1)
+    return _smooth(mesh, flat, area, _angles(corner))
+
+
+def _smooth(mesh: Mesh, flat: Doubles, area: Doubles, angles: Doubles) -> Doubles:
+    """Average the tangents (m, 6) of faces around each vertex: directions and lengths apart."""
+    groups = (2 * mesh.faces + (area > 0)[:, None]).ravel()
+    weights = (angles * (area != 0)[:, None]).ravel()
+    total = np.bincount(groups, weights)
+    out = np.empty((groups.size, 6))
+    for part in (slice(0, 3), slice(3, 6)):
+        vectors = np.repeat(flat[:, part], 3, 0)
+        size = np.linalg.norm(vectors, axis=1)
+        mean_size = np.bincount(groups, weights * size) / np.where(total > 0, total, 1)
+        units = vectors / np.where(size > 0, size, 1)[:, None]
+        direction = np.stack([np.bincount(groups, weights * unit) for unit in units.T], 1)
+        length = np.linalg.norm(direction, axis=1)
+        scale = mean_size / np.where(length > 0, length, 1)
+        out[:, part] = (direction * scale[:, None])[groups]
+    out[np.repeat(area == 0, 3)] = 0
+    return out.reshape(-1, 3, 6)
+
+
+def _angles(corner: Doubles) -> Doubles:
+    """Return the angles of triangles (m, 3, 3) at their corners, (m, 3)."""
+    forward = np.roll(corner, -1, 1) - corner
+    backward = np.roll(corner, 1, 1) - corner
+    size = np.linalg.norm(forward, axis=2) * np.linalg.norm(backward, axis=2)
+    cos = (forward * backward).sum(2) / np.where(size > 0, size, 1)
+    angles: Doubles = np.arccos(np.clip(cos, -1, 1))
+    return angles
