@@ -444,7 +444,8 @@ def test_ply_colours_are_srgb(write):
     assert mesh.colors == pytest.approx(np.column_stack([LINEAR, np.ones(4)]), rel=1e-5)
     assert isinstance(mesh.material.reflectance, VertexColors)
     clear = np.column_stack([CODES, [0, 51, 102, 255]])
-    (mesh,) = load_meshes(write(coloured_ply(clear, *BYTES, "uchar alpha"), "a.ply"))
+    with pytest.warns(UserWarning, match=r"a\.ply: not honoured: opacity of vertex colours"):
+        (mesh,) = load_meshes(write(coloured_ply(clear, *BYTES, "uchar alpha"), "a.ply"))
     assert mesh.colors[:, 3].tolist() == [0, 0.2, 0.4, 1]
     floats = ("float red", "float green", "float blue")
     (mesh,) = load_meshes(write(coloured_ply(CODES / 255, *floats), "a.ply"))

@@ -637,6 +637,43 @@ def test_vertex_colours_multiply_the_base_colour(build, path):
     assert isinstance(textured.material.base_color.times, Texture)
 
 
+@pytest.mark.parametrize("mode", ["OPAQUE", "MASK", "BLEND"])
+@pytest.mark.parametrize("textured", [False, True])
+def test_the_opacity_of_vertex_colours_counts_where_the_material_fades(build, path, mode, textured):
+    info = build.image(np.uint8([[[255, 255, 255, 51]]]))
+    group = {"baseColorTexture": info} if textured else {"baseColorFactor": [1, 1, 1, 0.5]}
+    clear = np.column_stack([COLORS, np.float32([0.25, 0.5, 1])])
+    build.material(pbrMetallicRoughness=group, alphaMode=mode, alphaCutoff=0.3)
+    build.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = build.accessor(clear)
+    (mesh,) = load_meshes(build.gltf(path))
+    opacity = mesh.material.opacity
+    if mode == "OPAQUE":
+        assert opacity is None
+        return
+    assert opacity.cutoff == (0.3 if mode == "MASK" else None)
+    assert opacity.alpha.channel == 3
+    if textured:
+        assert at(opacity.alpha.times, 0.5, 0.5) == pytest.approx(0.2)
+    else:
+        assert opacity.alpha.times == 0.5
+    # opaque colours leave the opacity as it is
+    build.json["accessors"][-1]["type"] = "VEC3"
+    (mesh,) = load_meshes(build.gltf(path))
+    plain = mesh.material.opacity
+    assert plain is None if mode == "MASK" and not textured else not isinstance(plain.alpha, VertexColors)
+
+
+def test_vertex_colours_fade_a_material_that_is_opaque_itself(build, path):
+    clear = np.column_stack([COLORS, np.float32([0.25, 0.5, 1])])
+    build.material(alphaMode="BLEND")
+    build.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = build.accessor(clear)
+    (mesh,) = load_meshes(build.gltf(path))
+    assert mesh.material.opacity.alpha.times == 1
+    (held,) = from_trimesh(trimesh.load_scene(path)).shapes
+    assert held.material.opacity.alpha.channel == 3
+    assert np.array_equal(mesh.colors, held.colors)
+
+
 def test_vertex_colours_on_glass_are_named(build, path):
     build.material(
         pbrMetallicRoughness={"metallicFactor": 0},

@@ -27,7 +27,10 @@ class Look:
     material: Bsdf
     emission: NDArray[np.float64] | None = None  # (3,) radiance
     lost: list[str] = field(default_factory=list)  # what the file asks for in vain
-    tinted: Look | None = None  # the same with its base colour multiplied by vertex colours, once made
+    alpha: Any = None  # number or texture where opacity counts: glTF's alpha modes MASK and BLEND
+    cutoff: float | None = None  # as of `Bsdf.with_alpha`
+    # the same with its base colour multiplied by vertex colours, once made; by whether its opacity is, too
+    tinted: dict[bool, Look] = field(default_factory=dict)
 
 
 COLOURED = Look(Diffuse(VertexColors()))  # of a mesh that has vertex colours and no material
@@ -40,22 +43,31 @@ def dress(raw: Raw, look: Look | None) -> bool:
     """
     honoured = True
     if raw.colors is not None:
-        look, honoured = (COLOURED, True) if look is None else _tinted(look)
+        look, honoured = (
+            (COLOURED, True) if look is None else _tinted(look, look.alpha is not None and is_faint(raw))
+        )
     if look is not None:
         raw.material, raw.emission = look.material, look.emission
     return honoured
 
 
-def _tinted(look: Look) -> tuple[Look, bool]:
+def is_faint(raw: Raw) -> bool:
+    """Tell whether vertex colours are anywhere less than opaque."""
+    return raw.colors is not None and bool((raw.colors[:, 3:] < 1).any())
+
+
+def _tinted(look: Look, faint: bool) -> tuple[Look, bool]:
     name = next((name for kind, name in BASES.items() if isinstance(look.material, kind)), None)
     if name is None:
         return look, False
-    if look.tinted is None:
+    if faint not in look.tinted:
         material = copy(look.material)
         base = getattr(material, name)
         setattr(material, name, VertexColors(base.ravel() if isinstance(base, np.ndarray) else base))
-        look.tinted = Look(material, look.emission)
-    return look.tinted, True
+        if faint:
+            material = material.with_alpha(VertexColors(look.alpha, channel=3), look.cutoff)
+        look.tinted[faint] = Look(material, look.emission)
+    return look.tinted[faint], True
 
 
 def realise(wanted: dict[str, Any]) -> tuple[Bsdf, list[str]]:

@@ -103,6 +103,8 @@ class _Reader:
         self._file = materials._document.name
         self._wanted: dict[str, Any] = {}
         self._lost: list[str] = []
+        self._alpha_given: Any = None
+        self._cutoff: float | None = None
 
     def look(self) -> Look:
         """Return the look of the material."""
@@ -124,7 +126,7 @@ class _Reader:
             material = material if relief is None else material.with_relief(relief)
         except SceneError as error:
             raise SceneError(f"{self._file}: {self._where}: {error}") from error
-        return Look(material, radiance, self._lost + lost)
+        return Look(material, radiance, self._lost + lost, self._alpha_given, self._cutoff)
 
     def _number(self, group: dict[str, Any], key: str, default: float, high: float = 1.0) -> float:
         value = floats(f"{self._file}: {self._where}.{key}", [group.get(key, default)], 1)[0]
@@ -174,12 +176,15 @@ class _Reader:
             )
         if mode == "OPAQUE":
             return
+        if mode == "MASK":
+            self._cutoff = self._number(self._item, "alphaCutoff", 0.5, high=np.inf)
         alpha: Any = factor
         if base is not None and base.channels == 4:
             alpha = self._texture(group, "baseColorTexture", srgb=False, channel=3, scale=factor)
+        self._alpha_given = alpha
         self._want("alpha", alpha, 1.0)
         if mode == "MASK" and "alpha" in self._wanted:
-            self._wanted["alpha_cutoff"] = self._number(self._item, "alphaCutoff", 0.5, high=np.inf)
+            self._wanted["alpha_cutoff"] = self._cutoff
 
     def _relief(self) -> NormalMap | None:
         if "occlusionTexture" in self._item:

@@ -20,7 +20,7 @@ from ..scene import Scene
 from ..shapes import Mesh
 from ..shapes.transform import moved
 from . import gltf, headers, mtl, obj, stl, visuals
-from .appearance import Look, dress
+from .appearance import Look, dress, is_faint
 from .files import beside, decode, read_bytes
 from .gltf_materials import Materials
 from .repair import Raw, build, warn
@@ -336,6 +336,8 @@ class _Visuals:
         dropped = raw.colors is None and visuals.drops_colours(mesh)
         if not dress(raw, look) or dropped:
             self.lost.setdefault("vertex colours", raw.name)
+        if look is None and is_faint(raw) and not visuals.is_gltf(mesh):  # where it has no say
+            self.lost.setdefault("opacity of vertex colours", raw.name)
 
     def _look(self, material: Any) -> Look | None:
         if material is None or visuals.is_blank(material):

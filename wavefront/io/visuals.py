@@ -36,7 +36,7 @@ def vertex_colours(mesh: Any) -> Table | None:
     visual = mesh.visual
     if visual.kind == "vertex":
         codes = np.asarray(visual.vertex_colors)
-        linear = "from_gltf_primitive" in mesh.metadata  # trimesh says so of every mesh of glTF
+        linear = is_gltf(mesh)
     elif "color" in getattr(visual, "vertex_attributes", {}):
         codes = np.asarray(visual.vertex_attributes["color"])  # with a material; only glTF has that
         linear = True
@@ -48,6 +48,11 @@ def vertex_colours(mesh: Any) -> Table | None:
         unit = f4(np.iinfo(codes.dtype).max) if codes.dtype.kind == "u" else f4(1)
         return (codes.astype(f4) / unit).astype(np.float64)
     return np.column_stack([from_srgb(codes[:, :3] / 255.0), codes[:, 3:] / 255.0])
+
+
+def is_gltf(mesh: Any) -> bool:
+    """Tell whether trimesh read a mesh from a glTF file: it leaves a mark on every one."""
+    return "from_gltf_primitive" in mesh.metadata
 
 
 def drops_colours(mesh: Any) -> bool:
@@ -87,14 +92,16 @@ def _pbr(material: Any) -> Look:
     codes = None if material.baseColorTexture is None else pixels(material.baseColorTexture)
     if codes is not None:
         wanted["base_color"] = Texture(codes, scale=factor[:3])
+    alpha: Any = None
+    cutoff = None
+    if material.alphaMode == "MASK":
+        cutoff = 0.5 if material.alphaCutoff is None else float(material.alphaCutoff)
     if material.alphaMode in ("MASK", "BLEND"):
-        alpha: Any = float(factor[3])
+        alpha = float(factor[3])
         if codes is not None and codes.shape[2] == 4:
             alpha = Texture(codes, srgb=False, channel=3, scale=alpha)
         if isinstance(alpha, Texture) or alpha != 1:
-            wanted["alpha"] = alpha
-            if material.alphaMode == "MASK":
-                wanted["alpha_cutoff"] = 0.5 if material.alphaCutoff is None else float(material.alphaCutoff)
+            wanted |= {"alpha": alpha, "alpha_cutoff": cutoff}
     metallic = 1.0 if material.metallicFactor is None else float(material.metallicFactor)
     roughness = 1.0 if material.roughnessFactor is None else float(material.roughnessFactor)
     both = None if material.metallicRoughnessTexture is None else pixels(material.metallicRoughnessTexture)
@@ -108,7 +115,7 @@ def _pbr(material: Any) -> Look:
     if material.normalTexture is not None:  # trimesh keeps no scale of it
         made = made.with_relief(NormalMap(Texture(pixels(material.normalTexture), False)))
     occluded = ["occlusionTexture"] if material.occlusionTexture is not None else []
-    return Look(made, radiance, occluded + dark + lost)
+    return Look(made, radiance, occluded + dark + lost, alpha, cutoff)
 
 
 def _simple(material: Any, where: str) -> Look:
