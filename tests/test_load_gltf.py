@@ -381,6 +381,18 @@ def test_normal_map(build, path, material, glass):
     assert at(relief.texture, 0.5, 0.5) == pytest.approx(codes[0, 0] / 255)
 
 
+def test_tangents_are_named_where_they_would_matter(build, path):
+    info = build.image(np.uint8([[[128, 128, 255]]]))
+    build.material()
+    build.json["meshes"][0]["primitives"][0]["attributes"]["TANGENT"] = build.accessor(
+        np.ones((3, 4), np.float32)
+    )
+    load(build.gltf(path))
+    build.json["materials"] = [{"normalTexture": info}]
+    with pytest.warns(UserWarning, match=r"not honoured: TANGENT \(made from .* instead\) \(mesh 'mesh0'\)"):
+        load(build.gltf(path))
+
+
 def test_bad_normal_maps(build, path):
     info = build.image(np.zeros((1, 1), np.uint8)) | {"scale": "big"}
     for message in (r"normalTexture\.scale is \['big'\]", r"normalTexture: NormalMap: .* gives numbers"):

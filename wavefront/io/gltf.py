@@ -283,6 +283,9 @@ def _primitive(document: Document, part: dict[str, Any], mode: int, name: str) -
     for extra in attributes:
         if extra.startswith(("COLOR_", "TEXCOORD_")) and extra not in READ:
             document.lose(extra, f"mesh {name!r}")
+    material = document.get("materials", part["material"]) if "material" in part else {}
+    if "TANGENT" in attributes and "normalTexture" in material:
+        document.lose("TANGENT (made from the texture coordinates instead)", f"mesh {name!r}")
     normals = _attribute(document, attributes, "NORMAL", 3, where, len(vertices))
     return Raw(
         name,
