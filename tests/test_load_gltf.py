@@ -418,13 +418,12 @@ def test_emission_and_its_strength(given):
     assert given(emissiveFactor=[1, 0.5, 0], extensions=strength)["emission"].ravel().tolist() == [10, 5, 0]
 
 
-def test_textured_emission_is_averaged_with_a_warning(given, build):
+def test_textured_emission(given, build):
     info = build.image(np.uint8([[[255, 255, 255], [0, 0, 0]]]))
-    with pytest.warns(
-        UserWarning, match=r"not honoured: emission texture \(its mean is used\) \(materials\[0\]\)"
-    ):
-        found = given(emissiveFactor=[1, 0.5, 0], emissiveTexture=info)
-    assert found["emission"].ravel().tolist() == [0.5, 0.25, 0]
+    strength = {"KHR_materials_emissive_strength": {"emissiveStrength": 4}}
+    found = given(emissiveFactor=[1, 0.5, 0], emissiveTexture=info, extensions=strength)
+    assert at(found["emission"], 0.25, 0.5) == pytest.approx([4, 2, 0])
+    assert at(found["emission"], 0.75, 0.5) == pytest.approx([0, 0, 0])
 
 
 @pytest.mark.parametrize(
@@ -908,6 +907,8 @@ def test_a_textured_object_in_memory_equals_its_file(tmp_path):
         roughnessFactor=1.0,
         emissiveFactor=[1.0, 0.0, 0.5],
         normalTexture=Image.fromarray(codes[::-1]),
+        emissiveTexture=Image.fromarray(codes[::-1].copy()),
+        doubleSided=True,
     )
     plane.visual = trimesh.visual.TextureVisuals(uv=plane.vertices[:, :2], material=material)
     plane.export(tmp_path / "a.glb")
@@ -917,6 +918,8 @@ def test_a_textured_object_in_memory_equals_its_file(tmp_path):
         assert np.array_equal(soup(mesh), soup(held))
         assert np.array_equal(soup(mesh, mesh.uvs), soup(held, held.uvs))
         assert same(mesh.emission, held.emission)
+        assert mesh.two_sided
+        assert held.two_sided
         assert same(mesh.material.base_color, held.material.base_color)
         assert same(mesh.material.relief.texture, held.material.relief.texture)
 

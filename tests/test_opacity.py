@@ -90,7 +90,7 @@ def test_what_is_not_there_is_no_event() -> None:
         assert (render(scene, 1, integrator=integrator, max_bounces=0).rgb == 1).all()
 
 
-@pytest.mark.parametrize("integrator", ALL)
+@pytest.mark.parametrize("integrator", ["naive", "full"])
 def test_the_environment_behind(integrator: str) -> None:
     """What passes everything meets the light at infinity, weighted as from where it scattered."""
     scene = wf.Scene([floor(), veil(0.25, half=1e4)], [wf.Environment(1.0)], probe(HERE, 0.1 * EYE))
@@ -109,7 +109,7 @@ def test_shadow_of_sheets(integrator: str, accel: str) -> None:
     assert_mean(mean, 0.7 * 0.5 * UNSHADED * ALBEDO / np.pi, 0.02 if integrator == "naive" else 0.004)
 
 
-@pytest.mark.parametrize("integrator", ALL)
+@pytest.mark.parametrize("integrator", ["naive", "full"])
 def test_shadow_of_a_sphere(integrator: str) -> None:
     """Light crosses it twice."""
     ball = wf.Sphere((0, 1, 0), 0.7, material=BLACK.with_alpha(0.3))
@@ -120,7 +120,7 @@ def test_shadow_of_a_sphere(integrator: str) -> None:
     assert_mean(mean, 0.49 * whole * ALBEDO / np.pi, 0.02)
 
 
-@pytest.mark.parametrize("integrator", ALL)
+@pytest.mark.parametrize("integrator", ["naive", "full"])
 def test_half_of_a_lamp_through_a_cut_out(integrator: str) -> None:
     """A sheet that is not there where x < 0 hides the other half exactly."""
     left = polygon_irradiance([(-0.5, 2, -0.4), (-0.5, 2, 0.7), (0, 2, 0.7), (0, 2, -0.4)])

@@ -28,14 +28,18 @@ from .lights import (
     SphereLights,
     SpotLight,
     TriangleLights,
+    TwoSidedRectangleLights,
+    TwoSidedTriangleLights,
     first_of_pairs,
 )
 from .shapes import Mesh, Sphere
 from .shapes.attributes import ATTRIBUTES, Corners, corner_values
 from .state import Surface
+from .uneven import Source, Uneven, is_uneven, mean_radiance
 from .vec import Bools, Floats, Ints, f4
 
 Shape: TypeAlias = Mesh | Sphere
+AREA_LIGHTS = (RectangleLights, TwoSidedRectangleLights, TriangleLights, TwoSidedTriangleLights)
 UserLight: TypeAlias = PointLight | SpotLight | DirectionalLight | Environment
 
 
@@ -181,7 +185,7 @@ class CompiledScene:
     absorption: Floats | None  # (3, materials) per scene unit; None when nothing absorbs
     opacities: Opacities | None  # None when every surface is all there
     lights: LightTable
-    uneven: Ints | None  # (lights,) triangle of a light that does not shine evenly, else -1; None: all do
+    uneven: Uneven | None  # the lights that do not shine evenly; None when all do
 
 
 def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "place") -> CompiledScene:
@@ -208,12 +212,12 @@ def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "plac
     corners = [(mesh.vertices - centre)[mesh.faces] for mesh in meshes]
     triangles = np.concatenate(corners) if corners else np.zeros((0, 3, 3))
     user_materials, material_of = _number_materials(meshes, spheres)
+    attributes = {name: corner_values(name, meshes) for name in _attributes_read(meshes, spheres)}
     lights, light_of, environment = _gather_lights(
         scene, meshes, spheres, corners, centre, (high - low) / 2, light_choice
     )
     centers = np.array([s.center - centre for s in spheres]).reshape(-1, 3).T.astype(f4)
     radii = np.array([s.radius for s in spheres]).astype(f4)
-    attributes = {name: corner_values(name, meshes) for name in _attributes_read(meshes, spheres)}
     smooth = any(mesh.normals is not None for mesh in meshes)
     triangles32 = np.ascontiguousarray(triangles, f4)
     opacities = _opacities(user_materials, material_of)
@@ -234,7 +238,7 @@ def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "plac
         absorption=_absorption(user_materials),
         opacities=opacities,
         lights=lights,
-        uneven=None if opacities is None else _uneven(len(lights), light_of, opacities.partly[:-1]),
+        uneven=_uneven(meshes, len(lights), light_of),
     )
 
 
@@ -327,7 +331,8 @@ def _attributes_read(meshes: Sequence[Mesh], spheres: Sequence[Sphere]) -> list[
     lacking: dict[str, dict[int, str]] = {}  # what -> the meshes that lack it, by identity, with their names
     shapes: list[Shape] = [*meshes, *spheres]
     for shape in shapes:
-        for name in sorted(_reads(shape.material)):
+        glow = shape.emission.reads if isinstance(shape.emission, Spatial) else ()
+        for name in sorted(_reads(shape.material).union(glow)):
             if name not in ATTRIBUTES:
                 known = ", ".join(ATTRIBUTES)
                 raise SceneError(f"{shape.name}: its material reads {name!r}; it must be one of {known}")
@@ -418,13 +423,14 @@ def _gather_lights(
             kinds.append(kind.concatenate(records))
             count += len(kinds[-1])
 
-    rectangles, triangle_lights = _area_lights(meshes, corners)
-    for faces, _ in (*rectangles, *triangle_lights):
-        light_of[faces] = count + np.arange(faces.shape[1])
-        count += faces.shape[1]
-    count = 0
-    add(RectangleLights, [record for _, record in rectangles])
-    add(TriangleLights, [record for _, record in triangle_lights])
+    area_lights = _area_lights(meshes, corners)
+    for kind in AREA_LIGHTS:
+        alike = [(faces, record) for faces, record in area_lights if type(record) is kind]
+        number = count
+        for faces, _ in alike:
+            light_of[faces] = number + np.arange(faces.shape[1])
+            number += faces.shape[1]
+        add(kind, [record for _, record in alike])
     for sphere in spheres:
         if sphere.emission is not None and sphere.material.opacity is not None:
             raise SceneError(
@@ -449,49 +455,60 @@ def _gather_lights(
             infinite.append(record)
         else:
             groups.setdefault(type(record), []).append(record)
-    for kind, alike in groups.items():
-        add(kind, alike)
+    for record_type, records in groups.items():
+        add(record_type, records)
     environment = count if infinite else -1
     if infinite:
         kinds.append(Sky.of(infinite))
     return LightTable(kinds, half_size, choice), light_of, environment
 
 
-def _uneven(lights: int, light_of: Ints, partly: Bools) -> Ints | None:
-    """Return the triangle of each light whose surface is only partly there, else -1; None for none."""
-    prims = np.flatnonzero((light_of >= 0) & partly)
-    if not prims.size:
-        return None
-    out = np.full(lights, -1, np.intp)
-    out[light_of.take(prims)] = prims
-    return out
+def _uneven(meshes: Sequence[Mesh], lights: int, light_of: Ints) -> Uneven | None:
+    """Return the lights that do not shine evenly, None when all do."""
+    uneven = Uneven(np.full(lights, -1, np.intp), np.full(lights, -1, np.intp), [])
+    numbers: dict[tuple[int, bool], int] = {}
+    start = 0
+    for mesh in meshes:
+        end = start + len(mesh.faces)
+        if mesh.emission is not None and is_uneven(mesh):
+            key = id(mesh.emission), mesh.two_sided
+            if key not in numbers:
+                numbers[key] = len(numbers)
+                uneven.sources.append(Source(mesh.emission, mesh.two_sided))
+            triangles = start + np.flatnonzero(light_of[start:end] >= 0)
+            number = light_of.take(triangles)
+            uneven.triangle[number], uneven.source[number] = triangles, numbers[key]
+        start = end
+    return uneven if uneven.sources else None
 
 
 def _area_lights(
     meshes: Sequence[Mesh], corners: Sequence[NDArray[np.float64]]
-) -> tuple[list[tuple[Ints, RectangleLights]], list[tuple[Ints, TriangleLights]]]:
+) -> list[tuple[Ints, RectangleLights | TriangleLights]]:
     """Return the emitting rectangles and triangles of all meshes.
 
     Only what shines evenly is taken for rectangles, as their points have no barycentric weights.
     With each record come its faces: (2, k) for rectangles, (1, k) for triangles.
     """
-    rectangles, triangles = [], []
+    found: list[tuple[Ints, RectangleLights | TriangleLights]] = []
     start = 0
     for mesh, part in zip(meshes, corners, strict=True):
         if mesh.emission is not None:
             shining = _with_area(mesh, part)
-            first = first_of_pairs(part[shining])
-            if mesh.material.opacity is not None:
-                first = first[:0]
+            uneven = is_uneven(mesh)
+            first = np.zeros(0, np.intp) if uneven else first_of_pairs(part[shining])
             pairs = shining[np.stack([first, first + 1])]
             alone = np.setdiff1d(shining, pairs)
             if first.size:
-                rectangles.append((start + pairs, RectangleLights.from_pairs(part[pairs[0]], mesh.emission)))
+                rectangle = TwoSidedRectangleLights if mesh.two_sided else RectangleLights
+                found.append((start + pairs, rectangle.from_pairs(part[pairs[0]], mesh.emission)))
             if alone.size:
-                single = TriangleLights.from_triangles(part[alone], mesh.emission)
-                triangles.append((start + alone[None], single))
+                triangle = TwoSidedTriangleLights if mesh.two_sided else TriangleLights
+                radiance = mean_radiance(mesh, part)[:, alone] if uneven else mesh.emission
+                single = triangle.from_triangles(part[alone], radiance)
+                found.append((start + alone[None], single))
         start += len(part)
-    return rectangles, triangles
+    return found
 
 
 def _with_area(mesh: Mesh, triangles: NDArray[np.float64]) -> Ints:

@@ -25,7 +25,8 @@ class Look:
     """What a surface looks like."""
 
     material: Bsdf
-    emission: NDArray[np.float64] | None = None  # (3,) radiance
+    emission: NDArray[np.float64] | Texture | None = None  # radiance, (3,) or varying
+    two_sided: bool = False  # the emission leaves both sides
     lost: list[str] = field(default_factory=list)  # what the file asks for in vain
     alpha: Any = None  # number or texture where opacity counts: glTF's alpha modes MASK and BLEND
     cutoff: float | None = None  # as of `Bsdf.with_alpha`
@@ -47,7 +48,7 @@ def dress(raw: Raw, look: Look | None) -> bool:
             (COLOURED, True) if look is None else _tinted(look, look.alpha is not None and is_faint(raw))
         )
     if look is not None:
-        raw.material, raw.emission = look.material, look.emission
+        raw.material, raw.emission, raw.two_sided = look.material, look.emission, look.two_sided
     return honoured
 
 
@@ -66,7 +67,7 @@ def _tinted(look: Look, faint: bool) -> tuple[Look, bool]:
         setattr(material, name, VertexColors(base.ravel() if isinstance(base, np.ndarray) else base))
         if faint:
             material = material.with_alpha(VertexColors(look.alpha, channel=3), look.cutoff)
-        look.tinted[faint] = Look(material, look.emission)
+        look.tinted[faint] = Look(material, look.emission, look.two_sided)
     return look.tinted[faint], True
 
 
@@ -103,14 +104,3 @@ def _glass(known: dict[str, Any]) -> Bsdf:
     if known.get("thin"):
         return ThinDielectric(ior, roughness, transmittance=tint)
     return Dielectric(ior, roughness, transmittance=tint, absorption=known.get("absorption", 0.0))
-
-
-def emission(
-    factor: NDArray[np.float64], texture: Texture | None
-) -> tuple[NDArray[np.float64] | None, list[str]]:
-    """Return the radiance (3,) of a surface, and what is lost: meshes emit evenly, an image is averaged."""
-    if not factor.any():
-        return None, []
-    if texture is None:
-        return factor, []
-    return factor * texture.mean().astype(np.float64), ["emission texture (its mean is used)"]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..relief import NormalMap
 from ..textures import Texture
-from .appearance import Look, emission, realise
+from .appearance import Look, realise
 from .gltf import Document, floats
 from .images import decode_codes
 
@@ -126,7 +126,8 @@ class _Reader:
             material = material if relief is None else material.with_relief(relief)
         except SceneError as error:
             raise SceneError(f"{self._file}: {self._where}: {error}") from error
-        return Look(material, radiance, self._lost + lost, self._alpha_given, self._cutoff)
+        both = bool(self._item.get("doubleSided"))
+        return Look(material, radiance, both, self._lost + lost, self._alpha_given, self._cutoff)
 
     def _number(self, group: dict[str, Any], key: str, default: float, high: float = 1.0) -> float:
         value = floats(f"{self._file}: {self._where}.{key}", [group.get(key, default)], 1)[0]
@@ -265,15 +266,13 @@ class _Reader:
                 raise SceneError(f"{self._file}: {self._where}.attenuationDistance is 0; it must be above 0")
             self._wanted["absorption"] = -np.log(np.maximum(colour, 1e-6)) / distance
 
-    def _emission(self, strength: dict[str, Any]) -> NDArray[np.float64] | None:
+    def _emission(self, strength: dict[str, Any]) -> NDArray[np.float64] | Texture | None:
         factor = self._colour(self._item, "emissiveFactor", [0.0, 0.0, 0.0])
         factor = factor * self._number(strength, "emissiveStrength", 1.0, high=np.inf)
-        texture = self._texture(self._item, "emissiveTexture") if factor.any() else None
-        radiance, lost = emission(factor, texture)
-        self._lost += lost
-        if radiance is not None and self._item.get("doubleSided"):
-            self._lost.append("emission from back sides")
-        return radiance
+        if not factor.any():
+            return None
+        texture = self._texture(self._item, "emissiveTexture", scale=factor)
+        return factor if texture is None else texture
 
 
 def _check_extensions(document: Document) -> None:

@@ -126,7 +126,10 @@ def join(
     raw.uvs1 = _joined([mesh.uvs1 for mesh in meshes])
     raw.colors = _joined([mesh.colors for mesh in meshes])
     raw.material = meshes[0].material if material is None else material
-    raw.emission = meshes[0].emission[:, 0] if material is None and meshes[0].emission is not None else None
+    if material is None:
+        glow = meshes[0].emission
+        raw.emission = glow[:, 0] if isinstance(glow, np.ndarray) else glow
+        raw.two_sided = meshes[0].two_sided
     mesh = build(name, raw)
     if mesh is None:
         raise SceneError(f"{name}: transform leaves no face with an area")

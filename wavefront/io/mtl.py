@@ -34,7 +34,7 @@ from ..bsdfs import Bsdf, Dielectric, Diffuse, Mirror, Relief
 from ..errors import SceneError
 from ..relief import BumpMap, NormalMap
 from ..textures import Texture
-from .appearance import Look, emission, realise
+from .appearance import Look, realise
 from .files import beside
 from .repair import warn
 
@@ -243,11 +243,12 @@ def look(entry: Entry) -> Look:
     factor = entry.colour("ke", 0.0, high=np.inf)
     if "map_ke" in entry.lines and not factor.any():
         factor = np.ones(3)
-    radiance, lost = emission(factor, entry.texture("map_ke"))
-    material, more = _material(entry)
+    texture = entry.texture("map_ke", factor)
+    radiance = texture if texture is not None else factor if factor.any() else None
+    material, lost = _material(entry)
     relief = _relief(entry)
     material = material if relief is None else material.with_relief(relief)
-    return Look(material, radiance, lost + more)
+    return Look(material, radiance, lost=lost)
 
 
 def _material(entry: Entry) -> tuple[Bsdf, list[str]]:

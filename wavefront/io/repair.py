@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..bsdfs import Bsdf
+from ..bsdfs.parameter import Colour
 from ..errors import SceneError
 from ..shapes import Mesh
 
@@ -46,7 +47,8 @@ class Raw:
     colors: Table | None = None  # (n, 3 or 4) linear
     lines: Faces | None = None  # (m,) line of the file for each face
     material: Bsdf | None = None
-    emission: ArrayLike | None = None
+    emission: Colour | None = None
+    two_sided: bool = False  # the emission leaves both sides
 
 
 def build(source: str, raw: Raw, strict: bool = False) -> Mesh | None:
@@ -88,6 +90,7 @@ def build(source: str, raw: Raw, strict: bool = False) -> Mesh | None:
         colors=_colors(label, raw.colors, strict),
         material=raw.material,
         emission=raw.emission,
+        two_sided=raw.two_sided,
         name=raw.name or "mesh",
     )
 

@@ -12,7 +12,7 @@ from ..relief import NormalMap
 from ..textures import Texture
 from ..vec import f4
 from . import mtl
-from .appearance import Look, emission, realise
+from .appearance import Look, realise
 from .images import srgb_to_linear
 from .mtl import MATTE
 from .repair import Table
@@ -24,7 +24,7 @@ def look(material: Any, where: str) -> Look:
         return _pbr(material)
     if hasattr(material, "diffuse"):
         return _simple(material, where)
-    return Look(Diffuse(MATTE), None, [type(material).__name__])
+    return Look(Diffuse(MATTE), lost=[type(material).__name__])
 
 
 def vertex_colours(mesh: Any) -> Table | None:
@@ -109,13 +109,14 @@ def _pbr(material: Any) -> Look:
         wanted["metallic"] = metallic if both is None else Texture(both, False, channel=2, scale=metallic)
     wanted["roughness"] = roughness if both is None else Texture(both, False, channel=1, scale=roughness)
     glow = np.zeros(3) if material.emissiveFactor is None else np.asarray(material.emissiveFactor, np.float64)
-    image = None if material.emissiveTexture is None else Texture(pixels(material.emissiveTexture))
-    radiance, dark = emission(glow, image)
+    radiance: Any = glow if glow.any() else None
+    if radiance is not None and material.emissiveTexture is not None:
+        radiance = Texture(pixels(material.emissiveTexture), scale=glow)
     made, lost = realise(wanted)
     if material.normalTexture is not None:  # trimesh keeps no scale of it
         made = made.with_relief(NormalMap(Texture(pixels(material.normalTexture), False)))
     occluded = ["occlusionTexture"] if material.occlusionTexture is not None else []
-    return Look(made, radiance, occluded + dark + lost, alpha, cutoff)
+    return Look(made, radiance, bool(material.doubleSided), occluded + lost, alpha, cutoff)
 
 
 def _simple(material: Any, where: str) -> Look:

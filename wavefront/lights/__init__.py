@@ -7,10 +7,10 @@ from .environment import ConstantEnvironment, Environment
 from .image import ImageEnvironment
 from .infinite import InfiniteLight, Sky
 from .point import PointLight, PointLights
-from .rectangle import RectangleLights, first_of_pairs
+from .rectangle import RectangleLights, TwoSidedRectangleLights, first_of_pairs
 from .sphere import SphereLights
 from .spot import SpotLight, SpotLights
-from .triangle import TriangleLights
+from .triangle import TriangleLights, TwoSidedTriangleLights
 
 __all__ = [
     "ConstantEnvironment",
@@ -31,5 +31,7 @@ __all__ = [
     "SpotLights",
     "SunLight",
     "TriangleLights",
+    "TwoSidedRectangleLights",
+    "TwoSidedTriangleLights",
     "first_of_pairs",
 ]

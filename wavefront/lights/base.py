@@ -81,8 +81,9 @@ def facing_area(
     normal: Floats,
     size: Floats,
     strength: NDArray[np.float64],
+    sides: int,
 ) -> NDArray[np.float64]:
-    """Irradiance at most that one-sided areas bring to balls of space, (c, k).
+    """Irradiance at most that areas bring to balls of space, (c, k).
 
     Parameters
     ----------
@@ -90,8 +91,11 @@ def facing_area(
         (3, c) and scalar: the balls.
     middle, normal, size, strength
         (3, k), (3, k), (k,), (k,): the areas' middle, front normal, width, and radiance times area.
+    sides
+        1 if they shine from the front only, else 2.
     """
     away = centre[:, :, None] - middle[:, None, :]
-    height = np.maximum((away * normal[:, None, :]).sum(0) + radius + size, 0)
+    height = (away * normal[:, None, :]).sum(0)
+    height = np.maximum((height if sides == 1 else np.abs(height)) + radius + size, 0)
     distance = np.sqrt(np.maximum((away**2).sum(0), np.maximum(size, radius) ** 2))
     return strength * np.minimum(height / distance, 1) / distance**2

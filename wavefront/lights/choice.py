@@ -43,6 +43,35 @@ class EverywhereAlike:
         return self.table.pmf(light)
 
 
+class Among:
+    """A choice of some lights only; the others are never chosen, and cost nothing.
+
+    Parameters
+    ----------
+    choice
+        Of one of the k lights.
+    chosen
+        (k,) their numbers, rising.
+    lights
+        How many lights there are in all.
+    """
+
+    def __init__(self, choice: LightChoice, chosen: Ints, lights: int) -> None:
+        self.choice, self.chosen = choice, chosen
+        self.place = np.full(lights, -1, np.intp)
+        self.place[chosen] = np.arange(len(chosen))
+
+    def sample(self, point: Floats, u: Floats) -> tuple[Ints, Floats]:
+        """Choose one of them."""
+        light, chance = self.choice.sample(point, u)
+        return self.chosen.take(light), chance
+
+    def pmf(self, light: Ints, point: Floats) -> Floats:
+        """Return the probability of each light, 0 for the others."""
+        place = self.place.take(light)
+        return np.where(place < 0, f4(0), self.choice.pmf(np.maximum(place, 0), point))
+
+
 class ByPlace:
     """Probabilities by place: a grid whose cells each weigh all lights by what they bring there.
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import SceneError
 from ..vec import ALL, Floats, Ints, Lanes, columns, f4
 from .base import Light, LightSample
-from .choice import ByPlace, EverywhereAlike, LightChoice
+from .choice import Among, ByPlace, EverywhereAlike, LightChoice
 
 CHOICES = ("place", "power", "uniform")
 
@@ -49,16 +49,22 @@ class LightTable:
         return int(self.starts[-1])
 
     def _make_choice(self, half_size: NDArray[np.float64], choice: str) -> LightChoice | None:
-        """Return the choice by name; None when nothing shines."""
+        """Return the choice by name; None when nothing shines. Lights without a power take no part."""
         if choice not in CHOICES:
             raise SceneError(f"light_choice is {choice!r}; it must be one of {', '.join(CHOICES)}")
         scene_radius = float(np.linalg.norm(half_size))
-        power = np.concatenate([np.zeros(0), *(kind.power(scene_radius) for kind in self.kinds)])
+        powers = [kind.power(scene_radius) for kind in self.kinds]
+        power = np.concatenate([np.zeros(0), *powers])
         if not power.any():
             return None
+        if not power.all():
+            shining = [np.flatnonzero(part) for part in powers]
+            kinds = [kind.take(lanes) for kind, lanes in zip(self.kinds, shining, strict=True) if lanes.size]
+            chosen = LightTable(kinds, half_size, choice).choice
+            return None if chosen is None else Among(chosen, np.flatnonzero(power), power.size)
         if choice == "uniform":
-            return EverywhereAlike((power > 0).astype(float))
-        if choice == "power" or np.count_nonzero(power) == 1:
+            return EverywhereAlike(np.ones_like(power))
+        if choice == "power" or power.size == 1:
             return EverywhereAlike(power)
 
         def irradiance(centre: NDArray[np.float64], radius: float) -> NDArray[np.float64]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,8 @@ class RectangleLights(Light):
     edge_v: Floats  # (3, k) from the corner, perpendicular to edge_u
     normal: Floats  # (3, k) unit normal of the front side
     radiance: Floats  # (3, k) W·sr⁻¹·m⁻²
+
+    sides: ClassVar[int] = 1  # that shine
 
     @classmethod
     def from_pairs(cls, triangles: NDArray[np.float64], radiance: Floats) -> RectangleLights:
@@ -49,28 +52,27 @@ class RectangleLights(Light):
             wi[:, near], d2[near] = away, dot(away, away)
         distance = np.sqrt(d2)
         wi /= np.where(distance > 0, distance, f4(1))
-        cos_light = -dot(self.normal, wi)
+        cos_light = self._cosine(wi)
         pdf = self._pdf(point, near, d2, cos_light)
         return LightSample(wi, np.broadcast_to(self.radiance, wi.shape), pdf, distance, cos_light)
 
     def pdf_li(self, point: Floats, wi: Floats) -> Floats:
-        """Return the density of `sample_li` where the ray meets the front side."""
+        """Return the density of `sample_li` where the ray meets a side that shines."""
         away = self.corner - point
-        cos_light = -dot(self.normal, wi)
-        height = -dot(self.normal, away)
-        front = (cos_light > 0) & (height > 0)
-        t = height / np.where(front, cos_light, f4(1))
+        cos_light = self._cosine(wi)
+        lit = cos_light > 0
+        t = dot(self.normal, away) / np.where(lit, dot(self.normal, wi), f4(1))
         on_plane = wi * t - away
-        meets = front & _within(on_plane, self.edge_u) & _within(on_plane, self.edge_v)
+        meets = lit & (t > 0) & _within(on_plane, self.edge_u) & _within(on_plane, self.edge_v)
         pdf = self._pdf(point, np.flatnonzero(self._near(point)), t * t, cos_light)
         return np.where(meets, pdf, f4(0))
 
     def _pdf(self, point: Floats, near: Ints, d2: Floats, cos_light: Floats) -> Floats:
-        """Return d²/(A·cosθ), and on the lanes `near` 1/(solid angle); 0 behind the rectangle."""
-        front = cos_light > 0
-        pdf = np.where(front, d2, f4(0)) / (np.where(front, cos_light, f4(1)) * self._area())
+        """Return d²/(A·cosθ), and on the lanes `near` 1/(solid angle); 0 on a dark side."""
+        lit = cos_light > 0
+        pdf = np.where(lit, d2, f4(0)) / (np.where(lit, cos_light, f4(1)) * self._area())
         if near.size:
-            pdf[near] = np.where(front.take(near), self._seen(point, near).pdf(), f4(0))
+            pdf[near] = np.where(lit.take(near), self._seen(point, near).pdf(), f4(0))
         return pdf
 
     def _area(self) -> Floats:
@@ -90,12 +92,12 @@ class RectangleLights(Light):
         return SphericalRectangle.of(one.corner - point.take(lanes, 1), one.edge_u, one.edge_v)
 
     def le(self, wi: Floats) -> Floats:
-        """Return the radiance on rays that come upon the front side, (3, n)."""
-        return self.radiance * (dot(self.normal, wi) < 0)
+        """Return the radiance on rays that come upon a side that shines, (3, n)."""
+        return self.radiance * (self._cosine(wi) > 0)
 
     def power(self, scene_radius: float) -> NDArray[np.float64]:
-        """π·A·L."""
-        return np.pi * self._area() * self.radiance.mean(0, dtype=np.float64)
+        """π·A·L for each side."""
+        return self.sides * np.pi * self._area() * self.radiance.mean(0, dtype=np.float64)
 
     def irradiance(
         self, centre: NDArray[np.float64], radius: float, scene_radius: float
@@ -103,7 +105,21 @@ class RectangleLights(Light):
         """L·A·cosθ/d² of a small area at the middle; (c, k)."""
         middle = self.corner + (self.edge_u + self.edge_v) / 2
         strength = self._area() * self.radiance.mean(0, dtype=np.float64)
-        return facing_area(centre, radius, middle, self.normal, np.sqrt(self._area()), strength)
+        return facing_area(centre, radius, middle, self.normal, np.sqrt(self._area()), strength, self.sides)
+
+    def _cosine(self, wi: Floats) -> Floats:
+        """Cosine (n,) of rays along wi against the normal, above 0 on sides that shine."""
+        return -dot(self.normal, wi)
+
+
+@dataclass(slots=True)
+class TwoSidedRectangleLights(RectangleLights):
+    """k rectangles that emit from both sides."""
+
+    sides: ClassVar[int] = 2
+
+    def _cosine(self, wi: Floats) -> Floats:
+        return np.abs(dot(self.normal, wi))
 
 
 def first_of_pairs(triangles: NDArray[np.float64]) -> Ints:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..bsdfs import Bsdf
+from ..bsdfs.parameter import Colour
 from ..errors import SceneError, finite_array, number
 from .mesh import Mesh
 
@@ -17,7 +18,8 @@ def Disk(
     *,
     segments: int = 64,
     material: Bsdf | None = None,
-    emission: ArrayLike | None = None,
+    emission: Colour | None = None,
+    two_sided: bool = False,
     name: str = "disk",
 ) -> Mesh:
     """Return a disk as a mesh: a regular polygon that has exactly the disk's area.
@@ -33,7 +35,7 @@ def Disk(
     segments
         Corners of the polygon, from 3 to 65536. From 16 on its rim lies within
         0.34·(π/segments)²·radius of the circle: 0.08 % of the radius for 64.
-    material, emission, name
+    material, emission, two_sided, name
         As for `Mesh`. Texture coordinates span the square around the disk.
 
     Raises
@@ -67,5 +69,6 @@ def Disk(
         uvs=np.vstack([0.5 + 0.5 * ring, [0.5, 0.5]]),
         material=material,
         emission=emission,
+        two_sided=two_sided,
         name=name,
     )

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..bsdfs import Bsdf, Diffuse
-from ..errors import SceneError, finite_array, rgb
+from ..bsdfs.parameter import Colour, colour
+from ..errors import SceneError, finite_array
 
 FLOAT32_MAX = float(np.finfo(np.float32).max)
 FLOAT32_MIN = float(np.finfo(np.float32).tiny)
@@ -31,7 +32,10 @@ class Mesh:
     material
         How the surface scatters light.
     emission
-        Radiance that leaves the front side, W·sr⁻¹·m⁻²: one number or three.
+        Radiance that leaves the front side, W·sr⁻¹·m⁻²: one number or three, or a `Texture` or
+        `VertexColors`, of which values below 0 count as 0.
+    two_sided
+        Whether the emission leaves the back side as well.
     name
         Used in messages.
 
@@ -52,7 +56,8 @@ class Mesh:
         uvs1: ArrayLike | None = None,
         colors: ArrayLike | None = None,
         material: Bsdf | None = None,
-        emission: ArrayLike | None = None,
+        emission: Colour | None = None,
+        two_sided: bool = False,
         name: str = "mesh",
     ) -> None:
         self.name = name
@@ -63,7 +68,8 @@ class Mesh:
         self.uvs1 = _per_vertex(f"{name}: uvs1", uvs1, len(self.vertices), 2)
         self.colors = _colors(f"{name}: colors", colors, len(self.vertices))
         self.material = check_material(name, material)
-        self.emission = None if emission is None else rgb(f"{name}: emission", emission)
+        self.emission = None if emission is None else colour(f"{name}: emission", emission, np.inf)
+        self.two_sided = two_sided
         _check_range(name, self.vertices)
 
     def __repr__(self) -> str:
@@ -83,7 +89,8 @@ def Rectangle(
     edge_v: ArrayLike,
     *,
     material: Bsdf | None = None,
-    emission: ArrayLike | None = None,
+    emission: Colour | None = None,
+    two_sided: bool = False,
     name: str = "rectangle",
 ) -> Mesh:
     """Return a parallelogram as a mesh of two triangles; the front is where edge_u × edge_v points.
@@ -92,8 +99,8 @@ def Rectangle(
     ----------
     corner, edge_u, edge_v
         (3,) a corner and the two edges that leave it, scene units.
-    material, emission, name
-        As for `Mesh`.
+    material, emission, two_sided, name
+        As for `Mesh`. Texture coordinates run from 0 to 1 along the edges.
 
     Raises
     ------
@@ -111,6 +118,7 @@ def Rectangle(
         uvs=[[0, 0], [1, 0], [1, 1], [0, 1]],
         material=material,
         emission=emission,
+        two_sided=two_sided,
         name=name,
     )
 

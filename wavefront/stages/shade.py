@@ -15,7 +15,7 @@ from ..state import Hits, Paths, Surface
 from ..vec import ALL, Floats, Ints, Lanes, columns, dot, f4
 from .intersect import shadow_rays, visible
 from .passing import let_through
-from .shine import shine
+from .shine import shine_at_hits, shine_at_samples
 from .surface import leave
 
 
@@ -50,6 +50,8 @@ def emitted(scene: CompiledScene, paths: Paths, hits: Hits) -> Emission:
     lanes = np.flatnonzero(light >= 0)
     light = light.take(lanes)
     radiance = scene.lights.le(light, paths.direction.take(lanes, 1))
+    if scene.uneven is not None:
+        shine_at_hits(scene, paths.take(lanes), hits.take(lanes), light, radiance)
     return Emission(lanes, radiance, light)
 
 
@@ -103,10 +105,10 @@ def direct(
     light, number, f_cos, pdf = light.take(lanes), number.take(lanes), f_cos.take(lanes, 1), pdf.take(lanes)
     delta = scene.lights.delta_of.take(number)
     weight = np.where(delta, f4(1), power_heuristic(light.pdf, pdf)) if mis else f4(1)
-    radiance = f_cos * light.radiance * (weight / light.pdf)
     rays = shadow_rays(surface, lanes, light)
     if scene.uneven is not None:
-        radiance *= shine(scene, rays, number, u_point.take(lanes, 1))
+        shine_at_samples(scene, rays, number, u_point.take(lanes, 1), light.radiance)
+    radiance = f_cos * light.radiance * (weight / light.pdf)
     if scene.opacities is not None:
         return Arrival(lanes, radiance * let_through(scene, rays))
     seen = np.flatnonzero(visible(scene, rays))

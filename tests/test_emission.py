@@ -1,0 +1,419 @@
+"""Light from meshes that shine by a texture, by vertex colours, or from both sides."""
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scenes import ALBEDO, ALL, BLACK, EYE, HERE, floor, polygon_irradiance, probe
+from significance import SIDE, assert_mean, assert_same_images, measure, render, repeat
+from test_load_gltf import Builder
+
+import wavefront as wf
+from wavefront import testing, uneven
+from wavefront.accel import make_accelerator
+from wavefront.lights import (
+    LightTable,
+    RectangleLights,
+    TriangleLights,
+    TwoSidedRectangleLights,
+    TwoSidedTriangleLights,
+)
+from wavefront.scene import compile_scene
+from wavefront.vec import f4
+
+RNG = np.random.default_rng(0)
+LOW, HIGH, Y = (-0.5, -0.4), (0.6, 0.7), 2.0
+
+
+def lamp(emission, **rest) -> wf.Mesh:
+    """A rectangle above the origin that faces down; u runs along x and v along z."""
+    (x, z), u, v = LOW, HIGH[0] - LOW[0], HIGH[1] - LOW[1]
+    return wf.Rectangle((x, Y, z), (u, 0, 0), (0, 0, v), emission=emission, **{"material": BLACK, **rest})
+
+
+def irradiance(low: tuple[float, float] = LOW, high: tuple[float, float] = HIGH) -> float:
+    """From a radiance of 1 on a rectangle at Y, (x, z) from low to high."""
+    (x0, z0), (x1, z1) = low, high
+    return polygon_irradiance([(x0, Y, z0), (x0, Y, z1), (x1, Y, z1), (x1, Y, z0)])
+
+
+def lit(*things: wf.Mesh) -> wf.Scene:
+    """A floor and things above it, seen at the origin."""
+    return wf.Scene([floor(), *things], camera=probe(HERE, EYE))
+
+
+def texture(values, **arguments) -> wf.Texture:
+    """A texture with hard edges."""
+    return wf.Texture(np.asarray(values, f4), filter="nearest", **arguments)
+
+
+def compiled(*shapes: wf.Mesh | wf.Sphere):
+    """The scene as arrays."""
+    return compile_scene(wf.Scene(shapes), lambda geometry: make_accelerator(geometry, "numpy"))
+
+
+# --- Textures --------------------------------------------------------------------------------------
+
+QUARTERS = np.array([[[4, 0, 0], [0, 0, 0]], [[1, 2, 3], [0, 8, 0]]], f4)  # rows from v = 1 down
+MIDDLE = ((LOW[0] + HIGH[0]) / 2, (LOW[1] + HIGH[1]) / 2)
+PARTS = {  # (row, column) -> corners
+    (0, 0): ((LOW[0], MIDDLE[1]), (MIDDLE[0], HIGH[1])),
+    (0, 1): (MIDDLE, HIGH),
+    (1, 0): (LOW, MIDDLE),
+    (1, 1): ((MIDDLE[0], LOW[1]), (HIGH[0], MIDDLE[1])),
+}
+
+
+@pytest.mark.parametrize("integrator", ALL)
+def test_quarters_of_a_lamp(integrator: str) -> None:
+    """The sum of what four lamps of one colour each would give, by all ways to find light."""
+    expected = sum(np.mean(QUARTERS[cell]) * irradiance(*corners) for cell, corners in PARTS.items())
+    spp = 8192 if integrator == "naive" else 2048
+    mean = measure(lit(lamp(texture(QUARTERS))), spp, integrator=integrator, max_bounces=1)
+    assert_mean(mean, expected * ALBEDO / np.pi, 0.02)
+
+
+def test_colours_stay_where_they_are() -> None:
+    """Each channel by itself, against lamps of one colour."""
+    whole = repeat(lit(lamp(texture(QUARTERS))), 64, max_bounces=1)
+    parts = [
+        wf.Rectangle(
+            (x0, Y, z0), (x1 - x0, 0, 0), (0, 0, z1 - z0), material=BLACK, emission=QUARTERS[cell].tolist()
+        )
+        for cell, ((x0, z0), (x1, z1)) in PARTS.items()
+    ]
+    assert_same_images(whole, repeat(lit(*parts), 64, max_bounces=1, first_seed=50), 0.02)
+
+
+@pytest.mark.parametrize("integrator", ALL)
+def test_a_lamp_is_seen_as_its_texture(integrator: str) -> None:
+    """By the camera, from below and through a mirror; from behind it is dark."""
+    scene = wf.Scene([lamp(texture(QUARTERS))])
+    for (row, column), (low, high) in PARTS.items():
+        at = ((low[0] + high[0]) / 2, Y, (low[1] + high[1]) / 2)
+        for eye, seen in ((-3, QUARTERS[row, column]), (7, np.zeros(3))):
+            scene.camera = wf.Camera.look_at((at[0], eye, at[2]), at, (0, 0, 1), fov=0.1, size=(2, 2))
+            image = render(scene, 1, integrator=integrator, max_bounces=1).rgb
+            assert image == pytest.approx(np.broadcast_to(seen, image.shape))
+
+
+@pytest.mark.parametrize("integrator", ["naive", "full"])
+def test_vertex_colours_shine(integrator: str) -> None:
+    """A linear ramp of radiance on a lamp far away gives the mean's irradiance."""
+    corners = [(-1, 100, -1), (1, 100, -1), (1, 100, 1), (-1, 100, 1)]
+    mesh = wf.Mesh(
+        corners,
+        [[0, 1, 2], [0, 2, 3]],
+        colors=[[0, 0, 0], [1, 0.5, 0.25], [1, 0.5, 0.25], [0, 0, 0]],
+        material=BLACK,
+        emission=wf.VertexColors(),
+    )
+    expected = polygon_irradiance([corners[i] for i in (0, 3, 2, 1)]) * (1.75 / 3) / 2
+    if integrator == "naive":  # would find it once in 8000 samples
+        mesh.vertices[:, 1] = 1
+        naive = repeat(lit(mesh), 256, runs=8, integrator="naive", max_bounces=1)
+        assert_same_images(naive, repeat(lit(mesh), 64, runs=8, first_seed=90, max_bounces=1), 0.02)
+    else:
+        mean = measure(lit(mesh), 1024, integrator=integrator, max_bounces=1)
+        assert_mean(mean, expected * ALBEDO / np.pi, 0.005)
+
+
+def test_what_the_estimate_misses_is_found_by_chance(monkeypatch) -> None:
+    """A stripe between the points that are looked up: no light samples, and no light lost."""
+    monkeypatch.setattr(uneven, "MOST", 4)  # the points are at 8/3 and 16/3 of every 8 texels
+    stripe = np.zeros((1, 32), f4)
+    stripe[0, 3:5] = 10
+    low, high = (LOW[0] + 3 / 32 * 1.1, LOW[1]), (LOW[0] + 5 / 32 * 1.1, HIGH[1])
+    expected = 10 * irradiance(low, high) * ALBEDO / np.pi
+    striped = lamp(texture(stripe))
+    assert compiled(floor(), striped).lights.choice is None
+    behind = wf.Sphere((0, 12, 0), 0.01, material=BLACK, emission=1.0)  # so that there is a choice
+    for things in ((), (behind,)):
+        scene = lit(striped, *things)
+        for integrator in ("naive", "full"):
+            mean = measure(scene, 4096, integrator=integrator, max_bounces=1)
+            assert_mean(mean, expected, 0.03)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 6), st.integers(1, 6))
+def test_the_mean_of_a_face(seed: int, width: int, height: int) -> None:
+    """Over a rectangle it is the image's mean, as near as 1024 points come."""
+    image = np.random.default_rng(seed).random((height, width, 3), f4)
+    mesh = lamp(texture(image, wrap="clamp"))
+    mean = uneven.mean_radiance(mesh, mesh.vertices[mesh.faces])
+    assert mean.mean(1) == pytest.approx(image.mean((0, 1)), abs=0.05)
+
+
+def test_the_mean_of_many_faces() -> None:
+    """Faces are looked up block by block; each gets its own."""
+    n = 20_000
+    corners = RNG.random((n, 1, 3)) + 0.01 * RNG.random((n, 3, 3))
+    values = RNG.random(n)
+    uvs = np.repeat((np.arange(n) + 0.5) / n, 3)
+    mesh = wf.Mesh(
+        corners.reshape(-1, 3),
+        np.arange(3 * n).reshape(-1, 3),
+        uvs=np.stack([uvs, uvs], 1),
+        material=wf.Diffuse(0.5).with_alpha(0.25),
+        emission=texture(values[None]),
+    )
+    assert uneven.mean_radiance(mesh, corners) == pytest.approx(np.tile(values / 4, (3, 1)), rel=1e-5)
+
+
+def test_light_samples_follow_the_texture() -> None:
+    """Of a thousand quads the ten that shine are chosen, each by its power; the rest cost no choice."""
+    n = 1000
+    x = np.repeat(np.arange(n), 4).reshape(n, 4) + np.array([0, 0.9, 0.9, 0])
+    z = np.tile([0, 0, 0.9, 0.9], (n, 1))
+    vertices = np.stack([x, np.full_like(x, 2.0), z], 2).reshape(-1, 3)
+    quads = np.arange(4 * n).reshape(n, 4)
+    uvs = np.repeat((np.arange(n) + 0.5) / n, 4)
+    image = np.zeros((1, n), f4)
+    image[0, ::100] = np.arange(1, 11)
+    mesh = wf.Mesh(
+        vertices,
+        np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]),
+        uvs=np.stack([uvs, uvs], 1),
+        material=BLACK,
+        emission=texture(image),
+    )
+    scene = compile_scene(
+        wf.Scene([floor(), mesh]), lambda geometry: make_accelerator(geometry, "numpy"), "power"
+    )
+    assert len(scene.lights) == 2 * n
+    chance = scene.lights.choice.pmf(np.arange(2 * n), np.zeros((3, 2 * n), f4))
+    assert np.flatnonzero(chance[:n]).tolist() == list(range(0, n, 100))
+    assert chance[: 2 * n].reshape(2, n)[:, ::100] == pytest.approx(np.tile(np.arange(1, 11) / 110, (2, 1)))
+    light, probability = scene.lights.choice.sample(np.zeros((3, 1000), f4), RNG.random(1000, f4))
+    assert (probability == chance[light]).all()
+    assert (light % 100 == 0).all()
+
+
+# --- Both sides ------------------------------------------------------------------------------------
+
+
+def test_both_sides_are_seen() -> None:
+    """From above and from below, evenly or by a texture."""
+    for emission in (3.0, texture(np.full((2, 2), 3.0))):
+        for both in (False, True):
+            scene = wf.Scene([lamp(emission, two_sided=both)])
+            for eye in (-3, 7):
+                scene.camera = wf.Camera.look_at((0, eye, 0), (0, Y, 0), (0, 0, 1), fov=1, size=(2, 2))
+                assert (render(scene, 1).rgb == (3 if both or eye < 0 else 0)).all()
+
+
+@pytest.mark.parametrize("shape", ["rectangle", "triangles", "texture"])
+@pytest.mark.parametrize("integrator", ["naive", "full"])
+def test_a_lamp_lights_on_both_sides(integrator: str, shape: str) -> None:
+    """A floor that it faces, and one that it looks away from, with the same closed form."""
+    uneven = texture(np.ones((2, 2))) if shape == "texture" else 1.0
+    up = wf.Rectangle(
+        (LOW[0], Y, LOW[1]), (0, 0, 1.1), (1.1, 0, 0), material=BLACK, emission=uneven, two_sided=True
+    )
+    if shape == "triangles":
+        up = wf.Mesh(up.vertices, up.faces[::-1], material=BLACK, emission=1.0, two_sided=True)
+    kinds = {"rectangle": TwoSidedRectangleLights}
+    assert isinstance(compiled(floor(), up).lights.kinds[0], kinds.get(shape, TwoSidedTriangleLights))
+    spp = 4096 if integrator == "naive" else 512
+    mean = measure(lit(up), spp, integrator=integrator, max_bounces=1)
+    assert_mean(mean, irradiance() * ALBEDO / np.pi, 0.02)
+
+
+def column(*values: float) -> np.ndarray:
+    """Three numbers as a (3, 1) column."""
+    return np.array(values, f4).reshape(3, 1)
+
+
+def lights(kind: type) -> TriangleLights | RectangleLights:
+    """Two of a kind, seen from both sides by the default points of `check_light`."""
+    corners = np.array([[[-1, 1.5, -1], [0.4, 1.3, -1], [0.4, 1.3, 0.6]], [[2, -2, 0], [2, 1, 4], [5, 1, 4]]])
+    corners[:, 2] = corners[:, 1] + np.cross(corners[:, 1] - corners[:, 0], [[0.3, 0.2, 1], [1, 0, 0.5]])
+    if issubclass(kind, TriangleLights):
+        return kind.from_triangles(corners, column(3, 2, 1))
+    return kind.from_pairs(corners, column(3, 2, 1))
+
+
+@pytest.mark.parametrize("kind", [TwoSidedTriangleLights, TwoSidedRectangleLights])
+def test_the_contract(kind: type) -> None:
+    """χ², densities and radiance agree, on both sides."""
+    record = lights(kind)
+    points = np.array([[0, 0, 0], [0.5, 4, 1]], f4)
+    testing.check_light(record, points=points, samples=20_000)
+    for k in range(2):
+        for p in points:
+            n, one = 64, record.take(np.array([k]))
+            sample = one.sample_li(np.repeat(p[:, None], n, 1), RNG.random((2, n), f4))
+            assert (sample.pdf > 0).all()
+            assert (sample.cos_light > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("one", "both"),
+    [(TriangleLights, TwoSidedTriangleLights), (RectangleLights, TwoSidedRectangleLights)],
+)
+def test_power_doubles(one: type, both: type) -> None:
+    """And the estimate of what it brings behind is that of before."""
+    assert lights(both).power(1.0) == pytest.approx(2 * lights(one).power(1.0))
+    normal = lights(one).normal[:, :1].astype(float)
+    record = lights(one)
+    edges = (record.edge1, record.edge2) if one is TriangleLights else (record.edge_u, record.edge_v)
+    share = 1 / 3 if one is TriangleLights else 1 / 2
+    middle = (record.corner + share * (edges[0] + edges[1]))[:, :1].astype(float)
+    before, behind = (
+        lights(both).irradiance(middle + side * 5 * normal, 0.1, 10.0)[0, 0] for side in (1, -1)
+    )
+    assert before == pytest.approx(behind, rel=1e-5)
+    assert before == pytest.approx(lights(one).irradiance(middle + 5 * normal, 0.1, 10.0)[0, 0], rel=1e-6)
+    assert lights(one).irradiance(middle - 5 * normal, 0.1, 10.0)[0, 0] < 0.1 * behind
+
+
+# --- Everything together -----------------------------------------------------------------------------
+
+
+def gallery(size: tuple[int, int] = (16, 8)) -> wf.Scene:
+    """Screens that shine on one side or both, one with holes, between glossy walls and a matte ball."""
+    rng = np.random.default_rng(5)
+    image = texture(rng.random((4, 4, 3)) ** 2 * 4)
+    leaf = wf.Diffuse(0.5).with_alpha(texture(rng.random((3, 3)), channel=0), cutoff=0.4)
+    shapes: list[wf.Mesh | wf.Sphere] = [
+        floor(half=3),
+        wf.Rectangle((-1.6, 0.3, 0.5), (1, 0, -0.7), (0, 1.2, 0), material=BLACK, emission=image),
+        wf.Rectangle(
+            (0.6, 0.4, -0.6), (1, 0, 1), (0, 1.2, 0.2), material=leaf, emission=image, two_sided=True
+        ),
+        wf.Rectangle((-0.5, 2.2, 0), (1, 0, 0), (0, 0.3, -1), material=BLACK, emission=image, two_sided=True),
+        wf.Rectangle((-3, 0, -1.5), (6, 0, 0), (0, 4, 0), material=wf.Principled(0.5, roughness=0.5)),
+        wf.Sphere((0, 0.5, 0.3), 0.5, material=wf.Diffuse(0.6)),
+    ]
+    camera = wf.Camera.look_at((0.3, 1.6, 6), (0, 1, 0), fov=36, size=size)
+    return wf.Scene(shapes, [wf.PointLight((1, 3, 2), 1.0)], camera)
+
+
+def test_estimators_agree() -> None:
+    """All light by chance and by light samples; the point light is left to both."""
+    scene = gallery()
+    scene.lights = []
+    naive = repeat(scene, 32, integrator="naive", max_bounces=4)
+    full = repeat(scene, 8, integrator="full", max_bounces=4, first_seed=100)
+    assert_same_images(naive, full, 0.02)
+    mis = repeat(scene, 8, integrator="direct_mis", max_bounces=1)
+    simple = repeat(scene, 16, integrator="direct_simple", max_bounces=1, first_seed=200)
+    assert_same_images(mis, simple, 0.02)
+
+
+@pytest.mark.parametrize("cut", [{"wave_size": 1}, {"wave_size": 50, "workers": 3}])
+def test_waves_and_workers_change_no_bit(cut: dict) -> None:
+    """Whatever is traced together."""
+    whole = render(gallery((6, 5)), 3).rgb
+    assert render(gallery((6, 5)), 3, **cut).rgb.tobytes() == whole.tobytes()
+
+
+def test_what_shines_evenly_pays_nothing() -> None:
+    """No table, and rectangles stay rectangles."""
+    scene = compiled(floor(), lamp(2.0))
+    assert scene.uneven is None
+    assert [type(kind) for kind in scene.lights.kinds] == [RectangleLights]
+    assert scene.lights.choice.__class__.__name__ == "EverywhereAlike"
+
+
+def test_dark_lights_take_no_part() -> None:
+    """A table with dark lights chooses as one without them."""
+    record = lights(TriangleLights)
+    dark = TriangleLights.concatenate([record.take(np.array([0])), record])
+    dark.radiance[:, 0] = 0
+    point, u, v = RNG.random((3, 100), f4), RNG.random(100, f4), RNG.random((2, 100), f4)
+    for choice in ("place", "power", "uniform"):
+        plain, mixed = LightTable([record], 5.0, choice), LightTable([dark], 5.0, choice)
+        (a, first), (b, second) = (table.sample_li(point, u, v) for table in (plain, mixed))
+        assert (second == first + 1).all()
+        assert (a.wi == b.wi).all()
+        assert (a.pdf == b.pdf).all()
+        assert (mixed.pdf_li(second, point, b.wi) == plain.pdf_li(first, point, a.wi)).all()
+        assert (mixed.pdf_li(np.zeros(100, np.intp), point, b.wi) == 0).all()
+
+
+# --- From files ------------------------------------------------------------------------------------
+
+CODES = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [188, 188, 188]]], np.uint8)
+GREY = ((188 / 255 + 0.055) / 1.055) ** 2.4
+
+
+def seen(mesh: wf.Mesh, u: float, v: float, eye: float = 1) -> np.ndarray:
+    """The colour of a mesh in the unit square at z = 0, from before or behind."""
+    camera = wf.Camera.look_at((u, v, eye), (u, v, 0), fov=0.01, size=(SIDE, SIDE))
+    return render(wf.Scene([mesh], camera=camera), 1, max_bounces=0).rgb.mean((0, 1))
+
+
+@pytest.mark.parametrize("both", [False, True])
+def test_gltf(tmp_path, both: bool) -> None:
+    """Factor × strength × decoded texture, from both sides if the material is double-sided."""
+    build = Builder()
+    info = build.image(CODES)
+    build.json["samplers"] = [{"magFilter": 9728}]
+    build.json["textures"][0]["sampler"] = 0
+    strength = {"KHR_materials_emissive_strength": {"emissiveStrength": 10}}
+    build.material(emissiveFactor=[1, 0.5, 0.25], emissiveTexture=info, doubleSided=both, extensions=strength)
+    (mesh,) = wf.load(build.gltf(tmp_path / "a.gltf"), strict=True).shapes
+    assert mesh.two_sided is both
+    # glTF's v runs downwards, so the image's top row is at y = 0
+    assert seen(mesh, 0.1, 0.1) == pytest.approx([10, 0, 0])
+    assert seen(mesh, 0.8, 0.1) == pytest.approx([0, 5, 0])
+    assert seen(mesh, 0.1, 0.8) == pytest.approx([0, 0, 2.5])
+    assert seen(mesh, 0.1, 0.1, -1) == pytest.approx([10 * both, 0, 0])
+
+
+def test_gltf_without_a_factor_is_dark(tmp_path) -> None:
+    """The factor is black by default."""
+    build = Builder()
+    build.material(emissiveTexture=build.image(CODES))
+    (mesh,) = wf.load(build.gltf(tmp_path / "a.gltf"), strict=True).shapes
+    assert mesh.emission is None
+
+
+@pytest.mark.parametrize(
+    ("lines", "factor"), [("map_Ke t.png", 1.0), ("Ke 4 4 4\nmap_Ke t.png", 4.0), ("Ke 2 2 2", None)]
+)
+def test_mtl(tmp_path, lines: str, factor: float | None) -> None:
+    """The image, alone or times Ke; its bottom row is at v = 0."""
+    iio.imwrite(tmp_path / "t.png", np.kron(CODES, np.ones((8, 8, 1), np.uint8)))
+    (tmp_path / "s.mtl").write_text(f"newmtl m\nKd 0 0 0\n{lines}\n")
+    text = "mtllib s.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n"
+    (tmp_path / "a.obj").write_text(text)
+    (mesh,) = wf.load(tmp_path / "a.obj", strict=True).shapes
+    if factor is None:
+        assert seen(mesh, 0.3, 0.3) == pytest.approx([2, 2, 2])
+        return
+    assert seen(mesh, 0.2, 0.2) == pytest.approx([0, 0, factor])
+    assert seen(mesh, 0.7, 0.2) == pytest.approx([GREY * factor] * 3, rel=1e-4)
+    assert seen(mesh, 0.2, 0.7) == pytest.approx([factor, 0, 0])
+
+
+def test_one_mesh_keeps_its_emission(tmp_path) -> None:
+    """`load_mesh` too."""
+    build = Builder()
+    build.material(emissiveFactor=[1, 1, 1], emissiveTexture=build.image(CODES), doubleSided=True)
+    mesh = wf.load_mesh(build.gltf(tmp_path / "a.gltf"))
+    assert isinstance(mesh.emission, wf.Texture)
+    assert mesh.two_sided
+    assert wf.load_mesh(tmp_path / "a.gltf", material=wf.Diffuse(0.5)).emission is None
+
+
+# --- Complaints ------------------------------------------------------------------------------------
+
+
+def test_complaints() -> None:
+    """A sphere shines evenly; a mesh without coordinates is named; a lamp needs a number or a texture."""
+    with pytest.raises(wf.SceneError, match="sphere: emission must be numeric, got <Texture"):
+        wf.Sphere(HERE, 1, emission=texture(QUARTERS))
+    with pytest.raises(wf.SceneError, match="rectangle: emission"):
+        lamp("bright")
+    bare = wf.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], emission=texture(QUARTERS))
+    with pytest.warns(UserWarning, match=r"1 meshes lack the texture coordinates \(uvs\).*first: 'mesh'"):
+        render(wf.Scene([bare]), 1)
+
+
+def test_values_below_0_count_as_0() -> None:
+    """A texture may hold anything."""
+    scene = lit(lamp(texture([[-5.0, -5.0]])))
+    assert not render(scene, 4, max_bounces=1).rgb.any()
