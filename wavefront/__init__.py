@@ -22,7 +22,7 @@ from .metrics import Comparison, compare
 from .relief import BumpMap, NormalMap
 from .render import render
 from .scene import Scene
-from .shapes import Disk, Mesh, Rectangle, Sphere
+from .shapes import Disk, Instance, Mesh, Rectangle, Sphere
 from .textures import Texture
 from .vertex_colors import VertexColors
 
@@ -39,6 +39,7 @@ __all__ = [
     "Disk",
     "Environment",
     "Image",
+    "Instance",
     "Mesh",
     "Mirror",
     "Mix",

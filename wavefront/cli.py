@@ -23,7 +23,7 @@ from .parallel import EXECUTORS
 from .render import DEFAULT_SPP, render
 from .sampling.sampler import SAMPLERS
 from .scene import Scene
-from .shapes import Mesh
+from .shapes import Instance, Mesh
 
 INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 VECTOR_OPTIONS = ("--origin", "--target", "--up")
@@ -174,7 +174,8 @@ def _summary(image: Image, path: str) -> str:
 def _info(options: argparse.Namespace) -> int:
     scene = load(options.scene)
     low, high = scene.bounds
-    faces = sum(len(shape.faces) for shape in scene.shapes if isinstance(shape, Mesh))
+    meshes = [shape.mesh if isinstance(shape, Instance) else shape for shape in scene.shapes]
+    faces = sum(len(mesh.faces) for mesh in meshes if isinstance(mesh, Mesh))
     print(f"{options.scene}: {len(scene.shapes)} shapes, {faces} triangles, {len(scene.lights)} lights")
     print(f"bounds: {_triple(low)} to {_triple(high)}")
     print(f"camera: {'in the file' if scene.camera else 'none; the scene will be framed'}")

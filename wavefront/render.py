@@ -26,7 +26,7 @@ from .parallel import Workers, choose_executor, worker_count
 from .progress import Bar, Progress
 from .sampling.sampler import make_sampler
 from .scene import Scene, compile_scene
-from .shapes import Mesh, Sphere
+from .shapes import Instance, Mesh, Sphere
 from .stopping import Clock, passes
 from .work import BadSamples, Piece, Wave, plan, trace_piece
 
@@ -184,7 +184,7 @@ def as_scene(subject: Any) -> Scene:
     """
     if isinstance(subject, Scene):
         return subject
-    if isinstance(subject, Mesh | Sphere):
+    if isinstance(subject, Mesh | Sphere | Instance):
         return Scene([subject])
     if isinstance(subject, str | os.PathLike):
         return load(Path(subject))

@@ -11,11 +11,12 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from .accel.base import Accelerator, Geometry
+from .accel import Accelerator, Geometry, InstanceAccelerator
 from .bsdfs import Bsdf, Opacity, Relief, Spatial
 from .camera import Camera
 from .camera.base import image_size
 from .errors import SceneError, number
+from .instances import InstanceTable, own_frame, place, resolve
 from .lights import (
     DirectionalLight,
     Environment,
@@ -32,13 +33,13 @@ from .lights import (
     TwoSidedTriangleLights,
     first_of_pairs,
 )
-from .shapes import Mesh, Sphere
+from .shapes import Instance, Mesh, Sphere
 from .shapes.attributes import ATTRIBUTES, Corners, corner_values
 from .state import Surface
 from .uneven import Source, Uneven, is_uneven, mean_radiance
 from .vec import Bools, Floats, Ints, f4
 
-Shape: TypeAlias = Mesh | Sphere
+Shape: TypeAlias = Mesh | Sphere | Instance
 AREA_LIGHTS = (RectangleLights, TwoSidedRectangleLights, TriangleLights, TwoSidedTriangleLights)
 UserLight: TypeAlias = PointLight | SpotLight | DirectionalLight | Environment
 
@@ -49,7 +50,7 @@ class Scene:
     Parameters
     ----------
     shapes
-        `Mesh` and `Sphere` objects; one with an emission is a light.
+        `Mesh`, `Sphere` and `Instance` objects; one with an emission is a light.
     lights
         `PointLight`, `SpotLight`, `DirectionalLight` and `Environment` objects, at most one
         `Environment`. A scene where nothing shines is rendered in a neutral environment, with a
@@ -66,7 +67,7 @@ class Scene:
     def __init__(
         self, shapes: Iterable[Shape] | Shape, lights: Iterable[UserLight] = (), camera: Camera | None = None
     ) -> None:
-        self.shapes: list[Shape] = _list_of("shapes", shapes, (Mesh, Sphere))
+        self.shapes: list[Shape] = _list_of("shapes", shapes, (Mesh, Sphere, Instance))
         self.lights: list[UserLight] = _list_of(
             "lights", lights, (PointLight, Environment, SpotLight, DirectionalLight)
         )
@@ -168,7 +169,10 @@ class Opacities:
 
 @dataclass(slots=True)
 class CompiledScene:
-    """A scene as flat arrays, relative to its centre. Triangles come first, then spheres."""
+    """A scene as flat arrays, relative to its centre. Triangles come first, then spheres.
+
+    A mesh that is placed several times stands in the arrays once, in its own frame.
+    """
 
     centre: NDArray[np.float64]  # (3,) scene units
     radius: float  # of the bounding sphere, scene units
@@ -186,6 +190,7 @@ class CompiledScene:
     opacities: Opacities | None  # None when every surface is all there
     lights: LightTable
     uneven: Uneven | None  # the lights that do not shine evenly; None when all do
+    instances: InstanceTable | None = None  # None when every mesh is placed once
 
 
 def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "place") -> CompiledScene:
@@ -207,12 +212,16 @@ def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "plac
     """
     low, high = scene.bounds
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
-    meshes = [shape for shape in scene.shapes if isinstance(shape, Mesh)]
-    spheres = [shape for shape in scene.shapes if isinstance(shape, Sphere)]
+    meshes, spheres, instances = resolve(scene.shapes)
+    placed: list[Shape] = [*meshes, *spheres, *instances]
+    shared = list({id(instance.mesh): instance.mesh for instance in instances}.values())
+    once = sum(len(mesh.faces) for mesh in meshes)
     corners = [(mesh.vertices - centre)[mesh.faces] for mesh in meshes]
+    corners += [own_frame(mesh)[mesh.faces] for mesh in shared]
+    meshes += shared
     triangles = np.concatenate(corners) if corners else np.zeros((0, 3, 3))
-    user_materials, material_of = _number_materials(meshes, spheres)
-    attributes = {name: corner_values(name, meshes) for name in _attributes_read(meshes, spheres)}
+    user_materials, material_of, replaced = _number_materials(meshes, spheres, instances)
+    attributes = {name: corner_values(name, meshes) for name in _attributes_read(placed)}
     lights, light_of, environment = _gather_lights(
         scene, meshes, spheres, corners, centre, (high - low) / 2, light_choice
     )
@@ -221,11 +230,20 @@ def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "plac
     smooth = any(mesh.normals is not None for mesh in meshes)
     triangles32 = np.ascontiguousarray(triangles, f4)
     opacities = _opacities(user_materials, material_of)
-    geometry = Geometry(triangles32, np.ascontiguousarray(centers), radii, weights=bool(attributes) or smooth)
+    weights = bool(attributes) or smooth
+    geometry = Geometry(triangles32[:once], np.ascontiguousarray(centers), radii, weights)
+    accelerator, table = make_accelerator(geometry), None
+    if shared:
+        placements, table = place(instances, shared, centre, once, len(spheres), replaced)
+        none = np.zeros((3, 0), f4), np.zeros(0, f4)
+        ends = np.cumsum([len(mesh.faces) for mesh in shared])
+        parts = np.split(triangles32[once:], ends[:-1])
+        built = [make_accelerator(Geometry(part, *none, weights)) for part in parts]
+        accelerator = InstanceAccelerator(accelerator, built, placements)
     return CompiledScene(
         centre=centre,
         radius=radius,
-        accelerator=make_accelerator(geometry),
+        accelerator=accelerator,
         triangles=len(triangles),
         normals=_face_normals(triangles),
         corner_normals=_corner_normals(meshes, triangles),
@@ -239,6 +257,7 @@ def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "plac
         opacities=opacities,
         lights=lights,
         uneven=_uneven(meshes, len(lights), light_of),
+        instances=table,
     )
 
 
@@ -319,7 +338,7 @@ def _merge(materials: Sequence[Bsdf], numbers: list[int]) -> Bsdf:
     return merged
 
 
-def _attributes_read(meshes: Sequence[Mesh], spheres: Sequence[Sphere]) -> list[str]:
+def _attributes_read(shapes: Sequence[Shape]) -> list[str]:
     """Return the names of what materials read; warn of meshes that lack what theirs reads.
 
     Raises
@@ -329,16 +348,16 @@ def _attributes_read(meshes: Sequence[Mesh], spheres: Sequence[Sphere]) -> list[
     """
     read: set[str] = set()
     lacking: dict[str, dict[int, str]] = {}  # what -> the meshes that lack it, by identity, with their names
-    shapes: list[Shape] = [*meshes, *spheres]
     for shape in shapes:
+        mesh = shape.mesh if isinstance(shape, Instance) else shape
         glow = shape.emission.reads if isinstance(shape.emission, Spatial) else ()
         for name in sorted(_reads(shape.material).union(glow)):
             if name not in ATTRIBUTES:
                 known = ", ".join(ATTRIBUTES)
                 raise SceneError(f"{shape.name}: its material reads {name!r}; it must be one of {known}")
             read.add(name)
-            if isinstance(shape, Mesh) and ATTRIBUTES[name].given(shape) is None:
-                lacking.setdefault(ATTRIBUTES[name].title, {})[id(shape)] = shape.name
+            if isinstance(mesh, Mesh) and ATTRIBUTES[name].given(mesh) is None:
+                lacking.setdefault(ATTRIBUTES[name].title, {})[id(mesh)] = shape.name
     for title, names in lacking.items():
         warnings.warn(
             f"{len(names)} meshes lack the {title} that their materials read, "
@@ -359,19 +378,28 @@ def _reads(material: Bsdf | Opacity) -> set[str]:
     return out
 
 
-def _number_materials(meshes: Sequence[Mesh], spheres: Sequence[Sphere]) -> tuple[list[Bsdf], Ints]:
-    """Return the distinct materials, and the number of each primitive's."""
+def _number_materials(
+    meshes: Sequence[Mesh], spheres: Sequence[Sphere], instances: Sequence[Instance]
+) -> tuple[list[Bsdf], Ints, Ints | None]:
+    """Return the distinct materials, and the numbers of each row's and of each instance's.
+
+    An instance that has the material of its mesh has the number -1; when all have, there are none.
+    """
     numbers: dict[int, int] = {}
     materials: list[Bsdf] = []
     of_shape: list[int] = []
-    shapes: list[Shape] = [*meshes, *spheres]
+    shapes: list[Shape] = [*meshes, *spheres, *instances]
     for shape in shapes:
         if id(shape.material) not in numbers:
             numbers[id(shape.material)] = len(materials)
             materials.append(shape.material)
         of_shape.append(numbers[id(shape.material)])
+    rows = len(meshes) + len(spheres)
     counts = [len(mesh.faces) for mesh in meshes] + [1] * len(spheres)
-    return materials, np.repeat(np.array(of_shape, np.intp), counts)
+    of_row = np.repeat(np.array(of_shape[:rows], np.intp), counts)
+    own = [instance.material is not instance.mesh.material for instance in instances]
+    replaced = np.where(own, np.array(of_shape[rows:], np.intp), -1) if any(own) else None
+    return materials, of_row, replaced
 
 
 def _face_normals(triangles: NDArray[np.float64]) -> Floats:

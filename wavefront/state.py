@@ -94,9 +94,12 @@ class Hits(Columns):
     """What each ray met first."""
 
     t: Floats  # (n,) distance along the ray, scene units; inf on a miss
-    prim: Ints  # (n,) primitive id, -1 on a miss
+    prim: (
+        Ints  # (n,) row of the scene's tables, -1 on a miss: the primitive's id where nothing is an instance
+    )
     b1: Floats  # (n,) barycentric weight of the second vertex
     b2: Floats  # (n,) barycentric weight of the third vertex
+    place: Ints | None = None  # (n,) column of the scene's `InstanceTable`; None when it has none
 
     @property
     def found(self) -> Ints:

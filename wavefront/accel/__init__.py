@@ -2,5 +2,13 @@
 
 from .base import Accelerator, Geometry, Intersections
 from .choose import make_accelerator
+from .instances import InstanceAccelerator, Placements
 
-__all__ = ["Accelerator", "Geometry", "Intersections", "make_accelerator"]
+__all__ = [
+    "Accelerator",
+    "Geometry",
+    "InstanceAccelerator",
+    "Intersections",
+    "Placements",
+    "make_accelerator",
+]

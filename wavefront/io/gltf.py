@@ -161,7 +161,8 @@ class Document:
 class Contents:
     """What a file holds, in world space."""
 
-    raws: list[tuple[Raw, int | None, Matrix]] = field(default_factory=list)  # mesh, material, placement
+    # mesh, material, placement; a mesh that several nodes have is one object
+    raws: list[tuple[Raw, int | None, Matrix]] = field(default_factory=list)
     lights: list[DirectionalLight | PointLight | SpotLight] = field(default_factory=list)
     camera: Camera | None = None
 
@@ -175,9 +176,12 @@ def contents(document: Document) -> Contents:
         If an element is missing or malformed.
     """
     out = Contents()
+    meshes: dict[int, list[tuple[Raw, int | None]]] = {}
     for node, matrix in _walk(document):
         if "mesh" in node:
-            out.raws += [(raw, material, matrix) for raw, material in _primitives(document, node["mesh"])]
+            if node["mesh"] not in meshes:
+                meshes[node["mesh"]] = _primitives(document, node["mesh"])
+            out.raws += [(raw, material, matrix) for raw, material in meshes[node["mesh"]]]
         if "camera" in node:
             _add_camera(document, out, node["camera"], matrix)
         if "skin" in node:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,7 +18,7 @@ from ..camera import Camera
 from ..errors import SceneError, finite_array
 from ..lights import DirectionalLight, PointLight, SpotLight
 from ..scene import Scene
-from ..shapes import Mesh
+from ..shapes import Instance, Mesh
 from ..shapes.transform import moved
 from . import gltf, headers, mtl, obj, stl, visuals
 from .appearance import Look, dress, is_faint
@@ -30,10 +31,13 @@ if TYPE_CHECKING:
 
 EXTENSIONS = (".obj", ".ply", ".stl", ".glb", ".gltf")
 PathLike = str | os.PathLike[str]
+T = TypeVar("T")
 
 
 def load(path: PathLike, *, strict: bool = False) -> Scene:
     """Read a scene: .obj (with its .mtl), .ply, .stl, .glb, .gltf.
+
+    A mesh that several nodes of a glTF file have is read once, and becomes an `Instance` for each.
 
     Parameters
     ----------
@@ -48,7 +52,7 @@ def load(path: PathLike, *, strict: bool = False) -> Scene:
         Naming the file, the line or element, the value and the limit.
     """
     name, contents = _contents(path, strict, materials=True)
-    return Scene(_meshes(name, contents.raws, strict), contents.lights, contents.camera)
+    return Scene(_shapes(name, contents.placed, strict), contents.lights, contents.camera)
 
 
 def load_mesh(
@@ -84,22 +88,24 @@ def load_mesh(
 def load_meshes(path: PathLike, *, strict: bool = False, materials: bool = True) -> list[Mesh]:
     """Read the meshes of a file, one for each material and node; arguments as for `load`."""
     name, contents = _contents(path, strict, materials)
-    return _meshes(name, contents.raws, strict)
+    meshes = [mesh for part in contents.placed if (mesh := build(name, part.moved(), strict)) is not None]
+    return _some(name, meshes)
 
 
 def from_trimesh(geometry: Any) -> Scene:
     """Turn a `trimesh.Trimesh` or `trimesh.Scene` into a scene, as if it had been read from a file.
 
     Normals are used where the object holds them: given by its file, or computed because somebody
-    asked for `vertex_normals`. Trimesh's own exporters follow the same rule.
+    asked for `vertex_normals`. Trimesh's own exporters follow the same rule. Geometry that stands in a
+    scene's graph several times becomes an `Instance` for each.
 
     Raises
     ------
     SceneError
         If it is something else, or has no faces.
     """
-    raws = _raws(geometry, "trimesh object", strict=False)
-    return Scene(_meshes("trimesh object", raws, strict=False), camera=_camera(geometry))
+    placed = _placed(geometry, "trimesh object", strict=False)
+    return Scene(_shapes("trimesh object", placed, strict=False), camera=_camera(geometry))
 
 
 def join(
@@ -143,10 +149,23 @@ def _joined(parts: list[np.ndarray | None]) -> np.ndarray | None:
 
 
 @dataclass
+class Placed:
+    """A mesh of a file and where it stands; what stands in several places is one `raw`."""
+
+    raw: Raw
+    matrix: np.ndarray = field(default_factory=lambda: np.eye(4))  # (4, 4) to the scene
+
+    def moved(self) -> Raw:
+        """Return a mesh of its own, in the scene's coordinates."""
+        vertices, faces, normals = moved(self.matrix, self.raw.vertices, self.raw.faces, self.raw.normals)
+        return replace(self.raw, vertices=vertices, faces=faces, normals=normals)
+
+
+@dataclass
 class Contents:
     """What a file holds."""
 
-    raws: list[Raw]
+    placed: list[Placed]
     lights: Sequence[DirectionalLight | PointLight | SpotLight] = ()
     camera: Camera | None = None
 
@@ -161,11 +180,11 @@ def _contents(path: PathLike, strict: bool, materials: bool) -> tuple[str, Conte
     _refuse(name, data)
     try:
         if extension == ".obj":
-            return name, Contents(_read_obj(path, data, strict, materials))
+            return name, Contents([Placed(raw) for raw in _read_obj(path, data, strict, materials)])
         if extension in (".glb", ".gltf"):
             return name, _read_gltf(path, data, strict, materials)
         if extension == ".stl":
-            return name, Contents(stl.parse(name, data))
+            return name, Contents([Placed(raw) for raw in stl.parse(name, data)])
         return name, Contents(_read_ply(name, data, strict))
     except MemoryError as error:
         raise SceneError(f"{name}: does not fit in memory") from error
@@ -179,11 +198,36 @@ def _refuse(name: str, data: bytes) -> None:
         raise SceneError(f"{name}: is an archive; unpack it first")
 
 
-def _meshes(name: str, raws: list[Raw], strict: bool) -> list[Mesh]:
-    meshes = [mesh for raw in raws if (mesh := build(name, raw, strict)) is not None]
-    if not meshes:
+def _shapes(name: str, placed: list[Placed], strict: bool) -> list[Mesh | Instance]:
+    """Build the meshes; what stands in several places is built once and becomes instances."""
+    times = Counter(id(part.raw) for part in placed)
+    shared: dict[int, Mesh | None] = {}
+    shapes: list[Mesh | Instance | None] = []
+    for part in placed:
+        key = id(part.raw)
+        if times[key] == 1:
+            shapes.append(build(name, part.moved(), strict))
+            continue
+        if key not in shared:
+            shared[key] = build(name, part.raw, strict)
+        shapes.append(_instance(name, part, shared[key], strict))
+    return _some(name, [shape for shape in shapes if shape is not None])
+
+
+def _instance(name: str, part: Placed, mesh: Mesh | None, strict: bool) -> Mesh | Instance | None:
+    """Place a mesh that others share; where its matrix is none for an instance, as a mesh of its own."""
+    if mesh is None:
+        return None
+    try:
+        return Instance(mesh, part.matrix)
+    except SceneError:
+        return build(name, part.moved(), strict)
+
+
+def _some(name: str, shapes: list[T]) -> list[T]:
+    if not shapes:
         raise SceneError(f"{name}: has no faces")
-    return meshes
+    return shapes
 
 
 def _read_gltf(path: PathLike, data: bytes, strict: bool, materials: bool) -> Contents:
@@ -192,13 +236,10 @@ def _read_gltf(path: PathLike, data: bytes, strict: bool, materials: bool) -> Co
         document = gltf.Document(path, data)
         found = gltf.contents(document)
         looks = Materials(document)
-        raws = []
-        for raw, number, matrix in found.raws:
+        for raw, number, _ in found.raws:
             # without a material, the mesh is as plain as in memory
             if materials and not dress(raw, None if number is None else looks.look(number)):
                 document.lose("vertex colours", f"mesh {raw.name!r}")
-            raw.vertices, raw.faces, raw.normals = moved(matrix, raw.vertices, raw.faces, raw.normals)
-            raws.append(raw)
     except (SceneError, MemoryError):
         raise
     # the JSON may hold anything anywhere: a list for a number, text for a list
@@ -207,7 +248,7 @@ def _read_gltf(path: PathLike, data: bytes, strict: bool, materials: bool) -> Co
     if document.lost and materials:
         listed = ", ".join(f"{what} ({where})" for what, where in document.lost.items())
         warn(f"{name}: not honoured: {listed}", strict)
-    return Contents(raws, found.lights, found.camera)
+    return Contents([Placed(raw, matrix) for raw, _, matrix in found.raws], found.lights, found.camera)
 
 
 def _read_obj(path: PathLike, data: bytes, strict: bool, materials: bool) -> list[Raw]:
@@ -242,7 +283,7 @@ def _libraries(path: PathLike, libraries: list[str], strict: bool) -> dict[str, 
     return looks
 
 
-def _read_ply(name: str, data: bytes, strict: bool) -> list[Raw]:
+def _read_ply(name: str, data: bytes, strict: bool) -> list[Placed]:
     """Let trimesh read a PLY file; whatever it raises becomes a SceneError, what it leaves out, too."""
     import trimesh
 
@@ -254,30 +295,32 @@ def _read_ply(name: str, data: bytes, strict: bool) -> list[Raw]:
         raise
     except Exception as error:
         raise SceneError(f"{name}: not a readable ply file: {error!r}") from error
-    raws = _raws(found, name, strict)
-    faces = sum(len(raw.faces) for raw in raws)
+    placed = _placed(found, name, strict)
+    faces = sum(len(part.raw.faces) for part in placed)
     if faces < claimed.get("face", 0):
         raise SceneError(f"{name}: claims {claimed['face']} of face; {faces} can be read")
-    return raws
+    return placed
 
 
-def _raws(geometry: Any, source: str, strict: bool) -> list[Raw]:
-    """Return the meshes of a trimesh object, placed and with materials."""
+def _placed(geometry: Any, source: str, strict: bool) -> list[Placed]:
+    """Return the meshes of a trimesh object with materials, and where they stand."""
     import trimesh
 
     looks = _Visuals()
-    raws = []
-    for mesh, name, matrix in _placed(geometry, trimesh):
-        raw = _raw(mesh, name, matrix)
-        looks.dress(raw, mesh)
-        raws.append(raw)
+    raws: dict[int, Raw] = {}
+    placed = []
+    for mesh, name, matrix in _nodes(geometry, trimesh):
+        if id(mesh) not in raws:
+            raws[id(mesh)] = _raw(mesh, name)
+            looks.dress(raws[id(mesh)], mesh)
+        placed.append(Placed(raws[id(mesh)], matrix))
     if looks.lost:
         listed = ", ".join(f"{what} (mesh {where!r})" for what, where in looks.lost.items())
         warn(f"{source}: not honoured: {listed}", strict)
-    return raws
+    return placed
 
 
-def _placed(geometry: Any, trimesh: Any) -> list[tuple[Any, str, np.ndarray]]:
+def _nodes(geometry: Any, trimesh: Any) -> list[tuple[Any, str, np.ndarray]]:
     """Return every mesh with its name and its matrix to world space."""
     if isinstance(geometry, trimesh.Trimesh):
         return [(geometry, str(geometry.metadata.get("name") or ""), np.eye(4))]
@@ -308,14 +351,14 @@ def _camera(geometry: Any) -> Camera | None:
     return gltf.camera_at(matrix, float(geometry.camera.fov[1]), float(width / height))
 
 
-def _raw(mesh: trimesh.Trimesh, name: str, matrix: np.ndarray) -> Raw:
+def _raw(mesh: trimesh.Trimesh, name: str) -> Raw:
     # asking for `vertex_normals` would compute them; the cache tells whether they are there
     normals = np.asarray(mesh.vertex_normals) if "vertex_normals" in mesh._cache.cache else None
     uvs = getattr(mesh.visual, "uv", None)
     vertices = np.asarray(mesh.vertices, np.float64)
     if uvs is not None and (np.ndim(uvs) != 2 or len(uvs) != len(vertices)):
         uvs = None
-    raw = Raw(name, *moved(matrix, vertices, np.asarray(mesh.faces), normals))
+    raw = Raw(name, vertices, np.asarray(mesh.faces), normals)
     raw.uvs = None if uvs is None else np.asarray(uvs, np.float64)[:, :2]
     raw.colors = visuals.vertex_colours(mesh)
     return raw

@@ -1,7 +1,8 @@
 """Shapes: what a scene is made of."""
 
 from .disk import Disk
+from .instance import Instance
 from .mesh import Mesh, Rectangle
 from .sphere import Sphere
 
-__all__ = ["Disk", "Mesh", "Rectangle", "Sphere"]
+__all__ = ["Disk", "Instance", "Mesh", "Rectangle", "Sphere"]

@@ -70,7 +70,7 @@ class Mesh:
         self.material = check_material(name, material)
         self.emission = None if emission is None else colour(f"{name}: emission", emission, np.inf)
         self.two_sided = two_sided
-        _check_range(name, self.vertices)
+        check_range(name, self.vertices)
 
     def __repr__(self) -> str:
         """Name the mesh and its size."""
@@ -176,7 +176,7 @@ def _colors(name: str, values: ArrayLike | None, count: int) -> NDArray[np.float
     return array if array.shape[1] == 4 else np.column_stack([array, np.ones(count)])
 
 
-def _check_range(name: str, vertices: NDArray[np.float64]) -> None:
+def check_range(name: str, vertices: NDArray[np.float64]) -> None:
     bad = np.argwhere(np.abs(vertices) > FLOAT32_MAX)
     if len(bad):
         i, j = bad[0]

@@ -27,7 +27,10 @@ class ShadowRays(Rays):
 def intersect(scene: CompiledScene, rays: Rays) -> Hits:
     """Find what each ray meets first."""
     found = scene.accelerator.closest(rays.origin, rays.direction, rays.leaving)
-    return Hits(found.t, found.prim, found.b1, found.b2)
+    if scene.instances is None:
+        return Hits(found.t, found.prim, found.b1, found.b2)
+    row, place = scene.instances.locate(found.prim)
+    return Hits(found.t, row, found.b1, found.b2, place)
 
 
 def shadow_rays(surface: Surface, lanes: Ints, light: LightSample) -> ShadowRays:

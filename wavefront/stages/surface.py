@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..instances import InstanceTable
 from ..scene import CompiledScene
 from ..shapes.attributes import ATTRIBUTES, Corners
 from ..state import Hits, Rays, Surface
@@ -17,20 +18,50 @@ MIN_COS = f4(1e-3)  # the least cosine between wo and the shading normal
 def interact(scene: CompiledScene, rays: Rays, hits: Hits) -> Surface:
     """Gather the geometry at hits; every ray must have one."""
     point = rays.origin + rays.direction * hits.t
-    error = POINT_ERROR * (np.abs(point).max(0) + hits.t)
+    placed = _places(scene, hits)
+    error = _point_error(placed, hits, point)
     wo = -rays.direction
     ng = normals(scene, hits.prim, point)
-    ns = _shading_normals(scene, hits, ng)
+    if placed is not None:
+        ng = placed.turn(ng)
+    ns = _shading_normals(scene, hits, placed, ng)
     facing = dot(ng, wo)
     inside = facing < 0
     side = np.where(inside, f4(-1), f4(1))
     ng = ng * side
     ns = ng if ns is None else towards(wo, ns * side)
-    material = scene.material_of.take(hits.prim)
-    surface = Surface(point, error, ng, ns, wo, hits.prim, material, inside)
+    prim = hits.prim if placed is None else hits.prim + placed.shift
+    surface = Surface(point, error, ng, ns, wo, prim, _materials(scene, hits, placed), inside)
     for name, corners in scene.attributes.items():
         setattr(surface, name, _attribute(scene, name, corners, hits, point))
     return surface
+
+
+def _places(scene: CompiledScene, hits: Hits) -> InstanceTable | None:
+    """Where the hit meshes stand, a column per hit; None in a scene without instances."""
+    if scene.instances is None or hits.place is None:
+        return None
+    return scene.instances.take(hits.place)
+
+
+def _point_error(placed: InstanceTable | None, hits: Hits, point: Floats) -> Floats:
+    """Bound the rounding error (n,) of hit points.
+
+    On an instance the ray was rounded once more, in the mesh's frame: its origin, no further away
+    there than the mesh's size and t together, and its direction.
+    """
+    size = np.abs(point).max(0)
+    if placed is None:
+        return POINT_ERROR * (size + hits.t)
+    return POINT_ERROR * (size + placed.reach + placed.skew * hits.t)
+
+
+def _materials(scene: CompiledScene, hits: Hits, placed: InstanceTable | None) -> Ints:
+    """Rows (n,) of the material table."""
+    material = scene.material_of.take(hits.prim)
+    if placed is None or placed.material is None:
+        return material
+    return np.where(placed.material >= 0, placed.material, material)
 
 
 def normals(scene: CompiledScene, prim: Ints, point: Floats) -> Floats:
@@ -73,11 +104,17 @@ def _onto_sphere(scene: CompiledScene, sphere: Ints, point: Floats) -> Floats:
     return normal
 
 
-def _shading_normals(scene: CompiledScene, hits: Hits, ng: Floats) -> Floats | None:
+def _shading_normals(
+    scene: CompiledScene, hits: Hits, placed: InstanceTable | None, ng: Floats
+) -> Floats | None:
     """Interpolate the corners' normals, (3, n); None when the scene has only flat facets."""
     if scene.corner_normals is None:
         return None
-    ns = normalize(_interpolate(scene.corner_normals, hits, scene.triangles))
+    corners = _at_corners(scene.corner_normals, hits, scene.triangles)
+    if placed is not None:
+        # each by itself, as a mesh of its own would have them: a skewed transform changes their lengths
+        corners = [placed.turn(corner) for corner in corners]
+    ns = normalize(_interpolate(corners, hits))
     flat = (hits.prim >= scene.triangles) | ~(dot(ns, ng) > 0)
     np.copyto(ns, ng, where=flat)
     return ns
@@ -86,7 +123,7 @@ def _shading_normals(scene: CompiledScene, hits: Hits, ng: Floats) -> Floats | N
 def _attribute(scene: CompiledScene, name: str, corners: Corners, hits: Hits, point: Floats) -> Floats:
     """Return what varies over shapes at hits: interpolated on triangles, computed on spheres."""
     if scene.triangles:
-        values = _interpolate(corners, hits, scene.triangles)
+        values = _interpolate(_at_corners(corners, hits, scene.triangles), hits)
     else:
         values = np.empty((len(corners[0]), len(hits.prim)), f4)
     round_ = np.flatnonzero(hits.prim >= scene.triangles)
@@ -97,7 +134,12 @@ def _attribute(scene: CompiledScene, name: str, corners: Corners, hits: Hits, po
     return values
 
 
-def _interpolate(corners: Corners, hits: Hits, triangles: int) -> Floats:
+def _at_corners(table: Corners, hits: Hits, triangles: int) -> list[Floats]:
+    """Gather the values at the corners of the triangles hit, 3 × (c, n); any triangle's on spheres."""
     prim = np.minimum(hits.prim, triangles - 1)
-    a, b, c = (corner.take(prim, 1) for corner in corners)
+    return [corner.take(prim, 1) for corner in table]
+
+
+def _interpolate(corners: list[Floats], hits: Hits) -> Floats:
+    a, b, c = corners
     return a * (f4(1) - hits.b1 - hits.b2) + b * hits.b1 + c * hits.b2

@@ -1,0 +1,489 @@
+"""Meshes placed many times: the same hits and pictures as of meshes of their own, and the memory of one."""
+
+import numpy as np
+import pytest
+import trimesh
+from significance import render
+from trimesh.transformations import euler_matrix, translation_matrix
+
+import wavefront as wf
+from wavefront import instances
+from wavefront.accel import InstanceAccelerator, Intersections, make_accelerator
+from wavefront.accel import instances as queries
+from wavefront.accel.embree import installed
+from wavefront.scene import CompiledScene, compile_scene
+from wavefront.stages.intersect import intersect
+from wavefront.stages.surface import interact
+from wavefront.state import Paths
+
+f4 = np.float32
+NAMES = ["numpy", pytest.param("embree", marks=pytest.mark.skipif(not installed(), reason="no embreex"))]
+SKY = [wf.Environment(1)]
+RED, BLUE = wf.Diffuse((0.8, 0.2, 0.1)), wf.Conductor.named("gold", roughness=0.4)
+
+
+@pytest.fixture(autouse=True)
+def share_all(monkeypatch):
+    """Share even what is small."""
+    monkeypatch.setattr(instances, "FEW", 0)
+
+
+def bumpy(smooth: bool = False, **more) -> wf.Mesh:
+    """A closed mesh of 320 triangles without any symmetry, away from its own origin."""
+    ball = trimesh.creation.icosphere(2)
+    vertices = ball.vertices * (1 + 0.2 * np.sin(3 * ball.vertices[:, :1] + 1)) + [3, 1, -2]
+    uvs = ball.vertices[:, :2] * 0.5 + 0.5
+    return wf.Mesh(vertices, ball.faces, normals=ball.vertices if smooth else None, uvs=uvs, **more)
+
+
+def knot(**more) -> wf.Mesh:
+    ring = trimesh.creation.torus(1, 0.3, 16, 8)
+    return wf.Mesh(ring.vertices, ring.faces, **more)
+
+
+def at(x: float, y: float, z: float, scale=1.0, turn=(0.0, 0.0, 0.0)) -> np.ndarray:
+    """A matrix that scales, turns and moves."""
+    return translation_matrix((x, y, z)) @ euler_matrix(*turn) @ np.diag([*np.broadcast_to(scale, 3), 1])
+
+
+MATRICES = [
+    at(0, 0, 0),
+    at(4, 0, 0, 0.5, (0.3, 1, 2)),
+    at(-4, 1, 0, (0.4, 1.5, 0.8), (1, 0, 0.5)),
+    at(0, 4, 1, (-1, 0.7, 1), (0.2, 0.4, 0)),  # mirrored
+    at(0, -4, 1, (-0.3, -0.7, -1), (0, 2, 1)),
+    at(1, 1, -4, 1, (2, 2, 0)) @ at(0, 0, 0, (1, 0.3, 1), (0, 1, 1)),  # turned, then squashed askew
+    at(0.3, 0.2, 0.1),  # through the first
+]
+
+
+def placed(mesh: wf.Mesh, matrices=MATRICES, **more) -> list[wf.Instance]:
+    return [wf.Instance(mesh, matrix, **more) for matrix in matrices]
+
+
+def mixture(smooth: bool = False) -> list:
+    """Two meshes, each placed often, among things that are placed once."""
+    first, second = bumpy(smooth, material=wf.Diffuse(0.5)), knot(material=BLUE)
+    others = [at(2, 2, 2) @ matrix for matrix in MATRICES[:4]]
+    return [
+        *placed(first),
+        wf.Sphere((-2, -1, 2), 0.7, material=wf.Dielectric(1.5)),
+        *placed(second, others[:2]),
+        wf.Rectangle((-8, -5, 8), (16, 0, 0), (0, 0, -16), material=wf.Diffuse(0.7)),
+        *placed(second, others[2:], material=RED),
+        wf.Instance(first, at(-3, -3, -3, 0.7), material=RED),
+    ]
+
+
+def alone(shapes: list) -> list:
+    """The same shapes, every instance as a mesh of its own."""
+    return [shape.to_mesh() if isinstance(shape, wf.Instance) else shape for shape in shapes]
+
+
+def compiled(shapes: list, accel: str = "numpy") -> CompiledScene:
+    return compile_scene(wf.Scene(shapes, SKY), lambda geometry: make_accelerator(geometry, accel))
+
+
+def rays(n: int, reach: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    origin = rng.uniform(-reach, reach, (3, n))
+    direction = rng.uniform(-reach, reach, (3, n)) * 0.6 - origin
+    direction[:, : n // 8] *= np.eye(3)[rng.integers(0, 3, n // 8)].T  # along an axis
+    direction[0, direction.max(0) == direction.min(0)] = 1
+    return origin.astype(f4), (direction / np.linalg.norm(direction, axis=0)).astype(f4)
+
+
+def nothing(n: int) -> np.ndarray:
+    return np.full(n, -1)
+
+
+def same_bits(a: Intersections, b: Intersections) -> bool:
+    return all(getattr(a, k).tobytes() == getattr(b, k).tobytes() for k in ("t", "prim", "b1", "b2"))
+
+
+def piece(hits: Intersections, part) -> Intersections:
+    return Intersections(hits.t[part], hits.prim[part], hits.b1[part], hits.b2[part])
+
+
+def apart(t: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Differences (n,) of distances; two misses are at one place."""
+    return np.abs(np.minimum(t, f4(1e6)) - np.minimum(other, f4(1e6)))
+
+
+# --- Hits -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("accel", NAMES)
+def test_hits_are_those_of_meshes_of_their_own(accel):
+    """The same triangle at the same distance; another one only where two are as near, or at an edge."""
+    n = 40_000
+    origin, direction = rays(n, 7)
+    shapes = [shape for shape in mixture() if not isinstance(shape, wf.Mesh | wf.Sphere)]  # so ids agree
+    shared, own = compiled(shapes, accel), compiled(alone(shapes), accel)
+    assert isinstance(shared.accelerator, InstanceAccelerator)
+    assert shared.accelerator.name == accel
+    a = shared.accelerator.closest(origin, direction, nothing(n))
+    b = own.accelerator.closest(origin, direction, nothing(n))
+    assert (b.prim >= 0).mean() > 0.15
+    # ids number instances in the order of the shapes, as they do meshes
+    same = a.prim == b.prim
+    assert (~same).sum() <= 4
+    assert apart(a.t, b.t)[same].max() < 3e-5
+    distance = np.full(n, 6, f4)
+    blocked = shared.accelerator.occluded(origin, direction, distance, nothing(n))
+    assert (blocked != (a.t < distance)).sum() <= 2
+    assert (blocked != own.accelerator.occluded(origin, direction, distance, nothing(n))).sum() <= 4
+
+
+@pytest.mark.parametrize("accel", NAMES)
+@pytest.mark.parametrize("smooth", [False, True])
+def test_surfaces_are_those_of_meshes_of_their_own(accel, smooth):
+    """Normals of the front, smooth ones too, uvs, sides and materials, on all kinds of things."""
+    n = 4000
+    origin, direction = rays(n, 7, seed=3)
+    first = mixture(smooth)
+    first[0].mesh.material = wf.Diffuse(wf.Texture(np.random.default_rng(0).random((4, 4, 3))))  # needs uvs
+    zero = np.zeros(n, np.uint32)
+    found = []
+    for shapes in (first, alone(first)):
+        scene = compiled(shapes, accel)
+        paths = Paths(*(zero,) * 3, origin, direction, nothing(n), np.ones((3, n), f4), *np.ones((3, n), f4))
+        hits = intersect(scene, paths)
+        lanes = hits.found
+        surface = interact(scene, paths.take(lanes), hits.take(lanes))
+        colour = np.full((9, n), np.nan)
+        colour[:, lanes] = [*surface.ng, *surface.ns, *surface.uv, surface.inside]
+        groups = np.full(n, -1)
+        kinds = [type(group).__name__ for group in scene.materials.groups]
+        groups[lanes] = [
+            sorted(set(kinds)).index(kinds[g]) for g in scene.materials.group_of.take(surface.material)
+        ]
+        found.append((hits.t, colour, groups))
+    (t, values, groups), (other_t, others, other_groups) = found
+    same = (apart(t, other_t) < 1e-4) & (t < np.inf)
+    assert (apart(t, other_t) > 1e-4).sum() <= 2
+    assert same.sum() > 500
+    assert np.array_equal(groups[same], other_groups[same])
+    off = np.abs(values - others)[:, same].max(0)
+    assert (off < 3e-4).mean() > 0.998  # next to an edge, the neighbour's normal
+    assert np.unique(values[8, same]).tolist() == [0, 1]
+
+
+def test_a_mirrored_instance_keeps_its_front():
+    """Rays from outside meet the front, whatever the transform."""
+    mesh = bumpy()
+    for matrix in MATRICES:
+        scene = compiled([*placed(mesh, [matrix, at(50, 0, 0)])])
+        middle = np.append(mesh.bounds.mean(0), 1) @ matrix.T
+        target = middle[:3] - scene.centre
+        origin = np.random.default_rng(0).normal(size=(3, 200)) * 30 + target[:, None]
+        direction = target[:, None] - origin
+        paths = Paths(
+            *(np.zeros(200, np.uint32),) * 3,
+            origin.astype(f4),
+            (direction / np.linalg.norm(direction, axis=0)).astype(f4),
+            nothing(200),
+            np.ones((3, 200), f4),
+            *np.ones((3, 200), f4),
+        )
+        hits = intersect(scene, paths)
+        lanes = np.flatnonzero(hits.prim >= 0)
+        assert lanes.size > 180
+        assert not interact(scene, paths.take(lanes), hits.take(lanes)).inside.any()
+
+
+# --- Exactness ------------------------------------------------------------------------------------
+
+FAR = [(scale, shift) for scale in (1e-3, 1.0, 1e3) for shift in (0.0, 100 * scale, 1e4 * scale, -3e3)]
+
+
+@pytest.mark.parametrize("accel", NAMES)
+@pytest.mark.parametrize(("scale", "shift"), FAR)
+def test_no_ray_slips_through(accel, scale, shift):
+    """Rays from inside a closed instance, aimed at its vertices, its edges and anywhere."""
+    n = 30_000
+    mesh = bumpy()
+    matrix = at(shift, -0.7 * shift, 0.3 * shift, scale, (0.4, 1.1, 2)) @ at(0, 0, 0, (1, 0.5, 2))
+    scene = compiled(placed(mesh, [matrix, at(0, 0, 0)]), accel)
+    triangles = (scene_vertices(mesh, matrix) - scene.centre)[mesh.faces]
+    rng = np.random.default_rng(1)
+    face, corner = rng.integers(0, len(triangles), n), rng.integers(0, 3, n)
+    along = np.select([np.arange(n) % 3 == 0, np.arange(n) % 3 == 1], [0.0, 0.5], rng.random(n))[:, None]
+    target = triangles[face, corner] * (1 - along) + triangles[face, (corner + 1) % 3] * along
+    middle = triangles.mean((0, 1))
+    origin = (middle + rng.uniform(-0.1, 0.1, (n, 3)) * np.ptp(triangles, axis=(0, 1)).min()).T.astype(f4)
+    direction = (target.T - origin).astype(f4)
+    hits = scene.accelerator.closest(origin, direction, nothing(n))
+    assert (hits.prim >= 0).all()
+    assert scene.accelerator.occluded(origin, direction, np.full(n, np.inf, f4), nothing(n)).all()
+    # where they should be: float32 around the scene's centre is what limits it
+    room = 1e-5 * (np.abs(triangles).max() + np.abs(direction).max()) / np.linalg.norm(direction, axis=0)
+    assert (np.abs(hits.t - 1) < 30 * room + 1e-4).mean() > 0.99
+
+
+def scene_vertices(mesh: wf.Mesh, matrix: np.ndarray) -> np.ndarray:
+    return mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+@pytest.mark.parametrize("accel", NAMES)
+@pytest.mark.parametrize(("scale", "shift"), [(1e-3, 0), (1e3, 0), (1, 300), (1, -2e4), (1e-3, 30)])
+def test_light_does_not_leak_in(accel, scale, shift):
+    """Inside a closed instance it stays dark, however often paths bounce off its wall."""
+    mesh = bumpy(smooth=True, material=wf.Diffuse(1))
+    matrix = at(shift, 0.4 * shift, shift, scale, (1, 2, 3))
+    middle = (np.append(mesh.bounds.mean(0), 1) @ matrix.T)[:3]
+    camera = wf.Camera.look_at(middle, middle + np.array([0.3, 0, 1]) * scale, fov=120, size=(24, 24))
+    scene = wf.Scene(placed(mesh, [matrix, at(0, 5, 0)]), [wf.Environment(1e4)], camera)
+    image = render(scene, 16, accel=accel, max_bounces=20)
+    assert image.rgb.max() == 0
+
+
+@pytest.mark.parametrize("accel", NAMES)
+def test_only_the_triangle_of_the_instance_left_is_skipped(accel):
+    """The same triangle of another instance, in the same place or behind, is hit."""
+    square = wf.Mesh([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    scene = compiled(placed(square, [at(0, 0, 0), at(0, 0, 1), at(0, 0, 2)]), accel)
+    origin = np.array([[0.5], [-0.5], [-1 - 1e-3]], f4).repeat(4, 1)
+    direction = np.array([[0], [0], [1]], f4).repeat(4, 1)
+    hits = scene.accelerator.closest(origin, direction, np.array([-1, 0, 1, 2]))
+    assert hits.prim.tolist() == [0, 2, 0, 0]
+    assert hits.t == pytest.approx([1e-3, 1 + 1e-3, 1e-3, 1e-3], rel=1e-3)
+    near = np.full(4, 0.5, f4)
+    blocked = scene.accelerator.occluded(origin, direction, near, np.array([-1, 0, 1, 2]))
+    assert blocked.tolist() == [True, False, True, True]
+
+
+@pytest.mark.parametrize("accel", NAMES)
+def test_ties_go_to_the_lowest_id(accel):
+    mesh = bumpy()
+    scene = compiled([*placed(mesh, [at(0, 0, 0), at(9, 0, 0)] + [at(0, 0, 0)] * 12)], accel)
+    origin, direction = rays(4000, 4)
+    hits = scene.accelerator.closest(origin, direction, nothing(4000))
+    first = hits.prim // len(mesh.faces)
+    assert np.unique(first[hits.prim >= 0]).tolist() == [0, 1]
+
+
+@pytest.mark.parametrize("accel", NAMES)
+def test_the_same_bits_for_any_batch(accel, monkeypatch):
+    n = 3000
+    scene = compiled(mixture(), accel)
+    trace = scene.accelerator
+    origin, direction = rays(n, 7)
+    leaving = np.random.default_rng(0).integers(-1, 3000, n)
+    distance = np.full(n, 5, f4)
+    whole, blocked = (
+        trace.closest(origin, direction, leaving),
+        trace.occluded(origin, direction, distance, leaving),
+    )
+    for part in (slice(0, 1), slice(7, 8), slice(100, 164), slice(1000, 2999), slice(None, None, -1)):
+        ray = np.ascontiguousarray(origin[:, part]), np.ascontiguousarray(direction[:, part])
+        assert same_bits(trace.closest(*ray, leaving[part]), piece(whole, part))
+        assert np.array_equal(trace.occluded(*ray, distance[part], leaving[part]), blocked[part])
+    monkeypatch.setattr(queries, "PAIRS", 200)  # cuts the batch into small ones
+    assert same_bits(trace.closest(origin, direction, leaving), whole)
+    monkeypatch.setattr(queries, "CHUNK", 64)
+    assert np.array_equal(trace.occluded(origin, direction, distance, leaving), blocked)
+
+
+@pytest.mark.parametrize("accel", NAMES)
+def test_the_same_picture_for_any_cut(accel):
+    scene = wf.Scene(mixture(), SKY, wf.Camera.look_at((0, 3, 14), (0, 0, 0), size=(10, 8)))
+    whole = render(scene, 5, accel=accel, workers=1).rgb.tobytes()
+    for cut in ({"wave_size": 7}, {"wave_size": 64, "workers": 2}, {"wave_size": 4096, "workers": 3}):
+        assert render(scene, 5, accel=accel, **cut).rgb.tobytes() == whole
+
+
+def test_rays_that_are_none_meet_nothing():
+    scene = compiled(placed(bumpy()))
+    bad = np.full((3, 4), np.nan, f4)
+    assert (scene.accelerator.closest(bad, bad, nothing(4)).prim == -1).all()
+    assert not scene.accelerator.occluded(bad, bad, np.ones(4, f4), nothing(4)).any()
+    empty = np.zeros((3, 0), f4)
+    assert scene.accelerator.closest(empty, empty, nothing(0)).t.size == 0
+    assert scene.accelerator.occluded(empty, empty, np.zeros(0, f4), nothing(0)).size == 0
+
+
+def test_a_tree_over_many_instances_loses_none():
+    """2000 small instances: all hits of the nearest found by testing each box of each."""
+    rng = np.random.default_rng(5)
+    ball = trimesh.creation.icosphere(0)
+    mesh = wf.Mesh(ball.vertices, ball.faces)
+    matrices = [
+        at(*rng.uniform(-10, 10, 3), rng.uniform(0.05, 0.5, 3), rng.uniform(-3, 3, 3)) for _ in range(2000)
+    ]
+    shapes = placed(mesh, matrices)
+    n = 2000
+    origin, direction = rays(n, 10)
+    shared, own = compiled(shapes), compiled(alone(shapes))
+    a, b = (scene.accelerator.closest(origin, direction, nothing(n)) for scene in (shared, own))
+    assert (b.prim >= 0).mean() > 0.3
+    assert (apart(a.t, b.t) > 1e-4).sum() <= 1
+
+
+# --- Pictures -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("accel", NAMES)
+def test_pictures_are_those_of_meshes_of_their_own(accel):
+    shapes = [*mixture(smooth=True), wf.Rectangle((-2, 9, -2), (4, 0, 0), (0, 0, 4), emission=12)]
+    camera = wf.Camera.look_at((0, 4, 15), (0, 0, 0), fov=45, size=(48, 36))
+    shared, own = (
+        render(wf.Scene(some, [wf.Environment(0.3)], camera), 8, accel=accel).rgb
+        for some in (shapes, alone(shapes))
+    )
+    # a path that takes another turn by rounding changes its pixel
+    assert (np.abs(shared - own).max(2) > 1e-3 * (own.max(2) + 0.1)).mean() < 0.02
+    assert shared.mean() == pytest.approx(own.mean(), rel=2e-3)
+
+
+def test_absorption_is_that_of_the_instances_material():
+    """Red glass in one place and clear glass in another, of one mesh."""
+    clear, red = wf.Dielectric(1.5), wf.Dielectric(1.5, absorption=(0, 3, 3))
+    mesh = bumpy(smooth=True, material=clear)
+    shapes = [wf.Instance(mesh, at(-3, 0, 0)), wf.Instance(mesh, at(0, 0, 0), material=red)]
+    camera = wf.Camera.look_at((1.5, 1, 6), (1.5, 1, 0), fov=50, size=(16, 8))
+    image = render(wf.Scene(shapes, SKY, camera), 16).rgb
+    assert np.ptp(image[:, :8], axis=2).max() < 1e-3
+    assert (image[:, 8:, 0] > image[:, 8:, 1] + 0.1).sum() > 3
+
+
+# --- What is shared -------------------------------------------------------------------------------
+
+
+def test_small_bright_lone_and_skewed_meshes_are_not_shared(monkeypatch):
+    """They are as good as meshes of their own: the same bits."""
+    lamp = bumpy(emission=3)
+    cases = [
+        [wf.Instance(bumpy(), MATRICES[3])],
+        placed(lamp, MATRICES[:3]),
+        placed(bumpy(), [at(0, 0, 0, (1, 1, 0.9e-3)), at(2, 0, 0, (1, 1, 0.9e-3))]),
+    ]
+    for shapes in cases:
+        assert compiled(shapes).instances is None
+    assert compiled(placed(bumpy(), MATRICES[:3])).instances is not None
+    monkeypatch.setattr(instances, "FEW", 960)
+    cases.append(placed(bumpy(), MATRICES[:3]))
+    assert compiled(cases[3]).instances is None
+    assert compiled(placed(bumpy(), MATRICES[:4])).instances is not None
+    for shapes in cases:
+        camera = wf.Scene(shapes).framing_camera(size=(24, 24))
+        a, b = (render(wf.Scene(some, SKY, camera), 2) for some in (shapes, alone(shapes)))
+        assert a.rgb.tobytes() == b.rgb.tobytes()
+
+
+def test_tables_hold_a_mesh_once():
+    scene = compiled(mixture())
+    once = 2 + len(bumpy().faces) + len(knot().faces)
+    assert scene.triangles == scene.normals.shape[1] == once
+    assert len(scene.material_of) == once + 1
+    row, place = scene.instances.locate(np.array([-1, 0, 1, 2, 3, 322, 323]))
+    assert row.tolist() == [-1, 0, 1, once, 2, 321, 2]
+    assert place.tolist() == [0, 0, 0, 1, 2, 2, 3]
+
+
+# --- The shape ------------------------------------------------------------------------------------
+
+TRIANGLE = wf.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], name="tri")
+PROJECTIVE = np.vstack([np.eye(4)[:3], [0, 0, 0.5, 1]])
+BAD = [
+    ((TRIANGLE, np.eye(3)), r"tri: transform must have shape \(4, 4\), got \(3, 3\)"),
+    ((TRIANGLE, "here"), r"tri: transform must be numeric, got 'here'"),
+    ((TRIANGLE, np.diag([1, np.nan, 1, 1])), r"tri: transform\[1\]\[1\] is nan; it must be finite"),
+    ((TRIANGLE, np.diag([1, np.inf, 1, 1])), r"tri: transform\[1\]\[1\] is inf; it must be finite"),
+    ((TRIANGLE, np.diag([1, 0, 1, 1])), r"tri: transform is singular: it stretches by 0 .* above 1e-12"),
+    ((TRIANGLE, np.diag([0, 0, 0, 1])), r"tri: transform is singular: it stretches by 0 .* and 0 along"),
+    ((TRIANGLE, PROJECTIVE), r"tri: transform has the last row \[0.0, 0.0, 0.5, 1.0\]; it must be"),
+    ((TRIANGLE, np.diag([1e39] * 3 + [1])), r"tri: vertices\[1\]\[0\] is 1e\+39; its size must be at most"),
+    (("ball", np.eye(4)), r"instance: mesh must be a wf.Mesh, got 'ball'"),
+    ((wf.Sphere((0, 0, 0), 1), np.eye(4)), r"instance: mesh must be a wf.Mesh, got <Sphere"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("arguments", "message"), BAD, ids=range(len(BAD)))
+def test_bad_arguments_are_named(arguments, message):
+    with pytest.raises(wf.SceneError, match=message):
+        wf.Instance(*arguments)
+
+
+def test_bad_materials_are_named():
+    with pytest.raises(wf.SceneError, match=r"leaf: material must be a material .*, got 'red'"):
+        wf.Instance(TRIANGLE, np.eye(4), material="red", name="leaf")
+    leaf = wf.Instance(TRIANGLE, np.eye(4))
+    with pytest.raises(wf.SceneError, match=r"tri: material must be a material .*, got 3"):
+        leaf.material = 3
+
+
+def test_an_instance_is_a_shape():
+    mesh = bumpy(material=RED, emission=(1, 2, 3))
+    shape = wf.Instance(mesh, MATRICES[3])
+    own = shape.to_mesh()
+    assert shape.bounds == pytest.approx(own.bounds)
+    assert shape.material is RED
+    assert shape.emission is mesh.emission
+    shape.material = BLUE
+    assert (shape.material, mesh.material, shape.to_mesh().material) == (BLUE, RED, BLUE)
+    assert own.vertices == pytest.approx(scene_vertices(mesh, MATRICES[3]))
+    assert wf.Scene(shape).bounds == pytest.approx(own.bounds)
+    assert repr(wf.Instance(TRIANGLE, at(1, 2, 3))) == (
+        "<Instance 'tri' of <Mesh 'tri': 3 vertices, 1 faces>: at [1.0, 2.0, 3.0]>"
+    )
+    lamp = wf.Mesh(TRIANGLE.vertices, TRIANGLE.faces, emission=1)
+    assert render(wf.Instance(lamp, np.eye(4)), 1, max_bounces=0).rgb.max() == 1
+
+
+def test_bounds_are_of_vertices_that_faces_use():
+    mesh = wf.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [99, 99, 99]], [[0, 1, 2]])
+    assert wf.Instance(mesh, at(1, 0, 0, 2)).bounds.tolist() == [[1, 0, 0], [3, 2, 0]]
+
+
+# --- Files ----------------------------------------------------------------------------------------
+
+
+def forest() -> trimesh.Scene:
+    """A ball placed five times, three of them below a node that turns and mirrors; a box placed once."""
+    scene = trimesh.Scene()
+    scene.add_geometry(trimesh.creation.box(), node_name="box", geom_name="box", transform=at(0, -2, 0))
+    scene.geometry["ball"] = trimesh.creation.icosphere(2)
+    scene.graph.update("group", "world", matrix=at(0, 1, 0, (-1, 1, 0.5), (0, 0.5, 0)))
+    for i, matrix in enumerate([at(-3, 0, 0), at(3, 0, 0, 0.5)]):
+        scene.graph.update(f"a{i}", "world", matrix=matrix, geometry="ball")
+    for i, matrix in enumerate([at(0, 2, 0), at(0, 0, 3, (1, 2, 1)), at(1, 1, -3, 0.4)]):
+        scene.graph.update(f"b{i}", "group", matrix=matrix, geometry="ball")
+    return scene
+
+
+def test_nodes_that_share_a_mesh_become_instances(tmp_path):
+    forest().export(tmp_path / "a.glb")
+    scene = wf.load(tmp_path / "a.glb")
+    balls = [shape for shape in scene.shapes if isinstance(shape, wf.Instance)]
+    assert len(scene.shapes) == 6
+    assert len(balls) == 5
+    assert len({id(ball.mesh) for ball in balls}) == 1
+    assert sum(np.linalg.det(ball.transform[:3, :3]) < 0 for ball in balls) == 3
+    whole = wf.load_mesh(tmp_path / "a.glb", wf.Diffuse(0.5))
+    assert len(whole.faces) == 5 * 320 + 12
+    assert scene.bounds == pytest.approx(whole.bounds)
+    camera = wf.Camera.look_at((0, 3, 12), (0, 0, 0), size=(24, 18))
+    a, b = (render(wf.Scene(shapes, SKY, camera), 8).rgb for shapes in (scene.shapes, whole))
+    assert (np.abs(a - b).max(2) > 1e-3).mean() < 0.01
+
+
+@pytest.mark.filterwarnings("ignore:the scene has no light")
+def test_a_scene_in_memory_looks_like_its_file(tmp_path):
+    """Bit for bit."""
+    forest().export(tmp_path / "a.glb")
+    held = trimesh.load(tmp_path / "a.glb")
+    assert sum(isinstance(shape, wf.Instance) for shape in wf.from_trimesh(held).shapes) == 5
+    a, b = (render(scene, 1, max_bounces=1).rgb for scene in (held, tmp_path / "a.glb"))
+    assert a.tobytes() == b.tobytes()
+
+
+def test_a_node_that_flattens_is_no_instance(tmp_path):
+    """Its mesh is flat, but the scene is still read, and as before."""
+    scene = forest()
+    scene.graph.update("flat", "world", matrix=at(0, 0, 0, (1, 0, 1)), geometry="ball")
+    scene.export(tmp_path / "a.glb")
+    with pytest.warns(UserWarning, match="dropped 16 faces of zero area"):
+        shapes = wf.load(tmp_path / "a.glb").shapes
+    assert sum(isinstance(shape, wf.Instance) for shape in shapes) == 5
+    assert sorted(len(shape.faces) for shape in shapes if isinstance(shape, wf.Mesh)) == [12, 304]

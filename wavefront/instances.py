@@ -1,0 +1,144 @@
+"""Meshes that are placed several times: which are worth sharing, and what shading needs to know of them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .accel import Placements
+from .shapes import Instance, Mesh, Sphere
+from .state import Columns
+from .vec import Floats, Ints, f4, normalize
+
+FEW = 1 << 16  # triangles: copies of a mesh that together have no more are not shared, which is faster
+SKEW = 1e3  # instances that are stretched more along one axis than along another are not shared
+BOX_ROOM = 2.0**-20  # added to boxes on all sides, relative to their size and distance from the centre
+
+Doubles = NDArray[np.float64]
+
+
+@dataclass(slots=True)
+class InstanceTable(Columns):
+    """What shading needs of instances.
+
+    One column for each "place": first what is placed once, its triangles and then its spheres, then the
+    instances. Triangles of instances have primitive ids of their own, but share the rows of the
+    scene's tables.
+    """
+
+    first: Ints  # (p,) first primitive id of each place, rising
+    shift: Ints  # (p,) primitive id less its row
+    normal: Floats  # (9, p) matrix that turns normals of the mesh into the scene's, row by row
+    skew: Floats  # (p,) how much larger a relative error of a direction is in the scene than in the mesh
+    reach: Floats  # (p,) largest coordinate in the mesh's frame, scene units; 0 for what is placed once
+    material: Ints | None  # (p,) material in place of the mesh's, -1 for none; None if there is none at all
+
+    def locate(self, prim: Ints) -> tuple[Ints, Ints]:
+        """Primitive ids (n,) -> rows of the scene's tables and places; a miss, -1, stays one."""
+        place = np.searchsorted(self.first[1:], prim, "right")
+        return prim - self.shift.take(place), place
+
+    def turn(self, normals: Floats) -> Floats:
+        """Unit normals of meshes (3, p), one for each column -> unit normals in the scene."""
+        m = self.normal
+        x, y, z = normals
+        return normalize(np.stack([m[i] * x + m[i + 1] * y + m[i + 2] * z for i in (0, 3, 6)]))
+
+
+def resolve(shapes: Sequence[Mesh | Sphere | Instance]) -> tuple[list[Mesh], list[Sphere], list[Instance]]:
+    """Sort shapes by kind; instances that had better not be shared become meshes.
+
+    Those are the ones of emitting meshes, as each triangle is a light; of a mesh placed once; of small
+    meshes, as one tree over all is faster than one per mesh; and very skewed ones, as float32 is not
+    enough in the mesh's own frame.
+    """
+    copies = Counter(id(shape.mesh) for shape in shapes if isinstance(shape, Instance))
+    meshes: list[Mesh] = []
+    spheres: list[Sphere] = []
+    instances: list[Instance] = []
+    for shape in shapes:
+        if isinstance(shape, Mesh):
+            meshes.append(shape)
+        elif isinstance(shape, Sphere):
+            spheres.append(shape)
+        elif _worth_sharing(shape, copies[id(shape.mesh)]):
+            instances.append(shape)
+        else:
+            meshes.append(shape.to_mesh())
+    return meshes, spheres, instances
+
+
+def _worth_sharing(instance: Instance, copies: int) -> bool:
+    if instance.emission is not None or copies == 1 or copies * len(instance.mesh.faces) <= FEW:
+        return False
+    stretch = np.linalg.svd(instance.transform[:3, :3], compute_uv=False)
+    return bool(stretch[0] <= SKEW * stretch[2])
+
+
+def own_frame(mesh: Mesh) -> Doubles:
+    """Return the vertices (n, 3) as they are traced: relative to the middle of the mesh's box."""
+    return mesh.vertices - mesh.bounds.mean(0)
+
+
+def place(
+    instances: Sequence[Instance],
+    shared: Sequence[Mesh],
+    centre: Doubles,
+    triangles: int,
+    spheres: int,
+    material: Ints | None,
+) -> tuple[Placements, InstanceTable]:
+    """Compute where instances stand.
+
+    Parameters
+    ----------
+    instances
+        k of them.
+    shared
+        The distinct meshes that they are of. Their rows follow one another, after those of triangles
+        that are placed once and before those of spheres.
+    centre
+        (3,) of the scene.
+    triangles, spheres
+        How many are placed once.
+    material
+        (k,) material of each instance in place of the mesh's, -1 for none.
+    """
+    numbers = {id(mesh): number for number, mesh in enumerate(shared)}
+    mesh_of = np.array([numbers[id(instance.mesh)] for instance in instances], np.intp)
+    sizes = np.array([len(mesh.faces) for mesh in shared])
+    rows = triangles + np.cumsum(sizes) - sizes
+    ends = triangles + spheres + np.cumsum(sizes.take(mesh_of))
+    first = ends - sizes.take(mesh_of)
+    boxes = np.stack([instance.bounds - centre for instance in instances])
+    middles = np.stack([mesh.bounds.mean(0) for mesh in shared]).take(mesh_of, 0)
+    halves = np.stack([np.ptp(mesh.bounds, axis=0) / 2 for mesh in shared]).take(mesh_of, 0)
+    linear = np.stack([instance.transform[:3, :3] for instance in instances])
+    shift = np.stack([instance.transform[:3, 3] for instance in instances])
+    shift += (linear * middles[:, None]).sum(2) - centre
+    inverse = np.linalg.inv(linear)
+    to_local = np.concatenate([inverse, -(inverse * shift[:, None]).sum(2)[:, :, None]], 2)
+    room = BOX_ROOM * (np.abs(boxes).max((1, 2)) + np.ptp(boxes, axis=1).max(1))[:, None]
+    placements = Placements(
+        mesh=mesh_of,
+        first=first,
+        to_local=np.ascontiguousarray(to_local.reshape(-1, 12).T),
+        low=np.ascontiguousarray((boxes[:, 0] - room).T, f4),
+        high=np.ascontiguousarray((boxes[:, 1] + room).T, f4),
+    )
+    normal = inverse.transpose(0, 2, 1) / np.abs(inverse).max((1, 2), keepdims=True)
+    skew = (np.abs(linear) @ np.abs(inverse)).sum(2).max(1)
+    reach = (np.abs(linear) * halves[:, None]).sum(2).max(1)
+    table = InstanceTable(
+        first=np.concatenate([[0, triangles], first]),
+        shift=np.concatenate([[0, -int(sizes.sum())], first - rows.take(mesh_of)]),
+        normal=np.concatenate([np.eye(3).reshape(9, 1).repeat(2, 1), normal.reshape(-1, 9).T], 1).astype(f4),
+        skew=np.concatenate([[1, 1], skew]).astype(f4),
+        reach=np.concatenate([[0, 0], reach]).astype(f4),
+        material=None if material is None else np.concatenate([[-1, -1], material]),
+    )
+    return placements, table

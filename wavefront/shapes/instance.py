@@ -1,0 +1,104 @@
+"""Meshes placed by a matrix."""
+
+from __future__ import annotations
+
+from copy import copy
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..bsdfs import Bsdf
+from ..errors import SceneError, finite_array
+from .mesh import Mesh, check_material, check_range
+from .transform import moved
+
+SINGULAR = 1e-12  # the least of the lengths to which a transform stretches, as a part of the greatest
+
+
+class Instance:
+    """A mesh somewhere else: moved, turned, scaled, mirrored or sheared.
+
+    A mesh that is placed many times takes the memory of one, and is prepared for rays once.
+
+    Parameters
+    ----------
+    mesh
+        The mesh; instances of one mesh share the object.
+    transform
+        (4, 4) affine matrix from the mesh's coordinates to the scene's, as it multiplies columns: the
+        shift is its last column. It must be invertible. One that mirrors leaves the front the front.
+    material
+        How this instance scatters light; by default as the mesh does.
+    name
+        Used in messages; by default that of the mesh.
+
+    Raises
+    ------
+    SceneError
+        If the transform is malformed, singular, or takes a vertex beyond the range of float32.
+    """
+
+    def __init__(
+        self, mesh: Mesh, transform: ArrayLike, *, material: Bsdf | None = None, name: str | None = None
+    ) -> None:
+        if not isinstance(mesh, Mesh):
+            raise SceneError(f"{name or 'instance'}: mesh must be a wf.Mesh, got {mesh!r}")
+        self.name = mesh.name if name is None else name
+        self.mesh = mesh
+        self.transform = _invertible(f"{self.name}: transform", transform)
+        self._material = None if material is None else check_material(self.name, material)
+        check_range(self.name, self._placed(mesh.vertices).T)
+
+    def __repr__(self) -> str:
+        """Name the instance and where the mesh's origin is placed."""
+        return f"<Instance {self.name!r} of {self.mesh!r}: at {self.transform[:3, 3].tolist()}>"
+
+    @property
+    def material(self) -> Bsdf:
+        """How the surface scatters light: the instance's own material, or else the mesh's."""
+        return self.mesh.material if self._material is None else self._material
+
+    @material.setter
+    def material(self, material: Bsdf) -> None:
+        self._material = check_material(self.name, material)
+
+    @property
+    def emission(self) -> NDArray[np.float32] | None:
+        """Radiance that leaves the front side, as of the mesh; (3, 1)."""
+        return self.mesh.emission
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Lower and upper corner, (2, 3), of the placed vertices that faces use."""
+        vertices = self.mesh.vertices
+        used = np.flatnonzero(np.bincount(self.mesh.faces.ravel(), minlength=len(vertices)))
+        placed = self._placed(vertices.take(used, 0))
+        return np.stack([placed.min(1), placed.max(1)])
+
+    def to_mesh(self) -> Mesh:
+        """Return a mesh of its own, with the vertices where the instance has them."""
+        mesh = copy(self.mesh)
+        mesh.name, mesh.material = self.name, self.material
+        mesh.vertices, mesh.faces, mesh.normals = moved(
+            self.transform, mesh.vertices, mesh.faces, mesh.normals
+        )
+        return mesh
+
+    def _placed(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return where vertices (n, 3) are placed, (3, n)."""
+        with np.errstate(over="ignore"):
+            return self.transform[:3, :3] @ vertices.T + self.transform[:3, 3:]
+
+
+def _invertible(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """Return a (4, 4) affine matrix that can be inverted."""
+    matrix = finite_array(name, value, (4, 4))
+    if not np.array_equal(matrix[3], [0, 0, 0, 1]):
+        raise SceneError(f"{name} has the last row {matrix[3].tolist()}; it must be [0, 0, 0, 1]")
+    stretch = np.linalg.svd(matrix[:3, :3], compute_uv=False)
+    if not stretch[2] > SINGULAR * stretch[0]:
+        raise SceneError(
+            f"{name} is singular: it stretches by {stretch[2]:.3g} along one axis and {stretch[0]:.3g} "
+            f"along another; their ratio must be above {SINGULAR:g}"
+        )
+    return matrix
