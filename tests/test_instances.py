@@ -7,8 +7,7 @@ from significance import render
 from trimesh.transformations import euler_matrix, translation_matrix
 
 import wavefront as wf
-from wavefront import instances
-from wavefront.accel import InstanceAccelerator, Intersections, make_accelerator
+from wavefront.accel import InstanceAccelerator, Intersections, choose, make_accelerator, most_copies
 from wavefront.accel import instances as queries
 from wavefront.accel.embree import installed
 from wavefront.scene import CompiledScene, compile_scene
@@ -25,7 +24,7 @@ RED, BLUE = wf.Diffuse((0.8, 0.2, 0.1)), wf.Conductor.named("gold", roughness=0.
 @pytest.fixture(autouse=True)
 def share_all(monkeypatch):
     """Share even what is small."""
-    monkeypatch.setattr(instances, "FEW", 0)
+    monkeypatch.setattr(choose, "COPIES", 0)
 
 
 def bumpy(smooth: bool = False, **more) -> wf.Mesh:
@@ -350,7 +349,7 @@ def test_absorption_is_that_of_the_instances_material():
 # --- What is shared -------------------------------------------------------------------------------
 
 
-def test_small_bright_lone_and_skewed_meshes_are_not_shared(monkeypatch):
+def test_bright_lone_and_skewed_meshes_are_not_shared():
     """They are as good as meshes of their own: the same bits."""
     lamp = bumpy(emission=3)
     cases = [
@@ -361,14 +360,25 @@ def test_small_bright_lone_and_skewed_meshes_are_not_shared(monkeypatch):
     for shapes in cases:
         assert compiled(shapes).instances is None
     assert compiled(placed(bumpy(), MATRICES[:3])).instances is not None
-    monkeypatch.setattr(instances, "FEW", 960)
-    cases.append(placed(bumpy(), MATRICES[:3]))
-    assert compiled(cases[3]).instances is None
-    assert compiled(placed(bumpy(), MATRICES[:4])).instances is not None
     for shapes in cases:
         camera = wf.Scene(shapes).framing_camera(size=(24, 24))
         a, b = (render(wf.Scene(some, SKY, camera), 2) for some in (shapes, alone(shapes)))
         assert a.rgb.tobytes() == b.rgb.tobytes()
+
+
+def test_few_triangles_are_not_shared_for_embree(monkeypatch):
+    """It takes one mesh faster than many; NumPy does not."""
+    monkeypatch.setattr(choose, "COPIES", 960)
+    assert most_copies("numpy") == 0
+    assert most_copies("embree") == 960
+    assert most_copies("auto") == (960 if installed() else 0)
+    for count, shared in ((3, False), (4, True)):
+        scene = compile_scene(
+            wf.Scene(placed(bumpy(), MATRICES[:count]), SKY),
+            lambda geometry: make_accelerator(geometry, "numpy"),
+            most_copies=most_copies("embree"),
+        )
+        assert (scene.instances is not None) == shared
 
 
 def test_tables_hold_a_mesh_once():

@@ -14,7 +14,6 @@ from .shapes import Instance, Mesh, Sphere
 from .state import Columns
 from .vec import Floats, Ints, f4, normalize
 
-FEW = 1 << 16  # triangles: copies of a mesh that together have no more are not shared, which is faster
 SKEW = 1e3  # instances that are stretched more along one axis than along another are not shared
 BOX_ROOM = 2.0**-20  # added to boxes on all sides, relative to their size and distance from the centre
 
@@ -49,13 +48,16 @@ class InstanceTable(Columns):
         return normalize(np.stack([m[i] * x + m[i + 1] * y + m[i + 2] * z for i in (0, 3, 6)]))
 
 
-def resolve(shapes: Sequence[Mesh | Sphere | Instance]) -> tuple[list[Mesh], list[Sphere], list[Instance]]:
-    """Sort shapes by kind; instances that had better not be shared become meshes.
+def resolve(
+    shapes: Sequence[Mesh | Sphere | Instance], most_copies: int
+) -> tuple[list[Mesh], list[Sphere], list[Instance]]:
+    """Sort shapes by kind; instances that had better not share their mesh become meshes.
 
-    Those are the ones of emitting meshes, as each triangle is a light; of a mesh placed once; of small
-    meshes, as one tree over all is faster than one per mesh; and very skewed ones, as float32 is not
-    enough in the mesh's own frame.
+    Those are all, where they come to no more than `most_copies` triangles together; those of emitting
+    meshes, as each triangle is a light; that of a mesh placed once; and very skewed ones, as float32
+    is not enough in the mesh's own frame.
     """
+    total = sum(len(shape.mesh.faces) for shape in shapes if isinstance(shape, Instance))
     copies = Counter(id(shape.mesh) for shape in shapes if isinstance(shape, Instance))
     meshes: list[Mesh] = []
     spheres: list[Sphere] = []
@@ -65,18 +67,16 @@ def resolve(shapes: Sequence[Mesh | Sphere | Instance]) -> tuple[list[Mesh], lis
             meshes.append(shape)
         elif isinstance(shape, Sphere):
             spheres.append(shape)
-        elif _worth_sharing(shape, copies[id(shape.mesh)]):
+        elif total > most_copies and copies[id(shape.mesh)] > 1 and _can_share(shape):
             instances.append(shape)
         else:
             meshes.append(shape.to_mesh())
     return meshes, spheres, instances
 
 
-def _worth_sharing(instance: Instance, copies: int) -> bool:
-    if instance.emission is not None or copies == 1 or copies * len(instance.mesh.faces) <= FEW:
-        return False
+def _can_share(instance: Instance) -> bool:
     stretch = np.linalg.svd(instance.transform[:3, :3], compute_uv=False)
-    return bool(stretch[0] <= SKEW * stretch[2])
+    return instance.emission is None and bool(stretch[0] <= SKEW * stretch[2])
 
 
 def own_frame(mesh: Mesh) -> Doubles:

@@ -193,7 +193,9 @@ class CompiledScene:
     instances: InstanceTable | None = None  # None when every mesh is placed once
 
 
-def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "place") -> CompiledScene:
+def compile_scene(
+    scene: Scene, make_accelerator: Any, light_choice: str = "place", most_copies: int = 0
+) -> CompiledScene:
     """Gather a scene into flat arrays.
 
     Parameters
@@ -204,6 +206,8 @@ def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "plac
         Called with the `Geometry`; returns the `Accelerator`.
     light_choice
         How one light of many is chosen: "place", "power" or "uniform".
+    most_copies
+        Up to so many triangles in all, each instance is built as a mesh of its own.
 
     Raises
     ------
@@ -212,7 +216,7 @@ def compile_scene(scene: Scene, make_accelerator: Any, light_choice: str = "plac
     """
     low, high = scene.bounds
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
-    meshes, spheres, instances = resolve(scene.shapes)
+    meshes, spheres, instances = resolve(scene.shapes, most_copies)
     placed: list[Shape] = [*meshes, *spheres, *instances]
     shared = list({id(instance.mesh): instance.mesh for instance in instances}.values())
     once = sum(len(mesh.faces) for mesh in meshes)

@@ -1,7 +1,7 @@
 """Ray queries: which surface a ray meets first, and whether anything blocks it."""
 
 from .base import Accelerator, Geometry, Intersections
-from .choose import make_accelerator
+from .choose import make_accelerator, most_copies
 from .instances import InstanceAccelerator, Placements
 
 __all__ = [
@@ -11,4 +11,5 @@ __all__ = [
     "Intersections",
     "Placements",
     "make_accelerator",
+    "most_copies",
 ]

@@ -8,6 +8,9 @@ from .embree import EmbreeAccelerator, installed
 from .stream import NumpyAccelerator
 
 CHOICES = ("auto", "numpy", "embree")
+COPIES = (
+    1 << 18
+)  # triangles that instances may come to for Embree, which takes one large mesh faster than many
 
 
 def make_accelerator(geometry: Geometry, accel: str) -> Accelerator:
@@ -20,6 +23,13 @@ def make_accelerator(geometry: Geometry, accel: str) -> Accelerator:
     """
     if accel not in CHOICES:
         raise SceneError(f"accel is {accel!r}; it must be one of {', '.join(CHOICES)}")
-    if accel == "embree" or (accel == "auto" and installed()):
-        return EmbreeAccelerator(geometry)
-    return NumpyAccelerator(geometry)
+    return EmbreeAccelerator(geometry) if _is_embree(accel) else NumpyAccelerator(geometry)
+
+
+def most_copies(accel: str) -> int:
+    """Return up to how many triangles in all it is faster to build each instance as a mesh of its own."""
+    return COPIES if _is_embree(accel) else 0
+
+
+def _is_embree(accel: str) -> bool:
+    return accel == "embree" or (accel == "auto" and installed())
