@@ -1,5 +1,9 @@
 """Meshes placed many times: the same hits and pictures as of meshes of their own, and the memory of one."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
@@ -13,7 +17,7 @@ from wavefront.accel.embree import installed
 from wavefront.scene import CompiledScene, compile_scene
 from wavefront.stages.intersect import intersect
 from wavefront.stages.surface import interact
-from wavefront.state import Paths
+from wavefront.state import Rays
 
 f4 = np.float32
 NAMES = ["numpy", pytest.param("embree", marks=pytest.mark.skipif(not installed(), reason="no embreex"))]
@@ -142,14 +146,13 @@ def test_surfaces_are_those_of_meshes_of_their_own(accel, smooth):
     origin, direction = rays(n, 7, seed=3)
     first = mixture(smooth)
     first[0].mesh.material = wf.Diffuse(wf.Texture(np.random.default_rng(0).random((4, 4, 3))))  # needs uvs
-    zero = np.zeros(n, np.uint32)
+    query = Rays(origin, direction, nothing(n))
     found = []
     for shapes in (first, alone(first)):
         scene = compiled(shapes, accel)
-        paths = Paths(*(zero,) * 3, origin, direction, nothing(n), np.ones((3, n), f4), *np.ones((3, n), f4))
-        hits = intersect(scene, paths)
+        hits = intersect(scene, query)
         lanes = hits.found
-        surface = interact(scene, paths.take(lanes), hits.take(lanes))
+        surface = interact(scene, query.take(lanes), hits.take(lanes))
         colour = np.full((9, n), np.nan)
         colour[:, lanes] = [*surface.ng, *surface.ns, *surface.uv, surface.inside]
         groups = np.full(n, -1)
@@ -177,18 +180,12 @@ def test_a_mirrored_instance_keeps_its_front():
         target = middle[:3] - scene.centre
         origin = np.random.default_rng(0).normal(size=(3, 200)) * 30 + target[:, None]
         direction = target[:, None] - origin
-        paths = Paths(
-            *(np.zeros(200, np.uint32),) * 3,
-            origin.astype(f4),
-            (direction / np.linalg.norm(direction, axis=0)).astype(f4),
-            nothing(200),
-            np.ones((3, 200), f4),
-            *np.ones((3, 200), f4),
-        )
-        hits = intersect(scene, paths)
-        lanes = np.flatnonzero(hits.prim >= 0)
+        direction /= np.linalg.norm(direction, axis=0)
+        inwards = Rays(origin.astype(f4), direction.astype(f4), nothing(200))
+        hits = intersect(scene, inwards)
+        lanes = hits.found
         assert lanes.size > 180
-        assert not interact(scene, paths.take(lanes), hits.take(lanes)).inside.any()
+        assert not interact(scene, inwards.take(lanes), hits.take(lanes)).inside.any()
 
 
 # --- Exactness ------------------------------------------------------------------------------------
@@ -346,6 +343,27 @@ def test_absorption_is_that_of_the_instances_material():
     assert (image[:, 8:, 0] > image[:, 8:, 1] + 0.1).sum() > 3
 
 
+@pytest.mark.parametrize("of_mesh", [True, False])
+def test_an_alpha_may_be_that_of_some_instances(of_mesh):
+    """Half-transparent in one place and solid in another, of one mesh; shadows too."""
+    solid, half = wf.Diffuse(0), wf.Diffuse(0).with_alpha(0.5)
+    square = wf.Mesh(
+        [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]],
+        [[0, 1, 2], [0, 2, 3]],
+        material=half if of_mesh else solid,
+    )
+    left = wf.Instance(square, at(-3, 0, 0), material=half)
+    right = wf.Instance(square, at(3, 0, 0), material=solid)
+    floor = wf.Rectangle((-9, -2, 9), (18, 0, 0), (0, 0, -18), material=wf.Diffuse(1))
+    sun = wf.DirectionalLight((0, -1, 0), np.pi)
+    for integrator in ("full", "direct_mis"):
+        for x, expected in ((-3, 0.25), (3, 0), (-6, 1)):
+            camera = wf.Camera.look_at((x, 5, 0), (x, 0, 0), up=(0, 0, 1), fov=4, size=(16, 16))
+            scene = wf.Scene([left, right, floor], [sun], camera)
+            seen = render(scene, 64, integrator=integrator, max_bounces=1).rgb
+            assert seen.mean() == pytest.approx(expected, abs=0.01)
+
+
 # --- What is shared -------------------------------------------------------------------------------
 
 
@@ -497,3 +515,19 @@ def test_a_node_that_flattens_is_no_instance(tmp_path):
         shapes = wf.load(tmp_path / "a.glb").shapes
     assert sum(isinstance(shape, wf.Instance) for shape in shapes) == 5
     assert sorted(len(shape.faces) for shape in shapes if isinstance(shape, wf.Mesh)) == [12, 304]
+
+
+# --- Memory ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is read from /proc")
+@pytest.mark.parametrize("accel", NAMES)
+def test_twenty_million_triangles_fit(accel):
+    """1 000 instances of 20 480 triangles, from a glb file to a picture, in less than 500 MB."""
+    script = Path(__file__).parents[1] / "benchmarks" / "instances.py"
+    command = [sys.executable, str(script), "--accel", accel, "--size", "96x72", "--spp", "1"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "= 20480000 triangles" in done.stdout
+    name, _, peak, *_ = done.stdout.splitlines()[-1].split()
+    assert name == accel
+    assert 50 < float(peak) < 500e6 / 2**20

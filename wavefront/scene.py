@@ -234,6 +234,8 @@ def compile_scene(
     smooth = any(mesh.normals is not None for mesh in meshes)
     triangles32 = np.ascontiguousarray(triangles, f4)
     opacities = _opacities(user_materials, material_of)
+    if opacities is not None:
+        _note_partly(opacities, meshes, instances)
     weights = bool(attributes) or smooth
     geometry = Geometry(triangles32[:once], np.ascontiguousarray(centers), radii, weights)
     accelerator, table = make_accelerator(geometry), None
@@ -313,6 +315,16 @@ def _opacities(materials: Sequence[Bsdf], material_of: Ints) -> Opacities | None
         else:
             constant[i] = material.opacity.constant
     return Opacities(np.append(partly.take(material_of), False), constant, varying)
+
+
+def _note_partly(opacities: Opacities, meshes: Sequence[Mesh], instances: Sequence[Instance]) -> None:
+    """Note the triangles of meshes that some instance has in a material that is only partly there."""
+    partly = {id(shape.mesh) for shape in instances if shape.material.opacity is not None}
+    start = 0
+    for mesh in meshes:
+        end = start + len(mesh.faces)
+        opacities.partly[start:end] |= id(mesh) in partly
+        start = end
 
 
 def _is_constant(value: object) -> bool:

@@ -94,9 +94,7 @@ class Hits(Columns):
     """What each ray met first."""
 
     t: Floats  # (n,) distance along the ray, scene units; inf on a miss
-    prim: (
-        Ints  # (n,) row of the scene's tables, -1 on a miss: the primitive's id where nothing is an instance
-    )
+    prim: Ints  # (n,) row of the scene's tables, -1 on a miss; without instances it is the primitive's id
     b1: Floats  # (n,) barycentric weight of the second vertex
     b2: Floats  # (n,) barycentric weight of the third vertex
     place: Ints | None = None  # (n,) column of the scene's `InstanceTable`; None when it has none
