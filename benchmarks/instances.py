@@ -3,9 +3,10 @@
 Run: python benchmarks/instances.py [--copies 1000] [--level 5] [--size 160x120] [--spp 4]
 
 It writes the scene as a glb file, then loads and renders it in a process of its own for each
-accelerator. "peak" is the resident memory of that process at its highest, "import" what it was
-before the file was opened; both are read from /proc, so only Linux has them. "again" is a second
-render in the same process.
+accelerator. "peak" is the resident memory of that process at its highest, together with that of its
+workers, where they are processes: what they share is counted for each. "import" is what it was before the
+file was opened. Both are read from /proc, so only Linux has them. "again" is a second render
+in the same process.
 """
 
 from __future__ import annotations
@@ -19,12 +20,13 @@ from pathlib import Path
 import numpy as np
 
 READER = """
-import sys, time
+import os, resource, sys, time
 import wavefront as wf
 
 def peak():
     (line,) = (line for line in open("/proc/self/status") if line.startswith("VmHWM:"))
-    return int(line.split()[1]) / 1024
+    worker = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+    return (int(line.split()[1]) + len(os.sched_getaffinity(0)) * worker) / 1024
 
 path, accel, width, height, spp = sys.argv[1], sys.argv[2], *map(int, sys.argv[3:])
 first = peak()

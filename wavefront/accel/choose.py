@@ -8,9 +8,7 @@ from .embree import EmbreeAccelerator, installed
 from .stream import NumpyAccelerator
 
 CHOICES = ("auto", "numpy", "embree")
-COPIES = (
-    1 << 18
-)  # triangles that instances may come to for Embree, which takes one large mesh faster than many
+COPIES = 1 << 18  # triangles of instances, in all, up to which Embree is faster with one mesh of them
 
 
 def make_accelerator(geometry: Geometry, accel: str) -> Accelerator:
