@@ -237,8 +237,8 @@ def test_light_does_not_leak_in(accel, scale, shift):
 @pytest.mark.parametrize("accel", NAMES)
 def test_only_the_triangle_of_the_instance_left_is_skipped(accel):
     """The same triangle of another instance, in the same place or behind, is hit."""
-    square = wf.Mesh([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2], [0, 2, 3]])
-    scene = compiled(placed(square, [at(0, 0, 0), at(0, 0, 1), at(0, 0, 2)]), accel)
+    bent = wf.Mesh([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.5]], [[0, 1, 2], [0, 2, 3]])
+    scene = compiled(placed(bent, [at(0, 0, 0), at(0, 0, 1), at(0, 0, 2)]), accel)
     origin = np.array([[0.5], [-0.5], [-1 - 1e-3]], f4).repeat(4, 1)
     direction = np.array([[0], [0], [1]], f4).repeat(4, 1)
     hits = scene.accelerator.closest(origin, direction, np.array([-1, 0, 1, 2]))
