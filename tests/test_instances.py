@@ -16,8 +16,10 @@ from wavefront.accel import instances as queries
 from wavefront.accel.embree import installed
 from wavefront.scene import CompiledScene, compile_scene
 from wavefront.stages.intersect import intersect
+from wavefront.stages.relief import tilt
 from wavefront.stages.surface import interact
 from wavefront.state import Rays
+from wavefront.vec import dot
 
 f4 = np.float32
 NAMES = ["numpy", pytest.param("embree", marks=pytest.mark.skipif(not installed(), reason="no embreex"))]
@@ -239,7 +241,7 @@ def test_only_the_triangle_of_the_instance_left_is_skipped(accel):
     """The same triangle of another instance, in the same place or behind, is hit."""
     bent = wf.Mesh([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.5]], [[0, 1, 2], [0, 2, 3]])
     scene = compiled(placed(bent, [at(0, 0, 0), at(0, 0, 1), at(0, 0, 2)]), accel)
-    origin = np.array([[0.5], [-0.5], [-1 - 1e-3]], f4).repeat(4, 1)
+    origin = np.array([[0.5], [-0.5], [-1e-3 - scene.centre[2]]], f4).repeat(4, 1)
     direction = np.array([[0], [0], [1]], f4).repeat(4, 1)
     hits = scene.accelerator.closest(origin, direction, np.array([-1, 0, 1, 2]))
     assert hits.prim.tolist() == [0, 2, 0, 0]
@@ -362,6 +364,38 @@ def test_an_alpha_may_be_that_of_some_instances(of_mesh):
             scene = wf.Scene([left, right, floor], [sun], camera)
             seen = render(scene, 64, integrator=integrator, max_bounces=1).rgb
             assert seen.mean() == pytest.approx(expected, abs=0.01)
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_reliefs_lie_as_on_meshes_of_their_own(smooth):
+    """Bumps follow the stretch of an instance, normal maps its tangents, mirrored or not."""
+    x, y = np.meshgrid(np.arange(16), np.arange(16))
+    height = np.sin(x * np.pi / 4) * np.cos(y * np.pi / 4) * 0.5 + 0.5
+    mesh = bumpy(smooth, material=wf.Diffuse(0.5).with_relief(wf.BumpMap(height, 0.3)))
+    matrices = MATRICES[1:5]
+    if smooth:  # averages around a vertex are weighted by angles, which skewed transforms change
+        matrices = [at(4, 0, 0, 0.5, (0.3, 1, 2)), at(0, 4, 1, (-1, 1, 1), (1, 2, 3)), at(-3, 0, 0, 1.3)]
+    matrices = [matrix @ translation_matrix(-mesh.bounds.mean(0)) for matrix in matrices]
+    n = 4000
+    origin, direction = rays(n, 7, seed=3)
+    query = Rays(origin, direction, nothing(n))
+    found = []
+    for shapes in (placed(mesh, matrices), alone(placed(mesh, matrices))):
+        scene = compiled(shapes)
+        hits = intersect(scene, query)
+        lanes = hits.found
+        surface = interact(scene, query.take(lanes), hits.take(lanes))
+        tangents = surface.tangents.copy()
+        tilt(scene, surface)
+        values = np.full((9, n), np.nan)
+        values[:, lanes] = [*surface.ns, *tangents]
+        found.append((hits.t, values, dot(surface.ns, surface.ng)))
+    (t, values, lean), (other_t, others, _) = found
+    assert (lean < 0.95).mean() > 0.2
+    same = (apart(t, other_t) < 1e-4) & (t < np.inf)
+    assert same.sum() > 300
+    off = np.abs(values - others)[:3, same].max(0)
+    assert np.quantile(off, 0.98) < 1e-4
 
 
 # --- What is shared -------------------------------------------------------------------------------

@@ -31,7 +31,8 @@ class InstanceTable(Columns):
 
     first: Ints  # (p,) first primitive id of each place, rising
     shift: Ints  # (p,) primitive id less its row
-    normal: Floats  # (9, p) matrix that turns normals of the mesh into the scene's, row by row
+    linear: Floats  # (9, p) matrix that turns vectors of the mesh into the scene's, row by row
+    normal: Floats  # (9, p) the same for normals
     skew: Floats  # (p,) how much larger a relative error of a direction is in the scene than in the mesh
     reach: Floats  # (p,) largest coordinate in the mesh's frame, scene units; 0 for what is placed once
     material: Ints | None  # (p,) material in place of the mesh's, -1 for none; None if there is none at all
@@ -43,9 +44,17 @@ class InstanceTable(Columns):
 
     def turn(self, normals: Floats) -> Floats:
         """Unit normals of meshes (3, p), one for each column -> unit normals in the scene."""
-        m = self.normal
-        x, y, z = normals
-        return normalize(np.stack([m[i] * x + m[i + 1] * y + m[i + 2] * z for i in (0, 3, 6)]))
+        return normalize(_times(self.normal, normals))
+
+    def stretch(self, vectors: Floats) -> Floats:
+        """Vectors in meshes (3·k, p), k for each column -> vectors in the scene."""
+        return np.concatenate([_times(self.linear, vectors[i : i + 3]) for i in range(0, len(vectors), 3)])
+
+
+def _times(m: Floats, vectors: Floats) -> Floats:
+    """Matrices (9, p), row by row, times vectors (3, p)."""
+    x, y, z = vectors
+    return np.stack([m[i] * x + m[i + 1] * y + m[i + 2] * z for i in (0, 3, 6)])
 
 
 def resolve(
@@ -136,9 +145,15 @@ def place(
     table = InstanceTable(
         first=np.concatenate([[0, triangles], first]),
         shift=np.concatenate([[0, -int(sizes.sum())], first - rows.take(mesh_of)]),
-        normal=np.concatenate([np.eye(3).reshape(9, 1).repeat(2, 1), normal.reshape(-1, 9).T], 1).astype(f4),
+        linear=_after_identities(linear),
+        normal=_after_identities(normal),
         skew=np.concatenate([[1, 1], skew]).astype(f4),
         reach=np.concatenate([[0, 0], reach]).astype(f4),
         material=None if material is None else np.concatenate([[-1, -1], material]),
     )
     return placements, table
+
+
+def _after_identities(matrices: Doubles) -> Floats:
+    """Return matrices (k, 3, 3), after those of the two places of what is placed once, as (9, k + 2)."""
+    return np.concatenate([[np.eye(3)] * 2, matrices]).reshape(-1, 9).T.astype(f4, order="C")

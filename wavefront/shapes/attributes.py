@@ -30,6 +30,7 @@ class Attribute:
     given: Callable[[Mesh], NDArray[np.float64] | None]  # what the user gives for it
     corners: Callable[[Mesh], NDArray[np.float64]]  # (m, 3, width), if it is given
     on_spheres: Callable[[Floats, Floats], Floats]  # from outward unit normals (3, n) and radii: (width, n)
+    vectors: bool = False  # whether these are vectors, three numbers each, which instances turn and stretch
 
 
 def sphere_uv(normal: Floats, radius: Floats) -> Floats:
@@ -78,10 +79,10 @@ ATTRIBUTES = {
     "uv1": _per_vertex(UV1, (0, 0), lambda mesh: mesh.uvs1, sphere_uv),
     "color": _per_vertex("vertex colours (colors)", (1, 1, 1, 1), lambda mesh: mesh.colors, sphere_color),
     "tangents": Attribute(
-        UV, NONE, lambda mesh: mesh.uvs, lambda mesh: mesh_tangents(mesh, mesh.uvs), sphere_tangents
+        UV, NONE, lambda mesh: mesh.uvs, lambda mesh: mesh_tangents(mesh, mesh.uvs), sphere_tangents, True
     ),
     "tangents1": Attribute(
-        UV1, NONE, lambda mesh: mesh.uvs1, lambda mesh: mesh_tangents(mesh, mesh.uvs1), sphere_tangents
+        UV1, NONE, lambda mesh: mesh.uvs1, lambda mesh: mesh_tangents(mesh, mesh.uvs1), sphere_tangents, True
     ),
 }
 

@@ -33,7 +33,10 @@ def interact(scene: CompiledScene, rays: Rays, hits: Hits) -> Surface:
     prim = hits.prim if placed is None else hits.prim + placed.shift
     surface = Surface(point, error, ng, ns, wo, prim, _materials(scene, hits, placed), inside)
     for name, corners in scene.attributes.items():
-        setattr(surface, name, _attribute(scene, name, corners, hits, point))
+        values = _attribute(scene, name, corners, hits, point)
+        if placed is not None and ATTRIBUTES[name].vectors:
+            values = placed.stretch(values)
+        setattr(surface, name, values)
     return surface
 
 
