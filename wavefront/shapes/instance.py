@@ -7,7 +7,7 @@ from copy import copy
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..bsdfs import Bsdf
+from ..bsdfs import Bsdf, Spatial
 from ..errors import SceneError, finite_array
 from .mesh import Mesh, check_material, check_range
 from .transform import moved
@@ -63,8 +63,8 @@ class Instance:
         self._material = check_material(self.name, material)
 
     @property
-    def emission(self) -> NDArray[np.float32] | None:
-        """Radiance that leaves the front side, as of the mesh; (3, 1)."""
+    def emission(self) -> Spatial | NDArray[np.float32] | None:
+        """Radiance that leaves the surface, as of the mesh."""
         return self.mesh.emission
 
     @property
