@@ -3,7 +3,7 @@
 import imageio.v3 as iio
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import ALBEDO, ALL, BLACK, EYE, HERE, floor, polygon_irradiance, probe
 from significance import SIDE, assert_mean, assert_same_images, measure, render, repeat
@@ -132,10 +132,11 @@ def test_what_the_estimate_misses_is_found_by_chance(monkeypatch) -> None:
     for things in ((), (behind,)):
         scene = lit(striped, *things)
         for integrator in ("naive", "full"):
-            mean = measure(scene, 4096, integrator=integrator, max_bounces=1)
-            assert_mean(mean, expected, 0.03)
+            mean = measure(scene, 2048, integrator=integrator, max_bounces=1)
+            assert_mean(mean, expected, 0.04)
 
 
+@settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 6), st.integers(1, 6))
 def test_the_mean_of_a_face(seed: int, width: int, height: int) -> None:
     """Over a rectangle it is the image's mean, as near as 1024 points come."""
@@ -239,7 +240,7 @@ def test_the_contract(kind: type) -> None:
     """χ², densities and radiance agree, on both sides."""
     record = lights(kind)
     points = np.array([[0, 0, 0], [0.5, 4, 1]], f4)
-    testing.check_light(record, points=points, samples=20_000)
+    testing.check_light(record, points=points, samples=10_000)
     for k in range(2):
         for p in points:
             n, one = 64, record.take(np.array([k]))
@@ -294,11 +295,11 @@ def test_estimators_agree() -> None:
     """All light by chance and by light samples; the point light is left to both."""
     scene = gallery()
     scene.lights = []
-    naive = repeat(scene, 32, integrator="naive", max_bounces=4)
-    full = repeat(scene, 8, integrator="full", max_bounces=4, first_seed=100)
-    assert_same_images(naive, full, 0.02)
-    mis = repeat(scene, 8, integrator="direct_mis", max_bounces=1)
-    simple = repeat(scene, 16, integrator="direct_simple", max_bounces=1, first_seed=200)
+    naive = repeat(scene, 32, runs=12, integrator="naive", max_bounces=4)
+    full = repeat(scene, 8, runs=12, integrator="full", max_bounces=4, first_seed=100)
+    assert_same_images(naive, full, 0.03)
+    mis = repeat(scene, 4, integrator="direct_mis", max_bounces=1)
+    simple = repeat(scene, 12, integrator="direct_simple", max_bounces=1, first_seed=200)
     assert_same_images(mis, simple, 0.02)
 
 

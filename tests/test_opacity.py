@@ -115,9 +115,9 @@ def test_shadow_of_a_sphere(integrator: str) -> None:
     ball = wf.Sphere((0, 1, 0), 0.7, material=BLACK.with_alpha(0.3))
     lamp = panel((-0.3, -0.3), (0.3, 0.3), 2.0)
     whole = polygon_irradiance([(-0.3, 2, -0.3), (-0.3, 2, 0.3), (0.3, 2, 0.3), (0.3, 2, -0.3)])
-    spp = 16384 if integrator == "naive" else 256
+    spp = 8192 if integrator == "naive" else 256
     mean = measure(lit(ball, lamp=lamp), spp, integrator=integrator, max_bounces=1)
-    assert_mean(mean, 0.49 * whole * ALBEDO / np.pi, 0.02)
+    assert_mean(mean, 0.49 * whole * ALBEDO / np.pi, 0.04)
 
 
 @pytest.mark.parametrize("integrator", ["naive", "full"])
@@ -201,8 +201,8 @@ def leaves(size: tuple[int, int] = (16, 8)) -> wf.Scene:
 
 def test_estimators_agree() -> None:
     """All light through leaves, by chance and by light samples."""
-    naive = repeat(leaves(), 64, integrator="naive", max_bounces=4)
-    full = repeat(leaves(), 16, integrator="full", max_bounces=4, first_seed=100)
+    naive = repeat(leaves(), 32, integrator="naive", max_bounces=4)
+    full = repeat(leaves(), 8, integrator="full", max_bounces=4, first_seed=100)
     assert_same_images(naive, full, 0.02)
 
 
@@ -213,6 +213,25 @@ def test_waves_and_workers_change_no_bit(integrator: str, cut: dict) -> None:
     scene = leaves((6, 5))
     whole = render(scene, 3, integrator=integrator).rgb
     assert render(scene, 3, integrator=integrator, **cut).rgb.tobytes() == whole.tobytes()
+
+
+@pytest.mark.parametrize(("scale", "shift"), [(1e6, 0.0), (1e-6, 0.0), (1.0, 1e4)])
+def test_scale_and_place_change_nothing(scale: float, shift: float) -> None:
+    """What lies behind a surface begins at its rounding error, not at a distance."""
+    scene = leaves((12, 8))
+    moved: list[wf.Mesh | wf.Sphere] = []
+    for shape in scene.shapes:
+        if isinstance(shape, wf.Mesh):
+            shape.vertices = shape.vertices * scale + shift
+            moved.append(shape)
+        else:
+            moved.append(
+                wf.Sphere(shape.center * scale + shift, shape.radius * scale, material=shape.material)
+            )
+    eye, target = (np.array(p) * scale + shift for p in ((0, 1.5, 6), (0, 1, 0)))
+    camera = wf.Camera.look_at(eye, target, fov=40, size=(12, 8))
+    image, plain = render(wf.Scene(moved, scene.lights, camera), 16).rgb, render(leaves((12, 8)), 16).rgb
+    assert np.abs(image - plain).mean() < 1e-3 * plain.mean()
 
 
 def test_what_is_all_there_costs_nothing() -> None:
