@@ -155,6 +155,8 @@ def test_surfaces_are_those_of_meshes_of_their_own(accel, smooth):
         hits = intersect(scene, query)
         lanes = hits.found
         surface = interact(scene, query.take(lanes), hits.take(lanes))
+        ids = scene.accelerator.closest(origin, direction, nothing(n)).prim
+        assert np.array_equal(surface.prim, ids[lanes])
         colour = np.full((9, n), np.nan)
         colour[:, lanes] = [*surface.ng, *surface.ns, *surface.uv, surface.inside]
         groups = np.full(n, -1)
@@ -236,6 +238,42 @@ def test_light_does_not_leak_in(accel, scale, shift):
     assert image.rgb.max() == 0
 
 
+VERTEX = at(0, 0, 0, 100) @ translation_matrix(-bumpy().vertices[0])  # puts a vertex at the origin
+SQUASH = at(0, 0, 0, (0.005, 1, 1), (1, 2, 3)) @ at(0, 0, 0, 1, (1, 2, 3))
+
+
+@pytest.mark.parametrize("accel", NAMES)
+@pytest.mark.parametrize(
+    ("matrix", "start", "aim"),
+    [(VERTEX, 0.1, 0.05), (np.eye(4), 3000, 0.8), (SQUASH, 300, 0.3)],
+    ids=["near the middle of a large one", "from afar", "squashed askew"],
+)
+def test_points_are_no_further_off_than_their_error(accel, matrix, start, aim):
+    """Distances to the planes of the triangles in float64; and the bound is no wild guess either."""
+    mesh, n, rng = bumpy(), 20_000, np.random.default_rng(0)
+    if matrix is SQUASH:  # a box on end, so that rays meet its narrow sides too
+        box = trimesh.creation.box(transform=np.linalg.inv(at(0, 0, 0, 1, (1, 2, 3))))
+        mesh = wf.Mesh(box.vertices, box.faces)
+    if matrix is not VERTEX:
+        matrix = matrix @ translation_matrix(-mesh.bounds.mean(0))
+    matrices = [matrix, np.diag([-1, -1, -1, 1]) @ matrix]  # so the scene's middle is the origin
+    scene = compiled(placed(mesh, matrices), accel)
+    assert scene.centre == pytest.approx([0, 0, 0], abs=1e-9)
+    origin = rng.normal(size=(3, n))
+    origin *= start / np.linalg.norm(origin, axis=0)
+    direction = rng.normal(size=(3, n)) * aim - origin
+    query = Rays(origin.astype(f4), (direction / np.linalg.norm(direction, axis=0)).astype(f4), nothing(n))
+    hits = intersect(scene, query)
+    query, hits = query.take(hits.found), hits.take(hits.found)
+    assert len(hits) > 500
+    surface = interact(scene, query, hits)
+    corners = np.stack([scene_vertices(mesh, m)[mesh.faces] for m in matrices])[hits.place - 2, hits.prim]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    off = np.abs((normal * (surface.point.T - corners[:, 0])).sum(1))
+    assert 0.02 < (off / surface.error).max() < 1
+
+
 @pytest.mark.parametrize("accel", NAMES)
 def test_only_the_triangle_of_the_instance_left_is_skipped(accel):
     """The same triangle of another instance, in the same place or behind, is hit."""
@@ -259,6 +297,24 @@ def test_ties_go_to_the_lowest_id(accel):
     hits = scene.accelerator.closest(origin, direction, nothing(4000))
     first = hits.prim // len(mesh.faces)
     assert np.unique(first[hits.prim >= 0]).tolist() == [0, 1]
+
+
+@pytest.mark.parametrize("accel", NAMES)
+def test_ties_go_to_the_lowest_id_whichever_is_traced_first(accel):
+    """A triangle that two meshes have: the box of the later one begins nearer."""
+    first = wf.Mesh([[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, -1]], [[0, 1, 2]])
+    second = wf.Mesh(
+        [[0, 0, 0], [4, 0, 0], [0, 4, 0], [8, 8, 2], [6, 8, 2], [8, 6, 2]], [[0, 1, 2], [3, 4, 5]]
+    )
+    both = [at(0, 0, 0), at(16, 0, 0)]
+    for shapes, expected in (
+        ([*placed(first, both), *placed(second, both)], 0),
+        ([*placed(second, both), *placed(first, both)], 0),
+    ):
+        scene = compiled(shapes, accel)
+        origin = (np.array([[1.0], [1.0], [9.0]]) - scene.centre[:, None]).astype(f4)
+        hits = scene.accelerator.closest(origin, np.array([[0], [0], [-1]], f4), nothing(1))
+        assert (hits.t[0], hits.prim[0]) == (9, expected)
 
 
 @pytest.mark.parametrize("accel", NAMES)
@@ -555,6 +611,7 @@ def test_a_node_that_flattens_is_no_instance(tmp_path):
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is read from /proc")
+@pytest.mark.slow
 @pytest.mark.parametrize("accel", NAMES)
 def test_twenty_million_triangles_fit(accel):
     """1 000 instances of 20 480 triangles, from a glb file to a picture, in less than 500 MB."""

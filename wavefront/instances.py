@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .accel import Placements
 from .shapes import Instance, Mesh, Sphere
 from .state import Columns
-from .vec import Floats, Ints, f4, normalize
+from .vec import Floats, Ints, f4
 
 SKEW = 1e3  # instances that are stretched more along one axis than along another are not shared
 BOX_ROOM = 2.0**-20  # added to boxes on all sides, relative to their size and distance from the centre
@@ -32,9 +32,8 @@ class InstanceTable(Columns):
     first: Ints  # (p,) first primitive id of each place, rising
     shift: Ints  # (p,) primitive id less its row
     linear: Floats  # (9, p) matrix that turns vectors of the mesh into the scene's, row by row
-    normal: Floats  # (9, p) the same for normals
-    skew: Floats  # (p,) how much larger a relative error of a direction is in the scene than in the mesh
-    reach: Floats  # (p,) largest coordinate in the mesh's frame, scene units; 0 for what is placed once
+    normal: Floats  # (9, p) the same for normals, scaled so that their lengths are at most 1
+    reach: Floats  # (p,) half the diagonal of the mesh's box, by the same factor; 0 for what is placed once
     material: Ints | None  # (p,) material in place of the mesh's, -1 for none; None if there is none at all
 
     def locate(self, prim: Ints) -> tuple[Ints, Ints]:
@@ -43,8 +42,8 @@ class InstanceTable(Columns):
         return prim - self.shift.take(place), place
 
     def turn(self, normals: Floats) -> Floats:
-        """Unit normals of meshes (3, p), one for each column -> unit normals in the scene."""
-        return normalize(_times(self.normal, normals))
+        """Unit normals of meshes (3, p), one for each column -> normals in the scene, of any length."""
+        return _times(self.normal, normals)
 
     def stretch(self, vectors: Floats) -> Floats:
         """Vectors in meshes (3·k, p), k for each column -> vectors in the scene."""
@@ -139,16 +138,13 @@ def place(
         low=np.ascontiguousarray((boxes[:, 0] - room).T, f4),
         high=np.ascontiguousarray((boxes[:, 1] + room).T, f4),
     )
-    normal = inverse.transpose(0, 2, 1) / np.abs(inverse).max((1, 2), keepdims=True)
-    skew = (np.abs(linear) @ np.abs(inverse)).sum(2).max(1)
-    reach = (np.abs(linear) * halves[:, None]).sum(2).max(1)
+    longest = np.linalg.norm(inverse, 2, (1, 2))  # of unit vectors of the scene, in the mesh's frame
     table = InstanceTable(
         first=np.concatenate([[0, triangles], first]),
         shift=np.concatenate([[0, -int(sizes.sum())], first - rows.take(mesh_of)]),
         linear=_after_identities(linear),
-        normal=_after_identities(normal),
-        skew=np.concatenate([[1, 1], skew]).astype(f4),
-        reach=np.concatenate([[0, 0], reach]).astype(f4),
+        normal=_after_identities(inverse.transpose(0, 2, 1) / longest[:, None, None]),
+        reach=np.concatenate([[0, 0], np.linalg.norm(halves, axis=1) / longest]).astype(f4),
         material=None if material is None else np.concatenate([[-1, -1], material]),
     )
     return placements, table

@@ -8,7 +8,7 @@ from ..instances import InstanceTable
 from ..scene import CompiledScene
 from ..shapes.attributes import ATTRIBUTES, Corners
 from ..state import Hits, Rays, Surface
-from ..vec import Floats, Ints, dot, f4, normalize
+from ..vec import Floats, Ints, dot, f4, length, normalize
 
 # o + t·d carries at most three roundings of half an ulp (2⁻²⁴) of its terms; this is five times that.
 POINT_ERROR = f4(2**-21)
@@ -19,11 +19,11 @@ def interact(scene: CompiledScene, rays: Rays, hits: Hits) -> Surface:
     """Gather the geometry at hits; every ray must have one."""
     point = rays.origin + rays.direction * hits.t
     placed = _places(scene, hits)
-    error = _point_error(placed, hits, point)
+    error = POINT_ERROR * (np.abs(point).max(0) + hits.t)
     wo = -rays.direction
     ng = normals(scene, hits.prim, point)
     if placed is not None:
-        ng = placed.turn(ng)
+        ng, error = _turned(placed, hits, ng, error)
     ns = _shading_normals(scene, hits, placed, ng)
     facing = dot(ng, wo)
     inside = facing < 0
@@ -47,16 +47,17 @@ def _places(scene: CompiledScene, hits: Hits) -> InstanceTable | None:
     return scene.instances.take(hits.place)
 
 
-def _point_error(placed: InstanceTable | None, hits: Hits, point: Floats) -> Floats:
-    """Bound the rounding error (n,) of hit points.
+def _turned(placed: InstanceTable, hits: Hits, ng: Floats, error: Floats) -> tuple[Floats, Floats]:
+    """Turn unit normals of meshes into the scene's, and enlarge the errors (n,) of hit points.
 
-    On an instance the ray was rounded once more, in the mesh's frame: its origin, no further away
-    there than the mesh's size and t together, and its direction.
+    On an instance the ray was rounded once more, in the mesh's frame: its origin, which is no further
+    away there than the mesh reaches and t together, and its direction. Lengths along a normal come
+    from that frame into the scene by division by the length of the turned normal.
     """
-    size = np.abs(point).max(0)
-    if placed is None:
-        return POINT_ERROR * (size + hits.t)
-    return POINT_ERROR * (size + placed.reach + placed.skew * hits.t)
+    ng = placed.turn(ng)
+    size = length(ng)
+    size = np.where(size > 0, size, f4(1))
+    return ng / size, error + POINT_ERROR * (placed.reach + hits.t) / size
 
 
 def _materials(scene: CompiledScene, hits: Hits, placed: InstanceTable | None) -> Ints:
@@ -116,7 +117,7 @@ def _shading_normals(
     corners = _at_corners(scene.corner_normals, hits, scene.triangles)
     if placed is not None:
         # each by itself, as a mesh of its own would have them: a skewed transform changes their lengths
-        corners = [placed.turn(corner) for corner in corners]
+        corners = [normalize(placed.turn(corner)) for corner in corners]
     ns = normalize(_interpolate(corners, hits))
     flat = (hits.prim >= scene.triangles) | ~(dot(ns, ng) > 0)
     np.copyto(ns, ng, where=flat)
