@@ -20,6 +20,7 @@ from wavefront.io.images import srgb_to_linear
 from wavefront.io.load import from_trimesh, load, load_meshes
 from wavefront.lights import DirectionalLight, SpotLight
 from wavefront.relief import NormalMap
+from wavefront.shapes import Instance
 from wavefront.textures import Texture
 from wavefront.vertex_colors import VertexColors
 
@@ -202,6 +203,68 @@ def test_a_flat_thing_may_be_scaled_by_0_across(build, path):
     build.json["nodes"][0]["scale"] = [1, 1, 0]
     build.mesh({"POSITION": TRIANGLE, "NORMAL": np.tile(np.float32([[0, 0, 1]]), (3, 1))}).gltf(path)
     assert np.array_equal(load_meshes(path)[0].normals, [[0, 0, 1]] * 3)
+
+
+def instanced(build, **attributes):
+    """Place the mesh of the first node by EXT_mesh_gpu_instancing."""
+    attributes = {name: build.accessor(values) for name, values in attributes.items()}
+    build.json["nodes"][0] |= {
+        "name": "grass",
+        "translation": [0, 0, 5],
+        "extensions": {"EXT_mesh_gpu_instancing": {"attributes": attributes}},
+    }
+    build.json |= {"extensionsUsed": ["EXT_mesh_gpu_instancing"]}
+    build.json |= {"extensionsRequired": ["EXT_mesh_gpu_instancing"]}
+    return build.mesh()
+
+
+def test_a_node_may_hold_many_instances(build, path):
+    quarter = np.array([[0, 0, 0, 127], [0, 0, 90, 90]], np.int8)  # normalised; lengths do not matter
+    build = instanced(
+        build,
+        TRANSLATION=np.float32([[1, 0, 0], [0, 2, 0]]),
+        ROTATION=quarter,
+        SCALE=np.float32([[1, 1, 1], [3, 1, 1]]),
+    )
+    build.json["accessors"][1]["normalized"] = True
+    build.gltf(path)
+    shapes = load(path).shapes
+    assert [type(shape) for shape in shapes] == [Instance] * 2
+    assert shapes[0].mesh is shapes[1].mesh
+    turned, still = (shape.to_mesh().vertices for shape in shapes)  # the last comes first, as of nodes
+    assert still == pytest.approx(TRIANGLE + np.array([1, 0, 5]))
+    assert turned == pytest.approx(np.array([[0, 2, 5], [0, 5, 5], [-1, 2, 5]]), abs=1e-6)
+    assert len(load_meshes(path)) == 2
+
+
+def test_what_instances_have_besides_is_named(build, path):
+    instanced(build, TRANSLATION=np.float32([[0, 0, 0]]), _COLOR=np.float32([[1, 0, 0]])).gltf(path)
+    with pytest.warns(UserWarning, match=r"not honoured: _COLOR of instances \(node 'grass'\)"):
+        assert len(load(path).shapes) == 1
+
+
+@pytest.mark.parametrize(
+    ("attributes", "message"),
+    [
+        (
+            {"TRANSLATION": np.zeros((2, 3), np.float32), "SCALE": np.ones((3, 3), np.float32)},
+            r"EXT_mesh_gpu_instancing of node 'grass' has 2 of TRANSLATION, 3 of SCALE; it must be as many",
+        ),
+        ({"SCALE": np.ones((2, 4), np.float32)}, r"has SCALE with 4 components; it must have 3"),
+        (
+            {"TRANSLATION": np.float32([[0, 0, 0], [0, np.nan, 0]])},
+            r"has TRANSLATION\[1\] \[0\.0, nan, 0\.0\]; it must be finite",
+        ),
+        (
+            {"TRANSLATION": np.zeros((2**20 + 1, 3), np.int8)},
+            r"has 1048577 of TRANSLATION; it must be as many of each, at most 1048576",
+        ),
+    ],
+)
+def test_bad_instances_are_named(build, path, attributes, message):
+    instanced(build, **attributes).gltf(path)
+    with pytest.raises(SceneError, match=message):
+        load(path)
 
 
 # ---- cameras and lights ---------------------------------------------------------------------------

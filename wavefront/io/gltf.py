@@ -36,6 +36,12 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 READ = ("TEXCOORD_0", "TEXCOORD_1", "COLOR_0")  # of the numbered attributes of a mesh
 TRIANGLES, STRIP, FAN = 4, 5, 6
 MAX_ELEMENTS = 2**28  # in one accessor, whatever backs it
+MAX_INSTANCES = 2**20  # of one node by EXT_mesh_gpu_instancing
+INSTANCE_ATTRIBUTES: dict[str, list[float]] = {  # what an instance without it has
+    "TRANSLATION": [0, 0, 0],
+    "ROTATION": [0, 0, 0, 1],
+    "SCALE": [1, 1, 1],
+}
 HEIGHT = 512  # pixels of a camera's picture; files give its shape only
 Matrix = NDArray[np.float64]
 
@@ -181,7 +187,8 @@ def contents(document: Document) -> Contents:
         if "mesh" in node:
             if node["mesh"] not in meshes:
                 meshes[node["mesh"]] = _primitives(document, node["mesh"])
-            out.raws += [(raw, material, matrix) for raw, material in meshes[node["mesh"]]]
+            for place in _places(document, node, matrix):
+                out.raws += [(raw, material, place) for raw, material in meshes[node["mesh"]]]
         if "camera" in node:
             _add_camera(document, out, node["camera"], matrix)
         if "skin" in node:
@@ -224,12 +231,44 @@ def _local(document: Document, index: int, node: dict[str, Any]) -> Matrix:
     where = f"{document.name}: nodes[{index}]"
     if "matrix" in node:
         return floats(where + ".matrix", node["matrix"], 16).reshape(4, 4).T
+    return _composed(
+        floats(where + ".translation", node.get("translation", [0, 0, 0]), 3),
+        floats(where + ".rotation", node.get("rotation", [0, 0, 0, 1]), 4),
+        floats(where + ".scale", node.get("scale", [1, 1, 1]), 3),
+    )
+
+
+def _places(document: Document, node: dict[str, Any], matrix: Matrix) -> list[Matrix]:
+    """Return where a node's mesh stands: once, or as often as EXT_mesh_gpu_instancing says."""
+    attributes = node.get("extensions", {}).get("EXT_mesh_gpu_instancing", {}).get("attributes")
+    if not attributes:
+        return [matrix]
+    where = f"{document.name}: EXT_mesh_gpu_instancing of node {node.get('name', '?')!r}"
+    for name in attributes.keys() - INSTANCE_ATTRIBUTES.keys():
+        document.lose(f"{name} of instances", f"node {node.get('name', '?')!r}")
+    counts = {name: document.get("accessors", index).get("count") for name, index in attributes.items()}
+    count = _count(next(iter(counts.values())))
+    if len(set(counts.values())) > 1 or count > MAX_INSTANCES:
+        listed = ", ".join(f"{number} of {name}" for name, number in counts.items())
+        raise SceneError(f"{where} has {listed}; it must be as many of each, at most {MAX_INSTANCES}")
+    parts = []
+    for name, neutral in INSTANCE_ATTRIBUTES.items():
+        values = _attribute(document, attributes, name, len(neutral), where, count)
+        parts.append(np.tile(neutral, (count, 1)) if values is None else wide(values))
+        bad = np.argwhere(~np.isfinite(parts[-1]))
+        if len(bad):
+            raise SceneError(
+                f"{where} has {name}[{bad[0][0]}] {parts[-1][bad[0][0]].tolist()}; it must be finite"
+            )
+    return [matrix @ _composed(*part) for part in zip(*parts, strict=True)]
+
+
+def _composed(translation: Matrix, rotation: Matrix, scale: Matrix) -> Matrix:
+    """Return translation · rotation · scale as a matrix; the rotation is a quaternion."""
     matrix = np.eye(4)
-    matrix[:3, 3] = floats(where + ".translation", node.get("translation", [0, 0, 0]), 3)
-    rotation = np.eye(4)
-    rotation[:3, :3] = _rotation(floats(where + ".rotation", node.get("rotation", [0, 0, 0, 1]), 4))
-    scale = floats(where + ".scale", node.get("scale", [1, 1, 1]), 3)
-    return matrix @ rotation @ np.diag([*scale, 1.0])
+    matrix[:3, :3] = _rotation(rotation) * scale
+    matrix[:3, 3] = translation
+    return matrix
 
 
 def _rotation(quaternion: Matrix) -> Matrix:

@@ -31,7 +31,7 @@ KNOWN = frozenset(
         "mesh_quantization",
         "texture_transform",
     )
-)
+) | {"EXT_mesh_gpu_instancing"}
 FLIP = np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]])  # between v downwards and v upwards
 
 
