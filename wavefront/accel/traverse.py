@@ -28,7 +28,7 @@ from .triangle import ROUNDOFF, Doubles
 BLOCK = 32  # rays that share one copy of a node's matrix
 BLOCK_SHIFT = 5
 CHUNK = 1 << 18  # elements of one product
-ROUNDS = (1, 1, 1, 2)  # children of the root that a ray takes in each round; then all that are left
+NEAR_ROUNDS = 3  # in which each ray takes the nearest child of the root; then all that are left
 TOP = 128  # children of the root at most: those of its children join it while so many fit
 NO_HIT = (0x7F800000 << 32) | 0x7FFFFFFF  # key of a miss: t = inf
 
@@ -135,7 +135,7 @@ class StreamTree:
     top: Ints  # (top,) their slots
     quadrics: Floats  # (nodes, width, 21) quadrics of each child, about the node's centre
     center: Floats  # (nodes, 3) where a node's moments are taken about
-    ball: Floats  # (nodes * width, 4) centre and radius of a ball around each child
+    box: Floats  # (6, nodes * width) lower and upper corner of a box around each child
     child: Ints  # (nodes * width,) child codes as in build.Tree
     leaves: Floats  # (leaves, rows, columns) the filter's matrices
     prim: Ints  # (leaves * leaf size,) primitive of each leaf slot
@@ -166,10 +166,9 @@ def stream_tree(points: Floats, leaf_size: int, width: int, ball: Ball) -> Strea
     quadrics[absent] = 0
     for axis in range(3):
         quadrics[absent, PAIRS.index((axis, axis))] = -1
-    balls = np.empty((nodes * width, 4), f4)
-    balls[:, :3] = shapes[:, :3]
-    axes = shapes[:, 3:].reshape(-1, 3, 3)
-    balls[:, 3] = np.sqrt((axes * axes).sum(1).max(1)) * (1 + 1e-6) + 2e-5
+    corners = np.concatenate([tree.low.reshape(-1, 3).T, tree.high.reshape(-1, 3).T]).astype(np.float64)
+    box = (corners - np.tile(ball.center, 2)[:, None]) / ball.radius
+    box += np.repeat([-BOX_MARGIN, BOX_MARGIN], 3)[:, None]
     top = np.flatnonzero(~absent[0])
     child = tree.child.ravel().astype(np.intp)
     while True:
@@ -183,9 +182,19 @@ def stream_tree(points: Floats, leaf_size: int, width: int, ball: Ball) -> Strea
     scale = f4(1 / ball.radius)
     leaves = np.empty((0, 0, 0), f4)
     return StreamTree(
-        root, top, quadrics, center.astype(f4), balls, child, leaves, tree.prim.ravel(), width, leaf_size,
-        tree.cost, scale,
-    )  # fmt: skip
+        root=root,
+        top=top,
+        quadrics=quadrics,
+        center=center.astype(f4),
+        box=box.astype(f4),
+        child=child,
+        leaves=leaves,
+        prim=tree.prim.ravel(),
+        width=width,
+        leaf_size=leaf_size,
+        cost=tree.cost,
+        scale=scale,
+    )
 
 
 def fit_ellipsoids(points: Floats, order: Ints, start: Ints) -> Doubles:
@@ -279,64 +288,83 @@ def trace(
     `reach_now()` (n + 1,) is how far rays still look, less after `visit(leaves, lanes)`, which tests.
     """
     reach = reach_now()
-    line = lanes.line.copy()
-    line[3:] *= tree.scale
-    begin = np.append((lanes.begin * tree.scale - np.abs(lanes.begin * tree.scale) * 1e-6).astype(f4), f4(0))
+    rays = _rays(lanes, tree.scale)
     codes = tree.child.take(tree.top)
-    mask = (1 << (tree.top.size - 1).bit_length()) - 1
-    slot, lane, near = _root_pairs(tree, line, begin, reach)
-    bits = near.view(np.int32).astype(np.int64)
-    bits &= ~mask
-    bits |= slot
-    bits |= lane << 32
-    key = bits
-    key.sort()
-    owner = key >> 32
-    at = _firsts(owner)
-    last = np.append(at[1:], key.size)
-    for taken in (*ROUNDS, 1 << 30):
-        if not at.size:
-            return
-        count = np.minimum(last - at, taken)
-        ends = np.cumsum(count)
-        place = at
-        if taken > 1:
-            place = np.arange(int(ends[-1])) + np.repeat(at - ends + count, count)
-        chosen = key.take(place)
-        lane = chosen >> 32
-        close = (chosen & (0xFFFFFFFF ^ mask)).astype(np.int32).view(f4) - OFFSET
-        looking = np.flatnonzero(close <= reach.take(lane))
-        code = codes.take(chosen.take(looking) & mask)
-        _descend(tree, line, begin, reach, code, lane.take(looking), visit)
+    slot, lane, near = _root_pairs(tree, rays, reach)
+    for last in (*[False] * NEAR_ROUNDS, True):
+        chosen = np.arange(lane.size) if last else _nearest_of_each(lane, near, lanes.count)
+        _descend(tree, rays, reach, codes.take(slot.take(chosen)), lane.take(chosen), visit)
         reach = reach_now()
-        at = at + count
-        more = np.flatnonzero(at < last)
-        at, last = at.take(more), last.take(more)
+        left = near <= reach.take(lane)
+        left[chosen] = False
+        rest = np.flatnonzero(left)
+        if not rest.size:
+            return
+        slot, lane, near = slot.take(rest), lane.take(rest), near.take(rest)
 
 
+@dataclass(slots=True)
+class _Rays:
+    """Lines in units of the ball's radius about its centre; at the end one that meets nothing."""
+
+    line: Floats  # (6, n + 1) Plücker coordinates
+    foot: Floats  # (3, n + 1) point next to the centre, from where distances count
+    inverse: Floats  # (3, n + 1) 1 / direction
+    begin: Floats  # (n + 1,) where rays start
+
+    def span(self, box: Floats, slot: Ints, lane: Ints) -> tuple[Floats, Floats]:
+        """Return where lanes (k,) enter and leave boxes `slot` (k,) of `box` (6, slots): slab tests."""
+        enter, leave = self.begin.take(lane), np.full(lane.size, np.inf, f4)
+        for axis in range(3):
+            foot, inverse = self.foot[axis].take(lane), self.inverse[axis].take(lane)
+            first = (box[axis].take(slot) - foot) * inverse
+            second = (box[axis + 3].take(slot) - foot) * inverse
+            np.maximum(enter, np.minimum(first, second), out=enter)
+            np.minimum(leave, np.maximum(first, second), out=leave)
+        return enter, leave
+
+
+def _rays(lanes: Lanes, scale: np.float32) -> _Rays:
+    line = lanes.line.copy()
+    line[3:] *= scale
+    dx, dy, dz, mx, my, mz = line
+    foot = np.stack([dy * mz - dz * my, dz * mx - dx * mz, dx * my - dy * mx])
+    inverse = f4(1) / np.where(line[:3] == 0, TINY, line[:3])
+    begin = lanes.begin * scale
+    begin = np.append((begin - np.abs(begin) * 1e-6 - 1e-6).astype(f4), f4(np.inf))
+    return _Rays(line, foot, inverse, begin)
+
+
+def _nearest_of_each(lane: Ints, near: Floats, count: int) -> Ints:
+    """Return the pair (k,) with the least distance of each lane that has one."""
+    key = (near + OFFSET).view(np.int32).astype(np.int64) << 32
+    key |= np.arange(lane.size)
+    least = np.full(count, NO_HIT, np.int64)
+    np.minimum.at(least, lane, key)
+    return least.compress(least != NO_HIT) & 0xFFFFFFFF
+
+
+BOX_MARGIN = 4e-6  # by which boxes are wider, for the rounding of lines
+TINY = f4(1e-30)  # in place of 0, so that 0 times the inverse is a number
 OFFSET = f4(4)  # makes distances positive, so that their bits sort like numbers
 
 
-def _root_pairs(tree: StreamTree, line: Floats, begin: Floats, reach: Floats) -> tuple[Ints, Ints, Floats]:
-    """All rays against the root's children -> child, lane, near distance + OFFSET of pairs."""
-    n, width = line.shape[1] - 1, tree.top.size
+def _root_pairs(tree: StreamTree, rays: _Rays, reach: Floats) -> tuple[Ints, Ints, Floats]:
+    """All rays against the root's children -> child, lane, near distance of pairs."""
+    n, width = rays.begin.size - 1, tree.top.size
     step = max(256, CHUNK // width)
+    box = tree.box.take(tree.top, 1)
     parts = []
-    balls = np.ascontiguousarray(tree.ball.take(tree.top, 0))
     for at in range(0, n, step):
         k = min(n - at, step)
-        part = line[:, at : at + k]
         features = scratch("features", (21, k))
-        _features(part, features)
+        _features(rays.line[:, at : at + k], features)
         value = np.matmul(tree.root, features, out=scratch("product", (width, k)))
         hit = flat_true(np.greater_equal(value, 0, out=scratch("mask", value.shape, np.bool_)))
-        along = np.matmul(balls[:, :3], part[:3], out=value).reshape(-1).take(hit)
-        slot = hit // k
-        lane = hit - slot * k + at
-        radius = balls[:, 3].take(slot)
-        near = along - radius
-        met = np.flatnonzero((along + radius >= begin.take(lane)) & (near <= reach.take(lane)))
-        near += OFFSET
+        slot, lane = np.divmod(hit, k)
+        lane += at
+        near, far = rays.span(box, slot, lane)
+        met = np.flatnonzero(near <= np.minimum(far, reach.take(lane)))
         parts.append((slot.take(met), lane.take(met), near.take(met)))
     if not parts:
         empty = np.zeros(0, np.intp)
@@ -353,8 +381,7 @@ def _features(line: Floats, out: Floats) -> None:
 
 def _descend(
     tree: StreamTree,
-    line: Floats,
-    begin: Floats,
+    rays: _Rays,
     reach: Floats,
     code: Ints,
     lane: Ints,
@@ -374,33 +401,31 @@ def _descend(
             leaf_lanes.append(lane.take(at))
             at = np.flatnonzero(~is_leaf)
             code, lane = code.take(at), lane.take(at)
-        code, lane = _expand(tree, line, begin, reach, code, lane)
+        code, lane = _expand(tree, rays, reach, code, lane)
     if leaf_codes:
         visit(np.concatenate(leaf_codes), np.concatenate(leaf_lanes))
 
 
-def _expand(
-    tree: StreamTree, line: Floats, begin: Floats, reach: Floats, node: Ints, lane: Ints
-) -> tuple[Ints, Ints]:
+def _expand(tree: StreamTree, rays: _Rays, reach: Floats, node: Ints, lane: Ints) -> tuple[Ints, Ints]:
     """Pairs of inner node and lane -> pairs of met child's code and lane."""
     width = tree.width
-    nodes, block_lanes = blocks(node, lane, line.shape[1] - 1)
+    nodes, block_lanes = blocks(node, lane, rays.begin.size - 1)
     step = max(1, CHUNK // (width * BLOCK))
     codes, lanes = [], []
     for start in range(0, nodes.size, step):
         chosen = nodes[start : start + step]
         k = chosen.size
         some = block_lanes[start * BLOCK : (start + k) * BLOCK]
-        rays = scratch("rays", (6, k, BLOCK))
+        line = scratch("rays", (6, k, BLOCK))
         for row in range(6):
-            np.take(line[row], some, 0, rays[row].reshape(-1), "clip")
-        dx, dy, dz = rays[:3]
+            np.take(rays.line[row], some, 0, line[row].reshape(-1), "clip")
+        dx, dy, dz = line[:3]
         cx, cy, cz = tree.center.take(chosen, 0).T[:, :, None]
-        rays[3] -= cy * dz - cz * dy
-        rays[4] -= cz * dx - cx * dz
-        rays[5] -= cx * dy - cy * dx
+        line[3] -= cy * dz - cz * dy
+        line[4] -= cz * dx - cx * dz
+        line[5] -= cx * dy - cy * dx
         features = scratch("features", (k, 21, BLOCK))
-        _features(rays, features.transpose(1, 0, 2))
+        _features(line, features.transpose(1, 0, 2))
         matrices = np.take(tree.quadrics, chosen, 0, scratch("nodes", (k, width, 21)), "clip")
         value = np.matmul(matrices, features, out=scratch("product", (k, width, BLOCK)))
         hit = flat_true(np.greater_equal(value, 0, out=scratch("mask", value.shape, np.bool_)))
@@ -409,11 +434,8 @@ def _expand(
         slot = chosen.take(block) * width + (pair & (width - 1))
         place = (block << BLOCK_SHIFT) + (hit & (BLOCK - 1))
         lane = some.take(place)
-        x, y, z, radius = tree.ball.take(slot, 0).T
-        flat = rays.reshape(6, -1)
-        along = x * flat[0].take(place) + y * flat[1].take(place) + z * flat[2].take(place)
-        met = (along + radius >= begin.take(lane)) & (along - radius <= reach.take(lane))
-        met_at = np.flatnonzero(met)
+        near, far = rays.span(tree.box, slot, lane)
+        met_at = np.flatnonzero(near <= np.minimum(far, reach.take(lane)))
         codes.append(tree.child.take(slot.take(met_at)))
         lanes.append(lane.take(met_at))
     return np.concatenate(codes), np.concatenate(lanes)
@@ -424,9 +446,8 @@ def blocks(node: Ints, lane: Ints, unused: int) -> tuple[Ints, Ints]:
 
     Returns the nodes (b,) and lanes (b * BLOCK,); places that are left over hold lane `unused`.
     """
-    key = (node << 32) | lane
-    key.sort()
-    node, lane = key >> 32, key & 0xFFFFFFFF
+    order = _order(node)
+    node, lane = node.take(order), lane.take(order)
     first = _firsts(node)
     count = np.diff(first, append=node.size)
     needed = (count + (BLOCK - 1)) >> BLOCK_SHIFT
@@ -435,6 +456,16 @@ def blocks(node: Ints, lane: Ints, unused: int) -> tuple[Ints, Ints]:
     lanes = np.full(int(needed.sum()) * BLOCK, unused)
     lanes[place] = lane
     return np.repeat(node.take(first), needed), lanes
+
+
+def _order(values: Ints) -> Ints:
+    """Sort stably: by 16 bits at a time, which NumPy does by radix, five times as fast as by comparison."""
+    order = np.argsort(values.astype(np.uint16), kind="stable")
+    shift = 16
+    while values.size and int(values.max()) >> shift:
+        order = order.take(np.argsort((values.take(order) >> shift).astype(np.uint16), kind="stable"))
+        shift += 16
+    return order
 
 
 def _firsts(values: Ints) -> Ints:
