@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import wavefront as wf
+from wavefront.bsdfs import ALL
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 SHAPES = {  # the picture of --size 24, (height, width)
@@ -20,6 +21,8 @@ SHAPES = {  # the picture of --size 24, (height, width)
     "environment": (13, 24),
     "estimators": (24, 96),
     "furnace": (24, 120),
+    "gltf_scene": (15, 24),
+    "material_sheet": (16, 24),
     "own_material": (15, 24),
 }
 
@@ -44,6 +47,13 @@ def load(name):
 
 def test_all_examples_are_here():
     assert {path.stem for path in EXAMPLES.glob("*.py")} == set(SHAPES)
+
+
+def test_readme_lists_all_examples():
+    text = (EXAMPLES.parent / "README.md").read_text("utf-8")
+    table = text.partition("## Examples")[2].partition("\n## ")[0]
+    listed = re.findall(r"^\| \[(\w+)\.py\]\(examples/\1\.py\) \|", table, re.MULTILINE)
+    assert sorted(listed) == sorted(SHAPES)
 
 
 @pytest.mark.parametrize("name", [name for name in SHAPES if name != "furnace"])
@@ -120,3 +130,28 @@ def test_estimators_agree_where_they_estimate_the_same(tmp_path):
     assert variance["direct_mis"] < variance["direct_simple"] / 2
     out, _ = run("estimators", tmp_path, "--spp", "2", "--size", "16")
     assert [line.split()[0] for line in out.splitlines()[1:5]] == list(module.ESTIMATORS)
+
+
+def test_material_sheet_has_every_material_of_the_package():
+    rows = load("material_sheet").rows()
+    assert [len(row) for row in rows] == [9] * 6
+    shown = {type(material) for row in rows for material in row}
+    assert shown == set(ALL) - {wf.Mirror}  # a smooth `Conductor` shows what a mirror does
+    assert any(material.relief is not None for material in rows[-1])
+    assert any(material.opacity is not None for material in rows[-1])
+
+
+def test_gltf_scene_is_honoured_whole(tmp_path):
+    scene = load("gltf_scene").scene(tmp_path / "a.glb", 48)
+    instances = [shape for shape in scene.shapes if isinstance(shape, wf.Instance)]
+    assert len(instances) == 7
+    assert len({id(instance.mesh) for instance in instances}) == 1
+    assert [type(light) for light in scene.lights] == [wf.SpotLight, wf.Environment]
+    assert sum(shape.emission is not None for shape in scene.shapes) == 1
+    assert sum(shape.material.opacity is not None for shape in scene.shapes) == 1
+    assert sum(shape.material.transmissive for shape in scene.shapes) == 1
+    rgb = wf.render(scene, 16, progress=False).rgb
+    urn, ball, bare = rgb[9, 20:25].mean(0), rgb[16:19, 31:36].mean((0, 1)), rgb[27:].mean((0, 1))
+    assert urn[2] > 1.5 * urn[0]  # blue glaze
+    assert ball[1] > 1.2 * max(ball[0], ball[2])  # green glass
+    assert bare[0] > bare[2]  # the floor by the light of the warm panel

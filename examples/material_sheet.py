@@ -1,0 +1,154 @@
+"""A sheet of samples: one ball for each material and roughness, on steps in a photographer's studio.
+
+python examples/material_sheet.py [out.png] [--spp 128] [--size 900]
+
+The lists that `rows` returns are the steps from the top down; docs/materials.md says what is on each.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+
+import wavefront as wf
+
+RADIUS = 0.42
+TREAD, RISER = 1.15, 0.58  # of a step, scene units
+ELEVATION = 25  # of the camera, degrees
+CLAY, SKY, WINE = (0.75, 0.33, 0.2), (0.16, 0.4, 0.68), (0.45, 0.05, 0.09)
+
+
+def rows() -> list[list[wf.Bsdf]]:
+    """Return nine materials for each step, three of a kind side by side."""
+    return [matte(), metal(), glass(), coated(), blended(), textured()]
+
+
+def matte() -> list[wf.Bsdf]:
+    """Return three colours of `Diffuse`, and clay ever rougher, without and with light between its facets."""
+    sigmas = (0.3, 0.6, 1.0)
+    rough = [wf.OrenNayar(CLAY, sigma) for sigma in sigmas]
+    preserving = [wf.OrenNayar(CLAY, sigma, energy_preserving=True) for sigma in sigmas]
+    return [*(wf.Diffuse(colour) for colour in (0.8, SKY, CLAY)), *rough, *preserving]
+
+
+def metal() -> list[wf.Bsdf]:
+    """Return three metals, each as a mirror, brushed and rough."""
+    names = ("gold", "copper", "aluminium")
+    return [wf.Conductor.named(name, roughness) for name in names for roughness in (0.0, 0.3, 0.6)]
+
+
+def glass() -> list[wf.Bsdf]:
+    """Return solid glass and thin shells, each ever more frosted, and glass that absorbs."""
+    solid = [wf.Dielectric(1.5, roughness) for roughness in (0.0, 0.25, 0.5)]
+    tint = (0.7, 0.85, 0.95)
+    shells = [wf.ThinDielectric(1.5, roughness, transmittance=tint) for roughness in (0.0, 0.25, 0.5)]
+    colours = [(0.15, 0.9, 2.6), (1.8, 0.35, 0.7), (2.2, 0.9, 0.2)]  # leave amber, green, blue
+    return [*solid, *shells, *(wf.Dielectric(1.5, absorption=colour) for colour in colours)]
+
+
+def coated() -> list[wf.Bsdf]:
+    """Return `Principled` from plastic to metal, under ever more varnish, and with ever more sheen."""
+    metallic = [wf.Principled(SKY, metallic, 0.3) for metallic in (0.0, 0.5, 1.0)]
+    varnish = [wf.Principled(WINE, 0.6, 0.55, clearcoat=coat) for coat in (0.0, 0.5, 1.0)]
+    velvet = [
+        wf.Principled((0.05, 0.09, 0.06), 0, 0.9, sheen=sheen, sheen_color=(0.5, 0.9, 0.6))
+        for sheen in (0.0, 0.5, 1.0)
+    ]
+    return [*metallic, *varnish, *velvet]
+
+
+def blended() -> list[wf.Bsdf]:
+    """Return `Principled` that grows clear, the same as it grows rough, and mixes of clay and gold."""
+    clear = [wf.Principled((0.95, 0.7, 0.75), 0, 0.05, transmission=part) for part in (0.3, 0.65, 1.0)]
+    plastic = [wf.Principled((0.85, 0.6, 0.08), 0, roughness) for roughness in (0.1, 0.35, 0.8)]
+    gold = wf.Conductor.named("gold", 0.2)
+    return [*clear, *plastic, *(wf.Mix(wf.Diffuse(SKY), gold, weight) for weight in (0.25, 0.5, 0.75))]
+
+
+def textured() -> list[wf.Bsdf]:
+    """Return materials that vary over the ball: by textures, by reliefs, and by holes."""
+    u, v = np.meshgrid((np.arange(512) + 0.5) / 512, (np.arange(256) + 0.5) / 256)
+    checks = ((u * 16).astype(int) + (v * 8).astype(int)) % 2
+    colours = np.where(checks[:, :, None], (0.85, 0.8, 0.7), (0.1, 0.25, 0.3))
+    bands = 0.5 + 0.5 * np.sin(2 * np.pi * 7 * v)
+    waves = 0.5 + 0.25 * (np.sin(2 * np.pi * 14 * u) + np.sin(2 * np.pi * 8 * v))
+    quilt = np.abs(np.sin(2 * np.pi * (6 * u + 3 * v)) * np.sin(2 * np.pi * (6 * u - 3 * v))) ** 0.5
+    return [
+        wf.Diffuse(wf.Texture(colours)),
+        wf.Conductor.named("copper", number(0.1 + 0.5 * checks)),
+        wf.Mix(wf.Diffuse((0.12, 0.12, 0.14)), wf.Conductor.named("gold", 0.2), number(bands > 0.5)),
+        wf.OrenNayar((0.7, 0.68, 0.6), 0.4).with_relief(wf.BumpMap(waves, 0.12)),
+        wf.Conductor.named("aluminium", 0.15).with_relief(wf.BumpMap(waves, 0.04)),
+        wf.Principled(WINE, 0, 0.35).with_relief(wf.NormalMap(normals(quilt, 0.06))),
+        wf.Diffuse((0.8, 0.35, 0.1)).with_alpha(0.45),
+        wf.Diffuse((0.2, 0.45, 0.4)).with_alpha(number(bands)),
+        wf.Conductor.named("gold", 0.3).with_alpha(number(waves), cutoff=0.5),
+    ]
+
+
+def number(values: np.ndarray) -> wf.Texture:
+    """Return an array (H, W) as a texture of one number."""
+    return wf.Texture(values.astype(np.float32), srgb=False, channel=0)
+
+
+def normals(heights: np.ndarray, height: float) -> np.ndarray:
+    """Return the normal map (H, W, 3) of heights on a ball: texel 1 stands `height` above texel 0."""
+    rows, columns = heights.shape
+    per_turn, per_half_turn = 2 * np.pi * RADIUS, np.pi * RADIUS
+    along_u = (np.roll(heights, -1, 1) - np.roll(heights, 1, 1)) * (height * columns / 2 / per_turn)
+    along_v = -np.gradient(heights, axis=0) * (height * rows / per_half_turn)  # v runs up, rows run down
+    normal = np.stack([-along_u, -along_v, np.ones_like(heights)], 2)
+    return 0.5 + 0.5 * normal / np.linalg.norm(normal, axis=2, keepdims=True)
+
+
+def studio(height: int = 128) -> np.ndarray:
+    """Return the radiance around the steps, (height, 2·height, 3): a dim room with two soft boxes.
+
+    It is black below and behind, which the steps and the wall hide: no samples are spent there.
+    """
+    latitude = 90 - 180 * (np.arange(height) + 0.5)[:, None] / height  # degrees
+    longitude = 180 - 180 * (np.arange(2 * height) + 0.5)[None, :] / height  # degrees from +z towards +x
+
+    def box(at: float, wide: float, low: float, high: float) -> np.ndarray:
+        """Return 1 inside a rectangle of directions, falling softly to 0 around it."""
+        beside = np.abs(longitude - at) - wide / 2
+        above = np.maximum(low - latitude, latitude - high)
+        return np.clip(0.5 - np.maximum(beside, above) / 6, 0, 1)[:, :, None]
+
+    room, warm, cool = np.array([0.32, 0.34, 0.38]), np.array([1.2, 0.95, 0.7]), np.array([0.7, 0.95, 1.3])
+    return box(0, 210, 0, 90) * room + box(-75, 55, 5, 60) * warm + box(70, 45, 5, 55) * cool
+
+
+def scene(size: int = 900) -> wf.Scene:
+    """Return the steps with a ball for each material, under a large panel."""
+    samples = rows()
+    width, top = 40.0, len(samples) * RISER
+    grey = wf.Diffuse((0.34, 0.335, 0.33))
+    shapes: list[wf.Mesh | wf.Sphere] = []
+    for step, row in enumerate(reversed(samples)):
+        floor, front = step * RISER, -step * TREAD
+        deep = TREAD if step else 8.0  # the lowest reaches out below the camera
+        tall = RISER if step < len(samples) - 1 else 6.0  # the highest is the back of the studio
+        left = -width / 2
+        shapes.append(wf.Rectangle((left, floor, front + deep), (width, 0, 0), (0, 0, -deep), material=grey))
+        shapes.append(wf.Rectangle((left, floor, front), (width, 0, 0), (0, tall, 0), material=grey))
+        for column, material in enumerate(row):
+            x = column - 4 + 0.3 * (column // 3 - 1)
+            shapes.append(wf.Sphere((x, floor + RADIUS, front + TREAD / 2), RADIUS, material=material))
+    panel = wf.Rectangle((-10, 9, -3), (14, 0, 0), (0, 3, 9), emission=(2.5, 2.4, 2.25), name="panel")
+    middle = np.array([0, top / 2 - 0.1, TREAD - len(samples) * TREAD / 2])
+    angle = np.radians(ELEVATION)
+    eye = middle + 40 * np.array([0, np.sin(angle), np.cos(angle)])
+    camera = wf.Camera.look_at(eye, middle, fov=10.0, size=(size, size * 2 // 3))
+    return wf.Scene([*shapes, panel], [wf.Environment(studio())], camera)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("output", nargs="?", default="material_sheet.png")
+    parser.add_argument("--spp", type=int, default=128)
+    parser.add_argument("--size", type=int, default=900)
+    options = parser.parse_args()
+    wf.render(scene(options.size), options.spp, filter="gaussian").save(options.output)
+    print(f"wrote {options.output}")
