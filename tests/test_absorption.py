@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import wavefront as wf
+from wavefront.accel import make_accelerator
+from wavefront.scene import compile_scene
 
 ABSORPTION = np.array([0.2, 1.0, 3.0])
 
@@ -42,3 +44,44 @@ def test_a_texture_cannot_absorb() -> None:
     material = wf.Dielectric(1.5, absorption=wf.Texture(np.ones((2, 2, 3), np.float32)))
     with pytest.raises(wf.SceneError, match="Dielectric absorption must be a colour, not a texture"):
         wf.render(wf.Scene([wf.Sphere((0, 0, 0), 1, material=material)], [wf.Environment(1.0)]), 1)
+
+
+GLASS = wf.Dielectric(1.0, absorption=ABSORPTION)
+ALIKE = wf.Principled(1.0, roughness=0.0, ior=1.0, transmission=1.0, absorption=ABSORPTION)
+
+
+@pytest.mark.parametrize(
+    "mix",
+    [
+        wf.Mix(GLASS, wf.Diffuse(0.0), 0.0),
+        wf.Mix(wf.Diffuse(0.0), GLASS, 1.0),
+        wf.Mix(GLASS, ALIKE, 0.0),
+        wf.Mix(wf.Diffuse(0.0), wf.Mix(GLASS, wf.Mirror(), 0.0), 1.0),
+    ],
+    ids=["first", "second", "both", "within"],
+)
+def test_a_mixture_absorbs_as_its_clear_part(mix: wf.Bsdf) -> None:
+    """What lies inside is glass, however much of the surface is."""
+    assert through(mix, 0.5) == pytest.approx(np.exp(-ABSORPTION * 0.5), rel=1e-4)
+
+
+def test_a_mixture_of_opaque_materials_has_no_inside() -> None:
+    """A scene of them skips the stage, as before."""
+    mix = wf.Mix(wf.Diffuse(), wf.Principled(absorption=2.0))
+    scene = wf.Scene([wf.Sphere((0, 0, 0), 1, material=mix)], [wf.Environment(1.0)])
+    assert compile_scene(scene, lambda geometry: make_accelerator(geometry, "numpy")).absorption is None
+
+
+def test_clear_parts_must_absorb_alike() -> None:
+    """There is but one matter inside."""
+    message = (
+        r"Mix first has the absorption \[1.0, 2.0, 3.0\], second \[0.0, 0.0, 0.0\]; where both let light"
+    )
+    with pytest.raises(wf.SceneError, match=message):
+        wf.Mix(wf.Dielectric(absorption=(1, 2, 3)), wf.Dielectric())
+
+
+def test_there_is_nothing_behind_a_thin_sheet() -> None:
+    """The second sheet is met from behind, and the air between the two does not absorb."""
+    sheet = wf.Principled(1.0, roughness=0.0, ior=1.0, transmission=1.0, thin=True, absorption=ABSORPTION)
+    assert through(sheet, 2.0) == pytest.approx(1, abs=0.01)  # roulette adds a little noise

@@ -294,7 +294,7 @@ def _absorption(materials: Sequence[Bsdf]) -> Floats | None:
     """
     table = np.zeros((3, len(materials)), f4)
     for i, material in enumerate(materials):
-        value = getattr(material, "absorption", 0.0)
+        value = material.absorption
         if isinstance(value, Spatial):
             raise SceneError(f"{type(material).__name__} absorption must be a colour, not a texture")
         table[:, i] = np.ravel(value)

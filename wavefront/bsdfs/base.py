@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from copy import copy
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -47,6 +47,7 @@ class Bsdf(ABC):
     dimensions: int = 2  # rows of u that sample_f reads
     specular: bool = False  # every lobe is a delta: f and pdf are 0, light sampling is skipped
     opacity: Opacity | None = None  # how much of the surface is there; None: all. The renderer sees to it
+    absorption: Any = np.zeros((3, 1), np.float32)  # of the inside, per scene unit. The path sees to it
     relief: Relief | None = None  # tilts the shading normals. The renderer sees to it, no material does
 
     def with_alpha(self, alpha: Scalar, cutoff: float | None = None) -> Self:

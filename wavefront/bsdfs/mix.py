@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -26,11 +26,14 @@ class Mix(Bsdf):
     weight
         Part of the second, in [0, 1]: a number or a texture.
 
+    The matter inside belongs to no point of the surface: its `absorption` is that of the part that
+    lets light through. Where both do, they must absorb alike.
+
     Raises
     ------
     SceneError
-        If the weight is outside [0, 1], something else than a material is given, or a material has
-        an alpha or a relief of its own.
+        If the weight is outside [0, 1], something else than a material is given, a material has
+        an alpha or a relief of its own, or both let light through but absorb differently.
     """
 
     dimensions = 3
@@ -47,6 +50,7 @@ class Mix(Bsdf):
         self.weight = scalar("Mix weight", weight)
         self.transmissive = first.transmissive or second.transmissive
         self.specular = first.specular and second.specular
+        self.absorption = _inside(first, second)
 
     def bind(self, surface: Surface) -> Self:
         """Look up the weight, and the parameters of both materials."""
@@ -91,6 +95,18 @@ class Mix(Bsdf):
 
     def _blend(self, first: Floats, second: Floats) -> Floats:
         return first + (second - first) * self.weight
+
+
+def _inside(first: Bsdf, second: Bsdf) -> Any:
+    """Return the absorption of the matter behind a mixture."""
+    clear = [part.absorption for part in (first, second) if part.transmissive]
+    if len(clear) == 2 and not np.array_equal(*clear):
+        a, b = (np.ravel(value).tolist() for value in clear)
+        raise SceneError(
+            f"Mix first has the absorption {a}, second {b}; where both let light through, "
+            "they must absorb alike"
+        )
+    return clear[0] if clear else Bsdf.absorption
 
 
 def _eta(one: BsdfSample, two: BsdfSample, second: np.ndarray) -> Floats:

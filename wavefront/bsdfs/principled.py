@@ -67,7 +67,8 @@ class Principled(Bsdf):
     specular, specular_color
         Strength and tint of the dielectric's reflection, in [0, 1].
     absorption
-        What the inside absorbs, per channel and scene unit, as for `Dielectric`.
+        What the inside absorbs, per channel and scene unit, as for `Dielectric`. There is an inside
+        only where light is transmitted, and behind no `thin` surface.
     alpha, alpha_cutoff
         How much of the surface is there, as by `with_alpha`.
     conserve_energy
@@ -116,10 +117,11 @@ class Principled(Bsdf):
         self.sheen_roughness = scalar("Principled sheen_roughness", sheen_roughness)
         self.specular_weight = scalar("Principled specular", specular)
         self.specular_color = colour("Principled specular_color", specular_color)
-        self.absorption = colour("Principled absorption", absorption, np.inf)
+        inside = colour("Principled absorption", absorption, np.inf)
         self.opacity = opacity("Principled", alpha, alpha_cutoff)
         self.conserve_energy = conserve_energy
         self.transmissive = _used(self.transmission)
+        self.absorption = inside if self.transmissive and not thin else Bsdf.absorption
         self._coated = _used(self.clearcoat)
         self._cloth = _used(self.sheen)
         self.inside: Bools | None = None  # (n,) wo is inside; unbound, it is outside
