@@ -212,3 +212,28 @@ def test_repr_counts() -> None:
     assert text == "<Scene: 1 shapes, 1 lights, camera=False>"
     assert repr(wf.Mesh(**TRIANGLE)) == "<Mesh 'mesh': 3 vertices, 1 faces>"
     assert repr(wf.Sphere(**BALL)) == "<Sphere 'sphere': center [0.0, 0.0, 0.0], radius 1>"
+
+
+def test_materials_out_of_sight_are_not_shaded() -> None:
+    """They are neither looked up nor asked, and the picture is the same bit for bit."""
+
+    class Untouched(wf.Diffuse):
+        def __init__(self, number: int) -> None:
+            super().__init__(0.5)
+            self.number = number  # keeps each in a group of its own
+
+        def bind(self, surface):
+            raise AssertionError("a material that no ray meets was bound")
+
+    room = [
+        wf.Sphere((0, 0, 0), 10, material=wf.Diffuse(0.5)),
+        wf.Sphere((0, 0, -5), 1, material=wf.Mirror()),
+        wf.Sphere((0, 4, -5), 0.5, material=wf.Diffuse(0), emission=5.0),
+    ]
+    camera = wf.Camera.look_at((0, 0, 5), (0, 0, 0), size=(8, 8))
+    pictures = []
+    for materials in ([wf.Diffuse(0.2)] * 10, [Untouched(i) for i in range(10)]):
+        outside = [wf.Sphere((20 + i, 0, 0), 0.4, material=m) for i, m in enumerate(materials)]
+        pictures.append(render(wf.Scene([*room, *outside], camera=camera), 4, max_bounces=4).rgb)
+    assert (pictures[0] == pictures[1]).all()
+    assert pictures[0].max() > 0

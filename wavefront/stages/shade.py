@@ -74,12 +74,12 @@ def shading(scene: CompiledScene, surface: Surface) -> Shading:
     else:
         groups = []
         group_of = materials.group_of.take(surface.material)
-        for number, bsdf in enumerate(materials.groups):
+        met = np.flatnonzero(np.bincount(group_of))
+        if met.size == 1:
+            return Shading(surface, frame, wo, [(ALL, materials.groups[met[0]].bind(surface))])
+        for number in met:
             lanes = np.flatnonzero(group_of == number)
-            if lanes.size == len(surface):
-                return Shading(surface, frame, wo, [(ALL, bsdf.bind(surface))])
-            if lanes.size:
-                groups.append((lanes, bsdf.bind(surface.take(lanes))))
+            groups.append((lanes, materials.groups[number].bind(surface.take(lanes))))
     return Shading(surface, frame, wo, groups)
 
 
