@@ -87,6 +87,8 @@ def test_options_without_effect_are_named(one):
         UserWarning, match=r"not honoured: -blendu of map_Kd \(material 'm'\), -texres of map_Kd"
     ):
         assert same(one("map_Kd -blendu off -texres 512 t.png").material.reflectance)
+    with pytest.warns(UserWarning, match="not honoured: -imfchan of map_Kd"):
+        assert same(one("map_Kd -imfchan r t.png").material.reflectance)
 
 
 @pytest.mark.parametrize(

@@ -59,6 +59,7 @@ OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-cc": 1, "-clamp": 1, "-imf
 OPTIONS |= {"-texres": 1, "-type": 1, "-bm": 1}
 READ = frozenset(("-s", "-o", "-mm", "-clamp", "-imfchan"))
 RELIEFS = ("norm", "map_bump", "bump")  # keywords whose maps have a multiplier, -bm
+WHOLE = ("map_kd", "map_ke", "norm")  # keywords whose maps are not one channel of an image
 CHANNELS: dict[str, Any] = {"r": 0, "g": 1, "b": 2, "m": 3, "l": "luminance"}
 
 Colour = NDArray[np.float64]
@@ -369,6 +370,7 @@ def _map(entry: Entry, key: str) -> tuple[dict[str, list[str]], str]:
         options[option] = words[:count]
         rest = (rest.split(None, count) + [""] * (count + 1))[count].strip()
     read = READ | {"-bm"} if key in RELIEFS else READ
+    read = read - {"-imfchan"} if key in WHOLE else read
     for option in options.keys() - read:
         entry.idle_options.add(f"{option} of {entry.lines[key][0]}")
     return options, rest
