@@ -509,6 +509,73 @@ def test_vertex_colours_in_memory_render_as_their_file(tmp_path, extension, by):
     assert pictures[0] == pytest.approx(pictures[2], abs=1e-3)
 
 
+def textured_ply(write, *comments):
+    lines = ["ply", "format ascii 1.0", *(f"comment TextureFile {c}" for c in comments), "element vertex 4"]
+    lines += [*(f"property float {x}" for x in "xyzst"), "element face 2"]
+    lines += ["property list uchar int vertex_indices", "end_header"]
+    lines += ["0 0 0 0 0", "1 0 0 1 0", "1 1 0 1 1", "0 1 0 0 1", "3 0 1 2", "3 0 2 3", ""]
+    return write("\n".join(lines), "a.ply")
+
+
+def textured_obj(write, *lines):
+    text = "mtllib s.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+    return write(text + "f 1/1 2/2 3/3 4/4\n", s_mtl="\n".join(["newmtl m", *lines]))
+
+
+def textured_glb(write, image):
+    material = trimesh.visual.material.PBRMaterial(baseColorTexture=image, metallicFactor=0.0)
+    corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    plane = trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False)
+    plane.visual = trimesh.visual.TextureVisuals(uv=plane.vertices[:, :2], material=material)
+    return write(plane.export(file_type="glb"), "a.glb")
+
+
+@pytest.mark.parametrize(
+    ("make", "least"),
+    [
+        (lambda write, _: textured_ply(write, "my tex.png"), 0.1),
+        (lambda write, _: textured_obj(write, "map_Kd my tex.png"), 0.1),
+        (lambda write, _: textured_obj(write, "Kd 0.5 1 0.25", "map_Kd my tex.png"), 0.05),
+        (lambda write, _: textured_obj(write, "Pr 0.5"), 0.0),
+        (textured_glb, 0.1),
+    ],
+    ids=["ply", "obj without Kd", "obj", "obj of no colour", "glb"],
+)
+def test_objects_in_memory_render_as_their_file(write, tmp_path, make, least):
+    """Bit for bit; `least` is how far the pixels differ in each channel."""
+    from PIL import Image
+
+    image = Image.fromarray(np.random.default_rng(0).integers(0, 256, (4, 4, 3), np.uint8))
+    image.save(tmp_path / "my tex.png")
+    path = make(write, image)
+    camera = Camera.look_at((0.5, 0.5, 3), (0.5, 0.5, 0), fov=25, size=(8, 8))
+    a, b = (
+        render(Scene(scene.shapes, [Environment(1.0)], camera), 2, workers=1, progress=False).rgb
+        for scene in (load(path), from_trimesh(trimesh.load(path, process=False)))
+    )
+    assert np.array_equal(a, b)
+    assert a.max() > 0.4
+    assert np.ptp(a, axis=(0, 1)).min() >= least
+
+
+def test_textures_of_ply(write, tmp_path):
+    from PIL import Image
+
+    with pytest.warns(UserWarning, match=r"a\.ply: texture 'b\.png' is missing"):
+        (mesh,) = load_meshes(textured_ply(write, "b.png"))
+    assert isinstance(mesh.material, Diffuse)
+    Image.new("RGB", (4, 4), (255, 0, 0)).save(tmp_path / "b.png")
+    with pytest.warns(UserWarning, match=r"not honoured: several textures; 'b\.png' is taken for all faces"):
+        (mesh,) = load_meshes(textured_ply(write, "a.png", "b.png"))
+    assert mesh.material.reflectance.mean() == pytest.approx([1, 0, 0])
+    assert load_mesh(textured_ply(write, "b.png"), Diffuse(0.25)).material.reflectance[0] == 0.25
+    with pytest.raises(SceneError, match=r"a\.ply: refers to '\.\./b\.png', which is outside its folder"):
+        load_meshes(textured_ply(write, "../b.png"))
+    (tmp_path / "b.png").write_bytes(b"\x89PNG")
+    with pytest.raises(SceneError, match=r"a\.ply: texture 'b\.png': not a readable png or jpg image"):
+        load_meshes(textured_ply(write, "b.png"))
+
+
 def test_face_colours_are_named():
     box = trimesh.creation.box()
     box.visual.face_colors = np.zeros((12, 4), np.uint8)

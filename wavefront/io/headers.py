@@ -51,6 +51,12 @@ def check_ply(name: str, data: bytes) -> dict[str, int]:
     return {element.name: element.count for element in elements}
 
 
+def ply_textures(data: bytes) -> list[str]:
+    """Return the images that the comments of a PLY header name, as MeshLab writes them."""
+    header = data[: data.find(b"end_header")].decode("latin-1")
+    return [name for name in re.findall(r"(?im)^comment\s+texturefile\s+(.*?)\s*$", header) if name]
+
+
 def _elements(name: str, header: str) -> list[Element]:
     out: list[Element] = []
     for number, line in enumerate(header.split("\n"), 1):

@@ -24,11 +24,13 @@ from . import gltf, headers, mtl, obj, stl, visuals
 from .appearance import Look, dress, is_faint
 from .files import beside, decode, read_bytes
 from .gltf_materials import Materials
+from .images import decode_codes
 from .repair import Raw, build, warn
 
 if TYPE_CHECKING:
     import trimesh
 
+BARE = ("obj", "ply")  # files whose materials may lack a colour, where trimesh makes a grey one up
 EXTENSIONS = (".obj", ".ply", ".stl", ".glb", ".gltf")
 PathLike = str | os.PathLike[str]
 T = TypeVar("T")
@@ -185,7 +187,7 @@ def _contents(path: PathLike, strict: bool, materials: bool) -> tuple[str, Conte
             return name, _read_gltf(path, data, strict, materials)
         if extension == ".stl":
             return name, Contents([Placed(raw) for raw in stl.parse(name, data)])
-        return name, Contents(_read_ply(name, data, strict))
+        return name, Contents(_read_ply(path, data, strict, materials))
     except MemoryError as error:
         raise SceneError(f"{name}: does not fit in memory") from error
 
@@ -283,14 +285,19 @@ def _libraries(path: PathLike, libraries: list[str], strict: bool) -> dict[str, 
     return looks
 
 
-def _read_ply(name: str, data: bytes, strict: bool) -> list[Placed]:
+def _read_ply(path: PathLike, data: bytes, strict: bool, materials: bool) -> list[Placed]:
     """Let trimesh read a PLY file; whatever it raises becomes a SceneError, what it leaves out, too."""
     import trimesh
 
+    name = os.fspath(path)
     claimed = headers.check_ply(name, data)
+    image = _ply_texture(path, data, strict) if materials else {}
+    files = trimesh.resolvers.ZipResolver({key: BytesIO(content) for key, content in image.items()})
     try:
         with np.errstate(all="ignore"):
-            found = trimesh.load_scene(BytesIO(data), file_type="ply", process=False)
+            found = trimesh.load_scene(
+                BytesIO(data), file_type="ply", process=False, resolver=files, skip_materials=not image
+            )
     except MemoryError:
         raise
     except Exception as error:
@@ -300,6 +307,22 @@ def _read_ply(name: str, data: bytes, strict: bool) -> list[Placed]:
     if faces < claimed.get("face", 0):
         raise SceneError(f"{name}: claims {claimed['face']} of face; {faces} can be read")
     return placed
+
+
+def _ply_texture(path: PathLike, data: bytes, strict: bool) -> dict[str, bytes]:
+    """Return the image of a PLY file by its name, none if it has none; of several, trimesh knows the last."""
+    name, textures = os.fspath(path), headers.ply_textures(data)
+    if len(textures) > 1:
+        warn(f"{name}: not honoured: several textures; {textures[-1]!r} is taken for all faces", strict)
+    for texture in textures[-1:]:
+        file = beside(path, texture)
+        if not file.exists():
+            warn(f"{name}: texture {texture!r} is missing", strict)
+            continue
+        content = read_bytes(file)
+        decode_codes(content, f"{name}: texture {texture!r}")  # for its messages: trimesh passes over errors
+        return {texture: content}
+    return {}
 
 
 def _placed(geometry: Any, source: str, strict: bool) -> list[Placed]:
@@ -312,7 +335,7 @@ def _placed(geometry: Any, source: str, strict: bool) -> list[Placed]:
     for mesh, name, matrix in _nodes(geometry, trimesh):
         if id(mesh) not in raws:
             raws[id(mesh)] = _raw(mesh, name)
-            looks.dress(raws[id(mesh)], mesh)
+            looks.dress(raws[id(mesh)], mesh, {geometry.source.file_type, mesh.source.file_type})
         placed.append(Placed(raws[id(mesh)], matrix))
     if looks.lost:
         listed = ", ".join(f"{what} (mesh {where!r})" for what, where in looks.lost.items())
@@ -371,12 +394,12 @@ class _Visuals:
         self._looks: dict[int, Look] = {}
         self.lost: dict[str, str] = {}  # what -> where first
 
-    def dress(self, raw: Raw, mesh: trimesh.Trimesh) -> None:
-        """Give a raw mesh its material and emission."""
+    def dress(self, raw: Raw, mesh: trimesh.Trimesh, file_types: set[str | None]) -> None:
+        """Give a raw mesh its material and emission; `file_types` tells what it was read from."""
         visual: Any = mesh.visual
         if visual.kind == "face":
             self.lost.setdefault("face colours", raw.name)
-        look = self._look(getattr(visual, "material", None))
+        look = self._look(getattr(visual, "material", None), not file_types.isdisjoint(BARE))
         for what in look.lost if look is not None else ():
             self.lost.setdefault(what, raw.name)
         dropped = raw.colors is None and visuals.drops_colours(mesh)
@@ -385,9 +408,9 @@ class _Visuals:
         if look is None and is_faint(raw) and not visuals.is_gltf(mesh):  # where it has no say
             self.lost.setdefault("opacity of vertex colours", raw.name)
 
-    def _look(self, material: Any) -> Look | None:
+    def _look(self, material: Any, bare: bool) -> Look | None:
         if material is None or visuals.is_blank(material):
             return None
         if id(material) not in self._looks:
-            self._looks[id(material)] = visuals.look(material, f"trimesh material {material.name!r}")
+            self._looks[id(material)] = visuals.look(material, f"trimesh material {material.name!r}", bare)
         return self._looks[id(material)]

@@ -18,12 +18,15 @@ from .mtl import MATTE
 from .repair import Table
 
 
-def look(material: Any, where: str) -> Look:
-    """Return the look of a trimesh `PBRMaterial` or `SimpleMaterial`; `where` is for messages."""
+def look(material: Any, where: str, bare: bool) -> Look:
+    """Return the look of a trimesh `PBRMaterial` or `SimpleMaterial`; `where` is for messages.
+
+    Where `bare`, the diffuse colour counts only if the material has a `Kd` of its own.
+    """
     if hasattr(material, "baseColorFactor"):
         return _pbr(material)
     if hasattr(material, "diffuse"):
-        return _simple(material, where)
+        return _simple(material, where, bare)
     return Look(Diffuse(MATTE), lost=[type(material).__name__])
 
 
@@ -119,11 +122,12 @@ def _pbr(material: Any) -> Look:
     return Look(made, radiance, bool(material.doubleSided), occluded + lost, alpha, cutoff)
 
 
-def _simple(material: Any, where: str) -> Look:
+def _simple(material: Any, where: str, bare: bool) -> Look:
     """Read an MTL material: trimesh keeps its lines as lists of words."""
     entry = mtl.Entry(where, str(material.name or ""))
     lines = {key: value for key, value in material.kwargs.items() if key != "name"}
-    lines.setdefault("kd", np.asarray(material.diffuse)[:3] / 255.0)
+    if not bare:
+        lines.setdefault("kd", np.asarray(material.diffuse)[:3] / 255.0)
     for key, value in lines.items():
         words = value if isinstance(value, list | tuple | np.ndarray) else [value]
         entry.lines[key.lower()] = (key, 0, " ".join(str(word) for word in words))
