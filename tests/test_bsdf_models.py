@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from significance import render
 
+import wavefront as wf
 from wavefront.bsdfs import (
     ALL,
     Conductor,
@@ -145,6 +147,20 @@ def test_dielectric_samples_keep_their_promises(ior, roughness, mu, inside):
 def test_rough_glass_loses_what_its_documentation_says(roughness, outside, inside):
     assert 1 - albedo(Dielectric(1.5, roughness), 1.0) == pytest.approx(outside, abs=3e-4)
     assert 1 - albedo(Dielectric(1.5, roughness), 1.0, inside=True) == pytest.approx(inside, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("roughness", "loss"),
+    [(0.1, 0.0006), (0.1**0.5, 0.0400), (0.5, 0.1831), (0.5**0.5, 0.4104), (1.0, 0.6522)],
+)
+def test_a_ball_of_rough_glass_loses_what_its_documentation_says(roughness, loss):
+    ball = wf.Sphere((0, 0, 0), 1, material=Dielectric(1.5, roughness))
+    camera = wf.Camera.orthographic((0, 0, 5), (0, 0, 0), height=1.8, size=(24, 24))
+    scene = wf.Scene(ball, [wf.Environment(1.0)], camera)
+    y, x = np.mgrid[:24, :24] - 11.5
+    within = np.hypot(x, y) < 12  # nine tenths of its radius
+    seen = render(scene, 32, integrator="naive", max_bounces=200).rgb[within].mean(dtype=float)
+    assert 1 - seen == pytest.approx(loss, abs=5e-3 if roughness > 0.1 else 5e-4)
 
 
 def test_rough_glass_becomes_smooth_glass():

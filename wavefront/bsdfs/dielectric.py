@@ -39,6 +39,7 @@ class Dielectric(Bsdf):
         so is an index within 0.001 of 1. Light that meets the rough surface more than once is not
         followed. For index 1.5 seen along the normal that loses 0.1 % from outside and 1 % from
         inside at roughness 0.32, 1 % and 7 % at 0.5, 3 % and 25 % at 0.71, 11 % and 58 % at 1.
+        A whole ball in even light loses 0.06 % at 0.1, 4 % at 0.32, 18 % at 0.5, 41 % at 0.71, 65 % at 1.
     reflectance, transmittance
         Tints of the reflected and of the refracted light per channel, in [0, 1]. 1 is physical.
     absorption

@@ -101,6 +101,10 @@ def from_trimesh(geometry: Any) -> Scene:
     asked for `vertex_normals`. Trimesh's own exporters follow the same rule. Geometry that stands in a
     scene's graph several times becomes an `Instance` for each.
 
+    What trimesh itself does not keep cannot count: of glTF it rounds base colours to 8 bits, and drops
+    extensions, lights and the scale of normal maps; of MTL it keeps the image of `map_Kd` only. `load`
+    reads all of these.
+
     Raises
     ------
     SceneError
