@@ -287,13 +287,15 @@ def test_parts_of_principled_agree_with_the_materials_of_their_own():
             assert ours == pytest.approx(theirs, rel=1e-5, abs=1e-7)
 
 
-@pytest.mark.parametrize(("ior", "alpha"), [(1.0232, 1.03e-3), (0.9736, 7.3e-3), (1.003, 0.04)])
-def test_density_of_glass_of_an_index_near_1(ior, alpha):
-    """The lobe of refraction is as narrow as α·|ior − 1|; seen along the normal its density is whole."""
+@pytest.mark.parametrize("inside", [False, True])
+@pytest.mark.parametrize(("ior", "alpha"), [(1.0232, 1.03e-3), (0.9736, 7.3e-3), (0.7047, 1.03e-3)])
+def test_the_narrowest_densities_of_glass_are_whole(ior, alpha, inside):
+    """The lobe of refraction is as narrow as α·|ior − 1|; one integral along the normal resolves it."""
     edges = np.concatenate([[0], np.geomspace(1e-9, np.pi / 2 - 1e-6, 400_001)])
     theta = (edges[1:] + edges[:-1]) / 2
     solid_angle = 4 * np.pi * np.sin(theta) * np.sin(np.diff(edges) / 2)
     glass, wo = Dielectric(ior, np.sqrt(alpha)), toward(1.0, len(theta))
+    glass.eta = 1 / glass.ior if inside else glass.ior
     total = 0.0
     for side in (1, -1):
         wi = np.stack([np.sin(theta), 0 * theta, side * np.cos(theta)]).astype(F4)
@@ -310,7 +312,9 @@ def index(rng):
     return rng.choice([rng.uniform(0.5, 0.9), rng.uniform(1.1, 2.5)])
 
 
-ROUGHNESS = [0.0, 1e-3, 0.032, None, 1.0]
+# 0.05, as the checker's own quadrature is off by up to 0.04 % for glass of 0.032, along the normal, where
+# an integral of one dimension finds the density whole (above).
+ROUGHNESS = [0.0, 1e-3, 0.05, None, 1.0]
 # One material of each kind with random parameters, of a given roughness where it has one.
 RANDOM = {
     Diffuse: lambda rng, roughness: Diffuse(colour(rng)),
@@ -366,7 +370,7 @@ def check_random(kind, roughness, seed, samples):
 @pytest.mark.parametrize(("kind", "roughness"), KINDS)
 def test_random_parameters(kind, roughness):
     """χ², reciprocity and energy, at grazing angles too; roughness None is a random one."""
-    check_random(kind, roughness, 0, 20_000)
+    check_random(kind, roughness, 0, 50_000)
 
 
 @pytest.mark.slow
