@@ -182,6 +182,15 @@ def test_sparse_and_normalised_accessors(build, path):
     assert mesh.uvs == pytest.approx(np.array([[0, 1], [1, 1], [0, 0.8]]))
 
 
+def test_quantised_texture_coordinates_are_turned_upwards(build, path):
+    """KHR_mesh_quantization has whole numbers, for a KHR_texture_transform to scale: 1 − v may be below 0."""
+    uvs, uvs1 = np.array([[0, 0], [3, 0], [0, 5]], np.uint16), np.array([[0, 200], [3, 0], [0, 5]], np.uint8)
+    build.mesh({"POSITION": TRIANGLE, "TEXCOORD_0": uvs, "TEXCOORD_1": uvs1}).gltf(path)
+    (mesh,) = load_meshes(path)
+    assert np.array_equal(mesh.uvs, [[0, 1], [3, 1], [0, -4]])
+    assert np.array_equal(mesh.uvs1, [[0, -199], [3, 1], [0, -4]])
+
+
 def test_nodes_place_and_repeat_meshes(build, path):
     half = np.sqrt(0.5)
     build.json["nodes"] = [

@@ -316,12 +316,8 @@ def _primitive(document: Document, part: dict[str, Any], mode: int, name: str) -
             raise SceneError(f"{where} has indices of type {indices.dtype}; they must be unsigned")
     else:
         indices = np.arange(len(vertices))
-    uvs = _attribute(document, attributes, "TEXCOORD_0", 2, where, len(vertices))
-    uvs1 = _attribute(document, attributes, "TEXCOORD_1", 2, where, len(vertices))
-    for coordinates in (uvs, uvs1):
-        if coordinates is not None:
-            with np.errstate(invalid="ignore"):
-                coordinates[:, 1] = 1 - coordinates[:, 1]  # glTF counts v downwards
+    uvs = _upright(_attribute(document, attributes, "TEXCOORD_0", 2, where, len(vertices)))
+    uvs1 = _upright(_attribute(document, attributes, "TEXCOORD_1", 2, where, len(vertices)))
     colors = _attribute(document, attributes, "COLOR_0", (3, 4), where, len(vertices))
     for extra in attributes:
         if extra.startswith(("COLOR_", "TEXCOORD_")) and extra not in READ:
@@ -339,6 +335,16 @@ def _primitive(document: Document, part: dict[str, Any], mode: int, name: str) -
         None if uvs1 is None else wide(uvs1),
         None if colors is None else wide(colors),
     )
+
+
+def _upright(coordinates: NDArray[Any] | None) -> NDArray[np.float32] | None:
+    """Return texture coordinates with v upwards, as floats: quantised ones may be whole numbers."""
+    if coordinates is None:
+        return None
+    with np.errstate(invalid="ignore"):
+        upright = coordinates.astype(np.float32)
+        upright[:, 1] = 1 - upright[:, 1]  # glTF counts v downwards
+    return upright
 
 
 def _attribute(
