@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import wavefront as wf
+from wavefront.version import VERSION
 
 ROOT = Path(__file__).parents[1]
 PUBLIC = {name: getattr(wf, name) for name in wf.__all__}
@@ -100,10 +101,11 @@ def test_all_public_callables_are_annotated():
             assert missing == [], name
 
 
-def test_version_is_the_one_of_the_project_file():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-    assert version("wavefront") == project["version"]
-    assert project["version"] in (ROOT / "CHANGELOG.md").read_text("utf-8")
+def test_the_version_is_the_same_everywhere():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+    assert project["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "wavefront.version.VERSION"}
+    assert version("wavefront") == VERSION
+    assert VERSION in (ROOT / "CHANGELOG.md").read_text("utf-8")
 
 
 def test_the_package_says_that_it_is_typed():

@@ -6,7 +6,6 @@ import argparse
 import sys
 import warnings
 from collections.abc import Sequence
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -24,6 +23,7 @@ from .render import DEFAULT_SPP, render
 from .sampling.sampler import SAMPLERS
 from .scene import Scene
 from .shapes import Instance, Mesh
+from .version import VERSION
 
 INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 VECTOR_OPTIONS = ("--origin", "--target", "--up")
@@ -59,7 +59,7 @@ def _joined(arguments: Sequence[str]) -> list[str]:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="wavefront", description="A path tracer in whole-array NumPy.")
-    parser.add_argument("--version", action="version", version=version("wavefront"))
+    parser.add_argument("--version", action="version", version=VERSION)
     commands = parser.add_subparsers(required=True, metavar="command")
     _add_render(commands)
     info = commands.add_parser("info", help="say what a scene file holds")

@@ -116,17 +116,22 @@ class Film:
         black pixels do not count for much. The worst `OUTLIERS` of the pixels count no more
         than the worst of the others: fireflies must not decide on a whole picture.
         """
-        pixels = self.count.size
-        floor = EPSILON * (self._overall_mean() ** 2) or 1.0
-        out = np.empty(pixels)
+        floor = self._floor()
+        out = np.empty(self.count.size)
         for span in self._chunks():
-            out[span] = (self.squared_error(span) / (np.square(self.mean(span)) + floor)).mean(0)
-        worst = pixels - 1 - int(OUTLIERS * pixels)
-        return np.minimum(out, np.partition(out, worst)[worst])
+            out[span] = self._relative(self.squared_error(span), span, floor)
+        return _without_outliers(out)
 
     def noise(self) -> float:
         """Estimate the relative error of the picture: what `render(noise=...)` brings down."""
         return float(np.sqrt(self.relative_variance().mean()))
+
+    def _relative(self, squared_error: Doubles, span: slice, floor: float) -> Doubles:
+        """Squared errors (3, k) of some pixels relative to their brightness, (k,)."""
+        return np.asarray((squared_error / (np.square(self.mean(span)) + floor)).mean(0))
+
+    def _floor(self) -> float:
+        return EPSILON * (self._overall_mean() ** 2) or 1.0
 
     def _overall_mean(self) -> float:
         return float(sum(self.mean(span).sum() for span in self._chunks()) / (3 * self.count.size))
@@ -137,22 +142,32 @@ class Film:
             yield slice(start, min(start + CHUNK, self.count.size))
 
     def image(self, metadata: dict[str, Any]) -> Image:
-        """Make a picture of what there is; a pixel without samples is black."""
+        """Make a picture of what there is; a pixel without samples is black. Its noise joins the metadata."""
         width, height = self.size
         rgb, variance, error = (np.empty((width * height, 3), np.float32) for _ in range(3))
+        relative, floor = np.empty(width * height), self._floor()
         for span in self._chunks():
             rgb[span] = self.mean(span).T
             variance[span] = self.variance(span).T
-            error[span] = np.sqrt(self.squared_error(span)).T
+            squared_error = self.squared_error(span)
+            error[span] = np.sqrt(squared_error).T
+            relative[span] = self._relative(squared_error, span, floor)
+        noise = float(np.sqrt(_without_outliers(relative).mean()))
         shape = height, width, 3
         return Image(
             rgb.reshape(shape),
             round(float(self.count.mean())),
-            metadata,
+            {**metadata, "noise": noise},
             counts=self.count.reshape(height, width),
             variance=variance.reshape(shape),
             standard_error=error.reshape(shape),
         )
+
+
+def _without_outliers(relative: Doubles) -> Doubles:
+    """Bring the worst `OUTLIERS` of the pixels down to the worst of the others."""
+    worst = relative.size - 1 - int(OUTLIERS * relative.size)
+    return np.minimum(relative, np.partition(relative, worst)[worst])
 
 
 def batch_size(count: int) -> int:

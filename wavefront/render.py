@@ -7,7 +7,6 @@ import time
 import warnings
 from collections.abc import Collection
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +27,7 @@ from .sampling.sampler import make_sampler
 from .scene import Scene, compile_scene
 from .shapes import Instance, Mesh, Sphere
 from .stopping import Clock, passes
+from .version import VERSION
 from .work import BadSamples, Piece, Wave, plan, trace_piece
 
 WAVE_LANES = 65_536  # paths that go round the loop together
@@ -167,10 +167,9 @@ def render(
             "spp": samples / film.count.size,
             "samples": samples,
             "rays": rays,
-            "noise": film.noise(),
             "bad_samples": bad.count,
             "interrupted": interrupted,
-            "version": version("wavefront"),
+            "version": VERSION,
             "numpy": np.__version__,
         }
     )

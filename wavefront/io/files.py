@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import secrets
 import stat
 from pathlib import Path
 
@@ -113,7 +112,7 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
         If it cannot be written; the old content is intact and nothing is left behind.
     """
     target = check_folder(path)
-    scratch = target.with_name(f".{target.name[:200]}.{secrets.token_hex(6)}.tmp")
+    scratch = target.with_name(f".{target.name[:200]}.{os.urandom(6).hex()}.tmp")
     try:
         with open(scratch, "xb") as file:
             file.write(data)
