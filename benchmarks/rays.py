@@ -1,9 +1,12 @@
 """Million rays per second: NumPy against embreex and a plain lockstep BVH, alternating in one run.
 
-Run: python benchmarks/rays.py [--rays N] [--repeats R] [--sizes 36,1280,...] [--lockstep]
+Run: python benchmarks/rays.py [--rays N] [--repeats R] [--sizes 36,1280,...] [--lockstep] [--prototype PATH]
 
 Times are CPU time of the calling thread, so that other processes matter less; the table gives medians.
-"two" is wall time with two threads over that with one, each thread tracing its own half of the rays.
+"two" is wall time with one worker process over that with two, which trace 16 parts of the rays; the
+parts come back through a pipe, as in a render. --prototype names a script with build(triangles, leaf,
+width) and closest(nodes, origin, direction), which knows no barycentrics, so that none are asked of NumPy
+in what it is compared with.
 """
 
 from __future__ import annotations
@@ -13,10 +16,13 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse
+import importlib.util
 import resource
+import sys
 import time
-from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from statistics import median
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -24,6 +30,7 @@ from numpy.typing import NDArray
 
 from wavefront.accel import Accelerator, Geometry, make_accelerator
 from wavefront.accel.build import build_tree
+from wavefront.parallel import Workers
 
 f4 = np.float32
 Array = NDArray[np.float32]
@@ -131,23 +138,49 @@ def lockstep_speed(triangles: Array, origin: Array, direction: Array) -> float:
     return n / (time.thread_time() - start) / 1e6
 
 
-def two_threads(accelerator: Accelerator, origin: Array, direction: Array) -> float:
-    """Wall time of one thread over two."""
-    none = np.full(origin.shape[1], -1)
-    half = origin.shape[1] // 2
-    parts = [slice(0, half), slice(half, None)]
+def two_workers(accelerator: Accelerator, origin: Array, direction: Array) -> float:
+    """Wall time of one worker process over that of two."""
+    parts = np.array_split(np.arange(origin.shape[1]), 16)
 
-    def run(part: slice) -> None:
-        accelerator.closest(origin[:, part], direction[:, part], none[part])
+    def run(part: NDArray[np.intp]) -> Array:
+        some = slice(part[0], part[-1] + 1)
+        return accelerator.closest(origin[:, some], direction[:, some], np.full(part.size, -1)).t
 
-    with ThreadPoolExecutor(2) as pool:
-        list(pool.map(run, parts))
-        start = time.perf_counter()
-        for part in parts:
-            run(part)
-        middle = time.perf_counter()
-        list(pool.map(run, parts))
-        return (middle - start) / (time.perf_counter() - middle)
+    def seconds(count: int) -> float:
+        with Workers(run, count, "processes") as crew:
+            list(crew.run(parts))  # starts them
+            start = time.perf_counter()
+            list(crew.run(parts))
+            return time.perf_counter() - start
+
+    return seconds(1) / seconds(2)
+
+
+def against_prototype(path: Path, triangles: Array, origin: Array, direction: Array) -> tuple[float, float]:
+    """Million rays per second of NumPy without barycentrics, and of a prototype; best of 4, in turn."""
+    sys.path.insert(0, str(path.parent))
+    spec = importlib.util.spec_from_file_location("prototype", path)
+    assert spec is not None
+    assert spec.loader is not None
+    prototype: Any = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(prototype)
+    nodes = prototype.build(
+        triangles, 32 if len(triangles) < 10_000 else 64 if len(triangles) < 1e5 else 128, 8
+    )
+    geometry = Geometry(triangles, np.zeros((3, 0), f4), np.zeros(0, f4), weights=False)
+    accelerator, none = make_accelerator(geometry, "numpy"), np.full(origin.shape[1], -1)
+    best = [np.inf, np.inf]
+    for _ in range(4):
+        for side, run in enumerate(
+            (
+                lambda: accelerator.closest(origin, direction, none),
+                lambda: prototype.closest(nodes, origin, direction),
+            )
+        ):
+            start = time.thread_time()
+            run()
+            best[side] = min(best[side], time.thread_time() - start)
+    return origin.shape[1] / best[0] / 1e6, origin.shape[1] / best[1] / 1e6
 
 
 def main() -> None:
@@ -157,6 +190,7 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--sizes", default="36,1280,20480,327680,1000000")
     parser.add_argument("--lockstep", action="store_true", help="slow")
+    parser.add_argument("--prototype", type=Path)
     options = parser.parse_args()
     np.seterr(all="ignore")
     print(
@@ -173,10 +207,13 @@ def main() -> None:
             ratio = median(ours / theirs for ours, theirs in times)
             slow, two = "", ""
             if kind == "incoherent":
-                two = f"{median(two_threads(sides[0], origin, direction) for _ in range(3)):.2f}"
+                two = f"{median(two_workers(sides[0], origin, direction) for _ in range(3)):.2f}"
             if kind == "incoherent" and options.lockstep:
                 slow = f"{lockstep_speed(triangles, origin, direction):.2f}"
             row = f"{len(triangles):9} {kind:>10} {speed[0]:7.2f} {speed[1]:8.2f} {ratio:6.2f}"
+            if options.prototype and kind != "shadow" and 36 < size < 1_000_000:
+                ours, theirs = against_prototype(options.prototype, triangles, origin, direction)
+                two += f"   without barycentrics {ours:.2f}, prototype {theirs:.2f}, {ours / theirs:.2f}x"
             print(f"{row} {slow:>9} {two:>5}", flush=True)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     print(f"million rays per second and core; ratio: time of numpy over embreex; peak memory {peak:.2f} GB")

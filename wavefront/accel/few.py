@@ -87,22 +87,27 @@ def _search(polygons: Polygons, lanes: Lanes, decisions: TriangleDecisions) -> N
     edges = len(polygons.rows) // m
     step = max(64, CHUNK // len(polygons.rows))
     batch = Candidates(decisions.decide)
+    leaving = polygons.slot.take(lanes.leaving) if (lanes.leaving >= 0).any() else None
     for at in range(0, lanes.count, step):
         k = min(step, lanes.count - at)
         part = slice(at, at + k)
         w = np.matmul(polygons.rows, lanes.line[:, part], out=scratch("product", (edges * m, k)))
         value = one_sign(w.reshape(1, edges, m, k), scratch("value", (1, m, k)))[0]
-        least = scratch("least", (m + 1, k))  # and a row for rays that leave none of these polygons
-        np.copyto(least[:-1], value)
+        least = value
+        padded = scratch("least", (m + 1, k))  # with a row for rays that leave none of these polygons
         for rows, points in ((polygons.ahead, lanes.start), (polygons.behind, lanes.end)):
             if points is not None:
                 side = np.matmul(rows, points[:, part], out=scratch("side", (m, k)))
                 side *= w[m : 2 * m]
-                np.minimum(least[:-1], side, out=least[:-1])
-        left = polygons.slot.take(lanes.leaving[part]) * k
-        left += np.arange(k)
-        least.reshape(-1)[left] = -2
-        hit = flat_true(np.greater_equal(least[:-1], -1, out=scratch("mask", (m, k), np.bool_)))
+                least = np.minimum(least, side, out=padded[:-1])
+        if leaving is not None:
+            if least is value:
+                least = padded[:-1]
+                np.copyto(least, value)
+            left = leaving[part] * k
+            left += np.arange(k)
+            padded.reshape(-1)[left] = -2
+        hit = flat_true(np.greater_equal(least, -1, out=scratch("mask", (m, k), np.bool_)))
         slot, lane = np.divmod(hit, k)
         batch.add(polygons.prim.take(slot), lane + at, value.reshape(-1).take(hit))
     batch.flush()
