@@ -47,13 +47,14 @@ class RectangleLights(Light):
         wi = target - point
         d2 = dot(wi, wi)
         near = np.flatnonzero(self._near(point))
+        seen = self._seen(point, near)
         if near.size:
-            away = self._seen(point, near).sample(u.take(near, 1))
+            away = seen.sample(u.take(near, 1))
             wi[:, near], d2[near] = away, dot(away, away)
         distance = np.sqrt(d2)
         wi /= np.where(distance > 0, distance, f4(1))
         cos_light = self._cosine(wi)
-        pdf = self._pdf(point, near, d2, cos_light)
+        pdf = self._pdf(near, seen, d2, cos_light)
         return LightSample(wi, np.broadcast_to(self.radiance, wi.shape), pdf, distance, cos_light)
 
     def pdf_li(self, point: Floats, wi: Floats) -> Floats:
@@ -64,27 +65,28 @@ class RectangleLights(Light):
         t = dot(self.normal, away) / np.where(lit, dot(self.normal, wi), f4(1))
         on_plane = wi * t - away
         meets = lit & (t > 0) & _within(on_plane, self.edge_u) & _within(on_plane, self.edge_v)
-        pdf = self._pdf(point, np.flatnonzero(self._near(point)), t * t, cos_light)
+        near = np.flatnonzero(self._near(point))
+        pdf = self._pdf(near, self._seen(point, near), t * t, cos_light)
         return np.where(meets, pdf, f4(0))
 
-    def _pdf(self, point: Floats, near: Ints, d2: Floats, cos_light: Floats) -> Floats:
-        """Return d²/(A·cosθ), and on the lanes `near` 1/(solid angle); 0 on a dark side."""
+    def _pdf(self, near: Ints, seen: SphericalRectangle, d2: Floats, cos_light: Floats) -> Floats:
+        """Return d²/(A·cosθ), and on the lanes `near` 1/(solid angle) as `seen`; 0 on a dark side."""
         lit = cos_light > 0
         pdf = np.where(lit, d2, f4(0)) / (np.where(lit, cos_light, f4(1)) * self._area())
         if near.size:
-            pdf[near] = np.where(lit.take(near), self._seen(point, near).pdf(), f4(0))
+            pdf[near] = np.where(lit.take(near), seen.pdf(), f4(0))
         return pdf
 
     def _area(self) -> Floats:
         return np.sqrt(dot(self.edge_u, self.edge_u) * dot(self.edge_v, self.edge_v))
 
     def _near(self, point: Floats) -> Bools:
-        """Tell which points are close to the middle, for the rectangle's size, (n,).
+        """Tell which points that get light are close to the middle, for the rectangle's size, (n,).
 
         From afar both densities are alike, and sampling the area costs a seventh.
         """
         away = self.corner + f4(0.5) * (self.edge_u + self.edge_v) - point
-        return dot(away, away) < NEAR * self._area()
+        return (dot(away, away) < NEAR * self._area()) & (self._cosine(away) > 0)
 
     def _seen(self, point: Floats, lanes: Ints) -> SphericalRectangle:
         """Return the rectangles as seen from the points of some lanes."""

@@ -95,7 +95,9 @@ def direct(
         return Arrival(np.zeros(0, np.intp), np.zeros((3, 0), f4))
     surface = shade.surface
     address = paths.pixel, paths.sample, bounce
-    u_choice = sampler.draw_1d(*address, Dimension.LIGHT)
+    # with one light there is nothing to choose
+    alone = len(scene.lights) == 1
+    u_choice = np.zeros(len(paths), f4) if alone else sampler.draw_1d(*address, Dimension.LIGHT)
     u_point = sampler.draw_2d(*address, Dimension.LIGHT_POINT)
     # from where a reflected ray would start, so that mis_weighted finds the same densities
     start = leave(surface.point, surface.error, surface.ng, surface.ng)
