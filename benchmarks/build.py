@@ -15,7 +15,7 @@ import numpy as np
 import trimesh
 
 from wavefront.accel.build import build_tree
-from wavefront.accel.stream import LEAF_SIZE, WIDTH
+from wavefront.accel.stream import WIDTH, leaf_size_for
 
 f4 = np.float32
 
@@ -43,7 +43,7 @@ def main() -> None:
             times = []
             for _ in range(options.repeats):
                 start = time.thread_time()
-                tree = build_tree(low, high, LEAF_SIZE, WIDTH)
+                tree = build_tree(low, high, leaf_size_for(low.shape[1]), WIDTH)
                 times.append(time.thread_time() - start)
             filled = (tree.prim >= 0).mean()
             row = f"{name:>10} {len(triangles):9} {median(times):8.3f} {tree.cost:7.2f}"

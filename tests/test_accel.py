@@ -14,8 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wavefront.accel import Accelerator, Geometry, make_accelerator
-from wavefront.accel.build import build_tree
+from wavefront.accel.build import build_tree, stable_order
 from wavefront.accel.embree import installed
+from wavefront.accel.stream import leaf_size_for
 from wavefront.errors import SceneError
 
 f4 = np.float32
@@ -448,6 +449,16 @@ def test_the_tree_holds_each_primitive_once_inside_its_boxes(count: int) -> None
         members = members[members >= 0]
         assert (low[:, members].min(1) >= tree.low[n, s]).all()
         assert (high[:, members].max(1) <= tree.high[n, s]).all()
+
+
+def test_leaves_are_as_large_as_measurements_say() -> None:
+    assert [leaf_size_for(count) for count in (200, 1 << 17, 1 << 19)] == [32, 16, 32]
+
+
+@pytest.mark.parametrize("count", [10, 70_000, 200_000])
+def test_stable_order_is_a_stable_sort(count: int) -> None:
+    values = np.random.default_rng(count).integers(0, count, 300_000)
+    np.testing.assert_array_equal(stable_order(values), np.argsort(values, kind="stable"))
 
 
 def test_many_equal_boxes_can_be_built() -> None:

@@ -44,8 +44,9 @@ def build_tree(
     `fit` turns segments (order, starts) of primitives into rows of numbers, to be kept for each child.
     """
     m = low.shape[1]
-    order = np.arange(m)
+    order, original = np.arange(m), np.arange(m)
     start, count = np.zeros(1, np.intp), np.full(1, m)
+    root_area = float(_area(low.min(1, keepdims=True), high.max(1, keepdims=True))[0])
     nodes, leaves = 0, 0
     lows, highs, children, members, shapes = [], [], [], [], []
     area_sum = 0.0
@@ -65,7 +66,7 @@ def build_tree(
         slots = np.zeros((parents, width), np.int32)
         slots[parent, rank] = code
         if fit is not None:
-            fitted = fit(order, start)
+            fitted = fit(original.take(order), start)
             shape = np.ones((parents, width, fitted.shape[1]))
             shape[parent, rank] = fitted
             shapes.append(shape)
@@ -73,12 +74,14 @@ def build_tree(
         lows.append(box[0])
         highs.append(box[1])
         children.append(slots)
-        members.append(_leaf_members(order, start[leaf], count[leaf], leaf_size))
+        members.append(_leaf_members(original.take(order), start[leaf], count[leaf], leaf_size))
         nodes += parents
         leaves += int(leaf.sum())
         inner = np.flatnonzero(~leaf)
         order, start, count = _keep(order, start, count, inner)
-    root_area = float(_area(low.min(1, keepdims=True), high.max(1, keepdims=True))[0])
+        # Boxes that are split together move together, which spares the next levels cache misses.
+        low, high, original = low.take(order, 1), high.take(order, 1), original.take(order)
+        order = np.arange(order.size)
     return Tree(
         np.concatenate(lows),
         np.concatenate(highs),
@@ -127,7 +130,7 @@ def _split(
     owner = np.repeat(np.arange(large.size), size)
     for axis in range(3):
         middle = low[axis].take(ids) + high[axis].take(ids)
-        sorted_ids = ids.take(_argsort_within(owner, middle))
+        sorted_ids = ids.take(_argsort_within(owner, begin, middle))
         cost, cut = _best_cut(sorted_ids, begin, size, low, high, leaf_size)
         better = cost < best_cost
         best_cost = np.where(better, cost, best_cost)
@@ -146,12 +149,25 @@ def _split(
     return new_order, new_start, new_count, new_parent
 
 
-def _argsort_within(owner: Ints, key: Floats) -> Ints:
-    """Sort by (owner, key): one sort of 64-bit words, as float32 bits order like integers but for sign."""
-    bits = key.view(np.int32)
-    ordered = np.where(bits < 0, bits ^ np.int32(0x7FFFFFFF), bits).astype(np.int64) + (1 << 31)
-    ordered |= owner << 32
-    return np.argsort(ordered)
+def _argsort_within(owner: Ints, begin: Ints, key: Floats) -> Ints:
+    """Sort segments, which begin at `begin` and whose number is `owner`, each by 65 536 steps of its keys."""
+    with np.errstate(all="ignore"):
+        low = np.minimum.reduceat(key, begin)
+        size = np.maximum.reduceat(key, begin) - low
+        steps = np.where(size > 0, f4(65535) / size, f4(0))
+        word = ((key - low.take(owner)) * steps.take(owner)).astype(np.uint16)
+    order = np.argsort(word, kind="stable")
+    return order.take(stable_order(owner.take(order)))
+
+
+def stable_order(values: Ints) -> Ints:
+    """Sort stably: by 16 bits at a time, which NumPy does by radix, five times as fast as by comparison."""
+    order = np.argsort(values.astype(np.uint16), kind="stable")
+    shift = 16
+    while values.size and int(values.max()) >> shift:
+        order = order.take(np.argsort((values.take(order) >> shift).astype(np.uint16), kind="stable"))
+        shift += 16
+    return order
 
 
 def _best_cut(

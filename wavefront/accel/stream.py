@@ -33,7 +33,7 @@ from .triangle import TriangleTable, one_sign
 BATCH = 1 << 16  # rays traced at a time without a tree
 SMALL = 128  # up to so many primitives, all are tested without a tree
 WIDTH = 32  # children of a node
-LEAF_SIZE = 32  # triangles or spheres of a leaf
+LARGE, HUGE = 1 << 17, 1 << 19  # primitives: between them, smaller leaves are worth their longer build
 
 
 class _TriangleTree:
@@ -160,6 +160,11 @@ class _Spheres:
         found.add(lane, ids, t)
 
 
+def leaf_size_for(primitives: int) -> int:
+    """Primitives of a leaf, by measurement (docs/performance.md)."""
+    return 16 if LARGE <= primitives < HUGE else 32
+
+
 def _batch_size(leaves: int) -> int:
     """Rays to trace at a time: enough to fill the blocks of each leaf, few enough for the cache."""
     if not leaves:
@@ -172,7 +177,7 @@ class NumpyAccelerator:
 
     name = "numpy"
 
-    def __init__(self, geometry: Geometry, leaf_size: int = LEAF_SIZE) -> None:
+    def __init__(self, geometry: Geometry, leaf_size: int | None = None) -> None:
         triangles, centers, radii = geometry.triangles, geometry.centers, geometry.radii
         self._first_sphere = len(triangles)
         self._weights = geometry.weights
@@ -186,8 +191,10 @@ class NumpyAccelerator:
                 primitives = len(triangles) + radii.size
                 self._triangles = FewTriangles(self._table, triangles, ids, primitives, self._ball)
             else:
-                self._triangles = _TriangleTree(self._table, triangles, ids, self._ball, leaf_size)
-            self._spheres = _Spheres(centers, radii, self._ball, len(triangles), leaf_size)
+                size = leaf_size or leaf_size_for(ids.size)
+                self._triangles = _TriangleTree(self._table, triangles, ids, self._ball, size)
+            size = leaf_size or leaf_size_for(radii.size)
+            self._spheres = _Spheres(centers, radii, self._ball, len(triangles), size)
         trees = self._triangles.tree, self._spheres.tree
         self._batch = _batch_size(sum(len(tree.leaves) for tree in trees if tree))
 

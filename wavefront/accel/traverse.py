@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..vec import Bools, Floats, Ints, f4
-from .build import build_tree
+from .build import build_tree, stable_order
 from .triangle import ROUNDOFF, Doubles
 
 BLOCK = 32  # rays that share one copy of a node's matrix
@@ -446,7 +446,7 @@ def blocks(node: Ints, lane: Ints, unused: int) -> tuple[Ints, Ints]:
 
     Returns the nodes (b,) and lanes (b * BLOCK,); places that are left over hold lane `unused`.
     """
-    order = _order(node)
+    order = stable_order(node)
     node, lane = node.take(order), lane.take(order)
     first = _firsts(node)
     count = np.diff(first, append=node.size)
@@ -456,16 +456,6 @@ def blocks(node: Ints, lane: Ints, unused: int) -> tuple[Ints, Ints]:
     lanes = np.full(int(needed.sum()) * BLOCK, unused)
     lanes[place] = lane
     return np.repeat(node.take(first), needed), lanes
-
-
-def _order(values: Ints) -> Ints:
-    """Sort stably: by 16 bits at a time, which NumPy does by radix, five times as fast as by comparison."""
-    order = np.argsort(values.astype(np.uint16), kind="stable")
-    shift = 16
-    while values.size and int(values.max()) >> shift:
-        order = order.take(np.argsort((values.take(order) >> shift).astype(np.uint16), kind="stable"))
-        shift += 16
-    return order
 
 
 def _firsts(values: Ints) -> Ints:
