@@ -40,7 +40,8 @@ class Accelerator(Protocol):
         """Find the nearest hit with t > 0 of rays (3, n); ties go to the lowest id.
 
         `leaving` (n,) names the primitive each ray starts on, -1 for none: a triangle is not hit
-        again by the ray that leaves it, and of a sphere only the far side can be.
+        again by the ray that leaves it, and of a sphere only the far side can be. Two triangles that
+        make one flat quadrilateral may count as one there.
         """
 
     def occluded(self, origin: Floats, direction: Floats, distance: Floats, leaving: Ints) -> Bools:
