@@ -228,8 +228,8 @@ def accelerator(request: pytest.FixtureRequest) -> Iterator[Accelerator]:
     return request.getfixturevalue(request.param)
 
 
-@pytest.mark.parametrize("size", [1, 7, 64, 4096])
-def test_batches_have_the_same_bits(accelerator: Accelerator, size: int) -> None:
+def check_batches(accelerator: Accelerator, size: int) -> None:
+    """The same bits, `size` rays at a time."""
     n = 300 if size == 1 else 9000
     origin, direction = random_rays(n, 6)
     origin[:, ::5] = 0  # through vertices too
@@ -244,6 +244,11 @@ def test_batches_have_the_same_bits(accelerator: Accelerator, size: int) -> None
             np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[p])
         part_blocked = accelerator.occluded(origin[:, p], direction[:, p], distance[p], leaving[p])
         np.testing.assert_array_equal(part_blocked, blocked[p])
+
+
+@pytest.mark.parametrize("size", [1, 7, 64, 4096])
+def test_batches_have_the_same_bits(accelerator: Accelerator, size: int) -> None:
+    check_batches(accelerator, size)
 
 
 def test_order_does_not_matter(accelerator: Accelerator) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_accel import PLACES, aimed_rays, brute_force, geometry, nothing, random_rays
+from test_accel import PLACES, aimed_rays, brute_force, check_batches, geometry, nothing, random_rays
 
 from wavefront.accel import Accelerator, make_accelerator
 from wavefront.accel.quads import find_quads
@@ -129,21 +129,7 @@ def room() -> Accelerator:
 @pytest.mark.parametrize("size", [1, 7, 64, 4096])
 def test_batches_have_the_same_bits(size: int) -> None:
     """However many rays are tested at once."""
-    accelerator = room()
-    n = 300 if size == 1 else 9000
-    origin, direction = random_rays(n, 6)
-    origin[:, ::5] = 0
-    leaving = np.random.default_rng(7).integers(-1, 37, n)
-    distance = np.full(n, 0.7, f4)
-    whole = accelerator.closest(origin, direction, leaving)
-    blocked = accelerator.occluded(origin, direction, distance, leaving)
-    for at in range(0, n, size):
-        p = slice(at, at + size)
-        part = accelerator.closest(origin[:, p], direction[:, p], leaving[p])
-        for name in ("t", "prim", "b1", "b2"):
-            np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[p])
-        part_blocked = accelerator.occluded(origin[:, p], direction[:, p], distance[p], leaving[p])
-        np.testing.assert_array_equal(part_blocked, blocked[p])
+    check_batches(room(), size)
 
 
 def test_neither_half_is_hit_by_a_ray_that_leaves_the_other() -> None:

@@ -33,8 +33,6 @@ TOP = 128  # children of the root at most: those of its children join it while s
 NO_HIT = (0x7F800000 << 32) | 0x7FFFFFFF  # key of a miss: t = inf
 
 Words = NDArray[np.int64]
-# Called with the leaf slots (k,), the lanes (k,) and the filter's values (k,) of candidates.
-Decide = Callable[[Ints, Ints, Floats], None]
 
 
 _memory = threading.local()
