@@ -132,12 +132,14 @@ def lit() -> wf.Scene:
         ("independent", 64, 0.93, 1.07),
         ("sobol", 16, 0.97, 1.2),
         ("sobol", 64, 0.97, 1.2),
+        ("bluenoise", 16, 0.97, 1.2),
+        ("bluenoise", 64, 0.97, 1.2),
         pytest.param("independent", 256, 0.93, 1.07, marks=pytest.mark.slow),
         pytest.param("sobol", 256, 0.95, 1.2, marks=pytest.mark.slow),
     ],
 )
 def test_standard_error_is_the_scatter_across_seeds(sampler: str, spp: int, low: float, high: float) -> None:
-    """On average over pixels, relative to their brightness; Sobol points are over-estimated a little."""
+    """On average over pixels, relative to their brightness; stratified ones are over-estimated a little."""
     images = [render(lit(), spp, sampler=sampler, seed=seed, max_bounces=3) for seed in range(24)]
     runs = np.stack([image.rgb for image in images]).astype(np.float64)
     weight = 1 / (runs.mean(0) ** 2 + 0.01 * runs.mean() ** 2)

@@ -46,11 +46,12 @@ def edge(up: tuple[float, float, float]) -> wf.Scene:
     return wf.Scene([light], camera=wf.Camera.look_at((0, 0, 10), (0, 0, 0), up, fov=fov, size=(8, 8)))
 
 
+@pytest.mark.parametrize("sampler", ["sobol", "bluenoise"])
 @pytest.mark.parametrize("up", [(0, 1, 0), (1, 0, 0)])
 @pytest.mark.parametrize("name", FILTERS)
-def test_an_edge_is_blurred_by_the_filter(name: str, up: tuple[float, float, float]) -> None:
+def test_an_edge_is_blurred_by_the_filter(name: str, up: tuple[float, float, float], sampler: str) -> None:
     """Each row of pixels beside the edge sees as much light as the filter has beyond it."""
-    image = render(edge(up), 256, filter=name, max_bounces=0)
+    image = render(edge(up), 256, filter=name, max_bounces=0, sampler=sampler)
     profile = image.rgb.mean((0, 2)) if up[1] else image.rgb.mean((1, 2))[::-1]
     expected = [beyond(name, 3.5 - k) for k in range(8)]
     assert profile == pytest.approx(expected, abs=2e-3)

@@ -41,9 +41,10 @@ def test_indirect_light_agrees(max_bounces: int) -> None:
     assert_same_images(naive, full, 0.003)
 
 
-def test_independent_numbers_agree() -> None:
-    """Plain random numbers give the same picture as Sobol points."""
-    assert_same_images(room("full", 8, 128), room("full", 8, 256, "independent"), 0.004)
+@pytest.mark.parametrize(("sampler", "spp"), [("independent", 256), ("bluenoise", 128)])
+def test_samplers_agree(sampler: str, spp: int) -> None:
+    """Plain random numbers and blue noise give the same picture as Sobol points."""
+    assert_same_images(room("full", 8, 128), room("full", 8, spp, sampler), 0.004)
 
 
 @pytest.mark.parametrize("integrator", scenes.INDIRECT)

@@ -11,7 +11,7 @@ from significance import ROUNDING, Mean, assert_mean, measure, repeat
 import wavefront as wf
 from wavefront.lights import LightTable, TriangleLights
 from wavefront.sampling import warp
-from wavefront.sampling.sampler import Dimension, make_sampler
+from wavefront.sampling.sampler import SAMPLERS, Dimension, make_sampler
 from wavefront.stages import compact
 from wavefront.vec import f4
 
@@ -19,7 +19,11 @@ from wavefront.vec import f4
 def run(case: Case, integrator: str, **options):
     """Measure a case as one integrator sees it."""
     spp = case.naive_spp if integrator == "naive" else case.spp
-    return measure(case.build(), spp, integrator=integrator, **{"max_bounces": 4, **case.options, **options})
+    options = {"integrator": integrator, "max_bounces": 4, **case.options, **options}
+    if options.get("sampler") != "bluenoise":
+        return measure(case.build(), spp, **options)
+    # pixels complement each other, so seeds are the batches that know nothing of each other
+    return Mean.of(repeat(case.build(), spp // 16, **options).mean((1, 2, 3)))
 
 
 @pytest.mark.parametrize(**each(scenes.DIRECT_CASES))
@@ -53,9 +57,9 @@ def test_specular_light(case: Case, integrator: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("after", [3, 1000], ids=["roulette", "no roulette"])
+@pytest.mark.parametrize("after", [compact.ROULETTE_AFTER, 1000], ids=["roulette", "no roulette"])
 @pytest.mark.parametrize("filter", ["box", "tent", "gaussian"])
-@pytest.mark.parametrize("sampler", ["sobol", "independent"])
+@pytest.mark.parametrize("sampler", SAMPLERS)
 @pytest.mark.parametrize(
     "case",
     [*scenes.DIRECT_CASES, *scenes.TRIANGLE_CASES, *scenes.INDIRECT_CASES, *scenes.SPECULAR_CASES],
@@ -130,10 +134,13 @@ def test_mirrors_take_part_of_the_light_each_time() -> None:
 # --- Sampling and solid angles (cases 17 and 18) -------------------------------------------------
 
 
-def numbers(sampler: str, n: int = 1 << 16) -> np.ndarray:
-    """64 batches of points in the unit square, (2, 64 n)."""
-    pixel, sample = np.repeat(np.arange(64, dtype=np.uint32), n), np.tile(np.arange(n, dtype=np.uint32), 64)
-    return make_sampler(sampler, 1).draw_2d(pixel, sample, 2, Dimension.DIRECTION)
+def numbers(sampler: str, n: int) -> np.ndarray:
+    """64 batches of points in the unit square, each with a seed of its own, (2, 64 n)."""
+    pixel, sample = np.full(n, 5, np.uint32), np.arange(n, dtype=np.uint32)
+    batches = [
+        make_sampler(sampler, seed, 8).draw_2d(pixel, sample, 2, Dimension.DIRECTION) for seed in range(64)
+    ]
+    return np.concatenate(batches, 1)
 
 
 MOMENTS = {
@@ -149,7 +156,7 @@ TRIANGLE_FACING_ORIGIN = {
 }
 
 
-@pytest.mark.parametrize("sampler", ["sobol", "independent"])
+@pytest.mark.parametrize("sampler", SAMPLERS)
 @pytest.mark.parametrize("name", MOMENTS)
 def test_moments_of_warps(name: str, sampler: str) -> None:
     """Means of cosines and squares over hemisphere, sphere and disk."""
@@ -158,7 +165,7 @@ def test_moments_of_warps(name: str, sampler: str) -> None:
     assert_mean(Mean.of(batches), expected, 0.002)
 
 
-@pytest.mark.parametrize("sampler", ["sobol", "independent"])
+@pytest.mark.parametrize("sampler", SAMPLERS)
 @pytest.mark.parametrize("name", TRIANGLE_FACING_ORIGIN)
 def test_solid_angles(name: str, sampler: str) -> None:
     """The mean of 1/pdf over a light's samples is the solid angle that it fills."""

@@ -78,10 +78,28 @@ def test_noise_gives_the_same_bits(cut: dict) -> None:
 
 def test_samples_are_a_bound() -> None:
     """None gets more, however noisy; and where noise is reached early they are not used up."""
-    assert (render(lit(), 7, noise=1e-6).counts == 7).all()
-    assert render(lit(), 40, noise=1e-6).counts.max() == 40
+    for most in (7, 40):
+        with pytest.warns(UserWarning, match="noise=1e-06 was not reached"):
+            image = render(lit(), most, noise=1e-6)
+        assert image.counts.max() == most
+        assert most > MIN_SPP or (image.counts == most).all()
     assert (render(lit(), 4096, noise=0.9).counts == MIN_SPP).all()
     assert (render(lit((4, 4)), None).counts == 100).all()
+
+
+@pytest.mark.parametrize("limit", [{"spp": 40}, {"spp": None, "seconds": 0.5}], ids=["samples", "time"])
+def test_noise_that_is_not_reached_is_told(limit: dict) -> None:
+    """Once, with what was asked for and what there is."""
+    with pytest.warns(UserWarning, match="noise") as caught:
+        image = render(lit(), noise=1e-4, **limit)
+    found = image.metadata
+    (warning,) = caught
+    assert str(warning.message) == (
+        f"noise=0.0001 was not reached: it is {found['noise']:.4g} after {found['spp']:.4g} samples per "
+        f"pixel in {found['seconds']:.3g} s"
+    )
+    with pytest.warns(UserWarning, match="it is unknown after 1 samples"):
+        render(lit(), 1, noise=0.5)
 
 
 def test_pieces_go_on_where_pixels_stopped() -> None:

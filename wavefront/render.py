@@ -82,7 +82,8 @@ def render(
     noise
         Go on until the estimated relative error of the picture is no more than this: 0.02 means
         2 %. It is the root of the relative MSE that `compare` would find against a converged
-        picture. Noisy parts get more samples than calm ones, and every pixel at least 32.
+        picture. Noisy parts get more samples than calm ones, and every pixel at least 32. When
+        `spp` or `seconds` end the render above it, a warning says so.
     seconds
         Go on until this time is used, scene setup included; at least for one sample per pixel.
         With `noise` as well, whichever comes first.
@@ -153,7 +154,7 @@ def render(
             warnings.warn(f"interrupted: the picture holds {so_far}", stacklevel=2)
     samples = int(film.count.sum())
     bad.report(samples)
-    return film.image(
+    image = film.image(
         {
             "integrator": integrator,
             "max_bounces": max_bounces,
@@ -173,6 +174,9 @@ def render(
             "numpy": np.__version__,
         }
     )
+    if noise is not None and not interrupted and (clock.up or film.count.max() == spp):
+        _warn_of_noise(image, noise)
+    return image
 
 
 def as_scene(subject: Any) -> Scene:
@@ -222,6 +226,19 @@ def _whole(name: str, value: Any, low: int, high: int) -> int:
     if not whole or not low <= value <= high:
         raise SceneError(f"{name} is {value!r}; it must be a whole number from {low} to {high}")
     return int(value)
+
+
+def _warn_of_noise(image: Image, asked: float) -> None:
+    """Warn when samples or time ran out above the noise that was asked for."""
+    found = image.metadata
+    if found["noise"] <= asked:
+        return
+    noise = "unknown" if np.isnan(found["noise"]) else f"{found['noise']:.4g}"
+    warnings.warn(
+        f"noise={asked:.4g} was not reached: it is {noise} after {found['spp']:.4g} samples per pixel "
+        f"in {found['seconds']:.3g} s",
+        stacklevel=3,
+    )
 
 
 def _warn_unseen_lights(scene: Scene, integrator: str) -> None:
