@@ -537,9 +537,10 @@ def textured_glb(write, image):
         (lambda write, _: textured_obj(write, "map_Kd my tex.png"), 0.1),
         (lambda write, _: textured_obj(write, "Kd 0.5 1 0.25", "map_Kd my tex.png"), 0.05),
         (lambda write, _: textured_obj(write, "Pr 0.5"), 0.0),
+        (lambda write, _: textured_obj(write, "Ks 0.5 1 0.25", "Ns 300", "map_Kd my tex.png"), 0.1),
         (textured_glb, 0.1),
     ],
-    ids=["ply", "obj without Kd", "obj", "obj of no colour", "glb"],
+    ids=["ply", "obj without Kd", "obj", "obj of no colour", "glossy obj", "glb"],
 )
 def test_objects_in_memory_render_as_their_file(write, tmp_path, make, least):
     """Bit for bit; `least` is how far the pixels differ in each channel."""
@@ -556,6 +557,30 @@ def test_objects_in_memory_render_as_their_file(write, tmp_path, make, least):
     assert np.array_equal(a, b)
     assert a.max() > 0.4
     assert np.ptp(a, axis=(0, 1)).min() >= least
+
+
+def test_a_material_made_in_memory_renders_as_its_obj(tmp_path):
+    from PIL import Image
+
+    image = Image.fromarray(np.random.default_rng(0).integers(0, 256, (4, 4, 3), np.uint8))
+    corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    plane = trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False)
+    material = trimesh.visual.material.SimpleMaterial(
+        image,
+        diffuse=[200, 101, 77, 255],
+        ambient=[0, 0, 0, 255],
+        specular=[99, 200, 255, 255],
+        glossiness=321.0,
+    )
+    plane.visual = trimesh.visual.TextureVisuals(uv=plane.vertices[:, :2], material=material)
+    plane.export(tmp_path / "a.obj")
+    camera = Camera.look_at((0.5, 0.5, 3), (0.5, 0.5, 0), fov=25, size=(8, 8))
+    a, b = (
+        render(Scene(scene.shapes, [Environment(1.0)], camera), 2, workers=1, progress=False).rgb
+        for scene in (load(tmp_path / "a.obj"), from_trimesh(plane))
+    )
+    assert np.array_equal(a, b)
+    assert np.ptp(a, axis=(0, 1)).min() > 0.05
 
 
 def test_textures_of_ply(write, tmp_path):

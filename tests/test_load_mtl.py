@@ -1,6 +1,7 @@
 """MTL maps, their options, and the PBR extension."""
 
 import inspect
+from types import SimpleNamespace
 
 import imageio.v3 as iio
 import numpy as np
@@ -38,7 +39,7 @@ class Recorder(Diffuse):
 
     def __init__(
         self, base_color, metallic=0, roughness=0.5, sheen=0, clearcoat=0, clearcoat_roughness=0,
-        anisotropy=0, specular=1,
+        anisotropy=0, ior=1.5, specular=1, specular_color=1,
     ):  # fmt: skip
         self.given = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
         super().__init__(0.5)
@@ -126,7 +127,9 @@ def test_the_pbr_extension(given):
         "clearcoat": 0.5,
         "clearcoat_roughness": 0.25,
         "anisotropy": 0.75,
+        "ior": 1.5,
         "specular": 1,
+        "specular_color": 1,
     }
 
 
@@ -203,6 +206,79 @@ def test_roughness_0_is_kept_and_absent_roughness_is_matte(given):
     assert (matte["roughness"], matte["specular"]) == (1, 0)
 
 
+@pytest.mark.parametrize("illum", [(), ("illum 2",)])
+@pytest.mark.parametrize(("ns", "roughness"), [(1e-3, 0.999), (10, 0.9), (250, 0.5), (1000, 0), (1e5, 0)])
+def test_ks_and_ns_are_a_gloss(one, illum, ns, roughness):
+    """The reflectance along the normal is 0.08 · Ks, the roughness 1 − √(Ns/1000), as in Blender."""
+    found = one("Kd 0.25 0.5 1", "Ks 1 0.5 0.25", f"Ns {ns}", *illum).material
+    assert isinstance(found, Principled)
+    assert found.base_color.ravel().tolist() == [0.25, 0.5, 1]
+    assert found.roughness == pytest.approx([roughness])
+    assert found._dielectric(np.zeros(1, np.float32)).ravel() == pytest.approx([0.08, 0.04, 0.02], rel=1e-6)
+    assert found.specular_weight == 1
+
+
+def test_the_gloss_that_blender_writes_is_that_of_principled(one):
+    found, plain = one("Kd 0.5 0.5 0.5", "Ks 0.5 0.5 0.5", "Ns 250", "Ni 1.45").material, Principled(0.5)
+    assert vars(found).keys() == vars(plain).keys()
+    for name, value in vars(plain).items():
+        assert value is None or getattr(found, name) == pytest.approx(value), name
+
+
+def test_a_faint_gloss_is_faint_at_grazing_angles_too(one):
+    faint = one("Ks 0.05 0.05 0.05", "Ns 250").material
+    assert faint._dielectric(np.zeros(1, np.float32)) == pytest.approx(np.full((3, 1), 0.004), rel=1e-5)
+    assert faint._dielectric(np.ones(1, np.float32)) == pytest.approx(np.full((3, 1), 0.2))
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ["Ks 1 1 1", "Ns 200", "illum 1"],
+        ["Ks 1 1 1", "Ns 0", "map_Ks t.png", "illum 2"],
+        ["Ks 0 0 0", "Ns 200"],
+        ["Ns 200", "illum 2"],
+    ],
+)
+def test_without_a_highlight_a_surface_is_matte(one, lines):
+    assert isinstance(one("Kd 0.5 0.5 0.5", *lines).material, Diffuse)
+
+
+def test_a_gloss_without_an_exponent_is_as_rough_as_can_be(given):
+    assert given("Ks 0.5 0.5 0.5")["roughness"] == 1
+
+
+def test_an_exponent_below_0_is_clamped(given):
+    with pytest.warns(UserWarning, match=r"s\.mtl line 3: Ns is -3; it must be at least 0 and was clamped"):
+        assert given("Ks 0.5 0.5 0.5", "Ns -3")["roughness"] == 1
+
+
+def test_the_pbr_extension_goes_before_ks_and_ns(given):
+    both = given("Ks 1 1 1", "Ns 250", "Pr 0.3")
+    assert both["roughness"] == 0.3
+    assert ((both["ior"] - 1) / (both["ior"] + 1)) ** 2 == pytest.approx(0.08)
+    assert given("Ks 1 1 1", "Ns 250", "Pm 0.7")["roughness"] == 0.5
+    assert given("Ns 250", "Pm 0.7")["roughness"] == 0.5
+    black = given("Ks 0 0 0", "Pr 0.3", "illum 1")
+    assert (black["roughness"], black["ior"], black["specular"]) == (0.3, 1.5, 1)
+
+
+def test_map_ks_is_the_strength_of_the_gloss(given):
+    """Below a reflectance of 0.02 the strength is less than 1 everywhere."""
+    assert same(given("map_Ks t.png")["specular"])
+    found = given("Ks 0.125 0.0625 0.125", "map_Ks -s 2 2 t.png")
+    assert same(found["specular"], scale=0.5, transform=np.diag([2.0, 2, 1]))
+    assert found["specular_color"].tolist() == [1, 0.5, 1]
+
+
+def test_a_map_of_the_gloss_counts_by_its_luminance(one):
+    strength = one("Ks 1 1 1", "map_Ks t.png").material.specular_weight
+    assert strength.scalar
+    seen = Texture(CODES).lookup(POINTS)
+    surface = SimpleNamespace(uv=POINTS)
+    assert strength.at(surface) == pytest.approx(0.2126 * seen[0] + 0.7152 * seen[1] + 0.0722 * seen[2])
+
+
 def test_parts_outside_their_range_are_clamped(given):
     with pytest.warns(
         UserWarning, match=r"s\.mtl line 2: Pr is 1\.5; it must be in \[0, 1\] and was clamped"
@@ -232,12 +308,13 @@ def test_map_ke(one):
     ("lines", "named"),
     [
         (["Ka 0.2 0.2 0.2"], "Ka"),
-        (["Ks 0.5 0.5 0.5", "Ns 100"], "Ks"),
+        (["Ks 0.5 0.5 0.5", "Ni 1.5", "illum 4"], "Ks"),
         (["norm t.png", "map_Bump t.png"], "map_Bump"),
         (["disp t.png"], "disp"),
         (["refl -type sphere t.png"], "refl"),
         (["Tf 0.5 0.5 0.5"], "Tf"),
-        (["map_Ks t.png"], "map_Ks"),
+        (["Ks 0.5 0.5 0.5", "map_Ns t.png"], "map_Ns"),
+        (["illum 10"], "illum"),
         (["anisor 0.5"], "anisor"),
     ],
 )
@@ -252,6 +329,7 @@ def test_what_is_not_honoured_is_named(one, lines, named):
 def test_values_that_change_nothing_are_quiet(one):
     one("Ka 0 0 0", "Kd 0.5 0.5 0.5", "Ks 0.000000 0.000000 0.000000", "Ns 96", "Ni 1.45", "d 1.0", "illum 2")
     one("Kd 0.5 0.5 0.5", "Tf 1 1 1", "Tr 0", "illum 1", "sharpness 60")
+    one("Kd 0.5 0.5 0.5", "Ks 1 1 1", "Ns 200", "map_Ks t.png", "illum 0")
 
 
 def test_comments_may_follow_numbers(one):

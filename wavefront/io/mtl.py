@@ -6,18 +6,26 @@ How an MTL material is read:
   beside a `map_Kd` counts as white, since some exporters write that.
 - `illum` 4, 6, 7 and 9 are glass with the index `Ni` (1.5 when absent), tinted by `Tf`, rough by `Pr`.
 - `illum` 3, 5 and 8 are mirrors of reflectance `Ks`, if `Ks` is not black and there is no `Pr` or `Pm`.
+- `illum` 0 and 1 ask for no highlight, and so does an `Ns` of 0, which MeshLab writes beside `Ks 1 1 1`:
+  such a surface is matte, whatever its `Ks`.
+- All others, and surfaces without an `illum`, have a gloss over the matte part if `Ks` or a `map_Ks` gives
+  one, by the rules of Blender's importer (obj_import_mtl.cc, set_bsdf_socket_values): its reflectance
+  seen along the normal is 0.08 · `Ks`, its roughness 1 - √(`Ns` / 1000). Without an `Ns` the roughness is 1,
+  where Blender has 0 if `illum` is 2. Below a reflectance of 0.02 the gloss is weaker at grazing angles,
+  too, as in S. Lagarde and C. de Rousiers 2014, "Moving Frostbite to PBR". `map_Ks` counts by its luminance.
 - `Pr Pm Ps Pc Pcr aniso` and their maps, `norm` and `map_d` (the PBR extension) are the parameters of
-  the same names of `Principled`.
+  the same names of `Principled`. `Pr` goes before `Ns`; beside `Pr` or `Pm`, what asks for no highlight
+  leaves the usual one of reflectance 0.04.
 - Opacity is `d`; without a `d` it is 1 - `Tr`, except that `Tr 1` alone means opaque: that is how
   MeshLab writes it, and a material that cannot be seen has no other use. A surface that is less
   than opaque and has an index `Ni` other than 1 is glass.
 - `norm` is a normal map. `bump`, or `map_Bump`, holds heights, of which 1 is `-bm` (1 when absent) scene
   units; but an image that looks like a normal map is one, for that is how Blender writes them, and
   `-bm` is then its strength.
+- `Ns` shapes nothing but the gloss, and `Ni` nothing but glass.
 - Images are sRGB where they are colours, data elsewhere. The options -s -o -clamp -mm -imfchan -bm are read.
 
-Whatever else a file asks for is named in one warning per file: `Ks` and `Ns` among it, for files set
-them to anything, and a highlight made of them is a guess.
+Whatever else a file asks for is named in one warning per file.
 """
 
 from __future__ import annotations
@@ -40,8 +48,13 @@ from .repair import warn
 
 GLASS = (4, 6, 7, 9)
 MIRROR = (3, 5, 8)
+NO_HIGHLIGHT = (0, 1)
+LARGEST_ILLUM = 9  # of those that change what a surface looks like
 GLASS_IOR = 1.5
 MATTE = 0.5  # reflectance where a file gives none
+KS_F0 = 0.08  # the reflectance that `Ks 1` stands for
+LEAST_F0 = 0.02  # of dielectrics; what reflects less is weaker at all angles
+LARGEST_NS = 1000.0
 # values that change nothing
 NEUTRAL = {"ka": 0.0, "kd": 0.0, "ks": 0.0, "tf": 1.0, "d": 1.0, "tr": 0.0, "sharpness": 60.0}
 
@@ -59,7 +72,7 @@ OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-cc": 1, "-clamp": 1, "-imf
 OPTIONS |= {"-texres": 1, "-type": 1, "-bm": 1}
 READ = frozenset(("-s", "-o", "-mm", "-clamp", "-imfchan"))
 RELIEFS = ("norm", "map_bump", "bump")  # keywords whose maps have a multiplier, -bm
-WHOLE = ("map_kd", "map_ke", "norm")  # keywords whose maps are not one channel of an image
+WHOLE = ("map_kd", "map_ke", "map_ks", "norm")  # keywords whose maps are not one channel of an image
 CHANNELS: dict[str, Any] = {"r": 0, "g": 1, "b": 2, "m": 3, "l": "luminance"}
 
 Colour = NDArray[np.float64]
@@ -176,9 +189,7 @@ class Entry:
     def _idle(self, key: str) -> bool:
         if key in self.read:
             return True
-        if key in ("ns", "ni"):  # they shape the highlight, and warning of Ks covers it
-            return True
-        if key == "illum":
+        if key in ("ns", "ni"):  # where there is neither a gloss nor glass, they mean nothing
             return True
         return key in NEUTRAL and set(self.lines[key][2].split()) <= _spellings(NEUTRAL[key])
 
@@ -254,18 +265,60 @@ def look(entry: Entry) -> Look:
 
 def _material(entry: Entry) -> tuple[Bsdf, list[str]]:
     illum = int(entry.number("illum", 2))
+    if not 0 <= illum <= LARGEST_ILLUM:
+        entry.read.discard("illum")
     ior = entry.number("ni", 1.0)
-    physical = entry.has(*(key for keys in PBR for key in keys[:2]))
+    extended = entry.has(*(key for keys in PBR for key in keys[:2]))
     if illum in GLASS or (opacity(entry) < 1 and ior != 1 and "map_d" not in entry.lines):
         return _glass(entry)
-    if illum in MIRROR and not physical and "ks" in entry.lines and entry.colour("ks", 0.0).any():
+    if illum in MIRROR and not extended and "ks" in entry.lines and entry.colour("ks", 0.0).any():
         return Mirror(entry.colour("ks", 0.0)).with_alpha(_alpha(entry)), []
-    wanted = _wanted(entry)
+    physical = entry.has("pr", "map_pr", "pm", "map_pm")
+    wanted = _gloss(entry, illum, physical) | _wanted(entry)
     material, lost = realise(wanted)
-    if type(material) is not Diffuse and not entry.has("pr", "map_pr", "pm", "map_pm"):
+    if type(material) is not Diffuse and not physical and "roughness" not in wanted:
         # a shine of its default kind would be an invention where the file does not speak of it
         material, lost = realise({**wanted, "roughness": 1.0, "specular": 0.0})
     return material, lost
+
+
+def _gloss(entry: Entry, illum: int, physical: bool) -> dict[str, Any]:
+    """Return the parameters of `Principled` for the gloss that `Ks` and `Ns` ask for, if they do."""
+    colour = _highlight(entry, illum)
+    gloss: dict[str, Any] = {}
+    if colour.any():
+        gloss = _specular(entry, float(colour.max()))
+        if np.ptp(colour):
+            gloss["specular_color"] = colour / colour.max()
+    if colour.any() or (physical and "ns" in entry.lines):
+        gloss["roughness"] = 1 - float(np.sqrt(_exponent(entry) / LARGEST_NS))
+    return gloss
+
+
+def _highlight(entry: Entry, illum: int) -> Colour:
+    """Return `Ks`, black where there is no highlight."""
+    if illum in NO_HIGHLIGHT or entry.number("ns", LARGEST_NS) == 0:
+        entry.read.update(("ks", "map_ks", "map_ns"))
+        return np.zeros(3)
+    colour = entry.colour("ks", 0.0)
+    return np.ones(3) if "map_ks" in entry.lines and not colour.any() else colour
+
+
+def _exponent(entry: Entry) -> float:
+    """Return `Ns` in [0, `LARGEST_NS`]; larger ones are none sharper."""
+    value = entry.number("ns", 0.0)
+    if value < 0:
+        warn(f"{entry.where('ns')} is {value:g}; it must be at least 0 and was clamped", entry.strict)
+    return min(max(value, 0.0), LARGEST_NS)
+
+
+def _specular(entry: Entry, strength: float) -> dict[str, Any]:
+    """Return the index and the strength of a gloss whose largest reflectance is `KS_F0` · `strength`."""
+    f0 = KS_F0 * strength
+    weight = min(f0 / LEAST_F0, 1.0)
+    root = float(np.sqrt(f0 / weight))
+    texture = entry.texture("map_ks", weight)
+    return {"ior": (1 + root) / (1 - root), "specular": weight if texture is None else texture}
 
 
 def _wanted(entry: Entry) -> dict[str, Any]:

@@ -21,7 +21,8 @@ from .repair import Table
 def look(material: Any, where: str, bare: bool) -> Look:
     """Return the look of a trimesh `PBRMaterial` or `SimpleMaterial`; `where` is for messages.
 
-    Where `bare`, the diffuse colour counts only if the material has a `Kd` of its own.
+    Where `bare`, the colours and the exponent of the highlight count only if the material has a `Kd`, `Ks`
+    or `Ns` of its own; elsewhere those that trimesh would write into a file.
     """
     if hasattr(material, "baseColorFactor"):
         return _pbr(material)
@@ -127,7 +128,9 @@ def _simple(material: Any, where: str, bare: bool) -> Look:
     entry = mtl.Entry(where, str(material.name or ""))
     lines = {key: value for key, value in material.kwargs.items() if key != "name"}
     if not bare:
-        lines.setdefault("kd", np.asarray(material.diffuse)[:3] / 255.0)
+        for key, codes in (("kd", material.diffuse), ("ks", material.specular)):
+            lines.setdefault(key, [f"{code / 255:.8f}" for code in np.asarray(codes)[:3]])
+        lines.setdefault("ns", f"{material.glossiness:.8f}")
     for key, value in lines.items():
         words = value if isinstance(value, list | tuple | np.ndarray) else [value]
         entry.lines[key.lower()] = (key, 0, " ".join(str(word) for word in words))
