@@ -54,7 +54,8 @@ def test_triangle(write):
 
 
 def test_load_gives_a_scene(write):
-    scene = load(write(SQUARE + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\nusemtl a\nf 1 2 4\n"))
+    text = f"mtllib s.mtl\n{SQUARE}usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\nusemtl a\nf 1 2 4\n"
+    scene = load(write(text, s_mtl="newmtl a\nnewmtl b\n"))
     assert [(shape.name, len(shape.faces)) for shape in scene.shapes] == [("a", 2), ("b", 1)]
 
 
@@ -133,9 +134,10 @@ def test_vertices_keep_all_their_digits(write):
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1"])
 def test_encodings_and_line_ends(write, encoding):
-    text = (SQUARE + "usemtl Fläche\nf 1 2 3\n").replace("\n", "\r\n")
-    (mesh,) = load_meshes(write(text.encode(encoding)))
+    text = ("mtllib s.mtl\n" + SQUARE + "usemtl Fläche\nf 1 2 3\n").replace("\n", "\r\n")
+    (mesh,) = load_meshes(write(text.encode(encoding), s_mtl="newmtl Fläche\nKd 1 0 0\n".encode(encoding)))
     assert (mesh.name, len(mesh.faces)) == ("Fläche", 1)
+    assert mesh.material.reflectance.ravel().tolist() == [1, 0, 0]
 
 
 @pytest.mark.parametrize("name", [b"caf\xe9.obj", "図.OBJ".encode(), b"a b.obj"])
@@ -201,11 +203,12 @@ BAD_FACES = {
 @pytest.mark.parametrize("case", BAD_FACES)
 def test_bad_faces_are_dropped_and_counted(write, case):
     row, message = BAD_FACES[case]
-    path = write(SQUARE + row + "usemtl a\nf 1 2 3\nf 1 2 5\nf 5 2 1\n")
-    with pytest.warns(UserWarning, match=rf"scene\.obj: 'a': dropped 2 faces .*{message}.*, first: line 8"):
+    text = f"mtllib s.mtl\n{SQUARE}{row}usemtl a\nf 1 2 3\nf 1 2 5\nf 5 2 1\n"
+    path = write(text, s_mtl="newmtl a\n")
+    with pytest.warns(UserWarning, match=rf"scene\.obj: 'a': dropped 2 faces .*{message}.*, first: line 9"):
         (mesh,) = load_meshes(path)
     assert len(mesh.faces) == 1
-    with pytest.raises(SceneError, match=rf"has 2 faces .*{message}.*, first: line 8"):
+    with pytest.raises(SceneError, match=rf"has 2 faces .*{message}.*, first: line 9"):
         load_meshes(path, strict=True)
 
 
@@ -244,6 +247,35 @@ def test_what_is_not_read_is_named_once(write):
     assert len(record) == 1
     with pytest.raises(SceneError, match="not honoured"):
         load_meshes(path, strict=True)
+
+
+@pytest.mark.parametrize(
+    "line", ["usemap a", "bevel on", "c_interp on", "d_interp on", "lod 5", "mg 1 2", "shadow_obj a.obj"]
+)
+def test_statements_that_obj_has_for_rendering_are_named(write, line):
+    path = write(f"{SQUARE}{line}\n{line}\nf 1 2 3\n")
+    with pytest.warns(UserWarning, match=rf"not honoured: {line.split()[0]} \(line 5\)$") as record:
+        load_meshes(path)
+    assert len(record) == 1
+    load_meshes(write(f"o a\ng b c\n{SQUARE}{line.split()[0]} off\nf 1 2 3\n"))
+    load_meshes(write(f"{SQUARE}{line.split()[0]} 0\nf 1 2 3\n"))
+
+
+def test_smoothing_groups_are_named_where_normals_are_missing(write):
+    some = SQUARE + "vn 0 0 1\n{}\nf 1//1 2//1 3//1\n{}\nf {}\n"
+    for first, second, face in (("s 1", "s 2", "1//1 3//1 4//1"), ("s off", "s 0", "1 3 4")):
+        load_meshes(write(some.format(first, second, face)))
+    with pytest.warns(UserWarning, match=r"not honoured: s, of faces without normals \(line 8\)$"):
+        load_meshes(write(some.format("s off", "s 3", "1 3 4")))
+    with pytest.warns(UserWarning, match=r"not honoured: s, of faces without normals \(line 5\)$"):
+        load_meshes(write(SQUARE + "s 1\nf 1 2 3\n"))
+
+
+def test_materials_without_a_material_file_are_named(write):
+    path = write(SQUARE + "f 1 2 3\nusemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n")
+    with pytest.warns(UserWarning, match=r"scene\.obj: names no material file for its materials 'a', 'b'$"):
+        load_meshes(path)
+    load_mesh(path, Diffuse(0.5))
 
 
 # ---- files that are no files ------------------------------------------------------------------
@@ -459,6 +491,38 @@ def test_ply_colours_beside_texture_coordinates_are_named(write):
     with pytest.warns(UserWarning, match="not honoured: vertex colours"):
         (mesh,) = load_meshes(write(text, "a.ply"))
     assert mesh.colors is None
+
+
+@pytest.mark.parametrize(
+    ("vertex", "face", "tail", "named"),
+    [
+        (["float quality"], [], "", "quality of vertex"),
+        ([], ["uchar flags"], "", "flags of face"),
+        ([], [], "element edge 1\nproperty int vertex1\nproperty int vertex2\n", "element edge"),
+        (
+            ["int a", "int b"],
+            ["int a"],
+            "element x 1\nproperty int y\n",
+            "a of vertex, b of vertex, a of f.*, el.* x",
+        ),
+    ],
+)
+def test_what_is_not_read_of_ply_is_named_once(write, vertex, face, tail, named):
+    lines = ["ply", "format ascii 1.0", "element vertex 3", *(f"property float {x}" for x in "xyz")]
+    lines += [f"property {x}" for x in vertex] + ["element face 1", "property list uchar int vertex_indices"]
+    lines += [f"property {x}" for x in face] + [*tail.splitlines(), "element none 0", "end_header"]
+    lines += [f"{row}{' 7' * len(vertex)}" for row in ("0 0 0", "1 0 0", "0 1 0")] + [
+        "3 0 1 2" + " 7" * len(face)
+    ]
+    lines += ["0 1"[: 2 * tail.count("property") - 1]] if tail else []
+    path = write("\n".join([*lines, ""]), "a.ply")
+    with pytest.warns(UserWarning, match=rf"a\.ply: not honoured: {named}$") as record:
+        (mesh,) = load_meshes(path)
+    assert len(record) == 1
+    assert np.array_equal(soup(mesh)[0], [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    with pytest.raises(SceneError, match="not honoured"):
+        load_meshes(path, strict=True)
+    load_mesh(path, Diffuse(0.5))
 
 
 def obj_with_colours(colours=CODES / 255):
@@ -713,6 +777,29 @@ def test_stl(write):
     assert mesh.normals is None
 
 
+@pytest.mark.parametrize(
+    ("header", "extra", "named"),
+    [
+        (b"COLOR=\xff\x00\x00\xff", [0, 0], "COLOR= in the header"),
+        (b"exported", [0, 0x801F], r"colours of facets \(facet 1\)"),
+        (
+            b"COLOR=abcd,MATERIAL=abcdefghijkl",
+            [3, 0],
+            r"COLOR= .*, MATERIAL= .*, colours of facets \(facet 0\)",
+        ),
+    ],
+)
+def test_colours_of_stl_are_named_once(write, header, extra, named):
+    facets = b"".join(struct.pack("<12fH", *FACET, colour) for colour in extra)
+    path = write(header.ljust(80) + struct.pack("<I", len(extra)) + facets, "a.stl")
+    with pytest.warns(UserWarning, match=rf"a\.stl: not honoured: {named}$") as record:
+        (mesh,) = load_meshes(path)
+    assert len(record) == 1
+    assert len(mesh.faces) == 2
+    with pytest.raises(SceneError, match="not honoured"):
+        load_meshes(path, strict=True)
+
+
 def test_stl_as_text(write):
     facet = (
         "facet normal 0 0 1\n outer loop\n  vertex 0 0 {0}\n  VERTEX 1 0 {0}\n  vertex 0 1e0 {0}\n"
@@ -767,7 +854,8 @@ def test_damaged_gltf(write, extension):
 
 
 def test_load_mesh_joins_and_places(write):
-    path = write(SQUARE + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n")
+    text = f"mtllib s.mtl\n{SQUARE}usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n"
+    path = write(text, s_mtl="newmtl a\nnewmtl b\n")
     glass = Dielectric(1.5)
     matrix = np.array([[0, -2, 0, 5], [2, 0, 0, 0], [0, 0, 2, 0], [0, 0, 0, 1.0]])
     mesh = load_mesh(path, glass, matrix)

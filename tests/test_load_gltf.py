@@ -425,6 +425,32 @@ def test_samplers(given, build):
     del build.json["samplers"], build.json["textures"][0]["sampler"]
 
 
+@pytest.mark.parametrize(
+    ("sampler", "expected", "named"),
+    [
+        ({}, "bilinear", False),
+        ({"magFilter": 9728}, "nearest", False),
+        ({"minFilter": 9728}, "nearest", False),
+        ({"magFilter": 9729, "minFilter": 9986}, "bilinear", False),
+        ({"magFilter": 9728, "minFilter": 9987}, "nearest", False),
+        ({"magFilter": 9728, "minFilter": 9729}, "nearest", True),
+        ({"magFilter": 9729, "minFilter": 9728}, "bilinear", True),
+    ],
+)
+def test_filters(build, path, sampler, expected, named):
+    """Mipmaps are not needed; a filter of its own for small pictures is not honoured."""
+    info = build.image(np.uint8([[[255, 0, 0], [0, 255, 0]]]))
+    build.json["samplers"] = [sampler]
+    build.json["textures"][0]["sampler"] = 0
+    build.material(emissiveFactor=[1, 1, 1], emissiveTexture=info).gltf(path)
+    with warnings.catch_warnings(record=True) as record:
+        warnings.simplefilter("always")
+        (mesh,) = load_meshes(path)
+    assert mesh.emission.filter == expected
+    message = r"not honoured: minFilter (magFilter counts at all distances) (materials[0].emissiveTexture)"
+    assert [message in str(entry.message) for entry in record] == [True] * named
+
+
 def test_texture_transform_by_the_example_of_its_specification(given, build):
     # "utilizes only the lower left quadrant of the source image, rotated clockwise 90°"
     rng = np.random.default_rng(0)
@@ -523,6 +549,17 @@ def test_volume_is_beer_lambert(given):
     volume = {"thicknessFactor": 1, "attenuationColor": [0.5, 1, 1], "attenuationDistance": 2}
     found = given(extensions={"KHR_materials_volume": volume})
     assert np.exp(-2 * found["absorption"]) == pytest.approx([0.5, 1, 1])
+
+
+def test_the_texture_of_a_thickness_is_named(build, path):
+    volume = {"thicknessFactor": 1, "thicknessTexture": build.image(np.zeros((1, 1, 3), np.uint8))}
+    extensions = {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": volume}
+    build.material(extensions=extensions).gltf(path)
+    with pytest.warns(
+        UserWarning, match=r"not honoured: thicknessTexture \(light goes .* encloses\) \(mat"
+    ) as record:
+        load(path)
+    assert len(record) == 1
 
 
 def test_extension_textures(given, build):
@@ -652,6 +689,10 @@ def lose_lines(b):
     b.json["meshes"][0]["primitives"].append({"mode": 1, "attributes": {"POSITION": 0}})
 
 
+def lose_scene(b):
+    b.json["scenes"].append({"nodes": []})
+
+
 def lose_extension(b):
     b.json["extensionsUsed"] = ["KHR_materials_iridescence"]
 
@@ -665,6 +706,7 @@ def lose_extension(b):
         (lose_colours, r"COLOR_1 \(mesh 'mesh0'\)"),
         (lose_targets, r"morph targets \(mesh 'mesh0'\)"),
         (lose_lines, r"points and lines \(mesh 'mesh0'\)"),
+        (lose_scene, r"further scenes \(the file\)"),
         (lose_extension, r"KHR_materials_iridescence \(the file\)"),
     ],
 )

@@ -196,6 +196,8 @@ def contents(document: Document) -> Contents:
         light = node.get("extensions", {}).get("KHR_lights_punctual", {}).get("light")
         if light is not None:
             _add_light(document, out, light, matrix)
+    if len(document.json.get("scenes", [])) > 1:
+        document.lose("further scenes", "the file")
     if document.json.get("animations"):
         document.lose("animations", "the file")
     # the walk meets the last node first, as trimesh does

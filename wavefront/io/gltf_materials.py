@@ -15,7 +15,7 @@ from .gltf import Document, floats
 from .images import decode_codes
 
 WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
-NEAREST = (9728, 9984, 9986)
+NEAREST, LINEAR = 9728, 9729
 # extensions whose every property is looked at here or in gltf.py
 KNOWN = frozenset(
     "KHR_" + name
@@ -71,11 +71,18 @@ class Materials:
         return Texture(
             self._image(item["source"]),
             wrap=(_wrap(sampler, "wrapS"), _wrap(sampler, "wrapT")),
-            filter="nearest" if sampler.get("magFilter") in NEAREST else "bilinear",
+            filter=self._filter(sampler, where),
             transform=_uv_matrix(document, move, where) if move else None,
             uv_set=1 if uv_set == 1 else 0,
             **arguments,
         )
+
+    def _filter(self, sampler: dict[str, Any], where: str) -> Any:
+        """Return how texels are looked up, near and far alike; samples of a pixel do what mipmaps are for."""
+        near, far = sampler.get("magFilter"), sampler.get("minFilter")
+        if {near, far} == {NEAREST, LINEAR}:
+            self._document.lose("minFilter (magFilter counts at all distances)", where)
+        return "nearest" if NEAREST in ((far,) if near is None else (near,)) else "bilinear"
 
     def _image(self, index: int) -> NDArray[Any]:
         """Return the stored values of an image, (H, W, C), decoded once."""
@@ -259,6 +266,8 @@ class _Reader:
         """Beer–Lambert: `attenuationColor` is what is left after `attenuationDistance`."""
         if group is None:
             return
+        if "thicknessTexture" in group:
+            self._lost.append("thicknessTexture (light goes through the volume that the mesh encloses)")
         colour = self._colour(group, "attenuationColor", [1.0, 1.0, 1.0])
         if "attenuationDistance" in group and (colour < 1).any():
             distance = self._number(group, "attenuationDistance", 1.0, high=np.inf)

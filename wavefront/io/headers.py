@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ..errors import SceneError
 
@@ -12,6 +12,11 @@ SIZES = {
     "short": 2, "ushort": 2, "int16": 2, "uint16": 2,
     "int": 4, "uint": 4, "int32": 4, "uint32": 4, "float": 4, "float32": 4,
     "double": 8, "float64": 8,
+}  # fmt: skip
+READ = {
+    "vertex": {"x", "y", "z", "nx", "ny", "nz", "red", "green", "blue", "alpha", "u", "v", "s", "t",
+               "texture_u", "texture_v"},
+    "face": {"vertex_index", "vertex_indices", "texcoord", "red", "green", "blue", "alpha"},
 }  # fmt: skip
 
 
@@ -24,10 +29,11 @@ class Element:
     size: int = 0  # least bytes of one
     words: int = 0  # words of one in a text; of a list, only its length
     lists: int = 0  # how many of its properties are lists
+    properties: list[str] = field(default_factory=list)  # their names
 
 
-def check_ply(name: str, data: bytes) -> dict[str, int]:
-    """Return how many of each element a PLY file has, after checking that it can hold them.
+def check_ply(name: str, data: bytes) -> list[Element]:
+    """Return the elements of a PLY file, after checking that it can hold them.
 
     Raises
     ------
@@ -48,7 +54,20 @@ def check_ply(name: str, data: bytes) -> dict[str, int]:
             )
     if text:
         _check_lines(name, elements, data[end.end() :].decode("latin-1"), header.count("\n") + 2)
-    return {element.name: element.count for element in elements}
+    return elements
+
+
+def unread(elements: list[Element]) -> list[str]:
+    """Return the names of elements and properties that nothing is made of."""
+    out = []
+    for element in elements:
+        if element.count and element.name not in READ:
+            out.append(f"element {element.name}")
+        elif element.count:
+            out += [
+                f"{name} of {element.name}" for name in element.properties if name not in READ[element.name]
+            ]
+    return out
 
 
 def ply_textures(data: bytes) -> list[str]:
@@ -63,13 +82,15 @@ def _elements(name: str, header: str) -> list[Element]:
         match line.split():
             case ["element", kind, count] if _is_count(count):
                 out.append(Element(kind, int(count)))
-            case ["property", "list", length, kind, _] if out and length in SIZES and kind in SIZES:
+            case ["property", "list", length, kind, label] if out and length in SIZES and kind in SIZES:
                 out[-1].size += SIZES[length]
                 out[-1].words += 1
                 out[-1].lists += 1
-            case ["property", kind, _] if out and kind in SIZES:
+                out[-1].properties.append(label)
+            case ["property", kind, label] if out and kind in SIZES:
                 out[-1].size += SIZES[kind]
                 out[-1].words += 1
+                out[-1].properties.append(label)
             case ["element" | "property", *_]:
                 raise SceneError(f"{name} line {number}: {line.strip()!r} is not part of a PLY header")
     return out

@@ -190,7 +190,7 @@ def _contents(path: PathLike, strict: bool, materials: bool) -> tuple[str, Conte
         if extension in (".glb", ".gltf"):
             return name, _read_gltf(path, data, strict, materials)
         if extension == ".stl":
-            return name, Contents([Placed(raw) for raw in stl.parse(name, data)])
+            return name, Contents([Placed(raw) for raw in stl.parse(name, data, strict)])
         return name, Contents(_read_ply(path, data, strict, materials))
     except MemoryError as error:
         raise SceneError(f"{name}: does not fit in memory") from error
@@ -271,9 +271,11 @@ def _read_obj(path: PathLike, data: bytes, strict: bool, materials: bool) -> lis
         if materials and not dress(raw, looks.get(raw.name)):
             warn(f"{os.fspath(path)}: not honoured: vertex colours (material {raw.name!r})", strict)
         raws.append(raw)
-    absent = [raw.name for raw in raws if raw.name and raw.name not in looks]
+    absent = ", ".join(repr(raw.name) for raw in raws if raw.name and raw.name not in looks)
     if looks and absent:
-        warn(f"{os.fspath(path)}: not in its material files: {', '.join(map(repr, absent))}", strict)
+        warn(f"{os.fspath(path)}: not in its material files: {absent}", strict)
+    if materials and absent and not parsed.libraries:
+        warn(f"{os.fspath(path)}: names no material file for its materials {absent}", strict)
     return raws
 
 
@@ -294,7 +296,10 @@ def _read_ply(path: PathLike, data: bytes, strict: bool, materials: bool) -> lis
     import trimesh
 
     name = os.fspath(path)
-    claimed = headers.check_ply(name, data)
+    elements = headers.check_ply(name, data)
+    unread = headers.unread(elements)
+    if unread and materials:
+        warn(f"{name}: not honoured: {', '.join(unread)}", strict)
     image = _ply_texture(path, data, strict) if materials else {}
     files = trimesh.resolvers.ZipResolver({key: BytesIO(content) for key, content in image.items()})
     try:
@@ -308,8 +313,9 @@ def _read_ply(path: PathLike, data: bytes, strict: bool, materials: bool) -> lis
         raise SceneError(f"{name}: not a readable ply file: {error!r}") from error
     placed = _placed(found, name, strict)
     faces = sum(len(part.raw.faces) for part in placed)
-    if faces < claimed.get("face", 0):
-        raise SceneError(f"{name}: claims {claimed['face']} of face; {faces} can be read")
+    claimed = sum(element.count for element in elements if element.name == "face")
+    if faces < claimed:
+        raise SceneError(f"{name}: claims {claimed} of face; {faces} can be read")
     return placed
 
 

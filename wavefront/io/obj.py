@@ -19,9 +19,9 @@ MISSING = np.iinfo(np.int64).min  # an index that a face corner does not give
 KINDS = ("v", "vt", "vn")
 FILL = {"v": np.nan, "vt": 0.0, "vn": 0.0}  # what a line leaves out: of v, that is its colour
 LEAST = {"v": 3, "vt": 1, "vn": 3}  # how many numbers a line must have
-IGNORED = frozenset(
-    ("o", "g", "s", "mg", "usemap", "lod", "shadow_obj", "trace_obj", "bevel", "c_interp", "d_interp")
-)
+NAMES = ("o", "g")  # keywords that say nothing about what a surface looks like
+OFF = ("off", "0")  # values with which a keyword asks for nothing
+SMOOTHING = "s, of faces without normals"
 
 Line = tuple[int, str]  # number in the file from 1, what follows the keyword
 Table = NDArray[np.float64]
@@ -56,6 +56,7 @@ class _Lines:
     tables: dict[str, list[Line]] = field(default_factory=lambda: {kind: [] for kind in KINDS})
     faces: dict[str | None, list[Line]] = field(default_factory=dict)
     libraries: list[str] = field(default_factory=list)
+    smooth: int | None = None  # first line that asks for smooth faces
     ignored: dict[str, int] = field(default_factory=dict)
 
 
@@ -74,6 +75,8 @@ def parse(path: str | os.PathLike[str], text: str) -> Obj:
     groups = [_group(name, key, faces, tables, rows) for key, faces in lines.faces.items()]
     if not groups:
         raise SceneError(f"{name}: has no faces")
+    if lines.smooth is not None and any(_has_flat(group) for group in groups):
+        lines.ignored[SMOOTHING] = lines.smooth
     return Obj(groups, lines.libraries, lines.ignored)
 
 
@@ -95,9 +98,13 @@ def _sort(name: str, text: str) -> _Lines:
             current = out.faces.get(material, [])
         elif keyword == "mtllib":
             out.libraries.append(rest.strip())
-        elif keyword and keyword not in IGNORED:
-            if not keyword.isidentifier():
-                raise SceneError(f"{name} line {number}: {line[:40]!r} is not OBJ")
+        elif keyword and not keyword.isidentifier():
+            raise SceneError(f"{name} line {number}: {line[:40]!r} is not OBJ")
+        elif not keyword or keyword in NAMES or rest.strip() in OFF:
+            continue
+        elif keyword == "s":
+            out.smooth = number if out.smooth is None else out.smooth
+        else:
             out.ignored.setdefault(keyword, number)
     return out
 
@@ -184,6 +191,11 @@ def _group(
         _optional(tables["vt"], unique[:, 1], 2),
         tables["v"][unique[:, 0], 3:6] if tables["v"].shape[1] >= 6 else None,
     )
+
+
+def _has_flat(group: Group) -> bool:
+    """Tell whether the file leaves out normals of any face."""
+    return group.normals is None or not group.normals.any(axis=1).all()
 
 
 def _corners(name: str, lines: list[Line]) -> NDArray[np.int64]:

@@ -9,22 +9,28 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from .files import decode
-from .repair import Raw, wide
+from .repair import Raw, warn, wide
 
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
+COLOURS = (b"COLOR=", b"MATERIAL=")  # what Materialise Magics writes into the header
 OTHER_LINES = re.compile(r"(facet|outer|endloop|endfacet|solid|endsolid)\b", re.IGNORECASE)
 
 
-def parse(name: str, data: bytes) -> list[Raw]:
+def parse(name: str, data: bytes, strict: bool = False) -> list[Raw]:
     """Read the solids of an STL file; the normals in it are those of the facets and are left out.
+
+    Some programs hide colours in a binary file. There are two ways, which contradict each other, so
+    these are left out with a warning.
 
     Raises
     ------
     SceneError
-        Naming the file, and the line of a text.
+        Naming the file, and the line of a text; or if `strict` and there are colours.
     """
     if len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little"):
-        corners = np.frombuffer(data, RECORD, offset=84)["corners"]
+        facets = np.frombuffer(data, RECORD, offset=84)
+        _warn_of_colours(name, data[:80], facets["extra"], strict)
+        corners = facets["corners"]
         return [Raw("", wide(corners.reshape(-1, 3)), np.arange(3 * len(corners)).reshape(-1, 3))]
     if data.lstrip()[:5].lower() == b"solid":
         return _text(name, decode(data))
@@ -32,6 +38,14 @@ def parse(name: str, data: bytes) -> list[Raw]:
         raise SceneError(f"{name}: has {len(data)} bytes; a binary STL has at least 84")
     count = int.from_bytes(data[80:84], "little")
     raise SceneError(f"{name}: claims {count} faces, {84 + 50 * count} bytes; it has {len(data)}")
+
+
+def _warn_of_colours(name: str, header: bytes, extra: NDArray[np.uint16], strict: bool) -> None:
+    found = [f"{word.decode()} in the header" for word in COLOURS if word in header]
+    if extra.any():
+        found.append(f"colours of facets (facet {int((extra != 0).argmax())})")
+    if found:
+        warn(f"{name}: not honoured: {', '.join(found)}", strict)
 
 
 def _text(name: str, text: str) -> list[Raw]:
