@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -267,6 +268,20 @@ def test_threads_do_not_disturb_each_other(accelerator: Accelerator) -> None:
     with ThreadPoolExecutor(4) as pool:
         together = list(pool.map(lambda r: accelerator.closest(*r), rays))
     assert all(same_bits(a, b) for a, b in zip(alone, together, strict=True))
+
+
+def test_queries_leave_nothing_to_the_garbage_collector(accelerator: Accelerator) -> None:
+    # what waits for it is rays by the megabyte
+    origin, direction = random_rays(2000, 13)
+    origin[:, ::5] = 0  # some doubtful
+    gc.collect()
+    gc.disable()
+    try:
+        accelerator.closest(origin, direction, nothing(2000))
+        accelerator.occluded(origin, direction, np.full(2000, 0.7, f4), nothing(2000))
+        assert gc.collect() == 0
+    finally:
+        gc.enable()
 
 
 @pytest.mark.parametrize("name", NAMES)

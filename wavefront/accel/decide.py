@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from ..vec import Floats, Ints
@@ -27,7 +29,8 @@ class TriangleDecisions:
 
     def __init__(self, table: TriangleTable, lanes: Lanes, found: Found, partner: Ints | None = None) -> None:
         self.table, self.lanes, self.found, self.partner = table, lanes, found, partner
-        self._doubts = Candidates(self._decide_doubts)
+        # not a method of this: a cycle of references would keep all rays until the garbage collector runs
+        self._doubts = Candidates(partial(_decide_doubts, table, lanes, found))
 
     def decide(self, prim: Ints, lane: Ints, value: Floats) -> None:
         """Decide candidates: triangles (k,), lanes (k,) and the filter's values (k,), sure hits above 1.
@@ -54,11 +57,12 @@ class TriangleDecisions:
             halves = np.flatnonzero(other >= 0)
             self._doubts.add(other.take(halves), lane.take(halves))
 
-    def _decide_doubts(self, prim: Ints, lane: Ints) -> None:
-        """Decide the few pairs (k,) that the filter cannot."""
-        origin = self.lanes.origin.take(lane, 1).astype(np.float64)
-        direction = self.lanes.direction.take(lane, 1).astype(np.float64)
-        rays = prim, origin, direction
-        t = triangle.plane_distance(self.table, *rays)
-        t = triangle.clamp_to_triangle(self.table, *rays, t)
-        self.found.add(lane, prim, np.where(triangle.hits_watertight(self.table, *rays), t, np.inf))
+
+def _decide_doubts(table: TriangleTable, lanes: Lanes, found: Found, prim: Ints, lane: Ints) -> None:
+    """Decide the few pairs (k,) that the filter cannot."""
+    origin = lanes.origin.take(lane, 1).astype(np.float64)
+    direction = lanes.direction.take(lane, 1).astype(np.float64)
+    rays = prim, origin, direction
+    t = triangle.plane_distance(table, *rays)
+    t = triangle.clamp_to_triangle(table, *rays, t)
+    found.add(lane, prim, np.where(triangle.hits_watertight(table, *rays), t, np.inf))
