@@ -13,11 +13,12 @@ import numpy as np
 import pytest
 import trimesh
 
+from wavefront import Camera, Scene, render
 from wavefront.bsdfs import Dielectric, Diffuse, Principled, ThinDielectric
 from wavefront.errors import SceneError
 from wavefront.io import appearance
 from wavefront.io.images import srgb_to_linear
-from wavefront.io.load import from_trimesh, load, load_meshes
+from wavefront.io.load import from_trimesh, load, load_mesh, load_meshes
 from wavefront.lights import DirectionalLight, SpotLight
 from wavefront.relief import NormalMap
 from wavefront.shapes import Instance
@@ -479,16 +480,73 @@ def test_normal_map(build, path, material, glass):
     assert at(relief.texture, 0.5, 0.5) == pytest.approx(codes[0, 0] / 255)
 
 
-def test_tangents_are_named_where_they_would_matter(build, path):
-    info = build.image(np.uint8([[[128, 128, 255]]]))
-    build.material()
-    build.json["meshes"][0]["primitives"][0]["attributes"]["TANGENT"] = build.accessor(
-        np.ones((3, 4), np.float32)
-    )
-    load(build.gltf(path))
-    build.json["materials"] = [{"normalTexture": info}]
-    with pytest.warns(UserWarning, match=r"not honoured: TANGENT \(made from .* instead\) \(mesh 'mesh0'\)"):
-        load(build.gltf(path))
+def tangent_space(build, **extra):
+    attributes = {
+        "POSITION": TRIANGLE,
+        "NORMAL": np.tile(np.float32([[0, 0, 1]]), (3, 1)),
+        "TEXCOORD_0": TRIANGLE[:, :2],
+        "TANGENT": np.tile(np.float32([[0, 1, 0, -1]]), (3, 1)),
+    }
+    return build.mesh({key: value for key, value in (attributes | extra).items() if value is not None})
+
+
+def test_tangents(build, path):
+    """They are kept, turned with their node, and left out where there are no normals, as glTF demands."""
+    tangent_space(build)
+    (mesh,) = load_meshes(build.gltf(path))
+    assert mesh.tangents.tolist() == [[0, 1, 0, -1]] * 3
+    build.json["nodes"][0]["matrix"] = [
+        0,
+        2,
+        0,
+        0,
+        2,
+        0,
+        0,
+        0,
+        0,
+        0,
+        2,
+        0,
+        5,
+        0,
+        0,
+        1,
+    ]  # x and y change places
+    (mesh,) = load_meshes(build.gltf(path))
+    assert mesh.tangents.tolist() == [[1, 0, 0, 1]] * 3
+    turned = np.array([[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
+    assert load_mesh(path, transform=turned).tangents == pytest.approx(np.array([[0, 1, 0, 1.0]] * 3))
+    again = Builder()
+    (mesh,) = load_meshes(tangent_space(again, NORMAL=None).gltf(path))
+    assert mesh.tangents is None
+
+
+def test_bad_tangents(build, path):
+    tangent_space(build, TANGENT=np.zeros((3, 3), np.float32)).gltf(path)
+    with pytest.raises(SceneError, match="has TANGENT with 3 components; it must have 4"):
+        load(path)
+    again = Builder()
+    tangent_space(again, TANGENT=np.float32([[1, 0, 0, 1], [np.nan, 0, 0, 1], [1, 0, 0, 1]])).gltf(path)
+    with pytest.warns(UserWarning, match="1 tangents are not finite, first: vertex 1"):
+        (mesh,) = load_meshes(path)
+    assert mesh.tangents[1].tolist() == [0, 0, 0, 0]
+
+
+@pytest.mark.parametrize("hand", [1, -1])
+def test_the_handedness_of_tangents_is_seen_in_the_picture(build, path, hand):
+    """A map that leans to green, lit from above: bright where green is up, dark where it is down.
+
+    The light comes along (0, -1, -1)/√2 with irradiance π. The map's normal is (0, ±0.6, 0.8), so a white
+    matte surface sends (0.8 ± 0.6)/√2.
+    """
+    tangent_space(build, TANGENT=np.tile(np.float32([[1, 0, 0, hand]]), (3, 1)))
+    (mesh,) = load_meshes(build.gltf(path))
+    mesh.material = Diffuse(1.0).with_relief(NormalMap(np.float32([[[0.5, 0.8, 0.9]]])))
+    sun = DirectionalLight((0, -1, -1), np.pi)
+    camera = Camera.look_at((0.3, 0.3, 5), (0.3, 0.3, 0), fov=0.1, size=(2, 2))
+    seen = render(Scene([mesh], [sun], camera), 4, workers=1, progress=False).rgb
+    assert seen == pytest.approx(np.full((2, 2, 3), (0.8 + 0.6 * hand) / np.sqrt(2)), rel=1e-4)
 
 
 def test_bad_normal_maps(build, path):

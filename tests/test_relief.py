@@ -12,9 +12,10 @@ import wavefront as wf
 from wavefront.accel import make_accelerator
 from wavefront.integrators import tilt
 from wavefront.scene import compile_scene
+from wavefront.stages.intersect import intersect
 from wavefront.stages.relief import upright
 from wavefront.stages.surface import interact
-from wavefront.state import Hits
+from wavefront.state import Hits, Rays
 
 F4 = np.float32
 CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
@@ -89,6 +90,67 @@ def test_the_lean_follows_the_texture_coordinates(matrix, axes):
     assert normals(square(), wf.NormalMap(texture))[1] == pytest.approx(expected, abs=1e-6)
     second = wf.Texture(texel(TILT), srgb=False, uv_set=1)
     assert normals(square(uvs1=uvs), wf.NormalMap(second))[1] == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("second", [False, True])
+@pytest.mark.parametrize("hand", [1, -1, 0.5, -2])
+@pytest.mark.parametrize("along", [[1, 0, 0], [0, 1, 0], [-0.6, 0.8, 0]])
+def test_tangents_of_the_mesh_go_before_its_texture_coordinates(along, hand, second):
+    """Red leans along the tangent, green along normal × tangent, or against it where w is below 0."""
+    given = np.tile([*along, hand], (4, 1))
+    mesh = square(normals=[[0, 0, 1]] * 4, uvs1=CORNERS, tangents=given)
+    texture = wf.Texture(texel(TILT), srgb=False, uv_set=int(second))
+    across = np.cross([0, 0, 1], along) * np.sign(hand)
+    expected = lean(TILT) @ np.array([along, across, [0, 0, 1]])
+    assert normals(mesh, wf.NormalMap(texture))[1] == pytest.approx(expected, abs=1e-6)
+
+
+def test_bumps_lie_by_the_texture_coordinates_whatever_the_tangents():
+    slope = wf.BumpMap(np.tile(np.linspace(0, 1, 8), (8, 1)), 0.3)
+    up = [[0, 0, 1]] * 4
+    turned = square(normals=up, tangents=[[0, 1, 0, -1]] * 4)
+    assert np.array_equal(normals(turned, slope)[1], normals(square(normals=up), slope)[1])
+    assert normals(turned, slope)[1][0] < -0.1
+
+
+@pytest.mark.parametrize(
+    "matrix", [np.diag([-1.0, 1, 1]), np.diag([2, 1, -1.0]), [[0, -1, 0], [3, 0, 0], [0, 0, 1]]]
+)
+@pytest.mark.parametrize("shared", [False, True])
+def test_tangents_move_with_their_mesh(matrix, shared):
+    """A mirrored mesh shows the mirrored relief, shared or as a mesh of its own."""
+    along, across = np.array([0.6, 0.8, 0]), np.array([0.8, -0.6, 0])
+    mesh = square(normals=[[0, 0, 1]] * 4, tangents=[[*along, -1]] * 4)
+    mesh.material = wf.Diffuse(0.5).with_relief(wf.NormalMap(texel(TILT)))
+    place = np.eye(4)
+    place[:3, :3] = matrix
+    other = np.eye(4)
+    other[:3, 3] = 50
+    shapes = [wf.Instance(mesh, place), wf.Instance(mesh, other)]
+    scene = wf.Scene(shapes, lights=[wf.Environment(1.0)])
+    compiled = compile_scene(
+        scene, lambda geometry: make_accelerator(geometry, "numpy"), most_copies=0 if shared else 1000
+    )
+    assert (compiled.instances is not None) == shared
+    o = (matrix @ np.array([0.5, 0.4, 0]) + np.array([0, 0, 5]) - compiled.centre).astype(F4).reshape(3, 1)
+    d = np.array([[0], [0], [-1]], F4)
+    hits = intersect(compiled, Rays(o, d, np.full(1, -1)))
+    surface = interact(compiled, Rays(o, d, np.full(1, -1)), hits)
+    tilt(compiled, surface)
+    moved = [np.asarray(matrix) @ axis for axis in (along, across)]
+    red = moved[0] / np.linalg.norm(moved[0])
+    green = np.cross([0, 0, 1], red)
+    green *= np.sign(green @ moved[1])
+    front = np.sign(matrix[2][2])  # seen from behind, a relief is turned round
+    expected = front * (lean(TILT) @ np.array([red, green, [0, 0, front]]))
+    assert surface.ns[:, 0] == pytest.approx(expected, abs=1e-5)
+
+
+def test_bad_tangents():
+    with pytest.raises(wf.SceneError, match="mesh: has tangents without normals; pass both"):
+        square(tangents=[[1, 0, 0, 1]] * 4)
+    with pytest.raises(wf.SceneError, match=r"mesh: tangents must have shape \(4, 4\), got \(4, 3\)"):
+        square(normals=[[0, 0, 1]] * 4, tangents=[[1, 0, 0]] * 4)
 
 
 def test_from_behind_the_relief_is_turned_round():

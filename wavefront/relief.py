@@ -15,15 +15,17 @@ from .textures import UV_SETS, Texture
 from .vec import Floats, Ints, cross, dot, f4, normalize
 
 Source: TypeAlias = str | os.PathLike[str] | ArrayLike | Texture
-TANGENTS = {"uv": "tangents", "uv1": "tangents1"}  # the fields of Surface that belong together
+# the fields of Surface that belong together
+TANGENTS = {"uv": "tangents", "uv1": "tangents1"}
+AXES = {"uv": "axes", "uv1": "axes1"}
 
 
 class NormalMap(Relief):
     """An image of normals, for `Bsdf.with_relief`.
 
     Red, green and blue from 0 to 1 are components from -1 to 1 along u, along v and along the
-    shading normal, as in glTF: green points up in the image. Where the image gives (0.5, 0.5, 1)
-    the surface keeps its own normal.
+    shading normal, as in glTF: green points up in the image. On a mesh with tangents of its own, those
+    say what is along u and along v. Where the image gives (0.5, 0.5, 1) the surface keeps its own normal.
 
     Parameters
     ----------
@@ -46,7 +48,7 @@ class NormalMap(Relief):
             raise SceneError(f"NormalMap: {self.texture!r} gives numbers; it must give three channels")
         _check_plain("NormalMap", self.texture)
         uv = UV_SETS[self.texture.uv_set]
-        self.reads = (uv, TANGENTS[uv])
+        self.reads = (uv, AXES[uv])
         self._turn = _inverse(self.texture)  # (2, 2) from the mesh's axes of u and v to the image's
 
     def __repr__(self) -> str:

@@ -123,6 +123,8 @@ class Surface(Columns):
     color: Floats | None = None  # (4, n) linear RGB and opacity, given per vertex
     tangents: Floats | None = None  # (6, n) how the point moves with u and with v, scene units
     tangents1: Floats | None = None  # (6, n) the same for uv1
+    axes: Floats | None = None  # (6, n) along what red and green of a normal map lean, of any length
+    axes1: Floats | None = None  # (6, n) the same for maps that uv1 places
 
     def frame(self) -> Frame:
         """Return the shading frames, z = ns."""

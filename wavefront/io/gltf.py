@@ -324,9 +324,7 @@ def _primitive(document: Document, part: dict[str, Any], mode: int, name: str) -
     for extra in attributes:
         if extra.startswith(("COLOR_", "TEXCOORD_")) and extra not in READ:
             document.lose(extra, f"mesh {name!r}")
-    material = document.get("materials", part["material"]) if "material" in part else {}
-    if "TANGENT" in attributes and "normalTexture" in material:
-        document.lose("TANGENT (made from the texture coordinates instead)", f"mesh {name!r}")
+    tangents = _attribute(document, attributes, "TANGENT", 4, where, len(vertices))
     normals = _attribute(document, attributes, "NORMAL", 3, where, len(vertices))
     return Raw(
         name,
@@ -335,6 +333,7 @@ def _primitive(document: Document, part: dict[str, Any], mode: int, name: str) -
         None if normals is None else wide(normals),
         None if uvs is None else wide(uvs),
         None if uvs1 is None else wide(uvs1),
+        None if tangents is None else wide(tangents),
         None if colors is None else wide(colors),
     )
 

@@ -19,7 +19,7 @@ from ..errors import SceneError, finite_array
 from ..lights import DirectionalLight, PointLight, SpotLight
 from ..scene import Scene
 from ..shapes import Instance, Mesh
-from ..shapes.transform import moved
+from ..shapes.transform import moved, moved_tangents
 from . import gltf, headers, mtl, obj, stl, visuals
 from .appearance import Look, dress, is_faint
 from .files import beside, decode, read_bytes
@@ -102,8 +102,8 @@ def from_trimesh(geometry: Any) -> Scene:
     scene's graph several times becomes an `Instance` for each.
 
     What trimesh itself does not keep cannot count: of glTF it rounds base colours to 8 bits, and drops
-    extensions, lights and the scale of normal maps; of MTL it keeps the image of `map_Kd` only. `load`
-    reads all of these.
+    extensions, lights, tangents and the scale of normal maps; of MTL it keeps the image of `map_Kd`
+    only. `load` reads all of these.
 
     Raises
     ------
@@ -136,6 +136,7 @@ def join(
     raw = Raw(name, *moved(matrix, vertices, faces, normals))
     raw.uvs = _joined([mesh.uvs for mesh in meshes])
     raw.uvs1 = _joined([mesh.uvs1 for mesh in meshes])
+    raw.tangents = moved_tangents(matrix, _joined([mesh.tangents for mesh in meshes]))
     raw.colors = _joined([mesh.colors for mesh in meshes])
     raw.material = meshes[0].material if material is None else material
     if material is None:
@@ -164,7 +165,8 @@ class Placed:
     def moved(self) -> Raw:
         """Return a mesh of its own, in the scene's coordinates."""
         vertices, faces, normals = moved(self.matrix, self.raw.vertices, self.raw.faces, self.raw.normals)
-        return replace(self.raw, vertices=vertices, faces=faces, normals=normals)
+        tangents = moved_tangents(self.matrix, self.raw.tangents)
+        return replace(self.raw, vertices=vertices, faces=faces, normals=normals, tangents=tangents)
 
 
 @dataclass

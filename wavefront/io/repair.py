@@ -44,6 +44,7 @@ class Raw:
     normals: Table | None = None  # (n, 3); a row of zeros means none
     uvs: Table | None = None  # (n, 2)
     uvs1: Table | None = None  # (n, 2)
+    tangents: Table | None = None  # (n, 4) as of `Mesh`; without normals they do not count
     colors: Table | None = None  # (n, 3 or 4) linear
     lines: Faces | None = None  # (m,) line of the file for each face
     material: Bsdf | None = None
@@ -87,6 +88,7 @@ def build(source: str, raw: Raw, strict: bool = False) -> Mesh | None:
         normals=_normals(label, raw.normals, vertices, faces, strict),
         uvs=_finite(label, "uvs", raw.uvs, 0.0, strict),
         uvs1=_finite(label, "second uvs", raw.uvs1, 0.0, strict),
+        tangents=None if raw.normals is None else _finite(label, "tangents", raw.tangents, 0.0, strict),
         colors=_colors(label, raw.colors, strict),
         material=raw.material,
         emission=raw.emission,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..vec import Floats, f4
 from .mesh import Mesh
-from .tangents import mesh_tangents
+from .tangents import mesh_axes, mesh_tangents
 
 Corners: TypeAlias = tuple[Floats, Floats, Floats]  # (width, m) values at the three corners of triangles
 
@@ -83,6 +83,12 @@ ATTRIBUTES = {
     ),
     "tangents1": Attribute(
         UV1, NONE, lambda mesh: mesh.uvs1, lambda mesh: mesh_tangents(mesh, mesh.uvs1), sphere_tangents, True
+    ),
+    "axes": Attribute(
+        UV, NONE, lambda mesh: mesh.uvs, lambda mesh: mesh_axes(mesh, mesh.uvs), sphere_tangents, True
+    ),
+    "axes1": Attribute(
+        UV1, NONE, lambda mesh: mesh.uvs1, lambda mesh: mesh_axes(mesh, mesh.uvs1), sphere_tangents, True
     ),
 }
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..bsdfs import Bsdf, Spatial
 from ..errors import SceneError, finite_array
 from .mesh import Mesh, check_material, check_range
-from .transform import moved
+from .transform import moved, moved_tangents
 
 SINGULAR = 1e-12  # the least of the lengths to which a transform stretches, as a part of the greatest
 
@@ -82,6 +82,7 @@ class Instance:
         mesh.vertices, mesh.faces, mesh.normals = moved(
             self.transform, mesh.vertices, mesh.faces, mesh.normals
         )
+        mesh.tangents = moved_tangents(self.transform, mesh.tangents)
         return mesh
 
     def _placed(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:

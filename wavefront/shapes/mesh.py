@@ -26,6 +26,10 @@ class Mesh:
         (n, 3) shading normals; without them the facets are flat.
     uvs, uvs1
         (n, 2) texture coordinates, and a second set of them.
+    tangents
+        (n, 4) what red means in normal maps: unit vectors at right angles to the normals, and 1 or -1 as
+        green is normal × tangent or its opposite, as in glTF. Without them both follow from the texture
+        coordinates, as they do for bump maps. They need normals.
     colors
         (n, 3) linear RGB, or (n, 4) with opacity, in [0, 1]. A material shows them by a parameter
         `VertexColors`.
@@ -42,8 +46,8 @@ class Mesh:
     Raises
     ------
     SceneError
-        If an array has a wrong shape, a value is not finite, an index is out of range, or there
-        is no face.
+        If an array has a wrong shape, a value is not finite, an index is out of range, there is no
+        face, or there are tangents without normals.
     """
 
     def __init__(
@@ -54,6 +58,7 @@ class Mesh:
         normals: ArrayLike | None = None,
         uvs: ArrayLike | None = None,
         uvs1: ArrayLike | None = None,
+        tangents: ArrayLike | None = None,
         colors: ArrayLike | None = None,
         material: Bsdf | None = None,
         emission: Colour | None = None,
@@ -66,6 +71,9 @@ class Mesh:
         self.normals = _per_vertex(f"{name}: normals", normals, len(self.vertices), 3)
         self.uvs = _per_vertex(f"{name}: uvs", uvs, len(self.vertices), 2)
         self.uvs1 = _per_vertex(f"{name}: uvs1", uvs1, len(self.vertices), 2)
+        self.tangents = _per_vertex(f"{name}: tangents", tangents, len(self.vertices), 4)
+        if self.tangents is not None and self.normals is None:
+            raise SceneError(f"{name}: has tangents without normals; pass both")
         self.colors = _colors(f"{name}: colors", colors, len(self.vertices))
         self.material = check_material(name, material)
         self.emission = None if emission is None else colour(f"{name}: emission", emission, np.inf)

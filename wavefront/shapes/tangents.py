@@ -1,4 +1,4 @@
-"""How the points of a mesh move with its texture coordinates."""
+"""How the points of a mesh move with its texture coordinates, and what normal maps make of it."""
 
 from __future__ import annotations
 
@@ -32,6 +32,19 @@ def mesh_tangents(mesh: Mesh, uvs: Doubles | None) -> Doubles:
     if mesh.normals is None:
         return np.repeat(flat[:, None], 3, 1)
     return _smooth(mesh, flat, area, _angles(corner))
+
+
+def mesh_axes(mesh: Mesh, uvs: Doubles | None) -> Doubles:
+    """Return along what red and green of normal maps lean at the corners of the faces, (m, 3, 6).
+
+    Those are the mesh's own tangents and bitangents (glTF 2.0, section 3.7.2.1: normal × tangent · w),
+    without them dP/du and dP/dv. Lengths do not count.
+    """
+    if mesh.tangents is None or mesh.normals is None:
+        return mesh_tangents(mesh, uvs)
+    tangents = mesh.tangents[:, :3]
+    across = np.cross(mesh.normals, tangents) * np.where(mesh.tangents[:, 3:] < 0, -1.0, 1.0)
+    return np.hstack([tangents, across])[mesh.faces]
 
 
 def _smooth(mesh: Mesh, flat: Doubles, area: Doubles, angles: Doubles) -> Doubles:

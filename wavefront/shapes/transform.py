@@ -7,6 +7,19 @@ import numpy as np
 from ..errors import SceneError
 
 
+def moved_tangents(matrix: np.ndarray, tangents: np.ndarray | None) -> np.ndarray | None:
+    """Apply a (4, 4) affine matrix to tangents (n, 4); a reflection changes their handedness.
+
+    Those that it takes to zero stay zero.
+    """
+    if tangents is None or np.array_equal(matrix, np.eye(4)):
+        return tangents
+    along = tangents[:, :3] @ matrix[:3, :3].T
+    size = np.linalg.norm(along, axis=1, keepdims=True)
+    hand = -tangents[:, 3:] if np.linalg.det(matrix[:3, :3]) < 0 else tangents[:, 3:]
+    return np.hstack([along / np.where(size > 0, size, 1), hand])
+
+
 def moved(
     matrix: np.ndarray, vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
