@@ -665,11 +665,67 @@ def test_textures_of_ply(write, tmp_path):
         load_meshes(textured_ply(write, "b.png"))
 
 
-def test_face_colours_are_named():
-    box = trimesh.creation.box()
-    box.visual.face_colors = np.zeros((12, 4), np.uint8)
-    with pytest.warns(UserWarning, match="not honoured: face colours"):
-        from_trimesh(box)
+def painted_ply(rows, faces, *properties, extra=()):
+    lines = ["ply", "format ascii 1.0", "element vertex 4", *(f"property float {x}" for x in "xyz"), *extra]
+    lines += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
+    lines += [f"property uchar {x}" for x in (*properties, "red", "green", "blue")]
+    return "\n".join([*lines, "end_header", *rows, *faces, ""])
+
+
+PLACES = ["0 0 0", "1 0 0", "1 1 0", "0 1 0"]
+
+
+def test_face_colours_are_those_of_all_corners(write):
+    (mesh,) = load_meshes(write(painted_ply(PLACES, ["3 0 1 2 255 188 0", "3 0 2 3 0 0 51"]), "a.ply"))
+    assert np.array_equal(soup(mesh)[1], [[0, 0, 0], [1, 1, 0], [0, 1, 0]])
+    green, blue = ((np.array([188, 51]) / 255 + 0.055) / 1.055) ** 2.4
+    expected = [[[1, green, 0, 1]], [[0, 0, blue, 1]]]
+    assert soup(mesh, mesh.colors) == pytest.approx(np.repeat(expected, 3, 1), rel=1e-6)
+    assert isinstance(mesh.material.reflectance, VertexColors)
+
+
+def test_face_colours_survive_faces_that_do_not(write):
+    faces = ["3 0 1 1 255 0 0", "3 0 1 2 0 255 0", "3 0 2 3 0 0 255"]
+    with pytest.warns(UserWarning, match="dropped 1 faces of zero area"):
+        (mesh,) = load_meshes(write(painted_ply(PLACES, faces), "a.ply"))
+    assert soup(mesh, mesh.colors)[:, :, 1:3].tolist() == [[[1, 0]] * 3, [[0, 1]] * 3]
+    with pytest.raises(SceneError, match=r"a\.ply: .*face 0 uses vertex 7; it must be in \[0, 3\]"):
+        load_meshes(write(painted_ply(PLACES, ["3 0 1 7 255 0 0"]), "a.ply"))
+
+
+@pytest.mark.parametrize(
+    ("rows", "faces", "extra"),
+    [
+        (PLACES, ["4 0 1 2 3 255 0 0"], []),
+        ([f"{row} 9 9 9" for row in PLACES], ["3 0 1 2 255 0 0"], ["red", "green", "blue"]),
+        ([f"{row} 0 1" for row in PLACES], ["3 0 1 2 255 0 0"], ["s", "t"]),
+    ],
+    ids=["polygons", "beside vertex colours", "beside texture coordinates"],
+)
+def test_face_colours_that_do_not_count_are_named(write, rows, faces, extra):
+    kind = "uchar" if "red" in extra else "float"
+    text = painted_ply(rows, faces, extra=[f"property {kind} {x}" for x in extra])
+    with pytest.warns(UserWarning, match=r"a\.ply: not honoured: face colours \(mesh") as record:
+        (mesh,) = load_meshes(write(text, "a.ply"))
+    assert len(record) == 1
+    assert (mesh.colors is not None) == ("red" in extra)
+
+
+def test_face_colours_in_memory_render_as_their_file(tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=1)
+    ball.apply_scale(0.75)
+    ball.vertices = ball.vertices.astype(np.float32)
+    ball.visual.face_colors = np.random.default_rng(0).integers(0, 256, (80, 3), np.uint8)
+    path = tmp_path / "ball.ply"
+    path.write_bytes(ball.export(file_type="ply"))
+    camera = Camera.look_at((0, 0, 5), (0, 0, 0), fov=20, size=(8, 8))
+    pictures = [
+        render(Scene(scene.shapes, [Environment(1.0)], camera), 2, workers=1, progress=False).rgb
+        for scene in (load(path), from_trimesh(trimesh.load(path, process=False)), from_trimesh(ball))
+    ]
+    assert np.ptp(pictures[0], axis=(0, 1)).min() > 0.1
+    assert np.array_equal(pictures[0], pictures[1])
+    assert np.array_equal(pictures[0], pictures[2])
 
 
 def test_load_mesh_keeps_colours_and_the_second_uvs(write):

@@ -25,7 +25,7 @@ from .appearance import Look, dress, is_faint
 from .files import beside, decode, read_bytes
 from .gltf_materials import Materials
 from .images import decode_codes
-from .repair import Raw, build, warn
+from .repair import Raw, build, warn, with_face_colors
 
 if TYPE_CHECKING:
     import trimesh
@@ -346,7 +346,7 @@ def _placed(geometry: Any, source: str, strict: bool) -> list[Placed]:
     placed = []
     for mesh, name, matrix in _nodes(geometry, trimesh):
         if id(mesh) not in raws:
-            raws[id(mesh)] = _raw(mesh, name)
+            raws[id(mesh)] = _raw(mesh, name, source)
             looks.dress(raws[id(mesh)], mesh, {geometry.source.file_type, mesh.source.file_type})
         placed.append(Placed(raws[id(mesh)], matrix))
     if looks.lost:
@@ -386,7 +386,7 @@ def _camera(geometry: Any) -> Camera | None:
     return gltf.camera_at(matrix, float(geometry.camera.fov[1]), float(width / height))
 
 
-def _raw(mesh: trimesh.Trimesh, name: str) -> Raw:
+def _raw(mesh: trimesh.Trimesh, name: str, source: str) -> Raw:
     # asking for `vertex_normals` would compute them; the cache tells whether they are there
     normals = np.asarray(mesh.vertex_normals) if "vertex_normals" in mesh._cache.cache else None
     uvs = getattr(mesh.visual, "uv", None)
@@ -396,7 +396,8 @@ def _raw(mesh: trimesh.Trimesh, name: str) -> Raw:
     raw = Raw(name, vertices, np.asarray(mesh.faces), normals)
     raw.uvs = None if uvs is None else np.asarray(uvs, np.float64)[:, :2]
     raw.colors = visuals.vertex_colours(mesh)
-    return raw
+    painted = visuals.face_colours(mesh)
+    return raw if painted is None else with_face_colors(source, raw, painted)
 
 
 class _Visuals:
@@ -409,14 +410,15 @@ class _Visuals:
     def dress(self, raw: Raw, mesh: trimesh.Trimesh, file_types: set[str | None]) -> None:
         """Give a raw mesh its material and emission; `file_types` tells what it was read from."""
         visual: Any = mesh.visual
-        if visual.kind == "face":
-            self.lost.setdefault("face colours", raw.name)
         look = self._look(getattr(visual, "material", None), not file_types.isdisjoint(BARE))
         for what in look.lost if look is not None else ():
             self.lost.setdefault(what, raw.name)
-        dropped = raw.colors is None and visuals.drops_colours(mesh)
-        if not dress(raw, look) or dropped:
-            self.lost.setdefault("vertex colours", raw.name)
+        painted = visual.kind == "face"
+        if not dress(raw, look) or (painted and raw.colors is None):
+            self.lost.setdefault("face colours" if painted else "vertex colours", raw.name)
+        for element in ("vertex", "face"):
+            if visual.kind != element and visuals.ply_has_colours(mesh, element):
+                self.lost.setdefault(f"{element} colours", raw.name)
         if look is None and is_faint(raw) and not visuals.is_gltf(mesh):  # where it has no say
             self.lost.setdefault("opacity of vertex colours", raw.name)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -52,6 +52,26 @@ class Raw:
     two_sided: bool = False  # the emission leaves both sides
 
 
+def with_face_colors(source: str, raw: Raw, colors: Table) -> Raw:
+    """Return the same mesh with colours (m, 4) for its faces: every corner gets a vertex of its own.
+
+    Raises
+    ------
+    SceneError
+        If an index is out of range; `source` is for messages, as for `build`.
+    """
+    _check_indices(_label(source, raw), raw.faces, len(raw.vertices))
+    corners = raw.faces.ravel()
+    return replace(
+        raw,
+        vertices=raw.vertices[corners],
+        faces=np.arange(corners.size).reshape(-1, 3),
+        normals=None if raw.normals is None else raw.normals[corners],
+        uvs=None if raw.uvs is None else raw.uvs[corners],
+        colors=np.repeat(colors, 3, 0),
+    )
+
+
 def build(source: str, raw: Raw, strict: bool = False) -> Mesh | None:
     """Return a sound mesh, or None when no face is left.
 
@@ -69,7 +89,7 @@ def build(source: str, raw: Raw, strict: bool = False) -> Mesh | None:
     SceneError
         If an index is out of range, or `strict` and anything needs repair.
     """
-    label = f"{source}: {raw.name!r}" if raw.name else source
+    label = _label(source, raw)
     vertices = np.asarray(raw.vertices, np.float64).reshape(-1, 3)
     faces = np.asarray(raw.faces).reshape(-1, 3).astype(np.intp)
     _check_indices(label, faces, len(vertices))
@@ -95,6 +115,10 @@ def build(source: str, raw: Raw, strict: bool = False) -> Mesh | None:
         two_sided=raw.two_sided,
         name=raw.name or "mesh",
     )
+
+
+def _label(source: str, raw: Raw) -> str:
+    return f"{source}: {raw.name!r}" if raw.name else source
 
 
 def _check_indices(label: str, faces: Faces, count: int) -> None:

@@ -51,7 +51,22 @@ def vertex_colours(mesh: Any) -> Table | None:
     if linear:
         unit = f4(np.iinfo(codes.dtype).max) if codes.dtype.kind == "u" else f4(1)
         return (codes.astype(f4) / unit).astype(np.float64)
+    return _decoded(codes)
+
+
+def _decoded(codes: NDArray[Any]) -> Table:
     return np.column_stack([from_srgb(codes[:, :3] / 255.0), codes[:, 3:] / 255.0])
+
+
+def face_colours(mesh: Any) -> Table | None:
+    """Return the colours of the faces of a trimesh mesh, linear (m, 4), if it has one for each face.
+
+    They are sRGB, as those of vertices are.
+    """
+    if mesh.visual.kind != "face":
+        return None
+    codes = np.asarray(mesh.visual.face_colors)
+    return _decoded(codes) if codes.shape == (len(mesh.faces), 4) else None
 
 
 def is_gltf(mesh: Any) -> bool:
@@ -59,9 +74,12 @@ def is_gltf(mesh: Any) -> bool:
     return "from_gltf_primitive" in mesh.metadata
 
 
-def drops_colours(mesh: Any) -> bool:
-    """Tell whether trimesh left out the colours of a PLY file, as it does beside texture coordinates."""
-    raw = mesh.metadata.get("_ply_raw", {}).get("vertex", {})
+def ply_has_colours(mesh: Any, element: str) -> bool:
+    """Tell whether the vertices or faces of the PLY file that trimesh read a mesh from have colours.
+
+    It leaves out both beside texture coordinates, and those of faces beside those of vertices.
+    """
+    raw = mesh.metadata.get("_ply_raw", {}).get(element, {})
     return "red" in raw.get("properties", {})
 
 
