@@ -143,8 +143,9 @@ class BlueNoiseSampler(Sampler):
     All pixels share one shuffled, Owen-scrambled sequence per stream, and each XORs a point of its
     own to it: the points of another sequence, taken along a Morton curve through the pixels. So
     neighbours get numbers that lie far apart and complement each other, and what is wrong in one is
-    made good beside it. In each pixel the samples are spread as those of `SobolSampler`, for any
-    number of samples.
+    made good beside it. Each square of the curve goes along or down first as a hash says, or all
+    pairs of neighbours would lie side by side, which shows as stripes. In each pixel the samples are
+    spread as those of `SobolSampler`, for any number of samples.
 
     After the idea of A. Ahmed and P. Wonka, Screen-Space Blue-Noise Diffusion of Monte Carlo
     Sampling Error via Hierarchical Ordering of Pixels, SIGGRAPH Asia 2020, which needs the number of
@@ -172,7 +173,8 @@ class BlueNoiseSampler(Sampler):
         first = np.zeros(len(pixel), u4)
         row = pixel // self.width
         place = _every_second_bit(pixel - row * self.width) | _every_second_bit(row) << u4(1)
-        own = _sequence(_stream(self.seed ^ _GOLDEN, bounce, dimension), place, first)
+        another = _stream(self.seed ^ _GOLDEN, bounce, dimension)
+        own = _sequence(another, _turn_squares(place, another.words[0]), first)
         out = np.empty((2, len(pixel)), f4)
         for word, shift, numbers in zip(_points(stream, sample, first, 2), own, out, strict=True):
             _fraction(word ^ shift, numbers)
@@ -339,6 +341,17 @@ def _every_second_bit(x: Words) -> Words:
     for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
         x = (x | x << u4(shift)) & u4(mask)
     return x
+
+
+def _turn_squares(place: Words, key: np.uint32) -> Words:
+    """Mirror some squares of a Morton curve at their diagonal: swap bits 2i and 2i + 1 of `place` (n,).
+
+    Whether to do so is a hash of the bits above, by which the square is known, as in `_owen`.
+    """
+    turned = _reverse(place)
+    flips = _reverse(_owen(turned, np.full_like(turned, key)) ^ turned)
+    swap = (place ^ place >> u4(1)) & flips >> u4(1) & u4(0x55555555)
+    return place ^ (swap | swap << u4(1))
 
 
 def _reverse(x: Words) -> Words:
