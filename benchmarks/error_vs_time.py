@@ -3,18 +3,30 @@
 python benchmarks/error_vs_time.py [--scene cornell|mesh|lights|all] [--data DATA] [--out plot.png]
 
 Sides: wavefront with each sampler, numpy and embree; Mitsuba `llvm_ad_rgb` and `scalar_rgb`, each with
-`independent` and `multijitter`. All are measured in turn, warm, medians over the repeats; Mitsuba's
-first render with its compilation is reported apart. The reference is the mean of two converged
-renders, one of each side, whose means are compared first. A table of error and time per sample count
-is printed, and for each side the time to the error that `llvm_ad_rgb independent` has at its largest
-sample count, by interpolation on logarithms. Needs `pip install wavefront[bench]`, and for
+`independent` and `multijitter`. All draw the same shapes with as many bounces, a box filter and a worker
+per core. The reference is the mean of two converged renders, one of each side, whose means are compared
+first. Printed are, for each side:
+
+- error and wall time at each sample count, warm: medians over the repeats, the sides in turn. A render of
+  wavefront includes setting up its scene, boxes and all; Mitsuba's scene is loaded once, beforehand;
+- what a fresh process takes besides, once: importing the renderer, loading the scene, compiling. It is
+  the time of a process of its own, with an empty cache of compiled kernels, less that of a warm render;
+- time to the error that `llvm_ad_rgb independent` has at its largest sample count, by straight lines
+  between the measured points on logarithmic axes, and beyond the last by the last two (marked *); a side
+  whose fewest samples have less error than that is given their time;
+- speed at that error relative to `llvm_ad_rgb independent`, warm, and cold with what comes once added.
+
+With `--keep FILE` results join those of earlier runs in that file, and the plot shows all of them, so
+that the scenes can be measured one at a time. Needs `pip install wavefront[bench]`, and for
 `llvm_ad_rgb` an LLVM library (DRJIT_LIBLLVM_PATH).
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
+import subprocess
 import sys
 import tempfile
 import time
@@ -28,12 +40,20 @@ from many_lights import lit
 from mitsuba_scene import to_mitsuba
 
 import wavefront as wf
+from wavefront.sampling.sampler import SAMPLERS
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
 from cornell_box import cornell_box
 
 BOUNCES = {"cornell": 7, "mesh": 7, "lights": 3}
 SPP = (4, 16, 64)
+IMPORT = """
+import time
+import numpy
+begin = time.perf_counter()
+import wavefront
+print(time.perf_counter() - begin)
+"""
 Render = Callable[[int, int], np.ndarray]  # spp, seed -> picture
 
 
@@ -91,33 +111,75 @@ def ours(scene: wf.Scene, bounces: int, sampler: str, accel: str) -> Render:
     return render
 
 
-def mitsuba(scene: wf.Scene, bounces: int, sampler: str, variant: str) -> Render:
-    """Return a renderer of Mitsuba."""
+def mitsuba(
+    scene: wf.Scene, bounces: int, sampler: str, variant: str, counts: tuple[int, ...] = SPP
+) -> Render:
+    """Return a renderer of Mitsuba, with the scene loaded for each of some sample counts."""
     import mitsuba as mi
 
     mi.set_variant(variant)
-    loaded = {spp: to_mitsuba(mi, scene, bounces, sampler, spp) for spp in SPP}
+    loaded = {spp: to_mitsuba(mi, scene, bounces, sampler, spp) for spp in counts}
 
     def render(spp: int, seed: int) -> np.ndarray:
         mi.set_variant(variant)
-        subject = loaded.get(spp, loaded[SPP[-1]])
+        subject = loaded.get(spp, loaded[counts[-1]])
         return np.array(mi.render(subject, spp=spp, seed=seed))
 
     return render
 
 
+def renderer(side: str, scene: wf.Scene, bounces: int, counts: tuple[int, ...] = SPP) -> Render:
+    """Return the renderer of a side, called "wavefront embree sobol" or "scalar_rgb multijitter"."""
+    *_, engine, sampler = side.split()
+    if side.startswith("wavefront"):
+        return ours(scene, bounces, sampler, engine)
+    return mitsuba(scene, bounces, sampler, engine, counts)
+
+
+def first(side: str, options: argparse.Namespace, name: str) -> float:
+    """Return the seconds of a first render in a process of its own, import and loading included."""
+    command = [sys.executable, __file__, "--scene", name, "--size", str(options.size), "--first", side]
+    if options.data:
+        command += ["--data", str(options.data)]
+    seconds = []
+    for _ in range(3):
+        with tempfile.TemporaryDirectory() as home:  # without Mitsuba's cache of compiled kernels
+            seconds.append(printed_by(command, HOME=home))
+    return median(seconds)
+
+
+def print_first(side: str, scene: wf.Scene, bounces: int) -> None:
+    """Print how long a first render takes in this process, the scene's arrays being there already."""
+    begin = time.perf_counter()
+    renderer(side, scene, bounces, SPP[:1])(SPP[0], 0)
+    seconds = time.perf_counter() - begin
+    if side.startswith("wavefront"):  # which this script has imported
+        seconds += printed_by([sys.executable, "-c", IMPORT])
+    print(seconds)
+
+
+def printed_by(command: list[str], **environment: str) -> float:
+    """Run a process and return the number that it prints last."""
+    done = subprocess.run(command, env={**os.environ, **environment}, check=True, stdout=subprocess.PIPE)
+    return float(done.stdout.split()[-1])
+
+
 def reference(scene: wf.Scene, bounces: int, spp: int, variant: str) -> np.ndarray:
-    """Return the mean of a converged picture of each side, after printing how their means compare."""
-    mine = ours(scene, bounces, "sobol", "auto")(spp, 1000)
-    passes = [
-        mitsuba(scene, bounces, "independent", variant)(256, 2000 + i) for i in range(max(1, spp // 256))
-    ]
-    other = np.mean(passes, 0)
+    """Return the mean of a converged picture of each side, after printing how they compare."""
+    mine = ours(scene, bounces, "sobol", "auto")(spp, 1000).astype(float)
+    render = mitsuba(scene, bounces, "independent", variant)
+    passes = [render(min(spp, 256), 2000 + i) for i in range(max(1, spp // 256))]
+    other = np.mean(passes, 0, dtype=float)
     ratio = mine.mean((0, 1)) / other.mean((0, 1))
-    print(f"converged at {spp} spp: mean of wavefront / mean of mitsuba = {ratio.round(4)}")
-    if np.abs(ratio - 1).max() > 0.01:
-        print("the means differ by more than 1 %: the figures below are not comparable")
-    return (mine.astype(float) + other) / 2
+    chance = (mine - other).std((0, 1)) / other.mean((0, 1)) / np.sqrt(mine[..., 0].size)
+    print(
+        f"converged at {spp} spp: mean of wavefront / mean of mitsuba = {ratio.round(4)} ± {chance.round(4)}"
+    )
+    if (np.abs(ratio - 1) > 4 * chance + 0.001).any():
+        print("the means differ by more than chance and 0.1 %: the figures below are not comparable")
+    exact = (mine + other) / 2
+    print(f"relative MSE of the reference itself, their mean: {relative_mse(mine, exact):.2g}")
+    return exact
 
 
 def relative_mse(picture: np.ndarray, exact: np.ndarray) -> float:
@@ -125,31 +187,30 @@ def relative_mse(picture: np.ndarray, exact: np.ndarray) -> float:
     return wf.compare(picture.astype(np.float32), exact.astype(np.float32)).relative_mse
 
 
-def time_to(error: float, errors: list[float], times: list[float]) -> float:
-    """Interpolate, or extrapolate, the time to an error on logarithms."""
-    slope, offset = np.polyfit(np.log(errors), np.log(times), 1)
-    return float(np.exp(slope * np.log(error) + offset))
+def time_to(error: float, errors: list[float], times: list[float]) -> tuple[float, bool]:
+    """Return the time to an error, on straight lines through logarithms, and whether it was extrapolated."""
+    if error >= errors[0]:
+        return times[0], False
+    x, y = np.log(errors), np.log(times)
+    end = next((i for i in range(1, len(x)) if errors[i] <= error), len(x) - 1)
+    slope = (y[end] - y[end - 1]) / (x[end] - x[end - 1])
+    return float(np.exp(y[end] + slope * (np.log(error) - x[end]))), error < errors[-1]
 
 
 def measure(name: str, scene: wf.Scene, options: argparse.Namespace) -> dict[str, Any]:
     """Measure all sides on one scene and print the table."""
     bounces = BOUNCES[name]
     variants = [v for v in ("llvm_ad_rgb", "scalar_rgb") if v in options.variants]
-    print(f"\n## {name}: {scene.camera.size[0]}x{scene.camera.size[1]}, max_bounces {bounces}")
+    print(f"\n## {name}: {scene.camera.size[0]}x{scene.camera.size[1]}, max_bounces {bounces}", flush=True)
     exact = reference(scene, bounces, options.reference_spp, variants[0])
-    sides: dict[str, Render] = {}
-    for accel in ("numpy", "embree"):
-        for sampler in ("independent", "sobol"):
-            sides[f"wavefront {accel} {sampler}"] = ours(scene, bounces, sampler, accel)
-    for variant in variants:
-        for sampler in ("independent", "multijitter"):
-            side = mitsuba(scene, bounces, sampler, variant)
-            begin = time.perf_counter()
-            side(SPP[0], 0)
-            print(f"first render at {SPP[0]} spp, {variant} {sampler}: {time.perf_counter() - begin:.2f} s")
-            sides[f"{variant} {sampler}"] = side
-    times = {side: {spp: [] for spp in SPP} for side in sides}
-    errors = {side: {spp: [] for spp in SPP} for side in sides}
+    names = [f"wavefront {accel} {sampler}" for accel in ("numpy", "embree") for sampler in SAMPLERS]
+    names += [f"{variant} {sampler}" for variant in variants for sampler in ("independent", "multijitter")]
+    sides = {side: renderer(side, scene, bounces) for side in names}
+    for side, render in sides.items():  # warm up; Mitsuba may compile anew for each sample count
+        for spp in SPP[:1] if side.startswith("wavefront") else SPP:
+            render(spp, 0)
+    times: dict[str, Any] = {side: {spp: [] for spp in SPP} for side in sides}
+    errors: dict[str, Any] = {side: {spp: [] for spp in SPP} for side in sides}
     for spp in SPP:
         for seed in range(options.repeat):
             for side, render in sides.items():
@@ -157,45 +218,78 @@ def measure(name: str, scene: wf.Scene, options: argparse.Namespace) -> dict[str
                 picture = render(spp, seed)
                 times[side][spp].append(time.perf_counter() - begin)
                 errors[side][spp].append(relative_mse(picture, exact))
-    return report(times, errors)
-
-
-def report(times: dict[str, Any], errors: dict[str, Any]) -> dict[str, Any]:
-    """Print error and time per sample count, and the time to equal error; return the medians."""
-    medians = {
-        side: ([median(errors[side][spp]) for spp in SPP], [median(times[side][spp]) for spp in SPP])
-        for side in times
+    found = {
+        side: {
+            "errors": [median(errors[side][spp]) for spp in SPP],
+            "seconds": [median(times[side][spp]) for spp in SPP],
+            "once": max(0.0, first(side, options, name) - median(times[side][SPP[0]])),
+        }
+        for side in sides
     }
+    report(found)
+    return found
+
+
+def report(found: dict[str, Any]) -> None:
+    """Print error and time per sample count, and the time to equal error."""
     base = "llvm_ad_rgb independent"
-    base = base if base in medians else next(side for side in medians if "rgb" in side)
-    target = medians[base][0][-1]
-    head = "".join(f"{f'{spp} spp':>22}" for spp in SPP)
-    print(f"{'relMSE in seconds':32}{head}{'time to ' + format(target, '.2g'):>18}{'speed':>8}")
-    base_time = time_to(target, *medians[base])
-    for side, (error, seconds) in medians.items():
-        cells = "".join(f"{f'{e:.5f} in {s:.2f} s':>22}" for e, s in zip(error, seconds, strict=True))
-        reached = time_to(target, error, seconds)
-        print(f"{side:32}{cells}{reached:16.2f} s{base_time / reached:7.2f}x")
-    return medians
+    base = base if base in found else next(side for side in found if "rgb" in side)
+    target = found[base]["errors"][-1]
+    head = "".join(f"{f'{spp} spp':>19}" for spp in SPP)
+    print(
+        f"{'relMSE in seconds':29}{head}{'once':>7}{'to ' + format(target, '.2g'):>11}{'warm':>8}{'cold':>7}"
+    )
+    base_time = found[base]["seconds"][-1]
+    for side, of in found.items():
+        cells = "".join(
+            f"{f'{e:.5f} in {s:.2f}':>19}" for e, s in zip(of["errors"], of["seconds"], strict=True)
+        )
+        reached, beyond = time_to(target, of["errors"], of["seconds"])
+        cold = (base_time + found[base]["once"]) / (reached + of["once"])
+        mark = "*" if beyond else " "
+        print(
+            f"{side:29}{cells}{of['once']:7.2f}{reached:10.2f}{mark}{base_time / reached:7.2f}x{cold:6.2f}x"
+        )
 
 
-def plot(results: dict[str, dict[str, Any]], path: Path) -> None:
+COLOURS = {"wavefront numpy": "C3", "wavefront embree": "C1", "llvm_ad_rgb": "C0", "scalar_rgb": "C2"}
+LINES = {"independent": ":", "sobol": "-", "bluenoise": "--", "multijitter": "-"}
+
+
+def plot(results: dict[str, Any], path: Path) -> None:
     """Draw error over time, a panel for each scene, both axes logarithmic."""
     import matplotlib
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
+    from matplotlib.ticker import NullFormatter
 
-    figure, axes = plt.subplots(1, len(results), figsize=(6 * len(results), 5), squeeze=False)
-    for axis, (name, medians) in zip(axes[0], results.items(), strict=True):
-        for side, (error, seconds) in medians.items():
-            axis.loglog(seconds, error, "o-" if side.startswith("wavefront") else "s--", label=side)
-        axis.set(title=name, xlabel="seconds", ylabel="relative MSE")
-        axis.grid(True, which="both", alpha=0.3)
-    axes[0][0].legend(fontsize=7)
-    figure.tight_layout()
+    figure, axes = plt.subplots(1, len(results), figsize=(4.2 * len(results), 4.6), squeeze=False)
+    for axis, (name, found) in zip(axes[0], results.items(), strict=True):
+        for side, of in found.items():
+            engine, sampler = side.rsplit(maxsplit=1)
+            marker = "o" if side.startswith("wavefront") else "s"
+            style = {"color": COLOURS[engine], "linestyle": LINES[sampler], "marker": marker, "markersize": 4}
+            axis.loglog(of["seconds"], of["errors"], label=side, **style)
+        axis.set(title=name, xlabel="seconds, warm")
+        axis.grid(True, which="both", alpha=0.25)
+        axis.xaxis.set_minor_formatter(NullFormatter())
+    axes[0][0].set_ylabel("relative MSE")
+    handles, labels = axes[0][0].get_legend_handles_labels()
+    rows = -(-len(labels) // (2 * len(results)))
+    figure.tight_layout(rect=(0, 0.05 * rows, 1, 1))
+    figure.legend(handles, labels, fontsize=7, ncols=2 * len(results), loc="lower center", frameon=False)
     figure.savefig(path, dpi=80)
     print(f"wrote {path}")
+
+
+def joined(found: dict[str, Any], kept: Path | None) -> dict[str, Any]:
+    """Return results together with those kept in a file, and keep them there too."""
+    if kept is None:
+        return found
+    everything = {**(json.loads(kept.read_text()) if kept.exists() else {}), **found}
+    kept.write_text(json.dumps(everything, indent=1))
+    return everything
 
 
 if __name__ == "__main__":
@@ -209,12 +303,16 @@ if __name__ == "__main__":
     parser.add_argument("--reference-spp", type=int, default=4096)
     parser.add_argument("--variants", default="llvm_ad_rgb,scalar_rgb")
     parser.add_argument("--out", type=Path, default=Path("error_vs_time.png"))
+    parser.add_argument("--keep", type=Path, help="JSON file of results to add to")
+    parser.add_argument("--first", help=argparse.SUPPRESS)  # a side: print what its first render takes
     chosen = parser.parse_args()
-    os.environ["HOME"] = tempfile.mkdtemp()  # without Mitsuba's cache of compiled kernels
     subjects = {
         "cornell": lambda: cornell_box(chosen.size),
         "mesh": lambda: mesh_scene(chosen.data, chosen.size),
         "lights": lambda: lit("panels", 1000, chosen.size),
     }
+    if chosen.first:
+        print_first(chosen.first, subjects[chosen.scene](), BOUNCES[chosen.scene])
+        sys.exit()
     names = list(subjects) if chosen.scene == "all" else [chosen.scene]
-    plot({name: measure(name, subjects[name](), chosen) for name in names}, chosen.out)
+    plot(joined({name: measure(name, subjects[name](), chosen) for name in names}, chosen.keep), chosen.out)
