@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .vec import Floats, f4
+from .vec import Floats, f4, signs
 
 
 @dataclass(slots=True)
@@ -23,7 +23,7 @@ class Frame:
 
         Source: Duff et al. 2017, "Building an Orthonormal Basis, Revisited", JCGT 6(1), listing 3.
         """
-        sign = np.copysign(f4(1), z[2])
+        sign = signs(z[2])
         a = f4(-1) / (sign + z[2])
         b = z[0] * z[1] * a
         x, y = np.empty_like(z), np.empty_like(z)

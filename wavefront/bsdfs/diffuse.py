@@ -32,7 +32,7 @@ class Diffuse(Bsdf):
 
     def f(self, wo: Floats, wi: Floats) -> Floats:
         """Return reflectance/π above the surface, (3, n)."""
-        return self.reflectance * np.where(wi[2] > 0, INV_PI, f4(0))
+        return self.reflectance * ((wi[2] > 0) * INV_PI)
 
     def pdf(self, wo: Floats, wi: Floats) -> Floats:
         """Return cosθ/π, (n,)."""
@@ -42,5 +42,5 @@ class Diffuse(Bsdf):
         """Draw cosine-weighted directions; the weight is the reflectance itself."""
         wi = cosine_hemisphere(u)
         pdf = cosine_hemisphere_pdf(wi)
-        weight = self.reflectance * np.where(pdf > 0, f4(1), f4(0))
+        weight = self.reflectance * (pdf > 0).astype(f4)
         return BsdfSample(wi, weight, pdf, np.zeros(len(pdf), np.bool_))

@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..state import Columns
-from ..vec import Floats
+from ..vec import Floats, f4
+
+TINY = f4(1e-35)  # added to squared distances before their root is divided by; lost in any that matter
 
 
 @dataclass(slots=True)
@@ -72,6 +74,22 @@ class Light(Columns, ABC):
         """
         alike = self.power(scene_radius) / (4 * np.pi * max(scene_radius, 1e-30) ** 2)
         return np.broadcast_to(alike, (centre.shape[1], len(alike)))
+
+
+def area_pdf(d2: Floats, cos_light: Floats, area: Floats) -> Floats:
+    """Solid-angle density d²/(A·cosθ) of points drawn uniformly from an area; 0 on a dark side; (n,).
+
+    Parameters
+    ----------
+    d2
+        (n,) squared distances of the points.
+    cos_light
+        (n,) cosines at the points, above 0 on a side that shines.
+    area
+        (n,) or (1,).
+    """
+    lit = cos_light > 0
+    return d2 * lit / ((np.abs(cos_light) + ~lit) * area)  # + ~lit keeps 0/0 away
 
 
 def facing_area(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError
+from ..sampling.mis import power_heuristic
 from ..vec import ALL, Floats, Ints, Lanes, columns, f4
 from .base import Light, LightSample
 from .choice import Among, ByPlace, EverywhereAlike, LightChoice
@@ -96,6 +97,12 @@ class LightTable:
         for kind, rows in self._by_kind(light):
             pdf[rows] = kind.pdf_li(columns(point, rows), columns(wi, rows))
         return pdf * self.choice.pmf(light, point)
+
+    def mis_weight(self, light: Ints, pdf: Floats, pdf_bsdf: Floats) -> Floats:
+        """Weight of samples of lights numbered `light` (n,) against BSDF sampling: 1 for delta lights."""
+        weight = power_heuristic(pdf, pdf_bsdf)
+        weight[self.delta_of.take(light).nonzero()[0]] = 1
+        return weight
 
     def le(self, light: Ints, wi: Floats) -> Floats:
         """Radiance (3, n) of the lights numbered `light` (n,) against wi (3, n)."""

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..sampling.spherical import SphericalRectangle
 from ..vec import Bools, Floats, Ints, dot, f4
-from .base import Light, LightSample, facing_area
+from .base import TINY, Light, LightSample, area_pdf, facing_area
 
 NEAR = f4(2)  # squared distance, in areas, within which solid angle is sampled
 SQUARE = 1e-6  # how far, relative to its sides, a pair of triangles may be from a rectangle
@@ -43,59 +43,71 @@ class RectangleLights(Light):
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
         """Draw a point uniformly by area, or from nearby a direction uniformly in solid angle."""
-        target = self.corner + self.edge_u * u[0] + self.edge_v * u[1]
-        wi = target - point
-        d2 = dot(wi, wi)
-        near = np.flatnonzero(self._near(point))
-        seen = self._seen(point, near)
+        wi = self.edge_u * u[0]
+        wi += self.edge_v * u[1]
+        wi += self.corner
+        wi -= point
+        height = self._facing(self._rise(point))
+        near = self._near(point, height)
         if near.size:
-            away = seen.sample(u.take(near, 1))
-            wi[:, near], d2[near] = away, dot(away, away)
-        distance = np.sqrt(d2)
-        wi /= np.where(distance > 0, distance, f4(1))
-        cos_light = self._cosine(wi)
-        pdf = self._pdf(near, seen, d2, cos_light)
+            seen = self._seen(point, near)
+            wi[:, near] = seen.sample(u.take(near, 1))
+        d2 = dot(wi, wi)
+        distance = np.sqrt(d2 + TINY)
+        wi /= distance
+        cos_light = height / distance
+        pdf = area_pdf(d2, cos_light, self._area())
+        if near.size:
+            pdf[near] = seen.pdf()
         return LightSample(wi, np.broadcast_to(self.radiance, wi.shape), pdf, distance, cos_light)
 
     def pdf_li(self, point: Floats, wi: Floats) -> Floats:
         """Return the density of `sample_li` where the ray meets a side that shines."""
-        away = self.corner - point
-        cos_light = self._cosine(wi)
-        lit = cos_light > 0
-        t = dot(self.normal, away) / np.where(lit, dot(self.normal, wi), f4(1))
-        on_plane = wi * t - away
-        meets = lit & (t > 0) & _within(on_plane, self.edge_u) & _within(on_plane, self.edge_v)
-        near = np.flatnonzero(self._near(point))
-        pdf = self._pdf(near, self._seen(point, near), t * t, cos_light)
-        return np.where(meets, pdf, f4(0))
-
-    def _pdf(self, near: Ints, seen: SphericalRectangle, d2: Floats, cos_light: Floats) -> Floats:
-        """Return d²/(A·cosθ), and on the lanes `near` 1/(solid angle) as `seen`; 0 on a dark side."""
-        lit = cos_light > 0
-        pdf = np.where(lit, d2, f4(0)) / (np.where(lit, cos_light, f4(1)) * self._area())
+        rise, fall = self._rise(point), -dot(self.normal, wi)
+        cos_light = self._facing(fall)
+        t = rise / np.where(cos_light > 0, fall, f4(1))
+        on_plane = wi * t - (self.corner - point)
+        meets = (cos_light > 0) & (t > 0) & _within(on_plane, self.edge_u) & _within(on_plane, self.edge_v)
+        pdf = area_pdf(t * t, cos_light, self._area())
+        near = self._near(point, self._facing(rise))
         if near.size:
-            pdf[near] = np.where(lit.take(near), seen.pdf(), f4(0))
-        return pdf
+            pdf[near] = self._seen(point, near).pdf()
+        return np.where(meets, pdf, f4(0))
 
     def _area(self) -> Floats:
         return np.sqrt(dot(self.edge_u, self.edge_u) * dot(self.edge_v, self.edge_v))
 
-    def _near(self, point: Floats) -> Bools:
-        """Tell which points that get light are close to the middle, for the rectangle's size, (n,).
+    def _rise(self, point: Floats) -> Floats:
+        """Height (n,) of points over the front."""
+        return dot(self.normal, point) - dot(self.normal, self.corner)
+
+    def _facing(self, rise: Floats) -> Floats:
+        """Turn heights, or cosines, over the front (n,) into those over a side that shines."""
+        return rise
+
+    def _near(self, point: Floats, height: Floats) -> Ints:
+        """Lanes (k,) of points that get light and are close to the middle, for the rectangle's size.
 
         From afar both densities are alike, and sampling the area costs a seventh.
         """
-        away = self.corner + f4(0.5) * (self.edge_u + self.edge_v) - point
-        return (dot(away, away) < NEAR * self._area()) & (self._cosine(away) > 0)
+        within = NEAR * self._area()
+        low = np.flatnonzero((height > 0) & (height < np.sqrt(within)))
+        some = self._at(low)
+        away = some.corner + f4(0.5) * (some.edge_u + some.edge_v) - point.take(low, 1)
+        return low.compress(dot(away, away) < NEAR * some._area())
+
+    def _at(self, lanes: Ints) -> Self:
+        """Return the rectangles of some lanes."""
+        return self if len(self) == 1 else self.take(lanes)
 
     def _seen(self, point: Floats, lanes: Ints) -> SphericalRectangle:
         """Return the rectangles as seen from the points of some lanes."""
-        one = self if len(self) == 1 else self.take(lanes)
-        return SphericalRectangle.of(one.corner - point.take(lanes, 1), one.edge_u, one.edge_v)
+        some = self._at(lanes)
+        return SphericalRectangle.of(some.corner - point.take(lanes, 1), some.edge_u, some.edge_v)
 
     def le(self, wi: Floats) -> Floats:
         """Return the radiance on rays that come upon a side that shines, (3, n)."""
-        return self.radiance * (self._cosine(wi) > 0)
+        return self.radiance * (self._facing(-dot(self.normal, wi)) > 0)
 
     def power(self, scene_radius: float) -> NDArray[np.float64]:
         """π·A·L for each side."""
@@ -109,10 +121,6 @@ class RectangleLights(Light):
         strength = self._area() * self.radiance.mean(0, dtype=np.float64)
         return facing_area(centre, radius, middle, self.normal, np.sqrt(self._area()), strength, self.sides)
 
-    def _cosine(self, wi: Floats) -> Floats:
-        """Cosine (n,) of rays along wi against the normal, above 0 on sides that shine."""
-        return -dot(self.normal, wi)
-
 
 @dataclass(slots=True)
 class TwoSidedRectangleLights(RectangleLights):
@@ -120,8 +128,8 @@ class TwoSidedRectangleLights(RectangleLights):
 
     sides: ClassVar[int] = 2
 
-    def _cosine(self, wi: Floats) -> Floats:
-        return np.abs(dot(self.normal, wi))
+    def _facing(self, rise: Floats) -> Floats:
+        return np.abs(rise)
 
 
 def first_of_pairs(triangles: NDArray[np.float64]) -> Ints:

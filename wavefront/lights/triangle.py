@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..sampling.warp import uniform_triangle
 from ..vec import Floats, cross, dot, f4
-from .base import Light, LightSample, facing_area
+from .base import TINY, Light, LightSample, area_pdf, facing_area
 
 
 @dataclass(slots=True)
@@ -42,14 +42,15 @@ class TriangleLights(Light):
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
         """Pick a point uniformly by area; its density in solid angle is d²/(A·cosθ)."""
         b = self.weights(u)
-        target = self.corner + self.edge1 * b[0] + self.edge2 * b[1]
-        wi = target - point
+        wi = self.edge1 * b[0]
+        wi += self.edge2 * b[1]
+        wi += self.corner
+        wi -= point
         d2 = dot(wi, wi)
-        distance = np.sqrt(d2)
-        wi /= np.where(distance > 0, distance, f4(1))
+        distance = np.sqrt(d2 + TINY)
+        wi /= distance
         cos_light = self._cosine(wi)
-        lit = cos_light > 0
-        pdf = np.where(lit, d2, f4(0)) / (np.where(lit, cos_light, f4(1)) * self.area)
+        pdf = area_pdf(d2, cos_light, self.area)
         radiance = np.broadcast_to(self.radiance, wi.shape)
         return LightSample(wi, radiance, pdf, distance, cos_light)
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..vec import Floats, f4
+from ..vec import Floats, f4, positive
 
 TWO_PI = f4(2 * np.pi)
 INV_PI = f4(1 / np.pi)
@@ -37,7 +37,7 @@ def cosine_hemisphere(u: Floats) -> Floats:
 
 def cosine_hemisphere_pdf(w: Floats) -> Floats:
     """Density of `cosine_hemisphere` at unit directions w (3, n), 1/sr."""
-    return np.maximum(w[2], f4(0)) * INV_PI
+    return positive(w[2]) * INV_PI
 
 
 def cosine_hemisphere_inverse(w: Floats) -> Floats:

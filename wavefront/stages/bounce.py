@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..bsdfs import BsdfSample
 from ..sampling.sampler import Dimension, Sampler
 from ..state import Paths
-from ..vec import columns, dot, f4
+from ..vec import Floats, columns, dot, f4
 from .shade import Shading
 from .surface import leave
 
@@ -17,42 +18,54 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
     The throughput is 0 where there is no sample, and where shading and geometric normal disagree
     on the side of the sampled direction.
     """
-    n = len(paths)
     surface = shade.surface
-    wi, weight = np.empty((3, n), f4), np.empty((3, n), f4)
-    pdf, specular, eta2 = np.empty(n, f4), np.empty(n, np.bool_), paths.eta2.copy()
-    u = _numbers(paths, shade, sampler, bounce)
-    for lanes, bsdf in shade.groups:
-        sample = bsdf.sample_f(columns(shade.wo, lanes), columns(u[: bsdf.dimensions], lanes))
-        wi[:, lanes], weight[:, lanes] = sample.wi, sample.weight
-        pdf[lanes], specular[lanes] = sample.pdf, sample.specular
-        if sample.eta is not None:
-            eta2[lanes] *= sample.eta**2
-    direction = shade.frame.to_world(wi)
+    sample = _sample(shade, _numbers(paths, shade, sampler, bounce))
+    direction = shade.frame.to_world(sample.wi)
     cos_g = dot(surface.ng, direction)
-    sides = wi[2] * cos_g
-    weight *= np.where(np.isnan(sides), sides, sides > 0)  # NaN stays, to be counted
+    throughput = paths.throughput * sample.weight
+    sides = sample.wi[2] * cos_g
+    lost = np.flatnonzero(~(sides > 0))
+    throughput[:, lost] *= f4(0) * sides.take(lost)  # NaN stays, to be counted
     return Paths(
         slot=paths.slot,
         pixel=paths.pixel,
         sample=paths.sample,
-        origin=leave(surface.point, surface.error, surface.ng, direction),
+        origin=leave(surface, cos_g),
         direction=direction,
         leaving=surface.prim,
-        throughput=paths.throughput * weight,
-        pdf=pdf,
-        specular=specular,
-        eta2=eta2,
+        throughput=throughput,
+        pdf=sample.pdf,
+        specular=sample.specular,
+        eta2=paths.eta2 if sample.eta is None else paths.eta2 * sample.eta**2,
     )
 
 
-def _numbers(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -> np.ndarray:
+def _sample(shade: Shading, u: Floats) -> BsdfSample:
+    """Sample each group's material for its lanes."""
+    if len(shade.groups) == 1:
+        bsdf = shade.groups[0][1]
+        return bsdf.sample_f(shade.wo, u[: bsdf.dimensions])
+    n = u.shape[1]
+    out = BsdfSample(
+        np.empty((3, n), f4), np.empty((3, n), f4), np.empty(n, f4), np.empty(n, np.bool_), np.ones(n, f4)
+    )
+    assert out.eta is not None
+    for lanes, bsdf in shade.groups:
+        part = bsdf.sample_f(columns(shade.wo, lanes), columns(u[: bsdf.dimensions], lanes))
+        out.wi[:, lanes], out.weight[:, lanes] = part.wi, part.weight
+        out.pdf[lanes], out.specular[lanes] = part.pdf, part.specular
+        if part.eta is not None:
+            out.eta[lanes] = part.eta
+    return out
+
+
+def _numbers(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -> Floats:
     """Draw as many numbers as the materials present read: 2 for the direction, a third for the lobe."""
     address = paths.pixel, paths.sample, bounce
     rows = max((bsdf.dimensions for _, bsdf in shade.groups), default=0)
-    u = np.empty((max(rows, 2), len(paths)), f4)
-    if rows:
-        u[:2] = sampler.draw_2d(*address, Dimension.DIRECTION)
-    if rows > 2:
-        u[2] = sampler.draw_1d(*address, Dimension.LOBE)
-    return u
+    if rows == 0:
+        return np.empty((0, len(paths)), f4)
+    direction = sampler.draw_2d(*address, Dimension.DIRECTION)
+    if rows <= 2:
+        return direction
+    return np.concatenate([direction, sampler.draw_1d(*address, Dimension.LOBE)[None]])

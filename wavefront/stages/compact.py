@@ -34,7 +34,7 @@ def roulette(paths: Paths, sampler: Sampler, bounce: int) -> Ints:
     """
     if bounce < ROULETTE_AFTER or not len(paths):
         return np.flatnonzero(carrying(paths))
-    chance = np.minimum(np.sqrt(paths.throughput.max(0) * paths.eta2), f4(1))
+    chance = np.clip(np.sqrt(paths.throughput.max(0) * paths.eta2), SMALLEST, f4(1))
     u = sampler.draw_1d(paths.pixel, paths.sample, bounce, Dimension.ROULETTE)
-    paths.throughput /= np.maximum(chance, SMALLEST)
+    paths.throughput /= chance
     return np.flatnonzero(~(u >= chance))  # NaN lives on, to be counted

@@ -9,7 +9,7 @@ import numpy as np
 from ..lights import LightSample
 from ..scene import CompiledScene
 from ..state import Hits, Rays, Surface
-from ..vec import Bools, Floats, Ints, f4
+from ..vec import Bools, Floats, Ints, f4, positive
 from .surface import leave
 
 TARGET_ERROR = f4(2**-20)  # rounding of a sampled point on a light, relative to its distance
@@ -33,14 +33,23 @@ def intersect(scene: CompiledScene, rays: Rays) -> Hits:
     return Hits(found.t, row, found.b1, found.b2, place)
 
 
-def shadow_rays(surface: Surface, lanes: Ints, light: LightSample) -> ShadowRays:
-    """Return rays (k,) from points to the sampled points on their lights.
+def shadow_rays(surface: Surface, start: Floats, lanes: Ints, light: LightSample, cos: Floats) -> ShadowRays:
+    """Return rays from points to the sampled points on their lights.
 
-    `lanes` (k,) are the columns of `surface` that the columns of `light` belong to.
+    Parameters
+    ----------
+    surface, start
+        n points, and where rays start that leave them to the side of wo, (3, n).
+    lanes
+        (k,) columns of these that the k columns of `light` belong to.
+    cos
+        (k,) cosines between the rays and the surfaces' geometric normals.
     """
-    point, error = surface.point.take(lanes, 1), surface.error.take(lanes)
-    origin = leave(point, error, surface.ng.take(lanes, 1), light.wi)
-    leaving = surface.prim.take(lanes)
+    origin = start.take(lanes, 1)
+    through = np.flatnonzero(cos < 0)
+    if through.size:
+        origin[:, through] = leave(surface.take(lanes.take(through)), cos.take(through))
+    leaving, error = surface.prim.take(lanes), surface.error.take(lanes)
     return ShadowRays(origin, light.wi, leaving, error, light.distance, light.cos_light)
 
 
@@ -55,6 +64,5 @@ def reach(rays: ShadowRays) -> Floats:
     Both ends are off by a known error; along a ray that meets the light's surface under a small
     cosine an error is 1/cosine times as long.
     """
-    grazing = f4(1) / np.maximum(rays.cos_light, f4(2) * TARGET_ERROR)
-    shortened = rays.distance * (f4(1) - TARGET_ERROR * grazing) - f4(2) * rays.error * grazing
-    return np.maximum(shortened, f4(0))
+    grazing = f4(1) / np.clip(rays.cos_light, f4(2) * TARGET_ERROR, f4(1))
+    return positive(rays.distance * (f4(1) - TARGET_ERROR * grazing) - f4(2) * rays.error * grazing)

@@ -16,7 +16,7 @@ import numpy as np
 from ..sampling.sampler import Dimension, Sampler
 from ..scene import CompiledScene
 from ..state import Hits, Paths, Rays, Surface
-from ..vec import Floats, f4
+from ..vec import Floats, dot, f4
 from .absorb import absorb
 from .intersect import ShadowRays, intersect, reach, visible
 from .surface import interact, leave
@@ -85,5 +85,5 @@ def let_through(scene: CompiledScene, rays: ShadowRays) -> Floats:
 
 def _behind(rays: Going, surface: Surface) -> Going:
     """Return rays as they go on from just behind the surfaces that they pass."""
-    origin = leave(surface.point, surface.error, surface.ng, rays.direction)
+    origin = leave(surface, dot(surface.ng, rays.direction))
     return replace(rays, origin=origin, leaving=surface.prim)

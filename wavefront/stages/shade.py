@@ -16,7 +16,7 @@ from ..vec import ALL, Floats, Ints, Lanes, columns, dot, f4
 from .intersect import shadow_rays, visible
 from .passing import let_through
 from .shine import shine_at_hits, shine_at_samples
-from .surface import leave
+from .surface import above
 
 
 @dataclass(slots=True)
@@ -100,16 +100,16 @@ def direct(
     u_choice = np.zeros(len(paths), f4) if alone else sampler.draw_1d(*address, Dimension.LIGHT)
     u_point = sampler.draw_2d(*address, Dimension.LIGHT_POINT)
     # from where a reflected ray would start, so that mis_weighted finds the same densities
-    start = leave(surface.point, surface.error, surface.ng, surface.ng)
+    start = above(surface)
     light, number = scene.lights.sample_li(start, u_choice, u_point)
-    f_cos, pdf = evaluate(shade, shade.frame.to_local(light.wi), dot(surface.ng, light.wi))
+    cos_g = dot(surface.ng, light.wi)
+    f_cos, pdf = evaluate(shade, shade.frame.to_local(light.wi), cos_g)
     lanes = np.flatnonzero((light.pdf > 0) & (f_cos.max(0) != 0))  # NaN stays, to be counted
     light, number, f_cos, pdf = light.take(lanes), number.take(lanes), f_cos.take(lanes, 1), pdf.take(lanes)
-    delta = scene.lights.delta_of.take(number)
-    weight = np.where(delta, f4(1), power_heuristic(light.pdf, pdf)) if mis else f4(1)
-    rays = shadow_rays(surface, lanes, light)
+    weight = scene.lights.mis_weight(number, light.pdf, pdf) if mis else f4(1)
+    rays = shadow_rays(surface, start, lanes, light, cos_g.take(lanes))
     if scene.uneven is not None:
-        shine_at_samples(scene, rays, number, u_point.take(lanes, 1), light.radiance)
+        light.radiance = shine_at_samples(scene, rays, number, u_point.take(lanes, 1), light.radiance)
     radiance = f_cos * light.radiance * (weight / light.pdf)
     if scene.opacities is not None:
         return Arrival(lanes, radiance * let_through(scene, rays))
@@ -124,7 +124,7 @@ def evaluate(shade: Shading, wi: Floats, cos_g: Floats) -> tuple[Floats, Floats]
     comes from: where the two normals disagree there is no light, so none leaks through.
     """
     n = wi.shape[1]
-    cos = np.where(wi[2] * cos_g > 0, np.abs(wi[2]), f4(0))
+    cos = np.abs(wi[2]) * (wi[2] * cos_g > 0)
     if len(shade.groups) == 1:
         f, pdf = shade.groups[0][1].evaluate(shade.wo, wi)
         return f * cos, pdf

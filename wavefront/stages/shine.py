@@ -23,8 +23,8 @@ def shine_at_hits(scene: CompiledScene, rays: Rays, hits: Hits, light: Ints, rad
 
 def shine_at_samples(
     scene: CompiledScene, rays: ShadowRays, light: Ints, u: Floats, radiance: Floats
-) -> None:
-    """Set the radiance (3, n) of sampled points on lights numbered `light` (n,), in place, where it varies.
+) -> Floats:
+    """Return the radiance (3, n) of sampled points on lights numbered `light` (n,), changed where it varies.
 
     A light that is only partly there sends as much less: paths meet it less often.
 
@@ -39,9 +39,11 @@ def shine_at_samples(
     triangle = scene.uneven.triangle.take(light)
     lanes = np.flatnonzero(triangle >= 0)
     if lanes.size:
+        radiance = radiance.copy()
         some, number = rays.take(lanes), light.take(lanes)
         b1, b2 = TriangleLights.weights(u.take(lanes, 1))
         surface = interact(scene, some, Hits(some.distance, triangle.take(lanes), b1, b2))
         radiance[:, lanes] = scene.uneven.radiance(number, surface)
         if scene.opacities is not None:
             radiance[:, lanes] *= scene.opacities.at(surface)
+    return radiance

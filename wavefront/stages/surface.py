@@ -8,7 +8,7 @@ from ..instances import InstanceTable
 from ..scene import CompiledScene
 from ..shapes.attributes import ATTRIBUTES, Corners
 from ..state import Hits, Rays, Surface
-from ..vec import Floats, Ints, dot, f4, length, normalize
+from ..vec import Floats, Ints, dot, f4, length, normalize, signs
 
 # o + t·d carries at most three roundings of half an ulp (2⁻²⁴) of its terms; this is five times that.
 POINT_ERROR = f4(2**-21)
@@ -27,7 +27,7 @@ def interact(scene: CompiledScene, rays: Rays, hits: Hits) -> Surface:
     ns = _shading_normals(scene, hits, placed, ng)
     facing = dot(ng, wo)
     inside = facing < 0
-    side = np.where(inside, f4(-1), f4(1))
+    side = f4(1) - f4(2) * inside
     ng = ng * side
     ns = ng if ns is None else towards(wo, ns * side)
     prim = hits.prim if placed is None else hits.prim + placed.shift
@@ -86,9 +86,17 @@ def normals(scene: CompiledScene, prim: Ints, point: Floats) -> Floats:
     return ng
 
 
-def leave(point: Floats, error: Floats, ng: Floats, wi: Floats) -> Floats:
-    """Origins (3, n) of rays that leave a surface along wi: moved off it by the point's error (n,)."""
-    return point + ng * np.copysign(error, dot(ng, wi))
+def above(surface: Surface) -> Floats:
+    """Origins (3, n) of rays that leave a surface to the side of wo."""
+    return surface.point + surface.ng * surface.error
+
+
+def leave(surface: Surface, cos: Floats) -> Floats:
+    """Origins (3, n) of rays that leave a surface: moved off it, to a side, by the points' errors.
+
+    `cos` (n,) is the cosine between the rays and `ng`.
+    """
+    return surface.point + surface.ng * (surface.error * signs(cos))
 
 
 def towards(wo: Floats, ns: Floats) -> Floats:
