@@ -25,8 +25,8 @@ def _names(record: type) -> tuple[str, ...]:
 
 
 def _gather(value: NDArray[Any], index: Ints) -> NDArray[Any]:
-    """Columns `index` (m,) of an array; of one column that was broadcast, as many more."""
-    if value.strides[-1] == 0:
+    """Columns `index` (m,) of an array."""
+    if value.strides[-1] == 0:  # one column, broadcast: stays so
         return np.broadcast_to(value[..., :1], (*value.shape[:-1], index.size))
     return value.take(index, -1)
 

@@ -29,6 +29,11 @@ def columns(a: Array, lanes: Lanes) -> Array:
     return a if isinstance(lanes, slice) else a.take(lanes, -1)  # type: ignore[return-value]
 
 
+def alike(value: Any, n: int) -> NDArray[Any]:
+    """One value for n lanes, (n,), read-only: free to keep, and free for `state.Columns.take` to gather."""
+    return np.broadcast_to(value, n)
+
+
 def dot(a: Floats, b: Floats) -> Floats:
     """Dot product of (3, n) columns -> (n,)."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -18,7 +18,7 @@ from .sampling.sampler import Sampler
 from .scene import CompiledScene
 from .stages.generate import generate
 from .state import Words
-from .vec import Bools, Floats, Ints
+from .vec import Bools, Floats, Ints, alike
 
 MAX_BAD_SAMPLES = 1e-4  # part of all samples that may be lost to NaN before it is an error
 
@@ -64,14 +64,21 @@ def trace_piece(
     """Take one wave of paths from the camera to its radiance."""
     begin = time.perf_counter()
     k, n = piece.pixels.size, piece.samples
-    samples = np.arange(piece.first_sample, piece.first_sample + n, dtype=np.uint32)
     counter = RayCounter(scene.accelerator)
     scene = replace(scene, accelerator=counter)
-    paths = generate(scene, camera, sampler, np.tile(piece.pixels, n), np.repeat(samples, k), filter)
+    paths = generate(scene, camera, sampler, np.tile(piece.pixels, n), _samples(piece), filter)
     radiance = estimate(scene, paths, sampler, max_bounces)
     bad = np.flatnonzero(~np.isfinite(radiance).all(0))
     radiance[:, bad] = 0
     return Wave(radiance.reshape(3, n, k), bad, counter.rays, time.perf_counter() - begin)
+
+
+def _samples(piece: Piece) -> Words:
+    """Index of the sample of each path of a piece, (lanes,)."""
+    if piece.samples == 1:
+        return alike(np.uint32(piece.first_sample), piece.pixels.size)
+    samples = np.arange(piece.first_sample, piece.first_sample + piece.samples, dtype=np.uint32)
+    return np.repeat(samples, piece.pixels.size)
 
 
 class RayCounter:

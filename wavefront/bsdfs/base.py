@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import SceneError
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..state import Surface
-from ..vec import Bools, Floats
+from ..vec import Bools, Floats, alike
 from .opacity import Opacity, opacity
 from .parameter import Scalar
 from .relief import Relief
@@ -110,7 +110,7 @@ class Bsdf(ABC):
         """Draw a direction per column from uniform numbers `u` (`dimensions`, n) in [0, 1)."""
         wi = cosine_hemisphere(u)
         pdf = self.pdf(wo, wi)
-        return BsdfSample(wi, weigh(self.f(wo, wi), wi, pdf), pdf, np.zeros(len(pdf), np.bool_))
+        return BsdfSample(wi, weigh(self.f(wo, wi), wi, pdf), pdf, alike(np.False_, len(pdf)))
 
 
 def weigh(f: Floats, wi: Floats, pdf: Floats) -> Floats:

@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 
 from ..errors import SceneError
-from ..vec import Floats
+from ..vec import Floats, alike
 from .base import Bsdf, BsdfSample, weigh
 from .fresnel import fresnel_conductor
 from .microfacet import alpha_of, is_smooth, mirror_lobe, reflect, visible_normals
@@ -99,4 +99,4 @@ class Conductor(Bsdf):
             return BsdfSample(mirrored(wo), weight, np.ones_like(wo[2]), np.ones(n, np.bool_))
         wi = reflect(wo, visible_normals(wo, alpha_of(self.roughness), u))
         f, pdf = self.evaluate(wo, wi)
-        return BsdfSample(wi, weigh(f, wi, pdf), pdf, np.zeros(n, np.bool_))
+        return BsdfSample(wi, weigh(f, wi, pdf), pdf, alike(np.False_, n))

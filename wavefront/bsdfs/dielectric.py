@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 
 from ..state import Surface
-from ..vec import Floats, dot, f4
+from ..vec import Floats, alike, dot, f4
 from .base import Bsdf, BsdfSample, Spatial, weigh
 from .fresnel import fresnel_dielectric
 from .microfacet import (
@@ -131,4 +131,4 @@ class Dielectric(Bsdf):
         # A facet may send light to the wrong side of the surface: no sample.
         pdf = np.where((wi[2] > 0) == reflects, pdf, f4(0))
         eta = np.where(reflects, f4(1), self.eta)
-        return BsdfSample(wi, weigh(f, wi, pdf), pdf, np.zeros(len(pdf), np.bool_), eta)
+        return BsdfSample(wi, weigh(f, wi, pdf), pdf, alike(np.False_, len(pdf)), eta)

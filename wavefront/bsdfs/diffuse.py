@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
-from ..vec import Floats, f4
+from ..vec import Floats, alike, f4
 from .base import Bsdf, BsdfSample
 from .parameter import Colour, colour
 
@@ -43,4 +43,4 @@ class Diffuse(Bsdf):
         wi = cosine_hemisphere(u)
         pdf = cosine_hemisphere_pdf(wi)
         weight = self.reflectance * (pdf > 0).astype(f4)
-        return BsdfSample(wi, weight, pdf, np.zeros(len(pdf), np.bool_))
+        return BsdfSample(wi, weight, pdf, alike(np.False_, len(pdf)))

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..state import Surface
-from ..vec import Bools, Floats, dot, f4, luminance
+from ..vec import Bools, Floats, alike, dot, f4, luminance
 from .albedo import gloss_tables, lookup
 from .base import Bsdf, BsdfSample, Spatial, weigh
 from .dielectric import LEAST_BEND
@@ -176,7 +176,7 @@ class Principled(Bsdf):
             eta = np.where(crosses, index, f4(1))
         f, pdf = self.evaluate(wo, wi)
         pdf = np.where((wi[2] < 0) == crosses, pdf, f4(0))
-        return BsdfSample(wi, weigh(f, wi, pdf), pdf, np.zeros(len(pdf), np.bool_), eta)
+        return BsdfSample(wi, weigh(f, wi, pdf), pdf, alike(np.False_, len(pdf)), eta)
 
     def _base(self, wo: Floats, wi: Floats, chances: Chances) -> tuple[Floats, Floats]:
         """Metal, matte, gloss and glass: value (3, n) and their part of the density (n,)."""

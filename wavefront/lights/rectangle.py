@@ -24,6 +24,7 @@ class RectangleLights(Light):
     edge_u: Floats  # (3, k) from the corner; edge_u × edge_v is the front
     edge_v: Floats  # (3, k) from the corner, perpendicular to edge_u
     normal: Floats  # (3, k) unit normal of the front side
+    area: Floats  # (k,)
     radiance: Floats  # (3, k) W·sr⁻¹·m⁻²
 
     sides: ClassVar[int] = 1  # that shine
@@ -37,9 +38,9 @@ class RectangleLights(Light):
         corner, edge_u = triangles[:, 0].T, (triangles[:, 1] - triangles[:, 0]).T
         edge_v = (triangles[:, 2] - triangles[:, 1]).T
         normal = np.cross(edge_u, edge_v, axis=0)
-        normal /= np.linalg.norm(normal, axis=0)
-        p, u, v, n = (np.ascontiguousarray(rows, f4) for rows in (corner, edge_u, edge_v, normal))
-        return cls(p, u, v, n, np.repeat(radiance, len(triangles), 1))
+        area = np.linalg.norm(normal, axis=0)
+        p, u, v, n = (np.ascontiguousarray(rows, f4) for rows in (corner, edge_u, edge_v, normal / area))
+        return cls(p, u, v, n, area.astype(f4), np.repeat(radiance, len(triangles), 1))
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
         """Draw a point uniformly by area, or from nearby a direction uniformly in solid angle."""
@@ -56,7 +57,7 @@ class RectangleLights(Light):
         distance = np.sqrt(d2 + TINY)
         wi /= distance
         cos_light = height / distance
-        pdf = area_pdf(d2, cos_light, self._area())
+        pdf = area_pdf(d2, cos_light, self.area)
         if near.size:
             pdf[near] = seen.pdf()
         return LightSample(wi, np.broadcast_to(self.radiance, wi.shape), pdf, distance, cos_light)
@@ -68,14 +69,11 @@ class RectangleLights(Light):
         t = rise / np.where(cos_light > 0, fall, f4(1))
         on_plane = wi * t - (self.corner - point)
         meets = (cos_light > 0) & (t > 0) & _within(on_plane, self.edge_u) & _within(on_plane, self.edge_v)
-        pdf = area_pdf(t * t, cos_light, self._area())
+        pdf = area_pdf(t * t, cos_light, self.area)
         near = self._near(point, self._facing(rise))
         if near.size:
             pdf[near] = self._seen(point, near).pdf()
         return np.where(meets, pdf, f4(0))
-
-    def _area(self) -> Floats:
-        return np.sqrt(dot(self.edge_u, self.edge_u) * dot(self.edge_v, self.edge_v))
 
     def _rise(self, point: Floats) -> Floats:
         """Height (n,) of points over the front."""
@@ -90,11 +88,10 @@ class RectangleLights(Light):
 
         From afar both densities are alike, and sampling the area costs a seventh.
         """
-        within = NEAR * self._area()
-        low = np.flatnonzero((height > 0) & (height < np.sqrt(within)))
+        low = np.flatnonzero((height > 0) & (height < np.sqrt(NEAR * self.area)))
         some = self._at(low)
         away = some.corner + f4(0.5) * (some.edge_u + some.edge_v) - point.take(low, 1)
-        return low.compress(dot(away, away) < NEAR * some._area())
+        return low.compress(dot(away, away) < NEAR * some.area)
 
     def _at(self, lanes: Ints) -> Self:
         """Return the rectangles of some lanes."""
@@ -111,15 +108,15 @@ class RectangleLights(Light):
 
     def power(self, scene_radius: float) -> NDArray[np.float64]:
         """π·A·L for each side."""
-        return self.sides * np.pi * self._area() * self.radiance.mean(0, dtype=np.float64)
+        return self.sides * np.pi * self.area * self.radiance.mean(0, dtype=np.float64)
 
     def irradiance(
         self, centre: NDArray[np.float64], radius: float, scene_radius: float
     ) -> NDArray[np.float64]:
         """L·A·cosθ/d² of a small area at the middle; (c, k)."""
         middle = self.corner + (self.edge_u + self.edge_v) / 2
-        strength = self._area() * self.radiance.mean(0, dtype=np.float64)
-        return facing_area(centre, radius, middle, self.normal, np.sqrt(self._area()), strength, self.sides)
+        strength = self.area * self.radiance.mean(0, dtype=np.float64)
+        return facing_area(centre, radius, middle, self.normal, np.sqrt(self.area), strength, self.sides)
 
 
 @dataclass(slots=True)

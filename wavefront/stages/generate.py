@@ -9,7 +9,7 @@ from ..filters import Filter, box
 from ..sampling.sampler import Dimension, Sampler
 from ..scene import CompiledScene
 from ..state import Paths, Words
-from ..vec import f4
+from ..vec import alike, f4
 
 
 def generate(
@@ -40,7 +40,7 @@ def generate(
         direction=direction,
         leaving=np.full(n, -1, np.intp),
         throughput=np.ones((3, n), f4),
-        pdf=np.ones(n, f4),
-        specular=np.ones(n, np.bool_),
-        eta2=np.ones(n, f4),
+        pdf=alike(f4(1), n),
+        specular=alike(np.True_, n),
+        eta2=alike(f4(1), n),
     )

@@ -48,7 +48,8 @@ def pass_through(
         lanes, here, surface = lanes.take(passing), here.take(passing), surface.take(passing)
         absorb(scene, here.throughput, at.take(passing), surface)
         here = _behind(here, surface)
-        paths.put(lanes, here)
+        paths.origin[:, lanes], paths.leaving[lanes] = here.origin, here.leaving
+        paths.throughput[:, lanes] = here.throughput
         hits.put(lanes, intersect(scene, here))
         lanes = lanes.compress(partly.take(hits.prim.take(lanes)))
         dimension += 1
