@@ -405,7 +405,7 @@ def test_one_mesh_keeps_its_emission(tmp_path) -> None:
 
 def test_complaints() -> None:
     """A sphere shines evenly; a mesh without coordinates is named; a lamp needs a number or a texture."""
-    with pytest.raises(wf.SceneError, match="sphere: emission must be numeric, got <Texture"):
+    with pytest.raises(wf.SceneError, match="sphere: a sphere shines evenly; a mesh can shine by <Texture"):
         wf.Sphere(HERE, 1, emission=texture(QUARTERS))
     with pytest.raises(wf.SceneError, match="rectangle: emission"):
         lamp("bright")

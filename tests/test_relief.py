@@ -367,6 +367,15 @@ def test_a_matte_tilted_patch_loses_what_lies_below():
         assert image.mean() == pytest.approx((1 + cos) / 2, abs=0.005)
 
 
+@pytest.mark.parametrize(("degrees", "left"), [(0, 0.99), (15, 0.99), (30, 0.97), (45, 0.55)])
+def test_a_rough_metal_loses_what_docs_say(degrees, left):
+    """The numbers of docs/materials.md."""
+    angle = np.radians(degrees)
+    code = [0.5 + 0.5 * np.sin(angle), 0.5, 0.5 + 0.5 * np.cos(angle)]
+    white = wf.Principled(1.0, metallic=1.0, roughness=0.3)
+    assert furnace(white.with_relief(wf.NormalMap(texel(code)))).mean() == pytest.approx(left, abs=0.008)
+
+
 @pytest.mark.parametrize("angle", [0.0, 0.8, 1.3, 1.55])
 def test_a_mirror_has_no_black_facets(angle):
     """However its normals lean, every ray finds the light."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..bsdfs import Bsdf
+from ..bsdfs import Bsdf, Spatial
 from ..errors import SceneError, finite_array, number, rgb
 from .mesh import FLOAT32_MAX, FLOAT32_MIN, check_material
 
@@ -22,14 +22,14 @@ class Sphere:
     material
         How the surface scatters light; its outside is the front.
     emission
-        Radiance W·sr⁻¹·m⁻², one number or three; it leaves the surface on both sides.
+        Radiance W·sr⁻¹·m⁻², one number or three, the same everywhere; it leaves the surface on both sides.
     name
         Used in messages.
 
     Raises
     ------
     SceneError
-        If an argument is malformed.
+        If an argument is malformed, or the emission is a texture.
     """
 
     def __init__(
@@ -56,6 +56,8 @@ class Sphere:
                 f"{name}: center[{i}] is {self.center[i]:g}; its size must be at most {FLOAT32_MAX:.3g}"
             )
         self.material = check_material(name, material)
+        if isinstance(emission, Spatial):
+            raise SceneError(f"{name}: a sphere shines evenly; a mesh can shine by {emission!r}")
         self.emission = None if emission is None else rgb(f"{name}: emission", emission)
 
     def __repr__(self) -> str:
