@@ -400,6 +400,62 @@ def test_one_mesh_keeps_its_emission(tmp_path) -> None:
     assert wf.load_mesh(tmp_path / "a.gltf", material=wf.Diffuse(0.5)).emission is None
 
 
+# --- Emission of materials -------------------------------------------------------------------------
+
+
+GLOW = wf.Principled(0.3, emission=(1, 2, 3))
+
+
+def two_pictures(first, second) -> list[np.ndarray]:
+    """Pictures of two sets of shapes above a floor."""
+    ground = wf.Rectangle((-2, -1, -2), (0, 0, 4), (4, 0, 0))
+    camera = wf.Camera.look_at((0, 1, 6), (0, 0, 0), fov=40, size=(16, 16))
+    return [render(wf.Scene([ground, *shapes], camera=camera), 4).rgb for shapes in (first, second)]
+
+
+def test_a_material_makes_a_light_of_its_shape() -> None:
+    """It shines as a shape with the same emission does, which goes before it."""
+    plain = wf.Principled(0.3)
+    square = ((-1, 0, 0), (2, 0, 0), (0, 1, 0))
+    by_material = [wf.Rectangle(*square, material=GLOW), wf.Sphere((0, 1.5, 0), 0.3, material=GLOW)]
+    by_shape = [
+        wf.Rectangle(*square, material=plain, emission=(1, 2, 3)),
+        wf.Sphere((0, 1.5, 0), 0.3, material=plain, emission=(1, 2, 3)),
+    ]
+    a, b = two_pictures(by_material, by_shape)
+    assert a.max() > 1
+    assert np.array_equal(a, b)
+    assert wf.Rectangle(*square, material=GLOW, emission=5.0).emission.ravel().tolist() == [5, 5, 5]
+    assert wf.Principled(0.3, emission=0.0).emission is None
+    assert wf.Rectangle(*square, material=wf.Principled(0.3, emission=0.0)).emission is None
+
+
+def test_a_material_may_shine_by_a_texture() -> None:
+    """As a mesh with a textured emission does, seen from both sides where it is two-sided."""
+    square = ((-1, 0, 0), (2, 0, 0), (0, 1, 0))
+    glow = texture(QUARTERS)
+    mesh = wf.Rectangle(*square, material=wf.Principled(0.3, emission=glow), two_sided=True)
+    same = wf.Rectangle(*square, material=wf.Principled(0.3), emission=glow, two_sided=True)
+    a, b = two_pictures([mesh], [same])
+    assert a.max() > 0.1
+    assert np.array_equal(a, b)
+
+
+def test_instances_shine_by_the_material_they_have() -> None:
+    """One of two instances of a mesh has a material that shines."""
+    mesh = wf.Rectangle((-1, 0, 0), (1, 0, 0), (0, 1, 0))
+    there, here = np.eye(4), np.eye(4)
+    there[0, 3] = 1.5
+    pair = [wf.Instance(mesh, here), wf.Instance(mesh, there, material=GLOW)]
+    assert [shape.emission is None for shape in pair] == [True, False]
+    own = wf.Rectangle((0.5, 0, 0), (1, 0, 0), (0, 1, 0), material=wf.Principled(0.3), emission=(1, 2, 3))
+    a, b = two_pictures(pair, [mesh, own])
+    assert (
+        np.quantile(np.abs(a - b).max(2), 0.95) < 1e-3
+    )  # one of the pair may be traced in a frame of its own
+    assert a.mean() == pytest.approx(b.mean(), rel=0.01)
+
+
 # --- Complaints ------------------------------------------------------------------------------------
 
 
@@ -409,6 +465,13 @@ def test_complaints() -> None:
         wf.Sphere(HERE, 1, emission=texture(QUARTERS))
     with pytest.raises(wf.SceneError, match="rectangle: emission"):
         lamp("bright")
+    ball = wf.Sphere(HERE, 1, material=wf.Principled(0.5, emission=texture(QUARTERS)), name="moon")
+    with pytest.raises(wf.SceneError, match="moon: a sphere shines evenly; a mesh can shine by <Texture"):
+        render(wf.Scene([ball]), 1)
+    with pytest.raises(wf.SceneError, match=r"Principled emission\[1\] is -1; it must be at least 0"):
+        wf.Principled(0.5, emission=(0, -1, 0))
+    with pytest.raises(wf.SceneError, match="Mix second has an emission; give it to the shape"):
+        wf.Mix(wf.Diffuse(0.5), GLOW)
     bare = wf.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], emission=texture(QUARTERS))
     with pytest.warns(UserWarning, match=r"1 meshes lack the texture coordinates \(uvs\).*first: 'mesh'"):
         render(wf.Scene([bare]), 1)

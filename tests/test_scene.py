@@ -174,14 +174,32 @@ def test_plain_colours_are_one_group() -> None:
         wf.Diffuse((0.2, 0.3, 0.4)),
         wf.Dielectric(1.5),
         wf.Dielectric(1.3),
+        wf.Principled((0.1, 0.2, 0.9), roughness=0.3),
+        wf.Principled(0.5, metallic=1.0, emission=2.0),
+        wf.Principled(0.5, clearcoat=1.0),  # with a lobe that the others lack
     ]
     grouped = group_materials(materials)
-    assert grouped.group_of.tolist() == [0, 1, 0, 2, 2]
-    assert len(grouped.groups) == 3
+    assert grouped.group_of.tolist() == [0, 1, 0, 2, 2, 3, 3, 4]
+    assert len(grouped.groups) == 5
 
 
-def test_grouping_changes_no_picture() -> None:
-    """Two colours in one group look like two renders with one colour each."""
+PAIRS = [
+    (wf.Diffuse((0.8, 0.1, 0.1)), wf.Diffuse(0.4)),
+    (wf.Mirror((0.8, 0.1, 0.1)), wf.Mirror(0.4)),
+    (wf.Dielectric(1.5, 0.3), wf.Dielectric(1.3, 0.6, transmittance=(1, 0.5, 0.2))),
+    (wf.Conductor.named("gold", roughness=0.3), wf.Conductor.named("silver", roughness=0.6)),
+    (wf.OrenNayar(0.8, 0.3), wf.OrenNayar((0.2, 0.3, 0.4), 0.6)),
+    (wf.ThinDielectric(1.5), wf.ThinDielectric(1.3)),
+    (wf.Principled((0.8, 0.1, 0.1), 0.3, 0.2), wf.Principled(0.4, 1.0, 0.6, 1.3)),
+    (wf.Principled((0.8, 0.1, 0.1), transmission=0.5), wf.Principled(0.4, transmission=1.0, ior=1.3)),
+    (wf.Principled(0.8, clearcoat=0.5, sheen=0.2), wf.Principled((0.1, 0.4, 0.6), clearcoat=1.0, sheen=1.0)),
+]
+
+
+@pytest.mark.parametrize(("red", "grey"), PAIRS, ids=lambda material: type(material).__name__)
+def test_grouping_changes_no_picture(red: wf.Bsdf, grey: wf.Bsdf) -> None:
+    """Two materials in one group look like two renders with one material each."""
+    assert len(group_materials([red, grey]).groups) == 1
     left, right = wf.Sphere((-1, 0, 0), 1), wf.Sphere((1, 0, 0), 1)
     camera = wf.Camera.look_at((0, 0, 6), (0, 0, 0), fov=30, size=(8, 4))
 
@@ -189,7 +207,6 @@ def test_grouping_changes_no_picture() -> None:
         left.material, right.material = a, b
         return render(wf.Scene([left, right], [wf.Environment()], camera), 4, max_bounces=1).rgb
 
-    red, grey = wf.Diffuse((0.8, 0.1, 0.1)), wf.Diffuse(0.4)
     both = picture(red, grey)
     assert both[:, :4].tobytes() == picture(red, red)[:, :4].tobytes()
     assert both[:, 4:].tobytes() == picture(grey, grey)[:, 4:].tobytes()

@@ -212,7 +212,8 @@ def compile_scene(
     Raises
     ------
     SceneError
-        If an emitting shape has no area, an emitting sphere has an alpha, or the choice is unknown.
+        If an emitting shape has no area, an emitting sphere has an alpha or shines by a texture, or the
+        choice is unknown.
     """
     low, high = scene.bounds
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
@@ -333,7 +334,9 @@ def _is_constant(value: object) -> bool:
 
 def _group_key(material: Bsdf) -> object:
     """Materials with equal keys may be merged; one with a texture stands alone."""
-    parameters = {name: value for name, value in vars(material).items() if name != "opacity"}
+    parameters = {
+        name: value for name, value in vars(material).items() if name not in ("opacity", "emission")
+    }
     if not all(_is_constant(v) or isinstance(v, bool | int | float | str) for v in parameters.values()):
         return id(material)
     shapes = tuple((k, v.shape if _is_constant(v) else v) for k, v in sorted(parameters.items()))
@@ -476,6 +479,10 @@ def _gather_lights(
             number += faces.shape[1]
         add(kind, [record for _, record in alike])
     for sphere in spheres:
+        if isinstance(sphere.emission, Spatial):
+            raise SceneError(
+                f"{sphere.name}: a sphere shines evenly; a mesh can shine by {sphere.emission!r}"
+            )
         if sphere.emission is not None and sphere.material.opacity is not None:
             raise SceneError(
                 f"{sphere.name}: a sphere that shines must be all there; its material has an alpha"

@@ -18,6 +18,7 @@ from ..errors import SceneError
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..state import Surface
 from ..vec import Bools, Floats, alike
+from .emission import Emission
 from .opacity import Opacity, opacity
 from .parameter import Scalar
 from .relief import Relief
@@ -48,6 +49,7 @@ class Bsdf(ABC):
     specular: bool = False  # every lobe is a delta: f and pdf are 0, light sampling is skipped
     opacity: Opacity | None = None  # how much of the surface is there; None: all. The renderer sees to it
     absorption: Any = np.zeros((3, 1), np.float32)  # of the inside, per scene unit. The path sees to it
+    emission: Emission | None = None  # what the surface sends itself. The shape that has it sees to it
     relief: Relief | None = None  # tilts the shading normals. The renderer sees to it, no material does
 
     def with_alpha(self, alpha: Scalar, cutoff: float | None = None) -> Self:

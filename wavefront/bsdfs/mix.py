@@ -33,7 +33,7 @@ class Mix(Bsdf):
     ------
     SceneError
         If the weight is outside [0, 1], something else than a material is given, a material has
-        an alpha or a relief of its own, or both let light through but absorb differently.
+        an alpha, a relief or an emission of its own, or both let light through but absorb differently.
     """
 
     dimensions = 3
@@ -46,6 +46,8 @@ class Mix(Bsdf):
                 raise SceneError(f"Mix {name} has an alpha; give it to the Mix, by with_alpha")
             if value.relief is not None:
                 raise SceneError(f"Mix {name} has a relief; give it to the Mix, by with_relief")
+            if value.emission is not None:
+                raise SceneError(f"Mix {name} has an emission; give it to the shape")
         self.first, self.second = first, second
         self.weight = scalar("Mix weight", weight)
         self.transmissive = first.transmissive or second.transmissive

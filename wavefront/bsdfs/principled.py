@@ -13,6 +13,7 @@ from ..vec import Bools, Floats, alike, dot, f4, luminance
 from .albedo import gloss_tables, lookup
 from .base import Bsdf, BsdfSample, Spatial, weigh
 from .dielectric import LEAST_BEND
+from .emission import emission as emission_of
 from .fresnel import fresnel_dielectric
 from .microfacet import INV_PI, alpha_of, mirror_lobe, reflect, refract, refraction_lobe, visible_normals
 from .opacity import opacity
@@ -69,6 +70,8 @@ class Principled(Bsdf):
     absorption
         What the inside absorbs, per channel and scene unit, as for `Dielectric`. There is an inside
         only where light is transmitted, and behind no `thin` surface.
+    emission
+        Radiance that surfaces of this material send, as the emission of a `Mesh`, which goes before it.
     alpha, alpha_cutoff
         How much of the surface is there, as by `with_alpha`.
     conserve_energy
@@ -82,6 +85,7 @@ class Principled(Bsdf):
     """
 
     dimensions = 3
+    inside: Bools | None = None  # (n,) wo is inside; unbound, it is outside
 
     def __init__(
         self,
@@ -100,6 +104,7 @@ class Principled(Bsdf):
         specular: Scalar = 1.0,
         specular_color: Colour = 1.0,
         absorption: Colour = 0.0,
+        emission: Colour = 0.0,
         alpha: Scalar = 1.0,
         alpha_cutoff: float | None = None,
         conserve_energy: bool = True,
@@ -118,13 +123,13 @@ class Principled(Bsdf):
         self.specular_weight = scalar("Principled specular", specular)
         self.specular_color = colour("Principled specular_color", specular_color)
         inside = colour("Principled absorption", absorption, np.inf)
+        self.emission = emission_of("Principled", emission)
         self.opacity = opacity("Principled", alpha, alpha_cutoff)
         self.conserve_energy = conserve_energy
         self.transmissive = _used(self.transmission)
         self.absorption = inside if self.transmissive and not thin else Bsdf.absorption
         self._coated = _used(self.clearcoat)
         self._cloth = _used(self.sheen)
-        self.inside: Bools | None = None  # (n,) wo is inside; unbound, it is outside
 
     def bind(self, surface: Surface) -> Self:
         """Look the parameters up, and remember on which side `wo` is."""

@@ -64,8 +64,8 @@ class Instance:
 
     @property
     def emission(self) -> Spatial | NDArray[np.float32] | None:
-        """Radiance that leaves the surface, as of the mesh."""
-        return self.mesh.emission
+        """Radiance that leaves the surface, as of the mesh with the instance's material."""
+        return self.mesh.emission_by(self.material)
 
     @property
     def bounds(self) -> NDArray[np.float64]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -37,7 +39,7 @@ class Mesh:
         How the surface scatters light.
     emission
         Radiance that leaves the front side, W·sr⁻¹·m⁻²: one number or three, or a `Texture` or
-        `VertexColors`, of which values below 0 count as 0.
+        `VertexColors`, of which values below 0 count as 0. By default that of the material, if it has one.
     two_sided
         Whether the emission leaves the back side as well.
     name
@@ -76,13 +78,28 @@ class Mesh:
             raise SceneError(f"{name}: has tangents without normals; pass both")
         self.colors = _colors(f"{name}: colors", colors, len(self.vertices))
         self.material = check_material(name, material)
-        self.emission = None if emission is None else colour(f"{name}: emission", emission, np.inf)
+        self._emission = None if emission is None else colour(f"{name}: emission", emission, np.inf)
         self.two_sided = two_sided
         check_range(name, self.vertices)
 
     def __repr__(self) -> str:
         """Name the mesh and its size."""
         return f"<Mesh {self.name!r}: {len(self.vertices)} vertices, {len(self.faces)} faces>"
+
+    @property
+    def emission(self) -> Any:
+        """Radiance that leaves the front side: the mesh's own, or else its material's; None if dark."""
+        return self.emission_by(self.material)
+
+    @emission.setter
+    def emission(self, emission: Any) -> None:
+        self._emission = emission
+
+    def emission_by(self, material: Bsdf) -> Any:
+        """Return the emission where the mesh has this material."""
+        if self._emission is not None or material.emission is None:
+            return self._emission
+        return material.emission.radiance
 
     @property
     def bounds(self) -> NDArray[np.float64]:

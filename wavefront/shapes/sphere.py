@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -22,7 +24,8 @@ class Sphere:
     material
         How the surface scatters light; its outside is the front.
     emission
-        Radiance W·sr⁻¹·m⁻², one number or three, the same everywhere; it leaves the surface on both sides.
+        Radiance W·sr⁻¹·m⁻², one number or three, the same everywhere; it leaves the surface on both
+        sides. By default that of the material, if it has one.
     name
         Used in messages.
 
@@ -58,11 +61,18 @@ class Sphere:
         self.material = check_material(name, material)
         if isinstance(emission, Spatial):
             raise SceneError(f"{name}: a sphere shines evenly; a mesh can shine by {emission!r}")
-        self.emission = None if emission is None else rgb(f"{name}: emission", emission)
+        self._emission = None if emission is None else rgb(f"{name}: emission", emission)
 
     def __repr__(self) -> str:
         """Name the sphere, its place and size."""
         return f"<Sphere {self.name!r}: center {self.center.tolist()}, radius {self.radius:g}>"
+
+    @property
+    def emission(self) -> Any:
+        """Radiance that leaves the surface: the sphere's own, or else its material's; None if dark."""
+        if self._emission is not None or self.material.emission is None:
+            return self._emission
+        return self.material.emission.radiance
 
     @property
     def bounds(self) -> NDArray[np.float64]:

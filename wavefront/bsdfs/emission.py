@@ -1,0 +1,34 @@
+"""What a material sends of its own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .parameter import Colour, colour
+
+
+class Emission:
+    """The radiance that leaves a surface, beside what it scatters; it makes a light of a shape.
+
+    Parameters
+    ----------
+    radiance
+        W·sr⁻¹·m⁻², (3, 1) float32, or a `Spatial` that gives colours.
+    """
+
+    def __init__(self, radiance: Any) -> None:
+        self.radiance = radiance
+
+
+def emission(name: str, radiance: Colour) -> Emission | None:
+    """Return the emission that a user asks for, None where it is black.
+
+    Raises
+    ------
+    SceneError
+        If a number is below 0 or not finite.
+    """
+    value = colour(f"{name} emission", radiance, np.inf)
+    return None if isinstance(value, np.ndarray) and not value.any() else Emission(value)
