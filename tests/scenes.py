@@ -172,6 +172,12 @@ def _lit_floor(*lights: object, at: ArrayLike = HERE) -> wf.Scene:
     return wf.Scene([floor(), *shapes], others, probe(at, np.asarray(at) + EYE))
 
 
+def _half_matte(light: wf.Mesh, at: ArrayLike) -> wf.Scene:
+    """A light above a floor of which half is a mirror; the light is not seen in it."""
+    ground = floor(wf.Mix(wf.Diffuse(ALBEDO), wf.Mirror(1.0), 0.5))
+    return wf.Scene([ground, light], camera=probe(at, np.asarray(at) + EYE))
+
+
 def _black_sphere(center: ArrayLike) -> wf.Sphere:
     return wf.Sphere(center, 0.5, material=BLACK, emission=1.0)
 
@@ -253,6 +259,13 @@ DIRECT_CASES = [
             ("offset 0.5", 0.5, 0, 1.564202),
             ("below a corner", 1, 1, 0.652688),
         )
+    ),
+    Case(
+        # all light comes from one quarter, so lobe and direction must not share a number
+        "half-matte floor, below a corner",
+        lambda: _half_matte(panel((-1, -1), (1, 1), 1), at=(-1, 0, -1)),
+        0.652688 * ALBEDO / np.pi / 2,
+        max_error=0.004,
     ),
     Case("environment", lambda: _lit_floor(wf.Environment(1.0)), ALBEDO),
     Case("cosine environment", lambda: _lit_floor(CosineEnvironment(1.0)), 2.094395 * ALBEDO / np.pi),

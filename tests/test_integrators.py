@@ -1,6 +1,7 @@
 """The four estimators against each other, where they estimate the same thing."""
 
 from functools import cache
+from importlib import import_module
 from itertools import combinations
 
 import numpy as np
@@ -8,6 +9,8 @@ import pytest
 import scenes
 from significance import Mean, assert_same_images, render, repeat
 
+import wavefront as wf
+from wavefront.sampling.sampler import Dimension, Sampler, make_sampler
 from wavefront.stages import compact as compact_stage
 
 DIRECT_SPP = {"naive": 256, "direct_simple": 96, "direct_mis": 64, "full": 64}
@@ -85,3 +88,55 @@ def test_every_bounce_adds_its_own_light(integrator: str) -> None:
     ]
     steps = np.diff([0, *(mean.value for mean in means)])
     assert steps == pytest.approx([1, 0.5, 0.25, 0.125], rel=0.01)
+
+
+class Once(Sampler):
+    """Another sampler's numbers, none of which may be asked for twice."""
+
+    def __init__(self, name: str, seed: int = 0, width: int = 1) -> None:
+        super().__init__(seed)
+        self.inner = make_sampler(name, seed, width)
+        self.given: dict[tuple[int, int], np.ndarray] = {}
+
+    def draw_1d(self, pixel, sample, bounce, dimension):
+        self.note(pixel, sample, bounce, dimension)
+        return self.inner.draw_1d(pixel, sample, bounce, dimension)
+
+    def draw_2d(self, pixel, sample, bounce, dimension):
+        self.note(pixel, sample, bounce, dimension)
+        return self.inner.draw_2d(pixel, sample, bounce, dimension)
+
+    def note(self, pixel, sample, bounce, dimension) -> None:
+        """Remember addresses, and complain of those that come again."""
+        stream = int(bounce), int(dimension)
+        now = pixel.astype(np.uint64) << np.uint64(32) | sample
+        before = self.given.get(stream, now[:0])
+        everything = np.concatenate([before, now])
+        assert len(np.unique(everything)) == len(everything), f"numbers of {stream} are used twice"
+        self.given[stream] = everything
+
+
+@pytest.mark.parametrize("integrator", scenes.ALL)
+def test_no_number_is_used_twice(integrator: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not by two decisions, not at two bounces: the means of many scenes would not show it."""
+    given: list[Once] = []
+
+    def record(*address) -> Once:
+        given.append(Once(*address))
+        return given[-1]
+
+    monkeypatch.setattr(import_module("wavefront.render"), "make_sampler", record)
+    scene = scenes.everything((12, 9))
+    veils = [
+        wf.Rectangle((-2, -2, z), (4, 0, 0), (0, 4, 0), material=wf.Diffuse(0.5).with_alpha(0.3))
+        for z in (1.1, 1.2, 1.3)
+    ]
+    blend = wf.Sphere((0.2, 0.3, 0.2), 0.2, material=wf.Mix(wf.Diffuse(0.7), wf.Dielectric(1.5, 0.3)))
+    camera = wf.Camera.look_at((0, 0, 3.9), (0, 0, 0), size=(12, 9), aperture=0.1, focus=3.9)
+    scene = wf.Scene([*scene.shapes, *veils, blend], [wf.Environment((0.2, 0.3, 0.5))], camera)
+    render(scene, 16, integrator=integrator, max_bounces=5)
+    left_out = {"naive": {Dimension.LIGHT, Dimension.LIGHT_POINT}, "full": set()}
+    decisions = {*Dimension, Dimension.OPACITY + 1, Dimension.OPACITY + 2}  # three veils
+    assert {dimension for _, dimension in given[-1].given} == decisions - left_out.get(
+        integrator, {Dimension.ROULETTE}
+    )
