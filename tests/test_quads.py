@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from test_accel import PLACES, aimed_rays, brute_force, check_batches, geometry, nothing, random_rays
 
 from wavefront.accel import Accelerator, make_accelerator
-from wavefront.accel.quads import find_quads
+from wavefront.accel.quads import are_parallelograms, corners, find_quads
 
 f4 = np.float32
 SQUARE = np.array([(0.0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
@@ -78,6 +78,15 @@ def test_a_triangle_between_quadrilaterals_stays_alone() -> None:
     """Pairs begin anywhere."""
     triangles = np.concatenate([fan(SQUARE), SQUARE[None, :3] + 5, fan(SQUARE + 9)])
     np.testing.assert_array_equal(find_quads(triangles.astype(f4)), [0, 3])
+
+
+def test_parallelograms_are_told_from_others() -> None:
+    """By more than rounding."""
+    quads = np.array([SQUARE, SQUARE + 0.1, SQUARE * (1, 1, 0) * 0.3 + 1, SQUARE, SQUARE], f4)
+    quads[3, 2] += (0.2, 0.1, 0)
+    quads[4, 1, 0] = 0.5
+    found = corners(fan(*quads), np.arange(0, 10, 2))
+    assert are_parallelograms(found, 2.0).tolist() == [True] * 3 + [False] * 2
 
 
 # --- rays -----------------------------------------------------------------------------------------
@@ -168,3 +177,54 @@ def test_ties_of_halves_with_others_go_to_the_lowest_id() -> None:
     direction = np.tile(np.array([[0], [0], [-1]], f4), 500)
     prim = accelerator.closest(origin, direction, nothing(500)).prim
     np.testing.assert_array_equal(prim, np.where(origin[1] > origin[0], 1, 0))
+
+
+@pytest.mark.parametrize("size", [1, 7, 64])
+def test_rays_at_corners_have_the_same_bits_in_any_batch(size: int) -> None:
+    """Where the filter is unsure, and the diagonal begins."""
+    triangles = np.concatenate([box((1, 0.8, 1.2), 2), trapezoids(4, 1)]).astype(f4)
+    accelerator = make_accelerator(geometry(triangles), "numpy")
+    origin, direction = aimed_rays(triangles.astype(float), 600, 1)
+    whole = accelerator.closest(origin, direction, nothing(600))
+    for at in range(0, 600, size):
+        part = slice(at, at + size)
+        hits = accelerator.closest(origin[:, part], direction[:, part], nothing(600)[part])
+        for name in ("t", "prim", "b1", "b2"):
+            np.testing.assert_array_equal(getattr(hits, name), getattr(whole, name)[part])
+
+
+@pytest.mark.parametrize("length", [1e-12, 1.0, 1e12, 1e25])
+def test_rays_are_blocked_however_long_their_directions(length: float) -> None:
+    """The last one's length is not a float32. Some end before the square, some beyond, and one behind."""
+    accelerator = make_accelerator(geometry(fan(SQUARE)), "numpy")
+    origin = np.tile(np.array([[0.3], [0.4], [0.5]], f4), 7)
+    direction = np.tile(np.array([[0], [0], [-length]], f4), 7)
+    direction[2, 0] = length
+    distance = (np.array([-2, -2, 0, 0.25, 0.499, 0.501, np.inf]) / length).astype(f4)
+    blocked = accelerator.occluded(origin, direction, distance, nothing(7))
+    assert blocked.tolist() == [False] * 5 + [True] * 2
+
+
+def test_a_bad_ray_does_not_disturb_others() -> None:
+    """Its batch's bounds are no numbers."""
+    accelerator = make_accelerator(geometry(fan(SQUARE)), "numpy")
+    origin = np.tile(np.array([[0.3], [0.4], [0.5]], f4), 3)
+    direction = np.tile(np.array([[0], [0], [-1]], f4), 3)
+    distance = np.array([np.nan, 2, 0.25], f4)
+    direction[0, 0] = np.nan
+    assert accelerator.occluded(origin, direction, distance, nothing(3)).tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize("away", [3e2, 3e4, 3e6])
+def test_rays_that_pass_far_away_in_the_plane_hit_nothing(away: float) -> None:
+    """All edge functions are nothing but rounding there."""
+    accelerator = make_accelerator(geometry(fan(SQUARE @ turn(5).T)), "numpy")
+    n = 4000
+    rng = np.random.default_rng(7)
+    angle = rng.uniform(0, 2 * np.pi, (2, n))
+    origin = turn(5) @ np.stack([np.cos(angle[0]), np.sin(angle[0]), np.zeros(n)]) * away
+    direction = turn(5) @ np.stack([np.cos(angle[1]), np.sin(angle[1]), np.zeros(n)])
+    hits = accelerator.closest(origin.astype(f4), direction.astype(f4), nothing(n))
+    past = np.linalg.norm(np.cross(origin, direction, axis=0), axis=0) > 10
+    assert past.sum() > 0.9 * n
+    assert (hits.prim[past] == -1).all()

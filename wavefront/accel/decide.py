@@ -37,32 +37,38 @@ class TriangleDecisions:
 
         Triangles that the rays leave must not be among them.
         """
-        origin = self.lanes.origin.take(lane, 1).astype(np.float64)
-        direction = self.lanes.direction.take(lane, 1).astype(np.float64)
-        t = triangle.plane_distance(self.table, prim, origin, direction)
         unsure = np.flatnonzero(value <= 1)
         if unsure.size:
-            self._doubt(prim.take(unsure), lane.take(unsure))
-            t[unsure] = np.inf
-        self.found.add(lane, prim, t)
+            self.doubt(prim.take(unsure), lane.take(unsure))
+            sure = np.flatnonzero(~(value <= 1))
+            prim, lane = prim.take(sure), lane.take(sure)
+        origin, direction = self.lanes.origin.take(lane, 1), self.lanes.direction.take(lane, 1)
+        self.found.add(lane, prim, triangle.plane_distance(self.table.plane, prim, origin, direction))
+
+    def doubt(self, prim: Ints, lane: Ints) -> None:
+        """Take unsure candidates: triangles (k,), the first ones of quadrilaterals, and lanes (k,)."""
+        self._doubts.add(prim, prim, lane)
+        if self.partner is not None:
+            other = self.partner.take(prim)
+            halves = np.flatnonzero(other >= 0)
+            self._doubts.add(other.take(halves), prim.take(halves), lane.take(halves))
 
     def finish(self) -> None:
         """Decide what is left."""
         self._doubts.flush()
 
-    def _doubt(self, prim: Ints, lane: Ints) -> None:
-        self._doubts.add(prim, lane)
-        if self.partner is not None:
-            other = self.partner.take(prim)
-            halves = np.flatnonzero(other >= 0)
-            self._doubts.add(other.take(halves), lane.take(halves))
 
+def _decide_doubts(
+    table: TriangleTable, lanes: Lanes, found: Found, prim: Ints, first: Ints, lane: Ints
+) -> None:
+    """Decide the few pairs (k,) that the filter cannot.
 
-def _decide_doubts(table: TriangleTable, lanes: Lanes, found: Found, prim: Ints, lane: Ints) -> None:
-    """Decide the few pairs (k,) that the filter cannot."""
+    The halves `prim` (k,) of a quadrilateral count as hits of its `first`: which half is told later, in
+    one way for hits of both kinds.
+    """
     origin = lanes.origin.take(lane, 1).astype(np.float64)
     direction = lanes.direction.take(lane, 1).astype(np.float64)
     rays = prim, origin, direction
-    t = triangle.plane_distance(table, *rays)
+    t = triangle.plane_distance(table.plane, *rays)
     t = triangle.clamp_to_triangle(table, *rays, t)
-    found.add(lane, prim, np.where(triangle.hits_watertight(table, *rays), t, np.inf))
+    found.add(lane, first, np.where(triangle.hits_watertight(table, *rays), t, np.inf))

@@ -1,35 +1,50 @@
 """Few triangles, without a tree: all rays against all, as one matrix product.
 
 Pairs of triangles that make a quadrilateral are tested as one: four edges and one plane for two times
-three and two. Rays with an end are tested against the planes from there as well.
+three and two. Most rays need no list of candidates. One that meets a single polygon, and surely, gets its
+distance in turn with its neighbours; a shadow ray that surely meets a polygon between its ends is
+blocked, and one that surely meets none is free. The others are decided pair by pair.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..vec import Floats, Ints, f4
+from ..vec import Bools, Floats, Ints, f4
 from . import triangle
 from .decide import TriangleDecisions
-from .found import Candidates, Found
-from .quads import corners, diagonal_planes, find_quads, planes
+from .found import Candidates, Found, Occluded
+from .quads import are_parallelograms, corners, diagonal_planes, find_quads, planes
 from .traverse import Ball, Lanes, flat_true, scratch
-from .triangle import TriangleTable, one_sign
+from .triangle import Sides, TriangleTable, one_sign, pairs_of_one_sign
 
 CHUNK = 1 << 19  # elements of one product
+Bytes = NDArray[np.uint8]
 
 
 @dataclass(slots=True)
 class Polygons:
-    """Polygons of one number of edges, as matrices."""
+    """Polygons of one kind, as matrices."""
 
     rows: Floats  # (edges * m, 6) see triangle.edge_rows
-    ahead: Floats  # (m, 4) see triangle.side_rows
-    behind: Floats  # (m, 4) its negative
-    prim: Ints  # (m,) their first triangle
-    slot: Ints  # (primitives + 1,) the polygon of each primitive, and at the end that of none: m for none
+    at: slice  # their places among all polygons
+    parallelograms: bool
+
+    def test(self, line: Floats, side: Floats | None, out: Floats) -> None:
+        """Test lines (6, k): above 1 in `out` (m, k) where they surely pass inside, not below -1 if they do.
+
+        Sides (m, k) of points, where there are any, are multiplied by an edge function.
+        """
+        m, k = out.shape
+        edges = np.matmul(self.rows, line, out=scratch("product", (len(self.rows), k))).reshape(1, -1, m, k)
+        if side is not None:
+            side *= edges[0, 1]
+        (pairs_of_one_sign if self.parallelograms else one_sign)(edges, out[None])
 
 
 class FewTriangles:
@@ -49,20 +64,164 @@ class FewTriangles:
         single = np.setdiff1d(ids, np.concatenate([first, first + 1]))
         quads = corners(triangles, first)
         table.plane[:, first] = table.plane[:, first + 1] = planes(quads)
-        groups = [(quads, first), (triangles.take(single, 0).transpose(1, 0, 2), single)]
         # The last column of these is for no primitive, -1.
         self._partner = np.full(primitives + 1, -1)
         self._partner[first] = first + 1
-        self._groups = [_polygons(corner, prim, self._partner, ball) for corner, prim in groups if prim.size]
         self._diagonal = np.zeros((4, primitives + 1), f4)
         self._diagonal[:, first] = diagonal_planes(quads)
+        parallel = are_parallelograms(quads, ball.radius)
+        self._gather(
+            [
+                (quads[:, parallel], first[parallel]),
+                (quads[:, ~parallel], first[~parallel]),
+                (triangles.take(single, 0).transpose(1, 0, 2), single),
+            ],
+            ball,
+        )
+
+    def _gather(self, kinds: list[tuple[Floats, Ints]], ball: Ball) -> None:
+        """Make matrices of parallelograms, other quadrilaterals and triangles: corners, triangle ids."""
+        self._polygons, begin = [], 0
+        sides, ahead = [], []
+        for number, (corner, prim) in enumerate(kinds):
+            if prim.size:
+                rows = triangle.edge_rows(corner, ball.center, ball.radius).reshape(-1, 6)
+                self._polygons.append(Polygons(rows, slice(begin, begin + prim.size), number == 0))
+                ahead.append(triangle.side_rows(corner, ball.center, ball.radius))
+                sides.append(triangle.sides(self._table, prim, corner, ball.center))
+                begin += prim.size
+        self._count = begin
+        self._rows = sum(len(polygons.rows) for polygons in self._polygons)
+        self._number = np.arange(1, begin + 1, dtype=np.uint8)[:, None]
+        # Of these, the first is for no polygon.
+        self._prim = np.concatenate([[-1], *(prim for _, prim in kinds)])
+        self._plane = np.full((4, begin + 1), np.nan)
+        self._plane[:, 1:] = self._table.plane.take(self._prim[1:], 1)
+        self._slot = np.zeros(self._partner.size, np.intp)
+        self._slot[self._prim] = np.arange(begin + 1)
+        half = np.flatnonzero(self._partner.take(self._prim) >= 0)
+        self._slot[self._partner.take(self._prim.take(half))] = half
+        if begin:
+            self._ahead = np.concatenate(ahead)
+            self._sides = Sides(*(np.concatenate(parts, -1) for parts in zip(*sides, strict=True)))
 
     def search(self, lanes: Lanes, found: Found) -> None:
         """Give all hits that may matter to `found`; those of a quadrilateral as hits of its first half."""
+        if not self._count:
+            return
         decisions = TriangleDecisions(self._table, lanes, found, self._partner)
-        for polygons in self._groups:
-            _search(polygons, lanes, decisions)
+        more: list[tuple[Ints, Bytes]] = []
+        for part, leaving in self._parts(lanes):
+            value, met = self._filter(lanes, part, leaving)
+            sure = np.greater(value, 1, out=scratch("sure", met.shape, np.bool_))
+            sure &= met
+            hits = _sum(sure)
+            self._doubt(met, sure, np.flatnonzero(hits != _sum(met)), decisions, part.start)
+            number = sure.view(np.uint8)
+            number *= self._number
+            highest = np.maximum.reduce(number, 0).astype(np.intp)
+            t = triangle.plane_distance(self._plane, highest, lanes.origin[:, part], lanes.direction[:, part])
+            found.add_each(part, self._prim.take(highest), t)
+            several = np.flatnonzero(hits > 1)
+            number = number.take(several, 1)
+            number[highest.take(several) - 1, np.arange(several.size)] = 0
+            more.append((several + part.start, number))
+        self._decide_more(more, lanes, found)
         decisions.finish()
+
+    def _doubt(
+        self, met: Bools, sure: Bools, lane: Ints, decisions: TriangleDecisions, first_lane: int
+    ) -> None:
+        """Leave it to `decisions` whether some lanes (c,) hit what of (m, k) they have met, not surely."""
+        if lane.size:
+            unsure = met.take(lane, 1) > sure.take(lane, 1)
+            slot, place = np.divmod(flat_true(unsure), lane.size)
+            decisions.doubt(self._prim.take(slot + 1), lane.take(place) + first_lane)
+
+    def _decide_more(self, more: list[tuple[Ints, Bytes]], lanes: Lanes, found: Found) -> None:
+        """Decide how far other sure hits are: lanes (c,), and numbers (m, c) of polygons, 0 for none."""
+        lane = np.concatenate([lane for lane, _ in more])
+        number = np.concatenate([number for _, number in more], 1)
+        origin, direction = lanes.origin.take(lane, 1), lanes.direction.take(lane, 1)
+        while lane.size:
+            chosen = np.maximum.reduce(number, 0).astype(np.intp)
+            left = np.flatnonzero(chosen)
+            if left.size < lane.size:
+                lane, number, chosen = lane.take(left), number.take(left, 1), chosen.take(left)
+                origin, direction = origin.take(left, 1), direction.take(left, 1)
+            t = triangle.plane_distance(self._plane, chosen, origin, direction)
+            found.add(lane, self._prim.take(chosen), t)
+            number[chosen - 1, np.arange(lane.size)] = 0
+
+    def block(self, lanes: Lanes, found: Occluded) -> None:
+        """Tell `found` which lanes are blocked."""
+        if lanes.start is None or lanes.end is None or not self._count:
+            return self.search(lanes, found)
+        decisions = TriangleDecisions(self._table, lanes, found, self._partner)
+        unsure = Candidates(decisions.decide)
+        start_rows, end_rows = self._sides.rows(lanes.start, lanes.end)
+        for part, leaving in self._parts(lanes):
+            value = self._lines(lanes, part, None)
+            m, k = value.shape
+            start = np.matmul(start_rows, lanes.start[:, part], out=scratch("side", (m, k)))
+            end = np.matmul(end_rows, lanes.end[:, part], out=scratch("end side", (m, k)))
+            padded = scratch("least", (m + 1, k))  # the first row: of no polygon
+            # Above 1: the line surely passes inside, and the ends are surely on different sides.
+            least = np.maximum(start, end, out=padded[1:])
+            np.minimum(least, value, out=least)
+            lower = np.minimum(start, end, out=start)
+            np.minimum(least, np.negative(lower, out=lower), out=least)
+            if leaving is not None:
+                padded.reshape(-1)[leaving] = -2
+            most = np.maximum.reduce(least, 0)
+            blocked = most > 1
+            found.blocked[part] |= blocked
+            rest = np.flatnonzero((most >= -1) > blocked)
+            slot, place = np.divmod(flat_true(least.take(rest, 1) >= -1), max(rest.size, 1))
+            lane = rest.take(place)
+            unsure.add(self._prim.take(slot + 1), lane + part.start, value.reshape(-1).take(slot * k + lane))
+        unsure.flush()
+        decisions.finish()
+        return None
+
+    def _parts(self, lanes: Lanes) -> Iterator[tuple[slice, Ints | None]]:
+        """Yield equal parts of the lanes, and where in (m + 1, k) the polygons are that they leave, flat."""
+        n = lanes.count
+        left = self._slot.take(lanes.leaving) if lanes.leaving.max(initial=-1) >= 0 else None
+        parts = -(-n * self._rows // CHUNK)
+        step = -(-n // parts)
+        step += -step % 16
+        for at in range(0, n, step):
+            part = slice(at, min(at + step, n))
+            if left is None:
+                yield part, None
+                continue
+            k = part.stop - at
+            flat = left[part] * k
+            flat += np.arange(k)
+            yield part, flat
+
+    def _filter(self, lanes: Lanes, part: slice, leaving: Ints | None) -> tuple[Floats, Bools]:
+        """Test lines against all polygons -> how sure (m, k), and which ones the rays may meet (m, k)."""
+        if lanes.start is None:
+            value = least = self._lines(lanes, part, None)
+        else:
+            points = lanes.start[:, part]
+            side = np.matmul(self._ahead, points, out=scratch("side", (self._count, points.shape[1])))
+            value = self._lines(lanes, part, side)
+            least = np.minimum(value, side, out=side)
+        met = scratch("met", (self._count + 1, value.shape[1]), np.bool_)  # the first row: of no polygon
+        np.greater_equal(least, -1, out=met[1:])
+        if leaving is not None:
+            met.reshape(-1)[leaving] = False
+        return value, met[1:]
+
+    def _lines(self, lanes: Lanes, part: slice, side: Floats | None) -> Floats:
+        line = lanes.line[:, part]
+        value = scratch("value", (self._count, line.shape[1]))
+        for polygons in self._polygons:
+            polygons.test(line, None if side is None else side[polygons.at], value[polygons.at])
+        return value
 
     def halves(self, prim: Ints, lanes: Lanes, t: Floats) -> Ints:
         """Tell which half of a quadrilateral was hit at t (n,): primitives (n,), -1 for a miss."""
@@ -71,43 +230,6 @@ class FewTriangles:
         return prim + (x * px + y * py + z * pz + offset > 0)
 
 
-def _polygons(corner: Floats, prim: Ints, partner: Ints, ball: Ball) -> Polygons:
-    rows = triangle.edge_rows(corner, ball.center, ball.radius).reshape(-1, 6)
-    side = triangle.side_rows(corner, ball.center, ball.radius)
-    slot = np.full(partner.size, prim.size)
-    slot[prim] = np.arange(prim.size)
-    halves = np.flatnonzero(partner.take(prim) >= 0)
-    slot[partner.take(prim.take(halves))] = halves
-    return Polygons(rows, side, -side, prim, slot)
-
-
-def _search(polygons: Polygons, lanes: Lanes, decisions: TriangleDecisions) -> None:
-    """Test all lanes against all polygons."""
-    m = polygons.prim.size
-    edges = len(polygons.rows) // m
-    step = max(64, CHUNK // len(polygons.rows))
-    batch = Candidates(decisions.decide)
-    leaving = polygons.slot.take(lanes.leaving) if (lanes.leaving >= 0).any() else None
-    for at in range(0, lanes.count, step):
-        k = min(step, lanes.count - at)
-        part = slice(at, at + k)
-        w = np.matmul(polygons.rows, lanes.line[:, part], out=scratch("product", (edges * m, k)))
-        value = one_sign(w.reshape(1, edges, m, k), scratch("value", (1, m, k)))[0]
-        least = value
-        padded = scratch("least", (m + 1, k))  # with a row for rays that leave none of these polygons
-        for rows, points in ((polygons.ahead, lanes.start), (polygons.behind, lanes.end)):
-            if points is not None:
-                side = np.matmul(rows, points[:, part], out=scratch("side", (m, k)))
-                side *= w[m : 2 * m]
-                least = np.minimum(least, side, out=padded[:-1])
-        if leaving is not None:
-            if least is value:
-                least = padded[:-1]
-                np.copyto(least, value)
-            left = leaving[part] * k
-            left += np.arange(k)
-            padded.reshape(-1)[left] = -2
-        hit = flat_true(np.greater_equal(least, -1, out=scratch("mask", (m, k), np.bool_)))
-        slot, lane = np.divmod(hit, k)
-        batch.add(polygons.prim.take(slot), lane + at, value.reshape(-1).take(hit))
-    batch.flush()
+def _sum(bytes_: NDArray[Any]) -> Bytes:
+    """Add up bytes (m, k) of each column."""
+    return np.add.reduce(bytes_.view(np.uint8), 0, dtype=np.uint8)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..vec import Floats, Ints, f4
-from .traverse import NO_HIT, Ball, Lanes
+from .traverse import NO_HIT, Ball, Lanes, Words
 from .triangle import ROUNDOFF, Doubles
 
 DECIDE = 1 << 14  # candidates decided at a time
@@ -20,6 +20,9 @@ class Found(Protocol):
 
     def add(self, lane: Ints, prim: Ints, t: Doubles) -> None:
         """Take hits of lanes (k,) at t; those with t <= 0, NaN or inf are none."""
+
+    def add_each(self, part: slice, prim: Ints, t: Doubles) -> None:
+        """Take one hit of each lane of a part, (k,)."""
 
     def reach(self) -> Floats:
         """Return how far each of n rays looks, as `traverse.trace` wants it, (n + 1,)."""
@@ -34,10 +37,11 @@ class Closest:
 
     def add(self, lane: Ints, prim: Ints, t: Doubles) -> None:
         """Record hits of lanes (k,) at t; those with t <= 0, NaN or inf are none."""
-        rounded = t.astype(f4)
-        valid = (rounded > 0) & (rounded < np.inf)
-        key = (rounded.view(np.int32).astype(np.int64) << 32) | prim
-        np.minimum.at(self.key, lane, np.where(valid, key, NO_HIT))
+        np.minimum.at(self.key, lane, _keys(prim, t))
+
+    def add_each(self, part: slice, prim: Ints, t: Doubles) -> None:
+        """Record one hit of each lane of a part, (k,)."""
+        np.minimum(self.key[part], _keys(prim, t), out=self.key[part])
 
     def reach(self) -> Floats:
         """Look no further than the nearest hit."""
@@ -56,9 +60,23 @@ class Occluded:
         rounded = t.astype(f4)
         self.blocked[lane.compress((rounded > 0) & (rounded < self.distance.take(lane)))] = True
 
+    def add_each(self, part: slice, prim: Ints, t: Doubles) -> None:
+        """Block lanes of a part with 0 < t < distance, (k,)."""
+        rounded = t.astype(f4)
+        self.blocked[part] |= (rounded > 0) & (rounded < self.distance[part])
+
     def reach(self) -> Floats:
         """Look as far as the distance, and no more when blocked."""
         return _reach(np.where(self.blocked, f4(-np.inf), self.distance), self.lanes, self.ball)
+
+
+def _keys(prim: Ints, t: Doubles) -> Words:
+    rounded = t.astype(f4)
+    valid = (rounded > 0) & (rounded < np.inf)
+    key = rounded.view(np.int32).astype(np.int64)
+    key <<= 32
+    key |= prim
+    return np.where(valid, key, NO_HIT)
 
 
 def _reach(t: Floats, lanes: Lanes, ball: Ball) -> Floats:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..vec import Floats, Ints
+from ..vec import Bools, Floats, Ints
 from .triangle import ROUNDOFF, Doubles
 
 FLATNESS = 2 * ROUNDOFF  # distance of the diagonals, relative to the coordinates
@@ -40,6 +40,17 @@ def corners(triangles: Floats, first: Ints) -> Floats:
     """Return the corners (4, k, 3) of quadrilaterals, in order round them."""
     one, other = triangles.take(first, 0), triangles.take(first + 1, 0)
     return np.stack([one[:, 0], one[:, 1], one[:, 2], other[:, 2]])
+
+
+def are_parallelograms(corner: Floats, radius: float) -> Bools:
+    """Tell which quadrilaterals (4, k, 3) in a ball are parallelograms, but for rounding.
+
+    Opposite edge functions of a line that meets the ball then add up to d·n within the area |n|; see
+    `triangle.pairs_of_one_sign`.
+    """
+    a, b, c, d = corner.astype(np.float64)
+    skew = np.linalg.norm(a - b + c - d, axis=1)
+    return skew * (8 * radius) < np.linalg.norm(np.cross(c - a, d - b), axis=1) / 2
 
 
 def planes(corner: Floats) -> Doubles:

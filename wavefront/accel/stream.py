@@ -58,6 +58,10 @@ class _TriangleTree:
         trace(self.tree, lanes, found.reach, partial(self._visit, lanes, decisions))
         decisions.finish()
 
+    def block(self, lanes: Lanes, found: Occluded) -> None:
+        """Tell `found` which lanes are blocked."""
+        self.search(lanes, found)
+
     def halves(self, prim: Ints, lanes: Lanes, t: Floats) -> Ints:
         """Return the primitives (n,) as they are: each was tested by itself."""
         return prim
@@ -221,7 +225,7 @@ class NumpyAccelerator:
                 ends = distance[part]
                 lanes = prepare(origin[:, part], direction[:, part], leaving[part], self._ball, ends)
                 found = Occluded(lanes, self._ball, ends)
-                self._triangles.search(lanes, found)
+                self._triangles.block(lanes, found)
                 self._spheres.search(lanes, found)
             blocked[part] = found.blocked
         return blocked

@@ -15,7 +15,7 @@ import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -69,7 +69,7 @@ def bounding_ball(low: Floats, high: Floats) -> Ball:
     return Ball(center, max(float(np.sqrt((reach * reach).sum())) * (1 + 1e-6), 1e-37))
 
 
-@dataclass(slots=True)
+@dataclass
 class Lanes:
     """A batch of n rays, prepared."""
 
@@ -78,14 +78,21 @@ class Lanes:
     leaving: Ints  # (n,)
     line: Floats  # (6, n + 1) Plücker coordinates: unit direction d, then (o - center) × d; the last is NaN
     speed: Floats  # (n,) length of `direction`
+    local: Floats | Doubles  # (3, n) o - center
     start: Floats | None  # (4, n) o - center, 1; None if some origin is far away
     end: Floats | None  # (4, n) the same of where rays end; None if they have no end, or start is None
-    begin: Floats | Doubles  # (n,) where rays start, as a distance from the point next to the centre
 
     @property
     def count(self) -> int:
         """Number of rays."""
         return self.speed.size
+
+    @cached_property
+    def begin(self) -> Floats | Doubles:
+        """Where rays start (n,), as a distance from the point next to the centre."""
+        x, y, z = self.local
+        ux, uy, uz = self.line[:3, :-1]
+        return x * ux + y * uy + z * uz
 
 
 def prepare(
@@ -96,33 +103,57 @@ def prepare(
     They are float32 while all origins are within two radii. Beyond, o - center loses what matters, and
     they are computed in float64.
     """
+    n = origin.shape[1]
     center = ball.center[:, None]
-    local: NDArray[Any] = origin - center
-    d: NDArray[Any] = direction
-    far = local.size and not float(np.abs(local).max()) * 3**0.5 <= 2 * ball.radius
-    if far:
-        local, d = origin.astype(np.float64) - center, direction.astype(np.float64)
-    speed = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
-    line = np.empty((6, speed.size + 1), f4)
+    local = np.subtract(origin, center, out=scratch("local", (3, n)))
+    furthest = np.maximum(local.max(initial=0), -local.min(initial=0))
+    far = not float(furthest) * 3**0.5 <= 2 * ball.radius
+    work = np.multiply(direction, direction, out=scratch("work", (3, n)))
+    speed = np.add(work[0], work[1], out=scratch("speed", (n,)))
+    speed += work[2]
+    np.sqrt(speed, out=speed)
+    line = scratch("line", (6, n + 1))
     line[:, -1] = np.nan
-    part = line[:, :-1]
-    ux, uy, uz = d / speed
-    x, y, z = local
-    part[0], part[1], part[2] = ux, uy, uz
-    part[3] = y * uz - z * uy
-    part[4] = z * ux - x * uz
-    part[5] = x * uy - y * ux
-    begin = x * ux + y * uy + z * uz
+    unit, moment = line[:3, :-1], line[3:, :-1]
+    np.divide(direction, speed, out=unit)
     if far:
-        return Lanes(origin, direction, leaving, line, speed.astype(f4), None, None, begin)
-    start = np.ones((4, speed.size), f4)
-    start[:3] = local
+        wide = scratch("wide", (8, n), np.float64)
+        local = np.subtract(origin, center, out=wide[:3], dtype=np.float64)
+        np.divide(_cross(local, direction, wide[3:]), speed, out=moment, casting="same_kind")
+        np.multiply(moment, moment, out=work)
+        # A line that passes the ball by meets nothing, and the filters do not allow for its rounding.
+        line[:, np.flatnonzero(work[0] + work[1] + work[2] > (1.01 * ball.radius) ** 2)] = np.nan
+        return Lanes(origin, direction, leaving, line, speed, local, None, None)
+    moment[:] = _cross(local, unit, scratch("moment", (5, n)))
+    start = _with_one("start", local)
     end = None
     if distance is not None:
-        end = np.ones((4, speed.size), f4)
-        np.multiply(part[:3], np.minimum(distance * speed, f4(3 * ball.radius)), out=end[:3])
+        length = np.divide(f4(3.01 * ball.radius), speed, out=work[0])
+        np.minimum(distance, length, out=length)
+        np.maximum(length, f4(0), out=length)
+        end = _with_one("end", direction)
+        end[:3] *= length
         end[:3] += local
-    return Lanes(origin, direction, leaving, line, speed, start, end, begin)
+        if not np.isfinite(end.max(initial=0) + speed.max(initial=0)):
+            return Lanes(origin, direction, leaving, line, speed, local, None, None)
+    return Lanes(origin, direction, leaving, line, speed, local, start, end)
+
+
+def _cross(a: NDArray[Any], b: NDArray[Any], work: NDArray[Any]) -> NDArray[Any]:
+    """Cross products of vectors (3, n), in work space (5, n)."""
+    for axis, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
+        np.multiply(a[i], b[j], out=work[3])
+        np.multiply(a[j], b[i], out=work[4])
+        np.subtract(work[3], work[4], out=work[axis])
+    return work[:3]
+
+
+def _with_one(name: str, points: Floats) -> Floats:
+    """Points (3, n) -> (4, n)."""
+    out = scratch(name, (4, points.shape[1]))
+    out[:3] = points
+    out[3] = 1
+    return out
 
 
 @dataclass(slots=True)

@@ -11,6 +11,7 @@ happened to round.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from ..vec import Bools, Floats, Ints, f4
 Doubles = NDArray[np.float64]
 
 ROUNDOFF = 2.0**-24  # half an ulp of float32
+TINY = 1e-30  # least extent of points, so that no row is infinite
 
 
 @dataclass(slots=True)
@@ -68,7 +70,7 @@ def edge_rows(corners: Floats, center: Floats, radius: float) -> Floats:
     Rows are scaled so that one threshold serves every polygon: a ray that truly hits has
     products w0 w1, w1 w2 ... of neighbours > -1, and if they are above 1, it truly hits. For an error
     of at most e in each w, and as hits have 0 <= |w| <= 2A (twice the area), the products are above
-    -e (2A + e).
+    -e (2A + e). Sure hits are above e (2A + 3e), as a wrong sign means a w of less than e.
     """
     corner: Doubles = corners.astype(np.float64) - center
     following = np.roll(corner, -1, 0)
@@ -77,6 +79,40 @@ def edge_rows(corners: Floats, center: Floats, radius: float) -> Floats:
     _, scale = _edge_error(corner, radius)
     rows = np.concatenate([moment, direction], 2) * scale[:, None]
     return rows.astype(f4)
+
+
+class Sides(NamedTuple):
+    """Planes of flat polygons (m), to tell on which side points are, with a bound for rounding."""
+
+    plane: Doubles  # (4, m) unit normal, and the offset: on the plane, their product with (p, 1) is 0
+    uneven: Doubles  # (m,) by how much the corners may be off the plane
+
+    def rows(self, start: Floats, end: Floats) -> tuple[Floats, Floats]:
+        """Return rows (m, 4) each for points where rays start and end, (4, n): o - center and 1.
+
+        Their products with them are beyond 1 or -1 where it is sure on which side the point is. For
+        the end, a float32 distance t to the plane is then less than the ray's length as well.
+        """
+        near, far = np.abs(start[:3]).max(1), np.abs(end[:3]).max(1)
+        near, far = near.astype(np.float64) + TINY, far.astype(np.float64) + TINY
+        normal, offset = np.abs(self.plane[:3].T), np.abs(self.plane[3])
+        # In half ulps: rounding of the point 1, of the plane 1, of the sum of four terms 4. An end is the
+        # sum of a start and a product of at most near + far, so 2 near + 2 far in place of 1; and a float32 t
+        # is off by as much as another such product.
+        at_start = ROUNDOFF * (normal @ (6 * near) + 6 * offset) + self.uneven
+        at_end = ROUNDOFF * (normal @ (4 * near + 8 * far) + 6 * offset) + self.uneven
+        return (self.plane / at_start).T.astype(f4), (self.plane / at_end).T.astype(f4)
+
+
+def sides(table: TriangleTable, prim: Ints, corners: Floats, center: Floats) -> Sides:
+    """Return the planes of flat polygons, corners (e, m, 3), that begin with triangles `prim` (m,).
+
+    They are those that t is computed with, about `center` (3,).
+    """
+    plane = table.plane.take(prim, 1)
+    plane[3] = (plane[:3] * center[:, None]).sum(0) - plane[3]
+    plane /= np.sqrt((plane[:3] * plane[:3]).sum(0))
+    return Sides(plane, np.zeros(prim.size) + _unevenness(corners.astype(np.float64) - center))
 
 
 def side_rows(corners: Floats, center: Floats, radius: float) -> Floats:
@@ -110,7 +146,7 @@ def _edge_error(corner: Doubles, radius: float) -> tuple[Doubles, Doubles]:
     error += _unevenness(corner) * span.sum(0)
     area2 = _twice_area(corner)
     with np.errstate(all="ignore"):
-        return error, 1 / np.sqrt(error * (area2 + error))
+        return error, 1 / np.sqrt(error * (area2 + 3 * error))
 
 
 def _twice_area(corner: Doubles) -> Doubles:
@@ -146,6 +182,16 @@ def one_sign(edges: Floats, out: Floats) -> Floats:
     return out
 
 
+def pairs_of_one_sign(edges: Floats, out: Floats) -> Floats:
+    """Edge functions (b, 4, m, k) of parallelograms -> the lesser of w0 w2 and w1 w3; see `one_sign`.
+
+    Opposite edges have one sum, d·n, so they cannot both have the other sign, that of an outside.
+    Overwrites the last two edges.
+    """
+    pairs = np.multiply(edges[:, :2], edges[:, 2:], out=edges[:, 2:])
+    return np.minimum(pairs[:, 0], pairs[:, 1], out=out)
+
+
 def hits_watertight(table: TriangleTable, prim: Ints, origin: Doubles, direction: Doubles) -> Bools:
     """Decide for pairs of triangle `prim` (k,) and ray (3, k) whether the ray's line passes inside.
 
@@ -175,9 +221,11 @@ def hits_watertight(table: TriangleTable, prim: Ints, origin: Doubles, direction
     return ((low >= 0) & (high > 0)) | ((high <= 0) & (low < 0))
 
 
-def plane_distance(table: TriangleTable, prim: Ints, origin: Doubles, direction: Doubles) -> Doubles:
-    """Distance t to the planes of triangles `prim` (k,) along rays (3, k), float64."""
-    nx, ny, nz, offset = (row.take(prim) for row in table.plane)
+def plane_distance(
+    plane: Doubles, chosen: Ints, origin: Floats | Doubles, direction: Floats | Doubles
+) -> Doubles:
+    """Distance t to planes `chosen` (k,) of all (4, m), see TriangleTable, along rays (3, k), float64."""
+    nx, ny, nz, offset = (row.take(chosen) for row in plane)
     top = offset - (nx * origin[0] + ny * origin[1] + nz * origin[2])
     return top / (nx * direction[0] + ny * direction[1] + nz * direction[2])
 
@@ -205,7 +253,7 @@ def barycentrics(
     table: TriangleTable, prim: Ints, origin: Doubles, direction: Doubles
 ) -> tuple[Floats, Floats]:
     """Weights (k,) of the second and third vertex where rays (3, k) cross triangles `prim` (k,)."""
-    t = plane_distance(table, prim, origin, direction)
+    t = plane_distance(table.plane, prim, origin, direction)
     x = origin[0] + t * direction[0]
     y = origin[1] + t * direction[1]
     z = origin[2] + t * direction[2]
