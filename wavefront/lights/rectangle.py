@@ -13,6 +13,8 @@ from ..vec import Bools, Floats, Ints, dot, f4
 from .base import TINY, Light, LightSample, area_pdf, facing_area
 
 NEAR = f4(2)  # squared distance, in areas, within which solid angle is sampled
+ROOT_NEAR = np.sqrt(NEAR)
+ON = f4(1e-5)  # height, in widths, of points on the rectangle itself
 SQUARE = 1e-6  # how far, relative to its sides, a pair of triangles may be from a rectangle
 
 
@@ -86,9 +88,11 @@ class RectangleLights(Light):
     def _near(self, point: Floats, height: Floats) -> Ints:
         """Lanes (k,) of points that get light and are close to the middle, for the rectangle's size.
 
-        From afar both densities are alike, and sampling the area costs a seventh.
+        From afar both densities are alike, and sampling the area costs a seventh. Points on the
+        rectangle itself are none of these.
         """
-        low = np.flatnonzero((height > 0) & (height < np.sqrt(NEAR * self.area)))
+        width = np.sqrt(self.area)
+        low = np.flatnonzero((height > ON * width) & (height < ROOT_NEAR * width))
         some = self._at(low)
         away = some.corner + f4(0.5) * (some.edge_u + some.edge_v) - point.take(low, 1)
         return low.compress(dot(away, away) < NEAR * some.area)
