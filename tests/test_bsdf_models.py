@@ -340,7 +340,7 @@ RANDOM = {
         sheen_color=colour(rng),
         sheen_roughness=rng.choice([roughness, rng.random()]),
         specular=rng.random(),
-        specular_color=colour(rng),
+        specular_color=4 * colour(rng),
     ),
     Mix: lambda rng, roughness: Mix(
         RANDOM[rng.choice([Diffuse, Mirror, Conductor])](rng, roughness),

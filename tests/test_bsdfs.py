@@ -263,7 +263,7 @@ def test_mirror_reflects_in_the_normal():
         (lambda: Principled(sheen_color=(0, 0, 2)), r"Principled sheen_color\[2\] is 2; it must be in"),
         (lambda: Principled(sheen_roughness=2), "Principled sheen_roughness is 2; it must be in"),
         (lambda: Principled(specular=2), "Principled specular is 2; it must be in"),
-        (lambda: Principled(specular_color=2), "Principled specular_color is 2; it must be in"),
+        (lambda: Principled(specular_color=-1), "Principled specular_color is -1; it must be at least 0"),
         (lambda: Principled(absorption=-1), "Principled absorption is -1; it must be at least 0"),
         (lambda: Mix(Diffuse(), 0.5), "Mix second must be a material, got 0.5"),
         (lambda: Mix(None, Diffuse()), "Mix first must be a material, got None"),

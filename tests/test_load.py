@@ -770,6 +770,18 @@ def test_from_trimesh_takes_normals_that_are_there():
     assert from_trimesh(smooth).shapes[0].normals == pytest.approx(smooth.vertices)
 
 
+def test_several_materials_of_one_trimesh_object_are_named():
+    box = trimesh.creation.box()
+    parts = [trimesh.visual.material.SimpleMaterial(diffuse=[255, 0, 0])] * 2
+    material = trimesh.visual.material.MultiMaterial(parts)
+    box.visual = trimesh.visual.TextureVisuals(uv=np.zeros((8, 2)), material=material)
+    with pytest.warns(
+        UserWarning, match=r"trimesh object: not honoured: MultiMaterial \(mesh ''\)"
+    ) as record:
+        from_trimesh(box)
+    assert len(record) == 1
+
+
 def test_from_trimesh_refuses_other_things():
     with pytest.raises(SceneError, match=r"expected a trimesh\.Trimesh or trimesh\.Scene, got list"):
         from_trimesh([1, 2])

@@ -309,6 +309,18 @@ def test_orthographic_camera(build, path):
     assert direction[:, 0] == pytest.approx([0, 0, -1])
 
 
+def test_the_camera_of_a_file_that_trimesh_read_is_named(build, path):
+    """Trimesh leaves out the nodes above it."""
+    build.json["nodes"].append({"camera": 0})
+    build.json["scenes"][0]["nodes"] = [0, 1]
+    build.json["cameras"] = [
+        {"type": "perspective", "perspective": {"yfov": 0.5, "aspectRatio": 1, "znear": 1}}
+    ]
+    held = trimesh.load_scene(build.mesh().gltf(path))
+    with pytest.warns(UserWarning, match="trimesh object: not honoured: the camera of its glTF file"):
+        assert from_trimesh(held).camera is None
+
+
 @pytest.mark.parametrize(
     ("camera", "message"),
     [
@@ -631,11 +643,33 @@ def test_extension_textures(given, build):
                 "clearcoatRoughnessFactor": 0.5,
                 "clearcoatRoughnessTexture": info,
             },
-            "KHR_materials_specular": {"specularTexture": info},
+            "KHR_materials_sheen": {
+                "sheenColorFactor": [1, 0.5, 0.25],
+                "sheenColorTexture": info,
+                "sheenRoughnessFactor": 0.5,
+                "sheenRoughnessTexture": info,
+            },
+            "KHR_materials_specular": {
+                "specularTexture": info,
+                "specularColorFactor": [2, 1, 0.5],
+                "specularColorTexture": info,
+            },
         }
     )
     expected = {"transmission": 0.2, "clearcoat": 0.2, "clearcoat_roughness": 0.2, "specular": 0.8}
+    expected |= {"sheen_roughness": 0.4}
     assert {k: float(at(found[k], 0.5, 0.5)) for k in expected} == pytest.approx(expected)
+    texel = np.array([srgb_to_linear(np.float32(code / 255)) for code in (51, 102, 153)])
+    assert at(found["sheen_color"], 0.5, 0.5) == pytest.approx(texel * [1, 0.5, 0.25])
+    assert at(found["specular_color"], 0.5, 0.5) == pytest.approx(texel * [2, 1, 0.5])
+
+
+def test_a_specular_colour_above_1_raises_the_reflectance_to_at_most_1(build, path):
+    """KHR_materials_specular: min(0.04 · colour, 1), of ior 1.5."""
+    build.material(extensions={"KHR_materials_specular": {"specularColorFactor": [1, 10, 100]}}).gltf(path)
+    (mesh,) = load_meshes(path)
+    found = mesh.material._dielectric(np.zeros(1, np.float32)).ravel()
+    assert found == pytest.approx([0.04, 0.4, 1])
 
 
 GLASS = {
@@ -755,6 +789,27 @@ def lose_extension(b):
     b.json["extensionsUsed"] = ["KHR_materials_iridescence"]
 
 
+def lose_skin(b):
+    b.json["nodes"][0] |= {"skin": 0, "name": "arm"}
+
+
+def lose_range(b):
+    punctual(b, type="point", range=5)
+
+
+def lose_of_material(named, **material):
+    """Give the triangle a material; return what to expect."""
+
+    def lose(b):
+        black = b.image(np.zeros((1, 1, 3), np.uint8))
+        text = json.dumps(material).replace('"image"', json.dumps(black))
+        b.json["materials"] = [{"name": "m", **json.loads(text)}]
+        b.json["meshes"][0]["primitives"][0]["material"] = 0
+
+    return lose, named + r" \(materials\[0\] 'm'\)"
+
+
+@pytest.mark.filterwarnings("ignore:.*lack the texture coordinates")
 @pytest.mark.parametrize(
     ("lose", "message"),
     [
@@ -764,6 +819,15 @@ def lose_extension(b):
         (lose_colours, r"COLOR_1 \(mesh 'mesh0'\)"),
         (lose_targets, r"morph targets \(mesh 'mesh0'\)"),
         (lose_lines, r"points and lines \(mesh 'mesh0'\)"),
+        (lose_skin, r"skin \(node 'arm'\)"),
+        (lose_range, r"range of a light \(light 0\)"),
+        lose_of_material("occlusionTexture", occlusionTexture="image"),
+        lose_of_material("ior 0", extensions={"KHR_materials_ior": {"ior": 0}}),
+        lose_of_material(
+            "clearcoatNormalTexture",
+            extensions={"KHR_materials_clearcoat": {"clearcoatFactor": 1, "clearcoatNormalTexture": "image"}},
+        ),
+        lose_of_material("KHR_materials_anisotropy", extensions={"KHR_materials_anisotropy": {}}),
         (lose_scene, r"further scenes \(the file\)"),
         (lose_extension, r"KHR_materials_iridescence \(the file\)"),
     ],

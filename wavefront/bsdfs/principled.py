@@ -66,7 +66,8 @@ class Principled(Bsdf):
     sheen, sheen_color, sheen_roughness
         Strength, colour and roughness of cloth fibres, in [0, 1].
     specular, specular_color
-        Strength and tint of the dielectric's reflection, in [0, 1].
+        Strength, in [0, 1], and tint, at least 0, of the dielectric's reflection along the normal, which
+        the tint raises to at most 1.
     absorption
         What the inside absorbs, per channel and scene unit, as for `Dielectric`. There is an inside
         only where light is transmitted, and behind no `thin` surface.
@@ -121,7 +122,7 @@ class Principled(Bsdf):
         self.sheen_color = colour("Principled sheen_color", sheen_color)
         self.sheen_roughness = scalar("Principled sheen_roughness", sheen_roughness)
         self.specular_weight = scalar("Principled specular", specular)
-        self.specular_color = colour("Principled specular_color", specular_color)
+        self.specular_color = colour("Principled specular_color", specular_color, np.inf)
         inside = colour("Principled absorption", absorption, np.inf)
         self.emission = emission_of("Principled", emission)
         self.opacity = opacity("Principled", alpha, alpha_cutoff)

@@ -255,9 +255,6 @@ class _Reader:
             return
         self._want("specular", self._scalar(group, "specularFactor", "specularTexture", 3, 1.0), 1.0)
         factor = self._colour(group, "specularColorFactor", [1.0, 1.0, 1.0], high=np.inf)
-        if (factor > 1).any():
-            self._lost.append("specularColorFactor above 1")
-            factor = np.minimum(factor, 1.0)
         texture = self._texture(group, "specularColorTexture", scale=factor)
         if texture is not None or (factor != 1).any():
             self._wanted["specular_color"] = factor if texture is None else texture
