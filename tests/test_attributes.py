@@ -11,6 +11,9 @@ import wavefront as wf
 from wavefront.accel import make_accelerator
 from wavefront.bsdfs.base import Spatial
 from wavefront.scene import compile_scene
+from wavefront.stages.intersect import intersect
+from wavefront.stages.surface import interact
+from wavefront.state import Rays
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 SQUARE = {"vertices": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "faces": [[0, 1, 2], [0, 2, 3]]}
@@ -89,6 +92,35 @@ def test_a_patch_of_a_real_file_shows_its_texture():
     assert np.ptp(blocks(expected), axis=(0, 1)).max() > 0.2
     assert blocks(found) == pytest.approx(blocks(expected), abs=0.02)
     assert found.mean((0, 1)) == pytest.approx(expected.mean((0, 1)), rel=2e-3)
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="the real files are not here")
+@pytest.mark.filterwarnings("ignore:.*not honoured", "ignore::DeprecationWarning")
+@pytest.mark.parametrize("name", ["fuze.obj", "BoxTextured.glb", "Duck.glb"])
+def test_faces_of_real_files_have_the_colours_of_their_image(name):
+    """In the middle of each face, as trimesh places it and as Pillow decodes it."""
+    (held,) = trimesh.load_scene(DATA / name, process=False).dump()
+    material = held.visual.material
+    image = getattr(material, "baseColorTexture", None) or material.image
+    codes = np.asarray(image.convert("RGB")) / 255
+    u, v = held.visual.uv[held.faces].mean(1).T % 1
+    code = codes[((1 - v) * len(codes)).astype(int), (u * len(codes[0])).astype(int)]
+    expected = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
+
+    (mesh,) = wf.load(DATA / name).shapes
+    scene = compile_scene(
+        wf.Scene(mesh, [wf.Environment(1.0)]), lambda parts: make_accelerator(parts, "numpy")
+    )
+    middles, normals = held.triangles_center, held.face_normals
+    origin = (middles + normals * 1e-3 * scene.radius - scene.centre).T.astype(np.float32)
+    rays = Rays(origin, np.ascontiguousarray(-normals.T, np.float32), np.full(len(middles), -1))
+    surface = interact(scene, rays, intersect(scene, rays))
+    (key,) = vars(mesh.material).keys() & {"base_color", "reflectance"}
+    found = getattr(mesh.material, key).at(surface).T
+    off = np.abs(found - expected).max(1)
+    assert np.quantile(off, 0.75) < 0.05  # near an edge in the image, the texel and the mean of four differ
+    assert found.mean(0) == pytest.approx(expected.mean(0), rel=0.02)
+    assert np.quantile(np.abs(found - expected[::-1]).max(1), 0.75) > 0.1
 
 
 # ---- vertex colours -----------------------------------------------------------------------------

@@ -261,6 +261,13 @@ def test_statements_that_obj_has_for_rendering_are_named(write, line):
     load_meshes(write(f"{SQUARE}{line.split()[0]} 0\nf 1 2 3\n"))
 
 
+def test_numbers_after_the_colour_of_a_vertex_are_named(write):
+    path = write("v 0 0 0 1 0 0\nv 1 0 0 1 0 0 0.5\nv 0 1 0 1 0 0 0.5\nf 1 2 3\n")
+    with pytest.warns(UserWarning, match=r"not honoured: numbers of v after the sixth \(line 2\)$"):
+        (mesh,) = load_meshes(path)
+    assert mesh.colors.tolist() == [[1, 0, 0, 1]] * 3
+
+
 def test_smoothing_groups_are_named_where_normals_are_missing(write):
     some = SQUARE + "vn 0 0 1\n{}\nf 1//1 2//1 3//1\n{}\nf {}\n"
     for first, second, face in (("s 1", "s 2", "1//1 3//1 4//1"), ("s off", "s 0", "1 3 4")):

@@ -72,6 +72,9 @@ def parse(path: str | os.PathLike[str], text: str) -> Obj:
     lines = _sort(name, text)
     tables = {kind: _table(name, kind, lines.tables[kind]) for kind in KINDS}
     rows = {kind: np.array([number for number, _ in lines.tables[kind]], np.int64) for kind in KINDS}
+    if tables["v"].shape[1] > 6:
+        line = rows["v"][np.argmax(~np.isnan(tables["v"][:, 6]))]
+        lines.ignored["numbers of v after the sixth"] = int(line)
     groups = [_group(name, key, faces, tables, rows) for key, faces in lines.faces.items()]
     if not groups:
         raise SceneError(f"{name}: has no faces")
