@@ -4,10 +4,13 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+import scenes
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
+from significance import render
 
+from wavefront import integrators
 from wavefront.sampling.sampler import make_sampler
 from wavefront.stages import compact as stage
 from wavefront.state import Hits, Paths, Surface
@@ -137,3 +140,16 @@ def test_roulette_looks_through_refraction() -> None:
     """Radiance that glass has compressed by η² is no reason to end a path."""
     left = survivors(carrying(0.25 / 2.25, 2.25, 1 << 14))
     assert len(left) / (1 << 14) == pytest.approx(0.5, abs=0.02)
+
+
+def test_paths_remember_by_how_much_glass_compresses(monkeypatch: pytest.MonkeyPatch) -> None:
+    """η² inside a ball of index 1.5, 1 where they were reflected and after they have left it."""
+    seen = []
+
+    def note(paths: Paths, sampler, bounce: int):
+        seen.append(np.unique(paths.eta2.round(4)).tolist())
+        return np.arange(len(paths))
+
+    monkeypatch.setattr(integrators, "roulette", note)
+    render(scenes.glass_ball(), 16, max_bounces=2)
+    assert seen == [[1, 2.25], [1, 2.25]]
