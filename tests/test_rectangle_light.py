@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import wavefront as wf
-from wavefront.lights import RectangleLights, first_of_pairs
+from wavefront.accel import make_accelerator
+from wavefront.lights import RectangleLights, TriangleLights, TwoSidedRectangleLights, first_of_pairs
+from wavefront.scene import compile_scene
 from wavefront.vec import f4
 
 WHITE = np.ones((3, 1), f4)
@@ -13,6 +15,11 @@ WHITE = np.ones((3, 1), f4)
 def corners(mesh: wf.Mesh) -> np.ndarray:
     """Triangles of a mesh, (m, 3, 3)."""
     return mesh.vertices[mesh.faces]
+
+
+def pairs(triangles: np.ndarray) -> list[int]:
+    """First triangles of rectangles among those of one mesh."""
+    return first_of_pairs(triangles, np.zeros(len(triangles), np.intp)).tolist()
 
 
 @pytest.mark.parametrize(
@@ -40,13 +47,13 @@ def test_pairs_are_found() -> None:
         corners(wf.Rectangle((5, 0, 0), (0, 1, 1), (0, 1, -1))),
     )
     lone = np.array([[[9.0, 0, 0], [9, 1, 0], [9, 0, 1]]])
-    assert first_of_pairs(np.concatenate([one, lone, two])).tolist() == [0, 3]
+    assert pairs(np.concatenate([one, lone, two])) == [0, 3]
 
 
 @pytest.mark.parametrize("edge_v", [(0.001, 1, 0), (-0.5, 1, 0)], ids=["barely skewed", "skewed"])
 def test_parallelograms_are_not_rectangles(edge_v: tuple[float, float, float]) -> None:
     """A skewed pair stays two triangles."""
-    assert first_of_pairs(corners(wf.Rectangle((0, 0, 0), (1, 0, 0), edge_v))).size == 0
+    assert pairs(corners(wf.Rectangle((0, 0, 0), (1, 0, 0), edge_v))) == []
 
 
 def test_overlapping_pairs_are_taken_once() -> None:
@@ -59,7 +66,7 @@ def test_overlapping_pairs_are_taken_once() -> None:
         ],
         float,
     )
-    assert first_of_pairs(fan).tolist() == [0]
+    assert pairs(fan) == [0]
 
 
 def test_a_lit_floor_is_exact_under_a_parallelogram_too() -> None:
@@ -71,3 +78,23 @@ def test_a_lit_floor_is_exact_under_a_parallelogram_too() -> None:
     for lights in ([whole], halves):
         image = wf.render(wf.Scene([floor, *lights], camera=camera), 1 << 14, max_bounces=1)
         np.testing.assert_allclose(image.rgb, 1.740840 * 0.159155, rtol=2e-3)
+
+
+def test_triangles_of_two_meshes_make_no_rectangle() -> None:
+    """Each light belongs to one mesh, even where two meshes touch."""
+    triangles = corners(wf.Rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)))
+    assert first_of_pairs(triangles, np.array([0, 1])).size == 0
+    halves = [wf.Mesh(part, [(0, 1, 2)], emission=1.0) for part in triangles]
+    lights = compile_scene(wf.Scene(halves), lambda geometry: make_accelerator(geometry, "numpy")).lights
+    assert [(type(kind), len(kind)) for kind in lights.kinds] == [(TriangleLights, 2)]
+
+
+def test_meshes_that_shine_alike_become_one_record() -> None:
+    """From one side or both, and each with the radiance of its mesh."""
+    panels = [
+        wf.Rectangle((3 * k, 0, 0), (1, 0, 0), (0, 1, 0), emission=k + 1.0, two_sided=k == 1)
+        for k in range(3)
+    ]
+    lights = compile_scene(wf.Scene(panels), lambda geometry: make_accelerator(geometry, "numpy")).lights
+    found = {type(kind): kind.radiance[0].tolist() for kind in lights.kinds}
+    assert found == {RectangleLights: [1.0, 3.0], TwoSidedRectangleLights: [2.0]}

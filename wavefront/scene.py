@@ -536,36 +536,52 @@ def _uneven(meshes: Sequence[Mesh], lights: int, light_of: Ints) -> Uneven | Non
 def _area_lights(
     meshes: Sequence[Mesh], corners: Sequence[NDArray[np.float64]]
 ) -> list[tuple[Ints, RectangleLights | TriangleLights]]:
-    """Return the emitting rectangles and triangles of all meshes.
+    """Return the emitting rectangles and triangles of all meshes, a record for each kind.
 
     Only what shines evenly is taken for rectangles, as their points have no barycentric weights.
     With each record come its faces: (2, k) for rectangles, (1, k) for triangles.
     """
+    emitting = [number for number, mesh in enumerate(meshes) if mesh.emission is not None]
+    if not emitting:
+        return []
+    sizes = [len(part) for part in corners]
+    starts = np.cumsum([0, *sizes])
+    mesh_of = np.repeat(emitting, [sizes[number] for number in emitting])
+    face = np.concatenate([np.arange(starts[number], starts[number + 1]) for number in emitting])
+    triangles = np.concatenate([corners[number] for number in emitting])
+    radiance = np.concatenate([_radiance(meshes[number], corners[number]) for number in emitting], 1)
+    shining = _with_area(meshes, mesh_of, triangles)
+    even = shining[~np.array([is_uneven(mesh) for mesh in meshes])[mesh_of[shining]]]
+    first = first_of_pairs(triangles[even], mesh_of[even])
+    pairs = even[np.stack([first, first + 1])]
+    alone = np.setdiff1d(shining, pairs)
+    two_sided = np.array([mesh.two_sided for mesh in meshes])[mesh_of]
     found: list[tuple[Ints, RectangleLights | TriangleLights]] = []
-    start = 0
-    for mesh, part in zip(meshes, corners, strict=True):
-        if mesh.emission is not None:
-            shining = _with_area(mesh, part)
-            uneven = is_uneven(mesh)
-            first = np.zeros(0, np.intp) if uneven else first_of_pairs(part[shining])
-            pairs = shining[np.stack([first, first + 1])]
-            alone = np.setdiff1d(shining, pairs)
-            if first.size:
-                rectangle = TwoSidedRectangleLights if mesh.two_sided else RectangleLights
-                found.append((start + pairs, rectangle.from_pairs(part[pairs[0]], mesh.emission)))
-            if alone.size:
-                triangle = TwoSidedTriangleLights if mesh.two_sided else TriangleLights
-                radiance = mean_radiance(mesh, part)[:, alone] if uneven else mesh.emission
-                single = triangle.from_triangles(part[alone], radiance)
-                found.append((start + alone[None], single))
-        start += len(part)
+    for chosen, rectangles, singles in (
+        (~two_sided, RectangleLights, TriangleLights),
+        (two_sided, TwoSidedRectangleLights, TwoSidedTriangleLights),
+    ):
+        pair, single = pairs[:, chosen[pairs[0]]], alone[chosen[alone]]
+        if pair.size:
+            found.append((face[pair], rectangles.from_pairs(triangles[pair[0]], radiance[:, pair[0]])))
+        if single.size:
+            found.append((face[single][None], singles.from_triangles(triangles[single], radiance[:, single])))
     return found
 
 
-def _with_area(mesh: Mesh, triangles: NDArray[np.float64]) -> Ints:
-    """Return the faces of an emitting mesh that have an area."""
+def _radiance(mesh: Mesh, triangles: NDArray[np.float64]) -> Floats:
+    """Return the radiance of each face of an emitting mesh, its mean where it varies, (3, k)."""
+    if is_uneven(mesh):
+        return mean_radiance(mesh, triangles)
+    return np.broadcast_to(np.asarray(mesh.emission, f4), (3, len(triangles)))
+
+
+def _with_area(meshes: Sequence[Mesh], mesh_of: Ints, triangles: NDArray[np.float64]) -> Ints:
+    """Return which triangles (k, 3, 3) of emitting meshes, numbered `mesh_of` (k,), have an area."""
     edges = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     shining = np.flatnonzero((edges != 0).any(1))
-    if not len(shining):
+    dark = np.setdiff1d(mesh_of, mesh_of[shining])
+    if dark.size:
+        mesh = meshes[dark[0]]
         raise SceneError(f"{mesh.name}: a light must have an area; all {len(mesh.faces)} faces have none")
     return shining

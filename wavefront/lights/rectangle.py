@@ -33,7 +33,7 @@ class RectangleLights(Light):
 
     @classmethod
     def from_pairs(cls, triangles: NDArray[np.float64], radiance: Floats) -> RectangleLights:
-        """Build from the first triangle of each pair, (k, 3, 3), and one radiance (3, 1).
+        """Build from the first triangle of each pair, (k, 3, 3), and radiance (3, k) or (3, 1).
 
         The corners of a pair are p, p + u, p + u + v and p, p + u + v, p + v.
         """
@@ -42,7 +42,8 @@ class RectangleLights(Light):
         normal = np.cross(edge_u, edge_v, axis=0)
         area = np.linalg.norm(normal, axis=0)
         p, u, v, n = (np.ascontiguousarray(rows, f4) for rows in (corner, edge_u, edge_v, normal / area))
-        return cls(p, u, v, n, area.astype(f4), np.repeat(radiance, len(triangles), 1))
+        each = np.broadcast_to(radiance, (3, len(triangles))).astype(f4)
+        return cls(p, u, v, n, area.astype(f4), each)
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
         """Draw a point uniformly by area, or from nearby a direction uniformly in solid angle."""
@@ -133,8 +134,10 @@ class TwoSidedRectangleLights(RectangleLights):
         return np.abs(rise)
 
 
-def first_of_pairs(triangles: NDArray[np.float64]) -> Ints:
+def first_of_pairs(triangles: NDArray[np.float64], mesh_of: Ints) -> Ints:
     """Find consecutive triangles (m, 3, 3) that make a rectangle: indices (k,) of the first of each.
+
+    `mesh_of` (m,) numbers their meshes; both must be of the same.
 
     They share the diagonal from the first corner of both to the third of the first and the second
     of the second, as `Rectangle` and fans of quadrilaterals lay them out.
@@ -146,7 +149,8 @@ def first_of_pairs(triangles: NDArray[np.float64]) -> Ints:
     size_u, size_v = np.linalg.norm(u, axis=1), np.linalg.norm(v, axis=1)
     closes = np.linalg.norm(d - a - v, axis=1) <= SQUARE * (size_u + size_v)
     square = np.abs((u * v).sum(1)) <= SQUARE * size_u * size_v
-    found = np.flatnonzero(shared & closes & square & (size_u > 0) & (size_v > 0))
+    one_mesh = mesh_of[:-1] == mesh_of[1:]
+    found = np.flatnonzero(one_mesh & shared & closes & square & (size_u > 0) & (size_v > 0))
     # in a run of pairs that overlap, every other one stands
     place = np.arange(len(found))
     starts = np.append(True, np.diff(found) > 1)[: len(found)]
