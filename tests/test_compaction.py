@@ -10,9 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from significance import render
 
+import wavefront as wf
 from wavefront import integrators
+from wavefront.accel.stream import NumpyAccelerator
 from wavefront.sampling.sampler import make_sampler
+from wavefront.scene import CompiledScene, compile_scene
 from wavefront.stages import compact as stage
+from wavefront.stages.shade import shading
 from wavefront.state import Hits, Paths, Surface
 from wavefront.vec import f4
 
@@ -53,10 +57,11 @@ kinds = st.sampled_from([Paths, Hits, Surface])
 
 @given(kinds, st.integers(1, 12), st.data())
 def test_take_takes_every_field(kind: type, n: int, data) -> None:
-    """Column i of the result is column index[i] of the record, in every field."""
+    """Column i of the result is column index[i] of the record, in every field; slices do the same."""
     whole, index = record(kind, n), data.draw(strategies.index_lists(n))
     part = whole.take(index)
     assert len(part) == len(index)
+    assert same(whole.take(slice(1, n - 1)), whole.take(np.arange(1, max(1, n - 1))))
     for field in fields(kind):
         before, after = getattr(whole, field.name), getattr(part, field.name)
         assert after.dtype == before.dtype
@@ -71,14 +76,65 @@ def test_concatenate_undoes_cutting(kind: type, n: int, data) -> None:
     assert same(kind.concatenate(halves), whole)
 
 
-@given(st.integers(1, 12), st.data())
-def test_compact_keeps_paths_and_hits_together(n: int, data) -> None:
-    """The same lanes of both; all lanes cost nothing."""
+MIRROR, GREY, GLASS, GOLD = (
+    wf.Mirror(),
+    wf.Diffuse(0.5),
+    wf.Dielectric(),
+    wf.Conductor.named("gold", roughness=0.3),
+)
+
+
+def balls(*materials: wf.Bsdf) -> CompiledScene:
+    """A ball of each material, far apart."""
+    shapes = [wf.Sphere((5 * i, 0, 0), 1, material=material) for i, material in enumerate(materials)]
+    return compile_scene(wf.Scene(shapes, [wf.Environment()]), NumpyAccelerator)
+
+
+@given(
+    st.sampled_from([(GREY,), (GREY, GREY, wf.Diffuse(0.1)), (MIRROR, GREY, GLASS, GOLD, GREY)]),
+    st.integers(1, 12),
+    st.data(),
+)
+def test_compact_keeps_paths_and_hits_together(materials: tuple[wf.Bsdf, ...], n: int, data) -> None:
+    """The same lanes of both, by groups of materials and else in order; delta lobes come last."""
+    scene = balls(*materials)
     paths, hits = record(Paths, n, 1), record(Hits, n, 2)
-    lanes = np.flatnonzero(data.draw(st.lists(st.booleans(), min_size=n, max_size=n)))
-    kept_paths, kept_hits = stage.compact(paths, hits, lanes)
-    assert same(kept_paths, paths.take(lanes))
-    assert same(kept_hits, hits.take(lanes))
+    paths.slot = np.arange(n)
+    met = st.integers(-1, len(materials) - 1)
+    hits.prim = np.array(data.draw(st.lists(met, min_size=n, max_size=n)))
+    kept_paths, kept_hits = stage.compact(scene, paths, hits, hits.found)
+    assert sorted(kept_paths.slot) == hits.found.tolist()
+    assert same(kept_paths, paths.take(kept_paths.slot))
+    assert same(kept_hits, hits.take(kept_paths.slot))
+    group = scene.materials.group_of.take(scene.material_of.take(kept_hits.prim))
+    assert (np.diff(group * n + kept_paths.slot) > 0).all()
+    specular = [materials[prim].specular for prim in kept_hits.prim]
+    assert specular == sorted(specular)
+
+
+def test_compact_of_all_lanes_copies_nothing() -> None:
+    """Where all hit one group of materials, paths and hits stay what they are."""
+    paths, hits = record(Paths, 4), record(Hits, 4)
+    hits.prim = np.array([0, 1, 1, 0])
+    assert stage.compact(balls(GREY, wf.Diffuse(0.1)), paths, hits, hits.found) == (paths, hits)
+    hits.prim = np.array([1, 1, 1, 1])
+    kept, _ = stage.compact(balls(GREY, MIRROR), paths, hits, hits.found)
+    assert kept is paths
+
+
+def test_light_is_sampled_only_where_it_can_be_scattered() -> None:
+    """No light sample is drawn for lanes that have only delta lobes; all others keep their columns."""
+    scene = balls(MIRROR, GREY, GLASS, GOLD, GREY)
+    surface = record(Surface, 8)
+    surface.material = np.array([1, 1, 3, 3, 3, 0, 2, 2])  # in the order of their groups
+    shade = shading(scene, surface)
+    assert [(lanes.start, lanes.stop) for lanes, _ in shade.groups] == [(0, 2), (2, 5), (5, 6), (6, 8)]
+    lit = shade.lit()
+    assert same(lit.surface, surface.take(np.arange(5)))
+    assert (lit.wo == shade.wo[:, :5]).all()
+    assert [type(bsdf) for _, bsdf in lit.groups] == [wf.Diffuse, wf.Conductor]
+    assert len(shading(scene, surface.take(np.arange(5, 8))).lit().surface) == 0
+    assert shading(scene, surface.take(np.arange(5))).lit().surface.material.tolist() == [1, 1, 3, 3, 3]
 
 
 def test_absent_fields_stay_absent() -> None:

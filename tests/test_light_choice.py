@@ -36,10 +36,10 @@ def test_lights_that_face_away_get_what_their_power_gives() -> None:
     assert chance == pytest.approx([BY_POWER / 2, 1 - BY_POWER / 2], rel=1e-5)
 
 
-def test_sampling_follows_the_probabilities() -> None:
-    """In every cell each of 1000 lights is drawn as often as its pmf says; u = 0 and 1 - 2^-24 too."""
+@pytest.mark.parametrize("k", [1, 2, 3, 5, 1000])
+def test_sampling_follows_the_probabilities(k: int) -> None:
+    """In every cell each of k lights is drawn as often as its pmf says; u = 0 and 1 - 2^-24 too."""
     rng = np.random.default_rng(3)
-    k = 1000
     choice = ByPlace(-np.ones(3), np.ones(3), lambda c, r: rng.random((c.shape[1], k)) ** 4, rng.random(k))
     n = 1 << 18
     for _ in range(3):

@@ -179,7 +179,7 @@ def test_plain_colours_are_one_group() -> None:
         wf.Principled(0.5, clearcoat=1.0),  # with a lobe that the others lack
     ]
     grouped = group_materials(materials)
-    assert grouped.group_of.tolist() == [0, 1, 0, 2, 2, 3, 3, 4]
+    assert grouped.group_of.tolist() == [0, 3, 0, 4, 4, 1, 1, 2]
     assert len(grouped.groups) == 5
 
 

@@ -36,7 +36,7 @@ def li_naive(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: 
         paths, hits = pass_through(scene, paths, hits, sampler, bounce)
         light = emitted(scene, paths, hits)
         deposit(L, paths, light)
-        paths, hits = compact(paths, hits, hits.found)
+        paths, hits = compact(scene, paths, hits, hits.found)
         if bounce == max_bounces or not len(paths):
             break
         shade = arrive(scene, paths, hits)
@@ -53,7 +53,7 @@ def li_direct_simple(scene: CompiledScene, paths: Paths, sampler: Sampler, max_b
         paths, hits = pass_through(scene, paths, hits, sampler, bounce)
         light = emitted(scene, paths, hits)
         deposit(L, paths, light)
-        paths, hits = compact(paths, hits, hits.found)
+        paths, hits = compact(scene, paths, hits, hits.found)
         if bounce == max_bounces or not len(paths):
             break
         shade = arrive(scene, paths, hits)
@@ -74,7 +74,7 @@ def li_direct_mis(scene: CompiledScene, paths: Paths, sampler: Sampler, max_boun
         paths, hits = pass_through(scene, paths, hits, sampler, bounce)
         light = emitted(scene, paths, hits)
         deposit(L, paths, mis_weighted(scene, paths, light))
-        paths, hits = compact(paths, hits, np.flatnonzero((hits.prim >= 0) & paths.specular))
+        paths, hits = compact(scene, paths, hits, np.flatnonzero((hits.prim >= 0) & paths.specular))
         if bounce == max_bounces or not len(paths):
             break
         shade = arrive(scene, paths, hits)
@@ -92,7 +92,7 @@ def li_full(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: i
         paths, hits = pass_through(scene, paths, hits, sampler, bounce)
         light = emitted(scene, paths, hits)
         deposit(L, paths, mis_weighted(scene, paths, light))
-        paths, hits = compact(paths, hits, hits.found)
+        paths, hits = compact(scene, paths, hits, hits.found)
         if bounce == max_bounces or not len(paths):
             break
         shade = arrive(scene, paths, hits)

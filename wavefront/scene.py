@@ -145,7 +145,7 @@ class Materials:
     """The materials of a scene, gathered into groups that are shaded together."""
 
     group_of: Ints  # (materials,) the group of each material
-    groups: tuple[Bsdf, ...]
+    groups: tuple[Bsdf, ...]  # those that are `specular` at the end
     reliefs: tuple[tuple[int, Relief], ...]  # the groups that have one, with it
 
 
@@ -272,15 +272,16 @@ def group_materials(materials: Sequence[Bsdf]) -> Materials:
     """Merge materials that differ only in the values of constant parameters into one group each.
 
     The merged material finds its values in a `Palette`, so a scene of a hundred plain colours is
-    shaded as one group.
+    shaded as one group. Groups that have only delta lobes come last.
     """
     members: dict[object, list[int]] = {}
     for i, material in enumerate(materials):
         members.setdefault(_group_key(material), []).append(i)
     group_of = np.empty(len(materials), np.intp)
-    for group, numbers in enumerate(members.values()):
+    ordered = sorted(members.values(), key=lambda numbers: materials[numbers[0]].specular)
+    for group, numbers in enumerate(ordered):
         group_of[numbers] = group
-    groups = tuple(_merge(materials, numbers) for numbers in members.values())
+    groups = tuple(_merge(materials, numbers) for numbers in ordered)
     reliefs = tuple((number, bsdf.relief) for number, bsdf in enumerate(groups) if bsdf.relief is not None)
     return Materials(group_of, groups, reliefs)
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .frame import Frame
-from .vec import Bools, Floats, Ints
+from .vec import Bools, Floats, Ints, Lanes
 
 Words = NDArray[np.uint32]
 
@@ -24,8 +24,10 @@ def _names(record: type) -> tuple[str, ...]:
     return tuple(field.name for field in fields(record))
 
 
-def _gather(value: NDArray[Any], index: Ints) -> NDArray[Any]:
-    """Columns `index` (m,) of an array."""
+def _gather(value: NDArray[Any], index: Lanes) -> NDArray[Any]:
+    """Columns `index` (m,) of an array; of a slice a view."""
+    if isinstance(index, slice):
+        return value[..., index]
     if value.strides[-1] == 0:  # one column, broadcast: stays so
         return np.broadcast_to(value[..., :1], (*value.shape[:-1], index.size))
     return value.take(index, -1)
@@ -48,8 +50,8 @@ class Columns:
         """Return the number of columns."""
         return int(next(value.shape[-1] for _, value in self._values() if value is not None))
 
-    def take(self, index: Ints) -> Self:
-        """Gather columns `index` (m,) of every field into a new record."""
+    def take(self, index: Lanes) -> Self:
+        """Gather columns `index` (m,) of every field into a new record; of a slice, views."""
         out = object.__new__(type(self))
         for name, value in self._values():
             object.__setattr__(out, name, None if value is None else _gather(value, index))

@@ -15,7 +15,7 @@ Floats = NDArray[np.floating[Any]]  # float32; the stubs lose the width in arith
 Ints = NDArray[np.intp]
 Bools = NDArray[np.bool_]
 
-Lanes: TypeAlias = Ints | slice  # some columns by index, or all of them: ALL
+Lanes: TypeAlias = Ints | slice  # some columns, by index or from one to another; all of them: ALL
 
 f4 = np.float32
 ALL = slice(None)
@@ -25,8 +25,8 @@ Array = TypeVar("Array", bound=NDArray[Any])
 
 
 def columns(a: Array, lanes: Lanes) -> Array:
-    """Columns `lanes` of (..., n); the array itself, not a copy, for all of them."""
-    return a if isinstance(lanes, slice) else a.take(lanes, -1)  # type: ignore[return-value]
+    """Columns `lanes` of (..., n); of a slice a view, not a copy."""
+    return a[..., lanes] if isinstance(lanes, slice) else a.take(lanes, -1)  # type: ignore[return-value]
 
 
 def alike(value: Any, n: int) -> NDArray[Any]:

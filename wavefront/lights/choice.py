@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..sampling.discrete import Discrete
+from ..sampling.discrete import Discrete, rounded_up
 from ..vec import Floats, Ints, f4
 
 Doubles = NDArray[np.float64]
@@ -105,16 +105,20 @@ class ByPlace:
         self.chance = table.astype(f4).ravel()
         cumulative = np.cumsum(table, 1)
         cumulative /= cumulative[:, -1:]
-        # one sorted array for all cells: cell number plus cumulative probability
-        self.cumulative = (cumulative + np.arange(len(table))[:, None]).ravel()
+        # where each light but the last ends, and then ones, so that a bisection halves what is left
+        self.ends = (1 << (self.lights - 1).bit_length()) - 1
+        ends = np.ones((len(table), self.ends), f4)
+        ends[:, : self.lights - 1] = rounded_up(cumulative[:, :-1])
+        self.end = ends.ravel()
 
     def sample(self, point: Floats, u: Floats) -> tuple[Ints, Floats]:
-        """Choose by inverting the cumulative weights of each point's cell."""
+        """Choose by inverting the cumulative weights of each point's cell, by bisection of all at once."""
         cell = self._cell(point)
-        entry = np.searchsorted(self.cumulative, cell + u.astype(np.float64), side="right")
-        first = cell * self.lights
-        entry = np.clip(entry, first, first + (self.lights - 1))
-        return entry - first, self.chance.take(entry)
+        light, before, step = np.zeros(len(cell), np.intp), cell * self.ends - 1, (self.ends + 1) // 2
+        while step:
+            light += (u >= self.end.take(before + light + step)) * np.intp(step)
+            step //= 2
+        return light, self.chance.take(cell * self.lights + light)
 
     def pmf(self, light: Ints, point: Floats) -> Floats:
         """Return the weight of each light in its point's cell."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..sampling.discrete import Discrete
-from ..vec import Floats, Ints, column, f4
+from ..vec import Floats, Lanes, column, f4
 from .base import Light, LightSample
 
 
@@ -23,7 +23,7 @@ class InfiniteLight(Light):
         """Return 1."""
         return 1
 
-    def take(self, index: Ints) -> Self:
+    def take(self, index: Lanes) -> Self:
         """Return the one light: every lane has the same."""
         return self
 

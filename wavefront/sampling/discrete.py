@@ -53,7 +53,7 @@ class _Inversion:
         self._start = (upto - probability).ravel()
         # Rounded up, a float32 edge splits float32 numbers exactly as the float64 sum does, and a
         # row's last one is 1 whatever its rounding error.
-        edge = _rounded_up(upto)
+        edge = rounded_up(upto)
         self._edge = edge.ravel()
         self._sorted = (edge + np.arange(rows, dtype=np.float64)[:, None]).ravel()
         cells_per_item = 8 if rows * items <= _LARGE else 1
@@ -87,7 +87,7 @@ class _Inversion:
         return flat, np.clip(rest, 0, _BELOW_ONE).astype(f4)
 
 
-def _rounded_up(x: NDArray[np.float64]) -> Floats:
+def rounded_up(x: NDArray[np.float64]) -> Floats:
     """The smallest float32 that is not below x, at most 1."""
     near = np.minimum(x, 1).astype(f4)
     np.nextafter(near, f4(2), out=near, where=near < x)

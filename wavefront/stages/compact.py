@@ -5,18 +5,36 @@ from __future__ import annotations
 import numpy as np
 
 from ..sampling.sampler import Dimension, Sampler
+from ..scene import CompiledScene
 from ..state import Hits, Paths
 from ..vec import Bools, Ints, f4
+from .surface import material_rows
 
 ROULETTE_AFTER = 2  # scattering events before paths may be ended
 SMALLEST = np.finfo(f4).tiny  # keeps the division finite on lanes that end anyway
 
 
-def compact(paths: Paths, hits: Hits, lanes: Ints) -> tuple[Paths, Hits]:
-    """Keep the given lanes of paths and hits."""
-    if lanes.size == len(paths):
+def compact(scene: CompiledScene, paths: Paths, hits: Hits, lanes: Ints) -> tuple[Paths, Hits]:
+    """Keep the given lanes of paths and hits, all of which hit something, ordered by groups of materials.
+
+    Each group is then a slice, whose columns need not be gathered to be shaded.
+    """
+    ordered = by_group(scene, hits, lanes)
+    if ordered is lanes and lanes.size == len(paths):
         return paths, hits
-    return paths.take(lanes), hits.take(lanes)
+    return paths.take(ordered), hits.take(ordered)
+
+
+def by_group(scene: CompiledScene, hits: Hits, lanes: Ints) -> Ints:
+    """Order lanes (k,) by the groups of the materials that they hit; the same array if they are."""
+    materials = scene.materials
+    if len(materials.groups) == 1:
+        return lanes
+    group = materials.group_of.take(material_rows(scene, hits, lanes))
+    if (group[1:] >= group[:-1]).all():
+        return lanes
+    short = group.astype(np.min_scalar_type(len(materials.groups)))  # sorted by radix
+    return lanes.take(np.argsort(short, kind="stable"))
 
 
 def carrying(paths: Paths) -> Bools:

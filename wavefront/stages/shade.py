@@ -12,7 +12,7 @@ from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
 from ..scene import CompiledScene
 from ..state import Hits, Paths, Surface
-from ..vec import ALL, Floats, Ints, Lanes, columns, dot, f4
+from ..vec import Floats, Ints, columns, dot, f4
 from .intersect import shadow_rays, visible
 from .passing import let_through
 from .shine import shine_at_hits, shine_at_samples
@@ -41,7 +41,16 @@ class Shading:
     surface: Surface
     frame: Frame
     wo: Floats  # (3, n) local frame
-    groups: list[tuple[Lanes, Bsdf]]  # lanes of each group, and its material bound to them
+    groups: list[tuple[slice, Bsdf]]  # lanes of each group, in order, and its material bound to them
+
+    def lit(self) -> Shading:
+        """Return the first lanes, those that light sampling serves: the rest has only delta lobes."""
+        groups = [(lanes, bsdf) for lanes, bsdf in self.groups if not bsdf.specular]
+        if len(groups) == len(self.groups):
+            return self
+        first = slice(groups[-1][0].stop if groups else 0)
+        frame = Frame(self.frame.x[:, first], self.frame.y[:, first], self.frame.z[:, first])
+        return Shading(self.surface.take(first), frame, self.wo[:, first], groups)
 
 
 def emitted(scene: CompiledScene, paths: Paths, hits: Hits) -> Emission:
@@ -57,29 +66,30 @@ def emitted(scene: CompiledScene, paths: Paths, hits: Hits) -> Emission:
 
 def mis_weighted(scene: CompiledScene, paths: Paths, emission: Emission) -> Arrival:
     """Return the emission weighted against light sampling; in full after a delta lobe."""
-    before = paths.take(emission.lanes)
-    start = before.origin if before.vertex is None else before.vertex
-    pdf_light = scene.lights.pdf_li(emission.light, start, before.direction)
-    weight = np.where(before.specular, f4(1), power_heuristic(before.pdf, pdf_light))
+    sampled = np.flatnonzero(~paths.specular.take(emission.lanes))
+    if not sampled.size:
+        return emission
+    lanes = emission.lanes.take(sampled)
+    start = (paths.origin if paths.vertex is None else paths.vertex).take(lanes, 1)
+    pdf = scene.lights.pdf_li(emission.light.take(sampled), start, paths.direction.take(lanes, 1))
+    weight = np.ones(len(emission.lanes), f4)
+    weight[sampled] = power_heuristic(paths.pdf.take(lanes), pdf)
     return Arrival(emission.lanes, emission.radiance * weight)
 
 
 def shading(scene: CompiledScene, surface: Surface) -> Shading:
-    """Set up local frames and group the lanes by material."""
+    """Set up local frames, and tell the groups of materials apart; `compact` has put them in order."""
     frame = surface.frame()
     wo = frame.to_local(surface.wo)
     materials = scene.materials
     if len(materials.groups) == 1:
-        groups: list[tuple[Lanes, Bsdf]] = [(ALL, materials.groups[0].bind(surface))]
-    else:
-        groups = []
-        group_of = materials.group_of.take(surface.material)
-        met = np.flatnonzero(np.bincount(group_of))
-        if met.size == 1:
-            return Shading(surface, frame, wo, [(ALL, materials.groups[met[0]].bind(surface))])
-        for number in met:
-            lanes = np.flatnonzero(group_of == number)
-            groups.append((lanes, materials.groups[number].bind(surface.take(lanes))))
+        return Shading(surface, frame, wo, [(slice(0, len(surface)), materials.groups[0].bind(surface))])
+    groups = []
+    group_of = materials.group_of.take(surface.material)
+    starts = np.searchsorted(group_of, np.arange(len(materials.groups) + 1))
+    for number in np.flatnonzero(np.diff(starts)):
+        lanes = slice(int(starts[number]), int(starts[number + 1]))
+        groups.append((lanes, materials.groups[number].bind(surface.take(lanes))))
     return Shading(surface, frame, wo, groups)
 
 
@@ -91,13 +101,14 @@ def direct(
     With `mis` it is weighted by the power heuristic against BSDF sampling. Surfaces that have
     only delta lobes get none.
     """
-    if scene.lights.choice is None or all(bsdf.specular for _, bsdf in shade.groups):
+    shade = shade.lit()
+    if scene.lights.choice is None or not shade.groups:
         return Arrival(np.zeros(0, np.intp), np.zeros((3, 0), f4))
-    surface = shade.surface
-    address = paths.pixel, paths.sample, bounce
+    surface, n = shade.surface, len(shade.surface)
+    address = paths.pixel[:n], paths.sample[:n], bounce
     # with one light there is nothing to choose
     alone = len(scene.lights) == 1
-    u_choice = np.zeros(len(paths), f4) if alone else sampler.draw_1d(*address, Dimension.LIGHT)
+    u_choice = np.zeros(n, f4) if alone else sampler.draw_1d(*address, Dimension.LIGHT)
     u_point = sampler.draw_2d(*address, Dimension.LIGHT_POINT)
     # from where a reflected ray would start, so that mis_weighted finds the same densities
     start = above(surface)
@@ -128,10 +139,8 @@ def evaluate(shade: Shading, wi: Floats, cos_g: Floats) -> tuple[Floats, Floats]
     if len(shade.groups) == 1:
         f, pdf = shade.groups[0][1].evaluate(shade.wo, wi)
         return f * cos, pdf
-    f, pdf = np.zeros((3, n), f4), np.zeros(n, f4)
+    f, pdf = np.empty((3, n), f4), np.empty(n, f4)
     for lanes, bsdf in shade.groups:
-        if bsdf.specular:
-            continue
         part_f, part_pdf = bsdf.evaluate(columns(shade.wo, lanes), columns(wi, lanes))
         f[:, lanes], pdf[lanes] = part_f, part_pdf
     f *= cos

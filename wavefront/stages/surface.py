@@ -8,7 +8,7 @@ from ..instances import InstanceTable
 from ..scene import CompiledScene
 from ..shapes.attributes import ATTRIBUTES, Corners
 from ..state import Hits, Rays, Surface
-from ..vec import Floats, Ints, dot, f4, length, normalize, signs
+from ..vec import ALL, Floats, Ints, Lanes, columns, dot, f4, length, normalize, signs
 
 # o + t·d carries at most three roundings of half an ulp (2⁻²⁴) of its terms; this is five times that.
 POINT_ERROR = f4(2**-21)
@@ -31,7 +31,7 @@ def interact(scene: CompiledScene, rays: Rays, hits: Hits) -> Surface:
     ng = ng * side
     ns = ng if ns is None else towards(wo, ns * side)
     prim = hits.prim if placed is None else hits.prim + placed.shift
-    surface = Surface(point, error, ng, ns, wo, prim, _materials(scene, hits, placed), inside)
+    surface = Surface(point, error, ng, ns, wo, prim, material_rows(scene, hits, ALL), inside)
     for name, corners in scene.attributes.items():
         values = _attribute(scene, name, corners, hits, point)
         if placed is not None and ATTRIBUTES[name].vectors:
@@ -60,12 +60,13 @@ def _turned(placed: InstanceTable, hits: Hits, ng: Floats, error: Floats) -> tup
     return ng / size, error + POINT_ERROR * (placed.reach + hits.t) / size
 
 
-def _materials(scene: CompiledScene, hits: Hits, placed: InstanceTable | None) -> Ints:
-    """Rows (n,) of the material table."""
-    material = scene.material_of.take(hits.prim)
-    if placed is None or placed.material is None:
+def material_rows(scene: CompiledScene, hits: Hits, lanes: Lanes) -> Ints:
+    """Rows (k,) of the material table that some lanes of the hits have."""
+    material = scene.material_of.take(columns(hits.prim, lanes))
+    if scene.instances is None or scene.instances.material is None or hits.place is None:
         return material
-    return np.where(placed.material >= 0, placed.material, material)
+    replaced = scene.instances.material.take(columns(hits.place, lanes))
+    return np.where(replaced >= 0, replaced, material)
 
 
 def normals(scene: CompiledScene, prim: Ints, point: Floats) -> Floats:
