@@ -11,6 +11,7 @@ from ..vec import Bools, Ints, f4
 from .surface import material_rows
 
 ROULETTE_AFTER = 2  # scattering events before paths may be ended
+SURE = f4(0.5)  # throughput from which on a path lives on for sure
 SMALLEST = np.finfo(f4).tiny  # keeps the division finite on lanes that end anyway
 
 
@@ -45,14 +46,15 @@ def carrying(paths: Paths) -> Bools:
 def roulette(paths: Paths, sampler: Sampler, bounce: int) -> Ints:
     """Choose the lanes that live on, and make them carry more, so that the mean stays.
 
-    The chance to survive is the root of the largest channel of the throughput, with the
-    compression of radiance by refraction taken out (E. Veach, thesis 1997, §10.4.1; pbrt-v4,
-    §13.2.1). The root ends fewer paths than the throughput itself, and raises the variance less.
-    In the first events only paths that carry nothing end.
+    Where the largest channel of the throughput, with the compression of radiance by refraction taken
+    out, is below `SURE`, the chance to survive is their ratio, and the path carries `SURE` from then
+    on (E. Veach, thesis 1997, §10.4.1; pbrt-v4, §13.2.1). Most of the work is saved on paths that carry
+    little, and most of the noise comes from ending those that carry much. In the first events only
+    paths that carry nothing end.
     """
     if bounce < ROULETTE_AFTER or not len(paths):
         return np.flatnonzero(carrying(paths))
-    chance = np.clip(np.sqrt(paths.throughput.max(0) * paths.eta2), SMALLEST, f4(1))
+    chance = np.clip(paths.throughput.max(0) * paths.eta2 / SURE, SMALLEST, f4(1))
     u = sampler.draw_1d(paths.pixel, paths.sample, bounce, Dimension.ROULETTE)
     paths.throughput /= chance
     return np.flatnonzero(~(u >= chance))  # NaN lives on, to be counted
