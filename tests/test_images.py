@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wavefront.errors import SceneError
-from wavefront.io import files, rgbe
+from wavefront.io import files, png, rgbe
 from wavefront.io.images import (
     check_writable,
     linear_to_srgb,
@@ -57,6 +57,20 @@ def test_png_decodes_to_what_was_written(tmp_path, picture, gamma):
     again = linear_to_srgb(clipped) if gamma == "srgb" else clipped ** (1 / gamma)
     assert np.abs(coded - again).max() <= 0.5001 / 255
     assert np.abs(linear - clipped).max() < 0.01
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (7, 1), (40, 31)])
+def test_png_keeps_every_code(shape):
+    """In rows of any length; noise grows by little, and an even picture is small."""
+    import imageio.v3 as iio
+
+    noise = np.random.default_rng(3).integers(0, 256, (*shape, 3), np.uint8)
+    data = png.encode(noise)
+    assert np.array_equal(iio.imread(data, extension=".png"), noise)
+    assert len(data) < noise.size * 1.05 + 100
+    even = np.full((*shape, 3), 200, np.uint8)
+    assert np.array_equal(iio.imread(png.encode(even), extension=".png"), even)
+    assert len(png.encode(even)) < 100 + noise.size / 50
 
 
 def test_jpg_is_close(tmp_path):

@@ -16,7 +16,8 @@ from wavefront.version import VERSION
 
 ROOT = Path(__file__).parents[1]
 PUBLIC = {name: getattr(wf, name) for name in wf.__all__}
-LAZY = ("trimesh", "imageio", "PIL", "OpenEXR", "scipy", "embreex", "matplotlib")
+LIBRARIES = ("trimesh", "imageio", "PIL", "OpenEXR", "scipy", "embreex", "matplotlib", "tqdm", "numpy.ma")
+LAZY = (*LIBRARIES, "wavefront.io.load", "wavefront.metrics", "wavefront.testing")
 
 
 def public_methods():
@@ -120,16 +121,42 @@ def test_import_leaves_heavy_modules_alone():
     assert done.stdout.strip() == "[]"
 
 
-def test_rendering_leaves_readers_of_files_alone():
+def test_a_first_picture_leaves_heavy_modules_alone(tmp_path):
     code = (
         "import sys, wavefront as wf\n"
-        "wf.render(wf.Scene(wf.Sphere((0, 0, 0), 1, emission=1)), 1, accel='numpy', progress=False)\n"
-        "print([m for m in ('trimesh', 'imageio', 'OpenEXR', 'scipy', 'embreex') if m in sys.modules])"
+        "light = wf.Rectangle((-1, 2, -1), (2, 0, 0), (0, 0, 2), emission=3.0)\n"
+        "camera = wf.Camera.look_at((0, 1, 5), (0, 0, 0), size=(16, 16))\n"
+        "scene = wf.Scene([light, wf.Sphere((0, 0, 0), 1)], camera=camera)\n"
+        "image = wf.render(scene, 16, accel='numpy')\n"
+        "image.save(sys.argv[1])\n"
+        f"print([m for m in {LAZY!r} if m in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, tmp_path / "a.png"],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    )
+    assert done.stdout.strip() == "[]"
+
+
+def test_what_is_imported_later_is_there():
+    """By attribute, by `from` and by `dir`; a name that does not exist is an error as in any module."""
+    assert set(wf._LATER) < set(wf.__all__)
+    assert set(dir(wf)) == set(wf.__all__)
+    code = (
+        "import wavefront as wf\n"
+        "print(wf.testing.__name__, wf.compare.__module__)\n"
+        "from wavefront import from_trimesh, load, load_mesh, Comparison, testing\n"
+        "print(load.__module__)"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
     )
-    assert done.stdout.strip() == "[]"
+    assert done.stdout.split() == ["wavefront.testing", "wavefront.metrics", "wavefront.io.load"]
+    with pytest.raises(AttributeError, match="module 'wavefront' has no attribute 'rendr'"):
+        _ = wf.rendr
 
 
 def test_errors_are_value_errors():

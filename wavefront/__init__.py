@@ -1,6 +1,8 @@
 """wavefront: a physically based path tracer in whole-array NumPy."""
 
-from . import testing
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from .bsdfs import (
     Bsdf,
     BsdfSample,
@@ -16,15 +18,27 @@ from .bsdfs import (
 from .camera import Camera
 from .errors import SceneError
 from .film import Image
-from .io.load import from_trimesh, load, load_mesh
 from .lights import DirectionalLight, Environment, PointLight, SpotLight
-from .metrics import Comparison, compare
 from .relief import BumpMap, NormalMap
 from .render import render
 from .scene import Scene
 from .shapes import Disk, Instance, Mesh, Rectangle, Sphere
 from .textures import Texture
 from .vertex_colors import VertexColors
+
+if TYPE_CHECKING:
+    from . import testing
+    from .io.load import from_trimesh, load, load_mesh
+    from .metrics import Comparison, compare
+
+_LATER = {  # what many programs do without is imported when they ask for it
+    "Comparison": ".metrics",
+    "compare": ".metrics",
+    "from_trimesh": ".io.load",
+    "load": ".io.load",
+    "load_mesh": ".io.load",
+    "testing": ".testing",
+}
 
 __all__ = [
     "Bsdf",
@@ -62,3 +76,14 @@ __all__ = [
     "render",
     "testing",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LATER:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module = import_module(_LATER[name], __name__)
+    return module if name == "testing" else getattr(module, name)
+
+
+def __dir__() -> list[str]:
+    return __all__

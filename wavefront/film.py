@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .io import png
 from .io.images import to_8bit, write_image
 from .state import Words
-from .vec import ALL, Floats, Lanes, columns
+from .vec import ALL, Floats, Ints, Lanes, columns
 
 Doubles = NDArray[np.float64]
 
@@ -19,7 +20,7 @@ BATCHES = 8  # at most
 WHOLE_BATCH = 4  # samples; batches are no shorter where a pixel has two such
 EPSILON = 1e-2  # of the squared mean of a picture, added to squares that errors are divided by
 OUTLIERS = 1e-3  # part of the pixels whose error counts no more than that of the worst other one
-CHUNK = 65_536  # pixels that are summed up together when a picture is made
+CHUNK = 8192  # pixels that are summed up together when a picture is made: few enough for the cache
 
 
 class Film:
@@ -100,7 +101,7 @@ class Film:
         """Estimate the variance of `mean` from batches, (3, k); NaN for fewer than two samples."""
         counts = self.count[span]
         error = np.full((3, counts.size), np.nan)
-        for count in np.unique(counts[counts > 1]).tolist():
+        for count in _distinct(counts[counts > 1]):
             alike = counts == count
             lanes = ALL if alike.all() else np.flatnonzero(alike)
             size = batch_size(count)
@@ -168,6 +169,12 @@ def _without_outliers(relative: Doubles) -> Doubles:
     """Bring the worst `OUTLIERS` of the pixels down to the worst of the others."""
     worst = relative.size - 1 - int(OUTLIERS * relative.size)
     return np.minimum(relative, np.partition(relative, worst)[worst])
+
+
+def _distinct(values: Ints) -> list[int]:
+    """Return what values there are, rising, as np.unique does, which loads numpy.ma first."""
+    ordered = np.sort(values)
+    return ordered[np.diff(ordered, prepend=-1) > 0].tolist()
 
 
 def batch_size(count: int) -> int:
@@ -267,6 +274,4 @@ class Image:
 
     def _repr_png_(self) -> bytes:
         """Show the picture in a notebook."""
-        import imageio.v3 as iio  # here, so that starting up does not pay for it
-
-        return bytes(iio.imwrite("<bytes>", to_8bit(self.rgb), extension=".png", plugin="pillow"))
+        return png.encode(to_8bit(self.rgb))

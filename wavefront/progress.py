@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Self, TypeAlias
-
-from tqdm import tqdm
+from typing import Any, Self, TypeAlias
 
 Progress: TypeAlias = Callable[[float, float], object] | bool | None
+
+DELAY = 2  # seconds before a bar appears
 
 
 class Bar:
@@ -25,23 +25,34 @@ class Bar:
 
     def __init__(self, progress: Progress, samples: int, seconds: float | None) -> None:
         self._callback = progress if callable(progress) else None
+        self._wanted = progress is None or progress is True
         self._timed = seconds is not None
         self._total = samples if seconds is None else seconds
         self._done: float = 0
-        style = {"bar_format": "{l_bar}{bar}| {n:.0f}/{total:.0f} s"} if self._timed else {"unit_scale": True}
-        shown = progress is None or progress is True
-        self._bar = tqdm(total=self._total, unit="sample", delay=2, disable=not shown, **style)
+        self._bar: Any = None
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._bar.close()
+        if self._bar is not None:
+            self._bar.close()
 
     def advance(self, samples: int, elapsed: float) -> None:
         """Take note of further samples, at a time in seconds."""
-        done = min(elapsed, self._total) if self._timed else self._done + samples
-        self._bar.update(done - self._done)
-        self._done = done
+        before = self._done
+        self._done = min(elapsed, self._total) if self._timed else before + samples
+        if self._bar is not None:
+            self._bar.update(self._done - before)
+        elif self._wanted and elapsed > DELAY:
+            self._bar = self._appear(elapsed)
         if self._callback:
-            self._callback(done, self._total)
+            self._callback(self._done, self._total)
+
+    def _appear(self, elapsed: float) -> Any:
+        from tqdm import tqdm  # here, so that starting up and short renders do not pay for it
+
+        style = {"bar_format": "{l_bar}{bar}| {n:.0f}/{total:.0f} s"} if self._timed else {"unit_scale": True}
+        bar = tqdm(total=self._total, initial=self._done, unit="sample", **style)
+        bar.start_t -= elapsed
+        return bar

@@ -18,7 +18,6 @@ from .errors import SceneError, number
 from .film import Film, Image
 from .filters import FILTERS
 from .integrators import INTEGRATORS
-from .io.load import from_trimesh, load
 from .lights import DirectionalLight, PointLight, SpotLight
 from .lights.choose import CHOICES as LIGHT_CHOICES
 from .parallel import Workers, choose_executor, worker_count
@@ -191,6 +190,8 @@ def as_scene(subject: Any) -> Scene:
         return subject
     if isinstance(subject, Mesh | Sphere | Instance):
         return Scene([subject])
+    from .io.load import from_trimesh, load  # here, so that scenes in memory do not pay for readers
+
     if isinstance(subject, str | os.PathLike):
         return load(Path(subject))
     if isinstance(subject, tuple) and len(subject) == 2:

@@ -555,7 +555,7 @@ def _area_lights(
     even = shining[~np.array([is_uneven(mesh) for mesh in meshes])[mesh_of[shining]]]
     first = first_of_pairs(triangles[even], mesh_of[even])
     pairs = even[np.stack([first, first + 1])]
-    alone = np.setdiff1d(shining, pairs)
+    alone = shining[~np.isin(shining, pairs)]
     two_sided = np.array([mesh.two_sided for mesh in meshes])[mesh_of]
     found: list[tuple[Ints, RectangleLights | TriangleLights]] = []
     for chosen, rectangles, singles in (
@@ -581,7 +581,7 @@ def _with_area(meshes: Sequence[Mesh], mesh_of: Ints, triangles: NDArray[np.floa
     """Return which triangles (k, 3, 3) of emitting meshes, numbered `mesh_of` (k,), have an area."""
     edges = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     shining = np.flatnonzero((edges != 0).any(1))
-    dark = np.setdiff1d(mesh_of, mesh_of[shining])
+    dark = mesh_of[~np.isin(mesh_of, mesh_of[shining])]
     if dark.size:
         mesh = meshes[dark[0]]
         raise SceneError(f"{mesh.name}: a light must have an area; all {len(mesh.faces)} faces have none")

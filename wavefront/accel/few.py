@@ -61,7 +61,7 @@ class FewTriangles:
         self._table = table
         first = find_quads(triangles)
         first = first[np.isin(first, ids) & np.isin(first + 1, ids)]
-        single = np.setdiff1d(ids, np.concatenate([first, first + 1]))
+        single = ids[~np.isin(ids, [first, first + 1])]
         quads = corners(triangles, first)
         table.plane[:, first] = table.plane[:, first + 1] = planes(quads)
         # The last column of these is for no primitive, -1.

@@ -7,7 +7,6 @@ who knows whether an image holds colours or data.
 from __future__ import annotations
 
 import os
-import tempfile
 import warnings
 from collections.abc import Mapping
 from io import BytesIO
@@ -19,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError, number
 from ..vec import Floats
-from . import rgbe
+from . import png, rgbe
 from .files import check_folder, check_size, read_bytes, write_bytes
 
 READABLE = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".npy")
@@ -199,11 +198,11 @@ def _finite(path: str | os.PathLike[str], pixels: Floats) -> Floats:
 
 
 def _encode_8bit(path: str | os.PathLike[str], pixels: Floats, gamma: float | str, extension: str) -> bytes:
-    import imageio.v3 as iio  # here, so that starting up does not pay for it
-
     coded = to_8bit(_finite(path, pixels), gamma)
     if extension == ".png":
-        return bytes(iio.imwrite("<bytes>", coded, extension=".png", plugin="pillow"))
+        return png.encode(coded)
+    import imageio.v3 as iio  # here, so that starting up does not pay for it
+
     return bytes(iio.imwrite("<bytes>", coded, extension=".jpg", plugin="pillow", quality=95, subsampling=0))
 
 
@@ -235,6 +234,8 @@ def _size_8bit(data: bytes) -> tuple[int, int]:
 
 
 def _encode_exr(channels: Mapping[str, NDArray[Any]], attributes: Mapping[str, Attribute]) -> bytes:
+    import tempfile
+
     import OpenEXR
 
     header = {**attributes, "compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
