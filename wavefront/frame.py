@@ -6,50 +6,72 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .vec import Floats, f4, signs
+from .vec import Floats, column, f4, signs
 
 
 @dataclass(slots=True)
 class Frame:
-    """Right-handed orthonormal frames, one per column."""
+    """Right-handed orthonormal frames, one per column.
 
-    x: Floats  # (3, n) tangent
-    y: Floats  # (3, n) bitangent
+    With σ = ±1 by the sign of z₂ and a = −1/(σ + z₂), the axes are
+
+        x = (1, 0, 0) + σz₀·(a·z₀, a·z₁, −1),  y = (0, σ, 0) + z₁·(a·z₀, a·z₁, −1)  and  z.
+
+    Written out, both ways between local and world share most of their products, so that x and y
+    need not be stored.
+
+    Source: Duff et al. 2017, "Building an Orthonormal Basis, Revisited", JCGT 6(1), listing 3.
+    """
+
     z: Floats  # (3, n) normal
+    sign: Floats  # (n,) σ
+    a: Floats  # (n,)
+    z0: Floats  # (n,) σz₀
 
     @classmethod
     def from_normal(cls, z: Floats) -> Frame:
-        """Build frames around unit normals (3, n) without branches.
-
-        Source: Duff et al. 2017, "Building an Orthonormal Basis, Revisited", JCGT 6(1), listing 3.
-        """
+        """Build frames around unit normals (3, n) without branches."""
         sign = signs(z[2])
-        a = f4(-1) / (sign + z[2])
-        b = z[0] * z[1] * a
-        x, y = np.empty_like(z), np.empty_like(z)
-        sx = sign * z[0]
-        np.add(f4(1), sx * z[0] * a, out=x[0])
-        np.multiply(sign, b, out=x[1])
-        np.negative(sx, out=x[2])
-        y[0] = b
-        np.add(sign, z[1] * z[1] * a, out=y[1])
-        np.negative(z[1], out=y[2])
-        return cls(x, y, z)
+        return cls(z, sign, f4(-1) / (sign + z[2]), sign * z[0])
+
+    @property
+    def x(self) -> Floats:
+        """Tangents, (3, n)."""
+        return self.to_world(column((1, 0, 0)))
+
+    @property
+    def y(self) -> Floats:
+        """Bitangents, (3, n)."""
+        return self.to_world(column((0, 1, 0)))
 
     def to_local(self, v: Floats) -> Floats:
         """World (3, n) -> local (3, n)."""
-        out = np.empty_like(self.z)
-        for row, axis in zip(out, (self.x, self.y, self.z), strict=True):
-            np.multiply(axis[0], v[0], out=row)
-            row += axis[1] * v[1]
-            row += axis[2] * v[2]
+        z, out = self.z, np.empty_like(self.z)
+        along = z[0] * v[0]
+        along += z[1] * v[1]
+        np.multiply(z[2], v[2], out=out[2])
+        out[2] += along
+        along *= self.a
+        along -= v[2]
+        np.multiply(self.z0, along, out=out[0])
+        out[0] += v[0]
+        along *= z[1]
+        np.multiply(self.sign, v[1], out=out[1])
+        out[1] += along
         return out
 
     def to_world(self, v: Floats) -> Floats:
         """Local (3, n) -> world (3, n)."""
-        out = np.empty_like(self.z)
-        for k, row in enumerate(out):
-            np.multiply(self.x[k], v[0], out=row)
-            row += self.y[k] * v[1]
-            row += self.z[k] * v[2]
+        z, out = self.z, np.empty_like(self.z)
+        down = self.z0 * v[0]
+        down += z[1] * v[1]
+        np.multiply(z[2], v[2], out=out[2])
+        out[2] -= down
+        down *= self.a
+        down += v[2]
+        np.multiply(z[0], down, out=out[0])
+        out[0] += v[0]
+        down *= z[1]
+        np.multiply(self.sign, v[1], out=out[1])
+        out[1] += down
         return out
