@@ -1,6 +1,6 @@
 """Records of columns: take, concatenate, compact and roulette keep every column whole."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from wavefront.scene import CompiledScene, compile_scene
 from wavefront.stages import compact as stage
 from wavefront.stages.shade import shading
 from wavefront.state import Hits, Paths, Surface
-from wavefront.vec import f4
+from wavefront.vec import alike, f4
 
 SHAPES = {
     Paths: {"origin": 3, "direction": 3, "throughput": 3, "vertex": 3},
@@ -96,7 +96,10 @@ def balls(*materials: wf.Bsdf) -> CompiledScene:
     st.data(),
 )
 def test_compact_keeps_paths_and_hits_together(materials: tuple[wf.Bsdf, ...], n: int, data) -> None:
-    """The same lanes of both, by groups of materials and else in order; delta lobes come last."""
+    """The same lanes of both, by groups of materials and else in order; delta lobes come last.
+
+    What nobody reads after the hit need not be kept.
+    """
     scene = balls(*materials)
     paths, hits = record(Paths, n, 1), record(Hits, n, 2)
     paths.slot = np.arange(n)
@@ -104,7 +107,9 @@ def test_compact_keeps_paths_and_hits_together(materials: tuple[wf.Bsdf, ...], n
     hits.prim = np.array(data.draw(st.lists(met, min_size=n, max_size=n)))
     kept_paths, kept_hits = stage.compact(scene, paths, hits, hits.found)
     assert sorted(kept_paths.slot) == hits.found.tolist()
-    assert same(kept_paths, paths.take(kept_paths.slot))
+    expected = paths.take(kept_paths.slot)
+    spent = {name: getattr(expected, name) for name in ("leaving", "pdf", "vertex")}
+    assert same(replace(kept_paths, **spent), expected)
     assert same(kept_hits, hits.take(kept_paths.slot))
     group = scene.materials.group_of.take(scene.material_of.take(kept_hits.prim))
     assert (np.diff(group * n + kept_paths.slot) > 0).all()
@@ -122,6 +127,13 @@ def test_compact_of_all_lanes_copies_nothing() -> None:
     assert kept is paths
 
 
+def test_all_paths_are_kept_without_a_copy() -> None:
+    """Others are gathered."""
+    paths = record(Paths, 5)
+    assert stage.keep(paths, np.arange(5)) is paths
+    assert same(stage.keep(paths, np.array([1, 4])), paths.take(np.array([1, 4])))
+
+
 def test_light_is_sampled_only_where_it_can_be_scattered() -> None:
     """No light sample is drawn for lanes that have only delta lobes; all others keep their columns."""
     scene = balls(MIRROR, GREY, GLASS, GOLD, GREY)
@@ -135,6 +147,18 @@ def test_light_is_sampled_only_where_it_can_be_scattered() -> None:
     assert [type(bsdf) for _, bsdf in lit.groups] == [wf.Diffuse, wf.Conductor]
     assert len(shading(scene, surface.take(np.arange(5, 8))).lit().surface) == 0
     assert shading(scene, surface.take(np.arange(5))).lit().surface.material.tolist() == [1, 1, 3, 3, 3]
+
+
+def test_what_is_alike_stays_so() -> None:
+    """One number for all columns is gathered without being written down, however many are asked for."""
+    paths = record(Paths, 3)
+    paths.eta2, paths.throughput = alike(f4(2), 3), np.broadcast_to(paths.throughput[:, :1], (3, 3))
+    for index in ([1], [0, 1, 2], [2, 2, 1, 0], slice(1, 3)):
+        part = paths.take(index if isinstance(index, slice) else np.array(index))
+        assert part.eta2.tolist() == [2] * len(part)
+        assert (part.throughput == paths.throughput[:, :1]).all()
+        assert part.eta2.base is not None
+        assert part.slot.tolist() == paths.slot[index].tolist()
 
 
 def test_absent_fields_stay_absent() -> None:

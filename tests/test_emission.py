@@ -315,7 +315,7 @@ def test_what_shines_evenly_pays_nothing() -> None:
     scene = compiled(floor(), lamp(2.0))
     assert scene.uneven is None
     assert [type(kind) for kind in scene.lights.kinds] == [RectangleLights]
-    assert scene.lights.choice.__class__.__name__ == "EverywhereAlike"
+    assert scene.lights.choice.__class__.__name__ == "Sole"
 
 
 def test_dark_lights_take_no_part() -> None:

@@ -254,3 +254,45 @@ def test_materials_out_of_sight_are_not_shaded() -> None:
         pictures.append(render(wf.Scene([*room, *outside], camera=camera), 4, max_bounces=4).rgb)
     assert (pictures[0] == pictures[1]).all()
     assert pictures[0].max() > 0
+
+
+class Ink(wf.Diffuse):
+    """Black, and in a group of its own."""
+
+    def __init__(self, reflectance: float = 0) -> None:
+        super().__init__(reflectance)
+        self.number = 1
+
+
+def test_paths_end_on_black_surfaces(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are seen, and shine, but are not shaded; the picture is the same bit for bit if they are."""
+    room = [
+        wf.Sphere((0, 0, 0), 10, material=wf.Diffuse(0.5)),
+        wf.Sphere((0, 0, -2), 1, material=Ink()),
+        wf.Sphere((0, 3, -2), 1, material=Ink(), emission=5.0),
+    ]
+    camera = wf.Camera.look_at((0, 0, 5), (0, 0, 0), size=(8, 8))
+    scene, shaded = wf.Scene(room, camera=camera), []
+    monkeypatch.setattr(Ink, "bind", lambda self, surface: shaded.append(len(surface)) or self)
+    pictures = []
+    for black in (True, False):
+        if not black:
+            monkeypatch.setattr(Ink, "black", False)
+        pictures.append(render(scene, 4, max_bounces=4).rgb)
+        assert bool(shaded) is not black
+    assert pictures[0].tobytes() == pictures[1].tobytes()
+    assert pictures[0].max() > 1
+
+
+def test_which_primitives_scatter() -> None:
+    """All but those of black materials; a mesh that is placed in another one somewhere may."""
+    mesh = wf.Mesh(**TRIANGLE, material=wf.Diffuse(0))
+    lights = [wf.Environment()]
+    shift = np.eye(4)
+    shift[0, 3] = 3
+    assert compiled(wf.Sphere(**BALL), lights=lights).scatters is None
+    assert compiled(mesh, wf.Sphere(**BALL), lights=lights).scatters.tolist() == [False, True, False]
+    black = [wf.Instance(mesh, np.eye(4)), wf.Instance(mesh, shift)]
+    assert compiled(*black, lights=lights).scatters.tolist() == [False, False]
+    white = wf.Instance(mesh, shift, material=wf.Diffuse(0.5))
+    assert compiled(black[0], white, lights=lights).scatters is None

@@ -34,6 +34,10 @@ class Frame:
         sign = signs(z[2])
         return cls(z, sign, f4(-1) / (sign + z[2]), sign * z[0])
 
+    def take(self, lanes: slice) -> Frame:
+        """Return the frames of some columns."""
+        return Frame(self.z[:, lanes], self.sign[lanes], self.a[lanes], self.z0[lanes])
+
     @property
     def x(self) -> Floats:
         """Tangents, (3, n)."""

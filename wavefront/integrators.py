@@ -16,14 +16,14 @@ from .sampling.sampler import Sampler
 from .scene import CompiledScene
 from .stages.absorb import absorb
 from .stages.bounce import bounce_sample
-from .stages.compact import carrying, compact, roulette
+from .stages.compact import carrying, compact, keep, roulette, scattering
 from .stages.intersect import intersect
 from .stages.passing import pass_through
 from .stages.relief import tilt
 from .stages.shade import Arrival, Shading, direct, emitted, mis_weighted, shading
 from .stages.surface import interact
 from .state import Hits, Paths
-from .vec import Floats, f4
+from .vec import Floats, columns, f4
 
 Integrator: TypeAlias = Callable[[CompiledScene, Paths, Sampler, int], Floats]
 
@@ -36,12 +36,12 @@ def li_naive(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: 
         paths, hits = pass_through(scene, paths, hits, sampler, bounce)
         light = emitted(scene, paths, hits)
         deposit(L, paths, light)
-        paths, hits = compact(scene, paths, hits, hits.found)
+        paths, hits = compact(scene, paths, hits, scattering(scene, hits))
         if bounce == max_bounces or not len(paths):
             break
         shade = arrive(scene, paths, hits)
         paths = bounce_sample(paths, shade, sampler, bounce)
-        paths = paths.take(roulette(paths, sampler, bounce))
+        paths = keep(paths, roulette(paths, sampler, bounce))
     return L
 
 
@@ -53,13 +53,13 @@ def li_direct_simple(scene: CompiledScene, paths: Paths, sampler: Sampler, max_b
         paths, hits = pass_through(scene, paths, hits, sampler, bounce)
         light = emitted(scene, paths, hits)
         deposit(L, paths, light)
-        paths, hits = compact(scene, paths, hits, hits.found)
+        paths, hits = compact(scene, paths, hits, scattering(scene, hits))
         if bounce == max_bounces or not len(paths):
             break
         shade = arrive(scene, paths, hits)
         deposit(L, paths, direct(scene, paths, shade, sampler, bounce, mis=False))
         paths = bounce_sample(paths, shade, sampler, bounce)
-        paths = paths.take(np.flatnonzero(paths.specular & carrying(paths)))
+        paths = keep(paths, np.flatnonzero(paths.specular & carrying(paths)))
     return L
 
 
@@ -80,7 +80,7 @@ def li_direct_mis(scene: CompiledScene, paths: Paths, sampler: Sampler, max_boun
         shade = arrive(scene, paths, hits)
         deposit(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
         paths = bounce_sample(paths, shade, sampler, bounce)
-        paths = paths.take(np.flatnonzero(carrying(paths)))
+        paths = keep(paths, np.flatnonzero(carrying(paths)))
     return L
 
 
@@ -92,13 +92,13 @@ def li_full(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: i
         paths, hits = pass_through(scene, paths, hits, sampler, bounce)
         light = emitted(scene, paths, hits)
         deposit(L, paths, mis_weighted(scene, paths, light))
-        paths, hits = compact(scene, paths, hits, hits.found)
+        paths, hits = compact(scene, paths, hits, scattering(scene, hits))
         if bounce == max_bounces or not len(paths):
             break
         shade = arrive(scene, paths, hits)
         deposit(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
         paths = bounce_sample(paths, shade, sampler, bounce)
-        paths = paths.take(roulette(paths, sampler, bounce))
+        paths = keep(paths, roulette(paths, sampler, bounce))
     return L
 
 
@@ -121,7 +121,7 @@ def arrive(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
 def deposit(L: Floats, paths: Paths, light: Arrival) -> None:
     """Add light that arrives on some lanes, carried on by their paths, to the slots of L."""
     if light.lanes.size:
-        slot = paths.slot.take(light.lanes)
-        arriving = paths.throughput.take(light.lanes, 1) * light.radiance
+        slot = columns(paths.slot, light.lanes)
+        arriving = columns(paths.throughput, light.lanes) * light.radiance
         for row, channel in zip(L, arriving, strict=True):  # a row at a time: much faster
             np.add.at(row, slot, channel)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -185,12 +185,19 @@ class CompiledScene:
     sphere_radii: Floats  # (k,)
     material_of: Ints  # (m + k,) material of each primitive
     light_of: Ints  # (m + k + 1,) light of each primitive, and at the end that of a miss; -1 for none
+    shines: Bools  # (m + k + 1,) whether there is one
+    scatters: Bools | None  # (m + k + 1,) primitives that are not black, a miss is; None when only a miss is
     materials: Materials
     absorption: Floats | None  # (3, materials) per scene unit; None when nothing absorbs
     opacities: Opacities | None  # None when every surface is all there
     lights: LightTable
     uneven: Uneven | None  # the lights that do not shine evenly; None when all do
     instances: InstanceTable | None = None  # None when every mesh is placed once
+
+    @property
+    def interpolates(self) -> bool:
+        """Whether anything varies between the corners of triangles."""
+        return bool(self.attributes) or self.corner_normals is not None
 
 
 def compile_scene(
@@ -234,9 +241,9 @@ def compile_scene(
     radii = np.array([s.radius for s in spheres]).astype(f4)
     smooth = any(mesh.normals is not None for mesh in meshes)
     triangles32 = np.ascontiguousarray(triangles, f4)
-    opacities = _opacities(user_materials, material_of)
-    if opacities is not None:
-        _note_partly(opacities, meshes, instances)
+    partly = _primitives(_is_partly_there, user_materials, material_of, meshes, instances)
+    scatters = _primitives(_scatters, user_materials, material_of, meshes, instances)
+    light_of = np.append(light_of, environment)
     weights = bool(attributes) or smooth
     geometry = Geometry(triangles32[:once], np.ascontiguousarray(centers), radii, weights)
     accelerator, table = make_accelerator(geometry), None
@@ -258,10 +265,12 @@ def compile_scene(
         sphere_centers=geometry.centers,
         sphere_radii=geometry.radii,
         material_of=material_of,
-        light_of=np.append(light_of, environment),
+        light_of=light_of,
+        shines=light_of >= 0,
+        scatters=None if scatters[:-1].all() else scatters,
         materials=group_materials(user_materials),
         absorption=_absorption(user_materials),
-        opacities=opacities,
+        opacities=_opacities(user_materials, partly),
         lights=lights,
         uneven=_uneven(meshes, len(lights), light_of),
         instances=table,
@@ -303,9 +312,8 @@ def _absorption(materials: Sequence[Bsdf]) -> Floats | None:
     return table if table.any() else None
 
 
-def _opacities(materials: Sequence[Bsdf], material_of: Ints) -> Opacities | None:
+def _opacities(materials: Sequence[Bsdf], partly: Bools) -> Opacities | None:
     """Return how much of the surfaces is there, None when all of them are."""
-    partly = np.array([material.opacity is not None for material in materials], np.bool_)
     if not partly.any():
         return None
     constant, varying = np.ones(len(materials), f4), []
@@ -316,17 +324,36 @@ def _opacities(materials: Sequence[Bsdf], material_of: Ints) -> Opacities | None
             varying.append((i, material.opacity))
         else:
             constant[i] = material.opacity.constant
-    return Opacities(np.append(partly.take(material_of), False), constant, varying)
+    return Opacities(partly, constant, varying)
 
 
-def _note_partly(opacities: Opacities, meshes: Sequence[Mesh], instances: Sequence[Instance]) -> None:
-    """Note the triangles of meshes that some instance has in a material that is only partly there."""
-    partly = {id(shape.mesh) for shape in instances if shape.material.opacity is not None}
+def _is_partly_there(material: Bsdf) -> bool:
+    return material.opacity is not None
+
+
+def _scatters(material: Bsdf) -> bool:
+    return not material.black
+
+
+def _primitives(
+    holds: Callable[[Bsdf], bool],
+    materials: Sequence[Bsdf],
+    material_of: Ints,
+    meshes: Sequence[Mesh],
+    instances: Sequence[Instance],
+) -> Bools:
+    """Tell for which primitives (m + k + 1,) something holds of a material that they are placed in.
+
+    For a miss, at the end, it does not.
+    """
+    found = np.append(np.array([holds(material) for material in materials]).take(material_of), False)
+    placed = {id(instance.mesh) for instance in instances if holds(instance.material)}
     start = 0
     for mesh in meshes:
         end = start + len(mesh.faces)
-        opacities.partly[start:end] |= id(mesh) in partly
+        found[start:end] |= id(mesh) in placed
         start = end
+    return found
 
 
 def _is_constant(value: object) -> bool:

@@ -5,7 +5,7 @@ Each field is declared once, with its shape and unit; `take`, `concatenate` and 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any, Self
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .frame import Frame
-from .vec import Bools, Floats, Ints, Lanes
+from .vec import Bools, Floats, Ints, Lanes, columns
 
 Words = NDArray[np.uint32]
 
@@ -22,15 +22,6 @@ Words = NDArray[np.uint32]
 @cache
 def _names(record: type) -> tuple[str, ...]:
     return tuple(field.name for field in fields(record))
-
-
-def _gather(value: NDArray[Any], index: Lanes) -> NDArray[Any]:
-    """Columns `index` (m,) of an array; of a slice a view."""
-    if isinstance(index, slice):
-        return value[..., index]
-    if value.strides[-1] == 0:  # one column, broadcast: stays so
-        return np.broadcast_to(value[..., :1], (*value.shape[:-1], index.size))
-    return value.take(index, -1)
 
 
 class Columns:
@@ -41,10 +32,9 @@ class Columns:
 
     __slots__ = ()
 
-    def _values(self) -> Iterator[tuple[str, Any]]:
+    def _values(self) -> list[tuple[str, Any]]:
         record: Any = type(self)
-        for name in _names(record):
-            yield name, getattr(self, name)
+        return [(name, getattr(self, name)) for name in _names(record)]
 
     def __len__(self) -> int:
         """Return the number of columns."""
@@ -54,7 +44,7 @@ class Columns:
         """Gather columns `index` (m,) of every field into a new record; of a slice, views."""
         out = object.__new__(type(self))
         for name, value in self._values():
-            object.__setattr__(out, name, None if value is None else _gather(value, index))
+            setattr(out, name, None if value is None else columns(value, index))
         return out
 
     def put(self, index: Ints, columns: Self) -> None:
@@ -71,7 +61,7 @@ class Columns:
         for name in _names(record):
             values = [getattr(record, name) for record in records]
             joined = None if values[0] is None else np.concatenate(values, axis=-1)
-            object.__setattr__(out, name, joined)
+            setattr(out, name, joined)
         return out
 
 
@@ -104,8 +94,8 @@ class Hits(Columns):
 
     t: Floats  # (n,) distance along the ray, scene units; inf on a miss
     prim: Ints  # (n,) row of the scene's tables, -1 on a miss; without instances it is the primitive's id
-    b1: Floats  # (n,) barycentric weight of the second vertex
-    b2: Floats  # (n,) barycentric weight of the third vertex
+    b1: Floats | None  # (n,) barycentric weight of the second vertex; None where nothing is interpolated
+    b2: Floats | None  # (n,) barycentric weight of the third vertex
     place: Ints | None = None  # (n,) column of the scene's `InstanceTable`; None when it has none
 
     @property

@@ -25,12 +25,19 @@ Array = TypeVar("Array", bound=NDArray[Any])
 
 
 def columns(a: Array, lanes: Lanes) -> Array:
-    """Columns `lanes` of (..., n); of a slice a view, not a copy."""
-    return a[..., lanes] if isinstance(lanes, slice) else a.take(lanes, -1)  # type: ignore[return-value]
+    """Columns `lanes` of (..., n), all in [0, n); views, not copies, for a slice and of what is `alike`."""
+    if isinstance(lanes, slice):
+        return a[..., lanes]  # type: ignore[return-value]
+    if a.strides[-1]:
+        # "wrap" is a sixth faster than the check of each index that is the default
+        return a.take(lanes, -1, mode="wrap")  # type: ignore[return-value]
+    if lanes.size <= a.shape[-1]:
+        return a[..., : lanes.size]  # type: ignore[return-value]
+    return np.broadcast_to(a[..., :1], (*a.shape[:-1], lanes.size))  # type: ignore[return-value]
 
 
 def alike(value: Any, n: int) -> NDArray[Any]:
-    """One value for n lanes, (n,), read-only: free to keep, and free for `state.Columns.take` to gather."""
+    """One value for n lanes, (n,), read-only: free to keep, and free to gather."""
     return np.broadcast_to(value, n)
 
 
@@ -56,7 +63,13 @@ def length(a: Floats) -> Floats:
 def normalize(a: Floats) -> Floats:
     """Scale (3, n) columns to unit length; a zero column stays zero."""
     size = length(a)
-    return a / np.where(size > 0, size, f4(1))
+    size += size == 0
+    return a / size
+
+
+def highest(a: Floats) -> Floats:
+    """Largest component of (3, n) columns -> (n,); NaN where one is. Faster than `a.max(0)`."""
+    return np.maximum(np.maximum(a[0], a[1]), a[2])
 
 
 def luminance(rgb: Floats) -> Floats:

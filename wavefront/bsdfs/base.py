@@ -52,6 +52,11 @@ class Bsdf(ABC):
     emission: Emission | None = None  # what the surface sends itself. The shape that has it sees to it
     relief: Relief | None = None  # tilts the shading normals. The renderer sees to it, no material does
 
+    @property
+    def black(self) -> bool:
+        """Whether nothing is scattered for certain: paths end there."""
+        return False
+
     def with_alpha(self, alpha: Scalar, cutoff: float | None = None) -> Self:
         """Return this material for a surface that is only partly there.
 

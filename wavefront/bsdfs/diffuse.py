@@ -8,6 +8,7 @@ from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..vec import Floats, alike, f4
 from .base import Bsdf, BsdfSample
 from .parameter import Colour, colour
+from .spatial import Spatial
 
 INV_PI = f4(1 / np.pi)
 
@@ -30,6 +31,11 @@ class Diffuse(Bsdf):
     def __init__(self, reflectance: Colour = 0.5) -> None:
         self.reflectance = colour("Diffuse reflectance", reflectance)
 
+    @property
+    def black(self) -> bool:
+        """Whether the reflectance is 0, as it often is of lamps."""
+        return not isinstance(self.reflectance, Spatial) and not self.reflectance.any()
+
     def f(self, wo: Floats, wi: Floats) -> Floats:
         """Return reflectance/π above the surface, (3, n)."""
         return self.reflectance * ((wi[2] > 0) * INV_PI)
@@ -42,5 +48,7 @@ class Diffuse(Bsdf):
         """Draw cosine-weighted directions; the weight is the reflectance itself."""
         wi = cosine_hemisphere(u)
         pdf = cosine_hemisphere_pdf(wi)
-        weight = self.reflectance * (pdf > 0).astype(f4)
+        weight = np.broadcast_to(self.reflectance, wi.shape)
+        if not pdf.all():
+            weight = weight * (pdf > 0)
         return BsdfSample(wi, weight, pdf, alike(np.False_, len(pdf)))

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..state import Columns
-from ..vec import Floats, f4
+from ..vec import Floats, f4, positive
 
 TINY = f4(1e-35)  # added to squared distances before their root is divided by; lost in any that matter
+EDGE_ON = f4(1e-14)  # taken off cosines that are divided by; smaller ones count as those of a dark side
 
 
 @dataclass(slots=True)
@@ -88,8 +89,7 @@ def area_pdf(d2: Floats, cos_light: Floats, area: Floats) -> Floats:
     area
         (n,) or (1,).
     """
-    lit = cos_light > 0
-    return d2 * lit / ((np.abs(cos_light) + ~lit) * area)  # + ~lit keeps 0/0 away
+    return positive(d2 / ((cos_light - EDGE_ON) * area))
 
 
 def facing_area(

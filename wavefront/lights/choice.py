@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..sampling.discrete import Discrete, rounded_up
-from ..vec import Floats, Ints, f4
+from ..vec import Floats, Ints, alike, f4
 
 Doubles = NDArray[np.float64]
 MOST_CELLS = 32**3
@@ -25,6 +25,19 @@ class LightChoice(Protocol):
 
     def pmf(self, light: Ints, point: Floats) -> Floats:
         """Probability (n,) that `light` (n,) is chosen at points (3, n)."""
+
+
+class Sole:
+    """The only light, of which there is no choice."""
+
+    def sample(self, point: Floats, u: Floats) -> tuple[Ints, Floats]:
+        """Return light 0."""
+        n = point.shape[1]
+        return alike(np.intp(0), n), alike(f4(1), n)
+
+    def pmf(self, light: Ints, point: Floats) -> Floats:
+        """Return 1."""
+        return alike(f4(1), len(light))
 
 
 class EverywhereAlike:

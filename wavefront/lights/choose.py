@@ -11,7 +11,7 @@ from ..errors import SceneError
 from ..sampling.mis import power_heuristic
 from ..vec import ALL, Floats, Ints, Lanes, columns, f4
 from .base import Light, LightSample
-from .choice import Among, ByPlace, EverywhereAlike, LightChoice
+from .choice import Among, ByPlace, EverywhereAlike, LightChoice, Sole
 
 CHOICES = ("place", "power", "uniform")
 
@@ -63,9 +63,11 @@ class LightTable:
             kinds = [kind.take(lanes) for kind, lanes in zip(self.kinds, shining, strict=True) if lanes.size]
             chosen = LightTable(kinds, half_size, choice).choice
             return None if chosen is None else Among(chosen, np.flatnonzero(power), power.size)
+        if power.size == 1:
+            return Sole()
         if choice == "uniform":
             return EverywhereAlike(np.ones_like(power))
-        if choice == "power" or power.size == 1:
+        if choice == "power":
             return EverywhereAlike(power)
 
         def irradiance(centre: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
@@ -101,11 +103,14 @@ class LightTable:
     def mis_weight(self, light: Ints, pdf: Floats, pdf_bsdf: Floats) -> Floats:
         """Weight of samples of lights numbered `light` (n,) against BSDF sampling: 1 for delta lights."""
         weight = power_heuristic(pdf, pdf_bsdf)
-        weight[self.delta_of.take(light).nonzero()[0]] = 1
+        if self.delta_of.any():
+            weight[np.flatnonzero(self.delta_of.take(light))] = 1
         return weight
 
     def le(self, light: Ints, wi: Floats) -> Floats:
         """Radiance (3, n) of the lights numbered `light` (n,) against wi (3, n)."""
+        if len(self.kinds) == 1:
+            return self._gathered(0, light).le(wi)
         radiance = np.empty_like(wi)
         for kind, rows in self._by_kind(light):
             radiance[:, rows] = kind.le(columns(wi, rows))

@@ -94,6 +94,8 @@ class RectangleLights(Light):
         """
         width = np.sqrt(self.area)
         low = np.flatnonzero((height > ON * width) & (height < ROOT_NEAR * width))
+        if not low.size:
+            return low
         some = self._at(low)
         away = some.corner + f4(0.5) * (some.edge_u + some.edge_v) - point.take(low, 1)
         return low.compress(dot(away, away) < NEAR * some.area)

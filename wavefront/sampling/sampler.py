@@ -275,7 +275,7 @@ def _points(stream: Stream, sample: Words, variant: Words, coordinates: int) -> 
     Returns the first `coordinates` coordinates as 32-bit fractions, (n,) each. Waves of a few
     consecutive samples, which is what a renderer traces, read them from a table.
     """
-    first, last = (int(sample.min()), int(sample.max())) if len(sample) else (0, 0)
+    first, last = _extent(sample)
     block = first // BLOCK
     if last // BLOCK != block:
         return list(_sequence(stream, sample, variant)[:coordinates])
@@ -286,6 +286,15 @@ def _points(stream: Stream, sample: Words, variant: Words, coordinates: int) -> 
     else:
         index = ((sample - u4(block * BLOCK)) * u4(VARIANTS) + variant).astype(np.intp)
     return [row.take(index) for row in table[:coordinates]]
+
+
+def _extent(sample: Words) -> tuple[int, int]:
+    """Return the lowest and the highest of the indices (n,); 0 of none."""
+    if not len(sample):
+        return 0, 0
+    if sample.strides == (0,):  # all alike
+        return int(sample[0]), int(sample[0])
+    return int(sample.min()), int(sample.max())
 
 
 @lru_cache(maxsize=256)

@@ -7,7 +7,7 @@ import numpy as np
 from ..bsdfs import BsdfSample
 from ..sampling.sampler import Dimension, Sampler
 from ..state import Paths
-from ..vec import Floats, columns, dot, f4
+from ..vec import Floats, columns, f4
 from .shade import Shading
 from .surface import leave
 
@@ -21,7 +21,7 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
     surface = shade.surface
     sample = _sample(shade, _numbers(paths, shade, sampler, bounce))
     direction = shade.frame.to_world(sample.wi)
-    cos_g = dot(surface.ng, direction)
+    cos_g = shade.cos_g(sample.wi, direction)
     throughput = paths.throughput * sample.weight
     sides = sample.wi[2] * cos_g
     lost = np.flatnonzero(~(sides > 0))
@@ -30,7 +30,7 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         slot=paths.slot,
         pixel=paths.pixel,
         sample=paths.sample,
-        origin=leave(surface, cos_g),
+        origin=leave(surface, cos_g) if (cos_g < 0).any() else shade.start,
         direction=direction,
         leaving=surface.prim,
         throughput=throughput,

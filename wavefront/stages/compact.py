@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..sampling.sampler import Dimension, Sampler
 from ..scene import CompiledScene
 from ..state import Hits, Paths
-from ..vec import Bools, Ints, f4
+from ..vec import Bools, Ints, alike, f4, highest
 from .surface import material_rows
 
 ROULETTE_AFTER = 2  # scattering events before paths may be ended
@@ -18,12 +20,14 @@ SMALLEST = np.finfo(f4).tiny  # keeps the division finite on lanes that end anyw
 def compact(scene: CompiledScene, paths: Paths, hits: Hits, lanes: Ints) -> tuple[Paths, Hits]:
     """Keep the given lanes of paths and hits, all of which hit something, ordered by groups of materials.
 
-    Each group is then a slice, whose columns need not be gathered to be shaded.
+    Each group is then a slice, whose columns need not be gathered to be shaded. What the paths
+    needed only on their way to the hits is not kept.
     """
-    ordered = by_group(scene, hits, lanes)
-    if ordered is lanes and lanes.size == len(paths):
+    ordered, n = by_group(scene, hits, lanes), len(paths)
+    if ordered is lanes and lanes.size == n:
         return paths, hits
-    return paths.take(ordered), hits.take(ordered)
+    arrived = replace(paths, leaving=alike(np.intp(-1), n), pdf=alike(f4(0), n), vertex=None)
+    return arrived.take(ordered), hits.take(ordered)
 
 
 def by_group(scene: CompiledScene, hits: Hits, lanes: Ints) -> Ints:
@@ -38,9 +42,21 @@ def by_group(scene: CompiledScene, hits: Hits, lanes: Ints) -> Ints:
     return lanes.take(np.argsort(short, kind="stable"))
 
 
+def keep(paths: Paths, lanes: Ints) -> Paths:
+    """Keep the given lanes of paths that set out."""
+    return paths if lanes.size == len(paths) else paths.take(lanes)
+
+
+def scattering(scene: CompiledScene, hits: Hits) -> Ints:
+    """Lanes that met a surface which scatters light, (k,). Paths end on black ones."""
+    if scene.scatters is None:
+        return hits.found
+    return np.flatnonzero(scene.scatters.take(hits.prim))  # a miss, -1, takes the last entry
+
+
 def carrying(paths: Paths) -> Bools:
     """Tell which paths still carry anything, (n,); NaN is kept, so that it is met and counted."""
-    return paths.throughput.max(0) != 0
+    return highest(paths.throughput) != 0
 
 
 def roulette(paths: Paths, sampler: Sampler, bounce: int) -> Ints:
@@ -54,7 +70,7 @@ def roulette(paths: Paths, sampler: Sampler, bounce: int) -> Ints:
     """
     if bounce < ROULETTE_AFTER or not len(paths):
         return np.flatnonzero(carrying(paths))
-    chance = np.clip(paths.throughput.max(0) * paths.eta2 / SURE, SMALLEST, f4(1))
+    chance = np.clip(highest(paths.throughput) * paths.eta2 / SURE, SMALLEST, f4(1))
     u = sampler.draw_1d(paths.pixel, paths.sample, bounce, Dimension.ROULETTE)
     paths.throughput /= chance
     return np.flatnonzero(~(u >= chance))  # NaN lives on, to be counted

@@ -9,8 +9,7 @@ import numpy as np
 from ..lights import LightSample
 from ..scene import CompiledScene
 from ..state import Hits, Rays, Surface
-from ..vec import Bools, Floats, Ints, f4, positive
-from .surface import leave
+from ..vec import Bools, Floats, Ints, columns, f4, positive
 
 TARGET_ERROR = f4(2**-20)  # rounding of a sampled point on a light, relative to its distance
 
@@ -27,30 +26,32 @@ class ShadowRays(Rays):
 def intersect(scene: CompiledScene, rays: Rays) -> Hits:
     """Find what each ray meets first."""
     found = scene.accelerator.closest(rays.origin, rays.direction, rays.leaving)
-    if scene.instances is None:
-        return Hits(found.t, found.prim, found.b1, found.b2)
-    row, place = scene.instances.locate(found.prim)
-    return Hits(found.t, row, found.b1, found.b2, place)
+    hits = Hits(found.t, found.prim, None, None)
+    if scene.interpolates:
+        hits.b1, hits.b2 = found.b1, found.b2
+    if scene.instances is not None:
+        hits.prim, hits.place = scene.instances.locate(found.prim)
+    return hits
 
 
-def shadow_rays(surface: Surface, start: Floats, lanes: Ints, light: LightSample, cos: Floats) -> ShadowRays:
-    """Return rays from points to the sampled points on their lights.
+def shadow_rays(surface: Surface, origin: Floats, light: LightSample, lanes: Ints) -> ShadowRays:
+    """Return rays from some points to the sampled points on their lights.
 
     Parameters
     ----------
-    surface, start
-        n points, and where rays start that leave them to the side of wo, (3, n).
+    surface, origin, light
+        n points, where rays from there start, (3, n), and the samples drawn at the points.
     lanes
-        (k,) columns of these that the k columns of `light` belong to.
-    cos
-        (k,) cosines between the rays and the surfaces' geometric normals.
+        (k,) columns of these that get a ray.
     """
-    origin = start.take(lanes, 1)
-    through = np.flatnonzero(cos < 0)
-    if through.size:
-        origin[:, through] = leave(surface.take(lanes.take(through)), cos.take(through))
-    leaving, error = surface.prim.take(lanes), surface.error.take(lanes)
-    return ShadowRays(origin, light.wi, leaving, error, light.distance, light.cos_light)
+    return ShadowRays(
+        origin=columns(origin, lanes),
+        direction=columns(light.wi, lanes),
+        leaving=columns(surface.prim, lanes),
+        error=columns(surface.error, lanes),
+        distance=columns(light.distance, lanes),
+        cos_light=columns(light.cos_light, lanes),
+    )
 
 
 def visible(scene: CompiledScene, rays: ShadowRays) -> Bools:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,13 +11,13 @@ from ..bsdfs import Bsdf
 from ..frame import Frame
 from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
-from ..scene import CompiledScene
+from ..scene import CompiledScene, Materials
 from ..state import Hits, Paths, Surface
-from ..vec import Floats, Ints, columns, dot, f4
+from ..vec import Floats, Ints, alike, columns, dot, f4, highest
 from .intersect import shadow_rays, visible
 from .passing import let_through
 from .shine import shine_at_hits, shine_at_samples
-from .surface import above
+from .surface import above, leave
 
 
 @dataclass(slots=True)
@@ -41,6 +42,7 @@ class Shading:
     surface: Surface
     frame: Frame
     wo: Floats  # (3, n) local frame
+    start: Floats  # (3, n) origins of rays that leave to the side of wo, scene units
     groups: list[tuple[slice, Bsdf]]  # lanes of each group, in order, and its material bound to them
 
     def lit(self) -> Shading:
@@ -49,15 +51,20 @@ class Shading:
         if len(groups) == len(self.groups):
             return self
         first = slice(groups[-1][0].stop if groups else 0)
-        frame = Frame(self.frame.x[:, first], self.frame.y[:, first], self.frame.z[:, first])
-        return Shading(self.surface.take(first), frame, self.wo[:, first], groups)
+        parts = self.surface.take(first), self.frame.take(first), self.wo[:, first], self.start[:, first]
+        return Shading(*parts, groups)
+
+    def cos_g(self, local: Floats, world: Floats) -> Floats:
+        """Cosine (n,) of directions, known in both frames, (3, n), against the geometric normal."""
+        if self.surface.ns is self.surface.ng:
+            return local[2]
+        return dot(self.surface.ng, world)
 
 
 def emitted(scene: CompiledScene, paths: Paths, hits: Hits) -> Emission:
     """Return the light that the paths' rays meet: emitting surfaces, and the environment on a miss."""
-    light = scene.light_of.take(hits.prim)  # a miss, -1, takes the last entry
-    lanes = np.flatnonzero(light >= 0)
-    light = light.take(lanes)
+    lanes = np.flatnonzero(scene.shines.take(hits.prim))  # a miss, -1, takes the last entry
+    light = scene.light_of.take(hits.prim.take(lanes))
     radiance = scene.lights.le(light, paths.direction.take(lanes, 1))
     if scene.uneven is not None:
         shine_at_hits(scene, paths.take(lanes), hits.take(lanes), light, radiance)
@@ -66,14 +73,14 @@ def emitted(scene: CompiledScene, paths: Paths, hits: Hits) -> Emission:
 
 def mis_weighted(scene: CompiledScene, paths: Paths, emission: Emission) -> Arrival:
     """Return the emission weighted against light sampling; in full after a delta lobe."""
-    sampled = np.flatnonzero(~paths.specular.take(emission.lanes))
+    sampled = np.flatnonzero(~columns(paths.specular, emission.lanes))
     if not sampled.size:
         return emission
     lanes = emission.lanes.take(sampled)
-    start = (paths.origin if paths.vertex is None else paths.vertex).take(lanes, 1)
-    pdf = scene.lights.pdf_li(emission.light.take(sampled), start, paths.direction.take(lanes, 1))
+    start = columns(paths.origin if paths.vertex is None else paths.vertex, lanes)
+    pdf = scene.lights.pdf_li(emission.light.take(sampled), start, columns(paths.direction, lanes))
     weight = np.ones(len(emission.lanes), f4)
-    weight[sampled] = power_heuristic(paths.pdf.take(lanes), pdf)
+    weight[sampled] = power_heuristic(columns(paths.pdf, lanes), pdf)
     return Arrival(emission.lanes, emission.radiance * weight)
 
 
@@ -81,16 +88,19 @@ def shading(scene: CompiledScene, surface: Surface) -> Shading:
     """Set up local frames, and tell the groups of materials apart; `compact` has put them in order."""
     frame = surface.frame()
     wo = frame.to_local(surface.wo)
-    materials = scene.materials
+    return Shading(surface, frame, wo, above(surface), list(_groups(scene.materials, surface)))
+
+
+def _groups(materials: Materials, surface: Surface) -> Iterator[tuple[slice, Bsdf]]:
+    """Yield the lanes of each group of materials that is met, and its material bound to them."""
     if len(materials.groups) == 1:
-        return Shading(surface, frame, wo, [(slice(0, len(surface)), materials.groups[0].bind(surface))])
-    groups = []
+        yield slice(0, len(surface)), materials.groups[0].bind(surface)
+        return
     group_of = materials.group_of.take(surface.material)
     starts = np.searchsorted(group_of, np.arange(len(materials.groups) + 1))
     for number in np.flatnonzero(np.diff(starts)):
         lanes = slice(int(starts[number]), int(starts[number + 1]))
-        groups.append((lanes, materials.groups[number].bind(surface.take(lanes))))
-    return Shading(surface, frame, wo, groups)
+        yield lanes, materials.groups[number].bind(surface.take(lanes))
 
 
 def direct(
@@ -104,44 +114,45 @@ def direct(
     shade = shade.lit()
     if scene.lights.choice is None or not shade.groups:
         return Arrival(np.zeros(0, np.intp), np.zeros((3, 0), f4))
-    surface, n = shade.surface, len(shade.surface)
+    n = len(shade.surface)
     address = paths.pixel[:n], paths.sample[:n], bounce
     # with one light there is nothing to choose
     alone = len(scene.lights) == 1
-    u_choice = np.zeros(n, f4) if alone else sampler.draw_1d(*address, Dimension.LIGHT)
+    u_choice = alike(f4(0), n) if alone else sampler.draw_1d(*address, Dimension.LIGHT)
     u_point = sampler.draw_2d(*address, Dimension.LIGHT_POINT)
     # from where a reflected ray would start, so that mis_weighted finds the same densities
-    start = above(surface)
-    light, number = scene.lights.sample_li(start, u_choice, u_point)
-    cos_g = dot(surface.ng, light.wi)
-    f_cos, pdf = evaluate(shade, shade.frame.to_local(light.wi), cos_g)
-    lanes = np.flatnonzero((light.pdf > 0) & (f_cos.max(0) != 0))  # NaN stays, to be counted
-    light, number, f_cos, pdf = light.take(lanes), number.take(lanes), f_cos.take(lanes, 1), pdf.take(lanes)
-    weight = scene.lights.mis_weight(number, light.pdf, pdf) if mis else f4(1)
-    rays = shadow_rays(surface, start, lanes, light, cos_g.take(lanes))
-    if scene.uneven is not None:
-        light.radiance = shine_at_samples(scene, rays, number, u_point.take(lanes, 1), light.radiance)
-    radiance = f_cos * light.radiance * (weight / light.pdf)
-    if scene.opacities is not None:
-        return Arrival(lanes, radiance * let_through(scene, rays))
-    seen = np.flatnonzero(visible(scene, rays))
-    return Arrival(lanes.take(seen), radiance.take(seen, 1))
-
-
-def evaluate(shade: Shading, wi: Floats, cos_g: Floats) -> tuple[Floats, Floats]:
-    """Return f·|cosθ| (3, n) and the pdf (n,) of local directions wi (3, n).
-
-    `cos_g` (n,), against the geometric normal, must agree with wi on the side that light
-    comes from: where the two normals disagree there is no light, so none leaks through.
-    """
-    n = wi.shape[1]
+    light, number = scene.lights.sample_li(shade.start, u_choice, u_point)
+    wi = shade.frame.to_local(light.wi)
+    cos_g = shade.cos_g(wi, light.wi)
+    # where the two normals disagree on the side that light comes from there is none, so none leaks through
     cos = np.abs(wi[2]) * (wi[2] * cos_g > 0)
+    f, pdf = evaluate(shade, wi)
+    lanes = np.flatnonzero((light.pdf > 0) & (highest(f) * cos != 0))  # NaN stays, to be counted
+    through = (cos_g.take(lanes) < 0).any()
+    origin = leave(shade.surface, cos_g) if through else shade.start
+    rays = shadow_rays(shade.surface, origin, light, lanes)
+    radiance = columns(light.radiance, lanes)
+    if scene.uneven is not None:
+        radiance = shine_at_samples(scene, rays, columns(number, lanes), u_point.take(lanes, 1), radiance)
+    if scene.opacities is not None:
+        radiance = radiance * let_through(scene, rays)
+    else:
+        seen = np.flatnonzero(visible(scene, rays))
+        lanes, radiance = lanes.take(seen), columns(radiance, seen)
+    pdf_light = columns(light.pdf, lanes)
+    scale = cos.take(lanes) / pdf_light
+    if mis:
+        scale *= scene.lights.mis_weight(columns(number, lanes), pdf_light, columns(pdf, lanes))
+    return Arrival(lanes, f.take(lanes, 1) * radiance * scale)
+
+
+def evaluate(shade: Shading, wi: Floats) -> tuple[Floats, Floats]:
+    """Return f (3, n), without the cosine, and the pdf (n,) of local directions wi (3, n)."""
     if len(shade.groups) == 1:
-        f, pdf = shade.groups[0][1].evaluate(shade.wo, wi)
-        return f * cos, pdf
+        return shade.groups[0][1].evaluate(shade.wo, wi)
+    n = wi.shape[1]
     f, pdf = np.empty((3, n), f4), np.empty(n, f4)
     for lanes, bsdf in shade.groups:
         part_f, part_pdf = bsdf.evaluate(columns(shade.wo, lanes), columns(wi, lanes))
         f[:, lanes], pdf[lanes] = part_f, part_pdf
-    f *= cos
     return f, pdf

@@ -8,7 +8,7 @@ from ..instances import InstanceTable
 from ..scene import CompiledScene
 from ..shapes.attributes import ATTRIBUTES, Corners
 from ..state import Hits, Rays, Surface
-from ..vec import ALL, Floats, Ints, Lanes, columns, dot, f4, length, normalize, signs
+from ..vec import ALL, Floats, Ints, Lanes, columns, dot, f4, highest, length, normalize, signs
 
 # o + t·d carries at most three roundings of half an ulp (2⁻²⁴) of its terms; this is five times that.
 POINT_ERROR = f4(2**-21)
@@ -19,15 +19,14 @@ def interact(scene: CompiledScene, rays: Rays, hits: Hits) -> Surface:
     """Gather the geometry at hits; every ray must have one."""
     point = rays.origin + rays.direction * hits.t
     placed = _places(scene, hits)
-    error = POINT_ERROR * (np.abs(point).max(0) + hits.t)
+    error: Floats = POINT_ERROR * (highest(np.abs(point)) + hits.t)
     wo = -rays.direction
     ng = normals(scene, hits.prim, point)
     if placed is not None:
         ng, error = _turned(placed, hits, ng, error)
     ns = _shading_normals(scene, hits, placed, ng)
     facing = dot(ng, wo)
-    inside = facing < 0
-    side = f4(1) - f4(2) * inside
+    side, inside = signs(facing), np.signbit(facing)
     ng = ng * side
     ns = ng if ns is None else towards(wo, ns * side)
     prim = hits.prim if placed is None else hits.prim + placed.shift
@@ -155,4 +154,6 @@ def _at_corners(table: Corners, hits: Hits, triangles: int) -> list[Floats]:
 
 def _interpolate(corners: list[Floats], hits: Hits) -> Floats:
     a, b, c = corners
+    assert hits.b1 is not None
+    assert hits.b2 is not None
     return a * (f4(1) - hits.b1 - hits.b2) + b * hits.b1 + c * hits.b2
