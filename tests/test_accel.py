@@ -544,6 +544,32 @@ def test_hit_for_hit_against_embree(name: str) -> None:
     assert differ.size < 1e-3 * n
 
 
+@pytest.mark.skipif(not installed(), reason="no embreex")
+def test_embree_never_meets_a_triangle_that_is_surely_behind() -> None:
+    """Rays that leave slivers and large triangles, from a few roundings beside them, also along them."""
+    rng = np.random.default_rng(21)
+    n, sure, met, cases = 4000, 0, 0, 0
+    for far in np.repeat([0.0, 1.0, 100.0], 60):
+        corners = (rng.normal(size=(3, 3)) + far * rng.normal(size=3)).astype(f4)
+        corners[2] = corners[1] + (corners[2] - corners[1]) * f4(10.0 ** rng.uniform(-3, 0))
+        accelerator = make_accelerator(geometry([corners]), "embree")
+        edge, other = (corners[1:] - corners[0]).astype(float)
+        normal = np.cross(edge, other)
+        normal /= np.linalg.norm(normal)
+        weights = rng.dirichlet((1, 1, 1), n)
+        height = 10.0 ** rng.uniform(-9, -2, n) * (1 + far) * rng.choice([-1, 1], n)
+        origin = (weights @ corners + normal * height[:, None]).T.astype(f4)
+        direction = rng.normal(size=(n, 3))
+        direction -= normal * (direction @ normal * (1 - 10.0 ** rng.uniform(-7, 0, n)))[:, None]
+        direction = (direction / np.linalg.norm(direction, axis=1)[:, None]).T.astype(f4)
+        behind = accelerator._planes.behind(origin, direction, np.zeros(n, int))
+        hit = np.isfinite(accelerator.closest(origin, direction, nothing(n)).t)
+        assert not (behind & hit).any()
+        sure, met, cases = sure + behind.sum(), met + hit.sum(), cases + n
+    assert sure > 0.1 * cases
+    assert met > 0.1 * cases
+
+
 def test_names() -> None:
     assert make_accelerator(geometry(), "numpy").name == "numpy"
     assert make_accelerator(geometry(), "auto").name == ("embree" if installed() else "numpy")

@@ -48,7 +48,7 @@ def dot(a: Floats, b: Floats) -> Floats:
 
 def cross(a: Floats, b: Floats) -> Floats:
     """Cross product of (3, n) columns -> (3, n)."""
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape), f4)
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape), np.result_type(a, b))
     np.subtract(a[1] * b[2], a[2] * b[1], out=out[0])
     np.subtract(a[2] * b[0], a[0] * b[2], out=out[1])
     np.subtract(a[0] * b[1], a[1] * b[0], out=out[2])

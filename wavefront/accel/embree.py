@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import SceneError
-from ..vec import Bools, Floats, Ints, f4
+from ..vec import Bools, Floats, Ints, cross, dot, f4, length
 from . import triangle
 from .base import Geometry, Intersections
 from .stream import NumpyAccelerator
@@ -37,14 +37,15 @@ class EmbreeAccelerator:
             ) from error
         triangles = np.ascontiguousarray(geometry.triangles, f4)
         with np.errstate(all="ignore"):
-            self._ids = np.flatnonzero(triangle.has_area(triangles))
+            ids = np.flatnonzero(triangle.has_area(triangles))
+        self._ids = np.append(ids, -1)  # by Embree's number, at the end that of a miss
         self._scene: Any = None
-        if self._ids.size:
+        if ids.size:
             self._scene = EmbreeScene(robust=True)
-            TriangleMesh(self._scene, triangles.take(self._ids, 0))
+            TriangleMesh(self._scene, triangles if ids.size == len(triangles) else triangles.take(ids, 0))
             rays = np.zeros((1, 3), f4)
             self._scene.run(rays, rays + f4(1))  # build now, not in the first of many threads
-        self._table = triangle.triangle_table(triangles)
+        self._planes = Planes(triangles)
         self._spheres: NumpyAccelerator | None = None
         if geometry.radii.size:
             none = np.zeros((0, 3, 3), f4)
@@ -78,15 +79,21 @@ class EmbreeAccelerator:
         if self._scene is None or not n:
             zero = np.zeros((2, n), f4)
             return Intersections(np.full(n, np.inf, f4), np.full(n, -1), zero[0], zero[1])
-        found = self._scene.run(_rows(origin), _rows(direction), query="INTERSECT", output=1)
-        missed = found["primID"] < 0
-        prim = np.where(missed, -1, self._ids.take(found["primID"], mode="clip"))
-        t = np.where(missed, f4(np.inf), found["tfar"])
-        hits = Intersections(t, prim, np.where(missed, 0, found["u"]), np.where(missed, 0, found["v"]))
-        again = np.flatnonzero(~missed & ((prim == leaving) | ~(t > 0)))
+        hits = self._run(origin, direction)
+        again = np.flatnonzero(((hits.prim == leaving) | ~(hits.t > 0)) & (hits.prim >= 0))
         if again.size:
             self._look_beyond(origin, direction, leaving, again, hits)
         return hits
+
+    def _run(self, origin: Floats, direction: Floats) -> Intersections:
+        """Ask Embree for what rays (3, n) meet first."""
+        far = np.full(origin.shape[1], np.inf, f4)
+        # it reads columns where they are
+        found = self._scene.run(origin.T, direction.T, dists=far, query="INTERSECT", output=1)
+        prim, b1, b2 = self._ids.take(found["primID"]), found["u"], found["v"]
+        missed = np.flatnonzero(prim < 0)
+        b1[missed] = b2[missed] = 0
+        return Intersections(found["tfar"], prim, b1, b2)
 
     def _look_beyond(
         self, origin: Floats, direction: Floats, leaving: Ints, again: Ints, hits: Intersections
@@ -102,14 +109,11 @@ class EmbreeAccelerator:
             size = np.abs(start).max(0) / np.abs(along).max(0)
             t = hits.t.take(again).astype(np.float64)
             t += step * (size + t)
-            rays = _rows((start + t * along).astype(f4)), _rows(along)
-            found = self._scene.run(*rays, query="INTERSECT", output=1)
-            missed = found["primID"] < 0
-            prim = np.where(missed, -1, self._ids.take(found["primID"], mode="clip"))
-            beyond = np.where(missed, np.inf, t + found["tfar"]).astype(f4)
-            hits.t[again], hits.prim[again] = beyond, prim
-            hits.b1[again], hits.b2[again] = np.where(missed, 0, found["u"]), np.where(missed, 0, found["v"])
-            again = again.compress(~missed & ((prim == leaving.take(again)) | ~(beyond > 0)))
+            found = self._run((start + t * along).astype(f4), along)
+            beyond = (t + found.t).astype(f4)
+            hits.t[again], hits.prim[again] = beyond, found.prim
+            hits.b1[again], hits.b2[again] = found.b1, found.b2
+            again = again.compress((found.prim >= 0) & ((found.prim == leaving.take(again)) | ~(beyond > 0)))
             step *= 2
 
     def _occluded_by_triangle(
@@ -119,16 +123,47 @@ class EmbreeAccelerator:
             return np.zeros(distance.size, bool)
         # Embree counts a hit at exactly the distance; we do not.
         limit = np.nextafter(distance, f4(0))
-        answer = self._scene.run(_rows(origin), _rows(direction), dists=limit, query="OCCLUDED")
+        answer = self._scene.run(origin.T, direction.T, dists=limit, query="OCCLUDED")
         blocked = (answer >= 0) & (distance > 0)
         # A blocked lane may have met only the triangle that it leaves.
-        doubtful = np.flatnonzero(blocked & (leaving >= 0))
+        lanes = np.flatnonzero(blocked & (leaving >= 0) & (leaving < len(self._planes)))
+        rays = origin.take(lanes, 1), direction.take(lanes, 1), leaving.take(lanes)
+        doubtful = np.flatnonzero(~self._planes.behind(*rays))
         if doubtful.size:
-            rays = origin.take(doubtful, 1), direction.take(doubtful, 1), leaving.take(doubtful)
-            blocked[doubtful] = self._closest_triangle(*rays).t < distance.take(doubtful)
+            lanes = lanes.take(doubtful)
+            rays = origin.take(lanes, 1), direction.take(lanes, 1), leaving.take(lanes)
+            blocked[lanes] = self._closest_triangle(*rays).t < distance.take(lanes)
         return blocked
 
 
-def _rows(vectors: Floats) -> Floats:
-    """(3, n) columns as the contiguous (n, 3) rows that Embree reads."""
-    return np.ascontiguousarray(vectors.T, f4)
+class Planes:
+    """The planes of triangles (m, 3, 3), to tell which rays surely do not meet the triangle that they leave.
+
+    Embree takes t from v·N and d·N in float32, where v goes from the origin to a corner and N is the
+    cross product of two edges, differences of such v. With E the extent of the triangle along each axis,
+    all of these are within E. In half ulps, edges are off by 3, products of two by 7 and a component of N by
+    16 of E·E; each term of v·N and d·N besides by 5. The bounds here are twice that.
+    """
+
+    def __init__(self, triangles: Floats) -> None:
+        corners = np.ascontiguousarray(triangles.transpose(1, 2, 0), np.float64)
+        a, b, c = corners
+        x, y, z = extent = np.ptp(corners, axis=0)
+        with np.errstate(all="ignore"):
+            normal = cross(b - a, c - a)
+            size = length(normal)
+            normal /= size
+            error = 2 * triangle.ROUNDOFF * (5 * np.abs(normal) + 16 * np.stack([y * z, z * x, x * y]) / size)
+        self._rows = np.stack([*normal, dot(normal, a), dot(error, extent), error.sum(0)])
+
+    def __len__(self) -> int:
+        """Return the number of triangles."""
+        return self._rows.shape[1]
+
+    def behind(self, origin: Floats, direction: Floats, leaving: Ints) -> Bools:
+        """Tell of which rays (3, n) the triangle that they leave (n,) is surely behind."""
+        nx, ny, nz, offset, unsure, grazing = self._rows.take(leaving, 1)
+        height = nx * origin[0] + ny * origin[1] + nz * origin[2] - offset
+        rise = nx * direction[0] + ny * direction[1] + nz * direction[2]
+        grazing *= np.abs(direction).max(0)
+        return (height * rise > 0) & (np.abs(height) > unsure) & (np.abs(rise) > grazing)

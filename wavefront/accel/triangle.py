@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..vec import Bools, Floats, Ints, f4
+from ..vec import Bools, Floats, Ints, cross, f4
 
 Doubles = NDArray[np.float64]
 
@@ -38,11 +38,11 @@ def triangle_table(triangles: Floats) -> TriangleTable:
     """Precompute planes and barycentric gradients of triangles (m, 3, 3)."""
     corners = np.ascontiguousarray(triangles.reshape(-1, 9).T, np.float64)
     a, b, c = corners[:3], corners[3:6], corners[6:]
-    normal = np.cross(b - a, c - a, axis=0)
+    normal = cross(b - a, c - a)
     with np.errstate(all="ignore"):
         size2 = (normal * normal).sum(0)
-        second = np.cross(c - a, normal, axis=0) / size2
-        third = np.cross(normal, b - a, axis=0) / size2
+        second = cross(c - a, normal) / size2
+        third = cross(normal, b - a) / size2
     return TriangleTable(
         corners,
         np.concatenate([normal, (normal * a).sum(0)[None]]),
@@ -54,7 +54,7 @@ def triangle_table(triangles: Floats) -> TriangleTable:
 def has_area(triangles: Floats) -> Bools:
     """Tell which triangles (m, 3, 3) are not degenerate; a degenerate one is never hit."""
     a, b, c = np.ascontiguousarray(triangles.transpose(1, 2, 0), np.float64)
-    normal = np.cross(b - a, c - a, axis=0)
+    normal = cross(b - a, c - a)
     with np.errstate(all="ignore"):
         size2 = (normal * normal).sum(0)
     return (size2 > 0) & np.isfinite(size2)
