@@ -7,8 +7,9 @@ Sides: wavefront with each sampler, numpy and embree; Mitsuba `llvm_ad_rgb` and 
 per core. The reference is the mean of two converged renders, one of each side, whose means are compared
 first. Printed are, for each side:
 
-- error and wall time at each sample count, warm: medians over the repeats, the sides in turn. A render of
-  wavefront includes setting up its scene, boxes and all; Mitsuba's scene is loaded once, beforehand;
+- error and wall time at each sample count, warm: medians over the repeats, the sides in turn. Mitsuba's
+  scene is loaded once, beforehand; a render of wavefront includes setting up its scene, but what rays are
+  traced with, which stays with the scene, has been built by the render before;
 - what a fresh process takes besides, once: importing the renderer, loading the scene, compiling. It is
   the time of a process of its own, with an empty cache of compiled kernels, less that of a warm render;
 - time to the error that `llvm_ad_rgb independent` has at its largest sample count, by straight lines

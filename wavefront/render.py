@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .accel import make_accelerator, most_copies
+from .accel import most_copies
 from .accel.choose import CHOICES
 from .errors import SceneError, number
 from .film import Film, Image
@@ -124,9 +124,7 @@ def render(
     camera = subject.camera or subject.framing_camera()
     draw = make_sampler(sampler, seed, camera.film[0])
     _warn_unseen_lights(subject, integrator)
-    compiled = compile_scene(
-        subject, lambda geometry: make_accelerator(geometry, accel), light_choice, most_copies(accel)
-    )
+    compiled = compile_scene(subject, subject.accelerators.maker(accel), light_choice, most_copies(accel))
     trace = partial(trace_piece, compiled, camera, draw, spread, estimate, max_bounces)
 
     film, clock = Film(*camera.size), Clock(begin, seconds, wave_size, workers)

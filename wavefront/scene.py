@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from .accel import Accelerator, Geometry, InstanceAccelerator
+from .accel import Accelerator, Geometry, InstanceAccelerator, KeptAccelerators
 from .bsdfs import Bsdf, Opacity, Relief, Spatial
 from .camera import Camera
 from .camera.base import image_size
@@ -37,7 +37,7 @@ from .shapes import Instance, Mesh, Sphere
 from .shapes.attributes import ATTRIBUTES, Corners, corner_values
 from .state import Surface
 from .uneven import Source, Uneven, is_uneven, mean_radiance
-from .vec import Bools, Floats, Ints, f4
+from .vec import Bools, Floats, Ints, cross, f4, length
 
 Shape: TypeAlias = Mesh | Sphere | Instance
 AREA_LIGHTS = (RectangleLights, TwoSidedRectangleLights, TriangleLights, TwoSidedTriangleLights)
@@ -58,6 +58,11 @@ class Scene:
     camera
         Without one the scene is framed.
 
+    Notes
+    -----
+    All of it may be changed between renders. What a render builds to find the nearest surfaces is kept
+    with the scene, and used again as long as every vertex and sphere is where it was.
+
     Raises
     ------
     SceneError
@@ -72,6 +77,7 @@ class Scene:
             "lights", lights, (PointLight, Environment, SpotLight, DirectionalLight)
         )
         self.camera = camera
+        self.accelerators = KeptAccelerators()  # of the last render, for the next
         if not self.shapes:
             raise SceneError("the scene has no shapes")
         if sum(isinstance(light, Environment) for light in self.lights) > 1:
@@ -228,8 +234,8 @@ def compile_scene(
     placed: list[Shape] = [*meshes, *spheres, *instances]
     shared = list({id(instance.mesh): instance.mesh for instance in instances}.values())
     once = sum(len(mesh.faces) for mesh in meshes)
-    corners = [(mesh.vertices - centre)[mesh.faces] for mesh in meshes]
-    corners += [own_frame(mesh)[mesh.faces] for mesh in shared]
+    corners = [(mesh.vertices - centre).take(mesh.faces, 0) for mesh in meshes]
+    corners += [own_frame(mesh).take(mesh.faces, 0) for mesh in shared]
     meshes += shared
     triangles = np.concatenate(corners) if corners else np.zeros((0, 3, 3))
     user_materials, material_of, replaced = _number_materials(meshes, spheres, instances)
@@ -245,6 +251,7 @@ def compile_scene(
     scatters = _primitives(_scatters, user_materials, material_of, meshes, instances)
     light_of = np.append(light_of, environment)
     weights = bool(attributes) or smooth
+    normals = _face_normals(triangles)
     geometry = Geometry(triangles32[:once], np.ascontiguousarray(centers), radii, weights)
     accelerator, table = make_accelerator(geometry), None
     if shared:
@@ -259,8 +266,8 @@ def compile_scene(
         radius=radius,
         accelerator=accelerator,
         triangles=len(triangles),
-        normals=_face_normals(triangles),
-        corner_normals=_corner_normals(meshes, triangles),
+        normals=normals,
+        corner_normals=_corner_normals(meshes, normals),
         attributes=attributes,
         sphere_centers=geometry.centers,
         sphere_radii=geometry.radii,
@@ -450,28 +457,29 @@ def _number_materials(
 
 
 def _face_normals(triangles: NDArray[np.float64]) -> Floats:
-    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    size = np.linalg.norm(normal, axis=1, keepdims=True)
-    return np.ascontiguousarray((normal / np.where(size > 0, size, 1)).T, f4)
+    """Return the unit normals of triangles (m, 3, 3), (3, m); 0 where they have no area."""
+    a, b, c = np.ascontiguousarray(triangles.transpose(1, 2, 0))
+    normal = cross(b - a, c - a)
+    size = length(normal)
+    return (normal / np.where(size > 0, size, 1)).astype(f4)
 
 
-def _corner_normals(
-    meshes: Sequence[Mesh], triangles: NDArray[np.float64]
-) -> tuple[Floats, Floats, Floats] | None:
+def _corner_normals(meshes: Sequence[Mesh], normals: Floats) -> tuple[Floats, Floats, Floats] | None:
     """Return the shading normals at the three corners; flat meshes and zero normals get the face's."""
     if all(mesh.normals is None for mesh in meshes):
         return None
-    corners = np.repeat(_face_normals(triangles).T[:, None, :], 3, 1)
+    corners = normals.copy(), normals.copy(), normals.copy()
     start = 0
     for mesh in meshes:
+        end = start + len(mesh.faces)
         if mesh.normals is not None:
-            given = mesh.normals[mesh.faces]
-            size = np.linalg.norm(given, axis=2, keepdims=True)
-            part = corners[start : start + len(mesh.faces)]
-            np.copyto(part, (given / np.where(size > 0, size, 1)).astype(f4), where=size > 0)
-        start += len(mesh.faces)
-    a, b, c = (np.ascontiguousarray(corners[:, i].T, f4) for i in range(3))
-    return a, b, c
+            given = np.ascontiguousarray(mesh.normals.T)
+            size = length(given)
+            given = (given / np.where(size > 0, size, 1)).astype(f4)
+            for corner, vertex in zip(corners, mesh.faces.T, strict=True):
+                np.copyto(corner[:, start:end], given.take(vertex, 1), where=size.take(vertex) > 0)
+        start = end
+    return corners
 
 
 def _gather_lights(

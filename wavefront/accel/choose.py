@@ -21,13 +21,14 @@ def make_accelerator(geometry: Geometry, accel: str) -> Accelerator:
     """
     if accel not in CHOICES:
         raise SceneError(f"accel is {accel!r}; it must be one of {', '.join(CHOICES)}")
-    return EmbreeAccelerator(geometry) if _is_embree(accel) else NumpyAccelerator(geometry)
+    return EmbreeAccelerator(geometry) if engine(accel) == "embree" else NumpyAccelerator(geometry)
 
 
 def most_copies(accel: str) -> int:
     """Return up to how many triangles in all it is faster to build each instance as a mesh of its own."""
-    return COPIES if _is_embree(accel) else 0
+    return COPIES if engine(accel) == "embree" else 0
 
 
-def _is_embree(accel: str) -> bool:
-    return accel == "embree" or (accel == "auto" and installed())
+def engine(accel: str) -> str:
+    """Return what `accel` stands for: "embree" or "numpy"."""
+    return "embree" if accel == "embree" or (accel == "auto" and installed()) else "numpy"

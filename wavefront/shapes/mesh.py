@@ -104,8 +104,10 @@ class Mesh:
     @property
     def bounds(self) -> NDArray[np.float64]:
         """Lower and upper corner, (2, 3), of the vertices that faces use."""
-        used = self.vertices[self.faces.ravel()]
-        return np.stack([used.min(0), used.max(0)])
+        used = np.zeros(len(self.vertices), np.bool_)
+        used[self.faces] = True
+        rows = np.ascontiguousarray(self.vertices[used].T)
+        return np.stack([rows.min(1), rows.max(1)])
 
 
 def Rectangle(
