@@ -356,3 +356,69 @@ def test_a_bright_environment_over_a_black_floor() -> None:
     camera = wf.Camera.look_at((0, 1, 0), (0, 2, 1), fov=20, size=(SIDE, SIDE))
     scene = wf.Scene([floor(BLACK)], [wf.Environment(np.full((2, 4, 3), 3.0))], camera)
     assert (render(scene, 1).rgb == 3).all()
+
+
+# --- Beside BSDF samples ---------------------------------------------------------------------------
+
+
+def directions(n: int) -> np.ndarray:
+    """Unit directions (3, n) all around."""
+    w = np.random.default_rng(3).normal(size=(3, n)).astype(f4)
+    return w / np.linalg.norm(w, axis=0)
+
+
+@pytest.mark.parametrize("transform", [None, turn(0.4, 0.3)])
+def test_beside_bsdf_samples_what_is_brighter_than_the_mean_is_drawn(transform) -> None:
+    """The density is what exceeds a uniform one, in proportion, also at the samples; so is the power."""
+    record = wf.Environment(sun_map(), transform=transform).record(ORIGIN)
+    left = record.compensated()
+    w = directions(20_000)
+    excess = np.maximum(record.pdf_li(w, w) - 1 / (4 * np.pi), 0)
+    assert left.pdf_li(w, w) == pytest.approx(excess / left.share, rel=1e-4, abs=1e-6)
+    assert left.le(w).tolist() == record.le(w).tolist()
+    assert left.power(2.0) == pytest.approx(left.share * record.power(2.0))
+    u = np.random.default_rng(4).random((2, 5000)).astype(f4)
+    sample = left.sample_li(w[:, :5000], u)
+    assert (sample.pdf > 0).all()
+    assert sample.pdf == pytest.approx(left.pdf_li(sample.wi, sample.wi), rel=1e-3)
+    complete = record.pdf_li(sample.wi, sample.wi)
+    assert sample.pdf == pytest.approx((complete - 1 / (4 * np.pi)) / left.share, rel=1e-3)
+
+
+@pytest.mark.parametrize("radiance", [1.0, np.ones((4, 8, 3)), np.full((16, 32, 3), 0.3)])
+def test_light_from_all_around_takes_no_light_samples_beside_bsdf_samples(radiance) -> None:
+    """No shadow ray is traced, but by the integrator that has nothing else."""
+    scene = wf.Scene([floor()], [wf.Environment(radiance)], wf.Camera.look_at(EYE, HERE, size=(8, 8)))
+    for integrator, shadow_rays in (("full", 0), ("direct_mis", 0), ("direct_simple", 1)):
+        image = wf.render(scene, 64, integrator=integrator, max_bounces=1, progress=False)
+        rays = image.metadata["rays"] / image.metadata["samples"]
+        # direct_simple draws half of its directions from below the floor, where no ray is needed
+        assert rays == pytest.approx(2 - 0.5 * shadow_rays, abs=0.1), integrator
+        assert image.rgb.mean() == pytest.approx(ALBEDO * radiance_of(radiance), rel=0.02)
+
+
+def radiance_of(radiance) -> float:
+    """The one value of a radiance."""
+    return float(np.ravel(radiance)[0])
+
+
+def test_a_sun_before_an_even_sky_gets_all_light_samples() -> None:
+    """Of a sky's two parts only what stands out is drawn; its density elsewhere is 0."""
+    sky = Sky.of([light.record(ORIGIN) for light in (wf.Environment(0.5), SUNS[0])]).compensated()
+    w = directions(20_000)
+    within = SUNS[0].record(ORIGIN).le(w)[0] > 0
+    assert 0 < within.sum() < len(within)
+    assert ((sky.pdf_li(w, w) > 0) == within).all()
+    assert sky.power(2.0) == pytest.approx(SUNS[0].record(ORIGIN).power(2.0))
+    sample = sky.sample_li(w, np.random.default_rng(4).random((2, 20_000)).astype(f4))
+    assert (sample.radiance > 0.5).all()
+
+
+def test_compensation_keeps_the_mean() -> None:
+    """Of a picture with a sun, with a panel beside it, on a rough metal: as by BSDF samples alone."""
+    metal = wf.Conductor.named("gold", roughness=0.7)
+    lights = [wf.Environment(np.minimum(sun_map(), 30)), *SUNS]
+    scene = wf.Scene([floor(metal)], lights, wf.Camera.look_at(EYE, HERE, size=(8, 8)))
+    naive = repeat(scene, 4096, integrator="naive", max_bounces=1, first_seed=100)
+    for integrator in ("full", "direct_mis"):
+        assert_same_images(repeat(scene, 512, integrator=integrator, max_bounces=1), naive, 0.01)

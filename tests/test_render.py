@@ -315,9 +315,10 @@ class Faulty(wf.Diffuse):
 
 
 def faulty(part: float, value: float = np.nan, method: str = "sample_f") -> wf.Scene:
-    """A floor of it."""
+    """A floor of it under a bright half of the sky, which both kinds of samples are drawn for."""
     floor = scenes.floor(Faulty(part, value, method))
-    return wf.Scene([floor], [wf.Environment()], scenes.probe((0, 0, 0), (0.1, 1, 0)))
+    sky = wf.DirectionalLight((0, -1, 0), np.pi, angle=180)
+    return wf.Scene([floor], [sky], scenes.probe((0, 0, 0), (0.1, 1, 0)))
 
 
 FAULTS = [

@@ -102,6 +102,7 @@ def li_full(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: i
     return L
 
 
+ONE_SAMPLE = ("naive", "direct_simple")  # that find light in one way, and so weigh no samples
 INTEGRATORS: dict[str, Integrator] = {
     "naive": li_naive,
     "direct_simple": li_direct_simple,

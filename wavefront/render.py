@@ -17,7 +17,7 @@ from .accel.choose import CHOICES
 from .errors import SceneError, number
 from .film import Film, Image
 from .filters import FILTERS
-from .integrators import INTEGRATORS
+from .integrators import INTEGRATORS, ONE_SAMPLE
 from .lights import DirectionalLight, PointLight, SpotLight
 from .lights.choose import CHOICES as LIGHT_CHOICES
 from .parallel import Workers, choose_executor, worker_count
@@ -124,7 +124,13 @@ def render(
     camera = subject.camera or subject.framing_camera()
     draw = make_sampler(sampler, seed, camera.film[0])
     _warn_unseen_lights(subject, integrator)
-    compiled = compile_scene(subject, subject.accelerators.maker(accel), light_choice, most_copies(accel))
+    compiled = compile_scene(
+        subject,
+        subject.accelerators.maker(accel),
+        light_choice,
+        most_copies(accel),
+        mis=integrator not in ONE_SAMPLE,
+    )
     trace = partial(trace_piece, compiled, camera, draw, spread, estimate, max_bounces)
 
     film, clock = Film(*camera.size), Clock(begin, seconds, wave_size, workers)

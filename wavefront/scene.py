@@ -207,7 +207,11 @@ class CompiledScene:
 
 
 def compile_scene(
-    scene: Scene, make_accelerator: Any, light_choice: str = "place", most_copies: int = 0
+    scene: Scene,
+    make_accelerator: Any,
+    light_choice: str = "place",
+    most_copies: int = 0,
+    mis: bool = False,
 ) -> CompiledScene:
     """Gather a scene into flat arrays.
 
@@ -221,6 +225,9 @@ def compile_scene(
         How one light of many is chosen: "place", "power" or "uniform".
     most_copies
         Up to so many triangles in all, each instance is built as a mesh of its own.
+    mis
+        Whether light samples are weighted against BSDF samples, so that they may leave out light from
+        all around, which those find better.
 
     Raises
     ------
@@ -241,7 +248,7 @@ def compile_scene(
     user_materials, material_of, replaced = _number_materials(meshes, spheres, instances)
     attributes = {name: corner_values(name, meshes) for name in _attributes_read(placed)}
     lights, light_of, environment = _gather_lights(
-        scene, meshes, spheres, corners, centre, (high - low) / 2, light_choice
+        scene, meshes, spheres, corners, centre, (high - low) / 2, light_choice, mis
     )
     centers = np.array([s.center - centre for s in spheres]).reshape(-1, 3).T.astype(f4)
     radii = np.array([s.radius for s in spheres]).astype(f4)
@@ -490,6 +497,7 @@ def _gather_lights(
     centre: NDArray[np.float64],
     half_size: NDArray[np.float64],
     choice: str,
+    mis: bool,
 ) -> tuple[LightTable, Ints, int]:
     """Return the table of lights, the light of each primitive, and that of rays that hit nothing."""
     user_lights = list(scene.lights)
@@ -539,7 +547,7 @@ def _gather_lights(
     for light in user_lights:
         record = light.record(centre)
         if isinstance(record, InfiniteLight):
-            infinite.append(record)
+            infinite.append(record.compensated() if mis else record)
         else:
             groups.setdefault(type(record), []).append(record)
     for record_type, records in groups.items():

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +24,11 @@ class ConstantEnvironment(InfiniteLight):
     """The same radiance from every direction."""
 
     radiance: Floats  # (3, 1) W·sr⁻¹·m⁻²
+    share: float = 1.0  # of the light that light samples are to bring
+
+    def compensated(self) -> Self:
+        """Leave all of it to BSDF samples, which beat directions drawn uniformly."""
+        return replace(self, share=0.0)
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
         """Draw a direction uniformly on the sphere."""
@@ -40,8 +45,8 @@ class ConstantEnvironment(InfiniteLight):
         return np.broadcast_to(self.radiance, wi.shape)
 
     def power(self, scene_radius: float) -> NDArray[np.float64]:
-        """4π·L through the disk of the scene, πR²."""
-        return through_scene(4 * np.pi * self.radiance.mean(0, dtype=np.float64), scene_radius)
+        """4π·L through the disk of the scene, πR², what light samples are to bring of it."""
+        return self.share * through_scene(4 * np.pi * self.radiance.mean(0, dtype=np.float64), scene_radius)
 
 
 class Environment:

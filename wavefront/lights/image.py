@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -22,6 +22,7 @@ from .infinite import InfiniteLight, at_infinity, through_scene, turned
 INV_PI = f4(1 / np.pi)
 INV_TWO_PI = f4(0.5 / np.pi)
 TWO_PI = f4(2 * np.pi)
+LEAST_SHARE = 1e-3  # of the light of an image that is worth light samples
 
 
 @dataclass(slots=True)
@@ -39,6 +40,7 @@ class ImageEnvironment(InfiniteLight):
     step: NDArray[np.float64]  # (H,) Δcosθ from the upper edge of each row to the lower
     mean: Floats  # (3, 1) radiance, averaged over all directions
     rotation: Floats | None  # (3, 3) to world from environment; None where they are the same
+    share: float = 1.0  # of the light that light samples are to bring
 
     @classmethod
     def of(cls, pixels: Floats, filter: str, rotation: NDArray[np.float64] | None) -> Self:
@@ -67,6 +69,18 @@ class ImageEnvironment(InfiniteLight):
             mean=shares.sum((0, 1)).astype(f4).reshape(3, 1),
             rotation=None if rotation is None else rotation.astype(f4),
         )
+
+    def compensated(self) -> Self:
+        """Draw directions by how much brighter than the mean they are, and leave the rest to BSDF samples.
+
+        In an image that is nearly the same all around, nothing is left to draw.
+        """
+        weights = self.texels.weights()  # density over the unit square; 1/(4π) per steradian is the mean
+        excess = np.maximum(weights - 0.5 * len(self.step) * self.step[:, None], 0)
+        share = float(excess.mean())
+        if share < LEAST_SHARE:
+            return replace(self, share=0.0)
+        return replace(self, texels=Distribution2D(excess), share=share)
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
         """Choose a texel, and a direction uniformly within it."""
@@ -99,8 +113,8 @@ class ImageEnvironment(InfiniteLight):
         return self._lookup(*self._place(wi))
 
     def power(self, scene_radius: float) -> NDArray[np.float64]:
-        """4π times the mean radiance, through the disk of the scene, πR²."""
-        return through_scene(4 * np.pi * self.mean.mean(0, dtype=np.float64), scene_radius)
+        """4π times the mean radiance, through the disk of the scene, πR²; what light samples are to bring."""
+        return self.share * through_scene(4 * np.pi * self.mean.mean(0, dtype=np.float64), scene_radius)
 
     def _place(self, wi: Floats) -> tuple[Floats, Floats]:
         """Return where directions (3, n) lie in the image, from the left and the top, in [0, 1]."""

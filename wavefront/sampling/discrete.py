@@ -183,6 +183,10 @@ class Distribution2D:
         y = _within_cell(row, rest_y, height)
         return x, y, self._density.take(flat)
 
+    def weights(self) -> NDArray[np.float64]:
+        """Return the density of each cell over the unit square, (rows, columns); their mean is 1."""
+        return self._density.reshape(self.shape).astype(np.float64)
+
     def pdf(self, x: Floats, y: Floats) -> Floats:
         """Density over the unit square at x, y (n,) in [0, 1], (n,)."""
         height, width = self.shape
