@@ -259,7 +259,8 @@ def compile_scene(
     light_of = np.append(light_of, environment)
     weights = bool(attributes) or smooth
     normals = _face_normals(triangles)
-    geometry = Geometry(triangles32[:once], np.ascontiguousarray(centers), radii, weights)
+    alike = None if weights else _alike(material_of[:once], light_of[:once])
+    geometry = Geometry(triangles32[:once], np.ascontiguousarray(centers), radii, weights, alike)
     accelerator, table = make_accelerator(geometry), None
     if shared:
         placements, table = place(instances, shared, centre, once, len(spheres), replaced)
@@ -289,6 +290,13 @@ def compile_scene(
         uneven=_uneven(meshes, len(lights), light_of),
         instances=table,
     )
+
+
+def _alike(material_of: Ints, light_of: Ints) -> Bools:
+    """Tell which triangles (m,) look like the next, where no attribute varies over them."""
+    same = np.zeros(material_of.size, np.bool_)
+    same[:-1] = (np.diff(material_of) == 0) & (np.diff(light_of) == 0)
+    return same
 
 
 def group_materials(materials: Sequence[Bsdf]) -> Materials:

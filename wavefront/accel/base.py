@@ -19,6 +19,9 @@ class Geometry:
     centers: Floats  # (3, k) sphere centres
     radii: Floats  # (k,) sphere radii
     weights: bool = True  # whether barycentric weights are needed; without them b1 and b2 are 0
+    # (m,) whether a triangle and the next look the same all over, so that a hit of a flat quadrilateral of
+    # both may name either; without it none do
+    alike: Bools | None = None
 
 
 @dataclass(slots=True)

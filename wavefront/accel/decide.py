@@ -68,7 +68,7 @@ def _decide_doubts(
     """
     origin = lanes.origin.take(lane, 1).astype(np.float64)
     direction = lanes.direction.take(lane, 1).astype(np.float64)
-    rays = prim, origin, direction
-    t = triangle.plane_distance(table.plane, *rays)
-    t = triangle.clamp_to_triangle(table, *rays, t)
-    found.add(lane, first, np.where(triangle.hits_watertight(table, *rays), t, np.inf))
+    vertices = triangle.vertices_from(table, prim, origin)
+    t = triangle.plane_distance(table.plane, prim, origin, direction)
+    t = triangle.clamp_to_triangle(t, vertices, direction)
+    found.add(lane, first, np.where(triangle.hits_watertight(vertices, direction), t, np.inf))

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..vec import Bools, Floats, Ints, f4
 from . import triangle
+from .base import Geometry
 from .decide import TriangleDecisions
 from .found import Candidates, Found, Occluded
 from .quads import are_parallelograms, corners, diagonal_planes, find_quads, planes
@@ -48,17 +49,17 @@ class Polygons:
 
 
 class FewTriangles:
-    """Triangles `ids` (k,) of all `triangles` (m, 3, 3), of a scene with so many `primitives`.
+    """Those triangles of `geometry` that have the `ids` (k,).
 
     Quadrilaterals get one plane in `table`: theirs differ by the rounding of their corners.
     """
 
     tree = None
 
-    def __init__(
-        self, table: TriangleTable, triangles: Floats, ids: Ints, primitives: int, ball: Ball
-    ) -> None:
+    def __init__(self, table: TriangleTable, geometry: Geometry, ids: Ints, ball: Ball) -> None:
         self._table = table
+        triangles = geometry.triangles
+        primitives = len(triangles) + geometry.radii.size
         first = find_quads(triangles)
         first = first[np.isin(first, ids) & np.isin(first + 1, ids)]
         single = ids[~np.isin(ids, [first, first + 1])]
@@ -67,8 +68,11 @@ class FewTriangles:
         # The last column of these is for no primitive, -1.
         self._partner = np.full(primitives + 1, -1)
         self._partner[first] = first + 1
-        self._diagonal = np.zeros((4, primitives + 1), f4)
-        self._diagonal[:, first] = diagonal_planes(quads)
+        differ = np.ones(first.size, np.bool_) if geometry.alike is None else ~geometry.alike.take(first)
+        self._diagonal: Floats | None = None
+        if differ.any():
+            self._diagonal = np.zeros((4, primitives + 1), f4)
+            self._diagonal[:, first[differ]] = diagonal_planes(quads[:, differ])
         parallel = are_parallelograms(quads, ball.radius)
         self._gather(
             [
@@ -95,6 +99,7 @@ class FewTriangles:
         self._number = np.arange(1, begin + 1, dtype=np.uint8)[:, None]
         # Of these, the first is for no polygon.
         self._prim = np.concatenate([[-1], *(prim for _, prim in kinds)])
+        self._named = np.maximum(self._prim, 0)  # distances to none are NaN
         self._plane = np.full((4, begin + 1), np.nan)
         self._plane[:, 1:] = self._table.plane.take(self._prim[1:], 1)
         self._slot = np.zeros(self._partner.size, np.intp)
@@ -121,7 +126,7 @@ class FewTriangles:
             number *= self._number
             highest = np.maximum.reduce(number, 0).astype(np.intp)
             t = triangle.plane_distance(self._plane, highest, lanes.origin[:, part], lanes.direction[:, part])
-            found.add_each(part, self._prim.take(highest), t)
+            found.add_each(part, self._named.take(highest), t)
             several = np.flatnonzero(hits > 1)
             number = number.take(several, 1)
             number[highest.take(several) - 1, np.arange(several.size)] = 0
@@ -224,7 +229,12 @@ class FewTriangles:
         return value
 
     def halves(self, prim: Ints, lanes: Lanes, t: Floats) -> Ints:
-        """Tell which half of a quadrilateral was hit at t (n,): primitives (n,), -1 for a miss."""
+        """Tell which half of a quadrilateral was hit at t (n,): primitives (n,), -1 for a miss.
+
+        Of halves that look alike the first is as good.
+        """
+        if self._diagonal is None:
+            return prim
         px, py, pz = lanes.origin + lanes.direction * t
         x, y, z, offset = (row.take(prim) for row in self._diagonal)
         return prim + (x * px + y * py + z * pz + offset > 0)

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..vec import Floats, Ints, f4
-from .traverse import NO_HIT, Ball, Lanes, Words
+from .traverse import Ball, Lanes, Words
 from .triangle import ROUNDOFF, Doubles
 
+PRIM_BITS = 31  # of a sortable word, below those of t
+NO_HIT = 0x7F7FFFFF << PRIM_BITS  # of a miss: t = inf
 DECIDE = 1 << 14  # candidates decided at a time
 
 
@@ -45,7 +47,7 @@ class Closest:
 
     def reach(self) -> Floats:
         """Look no further than the nearest hit."""
-        return _reach((self.key >> 32).astype(np.int32).view(f4), self.lanes, self.ball)
+        return _reach(distances(self.key), self.lanes, self.ball)
 
 
 class Occluded:
@@ -71,12 +73,25 @@ class Occluded:
 
 
 def _keys(prim: Ints, t: Doubles) -> Words:
-    rounded = t.astype(f4)
-    valid = (rounded > 0) & (rounded < np.inf)
-    key = rounded.view(np.int32).astype(np.int64)
-    key <<= 32
+    """Words that sort like t, those with equal t like `prim`; what is no hit sorts no lower than NO_HIT."""
+    bits = t.astype(f4).view(np.uint32)  # negative numbers and NaN are above inf
+    bits -= np.uint32(1)  # now 0 is, too
+    key = bits.astype(np.int64)
+    key <<= PRIM_BITS
     key |= prim
-    return np.where(valid, key, NO_HIT)
+    return key
+
+
+def distances(key: Words) -> Floats:
+    """Return the t (n,) of sortable words; inf of NO_HIT."""
+    return ((key >> PRIM_BITS) + 1).astype(np.uint32).view(f4)
+
+
+def prims(key: Words) -> Ints:
+    """Return the primitives (n,) of sortable words; -1 of NO_HIT."""
+    prim = key & ((1 << PRIM_BITS) - 1)
+    prim[np.flatnonzero(key == NO_HIT)] = -1
+    return prim
 
 
 def _reach(t: Floats, lanes: Lanes, ball: Ball) -> Floats:

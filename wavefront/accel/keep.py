@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from dataclasses import fields
 
 import numpy as np
 
@@ -48,7 +49,4 @@ class KeptAccelerators:
 
 
 def _same(a: Geometry, b: Geometry) -> bool:
-    return a.weights == b.weights and all(
-        np.array_equal(x, y)
-        for x, y in ((a.triangles, b.triangles), (a.centers, b.centers), (a.radii, b.radii))
-    )
+    return all(np.array_equal(getattr(a, each.name), getattr(b, each.name)) for each in fields(Geometry))

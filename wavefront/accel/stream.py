@@ -11,12 +11,11 @@ from . import sphere, triangle
 from .base import Geometry, Intersections
 from .decide import TriangleDecisions
 from .few import FewTriangles
-from .found import Candidates, Closest, Found, Occluded
+from .found import Candidates, Closest, Found, Occluded, distances, prims
 from .traverse import (
     BLOCK,
     BLOCK_SHIFT,
     CHUNK,
-    NO_HIT,
     Ball,
     Lanes,
     Words,
@@ -192,8 +191,7 @@ class NumpyAccelerator:
             ids = np.flatnonzero(triangle.has_area(triangles))
             self._triangles: FewTriangles | _TriangleTree
             if ids.size <= SMALL:
-                primitives = len(triangles) + radii.size
-                self._triangles = FewTriangles(self._table, triangles, ids, primitives, self._ball)
+                self._triangles = FewTriangles(self._table, geometry, ids, self._ball)
             else:
                 size = leaf_size or leaf_size_for(ids.size)
                 self._triangles = _TriangleTree(self._table, triangles, ids, self._ball, size)
@@ -232,16 +230,14 @@ class NumpyAccelerator:
 
     def _report(self, lanes: Lanes, key: Words, hits: Intersections, part: slice) -> None:
         """Unpack keys (n,) and compute the barycentrics of triangles."""
-        hits.t[part] = t = (key >> 32).astype(np.int32).view(f4)
-        missed = key == NO_HIT
-        prim = np.where(missed, -1, key & 0xFFFFFFFF)
-        hits.prim[part] = prim = self._triangles.halves(prim, lanes, t)
+        hits.t[part] = t = distances(key)
+        hits.prim[part] = prim = self._triangles.halves(prims(key), lanes, t)
         b1, b2 = hits.b1[part], hits.b2[part]
         b1[...] = 0
         b2[...] = 0
         if not self._weights:
             return
-        on = np.flatnonzero((prim < self._first_sphere) & ~missed)
+        on = np.flatnonzero((prim >= 0) & (prim < self._first_sphere))
         everywhere = on.size == key.size
         origin = (lanes.origin if everywhere else lanes.origin.take(on, 1)).astype(np.float64)
         direction = (lanes.direction if everywhere else lanes.direction.take(on, 1)).astype(np.float64)

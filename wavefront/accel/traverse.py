@@ -30,7 +30,6 @@ BLOCK_SHIFT = 5
 CHUNK = 1 << 18  # elements of one product
 NEAR_ROUNDS = 3  # in which each ray takes the nearest child of the root; then all that are left
 TOP = 128  # children of the root at most: those of its children join it while so many fit
-NO_HIT = (0x7F800000 << 32) | 0x7FFFFFFF  # key of a miss: t = inf
 
 Words = NDArray[np.int64]
 
@@ -105,7 +104,9 @@ def prepare(
     """
     n = origin.shape[1]
     center = ball.center[:, None]
-    local = np.subtract(origin, center, out=scratch("local", (3, n)))
+    start = scratch("start", (4, n))
+    start[3] = 1
+    local = np.subtract(origin, center, out=start[:3])
     furthest = np.maximum(local.max(initial=0), -local.min(initial=0))
     far = not float(furthest) * 3**0.5 <= 2 * ball.radius
     work = np.multiply(direction, direction, out=scratch("work", (3, n)))
@@ -125,7 +126,6 @@ def prepare(
         line[:, np.flatnonzero(work[0] + work[1] + work[2] > (1.01 * ball.radius) ** 2)] = np.nan
         return Lanes(origin, direction, leaving, line, speed, local, None, None)
     moment[:] = _cross(local, unit, scratch("moment", (5, n)))
-    start = _with_one("start", local)
     end = None
     if distance is not None:
         length = np.divide(f4(3.01 * ball.radius), speed, out=work[0])
@@ -368,9 +368,10 @@ def _nearest_of_each(lane: Ints, near: Floats, count: int) -> Ints:
     """Return the pair (k,) with the least distance of each lane that has one."""
     key = (near + OFFSET).view(np.int32).astype(np.int64) << 32
     key |= np.arange(lane.size)
-    least = np.full(count, NO_HIT, np.int64)
+    none = np.iinfo(np.int64).max
+    least = np.full(count, none, np.int64)
     np.minimum.at(least, lane, key)
-    return least.compress(least != NO_HIT) & 0xFFFFFFFF
+    return least.compress(least != none) & 0xFFFFFFFF
 
 
 BOX_MARGIN = 4e-6  # by which boxes are wider, for the rounding of lines

@@ -192,32 +192,28 @@ def pairs_of_one_sign(edges: Floats, out: Floats) -> Floats:
     return np.minimum(pairs[:, 0], pairs[:, 1], out=out)
 
 
-def hits_watertight(table: TriangleTable, prim: Ints, origin: Doubles, direction: Doubles) -> Bools:
-    """Decide for pairs of triangle `prim` (k,) and ray (3, k) whether the ray's line passes inside.
+def vertices_from(table: TriangleTable, prim: Ints, origin: Doubles) -> Doubles:
+    """Return the vertices of triangles `prim` (k,) as seen from points (3, k): corner, axis, k."""
+    return table.corners.take(prim, 1).reshape(3, 3, -1) - origin
+
+
+def hits_watertight(vertices: Doubles, direction: Doubles) -> Bools:
+    """Decide for triangles, seen from where rays start (3, 3, k), whether the rays' lines pass inside.
 
     Woop, Benthin, Wald, "Watertight ray/triangle intersection", JCGT 2(1), 2013: shear space so that
     the ray runs along z, and test the origin against the projected edges. The projected vertices are
     rounded to float32, so that in float64 their products are exact and so is the sign of a difference
     of two: the triangles of a mesh stay a mesh, without gaps.
     """
-    axis = np.abs(direction).argmax(0)
-    lane = np.arange(prim.size)
-    z, x, y = axis, (axis + 1) % 3, (axis + 2) % 3
-    slope_x = direction[x, lane] / direction[z, lane]
-    slope_y = direction[y, lane] / direction[z, lane]
-    projected = []
-    for corner in range(3):
-        vertex = table.corners[3 * corner : 3 * corner + 3].take(prim, 1) - origin
-        depth = vertex[z, lane]
-        px = (vertex[x, lane] - slope_x * depth).astype(f4).astype(np.float64)
-        py = (vertex[y, lane] - slope_y * depth).astype(f4).astype(np.float64)
-        projected.append((px, py))
-    (ax, ay), (bx, by), (cx, cy) = projected
-    u = cx * by - cy * bx
-    v = ax * cy - ay * cx
-    w = bx * ay - by * ax
-    low = np.minimum(np.minimum(u, v), w)
-    high = np.maximum(np.maximum(u, v), w)
+    z = np.abs(direction).argmax(0)
+    axes = np.stack([(z + 1) % 3, (z + 2) % 3, z])
+    turned = np.take_along_axis(vertices, axes[None], 1)
+    along = np.take_along_axis(direction, axes, 0)
+    projected = (turned[:, :2] - along[:2] / along[2] * turned[:, 2:]).astype(f4).astype(np.float64)
+    x, y = projected[:, 0], projected[:, 1]
+    one, other = [2, 0, 1], [1, 2, 0]
+    edges = x[one] * y[other] - y[one] * x[other]
+    low, high = edges.min(0), edges.max(0)
     return ((low >= 0) & (high > 0)) | ((high <= 0) & (low < 0))
 
 
@@ -230,21 +226,14 @@ def plane_distance(
     return top / (nx * direction[0] + ny * direction[1] + nz * direction[2])
 
 
-def clamp_to_triangle(
-    table: TriangleTable, prim: Ints, origin: Doubles, direction: Doubles, t: Doubles
-) -> Doubles:
-    """Keep t (k,) within the stretch of the ray (3, k) beside its triangle.
+def clamp_to_triangle(t: Doubles, vertices: Doubles, direction: Doubles) -> Doubles:
+    """Keep t (k,) within the stretch of the ray beside its triangle, as seen from its start (3, 3, k).
 
     A ray that runs in a triangle's plane has a plane distance of 0/0. The margin leaves every ray that
     crosses the plane at a measurable angle alone.
     """
-    depths = []
-    for corner in range(3):
-        x, y, z = table.corners[3 * corner : 3 * corner + 3].take(prim, 1) - origin
-        depths.append(x * direction[0] + y * direction[1] + z * direction[2])
-    size2 = direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2
-    low = np.minimum(np.minimum(depths[0], depths[1]), depths[2]) / size2
-    high = np.maximum(np.maximum(depths[0], depths[1]), depths[2]) / size2
+    depths = (vertices * direction).sum(1) / (direction * direction).sum(0)
+    low, high = depths.min(0), depths.max(0)
     margin = 1e-6 * (high - low) + 1e-9 * np.maximum(np.abs(low), np.abs(high))
     return np.clip(t, low - margin, high + margin)
 
