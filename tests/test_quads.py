@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_accel import PLACES, aimed_rays, brute_force, check_batches, geometry, nothing, random_rays
 
-from wavefront.accel import Accelerator, make_accelerator
+import wavefront as wf
+from wavefront.accel import Accelerator, Geometry, make_accelerator
 from wavefront.accel.quads import are_parallelograms, corners, find_quads
+from wavefront.scene import compile_scene
 
 f4 = np.float32
 SQUARE = np.array([(0.0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
@@ -139,6 +143,51 @@ def room() -> Accelerator:
 def test_batches_have_the_same_bits(size: int) -> None:
     """However many rays are tested at once."""
     check_batches(room(), size)
+
+
+def test_halves_are_told_apart_unless_they_look_alike() -> None:
+    """Of quadrilaterals that look the same all over, hits name the first half; nothing else changes."""
+    triangles = trapezoids(12, 5)
+    rays = *random_rays(2000, 6), nothing(2000)
+    both = make_accelerator(geometry(triangles), "numpy").closest(*rays)
+    alike = np.zeros(24, bool)
+    alike[[0, 1, 2, 8, 9, 22]] = True  # four quadrilaterals, and what lies between two of them
+    some = make_accelerator(replace(geometry(triangles), alike=alike), "numpy").closest(*rays)
+    one = np.isin(both.prim, [1, 3, 9, 23])
+    assert one.sum() > 20
+    assert (both.prim % 2 == 1)[~one].sum() > 20
+    np.testing.assert_array_equal(some.prim, both.prim - one)
+    alike[:] = True
+    every = make_accelerator(replace(geometry(triangles), alike=alike), "numpy").closest(*rays)
+    np.testing.assert_array_equal(every.prim, np.where(both.prim < 0, -1, both.prim // 2 * 2))
+    np.testing.assert_array_equal(some.t, both.t)
+    np.testing.assert_array_equal(every.t, both.t)
+
+
+def alike_in(scene: wf.Scene) -> list[bool] | None:
+    """What a compiled scene says to its accelerator of triangles that look alike."""
+    seen: list[Geometry] = []
+
+    def build(given: Geometry) -> Accelerator:
+        seen.append(given)
+        return make_accelerator(given, "numpy")
+
+    compile_scene(scene, build)
+    return None if seen[0].alike is None else seen[0].alike.tolist()
+
+
+def test_triangles_look_alike_by_material_and_light_where_nothing_varies() -> None:
+    """Halves of a lamp that are two lights are told apart, and all where normals or textures vary."""
+    grey, dark = wf.Diffuse(0.5), wf.Diffuse(0.1)
+    square = SQUARE, [(0, 1, 2), (0, 2, 3)]
+    kite = SQUARE * (1, 1, 1) + [(0, 0, 1), (0, 0, 1), (1, 1, 1), (0, 0, 1)], square[1]
+    floor, wall = wf.Mesh(*square, material=grey), wf.Mesh(*kite, material=dark)
+    lamp = wf.Rectangle((0, 0, 2), (1, 0, 0), (0, 1, 0), emission=1)
+    uneven = wf.Mesh(kite[0] + (0, 0, 3), square[1], emission=1)
+    assert alike_in(wf.Scene([floor, wall, lamp, uneven])) == [True, False] * 3 + [False, False]
+    assert alike_in(wf.Scene([floor, wf.Mesh(*kite, material=grey), lamp]))[:4] == [True] * 3 + [False]
+    smooth = wf.Mesh(*square, normals=np.tile((0.0, 0, 1), (4, 1)), material=grey)
+    assert alike_in(wf.Scene([smooth, wall, lamp])) is None
 
 
 def test_neither_half_is_hit_by_a_ray_that_leaves_the_other() -> None:
