@@ -153,6 +153,18 @@ def test_nothing_is_lost(bsdf):
     testing.check_bsdf(bsdf, samples=100_000, albedo=(1, 1))
 
 
+def test_only_diffuse_is_matte():
+    """Classes derived from it need not be."""
+
+    class Glossy(Diffuse):
+        pass
+
+    assert [kind for kind, arguments in CASES if kind(**arguments).matte] == [Diffuse, Diffuse]
+    assert not Glossy(0).matte
+    assert not Glossy(0).black
+    assert [Diffuse(reflectance).black for reflectance in (0, (0, 0, 0.1))] == [True, False]
+
+
 @pytest.mark.parametrize(("kind", "arguments"), CASES, ids=NAMES)
 def test_textures_of_one_value_equal_the_value(kind, arguments):
     plain = kind(**arguments)

@@ -13,12 +13,13 @@ from significance import render
 import wavefront as wf
 from wavefront import integrators
 from wavefront.accel.stream import NumpyAccelerator
+from wavefront.frame import Frame
 from wavefront.sampling.sampler import make_sampler
 from wavefront.scene import CompiledScene, compile_scene
 from wavefront.stages import compact as stage
 from wavefront.stages.shade import shading
 from wavefront.state import Hits, Paths, Surface
-from wavefront.vec import alike, f4
+from wavefront.vec import alike, f4, normalize
 
 SHAPES = {
     Paths: {"origin": 3, "direction": 3, "throughput": 3, "vertex": 3},
@@ -149,6 +150,18 @@ def test_light_is_sampled_only_where_it_can_be_scattered() -> None:
     assert shading(scene, surface.take(np.arange(5))).lit().surface.material.tolist() == [1, 1, 3, 3, 3]
 
 
+def test_directions_are_local_unless_no_material_reads_them() -> None:
+    """Matte materials alone are seen from straight above."""
+    surface = record(Surface, 4)
+    surface.ns = normalize(surface.ns)
+    local = Frame.from_normal(surface.ns).to_local(surface.wo)
+    surface.material = np.array([0, 0, 1, 1])
+    assert (shading(balls(GREY, GREY), surface).wo == [[0], [0], [1]]).all()
+    assert (shading(balls(GREY, GOLD), surface).wo == local).all()
+    surface.material = np.zeros(4, np.intp)
+    assert (shading(balls(GREY, GOLD), surface).wo == [[0], [0], [1]]).all()
+
+
 def test_what_is_alike_stays_so() -> None:
     """One number for all columns is gathered without being written down, however many are asked for."""
     paths = record(Paths, 3)
@@ -157,7 +170,7 @@ def test_what_is_alike_stays_so() -> None:
         part = paths.take(index if isinstance(index, slice) else np.array(index))
         assert part.eta2.tolist() == [2] * len(part)
         assert (part.throughput == paths.throughput[:, :1]).all()
-        assert part.eta2.base is not None
+        assert part.eta2.strides == (0,)
         assert part.slot.tolist() == paths.slot[index].tolist()
 
 

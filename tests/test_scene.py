@@ -259,16 +259,18 @@ def test_materials_out_of_sight_are_not_shaded() -> None:
 class Ink(wf.Diffuse):
     """Black, and in a group of its own."""
 
-    def __init__(self, reflectance: float = 0) -> None:
-        super().__init__(reflectance)
+    black = True
+
+    def __init__(self) -> None:
+        super().__init__(0)
         self.number = 1
 
 
-def test_paths_end_on_black_surfaces(monkeypatch: pytest.MonkeyPatch) -> None:
-    """They are seen, and shine, but are not shaded; the picture is the same bit for bit if they are."""
+def test_paths_end_on_black_lamps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They shine, but are not shaded; the picture is the same bit for bit if they are."""
     room = [
         wf.Sphere((0, 0, 0), 10, material=wf.Diffuse(0.5)),
-        wf.Sphere((0, 0, -2), 1, material=Ink()),
+        wf.Sphere((0, 0, -2), 1, material=wf.Diffuse(0.5), emission=1.0),
         wf.Sphere((0, 3, -2), 1, material=Ink(), emission=5.0),
     ]
     camera = wf.Camera.look_at((0, 0, 5), (0, 0, 0), size=(8, 8))
@@ -284,15 +286,18 @@ def test_paths_end_on_black_surfaces(monkeypatch: pytest.MonkeyPatch) -> None:
     assert pictures[0].max() > 1
 
 
-def test_which_primitives_scatter() -> None:
-    """All but those of black materials; a mesh that is placed in another one somewhere may."""
-    mesh = wf.Mesh(**TRIANGLE, material=wf.Diffuse(0))
-    lights = [wf.Environment()]
-    shift = np.eye(4)
-    shift[0, 3] = 3
-    assert compiled(wf.Sphere(**BALL), lights=lights).scatters is None
-    assert compiled(mesh, wf.Sphere(**BALL), lights=lights).scatters.tolist() == [False, True, False]
-    black = [wf.Instance(mesh, np.eye(4)), wf.Instance(mesh, shift)]
-    assert compiled(*black, lights=lights).scatters.tolist() == [False, False]
-    white = wf.Instance(mesh, shift, material=wf.Diffuse(0.5))
-    assert compiled(black[0], white, lights=lights).scatters is None
+def test_which_lights_are_black() -> None:
+    """Surfaces of a material that says so; one derived from `Diffuse` need not be, whatever its reflectance."""
+
+    class Glitter(wf.Diffuse):
+        pass
+
+    black, grey = wf.Diffuse(0), wf.Diffuse((0, 0.1, 0))
+    painted = wf.Diffuse(wf.Texture(np.zeros((1, 1, 3))))
+
+    def found(*materials: wf.Bsdf):
+        lamps = [wf.Rectangle(**SQUARE, material=m, emission=1) for m in materials]
+        return compiled(*lamps, wf.Sphere(**BALL, material=black), lights=[wf.Environment()]).black_lights
+
+    assert found(grey, black, Glitter(0), Ink()).tolist() == [False, True, False, True, False]
+    assert found(grey, painted, Glitter(0)) is None

@@ -211,7 +211,17 @@ class WrongSnell(Dielectric):
         return s
 
 
+class NotMatte(Diffuse):
+    """Darker seen from the side."""
+
+    matte = True
+
+    def f(self, wo, wi):
+        return super().f(wo, wi) * wo[2] * wi[2]
+
+
 MUTANTS = [
+    (NotMatte(1.0), "matte"),
     (TooDense(1.0), "integral of pdf"),
     (WrongPdf(0.5), "chi-square"),
     (WrongWeight(0.5), "weight"),

@@ -16,7 +16,7 @@ from .sampling.sampler import Sampler
 from .scene import CompiledScene
 from .stages.absorb import absorb
 from .stages.bounce import bounce_sample
-from .stages.compact import carrying, compact, keep, roulette, scattering
+from .stages.compact import carrying, compact, going_on, keep, roulette
 from .stages.intersect import intersect
 from .stages.passing import pass_through
 from .stages.relief import tilt
@@ -36,7 +36,7 @@ def li_naive(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: 
         paths, hits = pass_through(scene, paths, hits, sampler, bounce)
         light = emitted(scene, paths, hits)
         deposit(L, paths, light)
-        paths, hits = compact(scene, paths, hits, scattering(scene, hits))
+        paths, hits = compact(scene, paths, hits, going_on(scene, hits, light))
         if bounce == max_bounces or not len(paths):
             break
         shade = arrive(scene, paths, hits)
@@ -53,7 +53,7 @@ def li_direct_simple(scene: CompiledScene, paths: Paths, sampler: Sampler, max_b
         paths, hits = pass_through(scene, paths, hits, sampler, bounce)
         light = emitted(scene, paths, hits)
         deposit(L, paths, light)
-        paths, hits = compact(scene, paths, hits, scattering(scene, hits))
+        paths, hits = compact(scene, paths, hits, going_on(scene, hits, light))
         if bounce == max_bounces or not len(paths):
             break
         shade = arrive(scene, paths, hits)
@@ -92,7 +92,7 @@ def li_full(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: i
         paths, hits = pass_through(scene, paths, hits, sampler, bounce)
         light = emitted(scene, paths, hits)
         deposit(L, paths, mis_weighted(scene, paths, light))
-        paths, hits = compact(scene, paths, hits, scattering(scene, hits))
+        paths, hits = compact(scene, paths, hits, going_on(scene, hits, light))
         if bounce == max_bounces or not len(paths):
             break
         shade = arrive(scene, paths, hits)

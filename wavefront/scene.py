@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -192,11 +192,11 @@ class CompiledScene:
     material_of: Ints  # (m + k,) material of each primitive
     light_of: Ints  # (m + k + 1,) light of each primitive, and at the end that of a miss; -1 for none
     shines: Bools  # (m + k + 1,) whether there is one
-    scatters: Bools | None  # (m + k + 1,) primitives that are not black, a miss is; None when only a miss is
     materials: Materials
     absorption: Floats | None  # (3, materials) per scene unit; None when nothing absorbs
     opacities: Opacities | None  # None when every surface is all there
     lights: LightTable
+    black_lights: Bools | None  # (lights,) those whose surface scatters nothing; None when there are none
     uneven: Uneven | None  # the lights that do not shine evenly; None when all do
     instances: InstanceTable | None = None  # None when every mesh is placed once
 
@@ -254,8 +254,8 @@ def compile_scene(
     radii = np.array([s.radius for s in spheres]).astype(f4)
     smooth = any(mesh.normals is not None for mesh in meshes)
     triangles32 = np.ascontiguousarray(triangles, f4)
-    partly = _primitives(_is_partly_there, user_materials, material_of, meshes, instances)
-    scatters = _primitives(_scatters, user_materials, material_of, meshes, instances)
+    partly = _partly_there(user_materials, material_of, meshes, instances)
+    black_lights = _black_lights(user_materials, material_of, light_of, len(lights))
     light_of = np.append(light_of, environment)
     weights = bool(attributes) or smooth
     normals = _face_normals(triangles)
@@ -282,11 +282,11 @@ def compile_scene(
         material_of=material_of,
         light_of=light_of,
         shines=light_of >= 0,
-        scatters=None if scatters[:-1].all() else scatters,
         materials=group_materials(user_materials),
         absorption=_absorption(user_materials),
         opacities=_opacities(user_materials, partly),
         lights=lights,
+        black_lights=black_lights,
         uneven=_uneven(meshes, len(lights), light_of),
         instances=table,
     )
@@ -349,33 +349,27 @@ def _opacities(materials: Sequence[Bsdf], partly: Bools) -> Opacities | None:
     return Opacities(partly, constant, varying)
 
 
-def _is_partly_there(material: Bsdf) -> bool:
-    return material.opacity is not None
-
-
-def _scatters(material: Bsdf) -> bool:
-    return not material.black
-
-
-def _primitives(
-    holds: Callable[[Bsdf], bool],
-    materials: Sequence[Bsdf],
-    material_of: Ints,
-    meshes: Sequence[Mesh],
-    instances: Sequence[Instance],
+def _partly_there(
+    materials: Sequence[Bsdf], material_of: Ints, meshes: Sequence[Mesh], instances: Sequence[Instance]
 ) -> Bools:
-    """Tell for which primitives (m + k + 1,) something holds of a material that they are placed in.
-
-    For a miss, at the end, it does not.
-    """
-    found = np.append(np.array([holds(material) for material in materials]).take(material_of), False)
-    placed = {id(instance.mesh) for instance in instances if holds(instance.material)}
+    """Tell which primitives (m + k + 1,) are only partly there in some place; a miss, at the end, is not."""
+    partly = np.array([material.opacity is not None for material in materials], np.bool_)
+    found = np.append(partly.take(material_of), False)
+    placed = {id(shape.mesh) for shape in instances if shape.material.opacity is not None}
     start = 0
     for mesh in meshes:
         end = start + len(mesh.faces)
         found[start:end] |= id(mesh) in placed
         start = end
     return found
+
+
+def _black_lights(materials: Sequence[Bsdf], material_of: Ints, light_of: Ints, lights: int) -> Bools | None:
+    """Tell which lights (lights,) are surfaces of a black material; None when none is."""
+    black = np.array([material.black for material in materials], np.bool_).take(material_of)
+    found = np.zeros(lights, np.bool_)
+    found[light_of.compress(black & (light_of >= 0))] = True
+    return found if found.any() else None
 
 
 def _is_constant(value: object) -> bool:

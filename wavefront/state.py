@@ -38,7 +38,9 @@ class Columns:
 
     def __len__(self) -> int:
         """Return the number of columns."""
-        return int(next(value.shape[-1] for _, value in self._values() if value is not None))
+        record: Any = type(self)
+        values = (getattr(self, name) for name in _names(record))
+        return int(next(value.shape[-1] for value in values if value is not None))
 
     def take(self, index: Lanes) -> Self:
         """Gather columns `index` (m,) of every field into a new record; of a slice, views."""

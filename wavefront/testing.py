@@ -601,6 +601,8 @@ def _check_view(
     where = str(view)
     dimensions = view.bsdf.dimensions
     _check_arrays(report, view, rng)
+    if view.bsdf.matte:
+        _check_matte(report, view, rng)
     pilot = view.sample(rng.random((dimensions, PILOT), f4))
     points, lobes = [], list[_Lobe]()
     total, squares = np.zeros(3), np.zeros(3)
@@ -671,6 +673,19 @@ def _check_arrays(report: Report, view: _View, rng: np.random.Generator) -> None
     for k, (plain, joint) in enumerate(((4, 6), (5, 7))):
         error = np.abs(whole[plain] - whole[joint]) / np.maximum(np.abs(whole[plain]), 1e-20)
         report.at_most("evaluate = f, pdf", f"{where}, {('f', 'pdf')[k]}", float(error.max()), 1e-5)
+
+
+def _check_matte(report: Report, view: _View, rng: np.random.Generator) -> None:
+    """No method of a matte material reads wo."""
+    n = 1000
+    bound, wo = view.at(n)
+    w, u = _uniform_sphere(rng, n), rng.random((bound.dimensions, n), f4)
+    here, above = (
+        [*bound.evaluate(v, w), bound.sample_f(v, u).wi, bound.sample_f(v, u).weight]
+        for v in (wo, np.repeat(_direction(0, 0), n, 1))
+    )
+    for name, seen, straight in zip(("f", "pdf", "wi", "weight"), here, above, strict=True):
+        report.holds("matte", f"{view}, {name}", seen != straight, "the same bits as from straight above")
 
 
 def _check_samples(report: Report, view: _View, drawn: BsdfSample) -> None:

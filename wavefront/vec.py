@@ -18,6 +18,7 @@ Bools = NDArray[np.bool_]
 Lanes: TypeAlias = Ints | slice  # some columns, by index or from one to another; all of them: ALL
 
 f4 = np.float32
+ZERO, INF = f4(0), f4(np.inf)
 ALL = slice(None)
 
 
@@ -38,7 +39,10 @@ def columns(a: Array, lanes: Lanes) -> Array:
 
 def alike(value: Any, n: int) -> NDArray[Any]:
     """One value for n lanes, (n,), read-only: free to keep, and free to gather."""
-    return np.broadcast_to(value, n)
+    one = np.asarray(value)
+    out = np.ndarray(n, one.dtype, one, strides=(0,))  # a third of the time of np.broadcast_to
+    out.flags.writeable = False
+    return out
 
 
 def dot(a: Floats, b: Floats) -> Floats:
@@ -79,7 +83,7 @@ def luminance(rgb: Floats) -> Floats:
 
 def positive(x: Floats) -> Floats:
     """max(x, 0) of numbers (n,); NaN stays. Twice as fast as `np.maximum` with a scalar."""
-    return np.clip(x, f4(0), f4(np.inf))
+    return x.clip(ZERO, INF)
 
 
 def signs(x: Floats) -> Floats:

@@ -53,8 +53,13 @@ class Bsdf(ABC):
     relief: Relief | None = None  # tilts the shading normals. The renderer sees to it, no material does
 
     @property
+    def matte(self) -> bool:
+        """Whether it looks alike from everywhere: no method reads wo, which is then not made ready."""
+        return False
+
+    @property
     def black(self) -> bool:
-        """Whether nothing is scattered for certain: paths end there."""
+        """Whether it scatters nothing at all: paths end on lamps of it."""
         return False
 
     def with_alpha(self, alpha: Scalar, cutoff: float | None = None) -> Self:

@@ -32,9 +32,14 @@ class Diffuse(Bsdf):
         self.reflectance = colour("Diffuse reflectance", reflectance)
 
     @property
+    def matte(self) -> bool:
+        """True, but not for subclasses, which may see to it themselves."""
+        return type(self) is Diffuse
+
+    @property
     def black(self) -> bool:
         """Whether the reflectance is 0, as it often is of lamps."""
-        return not isinstance(self.reflectance, Spatial) and not self.reflectance.any()
+        return self.matte and not isinstance(self.reflectance, Spatial) and not self.reflectance.any()
 
     def f(self, wo: Floats, wi: Floats) -> Floats:
         """Return reflectance/π above the surface, (3, n)."""
@@ -47,7 +52,7 @@ class Diffuse(Bsdf):
     def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
         """Draw cosine-weighted directions; the weight is the reflectance itself."""
         wi = cosine_hemisphere(u)
-        pdf = cosine_hemisphere_pdf(wi)
+        pdf = wi[2] * INV_PI
         weight = np.broadcast_to(self.reflectance, wi.shape)
         if not pdf.all():
             weight = weight * (pdf > 0)

@@ -10,6 +10,7 @@ from ..sampling.sampler import Dimension, Sampler
 from ..scene import CompiledScene
 from ..state import Hits, Paths
 from ..vec import Bools, Ints, alike, f4, highest
+from .shade import Emission
 from .surface import material_rows
 
 ROULETTE_AFTER = 2  # scattering events before paths may be ended
@@ -47,11 +48,13 @@ def keep(paths: Paths, lanes: Ints) -> Paths:
     return paths if lanes.size == len(paths) else paths.take(lanes)
 
 
-def scattering(scene: CompiledScene, hits: Hits) -> Ints:
-    """Lanes that met a surface which scatters light, (k,). Paths end on black ones."""
-    if scene.scatters is None:
+def going_on(scene: CompiledScene, hits: Hits, emission: Emission) -> Ints:
+    """Lanes (k,) of paths that met a surface, and not a lamp that is black but for its light."""
+    if scene.black_lights is None:
         return hits.found
-    return np.flatnonzero(scene.scatters.take(hits.prim))  # a miss, -1, takes the last entry
+    found = hits.prim >= 0
+    found[emission.lanes.compress(scene.black_lights.take(emission.light))] = False
+    return np.flatnonzero(found)
 
 
 def carrying(paths: Paths) -> Bools:

@@ -13,11 +13,13 @@ from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
 from ..scene import CompiledScene, Materials
 from ..state import Hits, Paths, Surface
-from ..vec import Floats, Ints, alike, columns, dot, f4, highest
+from ..vec import Floats, Ints, alike, column, columns, dot, f4, highest
 from .intersect import shadow_rays, visible
 from .passing import let_through
 from .shine import shine_at_hits, shine_at_samples
 from .surface import above, leave
+
+UP = column((0, 0, 1))
 
 
 @dataclass(slots=True)
@@ -41,7 +43,7 @@ class Shading:
 
     surface: Surface
     frame: Frame
-    wo: Floats  # (3, n) local frame
+    wo: Floats  # (3, n) local frame; straight up where all materials are matte
     start: Floats  # (3, n) origins of rays that leave to the side of wo, scene units
     groups: list[tuple[slice, Bsdf]]  # lanes of each group, in order, and its material bound to them
 
@@ -87,8 +89,12 @@ def mis_weighted(scene: CompiledScene, paths: Paths, emission: Emission) -> Arri
 def shading(scene: CompiledScene, surface: Surface) -> Shading:
     """Set up local frames, and tell the groups of materials apart; `compact` has put them in order."""
     frame = surface.frame()
-    wo = frame.to_local(surface.wo)
-    return Shading(surface, frame, wo, above(surface), list(_groups(scene.materials, surface)))
+    groups = list(_groups(scene.materials, surface))
+    if all(bsdf.matte for _, bsdf in groups):
+        wo = np.broadcast_to(UP, surface.wo.shape)
+    else:
+        wo = frame.to_local(surface.wo)
+    return Shading(surface, frame, wo, above(surface), groups)
 
 
 def _groups(materials: Materials, surface: Surface) -> Iterator[tuple[slice, Bsdf]]:
@@ -127,8 +133,9 @@ def direct(
     # where the two normals disagree on the side that light comes from there is none, so none leaks through
     cos = np.abs(wi[2]) * (wi[2] * cos_g > 0)
     f, pdf = evaluate(shade, wi)
-    lanes = np.flatnonzero((light.pdf > 0) & (highest(f) * cos != 0))  # NaN stays, to be counted
-    through = (cos_g.take(lanes) < 0).any()
+    arriving = (light.pdf > 0) & (highest(f) * cos != 0)  # NaN stays, to be counted
+    lanes = np.flatnonzero(arriving)
+    through = (arriving & (cos_g < 0)).any()
     origin = leave(shade.surface, cos_g) if through else shade.start
     rays = shadow_rays(shade.surface, origin, light, lanes)
     radiance = columns(light.radiance, lanes)
