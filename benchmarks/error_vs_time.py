@@ -2,10 +2,10 @@
 
 python benchmarks/error_vs_time.py [--scene cornell|mesh|lights|all] [--data DATA] [--out plot.png]
 
-Sides: wavefront with each sampler, numpy and embree; Mitsuba `llvm_ad_rgb` and `scalar_rgb`, each with
-`independent` and `multijitter`. All draw the same shapes with as many bounces, a box filter and a worker
-per core. The reference is the mean of two converged renders, one of each side, whose means are compared
-first. Printed are, for each side:
+Sides: wavefront with each sampler and, "sobol/4", with four branches, numpy and embree; Mitsuba
+`llvm_ad_rgb` and `scalar_rgb`, each with `independent` and `multijitter`. All draw the same shapes with
+as many bounces, a box filter and a worker per core. The reference is the mean of two converged
+renders, one of each side, whose means are compared first. Printed are, for each side:
 
 - error and wall time at each sample count, warm: medians over the repeats, the sides in turn. Mitsuba's
   scene is loaded once, beforehand; a render of wavefront includes setting up its scene, but what rays are
@@ -100,14 +100,12 @@ def ball(subdivisions: int) -> tuple[np.ndarray, np.ndarray]:
     return np.asarray(mesh.vertices), np.asarray(mesh.faces)
 
 
-def ours(scene: wf.Scene, bounces: int, sampler: str, accel: str) -> Render:
+def ours(scene: wf.Scene, bounces: int, sampler: str, accel: str, branches: int = 1) -> Render:
     """Return a renderer of this project."""
+    options: dict[str, Any] = {"sampler": sampler, "accel": accel, "branches": branches}
 
     def render(spp: int, seed: int) -> np.ndarray:
-        image = wf.render(
-            scene, spp, seed=seed, sampler=sampler, accel=accel, max_bounces=bounces, progress=False
-        )
-        return image.rgb
+        return wf.render(scene, spp, seed=seed, max_bounces=bounces, progress=False, **options).rgb
 
     return render
 
@@ -133,7 +131,8 @@ def renderer(side: str, scene: wf.Scene, bounces: int, counts: tuple[int, ...] =
     """Return the renderer of a side, called "wavefront embree sobol" or "scalar_rgb multijitter"."""
     *_, engine, sampler = side.split()
     if side.startswith("wavefront"):
-        return ours(scene, bounces, sampler, engine)
+        sampler, _, branches = sampler.partition("/")
+        return ours(scene, bounces, sampler, engine, int(branches or 1))
     return mitsuba(scene, bounces, sampler, engine, counts)
 
 
@@ -204,7 +203,9 @@ def measure(name: str, scene: wf.Scene, options: argparse.Namespace) -> dict[str
     variants = [v for v in ("llvm_ad_rgb", "scalar_rgb") if v in options.variants]
     print(f"\n## {name}: {scene.camera.size[0]}x{scene.camera.size[1]}, max_bounces {bounces}", flush=True)
     exact = reference(scene, bounces, options.reference_spp, variants[0])
-    names = [f"wavefront {accel} {sampler}" for accel in ("numpy", "embree") for sampler in SAMPLERS]
+    names = [
+        f"wavefront {accel} {sampler}" for accel in ("numpy", "embree") for sampler in (*SAMPLERS, "sobol/4")
+    ]
     names += [f"{variant} {sampler}" for variant in variants for sampler in ("independent", "multijitter")]
     sides = {side: renderer(side, scene, bounces) for side in names}
     for side, render in sides.items():  # warm up; Mitsuba may compile anew for each sample count
@@ -254,7 +255,7 @@ def report(found: dict[str, Any]) -> None:
 
 
 COLOURS = {"wavefront numpy": "C3", "wavefront embree": "C1", "llvm_ad_rgb": "C0", "scalar_rgb": "C2"}
-LINES = {"independent": ":", "sobol": "-", "bluenoise": "--", "multijitter": "-"}
+LINES = {"independent": ":", "sobol": "-", "bluenoise": "--", "multijitter": "-", "sobol/4": "-."}
 
 
 def plot(results: dict[str, Any], path: Path) -> None:

@@ -77,6 +77,16 @@ def test_concatenate_undoes_cutting(kind: type, n: int, data) -> None:
     assert same(kind.concatenate(halves), whole)
 
 
+def test_what_is_alike_in_all_records_stays_so() -> None:
+    """One value for all lanes, which costs nothing to gather; two values are written out."""
+    first, second = record(Paths, 3), record(Paths, 2)
+    first.eta2, second.eta2 = alike(f4(1), 3), alike(f4(1), 2)
+    first.pdf, second.pdf = alike(f4(1), 3), alike(f4(2), 2)
+    joined = Paths.concatenate([first, second])
+    assert joined.eta2.strides == (0,)
+    assert (joined.eta2.tolist(), joined.pdf.tolist()) == ([1] * 5, [1, 1, 1, 2, 2])
+
+
 MIRROR, GREY, GLASS, GOLD = (
     wf.Mirror(),
     wf.Diffuse(0.5),
@@ -197,9 +207,9 @@ def carrying(throughput: float, eta2: float, n: int) -> Paths:
     return paths
 
 
-def survivors(paths: Paths, bounce: int = stage.ROULETTE_AFTER) -> Paths:
+def survivors(paths: Paths, bounce: int = stage.ROULETTE_AFTER, branches: int = 1) -> Paths:
     """The paths that roulette leaves."""
-    return paths.take(stage.roulette(paths, make_sampler("independent"), bounce))
+    return paths.take(stage.roulette(paths, make_sampler("independent"), bounce, branches))
 
 
 @pytest.mark.parametrize("throughput", [0.45, 0.25, 0.05])
@@ -217,6 +227,16 @@ def test_roulette_spares_the_strong(throughput: float) -> None:
     left = survivors(carrying(throughput, 1, 1 << 12))
     assert len(left) == 1 << 12
     assert left.throughput == pytest.approx(throughput, rel=1e-6)
+
+
+@pytest.mark.parametrize("branches", [2, 5])
+def test_roulette_spares_branches(branches: int) -> None:
+    """One of several branches carries less, and that is no reason to end it."""
+    n = 1 << 14
+    assert len(survivors(carrying(0.5 / branches, 1, n), branches=branches)) == n
+    left = survivors(carrying(0.25 / branches, 1, n), branches=branches)
+    assert len(left) / n == pytest.approx(0.5, abs=0.02)
+    assert left.throughput == pytest.approx(0.5 / branches, rel=1e-6)
 
 
 def test_roulette_waits() -> None:
@@ -239,7 +259,7 @@ def test_paths_remember_by_how_much_glass_compresses(monkeypatch: pytest.MonkeyP
     """η² inside a ball of index 1.5, 1 where they were reflected and after they have left it."""
     seen = []
 
-    def note(paths: Paths, sampler, bounce: int):
+    def note(paths: Paths, sampler, bounce: int, branches: int):
         seen.append(np.unique(paths.eta2.round(4)).tolist())
         return np.arange(len(paths))
 

@@ -116,9 +116,11 @@ class Once(Sampler):
         self.given[stream] = everything
 
 
-@pytest.mark.parametrize("integrator", scenes.ALL)
-def test_no_number_is_used_twice(integrator: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not by two decisions, not at two bounces: the means of many scenes would not show it."""
+@pytest.mark.parametrize(
+    ("integrator", "branches"), [*((integrator, 1) for integrator in scenes.ALL), ("full", 3)]
+)
+def test_no_number_is_used_twice(integrator: str, branches: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not by two decisions, bounces or branches: the means of many scenes would not show it."""
     given: list[Once] = []
 
     def record(*address) -> Once:
@@ -134,7 +136,7 @@ def test_no_number_is_used_twice(integrator: str, monkeypatch: pytest.MonkeyPatc
     blend = wf.Sphere((0.2, 0.3, 0.2), 0.2, material=wf.Mix(wf.Diffuse(0.7), wf.Dielectric(1.5, 0.3)))
     camera = wf.Camera.look_at((0, 0, 3.9), (0, 0, 0), size=(12, 9), aperture=0.1, focus=3.9)
     scene = wf.Scene([*scene.shapes, *veils, blend], [wf.Environment((0.2, 0.3, 0.5))], camera)
-    render(scene, 16, integrator=integrator, max_bounces=5)
+    render(scene, 16, integrator=integrator, max_bounces=5, branches=branches)
     left_out = {"naive": {Dimension.LIGHT, Dimension.LIGHT_POINT}, "full": set()}
     decisions = {*Dimension, Dimension.OPACITY + 1, Dimension.OPACITY + 2}  # three veils
     assert {dimension for _, dimension in given[-1].given} == decisions - left_out.get(

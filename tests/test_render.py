@@ -169,6 +169,12 @@ BAD = [
     ({"seed": -1}, r"seed is -1; it must be an integer in"),
     ({"seed": 2**64}, r"seed is 18446744073709551616; it must be"),
     ({"seed": 0.5}, r"seed is 0.5; it must be"),
+    *(({"branches": v}, rf"branches is {v}; it must be a whole number from 1 to 64") for v in (0, 65, 2.0)),
+    ({"branches": 4, "spp": 2**30 + 1}, r"spp is 1073741825; it must be a whole number from 1 to 1073741824"),
+    *(
+        ({"branches": 2, "integrator": name}, rf"branches is 2; with integrator='{name}' it must be 1")
+        for name in ("naive", "direct_simple", "direct_mis")
+    ),
 ]
 BAD_SCENES = [
     (None, r"cannot render NoneType: give a wf.Scene, a path"),

@@ -97,6 +97,7 @@ def _add_render(commands: Any) -> None:
     )
     command.add_argument("--integrator", choices=INTEGRATORS, default="full", help="estimator of light")
     command.add_argument("--max-bounces", type=int, default=12, help="scattering events along a path")
+    command.add_argument("--branches", type=int, default=1, help="ways a path goes on from its first surface")
     command.add_argument("--sampler", choices=SAMPLERS, default="sobol", help="source of random numbers")
     command.add_argument("--seed", type=int, default=0, help="same seed, same picture")
     command.add_argument("--accel", default="auto", help="ray queries: auto, numpy or embree")
@@ -134,6 +135,7 @@ def _render(options: argparse.Namespace) -> int:
             noise=options.noise,
             seconds=options.seconds,
             filter=options.filter,
+            branches=options.branches,
             progress=False if options.quiet else None,
         )
     for warning in caught:

@@ -15,7 +15,7 @@ import numpy as np
 from .sampling.sampler import Sampler
 from .scene import CompiledScene
 from .stages.absorb import absorb
-from .stages.bounce import bounce_sample
+from .stages.bounce import bounce_sample, branch
 from .stages.compact import carrying, compact, going_on, keep, roulette
 from .stages.intersect import intersect
 from .stages.passing import pass_through
@@ -84,8 +84,13 @@ def li_direct_mis(scene: CompiledScene, paths: Paths, sampler: Sampler, max_boun
     return L
 
 
-def li_full(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: int) -> Floats:
-    """Direct light by two samples at every bounce, and with it all indirect light."""
+def li_full(
+    scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: int, branches: int = 1
+) -> Floats:
+    """Direct light by two samples at every bounce, and with it all indirect light.
+
+    From its first surface each path goes on in so many `branches`.
+    """
     L = np.zeros((3, len(paths)), f4)
     for bounce in range(max_bounces + 1):
         hits = intersect(scene, paths)
@@ -97,8 +102,8 @@ def li_full(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: i
             break
         shade = arrive(scene, paths, hits)
         deposit(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
-        paths = bounce_sample(paths, shade, sampler, bounce)
-        paths = keep(paths, roulette(paths, sampler, bounce))
+        paths = branch(paths, shade, sampler, bounce, ways=branches if bounce == 0 else 1)
+        paths = keep(paths, roulette(paths, sampler, bounce, branches))
     return L
 
 

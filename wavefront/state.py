@@ -61,10 +61,19 @@ class Columns:
         out = object.__new__(cls)
         record: Any = cls
         for name in _names(record):
-            values = [getattr(record, name) for record in records]
-            joined = None if values[0] is None else np.concatenate(values, axis=-1)
-            setattr(out, name, joined)
+            setattr(out, name, _joined([getattr(record, name) for record in records]))
         return out
+
+
+def _joined(values: Sequence[NDArray[Any] | None]) -> NDArray[Any] | None:
+    """Join the columns of arrays; what is `alike` and the same in all of them stays one value."""
+    arrays = [value for value in values if value is not None]
+    if not arrays:
+        return None
+    first, shape = arrays[0], arrays[0].shape[:-1]
+    if all(a.strides[-1] == 0 and np.array_equal(a[..., :1], first[..., :1]) for a in arrays):
+        return np.broadcast_to(first[..., :1], (*shape, sum(a.shape[-1] for a in arrays)))
+    return np.concatenate(arrays, axis=-1)
 
 
 @dataclass(slots=True)

@@ -1,6 +1,8 @@
-"""The next direction of each path."""
+"""The next direction of each path, or several."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,6 +12,21 @@ from ..state import Paths
 from ..vec import Floats, columns, f4
 from .shade import Shading
 from .surface import leave
+
+
+def branch(paths: Paths, shade: Shading, sampler: Sampler, bounce: int, ways: int) -> Paths:
+    """Let each path go on in several ways, each with its part of the throughput.
+
+    What comes before is shared by all. Sample s becomes the samples s·ways to s·ways + ways − 1 from
+    here on, so that the ways of all samples of a pixel are spread together.
+    """
+    if ways == 1:
+        return bounce_sample(paths, shade, sampler, bounce)
+    numbers = [paths.sample * np.uint32(ways) + np.uint32(way) for way in range(ways)]
+    parts = [bounce_sample(replace(paths, sample=sample), shade, sampler, bounce) for sample in numbers]
+    paths = Paths.concatenate(parts)
+    paths.throughput *= f4(1 / ways)
+    return paths
 
 
 def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -> Paths:

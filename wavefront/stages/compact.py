@@ -62,18 +62,18 @@ def carrying(paths: Paths) -> Bools:
     return highest(paths.throughput) != 0
 
 
-def roulette(paths: Paths, sampler: Sampler, bounce: int) -> Ints:
+def roulette(paths: Paths, sampler: Sampler, bounce: int, branches: int = 1) -> Ints:
     """Choose the lanes that live on, and make them carry more, so that the mean stays.
 
     Where the largest channel of the throughput, with the compression of radiance by refraction taken
     out, is below `SURE`, the chance to survive is their ratio, and the path carries `SURE` from then
     on (E. Veach, thesis 1997, §10.4.1; pbrt-v4, §13.2.1). Most of the work is saved on paths that carry
     little, and most of the noise comes from ending those that carry much. In the first events only
-    paths that carry nothing end.
+    paths that carry nothing end. A path that is one of several `branches` began with as much less.
     """
     if bounce < ROULETTE_AFTER or not len(paths):
         return np.flatnonzero(carrying(paths))
-    chance = np.clip(highest(paths.throughput) * paths.eta2 / SURE, SMALLEST, f4(1))
+    chance = np.clip(highest(paths.throughput) * paths.eta2 * (branches / SURE), SMALLEST, f4(1))
     u = sampler.draw_1d(paths.pixel, paths.sample, bounce, Dimension.ROULETTE)
     paths.throughput /= chance
     return np.flatnonzero(~(u >= chance))  # NaN lives on, to be counted
