@@ -37,6 +37,12 @@ def columns(a: Array, lanes: Lanes) -> Array:
     return np.broadcast_to(a[..., :1], (*a.shape[:-1], lanes.size))  # type: ignore[return-value]
 
 
+def put(a: Floats, lanes: Lanes, values: Floats) -> None:
+    """Write values (c, k) over columns `lanes` of (c, n); by index three times as fast as at once."""
+    for row, new in zip(a, values, strict=True):
+        row[lanes] = new
+
+
 def alike(value: Any, n: int) -> NDArray[Any]:
     """One value for n lanes, (n,), read-only: free to keep, and free to gather."""
     one = np.asarray(value)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError
 from ..sampling.mis import power_heuristic
-from ..vec import ALL, Floats, Ints, Lanes, columns, f4
+from ..vec import ALL, Floats, Ints, Lanes, columns, f4, put
 from .base import Light, LightSample
 from .choice import Among, ByPlace, EverywhereAlike, LightChoice, Sole
 
@@ -43,23 +43,25 @@ class LightTable:
         self.starts = np.cumsum([0, *(len(kind) for kind in kinds)])
         self.kind_of = np.repeat(np.arange(len(kinds)), [len(kind) for kind in kinds])
         self.delta_of = np.array([kind.delta for kind in kinds], np.bool_)[self.kind_of]
-        self.choice = self._make_choice(np.broadcast_to(np.asarray(half_size, float), 3), choice)
+        extent = np.broadcast_to(np.asarray(half_size, float), 3)
+        power = np.concatenate([np.zeros(0), *(kind.power(float(np.linalg.norm(extent))) for kind in kinds)])
+        self.chosen_from = power != 0  # (lights,) which take part in the choice
+        self.choice = self._make_choice(power, extent, choice)
 
     def __len__(self) -> int:
         """Return the number of lights."""
         return int(self.starts[-1])
 
-    def _make_choice(self, half_size: NDArray[np.float64], choice: str) -> LightChoice | None:
+    def _make_choice(
+        self, power: NDArray[np.float64], half_size: NDArray[np.float64], choice: str
+    ) -> LightChoice | None:
         """Return the choice by name; None when nothing shines. Lights without a power take no part."""
         if choice not in CHOICES:
             raise SceneError(f"light_choice is {choice!r}; it must be one of {', '.join(CHOICES)}")
-        scene_radius = float(np.linalg.norm(half_size))
-        powers = [kind.power(scene_radius) for kind in self.kinds]
-        power = np.concatenate([np.zeros(0), *powers])
         if not power.any():
             return None
         if not power.all():
-            shining = [np.flatnonzero(part) for part in powers]
+            shining = [np.flatnonzero(part) for part in np.split(power, self.starts[1:-1])]
             kinds = [kind.take(lanes) for kind, lanes in zip(self.kinds, shining, strict=True) if lanes.size]
             chosen = LightTable(kinds, half_size, choice).choice
             return None if chosen is None else Among(chosen, np.flatnonzero(power), power.size)
@@ -69,6 +71,8 @@ class LightTable:
             return EverywhereAlike(np.ones_like(power))
         if choice == "power":
             return EverywhereAlike(power)
+
+        scene_radius = float(np.linalg.norm(half_size))
 
         def irradiance(centre: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
             return np.concatenate([kind.irradiance(centre, radius, scene_radius) for kind in self.kinds], 1)
@@ -113,17 +117,18 @@ class LightTable:
             return self._gathered(0, light).le(wi)
         radiance = np.empty_like(wi)
         for kind, rows in self._by_kind(light):
-            radiance[:, rows] = kind.le(columns(wi, rows))
+            put(radiance, rows, kind.le(columns(wi, rows)))
         return radiance
 
     def _sample_each(self, light: Ints, point: Floats, u: Floats) -> LightSample:
-        if len(self.kinds) == 1:
-            return self._gathered(0, light).sample_li(point, u)
         n = len(light)
         out = LightSample(np.empty((3, n), f4), np.empty((3, n), f4), *np.empty((3, n), f4))
         for kind, rows in self._by_kind(light):
+            if isinstance(rows, slice):
+                return kind.sample_li(point, u)
             part = kind.sample_li(columns(point, rows), columns(u, rows))
-            out.wi[:, rows], out.radiance[:, rows] = part.wi, part.radiance
+            put(out.wi, rows, part.wi)
+            put(out.radiance, rows, part.radiance)
             out.pdf[rows], out.distance[rows], out.cos_light[rows] = part.pdf, part.distance, part.cos_light
         return out
 
@@ -138,6 +143,9 @@ class LightTable:
             yield self._gathered(0, light), ALL
             return
         kind_of = self.kind_of.take(light)
+        if light.size and (kind_of == kind_of[0]).all():
+            yield self._gathered(kind_of[0], light), ALL
+            return
         for number in range(len(self.kinds)):
             rows = np.flatnonzero(kind_of == number)
             if rows.size:

@@ -74,8 +74,10 @@ def emitted(scene: CompiledScene, paths: Paths, hits: Hits) -> Emission:
 
 
 def mis_weighted(scene: CompiledScene, paths: Paths, emission: Emission) -> Arrival:
-    """Return the emission weighted against light sampling; in full after a delta lobe."""
-    sampled = np.flatnonzero(~columns(paths.specular, emission.lanes))
+    """Return the emission weighted against light sampling; in full where that could not have found it."""
+    sampled = np.flatnonzero(
+        ~columns(paths.specular, emission.lanes) & scene.lights.chosen_from.take(emission.light)
+    )
     if not sampled.size:
         return emission
     lanes = emission.lanes.take(sampled)
@@ -123,7 +125,7 @@ def direct(
     n = len(shade.surface)
     address = paths.pixel[:n], paths.sample[:n], bounce
     # with one light there is nothing to choose
-    alone = len(scene.lights) == 1
+    alone = np.count_nonzero(scene.lights.chosen_from) == 1
     u_choice = alike(f4(0), n) if alone else sampler.draw_1d(*address, Dimension.LIGHT)
     u_point = sampler.draw_2d(*address, Dimension.LIGHT_POINT)
     # from where a reflected ray would start, so that mis_weighted finds the same densities
