@@ -38,11 +38,11 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
     surface = shade.surface
     sample = _sample(shade, _numbers(paths, shade, sampler, bounce))
     direction = shade.frame.to_world(sample.wi)
-    cos_g = shade.cos_g(sample.wi, direction)
+    cos, cos_g = shade.cosines(sample.wi, direction)
     throughput = paths.throughput * sample.weight
-    sides = sample.wi[2] * cos_g
-    lost = np.flatnonzero(~(sides > 0))
-    throughput[:, lost] *= f4(0) * sides.take(lost)  # NaN stays, to be counted
+    if not (cos > 0).all():
+        lost = np.flatnonzero(~(cos > 0))
+        throughput[:, lost] *= f4(0) * cos.take(lost)  # NaN stays, to be counted
     return Paths(
         slot=paths.slot,
         pixel=paths.pixel,

@@ -56,11 +56,16 @@ class Shading:
         parts = self.surface.take(first), self.frame.take(first), self.wo[:, first], self.start[:, first]
         return Shading(*parts, groups)
 
-    def cos_g(self, local: Floats, world: Floats) -> Floats:
-        """Cosine (n,) of directions, known in both frames, (3, n), against the geometric normal."""
+    def cosines(self, local: Floats, world: Floats) -> tuple[Floats, Floats]:
+        """Return |cosθ| (n,) of directions, known in both frames, and their cosine against `ng`, (n,).
+
+        Where the two normals disagree on the side of a direction the first is 0, so that no light leaks
+        through.
+        """
         if self.surface.ns is self.surface.ng:
-            return local[2]
-        return dot(self.surface.ng, world)
+            return np.abs(local[2]), local[2]
+        cos_g = dot(self.surface.ng, world)
+        return np.abs(local[2]) * (local[2] * cos_g > 0), cos_g
 
 
 def emitted(scene: CompiledScene, paths: Paths, hits: Hits) -> Emission:
@@ -131,9 +136,7 @@ def direct(
     # from where a reflected ray would start, so that mis_weighted finds the same densities
     light, number = scene.lights.sample_li(shade.start, u_choice, u_point)
     wi = shade.frame.to_local(light.wi)
-    cos_g = shade.cos_g(wi, light.wi)
-    # where the two normals disagree on the side that light comes from there is none, so none leaks through
-    cos = np.abs(wi[2]) * (wi[2] * cos_g > 0)
+    cos, cos_g = shade.cosines(wi, light.wi)
     f, pdf = evaluate(shade, wi)
     arriving = (light.pdf > 0) & (highest(f) * cos != 0)  # NaN stays, to be counted
     lanes = np.flatnonzero(arriving)
