@@ -274,10 +274,13 @@ def test_what_workers_print_appears_once() -> None:
     script = (
         "from wavefront.parallel import Workers\n"
         "print('before')\n"
-        "with Workers(lambda k: print('piece', k), 2, 'processes') as crew:\n"
+        "with Workers(lambda k: print(f'piece {k}'), 2, 'processes') as crew:\n"
         "    list(crew.run(range(3)))\n"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    buffered = {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"}
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True, env=buffered
+    )
     assert sorted(done.stdout.splitlines()) == ["before", "piece 0", "piece 1", "piece 2"]
 
 
