@@ -467,6 +467,21 @@ def test_shapes_that_cover_nothing_have_no_density():
     assert within.pdf()[0] == 0
 
 
+@pytest.mark.parametrize("aspect", [1, 10, 100])
+def test_float32_is_enough_for_rectangles_that_are_not_seen_edge_on(aspect: float) -> None:
+    """From a quarter of its width off its plane on, densities and directions are those of float64."""
+    rng = np.random.default_rng(aspect)
+    u, v = aspect**0.5, aspect**-0.5
+    place = rng.uniform((-1.4, -1.4, 0.25), (1.4, 1.4, 1.4), (20_000, 3)).T
+    corner = (place - np.array([[u / 2], [v / 2], [0]])).astype(np.float32)
+    edges = f4(u, 0, 0).reshape(3, 1), f4(0, v, 0).reshape(3, 1)
+    fine, coarse = (SphericalRectangle.of(corner, *edges, dtype) for dtype in (np.float64, np.float32))
+    numbers = rng.random((2, corner.shape[1])).astype(np.float32)
+    assert coarse.pdf() == pytest.approx(fine.pdf(), rel=2e-4)
+    assert coarse.sample(numbers).dtype == np.float32
+    assert coarse.sample(numbers) == pytest.approx(fine.sample(numbers), abs=5e-4 * u)
+
+
 def test_points_stay_in_a_rectangle_that_touches_the_plane_of_sight():
     """At 1e-12 above the plane the tangent amplifies rounding without bound."""
     rectangle = SphericalRectangle.of(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
@@ -9,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..sampling.spherical import SphericalRectangle
-from ..vec import Bools, Floats, Ints, dot, f4
+from ..vec import Bools, Floats, Ints, dot, f4, put
 from .base import TINY, Light, LightSample, area_pdf, facing_area
 
 NEAR = f4(2)  # squared distance, in areas, within which solid angle is sampled
 ROOT_NEAR = np.sqrt(NEAR)
+HIGH = f4(0.25)  # height, in widths, from which float32 is enough for solid angles
 ON = f4(1e-5)  # height, in widths, of points on the rectangle itself
 SQUARE = 1e-6  # how far, relative to its sides, a pair of triangles may be from a rectangle
 
@@ -52,17 +54,16 @@ class RectangleLights(Light):
         wi += self.corner
         wi -= point
         height = self._facing(self._rise(point))
-        near = self._near(point, height)
-        if near.size:
-            seen = self._seen(point, near)
-            wi[:, near] = seen.sample(u.take(near, 1))
+        near = list(self._near(point, height))
+        for lanes, seen in near:
+            put(wi, lanes, seen.sample(u.take(lanes, 1)))
         d2 = dot(wi, wi)
         distance = np.sqrt(d2 + TINY)
         wi /= distance
         cos_light = height / distance
         pdf = area_pdf(d2, cos_light, self.area)
-        if near.size:
-            pdf[near] = seen.pdf()
+        for lanes, seen in near:
+            pdf[lanes] = seen.pdf()
         return LightSample(wi, np.broadcast_to(self.radiance, wi.shape), pdf, distance, cos_light)
 
     def pdf_li(self, point: Floats, wi: Floats) -> Floats:
@@ -73,9 +74,8 @@ class RectangleLights(Light):
         on_plane = wi * t - (self.corner - point)
         meets = (cos_light > 0) & (t > 0) & _within(on_plane, self.edge_u) & _within(on_plane, self.edge_v)
         pdf = area_pdf(t * t, cos_light, self.area)
-        near = self._near(point, self._facing(rise))
-        if near.size:
-            pdf[near] = self._seen(point, near).pdf()
+        for lanes, seen in self._near(point, self._facing(rise)):
+            pdf[lanes] = seen.pdf()
         return np.where(meets, pdf, f4(0))
 
     def _rise(self, point: Floats) -> Floats:
@@ -86,28 +86,32 @@ class RectangleLights(Light):
         """Turn heights, or cosines, over the front (n,) into those over a side that shines."""
         return rise
 
-    def _near(self, point: Floats, height: Floats) -> Ints:
-        """Lanes (k,) of points that get light and are close to the middle, for the rectangle's size.
+    def _near(self, point: Floats, height: Floats) -> Iterator[tuple[Ints, SphericalRectangle]]:
+        """Yield lanes of points that get light and are close to the middle, for the rectangle's size.
 
-        From afar both densities are alike, and sampling the area costs a seventh. Points on the
-        rectangle itself are none of these.
+        With them come the rectangles as seen from there. From afar both densities are alike, and
+        sampling the area costs less. Points on the rectangle itself are none of these.
         """
         width = np.sqrt(self.area)
         low = np.flatnonzero((height > ON * width) & (height < ROOT_NEAR * width))
         if not low.size:
-            return low
+            return
         some = self._at(low)
         away = some.corner + f4(0.5) * (some.edge_u + some.edge_v) - point.take(low, 1)
-        return low.compress(dot(away, away) < NEAR * some.area)
+        near = low.compress(dot(away, away) < NEAR * some.area)
+        high = height.take(near) > HIGH * (width if width.size == 1 else width.take(near))
+        for lanes, dtype in ((near.compress(high), np.float32), (near.compress(~high), np.float64)):
+            if lanes.size:
+                yield lanes, self._seen(point, lanes, dtype)
 
     def _at(self, lanes: Ints) -> Self:
         """Return the rectangles of some lanes."""
         return self if len(self) == 1 else self.take(lanes)
 
-    def _seen(self, point: Floats, lanes: Ints) -> SphericalRectangle:
+    def _seen(self, point: Floats, lanes: Ints, dtype: type[np.floating]) -> SphericalRectangle:
         """Return the rectangles as seen from the points of some lanes."""
         some = self._at(lanes)
-        return SphericalRectangle.of(some.corner - point.take(lanes, 1), some.edge_u, some.edge_v)
+        return SphericalRectangle.of(some.corner - point.take(lanes, 1), some.edge_u, some.edge_v, dtype)
 
     def le(self, wi: Floats) -> Floats:
         """Return the radiance on rays that come upon a side that shines, (3, n)."""

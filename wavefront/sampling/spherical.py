@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..vec import Floats, cross, dot, f4, normalize
 
-Doubles = NDArray[np.float64]
+Reals = NDArray[np.floating]  # float64 or float32
 
 
 def solid_angle_triangle(a: Floats, b: Floats, c: Floats) -> Floats:
@@ -110,7 +110,8 @@ class SphericalRectangle:
 
     In the rectangle's frame, at distance z, the part up to x covers F(x) − F(x₀) with
     F = asin(b₁c) − asin(b₀c), c = x/√(x² + z²), bᵢ = yᵢ/√(yᵢ² + z²); solved for c this is
-    c = sin F/√(b₀² + b₁² − 2b₀b₁ cos F). It is in float64, because F is a small difference.
+    c = sin F/√(b₀² + b₁² − 2b₀b₁ cos F). F is a small difference where the rectangle is seen edge-on,
+    so it is in float64, unless the caller knows that it is not: float32 takes two fifths of the time.
 
     Source: C. Ureña, M. Fajardo, A. King, An Area-Preserving Parametrization for Spherical
     Rectangles, EGSR 2013, with a form of its eq. 8 that needs no case for the sign of x.
@@ -120,15 +121,17 @@ class SphericalRectangle:
     y_axis: Floats  # (3, n or 1) unit vector along the second edge
     z_axis: Floats  # (3, n or 1) unit normal
     height: Floats  # (n,) signed distance of the plane along z_axis
-    x: tuple[Doubles, Doubles]  # (n,) each: bounds along x_axis
-    y: tuple[Doubles, Doubles]  # (n,) each: bounds along y_axis
-    z: Doubles  # (n,) distance of the plane
-    b: tuple[Doubles, Doubles]  # (n,) each: yᵢ/√(yᵢ² + z²)
-    start: Doubles  # (n,) F at the lower bound of x
-    angle: Doubles  # (n,) solid angle, sr
+    x: tuple[Reals, Reals]  # (n,) each: bounds along x_axis
+    y: tuple[Reals, Reals]  # (n,) each: bounds along y_axis
+    z: Reals  # (n,) distance of the plane
+    b: tuple[Reals, Reals]  # (n,) each: yᵢ/√(yᵢ² + z²)
+    start: Reals  # (n,) F at the lower bound of x
+    angle: Reals  # (n,) solid angle, sr
 
     @classmethod
-    def of(cls, corner: Floats, edge_u: Floats, edge_v: Floats) -> Self:
+    def of(
+        cls, corner: Floats, edge_u: Floats, edge_v: Floats, dtype: type[np.floating] = np.float64
+    ) -> Self:
         """Prepare rectangles.
 
         Parameters
@@ -137,14 +140,16 @@ class SphericalRectangle:
             (3, n) vector from the point to one corner.
         edge_u, edge_v
             (3, n) or (3, 1) perpendicular edges that leave that corner.
+        dtype
+            Of the calculation: float64, or float32.
         """
         x_axis, y_axis = normalize(edge_u), normalize(edge_v)
         z_axis = cross(x_axis, y_axis)
         height = dot(corner, z_axis)
-        x0, y0 = _dot64(corner, x_axis), _dot64(corner, y_axis)
-        x = (x0, x0 + _dot64(edge_u, x_axis))
-        y = (y0, y0 + _dot64(edge_v, y_axis))
-        z = np.abs(height.astype(np.float64))
+        x0, y0 = _dot(corner, x_axis, dtype), _dot(corner, y_axis, dtype)
+        x = (x0, x0 + _dot(edge_u, x_axis, dtype))
+        y = (y0, y0 + _dot(edge_v, y_axis, dtype))
+        z = np.abs(height.astype(dtype, copy=False))
         b = (_sine(y[0], z), _sine(y[1], z))
         start = _swept(b, _sine(x[0], z))
         angle = np.where(z > 0, _swept(b, _sine(x[1], z)) - start, 0.0)
@@ -153,7 +158,7 @@ class SphericalRectangle:
     @property
     def solid_angle(self) -> Floats:
         """Solid angle, (n,), sr."""
-        return self.angle.astype(f4)
+        return self.angle.astype(f4, copy=False)
 
     def pdf(self) -> Floats:
         """Density within the rectangle, (n,), 1/sr; 0 where it covers nothing."""
@@ -169,12 +174,14 @@ class SphericalRectangle:
         depth = np.sqrt(x * x + self.z * self.z)
         h0, h1 = _sine(self.y[0], depth), _sine(self.y[1], depth)
         y = _from_sine(h0 + u[1] * (h1 - h0), depth, self.y)
-        return x.astype(f4) * self.x_axis + y.astype(f4) * self.y_axis + self.height * self.z_axis
+        x, y = x.astype(f4, copy=False), y.astype(f4, copy=False)
+        return x * self.x_axis + y * self.y_axis + self.height * self.z_axis
 
     def inverse(self, w: Floats) -> Floats:
         """Return the u (2, n) that `sample` maps to vectors along w (3, n)."""
-        scale = self.z / np.abs(_dot64(w, self.z_axis))
-        x, y = _dot64(w, self.x_axis) * scale, _dot64(w, self.y_axis) * scale
+        x, y, z = (_dot(w, axis, np.float64) for axis in (self.x_axis, self.y_axis, self.z_axis))
+        scale = self.z / np.abs(z)
+        x, y = x * scale, y * scale
         depth = np.sqrt(x * x + self.z * self.z)
         h0, h1 = _sine(self.y[0], depth), _sine(self.y[1], depth)
         out = np.empty((2, w.shape[1]), f4)
@@ -199,24 +206,23 @@ def _reciprocal(x: Floats) -> Floats:
     return np.where(x > 0, f4(1) / np.where(x > 0, x, f4(1)), f4(0))
 
 
-def _dot64(a: Floats, b: Floats) -> Doubles:
-    """Dot product of (3, n) columns in float64, (n,)."""
-    p, q = a.astype(np.float64), b.astype(np.float64)
-    return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
+def _dot(a: Floats, b: Floats, dtype: type[np.floating]) -> Reals:
+    """Dot product of (3, n) columns in another type, (n,)."""
+    return dot(a.astype(dtype, copy=False), b.astype(dtype, copy=False))
 
 
-def _sine(side: Doubles, height: Doubles) -> Doubles:
+def _sine(side: Reals, height: Reals) -> Reals:
     """side/√(side² + height²), (n,), and 0 where both are 0."""
     size = np.sqrt(side * side + height * height)
     return side / np.where(size > 0, size, 1.0)
 
 
-def _from_sine(sine: Doubles, height: Doubles, bounds: tuple[Doubles, Doubles]) -> Doubles:
+def _from_sine(sine: Reals, height: Reals, bounds: tuple[Reals, Reals]) -> Reals:
     """Side (n,) with this sine at `height`, kept within `bounds` against rounding."""
-    cosine = np.sqrt(np.maximum(1 - sine * sine, 1e-300))
+    cosine = np.sqrt(np.maximum(1 - sine * sine, np.finfo(sine.dtype).tiny))
     return np.clip(sine * height / cosine, bounds[0], bounds[1])
 
 
-def _swept(b: tuple[Doubles, Doubles], c: Doubles) -> Doubles:
+def _swept(b: tuple[Reals, Reals], c: Reals) -> Reals:
     """Solid angle F (n,) between x = 0 and x, signed, where c = x/√(x² + z²)."""
     return np.arcsin(b[1] * c) - np.arcsin(b[0] * c)
