@@ -34,7 +34,7 @@ STAGES = (
     "interact",
     "shading",
     "direct",
-    "bounce_sample",
+    "branch",
     "roulette",
     "deposit",
 )
