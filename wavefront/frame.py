@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from .record import record
 from .vec import Floats, column, f4, signs
 
 
-@dataclass(slots=True)
+@record
 class Frame:
     """Right-handed orthonormal frames, one per column.
 

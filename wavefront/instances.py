@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .accel import Placements
+from .record import record
 from .shapes import Instance, Mesh, Sphere
 from .state import Columns
 from .vec import Floats, Ints, f4
@@ -20,7 +20,7 @@ BOX_ROOM = 2.0**-20  # added to boxes on all sides, relative to their size and d
 Doubles = NDArray[np.float64]
 
 
-@dataclass(slots=True)
+@record
 class InstanceTable(Columns):
     """What shading needs of instances.
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Sequence
 from copy import copy
-from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -33,6 +32,7 @@ from .lights import (
     TwoSidedTriangleLights,
     first_of_pairs,
 )
+from .record import record
 from .shapes import Instance, Mesh, Sphere
 from .shapes.attributes import ATTRIBUTES, Corners, corner_values
 from .state import Surface
@@ -135,7 +135,7 @@ def _list_of(name: str, items: Any, types: tuple[type, ...]) -> list[Any]:
     return listed
 
 
-@dataclass(slots=True)
+@record
 class Palette(Spatial):
     """A parameter of many alike materials, one column each, looked up by the material's number."""
 
@@ -146,7 +146,7 @@ class Palette(Spatial):
         return self.table.take(surface.material, -1)
 
 
-@dataclass(slots=True)
+@record
 class Materials:
     """The materials of a scene, gathered into groups that are shaded together."""
 
@@ -155,7 +155,7 @@ class Materials:
     reliefs: tuple[tuple[int, Relief], ...]  # the groups that have one, with it
 
 
-@dataclass(slots=True)
+@record
 class Opacities:
     """Which surfaces are only partly there, and how much of them is."""
 
@@ -173,7 +173,7 @@ class Opacities:
         return found
 
 
-@dataclass(slots=True)
+@record
 class CompiledScene:
     """A scene as flat arrays, relative to its centre. Triangles come first, then spheres.
 

@@ -6,7 +6,7 @@ Each field is declared once, with its shape and unit; `take`, `concatenate` and 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import cache
 from typing import Any, Self
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .frame import Frame
+from .record import record
 from .vec import Bools, Floats, Ints, Lanes, columns
 
 Words = NDArray[np.uint32]
@@ -76,7 +77,7 @@ def _joined(values: Sequence[NDArray[Any] | None]) -> NDArray[Any] | None:
     return np.concatenate(arrays, axis=-1)
 
 
-@dataclass(slots=True)
+@record
 class Rays(Columns):
     """What an accelerator is asked."""
 
@@ -85,7 +86,7 @@ class Rays(Columns):
     leaving: Ints  # (n,) primitive that the ray starts on, -1 for none
 
 
-@dataclass(slots=True)
+@record
 class Paths(Rays):
     """Live paths: the ray that each follows, and what it has gathered on the way."""
 
@@ -99,7 +100,7 @@ class Paths(Rays):
     vertex: Floats | None = None  # (3, n) where the paths last scattered; None where that is `origin`
 
 
-@dataclass(slots=True)
+@record
 class Hits(Columns):
     """What each ray met first."""
 
@@ -115,7 +116,7 @@ class Hits(Columns):
         return np.flatnonzero(self.prim >= 0)
 
 
-@dataclass(slots=True)
+@record
 class Surface(Columns):
     """Geometry at hit points. Normals face the side that the ray came from."""
 

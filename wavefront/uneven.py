@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from .bsdfs import Opacity, Spatial
+from .record import record
 from .shapes import Mesh
 from .shapes.attributes import Corners, corner_values
 from .state import Surface
@@ -17,7 +16,7 @@ MOST_SAMPLES = 1 << 18  # points of a mesh that are looked up, if possible
 LEAST, MOST = 4, 32  # parts that an edge of a face is cut into
 
 
-@dataclass(slots=True)
+@record
 class Source:
     """What one or more meshes send."""
 
@@ -32,7 +31,7 @@ class Source:
         return value if self.two_sided else value * ~surface.inside
 
 
-@dataclass(slots=True)
+@record
 class Uneven:
     """The lights that do not shine evenly."""
 

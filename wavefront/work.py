@@ -14,6 +14,7 @@ from .camera import Camera
 from .errors import SceneError
 from .filters import Filter
 from .integrators import Integrator
+from .record import record
 from .sampling.sampler import Sampler
 from .scene import CompiledScene
 from .stages.generate import generate
@@ -42,7 +43,7 @@ class Piece:
         return f"samples {self.first_sample} to {last} of {self.pixels.size} pixels from {self.pixels[0]} on"
 
 
-@dataclass(slots=True)
+@record
 class Wave:
     """What a piece of work came to."""
 

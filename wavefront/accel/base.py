@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
+from ..record import record
 from ..vec import Bools, Floats, Ints
 
 
-@dataclass(slots=True)
+@record
 class Geometry:
     """What rays can hit, in float32 relative to the scene's centre.
 
@@ -24,7 +24,7 @@ class Geometry:
     alike: Bools | None = None
 
 
-@dataclass(slots=True)
+@record
 class Intersections:
     """The nearest surface along each ray."""
 

@@ -9,18 +9,18 @@ fixed number of rows, a leaf costs the same however full it is: cuts lie at mult
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..record import record
 from ..vec import Floats, Ints, f4
 
 EMPTY = f4(3e38)  # the box that no ray meets runs from EMPTY to -EMPTY
 MAX_CUTS = 16  # cuts tried per node and axis
 
 
-@dataclass(slots=True)
+@record
 class Tree:
     """A wide tree. A child code c >= 0 is inner node c, c < 0 is leaf -1 - c."""
 

@@ -9,12 +9,12 @@ blocked, and one that surely meets none is free. The others are decided pair by 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..record import record
 from ..vec import Bools, Floats, Ints, f4
 from . import triangle
 from .base import Geometry
@@ -28,7 +28,7 @@ CHUNK = 1 << 19  # elements of one product
 Bytes = NDArray[np.uint8]
 
 
-@dataclass(slots=True)
+@record
 class Polygons:
     """Polygons of one kind, as matrices."""
 

@@ -10,11 +10,11 @@ distances stay those of the scene.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..record import record
 from ..vec import Bools, Floats, Ints, f4
 from .base import Accelerator, Intersections
 from .build import build_tree
@@ -28,7 +28,7 @@ ROUNDING = f4(1e-6)  # bound of the relative error of distances to boxes
 Doubles = NDArray[np.float64]
 
 
-@dataclass(slots=True)
+@record
 class Placements:
     """Where the instances stand, one column each."""
 

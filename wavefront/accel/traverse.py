@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..record import record
 from ..vec import Bools, Floats, Ints, f4
 from .build import build_tree, stable_order
 from .triangle import ROUNDOFF, Doubles
@@ -52,7 +53,7 @@ def flat_true(mask: Bools) -> Ints:
     return mask.reshape(-1).nonzero()[0]
 
 
-@dataclass(slots=True)
+@record
 class Ball:
     """A ball around everything that can be hit."""
 
@@ -156,7 +157,7 @@ def _with_one(name: str, points: Floats) -> Floats:
     return out
 
 
-@dataclass(slots=True)
+@record
 class StreamTree:
     """A tree as matrices. Lengths are in units of the ball's radius, places relative to its centre."""
 
@@ -332,7 +333,7 @@ def trace(
         slot, lane, near = slot.take(rest), lane.take(rest), near.take(rest)
 
 
-@dataclass(slots=True)
+@record
 class _Rays:
     """Lines in units of the ball's radius about its centre; at the end one that meets nothing."""
 

@@ -10,12 +10,12 @@ happened to round.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..record import record
 from ..vec import Bools, Floats, Ints, cross, f4
 
 Doubles = NDArray[np.float64]
@@ -24,7 +24,7 @@ ROUNDOFF = 2.0**-24  # half an ulp of float32
 TINY = 1e-30  # least extent of points, so that no row is infinite
 
 
-@dataclass(slots=True)
+@record
 class TriangleTable:
     """What the element-by-element decision reads, float64, one column per triangle (m)."""
 

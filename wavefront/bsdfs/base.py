@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from copy import copy
-from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
 
 from ..errors import SceneError
+from ..record import record
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..state import Surface
 from ..vec import Bools, Floats, alike
@@ -25,7 +25,7 @@ from .relief import Relief
 from .spatial import Spatial
 
 
-@dataclass(slots=True)
+@record
 class BsdfSample:
     """One sampled direction per column. A zero weight means that there is no sample."""
 

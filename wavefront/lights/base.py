@@ -8,12 +8,12 @@ a column per lane. Positions are relative to the scene's centre. Every pdf is in
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..record import record
 from ..state import Columns
 from ..vec import Floats, f4, positive
 
@@ -21,7 +21,7 @@ TINY = f4(1e-35)  # added to squared distances before their root is divided by; 
 EDGE_ON = f4(1e-14)  # taken off cosines that are divided by; smaller ones count as those of a dark side
 
 
-@dataclass(slots=True)
+@record
 class LightSample(Columns):
     """Light arriving at a point from one sampled direction. A pdf of 0 means no sample."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError, finite_array, number, rgb
 from ..frame import Frame
+from ..record import record
 from ..sampling.warp import uniform_cone
 from ..vec import Floats, column, dot, f4
 from .base import Light, LightSample
@@ -19,7 +19,7 @@ TWO_PI = f4(2 * np.pi)
 MIN_ANGLE = 0.01  # degrees; float32 directions cannot tell a smaller disk's edge to a percent
 
 
-@dataclass(slots=True)
+@record
 class DirectionalLights(Light):
     """k lights whose rays are parallel."""
 
@@ -51,7 +51,7 @@ class DirectionalLights(Light):
         return facing_irradiance(self, centre)
 
 
-@dataclass(slots=True)
+@record
 class SunLight(InfiniteLight):
     """A disk of constant radiance at infinity, sampled uniformly in solid angle."""
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError, rgb, rotation_matrix
+from ..record import record
 from ..sampling.warp import uniform_sphere
 from ..vec import Floats, f4
 from .base import LightSample
@@ -19,7 +20,7 @@ from .infinite import InfiniteLight, at_infinity, through_scene
 UNIFORM_SPHERE_PDF = f4(1 / (4 * np.pi))
 
 
-@dataclass(slots=True)
+@record
 class ConstantEnvironment(InfiniteLight):
     """The same radiance from every direction."""
 

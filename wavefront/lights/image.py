@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from ..io.images import check_size, read_codes, srgb_to_linear
+from ..record import record
 from ..sampling.discrete import Distribution2D
 from ..textures import Texture
 from ..vec import Floats, f4, luminance
@@ -25,7 +26,7 @@ TWO_PI = f4(2 * np.pi)
 LEAST_SHARE = 1e-3  # of the light of an image that is worth light samples
 
 
-@dataclass(slots=True)
+@record
 class ImageEnvironment(InfiniteLight):
     """Radiance from a latitude–longitude image, sampled texel by texel.
 

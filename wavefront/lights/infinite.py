@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..record import record
 from ..sampling.discrete import Discrete
 from ..vec import Floats, Lanes, column, f4
 from .base import Light, LightSample
@@ -42,7 +43,7 @@ class InfiniteLight(Light):
         return self
 
 
-@dataclass(slots=True)
+@record
 class Sky(InfiniteLight):
     """The sum of several lights at infinity, sampled one at a time by their power.
 

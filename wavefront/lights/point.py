@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import finite_array, rgb
+from ..record import record
 from ..vec import Floats, dot, f4
 from .base import Light, LightSample
 
 
-@dataclass(slots=True)
+@record
 class PointLights(Light):
     """k points that shine equally in all directions."""
 

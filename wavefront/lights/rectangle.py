@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..record import record
 from ..sampling.spherical import SphericalRectangle
 from ..vec import Bools, Floats, Ints, dot, f4, put
 from .base import TINY, Light, LightSample, area_pdf, facing_area
@@ -20,7 +20,7 @@ ON = f4(1e-5)  # height, in widths, of points on the rectangle itself
 SQUARE = 1e-6  # how far, relative to its sides, a pair of triangles may be from a rectangle
 
 
-@dataclass(slots=True)
+@record
 class RectangleLights(Light):
     """k rectangles that emit from their front side."""
 
@@ -130,7 +130,7 @@ class RectangleLights(Light):
         return facing_area(centre, radius, middle, self.normal, np.sqrt(self.area), strength, self.sides)
 
 
-@dataclass(slots=True)
+@record
 class TwoSidedRectangleLights(RectangleLights):
     """k rectangles that emit from both sides."""
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..frame import Frame
+from ..record import record
 from ..sampling.warp import uniform_cone, uniform_sphere
 from ..vec import Floats, dot, f4
 from .base import Light, LightSample
@@ -16,7 +15,7 @@ UNIFORM_SPHERE_PDF = f4(1 / (4 * np.pi))
 TWO_PI = f4(2 * np.pi)
 
 
-@dataclass(slots=True)
+@record
 class SphereLights(Light):
     """k spheres that emit on both sides."""
 

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError, finite_array, number, rgb
+from ..record import record
 from ..vec import Floats, dot, f4
 from .base import Light, LightSample
 from .directional import unit
 
 
-@dataclass(slots=True)
+@record
 class SpotLights(Light):
     """k points that shine into a cone each."""
 

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..record import record
 from ..sampling.warp import uniform_triangle
 from ..vec import Floats, cross, dot, f4
 from .base import TINY, Light, LightSample, area_pdf, facing_area
 
 
-@dataclass(slots=True)
+@record
 class TriangleLights(Light):
     """k triangles that emit from their front side, sampled uniformly by area."""
 
@@ -98,7 +98,7 @@ class TriangleLights(Light):
         return -dot(self.normal, wi)
 
 
-@dataclass(slots=True)
+@record
 class TwoSidedTriangleLights(TriangleLights):
     """k triangles that emit from both sides."""
 

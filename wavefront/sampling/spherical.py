@@ -5,12 +5,12 @@ Each record prepares what a sample and its density share, a column per lane.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..record import record
 from ..vec import Floats, cross, dot, f4, normalize
 
 Reals = NDArray[np.floating]  # float64 or float32
@@ -35,7 +35,7 @@ def solid_angle_rectangle(corner: Floats, edge_u: Floats, edge_v: Floats) -> Flo
     return solid_angle_triangle(a, b, c) + solid_angle_triangle(a, c, d)
 
 
-@dataclass(slots=True)
+@record
 class SphericalTriangle:
     """Triangles on the unit sphere, sampled uniformly in solid angle.
 
@@ -104,7 +104,7 @@ class SphericalTriangle:
         return self.a + (along * across - across2 * self.a) * scale
 
 
-@dataclass(slots=True)
+@record
 class SphericalRectangle:
     """Rectangles seen from a point each, sampled uniformly in solid angle.
 

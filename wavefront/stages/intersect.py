@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..lights import LightSample
+from ..record import record
 from ..scene import CompiledScene
 from ..state import Hits, Rays, Surface
 from ..vec import Bools, Floats, Ints, columns, f4, positive
@@ -14,7 +13,7 @@ from ..vec import Bools, Floats, Ints, columns, f4, positive
 TARGET_ERROR = f4(2**-20)  # rounding of a sampled point on a light, relative to its distance
 
 
-@dataclass(slots=True)
+@record
 class ShadowRays(Rays):
     """Rays from points towards sampled points on lights."""
 

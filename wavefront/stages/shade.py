@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from ..bsdfs import Bsdf
 from ..frame import Frame
+from ..record import record
 from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
 from ..scene import CompiledScene, Materials
@@ -22,7 +22,7 @@ from .surface import above, leave
 UP = column((0, 0, 1))
 
 
-@dataclass(slots=True)
+@record
 class Arrival:
     """Light that arrives on some lanes."""
 
@@ -30,14 +30,14 @@ class Arrival:
     radiance: Floats  # (3, k) W·sr⁻¹·m⁻²
 
 
-@dataclass(slots=True)
+@record
 class Emission(Arrival):
     """Light met by rays: only the lanes that meet some."""
 
     light: Ints  # (k,) number of the light
 
 
-@dataclass(slots=True)
+@record
 class Shading:
     """Surfaces ready for their materials: local frames, and the lanes grouped by material."""
 
