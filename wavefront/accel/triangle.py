@@ -22,6 +22,7 @@ Doubles = NDArray[np.float64]
 
 ROUNDOFF = 2.0**-24  # half an ulp of float32
 TINY = 1e-30  # least extent of points, so that no row is infinite
+SHEARED = np.array([[1, 2, 0], [2, 0, 1], [0, 1, 2]])  # a ray's x, y, z when it runs mostly along each axis
 
 
 @record
@@ -205,15 +206,14 @@ def hits_watertight(vertices: Doubles, direction: Doubles) -> Bools:
     rounded to float32, so that in float64 their products are exact and so is the sign of a difference
     of two: the triangles of a mesh stay a mesh, without gaps.
     """
-    z = np.abs(direction).argmax(0)
-    axes = np.stack([(z + 1) % 3, (z + 2) % 3, z])
-    turned = np.take_along_axis(vertices, axes[None], 1)
-    along = np.take_along_axis(direction, axes, 0)
+    axes = SHEARED.take(np.abs(direction).argmax(0), 1)
+    place = axes * direction.shape[1] + np.arange(direction.shape[1])
+    turned = vertices.reshape(3, -1).take(place, 1)
+    along = direction.reshape(-1).take(place)
     projected = (turned[:, :2] - along[:2] / along[2] * turned[:, 2:]).astype(f4).astype(np.float64)
-    x, y = projected[:, 0], projected[:, 1]
-    one, other = [2, 0, 1], [1, 2, 0]
-    edges = x[one] * y[other] - y[one] * x[other]
-    low, high = edges.min(0), edges.max(0)
+    before, after = projected.take([2, 0, 1], 0), projected.take([1, 2, 0], 0)
+    edges = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    low, high = np.minimum.reduce(edges, 0), np.maximum.reduce(edges, 0)
     return ((low >= 0) & (high > 0)) | ((high <= 0) & (low < 0))
 
 
