@@ -173,7 +173,7 @@ class Machine:
         while queue:
             finish()
         assert clock.up
-        self.last_wave_size = clock.wave_size()
+        self.last_wave_size = clock.wave_size(10**9)
         return counts
 
 
@@ -202,6 +202,27 @@ def test_waves_are_sized_to_the_time(monkeypatch) -> None:
         sizes.append(machine.last_wave_size)
     assert sizes[0] > 60_000
     assert 300 < sizes[1] < 3000
+
+
+def test_waves_get_smaller_towards_the_end() -> None:
+    """So that workers end together; never smaller than what pays, nor larger than was asked for."""
+    smallest, largest = stopping.WAVE
+    pixels = np.arange(100_000, dtype=np.uint32)
+
+    def sizes(wave_size: int | None, workers: int, branches: int = 1) -> np.ndarray:
+        clock = Clock(0.0, None, wave_size, workers, branches)
+        return np.array([piece.lanes for piece in plan(pixels, 0, 60, clock.wave_size)])
+
+    for workers in (1, 2, 4):
+        lanes = sizes(None, workers)
+        assert lanes.sum() == 60 * pixels.size
+        assert (np.diff(lanes[lanes >= smallest]) <= 0).all()
+        assert lanes.max() > 0.75 * min(largest, stopping.AT_ONCE // workers)
+        assert lanes.max() <= min(largest, stopping.AT_ONCE // workers)
+        assert (lanes[-4:] <= smallest).all()
+    for limit, cut in ((smallest, (None, 64)), (smallest // 4, (None, 64, 4)), (5000, (5000, 2))):
+        assert limit / 2 < sizes(*cut).min() <= sizes(*cut).max() <= limit
+    assert sizes(5000, 2, branches=64).max() == 5000 // 64
 
 
 def test_every_pixel_gets_a_sample(monkeypatch) -> None:

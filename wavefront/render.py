@@ -29,7 +29,6 @@ from .stopping import Clock, passes
 from .version import VERSION
 from .work import BadSamples, Piece, Wave, plan, trace_piece
 
-WAVE_LANES = 65_536  # paths that go round the loop together
 DEFAULT_SPP = 100
 MAX_SPP = 2**32  # a sample's index is 32 bits of its address, and each branch has one
 MAX_BRANCHES = 64
@@ -52,7 +51,7 @@ def render(
     filter: str = "box",
     light_choice: str = "place",
     branches: int = 1,
-    wave_size: int = WAVE_LANES,
+    wave_size: int | None = None,
     progress: Progress = None,
 ) -> Image:
     """Render a picture.
@@ -119,7 +118,8 @@ def render(
     branches = _whole("branches", branches, 1, MAX_BRANCHES)
     spp = _most_samples(spp, noise, seconds, MAX_SPP // branches)
     max_bounces = _whole("max_bounces", max_bounces, 0, 2**16)
-    wave_size = _whole("wave_size", wave_size, 1, 2**24)
+    if wave_size is not None:
+        wave_size = _whole("wave_size", wave_size, 1, 2**24)
     estimate = _estimator(integrator, branches)
     spread = FILTERS[_one_of("filter", filter, FILTERS)]
     accel = _one_of("accel", accel, CHOICES)
@@ -140,7 +140,7 @@ def render(
     )
     trace = partial(trace_piece, compiled, camera, draw, spread, estimate, max_bounces)
 
-    film, clock = Film(*camera.size), Clock(begin, seconds, max(1, wave_size // branches), workers)
+    film, clock = Film(*camera.size), Clock(begin, seconds, wave_size, workers, branches)
     bad, rays, interrupted = BadSamples(), 0, False
     executor = choose_executor(executor, workers, film.count.size * spp * branches)
     crew: Workers[Piece, Wave] = Workers(trace, workers, executor)

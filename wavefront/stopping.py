@@ -16,6 +16,9 @@ from .work import Piece
 MIN_SPP = 32  # before anything is decided by an error estimate
 TILE = 8  # pixels; decisions are made for squares of this side
 FIRST_WAVE = 4096  # lanes, while the speed is unknown
+WAVE = 1 << 16, 1 << 18  # lanes: from the first on a path costs little more, from the second on no less
+AT_ONCE = 1 << 19  # lanes of all workers together where that is a wave for each: 300 MB
+SHARE = 1 / 4  # part of what is left for each worker that a wave may be
 SHORT, LONG = 1 / 60, 1 / 20  # parts of the time there is that a wave should take
 SMOOTHING = 0.3  # weight of the latest wave in what a path is expected to cost
 
@@ -86,16 +89,23 @@ class Clock:
     seconds
         Time that it may take; None for any.
     wave_size
-        The largest wave.
+        Lanes of the largest wave; None for what suits so many workers.
     workers
         Waves that are traced at once.
+    branches
+        Lanes that a path may become.
     """
 
-    def __init__(self, begin: float, seconds: float | None, wave_size: int, workers: int) -> None:
+    def __init__(
+        self, begin: float, seconds: float | None, wave_size: int | None, workers: int, branches: int = 1
+    ) -> None:
         self.up = False  # work was turned away
         self._begin, self._seconds, self._workers = begin, seconds, workers
-        self._largest = wave_size
-        self._size = wave_size if seconds is None else min(FIRST_WAVE, wave_size)
+        if wave_size is None:
+            wave_size = min(max(AT_ONCE // workers, WAVE[0]), WAVE[1])
+        self._largest = max(1, wave_size // branches)
+        self._least = min(self._largest, max(1, WAVE[0] // branches))
+        self._size = min(FIRST_WAVE, self._largest)  # while there is a time to keep
         self._under_way = 0  # paths
         self._cost = 0.0  # expected seconds of a worker per path
 
@@ -104,9 +114,14 @@ class Clock:
         """Seconds since the render began."""
         return time.perf_counter() - self._begin
 
-    def wave_size(self) -> int:
-        """Return how many paths a wave may have: few against those there is time for."""
-        return self._size
+    def wave_size(self, left: int) -> int:
+        """Return how many paths a wave may have: few against those there is time for, or that are `left`.
+
+        So no worker has much to do when the others are done. Large waves cost less per path.
+        """
+        if self._seconds is not None:
+            return self._size
+        return min(self._largest, max(self._least, int(left * SHARE / self._workers)))
 
     def in_time(self, pieces: Iterator[Piece]) -> Iterator[Piece]:
         """Pass on pieces for as long as they will be done in time.

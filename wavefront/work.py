@@ -101,15 +101,16 @@ class RayCounter:
         return self._accelerator.occluded(origin, direction, distance, leaving)
 
 
-def plan(pixels: Words, first: int, last: int, wave_size: Callable[[], int]) -> Iterator[Piece]:
+def plan(pixels: Words, first: int, last: int, wave_size: Callable[[int], int]) -> Iterator[Piece]:
     """Cut samples `first` to `last` of some pixels into pieces.
 
-    Every pixel's samples come in order. No piece has more paths than `wave_size` says when a sweep
-    over the pixels begins.
+    Every pixel's samples come in order. No piece has more paths than `wave_size` says, told how many
+    are left, when a sweep over the pixels begins.
     """
     while first < last:
-        lanes = wave_size()
-        width = min(pixels.size, lanes)
+        lanes = wave_size((last - first) * pixels.size)
+        parts = -(-pixels.size // lanes)
+        width = -(-pixels.size // parts)  # equal parts: a small wave costs almost as much as a large one
         depth = min(max(1, lanes // width), last - first)
         for start in range(0, pixels.size, width):
             yield Piece(pixels[start : start + width], first, depth)
