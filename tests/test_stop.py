@@ -204,25 +204,35 @@ def test_waves_are_sized_to_the_time(monkeypatch) -> None:
     assert 300 < sizes[1] < 3000
 
 
-def test_waves_get_smaller_towards_the_end() -> None:
-    """So that workers end together; never smaller than what pays, nor larger than was asked for."""
-    smallest, largest = stopping.WAVE
-    pixels = np.arange(100_000, dtype=np.uint32)
+def wave_sizes(per_path: float, wave_size: int | None, workers: int, branches: int = 1) -> np.ndarray:
+    """Lanes of all waves of 100 000 pixels and 60 samples, each path of which takes a known time."""
+    clock, lanes = Clock(0.0, None, wave_size, workers, branches), []
+    for piece in plan(np.arange(100_000, dtype=np.uint32), 0, 60, clock.wave_size):
+        clock.note(piece, per_path * piece.lanes)
+        lanes.append(piece.lanes)
+    assert sum(lanes) == 6_000_000
+    return np.array(lanes)
 
-    def sizes(wave_size: int | None, workers: int, branches: int = 1) -> np.ndarray:
-        clock = Clock(0.0, None, wave_size, workers, branches)
-        return np.array([piece.lanes for piece in plan(pixels, 0, 60, clock.wave_size)])
 
+def test_waves_are_large_where_that_pays() -> None:
+    """Small until the speed is known and towards the end, and never larger than was asked for."""
+    least, largest = stopping.WAVE
     for workers in (1, 2, 4):
-        lanes = sizes(None, workers)
-        assert lanes.sum() == 60 * pixels.size
-        assert (np.diff(lanes[lanes >= smallest]) <= 0).all()
-        assert lanes.max() > 0.75 * min(largest, stopping.AT_ONCE // workers)
-        assert lanes.max() <= min(largest, stopping.AT_ONCE // workers)
-        assert (lanes[-4:] <= smallest).all()
-    for limit, cut in ((smallest, (None, 64)), (smallest // 4, (None, 64, 4)), (5000, (5000, 2))):
-        assert limit / 2 < sizes(*cut).min() <= sizes(*cut).max() <= limit
-    assert sizes(5000, 2, branches=64).max() == 5000 // 64
+        lanes = wave_sizes(1e-6, None, workers)
+        most = min(largest, stopping.AT_ONCE // workers)
+        assert 0.75 * most < lanes.max() <= most
+        assert lanes[0] <= least
+        assert lanes[-1] <= least
+        assert (np.diff(lanes[lanes > least]) <= 0).all()
+    for limit, cut in ((least, (None, 64)), (least // 4, (None, 64, 4)), (5000, (5000, 2))):
+        assert limit / 2 < wave_sizes(1e-6, *cut).min() <= wave_sizes(1e-6, *cut).max() <= limit
+    assert wave_sizes(1e-6, 5000, 2, 64).max() == 5000 // 64
+
+
+def test_nobody_waits_for_a_large_wave() -> None:
+    """Where paths are slow waves take about a second, or are small."""
+    assert wave_sizes(7e-6, None, 2).max() * 7e-6 <= stopping.PATIENCE
+    assert wave_sizes(1e-4, None, 2).max() <= stopping.WAVE[0]
 
 
 def test_every_pixel_gets_a_sample(monkeypatch) -> None:

@@ -98,7 +98,8 @@ def render(
         has any. Two to four make a sample dearer, but less noisy by more where most of the noise is in
         indirect light, as in a room.
     wave_size
-        The most paths that are traced together by one worker; the picture does not depend on it.
+        The most paths that are traced together by one worker; by default what suits their number and
+        speed, at most 131 072. The picture does not depend on it.
     progress
         By default a bar appears when a render takes over two seconds. False shows none; a
         function is called with how much is done and how much there is at most: samples, or

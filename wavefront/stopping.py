@@ -16,9 +16,10 @@ from .work import Piece
 MIN_SPP = 32  # before anything is decided by an error estimate
 TILE = 8  # pixels; decisions are made for squares of this side
 FIRST_WAVE = 4096  # lanes, while the speed is unknown
-WAVE = 1 << 16, 1 << 18  # lanes: from the first on a path costs little more, from the second on no less
-AT_ONCE = 1 << 19  # lanes of all workers together where that is a wave for each: 300 MB
+WAVE = 1 << 16, 1 << 17  # lanes; from the first on a path costs little more, from the second on hardly less
+AT_ONCE = 1 << 19  # lanes of all workers together where that is a wave for each: 400 MB
 SHARE = 1 / 4  # part of what is left for each worker that a wave may be
+PATIENCE = 1.0  # seconds that a large wave may take, for progress and Ctrl-C wait for it
 SHORT, LONG = 1 / 60, 1 / 20  # parts of the time there is that a wave should take
 SMOOTHING = 0.3  # weight of the latest wave in what a path is expected to cost
 
@@ -115,13 +116,15 @@ class Clock:
         return time.perf_counter() - self._begin
 
     def wave_size(self, left: int) -> int:
-        """Return how many paths a wave may have: few against those there is time for, or that are `left`.
+        """Return how many paths a wave may have.
 
-        So no worker has much to do when the others are done. Large waves cost less per path.
+        Large waves cost less per path. But no worker should have much to do when the others are done,
+        with all that are `left` or when the time is up, and nobody should have to wait for one.
         """
+        patience = max(self._least, int(PATIENCE / self._cost)) if self._cost else self._least
         if self._seconds is not None:
-            return self._size
-        return min(self._largest, max(self._least, int(left * SHARE / self._workers)))
+            return min(patience, self._size)
+        return min(self._largest, patience, max(self._least, int(left * SHARE / self._workers)))
 
     def in_time(self, pieces: Iterator[Piece]) -> Iterator[Piece]:
         """Pass on pieces for as long as they will be done in time.
@@ -138,10 +141,10 @@ class Clock:
     def note(self, piece: Piece, spent: float) -> None:
         """Take note that a piece is done, and how many seconds it took its worker."""
         self._under_way -= piece.lanes
-        if self._seconds is None:
-            return
         cost = spent / piece.lanes
         self._cost = (1 - SMOOTHING) * self._cost + SMOOTHING * cost if self._cost else cost
+        if self._seconds is None:
+            return
         # larger waves cost less per path, smaller ones end nearer to the time
         if spent < SHORT * self._seconds:
             self._size = max(self._size, min(self._largest, 2 * piece.lanes))
