@@ -231,7 +231,8 @@ def test_waves_are_large_where_that_pays() -> None:
 
 def test_nobody_waits_for_a_large_wave() -> None:
     """Where paths are slow waves take about a second, or are small."""
-    assert wave_sizes(7e-6, None, 2).max() * 7e-6 <= stopping.PATIENCE
+    assert wave_sizes(1e-6, None, 2).max() * 1.2e-5 > stopping.PATIENCE
+    assert wave_sizes(1.2e-5, None, 2).max() * 1.2e-5 <= stopping.PATIENCE
     assert wave_sizes(1e-4, None, 2).max() <= stopping.WAVE[0]
 
 
