@@ -216,7 +216,7 @@ def wave_sizes(per_path: float, wave_size: int | None, workers: int, branches: i
 
 def test_waves_are_large_where_that_pays() -> None:
     """Small until the speed is known and towards the end, and never larger than was asked for."""
-    least, largest = stopping.WAVE
+    least, largest = stopping.SMALL_WAVE, stopping.LARGE_WAVE
     for workers in (1, 2, 4):
         lanes = wave_sizes(1e-6, None, workers)
         most = min(largest, stopping.AT_ONCE // workers)
@@ -233,7 +233,7 @@ def test_nobody_waits_for_a_large_wave() -> None:
     """Where paths are slow waves take about a second, or are small."""
     assert wave_sizes(1e-6, None, 2).max() * 1.2e-5 > stopping.PATIENCE
     assert wave_sizes(1.2e-5, None, 2).max() * 1.2e-5 <= stopping.PATIENCE
-    assert wave_sizes(1e-4, None, 2).max() <= stopping.WAVE[0]
+    assert wave_sizes(1e-4, None, 2).max() <= stopping.SMALL_WAVE
 
 
 def test_every_pixel_gets_a_sample(monkeypatch) -> None:

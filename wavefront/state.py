@@ -21,8 +21,8 @@ Words = NDArray[np.uint32]
 
 
 @cache
-def _names(record: type) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(record))
+def _names(kind: type) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(kind))
 
 
 class Columns:
@@ -34,13 +34,13 @@ class Columns:
     __slots__ = ()
 
     def _values(self) -> list[tuple[str, Any]]:
-        record: Any = type(self)
-        return [(name, getattr(self, name)) for name in _names(record)]
+        kind: Any = type(self)
+        return [(name, getattr(self, name)) for name in _names(kind)]
 
     def __len__(self) -> int:
         """Return the number of columns."""
-        record: Any = type(self)
-        values = (getattr(self, name) for name in _names(record))
+        kind: Any = type(self)
+        values = (getattr(self, name) for name in _names(kind))
         return int(next(value.shape[-1] for value in values if value is not None))
 
     def take(self, index: Lanes) -> Self:
@@ -60,8 +60,8 @@ class Columns:
     def concatenate(cls, records: Sequence[Self]) -> Self:
         """Join the columns of several records of one type."""
         out = object.__new__(cls)
-        record: Any = cls
-        for name in _names(record):
+        kind: Any = cls
+        for name in _names(kind):
             setattr(out, name, _joined([getattr(record, name) for record in records]))
         return out
 

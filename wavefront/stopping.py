@@ -15,8 +15,9 @@ from .work import Piece
 
 MIN_SPP = 32  # before anything is decided by an error estimate
 TILE = 8  # pixels; decisions are made for squares of this side
-FIRST_WAVE = 4096  # lanes, while the speed is unknown
-WAVE = 1 << 16, 1 << 17  # lanes; from the first on a path costs little more, from the second on hardly less
+FIRST_WAVE = 4096  # lanes, while the speed is unknown and there is a time to keep
+SMALL_WAVE = 1 << 16  # lanes; in smaller waves a path costs more
+LARGE_WAVE = 1 << 17  # lanes; in larger waves it costs hardly less
 AT_ONCE = 1 << 19  # lanes of all workers together where that is a wave for each: 400 MB
 SHARE = 1 / 4  # part of what is left for each worker that a wave may be
 PATIENCE = 1.0  # seconds that a large wave may take, for progress and Ctrl-C wait for it
@@ -103,10 +104,10 @@ class Clock:
         self.up = False  # work was turned away
         self._begin, self._seconds, self._workers = begin, seconds, workers
         if wave_size is None:
-            wave_size = min(max(AT_ONCE // workers, WAVE[0]), WAVE[1])
+            wave_size = min(max(AT_ONCE // workers, SMALL_WAVE), LARGE_WAVE)
         self._largest = max(1, wave_size // branches)
-        self._least = min(self._largest, max(1, WAVE[0] // branches))
-        self._size = min(FIRST_WAVE, self._largest)  # while there is a time to keep
+        self._least = min(self._largest, max(1, SMALL_WAVE // branches))
+        self._size = min(FIRST_WAVE, self._largest)  # where there is a time to keep
         self._under_way = 0  # paths
         self._cost = 0.0  # expected seconds of a worker per path
 

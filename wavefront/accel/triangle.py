@@ -22,7 +22,8 @@ Doubles = NDArray[np.float64]
 
 ROUNDOFF = 2.0**-24  # half an ulp of float32
 TINY = 1e-30  # least extent of points, so that no row is infinite
-SHEARED = np.array([[1, 2, 0], [2, 0, 1], [0, 1, 2]])  # a ray's x, y, z when it runs mostly along each axis
+# Column i: the axes that become x, y and z for rays that run mostly along axis i.
+AXES = np.array([[1, 2, 0], [2, 0, 1], [0, 1, 2]])
 
 
 @record
@@ -206,7 +207,7 @@ def hits_watertight(vertices: Doubles, direction: Doubles) -> Bools:
     rounded to float32, so that in float64 their products are exact and so is the sign of a difference
     of two: the triangles of a mesh stay a mesh, without gaps.
     """
-    axes = SHEARED.take(np.abs(direction).argmax(0), 1)
+    axes = AXES.take(np.abs(direction).argmax(0), 1)
     place = axes * direction.shape[1] + np.arange(direction.shape[1])
     turned = vertices.reshape(3, -1).take(place, 1)
     along = direction.reshape(-1).take(place)
