@@ -16,7 +16,7 @@ from .bsdfs import (
     ThinDielectric,
 )
 from .camera import Camera
-from .errors import SceneError
+from .errors import Interrupted, RenderError, SaveError, SceneError
 from .film import Image
 from .lights import DirectionalLight, Environment, PointLight, SpotLight
 from .relief import BumpMap, NormalMap
@@ -24,12 +24,15 @@ from .render import render
 from .scene import Scene
 from .shapes import Disk, Instance, Mesh, Rectangle, Sphere
 from .textures import Texture
+from .version import VERSION
 from .vertex_colors import VertexColors
 
 if TYPE_CHECKING:
     from . import testing
     from .io.load import from_trimesh, load, load_mesh
     from .metrics import Comparison, compare
+
+__version__ = VERSION
 
 _LATER = {  # what many programs do without is imported when they ask for it
     "Comparison": ".metrics",
@@ -54,6 +57,7 @@ __all__ = [
     "Environment",
     "Image",
     "Instance",
+    "Interrupted",
     "Mesh",
     "Mirror",
     "Mix",
@@ -62,6 +66,8 @@ __all__ = [
     "PointLight",
     "Principled",
     "Rectangle",
+    "RenderError",
+    "SaveError",
     "Scene",
     "SceneError",
     "Sphere",

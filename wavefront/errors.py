@@ -1,4 +1,4 @@
-"""The one error type that users meet."""
+"""The errors that users meet, and checks of arguments."""
 
 from __future__ import annotations
 
@@ -14,6 +14,40 @@ class SceneError(ValueError):
 
     The message names what is wrong, where it is, the value found and the limit.
     """
+
+
+class SaveError(SceneError, OSError):
+    """A file that cannot be written. The old file, if there was one, is intact."""
+
+
+class RenderError(RuntimeError):
+    """A render that failed after it had begun.
+
+    Attributes
+    ----------
+    image
+        The picture so far, an `Image`; None if there is none.
+    """
+
+    def __init__(self, message: str, image: Any = None) -> None:
+        super().__init__(message)
+        self.image = image
+
+
+class Interrupted(KeyboardInterrupt):
+    """A render that Ctrl-C stopped.
+
+    It is a KeyboardInterrupt, so that a script stops unless it catches this one.
+
+    Attributes
+    ----------
+    image
+        The picture so far, an `Image`; None if there is none.
+    """
+
+    def __init__(self, message: str, image: Any = None) -> None:
+        super().__init__(message)
+        self.image = image
 
 
 def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
