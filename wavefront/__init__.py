@@ -17,7 +17,7 @@ from .bsdfs import (
 )
 from .camera import Camera
 from .errors import Interrupted, RenderError, SaveError, SceneError
-from .film import Image
+from .image import Image
 from .lights import DirectionalLight, Environment, PointLight, SpotLight
 from .relief import BumpMap, NormalMap
 from .render import render

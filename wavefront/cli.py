@@ -12,8 +12,8 @@ import numpy as np
 
 from .camera import Camera, image_size
 from .errors import SceneError
-from .film import Image
 from .filters import FILTERS
+from .image import Image
 from .integrators import INTEGRATORS
 from .io.images import check_writable
 from .io.load import load

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import SceneError
-from .film import EPSILON, Image
+from .film import EPSILON
+from .image import Image
 from .io.images import read_image, srgb_to_linear
 
 Picture: TypeAlias = Image | ArrayLike | str | os.PathLike[str]

@@ -15,8 +15,9 @@ import numpy as np
 from .accel import most_copies
 from .accel.choose import CHOICES
 from .errors import SceneError, number
-from .film import Film, Image
+from .film import Film
 from .filters import FILTERS
+from .image import Image
 from .integrators import INTEGRATORS, ONE_SAMPLE, Integrator, li_full
 from .lights import DirectionalLight, PointLight, SpotLight
 from .lights.choose import CHOICES as LIGHT_CHOICES
