@@ -264,7 +264,8 @@ def test_no_command_is_an_error(capsys):
 
 
 def test_ctrl_c_while_loading_gives_130(obj, fast, monkeypatch):
-    def interrupt(path):
+    def interrupt(path, progress):
+        assert progress is False  # as --quiet asks
         raise KeyboardInterrupt
 
     monkeypatch.setattr(cli, "load", interrupt)

@@ -1,8 +1,13 @@
 """The bar: late, so that short renders have none, and right from when it appears."""
 
+import threading
+import time
+
 import pytest
 
-from wavefront.progress import DELAY, Bar
+from wavefront import progress as module
+from wavefront.io import load as loading
+from wavefront.progress import DELAY, Bar, phase
 
 
 @pytest.mark.parametrize("progress", [None, True])
@@ -37,3 +42,62 @@ def test_there_is_no_bar_for_a_function_or_for_false(capsys) -> None:
             bar.advance(30, 60)
     assert calls == [(20, 100), (50, 100)]
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("progress", [None, True])
+def test_a_long_phase_shows_its_title(progress, monkeypatch, capsys) -> None:
+    """The line counts from the beginning of the phase, and its thread ends with the phase."""
+    monkeypatch.setattr(module, "DELAY", 1.1)
+    monkeypatch.setattr(module, "TICK", 0.01)
+    before = threading.active_count()
+    with phase("loading a.glb", progress):
+        assert capsys.readouterr().err == ""
+        time.sleep(1.3)
+        assert "loading a.glb: 00:01" in capsys.readouterr().err
+    # tqdm keeps one thread of its own
+    assert threading.active_count() <= before + 1
+
+
+def test_a_long_phase_is_shown_when_it_fails(monkeypatch, capsys) -> None:
+    """An error passes through."""
+    monkeypatch.setattr(module, "DELAY", 0.001)
+
+    def fail() -> None:
+        with phase("loading a.glb"):
+            time.sleep(0.3)
+            raise ValueError("bad")
+
+    with pytest.raises(ValueError, match="bad"):
+        fail()
+    assert "loading a.glb" in capsys.readouterr().err
+
+
+def test_short_phases_and_silent_ones_show_nothing(monkeypatch, capsys) -> None:
+    """A function is not called either: it counts samples."""
+    calls: list = []
+    with phase("loading a.glb"):
+        pass
+    monkeypatch.setattr(module, "DELAY", 0.001)
+    for progress in (False, lambda *call: calls.append(call)):
+        with phase("loading a.glb", progress):
+            time.sleep(0.05)
+    assert capsys.readouterr().err == ""
+    assert not calls
+
+
+@pytest.mark.parametrize("load", [loading.load, loading.load_mesh])
+@pytest.mark.parametrize("progress", [None, False])
+def test_loading_is_a_phase(load, progress, tmp_path, monkeypatch, capsys) -> None:
+    """Only its name is shown, not the folder."""
+    monkeypatch.setattr(module, "DELAY", 0.001)
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+
+    def slow(path: object) -> bytes:
+        time.sleep(0.3)
+        return (tmp_path / "a.obj").read_bytes()
+
+    monkeypatch.setattr(loading, "read_bytes", slow)
+    load(tmp_path / "a.obj", progress=progress)
+    shown = capsys.readouterr().err
+    assert ("loading a.obj: 00:00" in shown) == (progress is None)
+    assert str(tmp_path) not in shown

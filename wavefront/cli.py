@@ -118,7 +118,8 @@ def _add_render(commands: Any) -> None:
 
 def _render(options: argparse.Namespace) -> int:
     check_writable(options.output)
-    scene = load(options.scene)
+    progress = False if options.quiet else None
+    scene = load(options.scene, progress=progress)
     scene.camera = _camera(scene, options)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -136,7 +137,7 @@ def _render(options: argparse.Namespace) -> int:
             seconds=options.seconds,
             filter=options.filter,
             branches=options.branches,
-            progress=False if options.quiet else None,
+            progress=progress,
         )
     for warning in caught:
         _show_warning(warning.message)

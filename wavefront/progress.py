@@ -1,13 +1,17 @@
-"""How far a render has come, shown as a bar or told to a function."""
+"""How far a render has come, shown as a bar or told to a function; what else takes long, by its name."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, Self, TypeAlias
 
 Progress: TypeAlias = Callable[[float, float], object] | bool | None
 
-DELAY = 2  # seconds before a bar appears
+DELAY = 2  # seconds before anything appears
+TICK = 1  # seconds between updates of a phase's line
 
 
 class Bar:
@@ -56,3 +60,42 @@ class Bar:
         bar = tqdm(total=self._total, initial=self._done, unit="sample", **style)
         bar.start_t -= elapsed
         return bar
+
+
+@contextmanager
+def phase(title: str, progress: Progress = None) -> Iterator[None]:
+    """Show a line with a title and the time spent, if the block takes longer than `DELAY` seconds.
+
+    A thread writes the line, so the block needs no calls in it. The thread has ended when the block has.
+
+    Parameters
+    ----------
+    title
+        What is being done, such as "loading bunny.obj".
+    progress
+        True or None shows the line. False shows none, and neither does a function: it counts samples.
+    """
+    if progress is not None and progress is not True:
+        yield
+        return
+    ended = threading.Event()
+    writer = threading.Thread(target=_show, args=(title, ended), daemon=True)
+    writer.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        writer.join()
+
+
+def _show(title: str, ended: threading.Event) -> None:
+    """Write the line of a phase until it has ended."""
+    start = time.monotonic()
+    if ended.wait(DELAY):
+        return
+    from tqdm import tqdm  # as above
+
+    with tqdm(desc=title, bar_format="{desc}: {elapsed}") as line:
+        line.start_t -= time.monotonic() - start
+        while not ended.wait(TICK):
+            line.refresh()

@@ -129,7 +129,7 @@ def render(
     make_sampler(sampler, seed)  # checks both before the scene is read
     workers = worker_count(workers)
     choose_executor(executor, workers, 0)
-    subject = as_scene(scene)
+    subject = as_scene(scene, progress)
     camera = subject.camera or subject.framing_camera()
     draw = make_sampler(sampler, seed, camera.film[0])
     _warn_unseen_lights(subject, integrator)
@@ -192,7 +192,7 @@ def render(
     return image
 
 
-def as_scene(subject: Any) -> Scene:
+def as_scene(subject: Any, progress: Progress = None) -> Scene:
     """Return what `render` was given as a `Scene`.
 
     Raises
@@ -207,7 +207,7 @@ def as_scene(subject: Any) -> Scene:
     from .io.load import from_trimesh, load  # here, so that scenes in memory do not pay for readers
 
     if isinstance(subject, str | os.PathLike):
-        return load(Path(subject))
+        return load(Path(subject), progress=progress)
     if isinstance(subject, tuple) and len(subject) == 2:
         return Scene([Mesh(*subject)])
     if type(subject).__module__.split(".")[0] == "trimesh":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
@@ -17,6 +18,7 @@ from ..bsdfs import Bsdf
 from ..camera import Camera
 from ..errors import SceneError, finite_array
 from ..lights import DirectionalLight, PointLight, SpotLight
+from ..progress import Progress, phase
 from ..scene import Scene
 from ..shapes import Instance, Mesh
 from ..shapes.transform import moved, moved_tangents
@@ -36,7 +38,7 @@ PathLike = str | os.PathLike[str]
 T = TypeVar("T")
 
 
-def load(path: PathLike, *, strict: bool = False) -> Scene:
+def load(path: PathLike, *, strict: bool = False, progress: Progress = None) -> Scene:
     """Read a scene: .obj (with its .mtl), .ply, .stl, .glb, .gltf.
 
     A mesh that several nodes of a glTF file have is read once, and becomes an `Instance` for each.
@@ -47,14 +49,17 @@ def load(path: PathLike, *, strict: bool = False) -> Scene:
         The file. Files that it refers to are read only from its own folder.
     strict
         Refuse what would otherwise be repaired or left out with a warning.
+    progress
+        Where reading takes more than 2 s, True or None shows a line that says so; False shows nothing.
 
     Raises
     ------
     SceneError
         Naming the file, the line or element, the value and the limit.
     """
-    name, contents = _contents(path, strict, materials=True)
-    return Scene(_shapes(name, contents.placed, strict), contents.lights, contents.camera)
+    with _phase(path, progress):
+        name, contents = _contents(path, strict, materials=True)
+        return Scene(_shapes(name, contents.placed, strict), contents.lights, contents.camera)
 
 
 def load_mesh(
@@ -63,6 +68,7 @@ def load_mesh(
     transform: ArrayLike | None = None,
     *,
     strict: bool = False,
+    progress: Progress = None,
 ) -> Mesh:
     """Read all geometry of a file as one mesh.
 
@@ -75,7 +81,7 @@ def load_mesh(
         then have only one.
     transform
         (4, 4) matrix applied to the vertices.
-    strict
+    strict, progress
         As for `load`.
 
     Raises
@@ -83,8 +89,9 @@ def load_mesh(
     SceneError
         As for `load`.
     """
-    meshes = load_meshes(path, strict=strict, materials=material is None)
-    return join(meshes, Path(path).stem, material, transform)
+    with _phase(path, progress):
+        meshes = load_meshes(path, strict=strict, materials=material is None)
+        return join(meshes, Path(path).stem, material, transform)
 
 
 def load_meshes(path: PathLike, *, strict: bool = False, materials: bool = True) -> list[Mesh]:
@@ -92,6 +99,10 @@ def load_meshes(path: PathLike, *, strict: bool = False, materials: bool = True)
     name, contents = _contents(path, strict, materials)
     meshes = [mesh for part in contents.placed if (mesh := build(name, part.moved(), strict)) is not None]
     return _some(name, meshes)
+
+
+def _phase(path: PathLike, progress: Progress) -> AbstractContextManager[None]:
+    return phase(f"loading {os.path.basename(os.fspath(path))}", progress)
 
 
 def from_trimesh(geometry: Any) -> Scene:
