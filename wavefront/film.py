@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .exact_sum import ExactSums
 from .image import Image
 from .state import Words
 from .vec import ALL, Floats, Ints, Lanes, columns
@@ -18,14 +19,14 @@ BATCHES = 8  # at most
 WHOLE_BATCH = 4  # samples; batches are no shorter where a pixel has two such
 EPSILON = 1e-2  # of the squared mean of a picture, added to squares that errors are divided by
 OUTLIERS = 1e-3  # part of the pixels whose error counts no more than that of the worst other one
-CHUNK = 8192  # pixels that are summed up together when a picture is made: few enough for the cache
+CHUNK = 16384  # pixels, or samples, that are summed up together: few enough for the cache
 
 
 class Film:
     """Sums of samples per pixel, and what is needed to tell how noisy they are.
 
-    The samples of a pixel are added one after the other in the order of their index, in float64,
-    so the picture does not depend on how a render was cut into pieces.
+    The sums are exact (`ExactSums`), so the picture does not depend on how a render was cut into
+    pieces, nor on which of two films took which samples before they were merged.
 
     The samples of a stratified sampler depend on each other, so their own scatter says little of
     the error of their mean. Consecutive samples therefore form batches of `batch_size`, a power of
@@ -35,15 +36,14 @@ class Film:
     Sobol points the error is over-estimated, by 7 to 15 % in scenes of few and many kinds of
     light at 16 and 64 samples, by less later. Independent samples have no such bias.
 
-    Memory is 176 bytes per pixel, whatever the number of samples.
+    Memory is 179 bytes per pixel, whatever the number of samples.
     """
 
     def __init__(self, width: int, height: int) -> None:
         pixels = width * height
         self.size = width, height
         self.count = np.zeros(pixels, np.int64)
-        self.total = np.zeros((3, pixels))  # of full batches
-        self.open = np.zeros((3, pixels))  # of the batch that is not yet full
+        self.sums = ExactSums((3, pixels))  # of samples
         self.squares = np.zeros((3, pixels))  # sum of squared samples
         self.batches = np.zeros((BATCHES, 3, pixels), np.float32)  # sums of full batches
 
@@ -57,27 +57,41 @@ class Film:
         radiance
             (3, samples, k): the next samples of each pixel.
         """
-        lanes = _span(pixels)
-        count, samples = int(self.count[pixels[0]]), radiance.shape[1]
-        filling, squares = self.open[:, lanes], self.squares[:, lanes]  # views of a span, else copies
+        for start in range(0, pixels.size, CHUNK):
+            part = slice(start, start + CHUNK)
+            self._add(_span(pixels[part]), radiance[:, :, part])
+
+    def _add(self, lanes: Lanes, radiance: Floats) -> None:
+        """Add samples (3, samples, k) of at most `CHUNK` pixels."""
+        at_once = max(1, CHUNK // radiance.shape[2])
+        squares = self.squares[:, lanes]  # a view of a span, else a copy
+        count, samples = int(self.count[lanes][0]), radiance.shape[1]
         start = 0
         while start < samples:
             size = batch_size(count + 1)
             if count and size > batch_size(count):
                 self._pair_batches(lanes)
-            stop = min(samples, start + size - count % size)
+            stop = min(samples, start + at_once, start + size - count % size)
             rows = radiance[:, start:stop].astype(np.float64)
-            _add_in_order(filling, rows)
-            _add_in_order(squares, np.square(rows, out=rows))
+            _add_in_order(squares, np.square(rows))
+            self.sums.add(lanes, rows)
             count += stop - start
             start = stop
             if count % size == 0:
-                self.total[:, lanes] += filling
-                self.batches[count // size - 1][:, lanes] = filling
-                filling[:] = 0
+                self._close_batch(lanes, count // size - 1)
         if not isinstance(lanes, slice):
-            self.open[:, lanes], self.squares[:, lanes] = filling, squares
+            self.squares[:, lanes] = squares
         self.count[lanes] = count
+
+    def _close_batch(self, lanes: Lanes, number: int) -> None:
+        """Note the sum of the batch that is full: what is in the sums and in no batch before it.
+
+        The rounding errors of the batches do not add up, since each batch makes up for those before it.
+        """
+        before = np.zeros_like(self.squares[:, lanes])
+        for batch in self.batches[:number]:
+            before += batch[:, lanes]
+        self.batches[number][:, lanes] = self.sums.value(lanes) - before
 
     def _pair_batches(self, lanes: Lanes) -> None:
         """Join neighbours, so that half as many batches are twice as long."""
@@ -87,7 +101,7 @@ class Film:
 
     def mean(self, span: slice = slice(None)) -> Doubles:
         """Means of the samples of pixels, (3, k); 0 where there is none."""
-        return (self.total[:, span] + self.open[:, span]) / np.maximum(self.count[span], 1)
+        return self.sums.value(span) / np.maximum(self.count[span], 1)
 
     def variance(self, span: slice = slice(None)) -> Doubles:
         """Estimate the variance of one sample of each pixel, (3, k); NaN for fewer than two."""

@@ -15,6 +15,7 @@ import numpy as np
 from .accel import most_copies
 from .accel.choose import CHOICES
 from .errors import SceneError, number
+from .exact_sum import MAX_TERMS
 from .film import Film
 from .filters import FILTERS
 from .image import Image
@@ -31,7 +32,7 @@ from .version import VERSION
 from .work import BadSamples, Piece, Wave, plan, trace_piece
 
 DEFAULT_SPP = 100
-MAX_SPP = 2**32  # a sample's index is 32 bits of its address, and each branch has one
+MAX_BRANCH_SAMPLES = 2**32  # a sample's index is 32 bits of its address, and each branch has one
 MAX_BRANCHES = 64
 MAX_SPP_FOR_NOISE = 2**16  # where only `noise` was given
 
@@ -118,7 +119,7 @@ def render(
     """
     begin = time.perf_counter()
     branches = _whole("branches", branches, 1, MAX_BRANCHES)
-    spp = _most_samples(spp, noise, seconds, MAX_SPP // branches)
+    spp = _most_samples(spp, noise, seconds, min(MAX_TERMS, MAX_BRANCH_SAMPLES // branches))
     max_bounces = _whole("max_bounces", max_bounces, 0, 2**16)
     if wave_size is not None:
         wave_size = _whole("wave_size", wave_size, 1, 2**24)
