@@ -384,6 +384,7 @@ def test_colours_outside_their_range_are_clamped(write):
         ("Kd 0 0", r"line 2: Kd has 2 numbers; a colour has 1 or 3"),
         ("Kd", r"line 2: Kd is ''"),
         ("illum 4\nNi 0", r"line 3: Ni is 0; an index must be above 0"),
+        ("illum 4\nNi 1e30", r"line 3: Ni is 1e\+30; an index must be above 0, from 1e-06 to 1e\+06"),
         ("illum 4\nNi -1", r"line 3: Ni is -1"),
     ],
 )

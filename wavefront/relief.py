@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from copy import copy
 from typing import TypeAlias
 
 import numpy as np
@@ -105,6 +106,12 @@ class BumpMap(Relief):
         _check_plain("BumpMap", self.texture)
         uv = UV_SETS[self.texture.uv_set]
         self.reads = (uv, TANGENTS[uv])
+
+    def scaled(self, factor: float) -> BumpMap:
+        """Return this for a scene whose lengths were multiplied by `factor`."""
+        other = copy(self)
+        other.height = f4(self.height * factor)
+        return other
 
     def __repr__(self) -> str:
         """Name the image."""

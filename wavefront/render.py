@@ -141,7 +141,8 @@ def render(
         most_copies(accel),
         mis=integrator not in ONE_SAMPLE,
     )
-    trace = partial(trace_piece, compiled, camera, draw, spread, estimate, max_bounces)
+    view = compiled.view(camera)
+    trace = partial(trace_piece, compiled, view, draw, spread, estimate, max_bounces)
 
     film, clock = Film(*camera.size), Clock(begin, seconds, wave_size, workers, branches)
     bad, rays, interrupted = BadSamples(), 0, False

@@ -33,6 +33,7 @@ from .lights import (
     first_of_pairs,
 )
 from .record import record
+from .scale import check_distance, check_lights, length_factor, scaled_shapes
 from .shapes import Instance, Mesh, Sphere
 from .shapes.attributes import ATTRIBUTES, Corners, corner_values
 from .state import Surface
@@ -177,11 +178,13 @@ class Opacities:
 class CompiledScene:
     """A scene as flat arrays, relative to its centre. Triangles come first, then spheres.
 
-    A mesh that is placed several times stands in the arrays once, in its own frame.
+    A mesh that is placed several times stands in the arrays once, in its own frame. Where the scene is
+    extremely large or small, all lengths here and in what is traced are in another unit (see scale.py).
     """
 
-    centre: NDArray[np.float64]  # (3,) scene units
-    radius: float  # of the bounding sphere, scene units
+    scale: float  # a power of two by which lengths of the scene are multiplied; 1 for most scenes
+    centre: NDArray[np.float64]  # (3,)
+    radius: float  # of the bounding sphere
     accelerator: Accelerator
     triangles: int  # number of triangles
     normals: Floats  # (3, m) unit geometric normals of the triangles
@@ -193,7 +196,7 @@ class CompiledScene:
     light_of: Ints  # (m + k + 1,) light of each primitive, and at the end that of a miss; -1 for none
     shines: Bools  # (m + k + 1,) whether there is one
     materials: Materials
-    absorption: Floats | None  # (3, materials) per scene unit; None when nothing absorbs
+    absorption: Floats | None  # (3, materials) per unit of length; None when nothing absorbs
     opacities: Opacities | None  # None when every surface is all there
     lights: LightTable
     black_lights: Bools | None  # (lights,) those whose surface scatters nothing; None when there are none
@@ -204,6 +207,17 @@ class CompiledScene:
     def interpolates(self) -> bool:
         """Whether anything varies between the corners of triangles."""
         return bool(self.attributes) or self.corner_normals is not None
+
+    def view(self, camera: Camera) -> Camera:
+        """Return a camera of the scene in the unit of these arrays.
+
+        Raises
+        ------
+        SceneError
+            If it is so far away that float32 cannot measure its distance.
+        """
+        check_distance("Camera origin", camera.origin, self.centre / self.scale, self.scale)
+        return camera.scaled(self.scale)
 
 
 def compile_scene(
@@ -232,12 +246,16 @@ def compile_scene(
     Raises
     ------
     SceneError
-        If an emitting shape has no area, an emitting sphere has an alpha or shines by a texture, or the
-        choice is unknown.
+        If an emitting shape has no area, an emitting sphere has an alpha or shines by a texture, a light
+        is too far away or too strong for the scene's size, or the choice is unknown.
     """
     low, high = scene.bounds
-    centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
-    meshes, spheres, instances = resolve(scene.shapes, most_copies)
+    radius = float(np.linalg.norm(high - low)) / 2
+    scale = length_factor(radius)
+    check_lights(scene.lights, (low + high) / 2, scale)
+    low, high, radius = low * scale, high * scale, radius * scale
+    centre = (low + high) / 2
+    meshes, spheres, instances = resolve(scaled_shapes(scene.shapes, scale), most_copies)
     placed: list[Shape] = [*meshes, *spheres, *instances]
     shared = list({id(instance.mesh): instance.mesh for instance in instances}.values())
     once = sum(len(mesh.faces) for mesh in meshes)
@@ -248,7 +266,7 @@ def compile_scene(
     user_materials, material_of, replaced = _number_materials(meshes, spheres, instances)
     attributes = {name: corner_values(name, meshes) for name in _attributes_read(placed)}
     lights, light_of, environment = _gather_lights(
-        scene, meshes, spheres, corners, centre, (high - low) / 2, light_choice, mis
+        scene, scale, meshes, spheres, corners, centre, (high - low) / 2, light_choice, mis
     )
     centers = np.array([s.center - centre for s in spheres]).reshape(-1, 3).T.astype(f4)
     radii = np.array([s.radius for s in spheres]).astype(f4)
@@ -270,6 +288,7 @@ def compile_scene(
         built = [make_accelerator(Geometry(part, *none, weights)) for part in parts]
         accelerator = InstanceAccelerator(accelerator, built, placements)
     return CompiledScene(
+        scale=scale,
         centre=centre,
         radius=radius,
         accelerator=accelerator,
@@ -493,6 +512,7 @@ def _corner_normals(meshes: Sequence[Mesh], normals: Floats) -> tuple[Floats, Fl
 
 def _gather_lights(
     scene: Scene,
+    scale: float,
     meshes: Sequence[Mesh],
     spheres: Sequence[Sphere],
     corners: Sequence[NDArray[np.float64]],
@@ -547,7 +567,7 @@ def _gather_lights(
     groups: dict[type[Light], list[Any]] = {}
     infinite: list[InfiniteLight] = []
     for light in user_lights:
-        record = light.record(centre)
+        record = (light if scale == 1 else light.scaled(scale)).record(centre)
         if isinstance(record, InfiniteLight):
             infinite.append(record.compensated() if mis else record)
         else:

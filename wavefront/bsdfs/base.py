@@ -96,6 +96,19 @@ class Bsdf(ABC):
         carved.relief = relief
         return carved
 
+    def scaled(self, factor: float) -> Self:
+        """Return this material where lengths were multiplied by `factor`: itself if it has none."""
+        relief = None if self.relief is None else self.relief.scaled(factor)
+        absorbs = not isinstance(self.absorption, Spatial) and bool(np.any(self.absorption))
+        if factor == 1 or not (absorbs or relief is not self.relief):
+            return self
+        other = copy(self)
+        other.relief = relief
+        if absorbs:  # no float32 is so large that it would make a light path of length 0 a NaN
+            per_unit = np.asarray(self.absorption, np.float64) / factor
+            other.absorption = np.minimum(per_unit, np.finfo(np.float32).max).astype(np.float32)
+        return other
+
     def bind(self, surface: Surface) -> Self:
         """Return this material with its spatial parameters looked up at `surface` (n columns)."""
         varying = {name: value for name, value in vars(self).items() if isinstance(value, Spatial)}

@@ -12,7 +12,7 @@ from .base import Bsdf, BsdfSample, weigh
 from .fresnel import fresnel_conductor
 from .microfacet import alpha_of, is_smooth, mirror_lobe, reflect, visible_normals
 from .mirror import mirrored
-from .parameter import Colour, Scalar, colour, scalar
+from .parameter import MAX_INDEX, Colour, Scalar, colour, scalar
 
 # η and k of metals in linear Rec. 709 RGB: published measurements, weighted by the matching
 # functions of the three primaries (CIE 1931 2° by the fit of C. Wyman et al. 2013, JCGT 2(2), to
@@ -42,9 +42,9 @@ class Conductor(Bsdf):
     Parameters
     ----------
     eta
-        Real part per channel, more than 0: a number, three numbers, or a texture.
+        Real part per channel, more than 0 and at most 1e6: a number, three numbers, or a texture.
     k
-        Imaginary part (extinction) per channel, at least 0.
+        Imaginary part (extinction) per channel, in [0, 1e6].
     roughness
         In [0, 1]; α = roughness². 0, like anything with α < 0.001, is a perfect mirror.
 
@@ -55,8 +55,8 @@ class Conductor(Bsdf):
     """
 
     def __init__(self, eta: Colour, k: Colour, roughness: Scalar = 0.0) -> None:
-        self.eta = colour("Conductor eta", eta, np.inf, above_zero=True)
-        self.k = colour("Conductor k", k, np.inf)
+        self.eta = colour("Conductor eta", eta, MAX_INDEX, above_zero=True)
+        self.k = colour("Conductor k", k, MAX_INDEX)
         self.roughness = scalar("Conductor roughness", roughness)
         self.specular = is_smooth(self.roughness)
 

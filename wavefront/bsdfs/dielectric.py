@@ -20,7 +20,7 @@ from .microfacet import (
     refraction_lobe,
     visible_normals,
 )
-from .parameter import Colour, Scalar, colour, scalar
+from .parameter import Colour, Scalar, colour, refractive_index, scalar
 
 # Closer to 1 than this, refraction bends light by less than half vectors resolve: the boundary is smooth.
 LEAST_BEND = 1e-3
@@ -32,7 +32,7 @@ class Dielectric(Bsdf):
     Parameters
     ----------
     ior
-        Refractive index of the inside relative to the outside, more than 0. Below 1 the outside
+        Refractive index of the inside relative to the outside, from 1e-6 to 1e6. Below 1 the outside
         is the denser medium (a bubble in water: 1/1.33). At 1 light passes straight through.
     roughness
         In [0, 1]; α = roughness² (GGX). 0, like anything with α < 0.001, is perfectly smooth, and
@@ -64,7 +64,7 @@ class Dielectric(Bsdf):
         transmittance: Colour = 1.0,
         absorption: Colour = 0.0,
     ) -> None:
-        self.ior = scalar("Dielectric ior", ior, lambda x: x > 0, "more than 0")
+        self.ior = refractive_index("Dielectric ior", ior)
         self.roughness = scalar("Dielectric roughness", roughness)
         self.reflectance = colour("Dielectric reflectance", reflectance)
         self.transmittance = colour("Dielectric transmittance", transmittance)

@@ -16,6 +16,8 @@ from ..state import Surface
 from ..vec import Floats, f4, luminance
 from .spatial import Spatial
 
+MAX_INDEX = 1e6  # of refraction, and its inverse the least: squares of squares stay within float32
+
 Colour: TypeAlias = ArrayLike | Spatial
 Scalar: TypeAlias = float | Spatial
 
@@ -67,3 +69,13 @@ def scalar(
     if isinstance(value, Spatial):
         return Luminance(value) if value.scalar is False else value
     return np.array([number(name, value, holds, limit)], f4)
+
+
+def refractive_index(name: str, value: Scalar) -> Any:
+    """Return a refractive index as (1,) float32, or a `Spatial` that gives numbers."""
+    return scalar(
+        name,
+        value,
+        lambda x: 1 / MAX_INDEX <= x <= MAX_INDEX,
+        f"more than 0, from {1 / MAX_INDEX:g} to {MAX_INDEX:g}",
+    )

@@ -17,7 +17,7 @@ from .emission import emission as emission_of
 from .fresnel import fresnel_dielectric
 from .microfacet import INV_PI, alpha_of, mirror_lobe, reflect, refract, refraction_lobe, visible_normals
 from .opacity import opacity
-from .parameter import Colour, Scalar, colour, scalar
+from .parameter import Colour, Scalar, colour, refractive_index, scalar
 from .sheen import sheen_albedo, sheen_lobe
 
 COAT_F0 = 0.04
@@ -56,7 +56,7 @@ class Principled(Bsdf):
     roughness
         In [0, 1]; α = roughness², at least 0.001: it has no delta lobe.
     ior
-        Refractive index, more than 0; where light is transmitted at least 0.001 away from 1.
+        Refractive index, from 1e-6 to 1e6; where light is transmitted at least 0.001 away from 1.
     transmission
         Part of the base that is clear instead of matte, in [0, 1].
     thin
@@ -113,7 +113,7 @@ class Principled(Bsdf):
         self.base_color = colour("Principled base_color", base_color)
         self.metallic = scalar("Principled metallic", metallic)
         self.roughness = scalar("Principled roughness", roughness)
-        self.ior = scalar("Principled ior", ior, lambda x: x > 0, "more than 0")
+        self.ior = refractive_index("Principled ior", ior)
         self.transmission = scalar("Principled transmission", transmission)
         self.thin = thin
         self.clearcoat = scalar("Principled clearcoat", clearcoat)

@@ -13,6 +13,10 @@ class Relief(ABC):
 
     reads: tuple[str, ...]  # fields of `Surface` that `tilted` needs
 
+    def scaled(self, factor: float) -> Relief:
+        """Return this in a scene whose lengths were multiplied by `factor`: itself if it has none."""
+        return self
+
     @abstractmethod
     def tilted(self, surface: Surface, normal: Floats) -> tuple[Ints, Floats]:
         """Return which columns are tilted, (k,), and their new unit normals, (3, k).

@@ -9,7 +9,7 @@ from .base import Bsdf, BsdfSample, weigh
 from .fresnel import fresnel_dielectric
 from .microfacet import alpha_of, is_smooth, mirror_lobe, reflect, visible_normals
 from .mirror import mirrored
-from .parameter import Colour, Scalar, colour, scalar
+from .parameter import Colour, Scalar, colour, refractive_index, scalar
 
 
 class ThinDielectric(Bsdf):
@@ -23,7 +23,7 @@ class ThinDielectric(Bsdf):
     Parameters
     ----------
     ior
-        Refractive index of the material relative to what surrounds it, more than 0.
+        Refractive index of the material relative to what surrounds it, from 1e-6 to 1e6.
     roughness
         In [0, 1]; α = roughness² (GGX). 0, like anything with α < 0.001, is perfectly smooth.
     reflectance, transmittance
@@ -46,7 +46,7 @@ class ThinDielectric(Bsdf):
         reflectance: Colour = 1.0,
         transmittance: Colour = 1.0,
     ) -> None:
-        self.ior = scalar("ThinDielectric ior", ior, lambda x: x > 0, "more than 0")
+        self.ior = refractive_index("ThinDielectric ior", ior)
         self.roughness = scalar("ThinDielectric roughness", roughness)
         self.reflectance = colour("ThinDielectric reflectance", reflectance)
         self.transmittance = colour("ThinDielectric transmittance", transmittance)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any, Literal
 
 import numpy as np
@@ -248,6 +249,14 @@ class Camera:
     def cropped(self, crop: Window) -> Camera:
         """Return the same camera that renders only the window (x0, y0, x1, y1) of the whole picture."""
         return Camera(self.origin, self.rotation, self.projection, self.film, crop)
+
+    def scaled(self, factor: float) -> Camera:
+        """Return the same camera in a scene whose lengths were multiplied by `factor`."""
+        if factor == 1:
+            return self
+        camera = copy(self)
+        camera.origin, camera.projection = self.origin * factor, self.projection.scaled(factor)
+        return camera
 
     # --- What a render asks ---------------------------------------------------------------------
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 
@@ -23,6 +24,10 @@ class Projection(ABC):
     """The contract: film points to rays in camera space."""
 
     uses_lens: bool = False  # rays start at a sampled point of a lens
+
+    def scaled(self, factor: float) -> Projection:
+        """Return this in a scene whose lengths were multiplied by `factor`: itself where it holds none."""
+        return self
 
     @abstractmethod
     def rays(self, x: Floats, y: Floats, film: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
@@ -92,6 +97,12 @@ class Perspective(Projection):
         self.focus = 1.0 if focus is None else number("Camera focus", focus, lambda x: x > 0, "above 0")
         self.uses_lens = self.aperture > 0
 
+    def scaled(self, factor: float) -> Perspective:
+        """Return the lens for a scene whose lengths were multiplied by `factor`."""
+        lens = copy(self)
+        lens.aperture, lens.focus = self.aperture * factor, self.focus * factor
+        return lens
+
     def rays(self, x: Floats, y: Floats, film: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
         """Aim through the film, or from a point of the lens at where the middle's ray is in focus."""
         width, height = film
@@ -124,6 +135,10 @@ class Orthographic(Projection):
 
     def __init__(self, height: float) -> None:
         self.height = number("Camera height", height, lambda x: x > 0, "above 0")
+
+    def scaled(self, factor: float) -> Orthographic:
+        """Return the film for a scene whose lengths were multiplied by `factor`."""
+        return Orthographic(self.height * factor)
 
     def rays(self, x: Floats, y: Floats, film: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
         """Start on the film, and go straight ahead."""

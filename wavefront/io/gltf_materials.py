@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..bsdfs.parameter import MAX_INDEX
 from ..errors import SceneError
 from ..relief import NormalMap
 from ..textures import Texture
@@ -210,7 +211,7 @@ class _Reader:
     def _ior(self, group: dict[str, Any] | None) -> None:
         if group is None:
             return
-        ior = self._number(group, "ior", 1.5, high=np.inf)
+        ior = self._number(group, "ior", 1.5, high=MAX_INDEX)
         if ior < 1:  # 0 stands for infinity: everything is reflected
             self._lost.append(f"ior {ior:g}")
         else:

@@ -39,6 +39,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bsdfs import Bsdf, Dielectric, Diffuse, Mirror, Relief
+from ..bsdfs.parameter import MAX_INDEX
 from ..errors import SceneError
 from ..relief import BumpMap, NormalMap
 from ..textures import Texture
@@ -393,8 +394,9 @@ def _base(entry: Entry) -> Any:
 def _glass(entry: Entry) -> tuple[Bsdf, list[str]]:
     opacity(entry)
     ior = entry.number("ni", GLASS_IOR)
-    if ior <= 0:
-        raise SceneError(f"{entry.where('ni')} is {ior:g}; an index must be above 0")
+    if not 1 / MAX_INDEX <= ior <= MAX_INDEX:
+        limits = f"above 0, from {1 / MAX_INDEX:g} to {MAX_INDEX:g}"
+        raise SceneError(f"{entry.where('ni')} is {ior:g}; an index must be {limits}")
     entry.read.update(("d", "tr", "kd"))  # glass has no matte part: files give it a Kd all the same
     return Dielectric(ior, _part(entry, "pr", 0.0), transmittance=entry.colour("tf", 1.0)), []
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import finite_array, rgb
+from ..errors import SceneError, finite_array, rgb
 from ..record import record
 from ..vec import Floats, dot, f4
 from .base import Light, LightSample
+
+FLOAT32_MAX = float(np.finfo(f4).max)
 
 
 @record
@@ -69,8 +72,49 @@ class PointLight:
 
     def __init__(self, position: ArrayLike, intensity: ArrayLike) -> None:
         self.position = finite_array("PointLight position", position, (3,))
-        self.intensity = rgb("PointLight intensity", intensity)
+        self.intensity = intensity_of("PointLight intensity", intensity)
+
+    def scaled(self, factor: float) -> PointLight:
+        """Return the light for a scene whose lengths were multiplied by `factor`: the same irradiance there.
+
+        Raises
+        ------
+        SceneError
+            If its intensity is then beyond float32.
+        """
+        light = copy(self)
+        light.position = self.position * factor
+        light.intensity = scaled_intensity("PointLight intensity", self.intensity, factor)
+        return light
 
     def record(self, centre: NDArray[np.float64]) -> PointLights:
         """Return the light as a record of one column, relative to `centre` (3,)."""
-        return PointLights((self.position - centre).astype(f4).reshape(3, 1), self.intensity)
+        return PointLights((self.position - centre).astype(f4).reshape(3, 1), self.intensity.astype(f4))
+
+
+def intensity_of(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """Return an intensity as a (3, 1) float64 column: in a very large scene it may be beyond float32.
+
+    Raises
+    ------
+    SceneError
+        If it is not one or three finite numbers, at least 0.
+    """
+    return rgb(name, value, dtype=np.float64)
+
+
+def scaled_intensity(name: str, intensity: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
+    """Return an intensity (3, 1) in a scene whose lengths were multiplied by `factor`.
+
+    Raises
+    ------
+    SceneError
+        If it is then beyond float32.
+    """
+    scaled = intensity * factor * factor
+    if scaled.max() > FLOAT32_MAX:
+        raise SceneError(
+            f"{name} is {intensity.max():.3g}; in a scene of this size it must be at most "
+            f"{FLOAT32_MAX / factor / factor:.3g}"
+        )
+    return scaled

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SceneError, finite_array, number, rgb
+from ..errors import SceneError, finite_array, number
 from ..record import record
 from ..vec import Floats, dot, f4
 from .base import Light, LightSample
 from .directional import unit
+from .point import intensity_of, scaled_intensity
 
 
 @record
@@ -114,7 +116,7 @@ class SpotLight:
         blend: float = 0.15,
     ) -> None:
         self.position = finite_array("SpotLight position", position, (3,))
-        self.intensity = rgb("SpotLight intensity", intensity)
+        self.intensity = intensity_of("SpotLight intensity", intensity)
         if (target is None) == (direction is None):
             raise SceneError("SpotLight needs a target or a direction, and not both")
         if target is not None:
@@ -129,6 +131,19 @@ class SpotLight:
         )
         self.blend = number("SpotLight blend", blend, lambda x: 0 <= x <= 1, "in [0, 1]")
 
+    def scaled(self, factor: float) -> SpotLight:
+        """Return the light for a scene whose lengths were multiplied by `factor`: the same irradiance there.
+
+        Raises
+        ------
+        SceneError
+            If its intensity is then beyond float32.
+        """
+        light = copy(self)
+        light.position = self.position * factor
+        light.intensity = scaled_intensity("SpotLight intensity", self.intensity, factor)
+        return light
+
     def record(self, centre: NDArray[np.float64]) -> SpotLights:
         """Return the light as a record of one column, relative to `centre` (3,)."""
         half = np.radians(self.angle) / 2
@@ -140,5 +155,5 @@ class SpotLight:
             self.direction.astype(f4).reshape(3, 1),
             np.array([outer], f4),
             np.array([1 / width], f4),
-            self.intensity,
+            self.intensity.astype(f4),
         )

@@ -85,6 +85,22 @@ class Instance:
         mesh.tangents = moved_tangents(self.transform, mesh.tangents)
         return mesh
 
+    def scaled(self, factor: float, mesh: Mesh, own: float) -> Instance:
+        """Return the instance with all lengths multiplied by `factor`, and the same material.
+
+        Parameters
+        ----------
+        factor
+            Of lengths in the scene.
+        mesh, own
+            What it places: its mesh, with the lengths there multiplied by `own`.
+        """
+        instance = copy(self)
+        instance.mesh, instance.transform = mesh, self.transform.copy()
+        instance.transform[:3, :3] *= factor / own
+        instance.transform[:3, 3] *= factor
+        return instance
+
     def _placed(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return where vertices (n, 3) are placed, (3, n)."""
         with np.errstate(over="ignore"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -100,6 +101,12 @@ class Mesh:
         if self._emission is not None or material.emission is None:
             return self._emission
         return material.emission.radiance
+
+    def scaled(self, factor: float) -> Mesh:
+        """Return the mesh with all lengths multiplied by `factor`, and the same material."""
+        mesh = copy(self)
+        mesh.vertices = self.vertices * factor
+        return mesh
 
     @property
     def bounds(self) -> NDArray[np.float64]:

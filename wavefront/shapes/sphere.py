@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -73,6 +74,12 @@ class Sphere:
         if self._emission is not None or self.material.emission is None:
             return self._emission
         return self.material.emission.radiance
+
+    def scaled(self, factor: float) -> Sphere:
+        """Return the sphere with all lengths multiplied by `factor`, and the same material."""
+        sphere = copy(self)
+        sphere.center, sphere.radius = self.center * factor, self.radius * factor
+        return sphere
 
     @property
     def bounds(self) -> NDArray[np.float64]:
