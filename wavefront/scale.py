@@ -21,7 +21,8 @@ from .errors import SceneError
 from .lights import PointLight, SpotLight
 from .shapes import Instance, Mesh, Sphere
 
-SAFE = 2.0**20  # scenes of a radius from 1/SAFE to SAFE stay as they are
+# Radii of scenes that stay as they are. There is more room above: parts of a scene are only ever smaller.
+SMALLEST, LARGEST = 2.0**-20, 2.0**24
 FARTHEST = 2.0**60  # of cameras and lights from the scene's center, as the render counts lengths
 
 Shape = Mesh | Sphere | Instance
@@ -29,7 +30,7 @@ Shape = Mesh | Sphere | Instance
 
 def length_factor(radius: float) -> float:
     """Return the power of two that brings a radius beyond the safe range into [1, 2); within it 1."""
-    if radius == 0 or 1 / SAFE <= radius <= SAFE:
+    if radius == 0 or SMALLEST <= radius <= LARGEST:
         return 1.0
     return 2.0 ** (1 - int(np.frexp(radius)[1]))
 
