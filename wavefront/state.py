@@ -95,7 +95,7 @@ class Paths(Rays):
     sample: Words  # (n,) sample index within the pixel: second part of the address
     throughput: Floats  # (3, n) product of BSDF weights since the camera
     pdf: Floats  # (n,) density of the last BSDF sample, 1/sr; unused where specular
-    specular: Bools  # (n,) the last direction came from a delta lobe or from the camera
+    specular: Bools  # (n,) no light sample could have found the last direction: delta lobe, camera
     eta2: Floats  # (n,) square of the relative refractive index crossed so far
     vertex: Floats | None = None  # (3, n) where the paths last scattered; None where that is `origin`
 

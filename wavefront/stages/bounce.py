@@ -9,9 +9,9 @@ import numpy as np
 from ..bsdfs import BsdfSample
 from ..sampling.sampler import Dimension, Sampler
 from ..state import Paths
-from ..vec import Floats, columns, f4
+from ..vec import Floats, Ints, columns, f4, normalize, signs
 from .shade import Shading
-from .surface import leave
+from .surface import LIFT, leave
 
 
 def branch(paths: Paths, shade: Shading, sampler: Sampler, bounce: int, ways: int) -> Paths:
@@ -32,13 +32,20 @@ def branch(paths: Paths, shade: Shading, sampler: Sampler, bounce: int, ways: in
 def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -> Paths:
     """Sample the BSDF at each point and return the paths as they leave it.
 
-    The throughput is 0 where there is no sample, and where shading and geometric normal disagree
-    on the side of the sampled direction.
+    The throughput is 0 where there is no sample. Where shading and geometric normal disagree on the
+    side of the sampled direction it is 0 at opaque surfaces; at others the direction is turned.
     """
     surface = shade.surface
     sample = _sample(shade, _numbers(paths, shade, sampler, bounce))
     direction = shade.frame.to_world(sample.wi)
     cos, cos_g = shade.cosines(sample.wi, direction)
+    specular = sample.specular
+    turned = _strayed(shade, sample.wi, cos)
+    if turned.size:
+        direction[:, turned], cos_g[turned] = _turn(shade, turned, direction, cos_g, sample.wi[2])
+        cos[turned] = LIFT
+        specular = specular.copy()
+        specular[turned] = True  # no light sample finds these directions
     throughput = paths.throughput * sample.weight
     if not (cos > 0).all():
         lost = np.flatnonzero(~(cos > 0))
@@ -52,9 +59,41 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         leaving=surface.prim,
         throughput=throughput,
         pdf=sample.pdf,
-        specular=sample.specular,
+        specular=specular,
         eta2=paths.eta2 if sample.eta is None else paths.eta2 * sample.eta**2,
     )
+
+
+def _strayed(shade: Shading, wi: Floats, cos: Floats) -> Ints:
+    """Return the lanes (k,) of clear surfaces whose local directions lead to the wrong side of `ng`.
+
+    `cos` (n,) is 0 there. At an opaque surface such light is lost. Light that meets a clear one is
+    not: it is reflected or gets through.
+    """
+    if shade.surface.ns is shade.surface.ng:
+        return np.zeros(0, np.intp)
+    found = [
+        np.flatnonzero((cos[lanes] == 0) & (wi[2, lanes] != 0)) + lanes.start
+        for lanes, bsdf in shade.groups
+        if bsdf.transmissive
+    ]
+    return np.concatenate(found) if found else np.zeros(0, np.intp)
+
+
+def _turn(
+    shade: Shading, lanes: Ints, direction: Floats, cos_g: Floats, z: Floats
+) -> tuple[Floats, Floats]:
+    """Return directions (3, k) of some lanes, turned to the side of `ng` that z tells, and their cosines.
+
+    Reflected light stays outside or inside, refracted light crosses, and the index of refraction
+    and the absorption, which go by the geometric side, are those of the side that the ray is on.
+    A turned direction is the nearest one on that side that makes the cosine `LIFT` with the surface.
+    The renderers pbrt-v4 and Mitsuba 3 keep the direction and let the ray start on the side that it
+    leads to, which leaves a refracted ray where it was, but weakened by η².
+    """
+    ng, cos = shade.surface.ng.take(lanes, 1), cos_g.take(lanes)
+    wanted = LIFT * signs(z.take(lanes))
+    return normalize(direction.take(lanes, 1) + ng * (wanted - cos)), wanted
 
 
 def _sample(shade: Shading, u: Floats) -> BsdfSample:

@@ -7,9 +7,8 @@ import numpy as np
 from ..scene import CompiledScene
 from ..state import Surface
 from ..vec import Floats, dot, f4, normalize
-from .surface import towards
+from .surface import LIFT, towards
 
-LIFT = f4(0.01)  # the least cosine of a mirrored direction against the geometric normal
 SHALLOWER = f4(0.9)  # but no more than this part of wo's own
 
 

@@ -13,6 +13,7 @@ from ..vec import ALL, Floats, Ints, Lanes, columns, dot, f4, highest, length, n
 # o + t·d carries at most three roundings of half an ulp (2⁻²⁴) of its terms; this is five times that.
 POINT_ERROR = f4(2**-21)
 MIN_COS = f4(1e-3)  # the least cosine between wo and the shading normal
+LIFT = f4(0.01)  # the cosine against `ng` to which directions that lead below the surface are raised
 
 
 def interact(scene: CompiledScene, rays: Rays, hits: Hits) -> Surface:
