@@ -75,7 +75,8 @@ class TriangleLights(Light):
         b2 = dot(wi, q) * inverse
         t = dot(self.edge2, q) * inverse
         meets = lit & (t > 0) & (b1 >= 0) & (b2 >= 0) & (b1 + b2 <= 1)
-        return np.where(meets, t * t, f4(0)) / (np.where(meets, cos_light, f4(1)) * self.area)
+        t = np.where(meets, t, f4(0))  # elsewhere its square may be beyond float32
+        return t * t / (np.where(meets, cos_light, f4(1)) * self.area)
 
     def le(self, wi: Floats) -> Floats:
         """Return the radiance on rays that come upon a side that shines, (3, n)."""
