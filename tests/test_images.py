@@ -2,7 +2,11 @@
 
 import os
 import stat
+import struct
+import subprocess
 import sys
+import tracemalloc
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +14,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wavefront.errors import SceneError
-from wavefront.io import files, png, rgbe
+from wavefront.errors import SaveError, SceneError
+from wavefront.io import coded, files, rgbe
 from wavefront.io.images import (
     check_writable,
     linear_to_srgb,
@@ -65,12 +69,13 @@ def test_png_keeps_every_code(shape):
     import imageio.v3 as iio
 
     noise = np.random.default_rng(3).integers(0, 256, (*shape, 3), np.uint8)
-    data = png.encode(noise)
+    data = coded.encode(noise, ".png", 2.2)
     assert np.array_equal(iio.imread(data, extension=".png"), noise)
     assert len(data) < noise.size * 1.05 + 100
     even = np.full((*shape, 3), 200, np.uint8)
-    assert np.array_equal(iio.imread(png.encode(even), extension=".png"), even)
-    assert len(png.encode(even)) < 100 + noise.size / 50
+    flat = coded.encode(even, ".png", 2.2)
+    assert np.array_equal(iio.imread(flat, extension=".png"), even)
+    assert len(flat) < 120 + noise.size / 50
 
 
 def test_jpg_is_close(tmp_path):
@@ -154,9 +159,9 @@ def test_float_formats_keep_nan(tmp_path, picture):
 )
 def test_refuses_to_write(tmp_path, picture, name, message):
     (tmp_path / "folder.png").mkdir()
-    with pytest.raises(SceneError, match=message):
+    with pytest.raises(SaveError, match=message):
         check_writable(tmp_path / name)
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(SaveError, match=message):
         write_image(tmp_path / name, picture)
     assert [p.name for p in tmp_path.iterdir()] == ["folder.png"]
 
@@ -176,10 +181,12 @@ def test_refuses_a_folder_without_permission(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"gamma": 0}, "gamma is 0; it must be above 0"),
+        ({"gamma": 0}, "gamma is 0; it must be from 0.01 to 100"),
+        ({"gamma": 1e6}, "gamma is 1000000.0; it must be from 0.01 to 100"),
         ({"gamma": "rec709"}, "gamma is 'rec709'"),
         ({"gamma": float("nan")}, "gamma is nan"),
         ({"exposure": float("inf")}, "exposure is inf"),
+        ({"exposure": 5000}, "exposure is 5000; it must be from -100 to 100"),
     ],
 )
 def test_refuses_arguments(tmp_path, picture, arguments, message):
@@ -193,7 +200,7 @@ def test_refuses_shapes(tmp_path, shape):
         write_image(tmp_path / "a.png", np.zeros(shape))
 
 
-def test_a_failed_write_keeps_the_old_file(tmp_path, picture, monkeypatch):
+def test_a_failed_write_keeps_the_old_file(tmp_path, picture, monkeypatch, scratch):
     path = tmp_path / "a.npy"
     write_image(path, picture)
     before = path.read_bytes()
@@ -202,14 +209,157 @@ def test_a_failed_write_keeps_the_old_file(tmp_path, picture, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(files.os, "fsync", no_space)
-    with pytest.raises(SceneError, match=r"a\.npy: cannot be written: .*No space left"):
+    with pytest.raises(SaveError, match=r"a\.npy: cannot be written: .*No space left"):
         write_image(path, picture * 2)
     assert path.read_bytes() == before
     assert [p.name for p in tmp_path.iterdir()] == ["a.npy"]
 
 
+# --- Saving ------------------------------------------------------------------------------------------
+
+posix = pytest.mark.skipif(sys.platform == "win32", reason="POSIX permissions, links and pipes")
+
+
+@pytest.fixture(params=["nameless", "named"])
+def scratch(request, monkeypatch):
+    """Write with scratch files of both kinds."""
+    if request.param == "named":
+        monkeypatch.setattr(files, "OPEN_FILES", "/no/such/folder")
+    return request.param
+
+
+@pytest.mark.parametrize("extension", ["png", "jpg", "exr", "hdr", "npy"])
+def test_no_other_folder_is_needed(tmp_path, picture, monkeypatch, extension, scratch):
+    """Least of all the system's folder for temporary files."""
+    import tempfile
+
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "missing"))
+    write_image(tmp_path / f"a.{extension}", picture)
+    assert read_image(tmp_path / f"a.{extension}").shape == picture.shape
+    assert [p.name for p in tmp_path.iterdir()] == [f"a.{extension}"]
+
+
+@posix
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o444])
+def test_a_replaced_file_keeps_its_permissions(tmp_path, picture, scratch, mode):
+    path = tmp_path / "a.npy"
+    write_image(path, picture)
+    path.chmod(mode)
+    write_image(path, picture * 2)
+    assert stat.S_IMODE(path.stat().st_mode) == mode
+    assert np.array_equal(read_image(path), picture * 2)
+
+
+@posix
+def test_a_symbolic_link_is_followed(tmp_path, picture, scratch):
+    (tmp_path / "there").mkdir()
+    (tmp_path / "link.npy").symlink_to(tmp_path / "there" / "a.npy")
+    for factor in (1, 2):
+        write_image(tmp_path / "link.npy", picture * factor)
+        assert (tmp_path / "link.npy").is_symlink()
+        assert np.array_equal(read_image(tmp_path / "there" / "a.npy"), picture * factor)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes")
+def test_a_pipe_is_not_replaced(tmp_path, picture):
+    os.mkfifo(tmp_path / "p.png")
+    for write in (check_writable, lambda path: write_image(path, picture)):
+        with pytest.raises(SaveError, match=r"p\.png: is a device or pipe; only regular files are written"):
+            write(tmp_path / "p.png")
+    assert stat.S_ISFIFO((tmp_path / "p.png").stat().st_mode)
+
+
+@posix
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("x" * 252 + ".png", "File name too long"),
+        ("图" * 90 + ".png", "File name too long"),
+        ("a\0b.png", "null"),
+        ("loop.png", "[Ss]ymbolic links"),
+        ("file/a.png", "the folder .*file does not exist"),
+    ],
+)
+def test_names_that_cannot_be(tmp_path, picture, name, message):
+    """Are found before the render, and no untyped error comes of them afterwards."""
+    (tmp_path / "loop.png").symlink_to(tmp_path / "loop.png")
+    (tmp_path / "file").write_text("")
+    path = f"{tmp_path}/{name}"
+    for write in (check_writable, lambda path: write_image(path, picture)):
+        with pytest.raises(SaveError, match=message):
+            write(path)
+
+
+def test_a_name_of_255_bytes_is_written(tmp_path, picture, scratch):
+    name = "图" * 83 + "xx.png"
+    assert len(name.encode()) == 255
+    write_image(tmp_path / name, picture)
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.parametrize("path", [5, b"a.png", None, 2.5])
+def test_what_is_no_path_is_refused(picture, path):
+    for write in (check_writable, lambda path: write_image(path, picture)):
+        with pytest.raises(SaveError, match=f"path is {path!r}; it must be text or a path"):
+            write(path)
+    with pytest.raises(SceneError, match=f"path is {path!r}; it must be text or a path"):
+        read_image(path)
+
+
+@posix
+def test_a_folder_that_cannot_be_read_is_written_to(tmp_path, picture, monkeypatch):
+    """As one of permissions -wx."""
+    open_file = os.open
+
+    def refuse(path, flags, *args, **kwargs):
+        if flags == os.O_RDONLY:
+            raise PermissionError(13, "Permission denied", path)
+        return open_file(path, flags, *args, **kwargs)
+
+    monkeypatch.setattr(files.os, "open", refuse)
+    write_image(tmp_path / "a.npy", picture)
+    assert np.array_equal(np.load(tmp_path / "a.npy"), picture)
+
+
+def test_a_read_only_file_system_is_a_save_error(tmp_path, picture, monkeypatch):
+    """Also one that becomes so after the check."""
+
+    def refuse(path, flags, *args, **kwargs):
+        raise OSError(30, "Read-only file system", path)
+
+    monkeypatch.setattr(files.os, "open", refuse)
+    with pytest.raises(SaveError, match=r"a\.png: cannot be written: .*Read-only file system"):
+        write_image(tmp_path / "a.png", picture)
+
+
+def test_what_encoders_refuse_is_a_save_error(tmp_path):
+    with pytest.raises(SaveError, match=r"a\.jpg: cannot be encoded: a jpg has at most 65500 rows"):
+        write_image(tmp_path / "a.jpg", np.zeros((1, 65501, 3)))
+    with pytest.raises(SaveError, match=r"a\.exr: cannot be encoded"):
+        write_channels(tmp_path / "a.exr", {"Z": np.zeros((2, 2), "f4"), "id": np.zeros((3, 3), "f4")})
+    assert not list(tmp_path.iterdir())
+
+
+@posix
+@pytest.mark.parametrize("signal", ["SIGTERM", "SIGKILL"])
+def test_a_killed_process_leaves_nothing_behind(tmp_path, signal):
+    """Where the system has files without names."""
+    if files._open_nameless(tmp_path) is None:
+        pytest.skip("no files without names here")
+    code = (
+        "import os, signal, sys, numpy as np\n"
+        "from wavefront.io import files\n"
+        "from wavefront.io.images import write_image\n"
+        f"files.os.fsync = lambda handle: os.kill(os.getpid(), signal.{signal})\n"
+        "write_image(sys.argv[1], np.ones((4, 4, 3)))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, tmp_path / "a.npy"], check=False, timeout=60)
+    assert done.returncode < 0
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX permissions")
-def test_a_written_file_has_ordinary_permissions(tmp_path, picture):
+def test_a_written_file_has_ordinary_permissions(tmp_path, picture, scratch):
     mask = os.umask(0)
     os.umask(mask)
     write_image(tmp_path / "a.png", picture)
@@ -247,20 +397,19 @@ def test_a_pipe_is_refused_at_once(tmp_path):
         read_image(tmp_path / "p.png")
 
 
-def _bomb_png(width, height):
-    import struct
-    import zlib
+def _png(width, height, rows, bits=8, kind=0, interlaced=0):
+    """A png whose header claims `width` × `height` pixels; `rows` are its bytes before deflate."""
 
-    def chunk(kind, body):
-        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+    def chunk(name, body):
+        return struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
 
-    header = chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0))
-    return b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", zlib.compress(bytes(1000))) + chunk(b"IEND", b"")
+    header = chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, kind, 0, 0, interlaced))
+    return b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
 
 
 @pytest.mark.parametrize("width", [30000, 12000])
 def test_a_bomb_is_refused_before_decoding(tmp_path, width):
-    (tmp_path / "b.png").write_bytes(_bomb_png(width, width))
+    (tmp_path / "b.png").write_bytes(_png(width, width, bytes(1000)))
     with pytest.raises(SceneError, match=rf"b\.png: image has {width} × {width} pixels; the limit is"):
         read_image(tmp_path / "b.png")
     (tmp_path / "b.hdr").write_bytes(f"#?RADIANCE\n\n-Y {width} +X {width}\n".encode())
@@ -317,3 +466,146 @@ def test_paths_may_be_strings_or_not_ascii(tmp_path, picture):
     write_image(path, picture)
     assert read_image(path).shape == picture.shape
     assert Path(path).exists()
+
+
+# --- Files that claim more than they hold ------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("bits", "kind", "channels"), [(8, 0, 1), (8, 2, 3), (16, 6, 4), (1, 0, 1)])
+def test_a_png_with_too_few_rows_is_an_error(tmp_path, bits, kind, channels):
+    """And not a picture that is black below."""
+    width, height = 13, 24
+    row = b"\0" + bytes(range(1, 1 + (width * bits * channels + 7) // 8))
+    path = tmp_path / "a.png"
+    path.write_bytes(_png(width, height, row * height, bits, kind))
+    assert read_image(path).shape[:2] == (height, width)
+    for rows in (0, 8, height - 1):
+        path.write_bytes(_png(width, height, row * rows, bits, kind))
+        with pytest.raises(SceneError, match=rf"a\.png: ends early: 13 × 24 pixels take {height * len(row)}"):
+            read_image(path)
+
+
+@pytest.mark.parametrize(("width", "height"), [(8, 8), (13, 5), (1, 1), (3, 9)])
+def test_the_passes_of_an_interlaced_png_are_counted(tmp_path, width, height):
+    """One byte less than there must be is an error."""
+    steps = [(0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2)]
+    size = sum(
+        len(range(y, height, dy)) * (1 + len(range(x, width, dx))) if x < width else 0
+        for x, y, dx, dy in steps
+    )
+    path = tmp_path / "a.png"
+    path.write_bytes(_png(width, height, bytes(size), interlaced=1))
+    assert read_image(path).shape == (height, width, 1)
+    path.write_bytes(_png(width, height, bytes(size - 1), interlaced=1))
+    with pytest.raises(SceneError, match=rf"take {size} bytes; {size - 1} are there"):
+        read_image(path)
+
+
+def test_a_small_png_that_claims_much_costs_little(tmp_path):
+    """Neither by its header, nor by bytes that deflate to much more than the picture."""
+    path = tmp_path / "a.png"
+    for name, content in (
+        ("few bytes", _png(9, 8_323_079, bytes(300_000))),
+        ("many bytes", _png(8000, 4000, bytes(20_000_000))),
+        ("too many bytes", _png(4, 4, bytes(30_000_000))),
+    ):
+        path.write_bytes(content)
+        tracemalloc.start()
+        if name == "too many bytes":
+            assert not read_image(path).any()
+        else:
+            with pytest.raises(SceneError, match=r"a\.png: ends early"):
+                read_image(path)
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert peak < 4_000_000
+
+
+def _jpg(height, width=40):
+    """A jpg of noise."""
+    noise = np.random.default_rng(5).integers(0, 256, (height, width, 3), np.uint8)
+    return coded.encode(noise, ".jpg", 2.2)
+
+
+def _claims_rows(jpg, rows):
+    at = jpg.index(b"\xff\xc0") + 5
+    return jpg[:at] + struct.pack(">H", rows) + jpg[at + 2 :]
+
+
+def test_a_jpg_with_too_few_rows_is_an_error(tmp_path):
+    """And not a picture that is grey below; nor is a large one of a few bytes."""
+    path = tmp_path / "a.jpg"
+    for rows in (40, 56, 65000):
+        path.write_bytes(_claims_rows(_jpg(32), rows))
+        with pytest.raises(SceneError, match=r"a\.jpg: ends early"):
+            read_image(path)
+    path.write_bytes(_jpg(32)[:-400] + b"\xff\xd9")
+    with pytest.raises(SceneError, match=r"a\.jpg: ends early"):
+        read_image(path)
+
+
+def test_a_grey_jpg_is_read(tmp_path):
+    """Its last pixel is what the decoder leaves where data are missing."""
+    path = tmp_path / "a.jpg"
+    for values in (128, 127, 129):
+        path.write_bytes(coded.encode(np.full((21, 35, 3), values, np.uint8), ".jpg", 2.2))
+        assert np.abs(read_image(path) * 255 - values).max() <= 1
+
+
+def _exr(parts, path):
+    """Write an exr of (name, channels) per part."""
+    import OpenEXR
+
+    window = np.array([0, 0], np.int32), np.array([399, 299], np.int32)
+    header = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION, "displayWindow": window}
+    OpenEXR.File([OpenEXR.Part(dict(header), channels, name) for name, channels in parts]).write(str(path))
+
+
+def test_all_parts_and_channels_of_an_exr_count(tmp_path, monkeypatch):
+    """The library decodes them all."""
+    path = tmp_path / "a.exr"
+    small, flat = np.ones((4, 4), "f4"), np.zeros((300, 400), "f4")
+    monkeypatch.setattr("wavefront.io.exr.MAX_VALUES", 1_000_000)
+    _exr([("a", {"Y": small}), ("b", {"Y": flat})], path)
+    assert read_image(path).shape == (4, 4, 1)
+    _exr([("a", {"Y": small}), *((f"b{k}", {"Y": flat}) for k in range(9))], path)
+    with pytest.raises(SceneError, match=r"a\.exr: claims 1080016 values in 10 parts; the limit is 1000000"):
+        read_image(path)
+    _exr([("a", {f"c{k}": flat for k in range(9)})], path)
+    with pytest.raises(SceneError, match=r"a\.exr: claims 1080000 values in 1 part"):
+        read_image(path)
+
+
+def test_no_part_of_an_exr_stands_in_for_another(tmp_path, capfd):
+    """The library leaves out what it cannot decode, so the second part would become the first."""
+    path = tmp_path / "a.exr"
+    noise = np.random.default_rng(0).random((16, 16, 3)).astype("f4")
+    _exr([("a", {"RGB": noise}), ("b", {"RGB": np.full((16, 16, 3), 7, "f4")})], path)
+    data = path.read_bytes()
+    outcomes = set()
+    for at in range(700, 900):  # the offsets of chunks, and what leads the first chunk
+        path.write_bytes(data[:at] + bytes([data[at] ^ 0xFF]) + data[at + 1 :])
+        try:
+            assert read_image(path).mean() < 1
+        except SceneError as error:
+            outcomes.add(str(error).partition("a.exr: ")[2])
+    assert "part 0 ('a') of 2 is damaged" in outcomes
+
+
+def test_an_exr_with_channels_of_other_sizes_is_an_error(tmp_path):
+    """Subsampled channels do not fit the picture."""
+    path = tmp_path / "a.exr"
+    _exr([("a", {"Y": np.ones((4, 2), "f4")})], path)
+    data = path.read_bytes()
+    for before, after in (
+        (b"Y\0" + struct.pack("<IIII", 2, 0, 1, 1), b"Y\0" + struct.pack("<IIII", 2, 0, 2, 1)),  # x sampling
+        (
+            b"box2i\0" + struct.pack("<IIIII", 16, 0, 0, 1, 3),
+            b"box2i\0" + struct.pack("<IIIII", 16, 0, 0, 3, 3),
+        ),
+    ):
+        assert data.count(before) == 1
+        data = data.replace(before, after)
+    path.write_bytes(data)
+    with pytest.raises(SceneError, match=r"a\.exr: channel 'Y' has 2 × 4 values; the picture has 4 × 4"):
+        read_image(path)

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .io import png
-from .io.images import to_8bit, write_image
+from .errors import SceneError
+from .io.coded import Gamma
+from .io.images import encode_png, exposed, read_linear, to_8bit, write_image
 
 
 class Image:
@@ -63,25 +64,85 @@ class Image:
         """Return `rgb`."""
         return np.array(self.rgb, dtype=dtype, copy=copy)
 
-    def save(self, path: str | os.PathLike[str], gamma: float | str = 2.2, exposure: float = 0.0) -> None:
+    def __getitem__(self, key: Any) -> NDArray[np.float32]:
+        """Return `rgb[key]`: image[y, x] is one pixel, (3,)."""
+        return self.rgb[key]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W, 3), of `rgb`."""
+        return self.rgb.shape
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Image:
+        """Read a picture by its extension, as linear values.
+
+        png and jpg files are decoded by the gamma that they name, as those that `save` writes do, and
+        by the sRGB curve if they name none. exr, hdr and npy are linear. Alpha is left out; one channel
+        becomes three.
+
+        Parameters
+        ----------
+        path
+            A png, jpg, exr, hdr or npy file.
+
+        Raises
+        ------
+        SceneError
+            Naming the file: missing, of another kind, corrupt, truncated, or too large.
+        """
+        pixels = read_linear(path)
+        if not 1 <= pixels.shape[2] <= 4:
+            raise SceneError(f"{os.fspath(path)}: has {pixels.shape[2]} channels; a picture has 1 to 4")
+        return cls(three_channels(pixels))
+
+    def to_uint8(self, gamma: Gamma = 2.2, exposure: float = 0.0) -> NDArray[np.uint8]:
+        """Return the picture as (H, W, 3) codes for display, those that `save` writes into a png.
+
+        Parameters
+        ----------
+        gamma
+            Values are clipped to [0, 1] and raised to 1/gamma; "srgb" is the exact sRGB curve.
+        exposure
+            Stops (factors of 2) by which the picture is brightened first.
+
+        Raises
+        ------
+        SceneError
+            If gamma or exposure is out of range.
+        """
+        return to_8bit(exposed(self.rgb, exposure), gamma)
+
+    def save(self, path: str | os.PathLike[str], gamma: Gamma = 2.2, exposure: float = 0.0) -> None:
         """Write the picture by its extension: png or jpg for display; exr, hdr and npy linear.
+
+        The file holds its old content or all of the new, never a part. It keeps its permissions, and a
+        symbolic link is followed.
 
         Parameters
         ----------
         path
             Where to write.
         gamma
-            png and jpg hold value^(1/gamma); "srgb" is the exact sRGB curve.
+            png and jpg hold value^(1/gamma), and say so; "srgb" is the exact sRGB curve.
         exposure
             Stops (factors of 2) by which the picture is brightened first, in every format.
 
         Raises
         ------
+        SaveError
+            If the file cannot be written: an unknown extension, a folder that is missing, no space. It
+            is a SceneError and an OSError.
         SceneError
-            If the extension is unknown, the folder is missing, or gamma is out of range.
+            If gamma or exposure is out of range.
         """
         write_image(path, self.rgb, gamma=gamma, exposure=exposure)
 
     def _repr_png_(self) -> bytes:
         """Show the picture in a notebook."""
-        return png.encode(to_8bit(self.rgb))
+        return encode_png(self.rgb)
+
+
+def three_channels(pixels: NDArray[Any]) -> NDArray[Any]:
+    """Return the colors (H, W, 3) of pixels (H, W, 1 to 4), without alpha."""
+    return pixels[..., :3] if pixels.shape[2] > 2 else np.repeat(pixels[..., :1], 3, axis=2)

@@ -12,13 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import SceneError
 from .film import EPSILON
-from .image import Image
-from .io.images import read_image, srgb_to_linear
+from .image import Image, three_channels
+from .io.coded import EXTENSIONS
+from .io.images import codes_to_linear
 
 Picture: TypeAlias = Image | ArrayLike | str | os.PathLike[str]
 Doubles = NDArray[np.float64]
-
-CODED = (".png", ".jpg", ".jpeg")  # formats that hold sRGB codes; the others are linear
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +64,8 @@ def compare(a: Picture, b: Picture) -> Comparison:
     Parameters
     ----------
     a, b
-        Images, (H, W), (H, W, 3) or (H, W, 4) arrays of linear values, or paths of png, jpg (decoded
-        by the sRGB curve), exr, hdr or npy files. Alpha is left out.
+        Images, paths that `Image.load` reads, or arrays (H, W), (H, W, 3) or (H, W, 4): uint8 and
+        uint16 are sRGB codes that count from 0 to 1, all others are linear values. Alpha is left out.
 
     Raises
     ------
@@ -99,31 +98,34 @@ def _decibels(peak: float, rmse: float) -> float:
 
 
 def _is_coded(picture: Picture) -> bool:
-    return isinstance(picture, str | os.PathLike) and Path(picture).suffix.lower() in CODED
+    """Return whether a picture is made of 8- or 16-bit codes."""
+    if isinstance(picture, str | os.PathLike):
+        return Path(picture).suffix.lower() in EXTENSIONS
+    return getattr(picture, "dtype", None) in (np.uint8, np.uint16)
 
 
 def _pixels(name: str, picture: Picture) -> Doubles:
     """Return linear values, (H, W, 3)."""
     values: Any = picture
-    if isinstance(picture, Image):
+    if isinstance(picture, str | os.PathLike):
+        name, values = os.fspath(picture), Image.load(picture).rgb
+    elif isinstance(picture, Image):
         values = picture.rgb
-    elif isinstance(picture, str | os.PathLike):
-        name, values = os.fspath(picture), read_image(picture)
-        if _is_coded(picture):
-            values[..., :3] = srgb_to_linear(values[..., :3])
     try:
-        pixels = np.asarray(values, np.float64)
+        pixels = np.asarray(values)
+        pixels = pixels if _is_coded(pixels) else pixels.astype(np.float64)
     except (TypeError, ValueError) as error:
         raise SceneError(f"{name} is not a picture: {type(picture).__name__}") from error
     pixels = pixels[..., None] if pixels.ndim == 2 else pixels
     if pixels.ndim != 3 or not pixels.size or pixels.shape[2] not in (1, 2, 3, 4):
         raise SceneError(f"{name} has shape {pixels.shape}; a picture is (H, W) or (H, W, 1 to 4)")
-    colours = pixels[..., :3] if pixels.shape[2] > 2 else np.repeat(pixels[..., :1], 3, 2)
-    bad = np.argwhere(~np.isfinite(colours))
+    linear = codes_to_linear(pixels) if _is_coded(pixels) else pixels
+    colors: Doubles = three_channels(linear).astype(np.float64)
+    bad = np.argwhere(~np.isfinite(colors))
     if len(bad):
         y, x, _ = bad[0]
         raise SceneError(f"{name} has {len(bad)} values that are not finite, the first at x={x}, y={y}")
-    return colours
+    return colors
 
 
 def _flip(left: Doubles, right: Doubles, coded: bool) -> tuple[float | None, str]:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import stat
 from pathlib import Path
 
-from ..errors import SceneError
+from ..errors import SaveError, SceneError
 
 MAX_BYTES = 2**31  # larger files are refused before they are read
 MAX_PIXELS = 2**27  # 16384 × 8192; larger images are refused before they are decoded
+OPEN_FILES = "/proc/self/fd"  # Linux: the open files of the process, by number
 
 
 def read_bytes(path: str | os.PathLike[str], limit: int = MAX_BYTES) -> bytes:
@@ -20,7 +22,7 @@ def read_bytes(path: str | os.PathLike[str], limit: int = MAX_BYTES) -> bytes:
     SceneError
         If the file is missing, unreadable, not a regular file, or larger than `limit` bytes.
     """
-    name = os.fspath(path)
+    name = path_name(path)
     try:
         info = os.stat(name)
         if stat.S_ISDIR(info.st_mode):
@@ -84,54 +86,119 @@ def check_size(height: int, width: int) -> None:
         raise SceneError(f"image has {width} × {height} pixels; the limit is {MAX_PIXELS}")
 
 
-def check_folder(path: str | os.PathLike[str]) -> Path:
-    """Return `path`, after making sure that a file can be written there.
+def path_name(path: str | os.PathLike[str], error: type[SceneError] = SceneError) -> str:
+    """Return a path as text.
 
     Raises
     ------
     SceneError
-        If the folder is missing or not writable, or the path is itself a folder.
+        Or the subclass `error`, if it is neither text nor a path made of text.
     """
-    target = Path(os.path.realpath(path))
-    folder = target.parent
-    if target.is_dir():
-        raise SceneError(f"{path}: is a folder, not a file name")
-    if not folder.is_dir():
-        raise SceneError(f"{path}: the folder {folder} does not exist")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise SceneError(f"{path}: the folder {folder} is not writable")
+    name = os.fspath(path) if isinstance(path, os.PathLike) else path
+    if not isinstance(name, str):
+        raise error(f"path is {path!r}; it must be text or a path such as pathlib.Path")
+    return name
+
+
+def check_target(path: str | os.PathLike[str]) -> Path:
+    """Return where `path` leads, after making sure that a file can be written there.
+
+    Raises
+    ------
+    SaveError
+        If the name is not usable, the folder is missing or not writable, or something other than a
+        regular file is there.
+    """
+    name = path_name(path, SaveError)
+    try:
+        target = Path(os.path.realpath(name))
+        if not target.parent.is_dir():
+            raise SaveError(f"{name}: the folder {target.parent} does not exist")
+        _mode(target)
+        if not os.access(target.parent, os.W_OK | os.X_OK):
+            raise SaveError(f"{name}: the folder {target.parent} is not writable")
+    except SaveError:
+        raise
+    except (OSError, ValueError) as error:
+        raise SaveError(f"{name!r}: cannot be written: {error}") from error
     return target
+
+
+def _mode(target: Path) -> int | None:
+    """Return the permissions of the file that is to be replaced, None if there is none."""
+    try:
+        mode = os.stat(target).st_mode
+    except FileNotFoundError:
+        return None
+    if stat.S_ISDIR(mode):
+        raise SaveError(f"{target}: is a folder, not a file name")
+    if not stat.S_ISREG(mode):
+        raise SaveError(f"{target}: is a device or pipe; only regular files are written")
+    return mode & 0o777
 
 
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
     """Write a file so that, whatever happens, it holds either its old content or all of the new.
 
+    A file that is replaced keeps its permissions. Symbolic links are followed.
+
     Raises
     ------
-    SceneError
+    SaveError
         If it cannot be written; the old content is intact and nothing is left behind.
     """
-    target = check_folder(path)
-    scratch = target.with_name(f".{target.name[:200]}.{os.urandom(6).hex()}.tmp")
+    target = check_target(path)
+    scratch = target.with_name(f".wavefront-{os.urandom(6).hex()}.tmp")
     try:
-        with open(scratch, "xb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
+        _write_new(scratch, data, _mode(target))
         os.replace(scratch, target)
+    except SaveError:
+        raise
     except OSError as error:
-        raise SceneError(f"{path}: cannot be written: {error}") from error
+        raise SaveError(f"{path}: cannot be written: {error}") from error
     finally:
-        scratch.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            scratch.unlink()
     _sync_folder(target.parent)
+
+
+def _write_new(path: Path, data: bytes, mode: int | None) -> None:
+    """Write a new file with these permissions, or those of the umask.
+
+    Where the system can, the file has no name until it is complete: nothing is left behind, even
+    when the process is killed.
+    """
+    handle = _open_nameless(path.parent)
+    nameless = handle is not None
+    if handle is None:
+        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+    with open(handle, "wb") as file:
+        if mode is not None and hasattr(os, "fchmod"):
+            os.fchmod(handle, mode)
+        file.write(data)
+        file.flush()
+        os.fsync(handle)
+        if nameless:  # src_dir_fd makes Python follow the link, as it says it does anyway
+            os.link(f"{OPEN_FILES}/{handle}", path, src_dir_fd=handle)
+
+
+def _open_nameless(folder: Path) -> int | None:
+    """Open a new file without a name, to be linked from `OPEN_FILES`; None where that is not possible."""
+    if not hasattr(os, "O_TMPFILE") or not os.path.isdir(OPEN_FILES):
+        return None
+    try:
+        return os.open(folder, os.O_WRONLY | os.O_TMPFILE, 0o666)
+    except OSError:  # not all file systems can
+        return None
 
 
 def _sync_folder(folder: Path) -> None:
     """Make the new name itself durable, where the system can."""
     if os.name != "posix":
         return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
+    with contextlib.suppress(OSError):  # a folder may be writable and not readable
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)

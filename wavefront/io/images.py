@@ -1,14 +1,14 @@
 """Images from files and to files, by extension: png, jpg, exr, hdr, npy.
 
-Values are linear inside. Encoding for display happens here; decoding sRGB is left to the caller,
-who knows whether an image holds colours or data.
+Values are linear inside. Encoding for display happens here. `read_linear` decodes it again; for
+textures decoding is left to the caller, who knows whether an image holds colors or data.
 """
 
 from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -16,14 +16,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SceneError, number
+from ..errors import SaveError, SceneError, number
 from ..vec import Floats
-from . import png, rgbe
-from .files import check_folder, check_size, read_bytes, write_bytes
+from . import coded, exr, rgbe
+from .coded import Gamma
+from .exr import Attribute
+from .files import check_size, check_target, path_name, read_bytes, write_bytes
 
 READABLE = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".npy")
 WRITABLE = READABLE
-Attribute = str | int | float
+MAX_STOPS = 100
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
@@ -31,18 +33,19 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
     Raises
     ------
-    SceneError
-        If the extension is unknown, or the folder is missing or not writable.
+    SaveError
+        If the extension is unknown, the folder is missing or not writable, or something other than a
+        regular file is there.
     """
-    _extension(path, WRITABLE)
-    check_folder(path)
+    _extension(path, WRITABLE, SaveError)
+    check_target(path)
 
 
 def write_image(
     path: str | os.PathLike[str],
     rgb: ArrayLike,
     *,
-    gamma: float | str = 2.2,
+    gamma: Gamma = 2.2,
     exposure: float = 0.0,
     attributes: Mapping[str, Attribute] | None = None,
 ) -> None:
@@ -55,7 +58,8 @@ def write_image(
     rgb
         (H, W, 3) linear values.
     gamma
-        Values are raised to 1/gamma in png and jpg; "srgb" applies the exact sRGB curve.
+        Values are raised to 1/gamma in png and jpg; "srgb" applies the exact sRGB curve. The file
+        says which.
     exposure
         Stops: values are multiplied by 2**exposure first, in every format.
     attributes
@@ -63,19 +67,23 @@ def write_image(
 
     Raises
     ------
+    SaveError
+        If the file cannot be written. The old file stays intact.
     SceneError
-        If the extension, an argument or the folder is not usable. The old file stays intact.
+        If an argument is malformed.
     """
-    extension = _extension(path, WRITABLE)
-    pixels = _picture(rgb) * np.float32(2.0 ** number("exposure", exposure))
-    if extension in (".png", ".jpg", ".jpeg"):
-        data = _encode_8bit(path, pixels, gamma, extension)
+    extension = _extension(path, WRITABLE, SaveError)
+    pixels = exposed(_picture(rgb), exposure)
+    if extension in coded.EXTENSIONS:
+        codes = to_8bit(_finite(path, pixels), gamma)
+        data = _encoded(path, lambda: coded.encode(codes, extension, gamma))
     elif extension == ".exr":
-        data = _encode_exr({"RGB": pixels}, attributes or {})
+        data = _encoded(path, lambda: exr.encode({"RGB": pixels}, attributes or {}))
     elif extension == ".hdr":
-        data = rgbe.encode(_finite(path, pixels))
+        finite = _finite(path, pixels)
+        data = _encoded(path, lambda: rgbe.encode(finite))
     else:
-        data = _encode_npy(pixels)
+        data = _encoded(path, lambda: _encode_npy(pixels))
     write_bytes(path, data)
 
 
@@ -88,15 +96,15 @@ def write_channels(
 
     Raises
     ------
-    SceneError
-        If the extension is not .exr, or the folder is not usable.
+    SaveError
+        If the extension is not .exr, or the file cannot be written.
     """
-    _extension(path, (".exr",))
+    _extension(path, (".exr",), SaveError)
     arrays = {}
     for name, values in channels.items():
         array = np.asarray(values)
         arrays[name] = np.ascontiguousarray(array, np.uint32 if array.dtype.kind in "ui" else np.float32)
-    write_bytes(path, _encode_exr(arrays, attributes or {}))
+    write_bytes(path, _encoded(path, lambda: exr.encode(arrays, attributes or {})))
 
 
 def read_image(path: str | os.PathLike[str]) -> Floats:
@@ -119,8 +127,24 @@ def read_image(path: str | os.PathLike[str]) -> Floats:
 
 def read_codes(path: str | os.PathLike[str]) -> NDArray[Any]:
     """Return what `read_image` does, but 8- and 16-bit values as they are stored, (H, W, C)."""
-    extension = _extension(path, READABLE)
-    return _decode(os.fspath(path), extension, read_bytes(path))
+    return _read(path)[0]
+
+
+def read_linear(path: str | os.PathLike[str]) -> Floats:
+    """Return the linear values of an image file, (H, W, C) float32, top row first.
+
+    png and jpg are decoded by the gamma that they name (gAMA or sRGB of a png, Exif of a jpg), and by
+    the sRGB curve if they name none. Alpha, the last of two or four channels, is linear.
+
+    Raises
+    ------
+    SceneError
+        As `read_image`.
+    """
+    codes, data = _read(path)
+    if codes.dtype == np.float32:
+        return codes
+    return codes_to_linear(codes, coded.gamma_of(data))
 
 
 def decode_codes(data: bytes, name: str) -> NDArray[Any]:
@@ -128,10 +152,17 @@ def decode_codes(data: bytes, name: str) -> NDArray[Any]:
     return _decode(name, ".png", data)
 
 
+def _read(path: str | os.PathLike[str]) -> tuple[NDArray[Any], bytes]:
+    """Return the stored values of an image file, and its bytes."""
+    extension = _extension(path, READABLE)
+    data = read_bytes(path)
+    return _decode(os.fspath(path), extension, data), data
+
+
 def _decode(name: str, extension: str, data: bytes) -> NDArray[Any]:
-    readers = {".exr": _decode_exr, ".hdr": rgbe.decode, ".npy": _decode_npy}
+    readers = {".exr": exr.decode, ".hdr": rgbe.decode, ".npy": _decode_npy}
     try:
-        return readers.get(extension, _decode_8bit)(data)
+        return readers.get(extension, coded.decode)(data)
     except SceneError as error:
         raise SceneError(f"{name}: {error}") from error
     except MemoryError as error:
@@ -139,6 +170,17 @@ def _decode(name: str, extension: str, data: bytes) -> NDArray[Any]:
     # the decoders raise whatever comes to their mind on damaged bytes
     except Exception as error:
         raise SceneError(f"{name}: not a readable {extension[1:]} image: {error}") from error
+
+
+def codes_to_linear(codes: NDArray[Any], gamma: Gamma = "srgb") -> Floats:
+    """Decode uint8 or uint16 codes (H, W, C) that count from 0 to 1; alpha is linear already."""
+    values = codes.astype(np.float32) / np.float32(np.iinfo(codes.dtype).max)
+    colors = values[..., : 3 if values.shape[2] > 2 else 1]
+    if isinstance(gamma, str):
+        colors[:] = srgb_to_linear(colors)
+    else:
+        np.power(colors, np.float32(gamma), out=colors)
+    return values
 
 
 def srgb_to_linear(values: Floats) -> Floats:
@@ -156,29 +198,70 @@ def linear_to_srgb(values: Floats) -> Floats:
     return np.where(values <= 0.0031308, values * np.float32(12.92), high).astype(np.float32)
 
 
-def to_8bit(rgb: ArrayLike, gamma: float | str = 2.2) -> NDArray[np.uint8]:
+def exposed(rgb: Floats, exposure: float) -> Floats:
+    """Return values brightened by `exposure` stops, any shape.
+
+    Raises
+    ------
+    SceneError
+        If `exposure` is not a number from -100 to 100.
+    """
+    limit = f"from {-MAX_STOPS} to {MAX_STOPS}"
+    stops = number("exposure", exposure, lambda x: abs(x) <= MAX_STOPS, limit)
+    return rgb * np.float32(2.0**stops)
+
+
+def check_gamma(gamma: Gamma) -> Gamma:
+    """Return `gamma` as a float or "srgb".
+
+    Raises
+    ------
+    SceneError
+        If it is neither a number from 0.01 to 100 nor "srgb".
+    """
+    if gamma == "srgb":
+        return gamma
+    if isinstance(gamma, str):
+        raise SceneError(f"gamma is {gamma!r}; it must be a number above 0 or 'srgb'")
+    low, high = coded.GAMMAS
+    return number("gamma", gamma, lambda x: low <= x <= high, f"from {low:g} to {high:g}")
+
+
+def to_8bit(rgb: ArrayLike, gamma: Gamma = 2.2) -> NDArray[np.uint8]:
     """Return linear values as display values 0 to 255, any shape; NaN becomes 0.
 
     Raises
     ------
     SceneError
-        If gamma is neither a number above 0 nor "srgb".
+        If gamma is neither a number from 0.01 to 100 nor "srgb".
     """
+    curve = check_gamma(gamma)
     unit = np.clip(np.nan_to_num(np.asarray(rgb, np.float32), nan=0.0, posinf=1.0, neginf=0.0), 0, 1)
-    if gamma == "srgb":
-        encoded = linear_to_srgb(unit)
-    elif isinstance(gamma, str):
-        raise SceneError(f"gamma is {gamma!r}; it must be a number above 0 or 'srgb'")
-    else:
-        encoded = unit ** np.float32(1 / number("gamma", gamma, lambda x: x > 0, "above 0"))
+    encoded = linear_to_srgb(unit) if isinstance(curve, str) else unit ** np.float32(1 / curve)
     return np.round(encoded * 255).astype(np.uint8)
 
 
-def _extension(path: str | os.PathLike[str], allowed: tuple[str, ...]) -> str:
-    extension = Path(path).suffix.lower()
+def encode_png(rgb: ArrayLike, gamma: Gamma = 2.2) -> bytes:
+    """Return a png file of linear values (H, W, 3)."""
+    return coded.encode(to_8bit(rgb, gamma), ".png", gamma)
+
+
+def _extension(
+    path: str | os.PathLike[str], allowed: tuple[str, ...], error: type[SceneError] = SceneError
+) -> str:
+    name = path_name(path, error)
+    extension = Path(name).suffix.lower()
     if extension not in allowed:
-        raise SceneError(f"{os.fspath(path)}: extension {extension!r} is not one of {', '.join(allowed)}")
+        raise error(f"{name}: extension {extension!r} is not one of {', '.join(allowed)}")
     return extension
+
+
+def _encoded(path: str | os.PathLike[str], encode: Callable[[], bytes]) -> bytes:
+    """Return what `encode` does; whatever encoders raise becomes a SaveError."""
+    try:
+        return encode()
+    except Exception as error:
+        raise SaveError(f"{os.fspath(path)}: cannot be encoded: {error or type(error).__name__}") from error
 
 
 def _picture(rgb: ArrayLike) -> Floats:
@@ -195,66 +278,6 @@ def _finite(path: str | os.PathLike[str], pixels: Floats) -> Floats:
         return pixels
     warnings.warn(f"{os.fspath(path)}: {bad} pixels are not finite; NaN is written as 0", stacklevel=3)
     return np.nan_to_num(pixels, nan=0.0)
-
-
-def _encode_8bit(path: str | os.PathLike[str], pixels: Floats, gamma: float | str, extension: str) -> bytes:
-    coded = to_8bit(_finite(path, pixels), gamma)
-    if extension == ".png":
-        return png.encode(coded)
-    import imageio.v3 as iio  # here, so that starting up does not pay for it
-
-    return bytes(iio.imwrite("<bytes>", coded, extension=".jpg", plugin="pillow", quality=95, subsampling=0))
-
-
-def _decode_8bit(data: bytes) -> NDArray[Any]:
-    import imageio.v3 as iio
-
-    check_size(*_size_8bit(data))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the decoder warns of large images; the limit here is our own
-        pixels = iio.imread(data, plugin="pillow", index=0)
-    if pixels.dtype == np.bool_:
-        pixels = pixels * np.uint8(255)
-    if pixels.dtype not in (np.uint8, np.uint16):
-        raise SceneError(f"holds {pixels.dtype} values; only 8 and 16 bits are read")
-    return np.atleast_3d(pixels)
-
-
-def _size_8bit(data: bytes) -> tuple[int, int]:
-    """Return (height, width) from the header of a png or jpg, before anything is decoded."""
-    if data.startswith(b"\x89PNG\r\n\x1a\n"):
-        return int.from_bytes(data[20:24], "big"), int.from_bytes(data[16:20], "big")
-    at = 2 if data.startswith(b"\xff\xd8") else len(data)
-    while at + 9 <= len(data) and data[at] == 0xFF:
-        marker, length = data[at + 1], int.from_bytes(data[at + 2 : at + 4], "big")
-        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):  # a start of frame
-            return int.from_bytes(data[at + 5 : at + 7], "big"), int.from_bytes(data[at + 7 : at + 9], "big")
-        at += 1 if marker == 0xFF else 2 + length
-    raise SceneError("not a readable png or jpg image: its header is damaged")
-
-
-def _encode_exr(channels: Mapping[str, NDArray[Any]], attributes: Mapping[str, Attribute]) -> bytes:
-    import tempfile
-
-    import OpenEXR
-
-    header = {**attributes, "compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    # the library writes by file name only
-    with tempfile.TemporaryDirectory() as folder:
-        scratch = Path(folder) / "image.exr"
-        OpenEXR.File(header, {k: np.ascontiguousarray(v) for k, v in channels.items()}).write(str(scratch))
-        return scratch.read_bytes()
-
-
-def _decode_exr(data: bytes) -> Floats:
-    import OpenEXR
-
-    header = OpenEXR.File(BytesIO(data), header_only=True).header()
-    low, high = header["dataWindow"]
-    check_size(int(high[1]) - int(low[1]) + 1, int(high[0]) - int(low[0]) + 1)
-    channels = OpenEXR.File(BytesIO(data), separate_channels=True).channels()
-    names = [n for n in ("R", "G", "B", "A") if n in channels] or sorted(channels)[:1]
-    return np.stack([channels[n].pixels for n in names], axis=-1).astype(np.float32)
 
 
 def _encode_npy(pixels: Floats) -> bytes:

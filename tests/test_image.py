@@ -1,0 +1,195 @@
+"""Image: pictures as arrays, as codes for display, and from files again."""
+
+import struct
+import zlib
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+
+import wavefront as wf
+from wavefront.io.images import srgb_to_linear
+
+GAMMAS = [2.2, 1.8, 1.0, "srgb"]
+CURVES = [
+    (2.2, lambda code: code**2.2),
+    (1.8, lambda code: code**1.8),
+    ("srgb", lambda code: np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)),
+]
+
+
+@pytest.fixture
+def image():
+    """A picture of every code for display, in three channels, in large even patches."""
+    ramp = np.linspace(0, 1, 256, dtype=np.float32)
+    rgb = np.stack([ramp, ramp[::-1], np.roll(ramp, 100)], axis=-1).reshape(16, 16, 3)
+    return wf.Image(rgb.repeat(8, 0).repeat(8, 1))
+
+
+def steps(image, gamma):
+    """How far linear values may be apart that differ by half a code, (H, W, 3)."""
+    codes = image.to_uint8(gamma).astype(np.float64)
+    curve = dict(CURVES).get(gamma, lambda code: code)
+    return curve((codes + 0.501) / 255) - curve(np.maximum(codes - 0.501, 0) / 255)
+
+
+@pytest.mark.parametrize("gamma", GAMMAS)
+def test_a_saved_png_differs_from_the_picture_by_rounding(tmp_path, image, gamma):
+    path = tmp_path / "a.png"
+    image.save(path, gamma)
+    loaded = wf.Image.load(path)
+    assert loaded.rgb.dtype == np.float32
+    assert (np.abs(loaded.rgb - image.rgb) <= steps(image, gamma)).all()
+    found = wf.compare(image, path)
+    assert found.relative_mse**0.5 < 0.004
+    assert wf.compare(loaded, path).rmse == 0
+    assert (loaded.to_uint8(gamma) == image.to_uint8(gamma)).all()
+
+
+@pytest.mark.parametrize("gamma", GAMMAS)
+@pytest.mark.parametrize("extension", ["jpg", "jpeg"])
+def test_a_saved_jpg_differs_by_little_more(tmp_path, image, gamma, extension):
+    """By up to five codes, and by less than a fourth of one on the mean."""
+    path = tmp_path / f"a.{extension}"
+    image.save(path, gamma)
+    codes = wf.Image.load(path).to_uint8(gamma).astype(int) - image.to_uint8(gamma)
+    assert np.abs(codes).max() <= 5
+    assert abs(codes.mean()) < 0.25
+    assert wf.compare(image, path).relative_mse ** 0.5 < 0.02
+
+
+@pytest.mark.parametrize(("gamma", "curve"), CURVES)
+@pytest.mark.parametrize("extension", ["png", "jpg"])
+def test_values_of_files_by_hand(tmp_path, gamma, curve, extension):
+    """A grey of code 100, decoded by the gamma that the file names."""
+    grey = wf.Image(np.full((16, 16, 3), curve(np.float64(100 / 255)), np.float32))
+    grey.save(tmp_path / f"a.{extension}", gamma)
+    assert (iio.imread(tmp_path / f"a.{extension}") == 100).all()
+    # a png holds 1/gamma to 5 digits
+    expected = float(curve(100 / 255))
+    assert wf.Image.load(tmp_path / f"a.{extension}").rgb == pytest.approx(expected, rel=3e-5)
+
+
+def chunks(data):
+    """Return the chunks of a png by name."""
+    out, at = {}, 8
+    while at < len(data):
+        length = int.from_bytes(data[at : at + 4], "big")
+        out[data[at + 4 : at + 8]] = data[at + 8 : at + 8 + length]
+        at += 12 + length
+    return out
+
+
+def test_pngs_and_jpgs_say_their_gamma(tmp_path, image):
+    """As other programs read it."""
+    from PIL import Image
+
+    expected = {2.2: 45455, 1.8: 55556, 1.0: 100000, "srgb": 45455}
+    for gamma, gama in expected.items():
+        image.save(tmp_path / "a.png", gamma)
+        found = chunks((tmp_path / "a.png").read_bytes())
+        assert found[b"gAMA"] == struct.pack(">I", gama)
+        assert (b"sRGB" in found) == (gamma == "srgb")
+        image.save(tmp_path / "a.jpg", gamma)
+        with Image.open(tmp_path / "a.jpg") as file:
+            tags = file.getexif().get_ifd(0x8769)
+        assert tags[0xA001] == (1 if gamma == "srgb" else 0xFFFF)
+        assert tags.get(0xA500) == (None if gamma == "srgb" else gamma)
+
+
+def test_files_without_gamma_are_srgb(tmp_path):
+    """And those whose gamma makes no sense."""
+    codes = np.arange(256, dtype=np.uint8).reshape(16, 16)
+    expected = srgb_to_linear(codes / np.float32(255))[..., None].repeat(3, 2)
+    for name in ("a.png", "a.jpg"):
+        iio.imwrite(tmp_path / name, codes, **({"quality": 100} if name == "a.jpg" else {}))
+        assert wf.Image.load(tmp_path / name).rgb == pytest.approx(expected, abs=0.01)
+    data = (tmp_path / "a.png").read_bytes()
+    for gama in (0, 2**31 - 1):
+        body = b"gAMA" + struct.pack(">I", gama)
+        chunk = struct.pack(">I", 4) + body + struct.pack(">I", zlib.crc32(body))
+        (tmp_path / "b.png").write_bytes(data[:33] + chunk + data[33:])
+        assert (wf.Image.load(tmp_path / "b.png").rgb == wf.Image.load(tmp_path / "a.png").rgb).all()
+
+
+def test_damaged_exif_is_passed_over(tmp_path, image):
+    """Cameras and editors leave it behind."""
+    image.save(tmp_path / "a.jpg", "srgb")
+    data = (tmp_path / "a.jpg").read_bytes()
+    at = data.index(b"Exif\0\0") + 6
+    for length in (1, 4, 8, 20):
+        (tmp_path / "b.jpg").write_bytes(data[:at] + b"\xff" * length + data[at + length :])
+        assert (wf.Image.load(tmp_path / "b.jpg").rgb == wf.Image.load(tmp_path / "a.jpg").rgb).all()
+
+
+def test_textures_do_not_follow_the_gamma_of_a_file(tmp_path, image):
+    """They are sRGB or data, as their users say."""
+    image.save(tmp_path / "a.png", 1.0)
+    image.save(tmp_path / "b.png", "srgb")
+    by_curve, linear = (wf.Texture(tmp_path / "a.png", srgb=srgb).mean() for srgb in (True, False))
+    assert linear == pytest.approx(image.rgb.mean((0, 1)), abs=1e-3)
+    assert (by_curve < linear - 0.1).all()
+    assert wf.Texture(tmp_path / "b.png").mean() == pytest.approx(image.rgb.mean((0, 1)), abs=1e-3)
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_arrays_of_codes_are_compared_as_files_are(tmp_path, image, kind):
+    """They count from 0 to 1, by the sRGB curve; alpha does not count."""
+    image.save(tmp_path / "a.png", "srgb")
+    codes = iio.imread(tmp_path / "a.png").astype(kind) * kind(np.iinfo(kind).max // 255)
+    assert wf.compare(codes, tmp_path / "a.png").rmse < 1e-6
+    assert wf.compare(codes, image).relative_mse ** 0.5 < 0.004
+    white = np.full((2, 2, 3), np.iinfo(kind).max, kind)
+    assert wf.compare(white, np.ones((2, 2, 3))).rmse == 0
+    with_alpha = np.concatenate([white, np.zeros((2, 2, 1), kind)], axis=2)
+    assert wf.compare(with_alpha, np.ones((2, 2, 3))).rmse == 0
+    assert wf.compare(white[..., 0], np.ones((2, 2))).rmse == 0
+
+
+def test_integers_of_other_kinds_are_linear():
+    assert wf.compare(np.full((2, 2), 2, np.int64), np.full((2, 2), 2.0)).rmse == 0
+
+
+@pytest.mark.parametrize("extension", ["exr", "npy"])
+def test_linear_files_are_loaded_as_they_are(tmp_path, image, extension):
+    image.save(tmp_path / f"a.{extension}", exposure=3)
+    assert (wf.Image.load(tmp_path / f"a.{extension}").rgb == 8 * image.rgb).all()
+
+
+def test_grey_and_alpha_become_three_channels(tmp_path):
+    values = np.random.default_rng(0).random((4, 5, 4)).astype(np.float32)
+    for pick, expected in ((0, [0, 0, 0]), (slice(0, 2), [0, 0, 0]), (slice(0, 4), [0, 1, 2])):
+        np.save(tmp_path / "a.npy", values[..., pick])
+        assert (wf.Image.load(tmp_path / "a.npy").rgb == values[..., expected]).all()
+    np.save(tmp_path / "a.npy", np.zeros((2, 3, 7)))
+    with pytest.raises(wf.SceneError, match=r"a\.npy: has 7 channels; a picture has 1 to 4"):
+        wf.Image.load(tmp_path / "a.npy")
+
+
+def test_what_cannot_be_loaded(tmp_path):
+    with pytest.raises(wf.SceneError, match=r"no\.png: there is no such file"):
+        wf.Image.load(tmp_path / "no.png")
+    with pytest.raises(wf.SceneError, match="path is 5"):
+        wf.Image.load(5)
+
+
+def test_shape_and_indexing(image):
+    """Are those of the array."""
+    assert image.shape == (128, 128, 3)
+    assert (image[3, 70] == image.rgb[3, 70]).all()
+    assert image[3, 70].shape == (3,)
+    assert (image[10:20, :, 1] == image.rgb[10:20, :, 1]).all()
+    assert (image[image.rgb > 0.5] > 0.5).all()
+
+
+@pytest.mark.parametrize("gamma", GAMMAS)
+def test_to_uint8_is_what_save_writes(tmp_path, image, gamma):
+    for exposure in (0.0, -1.5):
+        image.save(tmp_path / "a.png", gamma, exposure)
+        codes = image.to_uint8(gamma, exposure)
+        assert codes.dtype == np.uint8
+        assert (codes == iio.imread(tmp_path / "a.png")).all()
+    with pytest.raises(wf.SceneError, match="gamma is 0"):
+        image.to_uint8(gamma=0)
+    with pytest.raises(wf.SceneError, match="exposure is 1000"):
+        image.to_uint8(exposure=1000)
