@@ -15,6 +15,7 @@ from wavefront.accel import InstanceAccelerator, Intersections, choose, make_acc
 from wavefront.accel import instances as queries
 from wavefront.accel.embree import installed
 from wavefront.scene import CompiledScene, compile_scene
+from wavefront.shapes.instance import can_place
 from wavefront.stages.intersect import intersect
 from wavefront.stages.relief import tilt
 from wavefront.stages.surface import interact
@@ -622,3 +623,54 @@ def test_twenty_million_triangles_fit(accel):
     name, _, peak, *_ = done.stdout.splitlines()[-1].split()
     assert name == accel
     assert 50 < float(peak) < 500e6 / 2**20
+
+
+def test_many_instances_are_those_made_one_by_one():
+    """With the same material and name."""
+    mesh = wf.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], name="leaf")
+    transforms = np.tile(np.eye(4), (3, 1, 1))
+    transforms[:, :3] += np.random.default_rng(0).random((3, 3, 4))
+    material = wf.Diffuse(0.25)
+    for options in ({}, {"material": material, "name": "red"}):
+        for one, transform in zip(wf.Instance.many(mesh, transforms, **options), transforms, strict=True):
+            alone = wf.Instance(mesh, transform, **options)
+            assert (one.name, one.mesh, one.material) == (alone.name, mesh, alone.material)
+            assert np.array_equal(one.transform, transform)
+            assert np.array_equal(one.bounds, alone.bounds)
+    assert wf.Instance.many(mesh, np.zeros((0, 4, 4))) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda m: m[:, :3], r"leaf: transforms must have shape \(n, 4, 4\), got \(3, 3, 4\)"),
+        (lambda m: m * np.nan, r"leaf: transforms\[0\]\[0\]\[0\] is nan; it must be finite"),
+        (lambda m: m * [[[1]], [[2]], [[1]]], r"leaf: transforms\[1\]: transform has the last row"),
+        (lambda m: m * [[1], [1], [0], [1]], r"leaf: transforms\[0\]: transform is singular"),
+        (lambda m: m * [[1e39], [1e39], [1e39], [1]], r"leaf: transforms\[0\]: vertices\[1\]\[0\] is 1e\+39"),
+    ],
+)
+def test_a_wrong_one_of_many_transforms_is_named(change, message):
+    """As when it stands alone."""
+    mesh = wf.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], name="leaf")
+    with pytest.raises(wf.SceneError, match=message):
+        wf.Instance.many(mesh, change(np.tile(np.eye(4), (3, 1, 1))))
+
+
+@pytest.mark.parametrize("power", range(-300, 301, 50))
+def test_what_can_be_placed_is_decided_as_for_one(power):
+    """Near the limit of the ratio of stretches, and at any scale."""
+    mesh = wf.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], name="leaf")
+    rng = np.random.default_rng(0)
+    transforms = np.tile(np.eye(4), (60, 1, 1))
+    for i, ratio in enumerate(np.logspace(-14, 0, 60)):
+        left, right = (np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(2))
+        transforms[i, :3, :3] = left @ np.diag([1, rng.uniform(ratio, 1), ratio]) @ right * 10.0**power
+
+    def works(transform):
+        try:
+            return bool(wf.Instance(mesh, transform))
+        except wf.SceneError:
+            return False
+
+    assert can_place(mesh, transforms).tolist() == [works(transform) for transform in transforms]

@@ -5,6 +5,7 @@ import inspect
 import io
 import json
 import struct
+import time
 import warnings
 from pathlib import Path
 
@@ -16,12 +17,12 @@ import trimesh
 from wavefront import Camera, Scene, render
 from wavefront.bsdfs import Dielectric, Diffuse, Principled, ThinDielectric
 from wavefront.errors import SceneError
-from wavefront.io import appearance
+from wavefront.io import appearance, gltf_document, placing
 from wavefront.io.images import srgb_to_linear
 from wavefront.io.load import from_trimesh, load, load_mesh, load_meshes
 from wavefront.lights import DirectionalLight, SpotLight
 from wavefront.relief import NormalMap
-from wavefront.shapes import Instance
+from wavefront.shapes import Instance, Mesh
 from wavefront.textures import Texture
 from wavefront.vertex_colors import VertexColors
 
@@ -115,6 +116,12 @@ def soup(mesh, values=None):
     return (mesh.vertices if values is None else values)[mesh.faces]
 
 
+def normal(mesh):
+    """The geometric normals of the faces of a mesh, (m, 3)."""
+    a, b, c = soup(mesh).transpose(1, 0, 2)
+    return np.cross(b - a, c - a)
+
+
 # ---- geometry -----------------------------------------------------------------------------------
 
 
@@ -154,6 +161,35 @@ def test_strips_and_fans(build, path, mode, expected):
     corners = np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
     build.mesh({"POSITION": corners}, np.arange(4, dtype=np.uint16), mode=mode).gltf(path)
     assert np.array_equal(soup(load_meshes(path)[0]), corners[expected])
+
+
+def test_triangles_without_an_area_join_strips(build, path):
+    """They are part of how strips are written, no defect; the turn of those behind them stays right."""
+    corners = np.float32(
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [5, 0, 0], [6, 0, 0], [5, 1, 0], [6, 1, 0]]
+    )
+    joined = np.array([0, 1, 2, 3, 3, 4, 4, 5, 6, 7], np.uint8)
+    build.mesh({"POSITION": corners}, joined, mode=5).gltf(path)
+    (mesh,) = load(path, strict=True).shapes
+    found = soup(mesh)
+    assert np.array_equal(found, corners[[[0, 1, 2], [2, 1, 3], [4, 5, 6], [6, 5, 7]]])
+    with pytest.warns(UserWarning, match="trimesh object: 'GLTF': dropped 4 faces of zero area"):
+        (held,) = from_trimesh(trimesh.load_scene(path, process=False)).shapes  # which keeps them
+    assert np.array_equal(normal(held), normal(mesh))
+
+
+@pytest.mark.parametrize(
+    ("mode", "expected"),
+    [(5, [[0, 1, 2], [2, 1, 3], [4, 5, 6], [6, 5, 7]]), (6, [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])],
+)
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.uint32])
+def test_strips_and_fans_that_begin_anew(build, path, mode, expected, kind):
+    """The largest index is forbidden in glTF, and begins a new strip in graphics hardware."""
+    corners = np.random.default_rng(0).random((8, 3), np.float32)
+    largest = np.iinfo(kind).max
+    build.mesh({"POSITION": corners}, np.array([0, 1, 2, 3, largest, 4, 5, 6, 7], kind), mode=mode).gltf(path)
+    (mesh,) = load(path, strict=True).shapes
+    assert np.array_equal(soup(mesh), corners[expected])
 
 
 def test_interleaved_and_offset_views(build, path):
@@ -267,12 +303,114 @@ def test_what_instances_have_besides_is_named(build, path):
         ),
         (
             {"TRANSLATION": np.zeros((2**20 + 1, 3), np.int8)},
-            r"has 1048577 of TRANSLATION; it must be as many of each, at most 1048576",
+            r"a\.gltf: nodes\[0\]: its nodes place 1048577 meshes so far; the limit is max_instances=1048576",
         ),
     ],
 )
 def test_bad_instances_are_named(build, path, attributes, message):
     instanced(build, **attributes).gltf(path)
+    with pytest.raises(SceneError, match=message):
+        load(path)
+
+
+def many(build, count):
+    """Place the mesh `count` times by an accessor without data."""
+    build.json["accessors"] = [{"componentType": 5126, "count": count, "type": "VEC3"}]
+    extension = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 0}}}
+    build.json["nodes"][0]["extensions"] = extension
+    return build.mesh({"POSITION": build.accessor(TRIANGLE)})
+
+
+def test_many_instances_load_fast(build, path):
+    """About 150 µs for each, as long as each was checked by itself, would be 20 s."""
+    many(build, 2**17).gltf(path)
+    start = time.process_time()
+    shapes = load(path).shapes
+    assert time.process_time() - start < 6
+    assert len(shapes) == 2**17
+    assert all(shape.mesh is shapes[0].mesh for shape in shapes)
+
+
+def test_many_nodes_load_fast(build, path):
+    """About 400 µs for each, as long as each was composed by itself, would be 20 s."""
+    turn = {"rotation": [0, 0, 0.6, 0.8], "scale": [1, 2, 1]}
+    build.json["nodes"] = [{"mesh": 0, "translation": [i, 0, 0], **turn} for i in range(50_000)]
+    build.json["scenes"][0]["nodes"] = list(range(50_000))
+    build.mesh().gltf(path)
+    start = time.process_time()
+    shapes = load(path).shapes
+    assert time.process_time() - start < 5
+    assert [shape.transform[0, 3] for shape in shapes] == list(range(50_000))
+
+
+def test_nodes_below_one_another(build, path):
+    """A long chain is neither a recursion nor a wrong product."""
+    build.json["nodes"] = [{"translation": [1, 0, 0], "children": [i + 1]} for i in range(4_999)]
+    build.json["nodes"].append({"mesh": 0, "rotation": [0, 0, 1, 0]})
+    (mesh,) = load_meshes(build.mesh().gltf(path))
+    assert soup(mesh)[0] == pytest.approx(TRIANGLE * [-1, -1, 1] + [4_999, 0, 0])
+
+
+def test_what_a_file_may_multiply_to_is_limited(build, path):
+    """Over all nodes, and before anything is made; whoever wants more says so."""
+    many(build, 2**20)
+    build.json["nodes"] *= 1000
+    build.json["scenes"][0]["nodes"] = list(range(1000))
+    build.gltf(path)
+    message = (
+        r"a\.gltf: nodes\[998\]: its nodes place 2097152 meshes so far; the limit is max_instances=1048576"
+    )
+    with pytest.raises(SceneError, match=message):
+        load(path)
+    build.json["nodes"] = build.json["nodes"][:1]
+    build.json["scenes"][0]["nodes"] = [0]
+    build.json["accessors"][0]["count"] = 5
+    build.gltf(path)
+    assert len(load(path, max_instances=5).shapes) == 5
+    with pytest.raises(SceneError, match="place 5 meshes so far; the limit is max_instances=4"):
+        load(path, max_instances=4)
+
+
+def test_how_many_triangles_are_copied_is_limited(build, path, monkeypatch):
+    """As meshes of their own, instances need the memory of each."""
+    many(build, 5).gltf(path)
+    monkeypatch.setattr(placing, "MAX_COPIED_FACES", 3)
+    assert len(load(path).shapes) == 5
+    message = (
+        r"a\.gltf: its 5 instances have 5 triangles together, its meshes 1; as meshes of their own, at most 3"
+    )
+    with pytest.raises(SceneError, match=message):
+        load_meshes(path)
+    monkeypatch.setattr(placing, "MAX_COPIED_FACES", 4)
+    assert len(load_meshes(path)) == 5
+
+
+def test_how_many_numbers_are_read_is_limited(build, path, monkeypatch):
+    """Meshes may share an accessor, and each makes arrays of its own."""
+    build.mesh()
+    build.json["meshes"] *= 5
+    build.json["nodes"] = [{"mesh": i} for i in range(5)]
+    build.json["scenes"][0]["nodes"] = list(range(5))
+    build.gltf(path)
+    monkeypatch.setattr(gltf_document, "MAX_NUMBERS", 45)
+    assert len(load(path).shapes) == 5
+    monkeypatch.setattr(gltf_document, "MAX_NUMBERS", 44)
+    message = (
+        r"a\.gltf: accessors\[0\]: the accessors that its meshes read have 45 numbers so far; the limit is 44"
+    )
+    with pytest.raises(SceneError, match=message):
+        load(path)
+
+
+def test_instances_without_a_volume(build, path, monkeypatch):
+    """Those that are flattened become meshes of their own, up to a limit."""
+    scale = np.float32([[1, 1, 1], [2, 1, 0], [1, 1, 0], [1, 2, 1]])
+    instanced(build, SCALE=scale).gltf(path)
+    shapes = load(path).shapes
+    assert [type(shape) for shape in shapes] == [Instance, Mesh, Mesh, Instance]  # the last comes first
+    assert [soup(shape)[0, 1, 0] for shape in shapes[1:3]] == [1, 2]
+    monkeypatch.setattr(placing, "MAX_COPIES", 1)
+    message = r"a\.gltf: 'mesh0' brings the meshes whose matrices are singular to 2; the limit is 1"
     with pytest.raises(SceneError, match=message):
         load(path)
 
@@ -1009,7 +1147,10 @@ def broken(**changes):
         (broken(nodes__0=None), r"nodes\[0\] is not an object"),
         (broken(accessors__0__count=4), r"accessors\[0\] has 4 elements, which its buffer view cannot hold"),
         (broken(accessors__0__count=10**15), r"accessors\[0\] has 1000000000000000 elements; the limit is"),
-        (broken(accessors__0__count=-3), r"-3 stands where glTF has a count"),
+        (
+            broken(accessors__0__count=-3),
+            r"a\.gltf: accessors\[0\]\.count is -3; it must be a whole number, at least 0",
+        ),
         (broken(accessors__0__type="VEC2"), r"has POSITION with 2 components; it must have 3"),
         (broken(accessors__0__type="VEC9"), r"accessors\[0\] is 'VEC9' of 5126, which glTF does not have"),
         (broken(accessors__0__componentType=9), r"accessors\[0\] is 'VEC3' of 9"),

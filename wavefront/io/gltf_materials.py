@@ -12,7 +12,7 @@ from ..errors import SceneError
 from ..relief import NormalMap
 from ..textures import Texture
 from .appearance import Look, realise
-from .gltf import Document, floats
+from .gltf_document import Document, floats
 from .images import decode_codes
 
 WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -20,13 +19,14 @@ from ..errors import SceneError, finite_array
 from ..lights import DirectionalLight, PointLight, SpotLight
 from ..progress import Progress, phase
 from ..scene import Scene
-from ..shapes import Instance, Mesh
+from ..shapes import Mesh
 from ..shapes.transform import moved, moved_tangents
 from . import gltf, headers, mtl, obj, stl, visuals
 from .appearance import Look, dress, is_faint
 from .files import beside, decode, read_bytes
 from .gltf_materials import Materials
 from .images import decode_codes
+from .placing import MAX_INSTANCES, Places, place_meshes, place_shapes
 from .repair import Raw, build, warn, with_face_colors
 
 if TYPE_CHECKING:
@@ -38,7 +38,13 @@ PathLike = str | os.PathLike[str]
 T = TypeVar("T")
 
 
-def load(path: PathLike, *, strict: bool = False, progress: Progress = None) -> Scene:
+def load(
+    path: PathLike,
+    *,
+    strict: bool = False,
+    progress: Progress = None,
+    max_instances: int = MAX_INSTANCES,
+) -> Scene:
     """Read a scene: .obj (with its .mtl), .ply, .stl, .glb, .gltf.
 
     A mesh that several nodes of a glTF file have is read once, and becomes an `Instance` for each.
@@ -51,6 +57,8 @@ def load(path: PathLike, *, strict: bool = False, progress: Progress = None) -> 
         Refuse what would otherwise be repaired or left out with a warning.
     progress
         Where reading takes more than 2 s, True or None shows a line that says so; False shows nothing.
+    max_instances
+        How many meshes a glTF file may place; one of a few bytes may place millions.
 
     Raises
     ------
@@ -58,8 +66,9 @@ def load(path: PathLike, *, strict: bool = False, progress: Progress = None) -> 
         Naming the file, the line or element, the value and the limit.
     """
     with _phase(path, progress):
-        name, contents = _contents(path, strict, materials=True)
-        return Scene(_shapes(name, contents.placed, strict), contents.lights, contents.camera)
+        name, contents = _contents(path, strict, True, max_instances)
+        shapes = _some(name, place_shapes(name, contents.raws, contents.places, strict))
+        return Scene(shapes, contents.lights, contents.camera)
 
 
 def load_mesh(
@@ -97,8 +106,7 @@ def load_mesh(
 def load_meshes(path: PathLike, *, strict: bool = False, materials: bool = True) -> list[Mesh]:
     """Read the meshes of a file, one for each material and node; arguments as for `load`."""
     name, contents = _contents(path, strict, materials)
-    meshes = [mesh for part in contents.placed if (mesh := build(name, part.moved(), strict)) is not None]
-    return _some(name, meshes)
+    return _some(name, place_meshes(name, contents.raws, contents.places, strict))
 
 
 def _phase(path: PathLike, progress: Progress) -> AbstractContextManager[None]:
@@ -121,8 +129,10 @@ def from_trimesh(geometry: Any) -> Scene:
     SceneError
         If it is something else, or has no faces.
     """
-    placed = _placed(geometry, "trimesh object", strict=False)
-    return Scene(_shapes("trimesh object", placed, strict=False), camera=_camera(geometry))
+    source = "trimesh object"
+    contents = _from_trimesh(geometry, source, strict=False)
+    shapes = _some(source, place_shapes(source, contents.raws, contents.places, strict=False))
+    return Scene(shapes, camera=_camera(geometry))
 
 
 def join(
@@ -167,29 +177,18 @@ def _joined(parts: list[np.ndarray | None]) -> np.ndarray | None:
 
 
 @dataclass
-class Placed:
-    """A mesh of a file and where it stands; what stands in several places is one `raw`."""
-
-    raw: Raw
-    matrix: np.ndarray = field(default_factory=lambda: np.eye(4))  # (4, 4) to the scene
-
-    def moved(self) -> Raw:
-        """Return a mesh of its own, in the scene's coordinates."""
-        vertices, faces, normals = moved(self.matrix, self.raw.vertices, self.raw.faces, self.raw.normals)
-        tangents = moved_tangents(self.matrix, self.raw.tangents)
-        return replace(self.raw, vertices=vertices, faces=faces, normals=normals, tangents=tangents)
-
-
-@dataclass
 class Contents:
     """What a file holds."""
 
-    placed: list[Placed]
+    raws: list[Raw]
+    places: Places
     lights: Sequence[DirectionalLight | PointLight | SpotLight] = ()
     camera: Camera | None = None
 
 
-def _contents(path: PathLike, strict: bool, materials: bool) -> tuple[str, Contents]:
+def _contents(
+    path: PathLike, strict: bool, materials: bool, max_instances: int = MAX_INSTANCES
+) -> tuple[str, Contents]:
     """Read a file of any kind; also return its name for messages."""
     name = os.fspath(path)
     extension = Path(name).suffix.lower()
@@ -199,14 +198,19 @@ def _contents(path: PathLike, strict: bool, materials: bool) -> tuple[str, Conte
     _refuse(name, data)
     try:
         if extension == ".obj":
-            return name, Contents([Placed(raw) for raw in _read_obj(path, data, strict, materials)])
+            return name, _once(_read_obj(path, data, strict, materials))
         if extension in (".glb", ".gltf"):
-            return name, _read_gltf(path, data, strict, materials)
+            return name, _read_gltf(path, data, strict, materials, max_instances)
         if extension == ".stl":
-            return name, Contents([Placed(raw) for raw in stl.parse(name, data, strict)])
-        return name, Contents(_read_ply(path, data, strict, materials))
+            return name, _once(stl.parse(name, data, strict))
+        return name, _read_ply(path, data, strict, materials)
     except MemoryError as error:
         raise SceneError(f"{name}: does not fit in memory") from error
+
+
+def _once(raws: list[Raw]) -> Contents:
+    """Return meshes that stand where their vertices are."""
+    return Contents(raws, Places.once(len(raws)))
 
 
 def _refuse(name: str, data: bytes) -> None:
@@ -217,57 +221,25 @@ def _refuse(name: str, data: bytes) -> None:
         raise SceneError(f"{name}: is an archive; unpack it first")
 
 
-def _shapes(name: str, placed: list[Placed], strict: bool) -> list[Mesh | Instance]:
-    """Build the meshes; what stands in several places is built once and becomes instances."""
-    times = Counter(id(part.raw) for part in placed)
-    shared: dict[int, Mesh | None] = {}
-    shapes: list[Mesh | Instance | None] = []
-    for part in placed:
-        key = id(part.raw)
-        if times[key] == 1:
-            shapes.append(build(name, part.moved(), strict))
-            continue
-        if key not in shared:
-            shared[key] = build(name, part.raw, strict)
-        shapes.append(_instance(name, part, shared[key], strict))
-    return _some(name, [shape for shape in shapes if shape is not None])
-
-
-def _instance(name: str, part: Placed, mesh: Mesh | None, strict: bool) -> Mesh | Instance | None:
-    """Place a mesh that others share; where its matrix is none for an instance, as a mesh of its own."""
-    if mesh is None:
-        return None
-    try:
-        return Instance(mesh, part.matrix)
-    except SceneError:
-        return build(name, part.moved(), strict)
-
-
 def _some(name: str, shapes: list[T]) -> list[T]:
     if not shapes:
         raise SceneError(f"{name}: has no faces")
     return shapes
 
 
-def _read_gltf(path: PathLike, data: bytes, strict: bool, materials: bool) -> Contents:
-    name = os.fspath(path)
-    try:
-        document = gltf.Document(path, data)
-        found = gltf.contents(document)
+def _read_gltf(path: PathLike, data: bytes, strict: bool, materials: bool, max_instances: int) -> Contents:
+    document = gltf.Document(path, data)
+    with document.inside("the file"):
+        found = gltf.contents(document, max_instances)
         looks = Materials(document)
-        for raw, number, _ in found.raws:
+        for raw, number in found.raws:
             # without a material, the mesh is as plain as in memory
             if materials and not dress(raw, None if number is None else looks.look(number)):
                 document.lose("vertex colours", f"mesh {raw.name!r}")
-    except (SceneError, MemoryError):
-        raise
-    # the JSON may hold anything anywhere: a list for a number, text for a list
-    except (TypeError, KeyError, AttributeError, IndexError, ValueError, OverflowError) as error:
-        raise SceneError(f"{name}: not glTF: {type(error).__name__}: {error}") from error
     if document.lost and materials:
         listed = ", ".join(f"{what} ({where})" for what, where in document.lost.items())
-        warn(f"{name}: not honoured: {listed}", strict)
-    return Contents([Placed(raw, matrix) for raw, _, matrix in found.raws], found.lights, found.camera)
+        warn(f"{document.name}: not honoured: {listed}", strict)
+    return Contents([raw for raw, _ in found.raws], found.places, found.lights, found.camera)
 
 
 def _read_obj(path: PathLike, data: bytes, strict: bool, materials: bool) -> list[Raw]:
@@ -304,7 +276,7 @@ def _libraries(path: PathLike, libraries: list[str], strict: bool) -> dict[str, 
     return looks
 
 
-def _read_ply(path: PathLike, data: bytes, strict: bool, materials: bool) -> list[Placed]:
+def _read_ply(path: PathLike, data: bytes, strict: bool, materials: bool) -> Contents:
     """Let trimesh read a PLY file; whatever it raises becomes a SceneError, what it leaves out, too."""
     import trimesh
 
@@ -324,12 +296,12 @@ def _read_ply(path: PathLike, data: bytes, strict: bool, materials: bool) -> lis
         raise
     except Exception as error:
         raise SceneError(f"{name}: not a readable ply file: {error!r}") from error
-    placed = _placed(found, name, strict)
-    faces = sum(len(part.raw.faces) for part in placed)
+    contents = _from_trimesh(found, name, strict)
+    faces = sum(len(raw.faces) for raw in contents.raws)
     claimed = sum(element.count for element in elements if element.name == "face")
     if faces < claimed:
         raise SceneError(f"{name}: claims {claimed} of face; {faces} can be read")
-    return placed
+    return contents
 
 
 def _ply_texture(path: PathLike, data: bytes, strict: bool) -> dict[str, bytes]:
@@ -348,22 +320,24 @@ def _ply_texture(path: PathLike, data: bytes, strict: bool) -> dict[str, bytes]:
     return {}
 
 
-def _placed(geometry: Any, source: str, strict: bool) -> list[Placed]:
+def _from_trimesh(geometry: Any, source: str, strict: bool) -> Contents:
     """Return the meshes of a trimesh object with materials, and where they stand."""
     import trimesh
 
     looks = _Visuals()
-    raws: dict[int, Raw] = {}
-    placed = []
-    for mesh, name, matrix in _nodes(geometry, trimesh):
-        if id(mesh) not in raws:
-            raws[id(mesh)] = _raw(mesh, name, source)
-            looks.dress(raws[id(mesh)], mesh, {geometry.source.file_type, mesh.source.file_type})
-        placed.append(Placed(raws[id(mesh)], matrix))
+    numbers: dict[int, int] = {}
+    raws: list[Raw] = []
+    nodes = _nodes(geometry, trimesh)
+    for mesh, name, _ in nodes:
+        if id(mesh) not in numbers:
+            numbers[id(mesh)] = len(raws)
+            raws.append(_raw(mesh, name, source))
+            looks.dress(raws[-1], mesh, {geometry.source.file_type, mesh.source.file_type})
     if looks.lost:
         listed = ", ".join(f"{what} (mesh {where!r})" for what, where in looks.lost.items())
         warn(f"{source}: not honoured: {listed}", strict)
-    return placed
+    of = np.array([numbers[id(mesh)] for mesh, _, _ in nodes], np.intp)
+    return Contents(raws, Places(of, np.array([matrix for *_, matrix in nodes]).reshape(-1, 4, 4)))
 
 
 def _nodes(geometry: Any, trimesh: Any) -> list[tuple[Any, str, np.ndarray]]:
@@ -394,7 +368,7 @@ def _camera(geometry: Any) -> Camera | None:
         return None
     width, height = geometry.camera.resolution
     matrix = np.asarray(geometry.camera_transform, np.float64)
-    return gltf.camera_at(matrix, float(geometry.camera.fov[1]), float(width / height))
+    return gltf.camera_at(matrix, float(geometry.camera.fov[1]), gltf.size_of(width / height))
 
 
 def _raw(mesh: trimesh.Trimesh, name: str, source: str) -> Raw:

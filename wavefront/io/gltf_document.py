@@ -1,0 +1,286 @@
+"""The JSON of a glTF file and the bytes that it refers to, with every index and number checked.
+
+Source: Khronos Group, glTF 2.0 specification, chapters 3.6 (buffers and accessors) and 4 (GLB).
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import os
+import struct
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import chain
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from .files import beside, read_bytes
+
+COMPONENTS: dict[int, type[np.generic]] = {
+    5120: np.int8,
+    5121: np.uint8,
+    5122: np.int16,
+    5123: np.uint16,
+    5125: np.uint32,
+    5126: np.float32,
+}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+MAX_ELEMENTS = 2**28  # in one accessor, whatever backs it
+MAX_NUMBERS = 2**29  # in all accessors that are read, as several meshes may share one
+LARGEST = float(np.finfo(np.float64).max)
+SHOWN = 80  # characters of a value in a message
+# what reading JSON of the wrong shape raises: a list for a number, text for a list
+MALFORMED = (TypeError, KeyError, AttributeError, IndexError, ValueError, OverflowError)
+Matrix = NDArray[np.float64]
+
+
+class Document:
+    """The JSON of a file and the bytes that it refers to. Lookups that fail name the file and the element."""
+
+    def __init__(self, path: str | os.PathLike[str], data: bytes) -> None:
+        self.path = path
+        self.name = os.fspath(path)
+        text, self._binary = _chunks(self.name, data) if data[:4] == b"glTF" else (data, None)
+        try:
+            self.json = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise SceneError(f"{self.name}: not glTF: its JSON is damaged: {error}") from error
+        if not isinstance(self.json, dict):
+            raise SceneError(f"{self.name}: not glTF: its JSON is a {type(self.json).__name__}")
+        with self.inside("asset"):
+            version = str(self.json.get("asset", {}).get("version", ""))
+        if not version.startswith("2"):
+            raise SceneError(f"{self.name}: is glTF version {shown(version)}; only version 2 is read")
+        self._buffers: dict[int, bytes] = {}
+        self._files: dict[str, bytes] = {}
+        self._numbers = 0  # how many were read from accessors
+        self.lost: dict[str, str] = {}  # what is not honoured -> where it was first met
+
+    @contextmanager
+    def inside(self, element: str) -> Iterator[None]:
+        """Make errors of the block name the file and the element.
+
+        Raises
+        ------
+        SceneError
+            In place of one that does not name the file, and of those that malformed JSON leads to.
+        """
+        try:
+            yield
+        except SceneError as error:
+            if str(error).startswith(self.name):
+                raise
+            raise SceneError(f"{self.name}: {element}: {error}") from error
+        except MALFORMED as error:
+            raise SceneError(
+                f"{self.name}: {element} is malformed: {type(error).__name__}: {shown(error)}"
+            ) from error
+
+    def lose(self, what: str, where: str) -> None:
+        """Note a property that is not honoured."""
+        self.lost.setdefault(what, where)
+
+    def get(self, kind: str, index: Any) -> dict[str, Any]:
+        """Return element `index` of the array `kind`."""
+        items = self.json.get(kind, [])
+        if not isinstance(items, list):
+            raise SceneError(f"{self.name}: {kind} is {shown(items)}; it must be a list")
+        if not isinstance(index, int) or not 0 <= index < len(items):
+            raise SceneError(f"{self.name}: {kind}[{shown(index)}] does not exist; there are {len(items)}")
+        item = items[index]
+        if not isinstance(item, dict):
+            raise SceneError(f"{self.name}: {kind}[{index}] is not an object")
+        return item
+
+    def count(self, where: str, item: dict[str, Any], key: str) -> int:
+        """Return a number of bytes or elements, 0 by default; `where` names the item."""
+        value = item.get(key, 0)
+        if not isinstance(value, int) or isinstance(value, bool) or value < 0:
+            raise SceneError(
+                f"{self.name}: {where}.{key} is {shown(value)}; it must be a whole number, at least 0"
+            )
+        return value
+
+    def uri(self, uri: Any, where: str) -> bytes:
+        """Return what a URI holds: data in the file itself, or a file beside it, which is read once."""
+        if not isinstance(uri, str):
+            raise SceneError(f"{self.name}: {where}.uri is {shown(uri)}; it must be text")
+        if not uri.startswith("data:"):
+            if uri not in self._files:
+                with self.inside(where):
+                    self._files[uri] = read_bytes(beside(self.path, unquote(uri)))
+            return self._files[uri]
+        try:
+            return base64.b64decode(uri.partition(",")[2], validate=True)
+        except (binascii.Error, ValueError) as error:
+            raise SceneError(f"{self.name}: {where} has damaged base64 data: {error}") from error
+
+    def is_missing(self, uri: str) -> bool:
+        """Return whether a URI names a file that does not exist."""
+        return not uri.startswith("data:") and not beside(self.path, unquote(uri)).exists()
+
+    def buffer(self, index: Any) -> bytes:
+        """Return the bytes of a buffer."""
+        item = self.get("buffers", index)
+        if index not in self._buffers:
+            where = f"buffers[{index}]"
+            if "uri" in item:
+                data = self.uri(item["uri"], where)
+            elif index == 0 and self._binary is not None:
+                data = self._binary
+            else:
+                raise SceneError(f"{self.name}: {where} has no data")
+            claimed = self.count(where, item, "byteLength")
+            if len(data) < claimed:
+                raise SceneError(f"{self.name}: {where} has {len(data)} bytes; it claims {claimed}")
+            self._buffers[index] = data
+        return self._buffers[index]
+
+    def view(self, index: Any) -> tuple[bytes, int, int, int]:
+        """Return (buffer, first byte, end, stride or 0) of a buffer view."""
+        item = self.get("bufferViews", index)
+        where = f"bufferViews[{index}]"
+        with self.inside(where):
+            data = self.buffer(item.get("buffer", -1))
+        start, length = self.count(where, item, "byteOffset"), self.count(where, item, "byteLength")
+        if start + length > len(data):
+            raise SceneError(
+                f"{self.name}: {where} ends at byte {start + length}; its buffer has {len(data)}"
+            )
+        return data, start, start + length, self.count(where, item, "byteStride")
+
+    def accessor(self, index: Any) -> NDArray[Any]:
+        """Return the elements of an accessor, (count, width); normalised integers become float32."""
+        item = self.get("accessors", index)
+        where = f"accessors[{index}]"
+        with self.inside(where):
+            values = self._elements(item, where)
+            return _normalised(values) if item.get("normalized") else values
+
+    def _elements(self, item: dict[str, Any], where: str) -> NDArray[Any]:
+        kind, width = COMPONENTS.get(item.get("componentType", 0)), WIDTHS.get(item.get("type", ""))
+        count = self.count(where, item, "count")
+        if kind is None or width is None:
+            raise SceneError(
+                f"{self.name}: {where} is {item.get('type')!r} of {item.get('componentType')!r}, "
+                "which glTF does not have"
+            )
+        if count * width > MAX_ELEMENTS:
+            raise SceneError(
+                f"{self.name}: {where} has {count} elements; the limit is {MAX_ELEMENTS // width}"
+            )
+        self._numbers += count * width
+        if self._numbers > MAX_NUMBERS:
+            raise SceneError(
+                f"{self.name}: {where}: the accessors that its meshes read have {self._numbers} numbers "
+                f"so far; the limit is {MAX_NUMBERS}"
+            )
+        if "bufferView" in item:
+            values = self._strided(item, count, width, kind, where)
+        else:
+            values = np.zeros((count, width), kind)
+        return self._sparse(item["sparse"], values, where) if "sparse" in item else values
+
+    def _strided(
+        self, item: dict[str, Any], count: int, width: int, kind: type[np.generic], where: str
+    ) -> NDArray[Any]:
+        """Return the elements (count, width) that an item's buffer view holds from its offset on."""
+        data, start, end, stride = self.view(item["bufferView"])
+        size = np.dtype(kind).itemsize * width
+        stride = stride or size
+        start += self.count(where, item, "byteOffset")
+        if count and start + (count - 1) * stride + size > end:
+            raise SceneError(f"{self.name}: {where} has {count} elements, which its buffer view cannot hold")
+        if not count:
+            return np.zeros((0, width), kind)
+        return np.ndarray((count, width), kind, data, start, (stride, np.dtype(kind).itemsize)).copy()
+
+    def _sparse(self, sparse: dict[str, Any], values: NDArray[Any], where: str) -> NDArray[Any]:
+        count = self.count(f"{where}.sparse", sparse, "count")
+        at, new = sparse["indices"], sparse["values"]
+        kind = COMPONENTS.get(at.get("componentType", 0), np.uint32)
+        index = self._strided(at, count, 1, kind, f"{where}.sparse.indices")[:, 0]
+        if index.dtype.kind != "u":
+            raise SceneError(
+                f"{self.name}: {where}.sparse.indices are of type {index.dtype}; they must be unsigned"
+            )
+        if count and index.max() >= len(values):
+            raise SceneError(f"{self.name}: {where} replaces element {index.max()}; it has {len(values)}")
+        values = values.copy()
+        width = values.shape[1]
+        values[index] = self._strided(new, count, width, values.dtype.type, f"{where}.sparse.values")
+        return values
+
+
+def floats(where: str, value: Any, count: int) -> Matrix:
+    """Return `count` finite numbers of the JSON, or raise a SceneError that names them."""
+    return table([value], count, lambda row: where)[0]
+
+
+def table(rows: list[Any], width: int, where: Callable[[int], str]) -> Matrix:
+    """Return rows of finite numbers of the JSON as (n, width).
+
+    Raises
+    ------
+    SceneError
+        Naming the first row that is something else, as `where` calls it.
+    """
+    sound = set(map(type, rows)) <= {list} and set(map(len, rows)) <= {width}
+    if sound and set(map(type, chain.from_iterable(rows))) <= {int, float}:
+        try:
+            array = np.array(rows, np.float64).reshape(-1, width)
+        except OverflowError:  # a whole number beyond float64
+            array = np.full((1, 1), np.inf)
+        if np.isfinite(array).all():
+            return array
+    row = next(i for i, value in enumerate(rows) if not _is_row(value, width))
+    raise SceneError(f"{where(row)} is {shown(rows[row])}; it must be {width} finite numbers")
+
+
+def _is_row(value: Any, width: int) -> bool:
+    return (
+        isinstance(value, list)
+        and len(value) == width
+        and all(type(x) in (int, float) and -LARGEST <= x <= LARGEST for x in value)
+    )
+
+
+def shown(value: Any) -> str:
+    """Return a value of the JSON for a message, shortened if it is long."""
+    text = str(value) if isinstance(value, Exception) else repr(value)
+    return text if len(text) <= SHOWN else text[: SHOWN - 3] + "..."
+
+
+def _normalised(values: NDArray[Any]) -> NDArray[Any]:
+    if values.dtype.kind == "f":
+        return values
+    scaled = values.astype(np.float32) / np.float32(np.iinfo(values.dtype).max)
+    return np.maximum(scaled, np.float32(-1))
+
+
+def _chunks(name: str, data: bytes) -> tuple[bytes, bytes | None]:
+    """Split a .glb into its JSON and its binary chunk."""
+    if len(data) < 20:
+        raise SceneError(f"{name}: ends early: {len(data)} bytes")
+    version, length = struct.unpack_from("<II", data, 4)
+    if version != 2:
+        raise SceneError(f"{name}: is glTF version {version}; only version 2 is read")
+    if length > len(data):
+        raise SceneError(f"{name}: claims {length} bytes; it has {len(data)}")
+    parts: dict[bytes, bytes] = {}
+    at = 12
+    while at + 8 <= length:
+        size, kind = struct.unpack_from("<I4s", data, at)
+        if at + 8 + size > length:
+            raise SceneError(f"{name}: a chunk claims {size} bytes; {length - at - 8} are there")
+        parts.setdefault(kind, data[at + 8 : at + 8 + size])
+        at += 8 + size
+    if b"JSON" not in parts:
+        raise SceneError(f"{name}: has no JSON chunk")
+    return parts[b"JSON"], parts.get(b"BIN\0")

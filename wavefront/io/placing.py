@@ -1,0 +1,105 @@
+"""Where the meshes of a file stand: a mesh that stands in several places is built once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from ..shapes import Instance, Mesh
+from ..shapes.instance import can_place
+from ..shapes.transform import moved, moved_tangents
+from .repair import Raw, build
+
+MAX_INSTANCES = 2**20  # meshes that the nodes of a file place, unless the user allows more
+MAX_COPIES = 2**14  # meshes that cannot be instances, as their matrices are singular
+MAX_COPIED_FACES = 2**25  # triangles in copies of meshes, where every place gets a mesh of its own
+
+Matrix = NDArray[np.float64]
+
+
+@dataclass
+class Places:
+    """Where meshes stand, in the order of the scene's shapes."""
+
+    raw: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))  # (n,) which of the meshes
+    matrix: Matrix = field(default_factory=lambda: np.zeros((0, 4, 4)))  # (n, 4, 4) to the scene
+
+    @classmethod
+    def once(cls, count: int) -> Places:
+        """Return the places of meshes that stand once each, where their vertices are."""
+        return cls(np.arange(count), np.tile(np.eye(4), (count, 1, 1)))
+
+
+def place_shapes(name: str, raws: list[Raw], places: Places, strict: bool) -> list[Mesh | Instance]:
+    """Build meshes, and an instance for each place of one that stands in several.
+
+    Parameters
+    ----------
+    name
+        File name, for messages.
+    raws
+        The distinct meshes.
+    places
+        Where they stand.
+    strict
+        As for `build`.
+
+    Raises
+    ------
+    SceneError
+        As from `build`, or if too many meshes would have to be copied.
+    """
+    shapes: list[Mesh | Instance | None] = [None] * len(places.raw)
+    copies = 0
+    for raw, at in _by_mesh(raws, places):
+        matrices = places.matrix[at]
+        if len(at) == 1:
+            shapes[at[0]] = build(name, moved_raw(raw, matrices[0]), strict)
+            continue
+        mesh = build(name, raw, strict)
+        if mesh is None:
+            continue
+        fit = can_place(mesh, matrices)
+        instances = Instance.many(mesh, matrices[fit])
+        for i, instance in zip(at[fit].tolist(), instances, strict=True):
+            shapes[i] = instance
+        copies += len(at) - len(instances)
+        if copies > MAX_COPIES:
+            raise SceneError(
+                f"{name}: {raw.name!r} brings the meshes whose matrices are singular to {copies}; "
+                f"the limit is {MAX_COPIES}"
+            )
+        for i in at[~fit].tolist():
+            shapes[i] = build(name, moved_raw(raw, places.matrix[i]), strict)
+    return [shape for shape in shapes if shape is not None]
+
+
+def place_meshes(name: str, raws: list[Raw], places: Places, strict: bool) -> list[Mesh]:
+    """Build a mesh of its own for each place; arguments and errors as of `place_shapes`."""
+    sizes = np.array([len(raw.faces) for raw in raws], np.int64)
+    total = int(sizes.take(places.raw).sum())
+    if total > sizes.sum() + MAX_COPIED_FACES:
+        raise SceneError(
+            f"{name}: its {len(places.raw)} instances have {total} triangles together, "
+            f"its meshes {sizes.sum()}; as meshes of their own, at most {MAX_COPIED_FACES} are copied"
+        )
+    parts = zip(places.raw.tolist(), places.matrix, strict=True)
+    built = (build(name, moved_raw(raws[number], matrix), strict) for number, matrix in parts)
+    return [mesh for mesh in built if mesh is not None]
+
+
+def moved_raw(raw: Raw, matrix: Matrix) -> Raw:
+    """Return a mesh moved by a (4, 4) matrix."""
+    vertices, faces, normals = moved(matrix, raw.vertices, raw.faces, raw.normals)
+    tangents = moved_tangents(matrix, raw.tangents)
+    return replace(raw, vertices=vertices, faces=faces, normals=normals, tangents=tangents)
+
+
+def _by_mesh(raws: list[Raw], places: Places) -> list[tuple[Raw, NDArray[np.intp]]]:
+    """Return each mesh that stands somewhere with the numbers of its places, in rising order."""
+    order = np.argsort(places.raw, kind="stable")
+    numbers, begins = np.unique(places.raw[order], return_index=True)
+    return list(zip((raws[i] for i in numbers), np.split(order, begins)[1:], strict=True))
