@@ -218,9 +218,11 @@ def test_gamma_and_exposure_reach_the_file(obj, tmp_path):
         (["--size", "640"], "is not WIDTHxHEIGHT"),
         (["--size", "4x3x2"], "is not WIDTHxHEIGHT"),
         (["--size", "ax3"], "is not WIDTHxHEIGHT"),
-        (["--gamma", "0"], "neither a number above 0"),
-        (["--gamma", "linear"], "neither a number above 0"),
+        (["--gamma", "0"], "neither a number from 0.01 to 100"),
+        (["--gamma", "linear"], "neither a number from 0.01 to 100"),
         (["--exposure", "nan"], "not a finite number"),
+        (["--exposure", "1e4"], "exposure is 10000.0; it must be from -100 to 100"),
+        (["-o", "x" * 300 + ".png"], "File name too long"),
         (["--integrator", "best"], "invalid choice: 'best'"),
         (["--sampler", "best"], "invalid choice: 'best'"),
         (["--spp", "many"], "invalid int value"),
@@ -284,3 +286,100 @@ def test_an_interrupted_render_is_saved_and_gives_130(obj, fast, monkeypatch):
     monkeypatch.setattr(cli, "render", interrupted)
     assert main(["render", obj, *options]) == 130
     assert output.exists()
+
+
+# --- Pictures that cannot be saved where they should be ----------------------------------------------
+
+
+def saved_instead(capsys):
+    """Return the error, and where the picture went."""
+    out, err = capsys.readouterr()
+    assert out == ""
+    error, note = err.strip().splitlines()
+    assert error.startswith("wavefront: error: ")
+    return error, note
+
+
+def broken_after_the_render(monkeypatch, act):
+    """Let something happen between the render and saving."""
+    render = cli.render
+
+    def render_then_act(*args, **kwargs):
+        image = render(*args, **kwargs)
+        act()
+        return image
+
+    monkeypatch.setattr(cli, "render", render_then_act)
+
+
+def test_a_picture_whose_folder_has_gone_is_saved_in_the_current_one(obj, tmp_path, capsys, monkeypatch):
+    here, there = tmp_path / "here", tmp_path / "there"
+    here.mkdir()
+    there.mkdir()
+    monkeypatch.chdir(here)
+    broken_after_the_render(monkeypatch, there.rmdir)
+    for count in range(2):
+        there.mkdir(exist_ok=True)
+        options = ["-o", str(there / "p.png"), "--spp", "1", "--size", "8x6", "--quiet", "--origin", "0,1,4"]
+        assert main(["render", obj, *options]) == 2
+        error, note = saved_instead(capsys)
+        assert "does not exist" in error
+        name = here / ("p-saved-2.png" if count else "p-saved.png")
+        assert note == f"wavefront: the picture was saved as {name}"
+        assert iio.imread(name).shape == (6, 8, 3)
+
+
+def test_a_picture_in_whose_place_is_something_else_is_saved_beside_it(obj, fast, capsys, monkeypatch):
+    output, options = fast
+    broken_after_the_render(monkeypatch, output.mkdir)
+    assert main(["render", obj, *options]) == 2
+    error, note = saved_instead(capsys)
+    assert "is a folder" in error
+    assert note == f"wavefront: the picture was saved as {output.with_name('picture-saved.npy')}"
+    assert np.load(output.with_name("picture-saved.npy")).shape == (6, 8, 3)
+
+
+def test_a_picture_that_its_format_cannot_hold_is_saved_in_another(obj, tmp_path, capsys, monkeypatch):
+    def refuse(*args, **kwargs):
+        raise OSError("encoder error -2")
+
+    monkeypatch.setattr("wavefront.io.coded.encode", refuse)
+    options = ["-o", str(tmp_path / "p.jpg"), "--spp", "1", "--size", "8x6", "--quiet", "--origin", "0,1,4"]
+    assert main(["render", obj, *options]) == 2
+    error, note = saved_instead(capsys)
+    assert "p.jpg: cannot be encoded: encoder error -2" in error
+    assert note == f"wavefront: the picture was saved as {tmp_path / 'p-saved.npy'}"
+
+
+def test_a_picture_that_can_be_saved_nowhere_is_said_to_be_lost(obj, fast, capsys, monkeypatch):
+    def refuse(*args):
+        raise wf.SaveError("no space left")
+
+    broken_after_the_render(
+        monkeypatch, lambda: monkeypatch.setattr("wavefront.io.images.write_bytes", refuse)
+    )
+    assert main(["render", obj, *fast[1]]) == 2
+    assert saved_instead(capsys) == ("wavefront: error: no space left", "wavefront: the picture is lost")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+def test_sigterm_ends_the_program_and_leaves_nothing(obj, fast):
+    """While a scratch file that has a name is there."""
+    output, options = fast
+    code = (
+        "import os, signal, sys\n"
+        "from wavefront import cli\n"
+        "from wavefront.io import files\n"
+        "files.OPEN_FILES = '/no/such/folder'\n"
+        "def end(handle):\n"
+        f"    assert any(name.endswith('.tmp') for name in os.listdir({str(output.parent)!r}))\n"
+        "    os.kill(os.getpid(), signal.SIGTERM)\n"
+        "files.os.fsync = end\n"
+        "sys.exit(cli.main(sys.argv[1:]))\n"
+    )
+    before = set(output.parent.iterdir())
+    done = subprocess.run(
+        [sys.executable, "-c", code, "render", obj, *options], capture_output=True, text=True, timeout=60
+    )
+    assert (done.returncode, done.stderr) == (143, "")
+    assert set(output.parent.iterdir()) == before

@@ -3,29 +3,36 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
+import threading
 import warnings
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NoReturn
 
 import numpy as np
 
 from .camera import Camera, image_size
-from .errors import SceneError
+from .errors import SaveError, SceneError
 from .filters import FILTERS
 from .image import Image
 from .integrators import INTEGRATORS
-from .io.images import check_writable
+from .io.images import check_exposure, check_gamma, check_writable
 from .io.load import load
 from .metrics import compare
 from .parallel import EXECUTORS
 from .render import DEFAULT_SPP, render
+from .rescue import save_elsewhere
 from .sampling.sampler import SAMPLERS
 from .scene import Scene
 from .shapes import Instance, Mesh
 from .version import VERSION
 
+ERROR = 2  # as argparse has it
 INTERRUPTED = 130  # 128 + SIGINT, as shells report it
+TERMINATED = 143  # 128 + SIGTERM
 VECTOR_OPTIONS = ("--origin", "--target", "--up")
 FOV = 40.0  # degrees
 
@@ -33,17 +40,35 @@ FOV = 40.0  # degrees
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
     options = _parser().parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
-    with warnings.catch_warnings():
+    with _sigterm_exits(), warnings.catch_warnings():
         warnings.simplefilter("always", UserWarning)
         warnings.showwarning = lambda message, *_: _show_warning(message)
         try:
             status: int = options.run(options)
         except (SceneError, OSError) as error:
             print(f"wavefront: error: {error}", file=sys.stderr)
-            return 2
+            return ERROR
         except KeyboardInterrupt:
             return INTERRUPTED
     return status
+
+
+@contextmanager
+def _sigterm_exits() -> Iterator[None]:
+    """Let SIGTERM end the program as an error does, which tidies up; a second one ends it at once."""
+
+    def leave(signal_number: int, frame: Any) -> NoReturn:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        raise SystemExit(TERMINATED)
+
+    if threading.current_thread() is not threading.main_thread():  # only that one may set handlers
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, leave)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _joined(arguments: Sequence[str]) -> list[str]:
@@ -111,7 +136,7 @@ def _add_render(commands: Any) -> None:
     command.add_argument("--up", **where, help="what is up in the picture (default: 0,1,0)")
     command.add_argument("--fov", type=_fov, help=f"vertical field of view, degrees (default: {FOV:g})")
     command.add_argument("--gamma", type=_gamma, default=2.2, help='for png and jpg: a number or "srgb"')
-    command.add_argument("--exposure", type=_finite, default=0.0, help="stops, applied when saving")
+    command.add_argument("--exposure", type=_exposure, default=0.0, help="stops, applied when saving")
     command.add_argument("--quiet", action="store_true", help="no progress bar")
     command.set_defaults(run=_render)
 
@@ -142,9 +167,24 @@ def _render(options: argparse.Namespace) -> int:
     for warning in caught:
         _show_warning(warning.message)
     interrupted = image.metadata["interrupted"]
-    image.save(options.output, gamma=options.gamma, exposure=options.exposure)
+    return _save(image, options) or (INTERRUPTED if interrupted else 0)
+
+
+def _save(image: Image, options: argparse.Namespace) -> int:
+    """Save a picture, if not where it was meant to go then elsewhere; return the exit status."""
+
+    def save(path: str | Path) -> None:
+        image.save(path, gamma=options.gamma, exposure=options.exposure)
+
+    try:
+        save(options.output)
+    except (SaveError, MemoryError) as error:
+        print(f"wavefront: error: {error or 'out of memory'}", file=sys.stderr)
+        place = save_elsewhere(save, options.output)
+        print(f"wavefront: the picture {f'was saved as {place}' if place else 'is lost'}", file=sys.stderr)
+        return ERROR
     print(_summary(image, options.output))
-    return INTERRUPTED if interrupted else 0
+    return 0
 
 
 def _camera(scene: Scene, options: argparse.Namespace) -> Camera:
@@ -236,12 +276,18 @@ def _gamma(text: str) -> float | str:
     if text == "srgb":
         return text
     try:
-        gamma = _finite(text)
+        return check_gamma(_finite(text))
     except ValueError:
-        gamma = 0.0
-    if gamma <= 0:
-        raise argparse.ArgumentTypeError(f'{text!r} is neither a number above 0 nor "srgb"')
-    return gamma
+        raise argparse.ArgumentTypeError(
+            f'{text!r} is neither a number from 0.01 to 100 nor "srgb"'
+        ) from None
+
+
+def _exposure(text: str) -> float:
+    try:
+        return check_exposure(_finite(text))
+    except SceneError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def _finite(text: str) -> float:

@@ -199,16 +199,20 @@ def linear_to_srgb(values: Floats) -> Floats:
 
 
 def exposed(rgb: Floats, exposure: float) -> Floats:
-    """Return values brightened by `exposure` stops, any shape.
+    """Return values brightened by `exposure` stops, any shape."""
+    return rgb * np.float32(2.0 ** check_exposure(exposure))
+
+
+def check_exposure(exposure: float) -> float:
+    """Return `exposure` as a float.
 
     Raises
     ------
     SceneError
-        If `exposure` is not a number from -100 to 100.
+        If it is not a number from -100 to 100.
     """
     limit = f"from {-MAX_STOPS} to {MAX_STOPS}"
-    stops = number("exposure", exposure, lambda x: abs(x) <= MAX_STOPS, limit)
-    return rgb * np.float32(2.0**stops)
+    return number("exposure", exposure, lambda x: abs(x) <= MAX_STOPS, limit)
 
 
 def check_gamma(gamma: Gamma) -> Gamma:

@@ -80,9 +80,7 @@ def _strayed(shade: Shading, wi: Floats, cos: Floats) -> Ints:
     return np.concatenate(found) if found else np.zeros(0, np.intp)
 
 
-def _turn(
-    shade: Shading, lanes: Ints, direction: Floats, cos_g: Floats, z: Floats
-) -> tuple[Floats, Floats]:
+def _turn(shade: Shading, lanes: Ints, direction: Floats, cos_g: Floats, z: Floats) -> tuple[Floats, Floats]:
     """Return directions (3, k) of some lanes, turned to the side of `ng` that z tells, and their cosines.
 
     Reflected light stays outside or inside, refracted light crosses, and the index of refraction
