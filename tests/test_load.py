@@ -157,7 +157,7 @@ def test_file_names(tmp_path, name):
         (SQUARE + "f 0 1 2\n", r"scene\.obj line 5: f uses v 0; it must be in \[1, 4\]"),
         (SQUARE + "\nf 1 2 5\n", r"line 6: f uses v 5; it must be in \[1, 4\]"),
         (SQUARE + "f -5 1 2\n", r"line 5: f uses v -5; .*\[-4, -1\] counting back"),
-        (SQUARE + "f 1/1 2/1 3/1\n", r"line 5: f uses vt 1; it must be left out"),
+        (SQUARE + "vt 0 0\nf 1/1 2/1 3/2\n", r"line 6: f uses vt 2; it must be in \[1, 1\]"),
         (SQUARE + "vn 0 0 1\nf 1//1 2//2 3//1\n", r"line 6: f uses vn 2; it must be in \[1, 1\]"),
         (SQUARE + "f 1 2\n", r"line 5: f has 2 corners \('1 2'\); it needs at least 3"),
         (SQUARE + "f\n", r"line 5: f has 0 corners"),
@@ -167,6 +167,17 @@ def test_file_names(tmp_path, name):
         (SQUARE + "f /1 2 3\n", r"line 5: f holds '/1'"),
         (SQUARE + "f 1/1 /1 2/1 3/1\n", r"line 5: f holds '/1'"),
         (SQUARE + "f 99999999999999999999 2 3\n", r"line 5: f holds '99999999999999999999'"),
+        (SQUARE + f"f {-(2**63)} 2 3\n", r"scene\.obj line 5: f uses v -9223372036854775808; it must be in"),
+        (
+            SQUARE + f"f 1 2 3 {-(2**63)}\n",
+            r"scene\.obj line 5: f uses v -9223372036854775808; it must be in",
+        ),
+        (SQUARE + f"f 1/{-(2**63)} 2/1 3/1\nvt 0 0\n", r"line 5: f uses vt -9223372036854775808; it must"),
+        (SQUARE + f"f {2**63 - 1} 2 3\n", r"line 5: f uses v 9223372036854775807; it must be in"),
+        (SQUARE + f"f -0{2**63} 2 3\n", r"line 5: f uses v -9223372036854775808"),
+        (SQUARE + "f 1_0 2 3\n", r"line 5: f holds '1_0'"),
+        (SQUARE + "f 1 // 2 3\n", r"line 5: f holds '//'"),
+        (SQUARE + "v 1 2 1_0\nf 1 2 3\n", r"line 5: v holds '1_0', which is not a number"),
         ("v 0 0\n" + SQUARE + "f 1 2 3\n", r"line 1: v has 2 numbers \('0 0'\); it must have at least 3"),
         (SQUARE + "v 1 2 zero\nf 1 2 3\n", r"line 5: v holds 'zero', which is not a number"),
         (SQUARE + "vn 0 1\nf 1 2 3\n", r"line 5: vn has 2 numbers"),
@@ -179,6 +190,31 @@ def test_file_names(tmp_path, name):
 def test_defects_are_named_with_their_line(write, text, message):
     with pytest.raises(SceneError, match=message):
         load_meshes(write(text))
+
+
+@pytest.mark.parametrize(
+    ("face", "message"),
+    [
+        ("1/1 2/2 3/3", r"scene\.obj line 5: f uses vt 1; there is none, so all are left out$"),
+        ("1//-1 2//2 3", r"scene\.obj line 5: f uses vn -1; there is none, so all are left out$"),
+    ],
+)
+def test_uvs_and_normals_that_no_line_gives_are_left_out(write, face, message):
+    path = write(f"{SQUARE}f {face}\nf 1 3 4\n")
+    with pytest.warns(UserWarning, match=message) as record:
+        (mesh,) = load_meshes(path)
+    assert len(record) == 1
+    assert (mesh.uvs, mesh.normals) == (None, None)
+    assert np.array_equal(soup(mesh)[:, :, :2], [[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]])
+    with pytest.raises(SceneError, match=message):
+        load_meshes(path, strict=True)
+
+
+def test_names_and_comments_may_hold_keywords(write):
+    text = f"# usemtl x f 1 2 3\nmtllib s.mtl\n{SQUARE}o usemtl f\nusemtl v usemtl #f\n"
+    text += "f 1 2 3 # usemtl y\ng f 1\nusemtl 0\nf 1 3 4\n"
+    scene = load(write(text, s_mtl="newmtl v usemtl #f\nnewmtl 0\n"))
+    assert [(shape.name, len(shape.faces)) for shape in scene.shapes] == [("v usemtl #f", 1), ("0", 1)]
 
 
 @pytest.mark.parametrize("cut", range(60, 5, -3))
@@ -890,6 +926,14 @@ def test_stl_as_text(write):
     assert np.array_equal(soup(two)[0], [[0, 0, 2], [1, 0, 2], [0, 1, 2]])
 
 
+def test_stl_with_tabs_and_names_of_keywords(write):
+    lines = ["solid\tvertex normal solid", "facet\tnormal 0 0 1", "\touter loop", *["vertex\t0 0\t0"]]
+    lines += ["\tvertex\t1 0 0", "vertex 0\t1 0\t", "endloop", "\tendfacet", "endsolid\tvertex", ""]
+    (mesh,) = load_meshes(write("\r\n".join(lines), "a.stl"))
+    assert mesh.name == "vertex normal solid"
+    assert np.array_equal(soup(mesh)[0], [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+
+
 def test_a_binary_stl_may_say_solid(write):
     (mesh,) = load_meshes(write(b"solid" + stl(1, [FACET])[5:], "a.stl"))
     assert len(mesh.faces) == 1
@@ -913,6 +957,7 @@ def test_a_binary_stl_may_say_solid(write):
         ),
         ("solid a\nvertex 0 0 0\nvertex 1 0 0\nendsolid\n", r"a\.stl: solid 'a' has 2 vertices"),
         ("solid a\nhello\nendsolid\n", r"a\.stl line 2: 'hello' is not STL"),
+        ("solid a\nendsolid\nvertex 0 0 0\nsolid\nendsolid", r"a\.stl line 3: 'vertex 0 0 0' is not STL"),
     ],
 )
 def test_damaged_stl(write, data, message):

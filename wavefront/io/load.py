@@ -243,25 +243,22 @@ def _read_gltf(path: PathLike, data: bytes, strict: bool, materials: bool, max_i
 
 
 def _read_obj(path: PathLike, data: bytes, strict: bool, materials: bool) -> list[Raw]:
-    parsed = obj.parse(path, decode(data))
+    name = os.fspath(path)
+    parsed = obj.parse(name, decode(data), strict)
     if parsed.ignored:
         listed = ", ".join(f"{keyword} (line {line})" for keyword, line in parsed.ignored.items())
-        warn(f"{os.fspath(path)}: not honoured: {listed}", strict)
+        warn(f"{name}: not honoured: {listed}", strict)
     looks = _libraries(path, parsed.libraries, strict) if materials else {}
-    raws = []
-    for group in parsed.groups:
-        raw = Raw(group.material or "", group.vertices, group.faces, group.normals, group.uvs)
-        raw.lines = group.lines
-        raw.colors = None if group.colors is None else visuals.from_srgb(group.colors)
+    for raw in parsed.raws:
+        raw.colors = None if raw.colors is None else visuals.from_srgb(raw.colors)
         if materials and not dress(raw, looks.get(raw.name)):
-            warn(f"{os.fspath(path)}: not honoured: vertex colours (material {raw.name!r})", strict)
-        raws.append(raw)
-    absent = ", ".join(repr(raw.name) for raw in raws if raw.name and raw.name not in looks)
+            warn(f"{name}: not honoured: vertex colours (material {raw.name!r})", strict)
+    absent = ", ".join(repr(raw.name) for raw in parsed.raws if raw.name and raw.name not in looks)
     if looks and absent:
-        warn(f"{os.fspath(path)}: not in its material files: {absent}", strict)
+        warn(f"{name}: not in its material files: {absent}", strict)
     if materials and absent and not parsed.libraries:
-        warn(f"{os.fspath(path)}: names no material file for its materials {absent}", strict)
-    return raws
+        warn(f"{name}: names no material file for its materials {absent}", strict)
+    return parsed.raws
 
 
 def _libraries(path: PathLike, libraries: list[str], strict: bool) -> dict[str, Look]:

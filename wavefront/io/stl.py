@@ -1,8 +1,9 @@
-"""STL, binary and text -> triangles."""
+"""STL: trimesh reads binary files and texts, after a check of what they claim against what they hold."""
 
 from __future__ import annotations
 
-import re
+from io import BytesIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,92 +11,82 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from .files import decode
 from .repair import Raw, warn, wide
+from .words import sort_lines
 
-RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
-COLOURS = (b"COLOR=", b"MATERIAL=")  # what Materialise Magics writes into the header
-OTHER_LINES = re.compile(r"(facet|outer|endloop|endfacet|solid|endsolid)\b", re.IGNORECASE)
+COLORS = (b"COLOR=", b"MATERIAL=")  # what Materialise Magics writes into the header
+FACET = ("facet", "outer", "endloop", "endfacet")  # lines of a text that say nothing more
 
 
 def parse(name: str, data: bytes, strict: bool = False) -> list[Raw]:
     """Read the solids of an STL file; the normals in it are those of the facets and are left out.
 
-    Some programs hide colours in a binary file. There are two ways, which contradict each other, so
+    Some programs hide colors in a binary file. There are two ways, which contradict each other, so
     these are left out with a warning.
 
     Raises
     ------
     SceneError
-        Naming the file, and the line of a text; or if `strict` and there are colours.
+        Naming the file, and the line of a text; or if `strict` and there are colors.
     """
-    if len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little"):
-        facets = np.frombuffer(data, RECORD, offset=84)
-        _warn_of_colours(name, data[:80], facets["extra"], strict)
-        corners = facets["corners"]
-        return [Raw("", wide(corners.reshape(-1, 3)), np.arange(3 * len(corners)).reshape(-1, 3))]
+    count = int.from_bytes(data[80:84], "little")
+    if len(data) >= 84 and len(data) == 84 + 50 * count:
+        return [Raw("", *mesh) for mesh in _binary(name, data, strict)]
     if data.lstrip()[:5].lower() == b"solid":
         return _text(name, decode(data))
     if len(data) < 84:
         raise SceneError(f"{name}: has {len(data)} bytes; a binary STL has at least 84")
-    count = int.from_bytes(data[80:84], "little")
     raise SceneError(f"{name}: claims {count} faces, {84 + 50 * count} bytes; it has {len(data)}")
 
 
-def _warn_of_colours(name: str, header: bytes, extra: NDArray[np.uint16], strict: bool) -> None:
-    found = [f"{word.decode()} in the header" for word in COLOURS if word in header]
-    if extra.any():
-        found.append(f"colours of facets (facet {int((extra != 0).argmax())})")
-    if found:
-        warn(f"{name}: not honoured: {', '.join(found)}", strict)
+def _read(data: bytes) -> list[dict[str, Any]]:
+    from trimesh.exchange.stl import load_stl
+
+    found = load_stl(BytesIO(data))
+    return list(found["geometry"].values()) if "geometry" in found else [found]
+
+
+def _binary(name: str, data: bytes, strict: bool) -> list[tuple[Any, Any]]:
+    colored = [f"{word.decode()} in the header" for word in COLORS if word in data[:80]]
+    meshes = _read(data)
+    extra = [mesh["face_attributes"]["stl"] for mesh in meshes]
+    if extra and extra[0].any():
+        colored.append(f"colours of facets (facet {int((extra[0] != 0).argmax())})")
+    if colored:
+        warn(f"{name}: not honoured: {', '.join(colored)}", strict)
+    return [(wide(mesh["vertices"]), mesh["faces"]) for mesh in meshes]
 
 
 def _text(name: str, text: str) -> list[Raw]:
-    solids: list[tuple[str, list[int], list[str]]] = []
-    closed = True
-    for number, line in enumerate(text.split("\n"), 1):
-        keyword, _, rest = line.strip().partition(" ")
-        match keyword.lower():
-            case "vertex" if not closed:
-                solids[-1][1].append(number)
-                solids[-1][2].append(rest)
-            case "solid":
-                solids.append((rest.strip(), [], []))
-                closed = False
-            case "endsolid":
-                closed = True
-            case "":
-                pass
-            case _ if not OTHER_LINES.match(keyword):
-                raise SceneError(f"{name} line {number}: {line.strip()[:40]!r} is not STL")
-    if not closed:
+    """Check a text, and let trimesh read its vertices; it would also look for them in the names of solids."""
+    lines = [line.strip() for line in text.replace("\t", " ").split("\n")]
+    (vertices, starts, ends, *_), others = sort_lines(
+        [line.lower() for line in lines], "vertex", "solid", "endsolid", *FACET
+    )
+    solid = np.searchsorted(starts.numbers, vertices.numbers) - 1  # of each vertex
+    closed = (
+        np.searchsorted(ends.numbers, vertices.numbers) > np.searchsorted(ends.numbers, starts.numbers)[solid]
+    )
+    bad = np.sort(np.r_[others + 1, vertices.numbers[closed]])
+    if len(bad):
+        raise SceneError(f"{name} line {bad[0]}: {lines[bad[0] - 1][:40]!r} is not STL")
+    if len(ends.numbers) == 0 or ends.numbers[-1] < starts.numbers[-1]:
         raise SceneError(f"{name}: ends early: the text has no endsolid")
-    return [_solid(name, *solid) for solid in solids if solid[2]]
-
-
-def _solid(name: str, solid: str, numbers: list[int], rows: list[str]) -> Raw:
-    if len(rows) % 3:
-        raise SceneError(f"{name}: solid {solid!r} has {len(rows)} vertices; facets need a multiple of 3")
-    lines = np.array(numbers, np.intp).reshape(-1, 3)[:, 0]
-    return Raw(solid, _table(name, numbers, rows), np.arange(len(rows)).reshape(-1, 3), lines=lines)
-
-
-def _table(name: str, numbers: list[int], rows: list[str]) -> NDArray[np.float64]:
-    words = [row.split() for row in rows]
-    try:
-        if any(len(row) != 3 for row in words):
-            raise ValueError
-        return np.array(words, np.float64)
-    except ValueError:
-        for number, row in zip(numbers, words, strict=True):
-            if len(row) != 3 or not all(map(_is_number, row)):
-                raise SceneError(
-                    f"{name} line {number}: vertex is {' '.join(row)!r}; it must be 3 numbers"
-                ) from None
-        raise
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
+    wrong = vertices.numbers[vertices.widths != 3][:1].tolist() or vertices.not_a_number()
+    if wrong:
+        rest = lines[wrong[0] - 1].partition(" ")[2]
+        raise SceneError(f"{name} line {wrong[0]}: vertex is {rest!r}; it must be 3 numbers")
+    solids: list[tuple[str, NDArray[np.intp]]] = []  # name, line of each facet's first vertex
+    written: list[str] = []
+    for chosen in np.split(np.arange(len(solid)), np.flatnonzero(np.diff(solid)) + 1) if len(solid) else []:
+        title = lines[starts.numbers[solid[chosen[0]]] - 1][5:].strip()
+        if len(chosen) % 3:
+            raise SceneError(
+                f"{name}: solid {title!r} has {len(chosen)} vertices; facets need a multiple of 3"
+            )
+        written += [f"solid {len(solids)}", *("vertex" + vertices.texts[i] for i in chosen), "endsolid"]
+        solids.append((title, vertices.numbers[chosen[::3]]))
+    meshes = _read("\n".join(written).encode()) if solids else []
+    return [
+        Raw(title, mesh["vertices"], mesh["faces"], lines=numbers)
+        for (title, numbers), mesh in zip(solids, meshes, strict=True)
+    ]
