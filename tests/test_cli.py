@@ -274,18 +274,23 @@ def test_ctrl_c_while_loading_gives_130(obj, fast, monkeypatch):
     assert main(["render", obj, *fast[1]]) == 130
 
 
-def test_an_interrupted_render_is_saved_and_gives_130(obj, fast, monkeypatch):
+@pytest.mark.parametrize(
+    ("error", "status", "message"),
+    [(wf.Interrupted, 130, "wavefront: stopped"), (wf.RenderError, 2, "wavefront: error: stopped")],
+)
+@pytest.mark.parametrize("begun", [True, False])
+def test_a_render_that_stops_is_saved(obj, fast, monkeypatch, capsys, error, status, message, begun):
+    """As far as it got; the exit status tells."""
     output, options = fast
     render = cli.render
 
-    def interrupted(*args, **kwargs):
-        image = render(*args, **kwargs)
-        image.metadata["interrupted"] = True
-        return image
+    def stopped(*args, **kwargs):
+        raise error("stopped", render(*args, **kwargs) if begun else None)
 
-    monkeypatch.setattr(cli, "render", interrupted)
-    assert main(["render", obj, *options]) == 130
-    assert output.exists()
+    monkeypatch.setattr(cli, "render", stopped)
+    assert main(["render", obj, *options]) == status
+    assert message in capsys.readouterr().err
+    assert output.exists() == begun
 
 
 # --- Pictures that cannot be saved where they should be ----------------------------------------------

@@ -122,7 +122,7 @@ def test_processes_that_die_again_and_again_are_an_error() -> None:
             os.kill(os.getpid(), signal.SIGKILL)
         return piece
 
-    with pytest.raises(wf.SceneError, match=r"worker processes died 3 times, at last with \d .*memory"):
+    with pytest.raises(wf.RenderError, match=r"worker processes died 3 times, at last with \d .*memory"):
         run(work, range(8), 2, "processes")
     assert not multiprocessing.active_children()
 
@@ -254,10 +254,8 @@ def test_ctrl_c_stops_processes() -> None:
 
     pictures = []
     for executor in ("processes", "threads"):
-        with pytest.warns(UserWarning, match="interrupted"):
-            image = wf.render(
-                scenes.everything(), 64, wave_size=300, workers=2, executor=executor, progress=stop
-            )
-        pictures.append(np.asarray(image).tobytes())
+        with pytest.raises(wf.Interrupted) as caught:
+            wf.render(scenes.everything(), 64, wave_size=300, workers=2, executor=executor, progress=stop)
+        pictures.append(np.asarray(caught.value.image).tobytes())
     assert pictures[0] == pictures[1]
     assert not multiprocessing.active_children()

@@ -352,8 +352,12 @@ def test_a_few_bad_samples_are_counted(integrator: str, method: str, value: floa
 @pytest.mark.parametrize(("integrator", "method"), FAULTS)
 def test_many_bad_samples_are_an_error(integrator: str, method: str) -> None:
     """More than 1e-4 of all."""
-    with pytest.raises(wf.SceneError, match=r"samples were not finite"):
+    with pytest.raises(wf.RenderError, match=r"samples were not finite") as caught:
         render(faulty(0.1, np.nan, method), 64, integrator=integrator)
+    image = caught.value.image
+    assert np.isfinite(image.rgb).all()
+    assert 0.2 < image.rgb.mean() < 0.5  # all the other samples are there
+    assert image.metadata["bad_samples"] > 0
 
 
 def test_naive_warns_of_point_lights() -> None:
@@ -373,20 +377,22 @@ def test_no_light_warns() -> None:
 
 
 @pytest.mark.parametrize("workers", [1, 3])
-def test_ctrl_c_gives_the_picture_so_far(workers: int) -> None:
-    """With a warning that says how much of it there is."""
+def test_ctrl_c_carries_the_picture_so_far(workers: int) -> None:
+    """In an error that is a KeyboardInterrupt and says how much of it there is."""
     scene = small((8, 8))
-    calls = []
+    calls: list = []
 
     def stop(done: int, total: int) -> None:
         calls.append(done)
         if done >= 4 * 64:
             raise KeyboardInterrupt
 
-    with pytest.warns(UserWarning, match=r"interrupted: the picture holds 25%"):
-        image = render(scene, 16, wave_size=64, workers=workers, progress=stop)
-    assert calls == [64, 128, 192, 256]
+    with pytest.raises(wf.Interrupted, match="has 4 of 16 samples per pixel") as caught:
+        render(scene, 16, wave_size=64, workers=workers, progress=stop)
+    assert sorted(set(calls)) == [64, 128, 192, 256]
+    image = caught.value.image
     assert image.spp == 4
+    assert image.metadata["interrupted"]
     assert image.rgb.tobytes() == render(scene, 4, wave_size=64).rgb.tobytes()
 
 
@@ -396,7 +402,8 @@ def test_ctrl_c_within_a_sample_of_all_pixels() -> None:
     def stop(done: int, total: int) -> None:
         raise KeyboardInterrupt
 
-    with pytest.warns(UserWarning, match=r"interrupted"):
-        image = render(small((8, 8)), 1, wave_size=16, progress=stop)
+    with pytest.raises(wf.Interrupted, match=r"0\.25 of 1 samples") as caught:
+        render(small((8, 8)), 1, wave_size=16, progress=stop)
+    image = caught.value.image
     assert (image.rgb[2:] == 0).all()
     assert (image.rgb[:2] > 0).all()

@@ -292,8 +292,10 @@ def test_ctrl_c_in_an_adaptive_pass_gives_the_picture_so_far() -> None:
         if done > 40 * size:
             raise KeyboardInterrupt
 
-    with pytest.warns(UserWarning, match=r"interrupted: the picture holds 4\d\.\d+ samples per pixel"):
-        image = render(lit(), None, noise=1e-3, wave_size=100, progress=stop)
+    message = r"interrupted: the picture so far has 4\d\.\d+ samples per pixel"
+    with pytest.raises(wf.Interrupted, match=message) as caught:
+        render(lit(), None, noise=1e-3, wave_size=100, progress=stop)
+    image = caught.value.image
     assert image.metadata["interrupted"]
     assert set(np.unique(image.counts)) <= set(range(32, 49))
     assert image.metadata["samples"] == image.counts.sum() > 40 * size

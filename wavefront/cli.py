@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from .camera import Camera, image_size
-from .errors import SaveError, SceneError
+from .errors import Interrupted, RenderError, SaveError, SceneError
 from .filters import FILTERS
 from .image import Image
 from .integrators import INTEGRATORS
@@ -146,8 +146,9 @@ def _render(options: argparse.Namespace) -> int:
     progress = False if options.quiet else None
     scene = load(options.scene, progress=progress)
     scene.camera = _camera(scene, options)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    image: Image | None
+    status = 0
+    try:
         image = render(
             scene,
             options.spp,
@@ -164,10 +165,13 @@ def _render(options: argparse.Namespace) -> int:
             branches=options.branches,
             progress=progress,
         )
-    for warning in caught:
-        _show_warning(warning.message)
-    interrupted = image.metadata["interrupted"]
-    return _save(image, options) or (INTERRUPTED if interrupted else 0)
+    except Interrupted as stop:
+        image, status = stop.image, INTERRUPTED
+        print(f"wavefront: {stop}", file=sys.stderr)
+    except RenderError as error:
+        image, status = error.image, ERROR
+        print(f"wavefront: error: {error}", file=sys.stderr)
+    return (image is not None and _save(image, options)) or status
 
 
 def _save(image: Image, options: argparse.Namespace) -> int:

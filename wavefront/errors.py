@@ -49,6 +49,14 @@ class Interrupted(KeyboardInterrupt):
         super().__init__(message)
         self.image = image
 
+    def _render_traceback_(self) -> list[str]:
+        """Show the picture in a notebook: IPython asks for this in place of the traceback."""
+        if self.image is not None:
+            from IPython.display import display  # it runs, or nobody would ask
+
+            display(self.image)
+        return [f"{type(self).__name__}: {self}"]
+
 
 def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
     """Return `value` as a float64 array of `shape` (None matches any length).

@@ -10,23 +10,21 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 import sys
 import threading
-import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Future
+from concurrent.futures import wait as wait_for_futures
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
-from multiprocessing.connection import wait
 from types import TracebackType
 from typing import Any, Generic, Self, TypeVar
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
-from .errors import SceneError
+from .crew import Crew, Stoppable, Threads
+from .errors import RenderError, SceneError
+from .shared import STOP, SharedNumber, Stopped
 
 Piece = TypeVar("Piece")
 Result = TypeVar("Result")
@@ -34,7 +32,7 @@ Result = TypeVar("Result")
 EXECUTORS = ("processes", "threads")
 MIN_PATHS = 1 << 18  # fewer are traced sooner than processes are started
 RETRIES = 2  # times that lost processes are replaced
-LARGEST_BLOCK = 31 << 20  # bytes; larger ones do not move glibc's limits
+POLL = 0.1  # seconds between two looks at whether work is to stop
 
 
 def worker_count(workers: int | None) -> int:
@@ -95,139 +93,131 @@ class Workers(Generic[Piece, Result]):
         Number of workers.
     executor
         "threads" or "processes".
+    stop
+        At STOP no piece is begun any more, and work that looks at it may raise `Stopped`; at AT_ONCE
+        nobody waits for pieces under way. Leaving the context sets it to STOP.
     """
 
-    def __init__(self, work: Callable[[Piece], Result], count: int, executor: str) -> None:
-        self._work, self._count, self._executor = work, count, executor
-        self._limits: Any = None
-        self._pool: Executor | None = None
+    def __init__(
+        self, work: Callable[[Piece], Result], count: int, executor: str, stop: SharedNumber | None = None
+    ) -> None:
+        self._stop = SharedNumber() if stop is None else stop
+        self._work, self._count, self._executor = Stoppable(work, self._stop), count, executor
+        self._crew: Crew | None = None
+        self._running: deque[tuple[Piece, Future[Result]]] = deque()
         self._retries = RETRIES
 
     def __enter__(self) -> Self:
         """Hold BLAS to one thread; workers start with the first piece."""
-        self._limits = threadpool_limits(1, "blas")
+        single_threaded_blas.acquire()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Drop what has not begun, and wait for what has."""
-        self._limits.restore_original_limits()
-        if self._pool is not None:
-            self._pool.shutdown(wait=True, cancel_futures=True)
-            self._pool = None
+        """Stop what is under way and end all workers.
 
-    def run(self, pieces: Iterable[Piece]) -> Iterator[tuple[Piece, Result]]:
+        Threads end at their next look at `stop`. Processes that have not ended after a second are killed.
+        """
+        self._stop.rise_to(STOP)
+        try:
+            if self._crew is not None:
+                self._crew.end([future for _, future in self._running])
+        finally:
+            single_threaded_blas.release()
+
+    def run(
+        self, pieces: Iterable[Piece], waiting: Callable[[], object] = lambda: None
+    ) -> Iterator[tuple[Piece, Result]]:
         """Yield each piece with its result, in the order of the pieces.
 
-        Few pieces are under way at once, so memory does not grow with their number.
+        Few pieces are under way at once, so memory does not grow with their number. While no result
+        comes, `waiting` is called every `POLL` seconds.
 
         Raises
         ------
-        SceneError
+        Stopped
+            If `stop` is set, or a piece raised it.
+        RenderError
             If worker processes die again and again.
         """
-        running: deque[tuple[Piece, Future[Result]]] = deque()
+        running = self._running
         for piece in pieces:
             running.append((piece, self._submit(piece)))
             if len(running) > 2 * self._count:
-                yield self._first(running)
+                yield self._first(waiting)
         while running:
-            yield self._first(running)
+            yield self._first(waiting)
 
-    def _first(self, running: deque[tuple[Piece, Future[Result]]]) -> tuple[Piece, Result]:
+    def _first(self, waiting: Callable[[], object]) -> tuple[Piece, Result]:
         """Wait for the first of the pieces under way; should workers have died, give all to new ones."""
         while True:
-            piece, future = running[0]
+            piece, future = self._running[0]
+            while not wait_for_futures([future], POLL).done:
+                waiting()
+                if self._stop.value:
+                    raise Stopped
             try:
                 result = future.result()
             except BrokenProcessPool:
                 self._replace(piece)
-                again = [each for each, _ in running]
-                running.clear()
-                running.extend((each, self._submit(each)) for each in again)
                 continue
-            running.popleft()
+            self._running.popleft()
             return piece, result
 
     def _replace(self, piece: Piece) -> None:
-        """Make room for a new pool."""
+        """Give all pieces under way to new processes."""
         if not self._retries:
-            raise SceneError(
+            raise RenderError(
                 f"worker processes died {RETRIES + 1} times, at last with {piece} under way; were they "
                 "killed for lack of memory? Use fewer workers or a smaller wave_size"
             ) from None
         self._retries -= 1
-        assert self._pool is not None
-        self._pool.shutdown(wait=False, cancel_futures=True)
-        self._pool = None
+        assert self._crew is not None
+        self._crew.end([future for _, future in self._running])
+        self._crew = None
+        again = [each for each, _ in self._running]
+        self._running.clear()
+        self._running.extend((each, self._submit(each)) for each in again)
 
     def _submit(self, piece: Piece) -> Future[Result]:
-        if self._pool is None:
-            self._pool = self._start()
-        try:
-            return self._pool.submit(self._work if self._executor == "threads" else _do, piece)
-        except BrokenProcessPool as error:
-            failed: Future[Result] = Future()
-            failed.set_exception(error)
-            return failed
+        if self._crew is None:
+            self._crew = self._start()
+        return self._crew.submit(piece)
 
-    def _start(self) -> Executor:
+    def _start(self) -> Crew:
         if self._executor == "threads":
-            return ThreadPoolExecutor(self._count, "wavefront")
-        fork = multiprocessing.get_context("fork")
-        pool = ProcessPoolExecutor(self._count, fork, _adopt, (self._work,))
-        with _forking():
-            pool.submit(int)  # the first task starts all processes
-        return pool
+            return Threads(self._work, self._count, self._stop)
+        from .processes import Processes  # here, because not every system can fork
+
+        return Processes(self._work, self._count, self._stop)
 
 
-@contextmanager
-def _forking() -> Iterator[None]:
-    """Let children be deaf to Ctrl-C, which the parent answers.
+class _SingleThreadedBlas:
+    """Holds BLAS to one thread for as long as anybody needs that.
 
-    Forking beside other threads is what Python warns of: a lock that one of them holds stays held in
-    the child. Ours take none but their own and those that Python and the C library renew.
+    The number of BLAS's threads is one for the whole process. With a limit for each render, that of two
+    overlapping ones that ends last would restore what it had found, which is the other's limit.
     """
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", ".*fork.*", DeprecationWarning)
-            yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._users = 0
+        self._limits: Any = None
+
+    def acquire(self) -> None:
+        """Hold BLAS to one thread."""
+        with self._lock:
+            if not self._users:
+                self._limits = threadpool_limits(1, "blas")
+            self._users += 1
+
+    def release(self) -> None:
+        """Let BLAS have as many threads as before, if nobody else needs it to have one."""
+        with self._lock:
+            self._users -= 1
+            if not self._users:
+                self._limits.restore_original_limits()
 
 
-_adopted: Callable[[Any], Any]  # in a worker process: its work
-
-
-def _adopt(work: Callable[[Any], Any]) -> None:
-    """Begin life as a worker process, which ends with its parent."""
-    global _adopted
-    _adopted = work
-    _prepare_heap()
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _prepare_heap() -> None:
-    """Have glibc keep what is freed, in large pages; with another C library, do nothing of use.
-
-    All memory of a young process is new, and the system hands it out page by page: 11 600 page faults
-    in the first wave. After glibc has freed a block, it takes smaller ones from its heap, and keeps
-    twice as much there before it gives any back; and NumPy asks for large pages under large arrays.
-    """
-    np.empty(LARGEST_BLOCK, np.uint8)
-    nearly_twice = [np.empty(9 * LARGEST_BLOCK // 10, np.uint8) for _ in range(2)]
-    del nearly_twice
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    wait([parent.sentinel])
-    os._exit(1)
-
-
-def _do(piece: Any) -> Any:
-    return _adopted(piece)
+single_threaded_blas = _SingleThreadedBlas()

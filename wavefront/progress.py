@@ -11,7 +11,7 @@ from typing import Any, Self, TypeAlias
 Progress: TypeAlias = Callable[[float, float], object] | bool | None
 
 DELAY = 2  # seconds before anything appears
-TICK = 1  # seconds between updates of a phase's line
+TICK = 1  # seconds between updates while nothing is done
 
 
 class Bar:
@@ -33,6 +33,7 @@ class Bar:
         self._timed = seconds is not None
         self._total = samples if seconds is None else seconds
         self._done: float = 0
+        self._told: float = 0  # when, in seconds
         self._bar: Any = None
 
     def __enter__(self) -> Self:
@@ -46,17 +47,32 @@ class Bar:
         """Take note of further samples, at a time in seconds."""
         before = self._done
         self._done = min(elapsed, self._total) if self._timed else before + samples
+        self._told = elapsed
         if self._bar is not None:
+            self._bar.set_postfix_str("", refresh=False)
             self._bar.update(self._done - before)
         elif self._wanted and elapsed > DELAY:
             self._bar = self._appear(elapsed)
         if self._callback:
             self._callback(self._done, self._total)
 
+    def wait(self, surfaces: int, elapsed: float) -> None:
+        """Take note that no samples have come, at a time in seconds, and how many surfaces a path has met.
+
+        It may be called often: something is shown, or the user's function called, every `TICK` seconds.
+        """
+        if elapsed - self._told < TICK:
+            return
+        self.advance(0, elapsed)
+        if self._bar is not None:
+            self._bar.set_postfix_str(f"paths of {surfaces} surfaces under way")
+
     def _appear(self, elapsed: float) -> Any:
         from tqdm import tqdm  # here, so that starting up and short renders do not pay for it
 
-        style = {"bar_format": "{l_bar}{bar}| {n:.0f}/{total:.0f} s"} if self._timed else {"unit_scale": True}
+        style: dict[str, Any] = {"unit_scale": True}
+        if self._timed:
+            style = {"bar_format": "{l_bar}{bar}| {n:.0f}/{total:.0f} s{postfix}"}
         bar = tqdm(total=self._total, initial=self._done, unit="sample", **style)
         bar.start_t -= elapsed
         return bar

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import time
 import warnings
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,22 +15,24 @@ import numpy as np
 
 from .accel import most_copies
 from .accel.choose import CHOICES
-from .errors import SceneError, number
+from .errors import Interrupted, RenderError, SceneError, number
 from .exact_sum import MAX_TERMS
 from .film import Film
 from .filters import FILTERS
 from .image import Image
 from .integrators import INTEGRATORS, ONE_SAMPLE, Integrator, li_full
+from .interrupt import CtrlC
 from .lights import DirectionalLight, PointLight, SpotLight
 from .lights.choose import CHOICES as LIGHT_CHOICES
 from .parallel import Workers, choose_executor, worker_count
-from .progress import Bar, Progress
+from .progress import Bar, Progress, phase
 from .sampling.sampler import make_sampler
 from .scene import Scene, compile_scene
 from .shapes import Instance, Mesh, Sphere
+from .shared import Stopped
 from .stopping import Clock, passes
 from .version import VERSION
-from .work import BadSamples, Piece, Wave, plan, trace_piece
+from .work import LONG_PATH, Piece, Tally, Watch, Wave, plan, trace_piece
 
 DEFAULT_SPP = 100
 MAX_BRANCH_SAMPLES = 2**32  # a sample's index is 32 bits of its address, and each branch has one
@@ -87,8 +90,9 @@ def render(
         picture. Noisy parts get more samples than calm ones, and every pixel at least 32. When
         `spp` or `seconds` end the render above it, a warning says so.
     seconds
-        Go on until this time is used, scene setup included; at least for one sample per pixel.
-        With `noise` as well, whichever comes first.
+        Go on until this time is used, scene setup included; waves that are still under way a tenth
+        later are discarded. Every pixel gets its first sample all the same, unless its path has met
+        1 000 surfaces by then. With `noise` as well, whichever comes first.
     filter
         How the samples of a pixel are spread: "box" (evenly over the pixel), "tent" (radius 1
         pixel) or "gaussian" (σ 0.5 pixels, cut off at 1.5 from the centre).
@@ -105,17 +109,23 @@ def render(
     progress
         By default a bar appears when a render takes over two seconds. False shows none; a
         function is called with how much is done and how much there is at most: samples, or
-        seconds where `seconds` is given.
+        seconds where `seconds` is given. While a wave takes long it is called every second.
 
     Returns
     -------
     Image
-        After Ctrl-C, the picture so far, with a warning.
 
     Raises
     ------
     SceneError
         If an argument or the scene is malformed. It is a ValueError.
+    Interrupted
+        After Ctrl-C, within about two seconds; at a second Ctrl-C at once. It is a KeyboardInterrupt,
+        and its `image` is the picture so far.
+    RenderError
+        If the render cannot go on: memory runs out, worker processes die again and again, more than
+        1e-4 of the samples are not finite, or `seconds` are over before there is one sample. Its
+        `image` is the picture so far.
     """
     begin = time.perf_counter()
     branches = _whole("branches", branches, 1, MAX_BRANCHES)
@@ -130,66 +140,79 @@ def render(
     make_sampler(sampler, seed)  # checks both before the scene is read
     workers = worker_count(workers)
     choose_executor(executor, workers, 0)
-    subject = as_scene(scene, progress)
-    camera = subject.camera or subject.framing_camera()
-    draw = make_sampler(sampler, seed, camera.film[0])
-    _warn_unseen_lights(subject, integrator)
-    compiled = compile_scene(
-        subject,
-        subject.accelerators.maker(accel),
-        light_choice,
-        most_copies(accel),
-        mis=integrator not in ONE_SAMPLE,
-    )
-    view = compiled.view(camera)
-    trace = partial(trace_piece, compiled, view, draw, spread, estimate, max_bounces)
+    with _setting_up():
+        subject = as_scene(scene, progress)
+        camera = subject.camera or subject.framing_camera()
+        draw = make_sampler(sampler, seed, camera.film[0])
+        _warn_unseen_lights(subject, integrator)
+        with phase("building the scene", progress):
+            compiled = compile_scene(
+                subject,
+                subject.accelerators.maker(accel),
+                light_choice,
+                most_copies(accel),
+                mis=integrator not in ONE_SAMPLE,
+            )
+        view = compiled.view(camera)
+        tally = Tally(Film(*camera.size))
 
-    film, clock = Film(*camera.size), Clock(begin, seconds, wave_size, workers, branches)
-    bad, rays, interrupted = BadSamples(), 0, False
-    executor = choose_executor(executor, workers, film.count.size * spp * branches)
-    crew: Workers[Piece, Wave] = Workers(trace, workers, executor)
-    with Bar(progress, film.count.size * spp, seconds) as bar, crew:
-        try:
-            for step in passes(film, spp, noise):
-                pieces = clock.in_time(plan(step.pixels, step.first, step.last, clock.wave_size))
-                for piece, wave in crew.run(pieces):
-                    film.add(piece.pixels, wave.radiance)
-                    bad.note(piece, wave)
-                    rays += wave.rays
-                    clock.note(piece, wave.seconds)
-                    bar.advance(piece.lanes, clock.elapsed)
-                if clock.up:
-                    break
-        except KeyboardInterrupt:
-            interrupted = True
-            so_far = f"{film.count.mean():.4g} samples per pixel"
-            if noise is None and seconds is None:
-                so_far = f"{film.count.mean() / spp:.0%} of its samples"
-            warnings.warn(f"interrupted: the picture holds {so_far}", stacklevel=2)
-    samples = int(film.count.sum())
-    bad.report(samples)
-    image = film.image(
-        {
-            "integrator": integrator,
-            "max_bounces": max_bounces,
-            "seed": seed,
-            "sampler": sampler,
-            "filter": filter,
-            "branches": branches,
-            "accelerator": compiled.accelerator.name,
-            "workers": workers,
-            "executor": executor,
-            "seconds": clock.elapsed,
-            "spp": samples / film.count.size,
-            "samples": samples,
-            "rays": rays,
-            "bad_samples": bad.count,
-            "interrupted": interrupted,
-            "version": VERSION,
-            "numpy": np.__version__,
-        }
-    )
-    if noise is not None and not interrupted and (clock.up or film.count.max() == spp):
+    clock = Clock(begin, seconds, wave_size, workers, branches)
+    watch = Watch(deadline=clock.deadline)
+    trace = partial(trace_piece, compiled, view, draw, spread, estimate, max_bounces, watch)
+    most = tally.film.count.size * spp
+    executor = choose_executor(executor, workers, most * branches)
+    failure: Exception | None = None
+    with CtrlC(watch.stop) as ctrl_c:
+        with (
+            Bar(progress, most, seconds) as bar,
+            Workers[Piece, Wave](trace, workers, executor, watch.stop) as crew,
+        ):
+            patience = _Patience(watch, clock, bar, max_bounces)
+            try:
+                for step in passes(tally.film, spp, noise):
+                    pieces = clock.in_time(plan(step.pixels, step.first, step.last, clock.wave_size))
+                    for piece, wave in crew.run(pieces, patience.wait):
+                        tally.add(piece, wave)
+                        clock.note(piece, wave.seconds)
+                        patience.end_of_wave()
+                        bar.advance(piece.lanes, clock.elapsed)
+                    if clock.up:
+                        break
+            except Stopped:
+                clock.up = not ctrl_c.pressed
+            except KeyboardInterrupt:  # from the user's function, or a handler of the program's own
+                ctrl_c.pressed = True
+            except (MemoryError, RenderError) as error:
+                failure = error
+        image = tally.film.image(
+            {
+                "integrator": integrator,
+                "max_bounces": max_bounces,
+                "seed": seed,
+                "sampler": sampler,
+                "filter": filter,
+                "branches": branches,
+                "accelerator": compiled.accelerator.name,
+                "workers": workers,
+                "executor": executor,
+                "seconds": clock.elapsed,
+                "spp": tally.samples / tally.film.count.size,
+                "samples": tally.samples,
+                "rays": tally.rays,
+                "bad_samples": tally.bad.count,
+                "interrupted": ctrl_c.pressed,
+                "version": VERSION,
+                "numpy": np.__version__,
+            }
+        )
+    if failure is not None:
+        raise _render_error(failure, image) from failure
+    if ctrl_c.pressed:
+        raise _interrupted(image, spp if noise is None and seconds is None else None)
+    if clock.up:
+        _check_first_samples(image, seconds)
+    tally.bad.report(image)
+    if noise is not None and (clock.up or tally.film.count.max() == spp):
         _warn_of_noise(image, noise)
     return image
 
@@ -217,6 +240,83 @@ def as_scene(subject: Any, progress: Progress = None) -> Scene:
     raise SceneError(
         f"cannot render {type(subject).__name__}: give a wf.Scene, a path, a trimesh mesh or scene, "
         "or (vertices, faces)"
+    )
+
+
+@contextmanager
+def _setting_up() -> Iterator[None]:
+    """Name what ends a render before there is a picture: Ctrl-C and a lack of memory."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise Interrupted("interrupted while the scene was set up: there is no picture yet") from None
+    except MemoryError as error:
+        raise RenderError(f"out of memory while the scene was set up: {error}") from error
+
+
+class _Patience:
+    """What is done while waves take long: time is shown, and once a warning given."""
+
+    def __init__(self, watch: Watch, clock: Clock, bar: Bar, max_bounces: int) -> None:
+        self._watch, self._clock, self._bar = watch, clock, bar
+        self._max_bounces = max_bounces
+        self._warned = max_bounces <= LONG_PATH
+
+    def wait(self) -> None:
+        """Be called now and then while no wave is done."""
+        self._bar.wait(self._watch.surfaces.value, self._clock.elapsed)
+        self._warn_of_long_paths()
+
+    def end_of_wave(self) -> None:
+        """Be called when a wave is done."""
+        self._warn_of_long_paths()
+        self._watch.surfaces.reset()
+
+    def _warn_of_long_paths(self) -> None:
+        if self._warned or self._watch.surfaces.value <= LONG_PATH:
+            return
+        self._warned = True
+        warnings.warn(
+            f"paths have met more than {LONG_PATH} surfaces, and may meet max_bounces={self._max_bounces}: "
+            "the scene is closed, and its materials absorb next to nothing, so hardly any path ends "
+            "before. Lower max_bounces or the reflectance",
+            stacklevel=4,
+        )
+
+
+def _picture_so_far(image: Image) -> Image | None:
+    return image if image.metadata["samples"] else None
+
+
+def _interrupted(image: Image, spp: int | None) -> Interrupted:
+    """Return the error that says how much of `spp` samples per pixel there is; None if that is open."""
+    if not image.metadata["samples"]:
+        return Interrupted("interrupted: there is no picture yet")
+    of = "" if spp is None else f" of {spp}"
+    return Interrupted(
+        f"interrupted: the picture so far has {image.metadata['spp']:.4g}{of} samples per pixel", image
+    )
+
+
+def _render_error(failure: Exception, image: Image) -> RenderError:
+    """Return the error that says why a render could not go on, with the picture so far."""
+    message = str(failure)
+    if isinstance(failure, MemoryError):
+        message = f"out of memory: {failure}; use fewer workers, a smaller wave_size or a smaller picture"
+    return RenderError(message, _picture_so_far(image))
+
+
+def _check_first_samples(image: Image, seconds: float | None) -> None:
+    """Warn of pixels without a sample when the time was up, or raise if there is nothing else."""
+    assert image.counts is not None
+    without = int((image.counts == 0).sum())
+    if not without:
+        return
+    why = f"paths of more than {LONG_PATH} surfaces were under way when seconds={seconds:g} were over"
+    if without == image.counts.size:
+        raise RenderError(f"there is no picture: {why}; lower max_bounces")
+    warnings.warn(
+        f"{without} pixels of {image.counts.size} have no sample and are black: {why}", stacklevel=3
     )
 
 

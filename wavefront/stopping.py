@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -20,7 +21,8 @@ SMALL_WAVE = 1 << 16  # lanes; in smaller waves a path costs more
 LARGE_WAVE = 1 << 17  # lanes; in larger waves it costs hardly less
 AT_ONCE = 1 << 19  # lanes of all workers together where that is a wave for each: 400 MB
 SHARE = 1 / 4  # part of what is left for each worker that a wave may be
-PATIENCE = 1.0  # seconds that a large wave may take, for progress and Ctrl-C wait for it
+PATIENCE = 1.0  # seconds that a large wave may take, for progress waits for it
+GRACE = 1.1  # times the seconds that were given: when waves under way are discarded
 SHORT, LONG = 1 / 60, 1 / 20  # parts of the time there is that a wave should take
 SMOOTHING = 0.3  # weight of the latest wave in what a path is expected to cost
 
@@ -101,7 +103,7 @@ class Clock:
     def __init__(
         self, begin: float, seconds: float | None, wave_size: int | None, workers: int, branches: int = 1
     ) -> None:
-        self.up = False  # work was turned away
+        self.up = False  # work was turned away, or discarded
         self._begin, self._seconds, self._workers = begin, seconds, workers
         if wave_size is None:
             wave_size = min(max(AT_ONCE // workers, SMALL_WAVE), LARGE_WAVE)
@@ -115,6 +117,11 @@ class Clock:
     def elapsed(self) -> float:
         """Seconds since the render began."""
         return time.perf_counter() - self._begin
+
+    @property
+    def deadline(self) -> float:
+        """When waves under way are discarded, by `time.perf_counter`."""
+        return math.inf if self._seconds is None else self._begin + GRACE * self._seconds
 
     def wave_size(self, left: int) -> int:
         """Return how many paths a wave may have.

@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
+import math
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from .accel.base import Accelerator, Intersections
 from .camera import Camera
-from .errors import SceneError
+from .errors import RenderError
+from .film import Film
 from .filters import Filter
+from .image import Image
 from .integrators import Integrator
 from .record import record
 from .sampling.sampler import Sampler
 from .scene import CompiledScene
+from .shared import SharedNumber, Stopped
 from .stages.generate import generate
 from .state import Words
 from .vec import Bools, Floats, Ints, alike
 
 MAX_BAD_SAMPLES = 1e-4  # part of all samples that may be lost to NaN before it is an error
+LONG_PATH = 1000  # surfaces along a path, after which it will hardly end by itself
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +58,29 @@ class Wave:
     seconds: float  # that it took its worker
 
 
+@dataclass(frozen=True)
+class Watch:
+    """What ends waves under way, and what they tell of themselves; all workers share it."""
+
+    stop: SharedNumber = field(default_factory=SharedNumber)
+    surfaces: SharedNumber = field(default_factory=SharedNumber)  # along the longest path under way
+    deadline: float = math.inf  # by `time.perf_counter`
+
+    def look(self, surfaces: int, first_samples: bool) -> None:
+        """Take note that a wave has come to its next surface.
+
+        Raises
+        ------
+        Stopped
+            If the wave is to end: somebody has asked for that, or the time is up. A wave of the first
+            samples of its pixels goes on even then, up to `LONG_PATH` surfaces.
+        """
+        self.surfaces.rise_to(surfaces)
+        late = time.perf_counter() > self.deadline and not (first_samples and surfaces <= LONG_PATH)
+        if late or self.stop.value:
+            raise Stopped
+
+
 def trace_piece(
     scene: CompiledScene,
     camera: Camera,
@@ -60,12 +88,19 @@ def trace_piece(
     filter: Filter,
     estimate: Integrator,
     max_bounces: int,
+    watch: Watch,
     piece: Piece,
 ) -> Wave:
-    """Take one wave of paths from the camera to its radiance."""
+    """Take one wave of paths from the camera to its radiance.
+
+    Raises
+    ------
+    Stopped
+        If `watch` ends the wave between two bounces.
+    """
     begin = time.perf_counter()
     k, n = piece.pixels.size, piece.samples
-    counter = RayCounter(scene.accelerator)
+    counter = WatchedAccelerator(scene.accelerator, watch, first_samples=piece.first_sample == 0)
     scene = replace(scene, accelerator=counter)
     paths = generate(scene, camera, sampler, np.tile(piece.pixels, n), _samples(piece), filter)
     radiance = estimate(scene, paths, sampler, max_bounces)
@@ -82,16 +117,29 @@ def _samples(piece: Piece) -> Words:
     return np.repeat(samples, piece.pixels.size)
 
 
-class RayCounter:
-    """An accelerator that counts the rays of one wave on their way to another accelerator."""
+class WatchedAccelerator:
+    """An accelerator for one wave: hands rays on to another one, counts them, and ends the wave in time.
 
-    def __init__(self, accelerator: Accelerator) -> None:
+    Every bounce of every integrator asks for the nearest surfaces, so here a wave can be ended between
+    two bounces, and no integrator needs to know of it.
+    """
+
+    def __init__(self, accelerator: Accelerator, watch: Watch, first_samples: bool) -> None:
         self.name = accelerator.name
         self.rays = 0
-        self._accelerator = accelerator
+        self._accelerator, self._watch, self._first_samples = accelerator, watch, first_samples
+        self._surfaces = 0
 
     def closest(self, origin: Floats, direction: Floats, leaving: Ints) -> Intersections:
-        """Find the nearest hits of rays (3, n)."""
+        """Find the nearest hits of rays (3, n).
+
+        Raises
+        ------
+        Stopped
+            If the wave is to end.
+        """
+        self._watch.look(self._surfaces, self._first_samples)
+        self._surfaces += 1
         self.rays += origin.shape[1]
         return self._accelerator.closest(origin, direction, leaving)
 
@@ -117,6 +165,34 @@ def plan(pixels: Words, first: int, last: int, wave_size: Callable[[int], int]) 
         first += depth
 
 
+class Tally:
+    """What all waves have come to so far.
+
+    Attributes
+    ----------
+    film
+        The sums of their samples.
+    bad
+        Those of them that were not finite.
+    rays
+        Queries of the accelerator.
+    """
+
+    def __init__(self, film: Film) -> None:
+        self.film, self.bad, self.rays = film, BadSamples(), 0
+
+    @property
+    def samples(self) -> int:
+        """Number of samples on the film."""
+        return int(self.film.count.sum())
+
+    def add(self, piece: Piece, wave: Wave) -> None:
+        """Add a wave, the next of its pixels."""
+        self.film.add(piece.pixels, wave.radiance)
+        self.bad.note(piece, wave)
+        self.rays += wave.rays
+
+
 class BadSamples:
     """Counts samples that were not finite; none is dropped in silence."""
 
@@ -131,17 +207,18 @@ class BadSamples:
             self.first = f"pixel {piece.pixels[pixel]}, sample {piece.first_sample + sample}"
         self.count += wave.bad.size
 
-    def report(self, samples: int) -> None:
-        """Warn of bad samples.
+    def report(self, image: Image) -> None:
+        """Warn of bad samples in a picture.
 
         Raises
         ------
-        SceneError
-            If they are more than 1e-4 of all.
+        RenderError
+            If they are more than 1e-4 of all. It has the picture, where they count as black.
         """
         if not self.count:
             return
+        samples = image.metadata["samples"]
         message = f"{self.count} of {samples} samples were not finite and count as black; first: {self.first}"
         if self.count > MAX_BAD_SAMPLES * samples:
-            raise SceneError(message)
+            raise RenderError(message, image)
         warnings.warn(message, stacklevel=3)
