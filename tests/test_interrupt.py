@@ -119,7 +119,8 @@ try:
     {ENDLESS.format(executor=executor)}
 except KeyboardInterrupt as stop:
     print("stopped", type(stop).__name__, getattr(stop, "image", "none at all"))
-    time.sleep(0.5 if {presses} > 2 else 0)  # of three, the last may leave threads on their way out
+    while {presses} > 1 and left():  # nobody waits for threads any longer: they end by themselves
+        time.sleep(0.01)
     print("left", left())
 """
     with script(body) as process:
