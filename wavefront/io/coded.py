@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+import zlib
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from .claims import JPG, check_claims
 Gamma = float | str  # an exponent, or "srgb" for the exact sRGB curve
 
 GAMMAS = (0.01, 100.0)  # the least and the largest exponent
+PNG_DEFLATE = zlib.Z_RLE  # runs only: rendered pictures take 3 % more bytes, and a fourth of the time
 EXTENSIONS = (".png", ".jpg", ".jpeg")
 MAX_JPG = 65500  # pixels in a row or a column, by libjpeg
 SRGB_GAMA = 45455  # what a png says beside its sRGB chunk, for readers that know gamma alone
@@ -33,14 +35,13 @@ def encode(codes: NDArray[np.uint8], extension: str, gamma: Gamma) -> bytes:
     import imageio.v3 as iio  # here, so that starting up does not pay for it
 
     if extension == ".png":
-        return bytes(
-            iio.imwrite("<bytes>", codes, extension=".png", plugin="pillow", pnginfo=_png_info(gamma))
-        )
+        options: dict[str, Any] = {"compress_type": PNG_DEFLATE, "pnginfo": _png_info(gamma)}
+        return bytes(iio.imwrite("<bytes>", codes, extension=".png", plugin="pillow", **options))
     if max(codes.shape[:2]) > MAX_JPG:
         raise SaveError(
             f"a jpg has at most {MAX_JPG} rows and columns, got {codes.shape[1]} × {codes.shape[0]}"
         )
-    options: dict[str, Any] = {"quality": 95, "subsampling": 0, "exif": _exif(gamma)}
+    options = {"quality": 95, "subsampling": 0, "exif": _exif(gamma)}
     return bytes(iio.imwrite("<bytes>", codes, extension=".jpg", plugin="pillow", **options))
 
 
