@@ -1,5 +1,6 @@
 """The command line: what it writes, what it says, and what it refuses before any work."""
 
+import os
 import subprocess
 import sys
 from importlib.metadata import version
@@ -388,3 +389,29 @@ def test_sigterm_ends_the_program_and_leaves_nothing(obj, fast):
     )
     assert (done.returncode, done.stderr) == (143, "")
     assert set(output.parent.iterdir()) == before
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of any bytes")
+def test_names_that_cannot_be_printed_are_no_error(obj, tmp_path):
+    """Such as those in another encoding than the terminal's."""
+    output = os.fsencode(tmp_path) + b"/\xff\xe5.npy"
+    command = [
+        sys.executable,
+        "-m",
+        "wavefront",
+        "render",
+        obj,
+        "-o",
+        output,
+        "--spp",
+        "1",
+        "--size",
+        "8x6",
+        "--quiet",
+    ]
+    for encoding in ("utf-8:strict", "ascii:strict"):
+        done = subprocess.run(
+            command, capture_output=True, env={**os.environ, "PYTHONIOENCODING": encoding}, timeout=60
+        )
+        assert (done.returncode, done.stderr) == (0, b"")
+        assert os.path.exists(output)

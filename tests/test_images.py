@@ -332,6 +332,19 @@ def test_a_read_only_file_system_is_a_save_error(tmp_path, picture, monkeypatch)
         write_image(tmp_path / "a.png", picture)
 
 
+@posix
+def test_files_without_names_that_cannot_be_named_do_not_matter(tmp_path, picture, monkeypatch):
+    """A security module may forbid it."""
+
+    def refuse(*args, **kwargs):
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(files.os, "link", refuse)
+    write_image(tmp_path / "a.npy", picture)
+    assert np.array_equal(np.load(tmp_path / "a.npy"), picture)
+    assert [p.name for p in tmp_path.iterdir()] == ["a.npy"]
+
+
 def test_what_encoders_refuse_is_a_save_error(tmp_path):
     with pytest.raises(SaveError, match=r"a\.jpg: cannot be encoded: a jpg has at most 65500 rows"):
         write_image(tmp_path / "a.jpg", np.zeros((1, 65501, 3)))

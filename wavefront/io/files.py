@@ -6,6 +6,7 @@ import contextlib
 import os
 import stat
 from pathlib import Path
+from typing import IO
 
 from ..errors import SaveError, SceneError
 
@@ -168,18 +169,25 @@ def _write_new(path: Path, data: bytes, mode: int | None) -> None:
     Where the system can, the file has no name until it is complete: nothing is left behind, even
     when the process is killed.
     """
-    handle = _open_nameless(path.parent)
-    nameless = handle is not None
-    if handle is None:
-        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
-    with open(handle, "wb") as file:
-        if mode is not None and hasattr(os, "fchmod"):
-            os.fchmod(handle, mode)
-        file.write(data)
-        file.flush()
-        os.fsync(handle)
-        if nameless:  # src_dir_fd makes Python follow the link, as it says it does anyway
-            os.link(f"{OPEN_FILES}/{handle}", path, src_dir_fd=handle)
+    nameless = _open_nameless(path.parent)
+    if nameless is not None:
+        with contextlib.suppress(OSError), open(nameless, "wb") as file:
+            _fill(file, data, mode)
+            # src_dir_fd makes Python follow the link, as it says it does anyway
+            os.link(f"{OPEN_FILES}/{nameless}", path, src_dir_fd=nameless)
+            return
+    named = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+    with open(named, "wb") as file:
+        _fill(file, data, mode)
+
+
+def _fill(file: IO[bytes], data: bytes, mode: int | None) -> None:
+    """Write all data through to the disk, after setting the permissions."""
+    if mode is not None and hasattr(os, "fchmod"):
+        os.fchmod(file.fileno(), mode)
+    file.write(data)
+    file.flush()
+    os.fsync(file.fileno())
 
 
 def _open_nameless(folder: Path) -> int | None:
