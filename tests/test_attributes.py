@@ -215,7 +215,7 @@ def test_a_mesh_without_the_coordinates_that_its_texture_reads_is_named():
 
 
 def test_only_what_is_read_is_compiled():
-    plain = square(uvs=CORNERS, uvs1=CORNERS, colors=[[0, 0, 0]] * 4)
+    plain = square(uvs=CORNERS, uvs1=CORNERS, colors=[[0, 0, 0]] * 4, material=wf.Diffuse(0.5))
     assert compiled(plain).attributes == {}
     plain.material = wf.Diffuse(wf.VertexColors(wf.Texture(np.ones((1, 1)), uv_set=1)))
     assert list(compiled(plain).attributes) == ["color", "uv1"]

@@ -40,6 +40,7 @@ def test_fov_is_vertical() -> None:
         assert right[0] / -right[2] == pytest.approx(np.tan(np.radians(30)) * width / 30, rel=1e-5)
 
 
+@pytest.mark.filterwarnings("ignore:Camera fov")
 @given(strategies.rotations(), st.floats(1, 170), st.data())
 def test_look_at_turns_with_the_world(turn: np.ndarray, fov: float, data) -> None:
     """Turning origin, target and up turns every ray; the axes stay right-handed."""
@@ -51,6 +52,7 @@ def test_look_at_turns_with_the_world(turn: np.ndarray, fov: float, data) -> Non
     assert np.cross(right, up) == pytest.approx(backward, abs=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore:Camera fov")
 @given(st.floats(1e-6, 179), st.integers(1, 200), st.integers(1, 200))
 def test_directions_are_unit(fov: float, width: int, height: int) -> None:
     """At every corner of every film."""
@@ -94,10 +96,10 @@ BAD = {
     ),
     "up along the view": ({"target": (1, 5, 3)}, r"up \[0.0, 1.0, 0.0\] must not be zero or parallel"),
     "up zero": ({"up": (0, 0, 0)}, r"up \[0.0, 0.0, 0.0\] must not be zero"),
-    "origin short": ({"origin": (1, 2)}, r"Camera origin must have shape \(3\), got \(2,\)"),
+    "origin short": ({"origin": (1, 2)}, r"Camera origin must have shape \(3,\), got \(2,\)"),
     "origin NaN": ({"origin": (1, np.nan, 3)}, r"Camera origin\[1\] is nan; it must be finite"),
     "target infinite": ({"target": (1, 2, np.inf)}, r"Camera target\[2\] is inf; it must be finite"),
-    "up text": ({"up": "y"}, r"Camera up must be numeric, got 'y'"),
+    "up text": ({"up": "sideways"}, r"Camera up is \'sideways\'; it must be a vector, or one of x, y, z"),
     "fov 0": ({"fov": 0}, r"Camera fov is 0; it must be above 0 and below 180"),
     "fov 180": ({"fov": 180}, r"Camera fov is 180; it must be above 0 and below 180"),
     "fov NaN": ({"fov": np.nan}, r"Camera fov is nan"),
@@ -121,3 +123,37 @@ def test_bad_arguments_are_named(name: str) -> None:
     arguments = {"origin": (1, 2, 3), "target": (0, 0, 0), **change}
     with pytest.raises(wf.SceneError, match=message):
         wf.Camera.look_at(**arguments)
+
+
+# --- Arguments as other programs have them ---------------------------------------------------------
+
+
+@pytest.mark.parametrize("fov", [np.pi / 4, 0.8, 1.2345, 3.1])
+def test_radians_are_noticed(fov: float) -> None:
+    """They look like a narrow field of view; the warning says what they are in degrees."""
+    for make in (
+        lambda: wf.Camera.look_at((0, 0, 5), (0, 0, 0), fov=fov),
+        lambda: wf.Camera.from_matrix(np.eye(4), fov),
+        lambda: wf.Scene(wf.Sphere((0, 0, 0), 1)).framing_camera(fov),
+    ):
+        with pytest.warns(UserWarning, match=rf"Camera fov is {fov:.4g} degrees.* {np.degrees(fov):.4g}"):
+            assert make().fov == fov
+
+
+@pytest.mark.parametrize("fov", [1, 2.0, 3.5, 0.1, 40])
+def test_degrees_are_taken_as_they_are(fov: float) -> None:
+    """Small ones as telescopes have them, too."""
+    assert wf.Camera.look_at((0, 0, 5), (0, 0, 0), fov=fov).fov == fov
+
+
+def test_the_fourth_argument_is_the_field_of_view() -> None:
+    """And a number for what is up says how to pass it."""
+    assert wf.Camera.look_at((0, 0, 5), (0, 0, 0), "y", 30).fov == 30
+    with pytest.raises(wf.SceneError, match=r"Camera up is 30; .* A field of view is given by name: fov=40"):
+        wf.Camera.look_at((0, 0, 5), (0, 0, 0), 30)
+
+
+def test_up_may_name_an_axis() -> None:
+    """The same camera, bit for bit."""
+    named, given = (wf.Camera.look_at((3, 2, 1), (0, 0, 0), up) for up in ("z", (0, 0, 1)))
+    assert named.rotation.tobytes() == given.rotation.tobytes()

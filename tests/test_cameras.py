@@ -302,7 +302,7 @@ BAD = {
     "aperture negative": (wf.Camera.look_at, {**HERE, "aperture": -1}, "Camera aperture is -1; it must be"),
     "aperture NaN": (wf.Camera.look_at, {**HERE, "aperture": np.nan}, "Camera aperture is nan"),
     "focus 0": (wf.Camera.look_at, {**HERE, "focus": 0}, "Camera focus is 0; it must be above 0"),
-    "shift short": (wf.Camera.look_at, {**HERE, "shift": (1,)}, r"Camera shift must have shape \(2\)"),
+    "shift short": (wf.Camera.look_at, {**HERE, "shift": (1,)}, r"Camera shift must have shape \(2,\)"),
     "crop outside": (
         wf.Camera.look_at,
         {**HERE, "crop": (0, 0, 513, 5)},
@@ -371,7 +371,7 @@ BAD = {
     "t short": (
         wf.Camera.from_intrinsics,
         {"K": K, "R": np.eye(3), "t": (0, 0), "size": (640, 480)},
-        r"t must have shape \(3\)",
+        r"t must have shape \(3,\)",
     ),
     "height 0": (wf.Camera.orthographic, {**HERE, "height": 0}, "Camera height is 0; it must be above 0"),
     "panorama target": (

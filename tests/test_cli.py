@@ -175,8 +175,8 @@ def test_the_camera_of_the_file_is_used_and_resized(gltf, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--target", "0,0,0"], "--target and --up need --origin"),
-        (["--up", "0,0,1"], "--target and --up need --origin"),
+        (["--target", "0,0,0"], "--target needs --origin"),
+        (["--origin", "0,1,0", "--direction", "0,0,1"], "--direction is for scenes that are framed"),
         (["--origin", "0,1,0", "--target", "0,1,0"], "must differ"),
         (["--origin", "0,1"], "is not X,Y,Z"),
         (["--origin", "nan,1,0"], "finite"),
@@ -191,6 +191,31 @@ def test_wrong_cameras(obj, fast, capsys, no_render, options, message):
 
 def test_fov_does_not_silently_yield_to_the_camera_of_the_file(gltf, fast, capsys, no_render):
     assert "has a camera of its own" in error_of(capsys, ["render", gltf, *fast[1], "--fov", "20"])
+
+
+@pytest.mark.parametrize("option", ["--up", "--direction"])
+def test_what_frames_a_scene_does_not_silently_yield_either(gltf, fast, capsys, no_render, option):
+    found = error_of(capsys, ["render", gltf, *fast[1], option, "0,0,1"])
+    assert f"{option} needs --origin: {gltf} has a camera of its own" in found
+
+
+@pytest.mark.parametrize("up", ["z", "0,0,1", "-Z"])
+def test_up_and_direction_frame_a_scene(obj, fast, up):
+    output, options = fast
+    assert main(["render", obj, *options, "--up", up, "--direction", "-1,-2,1"]) == 0
+    scene = wf.load(obj)
+    sign = -1 if up == "-Z" else 1
+    scene.camera = scene.framing_camera(
+        size=np.load(output).shape[1::-1], up=(0, 0, sign), direction=(-1, -2, 1)
+    )
+    expected = wf.render(scene, int(options[options.index("--spp") + 1]), progress=False)
+    np.testing.assert_array_equal(np.load(output), expected.rgb)
+
+
+def test_up_must_be_an_axis(obj, fast, capsys, no_render):
+    assert "it must be a vector, or one of x, y, z" in error_of(
+        capsys, ["render", obj, *fast[1], "--up", "q"]
+    )
 
 
 # --- Output ----------------------------------------------------------------------------------------

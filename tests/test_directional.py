@@ -120,7 +120,7 @@ BAD = {
         r"DirectionalLight direction is \[0.0, 0.0, 0.0\]; it must not be zero",
     ),
     "direction NaN": ({"direction": (0, np.nan, 0)}, r"DirectionalLight direction\[1\] is nan"),
-    "direction short": ({"direction": (0, 1)}, r"DirectionalLight direction must have shape \(3\)"),
+    "direction short": ({"direction": (0, 1)}, r"DirectionalLight direction must have shape \(3,\)"),
     "irradiance": ({"irradiance": -1}, "DirectionalLight irradiance is -1; it must be at least 0"),
     "angle tiny": ({"angle": 0.001}, "DirectionalLight angle is 0.001; it must be 0, or from 0.01 to 180"),
     "angle large": ({"angle": 181}, "angle is 181; it must be 0, or from 0.01 to 180 degrees"),

@@ -176,10 +176,13 @@ BAD = [
         for name in ("naive", "direct_simple", "direct_mis")
     ),
 ]
+TRIANGLES = [np.zeros((3, 3)), np.array([[0, 1, 2]])]
 BAD_SCENES = [
     (None, r"cannot render NoneType: give a wf.Scene, a path"),
     (5, r"cannot render int"),
-    ([BALL], r"cannot render list"),
+    ([], r"cannot render list"),
+    ([BALL, 5], r"cannot render int"),
+    (TRIANGLES, r"cannot render ndarray: give .* \(vertices, faces\) as a tuple"),
     (([[0, 0, 0]], [[0, 0, 1]]), r"faces\[0\]\[2\] is 1; it must be in \[0, 0\]"),
     (([[0, 0, np.nan]] * 3, [[0, 1, 2]]), r"vertices\[0\]\[2\] is nan"),
     (([], []), r"must have shape \(n, 3\)|no faces"),
@@ -222,27 +225,30 @@ TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float), np.array([[0, 1, 
         trimesh.Trimesh(*TRIANGLE, process=False),
         trimesh.Scene([trimesh.Trimesh(*TRIANGLE, process=False)]),
         wf.Scene([wf.Mesh(*TRIANGLE)]),
+        [wf.Mesh(*TRIANGLE)],
+        (wf.Mesh(*TRIANGLE), wf.Mesh(*TRIANGLE)),
+        [trimesh.Trimesh(*TRIANGLE, process=False), TRIANGLE],
+        wf.Scene(trimesh.Trimesh(*TRIANGLE, process=False)),
     ],
-    ids=["arrays", "lists", "mesh", "sphere", "trimesh", "trimesh-scene", "scene"],
+    ids=[
+        *("arrays", "lists", "mesh", "sphere", "trimesh", "trimesh-scene", "scene"),
+        *("list", "tuple", "mixed list", "scene of a trimesh"),
+    ],
 )
-def test_what_can_be_rendered(subject, monkeypatch) -> None:
+def test_what_can_be_rendered(subject) -> None:
     """Everything that a user may hold; it is framed, and lit by a neutral environment."""
-    camera = wf.Scene.framing_camera
-    monkeypatch.setattr(wf.Scene, "framing_camera", lambda self: camera(self, size=(6, 5)))
-    image = render(subject, 2)
+    image = render(subject, 2, size=(6, 5))
     assert image.rgb.shape == (5, 6, 3)
     assert image.rgb.max() == pytest.approx(1)
     assert (image.rgb < 0.99).any()
 
 
-def test_a_path_can_be_rendered(tmp_path, monkeypatch) -> None:
+def test_a_path_can_be_rendered(tmp_path) -> None:
     """A string or a Path."""
-    camera = wf.Scene.framing_camera
-    monkeypatch.setattr(wf.Scene, "framing_camera", lambda self: camera(self, size=(6, 5)))
     (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     for path in (tmp_path / "a.obj", str(tmp_path / "a.obj")):
         with pytest.warns(UserWarning, match="no light"):
-            assert render(path, 1).rgb.shape == (5, 6, 3)
+            assert render(path, 1, size=(6, 5)).rgb.shape == (5, 6, 3)
 
 
 # --- Result ---------------------------------------------------------------------------------------

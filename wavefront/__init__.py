@@ -22,7 +22,7 @@ from .lights import DirectionalLight, Environment, PointLight, SpotLight
 from .relief import BumpMap, NormalMap
 from .render import render
 from .scene import Scene
-from .shapes import Disk, Instance, Mesh, Rectangle, Sphere
+from .shapes import Disk, Instance, Mesh, Rectangle, Shape, Sphere
 from .textures import Texture
 from .version import VERSION
 from .vertex_colors import VertexColors
@@ -70,6 +70,7 @@ __all__ = [
     "SaveError",
     "Scene",
     "SceneError",
+    "Shape",
     "Sphere",
     "SpotLight",
     "Texture",

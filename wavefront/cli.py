@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from .camera import Camera, image_size
+from .camera import Camera, image_size, upward
 from .errors import Interrupted, RenderError, SaveError, SceneError
 from .filters import FILTERS
 from .image import Image
@@ -34,7 +34,7 @@ from .version import VERSION
 ERROR = 2  # as argparse has it
 INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 TERMINATED = 143  # 128 + SIGTERM
-VECTOR_OPTIONS = ("--origin", "--target", "--up")
+VECTOR_OPTIONS = ("--origin", "--target", "--up", "--direction")
 FOV = 40.0  # degrees
 
 
@@ -78,7 +78,8 @@ def _joined(arguments: Sequence[str]) -> list[str]:
     """Join a vector to its option, since argparse takes "-1,2,3" for an option of its own."""
     joined: list[str] = []
     for argument in arguments:
-        if joined and joined[-1] in VECTOR_OPTIONS and argument[:1] == "-" and "," in argument:
+        negative = argument[:1] == "-" and ("," in argument or argument.lower() in ("-x", "-y", "-z"))
+        if joined and joined[-1] in VECTOR_OPTIONS and negative:
             joined[-1] += "=" + argument
         else:
             joined.append(argument)
@@ -136,7 +137,15 @@ def _add_render(commands: Any) -> None:
     command.add_argument(
         "--target", **where, help="point that the camera looks at (default: the scene's middle)"
     )
-    command.add_argument("--up", **where, help="what is up in the picture (default: 0,1,0)")
+    command.add_argument(
+        "--direction", **where, help="from where a scene is framed: from its middle to the camera"
+    )
+    command.add_argument(
+        "--up",
+        type=_up,
+        metavar="X,Y,Z",
+        help="what is up in the picture, or an axis such as z, as in most stl and CAD files (default: y)",
+    )
     command.add_argument("--fov", type=_fov, help=f"vertical field of view, degrees (default: {FOV:g})")
     command.add_argument("--gamma", type=_gamma, default=2.2, help='for png and jpg: a number or "srgb"')
     command.add_argument("--exposure", type=_exposure, default=0.0, help="stops, applied when saving")
@@ -198,16 +207,19 @@ def _camera(scene: Scene, options: argparse.Namespace) -> Camera:
     """Return the camera that the options describe, else the file's, else one that frames the scene."""
     size = options.size or (scene.camera.size if scene.camera else (512, 512))
     fov = FOV if options.fov is None else options.fov
+    up = (0.0, 1.0, 0.0) if options.up is None else options.up
     if options.origin is not None:
+        if options.direction is not None:
+            raise SceneError("--direction is for scenes that are framed; with --origin use --target")
         target = scene.bounds.mean(0) if options.target is None else options.target
-        up = options.up or (0.0, 1.0, 0.0)
         return Camera.look_at(options.origin, target, up, fov=fov, size=size)
-    if options.target is not None or options.up is not None:
-        raise SceneError("--target and --up need --origin")
+    if options.target is not None:
+        raise SceneError("--target needs --origin")
     if scene.camera is None:
-        return scene.framing_camera(fov, size)
-    if options.fov is not None:
-        raise SceneError(f"--fov needs --origin: {options.scene} has a camera of its own")
+        return scene.framing_camera(fov, size, up=up, direction=options.direction)
+    for name in ("fov", "up", "direction"):
+        if getattr(options, name) is not None:
+            raise SceneError(f"--{name} needs --origin: {options.scene} has a camera of its own")
     return scene.camera.resized(size)
 
 
@@ -276,6 +288,16 @@ def _vector(text: str) -> tuple[float, float, float]:
         x, y, z = (float(part) for part in text.split(","))
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not X,Y,Z, such as 0,1.5,4") from None
+    return x, y, z
+
+
+def _up(text: str) -> tuple[float, float, float]:
+    if "," in text:
+        return _vector(text)
+    try:
+        x, y, z = upward("--up", text).tolist()
+    except SceneError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
     return x, y, z
 
 

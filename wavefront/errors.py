@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from .suggestions import did_you_mean
 
 
 class SceneError(ValueError):
@@ -74,13 +76,28 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> 
         want is None or have == want for have, want in zip(array.shape, shape, strict=True)
     )
     if not fits:
-        wanted = "(" + ", ".join("n" if want is None else str(want) for want in shape) + ")"
+        wanted = ", ".join("n" if want is None else str(want) for want in shape)
+        wanted = f"({wanted},)" if len(shape) == 1 else f"({wanted})"
         raise SceneError(f"{name} must have shape {wanted}, got {array.shape}")
     bad = np.argwhere(~np.isfinite(array))
     if len(bad):
         where = "".join(f"[{i}]" for i in bad[0])
         raise SceneError(f"{name}{where} is {array[tuple(bad[0])]}; it must be finite")
     return array
+
+
+def one_of(name: str, value: Any, choices: Collection[Any]) -> Any:
+    """Return `value` if it is one of the choices.
+
+    Raises
+    ------
+    SceneError
+        Naming them all, and the one that may be meant.
+    """
+    if not isinstance(value, str | int) or value not in choices:
+        hint = did_you_mean(value, [choice for choice in choices if isinstance(choice, str)])
+        raise SceneError(f"{name} is {value!r}; it must be one of {', '.join(map(str, choices))}{hint}")
+    return value
 
 
 def number(

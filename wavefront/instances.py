@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .accel import Placements
+from .errors import SceneError
 from .record import record
-from .shapes import Instance, Mesh, Sphere
+from .shapes import Instance, Mesh, Shape, Sphere
 from .state import Columns
 from .vec import Floats, Ints, f4
 
@@ -56,9 +57,7 @@ def _times(m: Floats, vectors: Floats) -> Floats:
     return np.stack([m[i] * x + m[i + 1] * y + m[i + 2] * z for i in (0, 3, 6)])
 
 
-def resolve(
-    shapes: Sequence[Mesh | Sphere | Instance], most_copies: int
-) -> tuple[list[Mesh], list[Sphere], list[Instance]]:
+def resolve(shapes: Sequence[Shape], most_copies: int) -> tuple[list[Mesh], list[Sphere], list[Instance]]:
     """Sort shapes by kind; instances that had better not share their mesh become meshes.
 
     Those are all, where they come to no more than `most_copies` triangles together; those of emitting
@@ -75,6 +74,8 @@ def resolve(
             meshes.append(shape)
         elif isinstance(shape, Sphere):
             spheres.append(shape)
+        elif not isinstance(shape, Instance):
+            raise SceneError(f"{shape.name}: cannot trace a {type(shape).__name__}")
         elif total > most_copies and copies[id(shape.mesh)] > 1 and _can_share(shape):
             instances.append(shape)
         else:

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import os
 import time
 import warnings
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .accel import most_copies
 from .accel.choose import CHOICES
-from .errors import Interrupted, RenderError, SceneError, number
+from .bsdfs import Bsdf
+from .camera import Camera
+from .errors import Interrupted, RenderError, SceneError, number, one_of
 from .exact_sum import MAX_TERMS
 from .film import Film
 from .filters import FILTERS
@@ -28,9 +29,10 @@ from .parallel import Workers, choose_executor, worker_count
 from .progress import Bar, Progress, phase
 from .sampling.sampler import make_sampler
 from .scene import Scene, compile_scene
-from .shapes import Instance, Mesh, Sphere
 from .shared import Stopped
 from .stopping import Clock, passes
+from .subject import View, as_scene
+from .suggestions import suggests_keywords
 from .version import VERSION
 from .work import LONG_PATH, Piece, Tally, Watch, Wave, plan, trace_piece
 
@@ -40,10 +42,15 @@ MAX_BRANCHES = 64
 MAX_SPP_FOR_NOISE = 2**16  # where only `noise` was given
 
 
+@suggests_keywords
 def render(
     scene: Any,
     spp: int | None = None,
     *,
+    camera: Camera | None = None,
+    size: tuple[int, int] | None = None,
+    material: Bsdf | None = None,
+    up: ArrayLike | None = None,
     integrator: str = "full",
     max_bounces: int = 12,
     seed: int = 0,
@@ -64,11 +71,21 @@ def render(
     Parameters
     ----------
     scene
-        A `Scene`, the path of a mesh file, a `trimesh.Trimesh` or `trimesh.Scene`, or a pair
-        (vertices, faces).
+        A `Scene`, the path of a mesh file, a `trimesh.Trimesh` or `trimesh.Scene`, a pair
+        (vertices, faces), a shape, or a list of these.
     spp
         Samples per pixel, at least 1; by default 100. With `noise` or `seconds` the most that a
         pixel gets; by default then 65536, and with `seconds` as many as there is time for.
+    camera
+        What sees the scene, in place of the scene's own camera. Without either the scene is framed.
+    size
+        (width, height) in pixels, in place of the camera's; by default (512, 512).
+    material
+        What bare meshes are made of: those of files and of trimesh, where it replaces what they say,
+        (vertices, faces), and shapes that were given no material.
+    up
+        What is up in the picture of a scene without a camera: a vector (3,), or the name of an axis, such
+        as "z" for most STL and CAD files; by default "y".
     integrator
         "full", "direct_mis", "direct_simple" or "naive".
     max_bounces
@@ -134,15 +151,16 @@ def render(
     if wave_size is not None:
         wave_size = _whole("wave_size", wave_size, 1, 2**24)
     estimate = _estimator(integrator, branches)
-    spread = FILTERS[_one_of("filter", filter, FILTERS)]
-    accel = _one_of("accel", accel, CHOICES)
-    light_choice = _one_of("light_choice", light_choice, LIGHT_CHOICES)
+    spread = FILTERS[one_of("filter", filter, FILTERS)]
+    accel = one_of("accel", accel, CHOICES)
+    light_choice = one_of("light_choice", light_choice, LIGHT_CHOICES)
     make_sampler(sampler, seed)  # checks both before the scene is read
     workers = worker_count(workers)
     choose_executor(executor, workers, 0)
+    seen = View(camera, size, up)
     with _setting_up():
-        subject = as_scene(scene, progress)
-        camera = subject.camera or subject.framing_camera()
+        subject = as_scene(scene, material, progress)
+        camera = seen.of(subject)
         draw = make_sampler(sampler, seed, camera.film[0])
         _warn_unseen_lights(subject, integrator)
         with phase("building the scene", progress):
@@ -215,32 +233,6 @@ def render(
     if noise is not None and (clock.up or tally.film.count.max() == spp):
         _warn_of_noise(image, noise)
     return image
-
-
-def as_scene(subject: Any, progress: Progress = None) -> Scene:
-    """Return what `render` was given as a `Scene`.
-
-    Raises
-    ------
-    SceneError
-        If it is nothing that can be rendered.
-    """
-    if isinstance(subject, Scene):
-        return subject
-    if isinstance(subject, Mesh | Sphere | Instance):
-        return Scene([subject])
-    from .io.load import from_trimesh, load  # here, so that scenes in memory do not pay for readers
-
-    if isinstance(subject, str | os.PathLike):
-        return load(Path(subject), progress=progress)
-    if isinstance(subject, tuple) and len(subject) == 2:
-        return Scene([Mesh(*subject)])
-    if type(subject).__module__.split(".")[0] == "trimesh":
-        return from_trimesh(subject)
-    raise SceneError(
-        f"cannot render {type(subject).__name__}: give a wf.Scene, a path, a trimesh mesh or scene, "
-        "or (vertices, faces)"
-    )
 
 
 @contextmanager
@@ -320,15 +312,9 @@ def _check_first_samples(image: Image, seconds: float | None) -> None:
     )
 
 
-def _one_of(name: str, value: Any, choices: Collection[str]) -> str:
-    if not isinstance(value, str) or value not in choices:
-        raise SceneError(f"{name} is {value!r}; it must be one of {', '.join(choices)}")
-    return value
-
-
 def _estimator(integrator: str, branches: int) -> Integrator:
     """Return the integrator with this name, for paths with so many branches."""
-    estimate = INTEGRATORS[_one_of("integrator", integrator, INTEGRATORS)]
+    estimate = INTEGRATORS[one_of("integrator", integrator, INTEGRATORS)]
     if branches == 1:
         return estimate
     if integrator != "full":

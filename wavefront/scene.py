@@ -3,46 +3,43 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Sequence
 from copy import copy
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, Self, SupportsIndex, TypeAlias, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .accel import Accelerator, Geometry, InstanceAccelerator, KeptAccelerators
 from .bsdfs import Bsdf, Opacity, Relief, Spatial
-from .camera import Camera
-from .camera.base import image_size
-from .errors import SceneError, number
+from .camera import Camera, field_of_view, image_size, upward
+from .errors import SceneError, finite_array
 from .instances import InstanceTable, own_frame, place, resolve
 from .lights import (
-    DirectionalLight,
     Environment,
     InfiniteLight,
     Light,
     LightTable,
-    PointLight,
     RectangleLights,
     Sky,
     SphereLights,
-    SpotLight,
     TriangleLights,
     TwoSidedRectangleLights,
     TwoSidedTriangleLights,
+    UserLight,
     first_of_pairs,
 )
 from .record import record
 from .scale import check_distance, check_lights, length_factor, scaled_shapes
-from .shapes import Instance, Mesh, Sphere
+from .shapes import Instance, Mesh, Shape, Sphere
 from .shapes.attributes import ATTRIBUTES, Corners, corner_values
 from .state import Surface
+from .suggestions import suggests_keywords
 from .uneven import Source, Uneven, is_uneven, mean_radiance
 from .vec import Bools, Floats, Ints, cross, f4, length
 
-Shape: TypeAlias = Mesh | Sphere | Instance
 AREA_LIGHTS = (RectangleLights, TwoSidedRectangleLights, TriangleLights, TwoSidedTriangleLights)
-UserLight: TypeAlias = PointLight | SpotLight | DirectionalLight | Environment
 
 
 class Scene:
@@ -51,7 +48,8 @@ class Scene:
     Parameters
     ----------
     shapes
-        `Mesh`, `Sphere` and `Instance` objects; one with an emission is a light.
+        `Mesh`, `Sphere` and `Instance` objects, and what `Rectangle` and `Disk` return; one with an
+        emission is a light. Objects of trimesh are converted.
     lights
         `PointLight`, `SpotLight`, `DirectionalLight` and `Environment` objects, at most one
         `Environment`. A scene where nothing shines is rendered in a neutral environment, with a
@@ -61,8 +59,9 @@ class Scene:
 
     Notes
     -----
-    All of it may be changed between renders. What a render builds to find the nearest surfaces is kept
-    with the scene, and used again as long as every vertex and sphere is where it was.
+    All of it may be changed between renders; what is assigned or put into the lists is checked as it is
+    here. What a render builds to find the nearest surfaces is kept with the scene, and used again as long
+    as every vertex and sphere is where it was.
 
     Raises
     ------
@@ -70,27 +69,80 @@ class Scene:
         If there is no shape, or an element is of the wrong type.
     """
 
+    @suggests_keywords
     def __init__(
-        self, shapes: Iterable[Shape] | Shape, lights: Iterable[UserLight] = (), camera: Camera | None = None
+        self,
+        shapes: Iterable[Any] | Any,
+        lights: Iterable[UserLight] | UserLight = (),
+        camera: Camera | None = None,
     ) -> None:
-        self.shapes: list[Shape] = _list_of("shapes", shapes, (Mesh, Sphere, Instance))
-        self.lights: list[UserLight] = _list_of(
-            "lights", lights, (PointLight, Environment, SpotLight, DirectionalLight)
-        )
+        self.shapes = shapes
+        self.lights = lights
         self.camera = camera
         self.accelerators = KeptAccelerators()  # of the last render, for the next
-        if not self.shapes:
-            raise SceneError("the scene has no shapes")
-        if sum(isinstance(light, Environment) for light in self.lights) > 1:
-            raise SceneError("the scene has more than one Environment; at most one is allowed")
-        if camera is not None and not isinstance(camera, Camera):
-            raise SceneError(f"camera must be a wf.Camera, got {camera!r}")
+        self.check()
 
     def __repr__(self) -> str:
         """Count what the scene holds."""
         return (
             f"<Scene: {len(self.shapes)} shapes, {len(self.lights)} lights, camera={self.camera is not None}>"
         )
+
+    @property
+    def shapes(self) -> list[Shape]:
+        """What the scene is made of."""
+        return self._shapes
+
+    @shapes.setter
+    def shapes(self, shapes: Any) -> None:
+        self._shapes = Shapes(shapes)
+
+    @property
+    def lights(self) -> list[UserLight]:
+        """What shines beside the shapes."""
+        return self._lights
+
+    @lights.setter
+    def lights(self, lights: Any) -> None:
+        self._lights = Lights(lights)
+
+    @property
+    def camera(self) -> Camera | None:
+        """What sees the scene; None frames it."""
+        return self._camera
+
+    @camera.setter
+    def camera(self, camera: Camera | None) -> None:
+        if camera is not None and not isinstance(camera, Camera):
+            raise SceneError(f"camera must be a wf.Camera, got {camera!r}")
+        self._camera = camera
+
+    def add(self, *items: Any) -> Self:
+        """Add shapes, objects of trimesh, and lights; return the scene.
+
+        Raises
+        ------
+        SceneError
+            If an item is something else, or a second `Environment`; the scene is then as it was.
+        """
+        shapes = Shapes([item for item in items if not isinstance(item, UserLight)])
+        lights = Lights([*self.lights, *(item for item in items if isinstance(item, UserLight))])
+        _check_environments(lights)
+        self.shapes.extend(shapes)
+        self._lights = lights
+        return self
+
+    def check(self) -> None:
+        """Check what must hold of the scene as a whole.
+
+        Raises
+        ------
+        SceneError
+            If there is no shape, or more than one `Environment`.
+        """
+        if not self.shapes:
+            raise SceneError("the scene has no shapes")
+        _check_environments(self.lights)
 
     @property
     def bounds(self) -> NDArray[np.float64]:
@@ -103,37 +155,179 @@ class Scene:
         """Whether anything in the scene shines."""
         return bool(self.lights) or any(shape.emission is not None for shape in self.shapes)
 
-    def framing_camera(self, fov: float = 40, size: tuple[int, int] = (512, 512)) -> Camera:
-        """Return a camera that sees the whole scene from the front, a little above and to the right.
+    @suggests_keywords
+    def framing_camera(
+        self,
+        fov: float = 40,
+        size: tuple[int, int] = (512, 512),
+        *,
+        up: ArrayLike = (0, 1, 0),
+        direction: ArrayLike | None = None,
+    ) -> Camera:
+        """Return a camera that sees the whole scene: from the front, a little above and to the right.
+
+        Parameters
+        ----------
+        fov
+            Vertical field of view, degrees.
+        size
+            (width, height) in pixels.
+        up
+            What is up in the picture: (3,), or the name of an axis, such as "z" for most STL and CAD
+            files. With "y" the front is where z points, with "z" where -y does.
+        direction
+            (3,) from where the scene is seen instead: from its middle to the camera, of any length.
 
         Raises
         ------
         SceneError
-            If the field of view or the size is out of range.
+            If an argument is malformed or out of range.
         """
         size = image_size(size)
-        fov = number("Camera fov", fov, lambda x: 0 < x < 180, "above 0 and below 180 degrees")
+        fov = field_of_view(fov)
+        turn = _turned_up(upward("up", up))
         low, high = self.bounds
         radius = float(np.linalg.norm(high - low)) / 2 or 1.0
         narrow = min(1.0, size[0] / size[1])
         half = np.arctan(np.tan(np.radians(fov) / 2) * narrow)
-        view = np.array([0.35, 0.3, 1.0])
-        eye = (low + high) / 2 + view / np.linalg.norm(view) * radius / np.sin(half)
-        return Camera.look_at(eye, (low + high) / 2, fov=fov, size=size)
+        view = turn @ (0.35, 0.3, 1.0)
+        if direction is not None:
+            view = finite_array("direction", direction, (3,))
+            if not view.any():
+                raise SceneError(f"direction is {view.tolist()}; it must not be zero")
+            view = view / np.abs(view).max()
+        view = view / np.linalg.norm(view)
+        eye = (low + high) / 2 + view * radius / np.sin(half)
+        upright = turn[:, 1]
+        if (
+            np.linalg.norm(np.cross(upright, view)) < 1e-6
+        ):  # seen from above or below: the front is at the bottom
+            upright = -turn[:, 2] * np.sign(view @ upright)
+        return Camera.look_at(eye, (low + high) / 2, upright, fov=fov, size=size)
 
 
-def _list_of(name: str, items: Any, types: tuple[type, ...]) -> list[Any]:
-    """Return the items, or a lone one, as a list, all of the given types."""
-    allowed = ", ".join("wf." + kind.__name__ for kind in types)
-    if isinstance(items, types):
-        return [items]
-    if isinstance(items, str) or not isinstance(items, Iterable):
-        raise SceneError(f"{name} must be a list of {allowed}, got {items!r}")
-    listed = list(items)
-    for i, item in enumerate(listed):
-        if not isinstance(item, types):
-            raise SceneError(f"{name}[{i}] is {item!r}; it must be one of {allowed}")
-    return listed
+T = TypeVar("T")
+Importer: TypeAlias = Callable[[Any], Scene]
+_IMPORTERS: dict[str, Importer] = {}  # by the package of an object's type
+
+
+def register_importer(package: str, convert: Importer) -> None:
+    """Let objects of a package's types stand wherever a scene takes shapes.
+
+    Parameters
+    ----------
+    package
+        The first part of the name of the modules that define the types.
+    convert
+        Called with an object; returns a scene, of which the shapes are taken.
+    """
+    _IMPORTERS[package] = convert
+
+
+def importer(item: Any) -> Importer | None:
+    """Return what turns an object of another package into a scene, None where nothing does."""
+    packages = (kind.__module__.split(".")[0] for kind in type(item).__mro__)
+    return next((_IMPORTERS[package] for package in packages if package in _IMPORTERS), None)
+
+
+class CheckedList(list[T], ABC):
+    """A list that checks and converts what is put into it.
+
+    Parameters
+    ----------
+    items
+        A list, or a lone element.
+    """
+
+    name: ClassVar[str]
+    allowed: ClassVar[str]  # for messages
+
+    def __init__(self, items: Any = ()) -> None:
+        super().__init__()
+        self.extend([items] if self.converted(items) is not None else items)
+
+    @abstractmethod
+    def converted(self, item: Any) -> list[T] | None:
+        """Return the elements that an item stands for, None if it stands for none."""
+
+    def append(self, item: Any) -> None:
+        """Add an element at the end."""
+        self.extend([item])
+
+    def extend(self, items: Any) -> None:
+        """Add elements at the end."""
+        super().extend(self._all(items, len(self)))
+
+    def insert(self, index: SupportsIndex, item: Any) -> None:
+        """Add an element before another."""
+        self[index:index] = [item]
+
+    def __iadd__(self, items: Any) -> Self:  # type: ignore[override, misc]
+        """Add elements at the end."""
+        self.extend(items)
+        return self
+
+    def __setitem__(self, index: Any, value: Any) -> None:
+        """Replace elements."""
+        if isinstance(index, slice):
+            super().__setitem__(index, self._all(value, index.indices(len(self))[0]))
+        else:
+            first = range(len(self))[index]
+            super().__setitem__(slice(first, first + 1), self._all([value], first))
+
+    def _all(self, items: Any, first: int) -> list[T]:
+        """Return the elements that items stand for; the first will be number `first` of the list."""
+        if isinstance(items, str | dict) or not isinstance(items, Iterable):
+            raise SceneError(f"{self.name} must be a list of {self.allowed}, got {items!r}")
+        found: list[T] = []
+        for number, item in enumerate(items, first):
+            elements = self.converted(item)
+            if elements is None:
+                raise SceneError(f"{self.name}[{number}] is {item!r}; it must be one of {self.allowed}")
+            found += elements
+        return found
+
+
+class Shapes(CheckedList[Shape]):
+    """The shapes of a scene."""
+
+    name = "shapes"
+    allowed = "wf.Mesh, wf.Rectangle, wf.Disk, wf.Sphere, wf.Instance, or a mesh or scene of trimesh"
+
+    def converted(self, item: Any) -> list[Shape] | None:
+        """Return a shape, or those of an object of another package."""
+        if isinstance(item, Shape):
+            return [item]
+        convert = importer(item)
+        return None if convert is None else convert(item).shapes
+
+
+class Lights(CheckedList[UserLight]):
+    """The lights of a scene."""
+
+    name = "lights"
+    allowed = "wf.PointLight, wf.SpotLight, wf.DirectionalLight, wf.Environment"
+
+    def converted(self, item: Any) -> list[UserLight] | None:
+        """Return a light."""
+        return [item] if isinstance(item, UserLight) else None
+
+
+def _check_environments(lights: Sequence[UserLight]) -> None:
+    if sum(isinstance(light, Environment) for light in lights) > 1:
+        raise SceneError("the scene has more than one Environment; at most one is allowed")
+
+
+def _turned_up(up: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the shortest rotation (3, 3) that takes +y to the direction of `up` (3,)."""
+    up = up / np.abs(up).max()
+    up = up / np.linalg.norm(up)
+    cos = up[1]
+    if cos < -1 + 1e-12:
+        return np.diag([1.0, -1.0, -1.0])
+    x, _, z = np.cross((0.0, 1.0, 0.0), up)
+    skew = np.array([[0.0, -z, 0.0], [z, 0.0, -x], [0.0, x, 0.0]])
+    return np.eye(3) + skew + skew @ skew / (1 + cos)
 
 
 @record
@@ -249,6 +443,7 @@ def compile_scene(
         If an emitting shape has no area, an emitting sphere has an alpha or shines by a texture, a light
         is too far away or too strong for the scene's size, or the choice is unknown.
     """
+    scene.check()
     low, high = scene.bounds
     radius = float(np.linalg.norm(high - low)) / 2
     scale = length_factor(radius)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .bsdfs.base import Spatial
-from .errors import SceneError, finite_array
+from .errors import SceneError, finite_array, one_of
 from .io.images import check_size, read_codes, srgb_to_linear
 from .state import Surface
 from .vec import Floats, Ints, f4
@@ -78,11 +78,11 @@ class Texture(Spatial):
         self._grey = channel == "luminance"
         self.scalar = channel is not None
         self.wrap = _pair(wrap)
-        self.filter = _one_of("filter", filter, ("bilinear", "nearest"))
+        self.filter = one_of("filter", filter, ("bilinear", "nearest"))
         self.transform = None if transform is None else finite_array("transform", transform, (3, 3))
         self.scale = _factor("scale", scale, self.scalar)
         self.offset = _factor("offset", offset, self.scalar)
-        self.uv_set = _one_of("uv_set", uv_set, (0, 1))
+        self.uv_set = one_of("uv_set", uv_set, (0, 1))
         self.reads = (UV_SETS[self.uv_set],)
 
     def __repr__(self) -> str:
@@ -231,17 +231,11 @@ def _factor(name: str, value: ArrayLike, scalar: bool) -> Floats:
     return np.broadcast_to(array.astype(f4).reshape(-1, 1), (3, 1)).copy()
 
 
-def _one_of(name: str, value: Any, allowed: tuple[str | int, ...]) -> Any:
-    if value not in allowed:
-        raise SceneError(f"{name} is {value!r}; it must be one of {', '.join(map(str, allowed))}")
-    return value
-
-
 def _pair(wrap: Any) -> tuple[str, str]:
     both = (wrap, wrap) if isinstance(wrap, str) else tuple(wrap)
     if len(both) != 2:
         raise SceneError(f"wrap is {wrap!r}; it must be one mode, or one for u and one for v")
-    u, v = (_one_of("wrap", mode, ("repeat", "mirror", "clamp")) for mode in both)
+    u, v = (one_of("wrap", mode, ("repeat", "mirror", "clamp")) for mode in both)
     return u, v
 
 

@@ -1,6 +1,15 @@
 """Cameras: a point of the film, and of the lens, becomes a ray."""
 
-from .base import Camera, image_size
+from .base import Camera, field_of_view, image_size, upward
 from .projection import Orthographic, Panorama, Perspective, Projection
 
-__all__ = ["Camera", "Orthographic", "Panorama", "Perspective", "Projection", "image_size"]
+__all__ = [
+    "Camera",
+    "Orthographic",
+    "Panorama",
+    "Perspective",
+    "Projection",
+    "field_of_view",
+    "image_size",
+    "upward",
+]

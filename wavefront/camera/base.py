@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import warnings
 from copy import copy
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SceneError, finite_array, rotation_matrix
+from ..errors import SceneError, finite_array, number, rotation_matrix
 from ..state import Words
+from ..suggestions import suggests_keywords
 from ..vec import Floats, column, normalize
 from .projection import Orthographic, Panorama, Perspective, Projection
 
 MAX_SIDE = 65_536  # pixels; a row-major pixel index then fits in 32 bits
+RADIANS = (0.2, 3.2)  # fields of view that are more often meant in radians than in degrees
 Window = tuple[int, int, int, int]
 
 
@@ -52,13 +55,14 @@ class Camera:
     # --- Ways to make one -----------------------------------------------------------------------
 
     @classmethod
+    @suggests_keywords
     def look_at(
         cls,
         origin: ArrayLike,
         target: ArrayLike,
         up: ArrayLike = (0, 1, 0),
-        *,
         fov: float = 40,
+        *,
         size: tuple[int, int] = (512, 512),
         aperture: float = 0,
         focus: float | None = None,
@@ -69,8 +73,10 @@ class Camera:
 
         Parameters
         ----------
-        origin, target, up
-            (3,) position, the point in the middle of the picture, and what is up in it.
+        origin, target
+            (3,) position, and the point in the middle of the picture.
+        up
+            What is up in the picture: (3,), or the name of an axis, such as "z".
         fov
             Vertical field of view, degrees.
         size
@@ -93,14 +99,21 @@ class Camera:
         """
         eye, axes, distance = _look(origin, target, up)
         focus = distance if focus is None else focus
-        return cls(eye, axes, Perspective(fov, shift=shift, aperture=aperture, focus=focus), size, crop)
+        return cls(
+            eye,
+            axes,
+            Perspective(field_of_view(fov), shift=shift, aperture=aperture, focus=focus),
+            size,
+            crop,
+        )
 
     @classmethod
+    @suggests_keywords
     def from_matrix(
         cls,
         cam_to_world: ArrayLike,
-        *,
         fov: float = 40,
+        *,
         size: tuple[int, int] = (512, 512),
         convention: Literal["opengl", "opencv"] = "opengl",
         aperture: float = 0,
@@ -130,9 +143,16 @@ class Camera:
         axes, eye = _rigid("cam_to_world", cam_to_world)
         if convention == "opencv":
             axes = axes * (1, -1, -1)
-        return cls(eye, axes, Perspective(fov, shift=shift, aperture=aperture, focus=focus), size, crop)
+        return cls(
+            eye,
+            axes,
+            Perspective(field_of_view(fov), shift=shift, aperture=aperture, focus=focus),
+            size,
+            crop,
+        )
 
     @classmethod
+    @suggests_keywords
     def from_intrinsics(
         cls,
         K: ArrayLike,
@@ -185,6 +205,7 @@ class Camera:
         return cls(eye, axes.T * (1, -1, -1), lens, size, crop)
 
     @classmethod
+    @suggests_keywords
     def orthographic(
         cls,
         origin: ArrayLike,
@@ -213,6 +234,7 @@ class Camera:
         return cls(eye, axes, Orthographic(height), size, crop)
 
     @classmethod
+    @suggests_keywords
     def panorama(
         cls,
         origin: ArrayLike,
@@ -326,10 +348,10 @@ def _look(origin: ArrayLike, target: ArrayLike, up: ArrayLike) -> tuple[NDArray[
 
 def _axes(backward: NDArray[np.float64], up: ArrayLike) -> NDArray[np.float64]:
     """Return the axes right, up and backward, (3, 3), as columns."""
-    upward = finite_array("Camera up", up, (3,))
-    right = np.cross(upward, backward)
-    if not np.linalg.norm(right) > 1e-9 * np.linalg.norm(upward):
-        raise SceneError(f"Camera up {upward.tolist()} must not be zero or parallel to the view")
+    vertical = upward("Camera up", up)
+    right = np.cross(vertical, backward)
+    if not np.linalg.norm(right) > 1e-9 * np.linalg.norm(vertical):
+        raise SceneError(f"Camera up {vertical.tolist()} must not be zero or parallel to the view")
     right = right / np.linalg.norm(right)
     return np.stack([right, np.cross(backward, right), backward], 1)
 
@@ -341,6 +363,49 @@ def _rigid(name: str, value: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np
     if rows == 4 and matrix[3].tolist() != [0, 0, 0, 1]:
         raise SceneError(f"{name}[3] is {matrix[3].tolist()}; it must be [0, 0, 0, 1]")
     return rotation_matrix(f"{name}[:3, :3]", matrix[:3, :3]), matrix[:3, 3]
+
+
+def upward(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """Return what is up in a picture, (3,) of any length, from a vector or the name of an axis.
+
+    Raises
+    ------
+    SceneError
+        If it is neither, or zero.
+    """
+    if isinstance(value, str):
+        axis = value.lower().removeprefix("+")
+        if axis.removeprefix("-") not in ("x", "y", "z"):
+            raise SceneError(f"{name} is {value!r}; it must be a vector, or one of x, y, z, -x, -y, -z")
+        return np.eye(3)["xyz".index(axis[-1])] * (-1.0 if axis[0] == "-" else 1.0)
+    if np.ndim(value) == 0:
+        raise SceneError(
+            f"{name} is {value!r}; it must be a vector (3,) or the name of an axis. "
+            "A field of view is given by name: fov=40"
+        )
+    vector = finite_array(name, value, (3,))
+    if not vector.any():
+        raise SceneError(f"{name} {vector.tolist()} must not be zero or parallel to the view")
+    return vector
+
+
+def field_of_view(fov: float) -> float:
+    """Return a field of view in degrees; warn of one that looks like radians.
+
+    Raises
+    ------
+    SceneError
+        If it is not above 0 and below 180.
+    """
+    degrees = number("Camera fov", fov, lambda x: 0 < x < 180, "above 0 and below 180 degrees")
+    low, high = RADIANS
+    if low <= degrees < high and degrees != int(degrees):
+        warnings.warn(
+            f"Camera fov is {degrees:.4g} degrees; if these are radians, pass np.degrees({degrees:.4g}), "
+            f"which is {np.degrees(degrees):.4g}",
+            stacklevel=4,
+        )
+    return degrees
 
 
 def image_size(size: tuple[int, int]) -> tuple[int, int]:

@@ -1,6 +1,6 @@
 """Lights, and how one of them is chosen."""
 
-from .base import Light, LightSample
+from .base import Light, LightSample, UserLight
 from .choose import LightTable
 from .directional import DirectionalLight, DirectionalLights, SunLight
 from .environment import ConstantEnvironment, Environment
@@ -33,5 +33,6 @@ __all__ = [
     "TriangleLights",
     "TwoSidedRectangleLights",
     "TwoSidedTriangleLights",
+    "UserLight",
     "first_of_pairs",
 ]

@@ -77,6 +77,14 @@ class Light(Columns, ABC):
         return np.broadcast_to(alike, (centre.shape[1], len(alike)))
 
 
+class UserLight(ABC):
+    """A light as a user makes it, beside the shapes of a scene."""
+
+    @abstractmethod
+    def record(self, centre: NDArray[np.float64]) -> Light:
+        """Return the light as a record of one column, relative to `centre` (3,)."""
+
+
 def area_pdf(d2: Floats, cos_light: Floats, area: Floats) -> Floats:
     """Solid-angle density d²/(A·cosθ) of points drawn uniformly from an area; 0 on a dark side; (n,).
 

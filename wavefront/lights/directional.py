@@ -11,8 +11,9 @@ from ..errors import SceneError, finite_array, number, rgb
 from ..frame import Frame
 from ..record import record
 from ..sampling.warp import uniform_cone
+from ..suggestions import suggests_keywords
 from ..vec import Floats, column, dot, f4
-from .base import Light, LightSample
+from .base import Light, LightSample, UserLight
 from .infinite import InfiniteLight, at_infinity, facing_irradiance, through_scene, turned
 
 TWO_PI = f4(2 * np.pi)
@@ -90,7 +91,7 @@ class SunLight(InfiniteLight):
         return f4(0.5) * dot(away, away) <= self.height  # 1 − cosθ without cancellation
 
 
-class DirectionalLight:
+class DirectionalLight(UserLight):
     """Light from one direction, infinitely far away, such as the sun's.
 
     Parameters
@@ -112,6 +113,7 @@ class DirectionalLight:
         0.01 to 180.
     """
 
+    @suggests_keywords
     def __init__(self, direction: ArrayLike, irradiance: ArrayLike, *, angle: float = 0.0) -> None:
         self.direction = unit("DirectionalLight direction", direction)
         self.irradiance = rgb("DirectionalLight irradiance", irradiance)

@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import SceneError, rgb, rotation_matrix
 from ..record import record
 from ..sampling.warp import uniform_sphere
+from ..suggestions import suggests_keywords
 from ..vec import Floats, f4
-from .base import LightSample
+from .base import LightSample, UserLight
 from .image import ImageEnvironment, environment_pixels
 from .infinite import InfiniteLight, at_infinity, through_scene
 
@@ -50,7 +51,7 @@ class ConstantEnvironment(InfiniteLight):
         return self.share * through_scene(4 * np.pi * self.radiance.mean(0, dtype=np.float64), scene_radius)
 
 
-class Environment:
+class Environment(UserLight):
     """Light that arrives from infinitely far away, wherever a ray leaves the scene.
 
     Parameters
@@ -86,6 +87,7 @@ class Environment:
         a rotation.
     """
 
+    @suggests_keywords
     def __init__(
         self,
         radiance: ArrayLike | str | os.PathLike[str] = 1.0,

@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError, finite_array, rgb
 from ..record import record
+from ..suggestions import suggests_keywords
 from ..vec import Floats, dot, f4
-from .base import Light, LightSample
+from .base import Light, LightSample, UserLight
 
 FLOAT32_MAX = float(np.finfo(f4).max)
 
@@ -54,7 +55,7 @@ class PointLights(Light):
         return self.intensity.mean(0, dtype=np.float64) / np.maximum((away**2).sum(0), radius**2)
 
 
-class PointLight:
+class PointLight(UserLight):
     """A point that shines equally in all directions.
 
     Parameters
@@ -70,6 +71,7 @@ class PointLight:
         If an argument is malformed.
     """
 
+    @suggests_keywords
     def __init__(self, position: ArrayLike, intensity: ArrayLike) -> None:
         self.position = finite_array("PointLight position", position, (3,))
         self.intensity = intensity_of("PointLight intensity", intensity)

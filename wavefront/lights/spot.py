@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError, finite_array, number
 from ..record import record
+from ..suggestions import suggests_keywords
 from ..vec import Floats, dot, f4
-from .base import Light, LightSample
+from .base import Light, LightSample, UserLight
 from .directional import unit
 from .point import intensity_of, scaled_intensity
 
@@ -77,7 +78,7 @@ class SpotLights(Light):
         return ramp * ramp
 
 
-class SpotLight:
+class SpotLight(UserLight):
     """A point that shines into a cone.
 
     Parameters
@@ -105,6 +106,7 @@ class SpotLight:
         If an argument is malformed or out of range.
     """
 
+    @suggests_keywords
     def __init__(
         self,
         position: ArrayLike,

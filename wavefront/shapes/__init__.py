@@ -1,8 +1,9 @@
 """Shapes: what a scene is made of."""
 
+from .base import Shape
 from .disk import Disk
 from .instance import Instance
 from .mesh import Mesh, Rectangle
 from .sphere import Sphere
 
-__all__ = ["Disk", "Instance", "Mesh", "Rectangle", "Sphere"]
+__all__ = ["Disk", "Instance", "Mesh", "Rectangle", "Shape", "Sphere"]

@@ -8,9 +8,11 @@ from numpy.typing import ArrayLike
 from ..bsdfs import Bsdf
 from ..bsdfs.parameter import Colour
 from ..errors import SceneError, finite_array, number
+from ..suggestions import suggests_keywords
 from .mesh import Mesh
 
 
+@suggests_keywords
 def Disk(
     center: ArrayLike,
     normal: ArrayLike,

@@ -9,14 +9,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..bsdfs import Bsdf, Spatial
 from ..errors import SceneError, finite_array
-from .mesh import FLOAT32_MAX, Mesh, check_material, check_range
+from ..suggestions import suggests_keywords
+from .base import Shape
+from .mesh import FLOAT32_MAX, Mesh, check_range
 from .transform import moved, moved_tangents
 
 SINGULAR = 1e-12  # the least of the lengths to which a transform stretches, as a part of the greatest
 SURE = 1e-6  # a cheap bound of that ratio that is larger leaves no doubt
 
 
-class Instance:
+class Instance(Shape):
     """A mesh somewhere else: moved, turned, scaled, mirrored or sheared.
 
     A mesh that is placed many times takes the memory of one, and is prepared for rays once.
@@ -39,6 +41,7 @@ class Instance:
         If the transform is malformed, singular, or takes a vertex beyond the range of float32.
     """
 
+    @suggests_keywords
     def __init__(
         self, mesh: Mesh, transform: ArrayLike, *, material: Bsdf | None = None, name: str | None = None
     ) -> None:
@@ -47,10 +50,11 @@ class Instance:
         self.name = mesh.name if name is None else name
         self.mesh = mesh
         self.transform = _invertible(f"{self.name}: transform", transform)
-        self._material = None if material is None else check_material(self.name, material)
+        self.material = material
         check_range(self.name, _placed(self.transform, mesh.vertices).T)
 
     @classmethod
+    @suggests_keywords
     def many(
         cls, mesh: Mesh, transforms: ArrayLike, *, material: Bsdf | None = None, name: str | None = None
     ) -> list[Instance]:
@@ -73,11 +77,11 @@ class Instance:
         bad = np.flatnonzero(~can_place(mesh, matrices))
         if bad.size:
             cls(mesh, matrices[bad[0]], name=f"{label}: transforms[{bad[0]}]")  # raises
-        own = None if material is None else check_material(label, material)
         out = []
         for matrix in matrices:
             instance = cls.__new__(cls)
-            instance.name, instance.mesh, instance.transform, instance._material = label, mesh, matrix, own
+            instance.name, instance.mesh, instance.transform = label, mesh, matrix
+            instance.material = material
             out.append(instance)
         return out
 
@@ -86,13 +90,9 @@ class Instance:
         return f"<Instance {self.name!r} of {self.mesh!r}: at {self.transform[:3, 3].tolist()}>"
 
     @property
-    def material(self) -> Bsdf:
-        """How the surface scatters light: the instance's own material, or else the mesh's."""
-        return self.mesh.material if self._material is None else self._material
-
-    @material.setter
-    def material(self, material: Bsdf) -> None:
-        self._material = check_material(self.name, material)
+    def default_material(self) -> Bsdf:
+        """The mesh's material."""
+        return self.mesh.material
 
     @property
     def emission(self) -> Spatial | NDArray[np.float32] | None:

@@ -11,12 +11,17 @@ from numpy.typing import ArrayLike, NDArray
 from ..bsdfs import Bsdf, Diffuse
 from ..bsdfs.parameter import Colour, colour
 from ..errors import SceneError, finite_array
+from ..io.images import srgb_to_linear
+from ..suggestions import suggests_keywords
+from ..vec import f4
+from ..vertex_colors import VertexColors
+from .base import Shape
 
 FLOAT32_MAX = float(np.finfo(np.float32).max)
 FLOAT32_MIN = float(np.finfo(np.float32).tiny)
 
 
-class Mesh:
+class Mesh(Shape):
     """Triangles that share vertices.
 
     Parameters
@@ -34,10 +39,11 @@ class Mesh:
         green is normal × tangent or its opposite, as in glTF. Without them both follow from the texture
         coordinates, as they do for bump maps. They need normals.
     colors
-        (n, 3) linear RGB, or (n, 4) with opacity, in [0, 1]. A material shows them by a parameter
-        `VertexColors`.
+        (n, 3) RGB, or (n, 4) with opacity. Floats are linear, in [0, 1]; uint8 and uint16, as trimesh
+        gives them, are decoded from sRGB, but for the opacity. A material that is given shows them by a
+        parameter `VertexColors`.
     material
-        How the surface scatters light.
+        How the surface scatters light. By default a `Diffuse` that shows the `colors`, or is grey.
     emission
         Radiance that leaves the front side, W·sr⁻¹·m⁻²: one number or three, or a `Texture` or
         `VertexColors`, of which values below 0 count as 0. By default that of the material, if it has one.
@@ -53,6 +59,7 @@ class Mesh:
         face, or there are tangents without normals.
     """
 
+    @suggests_keywords
     def __init__(
         self,
         vertices: ArrayLike,
@@ -78,7 +85,8 @@ class Mesh:
         if self.tangents is not None and self.normals is None:
             raise SceneError(f"{name}: has tangents without normals; pass both")
         self.colors = _colors(f"{name}: colors", colors, len(self.vertices))
-        self.material = check_material(name, material)
+        self.material = material
+        self._default: tuple[bool, Bsdf] | None = None  # whether it shows colors, and the material
         self._emission = None if emission is None else colour(f"{name}: emission", emission, np.inf)
         self.two_sided = two_sided
         check_range(name, self.vertices)
@@ -86,6 +94,14 @@ class Mesh:
     def __repr__(self) -> str:
         """Name the mesh and its size."""
         return f"<Mesh {self.name!r}: {len(self.vertices)} vertices, {len(self.faces)} faces>"
+
+    @property
+    def default_material(self) -> Bsdf:
+        """A `Diffuse` that shows the vertex colors, or is grey where there are none."""
+        shown = self.colors is not None
+        if self._default is None or self._default[0] != shown:
+            self._default = shown, Diffuse(VertexColors() if shown else 0.5)
+        return self._default[1]
 
     @property
     def emission(self) -> Any:
@@ -117,6 +133,7 @@ class Mesh:
         return np.stack([rows.min(1), rows.max(1)])
 
 
+@suggests_keywords
 def Rectangle(
     corner: ArrayLike,
     edge_u: ArrayLike,
@@ -157,21 +174,6 @@ def Rectangle(
     )
 
 
-def check_material(name: str, material: Bsdf | None) -> Bsdf:
-    """Return the material, a grey `Diffuse` by default.
-
-    Raises
-    ------
-    SceneError
-        If it is not a `Bsdf`.
-    """
-    if material is None:
-        return Diffuse(0.5)
-    if not isinstance(material, Bsdf):
-        raise SceneError(f"{name}: material must be a material such as wf.Diffuse(0.5), got {material!r}")
-    return material
-
-
 def _faces(name: str, faces: ArrayLike, count: int) -> NDArray[np.intp]:
     try:
         array = np.asarray(faces)
@@ -197,10 +199,15 @@ def _per_vertex(name: str, values: ArrayLike | None, count: int, width: int) -> 
 
 
 def _colors(name: str, values: ArrayLike | None, count: int) -> NDArray[np.float64] | None:
-    """Return (n, 4) colours in [0, 1]; without an opacity they are opaque."""
+    """Return (n, 4) linear colors in [0, 1]; without an opacity they are opaque."""
     if values is None:
         return None
     array = finite_array(name, values, (count, None))
+    codes = getattr(values, "dtype", None)
+    if codes in (np.uint8, np.uint16):
+        most = np.iinfo(codes).max
+        array[:, :3] = srgb_to_linear(array[:, :3].astype(f4) / f4(most))
+        array[:, 3:] /= most
     if array.shape[1] not in (3, 4):
         raise SceneError(f"{name} has {array.shape[1]} numbers per vertex; it must have 3 or 4")
     bad = np.argwhere((array < 0) | (array > 1))

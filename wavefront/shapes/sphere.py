@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..bsdfs import Bsdf, Spatial
+from ..bsdfs import Bsdf, Diffuse, Spatial
 from ..errors import SceneError, finite_array, number, rgb
-from .mesh import FLOAT32_MAX, FLOAT32_MIN, check_material
+from ..suggestions import suggests_keywords
+from .base import Shape
+from .mesh import FLOAT32_MAX, FLOAT32_MIN
 
 
-class Sphere:
+class Sphere(Shape):
     """A sphere, intersected exactly.
 
     Parameters
@@ -36,6 +38,7 @@ class Sphere:
         If an argument is malformed, or the emission is a texture.
     """
 
+    @suggests_keywords
     def __init__(
         self,
         center: ArrayLike,
@@ -59,7 +62,8 @@ class Sphere:
             raise SceneError(
                 f"{name}: center[{i}] is {self.center[i]:g}; its size must be at most {FLOAT32_MAX:.3g}"
             )
-        self.material = check_material(name, material)
+        self.material = material
+        self._default = Diffuse(0.5)
         if isinstance(emission, Spatial):
             raise SceneError(f"{name}: a sphere shines evenly; a mesh can shine by {emission!r}")
         self._emission = None if emission is None else rgb(f"{name}: emission", emission)
@@ -67,6 +71,11 @@ class Sphere:
     def __repr__(self) -> str:
         """Name the sphere, its place and size."""
         return f"<Sphere {self.name!r}: center {self.center.tolist()}, radius {self.radius:g}>"
+
+    @property
+    def default_material(self) -> Bsdf:
+        """A grey `Diffuse`."""
+        return self._default
 
     @property
     def emission(self) -> Any:

@@ -1,0 +1,58 @@
+"""The contract of every shape."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bsdfs import Bsdf
+from ..errors import SceneError
+
+
+class Shape(ABC):
+    """Something that a scene is made of: a `Mesh`, a `Sphere` or an `Instance`.
+
+    Attributes
+    ----------
+    name
+        Used in messages.
+    """
+
+    name: str
+    _material: Bsdf | None = None  # as it was given
+
+    @property
+    def material(self) -> Bsdf:
+        """How the surface scatters light. Assigning None brings the default back."""
+        return self.default_material if self._material is None else self._material
+
+    @material.setter
+    def material(self, material: Bsdf | None) -> None:
+        if material is not None and not isinstance(material, Bsdf):
+            raise SceneError(
+                f"{self.name}: material must be a material such as wf.Diffuse(0.5), got {material!r}"
+            )
+        self._material = material
+
+    @property
+    def has_material(self) -> bool:
+        """Whether the shape was given a material."""
+        return self._material is not None
+
+    @property
+    @abstractmethod
+    def default_material(self) -> Bsdf:
+        """The material of a shape that was given none."""
+
+    @property
+    @abstractmethod
+    def emission(self) -> Any:
+        """Radiance that leaves the surface, W·sr⁻¹·m⁻²: (3, 1) or a texture; None where it is dark."""
+
+    @property
+    @abstractmethod
+    def bounds(self) -> NDArray[np.float64]:
+        """Lower and upper corner, (2, 3), scene units."""

@@ -1,0 +1,164 @@
+"""What `render` is given, as a scene and the camera that sees it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .bsdfs import Bsdf
+from .camera import Camera, image_size, upward
+from .errors import SceneError
+from .lights import UserLight
+from .progress import Progress
+from .scene import Scene, importer, register_importer
+from .shapes import Instance, Mesh, Shape
+
+SIZE = (512, 512)  # pixels
+CAN_BE_RENDERED = (
+    "a wf.Scene, a path, a trimesh mesh or scene, (vertices, faces) as a tuple, a shape such as wf.Mesh, "
+    "wf.Rectangle, wf.Disk or wf.Sphere, or a list of these"
+)
+
+
+def as_scene(subject: Any, material: Bsdf | None = None, progress: Progress = None) -> Scene:
+    """Return what `render` was given as a `Scene`.
+
+    Parameters
+    ----------
+    subject
+        As for `render`.
+    material
+        What bare meshes are made of; None leaves everything as it is.
+    progress
+        As for `load`.
+
+    Raises
+    ------
+    SceneError
+        If it is nothing that can be rendered, or the material is meant for what has one of its own.
+    """
+    if material is not None and not isinstance(material, Bsdf):
+        raise SceneError(f"material must be a material such as wf.Diffuse(0.5), got {material!r}")
+    if isinstance(subject, Scene):
+        if material is not None:
+            raise SceneError("material is for bare meshes; in a wf.Scene set those of its shapes")
+        subject.check()
+        return subject
+    if isinstance(subject, Shape):
+        return Scene([_made_of(subject, material)])
+    if isinstance(subject, str | os.PathLike):
+        from .io.load import load  # here, so that scenes in memory do not pay for readers
+
+        return _all_made_of(load(Path(subject), progress=progress), material)
+    if importer(subject) is not None:
+        return _all_made_of(_imported(subject), material)
+    if _is_pair(subject):
+        return Scene([Mesh(*subject, material=material)])
+    if isinstance(subject, list | tuple) and subject:
+        return _joined(subject, material, progress)
+    raise SceneError(f"cannot render {type(subject).__name__}: give {CAN_BE_RENDERED}")
+
+
+@dataclass
+class View:
+    """How `render` was asked to see a scene.
+
+    Attributes
+    ----------
+    camera
+        In place of the scene's own.
+    size
+        (width, height) in pixels, in place of the camera's.
+    up
+        What is up in the picture of a scene without a camera.
+
+    Raises
+    ------
+    SceneError
+        If one is malformed, or there is a camera and an `up`.
+    """
+
+    camera: Camera | None
+    size: tuple[int, int] | None
+    up: Any
+
+    def __post_init__(self) -> None:
+        if self.camera is not None and not isinstance(self.camera, Camera):
+            raise SceneError(f"camera must be a wf.Camera, got {self.camera!r}")
+        self.size = None if self.size is None else image_size(self.size)
+        self.up = None if self.up is None else upward("up", self.up)
+        if self.camera is not None and self.up is not None:
+            raise SceneError("up turns the camera that frames a scene; give it to the camera")
+
+    def of(self, scene: Scene) -> Camera:
+        """Return the camera that sees the scene.
+
+        Raises
+        ------
+        SceneError
+            If an `up` is given for a scene that has a camera.
+        """
+        camera = self.camera or scene.camera
+        if camera is None:
+            return scene.framing_camera(size=self.size or SIZE, up="y" if self.up is None else self.up)
+        if self.up is not None:
+            raise SceneError(
+                "up turns the camera that frames a scene; this one has a camera: set scene.camera = None"
+            )
+        return camera if self.size is None else camera.resized(self.size)
+
+
+def _is_pair(subject: Any) -> bool:
+    """Tell whether something is (vertices, faces)."""
+    if not isinstance(subject, tuple) or len(subject) != 2:
+        return False
+    return all(isinstance(part, np.ndarray | list | tuple) for part in subject) and not any(
+        isinstance(item, Shape) or importer(item) is not None for part in subject for item in part[:1]
+    )
+
+
+def _joined(subjects: Sequence[Any], material: Bsdf | None, progress: Progress) -> Scene:
+    """Return one scene of all; the camera is the first that there is."""
+    lights = [item for item in subjects if isinstance(item, UserLight)]
+    parts = [as_scene(item, material, progress) for item in subjects if not isinstance(item, UserLight)]
+    cameras = [part.camera for part in parts if part.camera is not None]
+    return Scene(
+        [shape for part in parts for shape in part.shapes],
+        [*lights, *(light for part in parts for light in part.lights)],
+        cameras[0] if cameras else None,
+    )
+
+
+def _made_of(shape: Shape, material: Bsdf | None) -> Shape:
+    """Return a user's shape with a material; the user's own stays as it is."""
+    if material is None:
+        return shape
+    mesh = shape.mesh if isinstance(shape, Instance) else shape
+    if shape.has_material or mesh.has_material:
+        raise SceneError(f"material is for bare meshes; {shape.name} has a material of its own")
+    bare = copy(shape)
+    bare.material = material
+    return bare
+
+
+def _all_made_of(scene: Scene, material: Bsdf | None) -> Scene:
+    """Give all shapes of a scene that was just read a material in place of their own."""
+    for shape in scene.shapes if material is not None else ():
+        bare = shape.mesh if isinstance(shape, Instance) else shape
+        bare.material = material
+    return scene
+
+
+def _imported(geometry: Any) -> Scene:
+    from .io.load import from_trimesh
+
+    return from_trimesh(geometry)
+
+
+register_importer("trimesh", _imported)

@@ -1,0 +1,133 @@
+""" "Did you mean": the known name that is meant by an unknown one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from difflib import get_close_matches
+from functools import wraps
+from typing import ParamSpec, TypeVar
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+# What other programs call things, in lower case without underscores, and what is meant here: the first
+# of these that is known where the name was used.
+SYNONYMS: dict[str, tuple[str, ...]] = {
+    "albedo": ("reflectance", "base_color"),
+    "at": ("target",),
+    "basecolor": ("reflectance",),
+    "bounces": ("max_bounces",),
+    "center": ("position", "origin", "target"),
+    "centre": ("center", "position", "origin"),
+    "color": ("reflectance", "base_color", "intensity", "irradiance", "radiance", "colors", "emission"),
+    "colour": ("reflectance", "base_color", "intensity", "irradiance", "radiance", "colors", "emission"),
+    "depth": ("max_bounces",),
+    "diffuse": ("reflectance", "base_color"),
+    "emit": ("emission",),
+    "emissive": ("emission",),
+    "energy": ("intensity", "irradiance", "radiance"),
+    "eta": ("ior",),
+    "eye": ("origin",),
+    "fieldofview": ("fov",),
+    "fovy": ("fov",),
+    "from": ("origin",),
+    "indexofrefraction": ("ior",),
+    "indices": ("faces",),
+    "intensity": ("irradiance", "radiance"),
+    "intior": ("ior",),
+    "irradiance": ("intensity", "radiance"),
+    "kd": ("reflectance", "base_color"),
+    "location": ("position", "origin", "center"),
+    "lookat": ("target",),
+    "lookfrom": ("origin",),
+    "maxdepth": ("max_bounces",),
+    "method": ("integrator",),
+    "njobs": ("workers",),
+    "nsamples": ("spp",),
+    "numsamples": ("spp",),
+    "numthreads": ("workers",),
+    "pos": ("position", "origin", "center"),
+    "position": ("origin", "center"),
+    "power": ("intensity", "irradiance", "radiance"),
+    "quality": ("spp",),
+    "radiance": ("emission", "intensity", "irradiance"),
+    "resolution": ("size",),
+    "samplecount": ("spp",),
+    "samples": ("spp",),
+    "samplesperpixel": ("spp",),
+    "strength": ("intensity", "irradiance", "radiance"),
+    "texcoords": ("uvs",),
+    "threads": ("workers",),
+    "time": ("seconds",),
+    "timelimit": ("seconds",),
+    "timeout": ("seconds",),
+    "tint": ("transmittance", "reflectance", "base_color"),
+    "triangles": ("faces",),
+    "uv": ("uvs",),
+    "vertexcolors": ("colors",),
+    "vertexnormals": ("normals",),
+    "verts": ("vertices",),
+    "vfov": ("fov",),
+    "width": ("size",),
+    "yfov": ("fov",),
+    "arealight": ("Rectangle",),
+    "dome": ("Environment",),
+    "envmap": ("Environment",),
+    "environmentlight": ("Environment",),
+    "glass": ("Dielectric",),
+    "halton": ("sobol",),
+    "lambertian": ("Diffuse",),
+    "metal": ("Conductor",),
+    "path": ("full",),
+    "pathtracer": ("full",),
+    "pbr": ("Principled",),
+    "perspectivecamera": ("Camera",),
+    "plastic": ("Principled",),
+    "quad": ("Rectangle",),
+    "random": ("independent",),
+    "sun": ("DirectionalLight",),
+    "trianglemesh": ("Mesh",),
+}
+
+
+def meant(name: str, known: Iterable[str]) -> str | None:
+    """Return the known name that `name` stands for or is a misspelling of; None if there is none."""
+    plain = {_plain(other): other for other in known}
+    word = _plain(name)
+    if word in plain:
+        return plain[word]
+    for synonym in SYNONYMS.get(word, ()):
+        if _plain(synonym) in plain:
+            return plain[_plain(synonym)]
+    close = get_close_matches(word, plain, 1, 0.7)
+    return plain[close[0]] if close else None
+
+
+def did_you_mean(name: object, known: Iterable[str]) -> str:
+    """Return "; did you mean 'x'?" for an unknown name, or "" where nothing is near."""
+    found = meant(name, known) if isinstance(name, str) else None
+    return "" if found is None else f"; did you mean {found!r}?"
+
+
+def suggests_keywords(function: Callable[P, R]) -> Callable[P, R]:
+    """Let a function answer an unknown keyword argument with the one that is meant.
+
+    It stays a TypeError, as Python has it, and the signature is that of the function.
+    """
+    code = function.__code__
+    known = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
+    title = function.__qualname__.removesuffix(".__init__")
+
+    @wraps(function)
+    def checked(*args: P.args, **kwargs: P.kwargs) -> R:
+        for name in kwargs:
+            if name not in known:
+                hint = did_you_mean(name, known)
+                raise TypeError(f"{title}() got an unexpected keyword argument {name!r}{hint}")
+        return function(*args, **kwargs)
+
+    return checked
+
+
+def _plain(name: str) -> str:
+    return name.lower().replace("_", "")
