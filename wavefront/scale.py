@@ -19,13 +19,11 @@ from numpy.typing import NDArray
 from .bsdfs import Bsdf
 from .errors import SceneError
 from .lights import PointLight, SpotLight
-from .shapes import Instance, Mesh, Sphere
+from .shapes import Instance, Mesh, Shape, Sphere
 
 # Radii of scenes that stay as they are. There is more room above: parts of a scene are only ever smaller.
 SMALLEST, LARGEST = 2.0**-20, 2.0**24
 FARTHEST = 2.0**60  # of cameras and lights from the scene's center, as the render counts lengths
-
-Shape = Mesh | Sphere | Instance
 
 
 def length_factor(radius: float) -> float:
@@ -59,8 +57,10 @@ def scaled_shapes(shapes: Sequence[Shape], factor: float) -> list[Shape]:
     for shape in shapes:
         if isinstance(shape, Instance):
             part: Shape = shape.scaled(factor, meshes[id(shape.mesh)], own[id(shape.mesh)])
-        else:
+        elif isinstance(shape, Mesh | Sphere):
             part = shape.scaled(factor)
+        else:
+            raise SceneError(f"{shape.name}: cannot scale a {type(shape).__name__}")
         out.append(_with_material(part, material(shape.material)))
     return out
 

@@ -80,6 +80,10 @@ class Light(Columns, ABC):
 class UserLight(ABC):
     """A light as a user makes it, beside the shapes of a scene."""
 
+    def scaled(self, factor: float) -> UserLight:
+        """Return the light for a scene whose lengths were multiplied by `factor`: itself if it has none."""
+        return self
+
     @abstractmethod
     def record(self, centre: NDArray[np.float64]) -> Light:
         """Return the light as a record of one column, relative to `centre` (3,)."""

@@ -124,10 +124,6 @@ class DirectionalLight(UserLight):
             f"0, or from {MIN_ANGLE} to 180 degrees",
         )
 
-    def scaled(self, factor: float) -> DirectionalLight:
-        """Return the light for a scene whose lengths were multiplied by `factor`: itself."""
-        return self
-
     def record(self, centre: NDArray[np.float64]) -> DirectionalLights | SunLight:
         """Return the light as a record of one column."""
         towards = (-self.direction).astype(f4).reshape(3, 1)

@@ -105,10 +105,6 @@ class Environment(UserLight):
         else:
             self.radiance = rgb("Environment radiance", radiance)
 
-    def scaled(self, factor: float) -> Environment:
-        """Return the light for a scene whose lengths were multiplied by `factor`: itself."""
-        return self
-
     def record(self, centre: NDArray[np.float64]) -> InfiniteLight:
         """Return the light as a record of one column."""
         return ConstantEnvironment(self.radiance) if self._image is None else self._image
