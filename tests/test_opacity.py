@@ -11,6 +11,7 @@ import wavefront as wf
 from wavefront.accel import make_accelerator
 from wavefront.accel.embree import installed
 from wavefront.bsdfs import Principled
+from wavefront.sampling import sampler
 from wavefront.scene import compile_scene
 
 NO_EMBREE = pytest.mark.skipif(not installed(), reason="no embreex")
@@ -315,3 +316,16 @@ def test_complaints(make, message: str) -> None:
     """Name, value and limit."""
     with pytest.raises(wf.SceneError, match=message):
         make()
+
+
+def test_a_ray_through_more_veils_than_there_are_numbers_is_an_error(monkeypatch) -> None:
+    """Two decisions must never share a random number."""
+    monkeypatch.setitem(sampler.REPEATED, sampler.Dimension.OPACITY, 9)
+    veils = [
+        wf.Rectangle((-2, -2, z), (4, 0, 0), (0, 4, 0), material=wf.Diffuse(0.5).with_alpha(0.01))
+        for z in (1.0, 0.5, 0.0)
+    ]
+    camera = wf.Camera.look_at((0, 0, 3), (0, 0, 0), size=(4, 4))
+    scene = wf.Scene(veils, [wf.Environment(1.0)], camera)
+    with pytest.raises(wf.RenderError, match="more than 2 surfaces with an opacity below 1"):
+        wf.render(scene, 4, workers=1, progress=False)

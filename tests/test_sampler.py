@@ -1,5 +1,7 @@
 """Random numbers by address: purity, uniformity, independence of addresses, and stratification."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -18,6 +20,7 @@ from wavefront.sampling.sampler import (
     Sampler,
     SobolSampler,
     make_sampler,
+    numbers_of,
 )
 
 KINDS = {"independent": IndependentSampler, "sobol": SobolSampler, "bluenoise": BlueNoiseSampler}
@@ -138,8 +141,13 @@ def test_every_part_of_the_address_counts(name, pixel, bounce, dim, bit):
         assert (here != other).mean() > 0.8
 
 
-def test_dimensions_are_distinct():
-    assert [dimension.value for dimension in Dimension] == list(range(len(Dimension)))
+def test_no_two_decisions_share_numbers():
+    """Also where decisions repeat along a ray: their ranges are disjoint."""
+    ranges = sorted((numbers_of(dimension) for dimension in Dimension), key=lambda numbers: numbers.start)
+    assert all(len(numbers) > 0 for numbers in ranges)
+    assert all(before.stop <= after.start for before, after in itertools.pairwise(ranges))
+    assert numbers_of(Dimension.OPACITY) == range(7, 2**20)
+    assert numbers_of(Dimension.LIGHT) == range(2, 3)
 
 
 # Range and uniformity

@@ -32,7 +32,11 @@ BLOCK = 256  # consecutive samples per table; a power of two
 
 
 class Dimension(IntEnum):
-    """Every random decision of a path vertex. (bounce, dimension) addresses one stream."""
+    """Every random decision of a path vertex. (bounce, dimension) addresses one stream.
+
+    A decision that repeats at one vertex has a range of numbers (`numbers_of`). New decisions get
+    numbers above all ranges, so that pictures of old seeds do not change.
+    """
 
     PIXEL = 0  # 2-D: position within the pixel
     LENS = 1  # 2-D: position on the lens
@@ -41,7 +45,15 @@ class Dimension(IntEnum):
     LOBE = 4  # 1-D: which lobe of the BSDF
     DIRECTION = 5  # 2-D: direction within the lobe
     ROULETTE = 6  # 1-D: whether the path goes on
-    OPACITY = 7  # 1-D: whether the surface is there; 8, 9, ... for the next ones along the same ray
+    OPACITY = 7  # 1-D: whether the surface is there; repeats along the ray, up to 2²⁰
+
+
+REPEATED = {Dimension.OPACITY: 2**20}  # decisions that repeat, and one past the last of their numbers
+
+
+def numbers_of(dimension: Dimension) -> range:
+    """Return the numbers that a decision may use in an address, one for each time that it is made."""
+    return range(int(dimension), REPEATED.get(dimension, dimension + 1))
 
 
 class Sampler(ABC):

@@ -13,7 +13,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..sampling.sampler import Dimension, Sampler
+from ..errors import RenderError
+from ..sampling.sampler import Dimension, Sampler, numbers_of
 from ..scene import CompiledScene
 from ..state import Hits, Paths, Rays, Surface
 from ..vec import Floats, dot, f4
@@ -39,8 +40,12 @@ def pass_through(
     if not lanes.size:
         return paths, hits
     paths = replace(paths, origin=paths.origin.copy(), leaving=paths.leaving.copy(), vertex=paths.origin)
-    dimension = int(Dimension.OPACITY)
+    numbers = iter(numbers_of(Dimension.OPACITY))
     while lanes.size:
+        dimension = next(numbers, None)
+        if dimension is None:
+            most = len(numbers_of(Dimension.OPACITY))
+            raise RenderError(f"a ray meets more than {most} surfaces with an opacity below 1")
         here, at = paths.take(lanes), hits.take(lanes)
         surface = interact(scene, here, at)
         u = sampler.draw_1d(here.pixel, here.sample, bounce, dimension)
@@ -52,7 +57,6 @@ def pass_through(
         paths.throughput[:, lanes] = here.throughput
         hits.put(lanes, intersect(scene, here))
         lanes = lanes.compress(partly.take(hits.prim.take(lanes)))
-        dimension += 1
     return paths, hits
 
 
