@@ -8,6 +8,7 @@ import struct
 import time
 import warnings
 from pathlib import Path
+from types import SimpleNamespace
 
 import imageio.v3 as iio
 import numpy as np
@@ -17,7 +18,7 @@ import trimesh
 from wavefront import Camera, Scene, render
 from wavefront.bsdfs import Dielectric, Diffuse, Principled, ThinDielectric
 from wavefront.errors import SceneError
-from wavefront.io import appearance, gltf_document, placing
+from wavefront.io import appearance, gltf_document, gltf_materials, placing
 from wavefront.io.images import srgb_to_linear
 from wavefront.io.load import from_trimesh, load, load_mesh, load_meshes
 from wavefront.lights import DirectionalLight, SpotLight
@@ -447,6 +448,16 @@ def test_orthographic_camera(build, path):
     assert direction[:, 0] == pytest.approx([0, 0, -1])
 
 
+@pytest.mark.parametrize("scale", [1e-200, 1e200])
+def test_a_scale_of_its_node_has_no_say_for_a_camera(build, path, scale):
+    """Not even one whose square is no number."""
+    build.json["nodes"] += [{"camera": 0, "scale": [scale] * 3}]
+    build.json["scenes"][0]["nodes"] = [0, 1]
+    build.json["cameras"] = [{"type": "perspective", "perspective": {"yfov": 0.5}}]
+    camera = load(build.mesh().gltf(path)).camera
+    assert np.array_equal(camera.rotation, np.eye(3))
+
+
 def test_the_camera_of_a_file_that_trimesh_read_is_named(build, path):
     """Trimesh leaves out the nodes above it."""
     build.json["nodes"].append({"camera": 0})
@@ -809,6 +820,127 @@ def test_a_specular_colour_above_1_raises_the_reflectance_to_at_most_1(build, pa
     found = mesh.material._dielectric(np.zeros(1, np.float32)).ravel()
     assert found == pytest.approx([0.04, 0.4, 1])
 
+
+# ---- specular-glossiness ---------------------------------------------------------------------------
+
+
+def glossy(**group):
+    return {"extensions": {"KHR_materials_pbrSpecularGlossiness": group}}
+
+
+def test_specular_glossiness_reflects_as_its_formulas_say(build, path):
+    """c = diffuse·(1 − max(specular)), F0 = specular, α = (1 − glossiness)² in glTF's appendix B."""
+    diffuse, specular, glossiness = np.array([0.9, 0.5, 0.2]), np.array([0.1, 0.3, 0.6]), 0.4
+    group = {
+        "diffuseFactor": [*diffuse, 1], "specularFactor": specular.tolist(), "glossinessFactor": glossiness,
+    }  # fmt: skip
+    metal = {"baseColorFactor": [1, 0, 0, 1]}  # does not count beside it
+    (mesh,) = load_meshes(build.material(**glossy(**group), pbrMetallicRoughness=metal).gltf(path))
+    material = mesh.material
+    material.conserve_energy = False  # the appendix to the letter
+    wo, wi = (np.float32([[np.sin(t)], [0], [np.cos(t)]]) for t in (0.3, -0.9))
+    half = (wo + wi) / np.linalg.norm(wo + wi)
+    alpha2 = (1 - glossiness) ** 4
+    spread = alpha2 / (np.pi * (half[2] ** 2 * (alpha2 - 1) + 1) ** 2)
+    masked = [z * np.sqrt(alpha2 + (1 - alpha2) * y**2) for z, y in ((wi[2], wo[2]), (wo[2], wi[2]))]
+    visible = 0.5 / (masked[0] + masked[1])
+    fresnel = specular + (1 - specular) * (1 - (wo * half).sum()) ** 5
+    base = diffuse * (1 - specular.max())
+    expected = (1 - fresnel.max()) * base / np.pi + fresnel * spread * visible
+    assert material.f(wo, wi).ravel() == pytest.approx(expected, rel=1e-4)
+
+
+def test_the_defaults_of_specular_glossiness(given):
+    found = given(**glossy())
+    assert found["base_color"].tolist() == [0, 0, 0]
+    assert found["specular_color"] == pytest.approx([25, 25, 25])
+    assert (found["roughness"], found["metallic"], found["ior"]) == (0, 0, 1.5)
+
+
+def test_a_diffuse_texture_is_scaled_by_what_a_constant_specular_leaves(given, build):
+    info = build.image(np.uint8([[[255, 0, 188, 51]]]))
+    found = given(
+        **glossy(diffuseTexture=info, diffuseFactor=[0.5, 1, 1, 0.5], specularFactor=[0, 0.25, 0.125]),
+        alphaMode="BLEND",
+    )
+    grey = float(srgb_to_linear(np.float32(188 / 255)))
+    assert at(found["base_color"], 0.5, 0.5) == pytest.approx([0.375, 0, 0.75 * grey])
+    assert at(found["opacity"].alpha, 0.5, 0.5) == pytest.approx(0.1)
+    assert found["specular_color"] == pytest.approx([0, 6.25, 3.125])
+
+
+@pytest.mark.parametrize("textured", [False, True])
+def test_the_texture_of_specular_and_glossiness(given, build, textured):
+    """Colours are sRGB and glossiness is linear; the images may differ in size and in set of coordinates."""
+    both = build.image(np.uint8([[[255, 0, 0, 0], [0, 188, 0, 51]]]))
+    shade = build.image(np.uint8([[[255, 255, 255]], [[0, 188, 0]]])) | {"texCoord": 1}
+    group = {"specularGlossinessTexture": both, "specularFactor": [0.5, 1, 1], "glossinessFactor": 0.5}
+    group |= {"diffuseTexture": shade} if textured else {"diffuseFactor": [0.25, 0.5, 1, 1]}
+    found = given(**glossy(**group))
+    grey = float(srgb_to_linear(np.float32(188 / 255)))
+    assert at(found["roughness"], 0.25, 0.5) == pytest.approx(1)
+    assert at(found["roughness"], 0.75, 0.5) == pytest.approx(0.9)
+    assert at(found["specular_color"], 0.25, 0.5) == pytest.approx([12.5, 0, 0])
+    assert at(found["specular_color"], 0.75, 0.5) == pytest.approx([0, 25 * grey, 0])
+    points = np.float32([[0.25, 0.75, 0.75], [0.5, 0.5, 0.5]])
+    rows = np.float32([[0.5] * 3, [0.25, 0.25, 0.75]])
+    surface = SimpleNamespace(uv=points, uv1=rows)
+    left = np.array([0.5, 1 - grey, 1 - grey])
+    diffuse = np.array([[0, grey, 0], [0, grey, 0], [1, 1, 1]]) if textured else [0.25, 0.5, 1]
+    seen = found["base_color"].at(surface).T
+    assert seen == pytest.approx(left[:, None] * diffuse, abs=1e-6)
+    assert set(found["base_color"].reads) == ({"uv", "uv1"} if textured else {"uv"})
+
+
+def test_specular_without_an_alpha_is_evenly_glossy(given, build):
+    info = build.image(np.uint8([[[255, 0, 0]]]))
+    assert given(**glossy(specularGlossinessTexture=info, glossinessFactor=0.25))["roughness"] == 0.75
+
+
+def test_vertex_colours_multiply_the_diffuse_part_alone(build, path):
+    info = build.image(np.uint8([[[255, 0, 0, 0]]]))
+    build.material(**glossy(specularGlossinessTexture=info, specularFactor=[0.5, 1, 1]))
+    build.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = build.accessor(COLORS)
+    (mesh,) = load_meshes(build.gltf(path))
+    surface = SimpleNamespace(uv=np.float32([[0.5], [0.5]]), color=np.float32([[0.5], [1], [0], [1]]))
+    assert mesh.material.base_color.at(surface).ravel() == pytest.approx([0.25, 0.5, 0])
+    assert at(mesh.material.specular_color, 0.5, 0.5) == pytest.approx([12.5, 0, 0])
+
+
+def test_what_specular_glossiness_excludes_is_named(build, path):
+    """Their specifications say so of each other."""
+    extensions = glossy()["extensions"] | {
+        "KHR_materials_clearcoat": {"clearcoatFactor": 1},
+        "KHR_materials_emissive_strength": {"emissiveStrength": 2},
+    }
+    build.json["extensionsRequired"] = ["KHR_materials_pbrSpecularGlossiness"]
+    build.material(extensions=extensions, emissiveFactor=[1, 1, 1]).gltf(path)
+    message = r"not honoured: KHR_materials_clearcoat beside KHR_materials_pbrSpecularGlossiness \(materials"
+    with pytest.warns(UserWarning, match=message) as record:
+        (mesh,) = load_meshes(path)
+    assert len(record) == 1
+    assert mesh.emission.ravel().tolist() == [2, 2, 2]
+
+
+@pytest.mark.parametrize(
+    ("group", "message"),
+    [
+        ({"glossinessFactor": 2}, r"a\.gltf: materials\[0\]\.glossinessFactor is 2; it must be in \[0, 1\]"),
+        (
+            {"specularFactor": [1, 1]},
+            r"a\.gltf: materials\[0\]\.specularFactor is \[1, 1\]; it must be 3 finite",
+        ),
+        ({"diffuseTexture": 3}, r"a\.gltf: materials\[0\]\.diffuseTexture is 3; it must be an object"),
+        (7, r"a\.gltf: materials\[0\] is malformed: AttributeError"),
+    ],
+)
+def test_defects_of_specular_glossiness(build, path, group, message):
+    extensions = {"KHR_materials_pbrSpecularGlossiness": group}
+    with pytest.raises(SceneError, match=message):
+        load(build.material(extensions=extensions).gltf(path))
+
+
+# ---- which material it becomes ----------------------------------------------------------------------
 
 GLASS = {
     "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.25, "baseColorFactor": [1, 0.5, 0, 1]},
@@ -1211,6 +1343,14 @@ def test_too_few_indices(build, path, indices, mode, message):
         ({"alphaMode": "GLASS"}, r"alphaMode is 'GLASS'; it must be OPAQUE, MASK or BLEND"),
         ({"name": "red", "normalTexture": {"index": 3}}, r"textures\[3\] does not exist"),
         ({"normalTexture": 3}, r"materials\[0\]\.normalTexture is 3; it must be an object"),
+        (
+            {"extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 1e39}}},
+            r"a\.gltf: materials\[0\]\.emissiveStrength is 1e\+39; it must be in \[0, 3\.40282e\+38\]",
+        ),
+        (
+            {"extensions": {"KHR_materials_sheen": [1]}},
+            r"a\.gltf: materials\[0\] is malformed: AttributeError",
+        ),
     ],
 )
 def test_defects_of_materials(build, path, material, message):
@@ -1229,13 +1369,65 @@ def test_images_outside_the_folder_are_refused(build, path, uri):
         load(path)
 
 
-def test_missing_and_damaged_images_are_named(build, path):
+def test_a_missing_image_is_named_and_left_out(build, path):
+    """What it would multiply counts alone; `strict` refuses."""
+    build.json |= {"images": [{"uri": "my%20t.png"}], "textures": [{"source": 0}]}
+    info = {"index": 0}
+    group = {"baseColorTexture": info, "baseColorFactor": [0.5, 0.25, 1, 1], "metallicRoughnessTexture": info}
+    extensions = {"KHR_materials_clearcoat": {"clearcoatFactor": 0.5, "clearcoatTexture": info}}
+    build.material(
+        pbrMetallicRoughness=group | {"roughnessFactor": 0.75},
+        normalTexture=info,
+        emissiveFactor=[0, 1, 0],
+        emissiveTexture=info,
+        extensions=extensions,
+    )
+    build.gltf(path)
+    message = r"a\.gltf: not honoured: texture 'my%20t\.png', which is missing \(images\[0\]\)"
+    with pytest.warns(UserWarning, match=message) as record:
+        (mesh,) = load(path).shapes
+    assert len(record) == 1
+    assert mesh.material.base_color.ravel().tolist() == [0.5, 0.25, 1]
+    assert (mesh.material.roughness, mesh.material.clearcoat) == (0.75, 0.5)
+    assert mesh.material.relief is None
+    assert mesh.emission.ravel().tolist() == [0, 1, 0]
+    with pytest.raises(SceneError, match=message):
+        load(path, strict=True)
+    iio.imwrite(path.parent / "my t.png", np.zeros((2, 2, 3), np.uint8))
+    (mesh,) = load(path, strict=True).shapes
+    assert isinstance(mesh.material.base_color, Texture)
+
+
+def test_damaged_images_are_named(build, path):
     build.json |= {"images": [{"uri": "t.png"}], "textures": [{"source": 0}]}
     build.material(pbrMetallicRoughness={"baseColorTexture": {"index": 0}}).gltf(path)
-    with pytest.raises(SceneError, match=r"t\.png: there is no such file"):
-        load(path)
     (path.parent / "t.png").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(30))
-    with pytest.raises(SceneError, match=r"images\[0\] \(t\.png\): "):
+    with pytest.raises(SceneError, match=r"a\.gltf: images\[0\] \(t\.png\): "):
+        load(path)
+
+
+def test_a_missing_buffer_names_both_files(build, path):
+    build.mesh()
+    path.write_text(json.dumps(build.json | {"buffers": [{"byteLength": 36, "uri": "d.bin"}]}))
+    with pytest.raises(SceneError, match=r"a\.gltf: buffers\[0\]: .*d\.bin: there is no such file"):
+        load(path)
+
+
+def test_how_many_pixels_the_images_have_is_limited(build, path, monkeypatch):
+    """A view of the buffer may serve any number of images."""
+    info = build.image(np.zeros((4, 4, 3), np.uint8))
+    build.json["images"] *= 3
+    build.json["textures"] = [{"source": i} for i in range(3)]
+    build.material(
+        normalTexture=info, emissiveFactor=[1, 1, 1], emissiveTexture={"index": 1},
+        pbrMetallicRoughness={"baseColorTexture": {"index": 2}},
+    ).gltf(path)  # fmt: skip
+    monkeypatch.setattr(gltf_materials, "MAX_ALL_PIXELS", 48)
+    load(path)
+    monkeypatch.setattr(gltf_materials, "MAX_ALL_PIXELS", 47)
+    with pytest.raises(
+        SceneError, match=r"images\[\d\] brings the images to 48 pixels in all; the limit is 47"
+    ):
         load(path)
 
 

@@ -195,3 +195,9 @@ def test_complaints(source, arguments, message):
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(SceneError, match=r"no\.png: there is no such file"):
         Texture(tmp_path / "no.png")
+
+
+@pytest.mark.parametrize("name", ["scale", "offset"])
+def test_factors_beyond_float32_are_refused(name):
+    with pytest.raises(SceneError, match=rf"{name} is -1e\+39; its size must be at most 3\.4e\+38"):
+        Texture(np.zeros((1, 1)), **{name: -1e39})

@@ -228,6 +228,8 @@ def _factor(name: str, value: ArrayLike, scalar: bool) -> Floats:
     if scalar and not single:
         raise SceneError(f"{name} is {value!r}; with a channel it must be one number")
     array = finite_array(name, value, () if single else (3,))
+    if np.abs(array).max() > np.finfo(f4).max:
+        raise SceneError(f"{name} is {value!r}; its size must be at most {np.finfo(f4).max:.3g}")
     return np.broadcast_to(array.astype(f4).reshape(-1, 1), (3, 1)).copy()
 
 

@@ -128,8 +128,14 @@ def camera_at(matrix: Matrix, fov: float, size: tuple[int, int]) -> Camera:
 
 def _pose(matrix: Matrix) -> tuple[Matrix, Matrix, Matrix]:
     """Return where a camera is, what it looks at, and what is up; a scale of its node has no say."""
-    origin = matrix[:3, 3]
-    return origin, origin - matrix[:3, 2] / (np.linalg.norm(matrix[:3, 2]) or 1.0), matrix[:3, 1]
+    origin, backward, up = matrix[:3, 3], _near_one(matrix[:3, 2]), _near_one(matrix[:3, 1])
+    return origin, origin - backward / (np.linalg.norm(backward) or 1.0), up
+
+
+def _near_one(vector: Matrix) -> Matrix:
+    """Return a vector multiplied by the power of two that makes its size about 1, so that it has squares."""
+    _, exponent = np.frexp(np.abs(vector).max())
+    return np.ldexp(vector, -exponent)
 
 
 def size_of(aspect: float) -> tuple[int, int]:

@@ -1,4 +1,7 @@
-"""Materials and textures of glTF: metallic-roughness and its KHR extensions, from the JSON's own floats."""
+"""Materials and textures of glTF: metallic-roughness, specular-glossiness and the KHR extensions.
+
+They are read from the JSON's own floats.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,9 @@ from ..errors import SceneError
 from ..relief import NormalMap
 from ..textures import Texture
 from .appearance import Look, realise
+from .files import MAX_PIXELS
 from .gltf_document import Document, floats
+from .gltf_specular_glossiness import F0, BesideSpecular
 from .images import decode_codes
 
 WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
@@ -25,6 +30,7 @@ KNOWN = frozenset(
         "materials_clearcoat",
         "materials_emissive_strength",
         "materials_ior",
+        "materials_pbrSpecularGlossiness",
         "materials_sheen",
         "materials_specular",
         "materials_transmission",
@@ -33,6 +39,11 @@ KNOWN = frozenset(
         "texture_transform",
     )
 ) | {"EXT_mesh_gpu_instancing"}
+FLOAT32_MAX = float(np.finfo(np.float32).max)
+MAX_ALL_PIXELS = 4 * MAX_PIXELS  # of all images of a file, decoded
+BESIDE = frozenset(  # extensions that go with specular-glossiness; the others exclude it
+    ("KHR_materials_pbrSpecularGlossiness", "KHR_materials_emissive_strength", "KHR_texture_transform")
+)
 FLIP = np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]])  # between v downwards and v upwards
 
 
@@ -42,7 +53,8 @@ class Materials:
     def __init__(self, document: Document) -> None:
         self._document = document
         self._looks: dict[int, Look] = {}
-        self._images: dict[int, NDArray[Any]] = {}
+        self._images: dict[int, NDArray[Any] | None] = {}
+        self._pixels = 0  # of those
         _check_extensions(document)
 
     def look(self, index: int) -> Look:
@@ -50,13 +62,14 @@ class Materials:
         if index not in self._looks:
             item = self._document.get("materials", index)
             where = f"materials[{index}]" + (f" {item['name']!r}" if "name" in item else "")
-            look = self._looks[index] = _Reader(self, item, where).look()
+            with self._document.inside(where):
+                look = self._looks[index] = _Reader(self, item, where).look()
             for what in look.lost:
                 self._document.lose(what, where)
         return self._looks[index]
 
-    def texture(self, info: Any, where: str, **arguments: Any) -> Texture:
-        """Return a texture for a texture-info object of the JSON."""
+    def texture(self, info: Any, where: str, **arguments: Any) -> Texture | None:
+        """Return a texture for a texture-info object of the JSON, None if its image file is missing."""
         document = self._document
         if not isinstance(info, dict):
             raise SceneError(f"{document.name}: {where} is {info!r}; it must be an object")
@@ -69,8 +82,11 @@ class Materials:
         if uv_set not in (0, 1):
             document.lose(f"TEXCOORD_{uv_set}", where)
         sampler = document.get("samplers", item["sampler"]) if "sampler" in item else {}
+        codes = self._image(item["source"])
+        if codes is None:
+            return None
         return Texture(
-            self._image(item["source"]),
+            codes,
             wrap=(_wrap(sampler, "wrapS"), _wrap(sampler, "wrapT")),
             filter=self._filter(sampler, where),
             transform=_uv_matrix(document, move, where) if move else None,
@@ -85,22 +101,36 @@ class Materials:
             self._document.lose("minFilter (magFilter counts at all distances)", where)
         return "nearest" if NEAREST in ((far,) if near is None else (near,)) else "bilinear"
 
-    def _image(self, index: int) -> NDArray[Any]:
-        """Return the stored values of an image, (H, W, C), decoded once."""
+    def _image(self, index: int) -> NDArray[Any] | None:
+        """Return the stored values of an image, (H, W, C), decoded once; None if its file is missing."""
+        item = self._document.get("images", index)
         if index not in self._images:
-            document = self._document
-            item = document.get("images", index)
-            name = f"{document.name}: images[{index}]" + (f" {item['name']!r}" if "name" in item else "")
-            if "bufferView" in item:
-                data, start, end, _ = document.view(item["bufferView"])
-                content = data[start:end]
-            elif isinstance(item.get("uri"), str):
-                content = document.uri(item["uri"], f"images[{index}]")
-                name = name if item["uri"].startswith("data:") else f"{name} ({item['uri']})"
-            else:
-                raise SceneError(f"{name} has neither a uri nor a bufferView")
-            self._images[index] = decode_codes(content, name)
+            self._images[index] = self._decoded(item, f"images[{index}]")
         return self._images[index]
+
+    def _decoded(self, item: dict[str, Any], place: str) -> NDArray[Any] | None:
+        document = self._document
+        name = f"{document.name}: {place}" + (f" {item['name']!r}" if "name" in item else "")
+        uri = item.get("uri")
+        if "bufferView" in item:
+            data, start, end, _ = document.view(item["bufferView"])
+            content = data[start:end]
+        elif isinstance(uri, str):
+            with document.inside(place):
+                if document.is_missing(uri):
+                    document.lose(f"texture {uri!r}, which is missing", place)
+                    return None
+            content = document.uri(uri, place)
+            name = name if uri.startswith("data:") else f"{name} ({uri})"
+        else:
+            raise SceneError(f"{name} has neither a uri nor a bufferView")
+        codes = decode_codes(content, name)
+        self._pixels += codes.shape[0] * codes.shape[1]
+        if self._pixels > MAX_ALL_PIXELS:
+            raise SceneError(
+                f"{name} brings the images to {self._pixels} pixels in all; the limit is {MAX_ALL_PIXELS}"
+            )
+        return codes
 
 
 class _Reader:
@@ -116,9 +146,26 @@ class _Reader:
 
     def look(self) -> Look:
         """Return the look of the material."""
-        self._metallic_roughness(self._item.get("pbrMetallicRoughness", {}))
-        relief = self._relief()
         extensions = self._item.get("extensions", {})
+        relief = self._relief()
+        if "KHR_materials_pbrSpecularGlossiness" in extensions:
+            self._specular_glossiness(extensions["KHR_materials_pbrSpecularGlossiness"])
+            self._lost += [
+                f"{name} beside KHR_materials_pbrSpecularGlossiness"
+                for name in extensions
+                if name not in BESIDE
+            ]
+        else:
+            self._metallic_roughness(self._item.get("pbrMetallicRoughness", {}))
+            self._extended(extensions)
+        radiance = self._emission(extensions.get("KHR_materials_emissive_strength", {}))
+        material, lost = realise(self._wanted)
+        material = material if relief is None else material.with_relief(relief)
+        both = bool(self._item.get("doubleSided"))
+        return Look(material, radiance, both, self._lost + lost, self._alpha_given, self._cutoff)
+
+    def _extended(self, extensions: dict[str, Any]) -> None:
+        """Take what extends metallic-roughness."""
         self._ior(extensions.get("KHR_materials_ior"))
         self._transmission(
             extensions.get("KHR_materials_transmission"), extensions.get("KHR_materials_volume")
@@ -128,14 +175,6 @@ class _Reader:
         self._specular(extensions.get("KHR_materials_specular"))
         self._volume(extensions.get("KHR_materials_volume"))
         self._lost += [name for name in extensions if name not in KNOWN]
-        radiance = self._emission(extensions.get("KHR_materials_emissive_strength", {}))
-        try:
-            material, lost = realise(self._wanted)
-            material = material if relief is None else material.with_relief(relief)
-        except SceneError as error:
-            raise SceneError(f"{self._file}: {self._where}: {error}") from error
-        both = bool(self._item.get("doubleSided"))
-        return Look(material, radiance, both, self._lost + lost, self._alpha_given, self._cutoff)
 
     def _number(self, group: dict[str, Any], key: str, default: float, high: float = 1.0) -> float:
         value = floats(f"{self._file}: {self._where}.{key}", [group.get(key, default)], 1)[0]
@@ -172,12 +211,39 @@ class _Reader:
         factor = self._colour(group, "baseColorFactor", [1.0, 1.0, 1.0, 1.0])
         base = self._texture(group, "baseColorTexture", scale=factor[:3])
         self._wanted["base_color"] = factor[:3] if base is None else base
-        self._alpha(group, float(factor[3]), base)
+        self._alpha(group, "baseColorTexture", float(factor[3]), base)
         metallic = self._scalar(group, "metallicFactor", "metallicRoughnessTexture", 2, 1.0)
         self._want("metallic", metallic, 0.0)
         self._wanted["roughness"] = self._scalar(group, "roughnessFactor", "metallicRoughnessTexture", 1, 1.0)
 
-    def _alpha(self, group: dict[str, Any], factor: float, base: Texture | None) -> None:
+    def _specular_glossiness(self, group: dict[str, Any]) -> None:
+        """Take the parameters of KHR_materials_pbrSpecularGlossiness, which goes before metallic-roughness.
+
+        The base is diffuse·(1 − max(specular)), the reflectance along the normal is specular, the roughness
+        1 − glossiness. A dielectric of index 1.5 whose reflectance 0.04 is tinted is all of that exactly.
+        """
+        diffuse = self._colour(group, "diffuseFactor", [1.0, 1.0, 1.0, 1.0])
+        specular = self._colour(group, "specularFactor", [1.0, 1.0, 1.0])
+        glossiness = self._number(group, "glossinessFactor", 1.0)
+        map_key = "specularGlossinessTexture"
+        varying = self._texture(group, map_key, scale=specular)
+        if varying is None:
+            diffuse[:3] *= 1 - specular.max()
+        base = self._texture(group, "diffuseTexture", scale=diffuse[:3])
+        self._alpha(group, "diffuseTexture", float(diffuse[3]), base)
+        color: Any = diffuse[:3] if base is None else base
+        self._wanted["base_color"] = color if varying is None else BesideSpecular(color, varying)
+        self._wanted["specular_color"] = specular / F0
+        self._wanted["roughness"] = 1 - glossiness
+        if varying is not None:
+            self._wanted["specular_color"] = self._texture(group, map_key, scale=specular / F0)
+            if varying.channels == 4:
+                self._wanted["roughness"] = self._texture(
+                    group, map_key, srgb=False, channel=3, scale=-glossiness, offset=1.0
+                )
+
+    def _alpha(self, group: dict[str, Any], key: str, factor: float, base: Texture | None) -> None:
+        """Take the opacity of a base color: a factor, and the fourth channel of the texture `key`."""
         mode = self._item.get("alphaMode", "OPAQUE")
         if mode not in ("OPAQUE", "MASK", "BLEND"):
             raise SceneError(
@@ -189,7 +255,7 @@ class _Reader:
             self._cutoff = self._number(self._item, "alphaCutoff", 0.5, high=np.inf)
         alpha: Any = factor
         if base is not None and base.channels == 4:
-            alpha = self._texture(group, "baseColorTexture", srgb=False, channel=3, scale=factor)
+            alpha = self._texture(group, key, srgb=False, channel=3, scale=factor)
         self._alpha_given = alpha
         self._want("alpha", alpha, 1.0)
         if mode == "MASK" and "alpha" in self._wanted:
@@ -255,7 +321,7 @@ class _Reader:
         if group is None:
             return
         self._want("specular", self._scalar(group, "specularFactor", "specularTexture", 3, 1.0), 1.0)
-        factor = self._colour(group, "specularColorFactor", [1.0, 1.0, 1.0], high=np.inf)
+        factor = self._colour(group, "specularColorFactor", [1.0, 1.0, 1.0], high=FLOAT32_MAX)
         texture = self._texture(group, "specularColorTexture", scale=factor)
         if texture is not None or (factor != 1).any():
             self._wanted["specular_color"] = factor if texture is None else texture
@@ -271,11 +337,12 @@ class _Reader:
             distance = self._number(group, "attenuationDistance", 1.0, high=np.inf)
             if distance == 0:
                 raise SceneError(f"{self._file}: {self._where}.attenuationDistance is 0; it must be above 0")
-            self._wanted["absorption"] = -np.log(np.maximum(colour, 1e-6)) / distance
+            with np.errstate(over="ignore"):
+                self._wanted["absorption"] = -np.log(np.maximum(colour, 1e-6)) / distance
 
     def _emission(self, strength: dict[str, Any]) -> NDArray[np.float64] | Texture | None:
         factor = self._colour(self._item, "emissiveFactor", [0.0, 0.0, 0.0])
-        factor = factor * self._number(strength, "emissiveStrength", 1.0, high=np.inf)
+        factor = factor * self._number(strength, "emissiveStrength", 1.0, high=FLOAT32_MAX)
         if not factor.any():
             return None
         texture = self._texture(self._item, "emissiveTexture", scale=factor)
@@ -307,4 +374,7 @@ def _uv_matrix(document: Document, move: dict[str, Any], where: str) -> NDArray[
     moved = np.array(
         [[cos * scale[0], sin * scale[1], offset[0]], [-sin * scale[0], cos * scale[1], offset[1]], [0, 0, 1]]
     )
-    return FLIP @ moved @ FLIP
+    matrix = FLIP @ moved @ FLIP
+    if not np.abs(matrix).max() <= FLOAT32_MAX:
+        raise SceneError(f"{place}: an element of its matrix is beyond float32")
+    return matrix

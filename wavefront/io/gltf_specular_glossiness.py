@@ -1,0 +1,47 @@
+"""The diffuse color of glTF's specular-glossiness model, where it depends on two textures.
+
+Source: Khronos Group, KHR_materials_pbrSpecularGlossiness, "Specular - Glossiness".
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..bsdfs import Spatial
+from ..bsdfs.parameter import Colour, colour
+from ..state import Surface
+from ..textures import Texture
+from ..vec import Floats, f4
+
+F0 = 0.04  # reflectance of a `Principled` of index 1.5 along the normal, which `specular_color` multiplies
+
+
+class BesideSpecular(Spatial):
+    """diffuse · (1 − max(specular)), where the specular color is a texture.
+
+    Parameters
+    ----------
+    diffuse
+        A color in [0, 1], or a texture.
+    specular
+        A texture of colors in [0, 1]. Its image, its wrapping and its place may differ from those of the
+        diffuse one: both are looked up at the point in question.
+    """
+
+    def __init__(self, diffuse: Colour, specular: Texture) -> None:
+        self.diffuse: Any = colour("diffuse", diffuse)
+        self.specular = specular
+        reads = self.diffuse.reads if isinstance(self.diffuse, Spatial) else ()
+        self.reads = tuple(dict.fromkeys((*reads, *specular.reads)))
+
+    def __repr__(self) -> str:
+        """Name both."""
+        return f"BesideSpecular({self.diffuse!r}, {self.specular!r})"
+
+    def at(self, surface: Surface) -> Floats:
+        """Return the color at hit points, (3, n)."""
+        red, green, blue = self.specular.at(surface)
+        left = f4(1) - np.maximum(np.maximum(red, green), blue)
+        return left * (self.diffuse.at(surface) if isinstance(self.diffuse, Spatial) else self.diffuse)
