@@ -274,6 +274,18 @@ def test_not_finite_normals_and_uvs_are_announced(write):
         load_meshes(path, strict=True)
 
 
+def test_uvs_beyond_all_textures_are_announced(write):
+    path = write(SQUARE + "vt 1e39 0\nvt 0 0\nvt 1 -1e30\nf 1/1 2/2 3/3\n")
+    with pytest.warns(
+        UserWarning, match=r"2 uvs are beyond ±16777216 and were set to 0, first: vertex 0"
+    ) as record:
+        (mesh,) = load_meshes(path)
+    assert len(record) == 1
+    assert not mesh.uvs.any()
+    with pytest.raises(SceneError, match="2 uvs are beyond"):
+        load_meshes(path, strict=True)
+
+
 def test_what_is_not_read_is_named_once(write):
     path = write(SQUARE + "f 1 2 3\nl 1 2\nl 2 3\np 1\ncurv2 1 2\n")
     with pytest.warns(
@@ -726,6 +738,23 @@ def test_face_colours_are_those_of_all_corners(write):
     expected = [[[1, green, 0, 1]], [[0, 0, blue, 1]]]
     assert soup(mesh, mesh.colors) == pytest.approx(np.repeat(expected, 3, 1), rel=1e-6)
     assert isinstance(mesh.material.reflectance, VertexColors)
+
+
+def test_colors_of_faces_show_beside_vertices_that_are_all_white(write):
+    white = [f"{row} 255 255 255" for row in PLACES]
+    extra = [f"property uchar {x}" for x in ("red", "green", "blue")]
+    faces = ["3 0 1 2 255 0 0", "3 0 2 3 0 255 0"]
+    path = write(painted_ply(white, faces, extra=extra), "a.ply")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        (mesh,) = load_meshes(path, strict=True)
+        (held,) = from_trimesh(trimesh.load(path, process=False)).shapes
+    for found in (mesh, held):
+        assert soup(found, found.colors).tolist() == [[[1, 0, 0, 1]] * 3, [[0, 1, 0, 1]] * 3]
+    white[0] = f"{PLACES[0]} 0 0 255"  # a real color: those of the vertices count
+    with pytest.warns(UserWarning, match="not honoured: face colours"):
+        (mesh,) = load_meshes(write(painted_ply(white, faces, extra=extra), "a.ply"))
+    assert soup(mesh, mesh.colors)[0].tolist() == [[0, 0, 1, 1], [1, 1, 1, 1], [1, 1, 1, 1]]
 
 
 def test_face_colours_survive_faces_that_do_not(write):

@@ -23,6 +23,8 @@ POINTS = np.random.default_rng(1).random((2, 40), np.float32)
 def one(tmp_path):
     """Load a textured triangle whose material has the given lines, beside an image `t.png`."""
     iio.imwrite(tmp_path / "t.png", CODES)
+    (tmp_path / "t.tga").write_bytes(bytes(100))
+    (tmp_path / "broken.png").write_bytes((tmp_path / "t.png").read_bytes()[:60])
 
     def load_one(*lines, **arguments):
         (tmp_path / "s.mtl").write_text("\n".join(["newmtl m", *lines]))
@@ -103,18 +105,43 @@ def test_options_without_effect_are_named(one):
             "map_Pr -imfchan m t.png",
             r"line 2: map_Pr: channel is 3; texture 't\.png' has the channels 0 to 2",
         ),
-        ("map_Kd no.png", r"line 2: map_Kd: .*no\.png: there is no such file"),
         ("map_Kd t.tga", r"line 2: map_Kd: .*t\.tga: extension '\.tga' is not one of"),
         (
             "map_Kd ../t.png",
             r"line 2: map_Kd: .*s\.mtl: refers to '\.\./t\.png', which is outside its folder",
         ),
+        ("map_Kd broken.png", r"s\.mtl line 2: map_Kd: .*broken\.png"),
         ("map_Kd C:\\t.png", r"absolute path is not followed"),
     ],
 )
 def test_defects_of_maps(one, line, message):
     with pytest.raises(SceneError, match=message):
         one(line)
+
+
+@pytest.mark.parametrize(
+    ("lines", "missing", "plain"),
+    [
+        (("Kd 0.2 0.4 0.6", "map_Kd no.png"), "line 3: map_Kd: texture 'no.png'", ("Kd 0.2 0.4 0.6",)),
+        (("map_Kd -s 2 2 sub/no.png",), "line 2: map_Kd: texture 'sub/no.png'", ()),
+        (("map_Ke no.exr",), "line 2: map_Ke: texture 'no.exr'", ()),
+        (("map_d no.png",), "line 2: map_d: texture 'no.png'", ()),
+        (("map_Pr no.png",), "line 2: map_Pr: texture 'no.png'", ()),
+        (("norm no.png",), "line 2: norm: texture 'no.png'", ()),
+        (("map_Bump -bm 2 no.tga",), "line 2: map_Bump: texture 'no.tga'", ()),
+        (("map_Kd " + "n" * 300,), "line 2: map_Kd: texture 'nnn", ()),
+    ],
+)
+def test_missing_images_are_announced_and_left_out(one, lines, missing, plain):
+    with pytest.warns(UserWarning, match=rf"s\.mtl {missing}.* is missing$") as record:
+        mesh = one(*lines)
+    assert len(record) == 1
+    expected = one(*plain)
+    assert type(mesh.material) is type(expected.material) is Diffuse
+    assert np.array_equal(mesh.material.reflectance, expected.material.reflectance)
+    assert mesh.emission is None
+    with pytest.raises(SceneError, match=rf"s\.mtl {missing}.* is missing$"):
+        one(*lines, strict=True)
 
 
 def test_the_pbr_extension(given):
@@ -175,7 +202,7 @@ def test_a_bump_map_that_looks_like_normals_is_one(one, tmp_path):
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("norm no.png", r"s\.mtl line 2: norm: .*no\.png: there is no such file"),
+        ("norm broken.png", r"s\.mtl line 2: norm: .*broken\.png: ends early"),
         ("bump -bm x t.png", r"s\.mtl line 2: bump: .*-bm is 'x'; it must be numbers|-bm is 'x'"),
         ("norm -s 0 t.png", r"s\.mtl line 2: norm: NormalMap: the transform of .* is singular"),
         ("bump -bm nan t.png", r"s\.mtl line 2: bump: BumpMap height is nan"),

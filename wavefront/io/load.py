@@ -266,7 +266,7 @@ def _libraries(path: PathLike, libraries: list[str], strict: bool) -> dict[str, 
     looks: dict[str, Look] = {}
     for library in dict.fromkeys(libraries):
         file = beside(path, library)
-        if not file.exists():
+        if not os.path.exists(file):  # False, too, for names that no file can have
             warn(f"{os.fspath(path)}: material file {library!r} is missing", strict)
             continue
         looks.update(mtl.looks(mtl.parse(file, decode(read_bytes(file)), strict), strict))
@@ -308,7 +308,7 @@ def _ply_texture(path: PathLike, data: bytes, strict: bool) -> dict[str, bytes]:
         warn(f"{name}: not honoured: several textures; {textures[-1]!r} is taken for all faces", strict)
     for texture in textures[-1:]:
         file = beside(path, texture)
-        if not file.exists():
+        if not os.path.exists(file):  # False, too, for names that no file can have
             warn(f"{name}: texture {texture!r} is missing", strict)
             continue
         content = read_bytes(file)
@@ -398,8 +398,9 @@ class _Visuals:
         painted = visual.kind == "face"
         if not dress(raw, look) or (painted and raw.colors is None):
             self.lost.setdefault("face colours" if painted else "vertex colours", raw.name)
+        shown = {visual.kind, "face"} if visuals.shows_face_colors(mesh) else {visual.kind}
         for element in ("vertex", "face"):
-            if visual.kind != element and visuals.ply_has_colours(mesh, element):
+            if element not in shown and visuals.ply_has_colours(mesh, element):
                 self.lost.setdefault(f"{element} colours", raw.name)
         if look is None and is_faint(raw) and not visuals.is_gltf(mesh):  # where it has no say
             self.lost.setdefault("opacity of vertex colours", raw.name)

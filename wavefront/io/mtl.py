@@ -23,6 +23,7 @@ How an MTL material is read:
   units; but an image that looks like a normal map is one, for that is how Blender writes them, and
   `-bm` is then its strength.
 - `Ns` shapes nothing but the gloss, and `Ni` nothing but glass.
+- A map whose image is missing is left out with a warning.
 - Images are sRGB where they are colours, data elsewhere. The options -s -o -clamp -mm -imfchan -bm are read.
 
 Whatever else a file asks for is named in one warning per file.
@@ -33,6 +34,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -74,6 +76,7 @@ OPTIONS |= {"-texres": 1, "-type": 1, "-bm": 1}
 READ = frozenset(("-s", "-o", "-mm", "-clamp", "-imfchan"))
 RELIEFS = ("norm", "map_bump", "bump")  # keywords whose maps have a multiplier, -bm
 WHOLE = ("map_kd", "map_ke", "map_ks", "norm")  # keywords whose maps are not one channel of an image
+MAPS = {*WHOLE, *RELIEFS, "map_d", *(image for _, image, _ in PBR)}  # keywords whose images are read
 CHANNELS: dict[str, Any] = {"r": 0, "g": 1, "b": 2, "m": 3, "l": "luminance"}
 
 Colour = NDArray[np.float64]
@@ -144,9 +147,10 @@ class Entry:
             raise SceneError(f"{self.where(key)} names no file")
         self.read.add(key)
         base, gain = self._option(options, "-mm", [0.0, 1.0])
+        source = self.images[key] if key in self.images else self.beside(key, name)
         try:
             return Texture(
-                self.images[key] if key in self.images else beside(self.file, name),
+                source,
                 srgb=kind == "colour",
                 wrap="clamp" if options.get("-clamp") == ["on"] else "repeat",
                 transform=self._placing(options),
@@ -154,6 +158,13 @@ class Entry:
                 scale=np.asarray(scale) * gain,
                 offset=np.asarray(scale) * base,
             )
+        except SceneError as error:
+            raise SceneError(f"{self.where(key)}: {error}") from error
+
+    def beside(self, key: str, name: str) -> Path:
+        """Return the path of a file that a line names."""
+        try:
+            return beside(self.file, name)
         except SceneError as error:
             raise SceneError(f"{self.where(key)}: {error}") from error
 
@@ -253,6 +264,7 @@ def looks(entries: dict[str, Entry], strict: bool = False) -> dict[str, Look]:
 
 def look(entry: Entry) -> Look:
     """Turn one entry into a look; what is used is marked in `entry.read`."""
+    _leave_out_missing(entry)
     factor = entry.colour("ke", 0.0, high=np.inf)
     if "map_ke" in entry.lines and not factor.any():
         factor = np.ones(3)
@@ -262,6 +274,15 @@ def look(entry: Entry) -> Look:
     relief = _relief(entry)
     material = material if relief is None else material.with_relief(relief)
     return Look(material, radiance, lost=lost)
+
+
+def _leave_out_missing(entry: Entry) -> None:
+    """Announce maps whose files are missing; the material is what it is without them."""
+    for key in [key for key in entry.lines if key in MAPS and key not in entry.images]:
+        name = _map(entry, key)[1]
+        if name and not os.path.exists(entry.beside(key, name)):
+            warn(f"{entry.where(key)}: texture {name!r} is missing", entry.strict)
+            del entry.lines[key]
 
 
 def _material(entry: Entry) -> tuple[Bsdf, list[str]]:

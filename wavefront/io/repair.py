@@ -15,6 +15,7 @@ from ..errors import SceneError
 from ..shapes import Mesh
 
 FLOAT32_MAX = float(np.finfo(np.float32).max)
+MAX_UV = 2.0**24  # float32 has no fractions above, and textures only read those
 FLAT = 1e-14  # a face is degenerate if twice its area is below this part of its longest edge squared
 
 Table = NDArray[np.float64]
@@ -106,8 +107,8 @@ def build(source: str, raw: Raw, strict: bool = False) -> Mesh | None:
         vertices,
         faces,
         normals=_normals(label, raw.normals, vertices, faces, strict),
-        uvs=_finite(label, "uvs", raw.uvs, 0.0, strict),
-        uvs1=_finite(label, "second uvs", raw.uvs1, 0.0, strict),
+        uvs=_uvs(label, "uvs", raw.uvs, strict),
+        uvs1=_uvs(label, "second uvs", raw.uvs1, strict),
         tangents=None if raw.normals is None else _finite(label, "tangents", raw.tangents, 0.0, strict),
         colors=_colors(label, raw.colors, strict),
         material=raw.material,
@@ -178,6 +179,22 @@ def _finite(label: str, what: str, values: Table | None, otherwise: float, stric
         warn(f"{label}: {int(broken.sum())} {what} are not finite, first: vertex {broken.argmax()}", strict)
         values[broken] = otherwise
     return values
+
+
+def _uvs(label: str, what: str, uvs: Table | None, strict: bool) -> Table | None:
+    """Return texture coordinates, with 0 for those that name no place on a texture."""
+    uvs = _finite(label, what, uvs, 0.0, strict)
+    if uvs is None:
+        return None
+    large = (np.abs(uvs) > MAX_UV).any(axis=1)
+    if large.any():
+        warn(
+            f"{label}: {int(large.sum())} {what} are beyond ±{MAX_UV:.0f} and were set to 0, "
+            f"first: vertex {large.argmax()}",
+            strict,
+        )
+        uvs[large] = 0
+    return uvs
 
 
 def _colors(label: str, colors: Table | None, strict: bool) -> Table | None:

@@ -59,14 +59,36 @@ def _decoded(codes: NDArray[Any]) -> Table:
 
 
 def face_colours(mesh: Any) -> Table | None:
-    """Return the colours of the faces of a trimesh mesh, linear (m, 4), if it has one for each face.
+    """Return the colours of the faces of a trimesh mesh, linear (m, 4), if they are those that show.
 
     They are sRGB, as those of vertices are.
     """
-    if mesh.visual.kind != "face":
+    if not shows_face_colors(mesh):
         return None
-    codes = np.asarray(mesh.visual.face_colors)
-    return _decoded(codes) if codes.shape == (len(mesh.faces), 4) else None
+    if mesh.visual.kind == "face":
+        return _decoded(np.asarray(mesh.visual.face_colors))
+    return _decoded(np.asarray(type(mesh.visual)(face_colors=_ply_face_colors(mesh)).face_colors))
+
+
+def shows_face_colors(mesh: Any) -> bool:
+    """Return whether a trimesh mesh shows colors of its faces, one for each.
+
+    Of a PLY file with colors of both, trimesh takes those of the vertices; where they are all white, some
+    program filled them in, and those of the faces count.
+    """
+    if mesh.visual.kind == "face":
+        return np.shape(mesh.visual.face_colors) == (len(mesh.faces), 4)
+    if mesh.visual.kind != "vertex" or not ply_has_colours(mesh, "face"):
+        return False
+    white = bool((np.asarray(mesh.visual.vertex_colors) == 255).all())
+    return white and len(_ply_face_colors(mesh)) == len(mesh.faces)
+
+
+def _ply_face_colors(mesh: Any) -> NDArray[Any]:
+    """Return the colors of faces as their PLY file has them, (m, 3 or 4)."""
+    element = mesh.metadata["_ply_raw"]["face"]
+    names = [name for name in ("red", "green", "blue", "alpha") if name in element["properties"]]
+    return np.column_stack([np.asarray(element["data"][name]) for name in names])
 
 
 def is_gltf(mesh: Any) -> bool:
