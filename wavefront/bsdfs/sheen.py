@@ -27,10 +27,15 @@ def sheen_lobe(wo: Floats, wi: Floats, roughness: Floats) -> Floats:
     alpha = np.maximum(roughness, LEAST_ROUGHNESS)
     h = wo + wi
     sin2 = np.clip((h[0] * h[0] + h[1] * h[1]) / np.maximum(dot(h, h), f4(1e-20)), f4(0), f4(1))
-    density = (f4(2) + f4(1) / alpha) * _power(sin2, f4(0.5) / alpha) / TWO_PI
+    density = fiber_density(sin2, alpha)
     zo, zi = np.maximum(wo[2], f4(1e-4)), np.maximum(wi[2], f4(1e-4))
     shadowing = f4(1) + _lambda(zo, alpha) + _lambda(zi, alpha)
     return np.where(wi[2] > 0, density / (shadowing * f4(4) * zo * zi), f4(0))
+
+
+def fiber_density(sin2: Floats, alpha: Floats) -> Floats:
+    """D of half vectors whose angle with the normal has the squared sine sin2, (n,), 1/sr (eq. 2)."""
+    return (f4(2) + f4(1) / alpha) * _power(sin2, f4(0.5) / alpha) / TWO_PI
 
 
 def sheen_albedo(cos: Floats, roughness: Floats) -> Floats:

@@ -1,0 +1,491 @@
+"""Every formula of the materials against its source, written out again in float64, and against quadrature.
+
+The references read as their sources do, angles and all; the package's forms avoid divisions by cosines.
+"""
+
+import numpy as np
+import pytest
+
+from wavefront.bsdfs import Conductor, Dielectric, Diffuse, Mirror, Mix, OrenNayar, Principled, ThinDielectric
+from wavefront.bsdfs.albedo import SIZE, cosine_mean, gloss_tables, lookup
+from wavefront.bsdfs.conductor import METALS
+from wavefront.bsdfs.microfacet import alpha_of, normal_density, refraction_lobe, stretched
+from wavefront.bsdfs.sheen import fiber_density, sheen_albedo, sheen_lobe
+
+F4 = np.float32
+COLOR = (0.9, 0.5, 0.1)
+
+
+def column(value):
+    return np.reshape(value, (3, 1)).astype(float)
+
+
+def pairs(n=4000, seed=0, below=False):
+    """Directions wo above and wi above or `below` the surface, (3, n) float32 each, none of them grazing."""
+    v = np.random.default_rng(seed).normal(size=(2, 3, 3 * n))
+    v[:, 2] = np.abs(v[:, 2])
+    v /= np.linalg.norm(v, axis=1, keepdims=True)
+    wo, wi = v[:, :, (v[:, 2] > 0.05).all(0)][:, :, :n].astype(F4)
+    if below:
+        wi[2] *= -1
+    return wo, wi
+
+
+def dot(a, b):
+    return (a.astype(float) * b).sum(0)
+
+
+def half_vector(wo, wi):
+    h = wo.astype(float) + wi
+    return h / np.linalg.norm(h, axis=0)
+
+
+def midpoints(count, low=0.0, high=1.0):
+    """Midpoints (count,) of equal parts, and the width of one."""
+    return low + (np.arange(count) + 0.5) * (high - low) / count, (high - low) / count
+
+
+# ---- sources, in float64 ------------------------------------------------------------------------
+
+
+def fresnel(cos, eta):
+    """Unpolarized reflectance by Snell's law and Fresnel's equations."""
+    sin = np.sqrt(1 - cos**2) / eta
+    cos_t = np.sqrt(np.maximum(1 - sin**2, 0))
+    s = (cos - eta * cos_t) / (cos + eta * cos_t)
+    p = (eta * cos - cos_t) / (eta * cos + cos_t)
+    return np.where(sin < 1, (s**2 + p**2) / 2, 1.0)
+
+
+def schlick(f0, cos, f90=1.0):
+    """C. Schlick 1994, eq. 15."""
+    return f0 + (f90 - f0) * (1 - cos) ** 5
+
+
+def ggx(cos, alpha):
+    """B. Walter et al. 2007, eq. 33."""
+    tan2 = 1 / cos**2 - 1
+    return alpha**2 / (np.pi * cos**4 * (alpha**2 + tan2) ** 2)
+
+
+def smith(z, alpha):
+    """Λ of E. Heitz 2014, eq. 72."""
+    return (np.sqrt(1 + alpha**2 * (1 / z.astype(float) ** 2 - 1)) - 1) / 2
+
+
+def reflection(wo, wi, alpha):
+    """D·G2/(4·cosθo·cosθi) (Heitz 2014, eq. 99 for G2), and the cosine between wo and the half vector."""
+    h = half_vector(wo, wi)
+    shadowing = 1 / (1 + smith(wo[2], alpha) + smith(wi[2], alpha))
+    return ggx(h[2], alpha) * shadowing / (4 * wo[2].astype(float) * wi[2]), dot(wo, h)
+
+
+def refraction(wo, wi, alpha, eta):
+    """Walter et al. 2007, eqs. 16 and 21, over η² for radiance, without Fresnel; 0 where no facet does it."""
+    h = wo.astype(float) + eta * wi
+    h /= np.linalg.norm(h, axis=0) * np.sign(h[2])
+    o, i = dot(wo, h), dot(wi, h)
+    shadowing = 1 / (1 + smith(wo[2], alpha) + smith(np.abs(wi[2]), alpha))
+    value = np.abs(o * i) * ggx(h[2], alpha) * shadowing / (wo[2].astype(float) * -wi[2] * (o + eta * i) ** 2)
+    return np.where((o > 0) & (i < 0), value, 0.0), o
+
+
+# A. Conty Estevez and C. Kulla 2017, table 1: a, b, c, d, e for roughness 0 and for roughness 1.
+SMOOTH_FIT = (25.3245, 3.32435, 0.16801, -1.27393, -4.85967)
+ROUGH_FIT = (21.5473, 3.82987, 0.19823, -1.97760, -4.32054)
+
+
+def fiber_shadowing(z, roughness):
+    """Λ of Conty Estevez and Kulla 2017, eq. 3."""
+    weight = (1 - roughness) ** 2
+    a, b, c, d, e = (weight * s + (1 - weight) * r for s, r in zip(SMOOTH_FIT, ROUGH_FIT, strict=True))
+
+    def fit(x):
+        return a / (1 + b * x**c) + d * x + e
+
+    z = z.astype(float)
+    return np.exp(np.where(z < 0.5, fit(z), 2 * fit(0.5) - fit(1 - z)))
+
+
+def fibers(wo, wi, roughness):
+    """Conty Estevez and Kulla 2017, eqs. 1 to 3."""
+    sin = np.sqrt(1 - half_vector(wo, wi)[2] ** 2)
+    density = (2 + 1 / roughness) * sin ** (1 / roughness) / (2 * np.pi)
+    shadowing = 1 / (1 + fiber_shadowing(wo[2], roughness) + fiber_shadowing(wi[2], roughness))
+    return density * shadowing / (4 * wo[2].astype(float) * wi[2])
+
+
+def qualitative(wo, wi, sigma):
+    """M. Oren and S. Nayar 1994, eq. 30, of albedo 1."""
+    theta_o, theta_i = np.arccos(wo[2].astype(float)), np.arccos(wi[2].astype(float))
+    phi = np.arctan2(wo[1], wo[0]) - np.arctan2(wi[1], wi[0])
+    a = 1 - 0.5 * sigma**2 / (sigma**2 + 0.33)
+    b = 0.45 * sigma**2 / (sigma**2 + 0.09)
+    steep = np.sin(np.maximum(theta_o, theta_i)) * np.tan(np.minimum(theta_o, theta_i))
+    return (a + b * np.maximum(np.cos(phi), 0) * steep) / np.pi
+
+
+def eon(wo, wi, rho, r):
+    """J. Portsmouth, P. Kutz and S. Hill 2025, eqs. 16 to 27 (FON, its albedo, the compensation)."""
+    o, i = wo.astype(float), wi.astype(float)
+    a = 1 / (1 + (1 / 2 - 2 / (3 * np.pi)) * r)
+    s = dot(o, i) - o[2] * i[2]
+    single = rho / np.pi * a * (1 + r * s / np.where(s > 0, np.maximum(o[2], i[2]), 1))
+
+    def albedo(z):
+        theta, sin = np.arccos(z), np.sqrt(1 - z**2)
+        g = sin * (theta - sin * z) + 2 / 3 * (sin / z * (1 - sin**3) - sin)
+        return a * (1 + r / np.pi * g)
+
+    mean = a * (1 + (2 / 3 - 28 / (15 * np.pi)) * r)
+    left = (1 - albedo(o[2])) * (1 - albedo(i[2])) / (1 - mean)
+    return single + rho**2 * mean / (1 - rho * (1 - mean)) / np.pi * left
+
+
+# ---- distributions by quadrature ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("roughness", [0.07, 0.3, 0.6, 1.0])
+def test_fibers_cover_the_surface_once(roughness):
+    """∫ D cosθ dω = 1."""
+    theta, width = midpoints(20_000, 0, np.pi / 2)
+    density = fiber_density((np.sin(theta) ** 2).astype(F4), F4(roughness)).astype(float)
+    assert (density * np.cos(theta) * 2 * np.pi * np.sin(theta) * width).sum() == pytest.approx(1, abs=2e-5)
+
+
+@pytest.mark.parametrize("alpha", [1e-3, 0.03, 0.3, 1.0])
+def test_microfacets_cover_the_surface_once(alpha):
+    """∫ D cosθ dω = 1."""
+    t, width = midpoints(20_000)
+    theta = np.arctan(alpha * t / (1 - t))  # the narrow peak spread out
+    slope = alpha / (1 - t) ** 2 / (1 + np.tan(theta) ** 2)
+    h = np.stack([np.sin(theta), 0 * theta, np.cos(theta)])
+    density = normal_density(h, dot(h, h), alpha)
+    around = 2 * np.pi * np.sin(theta) * slope * width
+    assert (density * np.cos(theta) * around).sum() == pytest.approx(1, abs=1e-5)
+
+
+@pytest.mark.parametrize("mu", [1.0, 0.5, 0.1])
+@pytest.mark.parametrize("alpha", [0.1, 0.4, 1.0])
+def test_visible_microfacets_cover_what_is_seen_of_the_surface(alpha, mu):
+    """∫ G1 max(wo·m, 0) D dω = cosθo (Heitz 2014, eq. 14)."""
+    t, wide = midpoints(1500)
+    phi, turn = midpoints(360, 0, 2 * np.pi)
+    theta = np.arctan(alpha * t / (1 - t))[:, None]
+    slope = (alpha / (1 - t) ** 2)[:, None] / (1 + np.tan(theta) ** 2)
+    m = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta) + 0 * phi])
+    wo = np.array([np.sqrt(1 - mu * mu), 0, mu]).reshape(3, 1, 1)
+    sigma = float(stretched(wo.reshape(3, 1), alpha)[0])
+    masked = 2 * mu / (mu + sigma) * np.maximum((wo * m).sum(0), 0) * normal_density(m, (m * m).sum(0), alpha)
+    total = (masked * np.sin(theta) * slope).sum() * wide * turn
+    assert total == pytest.approx(mu, rel=1e-3)
+
+
+# ---- values -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("roughness", [0.05, 0.1, 0.3, 0.7, 1.0])
+def test_sheen(roughness):
+    wo, wi = pairs()
+    exact = fibers(wo, wi, max(roughness, 0.07))
+    assert sheen_lobe(wo, wi, F4(roughness)) == pytest.approx(exact, rel=2e-4, abs=1e-6)
+
+
+@pytest.mark.parametrize("roughness", [0.3, 0.7, 1.0])
+@pytest.mark.parametrize("mu", [0.3, 0.6, 1.0])
+def test_albedo_of_sheen(roughness, mu):
+    z, tall = midpoints(400)
+    phi, turn = midpoints(400, 0, 2 * np.pi)
+    z, phi = (x.ravel() for x in np.meshgrid(z, phi))
+    wi = np.stack([np.sqrt(1 - z**2) * np.cos(phi), np.sqrt(1 - z**2) * np.sin(phi), z])
+    wo = np.repeat(np.array([[np.sqrt(1 - mu * mu)], [0], [mu]]), len(z), 1)
+    exact = (fibers(wo, wi, roughness) * z).sum() * tall * turn
+    found = sheen_albedo(np.array([mu], F4), np.array([roughness], F4))[0]
+    assert found == pytest.approx(exact, rel=0.01)
+
+
+@pytest.mark.parametrize("sigma", [0.05, 0.3, 0.8, 1.5])
+def test_oren_nayar(sigma):
+    wo, wi = pairs()
+    exact = column(COLOR) * qualitative(wo, wi, sigma)
+    assert OrenNayar(COLOR, sigma).f(wo, wi) == pytest.approx(exact, rel=2e-4)
+
+
+@pytest.mark.parametrize("roughness", [0.1, 0.5, 1.0])
+def test_eon(roughness):
+    wo, wi = pairs()
+    exact = eon(wo, wi, column(COLOR), roughness)
+    assert OrenNayar(COLOR, roughness, energy_preserving=True).f(wo, wi) == pytest.approx(exact, rel=2e-4)
+
+
+@pytest.mark.parametrize("roughness", [0.2, 0.6, 1.0])
+def test_rough_metal(roughness):
+    wo, wi = pairs()
+    value, cos = reflection(wo, wi, roughness**2)
+    index = 0.5 + 3j
+    inner = np.sqrt(index**2 - (1 - cos**2))
+    s, p = (cos - inner) / (cos + inner), (index**2 * cos - inner) / (index**2 * cos + inner)
+    exact = value * (np.abs(s) ** 2 + np.abs(p) ** 2) / 2
+    assert Conductor(0.5, 3, roughness).f(wo, wi)[1] == pytest.approx(exact, rel=5e-4, abs=1e-6)
+
+
+@pytest.mark.parametrize("inside", [False, True])
+@pytest.mark.parametrize("roughness", [0.3, 0.6, 1.0])
+def test_rough_glass(roughness, inside):
+    glass = Dielectric(1.5, roughness, reflectance=COLOR, transmittance=COLOR[::-1])
+    eta = 1 / 1.5 if inside else 1.5
+    glass.eta = np.array([eta], F4)
+    wo, wi = pairs()
+    value, cos = reflection(wo, wi, roughness**2)
+    exact = column(COLOR) * (value * fresnel(cos, eta))
+    assert glass.f(wo, wi) == pytest.approx(exact, rel=1e-3, abs=1e-6)
+    wo, wi = pairs(below=True)
+    value, cos = refraction(wo, wi, roughness**2, eta)
+    sound = np.abs(wo + eta * wi)[2] > 0.05  # elsewhere the half vector has few digits
+    exact = column(COLOR[::-1]) * (value * (1 - fresnel(np.clip(cos, 1e-9, 1), eta)))
+    assert (value > 0).mean() > 0.1
+    assert glass.f(wo, wi)[:, sound] == pytest.approx(exact[:, sound], rel=3e-3, abs=1e-5)
+
+
+@pytest.mark.parametrize("roughness", [0.3, 1.0])
+def test_rough_sheet(roughness):
+    sheet = ThinDielectric(1.5, roughness, reflectance=COLOR, transmittance=COLOR[::-1])
+    wo, wi = pairs()
+    value, cos = reflection(wo, wi, roughness**2)
+    face = fresnel(cos, 1.5)
+    series = face + (1 - face) ** 2 * face / (1 - face**2)  # both faces, and all between
+    assert sheet.f(wo, wi) == pytest.approx(column(COLOR) * (value * series), rel=1e-3, abs=1e-6)
+    through = column(COLOR[::-1]) * (value * (1 - series))
+    wi[2] *= -1
+    assert sheet.f(wo, wi) == pytest.approx(through, rel=1e-3, abs=1e-6)
+
+
+def test_smooth_sheet():
+    sheet = ThinDielectric(1.5, reflectance=COLOR, transmittance=COLOR[::-1])
+    wo, _ = pairs()
+    face = fresnel(wo[2].astype(float), 1.5)
+    series = face + (1 - face) ** 2 * face / (1 - face**2)
+    up = sheet.sample_f(wo, np.zeros((3, wo.shape[1]), F4))
+    down = sheet.sample_f(wo, np.full((3, wo.shape[1]), np.nextafter(F4(1), F4(0))))
+    mirrored = wo * np.array([[-1], [-1], [1]], F4)
+    assert np.array_equal(up.wi, mirrored)
+    assert np.array_equal(down.wi, -wo)
+    assert up.pdf == pytest.approx(series, rel=1e-4)
+    assert down.pdf == pytest.approx(1 - series, rel=1e-4)
+    assert up.weight[:, 0] == pytest.approx(COLOR)
+    assert down.weight[:, 0] == pytest.approx(COLOR[::-1])
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_smooth_glass(inside):
+    glass = Dielectric(1.5, reflectance=COLOR, transmittance=COLOR[::-1])
+    eta = 1 / 1.5 if inside else 1.5
+    glass.eta = np.array([eta], F4)
+    wo, _ = pairs()
+    wo = wo[:, np.hypot(wo[0], wo[1]) < 0.99 * min(eta, 1)]
+    part = fresnel(wo[2].astype(float), eta)
+    up = glass.sample_f(wo, np.zeros((3, wo.shape[1]), F4))
+    down = glass.sample_f(wo, np.full((3, wo.shape[1]), np.nextafter(F4(1), F4(0))))
+    refracted = np.stack([-wo[0] / eta, -wo[1] / eta, -np.sqrt(1 - (wo[0] ** 2 + wo[1] ** 2) / eta**2)])
+    assert np.array_equal(up.wi, wo * np.array([[-1], [-1], [1]], F4))
+    assert down.wi == pytest.approx(refracted, abs=1e-5)
+    assert up.pdf == pytest.approx(part, rel=1e-3)
+    assert down.pdf == pytest.approx(1 - part, rel=1e-3)
+    assert (up.eta == 1).all()
+    assert down.eta == pytest.approx(eta)
+    assert up.weight[:, 0] == pytest.approx(COLOR)
+    assert down.weight[:, 0] == pytest.approx(np.array(COLOR[::-1]) / eta**2)
+
+
+def test_matte_and_mirror():
+    wo, wi = pairs(100)
+    assert Diffuse(COLOR).f(wo, wi)[:, 0] == pytest.approx(np.array(COLOR) / np.pi)
+    assert Diffuse(COLOR).pdf(wo, wi) == pytest.approx(wi[2] / np.pi)
+    assert Mirror(COLOR).sample_f(wo, np.zeros((2, 100), F4)).weight[:, 0] == pytest.approx(COLOR)
+
+
+def test_mix_is_a_mean():
+    wo, wi = pairs(100)
+    one, two = OrenNayar(COLOR, 0.3), Conductor(2, 4, 0.5)
+    mix = Mix(one, two, 0.3)
+    for method in ("f", "pdf"):
+        first, second = getattr(one, method)(wo, wi), getattr(two, method)(wo, wi)
+        assert getattr(mix, method)(wo, wi) == pytest.approx(0.7 * first + 0.3 * second, rel=1e-5)
+
+
+# ---- principled, part by part -------------------------------------------------------------------
+
+
+def gloss_of(ior, specular, tint, cos):
+    """KHR_materials_specular and _ior: Schlick from the tinted reflectance along the normal."""
+    f0 = np.minimum(column(tint) * ((ior - 1) / (ior + 1)) ** 2, 1) * specular
+    return schlick(f0, cos, specular)
+
+
+@pytest.mark.parametrize("tint", [(1, 1, 1), (2, 0.5, 30)])
+def test_opaque_base_to_the_letter(tint):
+    """KHR_materials_specular: fresnel_mix, with the largest channel taken from the matte base."""
+    ior, specular, metallic, roughness = 1.7, 0.8, 0.3, 0.6
+    wo, wi = pairs()
+    value, cos = reflection(wo, wi, roughness**2)
+    gloss = gloss_of(ior, specular, tint, cos)
+    plastic = gloss * value + column(COLOR) / np.pi * (1 - gloss.max(0))
+    metal = schlick(column(COLOR), cos) * value
+    bsdf = Principled(
+        COLOR, metallic, roughness, ior, specular=specular, specular_color=tint, conserve_energy=False
+    )
+    exact = metallic * metal + (1 - metallic) * plastic
+    assert bsdf.f(wo, wi) == pytest.approx(exact, rel=5e-4)
+
+
+def test_opaque_base_that_conserves_energy():
+    """Kulla and Conty 2017: (1 − E(wo))·(1 − E(wi))/(1 − mean E), E by the tables tested below."""
+    ior, specular, tint, roughness = 1.7, 0.8, (2, 0.5, 1), 0.6
+    wo, wi = pairs()
+    value, cos = reflection(wo, wi, roughness**2)
+    gloss = gloss_of(ior, specular, tint, cos)
+    f0, f90 = gloss_of(ior, specular, tint, 1.0).max(), specular
+    a, b, mean_a, mean_b = gloss_tables()
+    rough = np.full(len(cos), roughness, F4)
+
+    def left(first, second, z):
+        return 1 - f0 * lookup(first, rough, z).astype(float) - f90 * lookup(second, rough, z)
+
+    under = left(a, b, wo[2]) * left(a, b, wi[2]) / left(mean_a, mean_b, wo[2])
+    exact = gloss * value + column(COLOR) / np.pi * under
+    bsdf = Principled(COLOR, 0, roughness, ior, specular=specular, specular_color=tint)
+    assert bsdf.f(wo, wi) == pytest.approx(exact, rel=5e-4)
+
+
+@pytest.mark.parametrize("thin", [False, True])
+def test_clear_base(thin):
+    """KHR_materials_transmission and _volume, with Fresnel's equations."""
+    clear, metallic, roughness = 0.7, 0.2, 0.6
+    bsdf = Principled(COLOR, metallic, roughness, 1.5, clear, thin=thin, specular=0.0)
+    wo, wi = pairs()
+    value, cos = reflection(wo, wi, roughness**2)
+    face = fresnel(cos, 1.5)
+    reflected = 2 * face / (1 + face) if thin else face
+    part = (1 - metallic) * clear
+    matte = (1 - metallic) * (1 - clear) * column(COLOR) / np.pi
+    exact = metallic * schlick(column(COLOR), cos) * value + part * reflected * value + matte
+    assert bsdf.f(wo, wi) == pytest.approx(exact, rel=1e-3)
+    if thin:
+        through = value * (1 - reflected)
+        wi[2] *= -1
+        sound = np.ones(len(cos), bool)
+    else:
+        wo, wi = pairs(below=True)
+        through, cos = refraction(wo, wi, roughness**2, 1.5)
+        through = through * (1 - fresnel(np.clip(cos, 1e-9, 1), 1.5))
+        sound = np.abs(wo + 1.5 * wi)[2] > 0.05
+    exact = column(COLOR) * part * through
+    assert bsdf.f(wo, wi)[:, sound] == pytest.approx(exact[:, sound], rel=3e-3, abs=1e-5)
+
+
+def test_clear_coat():
+    """KHR_materials_clearcoat, darkened for both directions."""
+    base = Principled(COLOR, 0.5, 0.5)
+    bsdf = Principled(COLOR, 0.5, 0.5, clearcoat=0.8, clearcoat_roughness=0.4)
+    wo, wi = pairs()
+    value, cos = reflection(wo, wi, 0.4**2)
+    passed = (1 - 0.8 * schlick(0.04, wo[2].astype(float))) * (1 - 0.8 * schlick(0.04, wi[2].astype(float)))
+    exact = base.f(wo, wi) * passed + 0.8 * schlick(0.04, cos) * value
+    assert bsdf.f(wo, wi) == pytest.approx(exact, rel=5e-4)
+
+
+def test_sheen_over_the_base():
+    """KHR_materials_sheen: the base is weakened by the larger of both albedos."""
+    base, tint = Principled(COLOR, 0.5, 0.5), (0.9, 0.3, 0.6)
+    bsdf = Principled(COLOR, 0.5, 0.5, sheen=0.7, sheen_color=tint, sheen_roughness=0.4)
+    wo, wi = pairs()
+    rough = np.full(wo.shape[1], 0.4, F4)
+    seen = np.maximum(sheen_albedo(wo[2], rough), sheen_albedo(wi[2], rough))
+    exact = base.f(wo, wi) * (1 - 0.7 * 0.9 * seen) + 0.7 * column(tint) * fibers(wo, wi, 0.4)
+    assert bsdf.f(wo, wi) == pytest.approx(exact, rel=5e-4, abs=1e-6)
+
+
+# ---- tables -------------------------------------------------------------------------------------
+
+
+def test_lookup_is_bilinear_in_roughness_and_the_root_of_the_cosine():
+    side = np.linspace(0, 1, SIZE)
+    table = (0.2 + 0.5 * side[:, None] + 0.3 * side - 0.7 * side[:, None] * side).astype(F4)
+    rng = np.random.default_rng(0)
+    rough, cos = rng.random((2, 1000)).astype(F4)
+    y, x = rough.astype(float), np.sqrt(cos.astype(float))
+    assert lookup(table, rough, cos) == pytest.approx(0.2 + 0.5 * y + 0.3 * x - 0.7 * y * x, abs=1e-5)
+    assert lookup(table, np.array([0, 1, 2], F4), np.array([1, 0, 2], F4)) == pytest.approx([0.5, 0.7, 0.3])
+
+
+def test_means_over_the_hemisphere():
+    """∫ 2μ·1 dμ = 1, ∫ 2μ·μ dμ = 2/3, ∫ 2μ·√μ dμ = 4/5."""
+    root = np.linspace(0, 1, SIZE)
+    table = np.repeat(np.ones(SIZE)[:, None], SIZE, 1)
+    for power, mean in ((0, 1), (1, 4 / 5), (2, 2 / 3)):
+        assert cosine_mean((table * root**power).astype(F4)) == pytest.approx(mean, rel=1e-3)
+
+
+@pytest.mark.parametrize("roughness", [0.5, 0.8, 1.0])
+@pytest.mark.parametrize("mu", [0.3, 0.7, 1.0])
+def test_albedo_of_gloss(roughness, mu):
+    """∫ f cosθ dω with Schlick's Fresnel of F0 and F90, by quadrature."""
+    z, tall = midpoints(600)
+    phi, turn = midpoints(300, 0, 2 * np.pi)
+    z, phi = (x.ravel() for x in np.meshgrid(z, phi))
+    wi = np.stack([np.sqrt(1 - z**2) * np.cos(phi), np.sqrt(1 - z**2) * np.sin(phi), z])
+    wo = np.repeat(np.array([[np.sqrt(1 - mu * mu)], [0], [mu]]), len(z), 1)
+    value, cos = reflection(wo, wi, roughness**2)
+    at = np.array([roughness], F4), np.array([mu], F4)
+    a, b, _, _ = gloss_tables()
+    for table, weight in ((a, 1 - (1 - cos) ** 5), (b, (1 - cos) ** 5)):
+        exact = (value * weight * z).sum() * tall * turn
+        assert lookup(table, *at)[0] == pytest.approx(exact, rel=0.01, abs=2e-4)
+
+
+# ---- densities ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("alpha", [0.1, 0.5, 1.0])
+@pytest.mark.parametrize("eta", [1.5, 1 / 1.5])
+def test_density_of_refraction(eta, alpha):
+    """Walter et al., eqs. 17 and 24: D·G1·|wo·m|/cosθo times the Jacobian η²|wi·m|/(wo·m + η wi·m)²."""
+    wo, wi = pairs(below=True)
+    _, pdf, _, valid = refraction_lobe(wo, wi, F4(alpha), F4(eta))
+    h = wo.astype(float) + eta * wi
+    h /= np.linalg.norm(h, axis=0) * np.sign(h[2])
+    o, i = dot(wo, h), dot(wi, h)
+    visible = ggx(h[2], alpha) / (1 + smith(wo[2], alpha)) * o / wo[2]
+    exact = visible * eta**2 * -i / (o + eta * i) ** 2
+    sound = valid & (np.abs(wo + eta * wi)[2] > 0.05)
+    assert sound.sum() > 300
+    assert pdf[sound] == pytest.approx(exact[sound], rel=3e-3, abs=1e-5)
+
+
+def test_roughness_maps_to_its_square():
+    assert alpha_of(np.array([0.5, 1.0, 0.01], F4)) == pytest.approx([0.25, 1.0, 1e-3])
+
+
+# ---- metals -------------------------------------------------------------------------------------
+
+# Reflectance along the normal and at 75°, from η and k by complex arithmetic.
+REFLECTANCE = {
+    "aluminium": (0.908614, 0.916006, 0.923660, 0.855032, 0.871748, 0.892568),
+    "chromium": (0.550269, 0.556233, 0.555395, 0.515620, 0.522170, 0.551609),
+    "copper": (0.921320, 0.619890, 0.519937, 0.918436, 0.669226, 0.597503),
+    "gold": (0.968144, 0.745573, 0.371949, 0.964419, 0.798566, 0.513934),
+    "iron": (0.528315, 0.513475, 0.493431, 0.511066, 0.502146, 0.505091),
+    "nickel": (0.691238, 0.640995, 0.558910, 0.645705, 0.617853, 0.582316),
+    "platinum": (0.673658, 0.638112, 0.580892, 0.622920, 0.608404, 0.587847),
+    "silver": (0.988662, 0.983989, 0.977261, 0.985261, 0.981871, 0.980593),
+    "titanium": (0.614508, 0.579985, 0.541060, 0.570847, 0.555775, 0.544883),
+}
+
+
+@pytest.mark.parametrize("name", METALS)
+def test_metals(name):
+    wo = np.array([[0], [0], [1]], F4)
+    at_75 = np.array([[np.sin(np.radians(75))], [0], [np.cos(np.radians(75))]], F4)
+    metal = Conductor.named(name)
+    seen = [metal.sample_f(w, np.zeros((2, 1), F4)).weight[:, 0] for w in (wo, at_75)]
+    assert np.concatenate(seen) == pytest.approx(REFLECTANCE[name], abs=2e-5)
