@@ -160,10 +160,11 @@ class Film:
         rgb, variance, error = (np.empty((width * height, 3), np.float32) for _ in range(3))
         relative, floor = np.empty(width * height), self._floor()
         for span in self._chunks():
-            rgb[span] = self.mean(span).T
-            variance[span] = self.variance(span).T
             squared_error = self.squared_error(span)
-            error[span] = np.sqrt(squared_error).T
+            with np.errstate(over="ignore"):  # what is beyond float32 is infinite
+                rgb[span] = self.mean(span).T
+                variance[span] = self.variance(span).T
+                error[span] = np.sqrt(squared_error).T
             relative[span] = self._relative(squared_error, span, floor)
         noise = float(np.sqrt(_without_outliers(relative).mean()))
         shape = height, width, 3

@@ -13,8 +13,9 @@ from .bsdfs.relief import Relief
 from .errors import SceneError, number
 from .state import Surface
 from .textures import UV_SETS, Texture
-from .vec import Floats, Ints, cross, dot, f4, normalize
+from .vec import Floats, Ints, cross, dot, f4, highest, normalize
 
+FLATTEST = f4(2**-60)  # the least cosine of a tilt: float32 can square its slope
 Source: TypeAlias = str | os.PathLike[str] | ArrayLike | Texture
 # the fields of Surface that belong together
 TANGENTS = {"uv": "tangents", "uv1": "tangents1"}
@@ -123,9 +124,10 @@ class BumpMap(Relief):
         uv: Floats = getattr(surface, self.reads[0])
         slope_u, slope_v = self.texture.gradient(uv) * self.height
         area = dot(normal, cross(along_u, along_v))
-        lanes = np.flatnonzero(((slope_u != 0) | (slope_v != 0)) & (area != 0))
-        normal, along_u, along_v = normal.take(lanes, 1), along_u.take(lanes, 1), along_v.take(lanes, 1)
-        uphill = cross(along_v, normal) * slope_u.take(lanes) + cross(normal, along_u) * slope_v.take(lanes)
+        uphill = cross(along_v, normal) * slope_u + cross(normal, along_u) * slope_v
+        sound = highest(np.abs(uphill)) * FLATTEST < np.abs(area)
+        lanes = np.flatnonzero(((slope_u != 0) | (slope_v != 0)) & sound)
+        normal, uphill = normal.take(lanes, 1), uphill.take(lanes, 1)
         return lanes, normalize(normal - uphill / area.take(lanes))
 
 

@@ -170,11 +170,11 @@ def _normals(label: str, normals: Table | None, vertices: Table, faces: Faces, s
 
 
 def _finite(label: str, what: str, values: Table | None, otherwise: float, strict: bool) -> Table | None:
-    """Return values per vertex, where they are not finite replaced by `otherwise`."""
+    """Return values per vertex, where they are not finite in float32 replaced by `otherwise`."""
     if values is None:
         return None
     values = np.array(values, np.float64)
-    broken = ~np.isfinite(values).all(axis=1)
+    broken = ~(np.abs(values) <= FLOAT32_MAX).all(axis=1)
     if broken.any():
         warn(f"{label}: {int(broken.sum())} {what} are not finite, first: vertex {broken.argmax()}", strict)
         values[broken] = otherwise

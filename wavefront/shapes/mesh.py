@@ -18,6 +18,7 @@ from ..vertex_colors import VertexColors
 from .base import Shape
 
 FLOAT32_MAX = float(np.finfo(np.float32).max)
+MOST_DOUBLINGS = 60  # from 1 to the lengths of vectors that stay as given
 FLOAT32_MIN = float(np.finfo(np.float32).tiny)
 
 
@@ -55,8 +56,8 @@ class Mesh(Shape):
     Raises
     ------
     SceneError
-        If an array has a wrong shape, a value is not finite, an index is out of range, there is no
-        face, or there are tangents without normals.
+        If an array has a wrong shape, a value is not finite, a position or a texture coordinate is
+        beyond float32, an index is out of range, there is no face, or there are tangents without normals.
     """
 
     @suggests_keywords
@@ -78,10 +79,10 @@ class Mesh(Shape):
         self.name = name
         self.vertices = finite_array(f"{name}: vertices", vertices, (None, 3))
         self.faces = _faces(name, faces, len(self.vertices))
-        self.normals = _per_vertex(f"{name}: normals", normals, len(self.vertices), 3)
-        self.uvs = _per_vertex(f"{name}: uvs", uvs, len(self.vertices), 2)
-        self.uvs1 = _per_vertex(f"{name}: uvs1", uvs1, len(self.vertices), 2)
-        self.tangents = _per_vertex(f"{name}: tangents", tangents, len(self.vertices), 4)
+        self.normals = _vectors(f"{name}: normals", normals, len(self.vertices), 3)
+        self.uvs = _coordinates(f"{name}: uvs", uvs, len(self.vertices))
+        self.uvs1 = _coordinates(f"{name}: uvs1", uvs1, len(self.vertices))
+        self.tangents = _vectors(f"{name}: tangents", tangents, len(self.vertices), 4)
         if self.tangents is not None and self.normals is None:
             raise SceneError(f"{name}: has tangents without normals; pass both")
         self.colors = _colors(f"{name}: colors", colors, len(self.vertices))
@@ -198,6 +199,30 @@ def _per_vertex(name: str, values: ArrayLike | None, count: int, width: int) -> 
     return None if values is None else finite_array(name, values, (count, width))
 
 
+def _vectors(name: str, values: ArrayLike | None, count: int, width: int) -> NDArray[np.float64] | None:
+    """Return vectors (count, width) of which only directions count, none of them too long or short to square.
+
+    By powers of two, so that directions stay what they are.
+    """
+    array = _per_vertex(name, values, count, width)
+    if array is None:
+        return None
+    exponent = np.frexp(np.abs(array[:, :3]).max(1, initial=0))[1]
+    extreme = np.flatnonzero(np.abs(exponent) > MOST_DOUBLINGS)
+    if extreme.size:
+        array = array.copy()
+        array[extreme, :3] = np.ldexp(array[extreme, :3], -exponent[extreme, None])
+    return array
+
+
+def _coordinates(name: str, values: ArrayLike | None, count: int) -> NDArray[np.float64] | None:
+    """Return texture coordinates (count, 2) that float32 can hold."""
+    array = _per_vertex(name, values, count, 2)
+    if array is not None:
+        _check_float32(name, array)
+    return array
+
+
 def _colors(name: str, values: ArrayLike | None, count: int) -> NDArray[np.float64] | None:
     """Return (n, 4) linear colors in [0, 1]; without an opacity they are opaque."""
     if values is None:
@@ -218,9 +243,11 @@ def _colors(name: str, values: ArrayLike | None, count: int) -> NDArray[np.float
 
 
 def check_range(name: str, vertices: NDArray[np.float64]) -> None:
-    bad = np.argwhere(np.abs(vertices) > FLOAT32_MAX)
+    _check_float32(f"{name}: vertices", vertices)
+
+
+def _check_float32(name: str, rows: NDArray[np.float64]) -> None:
+    bad = np.argwhere(np.abs(rows) > FLOAT32_MAX)
     if len(bad):
         i, j = bad[0]
-        raise SceneError(
-            f"{name}: vertices[{i}][{j}] is {vertices[i, j]:g}; its size must be at most {FLOAT32_MAX:.3g}"
-        )
+        raise SceneError(f"{name}[{i}][{j}] is {rows[i, j]:g}; its size must be at most {FLOAT32_MAX:.3g}")

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from .mesh import Mesh
 
 Doubles = NDArray[np.float64]
+LONGEST = 2.0**60  # of tangents: float32 can square them
 
 
 def mesh_tangents(mesh: Mesh, uvs: Doubles | None) -> Doubles:
@@ -16,7 +17,8 @@ def mesh_tangents(mesh: Mesh, uvs: Doubles | None) -> Doubles:
     They are constant on the facets of a flat mesh. On a smooth one they are averaged around each
     vertex over the faces that share it and are not mirrored against each other, weighted by their
     angles there, as in M. Mikkelsen 2008, "Simulation of Wrinkled Surfaces Revisited", section 3.4
-    (MikkTSpace). Zero where the texture coordinates of a face span no area.
+    (MikkTSpace). Zero where the texture coordinates of a face span no area, or so little that the
+    tangents are longer than `LONGEST`.
     """
     flat = np.zeros((len(mesh.faces), 6))
     if uvs is None:
@@ -25,10 +27,10 @@ def mesh_tangents(mesh: Mesh, uvs: Doubles | None) -> Doubles:
     along, across = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     (du1, dv1), (du2, dv2) = (uv[:, 1] - uv[:, 0]).T, (uv[:, 2] - uv[:, 0]).T
     area = du1 * dv2 - du2 * dv1
+    columns = np.hstack([along * a[:, None] + across * b[:, None] for a, b in ((dv2, -dv1), (-du2, du1))])
+    area = np.where(np.abs(columns).max(1) <= LONGEST * np.abs(area), area, 0)
     sound = np.flatnonzero(area)
-    for k, (a, b) in enumerate(((dv2, -dv1), (-du2, du1))):
-        columns = along * a[:, None] + across * b[:, None]
-        flat[sound, 3 * k : 3 * k + 3] = columns[sound] / area[sound, None]
+    flat[sound] = columns[sound] / area[sound, None]
     if mesh.normals is None:
         return np.repeat(flat[:, None], 3, 1)
     return _smooth(mesh, flat, area, _angles(corner))

@@ -1,0 +1,135 @@
+"""Geometry and coordinates that are hardly there: finite pictures without a warning of NumPy.
+
+Warnings are errors in the tests.
+"""
+
+import numpy as np
+import pytest
+from significance import render
+
+import wavefront as wf
+
+TEXELS = np.random.default_rng(0).random((8, 8, 3), np.float32)
+NORMALS = wf.NormalMap(wf.Texture(TEXELS, srgb=False))
+BUMPS = wf.BumpMap(wf.Texture(TEXELS, srgb=False, channel=0), 0.3)
+VARNISH = wf.Principled(0.5, 0.3, 0.2, clearcoat=1.0, sheen=0.5)
+MATERIALS = {
+    "texture": wf.Diffuse(wf.Texture(TEXELS)),
+    "normal map": VARNISH.with_relief(NORMALS),
+    "bump map": VARNISH.with_relief(BUMPS),
+    "normal-mapped glass": wf.Dielectric(1.5).with_relief(NORMALS),
+}
+PLACES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.3]])
+FACES = [[0, 1, 2], [0, 2, 3]]
+UP = np.tile([0.0, 0.0, 1.0], (4, 1))
+LEANING = np.array([[0, 0, 1], [0, 0.5, 1], [0, 0, -1], [1, 0, 0.0]])
+TINY = [1e-10, 1e-19, 1e-30, 1e-38, 1e-42, 1e-46, 1e-200, 0.0]
+
+
+def quad(material, vertices=PLACES, uvs=PLACES[:, :2], **arguments):
+    return wf.Mesh(vertices, FACES, uvs=uvs, material=material, **arguments)
+
+
+def check(*shapes, size=1.0):
+    """Render shapes around the origin in two lights, by light and BSDF samples."""
+    camera = wf.Camera.look_at((0.6 * size, 0.7 * size, 2 * size), (0.5 * size, 0.5 * size, 0), size=(12, 12))
+    for light in (wf.Environment(1.0), wf.PointLight((size, size, size), size * size)):
+        image = render(wf.Scene(list(shapes), [light], camera), 4)
+        assert np.isfinite(image.rgb).all()
+        assert image.metadata["bad_samples"] == 0
+
+
+@pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS)
+@pytest.mark.parametrize("normals", [None, LEANING], ids=["flat", "smooth"])
+@pytest.mark.parametrize("axes", [[1, 1], [1, 0], [0, 1]], ids=["uv", "u", "v"])
+def test_texture_coordinates_that_span_hardly_any_area(material, normals, axes):
+    for tiny in TINY:
+        narrow = PLACES[:, :2] * np.where(axes, tiny, 1)
+        check(quad(material, uvs=narrow, normals=normals))
+
+
+@pytest.mark.parametrize("relief", [NORMALS, BUMPS], ids=["normals", "heights"])
+def test_a_relief_without_tangents_tilts_nothing(relief):
+    """Bit by bit: where coordinates span too little to say what is along them, there is no tilt."""
+    matte = wf.Diffuse(0.5)
+    camera = wf.Camera.look_at((0.6, 0.7, 2), (0.5, 0.5, 0), size=(12, 12))
+    for tiny in (1e-42, 1e-200, 0.0):
+        plain, carved = (
+            render(wf.Scene(quad(m, uvs=PLACES[:, :2] * [tiny, 1]), [wf.Environment(1.0)], camera), 4).rgb
+            for m in (matte, matte.with_relief(relief))
+        )
+        assert np.array_equal(plain, carved)
+
+
+@pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS)
+def test_large_texture_coordinates(material):
+    for large in (1e5, 1e19, 3e38):
+        check(quad(material, uvs=PLACES[:, :2] * large, normals=UP))
+
+
+def test_texture_coordinates_beyond_float32_are_named():
+    with pytest.raises(
+        wf.SceneError, match=r"mesh: uvs\[1\]\[0\] is 1e\+39; its size must be at most 3.4e\+38"
+    ):
+        quad(wf.Diffuse(0.5), uvs=PLACES[:, :2] * 1e39)
+    with pytest.raises(wf.SceneError, match=r"mesh: uvs1\[1\]\[0\] is -1e\+300; its size must be at most"):
+        quad(wf.Diffuse(0.5), uvs1=PLACES[:, :2] * -1e300)
+
+
+@pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS)
+def test_normals_and_tangents_of_any_length(material):
+    """Only their directions count; of those without a length, the face's."""
+    for size in (0.0, 1e-300, 1e-30, 1e30, 1e39, 1e200, 1e308):
+        check(quad(material, normals=LEANING * size))
+        tangents = np.tile([size, 0, 0, 1], (4, 1))
+        check(quad(material, normals=UP, tangents=tangents))
+
+
+def test_the_length_of_normals_changes_no_bit():
+    camera = wf.Camera.look_at((0.6, 0.7, 2), (0.5, 0.5, 0), size=(12, 12))
+    images = [
+        render(wf.Scene(quad(wf.Diffuse(0.5), normals=LEANING * size), [wf.Environment(1.0)], camera), 4).rgb
+        for size in (1.0, 2.0**-700, 2.0**900)
+    ]
+    assert np.array_equal(images[0], images[1])
+    assert np.array_equal(images[0], images[2])
+
+
+def test_given_arrays_are_left_alone():
+    normals = LEANING * 1e200
+    quad(wf.Diffuse(0.5), normals=normals)
+    assert np.array_equal(normals, LEANING * 1e200)
+
+
+@pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS)
+def test_tiny_shapes_alone_and_beside_large_ones(material):
+    large = quad(material, PLACES * 3 - 1, normals=UP)
+    for size in (1e-3, 1e-8, 1e-12, 1e-20, 1e-30):
+        check(quad(material, PLACES * size, normals=UP), size=size)
+        check(quad(material, PLACES * size, normals=UP), large)
+        check(wf.Sphere((0.4, 0.4, 0.05), size, material=material), large)
+
+
+@pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS)
+def test_slivers(material):
+    for height in (1e-7, 1e-15, 1e-25, 1e-45, 1e-150):
+        thin = np.array([[0, 0, 0], [1, 0, 0], [0.5, height, 0], [0, 1, 0]])
+        check(quad(material, thin, uvs=thin[:, :2]))
+        check(quad(material, thin, normals=UP))
+
+
+@pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS)
+def test_instances_that_shrink_and_flatten(material):
+    for uvs in (PLACES[:, :2], PLACES[:, :2] * 1e-30):
+        mesh = quad(material, uvs=uvs, normals=UP)
+        places = [np.eye(4), np.diag([1e-10, 1e-10, 1e-10, 1]), np.diag([1, 1e-8, 1, 1])]
+        check(*[wf.Instance(mesh, place) for place in places])
+
+
+def test_what_is_brighter_than_float32_is_infinite_without_a_warning():
+    """Its variance is; the picture itself is not."""
+    lamp = quad(wf.Diffuse(0.0), emission=1e25)
+    camera = wf.Camera.look_at((0.6, 0.7, 2), (0.5, 0.5, 0), size=(12, 12))
+    image = render(wf.Scene(lamp, camera=camera), 4)
+    assert np.isfinite(image.rgb).all()
+    assert image.rgb.max() == pytest.approx(1e25)
