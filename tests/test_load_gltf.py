@@ -1011,7 +1011,7 @@ def test_a_cone_that_opens_inwards_is_an_error(build, path):
     """The message gives both angles."""
     b = build.mesh()
     punctual(b, type="spot", spot={"innerConeAngle": 0.7, "outerConeAngle": 0.6})
-    with pytest.raises(SceneError, match=r"light 0: cone angles are 0\.7 and 0\.6; 0 <= inner < outer"):
+    with pytest.raises(SceneError, match=r"light 0: cone angles are 0\.7 and 0\.6; 0 <= inner <= outer"):
         load(b.gltf(path))
 
 

@@ -112,10 +112,10 @@ def _camera(camera: dict[str, Any], matrix: Matrix) -> Camera:
     lens = camera.get(str(kind), {})
     if kind == "perspective":
         fov, aspect = _positive(lens, "yfov", None), _positive(lens, "aspectRatio", 1)
-        return camera_at(matrix, float(np.degrees(fov)), size_of(aspect))
+        return camera_at(matrix, float(np.degrees(fov)), _size(aspect))
     if kind == "orthographic":
         half_width, half_height = _positive(lens, "xmag", None), _positive(lens, "ymag", None)
-        size = size_of(half_width / half_height)
+        size = _size(half_width / half_height)
         return Camera.orthographic(*_pose(matrix), height=2 * half_height, size=size)
     raise SceneError(f"type is {shown(kind)}; it must be 'perspective' or 'orthographic'")
 
@@ -138,7 +138,7 @@ def _near_one(vector: Matrix) -> Matrix:
     return np.ldexp(vector, -exponent)
 
 
-def size_of(aspect: float) -> tuple[int, int]:
+def _size(aspect: float) -> tuple[int, int]:
     """Return (width, height) in pixels of a picture of which only width / height is known."""
     return max(1, round(HEIGHT * aspect)), HEIGHT
 
@@ -159,15 +159,21 @@ def _add_light(document: Document, out: Contents, index: Any, matrix: Matrix) ->
         light = lights[index]
         if "range" in light:
             document.lose("range of a light", f"light {index}")
-        found = _light(light, matrix)
+        found = punctual_light(light, matrix)
         if found is None:
             document.lose(f"{light.get('type')} light", f"light {index}")
         else:
             out.lights.append(found)
 
 
-def _light(light: dict[str, Any], matrix: Matrix) -> DirectionalLight | PointLight | SpotLight | None:
-    """Return a light that shines along -z, None if there is none of its type."""
+def punctual_light(light: dict[str, Any], matrix: Matrix) -> DirectionalLight | PointLight | SpotLight | None:
+    """Return a light of KHR_lights_punctual, whose node has a matrix to the scene; None for other types.
+
+    Raises
+    ------
+    SceneError
+        If a value is malformed or out of range.
+    """
     colour = floats("color", light.get("color", [1, 1, 1]), 3)
     strength = colour * floats("intensity", [light.get("intensity", 1)], 1)
     place, forward = matrix[:3, 3], -matrix[:3, 2]
@@ -181,8 +187,10 @@ def _light(light: dict[str, Any], matrix: Matrix) -> DirectionalLight | PointLig
             inner, outer = floats(
                 "cone", [spot.get("innerConeAngle", 0), spot.get("outerConeAngle", np.pi / 4)], 2
             )
-            if not 0 <= inner < outer <= np.pi / 2:
-                raise SceneError(f"cone angles are {inner:g} and {outer:g}; 0 <= inner < outer <= π/2")
+            if not (0 <= inner <= outer <= np.pi / 2 and outer > 0):
+                raise SceneError(
+                    f"cone angles are {inner:g} and {outer:g}; 0 <= inner <= outer <= π/2, outer > 0"
+                )
             angle, blend = float(np.degrees(2 * outer)), float(1 - inner / outer)
             return SpotLight(place, strength, direction=forward, angle=angle, blend=blend)
     return None

@@ -21,7 +21,7 @@ from ..progress import Progress, phase
 from ..scene import Scene
 from ..shapes import Mesh
 from ..shapes.transform import moved, moved_tangents
-from . import gltf, headers, mtl, obj, stl, visuals
+from . import gltf, headers, mtl, obj, stl, trimesh_view, visuals
 from .appearance import Look, dress, is_faint
 from .files import beside, decode, read_bytes
 from .gltf_materials import Materials
@@ -120,6 +120,10 @@ def from_trimesh(geometry: Any) -> Scene:
     asked for `vertex_normals`. Trimesh's own exporters follow the same rule. Geometry that stands in a
     scene's graph several times becomes an `Instance` for each.
 
+    The camera and the lights of a trimesh scene are used if somebody set them. The camera's resolution is
+    the size of the picture; a camera without a transform is placed to see all of the scene. Colors of lights
+    are linear. The lights that trimesh makes up for its viewer do not count.
+
     What trimesh itself does not keep cannot count: of glTF it rounds base colours to 8 bits, and drops
     extensions, lights, tangents and the scale of normal maps; of MTL it keeps the image of `map_Kd`
     only. `load` reads all of these.
@@ -132,7 +136,9 @@ def from_trimesh(geometry: Any) -> Scene:
     source = "trimesh object"
     contents = _from_trimesh(geometry, source, strict=False)
     shapes = _some(source, place_shapes(source, contents.raws, contents.places, strict=False))
-    return Scene(shapes, camera=_camera(geometry))
+    scene = Scene(shapes, trimesh_view.lights(geometry))
+    trimesh_view.add_camera(scene, geometry)
+    return scene
 
 
 def join(
@@ -353,19 +359,6 @@ def _nodes(geometry: Any, trimesh: Any) -> list[tuple[Any, str, np.ndarray]]:
     if geometry.source is not None and geometry.source.file_type in ("obj", "glb", "gltf"):
         out.reverse()
     return out
-
-
-def _camera(geometry: Any) -> Camera | None:
-    """Return the camera that somebody gave a trimesh scene."""
-    if not getattr(geometry, "has_camera", False):
-        return None
-    if geometry.source is not None and geometry.source.file_type in ("glb", "gltf"):
-        # trimesh reads it without the nodes above it, so it stands in the wrong place
-        warn("trimesh object: not honoured: the camera of its glTF file; wf.load reads it", strict=False)
-        return None
-    width, height = geometry.camera.resolution
-    matrix = np.asarray(geometry.camera_transform, np.float64)
-    return gltf.camera_at(matrix, float(geometry.camera.fov[1]), gltf.size_of(width / height))
 
 
 def _raw(mesh: trimesh.Trimesh, name: str, source: str) -> Raw:

@@ -1,0 +1,129 @@
+"""The camera and the lights of trimesh scenes, as far as somebody gave them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..camera import Camera
+from ..camera.projection import Perspective
+from ..errors import SceneError
+from ..lights import DirectionalLight, PointLight, SpotLight
+from ..scene import Scene
+from . import gltf
+from .gltf_document import Matrix
+from .repair import warn
+
+SOURCE = "trimesh object"
+KINDS = {"PointLight": "point", "DirectionalLight": "directional", "SpotLight": "spot"}
+MADE_UP = (60, 60, 60, 255)  # color of trimesh's own lights
+
+
+def add_camera(scene: Scene, geometry: Any) -> None:
+    """Give a scene the camera that somebody gave the trimesh scene it was made of.
+
+    Its resolution is the size of the picture. A camera without a transform is moved to where it sees the
+    whole scene.
+
+    Raises
+    ------
+    SceneError
+        If a value is out of range.
+    """
+    if not getattr(geometry, "has_camera", False):
+        return
+    if geometry.source is not None and geometry.source.file_type in ("glb", "gltf"):
+        # trimesh reads it without the nodes above it, so it stands in the wrong place
+        warn(f"{SOURCE}: not honoured: the camera of its glTF file; wf.load reads it", strict=False)
+        return
+    camera = geometry.camera
+    width, height = (int(side) for side in camera.resolution)
+    fov = float(camera.fov[1])
+    matrix = _transform(geometry, camera.name)
+    try:
+        if matrix is None:
+            warn(f"{SOURCE}: its camera has no transform; it is placed to see all of the scene", strict=False)
+            placed = scene.framing_camera(fov=fov, size=(width, height))
+        else:
+            placed = gltf.camera_at(matrix, fov, (width, height))
+        lens = Perspective(fov, pixel_aspect=_pixel_aspect(camera))
+        scene.camera = Camera(placed.origin, placed.rotation, lens, (width, height))
+    except SceneError as error:
+        raise SceneError(f"{SOURCE}: its camera: {error}") from error
+
+
+def _pixel_aspect(camera: Any) -> float:
+    """Return the width of a pixel over its height.
+
+    It follows from the focal lengths. But where the sides of the picture are to each other as the angles
+    are, which trimesh does by default, that is a rule of thumb, and pixels are square, as in its viewer.
+    """
+    (width, height), (across, up) = camera.resolution, camera.fov
+    if abs(width - height * across / up) < 1:
+        return 1.0
+    return float(camera.focal[1] / camera.focal[0])
+
+
+def lights(geometry: Any) -> list[DirectionalLight | PointLight | SpotLight]:
+    """Return the lights that somebody gave a trimesh scene.
+
+    They are those of KHR_lights_punctual, and shine along -z of their nodes. A scene whose lights nobody
+    set, or trimesh itself when it showed the scene, has none.
+
+    Raises
+    ------
+    SceneError
+        If a light is malformed.
+    """
+    # asking for `lights` would make some up
+    given = getattr(geometry, "_lights", None) or []
+    if given and all(_is_made_up(light) for light in given):
+        warn(f"{SOURCE}: not honoured: the lights that trimesh made for its viewer", strict=False)
+        return []
+    return [_light(geometry, light) for light in given]
+
+
+def _light(geometry: Any, light: Any) -> DirectionalLight | PointLight | SpotLight:
+    label = f"{SOURCE}: light {getattr(light, 'name', light)!r}"
+    kind = KINDS.get(type(light).__name__)
+    if kind is None:
+        raise SceneError(f"{label} is a {type(light).__name__}; it must be one of {', '.join(KINDS)}")
+    if light.radius is not None:
+        warn(f"{label}: not honoured: radius", strict=False)
+    matrix = _transform(geometry, light.name)
+    if matrix is None:
+        warn(f"{label} has no transform; it stands at the origin and looks along -z", strict=False)
+        matrix = np.eye(4)
+    json: dict[str, Any] = {"type": kind, "intensity": light.intensity}
+    json["color"] = [int(code) / 255 for code in light.color[:3]]
+    if kind == "spot":
+        outer = min(light.outerConeAngle, np.pi / 2)
+        json["spot"] = {"innerConeAngle": min(light.innerConeAngle, outer), "outerConeAngle": outer}
+    try:
+        found = gltf.punctual_light(json, matrix)
+    except SceneError as error:
+        raise SceneError(f"{label}: {error}") from error
+    assert found is not None
+    return found
+
+
+def _is_made_up(light: Any) -> bool:
+    """Return whether a light is as trimesh makes them for scenes that have none."""
+    return (
+        type(light).__name__ == "PointLight"
+        and str(light.name).startswith("light_")
+        and tuple(light.color) == MADE_UP
+        and light.intensity == 1
+    )
+
+
+def _transform(geometry: Any, name: str) -> Matrix | None:
+    """Return the (4, 4) matrix of a node to the scene, None if the scene's graph has no such node."""
+    if name not in geometry.graph:
+        return None
+    try:
+        matrix, _ = geometry.graph[name]
+    except (ValueError, KeyError) as error:
+        raise SceneError(f"{SOURCE}: node {name!r} is not connected to the scene: {error}") from error
+    return np.asarray(matrix, np.float64)
