@@ -7,7 +7,7 @@ Source of the formats: W3C, Portable Network Graphics (third edition), 2025, and
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from ..errors import SceneError
 from .files import check_size
@@ -16,7 +16,6 @@ PNG = b"\x89PNG\r\n\x1a\n"
 JPG = b"\xff\xd8"
 PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # by color type
 ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))
-DEFLATE_RATIO = 1032  # most bytes that deflate makes of one
 JPG_PIXELS_PER_BYTE = 512  # a block of 8 × 8 takes a bit at least
 PIECE = 2**18  # bytes that are inflated at once
 
@@ -47,13 +46,9 @@ def _check_png(data: bytes) -> None:
     check_size(height, width)
     bits, interlaced = header[8] * PNG_CHANNELS[header[9]], header[12] == 1
     need = sum(rows * (1 + (columns * bits + 7) // 8) for columns, rows in _passes(width, height, interlaced))
-    pieces = list(_png_data(data))
-    there = sum(map(len, pieces))
-    if there * DEFLATE_RATIO >= need:
-        there = _inflated(pieces, need)
-        if there >= need:
-            return
-    raise SceneError(f"ends early: {width} × {height} pixels take {need} bytes; {there} are there")
+    there = _inflated(_png_data(data), need)
+    if there < need:
+        raise SceneError(f"ends early: {width} × {height} pixels take {need} bytes; {there} are there")
 
 
 def _passes(width: int, height: int, interlaced: bool) -> Iterator[tuple[int, int]]:
@@ -74,7 +69,7 @@ def _png_data(data: bytes) -> Iterator[memoryview]:
         at += 12 + length
 
 
-def _inflated(pieces: list[memoryview], need: int) -> int:
+def _inflated(pieces: Iterable[memoryview], need: int) -> int:
     """Count the bytes that deflate makes of `pieces`, up to about `need`."""
     inflate, count = zlib.decompressobj(), 0
     for piece in pieces:
