@@ -905,6 +905,83 @@ def test_damaged_ply(write, data, message):
         load_meshes(write(data, "a.ply"))
 
 
+CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 2, 0]], np.float32)
+
+
+def binary_ply(rows, order="<", kind="face", before=(), after=(), length="uchar"):
+    """A PLY file whose lists have any lengths; `before` and `after` are float properties of value 7."""
+    name = {"<": "little", ">": "big"}[order]
+    lines = ["ply", f"format binary_{name}_endian 1.0", f"element vertex {len(CORNERS)}"]
+    lines += [*(f"property float {x}" for x in "xyz"), f"element {kind} {len(rows)}"]
+    lines += [*(f"property float {x}" for x in before), f"property list {length} int vertex_indices"]
+    lines += [*(f"property float {x}" for x in after), "end_header", ""]
+    size = {"uchar": "B", "int": "i"}[length]
+    packed = [
+        struct.pack(
+            f"{order}{len(before)}f{size}{len(row)}i{len(after)}f",
+            *[7.0] * len(before), len(row), *row, *[7.0] * len(after),
+        )
+        for row in rows
+    ]  # fmt: skip
+    return "\n".join(lines).encode() + CORNERS.astype(order + "f4").tobytes() + b"".join(packed)
+
+
+@pytest.mark.parametrize("order", "<>")
+def test_polygons_of_several_sizes_in_a_binary_ply(write, order):
+    (mesh,) = load_meshes(write(binary_ply([(0, 1, 3, 2), (2, 3, 4)], order), "a.ply"))
+    found = {tuple(face) for face in mesh.faces.tolist()}
+    assert found == {(0, 1, 3), (3, 2, 0), (2, 3, 4)}
+    assert np.array_equal(mesh.vertices, CORNERS)
+    # as long together as three quads would be, so that trimesh would read three of them
+    rows = [(0, 1, 3, 2), (2, 3, 4), (1, 3, 4, 2, 0)]
+    path = write(binary_ply(rows, order, before=["a"], after=["red"]), "a.ply")
+    with pytest.warns(UserWarning, match=r"a\.ply: not honoured: a of face, red of face$"):
+        (mesh,) = load_meshes(path)
+    assert len(mesh.faces) == 6
+    with pytest.raises(SceneError, match="not honoured"):
+        load_meshes(path, strict=True)
+
+
+STRIPS = [(0, 1, 2, 3, 4), (2, 1, 0, -1, 4, 3, 2), (0, 1, 1, 2, 3)]
+UNROLLED = [[0, 1, 2], [2, 1, 3], [2, 3, 4], [2, 1, 0], [4, 3, 2], [1, 2, 3]]
+
+
+@pytest.mark.parametrize("order", ["<", ">", "text"])
+def test_triangle_strips_of_ply(write, order):
+    if order == "text":
+        text = "ply\nformat ascii 1.0\nelement vertex 5\n" + "".join(f"property float {x}\n" for x in "xyz")
+        text += "element tristrips 3\nproperty list int int vertex_indices\nend_header\n"
+        text += "".join("{} {} {}\n".format(*corner) for corner in CORNERS)
+        data = text + "".join(f"{len(strip)} {' '.join(map(str, strip))}\n" for strip in STRIPS)
+    else:
+        data = binary_ply(STRIPS, order, "tristrips", length="int")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        (mesh,) = load_meshes(write(data, "a.ply"), strict=True)
+    assert np.array_equal(mesh.faces, UNROLLED)
+    assert np.array_equal(mesh.vertices, CORNERS)
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (binary_ply([(0, 1, 2), (0, 1)]), r"a\.ply: face 1 has 2 corners; it needs at least 3"),
+        (binary_ply([(0, 1, 2), (0, 1, 2, 3)])[:-1], r"a\.ply: face 1 has a list of 4; the file ends before"),
+        (binary_ply([(0, 1, 9), (0, 1, 2, 3)]), r"a\.ply: .*uses vertex 9; it must be in \[0, 4\]"),
+        (binary_ply([(0, 1)], kind="tristrips"), r"a\.ply: has no faces"),
+        (binary_ply([(0, 1, 2)] * 2)[:-1], r"a\.ply"),
+        (
+            binary_ply([(0, 1, 2)]).replace(b"end_h", b"element tristrips 9\nproperty uchar x\nend_h")
+            + bytes(9),
+            r"a\.ply: has faces and triangle strips; only one of them",
+        ),
+    ],
+)
+def test_damaged_polygons_of_ply(write, data, message):
+    with pytest.raises(SceneError, match=message):
+        load_meshes(write(data, "a.ply"))
+
+
 def stl(count, faces):
     return bytes(80) + struct.pack("<I", count) + b"".join(struct.pack("<12fH", *f, 0) for f in faces)
 

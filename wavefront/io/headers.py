@@ -7,16 +7,18 @@ from dataclasses import dataclass, field
 
 from ..errors import SceneError
 
-SIZES = {
-    "char": 1, "uchar": 1, "int8": 1, "uint8": 1,
-    "short": 2, "ushort": 2, "int16": 2, "uint16": 2,
-    "int": 4, "uint": 4, "int32": 4, "uint32": 4, "float": 4, "float32": 4,
-    "double": 8, "float64": 8,
+TYPES = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
+    "short": "i2", "int16": "i2", "ushort": "u2", "uint16": "u2",
+    "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",
+    "double": "f8", "float64": "f8",
 }  # fmt: skip
+SIZES = {name: int(kind[1]) for name, kind in TYPES.items()}  # bytes
 READ = {
     "vertex": {"x", "y", "z", "nx", "ny", "nz", "red", "green", "blue", "alpha", "u", "v", "s", "t",
                "texture_u", "texture_v"},
     "face": {"vertex_index", "vertex_indices", "texcoord", "red", "green", "blue", "alpha"},
+    "tristrips": {"vertex_index", "vertex_indices"},
 }  # fmt: skip
 
 
@@ -30,6 +32,7 @@ class Element:
     words: int = 0  # words of one in a text; of a list, only its length
     lists: int = 0  # how many of its properties are lists
     properties: list[str] = field(default_factory=list)  # their names
+    kinds: list[tuple[str, ...]] = field(default_factory=list)  # their types; of a list, its length's first
 
 
 def check_ply(name: str, data: bytes) -> list[Element]:
@@ -87,10 +90,12 @@ def _elements(name: str, header: str) -> list[Element]:
                 out[-1].words += 1
                 out[-1].lists += 1
                 out[-1].properties.append(label)
+                out[-1].kinds.append((length, kind))
             case ["property", kind, label] if out and kind in SIZES:
                 out[-1].size += SIZES[kind]
                 out[-1].words += 1
                 out[-1].properties.append(label)
+                out[-1].kinds.append((kind,))
             case ["element" | "property", *_]:
                 raise SceneError(f"{name} line {number}: {line.strip()!r} is not part of a PLY header")
     return out

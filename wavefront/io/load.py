@@ -6,7 +6,6 @@ import os
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -21,11 +20,10 @@ from ..progress import Progress, phase
 from ..scene import Scene
 from ..shapes import Mesh
 from ..shapes.transform import moved, moved_tangents
-from . import gltf, headers, mtl, obj, stl, trimesh_view, visuals
+from . import gltf, mtl, obj, ply, stl, trimesh_view, visuals
 from .appearance import Look, dress, is_faint
 from .files import beside, decode, read_bytes
 from .gltf_materials import Materials
-from .images import decode_codes
 from .placing import MAX_INSTANCES, Places, place_meshes, place_shapes
 from .repair import Raw, build, warn, with_face_colors
 
@@ -280,47 +278,13 @@ def _libraries(path: PathLike, libraries: list[str], strict: bool) -> dict[str, 
 
 
 def _read_ply(path: PathLike, data: bytes, strict: bool, materials: bool) -> Contents:
-    """Let trimesh read a PLY file; whatever it raises becomes a SceneError, what it leaves out, too."""
-    import trimesh
-
     name = os.fspath(path)
-    elements = headers.check_ply(name, data)
-    unread = headers.unread(elements)
-    if unread and materials:
-        warn(f"{name}: not honoured: {', '.join(unread)}", strict)
-    image = _ply_texture(path, data, strict) if materials else {}
-    files = trimesh.resolvers.ZipResolver({key: BytesIO(content) for key, content in image.items()})
-    try:
-        with np.errstate(all="ignore"):
-            found = trimesh.load_scene(
-                BytesIO(data), file_type="ply", process=False, resolver=files, skip_materials=not image
-            )
-    except MemoryError:
-        raise
-    except Exception as error:
-        raise SceneError(f"{name}: not a readable ply file: {error!r}") from error
+    found, claimed = ply.parse(path, data, strict, materials)
     contents = _from_trimesh(found, name, strict)
     faces = sum(len(raw.faces) for raw in contents.raws)
-    claimed = sum(element.count for element in elements if element.name == "face")
     if faces < claimed:
         raise SceneError(f"{name}: claims {claimed} of face; {faces} can be read")
     return contents
-
-
-def _ply_texture(path: PathLike, data: bytes, strict: bool) -> dict[str, bytes]:
-    """Return the image of a PLY file by its name, none if it has none; of several, trimesh knows the last."""
-    name, textures = os.fspath(path), headers.ply_textures(data)
-    if len(textures) > 1:
-        warn(f"{name}: not honoured: several textures; {textures[-1]!r} is taken for all faces", strict)
-    for texture in textures[-1:]:
-        file = beside(path, texture)
-        if not os.path.exists(file):  # False, too, for names that no file can have
-            warn(f"{name}: texture {texture!r} is missing", strict)
-            continue
-        content = read_bytes(file)
-        decode_codes(content, f"{name}: texture {texture!r}")  # for its messages: trimesh passes over errors
-        return {texture: content}
-    return {}
 
 
 def _from_trimesh(geometry: Any, source: str, strict: bool) -> Contents:
