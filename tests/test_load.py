@@ -275,7 +275,7 @@ def test_not_finite_normals_and_uvs_are_announced(write):
 
 
 def test_uvs_beyond_all_textures_are_announced(write):
-    path = write(SQUARE + "vt 1e39 0\nvt 0 0\nvt 1 -1e30\nf 1/1 2/2 3/3\n")
+    path = write(SQUARE + "vt 1e38 0\nvt 0 0\nvt 1 -1e30\nf 1/1 2/2 3/3\n")
     with pytest.warns(
         UserWarning, match=r"2 uvs are beyond ±16777216 and were set to 0, first: vertex 0"
     ) as record:
