@@ -1,6 +1,6 @@
 """Materials. Adding one is a file here and a line below; the parametrised tests find it there."""
 
-from .base import Bsdf, BsdfSample
+from .base import Bsdf, BsdfSample, evaluated, sampled
 from .conductor import Conductor
 from .dielectric import Dielectric
 from .diffuse import Diffuse
@@ -30,4 +30,6 @@ __all__ = [
     "Relief",
     "Spatial",
     "ThinDielectric",
+    "evaluated",
+    "sampled",
 ]

@@ -142,3 +142,45 @@ def weigh(f: Floats, wi: Floats, pdf: Floats) -> Floats:
     """f·|cosθ|/pdf, and 0 (no sample) where the pdf is 0: (3, n)."""
     scale = np.abs(wi[2]) / np.where(pdf > 0, pdf, np.float32(1))
     return f * np.where(pdf > 0, scale, np.float32(0))
+
+
+def evaluated(bsdf: Bsdf, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
+    """Return f (3, n) and the pdf (n,) of a material.
+
+    Raises
+    ------
+    SceneError
+        If the material returns arrays of other shapes.
+    """
+    f, pdf = bsdf.evaluate(wo, wi)
+    n = wi.shape[1]
+    if np.shape(f) != (3, n) or np.shape(pdf) != (n,):
+        _check_shapes(bsdf, n, {"f": (f, 3), "pdf": (pdf, None)})
+    return f, pdf
+
+
+def sampled(bsdf: Bsdf, wo: Floats, u: Floats) -> BsdfSample:
+    """Return what a material samples for wo (3, n) with u (dimensions, n).
+
+    Raises
+    ------
+    SceneError
+        If the material returns arrays of other shapes than `BsdfSample` has.
+    """
+    out = bsdf.sample_f(wo, u[: bsdf.dimensions])
+    n = wo.shape[1]
+    if np.shape(out.wi) != (3, n) or np.shape(out.weight) != (3, n) or np.shape(out.pdf) != (n,):
+        found = {"wi": (out.wi, 3), "weight": (out.weight, 3), "pdf": (out.pdf, None)}
+        _check_shapes(bsdf, n, {f"sample_f's {name}": value for name, value in found.items()})
+    return out
+
+
+def _check_shapes(bsdf: Bsdf, n: int, found: dict[str, tuple[Any, int | None]]) -> None:
+    for name, (array, rows) in found.items():
+        wanted = (n,) if rows is None else (rows, n)
+        if np.shape(array) != wanted:
+            due = "(n,)" if rows is None else f"({rows}, n)"
+            have = np.shape(array)
+            raise SceneError(
+                f"{type(bsdf).__name__}: {name} has the shape {have}; it must have {due} = {wanted}"
+            )

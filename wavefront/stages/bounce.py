@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..bsdfs import BsdfSample
+from ..bsdfs import BsdfSample, sampled
 from ..sampling.sampler import Dimension, Sampler
 from ..state import Paths
 from ..vec import Floats, Ints, columns, f4, normalize, signs
@@ -97,15 +97,14 @@ def _turn(shade: Shading, lanes: Ints, direction: Floats, cos_g: Floats, z: Floa
 def _sample(shade: Shading, u: Floats) -> BsdfSample:
     """Sample each group's material for its lanes."""
     if len(shade.groups) == 1:
-        bsdf = shade.groups[0][1]
-        return bsdf.sample_f(shade.wo, u[: bsdf.dimensions])
+        return sampled(shade.groups[0][1], shade.wo, u)
     n = u.shape[1]
     out = BsdfSample(
         np.empty((3, n), f4), np.empty((3, n), f4), np.empty(n, f4), np.empty(n, np.bool_), np.ones(n, f4)
     )
     assert out.eta is not None
     for lanes, bsdf in shade.groups:
-        part = bsdf.sample_f(columns(shade.wo, lanes), columns(u[: bsdf.dimensions], lanes))
+        part = sampled(bsdf, columns(shade.wo, lanes), columns(u, lanes))
         out.wi[:, lanes], out.weight[:, lanes] = part.wi, part.weight
         out.pdf[lanes], out.specular[lanes] = part.pdf, part.specular
         if part.eta is not None:

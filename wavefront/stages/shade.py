@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..bsdfs import Bsdf
+from ..bsdfs import Bsdf, evaluated
 from ..frame import Frame
 from ..record import record
 from ..sampling.mis import power_heuristic
@@ -161,10 +161,10 @@ def direct(
 def evaluate(shade: Shading, wi: Floats) -> tuple[Floats, Floats]:
     """Return f (3, n), without the cosine, and the pdf (n,) of local directions wi (3, n)."""
     if len(shade.groups) == 1:
-        return shade.groups[0][1].evaluate(shade.wo, wi)
+        return evaluated(shade.groups[0][1], shade.wo, wi)
     n = wi.shape[1]
     f, pdf = np.empty((3, n), f4), np.empty(n, f4)
     for lanes, bsdf in shade.groups:
-        part_f, part_pdf = bsdf.evaluate(columns(shade.wo, lanes), columns(wi, lanes))
+        part_f, part_pdf = evaluated(bsdf, columns(shade.wo, lanes), columns(wi, lanes))
         f[:, lanes], pdf[lanes] = part_f, part_pdf
     return f, pdf
