@@ -351,17 +351,47 @@ BAD = {
     "K transposed": (
         wf.Camera.from_intrinsics,
         {"K": K.T, "R": np.eye(3), "t": (0, 0, 0), "size": (640, 480)},
-        r"K must be \[\[fx, 0, cx\]",
+        r"K must be \[\[fx, s, cx\]",
     ),
     "K negative": (
         wf.Camera.from_intrinsics,
         {"K": -K, "R": np.eye(3), "t": (0, 0, 0), "size": (640, 480)},
-        r"K must be \[\[fx, 0, cx\]",
+        r"K must be \[\[fx, s, cx\]",
     ),
-    "K skewed": (
+    "no size": (
         wf.Camera.from_intrinsics,
-        {"K": [[700, 2, 330], *K[1:]], "R": np.eye(3), "t": (0, 0, 0), "size": (640, 480)},
-        r"K\[0\]\[1\] is 2; pixels with a skew are not supported",
+        {"K": K, "R": np.eye(3), "t": (0, 0, 0)},
+        r"from_intrinsics needs size=\(width, height\)",
+    ),
+    "no t": (
+        wf.Camera.from_intrinsics,
+        {"K": K, "R": np.eye(3), "size": (640, 480)},
+        r"from_intrinsics needs t, or both in one matrix R",
+    ),
+    "t twice": (
+        wf.Camera.from_intrinsics,
+        {"K": K, "R": np.eye(4), "t": (0, 0, 0), "size": (640, 480)},
+        r"R has the shape \(4, 4\) and holds a translation; leave t out",
+    ),
+    "extrinsics scale": (
+        wf.Camera.from_intrinsics,
+        {"K": K, "R": np.diag([2, 2, 2, 1]), "size": (640, 480)},
+        r"R\[:3, :3\] must be a rotation, without scale or shear",
+    ),
+    "distortion of six": (
+        wf.Camera.from_intrinsics,
+        {"K": K, "R": np.eye(4), "size": (640, 480), "distortion": [0.1] * 6},
+        r"distortion has 6 numbers; it must have 4, 5 or 8: k1, k2, p1, p2, k3",
+    ),
+    "distortion NaN": (
+        wf.Camera.from_intrinsics,
+        {"K": K, "R": np.eye(4), "size": (640, 480), "distortion": [0.1, np.nan, 0, 0]},
+        r"distortion is \[0.1, nan, 0.0, 0.0\]; it must be finite",
+    ),
+    "distortion of a prism": (
+        wf.Camera.from_intrinsics,
+        {"K": K, "R": np.eye(4), "size": (640, 480), "distortion": [0.1] * 9 + [0] * 3},
+        r"distortion\[8:\] is .* not supported",
     ),
     "R mirrors": (
         wf.Camera.from_intrinsics,

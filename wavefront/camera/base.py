@@ -13,6 +13,7 @@ from ..errors import SceneError, finite_array, number, rotation_matrix
 from ..state import Words
 from ..suggestions import suggests_keywords
 from ..vec import Floats, column, normalize
+from .distortion import Distortion
 from .projection import Orthographic, Panorama, Perspective, Projection
 
 MAX_SIDE = 65_536  # pixels; a row-major pixel index then fits in 32 bits
@@ -50,6 +51,7 @@ class Camera:
         self.rotation = rotation_matrix("Camera rotation", rotation)
         self.projection = projection
         self.film = image_size(size)
+        projection.check(self.film)
         self.window = _window(crop, self.film)
 
     # --- Ways to make one -----------------------------------------------------------------------
@@ -157,9 +159,10 @@ class Camera:
         cls,
         K: ArrayLike,
         R: ArrayLike,
-        t: ArrayLike,
-        size: tuple[int, int],
+        t: ArrayLike | None = None,
+        size: tuple[int, int] | None = None,
         *,
+        distortion: ArrayLike | None = None,
         aperture: float = 0,
         focus: float | None = None,
         crop: Window | None = None,
@@ -171,38 +174,43 @@ class Camera:
         Parameters
         ----------
         K
-            (3, 3) intrinsics [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] in pixels. The upper left pixel
-            has its centre at (0.5, 0.5): a principal point in the middle is (width/2, height/2).
-            Where a calibration counts centres from (0, 0), add 0.5 to cx and cy.
+            (3, 3) intrinsics [[fx, s, cx], [0, fy, cy], [0, 0, 1]] in pixels. The upper left pixel
+            has its center at (0.5, 0.5): a principal point in the middle is (width/2, height/2).
+            OpenCV counts centers from (0, 0): add 0.5 to its cx and cy.
         R, t
-            (3, 3) rotation and (3,) translation from world to camera space.
+            Rotation (3, 3) and translation, (3,) or (3, 1), from world to camera space; or both in one
+            matrix (4, 4) or (3, 4), the extrinsics, as `R` alone.
         size
-            (width, height) in pixels.
+            (width, height) in pixels; it must be given.
+        distortion
+            Of the lens, OpenCV's (k1, k2, p1, p2), with k3, or with k3, k4, k5, k6 (Brown and Conrady).
         aperture, focus, crop
             As for `from_matrix`.
 
         Raises
         ------
         SceneError
-            If K has another form (a skew, say), R is no rotation, or an argument is out of range.
+            If K has another form, R is no rotation, an argument is out of range, or the distortion cannot
+            be undone inside the picture.
         """
+        if size is None:
+            raise SceneError("from_intrinsics needs size=(width, height), that of the calibrated pictures")
         width, height = image_size(size)
         k = finite_array("K", K, (3, 3))
         (fx, skew, cx), (zero, fy, cy), last = k.tolist()
         if zero != 0 or last != [0, 0, 1] or not (fx > 0 and fy > 0):
-            raise SceneError(f"K must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], fx, fy > 0; got {k.tolist()}")
-        if skew != 0:
-            raise SceneError(f"K[0][1] is {skew:g}; pixels with a skew are not supported")
-        axes = rotation_matrix("R", R)
-        eye = -axes.T @ finite_array("t", t, (3,))
+            raise SceneError(f"K must be [[fx, s, cx], [0, fy, cy], [0, 0, 1]], fx, fy > 0; got {k.tolist()}")
+        axes, shift = _extrinsics(R, t)
         lens = Perspective(
             2 * float(np.degrees(np.arctan(height / 2 / fy))),
             shift=(0.5 - cx / width, cy / height - 0.5),
             pixel_aspect=fy / fx,
             aperture=aperture,
             focus=focus,
+            skew=skew / fx,
+            distortion=None if distortion is None else Distortion(distortion),
         )
-        return cls(eye, axes.T * (1, -1, -1), lens, size, crop)
+        return cls(-axes.T @ shift, axes.T * (1, -1, -1), lens, size, crop)
 
     @classmethod
     @suggests_keywords
@@ -330,6 +338,34 @@ class Camera:
         origin = np.repeat(eye, len(x), 1) if offset is None else eye + self._turned(offset)
         return origin, towards if towards.shape[1] == len(x) else np.repeat(towards, len(x), 1)
 
+    def project(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return where points of the world are seen, and how far away they are.
+
+        Parameters
+        ----------
+        points
+            (n, 3) scene units.
+
+        Returns
+        -------
+        pixels
+            (n, 2) x from the left and y from the top of the whole picture, in pixels; the center of the
+            upper left pixel is (0.5, 0.5), so OpenCV's coordinates are these less 0.5. Points beside the
+            picture have coordinates outside of it. NaN for points that no picture could show: behind the
+            camera, or where its distortion has folded.
+        depth
+            (n,) distance along the view axis, scene units, negative behind the camera; of a panorama the
+            distance itself.
+
+        Raises
+        ------
+        SceneError
+            If the points are malformed.
+        """
+        away = finite_array("points", points, (None, 3)) - self.origin
+        pixels, depth = self.projection.project((away @ self.rotation).T, self.film)
+        return np.ascontiguousarray(pixels.T), depth
+
     def _turned(self, v: Floats) -> Floats:
         """Camera space (3, n) -> world space (3, n)."""
         right, up, backward = (column(axis) for axis in self.rotation.T)
@@ -363,6 +399,18 @@ def _rigid(name: str, value: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np
     if rows == 4 and matrix[3].tolist() != [0, 0, 0, 1]:
         raise SceneError(f"{name}[3] is {matrix[3].tolist()}; it must be [0, 0, 0, 1]")
     return rotation_matrix(f"{name}[:3, :3]", matrix[:3, :3]), matrix[:3, 3]
+
+
+def _extrinsics(R: ArrayLike, t: ArrayLike | None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return rotation (3, 3) and translation (3,) from world to camera space."""
+    if np.shape(R) in ((4, 4), (3, 4)):
+        if t is not None:
+            raise SceneError(f"R has the shape {np.shape(R)} and holds a translation; leave t out")
+        return _rigid("R", R)
+    axes = rotation_matrix("R", R)
+    if t is None:
+        raise SceneError("from_intrinsics needs t, or both in one matrix R of shape (4, 4) or (3, 4)")
+    return axes, finite_array("t", np.ravel(t) if np.shape(t) in ((3, 1), (1, 3)) else t, (3,))
 
 
 def upward(name: str, value: ArrayLike) -> NDArray[np.float64]:

@@ -12,12 +12,15 @@ from collections.abc import Sequence
 from copy import copy
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import SceneError, finite_array, number
 from ..sampling.warp import uniform_disk
 from ..vec import Floats, column, f4
+from .distortion import GRID, Distortion
 
 Size = tuple[int, int]
+Doubles = NDArray[np.float64]
 
 
 class Projection(ABC):
@@ -50,6 +53,34 @@ class Projection(ABC):
             (3, n) or (3, 1), of any length above 0.
         """
 
+    @abstractmethod
+    def project(self, points: Doubles, film: Size) -> tuple[Doubles, Doubles]:
+        """Return where points are seen; the inverse of `rays` through the middle of the lens.
+
+        Parameters
+        ----------
+        points
+            (3, n) in camera space, scene units.
+        film
+            (width, height) of the whole picture in pixels.
+
+        Returns
+        -------
+        pixels
+            (2, n) film position in pixels; NaN where a point cannot be seen, whatever the film's size.
+        depth
+            (n,) scene units.
+        """
+
+    def check(self, film: Size) -> None:  # noqa: B027 - most projections have no film that they could not fill
+        """Check that every point of the film has a ray.
+
+        Raises
+        ------
+        SceneError
+            If one has none.
+        """
+
 
 class Perspective(Projection):
     """A pinhole, or a thin lens that is sharp at one distance.
@@ -67,6 +98,10 @@ class Perspective(Projection):
         Diameter of the lens, scene units; 0 is a pinhole.
     focus
         Distance of the sharp plane, measured along the view axis, scene units.
+    skew
+        By how much the columns lean: K[0][1]/K[0][0] of a calibrated camera.
+    distortion
+        Of the lens; None for straight lines that stay straight.
 
     Notes
     -----
@@ -87,6 +122,8 @@ class Perspective(Projection):
         pixel_aspect: float = 1.0,
         aperture: float = 0.0,
         focus: float | None = None,
+        skew: float = 0.0,
+        distortion: Distortion | None = None,
     ) -> None:
         self.fov = number("Camera fov", fov, lambda x: 0 < x < 180, "above 0 and below 180 degrees")
         self.shift = finite_array("Camera shift", shift, (2,))
@@ -95,6 +132,8 @@ class Perspective(Projection):
         if focus is None and self.aperture > 0:
             raise SceneError(f"Camera aperture is {aperture!r}; a lens needs a focus distance: give focus")
         self.focus = 1.0 if focus is None else number("Camera focus", focus, lambda x: x > 0, "above 0")
+        self.skew = number("Camera skew", skew)
+        self.distortion = distortion
         self.uses_lens = self.aperture > 0
 
     def scaled(self, factor: float) -> Perspective:
@@ -111,12 +150,54 @@ class Perspective(Projection):
         np.multiply(x - f4(width * (0.5 - self.shift[0])), f4(pitch * self.pixel_aspect), out=direction[0])
         np.multiply(f4(height * (0.5 + self.shift[1])) - y, f4(pitch), out=direction[1])
         direction[2] = -1
+        if self.skew != 0 or self.distortion is not None:
+            direction[0], direction[1] = self._undistorted(x.astype(np.float64), y.astype(np.float64), film)
         if lens is None or not self.uses_lens:
             return None, direction
         offset = np.zeros_like(direction)
         np.multiply(uniform_disk(lens), f4(self.aperture / 2), out=offset[:2])
         direction[:2] -= offset[:2] * f4(1 / self.focus)
         return offset, direction
+
+    def project(self, points: Doubles, film: Size) -> tuple[Doubles, Doubles]:
+        """Divide by the depth, distort, and measure in pixels."""
+        depth = -points[2]
+        ahead = np.where(depth > 0, depth, np.nan)
+        x, y = points[0] / ahead, -points[1] / ahead
+        if self.distortion is not None:
+            seen = self.distortion.invertible(x, y)
+            x, y = self.distortion.apply(np.where(seen, x, np.nan), np.where(seen, y, np.nan))
+        middle, focal = self._intrinsics(film)
+        return np.stack([(x + self.skew * y) * focal[0] + middle[0], y * focal[1] + middle[1]]), depth
+
+    def check(self, film: Size) -> None:
+        """Check that the distortion can be undone at points all over the film."""
+        if self.distortion is None:
+            return
+        width, height = film
+        at = np.stack(np.meshgrid(np.linspace(0, width, GRID), np.linspace(0, height, GRID))).reshape(2, -1)
+        x, y = self._seen(at[0], at[1], film)
+        self.distortion.check(x, y, lambda k: f"the film point ({at[0, k]:.4g}, {at[1, k]:.4g})")
+
+    def _intrinsics(self, film: Size) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Return the film point on the axis, and the focal lengths, (x, y) in pixels."""
+        width, height = film
+        focal = height / 2 / np.tan(np.radians(self.fov) / 2)
+        middle = width * (0.5 - self.shift[0]), height * (0.5 + self.shift[1])
+        return middle, (focal / self.pixel_aspect, focal)
+
+    def _seen(self, x: Doubles, y: Doubles, film: Size) -> tuple[Doubles, Doubles]:
+        """Film points in pixels -> points of the plane at distance 1, y down, distorted."""
+        middle, focal = self._intrinsics(film)
+        down = (y - middle[1]) / focal[1]
+        return (x - middle[0]) / focal[0] - self.skew * down, down
+
+    def _undistorted(self, x: Doubles, y: Doubles, film: Size) -> tuple[Doubles, Doubles]:
+        """Film points in pixels -> points of the plane at distance 1, y up."""
+        right, down = self._seen(x, y, film)
+        if self.distortion is not None:
+            right, down = self.distortion.undo(right, down)
+        return right, -down
 
 
 class Orthographic(Projection):
@@ -149,6 +230,13 @@ class Orthographic(Projection):
         np.multiply(f4(height / 2) - y, pitch, out=offset[1])
         return offset, column((0, 0, -1))
 
+    def project(self, points: Doubles, film: Size) -> tuple[Doubles, Doubles]:
+        """Drop the depth, and measure in pixels."""
+        width, height = film
+        depth, pitch = -points[2], self.height / height
+        x, y = np.where(depth >= 0, points[:2], np.nan)
+        return np.stack([x / pitch + width / 2, height / 2 - y / pitch]), depth
+
 
 class Panorama(Projection):
     """All directions, by longitude and latitude: 360° across and 180° down the picture.
@@ -167,3 +255,14 @@ class Panorama(Projection):
         np.sin(latitude, out=direction[1])
         np.multiply(np.cos(longitude), -level, out=direction[2])
         return None, direction
+
+    def project(self, points: Doubles, film: Size) -> tuple[Doubles, Doubles]:
+        """Measure longitude and latitude; the depth is the distance."""
+        width, height = film
+        x, y, z = points
+        distance = np.sqrt(x * x + y * y + z * z)
+        away = np.where(distance > 0, distance, np.nan)
+        longitude, latitude = np.arctan2(x, -z), np.arcsin(np.clip(y / away, -1, 1))
+        longitude = np.where(distance > 0, longitude, np.nan)
+        pixels = [longitude * (width / (2 * np.pi)) + width / 2, height / 2 - latitude * (height / np.pi)]
+        return np.stack(pixels), distance

@@ -1,0 +1,139 @@
+"""Lens distortion by the model of Brown and Conrady, as OpenCV calibrates it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import SceneError
+
+Doubles = NDArray[np.float64]
+
+NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+COUNTS = (4, 5, 8, 12, 14)  # of coefficients that OpenCV gives; the last ones, of two other models, must be 0
+STEPS = 10  # of Newton's method; it has converged after four for the lenses of most cameras
+TOLERANCE = 1e-9  # of undistorted points, in focal lengths
+GRID = 65  # points along each side of the picture where the inverse is checked
+WAY = 32  # points on the way from the axis to a point where the model is checked for folds
+
+
+class Distortion:
+    """Radial and tangential distortion of a lens.
+
+    A point (x, y) of the plane at distance 1, x to the right and y down, is seen where an undistorted lens
+    sees (x·R + 2·p1·x·y + p2·(r² + 2x²), y·R + p1·(r² + 2y²) + 2·p2·x·y), with
+    R = (1 + k1·r² + k2·r⁴ + k3·r⁶) / (1 + k4·r² + k5·r⁴ + k6·r⁶). Source: D. Brown 1966, "Decentering
+    Distortion of Lenses"; the denominator, the order and the signs are OpenCV's.
+
+    Parameters
+    ----------
+    coefficients
+        (k1, k2, p1, p2), with k3, or with k3, k4, k5, k6, of any shape.
+
+    Raises
+    ------
+    SceneError
+        If they are not numeric, not finite, or of another number.
+    """
+
+    def __init__(self, coefficients: ArrayLike) -> None:
+        try:
+            given = np.asarray(coefficients, np.float64).ravel()
+        except (TypeError, ValueError) as error:
+            raise SceneError(f"distortion must be numeric, got {coefficients!r}") from error
+        if given.size not in COUNTS:
+            raise SceneError(
+                f"distortion has {given.size} numbers; it must have 4, 5 or 8: {', '.join(NAMES)}"
+            )
+        if not np.isfinite(given).all():
+            raise SceneError(f"distortion is {given.tolist()}; it must be finite")
+        if given[8:].any():
+            raise SceneError(
+                f"distortion[8:] is {given[8:].tolist()}; thin prisms and tilted sensors are not supported"
+            )
+        self.coefficients = np.zeros(8)
+        self.coefficients[: min(given.size, 8)] = given[:8]
+
+    def __repr__(self) -> str:
+        """Name the coefficients that are not 0."""
+        there = zip(NAMES, self.coefficients, strict=True)
+        return f"Distortion({', '.join(f'{name}={value:g}' for name, value in there if value)})"
+
+    def apply(self, x: Doubles, y: Doubles) -> tuple[Doubles, Doubles]:
+        """Return where points (n,) are seen, (n,) each."""
+        _, _, p1, p2, *_ = self.coefficients
+        r2 = x * x + y * y
+        ratio, _, _ = self._radial(r2)
+        return (
+            x * ratio + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+            y * ratio + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
+        )
+
+    def undo(self, x: Doubles, y: Doubles) -> tuple[Doubles, Doubles]:
+        """Return the points (n,) that are seen at x, y (n,), by Newton's method.
+
+        The number of steps is the same for all points, so that none depends on the others.
+        """
+        u, v = x, y
+        with np.errstate(all="ignore"):  # points that have none, outside of the picture
+            for _ in range(STEPS):
+                seen_u, seen_v = self.apply(u, v)
+                du, dv = x - seen_u, y - seen_v
+                a, b, c, det, _ = self._slopes(u, v)
+                u, v = u + (c * du - b * dv) / det, v + (a * dv - b * du) / det
+        return u, v
+
+    def invertible(self, x: Doubles, y: Doubles) -> NDArray[np.bool_]:
+        """Tell at which points (n,) the model has not folded on the way from the axis, (n,)."""
+        way = np.arange(1, WAY + 1)[:, None] / WAY
+        with np.errstate(all="ignore"):
+            _, _, _, det, bottom = self._slopes(way * x, way * y)
+            return np.asarray(((det > 0) & (bottom > 0)).all(0))
+
+    def check(self, x: Doubles, y: Doubles, name: Callable[[int], str]) -> None:
+        """Check that points (n,) of the picture can be undistorted.
+
+        Parameters
+        ----------
+        x, y
+            (n,) where they are seen.
+        name
+            Called with the number of a point; returns where it is, for the message.
+
+        Raises
+        ------
+        SceneError
+            If one cannot.
+        """
+        u, v = self.undo(x, y)
+        with np.errstate(all="ignore"):
+            seen_u, seen_v = self.apply(u, v)
+            off = np.hypot(seen_u - x, seen_v - y) / (1 + np.hypot(x, y))
+        bad = np.flatnonzero(~((off <= TOLERANCE) & self.invertible(u, v)))
+        if bad.size:
+            near = bad[np.argmin(np.hypot(x[bad], y[bad]))]
+            raise SceneError(
+                f"{self!r} cannot be undone inside the picture: near {name(near)} it folds, so that one "
+                "pixel sees several points. Does it belong to this size and focal length?"
+            )
+
+    def _radial(self, r2: Doubles) -> tuple[Doubles, Doubles, Doubles]:
+        """Return the ratio R, its derivative by r², and its denominator."""
+        k1, k2, _, _, k3, k4, k5, k6 = self.coefficients
+        top = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        bottom = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
+        top_slope = k1 + r2 * (2 * k2 + r2 * (3 * k3))
+        bottom_slope = k4 + r2 * (2 * k5 + r2 * (3 * k6))
+        ratio = top / bottom
+        return ratio, (top_slope - ratio * bottom_slope) / bottom, bottom
+
+    def _slopes(self, x: Doubles, y: Doubles) -> tuple[Doubles, Doubles, Doubles, Doubles, Doubles]:
+        """Return ∂x'/∂x, ∂x'/∂y = ∂y'/∂x and ∂y'/∂y, their determinant, and the denominator of R."""
+        _, _, p1, p2, *_ = self.coefficients
+        ratio, slope, bottom = self._radial(x * x + y * y)
+        a = ratio + 2 * x * x * slope + 2 * p1 * y + 6 * p2 * x
+        b = 2 * x * y * slope + 2 * p1 * x + 2 * p2 * y
+        c = ratio + 2 * y * y * slope + 6 * p1 * y + 2 * p2 * x
+        return a, b, c, a * c - b * b, bottom
