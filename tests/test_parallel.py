@@ -15,9 +15,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scenes
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import wavefront as wf
 from wavefront.parallel import MIN_PATHS, Workers, choose_executor, worker_count
+from wavefront.shared import STOP, SharedNumber, Stopped
 
 LINUX = sys.platform.startswith("linux")
 EXECUTORS = ["threads", pytest.param("processes", marks=pytest.mark.skipif(not LINUX, reason="needs fork"))]
@@ -179,6 +181,53 @@ def test_bad_worker_counts_are_named(workers: object) -> None:
     """With the value and the limit."""
     with pytest.raises(wf.SceneError, match=f"workers is {workers!r}.*at least 1"):
         worker_count(workers)
+
+
+@processes
+def test_a_process_that_ends_while_it_writes_is_no_obstacle() -> None:
+    """Killed in the middle of a result, with most of it yet to be read; the pieces are done again."""
+    begin = time.monotonic()
+    with Workers(lambda k: np.zeros(1 << 22) if k else k, 2, "processes") as crew:
+        results = crew.run(range(8))
+        next(results)
+        for child in multiprocessing.active_children():
+            os.kill(child.pid, signal.SIGSTOP)
+    assert time.monotonic() - begin < 10
+    assert not multiprocessing.active_children()
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_a_stop_ends_a_run(executor: str) -> None:
+    """Pieces that have not begun are not done; those under way may look, and stop too."""
+    stop = SharedNumber()
+
+    def work(piece: int) -> int:
+        while piece > 0 and not stop.value:
+            time.sleep(0.01)
+        return piece
+
+    with Workers(work, 2, executor, stop) as crew:
+        results = crew.run(range(100), lambda: stop.rise_to(STOP))
+        assert next(results) == (0, 0)
+        with pytest.raises(Stopped):
+            list(results)
+
+
+def blas_threads() -> set[int]:
+    return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
+
+
+def test_overlapping_workers_share_the_limit_of_blas() -> None:
+    """It stays until the last of them has ended, and then all is as before, in whatever order they end."""
+    with threadpool_limits(2, "blas"):
+        first, second = Workers(abs, 1, "threads"), Workers(abs, 1, "threads")
+        first.__enter__()
+        second.__enter__()
+        assert blas_threads() == {1}
+        first.__exit__(None, None, None)
+        assert blas_threads() == {1}
+        second.__exit__(None, None, None)
+        assert blas_threads() == {2}
 
 
 # --- which executor -------------------------------------------------------------------------------

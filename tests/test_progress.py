@@ -33,6 +33,21 @@ def test_a_bar_of_time_counts_seconds(capsys) -> None:
     assert "10/10 s" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("seconds", [None, 20.0])
+def test_a_bar_shows_how_far_paths_are(seconds, capsys) -> None:
+    """While nothing is done, every second."""
+    with Bar(None, 1000, seconds) as bar:
+        bar.wait(100, DELAY - 0.5)
+        assert capsys.readouterr().err == ""
+        bar.wait(200, DELAY + 0.7)
+        bar.wait(300, DELAY + 0.8)
+        assert "paths of 200 surfaces under way" in capsys.readouterr().err
+        bar.wait(400, DELAY + 1.8)
+        assert "paths of 400 surfaces under way" in capsys.readouterr().err
+        bar.advance(1000, DELAY + 30)
+    assert capsys.readouterr().err.rstrip().splitlines()[-1].count("surfaces") == 0
+
+
 def test_there_is_no_bar_for_a_function_or_for_false(capsys) -> None:
     """A function is called in its place."""
     calls: list = []

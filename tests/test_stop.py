@@ -1,12 +1,15 @@
 """Stopping by noise or time: right errors, no bias, the same bits, and the time that was given."""
 
+import sys
+import time
+
 import numpy as np
 import pytest
 import scenes
 from significance import render
 
 import wavefront as wf
-from wavefront import stopping
+from wavefront import stopping, work
 from wavefront.film import Film
 from wavefront.stopping import MIN_SPP, Clock, next_stop, passes
 from wavefront.vec import f4
@@ -258,6 +261,89 @@ def test_ten_seconds_are_ten_seconds(name: str) -> None:
     """Within 10 %, on a machine that has nothing else to do."""
     image = wf.render(SCENES[name]((256, 256)), seconds=10, progress=False)
     assert 9 <= image.metadata["seconds"] <= 11
+
+
+# --- Waves that take long --------------------------------------------------------------------------
+
+
+def closed(size: tuple[int, int]) -> wf.Scene:
+    """A room in which no light is lost, so that no path ends before `max_bounces`."""
+    room = wf.Sphere((0, 0, 0), 5, material=wf.Diffuse(1.0))
+    lamp = wf.Sphere((0, 0, -3), 0.1, emission=1)
+    return wf.Scene([room, lamp], camera=wf.Camera.look_at((0, 0, 3), (0, 0, 0), size=size))
+
+
+def test_time_ends_waves_under_way() -> None:
+    """Also those of first samples, if they take long: there is no picture then, and the error says why."""
+    begin = time.perf_counter()
+    message = r"no picture: when seconds=1 were over, .* had met \d+ surfaces; .* lower max_bounces"
+    with pytest.raises(wf.RenderError, match=message) as caught:
+        render(closed((64, 64)), None, seconds=1, max_bounces=2**16, workers=2)
+    assert caught.value.image is None
+    assert time.perf_counter() - begin < 10  # 3 s, while all its bounces take minutes
+
+
+def test_samples_of_waves_that_time_ends_are_discarded(monkeypatch) -> None:
+    """What was done before is there, as if nothing else had been asked for."""
+
+    def endless(*given) -> work.Wave:
+        *others, watch, piece = given
+        if piece.first_sample < 3:
+            return work.trace_piece(*others, watch, piece)
+        while True:
+            watch.look(0, watch.deadline)
+
+    monkeypatch.setattr(sys.modules["wavefront.render"], "trace_piece", endless)
+    monkeypatch.setattr(stopping, "FIRST_WAVE", 384)  # one sample of all pixels
+    image = render(lit(), None, seconds=0.5)
+    assert image.spp <= 3
+    monkeypatch.undo()
+    assert (image.rgb == render(lit(), image.spp).rgb).all()
+
+
+def test_pixels_without_a_sample_are_told(monkeypatch) -> None:
+    """They are black."""
+
+    def endless_after_the_first(*given) -> work.Wave:
+        *others, watch, piece = given
+        while piece.pixels[0]:
+            watch.look(123, watch.deadline)
+        return work.trace_piece(*others, watch, piece)
+
+    monkeypatch.setattr(sys.modules["wavefront.render"], "trace_piece", endless_after_the_first)
+    monkeypatch.setattr(stopping, "FIRST_WAVE", 100)
+    message = (
+        r"288 pixels of 384 have no sample and are black: when seconds=0.5 were over, .* met 123 surfaces"
+    )
+    with pytest.warns(UserWarning, match=message):
+        image = render(lit(), None, seconds=0.5, workers=1)
+    assert (image.counts == 0).sum() == 288
+    assert (image.rgb[image.counts == 0] == 0).all()
+
+
+def test_paths_that_do_not_end_are_told(monkeypatch) -> None:
+    """Once, where more than 1 000 bounces are allowed, and more than 1 000 surfaces met."""
+    assert work.LONG_PATH == 1000
+    monkeypatch.setattr(sys.modules["wavefront.render"], "LONG_PATH", 50)
+    with pytest.warns(UserWarning, match=r"more than 50 surfaces.*max_bounces=60.*absorb") as caught:
+        render(closed((2, 2)), 4, max_bounces=60, wave_size=8)
+    assert len(caught) == 1
+    render(closed((2, 2)), 2, max_bounces=50)
+    render(lit((8, 8)), 2, max_bounces=2**16)
+
+
+def test_progress_goes_on_within_a_wave() -> None:
+    """A function is called every second, so that it can also stop what takes long."""
+    calls: list = []
+
+    def stop(*call: float) -> None:
+        calls.append(call)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(wf.Interrupted, match="no picture yet"):
+        render(closed((32, 32)), 1, max_bounces=2**16, progress=stop)
+    assert calls == [(0, 1024)] * 2
 
 
 # --- Arguments, progress, Ctrl-C ------------------------------------------------------------------

@@ -108,8 +108,8 @@ def render(
         `spp` or `seconds` end the render above it, a warning says so.
     seconds
         Go on until this time is used, scene setup included; waves that are still under way a tenth
-        later are discarded. Every pixel gets its first sample all the same, unless its path has met
-        1 000 surfaces by then. With `noise` as well, whichever comes first.
+        later are discarded. Every pixel gets its first sample all the same, unless a wave of them
+        takes over three seconds. With `noise` as well, whichever comes first.
     filter
         How the samples of a pixel are spread: "box" (evenly over the pixel), "tent" (radius 1
         pixel) or "gaussian" (σ 0.5 pixels, cut off at 1.5 from the centre).
@@ -228,7 +228,7 @@ def render(
     if ctrl_c.pressed:
         raise _interrupted(image, spp if noise is None and seconds is None else None)
     if clock.up:
-        _check_first_samples(image, seconds)
+        _check_first_samples(image, seconds, watch.surfaces.value)
     tally.bad.report(image)
     if noise is not None and (clock.up or tally.film.count.max() == spp):
         _warn_of_noise(image, noise)
@@ -298,18 +298,23 @@ def _render_error(failure: Exception, image: Image) -> RenderError:
     return RenderError(message, _picture_so_far(image))
 
 
-def _check_first_samples(image: Image, seconds: float | None) -> None:
-    """Warn of pixels without a sample when the time was up, or raise if there is nothing else."""
+def _check_first_samples(image: Image, seconds: float | None, surfaces: int) -> None:
+    """Warn of pixels without a sample when the time was up, or raise if there is nothing else.
+
+    `surfaces` is how many a path under way had met.
+    """
     assert image.counts is not None
     without = int((image.counts == 0).sum())
-    if not without:
-        return
-    why = f"paths of more than {LONG_PATH} surfaces were under way when seconds={seconds:g} were over"
-    if without == image.counts.size:
-        raise RenderError(f"there is no picture: {why}; lower max_bounces")
-    warnings.warn(
-        f"{without} pixels of {image.counts.size} have no sample and are black: {why}", stacklevel=3
+    why = (
+        f"when seconds={seconds} were over, a wave of paths was under way that had met {surfaces} surfaces; "
+        "allow more time or lower max_bounces"
     )
+    if without == image.counts.size:
+        raise RenderError(f"there is no picture: {why}")
+    if without:
+        warnings.warn(
+            f"{without} pixels of {image.counts.size} have no sample and are black: {why}", stacklevel=3
+        )
 
 
 def _estimator(integrator: str, branches: int) -> Integrator:

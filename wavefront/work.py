@@ -26,6 +26,7 @@ from .state import Words
 from .vec import Bools, Floats, Ints, alike
 
 MAX_BAD_SAMPLES = 1e-4  # part of all samples that may be lost to NaN before it is an error
+PATIENCE = 3.0  # seconds that a wave of first samples may take even if the time is up
 LONG_PATH = 1000  # surfaces along a path, after which it will hardly end by itself
 
 
@@ -66,18 +67,16 @@ class Watch:
     surfaces: SharedNumber = field(default_factory=SharedNumber)  # along the longest path under way
     deadline: float = math.inf  # by `time.perf_counter`
 
-    def look(self, surfaces: int, first_samples: bool) -> None:
-        """Take note that a wave has come to its next surface.
+    def look(self, surfaces: int, deadline: float) -> None:
+        """Take note that a wave with a deadline of its own has come to its next surface.
 
         Raises
         ------
         Stopped
-            If the wave is to end: somebody has asked for that, or the time is up. A wave of the first
-            samples of its pixels goes on even then, up to `LONG_PATH` surfaces.
+            If the wave is to end: somebody has asked for that, or its time is up.
         """
         self.surfaces.rise_to(surfaces)
-        late = time.perf_counter() > self.deadline and not (first_samples and surfaces <= LONG_PATH)
-        if late or self.stop.value:
+        if self.stop.value or time.perf_counter() > deadline:
             raise Stopped
 
 
@@ -100,7 +99,8 @@ def trace_piece(
     """
     begin = time.perf_counter()
     k, n = piece.pixels.size, piece.samples
-    counter = WatchedAccelerator(scene.accelerator, watch, first_samples=piece.first_sample == 0)
+    deadline = watch.deadline if piece.first_sample else max(watch.deadline, begin + PATIENCE)
+    counter = WatchedAccelerator(scene.accelerator, watch, deadline)
     scene = replace(scene, accelerator=counter)
     paths = generate(scene, camera, sampler, np.tile(piece.pixels, n), _samples(piece), filter)
     radiance = estimate(scene, paths, sampler, max_bounces)
@@ -124,10 +124,10 @@ class WatchedAccelerator:
     two bounces, and no integrator needs to know of it.
     """
 
-    def __init__(self, accelerator: Accelerator, watch: Watch, first_samples: bool) -> None:
+    def __init__(self, accelerator: Accelerator, watch: Watch, deadline: float) -> None:
         self.name = accelerator.name
         self.rays = 0
-        self._accelerator, self._watch, self._first_samples = accelerator, watch, first_samples
+        self._accelerator, self._watch, self._deadline = accelerator, watch, deadline
         self._surfaces = 0
 
     def closest(self, origin: Floats, direction: Floats, leaving: Ints) -> Intersections:
@@ -138,7 +138,7 @@ class WatchedAccelerator:
         Stopped
             If the wave is to end.
         """
-        self._watch.look(self._surfaces, self._first_samples)
+        self._watch.look(self._surfaces, self._deadline)
         self._surfaces += 1
         self.rays += origin.shape[1]
         return self._accelerator.closest(origin, direction, leaving)
