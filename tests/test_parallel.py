@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
@@ -184,14 +185,24 @@ def test_bad_worker_counts_are_named(workers: object) -> None:
 
 
 @processes
-def test_a_process_that_ends_while_it_writes_is_no_obstacle() -> None:
-    """Killed in the middle of a result, with most of it yet to be read; the pieces are done again."""
+def test_a_process_that_is_killed_while_it_writes_is_no_obstacle() -> None:
+    """The reader would wait for the rest of the result for ever."""
+
+    def work(piece: int) -> int:
+        def send_half(connection: Connection, message: bytes) -> None:
+            os.write(connection.fileno(), message[: len(message) // 2])
+            os.kill(os.getpid(), signal.SIGSTOP)
+
+        if piece:
+            Connection._send = send_half  # type: ignore[attr-defined]
+        return piece
+
     begin = time.monotonic()
-    with Workers(lambda k: np.zeros(1 << 22) if k else k, 2, "processes") as crew:
-        results = crew.run(range(8))
-        next(results)
-        for child in multiprocessing.active_children():
-            os.kill(child.pid, signal.SIGSTOP)
+    with Workers(work, 1, "processes") as crew:
+        assert next(crew.run(range(3))) == (0, 0)
+        (child,) = multiprocessing.active_children()
+        while Path(f"/proc/{child.pid}/stat").read_text().rpartition(")")[2].split()[0] != "T":
+            time.sleep(0.01)
     assert time.monotonic() - begin < 10
     assert not multiprocessing.active_children()
 
