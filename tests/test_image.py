@@ -117,9 +117,12 @@ def test_damaged_exif_is_passed_over(tmp_path, image):
     image.save(tmp_path / "a.jpg", "srgb")
     data = (tmp_path / "a.jpg").read_bytes()
     at = data.index(b"Exif\0\0") + 6
-    for length in (1, 4, 8, 20):
+    for length in (1, 4, 8, 20, 40):
         (tmp_path / "b.jpg").write_bytes(data[:at] + b"\xff" * length + data[at + length :])
         assert (wf.Image.load(tmp_path / "b.jpg").rgb == wf.Image.load(tmp_path / "a.jpg").rgb).all()
+    for k in range(at, at + 44):
+        (tmp_path / "b.jpg").write_bytes(data[:k] + bytes([data[k] ^ 0xFF]) + data[k + 1 :])
+        assert wf.Image.load(tmp_path / "b.jpg").shape == image.shape
 
 
 def test_textures_do_not_follow_the_gamma_of_a_file(tmp_path, image):

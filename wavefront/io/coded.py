@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -66,15 +67,31 @@ def decode(data: bytes) -> NDArray[Any]:
 
 def gamma_of(data: bytes) -> Gamma:
     """Return how the codes of a png or jpg are to be decoded: "srgb" where the file does not say."""
+    try:
+        with _quiet():
+            exponent = _exponent(data)
+    # cameras and editors leave damaged Exif data behind, and the reader raises what it likes
+    except Exception:
+        return "srgb"
+    return exponent if exponent is not None and GAMMAS[0] <= exponent <= GAMMAS[1] else "srgb"
+
+
+def _exponent(data: bytes) -> float | None:
+    """Return the exponent that a png or jpg names, None if it names none or sRGB."""
     import imageio.v3 as iio
+    from PIL.Image import Exif
 
     with iio.imopen(data, "r", plugin="pillow") as file:
         info = file.metadata(index=0)
     if "srgb" in info:
-        return "srgb"
-    gamma = info.get("gamma")  # of a png: the exponent of encoding
-    exponent = 1 / gamma if gamma else _exif_gamma(info.get("exif", b""))
-    return exponent if GAMMAS[0] <= exponent <= GAMMAS[1] else "srgb"
+        return None
+    if "gamma" in info:  # of a png: the exponent of encoding
+        return 1 / info["gamma"]
+    exif = Exif()
+    exif.load(info.get("exif", b""))
+    tags = exif.get_ifd(EXIF_IFD)
+    named = tags.get(COLOR_SPACE) != SRGB_SPACE and EXIF_GAMMA in tags
+    return float(tags[EXIF_GAMMA]) if named else None
 
 
 def _png_info(gamma: Gamma) -> Any:
@@ -100,26 +117,19 @@ def _exif(gamma: Gamma) -> bytes:
     return exif.tobytes()
 
 
-def _exif_gamma(data: bytes) -> float:
-    """Return the exponent that Exif data name, NaN if they name none."""
-    from PIL.Image import Exif
-
-    exif = Exif()
-    try:
-        exif.load(data)
-        tags = exif.get_ifd(EXIF_IFD)
-        return math.nan if tags.get(COLOR_SPACE) == SRGB_SPACE else float(tags.get(EXIF_GAMMA, math.nan))
-    # cameras and editors leave damaged Exif data behind, and the reader raises what it likes
-    except Exception:
-        return math.nan
-
-
 def _decode(data: bytes) -> NDArray[Any]:
     import imageio.v3 as iio
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the decoder warns of large images; the limit here is our own
+    with _quiet():
         return np.asarray(iio.imread(data, plugin="pillow", index=0))
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the decoder's warnings away: of large images, whose limit is our own, and of Exif data."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
 
 
 def _ends_early(data: bytes, codes: NDArray[Any]) -> bool:
