@@ -214,7 +214,6 @@ def test_bad_scenes_are_named(scene, message: str) -> None:
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float), np.array([[0, 1, 2]])
 
 
-@pytest.mark.filterwarnings("ignore:the scene has no light")
 @pytest.mark.parametrize(
     "subject",
     [
@@ -236,8 +235,8 @@ TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float), np.array([[0, 1, 
     ],
 )
 def test_what_can_be_rendered(subject) -> None:
-    """Everything that a user may hold; it is framed, and lit by a neutral environment."""
-    image = render(subject, 2, size=(6, 5))
+    """Everything that a user may hold; it is framed, and lit."""
+    image = render(subject, 2, size=(6, 5), lighting="even")
     assert image.rgb.shape == (5, 6, 3)
     assert image.rgb.max() == pytest.approx(1)
     assert (image.rgb < 0.99).any()
@@ -372,14 +371,6 @@ def test_naive_warns_of_point_lights() -> None:
     with pytest.warns(UserWarning, match=r"naive integrator cannot find lights without size \(PointLight\)"):
         image = render(scene, 1, integrator="naive")
     assert (image.rgb == 0).all()
-
-
-def test_no_light_warns() -> None:
-    """And a neutral environment is used."""
-    camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), size=(4, 4))
-    with pytest.warns(UserWarning, match=r"the scene has no light; rendering it in Environment\(1.0\)"):
-        image = render(wf.Scene([BALL], camera=camera), 1)
-    assert image.rgb.max() == pytest.approx(1)
 
 
 @pytest.mark.parametrize("workers", [1, 3])

@@ -110,11 +110,11 @@ def test_a_light_must_have_an_area() -> None:
     assert len(compiled(mixed).lights) == 1
 
 
-def test_a_scene_without_light_gets_an_environment() -> None:
-    """And a warning."""
-    with pytest.warns(UserWarning, match=r"the scene has no light; rendering it in Environment\(1.0\)"):
-        scene = compiled(wf.Sphere(**BALL))
-    assert scene.light_of[-1] == 0
+def test_a_scene_without_light_is_dark() -> None:
+    """Light is added before, where it is wanted; see lighting.py."""
+    scene = compiled(wf.Sphere(**BALL))
+    assert len(scene.lights) == 0
+    assert scene.light_of[-1] == -1
 
 
 def test_a_dark_light_is_still_a_light() -> None:

@@ -18,6 +18,7 @@ from .bsdfs import (
 from .camera import Camera
 from .errors import Interrupted, RenderError, SaveError, SceneError
 from .image import Image
+from .lighting import studio
 from .lights import DirectionalLight, Environment, PointLight, SpotLight
 from .relief import BumpMap, NormalMap
 from .render import render
@@ -81,6 +82,7 @@ __all__ = [
     "load",
     "load_mesh",
     "render",
+    "studio",
     "testing",
 ]
 

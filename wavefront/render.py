@@ -23,6 +23,7 @@ from .filters import FILTERS
 from .image import Image
 from .integrators import INTEGRATORS, ONE_SAMPLE, Integrator, li_full
 from .interrupt import CtrlC
+from .lighting import check_lighting, choose_preset, lighted
 from .lights import DirectionalLight, PointLight, SpotLight
 from .lights.choose import CHOICES as LIGHT_CHOICES
 from .parallel import Workers, choose_executor, worker_count
@@ -51,6 +52,8 @@ def render(
     size: tuple[int, int] | None = None,
     material: Bsdf | None = None,
     up: ArrayLike | None = None,
+    lighting: str | None = "auto",
+    ground: bool = False,
     integrator: str = "full",
     max_bounces: int = 12,
     seed: int = 0,
@@ -85,7 +88,14 @@ def render(
         (vertices, faces), and shapes that were given no material.
     up
         What is up in the picture of a scene without a camera: a vector (3,), or the name of an axis, such
-        as "z" for most STL and CAD files; by default "y".
+        as "z" for most STL and CAD files; by default "y". It turns the light and the ground too.
+    lighting
+        "studio", "softbox", "three_point", "cloudy" or "even": adds the light of that name, which
+        `studio` describes, to the scene's own. "auto" adds "studio" where nothing shines, with a
+        warning, and nothing elsewhere; None adds nothing.
+    ground
+        Adds a level ground under the scene that catches its shadow and fades into the background. It
+        belongs to the picture alone: the scene, its bounds and the numbers of its shapes stay.
     integrator
         "full", "direct_mis", "direct_simple" or "naive".
     max_bounces
@@ -154,6 +164,7 @@ def render(
     spread = FILTERS[one_of("filter", filter, FILTERS)]
     accel = one_of("accel", accel, CHOICES)
     light_choice = one_of("light_choice", light_choice, LIGHT_CHOICES)
+    check_lighting(lighting)
     make_sampler(sampler, seed)  # checks both before the scene is read
     workers = worker_count(workers)
     choose_executor(executor, workers, 0)
@@ -162,10 +173,12 @@ def render(
         subject = as_scene(scene, material, progress)
         camera = seen.of(subject)
         draw = make_sampler(sampler, seed, camera.film[0])
-        _warn_unseen_lights(subject, integrator)
+        preset = choose_preset(subject, lighting)
+        complete = lighted(subject, preset, ground=ground, up="y" if seen.up is None else seen.up)
+        _warn_unseen_lights(complete, integrator)
         with phase("building the scene", progress):
             compiled = compile_scene(
-                subject,
+                complete,
                 subject.accelerators.maker(accel),
                 light_choice,
                 most_copies(accel),
@@ -204,6 +217,7 @@ def render(
                 failure = error
         image = tally.film.image(
             {
+                "lighting": preset,
                 "integrator": integrator,
                 "max_bounces": max_bounces,
                 "seed": seed,

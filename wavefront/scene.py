@@ -52,8 +52,7 @@ class Scene:
         emission is a light. Objects of trimesh are converted.
     lights
         `PointLight`, `SpotLight`, `DirectionalLight` and `Environment` objects, at most one
-        `Environment`. A scene where nothing shines is rendered in a neutral environment, with a
-        warning.
+        `Environment`. A scene where nothing shines is rendered in the light of a studio: see `render`.
     camera
         Without one the scene is framed.
 
@@ -717,10 +716,6 @@ def _gather_lights(
     mis: bool,
 ) -> tuple[LightTable, Ints, int]:
     """Return the table of lights, the light of each primitive, and that of rays that hit nothing."""
-    user_lights = list(scene.lights)
-    if not scene.emits:
-        warnings.warn("the scene has no light; rendering it in Environment(1.0)", stacklevel=4)
-        user_lights = [Environment(1.0)]
     kinds: list[Light] = []
     light_of = np.full(sum(len(part) for part in corners) + len(spheres), -1, np.intp)
     count = 0
@@ -761,7 +756,7 @@ def _gather_lights(
     )
     groups: dict[type[Light], list[Any]] = {}
     infinite: list[InfiniteLight] = []
-    for light in user_lights:
+    for light in scene.lights:
         record = (light if scale == 1 else light.scaled(scale)).record(centre)
         if isinstance(record, InfiniteLight):
             infinite.append(record.compensated() if mis else record)

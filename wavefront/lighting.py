@@ -1,0 +1,288 @@
+"""Ready-made light for scenes that have none of their own, and a ground that catches their shadow.
+
+The light of a preset is one image of an environment: a gradient with soft boxes painted into it. The boxes
+are above the horizon, as the lamps of a studio are. Below it and a little above it lies the backdrop, which a
+camera that looks level or down sees behind the scene.
+"""
+
+from __future__ import annotations
+
+import warnings
+from contextlib import suppress
+from copy import copy
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .bsdfs import Diffuse
+from .camera import Camera
+from .errors import SceneError, finite_array
+from .lights import Environment
+from .scene import Scene
+from .shapes import Disk, Mesh
+from .textures import Texture
+
+Doubles = NDArray[np.float64]
+
+FRAMING_VIEW = (0.35, 0.3, 1.0)
+
+HEIGHT, WIDTH = 128, 256  # pixels of an environment's image
+GROUND_REACH = 6.0  # radius of the ground in radii of the scene
+GROUND_FADE = 0.25  # part of the ground's radius at which it begins to fade out
+MOST_GROUND = 0.9  # albedo of the ground at most
+GROUND_GAP = 1e-4  # between the scene and the ground, part of the scene's half height
+OWN_LIGHT_GROUND = 0.4  # albedo of the ground where no preset is used
+
+
+@dataclass(frozen=True)
+class SoftBox:
+    """A bright rectangle with soft edges, infinitely far away."""
+
+    azimuth: float  # degrees from the direction of the camera, to its right
+    elevation: float  # degrees above the horizon
+    width: float  # degrees, below 180
+    height: float  # degrees, below 180
+    radiance: tuple[float, float, float]  # W·sr⁻¹·m⁻² in its middle
+    feather: float = 0.35  # part of the half width over which it fades out
+
+    def radiance_at(self, directions: Doubles) -> Doubles:
+        """Return the radiance (H, W, 3) from unit directions (3, H, W): x right, y up, z to the camera."""
+        azimuth, elevation = np.radians(self.azimuth), np.radians(self.elevation)
+        right = np.array([np.cos(azimuth), 0.0, -np.sin(azimuth)])
+        ahead = np.array(
+            [np.sin(azimuth) * np.cos(elevation), np.sin(elevation), np.cos(azimuth) * np.cos(elevation)]
+        )
+        depth = np.tensordot(ahead, directions, 1)
+        in_front = depth > 1e-3
+        part = in_front.astype(float)
+        for axis, size in ((right, self.width), (np.cross(ahead, right), self.height)):
+            offset = np.abs(np.tensordot(axis, directions, 1)) / np.where(in_front, depth, 1)
+            part *= smoothstep((1 - offset / np.tan(np.radians(size) / 2)) / self.feather)
+        return part[:, :, None] * np.array(self.radiance)
+
+
+@dataclass(frozen=True)
+class Preset:
+    """A gradient from bottom to top, and soft boxes."""
+
+    gradient: tuple[tuple[float, float], ...]  # sine of the elevation, rising; radiance, W·sr⁻¹·m⁻²
+    boxes: tuple[SoftBox, ...] = ()
+
+    def pixels(self) -> Doubles:
+        """Return the image (H, W, 3) of the environment, as `Environment` lays it out."""
+        directions = _directions()
+        heights, levels = np.array(self.gradient).T
+        place = np.clip(np.searchsorted(heights, directions[1]) - 1, 0, len(heights) - 2)
+        step = (directions[1] - heights[place]) / np.diff(heights)[place]
+        backdrop = levels[place] + np.diff(levels)[place] * smoothstep(step)
+        boxes = [box.radiance_at(directions) for box in self.boxes]
+        return sum(boxes, np.repeat(backdrop[:, :, None], 3, 2))
+
+    def ground_albedo(self) -> tuple[float, float, float]:
+        """Return the albedo of a level ground that is as bright as the gradient below the horizon."""
+        pixels, (_, up, _) = self.pixels(), _directions()
+        irradiance = (pixels * (np.maximum(up, 0) * _solid_angles())[:, :, None]).sum((0, 1))
+        red, green, blue = np.minimum(np.pi * self.gradient[0][1] / irradiance, MOST_GROUND).tolist()
+        return red, green, blue
+
+
+def smoothstep(x: Doubles) -> Doubles:
+    """Return 0 below 0, 1 above 1, and 3x² − 2x³ between them."""
+    x = np.clip(x, 0, 1)
+    return x * x * (3 - 2 * x)
+
+
+def _directions() -> Doubles:
+    """Return the unit directions (3, H, W) of the pixels' centers."""
+    polar = np.pi * (np.arange(HEIGHT) + 0.5)[:, None] / HEIGHT
+    azimuth = 2 * np.pi * (0.5 - (np.arange(WIDTH) + 0.5) / WIDTH)
+    level = np.ones(WIDTH)
+    return np.stack([np.sin(polar) * np.sin(azimuth), np.cos(polar) * level, np.sin(polar) * np.cos(azimuth)])
+
+
+def _solid_angles() -> Doubles:
+    """Return the solid angle of each pixel, (H, W) sr."""
+    edges = np.cos(np.pi * np.arange(HEIGHT + 1) / HEIGHT)
+    return np.repeat((edges[:-1] - edges[1:])[:, None] * (2 * np.pi / WIDTH), WIDTH, 1)
+
+
+def _tinted(radiance: float, warmth: float) -> tuple[float, float, float]:
+    return radiance * (1 + warmth), radiance, radiance * (1 - warmth)
+
+
+# A surface that faces the brightest side gets 0.9 to 1.1 times what an even environment of radiance 1
+# brings, so white keeps its shading. The camera of `Scene.framing_camera` sees none of the boxes.
+PRESETS = {
+    "studio": Preset(
+        ((-1, 0.1), (-0.4, 0.1), (0.12, 0.045), (0.95, 0.18)),
+        (
+            SoftBox(-62, 34, 60, 56, _tinted(4.4, 0.02)),  # key
+            SoftBox(75, 14, 64, 60, _tinted(1.05, -0.03)),  # fill
+            SoftBox(140, 34, 40, 40, _tinted(2.6, 0.0)),  # rim
+        ),
+    ),
+    "softbox": Preset(
+        ((-1, 0.09), (-0.4, 0.09), (0.12, 0.035), (1, 0.05)),
+        (SoftBox(-30, 52, 80, 70, _tinted(2.7, 0.01), feather=0.25),),
+    ),
+    "three_point": Preset(
+        ((-1, 0.1), (-0.4, 0.1), (0.12, 0.04), (1, 0.06)),
+        (
+            SoftBox(-45, 38, 26, 26, _tinted(17.0, 0.03)),  # key
+            SoftBox(55, 18, 34, 34, _tinted(3.2, -0.03)),  # fill
+            SoftBox(155, 42, 24, 24, _tinted(12.0, 0.0)),  # back
+        ),
+    ),
+    "cloudy": Preset(((-1, 0.1), (-0.35, 0.1), (0.12, 0.45), (1, 1.3))),
+}
+LIGHTINGS = (*PRESETS, "even")
+DEFAULT = "studio"
+STEEP = 1e-3  # sine between the view and the vertical below which a camera looks straight down
+
+
+def studio(
+    preset: str = DEFAULT, *, up: ArrayLike = (0, 1, 0), camera: Camera | None = None
+) -> list[Environment]:
+    """Return the lights of a preset, to be put into a `Scene`.
+
+    Parameters
+    ----------
+    preset
+        "studio": a large key light from the left, a weak fill from the right and a rim light from behind,
+        before a dark gray gradient. "softbox": one large light before a darker one. "three_point": key, fill
+        and back light, smaller, with harder shadows. "cloudy": an overcast sky, brightest overhead. "even":
+        the same from all around.
+    up
+        (3,) what is up in the scene.
+    camera
+        Left, right, front and behind are those of this camera. By default they are those of
+        `Scene.framing_camera`, from wherever the scene is then rendered: the light stays where it is while a
+        camera goes around the scene.
+
+    Returns
+    -------
+    list
+        One `Environment`. All light comes from infinitely far away, so that it suits scenes of any size.
+
+    Raises
+    ------
+    SceneError
+        If there is no such preset, or `up` is malformed or zero.
+    """
+    if preset not in LIGHTINGS:
+        raise SceneError(f"preset is {preset!r}; it must be one of {', '.join(LIGHTINGS)}")
+    axes = _axes(up, camera)
+    if preset == "even":
+        return [Environment(1.0)]
+    return [Environment(PRESETS[preset].pixels().astype(np.float32), transform=axes)]
+
+
+def check_lighting(lighting: str | None) -> None:
+    """Check what `render` was given as `lighting`.
+
+    Raises
+    ------
+    SceneError
+        If it is not the name of a preset, "auto" or None.
+    """
+    if lighting is not None and lighting not in ("auto", *LIGHTINGS):
+        known = ", ".join(LIGHTINGS)
+        raise SceneError(f"lighting is {lighting!r}; it must be auto, None or one of {known}")
+
+
+def choose_preset(scene: Scene, lighting: str | None) -> str | None:
+    """Return the preset that lights a scene; None for none.
+
+    "auto" is the default preset where nothing in the scene shines, with a warning, and none elsewhere.
+
+    Raises
+    ------
+    SceneError
+        If a preset was asked for and the scene has an `Environment`.
+    """
+    if lighting == "auto":
+        if scene.emits:
+            return None
+        _say_that_it_is_lit()
+        return DEFAULT
+    if lighting is not None and any(isinstance(light, Environment) for light in scene.lights):
+        raise SceneError(
+            f"lighting={lighting!r} brings an Environment, and the scene has one; at most one is allowed"
+        )
+    return lighting
+
+
+def _say_that_it_is_lit() -> None:
+    """Warn of the default light, from this line: Python shows a warning once for each line.
+
+    Where warnings are errors it is kept back: the default is documented and harms no picture.
+    """
+    with suppress(UserWarning):
+        warnings.warn(
+            f"the scene has no light; it is rendered with lighting={DEFAULT!r} "
+            f"(or choose {', '.join(name for name in LIGHTINGS if name != DEFAULT)}, or None for no light)",
+            stacklevel=1,
+        )
+
+
+def lighted(scene: Scene, preset: str | None, *, ground: bool = False, up: ArrayLike = (0, 1, 0)) -> Scene:
+    """Return the scene with the light of a preset, and with a ground; the scene itself stays as it is."""
+    if preset is None and not ground:
+        return scene
+    complete = copy(scene)  # keeps the accelerators of the last render
+    if preset is not None:
+        complete.lights = [*scene.lights, *studio(preset, up=up)]
+    if ground:
+        complete.shapes = [*scene.shapes, _ground(scene, preset, up)]
+    return complete
+
+
+def _ground(scene: Scene, preset: str | None, up: ArrayLike) -> Mesh:
+    """Return a level disk under a scene that fades out towards its rim.
+
+    Where it is not in shadow it is as bright as the lower half of the preset's environment, so that no edge
+    and no horizon shows.
+    """
+    low, high = scene.bounds
+    center, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
+    upward = _axes(up, None)[:, 1]
+    depth = float(np.abs(upward) @ (high - low)) / 2  # of the box's lowest corner under its middle
+    if preset is None:
+        albedo = (OWN_LIGHT_GROUND,) * 3
+    else:
+        albedo = PRESETS[preset].ground_albedo() if preset in PRESETS else (MOST_GROUND,) * 3
+    texels = np.linspace(-1, 1, 129)
+    rim = np.hypot(texels[:, None], texels)
+    alpha = smoothstep((1 - rim) / (1 - GROUND_FADE))
+    return Disk(
+        center - upward * depth * (1 + GROUND_GAP),
+        upward,
+        GROUND_REACH * radius,
+        material=Diffuse(albedo).with_alpha(Texture(alpha, channel=0, wrap="clamp")),
+        name="ground",
+    )
+
+
+def _axes(up: ArrayLike, camera: Camera | None) -> Doubles:
+    """Return the axes right, up and front of a studio, columns of (3, 3)."""
+    upward = finite_array("up", up, (3,))
+    if not np.linalg.norm(upward) > 0:
+        raise SceneError(f"up is {upward.tolist()}; it must not be zero")
+    upward = upward / np.linalg.norm(upward)
+    front = _turned_up(upward) @ FRAMING_VIEW if camera is None else camera.rotation[:, 2]
+    if camera is not None and np.linalg.norm(np.cross(upward, front)) < STEEP:
+        front = -camera.rotation[:, 1]  # a camera that looks down has its front at the lower edge
+    right = np.cross(upward, front)
+    right /= np.linalg.norm(right)
+    return np.stack([right, upward, np.cross(right, upward)], 1)
+
+
+def _turned_up(upward: Doubles) -> Doubles:
+    """Return the smallest rotation (3, 3) that turns y to `upward`."""
+    axis = np.cross((0.0, 1.0, 0.0), upward)
+    if upward[1] < -1 + 1e-9:
+        return np.diag([1.0, -1.0, -1.0])
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.asarray(np.eye(3) + cross + cross @ cross / (1 + upward[1]))
