@@ -138,6 +138,25 @@ def test_a_scene_without_light_is_rendered_with_a_warning(tmp_path, fast, capsys
     assert "wavefront: warning: the scene has no light" in capsys.readouterr().err
 
 
+def test_lighting_and_ground_are_handed_on(tmp_path, fast, capsys):
+    path = tmp_path / "dark.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    output, options = fast
+    scene = wf.load(path)
+    for arguments, settings in (
+        (["--lighting", "cloudy"], {"lighting": "cloudy"}),
+        (["--lighting", "even", "--ground"], {"lighting": "even", "ground": True}),
+    ):
+        assert main(["render", str(path), *options, *arguments]) == 0
+        picture = np.load(output)
+        scene.camera = scene.framing_camera(size=picture.shape[1::-1])
+        np.testing.assert_array_equal(picture, wf.render(scene, 2, **settings).rgb)
+    assert capsys.readouterr().err == ""
+    with pytest.raises(SystemExit):
+        main(["render", str(path), *options, "--lighting", "sunny"])
+    assert "lighting is 'sunny'; it must be auto, None or one of studio," in capsys.readouterr().err
+
+
 # --- Cameras ---------------------------------------------------------------------------------------
 
 

@@ -1,7 +1,6 @@
 """Every Python block of the README and the documents runs, and no link leads nowhere."""
 
 import re
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -33,9 +32,7 @@ def test_block_runs(document, line, code, tmp_path, monkeypatch):
 
     monkeypatch.setattr(wf, "render", quick)
     monkeypatch.chdir(tmp_path)
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="the scene has no light")
-        exec(compile("\n" * (line - 1) + code, str(document), "exec"), {"__name__": "__main__"})
+    exec(compile("\n" * (line - 1) + code, str(document), "exec"), {"__name__": "__main__"})
     for picture in tmp_path.iterdir():
         assert picture.stat().st_size > 100
 

@@ -17,6 +17,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 SHAPES = {  # the picture of --size 24, (height, width)
     "cornell_box": (24, 24),
     "course_spheres": (24, 24),
+    "default_look": (20, 24),
     "depth_of_field": (13, 24),
     "environment": (13, 24),
     "estimators": (24, 96),

@@ -11,7 +11,7 @@ from wavefront.lighting import LIGHTINGS, PRESETS, lighted
 
 CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 SIDES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-CUBE_PARTS = [np.s_[34:44, 18:34], np.s_[24:40, 48:49], np.s_[16:17, 32:48], np.s_[24:40, 54:60]]
+CUBE_PARTS = [np.s_[34:44, 18:34], np.s_[24:40, 48:49], np.s_[16:17, 38:46], np.s_[24:40, 54:60]]
 Z_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], float)  # takes y to z, and z to -y
 
 

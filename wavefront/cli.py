@@ -22,6 +22,7 @@ from .image import Image
 from .integrators import INTEGRATORS
 from .io.images import check_exposure, check_gamma, check_writable
 from .io.load import load
+from .lighting import DEFAULT, LIGHTINGS, check_lighting
 from .metrics import compare
 from .parallel import EXECUTORS
 from .render import DEFAULT_SPP, render
@@ -124,6 +125,14 @@ def _add_render(commands: Any) -> None:
     command.add_argument(
         "--size", type=_size, help="WIDTHxHEIGHT in pixels (default: the camera's, or 512x512)"
     )
+    command.add_argument(
+        "--lighting",
+        type=_lighting,
+        metavar="PRESET",
+        default="auto",
+        help=f"light to add: {', '.join(LIGHTINGS)}, none, or auto, which is {DEFAULT} where nothing shines",
+    )
+    command.add_argument("--ground", action="store_true", help="add a ground that catches the shadow")
     command.add_argument("--integrator", choices=INTEGRATORS, default="full", help="estimator of light")
     command.add_argument("--max-bounces", type=int, default=12, help="scattering events along a path")
     command.add_argument("--branches", type=int, default=1, help="ways a path goes on from its first surface")
@@ -164,6 +173,8 @@ def _render(options: argparse.Namespace) -> int:
         image = render(
             scene,
             options.spp,
+            lighting=options.lighting,
+            ground=options.ground,
             integrator=options.integrator,
             max_bounces=options.max_bounces,
             seed=options.seed,
@@ -281,6 +292,15 @@ def _fov(text: str) -> float:
     if not 0 < fov < 180:
         raise argparse.ArgumentTypeError(f"{text!r} is not above 0 and below 180 degrees")
     return fov
+
+
+def _lighting(text: str) -> str | None:
+    lighting = None if text == "none" else text
+    try:
+        check_lighting(lighting)
+    except SceneError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return lighting
 
 
 def _vector(text: str) -> tuple[float, float, float]:

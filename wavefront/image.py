@@ -23,9 +23,10 @@ class Image:
     spp
         Samples per pixel; the rounded mean where pixels differ.
     metadata
-        What was rendered and how: integrator, max_bounces, seed, sampler, filter, accelerator, workers,
-        executor, seconds (wall time), spp (mean over pixels), samples, rays, bad_samples, interrupted,
-        version (of this package), numpy, and noise (estimated relative error of the picture).
+        What was rendered and how: lighting (the preset that was added, or None), integrator, max_bounces,
+        seed, sampler, filter, accelerator, workers, executor, seconds (wall time), spp (mean over pixels),
+        samples, rays, bad_samples, interrupted, version (of this package), numpy, and noise (estimated
+        relative error of the picture).
     counts
         (H, W) int64 samples of each pixel.
     variance

@@ -117,8 +117,8 @@ PRESETS = {
     "studio": Preset(
         ((-1, 0.1), (-0.4, 0.1), (0.12, 0.045), (0.95, 0.18)),
         (
-            SoftBox(-62, 34, 60, 56, _tinted(4.4, 0.02)),  # key
-            SoftBox(75, 14, 64, 60, _tinted(1.05, -0.03)),  # fill
+            SoftBox(-62, 34, 60, 56, _tinted(4.6, 0.02)),  # key
+            SoftBox(75, 14, 64, 60, _tinted(1.1, -0.03)),  # fill
             SoftBox(140, 34, 40, 40, _tinted(2.6, 0.0)),  # rim
         ),
     ),
