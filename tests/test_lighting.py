@@ -200,6 +200,18 @@ def test_up_turns_the_light() -> None:
     np.testing.assert_allclose(turned, upright, atol=1e-4)
 
 
+def test_a_z_up_mesh_looks_as_the_same_mesh_with_y_up() -> None:
+    """By default, and on the ground."""
+    y_up = cube()
+    z_up = wf.Mesh(y_up.vertices @ Z_UP.T, y_up.faces)
+    for ground in (False, True):
+        upright, turned = (
+            wf.render(mesh, 64, size=(32, 32), up=up, ground=ground, progress=False).rgb
+            for mesh, up in ((y_up, "y"), (z_up, "z"))
+        )
+        assert np.abs(upright - turned).mean() < 0.01
+
+
 @pytest.mark.parametrize("origin", [(3, 1, 0), (0, 2, -5), (0, 5, 0.0)])
 def test_the_key_light_is_left_of_the_camera_that_is_given(origin) -> None:
     """And above; a camera that looks straight down has its front at the lower edge of the picture."""

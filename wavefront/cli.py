@@ -153,7 +153,7 @@ def _add_render(commands: Any) -> None:
         "--up",
         type=_up,
         metavar="X,Y,Z",
-        help="what is up in the picture, or an axis such as z, as in most stl and CAD files (default: y)",
+        help="what is up in the scene, or an axis such as z, as in most stl and CAD files (default: y)",
     )
     command.add_argument("--fov", type=_fov, help=f"vertical field of view, degrees (default: {FOV:g})")
     command.add_argument("--gamma", type=_gamma, default=2.2, help='for png and jpg: a number or "srgb"')
@@ -173,6 +173,7 @@ def _render(options: argparse.Namespace) -> int:
         image = render(
             scene,
             options.spp,
+            up=options.up,
             lighting=options.lighting,
             ground=options.ground,
             integrator=options.integrator,

@@ -16,16 +16,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .bsdfs import Diffuse
-from .camera import Camera
-from .errors import SceneError, finite_array
+from .camera import Camera, upward
+from .errors import SceneError
 from .lights import Environment
-from .scene import Scene
+from .scene import FRAMING_VIEW, Scene, turned_up
 from .shapes import Disk, Mesh
 from .textures import Texture
 
 Doubles = NDArray[np.float64]
-
-FRAMING_VIEW = (0.35, 0.3, 1.0)
 
 HEIGHT, WIDTH = 128, 256  # pixels of an environment's image
 GROUND_REACH = 6.0  # radius of the ground in radii of the scene
@@ -141,9 +139,7 @@ DEFAULT = "studio"
 STEEP = 1e-3  # sine between the view and the vertical below which a camera looks straight down
 
 
-def studio(
-    preset: str = DEFAULT, *, up: ArrayLike = (0, 1, 0), camera: Camera | None = None
-) -> list[Environment]:
+def studio(preset: str = DEFAULT, *, up: ArrayLike = "y", camera: Camera | None = None) -> list[Environment]:
     """Return the lights of a preset, to be put into a `Scene`.
 
     Parameters
@@ -154,7 +150,7 @@ def studio(
         and back light, smaller, with harder shadows. "cloudy": an overcast sky, brightest overhead. "even":
         the same from all around.
     up
-        (3,) what is up in the scene.
+        What is up in the scene: (3,), or the name of an axis, such as "z".
     camera
         Left, right, front and behind are those of this camera. By default they are those of
         `Scene.framing_camera`, from wherever the scene is then rendered: the light stays where it is while a
@@ -226,7 +222,7 @@ def _say_that_it_is_lit() -> None:
         )
 
 
-def lighted(scene: Scene, preset: str | None, *, ground: bool = False, up: ArrayLike = (0, 1, 0)) -> Scene:
+def lighted(scene: Scene, preset: str | None, *, ground: bool = False, up: ArrayLike = "y") -> Scene:
     """Return the scene with the light of a preset, and with a ground; the scene itself stays as it is."""
     if preset is None and not ground:
         return scene
@@ -246,8 +242,8 @@ def _ground(scene: Scene, preset: str | None, up: ArrayLike) -> Mesh:
     """
     low, high = scene.bounds
     center, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
-    upward = _axes(up, None)[:, 1]
-    depth = float(np.abs(upward) @ (high - low)) / 2  # of the box's lowest corner under its middle
+    vertical = turned_up(upward("up", up))[:, 1]
+    depth = float(np.abs(vertical) @ (high - low)) / 2  # of the box's lowest corner under its middle
     if preset is None:
         albedo = (OWN_LIGHT_GROUND,) * 3
     else:
@@ -256,8 +252,8 @@ def _ground(scene: Scene, preset: str | None, up: ArrayLike) -> Mesh:
     rim = np.hypot(texels[:, None], texels)
     alpha = smoothstep((1 - rim) / (1 - GROUND_FADE))
     return Disk(
-        center - upward * depth * (1 + GROUND_GAP),
-        upward,
+        center - vertical * depth * (1 + GROUND_GAP),
+        vertical,
         GROUND_REACH * radius,
         material=Diffuse(albedo).with_alpha(Texture(alpha, channel=0, wrap="clamp")),
         name="ground",
@@ -266,23 +262,11 @@ def _ground(scene: Scene, preset: str | None, up: ArrayLike) -> Mesh:
 
 def _axes(up: ArrayLike, camera: Camera | None) -> Doubles:
     """Return the axes right, up and front of a studio, columns of (3, 3)."""
-    upward = finite_array("up", up, (3,))
-    if not np.linalg.norm(upward) > 0:
-        raise SceneError(f"up is {upward.tolist()}; it must not be zero")
-    upward = upward / np.linalg.norm(upward)
-    front = _turned_up(upward) @ FRAMING_VIEW if camera is None else camera.rotation[:, 2]
-    if camera is not None and np.linalg.norm(np.cross(upward, front)) < STEEP:
-        front = -camera.rotation[:, 1]  # a camera that looks down has its front at the lower edge
-    right = np.cross(upward, front)
+    turn = turned_up(upward("up", up))
+    vertical = turn[:, 1]
+    front = turn @ FRAMING_VIEW if camera is None else camera.rotation[:, 2]
+    if np.linalg.norm(np.cross(vertical, front)) < STEEP and camera is not None:
+        front = -camera.rotation[:, 1] * np.sign(vertical @ front)  # its lower edge when it looks down
+    right = np.cross(vertical, front)
     right /= np.linalg.norm(right)
-    return np.stack([right, upward, np.cross(right, upward)], 1)
-
-
-def _turned_up(upward: Doubles) -> Doubles:
-    """Return the smallest rotation (3, 3) that turns y to `upward`."""
-    axis = np.cross((0.0, 1.0, 0.0), upward)
-    if upward[1] < -1 + 1e-9:
-        return np.diag([1.0, -1.0, -1.0])
-    x, y, z = axis
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.asarray(np.eye(3) + cross + cross @ cross / (1 + upward[1]))
+    return np.stack([right, vertical, np.cross(right, vertical)], 1)

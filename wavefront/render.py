@@ -87,8 +87,9 @@ def render(
         What bare meshes are made of: those of files and of trimesh, where it replaces what they say,
         (vertices, faces), and shapes that were given no material.
     up
-        What is up in the picture of a scene without a camera: a vector (3,), or the name of an axis, such
-        as "z" for most STL and CAD files; by default "y". It turns the light and the ground too.
+        What is up in the scene: a vector (3,), or the name of an axis, such as "z" for most STL and CAD
+        files; by default "y". It turns the camera that frames a scene without one, and the `lighting` and
+        the `ground`.
     lighting
         "studio", "softbox", "three_point", "cloudy" or "even": adds the light of that name, which
         `studio` describes, to the scene's own. "auto" adds "studio" where nothing shines, with a
@@ -174,7 +175,7 @@ def render(
         camera = seen.of(subject)
         draw = make_sampler(sampler, seed, camera.film[0])
         preset = choose_preset(subject, lighting)
-        complete = lighted(subject, preset, ground=ground, up="y" if seen.up is None else seen.up)
+        complete = lighted(subject, preset, ground=ground, up=seen.up)
         _warn_unseen_lights(complete, integrator)
         with phase("building the scene", progress):
             compiled = compile_scene(

@@ -39,6 +39,7 @@ from .suggestions import suggests_keywords
 from .uneven import Source, Uneven, is_uneven, mean_radiance
 from .vec import Bools, Floats, Ints, cross, f4, length
 
+FRAMING_VIEW = 0.35, 0.3, 1.0  # from the middle of a scene whose up is y to the camera that frames it
 AREA_LIGHTS = (RectangleLights, TwoSidedRectangleLights, TriangleLights, TwoSidedTriangleLights)
 
 
@@ -184,12 +185,12 @@ class Scene:
         """
         size = image_size(size)
         fov = field_of_view(fov)
-        turn = _turned_up(upward("up", up))
+        turn = turned_up(upward("up", up))
         low, high = self.bounds
         radius = float(np.linalg.norm(high - low)) / 2 or 1.0
         narrow = min(1.0, size[0] / size[1])
         half = np.arctan(np.tan(np.radians(fov) / 2) * narrow)
-        view = turn @ (0.35, 0.3, 1.0)
+        view = turn @ FRAMING_VIEW
         if direction is not None:
             view = finite_array("direction", direction, (3,))
             if not view.any():
@@ -317,7 +318,7 @@ def _check_environments(lights: Sequence[UserLight]) -> None:
         raise SceneError("the scene has more than one Environment; at most one is allowed")
 
 
-def _turned_up(up: NDArray[np.float64]) -> NDArray[np.float64]:
+def turned_up(up: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the shortest rotation (3, 3) that takes +y to the direction of `up` (3,)."""
     up = up / np.abs(up).max()
     up = up / np.linalg.norm(up)

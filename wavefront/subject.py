@@ -76,12 +76,12 @@ class View:
     size
         (width, height) in pixels, in place of the camera's.
     up
-        What is up in the picture of a scene without a camera.
+        What is up in the scene: it turns the camera that frames a scene without one, and ready-made light.
 
     Raises
     ------
     SceneError
-        If one is malformed, or there is a camera and an `up`.
+        If one is malformed.
     """
 
     camera: Camera | None
@@ -92,25 +92,13 @@ class View:
         if self.camera is not None and not isinstance(self.camera, Camera):
             raise SceneError(f"camera must be a wf.Camera, got {self.camera!r}")
         self.size = None if self.size is None else image_size(self.size)
-        self.up = None if self.up is None else upward("up", self.up)
-        if self.camera is not None and self.up is not None:
-            raise SceneError("up turns the camera that frames a scene; give it to the camera")
+        self.up = upward("up", "y" if self.up is None else self.up)
 
     def of(self, scene: Scene) -> Camera:
-        """Return the camera that sees the scene.
-
-        Raises
-        ------
-        SceneError
-            If an `up` is given for a scene that has a camera.
-        """
+        """Return the camera that sees the scene."""
         camera = self.camera or scene.camera
         if camera is None:
-            return scene.framing_camera(size=self.size or SIZE, up="y" if self.up is None else self.up)
-        if self.up is not None:
-            raise SceneError(
-                "up turns the camera that frames a scene; this one has a camera: set scene.camera = None"
-            )
+            return scene.framing_camera(size=self.size or SIZE, up=self.up)
         return camera if self.size is None else camera.resized(self.size)
 
 
