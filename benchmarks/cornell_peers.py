@@ -2,7 +2,7 @@
 
 python benchmarks/cornell_peers.py [--bpy-python PATH] [--prototype PATH] [--repeat 5]
 
-Needs `pip install wavefront[bench]`. Cycles joins when --bpy-python names a Python that has `bpy`
+Needs `pip install -e '.[bench]'`. Cycles joins when --bpy-python names a Python that has `bpy`
 installed; --prototype names a script with a function render(res=, spp=). 256x256, 64 spp, eight
 path edges, all cores, scene set-up and compilation left out.
 """

@@ -18,7 +18,7 @@ renders, one of each side, whose means are compared first. Printed are, for each
 - speed at that error relative to `llvm_ad_rgb independent`, warm, and cold with what comes once added.
 
 With `--keep FILE` results join those of earlier runs in that file, and the plot shows all of them, so
-that the scenes can be measured one at a time. Needs `pip install wavefront[bench]`, and for
+that the scenes can be measured one at a time. Needs `pip install -e '.[bench]'`, and for
 `llvm_ad_rgb` an LLVM library (DRJIT_LIBLLVM_PATH).
 """
 

@@ -5,7 +5,7 @@ python benchmarks/first_picture.py [--repeat 5]
 The picture is the Cornell box at 256x256 and 16 spp, Mitsuba's own for Mitsuba. Every run is a process
 of its own, the sides in turn; `llvm_ad_rgb` is measured with an empty cache of compiled kernels and with
 a full one.
-Needs `pip install wavefront[bench]` and an LLVM library (DRJIT_LIBLLVM_PATH).
+Needs `pip install -e '.[bench]'` and an LLVM library (DRJIT_LIBLLVM_PATH).
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 python benchmarks/vs_mitsuba.py --data DATA [--spp 256] [--size 400x300] [--out vs_mitsuba.png]
 
-Needs `pip install wavefront[bench]` and the scene's obj files in DATA/cornell. Prints the mean of
+Needs `pip install -e '.[bench]'` and the scene's obj files in DATA/cornell. Prints the mean of
 each channel on both sides, and writes ours, Mitsuba's and ten times their difference, in a row.
 """
 

@@ -581,7 +581,7 @@ def test_embree_that_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in ("embreex", "embreex.rtcore_scene", "embreex.mesh_construction"):
         monkeypatch.setitem(sys.modules, module, None)
     assert make_accelerator(geometry(), "auto").name == "numpy"
-    with pytest.raises(SceneError, match=r"pip install wavefront\[embree\]"):
+    with pytest.raises(SceneError, match=r"pip install embreex"):
         make_accelerator(geometry(), "embree")
 
 

@@ -467,7 +467,9 @@ def test_good_seeds_are_taken(seed):
 def test_unknown_names_are_refused():
     with pytest.raises(SceneError) as caught:
         make_sampler("halton")
-    assert str(caught.value) == "sampler is 'halton'; it must be one of 'sobol', 'bluenoise', 'independent'"
+    assert str(caught.value) == (
+        "sampler is 'halton'; it must be one of sobol, bluenoise, independent; did you mean 'sobol'?"
+    )
 
 
 @names

@@ -24,6 +24,7 @@ from .relief import BumpMap, NormalMap
 from .render import render
 from .scene import Scene
 from .shapes import Disk, Instance, Mesh, Rectangle, Shape, Sphere
+from .suggestions import did_you_mean
 from .textures import Texture
 from .version import VERSION
 from .vertex_colors import VertexColors
@@ -89,7 +90,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name not in _LATER:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        hint = did_you_mean(name, __all__) if not name.startswith("_") else ""
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}{hint}")
     module = import_module(_LATER[name], __name__)
     return module if name == "testing" else getattr(module, name)
 

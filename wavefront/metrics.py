@@ -57,7 +57,7 @@ def compare(a: Picture, b: Picture) -> Comparison:
     Rousselle, C. Knaus and M. Zwicker, Adaptive Sampling and Reconstruction using Greedy Error
     Minimization, 2011, there with a fixed ε for pictures in [0, 1].
 
-    FLIP needs the extra `wavefront[metrics]`. For two pictures of 8 bits it is LDR-FLIP, else
+    FLIP needs `pip install flip-evaluator`. For two pictures of 8 bits it is LDR-FLIP, else
     HDR-FLIP (P. Andersson et al., FLIP, 2020, and Visualizing Errors in Rendered High Dynamic Range
     Images, 2021).
 
@@ -133,7 +133,7 @@ def _flip(left: Doubles, right: Doubles, coded: bool) -> tuple[float | None, str
     try:
         from flip_evaluator import evaluate
     except ImportError:
-        return None, "not computed: needs the extra wavefront[metrics]"
+        return None, "not computed: pip install flip-evaluator"
     if right.max() <= 0:
         return None, "not computed: the reference is black"
     test, reference = (np.maximum(x, 0).astype(np.float32) for x in (left, right))

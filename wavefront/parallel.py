@@ -23,7 +23,7 @@ from typing import Any, Generic, Self, TypeVar
 from threadpoolctl import threadpool_limits
 
 from .crew import Crew, Stoppable, Threads
-from .errors import RenderError, SceneError
+from .errors import RenderError, SceneError, one_of
 from .shared import STOP, SharedNumber, Stopped
 
 Piece = TypeVar("Piece")
@@ -58,8 +58,8 @@ def choose_executor(executor: str | None, workers: int, paths: int) -> str:
     SceneError
         If the name is unknown, or processes are asked for where they cannot be had.
     """
-    if executor not in (None, *EXECUTORS):
-        raise SceneError(f"executor is {executor!r}; it must be one of {', '.join(EXECUTORS)}")
+    if executor is not None:
+        one_of("executor", executor, EXECUTORS)
     obstacle = _obstacle_to_processes()
     if executor == "processes" and obstacle:
         raise SceneError(f"executor is 'processes', but {obstacle}; use 'threads'")

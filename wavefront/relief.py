@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from .bsdfs.relief import Relief
 from .errors import SceneError, number
 from .state import Surface
+from .suggestions import suggests_keywords
 from .textures import UV_SETS, Texture
 from .vec import Floats, Ints, cross, dot, f4, highest, normalize
 
@@ -43,6 +44,7 @@ class NormalMap(Relief):
         strength is not finite.
     """
 
+    @suggests_keywords
     def __init__(self, image: Source, strength: float = 1.0) -> None:
         self.texture = image if isinstance(image, Texture) else Texture(image, srgb=False)
         self.strength = f4(number("NormalMap strength", strength))
@@ -97,6 +99,7 @@ class BumpMap(Relief):
         If the texture gives colours or is decoded from sRGB, or the height is not finite.
     """
 
+    @suggests_keywords
     def __init__(self, image: Source, height: float = 1.0) -> None:
         self.texture = (
             image if isinstance(image, Texture) else Texture(image, srgb=False, channel="luminance")

@@ -106,7 +106,7 @@ def render(
     sampler
         "sobol"; "bluenoise", whose error at few samples is even to the eye; or "independent".
     accel
-        Ray queries by "numpy", by "embree" (extra `wavefront[embree]`), or "auto".
+        Ray queries by "numpy", by "embree" (`pip install embreex`), or "auto".
     workers
         How many waves are traced at once; by default one per core.
     executor

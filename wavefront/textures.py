@@ -13,6 +13,7 @@ from .bsdfs.base import Spatial
 from .errors import SceneError, finite_array, one_of
 from .io.images import check_size, read_codes, srgb_to_linear
 from .state import Surface
+from .suggestions import suggests_keywords
 from .vec import Floats, Ints, f4
 
 Wrap: TypeAlias = Literal["repeat", "mirror", "clamp"]
@@ -55,6 +56,7 @@ class Texture(Spatial):
         If the file cannot be read, or an argument is malformed.
     """
 
+    @suggests_keywords
     def __init__(
         self,
         source: str | os.PathLike[str] | ArrayLike,

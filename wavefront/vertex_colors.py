@@ -8,6 +8,7 @@ from .bsdfs.base import Spatial
 from .bsdfs.parameter import Colour, colour, scalar
 from .errors import SceneError
 from .state import Surface
+from .suggestions import suggests_keywords
 from .vec import Floats
 
 
@@ -30,6 +31,7 @@ class VertexColors(Spatial):
         If `times` is out of range, or the channel is none of these.
     """
 
+    @suggests_keywords
     def __init__(self, times: Colour = 1.0, channel: int | None = None) -> None:
         if channel not in (None, 0, 1, 2, 3):
             raise SceneError(f"VertexColors channel is {channel!r}; it must be from 0 to 3, or None")

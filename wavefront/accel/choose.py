@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..errors import SceneError
+from ..errors import one_of
 from .base import Accelerator, Geometry
 from .embree import EmbreeAccelerator, installed
 from .stream import NumpyAccelerator
@@ -19,8 +19,7 @@ def make_accelerator(geometry: Geometry, accel: str) -> Accelerator:
     SceneError
         If the name is unknown, or Embree is asked for and not installed.
     """
-    if accel not in CHOICES:
-        raise SceneError(f"accel is {accel!r}; it must be one of {', '.join(CHOICES)}")
+    one_of("accel", accel, CHOICES)
     return EmbreeAccelerator(geometry) if engine(accel) == "embree" else NumpyAccelerator(geometry)
 
 

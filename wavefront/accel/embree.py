@@ -1,4 +1,4 @@
-"""Ray queries through Embree (the extra `wavefront[embree]`); spheres stay with NumPy."""
+"""Ray queries through Embree (package embreex); spheres stay with NumPy."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class EmbreeAccelerator:
             from embreex.rtcore_scene import EmbreeScene
         except ImportError as error:
             raise SceneError(
-                'accel="embree" needs embreex, which is not installed: pip install wavefront[embree]'
+                'accel="embree" needs embreex, which is not installed: pip install embreex'
             ) from error
         triangles = np.ascontiguousarray(geometry.triangles, f4)
         with np.errstate(all="ignore"):

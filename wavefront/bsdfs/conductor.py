@@ -6,7 +6,8 @@ from typing import Self
 
 import numpy as np
 
-from ..errors import SceneError
+from ..errors import one_of
+from ..suggestions import suggests_keywords
 from ..vec import Floats, alike
 from .base import Bsdf, BsdfSample, weigh
 from .fresnel import fresnel_conductor
@@ -30,6 +31,7 @@ METALS = {
     "silver": ((0.0554, 0.0547, 0.0427), (4.2931, 3.5430, 2.5346)),
     "titanium": ((2.7159, 2.5119, 2.2270), (3.7912, 3.4042, 2.9994)),
 }
+SPELLINGS = {"aluminum": "aluminium", "chrome": "chromium"}
 
 
 class Conductor(Bsdf):
@@ -54,6 +56,7 @@ class Conductor(Bsdf):
         If a parameter is out of its range or not finite.
     """
 
+    @suggests_keywords
     def __init__(self, eta: Colour, k: Colour, roughness: Scalar = 0.0) -> None:
         self.eta = colour("Conductor eta", eta, MAX_INDEX, above_zero=True)
         self.k = colour("Conductor k", k, MAX_INDEX)
@@ -61,18 +64,17 @@ class Conductor(Bsdf):
         self.specular = is_smooth(self.roughness)
 
     @classmethod
+    @suggests_keywords
     def named(cls, name: str, roughness: Scalar = 0.0) -> Self:
-        """Return the metal `name`: one of `METALS`, such as "gold".
+        """Return the metal `name`: one of `METALS`, such as "gold", in capitals or not.
 
         Raises
         ------
         SceneError
             If the name is not known, listing those that are.
         """
-        known = METALS.get(name)
-        if known is None:
-            raise SceneError(f"Conductor name is {name!r}; it must be one of {', '.join(METALS)}")
-        return cls(*known, roughness)
+        key = name.lower() if isinstance(name, str) else name
+        return cls(*METALS[one_of("Conductor name", SPELLINGS.get(key, key), METALS)], roughness)
 
     def f(self, wo: Floats, wi: Floats) -> Floats:
         """Return F·D·G/(4·cosθo·cosθi), (3, n); 0 for a mirror."""

@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 
 from ..state import Surface
+from ..suggestions import suggests_keywords
 from ..vec import Floats, alike, dot, f4
 from .base import Bsdf, BsdfSample, Spatial, weigh
 from .fresnel import fresnel_dielectric
@@ -55,6 +56,7 @@ class Dielectric(Bsdf):
     transmissive = True
     dimensions = 3
 
+    @suggests_keywords
     def __init__(
         self,
         ior: Scalar = 1.5,

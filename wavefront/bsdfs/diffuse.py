@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
+from ..suggestions import suggests_keywords
 from ..vec import Floats, alike, f4
 from .base import Bsdf, BsdfSample
 from .parameter import Colour, colour
@@ -28,6 +29,7 @@ class Diffuse(Bsdf):
         If the reflectance is outside [0, 1] or not finite.
     """
 
+    @suggests_keywords
     def __init__(self, reflectance: Colour = 0.5) -> None:
         self.reflectance = colour("Diffuse reflectance", reflectance)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..suggestions import suggests_keywords
 from ..vec import Floats
 from .base import Bsdf, BsdfSample
 from .parameter import Colour, colour
@@ -26,6 +27,7 @@ class Mirror(Bsdf):
 
     specular = True
 
+    @suggests_keywords
     def __init__(self, reflectance: Colour = 1.0) -> None:
         self.reflectance = colour("Mirror reflectance", reflectance)
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import SceneError
 from ..state import Surface
+from ..suggestions import suggests_keywords
 from ..vec import Floats, f4
 from .base import Bsdf, BsdfSample, weigh
 from .parameter import Scalar, scalar
@@ -38,6 +39,7 @@ class Mix(Bsdf):
 
     dimensions = 3
 
+    @suggests_keywords
     def __init__(self, first: Bsdf, second: Bsdf, weight: Scalar = 0.5) -> None:
         for name, value in (("first", first), ("second", second)):
             if not isinstance(value, Bsdf):

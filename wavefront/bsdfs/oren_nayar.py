@@ -6,6 +6,7 @@ import numpy as np
 
 from ..errors import SceneError
 from ..sampling.warp import cosine_hemisphere_pdf
+from ..suggestions import suggests_keywords
 from ..vec import Floats, dot, f4
 from .base import Bsdf, Spatial
 from .microfacet import INV_PI
@@ -41,6 +42,7 @@ class OrenNayar(Bsdf):
         If a parameter is out of its range or not finite.
     """
 
+    @suggests_keywords
     def __init__(
         self, reflectance: Colour = 0.5, sigma: Scalar = 0.5, *, energy_preserving: bool = False
     ) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..state import Surface
+from ..suggestions import suggests_keywords
 from ..vec import Bools, Floats, alike, dot, f4, luminance
 from .albedo import gloss_tables, lookup
 from .base import Bsdf, BsdfSample, Spatial, weigh
@@ -88,6 +89,7 @@ class Principled(Bsdf):
     dimensions = 3
     inside: Bools | None = None  # (n,) wo is inside; unbound, it is outside
 
+    @suggests_keywords
     def __init__(
         self,
         base_color: Colour = 0.8,

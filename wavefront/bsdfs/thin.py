@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..suggestions import suggests_keywords
 from ..vec import Floats, dot, f4
 from .base import Bsdf, BsdfSample, weigh
 from .fresnel import fresnel_dielectric
@@ -38,6 +39,7 @@ class ThinDielectric(Bsdf):
     transmissive = True
     dimensions = 3
 
+    @suggests_keywords
     def __init__(
         self,
         ior: Scalar = 1.5,

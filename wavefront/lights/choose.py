@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SceneError
+from ..errors import one_of
 from ..sampling.mis import power_heuristic
 from ..vec import ALL, Floats, Ints, Lanes, columns, f4, put
 from .base import Light, LightSample
@@ -56,8 +56,7 @@ class LightTable:
         self, power: NDArray[np.float64], half_size: NDArray[np.float64], choice: str
     ) -> LightChoice | None:
         """Return the choice by name; None when nothing shines. Lights without a power take no part."""
-        if choice not in CHOICES:
-            raise SceneError(f"light_choice is {choice!r}; it must be one of {', '.join(CHOICES)}")
+        one_of("light_choice", choice, CHOICES)
         if not power.any():
             return None
         if not power.all():

@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SceneError
+from ..errors import SceneError, one_of
 from ..state import Words
 from ..vec import Floats, f4
 
@@ -204,8 +204,7 @@ def make_sampler(name: str, seed: int = 0, width: int = 1) -> Sampler:
     SceneError
         If there is no such sampler, or the seed is out of range.
     """
-    if name not in SAMPLERS:
-        raise SceneError(f"sampler is {name!r}; it must be one of {', '.join(map(repr, SAMPLERS))}")
+    one_of("sampler", name, SAMPLERS)
     if name == "bluenoise":
         return BlueNoiseSampler(seed, width)
     return SobolSampler(seed) if name == "sobol" else IndependentSampler(seed)
