@@ -20,7 +20,7 @@ from ..progress import Progress, phase
 from ..scene import Scene
 from ..shapes import Mesh
 from ..shapes.transform import moved, moved_tangents
-from . import gltf, mtl, obj, ply, stl, trimesh_view, visuals
+from . import dae, gltf, mtl, obj, off, ply, stl, threemf, trimesh_view, visuals
 from .appearance import Look, dress, is_faint
 from .files import beside, decode, read_bytes
 from .gltf_materials import Materials
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     import trimesh
 
 BARE = ("obj", "ply")  # files whose materials may lack a colour, where trimesh makes a grey one up
-EXTENSIONS = (".obj", ".ply", ".stl", ".glb", ".gltf")
+EXTENSIONS = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off", ".dae", ".3mf")
 PathLike = str | os.PathLike[str]
 T = TypeVar("T")
 
@@ -43,7 +43,9 @@ def load(
     progress: Progress = None,
     max_instances: int = MAX_INSTANCES,
 ) -> Scene:
-    """Read a scene: .obj (with its .mtl), .ply, .stl, .glb, .gltf.
+    """Read a scene: .obj (with its .mtl), .ply, .stl, .glb, .gltf, .off, .dae, .3mf.
+
+    The last two need the packages of the extra `formats`: `pip install pycollada lxml networkx`.
 
     A mesh that several nodes of a glTF file have is read once, and becomes an `Instance` for each.
 
@@ -199,7 +201,8 @@ def _contents(
     if extension not in EXTENSIONS:
         raise SceneError(f"{name}: extension {extension!r} is not one of {', '.join(EXTENSIONS)}")
     data = read_bytes(path)
-    _refuse(name, data)
+    if extension != ".3mf":
+        _refuse(name, data)
     try:
         if extension == ".obj":
             return name, _once(_read_obj(path, data, strict, materials))
@@ -207,7 +210,13 @@ def _contents(
             return name, _read_gltf(path, data, strict, materials, max_instances)
         if extension == ".stl":
             return name, _once(stl.parse(name, data, strict))
-        return name, _read_ply(path, data, strict, materials)
+        if extension == ".ply":
+            return name, _read_ply(path, data, strict, materials)
+        if extension == ".off":
+            return name, _from_trimesh(off.parse(name, data, strict, materials), name, strict)
+        if extension == ".dae":
+            return name, _from_trimesh(dae.parse(path, data, strict, materials), name, strict)
+        return name, _from_trimesh(threemf.parse(name, data, strict, materials), name, strict)
     except MemoryError as error:
         raise SceneError(f"{name}: does not fit in memory") from error
 

@@ -10,16 +10,14 @@ import os
 import re
 from collections.abc import Iterator
 from dataclasses import replace
-from io import BytesIO
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
-from .files import beside, read_bytes
 from .headers import SIZES, TYPES, Element, check_ply, ply_textures, unread
-from .images import decode_codes
+from .reading import Images, by_trimesh
 from .repair import warn
 
 FACES = ("face", "tristrips")
@@ -34,8 +32,6 @@ def parse(path: str | os.PathLike[str], data: bytes, strict: bool, materials: bo
     SceneError
         Naming the file, and the line of a text.
     """
-    import trimesh
-
     name = os.fspath(path)
     elements = check_ply(name, data)
     lost = unread(elements)
@@ -45,34 +41,13 @@ def parse(path: str | os.PathLike[str], data: bytes, strict: bool, materials: bo
         elements = [faces]
     if lost and materials:
         warn(f"{name}: not honoured: {', '.join(dict.fromkeys(lost))}", strict)
-    image = _texture(path, data, strict) if materials else {}
-    files = trimesh.resolvers.ZipResolver({key: BytesIO(content) for key, content in image.items()})
-    try:
-        with np.errstate(all="ignore"):
-            found = trimesh.load_scene(
-                BytesIO(data), file_type="ply", process=False, resolver=files, skip_materials=not image
-            )
-    except MemoryError:
-        raise
-    except Exception as error:
-        raise SceneError(f"{name}: not a readable ply file: {error!r}") from error
-    return found, sum(element.count for element in elements if element.name == "face")
-
-
-def _texture(path: str | os.PathLike[str], data: bytes, strict: bool) -> dict[str, bytes]:
-    """Return the image of a PLY file by its name, none if it has none; of several, trimesh knows the last."""
-    name, textures = os.fspath(path), ply_textures(data)
-    if len(textures) > 1:
+    textures = ply_textures(data)
+    if len(textures) > 1 and materials:
         warn(f"{name}: not honoured: several textures; {textures[-1]!r} is taken for all faces", strict)
-    for texture in textures[-1:]:
-        file = beside(path, texture)
-        if not os.path.exists(file):
-            warn(f"{name}: texture {texture!r} is missing", strict)
-            continue
-        content = read_bytes(file)
-        decode_codes(content, f"{name}: texture {texture!r}")  # for its messages: trimesh passes over errors
-        return {texture: content}
-    return {}
+    images = Images(path)
+    found = by_trimesh(name, data, "ply", images, skip_materials=not (textures and materials))
+    images.report(strict)
+    return found, sum(element.count for element in elements if element.name == "face")
 
 
 def _with_triangles(name: str, data: bytes, elements: list[Element]) -> tuple[bytes, Element | None]:

@@ -1,0 +1,87 @@
+"""COLLADA (.dae) by trimesh and pycollada, after a look at what the file refers to.
+
+Positions are as they are written: trimesh applies neither `up_axis` nor `unit`.
+"""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from io import BytesIO
+from typing import Any
+
+from ..errors import SceneError
+from .markup import check_expanded, look_through, need, total
+from .reading import Images, by_trimesh
+from .repair import warn
+
+LOST = ("instance_controller", "instance_light", "instance_camera", "lines", "linestrips", "animation")
+PRIMITIVES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
+PLACES = ("node", "visual_scene", "scene")  # elements that hold nodes, or refer to them
+
+
+def parse(path: str | os.PathLike[str], data: bytes, strict: bool, materials: bool) -> Any:
+    """Return the trimesh scene of a COLLADA file.
+
+    Raises
+    ------
+    SceneError
+        If pycollada is missing, or naming the file and what is wrong in it.
+    """
+    name = os.fspath(path)
+    need(name, ".dae", ("collada", "pycollada"))
+    if zipfile.is_zipfile(BytesIO(data)):  # one may stand behind other bytes
+        raise SceneError(f"{name}: is an archive; unpack it first")
+    document = _Document(name, data)
+    check_expanded(name, document.children, document.sizes, "scene")
+    if document.lost and materials:
+        listed = ", ".join(f"{tag} (line {line})" for tag, line in document.lost.items())
+        warn(f"{name}: not honoured: {listed}", strict)
+    images = Images(path)
+    found = by_trimesh(name, data, "dae", images)
+    if materials:
+        images.report(strict)
+    # pycollada leaves out what is broken, and says nothing
+    there = total(name, document.children, lambda node: document.primitives.get(node, 0), "scene")
+    absent = there - len(found.graph.nodes_geometry)
+    if there and absent == there:
+        raise SceneError(f"{name}: not a readable dae file: all parts of its geometry are damaged")
+    if absent > 0:
+        warn(f"{name}: left out {absent} of {there} parts of its geometry, which are damaged", strict)
+    return found
+
+
+class _Document:
+    """What the nodes of a file hold and refer to, and what is not read."""
+
+    def __init__(self, name: str, data: bytes) -> None:
+        self.children: dict[str, list[str]] = {}
+        self.sizes: dict[str, int] = {}  # bytes of the geometries
+        self.primitives: dict[str, int] = {}  # how many there are in each geometry
+        self.lost: dict[str, int] = {}  # tag -> first line
+        self._inside: list[str] = []
+        self._geometry = ("", 0)
+        self._data = data
+        look_through(name, data, self._begin, self._end)
+
+    def _begin(self, tag: str, attributes: dict[str, str], at: int) -> None:
+        if tag in LOST:
+            self.lost.setdefault(tag, self._data.count(b"\n", 0, at) + 1)
+        if tag in PLACES:
+            key = "scene" if tag == "scene" else "#" + attributes.get("id", f" {at}")
+            if self._inside:
+                self.children.setdefault(self._inside[-1], []).append(key)
+            self._inside.append(key)
+        elif tag.startswith("instance_") and self._inside:
+            self.children.setdefault(self._inside[-1], []).append(attributes.get("url", ""))
+        elif tag == "geometry":
+            self._geometry = "#" + attributes.get("id", ""), at
+        elif tag in PRIMITIVES and attributes.get("count") != "0":
+            self.primitives[self._geometry[0]] = self.primitives.get(self._geometry[0], 0) + 1
+
+    def _end(self, tag: str, at: int) -> None:
+        if tag in PLACES:
+            self._inside.pop()
+        elif tag == "geometry":
+            key, begin = self._geometry
+            self.sizes[key] = max(self.sizes.get(key, 0), at - begin)

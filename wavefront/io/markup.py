@@ -1,0 +1,108 @@
+"""XML files, looked through before a library reads them: no entities, a limit to what they multiply to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from importlib.util import find_spec
+from xml.parsers import expat
+
+from ..errors import SceneError
+
+MAX_DEPTH = 128  # of nodes in nodes
+MAX_EXPANDED = 2**31  # bytes of a file with every reference replaced by what it refers to
+NODE_BYTES = 2**11  # what a node counts for at least; it bounds how many there are
+
+
+def look_through(
+    name: str,
+    data: bytes,
+    begin: Callable[[str, dict[str, str], int], None],
+    end: Callable[[str, int], None] = lambda tag, at: None,
+) -> None:
+    """Call `begin` with the tag, the attributes and the byte of every element, and `end` at its end.
+
+    Tags and attributes come without namespaces.
+
+    Raises
+    ------
+    SceneError
+        If the file is not well formed, or has a document type: it could define entities, which multiply
+        or name other files.
+    """
+    parser = expat.ParserCreate(namespace_separator=" ")
+
+    def refuse(*_: object) -> None:
+        raise SceneError(
+            f"{name} line {parser.CurrentLineNumber}: has a document type; such files are refused"
+        )
+
+    def start_element(tag: str, attributes: dict[str, str]) -> None:
+        bare = {key.rpartition(" ")[2]: value for key, value in attributes.items()}
+        begin(tag.rpartition(" ")[2], bare, parser.CurrentByteIndex)
+
+    parser.StartDoctypeDeclHandler = refuse
+    parser.StartElementHandler = start_element
+    parser.EndElementHandler = lambda tag: end(tag.rpartition(" ")[2], parser.CurrentByteIndex)
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError as error:
+        raise SceneError(f"{name}: not a readable file: {error}") from error
+
+
+def check_expanded(name: str, children: Mapping[str, list[str]], sizes: Mapping[str, int], root: str) -> None:
+    """Check what a file grows to when each node is put where others refer to it; arguments as of `total`.
+
+    Raises
+    ------
+    SceneError
+        If it is too large, too deep, or a node holds itself.
+    """
+    size = total(name, children, lambda node: sizes.get(node, 0) + NODE_BYTES, root)
+    if size > MAX_EXPANDED:
+        raise SceneError(
+            f"{name}: its nodes refer to each other so often that they stand for {size} bytes; "
+            f"the limit is {MAX_EXPANDED}"
+        )
+
+
+def total(name: str, children: Mapping[str, list[str]], own: Callable[[str], int], root: str) -> int:
+    """Return the sum over all nodes, each as often as others refer to it.
+
+    Parameters
+    ----------
+    name
+        File name, for messages.
+    children
+        The nodes that each node refers to or holds; one may occur several times.
+    own
+        What a node counts for.
+    root
+        The node to begin with.
+
+    Raises
+    ------
+    SceneError
+        If the nodes are too deep, or a node holds itself.
+    """
+    known: dict[str, int] = {}
+
+    def below(node: str, above: tuple[str, ...]) -> int:
+        if node in above:
+            raise SceneError(f"{name}: node {node!r} holds itself")
+        if len(above) >= MAX_DEPTH:
+            raise SceneError(f"{name}: its nodes are nested deeper than {MAX_DEPTH}")
+        if node not in known:
+            parts = (below(child, (*above, node)) for child in children.get(node, []))
+            known[node] = own(node) + sum(parts)
+        return known[node]
+
+    return below(root, ())
+
+
+def need(name: str, kind: str, *packages: tuple[str, str]) -> None:
+    """Raise a SceneError that says what to install if a package (module, name to install) is missing."""
+    missing = [install for module, install in packages if find_spec(module) is None]
+    if missing:
+        raise SceneError(
+            f"{name}: reading {kind} needs {' and '.join(missing)}: pip install {' '.join(missing)}"
+        )

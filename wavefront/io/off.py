@@ -1,0 +1,73 @@
+"""OFF by trimesh, after a check of its text: trimesh passes over what is too short, and over colors."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..errors import SceneError
+from .files import decode
+from .reading import by_trimesh
+from .repair import warn
+
+HEADERS = {"OFF": [], "COFF": ["colors of vertices"], "NOFF": ["normals"], "STOFF": ["texture coordinates"]}
+
+
+def parse(name: str, data: bytes, strict: bool, materials: bool) -> Any:
+    """Return the trimesh scene of an OFF file.
+
+    Raises
+    ------
+    SceneError
+        Naming the file and the line.
+    """
+    lines = [line.partition("#")[0].split() for line in decode(data).split("\n")]
+    rows = [(number, words) for number, words in enumerate(lines, 1) if words]
+    header = rows[0][1][0].upper() if rows else ""
+    if header not in HEADERS:
+        raise SceneError(f"{name}: begins with {header[:20]!r}; it must be one of {', '.join(HEADERS)}")
+    rows[0] = (rows[0][0], rows[0][1][1:])
+    if not rows[0][1]:
+        del rows[0]
+    (vertices, faces), rows = _counts(name, rows), rows[1:]
+    if len(rows) < vertices + faces:
+        raise SceneError(f"{name}: claims {vertices} vertices and {faces} faces; {len(rows)} lines are there")
+    for number, words in rows[:vertices]:
+        if len(words) < 3 or not all(map(_is_number, words[:3])):
+            raise SceneError(f"{name} line {number}: vertex is {' '.join(words)!r}; it must be 3 numbers")
+    for number, words in rows[vertices : vertices + faces]:
+        _check_face(name, number, words, vertices)
+    lost = list(HEADERS[header])
+    if any(len(words) > int(words[0]) + 1 for _, words in rows[vertices : vertices + faces]):
+        lost.append("colors of faces")
+    if lost and materials:
+        warn(f"{name}: not honoured: {', '.join(lost)}", strict)
+    # the counts and the rows that they cover: what follows is none of trimesh's concern
+    text = [f"OFF\n{vertices} {faces} 0", *(" ".join(words) for _, words in rows[: vertices + faces])]
+    return by_trimesh(name, "\n".join(text).encode(), "off")
+
+
+def _counts(name: str, rows: list[tuple[int, list[str]]]) -> tuple[int, int]:
+    number, words = rows[0] if rows else (1, [])
+    if len(words) < 2 or not all(
+        word.isdecimal() and word.isascii() and len(word) < 18 for word in words[:2]
+    ):
+        raise SceneError(f"{name} line {number}: counts are {' '.join(words)!r}; they must be whole numbers")
+    return int(words[0]), int(words[1])
+
+
+def _check_face(name: str, number: int, words: list[str], vertices: int) -> None:
+    where, text = f"{name} line {number}: face", " ".join(words[:9])
+    count = int(words[0]) if words[0].isdecimal() and words[0].isascii() and len(words[0]) < 18 else 0
+    if count < 3 or len(words) <= count:
+        raise SceneError(f"{where} is {text!r}; it must be a count of at least 3 and as many indices")
+    for word in words[1 : count + 1]:
+        if not (word.isdecimal() and word.isascii() and len(word) < 18 and int(word) < vertices):
+            raise SceneError(f"{where} uses vertex {word}; it must be in [0, {vertices - 1}]")
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return word.isascii() and "_" not in word

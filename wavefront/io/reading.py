@@ -1,0 +1,97 @@
+"""Files by trimesh's loaders: errors become SceneErrors, and images come only from the file's own folder."""
+
+from __future__ import annotations
+
+import os
+from io import BytesIO
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+
+from ..errors import SceneError
+from .files import beside, read_bytes
+from .images import decode_codes
+from .repair import warn
+
+
+class Images:
+    """The images beside a file, for trimesh, which itself passes over missing and broken ones."""
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = path
+        self.missing: list[str] = []
+        self.error: SceneError | None = None
+
+    def get(self, reference: str) -> bytes:
+        """Return the content of an image, after checking that it can be decoded."""
+        try:
+            file = beside(self.path, reference)
+            if not os.path.exists(file):
+                file = beside(self.path, unquote(reference))
+            if os.path.exists(file):
+                content = read_bytes(file)
+                decode_codes(content, f"{os.fspath(self.path)}: texture {reference!r}")
+                return content
+        except SceneError as error:
+            self.error = self.error or error
+            raise
+        self.missing.append(reference)
+        raise FileNotFoundError(reference)
+
+    def report(self, strict: bool) -> None:
+        """Announce the images that are missing; raise the first error that trimesh passed over."""
+        if self.error is not None:
+            raise self.error
+        for name in dict.fromkeys(self.missing):
+            warn(f"{os.fspath(self.path)}: texture {name!r} is missing", strict)
+
+
+def by_trimesh(name: str, data: bytes, kind: str, images: Any = None, skip_materials: bool = False) -> Any:
+    """Return the trimesh scene that a file holds, as it is written: nothing merged or dropped.
+
+    Parameters
+    ----------
+    name
+        File name, for messages.
+    data
+        The file.
+    kind
+        Its extension, without the dot.
+    images
+        Where trimesh gets other files from.
+    skip_materials
+        As of trimesh's loaders of kinds that have it.
+
+    Raises
+    ------
+    SceneError
+        For whatever trimesh raises, except that memory is short.
+    """
+    import trimesh
+
+    options: dict[str, Any] = {"skip_materials": True} if skip_materials else {}
+    try:
+        with np.errstate(all="ignore"):
+            if kind == "dae":
+                return _unprocessed(trimesh.exchange.dae.load_collada(BytesIO(data), images))
+            return trimesh.load_scene(
+                BytesIO(data), file_type=kind, process=False, resolver=images, **options
+            )
+    except (MemoryError, SceneError):
+        raise
+    except Exception as error:
+        raise SceneError(f"{name}: not a readable {kind} file: {error!r}") from error
+
+
+def _unprocessed(loaded: dict[str, Any]) -> Any:
+    """Build the scene that trimesh's loader of COLLADA describes; `load_scene` would merge its vertices."""
+    import trimesh
+
+    scene = trimesh.Scene()
+    scene.geometry.update(
+        {key: trimesh.Trimesh(**mesh, process=False) for key, mesh in loaded["geometry"].items()}
+    )
+    for node in loaded["graph"]:
+        scene.graph.update(**node)
+    return scene
