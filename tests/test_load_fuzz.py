@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from test_load_gltf import Builder
+from gltf_builder import Builder
 
 from wavefront.errors import SceneError
 from wavefront.io.images import read_image, write_image

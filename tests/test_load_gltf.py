@@ -1,10 +1,7 @@
 """glTF: geometry, nodes, materials, textures, lights and cameras, on small files written here."""
 
-import base64
 import inspect
-import io
 import json
-import struct
 import time
 import warnings
 from pathlib import Path
@@ -14,6 +11,7 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 import trimesh
+from gltf_builder import TRIANGLE, Builder
 
 from wavefront import Camera, Scene, render
 from wavefront.bsdfs import Dielectric, Diffuse, Principled, ThinDielectric
@@ -28,79 +26,6 @@ from wavefront.textures import Texture
 from wavefront.vertex_colors import VertexColors
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
-TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
-CODES = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
-TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
-
-
-class Builder:
-    """Writes the smallest glTF that says what a test needs."""
-
-    def __init__(self):
-        self.json = {
-            "asset": {"version": "2.0"},
-            "scene": 0,
-            "scenes": [{"nodes": [0]}],
-            "nodes": [{"mesh": 0}],
-        }
-        self.json |= {"accessors": [], "bufferViews": [], "meshes": []}
-        self.binary = b""
-
-    def view(self, data, **extra):
-        self.json["bufferViews"].append(
-            {"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(data), **extra}
-        )
-        self.binary += data + bytes(-len(data) % 4)
-        return len(self.json["bufferViews"]) - 1
-
-    def accessor(self, values, **extra):
-        values = np.asarray(values)
-        values = values[:, None] if values.ndim == 1 else values
-        item = {
-            "componentType": CODES[values.dtype.name],
-            "count": len(values),
-            "type": TYPES[values.shape[1]],
-        }
-        self.json["accessors"].append({"bufferView": self.view(values.tobytes()), **item, **extra})
-        return len(self.json["accessors"]) - 1
-
-    def mesh(self, attributes=None, indices=None, **part):
-        attributes = {"POSITION": TRIANGLE} if attributes is None else attributes
-        part = {
-            "attributes": {k: v if isinstance(v, int) else self.accessor(v) for k, v in attributes.items()}
-        } | part
-        if indices is not None:
-            part["indices"] = self.accessor(indices)
-        self.json["meshes"].append({"primitives": [part]})
-        return self
-
-    def image(self, codes):
-        """Add a PNG as a texture and return its number."""
-        data = io.BytesIO()
-        iio.imwrite(data, codes, extension=".png")
-        images = self.json.setdefault("images", [])
-        images.append({"bufferView": self.view(data.getvalue()), "mimeType": "image/png"})
-        textures = self.json.setdefault("textures", [])
-        textures.append({"source": len(images) - 1})
-        return {"index": len(textures) - 1}
-
-    def material(self, **material):
-        """Add a textured triangle with a material."""
-        self.json["materials"] = [material]
-        return self.mesh({"POSITION": TRIANGLE, "TEXCOORD_0": TRIANGLE[:, :2]}, material=0)
-
-    def gltf(self, path):
-        uri = "data:application/octet-stream;base64," + base64.b64encode(self.binary).decode()
-        path.write_text(json.dumps(self.json | {"buffers": [{"byteLength": len(self.binary), "uri": uri}]}))
-        return path
-
-    def glb(self, path):
-        text = json.dumps(self.json | {"buffers": [{"byteLength": len(self.binary)}]}).encode()
-        text += b" " * (-len(text) % 4)
-        body = struct.pack("<I4s", len(text), b"JSON") + text
-        body += struct.pack("<I4s", len(self.binary), b"BIN\0") + self.binary
-        path.write_bytes(b"glTF" + struct.pack("<II", 2, 12 + len(body)) + body)
-        return path
 
 
 @pytest.fixture
@@ -448,7 +373,7 @@ def test_orthographic_camera(build, path):
     assert direction[:, 0] == pytest.approx([0, 0, -1])
 
 
-@pytest.mark.parametrize("scale", [1e-200, 1e200])
+@pytest.mark.parametrize("scale", [1e-200, 1e90])
 def test_a_scale_of_its_node_has_no_say_for_a_camera(build, path, scale):
     """Not even one whose square is no number."""
     build.json["nodes"] += [{"camera": 0, "scale": [scale] * 3}]
@@ -1274,7 +1199,14 @@ def broken(**changes):
         (broken(nodes__0__children=[0]), r"nodes\[0\] is reached twice; nodes must form a tree"),
         (broken(nodes__0__scale=[1, 2]), r"nodes\[0\]\.scale is \[1, 2\]; it must be 3 finite numbers"),
         (broken(nodes__0__translation=[1, 2, float("nan")]), r"nodes\[0\]\.translation"),
-        (broken(nodes__0__matrix=[0] * 16), r"last row|faces of zero area|has no faces"),
+        (
+            broken(nodes__0__matrix=[0] * 16),
+            r"a\.gltf: nodes\[0\]\.matrix has the last row \[0\.0, 0\.0, 0\.0, 0\.0\]",
+        ),
+        (
+            broken(nodes__0__scale=[1, 1e101, 1]),
+            r"nodes\[0\]: its matrix to the scene has an element .* above 1e\+100",
+        ),
         (broken(nodes=5), r"a\.gltf"),
         (broken(nodes__0=None), r"nodes\[0\] is not an object"),
         (broken(accessors__0__count=4), r"accessors\[0\] has 4 elements, which its buffer view cannot hold"),

@@ -3,9 +3,9 @@
 import imageio.v3 as iio
 import numpy as np
 import pytest
+from gltf_builder import Builder
 from scenes import ALBEDO, ALL, BLACK, EYE, HERE, floor, panel, polygon_irradiance, probe
 from significance import SIDE, assert_mean, assert_same_images, measure, render, repeat
-from test_load_gltf import Builder
 
 import wavefront as wf
 from wavefront.accel import make_accelerator

@@ -499,3 +499,21 @@ def test_with_relief_leaves_the_material_alone():
     assert type(carved) is wf.Principled
     assert repr(STRONG).startswith("NormalMap(<Texture 'array': 64 × 64>")
     assert repr(STEEP).startswith("BumpMap(")
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (
+            lambda: wf.NormalMap(np.ones((1, 1, 3)), 1e10),
+            r"NormalMap strength is 1\d+\.0; it must be finite, and at most 1e\+09",
+        ),
+        (
+            lambda: wf.BumpMap(np.ones((1, 1)), -1e31),
+            r"BumpMap height is -1e\+31; it must be finite, and at most 1e\+30",
+        ),
+    ],
+)
+def test_sizes_that_float32_cannot_work_with_are_refused(make, message):
+    with pytest.raises(wf.SceneError, match=message):
+        make()

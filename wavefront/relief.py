@@ -21,6 +21,8 @@ Source: TypeAlias = str | os.PathLike[str] | ArrayLike | Texture
 # the fields of Surface that belong together
 TANGENTS = {"uv": "tangents", "uv1": "tangents1"}
 AXES = {"uv": "axes", "uv1": "axes1"}
+MAX_STRENGTH = 1e9  # of a normal map; a larger one turns every normal into the surface
+MAX_HEIGHT = 1e30  # of a bump map, scene units
 
 
 class NormalMap(Relief):
@@ -41,13 +43,20 @@ class NormalMap(Relief):
     ------
     SceneError
         If the texture gives numbers, is decoded from sRGB or has a singular transform, or the
-        strength is not finite.
+        strength is not finite or of a size above 1e9.
     """
 
     @suggests_keywords
     def __init__(self, image: Source, strength: float = 1.0) -> None:
         self.texture = image if isinstance(image, Texture) else Texture(image, srgb=False)
-        self.strength = f4(number("NormalMap strength", strength))
+        self.strength = f4(
+            number(
+                "NormalMap strength",
+                strength,
+                lambda x: abs(x) <= MAX_STRENGTH,
+                f"finite, and at most {MAX_STRENGTH:g}",
+            )
+        )
         if self.texture.scalar or self.texture.channels < 3:
             raise SceneError(f"NormalMap: {self.texture!r} gives numbers; it must give three channels")
         _check_plain("NormalMap", self.texture)
@@ -96,7 +105,8 @@ class BumpMap(Relief):
     Raises
     ------
     SceneError
-        If the texture gives colours or is decoded from sRGB, or the height is not finite.
+        If the texture gives colours or is decoded from sRGB, or the height is not finite or of a
+        size above 1e30.
     """
 
     @suggests_keywords
@@ -104,7 +114,14 @@ class BumpMap(Relief):
         self.texture = (
             image if isinstance(image, Texture) else Texture(image, srgb=False, channel="luminance")
         )
-        self.height = f4(number("BumpMap height", height))
+        self.height = f4(
+            number(
+                "BumpMap height",
+                height,
+                lambda x: abs(x) <= MAX_HEIGHT,
+                f"finite, and at most {MAX_HEIGHT:g}",
+            )
+        )
         if not self.texture.scalar:
             raise SceneError(f"BumpMap: {self.texture!r} gives colours; choose one by channel=")
         _check_plain("BumpMap", self.texture)

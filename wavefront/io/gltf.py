@@ -100,7 +100,7 @@ def _add_others(document: Document, out: Contents, node: Node) -> None:
 
 def _add_camera(document: Document, out: Contents, index: Any, matrix: Matrix) -> None:
     if out.camera is not None:
-        document.lose("further cameras", f"cameras[{index}]")
+        document.lose("further cameras", f"cameras[{shown(index)}]")
         return
     camera = document.get("cameras", index)
     with document.inside(f"cameras[{index}]"):
@@ -175,7 +175,8 @@ def punctual_light(light: dict[str, Any], matrix: Matrix) -> DirectionalLight | 
         If a value is malformed or out of range.
     """
     colour = floats("color", light.get("color", [1, 1, 1]), 3)
-    strength = colour * floats("intensity", [light.get("intensity", 1)], 1)
+    with np.errstate(over="ignore"):
+        strength = colour * floats("intensity", [light.get("intensity", 1)], 1)
     place, forward = matrix[:3, 3], -matrix[:3, 2]
     match light.get("type"):
         case "point":

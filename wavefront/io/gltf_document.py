@@ -33,6 +33,7 @@ COMPONENTS: dict[int, type[np.generic]] = {
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 MAX_ELEMENTS = 2**28  # in one accessor, whatever backs it
 MAX_NUMBERS = 2**29  # in all accessors that are read, as several meshes may share one
+MAX_COUNT = 2**53  # of bytes or elements: up to here JSON's numbers are whole everywhere
 LARGEST = float(np.finfo(np.float64).max)
 SHOWN = 80  # characters of a value in a message
 # what reading JSON of the wrong shape raises: a list for a number, text for a list
@@ -101,9 +102,10 @@ class Document:
     def count(self, where: str, item: dict[str, Any], key: str) -> int:
         """Return a number of bytes or elements, 0 by default; `where` names the item."""
         value = item.get(key, 0)
-        if not isinstance(value, int) or isinstance(value, bool) or value < 0:
+        if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= MAX_COUNT:
             raise SceneError(
                 f"{self.name}: {where}.{key} is {shown(value)}; it must be a whole number, at least 0"
+                + (f" and at most {MAX_COUNT}" if isinstance(value, int) and value > 0 else "")
             )
         return value
 
@@ -168,7 +170,7 @@ class Document:
         count = self.count(where, item, "count")
         if kind is None or width is None:
             raise SceneError(
-                f"{self.name}: {where} is {item.get('type')!r} of {item.get('componentType')!r}, "
+                f"{self.name}: {where} is {shown(item.get('type'))} of {shown(item.get('componentType'))}, "
                 "which glTF does not have"
             )
         if count * width > MAX_ELEMENTS:

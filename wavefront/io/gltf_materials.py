@@ -16,7 +16,7 @@ from ..relief import NormalMap
 from ..textures import Texture
 from .appearance import Look, realise
 from .files import MAX_PIXELS
-from .gltf_document import Document, floats
+from .gltf_document import SHOWN, Document, floats, shown
 from .gltf_specular_glossiness import F0, BesideSpecular
 from .images import decode_codes
 
@@ -59,8 +59,8 @@ class Materials:
 
     def look(self, index: int) -> Look:
         """Return what material `index` looks like."""
+        item = self._document.get("materials", index)
         if index not in self._looks:
-            item = self._document.get("materials", index)
             where = f"materials[{index}]" + (f" {item['name']!r}" if "name" in item else "")
             with self._document.inside(where):
                 look = self._looks[index] = _Reader(self, item, where).look()
@@ -72,7 +72,7 @@ class Materials:
         """Return a texture for a texture-info object of the JSON, None if its image file is missing."""
         document = self._document
         if not isinstance(info, dict):
-            raise SceneError(f"{document.name}: {where} is {info!r}; it must be an object")
+            raise SceneError(f"{document.name}: {where} is {shown(info)}; it must be an object")
         item = document.get("textures", info.get("index"))
         if "source" not in item:
             listed = ", ".join(item.get("extensions", {})) or "nothing"
@@ -247,7 +247,7 @@ class _Reader:
         mode = self._item.get("alphaMode", "OPAQUE")
         if mode not in ("OPAQUE", "MASK", "BLEND"):
             raise SceneError(
-                f"{self._file}: {self._where}.alphaMode is {mode!r}; it must be OPAQUE, MASK or BLEND"
+                f"{self._file}: {self._where}.alphaMode is {shown(mode)}; it must be OPAQUE, MASK or BLEND"
             )
         if mode == "OPAQUE":
             return
@@ -350,12 +350,14 @@ class _Reader:
 
 
 def _check_extensions(document: Document) -> None:
-    for name in document.json.get("extensionsRequired", []):
-        if name not in KNOWN and name != "KHR_materials_unlit":
-            raise SceneError(f"{document.name}: requires {name}, which is not read")
-    for name in document.json.get("extensionsUsed", []):
-        if name not in KNOWN:
-            document.lose(name, "the file")
+    with document.inside("extensionsRequired"):
+        for name in document.json.get("extensionsRequired", []):
+            if name not in KNOWN and name != "KHR_materials_unlit":
+                raise SceneError(f"{document.name}: requires {str(name)[:SHOWN]}, which is not read")
+    with document.inside("extensionsUsed"):
+        for name in document.json.get("extensionsUsed", []):
+            if name not in KNOWN:
+                document.lose(name, "the file")
 
 
 def _wrap(sampler: dict[str, Any], key: str) -> Any:

@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import SceneError
-from .gltf_document import Document, Matrix, table
+from .gltf_document import Document, Matrix, shown, table
 from .gltf_meshes import attribute
+from .placing import MAX_ELEMENT, in_range
 from .repair import wide
 
+TOO_LARGE = f"has an element whose size is above {MAX_ELEMENT:g}"
 INSTANCE_ATTRIBUTES: dict[str, list[float]] = {  # what an instance without it has
     "TRANSLATION": [0, 0, 0],
     "ROTATION": [0, 0, 0, 1],
@@ -44,14 +46,7 @@ def walk(document: Document) -> list[Node]:
     SceneError
         If a node is missing or malformed, is reached twice, or lies outside the range of numbers.
     """
-    if "scenes" in document.json:
-        scene = document.get("scenes", document.json.get("scene", 0))
-        roots = scene.get("nodes", [])
-    else:
-        nodes = document.json.get("nodes", [])
-        children = {child for node in nodes for child in node.get("children", [])}
-        roots = [i for i in range(len(nodes)) if i not in children]
-    stack = [(index, -1, 0) for index in roots]
+    stack = [(index, -1, 0) for index in _roots(document)]
     seen: set[int] = set()
     indices: list[int] = []
     found: list[dict[str, Any]] = []
@@ -74,10 +69,24 @@ def walk(document: Document) -> list[Node]:
         parents.append(parent)
         depths.append(depth)
     matrices = _to_scene(_local(document, indices, found), np.array(parents, np.intp), np.array(depths))
-    bad = np.flatnonzero(~np.isfinite(matrices).all((1, 2)))
+    bad = np.flatnonzero(~in_range(matrices))
     if bad.size:
-        raise SceneError(f"{document.name}: nodes[{indices[bad[0]]}]: its matrix to the scene is not finite")
+        raise SceneError(f"{document.name}: nodes[{indices[bad[0]]}]: its matrix to the scene {TOO_LARGE}")
     return [Node(*each) for each in zip(indices, found, matrices, strict=True)]
+
+
+def _roots(document: Document) -> list[Any]:
+    """Return the numbers of the nodes that have no parent in the default scene."""
+    if "scenes" in document.json:
+        index = document.json.get("scene", 0)
+        roots = document.get("scenes", index).get("nodes", [])
+        if not isinstance(roots, list):
+            raise SceneError(f"{document.name}: scenes[{index}].nodes is {shown(roots)}; it must be a list")
+        return roots
+    with document.inside("nodes"):
+        nodes = document.json.get("nodes", [])
+        children = {child for node in nodes for child in node.get("children", [])}
+        return [i for i in range(len(nodes)) if i not in children]
 
 
 def _to_scene(local: Matrix, parents: np.ndarray, depths: np.ndarray) -> Matrix:
@@ -146,9 +155,9 @@ def placements(document: Document, node: Node, count: int) -> Matrix:
             raise SceneError(f"{where} has {name}[{bad[0]}] {value}; it must be finite")
     with np.errstate(over="ignore", invalid="ignore"):
         matrices = node.matrix @ _composed(*parts)
-    bad = np.flatnonzero(~np.isfinite(matrices).all((1, 2)))
+    bad = np.flatnonzero(~in_range(matrices))
     if bad.size:
-        raise SceneError(f"{where}: the matrix of instance {bad[0]} to the scene is not finite")
+        raise SceneError(f"{where}: the matrix of instance {bad[0]} to the scene {TOO_LARGE}")
     return matrices
 
 

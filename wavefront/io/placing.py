@@ -14,6 +14,7 @@ from ..shapes.transform import moved, moved_tangents
 from .repair import Raw, build
 
 MAX_INSTANCES = 2**20  # meshes that the nodes of a file place, unless the user allows more
+MAX_ELEMENT = 1e100  # of a matrix: larger ones have no squares
 MAX_COPIES = 2**14  # meshes that cannot be instances, as their matrices are singular
 MAX_COPIED_FACES = 2**25  # triangles in copies of meshes, where every place gets a mesh of its own
 
@@ -52,6 +53,7 @@ def place_shapes(name: str, raws: list[Raw], places: Places, strict: bool) -> li
     SceneError
         As from `build`, or if too many meshes would have to be copied.
     """
+    _check_range(name, raws, places)
     shapes: list[Mesh | Instance | None] = [None] * len(places.raw)
     copies = 0
     for raw, at in _by_mesh(raws, places):
@@ -79,6 +81,7 @@ def place_shapes(name: str, raws: list[Raw], places: Places, strict: bool) -> li
 
 def place_meshes(name: str, raws: list[Raw], places: Places, strict: bool) -> list[Mesh]:
     """Build a mesh of its own for each place; arguments and errors as of `place_shapes`."""
+    _check_range(name, raws, places)
     sizes = np.array([len(raw.faces) for raw in raws], np.int64)
     total = int(sizes.take(places.raw).sum())
     if total > sizes.sum() + MAX_COPIED_FACES:
@@ -96,6 +99,21 @@ def moved_raw(raw: Raw, matrix: Matrix) -> Raw:
     vertices, faces, normals = moved(matrix, raw.vertices, raw.faces, raw.normals)
     tangents = moved_tangents(matrix, raw.tangents)
     return replace(raw, vertices=vertices, faces=faces, normals=normals, tangents=tangents)
+
+
+def in_range(matrices: Matrix) -> NDArray[np.bool_]:
+    """Return which matrices (n, 4, 4) have only elements that can be worked with, (n,); NaN is none."""
+    return np.asarray((np.abs(matrices) <= MAX_ELEMENT).all((1, 2)))
+
+
+def _check_range(name: str, raws: list[Raw], places: Places) -> None:
+    bad = np.flatnonzero(~in_range(places.matrix))
+    if bad.size:
+        element = np.abs(places.matrix[bad[0]]).max()
+        raise SceneError(
+            f"{name}: {raws[places.raw[bad[0]]].name!r} is placed by a matrix with an element of size "
+            f"{element:g}; it must be at most {MAX_ELEMENT:g}"
+        )
 
 
 def _by_mesh(raws: list[Raw], places: Places) -> list[tuple[Raw, NDArray[np.intp]]]:
