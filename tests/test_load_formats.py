@@ -180,6 +180,13 @@ def test_what_is_not_read_of_dae_is_named(write, image):
         load_meshes(path, strict=True)
 
 
+def test_opacity_of_dae_is_named(write, image):
+    pytest.importorskip("collada")
+    clear = "</diffuse><transparent><color>1 1 1 0.5</color></transparent>"
+    with pytest.warns(UserWarning, match=r"a\.dae: not honoured: opacity of materials$"):
+        load_meshes(write(dae().replace("</diffuse>", clear), "a.dae"))
+
+
 def test_damaged_parts_of_dae_are_announced(write, image):
     pytest.importorskip("collada")
     data = dae()

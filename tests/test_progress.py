@@ -6,7 +6,8 @@ import time
 import pytest
 
 from wavefront import progress as module
-from wavefront.io import load as loading
+from wavefront.io import readers
+from wavefront.io.load import load, load_mesh
 from wavefront.progress import DELAY, Bar, phase
 
 
@@ -100,7 +101,7 @@ def test_short_phases_and_silent_ones_show_nothing(monkeypatch, capsys) -> None:
     assert not calls
 
 
-@pytest.mark.parametrize("load", [loading.load, loading.load_mesh])
+@pytest.mark.parametrize("load", [load, load_mesh])
 @pytest.mark.parametrize("progress", [None, False])
 def test_loading_is_a_phase(load, progress, tmp_path, monkeypatch, capsys) -> None:
     """Only its name is shown, not the folder."""
@@ -111,7 +112,7 @@ def test_loading_is_a_phase(load, progress, tmp_path, monkeypatch, capsys) -> No
         time.sleep(0.3)
         return (tmp_path / "a.obj").read_bytes()
 
-    monkeypatch.setattr(loading, "read_bytes", slow)
+    monkeypatch.setattr(readers, "read_bytes", slow)
     load(tmp_path / "a.obj", progress=progress)
     shown = capsys.readouterr().err
     assert ("loading a.obj: 00:00" in shown) == (progress is None)

@@ -12,8 +12,8 @@ from typing import Any
 
 from ..errors import SceneError
 from .markup import check_expanded, look_through, need, total
-from .reading import Images, by_trimesh
 from .repair import warn
+from .trimesh_loading import Images, by_trimesh
 
 LOST = ("instance_controller", "instance_light", "instance_camera", "lines", "linestrips", "animation")
 PRIMITIVES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
@@ -34,11 +34,13 @@ def parse(path: str | os.PathLike[str], data: bytes, strict: bool, materials: bo
         raise SceneError(f"{name}: is an archive; unpack it first")
     document = _Document(name, data)
     check_expanded(name, document.children, document.sizes, "scene")
-    if document.lost and materials:
-        listed = ", ".join(f"{tag} (line {line})" for tag, line in document.lost.items())
-        warn(f"{name}: not honoured: {listed}", strict)
     images = Images(path)
     found = by_trimesh(name, data, "dae", images)
+    lost = [f"{tag} (line {line})" for tag, line in document.lost.items()]
+    if any(map(_is_clear, found.geometry.values())):
+        lost.append("opacity of materials")
+    if lost and materials:
+        warn(f"{name}: not honoured: {', '.join(lost)}", strict)
     if materials:
         images.report(strict)
     # pycollada leaves out what is broken, and says nothing
@@ -49,6 +51,11 @@ def parse(path: str | os.PathLike[str], data: bytes, strict: bool, materials: bo
     if absent > 0:
         warn(f"{name}: left out {absent} of {there} parts of its geometry, which are damaged", strict)
     return found
+
+
+def _is_clear(mesh: Any) -> bool:
+    color = getattr(getattr(mesh.visual, "material", None), "baseColorFactor", None)
+    return color is not None and bool(color[3] < 255)
 
 
 class _Document:

@@ -6,8 +6,8 @@ from typing import Any
 
 from ..errors import SceneError
 from .files import decode
-from .reading import by_trimesh
 from .repair import warn
+from .trimesh_loading import by_trimesh
 
 HEADERS = {"OFF": [], "COFF": ["colors of vertices"], "NOFF": ["normals"], "STOFF": ["texture coordinates"]}
 

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from .headers import SIZES, TYPES, Element, check_ply, ply_textures, unread
-from .reading import Images, by_trimesh
 from .repair import warn
+from .trimesh_loading import Images, by_trimesh
 
 FACES = ("face", "tristrips")
 ORDERS: dict[str, Literal["little", "big"]] = {"<": "little", ">": "big"}

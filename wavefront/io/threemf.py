@@ -11,8 +11,8 @@ from typing import Any
 
 from ..errors import SceneError
 from .markup import check_expanded, look_through, need
-from .reading import by_trimesh
 from .repair import warn
+from .trimesh_loading import by_trimesh
 
 MAX_MEMBERS = 2**12
 MAX_UNPACKED = 2**30  # bytes

@@ -1,0 +1,53 @@
+"""Several meshes made one."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..bsdfs import Bsdf
+from ..errors import SceneError, finite_array
+from ..shapes import Mesh
+from ..shapes.transform import moved, moved_tangents
+from .repair import Raw, build
+
+
+def join(
+    meshes: list[Mesh], name: str, material: Bsdf | None = None, transform: ArrayLike | None = None
+) -> Mesh:
+    """Return one mesh with the triangles of all.
+
+    Raises
+    ------
+    SceneError
+        If there are several materials and `material` does not say which to use.
+    """
+    if material is None and len({id(mesh.material) for mesh in meshes}) > 1:
+        raise SceneError(f"{name}: has {len(meshes)} materials; pass one, or use wf.load")
+    matrix = np.eye(4) if transform is None else finite_array("transform", transform, (4, 4))
+    if np.linalg.det(matrix) == 0:
+        raise SceneError("transform is singular; it must be invertible")
+    starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
+    vertices = np.concatenate([mesh.vertices for mesh in meshes])
+    faces = np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts[:-1], strict=True)])
+    normals = _joined([mesh.normals for mesh in meshes])
+    raw = Raw(name, *moved(matrix, vertices, faces, normals))
+    raw.uvs = _joined([mesh.uvs for mesh in meshes])
+    raw.uvs1 = _joined([mesh.uvs1 for mesh in meshes])
+    raw.tangents = moved_tangents(matrix, _joined([mesh.tangents for mesh in meshes]))
+    raw.colors = _joined([mesh.colors for mesh in meshes])
+    raw.material = meshes[0].material if material is None else material
+    if material is None:
+        glow = meshes[0].emission
+        raw.emission = glow[:, 0] if isinstance(glow, np.ndarray) else glow
+        raw.two_sided = meshes[0].two_sided
+    mesh = build(name, raw)
+    if mesh is None:
+        raise SceneError(f"{name}: transform leaves no face with an area")
+    return mesh
+
+
+def _joined(parts: list[np.ndarray | None]) -> np.ndarray | None:
+    """Concatenate what every part has."""
+    there = [part for part in parts if part is not None]
+    return np.concatenate(there) if len(there) == len(parts) else None

@@ -1,0 +1,145 @@
+"""The kinds of files that are read, and what reads each."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import SceneError
+from . import dae, gltf, mtl, obj, off, ply, stl, threemf, trimesh_objects, visuals
+from .appearance import Look, dress
+from .contents import Contents
+from .files import beside, decode, read_bytes
+from .gltf_materials import Materials
+from .placing import MAX_INSTANCES
+from .repair import warn
+
+PathLike = str | os.PathLike[str]
+
+
+@dataclass(frozen=True)
+class Wish:
+    """How a file is to be read."""
+
+    strict: bool = False  # refuse what would be repaired or left out
+    materials: bool = True  # what the meshes are made of counts
+    max_instances: int = MAX_INSTANCES  # meshes that the nodes of a file may place
+
+
+def read(path: PathLike, wish: Wish) -> Contents:
+    """Read a file of any kind.
+
+    Raises
+    ------
+    SceneError
+        Naming the file, the line or element, the value and the limit.
+    """
+    name = os.fspath(path)
+    extension = Path(name).suffix.lower()
+    if extension not in READERS:
+        raise SceneError(f"{name}: extension {extension!r} is not one of {', '.join(READERS)}")
+    data = read_bytes(path)
+    if extension not in ARCHIVES:
+        _refuse(name, data)
+    try:
+        return READERS[extension](path, data, wish)
+    except MemoryError as error:
+        raise SceneError(f"{name}: does not fit in memory") from error
+
+
+def _refuse(name: str, data: bytes) -> None:
+    """Refuse files that are empty, or archives under another name."""
+    if not data:
+        raise SceneError(f"{name}: is empty")
+    if data[:4] in (b"PK\x03\x04", b"PK\x05\x06") or data[:2] == b"\x1f\x8b":
+        raise SceneError(f"{name}: is an archive; unpack it first")
+
+
+def _read_gltf(path: PathLike, data: bytes, wish: Wish) -> Contents:
+    document = gltf.Document(path, data)
+    with document.inside("the file"):
+        found = gltf.contents(document, wish.max_instances)
+        looks = Materials(document)
+        for raw, number in found.raws:
+            # without a material, the mesh is as plain as in memory
+            if wish.materials and not dress(raw, None if number is None else looks.look(number)):
+                document.lose("vertex colours", f"mesh {raw.name!r}")
+    if document.lost and wish.materials:
+        listed = ", ".join(f"{what} ({where})" for what, where in document.lost.items())
+        warn(f"{document.name}: not honoured: {listed}", wish.strict)
+    return Contents([raw for raw, _ in found.raws], found.places, found.lights, found.camera)
+
+
+def _read_obj(path: PathLike, data: bytes, wish: Wish) -> Contents:
+    name, strict, materials = os.fspath(path), wish.strict, wish.materials
+    parsed = obj.parse(name, decode(data), strict)
+    if parsed.ignored:
+        listed = ", ".join(f"{keyword} (line {line})" for keyword, line in parsed.ignored.items())
+        warn(f"{name}: not honoured: {listed}", strict)
+    looks = _libraries(path, parsed.libraries, strict) if materials else {}
+    for raw in parsed.raws:
+        raw.colors = None if raw.colors is None else visuals.from_srgb(raw.colors)
+        if materials and not dress(raw, looks.get(raw.name)):
+            warn(f"{name}: not honoured: vertex colours (material {raw.name!r})", strict)
+    absent = ", ".join(repr(raw.name) for raw in parsed.raws if raw.name and raw.name not in looks)
+    if looks and absent:
+        warn(f"{name}: not in its material files: {absent}", strict)
+    if materials and absent and not parsed.libraries:
+        warn(f"{name}: names no material file for its materials {absent}", strict)
+    return Contents.once(parsed.raws)
+
+
+def _libraries(path: PathLike, libraries: list[str], strict: bool) -> dict[str, Look]:
+    """Read the material files; a missing one is announced and left out."""
+    looks: dict[str, Look] = {}
+    for library in dict.fromkeys(libraries):
+        file = beside(path, library)
+        if not os.path.exists(file):  # False, too, for names that no file can have
+            warn(f"{os.fspath(path)}: material file {library!r} is missing", strict)
+            continue
+        looks.update(mtl.looks(mtl.parse(file, decode(read_bytes(file)), strict), strict))
+    return looks
+
+
+def _read_ply(path: PathLike, data: bytes, wish: Wish) -> Contents:
+    name = os.fspath(path)
+    found, claimed = ply.parse(path, data, wish.strict, wish.materials)
+    contents = trimesh_objects.read(found, name, wish.strict)
+    faces = sum(len(raw.faces) for raw in contents.raws)
+    if faces < claimed:
+        raise SceneError(f"{name}: claims {claimed} of face; {faces} can be read")
+    return contents
+
+
+def _read_stl(path: PathLike, data: bytes, wish: Wish) -> Contents:
+    return Contents.once(stl.parse(os.fspath(path), data, wish.strict))
+
+
+def _read_off(path: PathLike, data: bytes, wish: Wish) -> Contents:
+    name = os.fspath(path)
+    return trimesh_objects.read(off.parse(name, data, wish.strict, wish.materials), name, wish.strict)
+
+
+def _read_dae(path: PathLike, data: bytes, wish: Wish) -> Contents:
+    found = dae.parse(path, data, wish.strict, wish.materials)
+    return trimesh_objects.read(found, os.fspath(path), wish.strict)
+
+
+def _read_3mf(path: PathLike, data: bytes, wish: Wish) -> Contents:
+    name = os.fspath(path)
+    return trimesh_objects.read(threemf.parse(name, data, wish.strict, wish.materials), name, wish.strict)
+
+
+READERS: dict[str, Callable[[PathLike, bytes, Wish], Contents]] = {
+    ".obj": _read_obj,
+    ".ply": _read_ply,
+    ".stl": _read_stl,
+    ".glb": _read_gltf,
+    ".gltf": _read_gltf,
+    ".off": _read_off,
+    ".dae": _read_dae,
+    ".3mf": _read_3mf,
+}
+ARCHIVES = (".3mf",)  # kinds that are archives by themselves
