@@ -11,17 +11,15 @@ from __future__ import annotations
 import multiprocessing
 import os
 import sys
-import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
 from concurrent.futures import wait as wait_for_futures
 from concurrent.futures.process import BrokenProcessPool
 from types import TracebackType
-from typing import Any, Generic, Self, TypeVar
+from typing import Generic, Self, TypeVar
 
-from threadpoolctl import threadpool_limits
-
+from .blas import reserve_buffers, single_threaded_blas
 from .crew import Crew, Stoppable, Threads
 from .errors import RenderError, SceneError, one_of
 from .shared import STOP, SharedNumber, Stopped
@@ -181,43 +179,17 @@ class Workers(Generic[Piece, Result]):
         self._running.extend((each, self._submit(each)) for each in again)
 
     def _submit(self, piece: Piece) -> Future[Result]:
-        if self._crew is None:
-            self._crew = self._start()
-        return self._crew.submit(piece)
+        try:
+            if self._crew is None:
+                self._crew = self._start()
+            return self._crew.submit(piece)
+        except (RuntimeError, OSError) as error:  # a limit of threads, processes or memory
+            raise RenderError(f"a worker cannot be started: {error}; use fewer workers") from error
 
     def _start(self) -> Crew:
         if self._executor == "threads":
+            reserve_buffers(self._count)
             return Threads(self._work, self._count, self._stop)
         from .processes import Processes  # here, because not every system can fork
 
         return Processes(self._work, self._count, self._stop)
-
-
-class _SingleThreadedBlas:
-    """Holds BLAS to one thread for as long as anybody needs that.
-
-    The number of BLAS's threads is one for the whole process. With a limit for each render, that of two
-    overlapping ones that ends last would restore what it had found, which is the other's limit.
-    """
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._users = 0
-        self._limits: Any = None
-
-    def acquire(self) -> None:
-        """Hold BLAS to one thread."""
-        with self._lock:
-            if not self._users:
-                self._limits = threadpool_limits(1, "blas")
-            self._users += 1
-
-    def release(self) -> None:
-        """Let BLAS have as many threads as before, if nobody else needs it to have one."""
-        with self._lock:
-            self._users -= 1
-            if not self._users:
-                self._limits.restore_original_limits()
-
-
-single_threaded_blas = _SingleThreadedBlas()

@@ -16,7 +16,7 @@ import warnings
 from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import wait
 from multiprocessing.context import ForkContext, ForkProcess
 from multiprocessing.process import BaseProcess
@@ -157,9 +157,10 @@ def _prepare_heap() -> None:
     in the first wave. After glibc has freed a block, it takes smaller ones from its heap, and keeps
     twice as much there before it gives any back; and NumPy asks for large pages under large arrays.
     """
-    np.empty(LARGEST_BLOCK, np.uint8)
-    nearly_twice = [np.empty(9 * LARGEST_BLOCK // 10, np.uint8) for _ in range(2)]
-    del nearly_twice
+    with suppress(MemoryError):
+        np.empty(LARGEST_BLOCK, np.uint8)
+        nearly_twice = [np.empty(9 * LARGEST_BLOCK // 10, np.uint8) for _ in range(2)]
+        del nearly_twice
 
 
 def _end_with_parent() -> None:

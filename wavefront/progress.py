@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, Self, TypeAlias
 
 Progress: TypeAlias = Callable[[float, float], object] | bool | None
@@ -96,12 +96,14 @@ def phase(title: str, progress: Progress = None) -> Iterator[None]:
         return
     ended = threading.Event()
     writer = threading.Thread(target=_show, args=(title, ended), daemon=True)
-    writer.start()
+    with suppress(RuntimeError):  # where no further thread can be had there is no line
+        writer.start()
     try:
         yield
     finally:
         ended.set()
-        writer.join()
+        if writer.is_alive():
+            writer.join()
 
 
 def _show(title: str, ended: threading.Event) -> None:

@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike
 
 from .accel import most_copies
 from .accel.choose import CHOICES
+from .blas import reserve_buffers
 from .bsdfs import Bsdf
 from .camera import Camera
 from .errors import Interrupted, RenderError, SceneError, number, one_of
 from .exact_sum import MAX_TERMS
-from .film import Film
 from .filters import FILTERS
 from .image import Image
 from .integrators import INTEGRATORS, ONE_SAMPLE, Integrator, li_full
@@ -171,8 +171,10 @@ def render(
     choose_executor(executor, workers, 0)
     seen = View(camera, size, up)
     with _setting_up():
+        reserve_buffers(1)
         subject = as_scene(scene, material, progress)
         camera = seen.of(subject)
+        tally = Tally(*camera.size)
         draw = make_sampler(sampler, seed, camera.film[0])
         preset = choose_preset(subject, lighting)
         complete = lighted(subject, preset, ground=ground, up=seen.up)
@@ -186,7 +188,6 @@ def render(
                 mis=integrator not in ONE_SAMPLE,
             )
         view = compiled.view(camera)
-        tally = Tally(Film(*camera.size))
 
     clock = Clock(begin, seconds, wave_size, workers, branches)
     watch = Watch(deadline=clock.deadline)
@@ -216,7 +217,7 @@ def render(
                 ctrl_c.pressed = True
             except (MemoryError, RenderError) as error:
                 failure = error
-        image = tally.film.image(
+        image = tally.image(
             {
                 "lighting": preset,
                 "integrator": integrator,

@@ -7,6 +7,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from .film import Film
 from .filters import Filter
 from .image import Image
 from .integrators import Integrator
+from .memory import check_memory
 from .record import record
 from .sampling.sampler import Sampler
 from .scene import CompiledScene
@@ -27,6 +29,9 @@ from .vec import Bools, Floats, Ints, alike
 
 MAX_BAD_SAMPLES = 1e-4  # part of all samples that may be lost to NaN before it is an error
 PATIENCE = 3.0  # seconds that a wave of first samples may take even if the time is up
+FILM_BYTES = 179  # of a pixel of the film
+PICTURE_BYTES = 64  # of a pixel of the picture, and of what is needed to make it
+SPARE_BYTES = 16 << 20
 LONG_PATH = 1000  # surfaces along a path, after which it will hardly end by itself
 
 
@@ -168,6 +173,11 @@ def plan(pixels: Words, first: int, last: int, wave_size: Callable[[int], int]) 
 class Tally:
     """What all waves have come to so far.
 
+    Raises
+    ------
+    SceneError
+        If there is not enough memory for the film and the picture.
+
     Attributes
     ----------
     film
@@ -178,13 +188,22 @@ class Tally:
         Queries of the accelerator.
     """
 
-    def __init__(self, film: Film) -> None:
-        self.film, self.bad, self.rays = film, BadSamples(), 0
+    def __init__(self, width: int, height: int) -> None:
+        pixels = width * height
+        picture = PICTURE_BYTES * pixels + SPARE_BYTES
+        check_memory(f"a picture of {width}x{height} pixels", FILM_BYTES * pixels + picture)
+        self.film, self.bad, self.rays = Film(width, height), BadSamples(), 0
+        self._reserve: Any = np.empty(picture, np.uint8)  # for the picture so far when memory has run out
 
     @property
     def samples(self) -> int:
         """Number of samples on the film."""
         return int(self.film.count.sum())
+
+    def image(self, metadata: dict[str, Any]) -> Image:
+        """Make a picture of what there is; no wave can be added after that."""
+        self._reserve = None
+        return self.film.image(metadata)
 
     def add(self, piece: Piece, wave: Wave) -> None:
         """Add a wave, the next of its pixels."""
