@@ -9,7 +9,16 @@ import pytest
 from wavefront.bsdfs import Conductor, Dielectric, Diffuse, Mirror, Mix, OrenNayar, Principled, ThinDielectric
 from wavefront.bsdfs.albedo import SIZE, cosine_mean, gloss_tables, lookup
 from wavefront.bsdfs.conductor import METALS
-from wavefront.bsdfs.microfacet import alpha_of, normal_density, refraction_lobe, stretched
+from wavefront.bsdfs.microfacet import (
+    alpha_of,
+    is_smooth,
+    mirror_lobe,
+    normal_density,
+    reflect,
+    refract,
+    refraction_lobe,
+    stretched,
+)
 from wavefront.bsdfs.sheen import fiber_density, sheen_albedo, sheen_lobe
 
 F4 = np.float32
@@ -462,7 +471,33 @@ def test_density_of_refraction(eta, alpha):
     assert pdf[sound] == pytest.approx(exact[sound], rel=3e-3, abs=1e-5)
 
 
+@pytest.mark.parametrize("alpha", [0.1, 0.5, 1.0])
+def test_density_of_reflection(alpha):
+    """Walter et al., eqs. 14 and 24: D·G1·|wo·m|/cosθo times the Jacobian 1/(4|wo·m|)."""
+    wo, wi = pairs()
+    exact = ggx(half_vector(wo, wi)[2], alpha) / (1 + smith(wo[2], alpha)) / (4 * wo[2].astype(float))
+    assert mirror_lobe(wo, wi, F4(alpha))[1] == pytest.approx(exact, rel=1e-3, abs=1e-6)
+
+
+@pytest.mark.parametrize("eta", [1.5, 1 / 1.5])
+def test_directions_by_snell(eta):
+    """Both leave in the plane of wo and m: at the angle of wo, and by sinθo = η·sinθt beyond."""
+    wo, _ = pairs()
+    m = half_vector(wo, np.array([[0.3], [0.1], [0.9]])).astype(F4)
+    cos = dot(wo, m)
+    sin = np.sqrt(1 - cos**2)
+    keep = sin < 0.99 * min(eta, 1)
+    wo, m, cos, sin = wo[:, keep], m[:, keep], cos[keep], sin[keep]
+    along = (wo - m * cos) / sin
+    cos_t = np.sqrt(1 - (sin / eta) ** 2)
+    assert reflect(wo, m) == pytest.approx(m * cos - along * sin, abs=1e-5)
+    refracted = refract(wo, m, cos.astype(F4), cos_t.astype(F4), F4(eta))
+    assert refracted == pytest.approx(-m * cos_t - along * sin / eta, abs=1e-5)
+
+
 def test_roughness_maps_to_its_square():
+    assert is_smooth(np.array([0.0316], F4))
+    assert not is_smooth(np.array([0.0317], F4))
     assert alpha_of(np.array([0.5, 1.0, 0.01], F4)) == pytest.approx([0.25, 1.0, 1e-3])
 
 
