@@ -322,6 +322,15 @@ def test_mix_is_a_mean():
         assert getattr(mix, method)(wo, wi) == pytest.approx(0.7 * first + 0.3 * second, rel=1e-5)
 
 
+def test_parts_of_a_mix_are_chosen_by_its_weight():
+    wo, _ = pairs(1000)
+    u = np.random.default_rng(0).random((3, 1000)).astype(F4)
+    for mix, chance in ((Mix(Mirror(), Diffuse(), 0.3), 0.7), (Mix(Diffuse(), Mirror(), 0.3), 0.3)):
+        sample = mix.sample_f(wo, u)
+        assert sample.pdf[sample.specular] == pytest.approx(chance)
+        assert sample.specular.mean() == pytest.approx(chance, abs=0.05)
+
+
 # ---- principled, part by part -------------------------------------------------------------------
 
 
@@ -412,6 +421,70 @@ def test_sheen_over_the_base():
     seen = np.maximum(sheen_albedo(wo[2], rough), sheen_albedo(wi[2], rough))
     exact = base.f(wo, wi) * (1 - 0.7 * 0.9 * seen) + 0.7 * column(tint) * fibers(wo, wi, 0.4)
     assert bsdf.f(wo, wi) == pytest.approx(exact, rel=5e-4, abs=1e-6)
+
+
+def test_shares_of_the_lobes():
+    """The density is a mean of those of the lobes, weighted by about what each reflects along wo."""
+    metallic, clear, specular, ior, tint, coat, sheen = 0.3, 0.4, 0.8, 1.7, (0.5, 0.5, 0.5), 0.6, 0.7
+    bsdf = Principled(
+        COLOR, metallic, 0.5, ior, clear, thin=True, specular=specular, specular_color=tint,
+        clearcoat=coat, clearcoat_roughness=0.3, sheen=sheen, sheen_color=tint,
+    )  # fmt: skip
+    wo, wi = pairs()
+
+    def luminance(color):
+        return (column((0.2126, 0.7152, 0.0722)) * color).sum(0)
+
+    away = (1 - wo[2].astype(float)) ** 5
+    opaque = (1 - metallic) * (1 - clear)
+    seen = luminance(gloss_of(ior, specular, tint, wo[2].astype(float)))
+    gloss = metallic * (luminance(schlick(column(COLOR), wo[2].astype(float))) + 0.1) + opaque * (seen + 0.1)
+    glass = (1 - metallic) * clear
+    varnish = coat * (0.1 + schlick(0.04, wo[2].astype(float)))
+    matte = opaque * (luminance(column(COLOR)) + 0.01) + sheen * 0.5 * (0.2 + away)
+    rough, smooth = (mirror_lobe(wo, wi, F4(alpha))[1] for alpha in (0.25, 0.09))
+    face = fresnel(dot(wo, half_vector(wo, wi)), ior)
+    lobes = gloss * rough + glass * rough * 2 * face / (1 + face) + varnish * smooth + matte * wi[2] / np.pi
+    assert bsdf.pdf(wo, wi) == pytest.approx(lobes / (gloss + glass + varnish + matte), rel=1e-3)
+
+
+@pytest.mark.parametrize("make", [Dielectric, lambda ior, rough: Principled(1.0, 0, rough, ior, 1.0)])
+@pytest.mark.parametrize("inside", [False, True])
+def test_what_crosses_says_the_index_it_met(make, inside):
+    """And what is reflected says 1, as does all that crosses a sheet."""
+    wo = np.repeat(np.array([[0.3], [0], [np.sqrt(0.91)]], F4), 256, 1)
+    u = np.random.default_rng(0).random((3, 256)).astype(F4)
+    glass = make(1.5, 0.3)
+    glass.inside, glass.eta = np.full(256, inside), np.full(256, 1 / 1.5 if inside else 1.5, F4)
+    sample = glass.sample_f(wo, u)
+    below = sample.wi[2] < 0
+    assert below.any()
+    assert not below.all()
+    sound = sample.pdf > 0
+    expected = np.where(below, 1 / 1.5 if inside else 1.5, 1)
+    assert sample.eta[sound] == pytest.approx(expected[sound])
+    sheet = Principled(1.0, 0, 0.3, 1.5, 1.0, thin=True).sample_f(wo, u)
+    assert (sheet.eta == 1).all()
+
+
+@pytest.mark.parametrize(
+    ("ior", "bent"), [(1.0, 1.001), (1.0005, 1.001), (0.9995, 1.001), (1.02, 1.02), (0.98, 0.98)]
+)
+def test_clear_bases_bend_a_little_at_least(ior, bent):
+    wo = np.repeat(np.array([[0.3], [0], [np.sqrt(0.91)]], F4), 64, 1)
+    u = np.random.default_rng(0).random((3, 64)).astype(F4)
+    sample = Principled(1.0, 0, 0.3, ior, 1.0).sample_f(wo, u)
+    assert sample.eta[sample.wi[2] < 0] == pytest.approx(bent, rel=1e-5)
+
+
+def test_indices_too_near_1_to_be_rough():
+    assert [Dielectric(ior, 0.5).specular for ior in (0.99901, 1.00099, 1.00101, 0.99899, 1.02)] == [
+        True, True, False, False, False,
+    ]  # fmt: skip
+
+
+def test_the_widest_slopes():
+    assert OrenNayar(0.5, np.pi / 2).sigma[0] == F4(np.pi / 2)
 
 
 # ---- tables -------------------------------------------------------------------------------------
