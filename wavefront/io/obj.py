@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from .repair import Raw, warn
+from .trimesh_loading import typed_errors
 from .words import Rows, sort_lines
 
 NAMES = ("o", "g")  # keywords that say nothing about what a surface looks like
@@ -64,8 +65,11 @@ def parse(name: str, text: str, strict: bool = False) -> Obj:
     order = np.argsort(label, kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
     groups.sort(key=lambda group: int(group[0]))  # materials as they are first used
-    for group, mesh in zip(groups, _read(written, groups), strict=True):
-        out.raws.append(_raw(list(names)[label[group[0]]], mesh, faces, group))
+    titles = list(names)
+    with typed_errors(name, "obj"):
+        meshes = _read(written, groups)
+    for group, mesh in zip(groups, meshes, strict=True):
+        out.raws.append(_raw(titles[label[group[0]]], mesh, faces, group))
     if out.smooth and any(raw.normals is None or not raw.normals.any(axis=1).all() for raw in out.raws):
         out.ignored["s, of faces without normals"] = out.smooth
     return out

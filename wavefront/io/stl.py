@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from .files import decode
 from .repair import Raw, warn, wide
+from .trimesh_loading import typed_errors
 from .words import sort_lines
 
 COLORS = (b"COLOR=", b"MATERIAL=")  # what Materialise Magics writes into the header
@@ -38,16 +39,17 @@ def parse(name: str, data: bytes, strict: bool = False) -> list[Raw]:
     raise SceneError(f"{name}: claims {count} faces, {84 + 50 * count} bytes; it has {len(data)}")
 
 
-def _read(data: bytes) -> list[dict[str, Any]]:
+def _read(name: str, data: bytes) -> list[dict[str, Any]]:
     from trimesh.exchange.stl import load_stl
 
-    found = load_stl(BytesIO(data))
+    with typed_errors(name, "stl"):
+        found = load_stl(BytesIO(data))
     return list(found["geometry"].values()) if "geometry" in found else [found]
 
 
 def _binary(name: str, data: bytes, strict: bool) -> list[tuple[Any, Any]]:
     colored = [f"{word.decode()} in the header" for word in COLORS if word in data[:80]]
-    meshes = _read(data)
+    meshes = _read(name, data)
     extra = [mesh["face_attributes"]["stl"] for mesh in meshes]
     if extra and extra[0].any():
         colored.append(f"colours of facets (facet {int((extra[0] != 0).argmax())})")
@@ -85,7 +87,7 @@ def _text(name: str, text: str) -> list[Raw]:
             )
         written += [f"solid {len(solids)}", *("vertex" + vertices.texts[i] for i in chosen), "endsolid"]
         solids.append((title, vertices.numbers[chosen[::3]]))
-    meshes = _read("\n".join(written).encode()) if solids else []
+    meshes = _read(name, "\n".join(written).encode()) if solids else []
     return [
         Raw(title, mesh["vertices"], mesh["faces"], lines=numbers)
         for (title, numbers), mesh in zip(solids, meshes, strict=True)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from io import BytesIO
 from typing import Any
 from urllib.parse import unquote
@@ -71,13 +73,18 @@ def by_trimesh(name: str, data: bytes, kind: str, images: Any = None, skip_mater
     import trimesh
 
     options: dict[str, Any] = {"skip_materials": True} if skip_materials else {}
+    with typed_errors(name, kind):
+        if kind == "dae":
+            return _unprocessed(trimesh.exchange.dae.load_collada(BytesIO(data), images))
+        return trimesh.load_scene(BytesIO(data), file_type=kind, process=False, resolver=images, **options)
+
+
+@contextmanager
+def typed_errors(name: str, kind: str) -> Iterator[None]:
+    """Turn whatever a loader raises into a SceneError, except that memory is short; keep NumPy quiet."""
     try:
         with np.errstate(all="ignore"):
-            if kind == "dae":
-                return _unprocessed(trimesh.exchange.dae.load_collada(BytesIO(data), images))
-            return trimesh.load_scene(
-                BytesIO(data), file_type=kind, process=False, resolver=images, **options
-            )
+            yield
     except (MemoryError, SceneError):
         raise
     except Exception as error:
