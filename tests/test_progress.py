@@ -1,10 +1,13 @@
 """The bar: late, so that short renders have none, and right from when it appears."""
 
+import sys
 import threading
 import time
 
 import pytest
+import scenes
 
+import wavefront as wf
 from wavefront import progress as module
 from wavefront.io import readers
 from wavefront.io.load import load, load_mesh
@@ -117,3 +120,19 @@ def test_loading_is_a_phase(load, progress, tmp_path, monkeypatch, capsys) -> No
     shown = capsys.readouterr().err
     assert ("loading a.obj: 00:00" in shown) == (progress is None)
     assert str(tmp_path) not in shown
+
+
+def test_building_a_scene_shows_a_line(monkeypatch, capsys) -> None:
+    """Where it takes long, and is not asked to be quiet."""
+    render = sys.modules["wavefront.render"]
+    compile_scene = render.compile_scene
+
+    def slowly(*given, **options):
+        time.sleep(0.3)
+        return compile_scene(*given, **options)
+
+    monkeypatch.setattr(render, "compile_scene", slowly)
+    monkeypatch.setattr(module, "DELAY", 0.05)
+    for quiet in (False, True):
+        wf.render(scenes.everything(), 1, progress=False if quiet else None)
+        assert ("building the scene: 00:0" in capsys.readouterr().err) is not quiet
