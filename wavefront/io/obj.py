@@ -81,7 +81,9 @@ def _clean(text: str) -> list[str]:
         text = re.sub(
             r"(?m)^(?:.*\\\n)+.*", lambda m: m[0].replace("\\\n", " ") + "\n" * m[0].count("\\\n"), text
         )
-    lines = map(str.strip, text.replace("\t", " ").split("\n"))
+    lines = list(map(str.strip, text.replace("\t", " ").split("\n")))
+    if "#" not in text:
+        return lines
     # a name may hold a #, so only whole-line comments and those behind numbers go
     named = ("usemtl", "mtllib", "o ", "g ")
     return [x if "#" not in x or x.startswith(named) else x.partition("#")[0].rstrip() for x in lines]
@@ -121,7 +123,7 @@ def _check_faces(
     lines = []
     for column, (rows, fill) in enumerate(zip(tables, ("nan", "0", "0"), strict=True)):
         width = (6 if rows.widths.max(initial=0) >= 6 else 3, 2, 3)[column]
-        lines += [rows.keyword + text for text in rows.resized(width, fill)]
+        lines += [rows.keyword + f"\n{rows.keyword}".join(rows.resized(width, fill))] if rows.texts else []
         has = given[:, column]
         if column and not rows.texts and has.any():
             i = has.argmax()
@@ -165,17 +167,30 @@ def _corners(text: str) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Read corners, of which each follows a blank; raises ValueError or OverflowError."""
     text = re.sub(r"(?<=\d)/+(?= |$)", "", text) if "/ " in text or text.endswith("/") else text
     data = text.encode()
-    codes = np.frombuffer(data, np.uint8)
-    slash, blank = codes == ord("/"), codes == ord(" ")
-    word = (np.cumsum(blank[:-1] & ~blank[1:]) - 1)[slash[1:]]  # of every slash
-    count = len(text.split())
-    form = np.bincount(word, minlength=count) + np.bincount(word[slash[:-1][slash[1:]]], minlength=count)
-    numbers = np.array(list(map(int, text.replace("/", " ").split())), np.int64)
-    if data.translate(None, INDEX) or form.max() >= len(GIVEN) or GIVEN[form].sum() != len(numbers):
+    form = _forms(data, len(text.split()))
+    split = text.replace("/", " ")
+    if data.translate(None, INDEX):
         raise ValueError
-    index = np.zeros((count, 3), np.int64)
+    numbers = np.fromstring(split, np.int64, sep=" ") if "-" not in text and "+" not in text else None
+    if (
+        numbers is None or numbers.max(initial=0) >= 10**18
+    ):  # it stops at signs and goes no further than int64
+        numbers = np.array(list(map(int, split.split())), np.int64)
+    if form.max() >= len(GIVEN) or GIVEN[form].sum() != len(numbers):
+        raise ValueError
+    index = np.zeros((len(form), 3), np.int64)
     index[GIVEN[form]] = numbers
     return index, GIVEN[form]
+
+
+def _forms(text: bytes, count: int) -> NDArray[np.intp]:
+    """Return the row of `GIVEN` for each of `count` corners; a larger number for what is none."""
+    if b"/" not in text:
+        return np.zeros(count, np.intp)
+    codes = np.frombuffer(text, np.uint8)
+    slash, blank = codes == ord("/"), codes == ord(" ")
+    word = (np.cumsum(blank[:-1] & ~blank[1:]) - 1)[slash[1:]]  # of every slash
+    return np.bincount(word, minlength=count) + np.bincount(word[slash[:-1][slash[1:]]], minlength=count)
 
 
 def _resolve(
@@ -198,7 +213,8 @@ def _read(written: tuple[list[str], list[str]], groups: list[NDArray[np.intp]]) 
 
     lines, faces = written
     for number, group in enumerate(groups):
-        lines += [f"usemtl {number}", *("f" + faces[i] for i in group)]
+        texts = [faces[i] for i in group.tolist()] if len(groups) > 1 else faces
+        lines += [f"usemtl {number}", "f" + "\nf".join(texts)]
     # the loader itself: a trimesh object would round colors to 8 bits
     found = load_obj(StringIO("\n".join(lines)), skip_materials=True)["geometry"]
     return list(found.values())[::-1]  # it lists the last one first

@@ -21,7 +21,7 @@ class Rows:
     keyword: str
     numbers: NDArray[np.intp]  # (n,) line of the file, from 1
     widths: NDArray[np.intp]  # (n,) how many words follow the keyword
-    texts: list[str]  # n
+    texts: list[str]  # n, each empty or with a blank before every word
 
     def resized(self, width: int, fill: str) -> list[str]:
         """Return the texts with `width` words each: the first ones, filled up with `fill`."""
@@ -43,7 +43,7 @@ class Rows:
     def not_a_number(self) -> tuple[int, str] | None:
         """Return the first word that is not a number, and its line."""
         try:
-            _check_floats(" ".join(self.texts))
+            _check_floats("".join(self.texts))
         except ValueError:
             return self.first_but(_check_floats)
         return None
