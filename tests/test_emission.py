@@ -12,6 +12,7 @@ from significance import SIDE, assert_mean, assert_same_images, measure, render,
 import wavefront as wf
 from wavefront import testing, uneven
 from wavefront.accel import make_accelerator
+from wavefront.bsdfs import Spatial
 from wavefront.lights import (
     LightTable,
     RectangleLights,
@@ -477,7 +478,19 @@ def test_complaints() -> None:
         render(wf.Scene([bare]), 1)
 
 
+class Negative(Spatial):
+    """What a user's own class may return."""
+
+    def at(self, surface):
+        """Return -5."""
+        return np.full((3, len(surface)), -5, f4)
+
+
 def test_values_below_0_count_as_0() -> None:
-    """A texture may hold anything."""
-    scene = lit(lamp(texture([[-5.0, -5.0]])))
+    """Those of a user's own class, whose values are not known before; an image that has some is refused."""
+    scene = lit(lamp(Negative()))
     assert not render(scene, 4, max_bounces=1).rgb.any()
+    with pytest.raises(
+        wf.SceneError, match=r"emission: <Texture 'array'.* has the value -5; it must be at least 0"
+    ):
+        lamp(texture([[-5.0, -5.0]]))

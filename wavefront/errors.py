@@ -130,6 +130,8 @@ def rgb(
         If it is not one or three finite numbers in [0, `high`], or is beyond the type.
     """
     scalar = np.ndim(value) == 0
+    if np.shape(value) == (3, 1):  # as it is kept
+        value = np.ravel(value)
     array = finite_array(name, value, () if scalar else (3,))
     largest = float(np.finfo(dtype).max)
     bad = np.flatnonzero(~((array >= 0) & (array <= min(high, largest))))

@@ -611,7 +611,7 @@ def _merge(materials: Sequence[Bsdf], numbers: list[int]) -> Bsdf:
         if _is_constant(value) and not all(np.array_equal(value, other) for other in values):
             table = np.zeros((*value.shape[:-1], len(materials)), f4)
             table[..., numbers] = np.concatenate(values, -1)
-            setattr(merged, name, Palette(table))
+            vars(merged)[name] = Palette(table)
     return merged
 
 

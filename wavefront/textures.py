@@ -21,6 +21,8 @@ Channel: TypeAlias = int | Literal["luminance"]
 UV_SETS = ("uv", "uv1")  # the fields of Surface
 LUMINANCE = (f4(0.2126), f4(0.7152), f4(0.0722))  # ITU-R BT.709
 
+CHUNK = 1 << 20  # texels that are looked at together
+
 
 class Texture(Spatial):
     """An image on a surface, wherever a material takes a colour or a number.
@@ -134,6 +136,19 @@ class Texture(Spatial):
         everywhere = np.arange(width * height, dtype=np.intp)
         means = [self._decoded(everywhere, k).mean(dtype=np.float64) for k in range(len(self._channels))]
         return self._shaped([np.array([mean], f4) for mean in means])[..., 0]
+
+    def limits(self) -> tuple[float, float]:
+        """Return the least and the greatest value of the image, scaled."""
+        ends = np.stack([self.offset, self.scale + self.offset]).astype(float)
+        if self._texels.dtype.kind == "u" and ends.min() >= 0 and ends.max() <= 1:
+            return float(ends.min()), float(ends.max())  # no need to look
+        width, height = self.size
+        low, high = np.inf, -np.inf
+        for start in range(0, width * height, CHUNK):
+            texels = np.arange(start, min(start + CHUNK, width * height), dtype=np.intp)
+            values = self._shaped([self._decoded(texels, k) for k in range(len(self._channels))])
+            low, high = min(low, float(values.min())), max(high, float(values.max()))
+        return low, high
 
     def _shaped(self, rows: list[Floats]) -> Floats:
         """Turn channel values (n,) into (3, n) or (n,), scaled."""

@@ -14,6 +14,7 @@ from typing import Any, Self
 import numpy as np
 
 from ..errors import SceneError
+from ..parameter import Parametrized, brief
 from ..record import record
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..state import Surface
@@ -36,7 +37,7 @@ class BsdfSample:
     eta: Floats | None = None  # (n,) ior beyond / ior before where light crosses, 1 elsewhere
 
 
-class Bsdf(ABC):
+class Bsdf(Parametrized, ABC):
     """A material: how a surface scatters light.
 
     A subclass gives `f`; it may give a `sample_f` and its `pdf` that follow `f` more closely than
@@ -51,6 +52,14 @@ class Bsdf(ABC):
     absorption: Any = np.zeros((3, 1), np.float32)  # of the inside, per scene unit. The path sees to it
     emission: Emission | None = None  # what the surface sends itself. The shape that has it sees to it
     relief: Relief | None = None  # tilts the shading normals. The renderer sees to it, no material does
+
+    def __repr__(self) -> str:
+        """Name the parameters, the alpha and the relief."""
+        text = super().__repr__()
+        if self.opacity is not None:
+            cutoff = "" if self.opacity.cutoff is None else f", {self.opacity.cutoff:g}"
+            text += f".with_alpha({brief(self.opacity.alpha)}{cutoff})"
+        return text if self.relief is None else f"{text}.with_relief({self.relief!r})"
 
     @property
     def matte(self) -> bool:
@@ -116,7 +125,7 @@ class Bsdf(ABC):
             return self
         bound = copy(self)
         for name, value in varying.items():
-            setattr(bound, name, value.at(surface))
+            vars(bound)[name] = value.at(surface)  # not by assignment, which would check it
         return bound
 
     @abstractmethod

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Self
 
 import numpy as np
 
 from ..errors import one_of
+from ..parameter import Parameter
 from ..suggestions import suggests_keywords
 from ..vec import Floats, alike
 from .base import Bsdf, BsdfSample, weigh
@@ -56,11 +58,19 @@ class Conductor(Bsdf):
         If a parameter is out of its range or not finite.
     """
 
+    eta = Parameter(partial(colour, high=MAX_INDEX, above_zero=True))
+    k = Parameter(partial(colour, high=MAX_INDEX))
+    roughness = Parameter(scalar)
+
     @suggests_keywords
     def __init__(self, eta: Colour, k: Colour, roughness: Scalar = 0.0) -> None:
-        self.eta = colour("Conductor eta", eta, MAX_INDEX, above_zero=True)
-        self.k = colour("Conductor k", k, MAX_INDEX)
-        self.roughness = scalar("Conductor roughness", roughness)
+        self.eta = eta
+        self.k = k
+        self.roughness = roughness
+        self.derive()
+
+    def derive(self) -> None:
+        """Tell whether it is a mirror."""
         self.specular = is_smooth(self.roughness)
 
     @classmethod

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from copy import copy
+from functools import partial
 from typing import Self
 
 import numpy as np
 
+from ..parameter import Parameter
 from ..state import Surface
 from ..suggestions import suggests_keywords
 from ..vec import Floats, alike, dot, f4
@@ -56,6 +58,12 @@ class Dielectric(Bsdf):
     transmissive = True
     dimensions = 3
 
+    ior = Parameter(refractive_index)
+    roughness = Parameter(scalar)
+    reflectance = Parameter(colour)
+    transmittance = Parameter(colour)
+    absorption = Parameter(partial(colour, high=np.inf))
+
     @suggests_keywords
     def __init__(
         self,
@@ -66,11 +74,15 @@ class Dielectric(Bsdf):
         transmittance: Colour = 1.0,
         absorption: Colour = 0.0,
     ) -> None:
-        self.ior = refractive_index("Dielectric ior", ior)
-        self.roughness = scalar("Dielectric roughness", roughness)
-        self.reflectance = colour("Dielectric reflectance", reflectance)
-        self.transmittance = colour("Dielectric transmittance", transmittance)
-        self.absorption = colour("Dielectric absorption", absorption, np.inf)
+        self.ior = ior
+        self.roughness = roughness
+        self.reflectance = reflectance
+        self.transmittance = transmittance
+        self.absorption = absorption
+        self.derive()
+
+    def derive(self) -> None:
+        """Tell whether it is smooth, and set the index as seen from outside."""
         straight = not isinstance(self.ior, Spatial) and abs(self.ior[0] - 1) < LEAST_BEND
         self.specular = is_smooth(self.roughness) or bool(straight)
         self.eta = self.ior  # (n,) or (1,) index beyond / before; unbound, wo is outside

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..parameter import Parameter
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..suggestions import suggests_keywords
 from ..vec import Floats, alike, f4
@@ -29,9 +30,11 @@ class Diffuse(Bsdf):
         If the reflectance is outside [0, 1] or not finite.
     """
 
+    reflectance = Parameter(colour)
+
     @suggests_keywords
     def __init__(self, reflectance: Colour = 0.5) -> None:
-        self.reflectance = colour("Diffuse reflectance", reflectance)
+        self.reflectance = reflectance
 
     @property
     def matte(self) -> bool:

@@ -22,13 +22,15 @@ class Emission:
         self.radiance = radiance
 
 
-def emission(name: str, radiance: Colour) -> Emission | None:
-    """Return the emission that a user asks for, None where it is black.
+def emission(name: str, radiance: Colour | Emission | None) -> Emission | None:
+    """Return the emission that a user asks for by `name`, None where it is black.
 
     Raises
     ------
     SceneError
         If a number is below 0 or not finite.
     """
-    value = colour(f"{name} emission", radiance, np.inf)
+    if radiance is None or isinstance(radiance, Emission):
+        return radiance
+    value = colour(name, radiance, np.inf)
     return None if isinstance(value, np.ndarray) and not value.any() else Emission(value)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..parameter import Parameter
 from ..suggestions import suggests_keywords
 from ..vec import Floats
 from .base import Bsdf, BsdfSample
@@ -27,9 +28,11 @@ class Mirror(Bsdf):
 
     specular = True
 
+    reflectance = Parameter(colour)
+
     @suggests_keywords
     def __init__(self, reflectance: Colour = 1.0) -> None:
-        self.reflectance = colour("Mirror reflectance", reflectance)
+        self.reflectance = reflectance
 
     def f(self, wo: Floats, wi: Floats) -> Floats:
         """Return 0, (3, n): no two given directions mirror each other."""

@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from ..errors import SceneError
+from ..parameter import Parameter
 from ..state import Surface
 from ..suggestions import suggests_keywords
 from ..vec import Floats, f4
@@ -15,6 +16,19 @@ from .base import Bsdf, BsdfSample, weigh
 from .parameter import Scalar, scalar
 
 BELOW_1 = np.nextafter(f4(1), f4(0))
+
+
+def _component(name: str, value: Any) -> Bsdf:
+    """Return a material that can be a part of another."""
+    if not isinstance(value, Bsdf):
+        raise SceneError(f"{name} must be a material, got {value!r}")
+    if value.opacity is not None:
+        raise SceneError(f"{name} has an alpha; give it to the Mix, by with_alpha")
+    if value.relief is not None:
+        raise SceneError(f"{name} has a relief; give it to the Mix, by with_relief")
+    if value.emission is not None:
+        raise SceneError(f"{name} has an emission; give it to the shape")
+    return value
 
 
 class Mix(Bsdf):
@@ -39,27 +53,26 @@ class Mix(Bsdf):
 
     dimensions = 3
 
+    first = Parameter(_component)
+    second = Parameter(_component)
+    weight = Parameter(scalar)
+
     @suggests_keywords
     def __init__(self, first: Bsdf, second: Bsdf, weight: Scalar = 0.5) -> None:
-        for name, value in (("first", first), ("second", second)):
-            if not isinstance(value, Bsdf):
-                raise SceneError(f"Mix {name} must be a material, got {value!r}")
-            if value.opacity is not None:
-                raise SceneError(f"Mix {name} has an alpha; give it to the Mix, by with_alpha")
-            if value.relief is not None:
-                raise SceneError(f"Mix {name} has a relief; give it to the Mix, by with_relief")
-            if value.emission is not None:
-                raise SceneError(f"Mix {name} has an emission; give it to the shape")
         self.first, self.second = first, second
-        self.weight = scalar("Mix weight", weight)
-        self.transmissive = first.transmissive or second.transmissive
-        self.specular = first.specular and second.specular
-        self.absorption = _inside(first, second)
+        self.weight = weight
+        self.derive()
+
+    def derive(self) -> None:
+        """See what both materials come to."""
+        self.transmissive = self.first.transmissive or self.second.transmissive
+        self.specular = self.first.specular and self.second.specular
+        self.absorption = _inside(self.first, self.second)
 
     def bind(self, surface: Surface) -> Self:
         """Look up the weight, and the parameters of both materials."""
         bound = copy(super().bind(surface))
-        bound.first, bound.second = self.first.bind(surface), self.second.bind(surface)
+        vars(bound).update(first=self.first.bind(surface), second=self.second.bind(surface))
         return bound
 
     def f(self, wo: Floats, wi: Floats) -> Floats:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
-from ..errors import SceneError
+from ..parameter import Parameter
 from ..sampling.warp import cosine_hemisphere_pdf
 from ..suggestions import suggests_keywords
 from ..vec import Floats, dot, f4
-from .base import Bsdf, Spatial
+from .base import Bsdf
 from .microfacet import INV_PI
 from .parameter import Colour, Scalar, colour, scalar
 
@@ -42,15 +44,22 @@ class OrenNayar(Bsdf):
         If a parameter is out of its range or not finite.
     """
 
+    reflectance = Parameter(colour)
+    sigma = Parameter(partial(scalar, holds=lambda x: 0 <= x <= np.pi / 2, limit="in [0, π/2]"))
+
     @suggests_keywords
     def __init__(
         self, reflectance: Colour = 0.5, sigma: Scalar = 0.5, *, energy_preserving: bool = False
     ) -> None:
-        self.reflectance = colour("OrenNayar reflectance", reflectance)
-        self.sigma = scalar("OrenNayar sigma", sigma, lambda x: 0 <= x <= np.pi / 2, "in [0, π/2]")
-        if energy_preserving and not isinstance(self.sigma, Spatial) and self.sigma[0] > 1:
-            raise SceneError(f"OrenNayar sigma is {sigma!r}; it must be in [0, 1] to preserve energy")
+        self.reflectance = reflectance
+        self.sigma = sigma
         self.energy_preserving = energy_preserving
+        self.derive()
+
+    def derive(self) -> None:
+        """Check what the model that preserves energy asks for."""
+        if self.energy_preserving:
+            scalar("OrenNayar sigma", self.sigma, lambda x: 0 <= x <= 1, "in [0, 1] to preserve energy")
 
     def f(self, wo: Floats, wi: Floats) -> Floats:
         """Return the BRDF above the surface, (3, n)."""

@@ -30,6 +30,14 @@ class Grey(Spatial):
     def __init__(self, numbers: Spatial) -> None:
         self.numbers, self.reads = numbers, numbers.reads
 
+    def __repr__(self) -> str:
+        """Name the numbers."""
+        return repr(self.numbers)
+
+    def limits(self) -> tuple[float, ...]:
+        """Return those of the numbers."""
+        return self.numbers.limits()
+
     def at(self, surface: Surface) -> Floats:
         """Return the numbers as colours, (3, n)."""
         values = self.numbers.at(surface)
@@ -44,14 +52,41 @@ class Luminance(Spatial):
     def __init__(self, colours: Spatial) -> None:
         self.colours, self.reads = colours, colours.reads
 
+    def __repr__(self) -> str:
+        """Name the colors."""
+        return repr(self.colours)
+
+    def limits(self) -> tuple[float, ...]:
+        """Return those of the colors."""
+        return self.colours.limits()
+
     def at(self, surface: Surface) -> Floats:
         """Return the luminance of the colours, (n,)."""
         return luminance(self.colours.at(surface))
 
 
+def check_limits(name: str, value: Spatial, holds: Callable[[float], bool], limit: str) -> None:
+    """Check the least and the greatest of what varies over a surface, where they are known.
+
+    Raises
+    ------
+    SceneError
+        Naming what varies, the value and the limit.
+    """
+    for extreme in value.limits():
+        if not holds(extreme):
+            hint = ""
+            if 1 < extreme <= 255:
+                hint = ". Values from 0 to 255 are passed as uint8, or divided by 255; scale= multiplies them"
+            raise SceneError(f"{name}: {value!r} has the value {extreme:g}; it must be {limit}{hint}")
+
+
 def colour(name: str, value: Colour, high: float = 1.0, *, above_zero: bool = False) -> Any:
     """Return a colour as (3, 1) float32 within [0, `high`], or a `Spatial` that gives colours."""
     if isinstance(value, Spatial):
+        check_limits(
+            name, value, lambda x: 0 <= x <= high, "at least 0" if np.isinf(high) else f"in [0, {high:g}]"
+        )
         return Grey(value) if value.scalar else value
     result = rgb(name, value, high)
     if above_zero and not (result > 0).all():
@@ -67,7 +102,10 @@ def scalar(
 ) -> Any:
     """Return a number as (1,) float32 for which `holds` is true, or a `Spatial` that gives numbers."""
     if isinstance(value, Spatial):
+        check_limits(name, value, holds, limit)
         return Luminance(value) if value.scalar is False else value
+    if isinstance(value, np.ndarray) and value.shape == (1,):  # as it is kept
+        value = value[0]
     return np.array([number(name, value, holds, limit)], f4)
 
 

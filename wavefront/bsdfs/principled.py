@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from copy import copy
+from functools import partial
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from ..parameter import Parameter
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..state import Surface
 from ..suggestions import suggests_keywords
@@ -89,6 +91,21 @@ class Principled(Bsdf):
     dimensions = 3
     inside: Bools | None = None  # (n,) wo is inside; unbound, it is outside
 
+    base_color = Parameter(colour)
+    metallic = Parameter(scalar)
+    roughness = Parameter(scalar)
+    ior = Parameter(refractive_index)
+    transmission = Parameter(scalar)
+    clearcoat = Parameter(scalar)
+    clearcoat_roughness = Parameter(scalar)
+    sheen = Parameter(scalar)
+    sheen_color = Parameter(colour)
+    sheen_roughness = Parameter(scalar)
+    specular_weight = Parameter(scalar)
+    specular_color = Parameter(partial(colour, high=np.inf))
+    absorption = Parameter(partial(colour, high=np.inf))
+    emission = Parameter(emission_of)
+
     @suggests_keywords
     def __init__(
         self,
@@ -112,25 +129,30 @@ class Principled(Bsdf):
         alpha_cutoff: float | None = None,
         conserve_energy: bool = True,
     ) -> None:
-        self.base_color = colour("Principled base_color", base_color)
-        self.metallic = scalar("Principled metallic", metallic)
-        self.roughness = scalar("Principled roughness", roughness)
-        self.ior = refractive_index("Principled ior", ior)
-        self.transmission = scalar("Principled transmission", transmission)
+        self.base_color = base_color
+        self.metallic = metallic
+        self.roughness = roughness
+        self.ior = ior
+        self.transmission = transmission
         self.thin = thin
-        self.clearcoat = scalar("Principled clearcoat", clearcoat)
-        self.clearcoat_roughness = scalar("Principled clearcoat_roughness", clearcoat_roughness)
-        self.sheen = scalar("Principled sheen", sheen)
-        self.sheen_color = colour("Principled sheen_color", sheen_color)
-        self.sheen_roughness = scalar("Principled sheen_roughness", sheen_roughness)
-        self.specular_weight = scalar("Principled specular", specular)
-        self.specular_color = colour("Principled specular_color", specular_color, np.inf)
-        inside = colour("Principled absorption", absorption, np.inf)
-        self.emission = emission_of("Principled", emission)
+        self.clearcoat = clearcoat
+        self.clearcoat_roughness = clearcoat_roughness
+        self.sheen = sheen
+        self.sheen_color = sheen_color
+        self.sheen_roughness = sheen_roughness
+        self.specular_weight = specular
+        self.specular_color = specular_color
+        self.absorption = absorption
+        self.emission = emission
         self.opacity = opacity("Principled", alpha, alpha_cutoff)
         self.conserve_energy = conserve_energy
+        self.derive()
+
+    def derive(self) -> None:
+        """See which lobes there are; only what light enters absorbs."""
         self.transmissive = _used(self.transmission)
-        self.absorption = inside if self.transmissive and not thin else Bsdf.absorption
+        if not self.transmissive or self.thin:
+            vars(self)["absorption"] = Bsdf.absorption
         self._coated = _used(self.clearcoat)
         self._cloth = _used(self.sheen)
 

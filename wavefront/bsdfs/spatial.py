@@ -14,6 +14,10 @@ class Spatial(ABC):
     reads: tuple[str, ...] = ("uv",)  # fields of `Surface` that `at` needs: "uv", "uv1", "color"
     scalar: bool | None = None  # `at` returns numbers (n,), not colours; None: what the parameter is
 
+    def limits(self) -> tuple[float, ...]:
+        """Return the least and the greatest value, or nothing where they are not known."""
+        return ()
+
     @abstractmethod
     def at(self, surface: Surface) -> Floats:
         """Return the values at the hit points: (3, n) for a colour, (n,) for a scalar."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..parameter import Parameter
 from ..suggestions import suggests_keywords
 from ..vec import Floats, dot, f4
 from .base import Bsdf, BsdfSample, weigh
@@ -39,6 +40,11 @@ class ThinDielectric(Bsdf):
     transmissive = True
     dimensions = 3
 
+    ior = Parameter(refractive_index)
+    roughness = Parameter(scalar)
+    reflectance = Parameter(colour)
+    transmittance = Parameter(colour)
+
     @suggests_keywords
     def __init__(
         self,
@@ -48,10 +54,14 @@ class ThinDielectric(Bsdf):
         reflectance: Colour = 1.0,
         transmittance: Colour = 1.0,
     ) -> None:
-        self.ior = refractive_index("ThinDielectric ior", ior)
-        self.roughness = scalar("ThinDielectric roughness", roughness)
-        self.reflectance = colour("ThinDielectric reflectance", reflectance)
-        self.transmittance = colour("ThinDielectric transmittance", transmittance)
+        self.ior = ior
+        self.roughness = roughness
+        self.reflectance = reflectance
+        self.transmittance = transmittance
+        self.derive()
+
+    def derive(self) -> None:
+        """Tell whether it is smooth."""
         self.specular = is_smooth(self.roughness)
 
     def f(self, wo: Floats, wi: Floats) -> Floats:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError, finite_array, number, rotation_matrix
+from ..parameter import brief
 from ..state import Words
 from ..suggestions import suggests_keywords
 from ..vec import Floats, column, normalize
@@ -53,6 +54,13 @@ class Camera:
         self.film = image_size(size)
         projection.check(self.film)
         self.window = _window(crop, self.film)
+
+    def __repr__(self) -> str:
+        """Name the projection, where the camera stands and where it looks, and the size."""
+        ahead = brief(-self.rotation[:, 2] + 0.0)
+        size = f"{self.size[0]} × {self.size[1]}"
+        crop = "" if self.size == self.film else f" of {self.film[0]} × {self.film[1]}"
+        return f"<Camera: {self.projection!r} at {brief(self.origin)} towards {ahead}, {size}{crop}>"
 
     # --- Ways to make one -----------------------------------------------------------------------
 

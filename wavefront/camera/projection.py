@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError, finite_array, number
+from ..parameter import Parametrized
 from ..sampling.warp import uniform_disk
 from ..vec import Floats, column, f4
 from .distortion import GRID, Distortion
@@ -23,7 +24,7 @@ Size = tuple[int, int]
 Doubles = NDArray[np.float64]
 
 
-class Projection(ABC):
+class Projection(Parametrized, ABC):
     """The contract: film points to rays in camera space."""
 
     uses_lens: bool = False  # rays start at a sampled point of a lens
@@ -72,7 +73,7 @@ class Projection(ABC):
             (n,) scene units.
         """
 
-    def check(self, film: Size) -> None:  # noqa: B027 - most projections have no film that they could not fill
+    def check(self, film: Size) -> None:
         """Check that every point of the film has a ray.
 
         Raises

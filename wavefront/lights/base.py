@@ -11,8 +11,10 @@ from abc import ABC, abstractmethod
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from ..errors import finite_array
+from ..parameter import Parametrized
 from ..record import record
 from ..state import Columns
 from ..vec import Floats, f4, positive
@@ -77,7 +79,12 @@ class Light(Columns, ABC):
         return np.broadcast_to(alike, (centre.shape[1], len(alike)))
 
 
-class UserLight(ABC):
+def position(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """Return where a light stands, (3,) scene units."""
+    return finite_array(name, value, (3,))
+
+
+class UserLight(Parametrized, ABC):
     """A light as a user makes it, beside the shapes of a scene."""
 
     def scaled(self, factor: float) -> UserLight:

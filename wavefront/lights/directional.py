@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError, finite_array, number, rgb
 from ..frame import Frame
+from ..parameter import Parameter
 from ..record import record
 from ..sampling.warp import uniform_cone
 from ..suggestions import suggests_keywords
@@ -91,6 +92,27 @@ class SunLight(InfiniteLight):
         return f4(0.5) * dot(away, away) <= self.height  # 1 − cosθ without cancellation
 
 
+def unit(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """Return a (3,) direction scaled to unit length.
+
+    Raises
+    ------
+    SceneError
+        If it is malformed or zero.
+    """
+    vector = finite_array(name, value, (3,))
+    largest = np.abs(vector).max()
+    if not largest > 0:
+        raise SceneError(f"{name} is {vector.tolist()}; it must not be zero")
+    vector = vector / largest
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+def _angle(name: str, value: float) -> float:
+    allowed = f"0, or from {MIN_ANGLE} to 180 degrees"
+    return number(name, value, lambda x: x == 0 or MIN_ANGLE <= x <= 180, allowed)
+
+
 class DirectionalLight(UserLight):
     """Light from one direction, infinitely far away, such as the sun's.
 
@@ -113,16 +135,15 @@ class DirectionalLight(UserLight):
         0.01 to 180.
     """
 
+    direction = Parameter(unit)
+    irradiance = Parameter(rgb)
+    angle = Parameter(_angle)
+
     @suggests_keywords
     def __init__(self, direction: ArrayLike, irradiance: ArrayLike, *, angle: float = 0.0) -> None:
-        self.direction = unit("DirectionalLight direction", direction)
-        self.irradiance = rgb("DirectionalLight irradiance", irradiance)
-        self.angle = number(
-            "DirectionalLight angle",
-            angle,
-            lambda x: x == 0 or MIN_ANGLE <= x <= 180,
-            f"0, or from {MIN_ANGLE} to 180 degrees",
-        )
+        self.direction = direction
+        self.irradiance = irradiance
+        self.angle = angle
 
     def record(self, centre: NDArray[np.float64]) -> DirectionalLights | SunLight:
         """Return the light as a record of one column."""
@@ -134,19 +155,3 @@ class DirectionalLight(UserLight):
         axes = np.concatenate([frame.x, frame.y, frame.z], axis=1)
         height = np.array([2 * np.sin(radius / 2) ** 2], f4)
         return SunLight(axes, height, (self.irradiance / (np.pi * np.sin(radius) ** 2)).astype(f4))
-
-
-def unit(name: str, value: ArrayLike) -> NDArray[np.float64]:
-    """Return a (3,) direction scaled to unit length.
-
-    Raises
-    ------
-    SceneError
-        If it is malformed or zero.
-    """
-    vector = finite_array(name, value, (3,))
-    largest = np.abs(vector).max()
-    if not largest > 0:
-        raise SceneError(f"{name} is {vector.tolist()}; it must not be zero")
-    vector = vector / largest
-    return np.asarray(vector / np.linalg.norm(vector))

@@ -9,7 +9,7 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SceneError, rgb, rotation_matrix
+from ..errors import one_of, rgb, rotation_matrix
 from ..record import record
 from ..sampling.warp import uniform_sphere
 from ..suggestions import suggests_keywords
@@ -95,15 +95,26 @@ class Environment(UserLight):
         transform: ArrayLike | None = None,
         filter: Literal["bilinear", "nearest"] = "bilinear",
     ) -> None:
-        if filter not in ("bilinear", "nearest"):
-            raise SceneError(f"filter is {filter!r}; it must be 'bilinear' or 'nearest'")
-        turn = None if transform is None else rotation_matrix("Environment transform", transform)
+        self._filter = one_of("filter", filter, ("bilinear", "nearest"))
+        self._transform = None if transform is None else rotation_matrix("Environment transform", transform)
         self._image: ImageEnvironment | None = None
-        if isinstance(radiance, str | os.PathLike) or np.ndim(radiance) > 1:
-            self._image = ImageEnvironment.of(environment_pixels(radiance), filter, turn)
-            self.radiance: Floats = self._image.mean
+        self._radiance: Floats
+        self.radiance = radiance
+
+    @property
+    def radiance(self) -> Floats:
+        """W·sr⁻¹·m⁻², (3, 1); of an image, the mean over all directions."""
+        return self._radiance
+
+    @radiance.setter
+    def radiance(self, radiance: ArrayLike | str | os.PathLike[str]) -> None:
+        if isinstance(radiance, str | os.PathLike) or (
+            np.ndim(radiance) > 1 and np.shape(radiance) != (3, 1)  # a color as it is kept
+        ):
+            image = ImageEnvironment.of(environment_pixels(radiance), self._filter, self._transform)
+            self._radiance, self._image = image.mean, image
         else:
-            self.radiance = rgb("Environment radiance", radiance)
+            self._radiance, self._image = rgb("Environment radiance", radiance), None
 
     def record(self, centre: NDArray[np.float64]) -> InfiniteLight:
         """Return the light as a record of one column."""

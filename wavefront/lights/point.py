@@ -8,11 +8,12 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SceneError, finite_array, rgb
+from ..errors import SceneError, rgb
+from ..parameter import Parameter
 from ..record import record
 from ..suggestions import suggests_keywords
 from ..vec import Floats, dot, f4
-from .base import Light, LightSample, UserLight
+from .base import Light, LightSample, UserLight, position
 
 FLOAT32_MAX = float(np.finfo(f4).max)
 
@@ -55,6 +56,17 @@ class PointLights(Light):
         return self.intensity.mean(0, dtype=np.float64) / np.maximum((away**2).sum(0), radius**2)
 
 
+def intensity_of(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """Return an intensity as a (3, 1) float64 column: in a very large scene it may be beyond float32.
+
+    Raises
+    ------
+    SceneError
+        If it is not one or three finite numbers, at least 0.
+    """
+    return rgb(name, value, dtype=np.float64)
+
+
 class PointLight(UserLight):
     """A point that shines equally in all directions.
 
@@ -71,10 +83,13 @@ class PointLight(UserLight):
         If an argument is malformed.
     """
 
+    position = Parameter(position)
+    intensity = Parameter(intensity_of)
+
     @suggests_keywords
     def __init__(self, position: ArrayLike, intensity: ArrayLike) -> None:
-        self.position = finite_array("PointLight position", position, (3,))
-        self.intensity = intensity_of("PointLight intensity", intensity)
+        self.position = position
+        self.intensity = intensity
 
     def scaled(self, factor: float) -> PointLight:
         """Return the light for a scene whose lengths were multiplied by `factor`: the same irradiance there.
@@ -92,17 +107,6 @@ class PointLight(UserLight):
     def record(self, centre: NDArray[np.float64]) -> PointLights:
         """Return the light as a record of one column, relative to `centre` (3,)."""
         return PointLights((self.position - centre).astype(f4).reshape(3, 1), self.intensity.astype(f4))
-
-
-def intensity_of(name: str, value: ArrayLike) -> NDArray[np.float64]:
-    """Return an intensity as a (3, 1) float64 column: in a very large scene it may be beyond float32.
-
-    Raises
-    ------
-    SceneError
-        If it is not one or three finite numbers, at least 0.
-    """
-    return rgb(name, value, dtype=np.float64)
 
 
 def scaled_intensity(name: str, intensity: NDArray[np.float64], factor: float) -> NDArray[np.float64]:

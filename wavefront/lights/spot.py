@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError, finite_array, number
+from ..parameter import Parameter
 from ..record import record
 from ..suggestions import suggests_keywords
 from ..vec import Floats, dot, f4
-from .base import Light, LightSample, UserLight
+from .base import Light, LightSample, UserLight, position
 from .directional import unit
 from .point import intensity_of, scaled_intensity
 
@@ -78,6 +79,14 @@ class SpotLights(Light):
         return ramp * ramp
 
 
+def _angle(name: str, value: float) -> float:
+    return number(name, value, lambda x: 0 < x <= 180, "above 0 and at most 180 degrees")
+
+
+def _blend(name: str, value: float) -> float:
+    return number(name, value, lambda x: 0 <= x <= 1, "in [0, 1]")
+
+
 class SpotLight(UserLight):
     """A point that shines into a cone.
 
@@ -106,6 +115,12 @@ class SpotLight(UserLight):
         If an argument is malformed or out of range.
     """
 
+    position = Parameter(position)
+    intensity = Parameter(intensity_of)
+    direction = Parameter(unit)
+    angle = Parameter(_angle)
+    blend = Parameter(_blend)
+
     @suggests_keywords
     def __init__(
         self,
@@ -117,21 +132,19 @@ class SpotLight(UserLight):
         angle: float = 45.0,
         blend: float = 0.15,
     ) -> None:
-        self.position = finite_array("SpotLight position", position, (3,))
-        self.intensity = intensity_of("SpotLight intensity", intensity)
+        self.position = position
+        self.intensity = intensity
         if (target is None) == (direction is None):
             raise SceneError("SpotLight needs a target or a direction, and not both")
         if target is not None:
             aim = finite_array("SpotLight target", target, (3,)) - self.position
             if not aim.any():
                 raise SceneError(f"SpotLight position and target are both {self.position.tolist()}")
-            self.direction = unit("SpotLight target", aim)
+            self.direction = aim
         else:
-            self.direction = unit("SpotLight direction", direction)  # type: ignore[arg-type]
-        self.angle = number(
-            "SpotLight angle", angle, lambda x: 0 < x <= 180, "above 0 and at most 180 degrees"
-        )
-        self.blend = number("SpotLight blend", blend, lambda x: 0 <= x <= 1, "in [0, 1]")
+            self.direction = direction
+        self.angle = angle
+        self.blend = blend
 
     def scaled(self, factor: float) -> SpotLight:
         """Return the light for a scene whose lengths were multiplied by `factor`: the same irradiance there.

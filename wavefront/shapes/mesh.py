@@ -47,7 +47,7 @@ class Mesh(Shape):
         How the surface scatters light. By default a `Diffuse` that shows the `colors`, or is grey.
     emission
         Radiance that leaves the front side, W·sr⁻¹·m⁻²: one number or three, or a `Texture` or
-        `VertexColors`, of which values below 0 count as 0. By default that of the material, if it has one.
+        `VertexColors`, at least 0. By default that of the material, if it has one.
     two_sided
         Whether the emission leaves the back side as well.
     name
@@ -88,7 +88,7 @@ class Mesh(Shape):
         self.colors = _colors(f"{name}: colors", colors, len(self.vertices))
         self.material = material
         self._default: tuple[bool, Bsdf] | None = None  # whether it shows colors, and the material
-        self._emission = None if emission is None else colour(f"{name}: emission", emission, np.inf)
+        self.emission = emission
         self.two_sided = two_sided
         check_range(name, self.vertices)
 
@@ -111,7 +111,7 @@ class Mesh(Shape):
 
     @emission.setter
     def emission(self, emission: Any) -> None:
-        self._emission = emission
+        self._emission = None if emission is None else colour(f"{self.name}: emission", emission, np.inf)
 
     def emission_by(self, material: Bsdf) -> Any:
         """Return the emission where the mesh has this material."""

@@ -64,9 +64,7 @@ class Sphere(Shape):
             )
         self.material = material
         self._default = Diffuse(0.5)
-        if isinstance(emission, Spatial):
-            raise SceneError(f"{name}: a sphere shines evenly; a mesh can shine by {emission!r}")
-        self._emission = None if emission is None else rgb(f"{name}: emission", emission)
+        self.emission = emission
 
     def __repr__(self) -> str:
         """Name the sphere, its place and size."""
@@ -83,6 +81,12 @@ class Sphere(Shape):
         if self._emission is not None or self.material.emission is None:
             return self._emission
         return self.material.emission.radiance
+
+    @emission.setter
+    def emission(self, emission: Any) -> None:
+        if isinstance(emission, Spatial):
+            raise SceneError(f"{self.name}: a sphere shines evenly; a mesh can shine by {emission!r}")
+        self._emission = None if emission is None else rgb(f"{self.name}: emission", emission)
 
     def scaled(self, factor: float) -> Sphere:
         """Return the sphere with all lengths multiplied by `factor`, and the same material."""

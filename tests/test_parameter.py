@@ -1,0 +1,228 @@
+"""Parameters are checked when they are assigned, as they are in the constructor, and shown."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+from significance import render
+
+import wavefront as wf
+
+CAMERA = wf.Camera.look_at((0, 0, 5), (0, 0, 0), fov=30, size=(8, 8))
+ROUGH = {"roughness": 0.5}
+MATERIALS = {  # a material, and for each of its parameters a new value
+    "Diffuse": (wf.Diffuse(0.8), {"reflectance": (0.1, 0.2, 0.3)}),
+    "Mirror": (wf.Mirror(), {"reflectance": 0.25}),
+    "Conductor": (wf.Conductor.named("gold"), {"eta": 2.0, "k": (1, 2, 3), **ROUGH}),
+    "Dielectric": (
+        wf.Dielectric(),
+        {"ior": 1.3, **ROUGH, "reflectance": 0.5, "transmittance": 0.6, "absorption": (1, 0, 0)},
+    ),
+    "ThinDielectric": (wf.ThinDielectric(), {"ior": 1.3, **ROUGH, "reflectance": 0.5, "transmittance": 0.6}),
+    "OrenNayar": (wf.OrenNayar(), {"reflectance": 0.7, "sigma": 0.1}),
+    "Mix": (
+        wf.Mix(wf.Diffuse(0.3), wf.Diffuse(0.6)),
+        {"first": wf.Mirror(0.5), "second": wf.Dielectric(1.5), "weight": 0.25},
+    ),
+    "Principled": (
+        wf.Principled(),
+        {
+            "base_color": (0.2, 0.3, 0.4),
+            "metallic": 0.5,
+            **ROUGH,
+            "ior": 1.3,
+            "transmission": 0.5,
+            "clearcoat": 1.0,
+            "sheen": 0.5,
+            "emission": 0.5,
+        },
+    ),
+}
+
+
+def seen(material: wf.Bsdf | None, *lights) -> bytes:
+    ball = wf.Sphere((0, 0, 0), 1, material=material)
+    return render(wf.Scene(ball, lights or [wf.Environment()], CAMERA), 4).rgb.tobytes()
+
+
+@pytest.mark.parametrize("kind", MATERIALS)
+def test_an_assigned_parameter_is_as_a_given_one(kind: str) -> None:
+    """The picture is that of a material made with it: what follows from it changes, too."""
+    material, changes = copy.deepcopy(MATERIALS[kind])
+    before = seen(material)
+    for name, value in changes.items():
+        setattr(material, name, value)
+    assert seen(material) != before
+    given = {
+        name: value
+        for name, value in {**vars(MATERIALS[kind][0]), **changes}.items()
+        if name in wf_parameters(type(material))
+    }
+    assert seen(material) == seen(type(material)(**given))
+
+
+def wf_parameters(kind: type) -> list[str]:
+    import inspect
+
+    return list(inspect.signature(kind).parameters)
+
+
+@pytest.mark.parametrize(
+    ("thing", "name", "value", "message"),
+    [
+        (wf.Diffuse(), "reflectance", 5.0, r"Diffuse reflectance is 5; it must be in \[0, 1\]"),
+        (wf.Diffuse(), "reflectance", "red", r"Diffuse reflectance must be numeric, got 'red'"),
+        (wf.Diffuse(), "reflectance", None, r"Diffuse reflectance "),
+        (wf.Mirror(), "reflectance", (0, -1, 0), r"Mirror reflectance\[1\] is -1"),
+        (wf.Conductor(1, 1), "roughness", 2, r"Conductor roughness is 2; it must be in \[0, 1\]"),
+        (wf.Conductor(1, 1), "eta", 0, r"Conductor eta is 0; it must be more than 0"),
+        (wf.Dielectric(), "ior", -1, r"Dielectric ior is -1; it must be more than 0"),
+        (wf.OrenNayar(0.5, 1, energy_preserving=True), "sigma", 1.5, r"sigma is .*1.5.*to preserve energy"),
+        (wf.Mix(wf.Mirror(), wf.Mirror()), "first", 3, r"Mix first must be a material, got 3"),
+        (wf.Principled(), "metallic", np.nan, r"Principled metallic is nan"),
+        (wf.PointLight((0, 0, 0), 1), "intensity", -1, r"PointLight intensity is -1; it must be at least 0"),
+        (wf.PointLight((0, 0, 0), 1), "position", (0, 1), r"PointLight position must have shape \(3,\)"),
+        (wf.SpotLight((0, 0, 0), 1, target=(0, 0, 1)), "angle", 200, r"SpotLight angle is 200"),
+        (wf.SpotLight((0, 0, 0), 1, target=(0, 0, 1)), "blend", 2, r"SpotLight blend is 2"),
+        (wf.DirectionalLight((0, 0, 1), 1), "direction", (0, 0, 0), r"direction is \[0.0, 0.0, 0.0\]"),
+        (wf.DirectionalLight((0, 0, 1), 1), "angle", -3, r"DirectionalLight angle is -3"),
+        (wf.Environment(), "radiance", -1, r"Environment radiance is -1; it must be at least 0"),
+        (wf.Sphere((0, 0, 0), 1, name="sun"), "emission", -1, r"sun: emission is -1"),
+        (wf.Sphere((0, 0, 0), 1, name="sun"), "material", "red", r"sun: material must be a material"),
+        (wf.Mesh(np.eye(3), [[0, 1, 2]], name="roof"), "emission", "x", r"roof: emission must be numeric"),
+        (wf.Mesh(np.eye(3), [[0, 1, 2]], name="roof"), "material", 1, r"roof: material must be a material"),
+    ],
+)
+def test_wrong_values_are_refused_and_change_nothing(thing, name: str, value, message: str) -> None:
+    thing = copy.deepcopy(thing)
+    before = getattr(thing, name)
+    with pytest.raises(wf.SceneError, match=message):
+        setattr(thing, name, value)
+    after = getattr(thing, name)
+    assert after is before or np.array_equal(after, before)
+
+
+def test_lights_change_as_they_are_assigned() -> None:
+    """An environment turns into another one, and back from an image."""
+    sky = wf.Environment(0.5)
+    first = seen(None, sky)
+    sky.radiance = np.random.default_rng(0).random((4, 8, 3))
+    assert seen(None, sky) != first
+    sky.radiance = 0.5
+    assert seen(None, sky) == first
+    spot = wf.SpotLight((0, 0, 4), 10, target=(0, 0, 0))
+    spot.intensity, spot.direction = (1, 2, 3), (0, 0.1, -2)
+    assert seen(None, spot) == seen(None, wf.SpotLight((0, 0, 4), (1, 2, 3), direction=(0, 0.1, -2)))
+
+
+def test_none_brings_the_default_back() -> None:
+    ball = wf.Sphere((0, 0, 0), 1, material=wf.Mirror())
+    ball.material = None
+    assert type(ball.material) is wf.Diffuse
+
+
+def test_copies_keep_their_parameters() -> None:
+    for material, _ in MATERIALS.values():
+        for other in (copy.copy(material), copy.deepcopy(material), pickle.loads(pickle.dumps(material))):
+            assert seen(other) == seen(material)
+
+
+@pytest.mark.parametrize(
+    ("thing", "text"),
+    [
+        (wf.Diffuse(0.8), "Diffuse(reflectance=0.8)"),
+        (wf.Diffuse((0.8, 0.2, 0.1)).with_alpha(0.5), "Diffuse(reflectance=(0.8, 0.2, 0.1)).with_alpha(0.5)"),
+        (wf.Diffuse(wf.VertexColors()), "Diffuse(reflectance=VertexColors("),
+        (wf.Dielectric(1.5), "Dielectric(ior=1.5, roughness=0)"),
+        (wf.Dielectric(absorption=(1, 0, 0)), "Dielectric(ior=1.5, roughness=0, absorption=(1, 0, 0))"),
+        (
+            wf.Mix(wf.Mirror(), wf.Diffuse()),
+            "Mix(first=Mirror(reflectance=1), second=Diffuse(reflectance=0.5), weight",
+        ),
+        (wf.Principled(0.5, clearcoat=1.0), "transmission=0, clearcoat=1"),
+        (wf.PointLight((0, 1, 2.5), 3), "PointLight(position=(0, 1, 2.5), intensity=3)"),
+        (
+            wf.SpotLight((0, 0, 0), 3, target=(0, 0, -2)),
+            "SpotLight(position=(0, 0, 0), intensity=3, direction=(0, 0, -1))",
+        ),
+        (
+            wf.DirectionalLight((0, -2, 0), 3, angle=0.5),
+            "DirectionalLight(direction=(0, -1, 0), irradiance=3, angle=0.5)",
+        ),
+        (wf.Environment((1, 2, 3)), "Environment(radiance=(1, 2, 3))"),
+        (wf.Texture(np.ones((2, 4))), "<Texture 'array': 4 × 2>"),
+        (CAMERA, "<Camera: Perspective(fov=30, focus=5) at (0, 0, 5) towards (0, 0, -1), 8 × 8>"),
+        (wf.Camera.orthographic((0, 0, 5), (0, 0, 0), height=3), "<Camera: Orthographic(height=3) at"),
+        (
+            wf.Camera.panorama((0, 0, 0), crop=(0, 0, 3, 2)),
+            "<Camera: Panorama() at (0, 0, 0) towards (0, 0, 1), 3 × 2 of",
+        ),
+    ],
+)
+def test_repr_shows_the_parameters(thing, text: str) -> None:
+    assert text in repr(thing)
+
+
+def test_an_own_material_is_shown() -> None:
+    class Phong(wf.Bsdf):
+        def __init__(self, exponent: float) -> None:
+            self.exponent = exponent
+
+        def f(self, wo, wi):
+            return np.zeros_like(wi)
+
+    assert repr(Phong(3.0)) == "Phong(exponent=3)"
+
+
+BYTES = np.full((4, 4), 200, np.uint8)
+
+
+def floats(value: float, **options) -> wf.Texture:
+    return wf.Texture(np.full((4, 4, 3), float(value)), **options)
+
+
+# --- Textures -------------------------------------------------------------------------------------
+
+
+RANGE = r"; it must be in \[0, 1\]"
+OUT_OF_RANGE = {
+    "bytes as floats": (
+        lambda: wf.Diffuse(floats(255)),
+        rf"Diffuse reflectance: <Texture 'array'.* 255{RANGE}",
+    ),
+    "what to do": (lambda: wf.Diffuse(floats(255)), r"Values from 0 to 255 are passed as uint8"),
+    "below 0": (lambda: wf.Diffuse(floats(-1)), rf"Diffuse reflectance: <Texture 'array'.* -1{RANGE}"),
+    "scaled bytes": (lambda: wf.Diffuse(wf.Texture(BYTES, srgb=False, scale=3)), r"has the value 2.35"),
+    "offset": (lambda: wf.Diffuse(wf.Texture(BYTES * 0, offset=-0.5)), r"has the value -0.5"),
+    "roughness": (lambda: wf.Conductor(1, 1, floats(1.5, channel=0)), rf"Conductor roughness.* 1.5{RANGE}"),
+    "eta": (lambda: wf.Conductor(floats(-1), 1), r"Conductor eta.* -1; it must be"),
+    "ior": (lambda: wf.Dielectric(floats(0, channel=0)), r"Dielectric ior.* 0; it must be more than 0"),
+    "alpha": (lambda: wf.Diffuse().with_alpha(floats(3, channel=0)), rf"Diffuse alpha.* 3{RANGE}"),
+    "times": (lambda: wf.VertexColors(floats(3)), rf"VertexColors times.* 3{RANGE}"),
+    "emission": (
+        lambda: wf.Mesh(np.eye(3), [[0, 1, 2]], emission=floats(-3)),
+        r"mesh: emission.* -3; it must be at least 0",
+    ),
+    "assigned": (lambda: setattr(wf.Mirror(), "reflectance", floats(9)), rf"Mirror reflectance.* 9{RANGE}"),
+}
+
+
+@pytest.mark.parametrize("name", OUT_OF_RANGE)
+def test_textures_out_of_range_are_refused(name: str) -> None:
+    """Naming what they are used as, the texture, the value, the limit, and what to do."""
+    make, message = OUT_OF_RANGE[name]
+    with pytest.raises(wf.SceneError, match=message):
+        make()
+
+
+def test_textures_in_range_are_taken() -> None:
+    """an emission may be above 1; scale and offset count; one channel of several too."""
+    codes = np.random.default_rng(0).integers(0, 256, (4, 4, 3), np.uint8)
+    wf.Diffuse(wf.Texture(codes))
+    wf.Diffuse(wf.Texture(codes.astype(np.uint16) * 257))
+    wf.Diffuse(wf.Texture(codes.astype(np.float32), scale=1 / 255))
+    wf.Diffuse(wf.Texture(np.full((2, 2, 3), 3.0), scale=-1, offset=3.5))
+    wf.Diffuse(wf.Texture(np.array([[[0.5, 7.0, 0.1]]]), channel=0))
+    wf.Mesh(np.eye(3), [[0, 1, 2]], emission=wf.Texture(np.full((2, 2, 3), 300.0)))
+    assert wf.Texture(np.array([[[0.25, 0.5, 2.0]]]), scale=2).limits() == (0.5, 4.0)
