@@ -34,7 +34,7 @@ MTL = "newmtl m\nKd 1 1 1\nmap_Kd -s 1 1 1 t.png\nPr 0.3\nd 0.5\nKe 1 1 1\n"
 def make_seeds(folder):
     """Write a sound file of every kind."""
     ball = trimesh.creation.icosphere(1)
-    for extension in ("obj", "ply", "stl", "glb"):
+    for extension in ("obj", "ply", "stl", "glb", "off", "dae", "3mf"):
         ball.export(folder / f"ball.{extension}")
     (folder / "text.ply").write_bytes(trimesh.exchange.ply.export_ply(ball, encoding="ascii"))
     (folder / "text.stl").write_text(trimesh.exchange.stl.export_stl_ascii(ball))
