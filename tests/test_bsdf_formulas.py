@@ -423,11 +423,12 @@ def test_sheen_over_the_base():
     assert bsdf.f(wo, wi) == pytest.approx(exact, rel=5e-4, abs=1e-6)
 
 
-def test_shares_of_the_lobes():
+@pytest.mark.parametrize(("color", "sheen", "roughness"), [(COLOR, 0.7, 0.5), ((1e-3, 0, 0), 0.0, 0.2)])
+def test_shares_of_the_lobes(color, sheen, roughness):
     """The density is a mean of those of the lobes, weighted by about what each reflects along wo."""
-    metallic, clear, specular, ior, tint, coat, sheen = 0.3, 0.4, 0.8, 1.7, (0.5, 0.5, 0.5), 0.6, 0.7
+    metallic, clear, specular, ior, tint, coat = 0.3, 0.4, 0.8, 1.7, (0.5, 0.5, 0.5), 0.6
     bsdf = Principled(
-        COLOR, metallic, 0.5, ior, clear, thin=True, specular=specular, specular_color=tint,
+        color, metallic, roughness, ior, clear, thin=True, specular=specular, specular_color=tint,
         clearcoat=coat, clearcoat_roughness=0.3, sheen=sheen, sheen_color=tint,
     )  # fmt: skip
     wo, wi = pairs()
@@ -438,11 +439,11 @@ def test_shares_of_the_lobes():
     away = (1 - wo[2].astype(float)) ** 5
     opaque = (1 - metallic) * (1 - clear)
     seen = luminance(gloss_of(ior, specular, tint, wo[2].astype(float)))
-    gloss = metallic * (luminance(schlick(column(COLOR), wo[2].astype(float))) + 0.1) + opaque * (seen + 0.1)
+    gloss = metallic * (luminance(schlick(column(color), wo[2].astype(float))) + 0.1) + opaque * (seen + 0.1)
     glass = (1 - metallic) * clear
     varnish = coat * (0.1 + schlick(0.04, wo[2].astype(float)))
-    matte = opaque * (luminance(column(COLOR)) + 0.01) + sheen * 0.5 * (0.2 + away)
-    rough, smooth = (mirror_lobe(wo, wi, F4(alpha))[1] for alpha in (0.25, 0.09))
+    matte = opaque * (luminance(column(color)) + 0.01) + sheen * 0.5 * (0.2 + away)
+    rough, smooth = (mirror_lobe(wo, wi, F4(r**2))[1] for r in (roughness, 0.3))
     face = fresnel(dot(wo, half_vector(wo, wi)), ior)
     lobes = gloss * rough + glass * rough * 2 * face / (1 + face) + varnish * smooth + matte * wi[2] / np.pi
     assert bsdf.pdf(wo, wi) == pytest.approx(lobes / (gloss + glass + varnish + matte), rel=1e-3)
