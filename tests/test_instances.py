@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from wavefront.accel import InstanceAccelerator, Intersections, choose, make_acc
 from wavefront.accel import instances as queries
 from wavefront.accel.embree import installed
 from wavefront.scene import CompiledScene, compile_scene
-from wavefront.shapes.instance import can_place
+from wavefront.shapes.instance import can_place, instance_bounds
 from wavefront.stages.intersect import intersect
 from wavefront.stages.relief import tilt
 from wavefront.stages.surface import interact
@@ -674,3 +675,30 @@ def test_what_can_be_placed_is_decided_as_for_one(power):
             return False
 
     assert can_place(mesh, transforms).tolist() == [works(transform) for transform in transforms]
+
+
+def test_a_scene_of_many_instances_is_prepared_fast():
+    """Bounds, materials and matrices of instances are looked at together, not one by one."""
+    mesh = wf.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    transforms = np.tile(np.eye(4), (2**15, 1, 1))
+    transforms[:, :3, 3] = np.random.default_rng(0).random((2**15, 3)) * 100
+    scene = wf.Scene(wf.Instance.many(mesh, transforms), [wf.Environment(1.0)])
+    start = time.process_time()
+    bounds = scene.bounds
+    assert time.process_time() - start < 1
+    low, high = transforms[:, :3, 3].min(0), (transforms[:, :3, 3] + [1, 1, 0]).max(0)
+    assert np.array_equal(bounds, [low, high])
+
+
+def test_bounds_of_instances_are_those_of_each():
+    """Bit for bit, whatever other instances stand beside them."""
+    rng = np.random.default_rng(0)
+    meshes = [wf.Mesh(rng.normal(size=(n, 3)), rng.integers(0, n, (n, 3))) for n in (3, 5, 400)]
+    transforms = np.tile(np.eye(4), (500, 1, 1))
+    transforms[:, :3] = rng.normal(size=(500, 3, 4))
+    instances = [wf.Instance(meshes[i % 3], transform) for i, transform in enumerate(transforms)]
+    together = instance_bounds(instances)
+    for instance, box in zip(instances, together, strict=True):
+        assert np.array_equal(instance.bounds, box)
+        used = instance.to_mesh().bounds
+        assert box == pytest.approx(used, rel=1e-12, abs=1e-12)

@@ -12,6 +12,7 @@ from .accel import Placements
 from .errors import SceneError
 from .record import record
 from .shapes import Instance, Mesh, Shape, Sphere
+from .shapes.instance import instance_bounds
 from .state import Columns
 from .vec import Floats, Ints, f4
 
@@ -69,6 +70,7 @@ def resolve(shapes: Sequence[Shape], most_copies: int) -> tuple[list[Mesh], list
     meshes: list[Mesh] = []
     spheres: list[Sphere] = []
     instances: list[Instance] = []
+    shareable = _shareable([shape for shape in shapes if isinstance(shape, Instance)])
     for shape in shapes:
         if isinstance(shape, Mesh):
             meshes.append(shape)
@@ -76,16 +78,22 @@ def resolve(shapes: Sequence[Shape], most_copies: int) -> tuple[list[Mesh], list
             spheres.append(shape)
         elif not isinstance(shape, Instance):
             raise SceneError(f"{shape.name}: cannot trace a {type(shape).__name__}")
-        elif total > most_copies and copies[id(shape.mesh)] > 1 and _can_share(shape):
+        elif total > most_copies and copies[id(shape.mesh)] > 1 and id(shape) in shareable:
             instances.append(shape)
         else:
             meshes.append(shape.to_mesh())
     return meshes, spheres, instances
 
 
-def _can_share(instance: Instance) -> bool:
-    stretch = np.linalg.svd(instance.transform[:3, :3], compute_uv=False)
-    return instance.emission is None and bool(stretch[0] <= SKEW * stretch[2])
+def _shareable(instances: Sequence[Instance]) -> set[int]:
+    """Return the identities of the instances that shine by no light and are not very skewed."""
+    if not instances:
+        return set()
+    linear = np.stack([instance.transform[:3, :3] for instance in instances])
+    stretch = np.linalg.svd(linear, compute_uv=False)
+    even = (stretch[:, 0] <= SKEW * stretch[:, 2]).tolist()
+    pairs = zip(instances, even, strict=True)
+    return {id(instance) for instance, fits in pairs if fits and instance.emission is None}
 
 
 def own_frame(mesh: Mesh) -> Doubles:
@@ -123,7 +131,7 @@ def place(
     rows = triangles + np.cumsum(sizes) - sizes
     ends = triangles + spheres + np.cumsum(sizes.take(mesh_of))
     first = ends - sizes.take(mesh_of)
-    boxes = np.stack([instance.bounds - centre for instance in instances])
+    boxes = instance_bounds(instances) - centre
     middles = np.stack([mesh.bounds.mean(0) for mesh in shared]).take(mesh_of, 0)
     halves = np.stack([np.ptp(mesh.bounds, axis=0) / 2 for mesh in shared]).take(mesh_of, 0)
     linear = np.stack([instance.transform[:3, :3] for instance in instances])

@@ -22,7 +22,7 @@ Source: TypeAlias = str | os.PathLike[str] | ArrayLike | Texture
 TANGENTS = {"uv": "tangents", "uv1": "tangents1"}
 AXES = {"uv": "axes", "uv1": "axes1"}
 MAX_STRENGTH = 1e9  # of a normal map; a larger one turns every normal into the surface
-MAX_HEIGHT = 1e30  # of a bump map, scene units
+MAX_HEIGHT = float(np.finfo(f4).max)  # of a bump map, scene units
 
 
 class NormalMap(Relief):
@@ -106,7 +106,7 @@ class BumpMap(Relief):
     ------
     SceneError
         If the texture gives colours or is decoded from sRGB, or the height is not finite or of a
-        size above 1e30.
+        size beyond float32.
     """
 
     @suggests_keywords

@@ -34,6 +34,7 @@ from .record import record
 from .scale import check_distance, check_lights, length_factor, scaled_shapes
 from .shapes import Instance, Mesh, Shape, Sphere
 from .shapes.attributes import ATTRIBUTES, Corners, corner_values
+from .shapes.instance import instance_bounds
 from .state import Surface
 from .suggestions import suggests_keywords
 from .uneven import Source, Uneven, is_uneven, mean_radiance
@@ -147,7 +148,9 @@ class Scene:
     @property
     def bounds(self) -> NDArray[np.float64]:
         """Lower and upper corner of all shapes, (2, 3), scene units."""
-        boxes = np.stack([shape.bounds for shape in self.shapes])
+        instances = [shape for shape in self.shapes if isinstance(shape, Instance)]
+        alone = [shape.bounds for shape in self.shapes if not isinstance(shape, Instance)]
+        boxes = np.concatenate([np.array(alone).reshape(-1, 2, 3), instance_bounds(instances)])
         return np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
 
     @property
@@ -625,10 +628,19 @@ def _attributes_read(shapes: Sequence[Shape]) -> list[str]:
     """
     read: set[str] = set()
     lacking: dict[str, dict[int, str]] = {}  # what -> the meshes that lack it, by identity, with their names
+    seen: set[tuple[int, int]] = set()  # meshes and materials of instances
+    of_material: dict[int, set[str]] = {}
     for shape in shapes:
+        if isinstance(shape, Instance):
+            pair = id(shape.mesh), id(shape.material)
+            if pair in seen:
+                continue
+            seen.add(pair)
         mesh = shape.mesh if isinstance(shape, Instance) else shape
         glow = shape.emission.reads if isinstance(shape.emission, Spatial) else ()
-        for name in sorted(_reads(shape.material).union(glow)):
+        if id(shape.material) not in of_material:
+            of_material[id(shape.material)] = _reads(shape.material)
+        for name in sorted(of_material[id(shape.material)].union(glow)):
             if name not in ATTRIBUTES:
                 known = ", ".join(ATTRIBUTES)
                 raise SceneError(f"{shape.name}: its material reads {name!r}; it must be one of {known}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 
 import numpy as np
@@ -15,6 +16,7 @@ from .mesh import FLOAT32_MAX, Mesh, check_range
 from .transform import moved, moved_tangents
 
 SINGULAR = 1e-12  # the least of the lengths to which a transform stretches, as a part of the greatest
+MOST_PLACED = 1 << 16  # vertices that are placed at a time
 SURE = 1e-6  # a cheap bound of that ratio that is larger leaves no doubt
 
 
@@ -102,10 +104,7 @@ class Instance(Shape):
     @property
     def bounds(self) -> NDArray[np.float64]:
         """Lower and upper corner, (2, 3), of the placed vertices that faces use."""
-        vertices = self.mesh.vertices
-        used = np.flatnonzero(np.bincount(self.mesh.faces.ravel(), minlength=len(vertices)))
-        placed = _placed(self.transform, vertices.take(used, 0))
-        return np.stack([placed.min(1), placed.max(1)])
+        return instance_bounds([self])[0]
 
     def to_mesh(self) -> Mesh:
         """Return a mesh of its own, with the vertices where the instance has them."""
@@ -167,6 +166,26 @@ def can_place(mesh: Mesh, transforms: NDArray[np.float64]) -> NDArray[np.bool_]:
     for i in np.flatnonzero(good & ~(bound.max(1) <= FLOAT32_MAX / 2)).tolist():
         good[i] = (np.abs(_placed(transforms[i], mesh.vertices)) <= FLOAT32_MAX).all()
     return good
+
+
+def instance_bounds(instances: Sequence[Instance]) -> NDArray[np.float64]:
+    """Return the `bounds` of instances, (n, 2, 3), those of one mesh together."""
+    out = np.empty((len(instances), 2, 3))
+    numbers: dict[int, list[int]] = {}  # by mesh
+    for number, instance in enumerate(instances):
+        numbers.setdefault(id(instance.mesh), []).append(number)
+    for alike in numbers.values():
+        mesh = instances[alike[0]].mesh
+        used = np.flatnonzero(np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices)))
+        vertices = mesh.vertices.take(used, 0).T
+        step = max(1, MOST_PLACED // used.size)
+        for begin in range(0, len(alike), step):
+            some = alike[begin : begin + step]
+            transforms = np.stack([instances[number].transform for number in some])
+            with np.errstate(over="ignore", invalid="ignore"):
+                placed = transforms[:, :3, :3] @ vertices + transforms[:, :3, 3:]
+            out[some, 0], out[some, 1] = placed.min(2), placed.max(2)
+    return out
 
 
 def _placed(transform: NDArray[np.float64], vertices: NDArray[np.float64]) -> NDArray[np.float64]:
