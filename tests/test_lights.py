@@ -259,7 +259,8 @@ def test_a_closed_mesh_lets_no_light_in(scale: float) -> None:
     camera = wf.Camera.look_at((0, 0, 0), (0, 1, 0), (0, 0, 1), fov=120, size=(32, 32))
     lights = [wf.Environment(), wf.PointLight((0, 2 * scale, 0), scale**2)]
     scene = wf.Scene([wf.Mesh(mesh.vertices * scale, mesh.faces)], lights, camera)
-    assert (render(scene, 16, max_bounces=3).rgb == 0).all()
+    with pytest.warns(UserWarning, match="the camera is inside 'mesh', where no light gets in"):
+        assert (render(scene, 16, max_bounces=3).rgb == 0).all()
 
 
 def test_shadow_rays_end_before_the_light() -> None:

@@ -17,6 +17,7 @@ from .accel.choose import CHOICES
 from .blas import reserve_buffers
 from .bsdfs import Bsdf
 from .camera import Camera
+from .diagnosis import warn_of_black_or_white
 from .errors import Interrupted, RenderError, SceneError, number, one_of
 from .exact_sum import MAX_TERMS
 from .filters import FILTERS
@@ -246,6 +247,7 @@ def render(
     if clock.up:
         _check_first_samples(image, seconds, watch.surfaces.value)
     tally.bad.report(image)
+    warn_of_black_or_white(image, complete, compiled, view, integrator, max_bounces)
     if noise is not None and (clock.up or tally.film.count.max() == spp):
         _warn_of_noise(image, noise)
     return image

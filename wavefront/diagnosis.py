@@ -1,0 +1,245 @@
+"""Why a picture is black or white: the likely cause, found from the scene.
+
+A few rays through the picture, and samples of light where they meet a surface, tell what is wrong. The checks
+go from what explains all of it to what explains less, and the first one that holds is named. They run for
+pictures alone that show nothing.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from functools import cached_property
+
+import numpy as np
+
+from .bsdfs import Bsdf
+from .camera import Camera
+from .image import Image
+from .lights import LightSample, SpotLight
+from .scene import CompiledScene, Scene
+from .shapes import Instance, Mesh, Shape
+from .stages.intersect import intersect, shadow_rays, visible
+from .stages.surface import above, interact
+from .state import Hits, Rays, Surface
+from .vec import Bools, Ints, dot, f4
+
+FEWEST_PIXELS = 256  # a smaller picture is a measurement: nobody looks at it
+BLACK = (0.5 / 255) ** 2.2  # radiance below which a PNG holds 0
+DIM = 1e-3  # radiance below which a picture is black to the eye
+GRID = 16  # rays across the picture and down
+SAMPLES = 16  # of light at each point that is seen
+
+
+def warn_of_black_or_white(
+    image: Image, scene: Scene, compiled: CompiledScene, view: Camera, integrator: str, max_bounces: int
+) -> None:
+    """Warn of a picture that is black or white all over, with the likely cause.
+
+    Parameters
+    ----------
+    image
+        What was rendered.
+    scene, compiled
+        What it shows, as it was put together and as it was rendered.
+    view
+        The camera, in the units of `compiled`.
+    integrator, max_bounces
+        How it was rendered.
+    """
+    if image.rgb.shape[0] * image.rgb.shape[1] < FEWEST_PIXELS:
+        return
+    brightest, darkest = float(image.rgb.max()), float(image.rgb.min())
+    if brightest >= DIM and darkest <= 1:
+        return
+    sight = Sight(scene, compiled, view, integrator, max_bounces)
+    if darkest > 1:
+        warnings.warn(f"the picture is white: {sight.why_white(darkest)}", stacklevel=3)
+    elif brightest > BLACK:
+        stops = int(np.ceil(np.log2(0.5 / brightest)))
+        warnings.warn(
+            f"the picture is almost black: its brightest pixel is {brightest:.2g}, and 1 is white; "
+            f"save(..., exposure={stops}) shows it, or lights {2**stops} times as bright",
+            stacklevel=3,
+        )
+    elif not sight.lights_are_off:
+        warnings.warn(f"the picture is black: {sight.why_black()}", stacklevel=3)
+
+
+class Sight:
+    """What a camera sees of a scene, by a grid of rays."""
+
+    def __init__(
+        self, scene: Scene, compiled: CompiledScene, view: Camera, integrator: str, max_bounces: int
+    ) -> None:
+        self._scene, self._compiled, self._view = scene, compiled, view
+        self._integrator, self._max_bounces = integrator, max_bounces
+
+    @property
+    def lights_are_off(self) -> bool:
+        """Whether there are lights, and each was told to send nothing."""
+        lights = self._compiled.lights
+        if not len(lights) or lights.choice is not None:
+            return False
+        environment = self._compiled.light_of[-1]
+        if environment < 0:
+            return True
+        around = np.concatenate([np.eye(3, dtype=f4), -np.eye(3, dtype=f4)], 1)
+        return not lights.le(np.full(6, environment), around).any()
+
+    def why_black(self) -> str:
+        """Return the likely cause of a black picture."""
+        if not len(self._compiled.lights):
+            return "nothing in the scene shines; lighting='studio' lights it"
+        if not len(self._seen):
+            return f"the camera sees no shape; {self._where_the_scene_is()}"
+        if self._max_bounces == 0:
+            return "max_bounces=0 shows lights alone, and the camera sees none that shines towards it"
+        if all(bsdf.black for bsdf in self._materials_seen()):
+            return "the materials of all that the camera sees reflect nothing"
+        found = self._why_no_light_arrives()
+        if found is None and self._around.inside.all() and len(self._around) == GRID * GRID:
+            found = f"the camera is inside {self._name(self._around.prim)}, where no light gets in"
+        return found or self._why_it_is_not_found()
+
+    def why_white(self, darkest: float) -> str:
+        """Return the likely cause of a white picture."""
+        fix = f"save(..., exposure={-int(np.ceil(np.log2(darkest)))}) shows what is below"
+        shines = self._compiled.shines.take(self._hits.prim)
+        if not len(self._seen):
+            return f"the camera sees no shape, only light from all around that is above 1; {fix}"
+        if shines.all():
+            return f"the camera sees nothing but {self._name(self._seen.prim)}, which shines; {fix}"
+        return f"its darkest pixel is {darkest:.3g}, and 1 is white; {fix}"
+
+    # --- What is seen ---------------------------------------------------------------------------------
+
+    @cached_property
+    def _rays(self) -> Rays:
+        x0, y0, x1, y1 = self._view.window
+        step = (np.arange(GRID) + 0.5) / GRID
+        x, y = np.meshgrid(x0 + (x1 - x0) * step, y0 + (y1 - y0) * step)
+        origin, direction = self._view.rays(
+            x.ravel().astype(f4), y.ravel().astype(f4), self._compiled.centre, None
+        )
+        return Rays(origin, direction, np.full(GRID * GRID, -1, np.intp))
+
+    @cached_property
+    def _hits(self) -> Hits:
+        return intersect(self._compiled, self._rays)
+
+    @cached_property
+    def _seen(self) -> Surface:
+        return self._surface(self._rays, self._hits)
+
+    @cached_property
+    def _around(self) -> Surface:
+        """What lies around the camera, in all directions."""
+        n = GRID * GRID
+        height = 1 - (2 * np.arange(n) + 1) / n
+        turn = np.arange(n) * np.pi * (3 - np.sqrt(5))  # the golden angle spreads points evenly
+        level = np.sqrt(1 - height**2)
+        direction = np.stack([level * np.cos(turn), height, level * np.sin(turn)]).astype(f4)
+        rays = Rays(self._rays.origin[:, :1].repeat(n, 1), direction, np.full(n, -1, np.intp))
+        return self._surface(rays, intersect(self._compiled, rays))
+
+    def _surface(self, rays: Rays, hits: Hits) -> Surface:
+        found = hits.found
+        return interact(self._compiled, rays.take(found), hits.take(found))
+
+    def _materials_seen(self) -> list[Bsdf]:
+        materials = self._compiled.materials
+        return [materials.groups[group] for group in np.unique(materials.group_of.take(self._seen.material))]
+
+    def _where_the_scene_is(self) -> str:
+        backward = self._view.rotation[:, 2]
+        middle = self._compiled.centre - self._view.origin
+        if float(middle @ backward) > 0:
+            return "the middle of the scene is behind it: look the other way"
+        return "it looks past the scene"
+
+    def _name(self, prims: Ints) -> str:
+        """Return the name of the shape that most of the primitives (n,) belong to."""
+        shapes = list(self._scene.shapes)
+        if any(isinstance(shape, Instance) for shape in shapes):
+            return "a shape"
+        ordered: list[Shape] = sorted(shapes, key=lambda shape: not isinstance(shape, Mesh))  # as compiled
+        ends = np.cumsum([len(shape.faces) if isinstance(shape, Mesh) else 1 for shape in ordered])
+        numbers = np.searchsorted(ends, prims, "right")
+        return repr(ordered[int(np.bincount(numbers).argmax())].name)
+
+    # --- What light reaches ---------------------------------------------------------------------------
+
+    def _why_no_light_arrives(self) -> str | None:
+        """Return what keeps light samples from all points that are seen; None if some arrive, or none are."""
+        if self._compiled.lights.choice is None:
+            return None
+        shining = facing = False
+        blockers: list[Ints] = []
+        for light, lanes in self._light_samples():
+            shining |= bool(lanes.any())
+            lanes &= (dot(self._seen.ng, light.wi) > 0) | self._transmissive(self._seen.material)
+            facing |= bool(lanes.any())
+            rays = shadow_rays(self._seen, above(self._seen), light, np.flatnonzero(lanes))
+            if visible(self._compiled, rays).any():
+                return None
+            blockers.append(self._first_met(rays))
+        if not shining:
+            return f"the lights shine away from all that the camera sees; {self._how_to_turn_lights()}"
+        if not facing:
+            return "the camera sees only the sides of surfaces that are turned away from the lights"
+        return self._why_it_is_blocked(np.concatenate(blockers))
+
+    def _light_samples(self) -> Iterator[tuple[LightSample, Bools]]:
+        """Yield samples of light at the points that are seen, and which of them carry any."""
+        random = np.random.default_rng(0)
+        n = len(self._seen)
+        for _ in range(SAMPLES):
+            u = random.random((3, n), f4)
+            light, _ = self._compiled.lights.sample_li(above(self._seen), u[0], u[1:])
+            yield light, (light.pdf > 0) & (light.radiance > 0).any(0)
+
+    def _first_met(self, rays: Rays) -> Ints:
+        """Return the primitives that rays meet first."""
+        hits = intersect(self._compiled, rays)
+        return hits.prim.take(hits.found)
+
+    def _transmissive(self, rows: Ints) -> Bools:
+        materials = self._compiled.materials
+        clear = np.array([bsdf.transmissive for bsdf in materials.groups], np.bool_)
+        return clear.take(materials.group_of.take(rows))
+
+    def _how_to_turn_lights(self) -> str:
+        if any(isinstance(light, SpotLight) for light in self._scene.lights):
+            return "direct the SpotLight, or widen its cone"
+        return "reverse their faces, or give them two_sided=True"
+
+    def _why_it_is_blocked(self, prims: Ints) -> str:
+        name = self._name(prims)
+        through = self._transmissive(self._compiled.material_of.take(prims))
+        if not through.any():
+            if self._around.inside.all() and len(self._around) == GRID * GRID:
+                return f"the camera is inside {name}, where no light gets in"
+            return f"all that the camera sees is in the shadow of {name}"
+        if self._compiled.lights.delta_of.all():
+            return (
+                f"{name} lets light through, but bends it, and no path meets a light without size there; "
+                "give the light a size: a small wf.Sphere with an emission"
+            )
+        if self._integrator != "full":
+            return (
+                f"light comes through {name} alone, which integrator={self._integrator!r} does not follow; "
+                "integrator='full' does"
+            )
+        return f"light comes through {name} alone, too seldom to be found by so few samples"
+
+    def _why_it_is_not_found(self) -> str:
+        """Return why light that there is does not reach the camera."""
+        if self._integrator == "naive" and self._compiled.lights.delta_of.all():
+            return "the naive integrator meets lights by chance, and lights without size never"
+        if self._integrator in ("direct_simple", "direct_mis"):
+            return (
+                f"integrator={self._integrator!r} shows direct light only, and none reaches what the camera "
+                "sees; integrator='full' shows all light"
+            )
+        return "no light reaches what the camera sees"
