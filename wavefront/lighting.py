@@ -110,13 +110,14 @@ def _tinted(radiance: float, warmth: float) -> tuple[float, float, float]:
 
 
 # A surface that faces the brightest side gets 0.9 to 1.1 times what an even environment of radiance 1
-# brings, so white keeps its shading. The camera of `Scene.framing_camera` sees none of the boxes.
+# brings, so white keeps its shading. A camera at the height of that of `Scene.framing_camera` sees none
+# of the boxes, from whichever side.
 PRESETS = {
     "studio": Preset(
         ((-1, 0.1), (-0.4, 0.1), (0.12, 0.045), (0.95, 0.18)),
         (
             SoftBox(-62, 34, 60, 56, _tinted(4.6, 0.02)),  # key
-            SoftBox(75, 14, 64, 60, _tinted(1.1, -0.03)),  # fill
+            SoftBox(75, 34, 66, 54, _tinted(1.35, -0.03)),  # fill
             SoftBox(140, 34, 40, 40, _tinted(2.6, 0.0)),  # rim
         ),
     ),
@@ -128,7 +129,7 @@ PRESETS = {
         ((-1, 0.1), (-0.4, 0.1), (0.12, 0.04), (1, 0.06)),
         (
             SoftBox(-45, 38, 26, 26, _tinted(17.0, 0.03)),  # key
-            SoftBox(55, 18, 34, 34, _tinted(3.2, -0.03)),  # fill
+            SoftBox(55, 25, 34, 34, _tinted(3.2, -0.03)),  # fill
             SoftBox(155, 42, 24, 24, _tinted(12.0, 0.0)),  # back
         ),
     ),
