@@ -229,6 +229,7 @@ def scene_vertices(mesh: wf.Mesh, matrix: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("accel", NAMES)
 @pytest.mark.parametrize(("scale", "shift"), [(1e-3, 0), (1e3, 0), (1, 300), (1, -2e4), (1e-3, 30)])
+@pytest.mark.filterwarnings("ignore:the picture is black")
 def test_light_does_not_leak_in(accel, scale, shift):
     """Inside a closed instance it stays dark, however often paths bounce off its wall."""
     mesh = bumpy(smooth=True, material=wf.Diffuse(1))
@@ -404,6 +405,7 @@ def test_absorption_is_that_of_the_instances_material():
 
 
 @pytest.mark.parametrize("of_mesh", [True, False])
+@pytest.mark.filterwarnings("ignore:the picture is black")
 def test_an_alpha_may_be_that_of_some_instances(of_mesh):
     """Half-transparent in one place and solid in another, of one mesh; shadows too."""
     solid, half = wf.Diffuse(0), wf.Diffuse(0).with_alpha(0.5)

@@ -383,6 +383,7 @@ def test_a_mirror_has_no_black_facets(angle):
         assert furnace(wf.Mirror(1.0).with_relief(relief), angle) == pytest.approx(1.0, rel=1e-5)
 
 
+@pytest.mark.filterwarnings("ignore:the picture is black")
 def test_light_does_not_leak_from_behind():
     lamp = square(z=-0.5, emission=5.0)
     camera = wf.Camera.orthographic((0.5, 0.5, 3), (0.5, 0.5, 0), height=0.9, size=(16, 16))

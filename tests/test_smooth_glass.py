@@ -137,6 +137,7 @@ OPAQUE = {
 }
 
 
+@pytest.mark.filterwarnings("ignore:the picture is black")
 @pytest.mark.parametrize("lean", [0.5, 2.0])
 @pytest.mark.parametrize("name", OPAQUE)
 def test_nothing_leaks_through_walls_with_strongly_tilted_normals(name, lean):
