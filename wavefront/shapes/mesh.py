@@ -238,7 +238,7 @@ def _colors(name: str, values: ArrayLike | None, count: int) -> NDArray[np.float
     bad = np.argwhere((array < 0) | (array > 1))
     if len(bad):
         i, j = bad[0]
-        raise SceneError(f"{name}[{i}][{j}] is {array[i, j]:g}; it must be in [0, 1]")
+        raise SceneError(f"{name}[{i}][{j}] is {array[i, j]:g}; it must be in [0, 1], or uint8")
     return array if array.shape[1] == 4 else np.column_stack([array, np.ones(count)])
 
 
