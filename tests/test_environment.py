@@ -329,7 +329,10 @@ BAD = {
     "black": ({"radiance": PICTURE * 0}, r"every pixel of the Environment is black; Environment\(0\) is"),
     "no file": ({"radiance": "missing.exr"}, "missing.exr"),
     "no image": ({"radiance": "sky.obj"}, "extension '.obj' is not one of"),
-    "filter": ({"radiance": PICTURE, "filter": "cubic"}, "filter is 'cubic'; it must be 'bilinear' or"),
+    "filter": (
+        {"radiance": PICTURE, "filter": "cubic"},
+        "filter is 'cubic'; it must be one of bilinear, nearest",
+    ),
     "negative": ({"radiance": -1.0}, "Environment radiance is -1; it must be at least 0"),
     "transform scales": (
         {"radiance": PICTURE, "transform": 2 * np.eye(3)},

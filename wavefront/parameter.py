@@ -20,15 +20,17 @@ class Parameter:
     convert
         Called with the name for messages, such as "Diffuse reflectance", and the value; returns what is
         kept, or raises a SceneError. What it returns it must take as well.
+    argument
+        What the constructor calls it, if not by its name; for messages.
     """
 
-    def __init__(self, convert: Callable[[str, Any], Any]) -> None:
-        self._convert = convert
+    def __init__(self, convert: Callable[[str, Any], Any], argument: str | None = None) -> None:
+        self._convert, self._argument = convert, argument
         self._name = self._title = ""
 
     def __set_name__(self, owner: type, name: str) -> None:
         """Learn the name under which the class has it."""
-        self._name, self._title = name, f"{owner.__name__} {name}"
+        self._name, self._title = name, f"{owner.__name__} {self._argument or name}"
 
     def __set__(self, instance: Any, value: Any) -> None:
         """Keep the value as it is converted; a later one changes what follows from it, too."""

@@ -6,11 +6,12 @@ from functools import partial
 
 import numpy as np
 
-from ..parameter import Parameter
+from ..errors import SceneError
+from ..parameter import Parameter, brief
 from ..sampling.warp import cosine_hemisphere_pdf
 from ..suggestions import suggests_keywords
 from ..vec import Floats, dot, f4
-from .base import Bsdf
+from .base import Bsdf, Spatial
 from .microfacet import INV_PI
 from .parameter import Colour, Scalar, colour, scalar
 
@@ -58,8 +59,9 @@ class OrenNayar(Bsdf):
 
     def derive(self) -> None:
         """Check what the model that preserves energy asks for."""
-        if self.energy_preserving:
-            scalar("OrenNayar sigma", self.sigma, lambda x: 0 <= x <= 1, "in [0, 1] to preserve energy")
+        if self.energy_preserving and not isinstance(self.sigma, Spatial) and self.sigma[0] > 1:
+            found = brief(self.sigma)
+            raise SceneError(f"OrenNayar sigma is {found}; it must be in [0, 1] to preserve energy")
 
     def f(self, wo: Floats, wi: Floats) -> Floats:
         """Return the BRDF above the surface, (3, n)."""

@@ -101,7 +101,7 @@ class Principled(Bsdf):
     sheen = Parameter(scalar)
     sheen_color = Parameter(colour)
     sheen_roughness = Parameter(scalar)
-    specular_weight = Parameter(scalar)
+    specular_weight = Parameter(scalar, "specular")
     specular_color = Parameter(partial(colour, high=np.inf))
     absorption = Parameter(partial(colour, high=np.inf))
     emission = Parameter(emission_of)
