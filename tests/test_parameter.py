@@ -226,3 +226,14 @@ def test_textures_in_range_are_taken() -> None:
     wf.Diffuse(wf.Texture(np.array([[[0.5, 7.0, 0.1]]]), channel=0))
     wf.Mesh(np.eye(3), [[0, 1, 2]], emission=wf.Texture(np.full((2, 2, 3), 300.0)))
     assert wf.Texture(np.array([[[0.25, 0.5, 2.0]]]), scale=2).limits() == (0.5, 4.0)
+
+
+def test_faces_are_checked_again() -> None:
+    """They may have been changed before the vertices were."""
+    mesh = wf.Mesh(np.eye(3), [[0, 1, 2]], name="roof")
+    scene = wf.Scene(mesh, wf.Environment())
+    mesh.faces = mesh.faces + 100
+    with pytest.raises(wf.SceneError, match=r"roof: faces\[0\]\[0\] is 100; it must be in \[0, 2\]"):
+        render(scene, 1)
+    mesh.faces, mesh.vertices = mesh.faces - 99, np.eye(4)[:, :3]
+    render(scene, 1, size=(4, 4))

@@ -139,11 +139,14 @@ class Scene:
         Raises
         ------
         SceneError
-            If there is no shape, or more than one `Environment`.
+            If there is no shape, more than one `Environment`, or a face has an index that no vertex has.
         """
         if not self.shapes:
             raise SceneError("the scene has no shapes")
         _check_environments(self.lights)
+        for shape in self.shapes:
+            if isinstance(shape, Mesh):
+                shape.check()
 
     @property
     def bounds(self) -> NDArray[np.float64]:

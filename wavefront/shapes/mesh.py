@@ -119,6 +119,17 @@ class Mesh(Shape):
             return self._emission
         return material.emission.radiance
 
+    def check(self) -> None:
+        """Check what must hold between arrays that may have been changed one after the other.
+
+        Raises
+        ------
+        SceneError
+            If faces have an index that no vertex has.
+        """
+        if self.faces.max() >= len(self.vertices) or self.faces.min() < 0:
+            _faces(self.name, self.faces, len(self.vertices))  # raises
+
     def scaled(self, factor: float) -> Mesh:
         """Return the mesh with all lengths multiplied by `factor`, and the same material."""
         mesh = copy(self)
