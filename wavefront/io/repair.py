@@ -13,6 +13,7 @@ from ..bsdfs import Bsdf
 from ..bsdfs.parameter import Colour
 from ..errors import SceneError
 from ..shapes import Mesh
+from ..vec import cross
 
 FLOAT32_MAX = float(np.finfo(np.float32).max)
 MAX_UV = 2.0**24  # float32 has no fractions above, and textures only read those
@@ -138,11 +139,12 @@ def _report(label: str, raw: Raw, bad: NDArray[np.bool_], what: str, strict: boo
 
 
 def _has_area(vertices: Table, faces: Faces) -> NDArray[np.bool_]:
-    edges = vertices[np.roll(faces, -1, axis=1)] - vertices[faces]
-    longest = np.abs(edges).max(axis=(1, 2))
+    a, b, c = vertices.take(faces, 0).transpose(1, 2, 0)
+    edges = np.stack([b - a, c - b, a - c])  # (3, 3, m)
+    longest = np.abs(edges).max(axis=(0, 1))
     # divided by the longest edge first, so that squares neither overflow nor vanish
-    unit = edges / np.where(longest > 0, longest, 1)[:, None, None]
-    return np.abs(np.cross(unit[:, 0], unit[:, 1])).max(axis=1) > FLAT
+    unit = edges / np.where(longest > 0, longest, 1)
+    return np.asarray(np.abs(cross(unit[0], unit[1])).max(axis=0) > FLAT)
 
 
 def _normals(label: str, normals: Table | None, vertices: Table, faces: Faces, strict: bool) -> Table | None:

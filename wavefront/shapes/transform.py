@@ -6,13 +6,15 @@ import numpy as np
 
 from ..errors import SceneError
 
+IDENTITY = np.eye(4)
+
 
 def moved_tangents(matrix: np.ndarray, tangents: np.ndarray | None) -> np.ndarray | None:
     """Apply a (4, 4) affine matrix to tangents (n, 4); a reflection changes their handedness.
 
     Those that it takes to zero stay zero.
     """
-    if tangents is None or np.array_equal(matrix, np.eye(4)):
+    if tangents is None or (matrix == IDENTITY).all():
         return tangents
     along = tangents[:, :3] @ matrix[:3, :3].T
     size = np.linalg.norm(along, axis=1, keepdims=True)
@@ -25,7 +27,7 @@ def moved(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
     """Apply a (4, 4) affine matrix; a reflection also turns the faces, so that fronts stay fronts."""
     linear, shift = matrix[:3, :3], matrix[:3, 3]
-    if np.array_equal(matrix, np.eye(4)):
+    if (matrix == IDENTITY).all():
         return vertices, faces, normals
     if not np.array_equal(matrix[3], [0, 0, 0, 1]):
         raise SceneError(f"transform has the last row {matrix[3].tolist()}; it must be [0, 0, 0, 1]")
