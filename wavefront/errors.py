@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import warnings
 from collections.abc import Callable, Collection
 from typing import Any
 
@@ -9,6 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .suggestions import did_you_mean
+
+PACKAGE = os.path.join(os.path.dirname(__file__), "")
 
 
 class SceneError(ValueError):
@@ -58,6 +63,14 @@ class Interrupted(KeyboardInterrupt):
 
             display(self.image)
         return [f"{type(self).__name__}: {self}"]
+
+
+def warn_caller(message: str) -> None:
+    """Warn, at the line of the user's program that called into this package."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, stacklevel=level)
 
 
 def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -18,7 +17,7 @@ from .blas import reserve_buffers
 from .bsdfs import Bsdf
 from .camera import Camera
 from .diagnosis import warn_of_black_or_white
-from .errors import Interrupted, RenderError, SceneError, number, one_of
+from .errors import Interrupted, RenderError, SceneError, number, one_of, warn_caller
 from .exact_sum import MAX_TERMS
 from .filters import FILTERS
 from .image import Image
@@ -286,11 +285,10 @@ class _Patience:
         if self._warned or self._watch.surfaces.value <= LONG_PATH:
             return
         self._warned = True
-        warnings.warn(
+        warn_caller(
             f"paths have met more than {LONG_PATH} surfaces, and may meet max_bounces={self._max_bounces}: "
             "the scene is closed, and its materials absorb next to nothing, so hardly any path ends "
-            "before. Lower max_bounces or the reflectance",
-            stacklevel=4,
+            "before. Lower max_bounces or the reflectance"
         )
 
 
@@ -330,9 +328,7 @@ def _check_first_samples(image: Image, seconds: float | None, surfaces: int) -> 
     if without == image.counts.size:
         raise RenderError(f"there is no picture: {why}")
     if without:
-        warnings.warn(
-            f"{without} pixels of {image.counts.size} have no sample and are black: {why}", stacklevel=3
-        )
+        warn_caller(f"{without} pixels of {image.counts.size} have no sample and are black: {why}")
 
 
 def _estimator(integrator: str, branches: int) -> Integrator:
@@ -370,10 +366,9 @@ def _warn_of_noise(image: Image, asked: float) -> None:
     if found["noise"] <= asked:
         return
     noise = "unknown" if np.isnan(found["noise"]) else f"{found['noise']:.4g}"
-    warnings.warn(
+    warn_caller(
         f"noise={asked:.4g} was not reached: it is {noise} after {found['spp']:.4g} samples per pixel "
-        f"in {found['seconds']:.3g} s",
-        stacklevel=3,
+        f"in {found['seconds']:.3g} s"
     )
 
 
@@ -386,4 +381,4 @@ def _warn_unseen_lights(scene: Scene, integrator: str) -> None:
     ]
     if integrator == "naive" and unseen:
         kinds = ", ".join(sorted({type(light).__name__ for light in unseen}))
-        warnings.warn(f"the naive integrator cannot find lights without size ({kinds})", stacklevel=3)
+        warn_caller(f"the naive integrator cannot find lights without size ({kinds})")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -13,7 +12,7 @@ import numpy as np
 
 from .accel.base import Accelerator, Intersections
 from .camera import Camera
-from .errors import RenderError
+from .errors import RenderError, warn_caller
 from .film import Film
 from .filters import Filter
 from .image import Image
@@ -240,4 +239,4 @@ class BadSamples:
         message = f"{self.count} of {samples} samples were not finite and count as black; first: {self.first}"
         if self.count > MAX_BAD_SAMPLES * samples:
             raise RenderError(message, image)
-        warnings.warn(message, stacklevel=3)
+        warn_caller(message)
