@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .bsdfs import Diffuse
 from .camera import Camera, upward
+from .elementary import sin_cos_turns
 from .errors import SceneError
 from .lights import Environment
 from .scene import FRAMING_VIEW, Scene, turned_up
@@ -46,17 +47,17 @@ class SoftBox:
 
     def radiance_at(self, directions: Doubles) -> Doubles:
         """Return the radiance (H, W, 3) from unit directions (3, H, W): x right, y up, z to the camera."""
-        azimuth, elevation = np.radians(self.azimuth), np.radians(self.elevation)
-        right = np.array([np.cos(azimuth), 0.0, -np.sin(azimuth)])
-        ahead = np.array(
-            [np.sin(azimuth) * np.cos(elevation), np.sin(elevation), np.cos(azimuth) * np.cos(elevation)]
-        )
+        across, along = sin_cos_turns(np.float64(self.azimuth / 360))
+        high, level = sin_cos_turns(np.float64(self.elevation / 360))
+        right = np.array([along, 0.0, -across])
+        ahead = np.array([across * level, high, along * level])
         depth = np.tensordot(ahead, directions, 1)
         in_front = depth > 1e-3
         part = in_front.astype(float)
         for axis, size in ((right, self.width), (np.cross(ahead, right), self.height)):
+            sin, cos = sin_cos_turns(np.float64(size / 720))
             offset = np.abs(np.tensordot(axis, directions, 1)) / np.where(in_front, depth, 1)
-            part *= smoothstep((1 - offset / np.tan(np.radians(size) / 2)) / self.feather)
+            part *= smoothstep((1 - offset * cos / sin) / self.feather)
         return part[:, :, None] * np.array(self.radiance)
 
 
@@ -93,15 +94,14 @@ def smoothstep(x: Doubles) -> Doubles:
 
 def _directions() -> Doubles:
     """Return the unit directions (3, H, W) of the pixels' centers."""
-    polar = np.pi * (np.arange(HEIGHT) + 0.5)[:, None] / HEIGHT
-    azimuth = 2 * np.pi * (0.5 - (np.arange(WIDTH) + 0.5) / WIDTH)
-    level = np.ones(WIDTH)
-    return np.stack([np.sin(polar) * np.sin(azimuth), np.cos(polar) * level, np.sin(polar) * np.cos(azimuth)])
+    level, high = sin_cos_turns((np.arange(HEIGHT) + 0.5)[:, None] / (2 * HEIGHT))
+    across, along = sin_cos_turns(0.5 - (np.arange(WIDTH) + 0.5) / WIDTH)
+    return np.stack([level * across, high * np.ones(WIDTH), level * along])
 
 
 def _solid_angles() -> Doubles:
     """Return the solid angle of each pixel, (H, W) sr."""
-    edges = np.cos(np.pi * np.arange(HEIGHT + 1) / HEIGHT)
+    _, edges = sin_cos_turns(np.arange(HEIGHT + 1) / (2 * HEIGHT))
     return np.repeat((edges[:-1] - edges[1:])[:, None] * (2 * np.pi / WIDTH), WIDTH, 1)
 
 
@@ -250,7 +250,7 @@ def _ground(scene: Scene, preset: str | None, up: ArrayLike) -> Mesh:
     else:
         albedo = PRESETS[preset].ground_albedo() if preset in PRESETS else (MOST_GROUND,) * 3
     texels = np.linspace(-1, 1, 129)
-    rim = np.hypot(texels[:, None], texels)
+    rim = np.sqrt(texels[:, None] * texels[:, None] + texels * texels)
     alpha = smoothstep((1 - rim) / (1 - GROUND_FADE))
     return Disk(
         center - vertical * depth * (1 + GROUND_GAP),

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from .accel import Accelerator, Geometry, InstanceAccelerator, KeptAccelerators
 from .bsdfs import Bsdf, Opacity, Relief, Spatial
 from .camera import Camera, field_of_view, image_size, upward
+from .elementary import arctan2, sin_cos
 from .errors import SceneError, finite_array
 from .instances import InstanceTable, own_frame, place, resolve
 from .lights import (
@@ -195,7 +196,8 @@ class Scene:
         low, high = self.bounds
         radius = float(np.linalg.norm(high - low)) / 2 or 1.0
         narrow = min(1.0, size[0] / size[1])
-        half = np.arctan(np.tan(np.radians(fov) / 2) * narrow)
+        sin, cos = sin_cos(np.float64(np.radians(fov) / 2))
+        sin_half, _ = sin_cos(arctan2(sin * narrow, cos))
         view = turn @ FRAMING_VIEW
         if direction is not None:
             view = finite_array("direction", direction, (3,))
@@ -203,7 +205,7 @@ class Scene:
                 raise SceneError(f"direction is {view.tolist()}; it must not be zero")
             view = view / np.abs(view).max()
         view = view / np.linalg.norm(view)
-        eye = (low + high) / 2 + view * radius / np.sin(half)
+        eye = (low + high) / 2 + view * radius / sin_half
         upright = turn[:, 1]
         if (
             np.linalg.norm(np.cross(upright, view)) < 1e-6

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ..elementary import sin_cos_turns
 from ..vec import Bools, Floats, dot, f4, normalize
 from .base import Spatial
 from .fresnel import TINY
@@ -59,11 +60,11 @@ def visible_normals(wo: Floats, alpha: Floats, u: Floats) -> Floats:
     squeezed = wo.copy()
     squeezed[:2] *= alpha
     squeezed = normalize(squeezed)
-    phi = TWO_PI * u[0]
+    sin, cos = sin_cos_turns(u[0])
     z = (f4(1) - u[1]) * (f4(1) + squeezed[2]) - squeezed[2]
     radius = np.sqrt(np.maximum((f4(1) - z) * (f4(1) + z), f4(0)))
-    squeezed[0] += radius * np.cos(phi)
-    squeezed[1] += radius * np.sin(phi)
+    squeezed[0] += radius * cos
+    squeezed[1] += radius * sin
     squeezed[2] += z
     squeezed[:2] *= alpha
     squeezed[2] = np.maximum(squeezed[2], TINY)

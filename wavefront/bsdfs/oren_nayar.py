@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from ..elementary import arctan2
 from ..errors import SceneError
 from ..parameter import Parameter, brief
 from ..sampling.warp import cosine_hemisphere_pdf
@@ -96,5 +97,5 @@ class OrenNayar(Bsdf):
         sin = np.sqrt(np.maximum((f4(1) - z) * (f4(1) + z), f4(0)))
         # (sin/z)·(1 − sin³) = sin·z·(1 + sin + sin²)/(1 + sin), as 1 − sin² = z²
         steep = sin * z * (f4(1) + sin + sin * sin) / (f4(1) + sin)
-        g = sin * (np.arccos(np.minimum(z, f4(1))) - sin * z) + f4(2 / 3) * (steep - sin)
+        g = sin * (arctan2(sin, z) - sin * z) + f4(2 / 3) * (steep - sin)
         return a * (f4(1) + self.sigma * INV_PI * g)

@@ -10,6 +10,7 @@ from functools import cache
 
 import numpy as np
 
+from ..elementary import exp, log
 from ..sampling.warp import uniform_hemisphere
 from ..vec import Floats, dot, f4
 from .albedo import lookup, tabulate
@@ -45,7 +46,7 @@ def sheen_albedo(cos: Floats, roughness: Floats) -> Floats:
 
 def _power(x: Floats, exponent: Floats) -> Floats:
     """x^exponent; np.power rounds differently beside other lanes."""
-    return np.exp(np.log(np.maximum(x, f4(1e-20))) * exponent)
+    return exp(log(np.maximum(x, f4(1e-20))) * exponent)
 
 
 def _lambda(z: Floats, alpha: Floats) -> Floats:
@@ -58,7 +59,7 @@ def _lambda(z: Floats, alpha: Floats) -> Floats:
 
     steep = z < f4(0.5)
     value = fit(np.where(steep, z, f4(1) - z))
-    return np.exp(np.where(steep, value, f4(2) * fit(np.full_like(z, 0.5)) - value))
+    return exp(np.where(steep, value, f4(2) * fit(np.full_like(z, 0.5)) - value))
 
 
 @cache

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..elementary import arctan2
 from ..errors import SceneError, finite_array, number, rotation_matrix
 from ..parameter import brief
 from ..state import Words
@@ -210,7 +211,7 @@ class Camera:
             raise SceneError(f"K must be [[fx, s, cx], [0, fy, cy], [0, 0, 1]], fx, fy > 0; got {k.tolist()}")
         axes, shift = _extrinsics(R, t)
         lens = Perspective(
-            2 * float(np.degrees(np.arctan(height / 2 / fy))),
+            2 * float(np.degrees(arctan2(np.float64(height / 2), np.float64(fy)))),
             shift=(0.5 - cx / width, cy / height - 0.5),
             pixel_aspect=fy / fx,
             aperture=aperture,

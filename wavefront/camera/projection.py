@@ -14,6 +14,7 @@ from copy import copy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..elementary import sin_cos, sin_cos_turns
 from ..errors import SceneError, finite_array, number
 from ..parameter import Parametrized
 from ..sampling.warp import uniform_disk
@@ -146,7 +147,8 @@ class Perspective(Projection):
     def rays(self, x: Floats, y: Floats, film: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
         """Aim through the film, or from a point of the lens at where the middle's ray is in focus."""
         width, height = film
-        pitch = 2 * np.tan(np.radians(self.fov) / 2) / height
+        sin, cos = sin_cos(np.float64(np.radians(self.fov) / 2))
+        pitch = 2 * (sin / cos) / height
         direction = np.empty((3, len(x)), f4)
         np.multiply(x - f4(width * (0.5 - self.shift[0])), f4(pitch * self.pixel_aspect), out=direction[0])
         np.multiply(f4(height * (0.5 + self.shift[1])) - y, f4(pitch), out=direction[1])
@@ -183,7 +185,8 @@ class Perspective(Projection):
     def _intrinsics(self, film: Size) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return the film point on the axis, and the focal lengths, (x, y) in pixels."""
         width, height = film
-        focal = height / 2 / np.tan(np.radians(self.fov) / 2)
+        sin, cos = sin_cos(np.float64(np.radians(self.fov) / 2))
+        focal = float(height / 2 * cos / sin)
         middle = width * (0.5 - self.shift[0]), height * (0.5 + self.shift[1])
         return middle, (focal / self.pixel_aspect, focal)
 
@@ -248,13 +251,12 @@ class Panorama(Projection):
     def rays(self, x: Floats, y: Floats, film: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
         """Turn by longitude to the right and by latitude up."""
         width, height = film
-        longitude = (x - f4(width / 2)) * f4(2 * np.pi / width)
-        latitude = (f4(height / 2) - y) * f4(np.pi / height)
-        level = np.cos(latitude)
+        sin, cos = sin_cos_turns((x - f4(width / 2)) * f4(1 / width))  # of the longitude
+        height_up, level = sin_cos_turns((f4(height / 2) - y) * f4(0.5 / height))  # of the latitude
         direction = np.empty((3, len(x)), f4)
-        np.multiply(np.sin(longitude), level, out=direction[0])
-        np.sin(latitude, out=direction[1])
-        np.multiply(np.cos(longitude), -level, out=direction[2])
+        np.multiply(sin, level, out=direction[0])
+        direction[1] = height_up
+        np.multiply(cos, -level, out=direction[2])
         return None, direction
 
     def project(self, points: Doubles, film: Size) -> tuple[Doubles, Doubles]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bsdfs.parameter import MAX_INDEX
+from ..elementary import log, sin_cos_turns
 from ..errors import SceneError
 from ..relief import NormalMap
 from ..textures import Texture
@@ -338,7 +339,7 @@ class _Reader:
             if distance == 0:
                 raise SceneError(f"{self._file}: {self._where}.attenuationDistance is 0; it must be above 0")
             with np.errstate(over="ignore"):
-                self._wanted["absorption"] = -np.log(np.maximum(colour, 1e-6)) / distance
+                self._wanted["absorption"] = -log(np.maximum(colour, 1e-6).astype(np.float32)) / distance
 
     def _emission(self, strength: dict[str, Any]) -> NDArray[np.float64] | Texture | None:
         factor = self._colour(self._item, "emissiveFactor", [0.0, 0.0, 0.0])
@@ -370,7 +371,7 @@ def _uv_matrix(document: Document, move: dict[str, Any], where: str) -> NDArray[
     offset = floats(place + " offset", move.get("offset", [0, 0]), 2)
     scale = floats(place + " scale", move.get("scale", [1, 1]), 2)
     angle = floats(place + " rotation", [move.get("rotation", 0)], 1)[0]
-    cos, sin = np.cos(angle), np.sin(angle)
+    sin, cos = sin_cos_turns(np.float64(angle / (2 * np.pi)))
     # the signs follow the extension's example (a quarter turn that lands in the lower left), which
     # is how viewers do it; the GLSL beside that example turns the other way
     moved = np.array(

@@ -179,23 +179,23 @@ def codes_to_linear(codes: NDArray[Any], gamma: Gamma = "srgb") -> Floats:
     if isinstance(gamma, str):
         colors[:] = srgb_to_linear(colors)
     else:
-        np.power(colors, np.float32(gamma), out=colors)
+        colors[:] = colors.astype(np.float64) ** gamma
     return values
 
 
 def srgb_to_linear(values: Floats) -> Floats:
     """Decode sRGB values in [0, 1], any shape (IEC 61966-2-1)."""
-    values = np.asarray(values, np.float32)
-    low = values / np.float32(12.92)
-    high = ((values + np.float32(0.055)) / np.float32(1.055)) ** np.float32(2.4)
+    values = np.asarray(values, np.float64)  # rounded at the end: float32 powers differ between machines
+    low = values / 12.92
+    high = ((values + 0.055) / 1.055) ** 2.4
     return np.where(values <= 0.04045, low, high).astype(np.float32)
 
 
 def linear_to_srgb(values: Floats) -> Floats:
     """Encode linear values in [0, 1] as sRGB, any shape (IEC 61966-2-1)."""
-    values = np.asarray(values, np.float32)
-    high = np.float32(1.055) * np.maximum(values, 0) ** np.float32(1 / 2.4) - np.float32(0.055)
-    return np.where(values <= 0.0031308, values * np.float32(12.92), high).astype(np.float32)
+    values = np.asarray(values, np.float64)
+    high = 1.055 * np.maximum(values, 0) ** (1 / 2.4) - 0.055
+    return np.where(values <= 0.0031308, values * 12.92, high).astype(np.float32)
 
 
 def exposed(rgb: Floats, exposure: float) -> Floats:
@@ -241,7 +241,7 @@ def to_8bit(rgb: ArrayLike, gamma: Gamma = 2.2) -> NDArray[np.uint8]:
     """
     curve = check_gamma(gamma)
     unit = np.clip(np.nan_to_num(np.asarray(rgb, np.float32), nan=0.0, posinf=1.0, neginf=0.0), 0, 1)
-    encoded = linear_to_srgb(unit) if isinstance(curve, str) else unit ** np.float32(1 / curve)
+    encoded = linear_to_srgb(unit) if isinstance(curve, str) else unit.astype(np.float64) ** (1 / curve)
     return np.round(encoded * 255).astype(np.uint8)
 
 

@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..elementary import sin_cos
 from ..errors import SceneError, finite_array, number, rgb
 from ..frame import Frame
 from ..parameter import Parameter
@@ -153,5 +154,7 @@ class DirectionalLight(UserLight):
         radius = np.radians(self.angle) / 2
         frame = Frame.from_normal(towards)
         axes = np.concatenate([frame.x, frame.y, frame.z], axis=1)
-        height = np.array([2 * np.sin(radius / 2) ** 2], f4)
-        return SunLight(axes, height, (self.irradiance / (np.pi * np.sin(radius) ** 2)).astype(f4))
+        height = np.array([2 * sin_cos(np.float64(radius / 2))[0] ** 2], f4)
+        return SunLight(
+            axes, height, (self.irradiance / (np.pi * sin_cos(np.float64(radius))[0] ** 2)).astype(f4)
+        )

@@ -11,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..elementary import arctan2, sin_cos, sin_cos_turns
 from ..errors import SceneError
 from ..io.images import check_size, read_codes, srgb_to_linear
 from ..record import record
@@ -54,8 +55,9 @@ class ImageEnvironment(InfiniteLight):
         """
         height = len(pixels)
         image = Texture(pixels, wrap=("repeat", "clamp"), filter=filter)  # type: ignore[arg-type]
-        middle = np.pi / height * (np.arange(height) + 0.5)
-        step = 2 * np.sin(middle) * np.sin(np.pi / (2 * height))  # cos of one edge − cos of the next
+        sin_middle, _ = sin_cos_turns((np.arange(height) + 0.5) / (2 * height))
+        sin_half, _ = sin_cos(np.float64(np.pi / (2 * height)))
+        step = 2 * sin_middle * sin_half  # cos of one edge − cos of the next
         texels = pixels.astype(np.float64) if filter == "nearest" else _spread(pixels)
         shares = texels * (step / (2 * pixels.shape[1]))[:, None, None]  # of the sphere
         weights = luminance(np.moveaxis(shares, -1, 0))
@@ -65,7 +67,7 @@ class ImageEnvironment(InfiniteLight):
             image=image,
             texels=Distribution2D(weights),
             density=(1 / (2 * np.pi * height * step)).astype(f4),
-            top=np.cos(middle - np.pi / (2 * height)),
+            top=sin_cos_turns(np.arange(height) / (2 * height))[1],
             step=step,
             mean=shares.sum((0, 1)).astype(f4).reshape(3, 1),
             rotation=None if rotation is None else rotation.astype(f4),
@@ -92,12 +94,12 @@ class ImageEnvironment(InfiniteLight):
         # float64: near the poles cosθ itself is far coarser in float32 than the rows
         cos = self.top.take(row) - (scaled - row) * self.step.take(row)
         sin = np.sqrt(np.maximum((1 - cos) * (1 + cos), 0)).astype(f4)
-        longitude = TWO_PI * (f4(0.5) - x)
+        sin_longitude, cos_longitude = sin_cos_turns(f4(0.5) - x)
         wi = np.empty((3, len(x)), f4)
-        np.multiply(np.sin(longitude), sin, out=wi[0])
+        np.multiply(sin_longitude, sin, out=wi[0])
         wi[1] = cos
-        np.multiply(np.cos(longitude), sin, out=wi[2])
-        v = np.arctan2(sin, wi[1]) * INV_PI
+        np.multiply(cos_longitude, sin, out=wi[2])
+        v = arctan2(sin, wi[1]) * INV_PI
         radiance = self._lookup(x, v)
         if self.rotation is not None:
             wi = turned(self.rotation, wi)
@@ -120,9 +122,9 @@ class ImageEnvironment(InfiniteLight):
     def _place(self, wi: Floats) -> tuple[Floats, Floats]:
         """Return where directions (3, n) lie in the image, from the left and the top, in [0, 1]."""
         local = wi if self.rotation is None else turned(self.rotation.T, wi)
-        x = f4(0.5) - np.arctan2(local[0], local[2]) * INV_TWO_PI
+        x = f4(0.5) - arctan2(local[0], local[2]) * INV_TWO_PI
         level = np.sqrt(local[0] * local[0] + local[2] * local[2])
-        return x, np.arctan2(level, local[1]) * INV_PI
+        return x, arctan2(level, local[1]) * INV_PI
 
     def _lookup(self, x: Floats, y: Floats) -> Floats:
         return self.image.lookup(np.stack([x, f4(1) - y]))

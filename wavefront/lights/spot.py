@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..elementary import arccos, arcsin, sin_cos, sin_cos_turns
 from ..errors import SceneError, finite_array, number
 from ..parameter import Parameter
 from ..record import record
@@ -62,10 +63,10 @@ class SpotLights(Light):
         away = centre[:, :, None] - self.position[:, None, :]
         distance = np.sqrt((away**2).sum(0))
         far = np.maximum(distance, 1e-30)
-        angle = np.arccos(np.clip((away * self.axis[:, None, :]).sum(0) / far, -1, 1))
-        nearest = angle - np.arcsin(np.minimum(radius / far, 1))
+        angle = arccos(np.clip((away * self.axis[:, None, :]).sum(0) / far, -1, 1))
+        nearest = angle - arcsin(np.minimum(radius / far, 1))
         nearest = np.where(distance > radius, np.maximum(nearest, 0), 0)
-        ramp = np.clip((self.outer - (1 - np.cos(nearest))) * self.slope, 0, 1)
+        ramp = np.clip((self.outer - (1 - sin_cos_turns(nearest / (2 * np.pi))[1])) * self.slope, 0, 1)
         return self.intensity.mean(0, dtype=np.float64) * ramp**2 / np.maximum(distance, radius) ** 2
 
     def _falloff(self, wi: Floats) -> Floats:
@@ -162,8 +163,8 @@ class SpotLight(UserLight):
     def record(self, centre: NDArray[np.float64]) -> SpotLights:
         """Return the light as a record of one column, relative to `centre` (3,)."""
         half = np.radians(self.angle) / 2
-        outer = 2 * np.sin(half / 2) ** 2
-        inner = 2 * np.sin(half * (1 - self.blend) / 2) ** 2
+        outer = 2 * sin_cos(np.float64(half / 2))[0] ** 2
+        inner = 2 * sin_cos(np.float64(half * (1 - self.blend) / 2))[0] ** 2
         width = max(outer - inner, 1e-6 * outer)  # a hard edge is a very steep ramp
         return SpotLights(
             (self.position - centre).astype(f4).reshape(3, 1),

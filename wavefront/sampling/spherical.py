@@ -10,6 +10,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..elementary import arctan2, sin_cos
 from ..record import record
 from ..vec import Floats, cross, dot, f4, normalize
 
@@ -168,9 +169,9 @@ class SphericalRectangle:
         """Vectors (3, n) from the point to points of the rectangle, from u (2, n)."""
         swept = self.start + u[0] * self.angle
         b0, b1 = self.b
-        half = np.sin(0.5 * swept)
-        size = np.sqrt((b1 - b0) ** 2 + 4 * b0 * b1 * half * half)
-        x = _from_sine(np.sin(swept) / np.where(size > 0, size, 1.0), self.z, self.x)
+        sin, cos = sin_cos(0.5 * swept)
+        size = np.sqrt((b1 - b0) ** 2 + 4 * b0 * b1 * sin * sin)
+        x = _from_sine(2 * sin * cos / np.where(size > 0, size, 1.0), self.z, self.x)
         depth = np.sqrt(x * x + self.z * self.z)
         h0, h1 = _sine(self.y[0], depth), _sine(self.y[1], depth)
         y = _from_sine(h0 + u[1] * (h1 - h0), depth, self.y)
@@ -224,5 +225,8 @@ def _from_sine(sine: Reals, height: Reals, bounds: tuple[Reals, Reals]) -> Reals
 
 
 def _swept(b: tuple[Reals, Reals], c: Reals) -> Reals:
-    """Solid angle F (n,) between x = 0 and x, signed, where c = x/√(x² + z²)."""
-    return np.arcsin(b[1] * c) - np.arcsin(b[0] * c)
+    """Solid angle F (n,) between x = 0 and x, signed, where c = x/√(x² + z²): by sine and cosine of it."""
+    one = c.dtype.type(1)
+    s0, s1 = b[0] * c, b[1] * c
+    c0, c1 = np.sqrt((one - s0) * (one + s0)), np.sqrt((one - s1) * (one + s1))
+    return arctan2(s1 * c0 - s0 * c1, c1 * c0 + s1 * s0)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..elementary import log, sin_cos, sin_cos_turns
 from ..vec import Floats, f4, positive
 
-TWO_PI = f4(2 * np.pi)
 INV_PI = f4(1 / np.pi)
 INV_TWO_PI = f4(0.5 / np.pi)
 INV_FOUR_PI = f4(0.25 / np.pi)
@@ -26,11 +26,11 @@ def cosine_hemisphere(u: Floats) -> Floats:
     Source: P. Dutré, Global Illumination Compendium, eq. 35:
     x = cos(2πr₁)√(1−r₂), y = sin(2πr₁)√(1−r₂), z = √r₂.
     """
-    phi = TWO_PI * u[0]
+    sin, cos = sin_cos_turns(u[0])
     radius = np.sqrt(f4(1) - u[1])
     out = np.empty((3, u.shape[1]), f4)
-    np.multiply(np.cos(phi), radius, out=out[0])
-    np.multiply(np.sin(phi), radius, out=out[1])
+    np.multiply(cos, radius, out=out[0])
+    np.multiply(sin, radius, out=out[1])
     np.sqrt(u[1], out=out[2])
     return out
 
@@ -115,8 +115,9 @@ def uniform_disk(u: Floats) -> Floats:
     steep = (size_b >= size_a).astype(f4)
     phi = steep * HALF_PI + (f4(1) - f4(2) * steep) * octant
     out = np.empty_like(u)
-    np.copysign(radius * np.cos(phi), a, out=out[0])
-    np.copysign(radius * np.sin(phi), b, out=out[1])
+    sin, cos = sin_cos(phi)
+    np.copysign(radius * cos, a, out=out[0])
+    np.copysign(radius * sin, b, out=out[1])
     return out
 
 
@@ -179,11 +180,11 @@ def _turn(w: Floats) -> Floats:
 
 def _around_z(turn: Floats, z: Floats, depth: Floats) -> Floats:
     """Unit vectors (3, n) at azimuth 2π·turn and height z = 1 − depth, all (n,)."""
-    phi = TWO_PI * turn
+    sin, cos = sin_cos_turns(turn)
     radius = np.sqrt(np.maximum(depth * (f4(1) + z), f4(0)))  # 1 − z² without cancellation
-    out = np.empty((3, len(phi)), f4)
-    np.multiply(np.cos(phi), radius, out=out[0])
-    np.multiply(np.sin(phi), radius, out=out[1])
+    out = np.empty((3, len(turn)), f4)
+    np.multiply(cos, radius, out=out[0])
+    np.multiply(sin, radius, out=out[1])
     out[2] = z
     return out
 
@@ -235,7 +236,7 @@ def _erfinv(y: Floats) -> Floats:
 
     Source: M. Giles, Approximating the erfinv Function, GPU Computing Gems 2, 2011, table 2.
     """
-    w = -np.log((f4(1) - y) * (f4(1) + y))
+    w = -log((f4(1) - y) * (f4(1) + y))
     near = _polynomial(w - f4(2.5), _ERFINV_NEAR)
     if w.max(initial=0) < 5:
         return near * y

@@ -14,6 +14,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ..elementary import arccos, arctan2
 from ..vec import Floats, f4
 from .mesh import Mesh
 from .tangents import mesh_axes, mesh_tangents
@@ -36,8 +37,8 @@ class Attribute:
 def sphere_uv(normal: Floats, radius: Floats) -> Floats:
     """Longitude and latitude as texture coordinates, (2, n)."""
     uv = np.empty((2, normal.shape[1]), f4)
-    uv[0] = np.arctan2(normal[0], normal[2]) * f4(0.5 / np.pi) + f4(0.5)
-    uv[1] = f4(1) - np.arccos(np.clip(normal[1], f4(-1), f4(1))) * f4(1 / np.pi)
+    uv[0] = arctan2(normal[0], normal[2]) * f4(0.5 / np.pi) + f4(0.5)
+    uv[1] = f4(1) - arccos(np.clip(normal[1], f4(-1), f4(1))) * f4(1 / np.pi)
     return uv
 
 

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from ..bsdfs import Bsdf
 from ..bsdfs.parameter import Colour
+from ..elementary import sin_cos_turns
 from ..errors import SceneError, finite_array, number
 from ..suggestions import suggests_keywords
 from .mesh import Mesh
@@ -61,9 +62,9 @@ def Disk(
     axis = axis / np.linalg.norm(axis)
     u = np.cross(np.eye(3)[np.abs(axis).argmin()], axis)
     u /= np.linalg.norm(u)
-    turn = np.arange(n) * (2 * np.pi / n)
-    ring = np.stack([np.cos(turn), np.sin(turn)], 1)
-    reach = size * np.sqrt(2 * np.pi / n / np.sin(2 * np.pi / n))  # of the corners, for equal area
+    sin, cos = sin_cos_turns(np.arange(n) / n)
+    ring = np.stack([cos, sin], 1)
+    reach = size * np.sqrt(2 * np.pi / n / sin[1])  # of the corners, for equal area
     k = np.arange(n)
     return Mesh(
         middle + reach * np.vstack([ring @ np.stack([u, np.cross(axis, u)]), np.zeros(3)]),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..elementary import arccos
 from .mesh import Mesh
 
 Doubles = NDArray[np.float64]
@@ -74,5 +75,5 @@ def _angles(corner: Doubles) -> Doubles:
     backward = np.roll(corner, 1, 1) - corner
     size = np.linalg.norm(forward, axis=2) * np.linalg.norm(backward, axis=2)
     cos = (forward * backward).sum(2) / np.where(size > 0, size, 1)
-    angles: Doubles = np.arccos(np.clip(cos, -1, 1))
+    angles: Doubles = arccos(np.clip(cos, -1, 1))
     return angles

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..elementary import exp
 from ..scene import CompiledScene
 from ..state import Hits, Surface
 from ..vec import Floats
@@ -19,4 +20,4 @@ def absorb(scene: CompiledScene, throughput: Floats, hits: Hits, surface: Surfac
         return
     lanes = np.flatnonzero(surface.inside)
     depth = scene.absorption.take(surface.material.take(lanes), 1) * hits.t.take(lanes)
-    throughput[:, lanes] *= np.exp(-depth)
+    throughput[:, lanes] *= exp(-depth)
