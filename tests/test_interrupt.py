@@ -119,7 +119,7 @@ try:
     {ENDLESS.format(executor=executor)}
 except KeyboardInterrupt as stop:
     print("stopped", type(stop).__name__, getattr(stop, "image", "none at all"))
-    while {presses} > 1 and left():  # nobody waits for threads any longer: they end by themselves
+    while {presses} == 2 and left():  # nobody waits for threads any longer: they end by themselves
         time.sleep(0.01)
     print("left", left())
 """

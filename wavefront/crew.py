@@ -49,7 +49,9 @@ class Threads:
 
     def end(self, running: Collection[Future[Any]]) -> None:
         """Wait for the threads, which stop at their next look; at a second Ctrl-C leave them to it."""
-        self._pool.shutdown(wait=all_done(running, math.inf, self._stop))
+        self._pool.shutdown(wait=False)
+        if all_done(running, math.inf, self._stop):
+            self._pool.shutdown(wait=True)
 
 
 def all_done(futures: Collection[Future[Any]], patience: float, stop: SharedNumber) -> bool:
