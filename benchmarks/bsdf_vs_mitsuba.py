@@ -23,7 +23,7 @@ import numpy as np
 
 from wavefront.bsdfs import Bsdf, Conductor, Dielectric, Diffuse, Mirror, Principled
 from wavefront.bsdfs.microfacet import alpha_of, stretched
-from wavefront.state import Surface
+from wavefront.state import SurfaceInteraction
 
 LIMIT = 1e-4
 Array = np.ndarray
@@ -49,13 +49,13 @@ def directions(rng: np.random.Generator, n: int, whole: bool) -> Array:
     return np.stack([r * np.cos(phi), r * np.sin(phi), z]).astype(np.float32)
 
 
-def surface(wo: Array, inside: bool) -> Surface:
+def surface(wo: Array, inside: bool) -> SurfaceInteraction:
     """Hit points for `bind`."""
     n = wo.shape[1]
     normal = np.repeat(np.array([[0], [0], [1]], np.float32), n, 1)
     zero, index = np.zeros(n, np.float32), np.zeros(n, np.intp)
     at = np.zeros((3, n), np.float32)
-    return Surface(at, zero, normal, normal, wo, index, index, np.full(n, inside))
+    return SurfaceInteraction(at, zero, normal, normal, wo, index, index, np.full(n, inside))
 
 
 def separable(wo: Array, wi: Array, roughness: float) -> Array:
@@ -137,12 +137,12 @@ def compare(pairs: int = 10_000) -> list[Row]:
     import mitsuba as mi
 
     mi.set_variant("scalar_rgb")
-    colour = {"type": "rgb", "value": [0.9, 0.5, 0.1]}
+    color = {"type": "rgb", "value": [0.9, 0.5, 0.1]}
     eta, k = [0.2, 0.9, 1.4], [3.9, 2.4, 1.6]
     metal = {"eta": {"type": "rgb", "value": eta}, "k": {"type": "rgb", "value": k}}
     glass = {"int_ior": 1.5, "ext_ior": 1.0}
     rows = rough(
-        mi, "diffuse", Diffuse((0.9, 0.5, 0.1)), {"type": "diffuse", "reflectance": colour}, pairs, None
+        mi, "diffuse", Diffuse((0.9, 0.5, 0.1)), {"type": "diffuse", "reflectance": color}, pairs, None
     )
     rows += delta(mi, "conductor", Conductor(eta, k), {"type": "conductor", **metal}, pairs)
     rows += delta(mi, "mirror", Mirror(), {"type": "conductor"}, pairs)
@@ -157,7 +157,7 @@ def compare(pairs: int = 10_000) -> list[Row]:
         rows += rough(
             mi, f"roughdielectric {roughness}", Dielectric(1.5, roughness), dielectric, pairs, roughness
         )
-        principled = {"type": "principled", "base_color": colour, "metallic": 1.0, "roughness": roughness}
+        principled = {"type": "principled", "base_color": color, "metallic": 1.0, "roughness": roughness}
         ours = Principled((0.9, 0.5, 0.1), 1.0, roughness)
         rows += rough(mi, f"principled metal {roughness}", ours, principled, pairs, roughness)
     return rows

@@ -15,7 +15,7 @@ import numpy as np
 import trimesh
 
 from wavefront.accel.build import build_tree
-from wavefront.accel.stream import WIDTH, leaf_size_for
+from wavefront.accel.numpy_accel import WIDTH, leaf_size_for
 
 f4 = np.float32
 

@@ -13,7 +13,7 @@ import time
 import bpy
 
 
-def material(name: str, colour: list[float], emission: list[float] | None) -> bpy.types.Material:
+def material(name: str, color: list[float], emission: list[float] | None) -> bpy.types.Material:
     """Return a diffuse or an emitting material of Cycles."""
     made = bpy.data.materials.new(name)
     made.use_nodes = True
@@ -21,7 +21,7 @@ def material(name: str, colour: list[float], emission: list[float] | None) -> bp
     nodes.clear()
     kind = "ShaderNodeEmission" if emission else "ShaderNodeBsdfDiffuse"
     shader, output = nodes.new(kind), nodes.new("ShaderNodeOutputMaterial")
-    value = emission or colour
+    value = emission or color
     shader.inputs["Color"].default_value = (*value, 1.0)
     made.node_tree.links.new(shader.outputs[0], output.inputs["Surface"])
     return made
@@ -34,7 +34,7 @@ def build(shapes: list[dict], size: int, spp: int, threads: int, max_bounces: in
     for shape in shapes:
         mesh = bpy.data.meshes.new(shape["name"])
         mesh.from_pydata(shape["vertices"], [], shape["faces"])
-        mesh.materials.append(material(shape["name"], shape["colour"], shape["emission"]))
+        mesh.materials.append(material(shape["name"], shape["color"], shape["emission"]))
         scene.collection.objects.link(bpy.data.objects.new(shape["name"], mesh))
     camera = bpy.data.cameras.new("camera")
     camera.angle = 39.3077 * 3.141592653589793 / 180

@@ -59,7 +59,7 @@ Render = Callable[[int, int], np.ndarray]  # spp, seed -> picture
 
 
 def mesh_scene(data: Path | None, size: int) -> wf.Scene:
-    """Return 40 000 triangles or more of metal and glass on a floor, under a panel and a grey sky."""
+    """Return 40 000 triangles or more of metal and glass on a floor, under a panel and a gray sky."""
     part = data / "rocker-arm.obj" if data else None
     if part and part.exists():
         metal = wf.load_mesh(part)
@@ -254,7 +254,7 @@ def report(found: dict[str, Any]) -> None:
         )
 
 
-COLOURS = {"wavefront numpy": "C3", "wavefront embree": "C1", "llvm_ad_rgb": "C0", "scalar_rgb": "C2"}
+COLORS = {"wavefront numpy": "C3", "wavefront embree": "C1", "llvm_ad_rgb": "C0", "scalar_rgb": "C2"}
 LINES = {"independent": ":", "sobol": "-", "bluenoise": "--", "multijitter": "-", "sobol/4": "-."}
 
 
@@ -271,7 +271,7 @@ def plot(results: dict[str, Any], path: Path) -> None:
         for side, of in found.items():
             engine, sampler = side.rsplit(maxsplit=1)
             marker = "o" if side.startswith("wavefront") else "s"
-            style = {"color": COLOURS[engine], "linestyle": LINES[sampler], "marker": marker, "markersize": 4}
+            style = {"color": COLORS[engine], "linestyle": LINES[sampler], "marker": marker, "markersize": 4}
             axis.loglog(of["seconds"], of["errors"], label=side, **style)
         axis.set(title=name, xlabel="seconds, warm")
         axis.grid(True, which="both", alpha=0.25)

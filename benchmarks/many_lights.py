@@ -22,14 +22,14 @@ POWER = 4000.0
 
 def hall(size: int) -> tuple[list[wf.Mesh], wf.Camera]:
     """Return a hall 40 by 20 by 6 with two rows of columns, and a camera at its end."""
-    grey = wf.Diffuse(0.6)
+    gray = wf.Diffuse(0.6)
     walls = [
-        wf.Rectangle((-20, 0, 10), (40, 0, 0), (0, 0, -20), material=grey),
-        wf.Rectangle((-20, 6, -10), (40, 0, 0), (0, 0, 20), material=grey),
-        wf.Rectangle((-20, 0, -10), (40, 0, 0), (0, 6, 0), material=grey),
-        wf.Rectangle((20, 0, 10), (-40, 0, 0), (0, 6, 0), material=grey),
-        wf.Rectangle((20, 0, -10), (0, 0, 20), (0, 6, 0), material=grey),
-        wf.Rectangle((-20, 0, 10), (0, 0, -20), (0, 6, 0), material=grey),
+        wf.Rectangle((-20, 0, 10), (40, 0, 0), (0, 0, -20), material=gray),
+        wf.Rectangle((-20, 6, -10), (40, 0, 0), (0, 0, 20), material=gray),
+        wf.Rectangle((-20, 0, -10), (40, 0, 0), (0, 6, 0), material=gray),
+        wf.Rectangle((20, 0, 10), (-40, 0, 0), (0, 6, 0), material=gray),
+        wf.Rectangle((20, 0, -10), (0, 0, 20), (0, 6, 0), material=gray),
+        wf.Rectangle((-20, 0, 10), (0, 0, -20), (0, 6, 0), material=gray),
     ]
     for x in range(-16, 17, 4):
         for z in (-5, 5):
@@ -46,9 +46,9 @@ def hall(size: int) -> tuple[list[wf.Mesh], wf.Camera]:
 
 def places(count: int) -> np.ndarray:
     """Return (count, 3) positions spread over the ceiling."""
-    columns = int(np.ceil(np.sqrt(2 * count)))
-    rows = int(np.ceil(count / columns))
-    x, z = np.meshgrid((np.arange(columns) + 0.5) / columns, (np.arange(rows) + 0.5) / rows)
+    take = int(np.ceil(np.sqrt(2 * count)))
+    rows = int(np.ceil(count / take))
+    x, z = np.meshgrid((np.arange(take) + 0.5) / take, (np.arange(rows) + 0.5) / rows)
     spread = np.stack([x.ravel() * 38 - 19, np.full(x.size, 5.9), z.ravel() * 18 - 9], 1)
     return spread[:count]
 
@@ -81,7 +81,7 @@ def measure(scene: wf.Scene, choice: str, options: argparse.Namespace) -> tuple[
             scene,
             options.spp,
             seed=seed,
-            light_choice=choice,
+            light_sampler=choice,
             accel=options.accel,
             max_bounces=3,
             sampler="independent",

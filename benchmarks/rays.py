@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from wavefront.accel import Accelerator, Geometry, make_accelerator
 from wavefront.accel.build import build_tree
-from wavefront.parallel import Workers
+from wavefront.scheduling.executors import Workers
 
 f4 = np.float32
 Array = NDArray[np.float32]
@@ -88,7 +88,7 @@ def trace(accelerator: Accelerator, kind: str, origin: Array, direction: Array) 
 
 
 class Lockstep:
-    """The usual way to vectorise a BVH: one stack per ray, all rays take one step at a time."""
+    """The usual way to vectorize a BVH: one stack per ray, all rays take one step at a time."""
 
     def __init__(self, triangles: Array) -> None:
         low, high = (np.ascontiguousarray(v.T) for v in (triangles.min(1), triangles.max(1)))

@@ -28,7 +28,7 @@ from cornell_box import cornell_box
 
 STAGES = (
     "intersect",
-    "pass_through",
+    "alpha_pass_through",
     "emitted",
     "mis_weighted",
     "interact",

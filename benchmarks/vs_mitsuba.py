@@ -30,7 +30,7 @@ DIFFUSE = {
 
 def our_scene(folder: Path, size: tuple[int, int]) -> wf.Scene:
     """Load the parts with wavefront."""
-    shapes = [wf.load_mesh(folder / f"{name}.obj", wf.Diffuse(colour)) for name, colour in DIFFUSE.items()]
+    shapes = [wf.load_mesh(folder / f"{name}.obj", wf.Diffuse(color)) for name, color in DIFFUSE.items()]
     shapes[-1].emission = np.array(RADIANCE, np.float32).reshape(3, 1)
     shapes.append(wf.load_mesh(folder / "sphere1.obj", wf.Mirror()))
     shapes.append(wf.load_mesh(folder / "sphere2.obj", wf.Dielectric(1.5)))
@@ -58,8 +58,8 @@ def mitsuba_scene(mi: Any, folder: Path, size: tuple[int, int], max_depth: int) 
             },
         },
     }
-    for name, colour in DIFFUSE.items():
-        diffuse = {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(colour)}}
+    for name, color in DIFFUSE.items():
+        diffuse = {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(color)}}
         scene[name] = {
             "type": "obj",
             "filename": str(folder / f"{name}.obj"),

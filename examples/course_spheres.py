@@ -12,14 +12,14 @@ import argparse
 
 import wavefront as wf
 
-FAR = 1000.0  # from the middle of the room to the centre of each wall
+FAR = 1000.0  # from the middle of the room to the center of each wall
 
 
-def wall(axis: int, side: int, distance: float, colour: tuple[float, float, float]) -> wf.Sphere:
+def wall(axis: int, side: int, distance: float, color: tuple[float, float, float]) -> wf.Sphere:
     """Return a sphere that touches the plane at `distance` along an axis, on one side of the room."""
     center = [0.0, 0.0, 0.0]
     center[axis] = side * FAR
-    return wf.Sphere(center, FAR - distance, material=wf.Diffuse(colour))
+    return wf.Sphere(center, FAR - distance, material=wf.Diffuse(color))
 
 
 def course_spheres(size: int = 512) -> wf.Scene:
@@ -33,7 +33,7 @@ def course_spheres(size: int = 512) -> wf.Scene:
         wall(2, +1, 75, (0.75, 0.45, 0.70)),  # behind the camera
     ]
     balls = [
-        wf.Sphere((-21, 0, -4), 10, material=wf.Diffuse((0.9, 0.6, 0.2)), name="matte"),
+        wf.Sphere((-21, 0, -4), 10, material=wf.Diffuse((0.9, 0.6, 0.2)), name="view_independent"),
         wf.Sphere((0, 0, -18), 10, material=wf.Mirror(0.95), name="mirror"),
         wf.Sphere((20, 0, -4), 10, material=wf.Dielectric(1.5), name="glass"),
     ]

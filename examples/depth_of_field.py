@@ -19,8 +19,8 @@ def scene(size: int = 640, aperture: float = 0.5, focus: float | None = None) ->
     """Return the row; without a focus the camera is focused on the middle sphere, its target."""
     spheres = []
     for k in range(-2, 5):
-        colour = colorsys.hsv_to_rgb(0.08 + (k + 2) / 9, 0.75, 0.8)
-        spheres.append(wf.Sphere((0.95 * (k - 0.5), 0.7, -1.9 * k), 0.7, material=wf.Diffuse(colour)))
+        color = colorsys.hsv_to_rgb(0.08 + (k + 2) / 9, 0.75, 0.8)
+        spheres.append(wf.Sphere((0.95 * (k - 0.5), 0.7, -1.9 * k), 0.7, material=wf.Diffuse(color)))
     lamps = [wf.Sphere((2.5 * x, 2.6, -16), 0.06, emission=120.0) for x in range(-3, 4)]
     ground = wf.Rectangle((-40, 0, 40), (80, 0, 0), (0, 0, -80), material=wf.Diffuse(0.5), name="ground")
     sun = wf.DirectionalLight((-0.6, -1, -0.5), (2.4, 2.2, 1.9), angle=2)

@@ -35,7 +35,7 @@ def sky(height: int = 256) -> np.ndarray:
 
 
 def scene(size: int = 640, picture: str | None = None) -> wf.Scene:
-    """Return a row of spheres of several materials on a grey ground."""
+    """Return a row of spheres of several materials on a gray ground."""
     materials = [
         wf.Diffuse((0.75, 0.2, 0.12)),
         wf.Conductor.named("gold", roughness=0.4),

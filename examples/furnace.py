@@ -1,7 +1,7 @@
 """Furnaces: scenes whose right answer is known, measured against it.
 
 Prints a table and writes a strip of the four pictures, each divided by its exact value and shown
-at half brightness: a renderer that is right shows one even grey.
+at half brightness: a renderer that is right shows one even gray.
 
 python examples/furnace.py [out.png] [--spp 64] [--size 16]
 """
@@ -39,7 +39,7 @@ def inside(size: int) -> wf.Camera:
 
 def furnaces(size: int) -> list[tuple[str, wf.Scene, float]]:
     """Return (name, scene, exact radiance everywhere in the picture)."""
-    grey = wf.Diffuse(0.5)
+    gray = wf.Diffuse(0.5)
     point = wf.PointLight((0, 0, 0), intensity=np.pi)
     glass = wf.Sphere((0, 0, 0), 1, material=wf.Dielectric(1.5))
     outside = wf.Camera.look_at((0, 0, 4), (0, 0, 0), fov=40, size=(size, size))
@@ -47,16 +47,16 @@ def furnaces(size: int) -> list[tuple[str, wf.Scene, float]]:
         # light that has bounced k times is the emission times reflectance^k: the sum is 1/(1-reflectance)
         ("closed box, Le = 1, reflectance 0.5", wf.Scene(box(0.5), camera=inside(size)), 2.0),
         ("closed box, Le = 1, reflectance 0.8", wf.Scene(box(0.8), camera=inside(size)), 5.0),
-        # the light at the centre sends irradiance pi to the whole wall; half of
+        # the light at the center sends irradiance pi to the whole wall; half of
         # it is scattered, evenly, again and again
         (
             "unit sphere from inside, point light pi",
-            wf.Scene([wf.Sphere((0, 0, 0), 1, material=grey)], [point], inside(size)),
+            wf.Scene([wf.Sphere((0, 0, 0), 1, material=gray)], [point], inside(size)),
             1.0,
         ),
         (
             "unit sphere from inside, Le = 0.5",
-            wf.Scene([wf.Sphere((0, 0, 0), 1, material=grey, emission=0.5)], camera=inside(size)),
+            wf.Scene([wf.Sphere((0, 0, 0), 1, material=gray, emission=0.5)], camera=inside(size)),
             1.0,
         ),
         # glass that absorbs nothing is invisible where all around is equally bright

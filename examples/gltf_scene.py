@@ -2,9 +2,9 @@
 
 python examples/gltf_scene.py [out.png] [--spp 128] [--size 640]
 
-The file is kept beside the picture, as out.glb. It holds an urn with textures of colour, metalness and
+The file is kept beside the picture, as out.glb. It holds an urn with textures of color, metalness and
 roughness, a pillar that seven nodes share, a lattice cut out by an alpha mask, a ball of green glass, a
-panel that shines, a spot light, and a perspective camera. All of it is honoured.
+panel that shines, a spot light, and a perspective camera. All of it is honored.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ def urn(glb: Glb) -> int:
 
 
 def lattice(glb: Glb) -> int:
-    """Add a wooden screen whose holes are cut out by the alpha of its colour; return its mesh."""
+    """Add a wooden screen whose holes are cut out by the alpha of its color; return its mesh."""
     x, y = np.meshgrid((np.arange(128) + 0.5) / 128, (np.arange(128) + 0.5) / 128)
     bars = np.minimum(np.abs((x + y) % 1 - 0.5), np.abs((x - y) % 1 - 0.5)) < 0.13
     wood = np.array([0.52, 0.33, 0.2]) * (0.9 + 0.1 * np.sin(40 * x + 6 * np.sin(5 * y)))[:, :, None]
@@ -194,10 +194,10 @@ def pillar(glb: Glb) -> int:
 def floor(glb: Glb) -> int:
     """Add a floor of polished tiles; return its mesh."""
     tiles = np.indices((2, 2)).sum(0) % 2
-    colours = np.where(tiles[:, :, None], (0.75, 0.72, 0.68), (0.42, 0.4, 0.39))
+    colors = np.where(tiles[:, :, None], (0.75, 0.72, 0.68), (0.42, 0.4, 0.39))
     material = {
         "pbrMetallicRoughness": {
-            "baseColorTexture": glb.texture(codes(np.kron(colours, np.ones((32, 32, 1))))),
+            "baseColorTexture": glb.texture(codes(np.kron(colors, np.ones((32, 32, 1))))),
             "metallicFactor": 0,
             "roughnessFactor": 0.25,
         }

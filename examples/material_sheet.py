@@ -21,15 +21,15 @@ CLAY, SKY, WINE = (0.75, 0.33, 0.2), (0.16, 0.4, 0.68), (0.45, 0.05, 0.09)
 
 def rows() -> list[list[wf.Bsdf]]:
     """Return nine materials for each step, three of a kind side by side."""
-    return [matte(), metal(), glass(), coated(), blended(), textured()]
+    return [view_independent(), metal(), glass(), coated(), blended(), textured()]
 
 
-def matte() -> list[wf.Bsdf]:
-    """Return three colours of `Diffuse`, and clay ever rougher, without and with light between its facets."""
+def view_independent() -> list[wf.Bsdf]:
+    """Return three colors of `Diffuse`, and clay ever rougher, without and with light between its facets."""
     sigmas = (0.3, 0.6, 1.0)
     rough = [wf.OrenNayar(CLAY, sigma) for sigma in sigmas]
     preserving = [wf.OrenNayar(CLAY, sigma, energy_preserving=True) for sigma in sigmas]
-    return [*(wf.Diffuse(colour) for colour in (0.8, SKY, CLAY)), *rough, *preserving]
+    return [*(wf.Diffuse(color) for color in (0.8, SKY, CLAY)), *rough, *preserving]
 
 
 def metal() -> list[wf.Bsdf]:
@@ -43,8 +43,8 @@ def glass() -> list[wf.Bsdf]:
     solid = [wf.Dielectric(1.5, roughness) for roughness in (0.0, 0.25, 0.5)]
     tint = (0.7, 0.85, 0.95)
     shells = [wf.ThinDielectric(1.5, roughness, transmittance=tint) for roughness in (0.0, 0.25, 0.5)]
-    colours = [(0.15, 0.9, 2.6), (1.8, 0.35, 0.7), (2.2, 0.9, 0.2)]  # leave amber, green, blue
-    return [*solid, *shells, *(wf.Dielectric(1.5, absorption=colour) for colour in colours)]
+    colors = [(0.15, 0.9, 2.6), (1.8, 0.35, 0.7), (2.2, 0.9, 0.2)]  # leave amber, green, blue
+    return [*solid, *shells, *(wf.Dielectric(1.5, absorption=color) for color in colors)]
 
 
 def coated() -> list[wf.Bsdf]:
@@ -70,17 +70,17 @@ def textured() -> list[wf.Bsdf]:
     """Return materials that vary over the ball: by textures, by reliefs, and by holes."""
     u, v = np.meshgrid((np.arange(512) + 0.5) / 512, (np.arange(256) + 0.5) / 256)
     checks = ((u * 16).astype(int) + (v * 8).astype(int)) % 2
-    colours = np.where(checks[:, :, None], (0.85, 0.8, 0.7), (0.1, 0.25, 0.3))
+    colors = np.where(checks[:, :, None], (0.85, 0.8, 0.7), (0.1, 0.25, 0.3))
     bands = 0.5 + 0.5 * np.sin(2 * np.pi * 7 * v)
     waves = 0.5 + 0.25 * (np.sin(2 * np.pi * 14 * u) + np.sin(2 * np.pi * 8 * v))
     quilt = np.abs(np.sin(2 * np.pi * (6 * u + 3 * v)) * np.sin(2 * np.pi * (6 * u - 3 * v))) ** 0.5
     return [
-        wf.Diffuse(wf.Texture(colours)),
+        wf.Diffuse(wf.Texture(colors)),
         wf.Conductor.named("copper", number(0.1 + 0.5 * checks)),
         wf.Mix(wf.Diffuse((0.12, 0.12, 0.14)), wf.Conductor.named("gold", 0.2), number(bands > 0.5)),
-        wf.OrenNayar((0.7, 0.68, 0.6), 0.4).with_relief(wf.BumpMap(waves, 0.12)),
-        wf.Conductor.named("aluminium", 0.15).with_relief(wf.BumpMap(waves, 0.04)),
-        wf.Principled(WINE, 0, 0.35).with_relief(wf.NormalMap(normals(quilt, 0.06))),
+        wf.OrenNayar((0.7, 0.68, 0.6), 0.4).with_normal_map(wf.BumpMap(waves, 0.12)),
+        wf.Conductor.named("aluminium", 0.15).with_normal_map(wf.BumpMap(waves, 0.04)),
+        wf.Principled(WINE, 0, 0.35).with_normal_map(wf.NormalMap(normals(quilt, 0.06))),
         wf.Diffuse((0.8, 0.35, 0.1)).with_alpha(0.45),
         wf.Diffuse((0.2, 0.45, 0.4)).with_alpha(number(bands)),
         wf.Conductor.named("gold", 0.3).with_alpha(number(waves), cutoff=0.5),
@@ -94,9 +94,9 @@ def number(values: np.ndarray) -> wf.Texture:
 
 def normals(heights: np.ndarray, height: float) -> np.ndarray:
     """Return the normal map (H, W, 3) of heights on a ball: texel 1 stands `height` above texel 0."""
-    rows, columns = heights.shape
+    rows, take = heights.shape
     per_turn, per_half_turn = 2 * np.pi * RADIUS, np.pi * RADIUS
-    along_u = (np.roll(heights, -1, 1) - np.roll(heights, 1, 1)) * (height * columns / 2 / per_turn)
+    along_u = (np.roll(heights, -1, 1) - np.roll(heights, 1, 1)) * (height * take / 2 / per_turn)
     along_v = -np.gradient(heights, axis=0) * (height * rows / per_half_turn)  # v runs up, rows run down
     normal = np.stack([-along_u, -along_v, np.ones_like(heights)], 2)
     return 0.5 + 0.5 * normal / np.linalg.norm(normal, axis=2, keepdims=True)
@@ -124,15 +124,15 @@ def scene(size: int = 900) -> wf.Scene:
     """Return the steps with a ball for each material, under a large panel."""
     samples = rows()
     width, top = 40.0, len(samples) * RISER
-    grey = wf.Diffuse((0.34, 0.335, 0.33))
+    gray = wf.Diffuse((0.34, 0.335, 0.33))
     shapes: list[wf.Mesh | wf.Sphere] = []
     for step, row in enumerate(reversed(samples)):
         floor, front = step * RISER, -step * TREAD
         deep = TREAD if step else 8.0  # the lowest reaches out below the camera
         tall = RISER if step < len(samples) - 1 else 6.0  # the highest is the back of the studio
         left = -width / 2
-        shapes.append(wf.Rectangle((left, floor, front + deep), (width, 0, 0), (0, 0, -deep), material=grey))
-        shapes.append(wf.Rectangle((left, floor, front), (width, 0, 0), (0, tall, 0), material=grey))
+        shapes.append(wf.Rectangle((left, floor, front + deep), (width, 0, 0), (0, 0, -deep), material=gray))
+        shapes.append(wf.Rectangle((left, floor, front), (width, 0, 0), (0, tall, 0), material=gray))
         for column, material in enumerate(row):
             x = column - 4 + 0.3 * (column // 3 - 1)
             shapes.append(wf.Sphere((x, floor + RADIUS, front + TREAD / 2), RADIUS, material=material))

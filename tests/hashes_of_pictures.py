@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 import wavefront as wf
-from wavefront.accel import choose
+from wavefront.accel import registry as choose
 from wavefront.accel.embree import installed
-from wavefront.io.images import srgb_to_linear, to_8bit
+from wavefront.codecs.encoding import srgb_to_linear, to_8bit
 
 warnings.simplefilter("ignore")
 choose.COPIES = 0  # instances are traced as such
@@ -75,8 +75,8 @@ add(
     [wf.DirectionalLight((1, -2, -1), 3, angle=1), SKY],
 )
 add("spots", [ball(GREY)], SPOTS)
-add("bumps", [net(GREY.with_relief(wf.BumpMap(rng.random((16, 16)), 0.05)))], [SKY])
-add("normal map", [net(GREY.with_relief(wf.NormalMap(0.5 + 0.3 * rng.random((16, 16, 3)))))], [SKY])
+add("bumps", [net(GREY.with_normal_map(wf.BumpMap(rng.random((16, 16)), 0.05)))], [SKY])
+add("normal map", [net(GREY.with_normal_map(wf.NormalMap(0.5 + 0.3 * rng.random((16, 16, 3)))))], [SKY])
 add(
     "lens",
     [ball(GREY), LAMP],

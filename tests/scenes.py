@@ -107,7 +107,7 @@ def box(
 class CosineEnvironment(wf.Environment):
     """An environment of radiance max(cosθ, 0) around y, written as a user would write one."""
 
-    def record(self, centre: NDArray[np.float64]) -> ConstantEnvironment:
+    def record(self, center: NDArray[np.float64]) -> ConstantEnvironment:
         """Return the light as a record of one column."""
         return _CosineRecord(self.radiance)
 
@@ -149,7 +149,7 @@ def disk_irradiance(radius: float, height: float, offset: float) -> float:
 
 
 def fresnel(degrees: float, ior: float = 1.5) -> float:
-    """Unpolarised reflectance of a dielectric boundary, by Snell and Fresnel as in any textbook."""
+    """Unpolarized reflectance of a dielectric boundary, by Snell and Fresnel as in any textbook."""
     theta = np.radians(degrees)
     sin_t = np.sin(theta) / ior
     if sin_t >= 1:
@@ -255,7 +255,7 @@ DIRECT_CASES = [
             spp=16384,
         )
         for where, x, z, expected in (
-            ("centre", 0, 0, 1.740840),
+            ("center", 0, 0, 1.740840),
             ("offset 0.5", 0.5, 0, 1.564202),
             ("below a corner", 1, 1, 0.652688),
         )
@@ -443,7 +443,7 @@ SPECULAR_CASES = [
             (0, 0.04),
             (30, 0.041523),
             (45, 0.050240),
-            (56.309932, 0.073965),  # Brewster's angle: only one polarisation is reflected
+            (56.309932, 0.073965),  # Brewster's angle: only one polarization is reflected
             (60, 0.089187),
             (75, 0.253061),
             (80, 0.387704),

@@ -32,7 +32,7 @@ class Mean:
 
     @classmethod
     def of(cls, batches: Doubles) -> Mean:
-        """Summarise the means of batches (k,)."""
+        """Summarize the means of batches (k,)."""
         return cls(float(batches.mean()), float(batches.std(ddof=1) / np.sqrt(batches.size)), batches.size)
 
     def __str__(self) -> str:

@@ -15,7 +15,7 @@ seeds = st.integers(0, 2**63)
 
 @st.composite
 def unit_vectors(draw, min_count: int = 1, max_count: int = 20):
-    """Unit vectors (3, n) float32, the poles and their neighbourhood among them."""
+    """Unit vectors (3, n) float32, the poles and their neighborhood among them."""
     count = draw(st.integers(min_count, max_count))
     rows = []
     for _ in range(count):

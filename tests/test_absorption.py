@@ -1,11 +1,11 @@
-"""Coloured glass: exp(−absorption · length) along the way through it."""
+"""Colored glass: exp(−absorption · length) along the way through it."""
 
 import numpy as np
 import pytest
 
 import wavefront as wf
 from wavefront.accel import make_accelerator
-from wavefront.scene import compile_scene
+from wavefront.compile.scene import compile_scene
 
 ABSORPTION = np.array([0.2, 1.0, 3.0])
 
@@ -42,7 +42,7 @@ def test_clear_and_absorbing_glass_side_by_side() -> None:
 def test_a_texture_cannot_absorb() -> None:
     """The message says why."""
     material = wf.Dielectric(1.5, absorption=wf.Texture(np.ones((2, 2, 3), np.float32)))
-    with pytest.raises(wf.SceneError, match="Dielectric absorption must be a colour, not a texture"):
+    with pytest.raises(wf.SceneError, match="Dielectric absorption must be a color, not a texture"):
         wf.render(wf.Scene([wf.Sphere((0, 0, 0), 1, material=material)], [wf.Environment(1.0)]), 1)
 
 

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from wavefront.accel import Accelerator, Geometry, make_accelerator
 from wavefront.accel.build import build_tree, stable_order
 from wavefront.accel.embree import installed
-from wavefront.accel.stream import leaf_size_for
+from wavefront.accel.numpy_accel import leaf_size_for
 from wavefront.errors import SceneError
 
 f4 = np.float32
@@ -70,7 +70,7 @@ def same_bits(a: object, b: object) -> bool:
 
 
 def aimed_rays(triangles: np.ndarray, n: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Rays from inside a mesh around its centre: a third each at vertices, edges and anywhere."""
+    """Rays from inside a mesh around its center: a third each at vertices, edges and anywhere."""
     rng = np.random.default_rng(seed)
     low, high = triangles.min((0, 1)), triangles.max((0, 1))
     center, size = (low + high) / 2.0, (high - low).max()
@@ -181,8 +181,8 @@ def check_against_brute_force(
     """Hit for hit, but for rays that graze an edge or begin on a surface within rounding."""
     hits = make_accelerator(geometry(triangles), "numpy").closest(origin, direction, nothing(origin.shape[1]))
     t, weight = brute_force(triangles, origin, direction)
-    inside = (weight >= 0) & (t > 0)
-    nearest = np.where(inside, t, np.inf).min(0)
+    back_facing = (weight >= 0) & (t > 0)
+    nearest = np.where(back_facing, t, np.inf).min(0)
     doubtful = (np.abs(weight) < 1e-5) | ((weight >= 0) & (np.abs(t) < 1e-6 * size))
     clear = ~doubtful.any(0)
     np.testing.assert_array_equal(np.isfinite(hits.t[clear]), np.isfinite(nearest[clear]))
@@ -234,16 +234,16 @@ def check_batches(accelerator: Accelerator, size: int) -> None:
     n = 300 if size == 1 else 9000
     origin, direction = random_rays(n, 6)
     origin[:, ::5] = 0  # through vertices too
-    leaving = np.random.default_rng(7).integers(-1, 37, n)
+    exclude_prim = np.random.default_rng(7).integers(-1, 37, n)
     distance = np.full(n, 0.7, f4)
-    whole = accelerator.closest(origin, direction, leaving)
-    blocked = accelerator.occluded(origin, direction, distance, leaving)
+    whole = accelerator.closest(origin, direction, exclude_prim)
+    blocked = accelerator.occluded(origin, direction, distance, exclude_prim)
     for at in range(0, n, size):
         p = slice(at, at + size)
-        part = accelerator.closest(origin[:, p], direction[:, p], leaving[p])
+        part = accelerator.closest(origin[:, p], direction[:, p], exclude_prim[p])
         for name in ("t", "prim", "b1", "b2"):
             np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[p])
-        part_blocked = accelerator.occluded(origin[:, p], direction[:, p], distance[p], leaving[p])
+        part_blocked = accelerator.occluded(origin[:, p], direction[:, p], distance[p], exclude_prim[p])
         np.testing.assert_array_equal(part_blocked, blocked[p])
 
 
@@ -288,12 +288,12 @@ def test_queries_leave_nothing_to_the_garbage_collector(accelerator: Accelerator
 def test_occluded_means_closer_than_the_distance(name: str) -> None:
     accelerator = make_accelerator(geometry(sphere_mesh(3), [(0, 0, 0)], [0.3]), name)
     origin, direction = random_rays(5000, 10)
-    leaving = np.random.default_rng(1).integers(-1, 1281, 5000)
-    hits = accelerator.closest(origin, direction, leaving)
+    exclude_prim = np.random.default_rng(1).integers(-1, 1281, 5000)
+    hits = accelerator.closest(origin, direction, exclude_prim)
     hit = np.isfinite(hits.t)
     for factor, expected in ((0.999, False), (1.001, True)):
         distance = np.where(hit, hits.t * f4(factor), f4(10)).astype(f4)
-        blocked = accelerator.occluded(origin, direction, distance, leaving)
+        blocked = accelerator.occluded(origin, direction, distance, exclude_prim)
         np.testing.assert_array_equal(blocked, hit & expected)
 
 
@@ -363,8 +363,8 @@ def test_rays_on_the_faces_of_boxes() -> None:
     grid = np.stack(np.meshgrid(*[np.arange(4) * 2.0] * 3), -1).reshape(-1, 1, 1, 3)
     accelerator = make_accelerator(geometry((cube + grid).reshape(-1, 3, 3)), "numpy")
     y, z = (v.ravel() for v in np.meshgrid(np.arange(4) * 2.0, np.arange(4) * 2.0))
-    for inside in (0.0, 0.25):
-        origin = np.stack([np.full(16, 0.5), y + inside, z + inside]).astype(f4)
+    for back_facing in (0.0, 0.25):
+        origin = np.stack([np.full(16, 0.5), y + back_facing, z + back_facing]).astype(f4)
         direction = np.tile(np.array([[1], [0], [-0.0]], f4), 16)
         hits = accelerator.closest(origin, direction, nothing(16))
         np.testing.assert_array_equal(hits.t, 1)
@@ -443,13 +443,19 @@ def test_from_inside_outside_and_on_a_sphere(name: str) -> None:
     accelerator = make_accelerator(geometry([[(9, 9, 9), (9, 8, 9), (8, 9, 9)]], [(0, 0, 0)], [1]), name)
     origin = np.array([[0, -3, 1, 1, 1], [0] * 5, [0] * 5], f4)
     direction = np.array([[1, 1, 1, -1, -1], [0] * 5, [0] * 5], f4)
-    leaving = np.array([-1, -1, 1, 1, -1])
-    hits = accelerator.closest(origin, direction, leaving)
+    exclude_prim = np.array([-1, -1, 1, 1, -1])
+    hits = accelerator.closest(origin, direction, exclude_prim)
     np.testing.assert_array_equal(hits.t, [1, 2, np.inf, 2, 2])
     np.testing.assert_array_equal(hits.prim, [1, 1, -1, 1, 1])
     assert not hits.b1.any()
     far = np.full(5, 2.5, f4)
-    assert accelerator.occluded(origin, direction, far, leaving).tolist() == [True, True, False, True, True]
+    assert accelerator.occluded(origin, direction, far, exclude_prim).tolist() == [
+        True,
+        True,
+        False,
+        True,
+        True,
+    ]
 
 
 # --- build, and the choice of accelerator ---------------------------------------------------------

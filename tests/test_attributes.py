@@ -1,4 +1,4 @@
-"""Vertex colours, texture coordinates and textures: from the mesh to the picture."""
+"""Vertex colors, texture coordinates and textures: from the mesh to the picture."""
 
 from pathlib import Path
 
@@ -9,11 +9,11 @@ from significance import render
 
 import wavefront as wf
 from wavefront.accel import make_accelerator
-from wavefront.bsdfs.base import Spatial
-from wavefront.scene import compile_scene
+from wavefront.compile.scene import compile_scene
+from wavefront.stages.interaction import interaction
 from wavefront.stages.intersect import intersect
-from wavefront.stages.surface import interact
 from wavefront.state import Rays
+from wavefront.textures.base import BaseTexture
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 SQUARE = {"vertices": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "faces": [[0, 1, 2], [0, 2, 3]]}
@@ -22,7 +22,7 @@ N = 8  # pixels along a side of the picture of the unit square
 
 
 def unlit(*shapes):
-    """Picture the unit square z = 0 in even light, where a matte flat patch shows its own colour.
+    """Picture the unit square z = 0 in even light, where a matte flat patch shows its own color.
 
     Every ray that leaves it finds radiance 1, and its weight is the reflectance: no noise.
     """
@@ -40,19 +40,19 @@ def compiled(*shapes):
     return compile_scene(scene, lambda geometry: make_accelerator(geometry, "numpy"))
 
 
-def centres():
-    """x and y of the centres of the pixels, (N, N) each; row 0 is the top."""
+def centers():
+    """x and y of the centers of the pixels, (N, N) each; row 0 is the top."""
     along = (np.arange(N) + 0.5) / N
     return np.meshgrid(along, along[::-1])
 
 
-# ---- a patch shows the texture's own colour -----------------------------------------------------
+# ---- a patch shows the texture's own color -----------------------------------------------------
 
 
 def test_a_textured_patch_in_even_light_shows_its_texels():
     codes = np.random.default_rng(0).integers(0, 256, (N, N, 3), np.uint8)
     texture = wf.Texture(codes, filter="nearest")
-    texels = texture.lookup(np.stack([c.ravel() for c in centres()]).astype(np.float32)).T.reshape(N, N, 3)
+    texels = texture.lookup(np.stack([c.ravel() for c in centers()]).astype(np.float32)).T.reshape(N, N, 3)
     image = unlit(square(uvs=CORNERS, material=wf.Diffuse(texture)))
     assert image == pytest.approx(texels, rel=1e-5)
     # the same by the definition of sRGB, so that lookup and test cannot both be wrong
@@ -95,9 +95,9 @@ def test_a_patch_of_a_real_file_shows_its_texture():
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="the real files are not here")
-@pytest.mark.filterwarnings("ignore:.*not honoured", "ignore::DeprecationWarning")
+@pytest.mark.filterwarnings("ignore:.*not honored", "ignore::DeprecationWarning")
 @pytest.mark.parametrize("name", ["fuze.obj", "BoxTextured.glb", "Duck.glb"])
-def test_faces_of_real_files_have_the_colours_of_their_image(name):
+def test_faces_of_real_files_have_the_colors_of_their_image(name):
     """In the middle of each face, as trimesh places it and as Pillow decodes it."""
     (held,) = trimesh.load_scene(DATA / name, process=False).dump()
     material = held.visual.material
@@ -112,9 +112,9 @@ def test_faces_of_real_files_have_the_colours_of_their_image(name):
         wf.Scene(mesh, [wf.Environment(1.0)]), lambda parts: make_accelerator(parts, "numpy")
     )
     middles, normals = held.triangles_center, held.face_normals
-    origin = (middles + normals * 1e-3 * scene.radius - scene.centre).T.astype(np.float32)
+    origin = (middles + normals * 1e-3 * scene.radius - scene.center).T.astype(np.float32)
     rays = Rays(origin, np.ascontiguousarray(-normals.T, np.float32), np.full(len(middles), -1))
-    surface = interact(scene, rays, intersect(scene, rays))
+    surface = interaction(scene, rays, intersect(scene, rays))
     (key,) = vars(mesh.material).keys() & {"base_color", "reflectance"}
     found = getattr(mesh.material, key).at(surface).T
     off = np.abs(found - expected).max(1)
@@ -123,39 +123,39 @@ def test_faces_of_real_files_have_the_colours_of_their_image(name):
     assert np.quantile(np.abs(found - expected[::-1]).max(1), 0.75) > 0.1
 
 
-# ---- vertex colours -----------------------------------------------------------------------------
+# ---- vertex colors -----------------------------------------------------------------------------
 
 
-def test_vertex_colours_are_interpolated():
+def test_vertex_colors_are_interpolated():
     colors = np.column_stack([CORNERS, 1 - CORNERS[:, 0]])
     image = unlit(square(colors=colors, material=wf.Diffuse(wf.VertexColors())))
-    x, y = centres()
+    x, y = centers()
     # samples lie anywhere in their pixel
     assert image == pytest.approx(np.stack([x, y, 1 - x], -1), abs=0.5 / N)
     assert image.mean((0, 1)) == pytest.approx([0.5, 0.5, 0.5], abs=0.1 / N)
 
 
-def test_vertex_colours_multiply_a_colour_and_a_texture():
+def test_vertex_colors_multiply_a_color_and_a_texture():
     colors = [[0.5, 1, 0.25]] * 4
-    grey = np.full((1, 1, 3), 0.5, np.float32)
-    for times, expected in (((0.2, 0.5, 1), [0.1, 0.5, 0.25]), (wf.Texture(grey), [0.25, 0.5, 0.125])):
+    gray = np.full((1, 1, 3), 0.5, np.float32)
+    for times, expected in (((0.2, 0.5, 1), [0.1, 0.5, 0.25]), (wf.Texture(gray), [0.25, 0.5, 0.125])):
         image = unlit(square(colors=colors, uvs=CORNERS, material=wf.Diffuse(wf.VertexColors(times))))
         assert image == pytest.approx(np.broadcast_to(expected, image.shape), rel=1e-5)
 
 
-def test_a_channel_of_the_colours_is_a_number():
+def test_a_channel_of_the_colors_is_a_number():
     weight = wf.VertexColors(0.5, channel=3)
     mixed = wf.Mix(wf.Diffuse(0.0), wf.Diffuse(1.0), weight)
     # by the expected value: a cosine-weighted sample of either part weighs 0.5 · 0.4
     image = unlit(square(colors=[[0, 0, 0, 0.4]] * 4, material=mixed))
     assert image == pytest.approx(0.2, rel=1e-5)
-    red = wf.Diffuse(wf.VertexColors(channel=0))  # and serves as a grey colour
+    red = wf.Diffuse(wf.VertexColors(channel=0))  # and serves as a gray color
     assert unlit(square(colors=[[0.3, 0, 0]] * 4, material=red)) == pytest.approx(0.3, rel=1e-5)
 
 
-def test_what_has_no_colours_is_white():
+def test_what_has_no_colors_is_white():
     material = wf.Diffuse(wf.VertexColors(0.7))
-    with pytest.warns(UserWarning, match=r"1 meshes lack the vertex colours .* read, first: 'plain'"):
+    with pytest.warns(UserWarning, match=r"1 meshes lack the vertex colors .* read, first: 'plain'"):
         image = unlit(square(material=material, name="plain"))
     assert image == pytest.approx(0.7, rel=1e-5)
     ball = wf.Sphere((0.5, 0.5, -9), 8, material=material)
@@ -164,7 +164,7 @@ def test_what_has_no_colours_is_white():
     assert unlit(ball, beside).max() == 0
 
 
-def test_the_checker_takes_materials_with_vertex_colours():
+def test_the_checker_takes_materials_with_vertex_colors():
     wf.testing.check_bsdf(wf.OrenNayar(wf.VertexColors((0.3, 0.5, 0.9))), samples=20_000)
 
 
@@ -179,7 +179,7 @@ def test_the_checker_takes_materials_with_vertex_colours():
         ([[0, 0, 0], [0]], r"colors must be numeric"),
     ],
 )
-def test_bad_colours(colors, message):
+def test_bad_colors(colors, message):
     with pytest.raises(wf.SceneError, match=message):
         square(colors=colors)
 
@@ -222,7 +222,7 @@ def test_only_what_is_read_is_compiled():
 
 
 def test_a_parameter_that_reads_the_unknown_is_refused():
-    class Odd(Spatial):
+    class Odd(BaseTexture):
         reads = ("smell",)
 
         def at(self, surface):
@@ -234,10 +234,10 @@ def test_a_parameter_that_reads_the_unknown_is_refused():
         compiled(square(material=wf.Diffuse(Odd())))
 
 
-# ---- textures of numbers as colours, and the other way round ------------------------------------
+# ---- textures of numbers as colors, and the other way round ------------------------------------
 
 
-def test_a_texture_of_numbers_serves_as_a_colour():
+def test_a_texture_of_numbers_serves_as_a_color():
     image = np.random.default_rng(2).random((N, N, 3), np.float32)
     number = wf.Texture(image, channel=1)
     material = wf.Diffuse(number)
@@ -253,7 +253,7 @@ def test_a_texture_of_numbers_serves_as_a_colour():
     )
 
 
-def test_a_texture_of_colours_serves_as_a_number():
+def test_a_texture_of_colors_serves_as_a_number():
     image = np.random.default_rng(3).random((N, N, 3), np.float32)
     bound = wf.Principled(0.5, roughness=wf.Texture(image)).bind(_Surface)
     expected = wf.Texture(image, channel="luminance").lookup(_Surface.uv)

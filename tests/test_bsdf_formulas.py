@@ -238,11 +238,11 @@ def test_rough_metal(roughness):
     assert Conductor(0.5, 3, roughness).f(wo, wi)[1] == pytest.approx(exact, rel=5e-4, abs=1e-6)
 
 
-@pytest.mark.parametrize("inside", [False, True])
+@pytest.mark.parametrize("back_facing", [False, True])
 @pytest.mark.parametrize("roughness", [0.3, 0.6, 1.0])
-def test_rough_glass(roughness, inside):
+def test_rough_glass(roughness, back_facing):
     glass = Dielectric(1.5, roughness, reflectance=COLOR, transmittance=COLOR[::-1])
-    eta = 1 / 1.5 if inside else 1.5
+    eta = 1 / 1.5 if back_facing else 1.5
     glass.eta = np.array([eta], F4)
     wo, wi = pairs()
     value, cos = reflection(wo, wi, roughness**2)
@@ -285,10 +285,10 @@ def test_smooth_sheet():
     assert down.weight[:, 0] == pytest.approx(COLOR[::-1])
 
 
-@pytest.mark.parametrize("inside", [False, True])
-def test_smooth_glass(inside):
+@pytest.mark.parametrize("back_facing", [False, True])
+def test_smooth_glass(back_facing):
     glass = Dielectric(1.5, reflectance=COLOR, transmittance=COLOR[::-1])
-    eta = 1 / 1.5 if inside else 1.5
+    eta = 1 / 1.5 if back_facing else 1.5
     glass.eta = np.array([eta], F4)
     wo, _ = pairs()
     wo = wo[:, np.hypot(wo[0], wo[1]) < 0.99 * min(eta, 1)]
@@ -385,8 +385,8 @@ def test_clear_base(thin):
     face = fresnel(cos, 1.5)
     reflected = 2 * face / (1 + face) if thin else face
     part = (1 - metallic) * clear
-    matte = (1 - metallic) * (1 - clear) * column(COLOR) / np.pi
-    exact = metallic * schlick(column(COLOR), cos) * value + part * reflected * value + matte
+    view_independent = (1 - metallic) * (1 - clear) * column(COLOR) / np.pi
+    exact = metallic * schlick(column(COLOR), cos) * value + part * reflected * value + view_independent
     assert bsdf.f(wo, wi) == pytest.approx(exact, rel=1e-3)
     if thin:
         through = value * (1 - reflected)
@@ -442,27 +442,35 @@ def test_shares_of_the_lobes(color, sheen, roughness):
     gloss = metallic * (luminance(schlick(column(color), wo[2].astype(float))) + 0.1) + opaque * (seen + 0.1)
     glass = (1 - metallic) * clear
     varnish = coat * (0.1 + schlick(0.04, wo[2].astype(float)))
-    matte = opaque * (luminance(column(color)) + 0.01) + sheen * 0.5 * (0.2 + away)
+    view_independent = opaque * (luminance(column(color)) + 0.01) + sheen * 0.5 * (0.2 + away)
     rough, smooth = (mirror_lobe(wo, wi, F4(r**2))[1] for r in (roughness, 0.3))
     face = fresnel(dot(wo, half_vector(wo, wi)), ior)
-    lobes = gloss * rough + glass * rough * 2 * face / (1 + face) + varnish * smooth + matte * wi[2] / np.pi
-    assert bsdf.pdf(wo, wi) == pytest.approx(lobes / (gloss + glass + varnish + matte), rel=1e-3)
+    lobes = (
+        gloss * rough
+        + glass * rough * 2 * face / (1 + face)
+        + varnish * smooth
+        + view_independent * wi[2] / np.pi
+    )
+    assert bsdf.pdf(wo, wi) == pytest.approx(lobes / (gloss + glass + varnish + view_independent), rel=1e-3)
 
 
 @pytest.mark.parametrize("make", [Dielectric, lambda ior, rough: Principled(1.0, 0, rough, ior, 1.0)])
-@pytest.mark.parametrize("inside", [False, True])
-def test_what_crosses_says_the_index_it_met(make, inside):
+@pytest.mark.parametrize("back_facing", [False, True])
+def test_what_crosses_says_the_index_it_met(make, back_facing):
     """And what is reflected says 1, as does all that crosses a sheet."""
     wo = np.repeat(np.array([[0.3], [0], [np.sqrt(0.91)]], F4), 256, 1)
     u = np.random.default_rng(0).random((3, 256)).astype(F4)
     glass = make(1.5, 0.3)
-    glass.inside, glass.eta = np.full(256, inside), np.full(256, 1 / 1.5 if inside else 1.5, F4)
+    glass.back_facing, glass.eta = (
+        np.full(256, back_facing),
+        np.full(256, 1 / 1.5 if back_facing else 1.5, F4),
+    )
     sample = glass.sample_f(wo, u)
     below = sample.wi[2] < 0
     assert below.any()
     assert not below.all()
     sound = sample.pdf > 0
-    expected = np.where(below, 1 / 1.5 if inside else 1.5, 1)
+    expected = np.where(below, 1 / 1.5 if back_facing else 1.5, 1)
     assert sample.eta[sound] == pytest.approx(expected[sound])
     sheet = Principled(1.0, 0, 0.3, 1.5, 1.0, thin=True).sample_f(wo, u)
     assert (sheet.eta == 1).all()

@@ -21,7 +21,7 @@ from wavefront.bsdfs import (
 from wavefront.bsdfs.conductor import METALS
 from wavefront.bsdfs.fresnel import fresnel_conductor
 from wavefront.bsdfs.microfacet import mirror_lobe, normal_density, stretched, visible_normals
-from wavefront.testing import check_bsdf
+from wavefront.testing.bsdf import check_bsdf
 
 F4 = np.float32
 LAST = np.nextafter(F4(1), F4(0))
@@ -49,9 +49,9 @@ def upper_hemisphere(side):
     return np.stack([r * np.cos(phi), r * np.sin(phi), z]).reshape(3, -1).astype(F4)
 
 
-def albedo(bsdf, mu, inside=False):
+def albedo(bsdf, mu, back_facing=False):
     """Part of the energy that leaves again."""
-    if inside:
+    if back_facing:
         bsdf.eta = 1 / bsdf.ior
     u = stratified(bsdf.dimensions)
     sample = bsdf.sample_f(toward(mu, u.shape[1]), u)
@@ -121,10 +121,10 @@ def test_mirror_lobe_is_reciprocal_and_finite(alpha, mu, nu, phi):
     assert 0 <= cos[0] <= 1
 
 
-@given(ior=st.floats(0.4, 3), roughness=st.floats(0, 1), mu=st.floats(1e-5, 1), inside=st.booleans())
-def test_dielectric_samples_keep_their_promises(ior, roughness, mu, inside):
+@given(ior=st.floats(0.4, 3), roughness=st.floats(0, 1), mu=st.floats(1e-5, 1), back_facing=st.booleans())
+def test_dielectric_samples_keep_their_promises(ior, roughness, mu, back_facing):
     glass = Dielectric(ior, roughness)
-    glass.eta = 1 / glass.ior if inside else glass.ior
+    glass.eta = 1 / glass.ior if back_facing else glass.ior
     rng = np.random.default_rng(0)
     wo = toward(mu, 200)
     sample = glass.sample_f(wo, rng.random((3, 200), dtype=F4))
@@ -135,7 +135,7 @@ def test_dielectric_samples_keep_their_promises(ior, roughness, mu, inside):
 
 
 @pytest.mark.parametrize(
-    ("roughness", "outside", "inside"),
+    ("roughness", "outside", "back_facing"),
     [
         (0.0, 0, 0),
         (0.1**0.5, 0.0012, 0.0110),
@@ -144,9 +144,11 @@ def test_dielectric_samples_keep_their_promises(ior, roughness, mu, inside):
         (1.0, 0.1066, 0.5829),
     ],
 )
-def test_rough_glass_loses_what_its_documentation_says(roughness, outside, inside):
+def test_rough_glass_loses_what_its_documentation_says(roughness, outside, back_facing):
     assert 1 - albedo(Dielectric(1.5, roughness), 1.0) == pytest.approx(outside, abs=3e-4)
-    assert 1 - albedo(Dielectric(1.5, roughness), 1.0, inside=True) == pytest.approx(inside, abs=1e-3)
+    assert 1 - albedo(Dielectric(1.5, roughness), 1.0, back_facing=True) == pytest.approx(
+        back_facing, abs=1e-3
+    )
 
 
 @pytest.mark.parametrize(
@@ -196,8 +198,8 @@ def test_sigma_0_is_diffuse():
     wi = upper_hemisphere(50)
     wo = np.repeat(toward(0.3), wi.shape[1], 1)
     for preserving in (False, True):
-        matte = OrenNayar(0.7, 0.0, energy_preserving=preserving)
-        assert matte.f(wo, wi) == pytest.approx(Diffuse(0.7).f(wo, wi), rel=1e-5)
+        view_independent = OrenNayar(0.7, 0.0, energy_preserving=preserving)
+        assert view_independent.f(wo, wi) == pytest.approx(Diffuse(0.7).f(wo, wi), rel=1e-5)
 
 
 def test_thin_sheet_reflects_the_series_of_its_faces():
@@ -209,7 +211,7 @@ def test_thin_sheet_reflects_the_series_of_its_faces():
 
 
 @pytest.mark.parametrize(
-    ("name", "colour"),
+    ("name", "color"),
     [
         ("gold", (0.97, 0.75, 0.37)),
         ("silver", (0.99, 0.98, 0.98)),
@@ -222,14 +224,14 @@ def test_thin_sheet_reflects_the_series_of_its_faces():
         ("nickel", (0.69, 0.64, 0.56)),
     ],
 )
-def test_colour_of_metals(name, colour):
+def test_color_of_metals(name, color):
     metal = Conductor.named(name)
     seen = fresnel_conductor(np.ones(1, F4), metal.eta, metal.k)[:, 0]
-    assert seen == pytest.approx(colour, abs=0.006)
+    assert seen == pytest.approx(color, abs=0.006)
 
 
-def test_every_metal_has_a_colour_test():
-    tested = test_colour_of_metals.pytestmark[0].args[1]
+def test_every_metal_has_a_color_test():
+    tested = test_color_of_metals.pytestmark[0].args[1]
     assert {name for name, _ in tested} == set(METALS)
 
 
@@ -243,10 +245,10 @@ def appendix_b(base_color, metallic, roughness, wo, wi):
     root_v, root_l = (np.sqrt(a2 + (1 - a2) * w[2] ** 2) for w in (v, l))
     specular = d * 0.5 / (v[2] * root_l + l[2] * root_v)
     away = (1 - np.abs((v * h).sum(0))) ** 5
-    colour = np.array(base_color, float).reshape(3, 1)
+    color = np.array(base_color, float).reshape(3, 1)
     fresnel = 0.04 + 0.96 * away
-    dielectric = (1 - fresnel) * colour / np.pi + fresnel * specular
-    metal = (colour + (1 - colour) * away) * specular
+    dielectric = (1 - fresnel) * color / np.pi + fresnel * specular
+    metal = (color + (1 - color) * away) * specular
     return (1 - metallic) * dielectric + metallic * metal
 
 
@@ -287,15 +289,15 @@ def test_parts_of_principled_agree_with_the_materials_of_their_own():
             assert ours == pytest.approx(theirs, rel=1e-5, abs=1e-7)
 
 
-@pytest.mark.parametrize("inside", [False, True])
+@pytest.mark.parametrize("back_facing", [False, True])
 @pytest.mark.parametrize(("ior", "alpha"), [(1.0232, 1.03e-3), (0.9736, 7.3e-3), (0.7047, 1.03e-3)])
-def test_the_narrowest_densities_of_glass_are_whole(ior, alpha, inside):
+def test_the_narrowest_densities_of_glass_are_whole(ior, alpha, back_facing):
     """The lobe of refraction is as narrow as α·|ior − 1|; one integral along the normal resolves it."""
     edges = np.concatenate([[0], np.geomspace(1e-9, np.pi / 2 - 1e-6, 400_001)])
     theta = (edges[1:] + edges[:-1]) / 2
     solid_angle = 4 * np.pi * np.sin(theta) * np.sin(np.diff(edges) / 2)
     glass, wo = Dielectric(ior, np.sqrt(alpha)), toward(1.0, len(theta))
-    glass.eta = 1 / glass.ior if inside else glass.ior
+    glass.eta = 1 / glass.ior if back_facing else glass.ior
     total = 0.0
     for side in (1, -1):
         wi = np.stack([np.sin(theta), 0 * theta, side * np.cos(theta)]).astype(F4)
@@ -303,7 +305,7 @@ def test_the_narrowest_densities_of_glass_are_whole(ior, alpha, inside):
     assert total == pytest.approx(1, abs=1e-5)
 
 
-def colour(rng):
+def color(rng):
     return rng.random(3)
 
 
@@ -317,18 +319,18 @@ def index(rng):
 ROUGHNESS = [0.0, 1e-3, 0.05, None, 1.0]
 # One material of each kind with random parameters, of a given roughness where it has one.
 RANDOM = {
-    Diffuse: lambda rng, roughness: Diffuse(colour(rng)),
-    Mirror: lambda rng, roughness: Mirror(colour(rng)),
+    Diffuse: lambda rng, roughness: Diffuse(color(rng)),
+    Mirror: lambda rng, roughness: Mirror(color(rng)),
     Conductor: lambda rng, roughness: Conductor(rng.uniform(0.1, 3, 3), rng.uniform(0, 6, 3), roughness),
     Dielectric: lambda rng, roughness: Dielectric(
-        index(rng), roughness, reflectance=colour(rng), transmittance=colour(rng)
+        index(rng), roughness, reflectance=color(rng), transmittance=color(rng)
     ),
     ThinDielectric: lambda rng, roughness: ThinDielectric(
-        index(rng), roughness, reflectance=colour(rng), transmittance=colour(rng)
+        index(rng), roughness, reflectance=color(rng), transmittance=color(rng)
     ),
-    OrenNayar: lambda rng, roughness: OrenNayar(colour(rng), roughness, energy_preserving=rng.random() < 0.5),
+    OrenNayar: lambda rng, roughness: OrenNayar(color(rng), roughness, energy_preserving=rng.random() < 0.5),
     Principled: lambda rng, roughness: Principled(
-        colour(rng),
+        color(rng),
         rng.choice([0, 1, rng.random()]),
         roughness,
         index(rng),
@@ -337,10 +339,10 @@ RANDOM = {
         clearcoat=rng.choice([0, rng.random()]),
         clearcoat_roughness=rng.choice([roughness, rng.random()]),
         sheen=rng.choice([0, rng.random()]),
-        sheen_color=colour(rng),
+        sheen_color=color(rng),
         sheen_roughness=rng.choice([roughness, rng.random()]),
         specular=rng.random(),
-        specular_color=4 * colour(rng),
+        specular_color=4 * color(rng),
     ),
     Mix: lambda rng, roughness: Mix(
         RANDOM[rng.choice([Diffuse, Mirror, Conductor])](rng, roughness),

@@ -4,19 +4,10 @@ import numpy as np
 import pytest
 
 from wavefront import bsdfs, testing
-from wavefront.bsdfs import (
-    Conductor,
-    Dielectric,
-    Diffuse,
-    Mirror,
-    Mix,
-    OrenNayar,
-    Principled,
-    Spatial,
-    ThinDielectric,
-)
+from wavefront.bsdfs import Conductor, Dielectric, Diffuse, Mirror, Mix, OrenNayar, Principled, ThinDielectric
 from wavefront.errors import SceneError
-from wavefront.state import Surface
+from wavefront.state import SurfaceInteraction
+from wavefront.textures.base import BaseTexture
 
 F4 = np.float32
 
@@ -95,7 +86,7 @@ CASES = [(kind, arguments) for kind, examples in EXAMPLES.items() for arguments 
 NAMES = [f"{kind.__name__}{number}" for number, (kind, _) in enumerate(CASES)]
 
 
-class Constant(Spatial):
+class Constant(BaseTexture):
     """A texture of one value."""
 
     def __init__(self, value):
@@ -109,18 +100,20 @@ class Constant(Spatial):
 
 
 def varying(bsdf, name, value):
-    """A texture of a parameter's value, a colour where the material keeps a colour."""
+    """A texture of a parameter's value, a color where the material keeps a color."""
     if not isinstance(value, float | tuple):
         return value
-    is_colour = getattr(getattr(bsdf, name, None), "ndim", 0) == 2
-    return Constant(np.broadcast_to(value, 3) if is_colour else value)
+    is_color = getattr(getattr(bsdf, name, None), "ndim", 0) == 2
+    return Constant(np.broadcast_to(value, 3) if is_color else value)
 
 
-def surface(wo, inside=False):
+def surface(wo, back_facing=False):
     n = wo.shape[1]
     normal = np.repeat(np.array([[0], [0], [1]], F4), n, 1)
     zero, index = np.zeros(n, F4), np.zeros(n, np.intp)
-    return Surface(np.zeros((3, n), F4), zero, normal, normal, wo, index, index, np.full(n, inside))
+    return SurfaceInteraction(
+        np.zeros((3, n), F4), zero, normal, normal, wo, index, index, np.full(n, back_facing)
+    )
 
 
 def directions(n, seed=0, upper=True):
@@ -159,8 +152,8 @@ def test_only_diffuse_is_matte():
     class Glossy(Diffuse):
         pass
 
-    assert [kind for kind, arguments in CASES if kind(**arguments).matte] == [Diffuse, Diffuse]
-    assert not Glossy(0).matte
+    assert [kind for kind, arguments in CASES if kind(**arguments).view_independent] == [Diffuse, Diffuse]
+    assert not Glossy(0).view_independent
     assert not Glossy(0).black
     assert [Diffuse(reflectance).black for reflectance in (0, (0, 0, 0.1))] == [True, False]
 
@@ -170,8 +163,8 @@ def test_textures_of_one_value_equal_the_value(kind, arguments):
     plain = kind(**arguments)
     textured = kind(**{name: varying(plain, name, value) for name, value in arguments.items()})
     wo, wi, u = directions(500), directions(500, 2, upper=False), uniforms(plain, 500)
-    for inside in (False, True):
-        a, b = plain.bind(surface(wo, inside)), textured.bind(surface(wo, inside))
+    for back_facing in (False, True):
+        a, b = plain.bind(surface(wo, back_facing)), textured.bind(surface(wo, back_facing))
         if plain.specular and "roughness" in arguments:
             continue  # a texture of roughness 0 is raised to a very sharp lobe
         assert a.f(wo, wi) == pytest.approx(b.f(wo, wi), rel=1e-5)
@@ -201,8 +194,8 @@ def test_corners_of_the_random_numbers(kind, arguments):
     )
     for z in (1, 0.5, 1e-3, 1e-6):
         wo = np.repeat(np.array([[np.sqrt(1 - z * z)], [0], [z]], F4), corners.shape[1], 1)
-        for inside in (False, True):
-            bound = bsdf.bind(surface(wo, inside))
+        for back_facing in (False, True):
+            bound = bsdf.bind(surface(wo, back_facing))
             sample = bound.sample_f(wo, corners)
             values = np.concatenate([sample.wi, sample.weight, sample.pdf[None], bound.f(wo, sample.wi)])
             assert np.isfinite(values).all()
@@ -213,15 +206,15 @@ def test_dielectric_knows_its_side():
     glass = Dielectric(1.5)
     wo = directions(4)
     at = surface(wo)
-    at.inside = np.array([False, True, False, True])
+    at.back_facing = np.array([False, True, False, True])
     assert glass.bind(at).eta == pytest.approx([1.5, 1 / 1.5, 1.5, 1 / 1.5])
     assert glass.eta == pytest.approx([1.5])
 
 
 def test_index_1_goes_straight_through():
     wo = directions(1000)
-    for inside in (False, True):
-        clear = Dielectric(1.0).bind(surface(wo, inside))
+    for back_facing in (False, True):
+        clear = Dielectric(1.0).bind(surface(wo, back_facing))
         sample = clear.sample_f(wo, uniforms(clear, 1000))
         assert sample.wi == pytest.approx(-wo, abs=1e-7)
         assert (sample.weight == 1).all()

@@ -61,7 +61,7 @@ def test_directions_are_unit(fov: float, width: int, height: int) -> None:
     assert length(camera.rays(x, y, ORIGIN)[1]) == pytest.approx(1, abs=1e-6)
 
 
-def test_origins_are_relative_to_the_centre() -> None:
+def test_origins_are_relative_to_the_center() -> None:
     """Subtracted in float64, so nothing is lost far away."""
     camera = wf.Camera.look_at((1e8 + 0.5, 0, 0), (1e8, 0, 0))
     origin, _ = camera.rays(np.zeros(2, f4), np.zeros(2, f4), np.array([1e8, 0, 0]))
@@ -69,11 +69,11 @@ def test_origins_are_relative_to_the_centre() -> None:
 
 
 def test_every_pixel_sees_its_own_place() -> None:
-    """A render agrees with the rays: coloured quarters come out where they are."""
-    colours = {(-1, 0): (1, 0, 0), (0, 0): (0, 1, 0), (-1, -1): (0, 0, 1), (0, -1): (1, 1, 0)}
+    """A render agrees with the rays: colored quarters come out where they are."""
+    colors = {(-1, 0): (1, 0, 0), (0, 0): (0, 1, 0), (-1, -1): (0, 0, 1), (0, -1): (1, 1, 0)}
     quarters = [
         wf.Rectangle((x, y, 0), (1, 0, 0), (0, 1, 0), material=wf.Diffuse(0), emission=c)
-        for (x, y), c in colours.items()
+        for (x, y), c in colors.items()
     ]
     camera = wf.Camera.look_at((0, 0, 1), (0, 0, 0), fov=60, size=(4, 4))
     rgb = render(wf.Scene(quarters, camera=camera), 1, max_bounces=0).rgb

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 import wavefront as wf
 from wavefront.camera import Orthographic, Panorama, Perspective
+from wavefront.compile.scene import compile_scene
 from wavefront.sampling.sampler import make_sampler
-from wavefront.scene import compile_scene
 from wavefront.stages.generate import generate
 from wavefront.vec import f4, length
 

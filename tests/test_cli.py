@@ -12,7 +12,7 @@ import pytest
 import wavefront as wf
 from wavefront import cli
 from wavefront.cli import main
-from wavefront.io.images import read_image
+from wavefront.codecs.images import read_image
 
 SQUARE = """
 mtllib square.mtl
@@ -393,7 +393,7 @@ def test_a_picture_that_its_format_cannot_hold_is_saved_in_another(obj, tmp_path
     def refuse(*args, **kwargs):
         raise OSError("encoder error -2")
 
-    monkeypatch.setattr("wavefront.io.coded.encode", refuse)
+    monkeypatch.setattr("wavefront.codecs.png_jpeg.encode", refuse)
     options = ["-o", str(tmp_path / "p.jpg"), "--spp", "1", "--size", "8x6", "--quiet", "--origin", "0,1,4"]
     assert main(["render", obj, *options]) == 2
     error, note = saved_instead(capsys)
@@ -406,7 +406,7 @@ def test_a_picture_that_can_be_saved_nowhere_is_said_to_be_lost(obj, fast, capsy
         raise wf.SaveError("no space left")
 
     broken_after_the_render(
-        monkeypatch, lambda: monkeypatch.setattr("wavefront.io.images.write_bytes", refuse)
+        monkeypatch, lambda: monkeypatch.setattr("wavefront.codecs.images.write_bytes", refuse)
     )
     assert main(["render", obj, *fast[1]]) == 2
     assert saved_instead(capsys) == ("wavefront: error: no space left", "wavefront: the picture is lost")
@@ -419,7 +419,7 @@ def test_sigterm_ends_the_program_and_leaves_nothing(obj, fast):
     code = (
         "import os, signal, sys\n"
         "from wavefront import cli\n"
-        "from wavefront.io import files\n"
+        "from wavefront import files\n"
         "files.OPEN_FILES = '/no/such/folder'\n"
         "def end(handle):\n"
         f"    assert any(name.endswith('.tmp') for name in os.listdir({str(output.parent)!r}))\n"

@@ -12,24 +12,24 @@ from significance import render
 
 import wavefront as wf
 from wavefront import integrators
-from wavefront.accel.stream import NumpyAccelerator
+from wavefront.accel.numpy_accel import NumpyAccelerator
+from wavefront.compile.scene import CompiledScene, compile_scene
 from wavefront.frame import Frame
 from wavefront.sampling.sampler import make_sampler
-from wavefront.scene import CompiledScene, compile_scene
 from wavefront.stages import compact as stage
 from wavefront.stages.shade import shading
-from wavefront.state import Hits, Paths, Surface
-from wavefront.vec import alike, f4, normalize
+from wavefront.state import Hits, Paths, SurfaceInteraction
+from wavefront.vec import broadcast, f4, normalize
 
 SHAPES = {
     Paths: {"origin": 3, "direction": 3, "throughput": 3, "vertex": 3},
     Hits: {},
-    Surface: {"point": 3, "ng": 3, "ns": 3, "wo": 3, "uv": 2},
+    SurfaceInteraction: {"point": 3, "ng": 3, "ns": 3, "wo": 3, "uv": 2},
 }
 KINDS = {
-    **dict.fromkeys(("slot", "leaving", "prim", "material"), np.intp),
+    **dict.fromkeys(("slot", "exclude_prim", "prim", "material"), np.intp),
     **dict.fromkeys(("pixel", "sample"), np.uint32),
-    **dict.fromkeys(("specular", "inside"), np.bool_),
+    **dict.fromkeys(("specular", "back_facing"), np.bool_),
 }
 
 
@@ -53,7 +53,7 @@ def same(a, b) -> bool:
     )
 
 
-kinds = st.sampled_from([Paths, Hits, Surface])
+kinds = st.sampled_from([Paths, Hits, SurfaceInteraction])
 
 
 @given(kinds, st.integers(1, 12), st.data())
@@ -80,11 +80,11 @@ def test_concatenate_undoes_cutting(kind: type, n: int, data) -> None:
 def test_what_is_alike_in_all_records_stays_so() -> None:
     """One value for all lanes, which costs nothing to gather; two values are written out."""
     first, second = record(Paths, 3), record(Paths, 2)
-    first.eta2, second.eta2 = alike(f4(1), 3), alike(f4(1), 2)
-    first.pdf, second.pdf = alike(f4(1), 3), alike(f4(2), 2)
+    first.eta_scale, second.eta_scale = broadcast(f4(1), 3), broadcast(f4(1), 2)
+    first.pdf, second.pdf = broadcast(f4(1), 3), broadcast(f4(2), 2)
     joined = Paths.concatenate([first, second])
-    assert joined.eta2.strides == (0,)
-    assert (joined.eta2.tolist(), joined.pdf.tolist()) == ([1] * 5, [1, 1, 1, 2, 2])
+    assert joined.eta_scale.strides == (0,)
+    assert (joined.eta_scale.tolist(), joined.pdf.tolist()) == ([1] * 5, [1, 1, 1, 2, 2])
 
 
 MIRROR, GREY, GLASS, GOLD = (
@@ -119,7 +119,7 @@ def test_compact_keeps_paths_and_hits_together(materials: tuple[wf.Bsdf, ...], n
     kept_paths, kept_hits = stage.compact(scene, paths, hits, hits.found)
     assert sorted(kept_paths.slot) == hits.found.tolist()
     expected = paths.take(kept_paths.slot)
-    spent = {name: getattr(expected, name) for name in ("leaving", "pdf", "vertex")}
+    spent = {name: getattr(expected, name) for name in ("exclude_prim", "pdf", "vertex")}
     assert same(replace(kept_paths, **spent), expected)
     assert same(kept_hits, hits.take(kept_paths.slot))
     group = scene.materials.group_of.take(scene.material_of.take(kept_hits.prim))
@@ -141,14 +141,14 @@ def test_compact_of_all_lanes_copies_nothing() -> None:
 def test_all_paths_are_kept_without_a_copy() -> None:
     """Others are gathered."""
     paths = record(Paths, 5)
-    assert stage.keep(paths, np.arange(5)) is paths
-    assert same(stage.keep(paths, np.array([1, 4])), paths.take(np.array([1, 4])))
+    assert stage.select(paths, np.arange(5)) is paths
+    assert same(stage.select(paths, np.array([1, 4])), paths.take(np.array([1, 4])))
 
 
 def test_light_is_sampled_only_where_it_can_be_scattered() -> None:
     """No light sample is drawn for lanes that have only delta lobes; all others keep their columns."""
     scene = balls(MIRROR, GREY, GLASS, GOLD, GREY)
-    surface = record(Surface, 8)
+    surface = record(SurfaceInteraction, 8)
     surface.material = np.array([1, 1, 3, 3, 3, 0, 2, 2])  # in the order of their groups
     shade = shading(scene, surface)
     assert [(lanes.start, lanes.stop) for lanes, _ in shade.groups] == [(0, 2), (2, 5), (5, 6), (6, 8)]
@@ -162,7 +162,7 @@ def test_light_is_sampled_only_where_it_can_be_scattered() -> None:
 
 def test_directions_are_local_unless_no_material_reads_them() -> None:
     """Matte materials alone are seen from straight above."""
-    surface = record(Surface, 4)
+    surface = record(SurfaceInteraction, 4)
     surface.ns = normalize(surface.ns)
     local = Frame.from_normal(surface.ns).to_local(surface.wo)
     surface.material = np.array([0, 0, 1, 1])
@@ -175,21 +175,21 @@ def test_directions_are_local_unless_no_material_reads_them() -> None:
 def test_what_is_alike_stays_so() -> None:
     """One number for all columns is gathered without being written down, however many are asked for."""
     paths = record(Paths, 3)
-    paths.eta2, paths.throughput = alike(f4(2), 3), np.broadcast_to(paths.throughput[:, :1], (3, 3))
+    paths.eta_scale, paths.throughput = broadcast(f4(2), 3), np.broadcast_to(paths.throughput[:, :1], (3, 3))
     for index in ([1], [0, 1, 2], [2, 2, 1, 0], slice(1, 3)):
         part = paths.take(index if isinstance(index, slice) else np.array(index))
-        assert part.eta2.tolist() == [2] * len(part)
+        assert part.eta_scale.tolist() == [2] * len(part)
         assert (part.throughput == paths.throughput[:, :1]).all()
-        assert part.eta2.strides == (0,)
+        assert part.eta_scale.strides == (0,)
         assert part.slot.tolist() == paths.slot[index].tolist()
 
 
 def test_absent_fields_stay_absent() -> None:
     """None is neither taken nor joined."""
-    surface = record(Surface, 4, absent=("uv",))
+    surface = record(SurfaceInteraction, 4, absent=("uv",))
     assert len(surface) == 4
     assert surface.take(np.array([2, 2])).uv is None
-    assert Surface.concatenate([surface, surface]).uv is None
+    assert SurfaceInteraction.concatenate([surface, surface]).uv is None
 
 
 def test_found_are_the_lanes_that_hit() -> None:
@@ -199,11 +199,11 @@ def test_found_are_the_lanes_that_hit() -> None:
     assert hits.found.tolist() == [0, 2]
 
 
-def carrying(throughput: float, eta2: float, n: int) -> Paths:
+def alive(throughput: float, eta_scale: float, n: int) -> Paths:
     """Paths of n different addresses, all alike."""
     paths = record(Paths, n)
     paths.pixel, paths.sample = np.arange(n, dtype=np.uint32), np.zeros(n, np.uint32)
-    paths.throughput, paths.eta2 = np.full((3, n), throughput, f4), np.full(n, eta2, f4)
+    paths.throughput, paths.eta_scale = np.full((3, n), throughput, f4), np.full(n, eta_scale, f4)
     return paths
 
 
@@ -216,7 +216,7 @@ def survivors(paths: Paths, bounce: int = stage.ROULETTE_AFTER, branches: int = 
 def test_roulette_keeps_the_mean(throughput: float) -> None:
     """A weak path survives with twice its throughput as its chance, and then carries more by as much."""
     n = 1 << 16
-    left, chance = survivors(carrying(throughput, 1, n)), throughput / float(stage.SURE)
+    left, chance = survivors(alive(throughput, 1, n)), throughput / float(stage.SURE)
     assert len(left) / n == pytest.approx(chance, abs=4 * np.sqrt(chance * (1 - chance) / n))
     assert left.throughput == pytest.approx(throughput / chance, rel=1e-6)
 
@@ -224,7 +224,7 @@ def test_roulette_keeps_the_mean(throughput: float) -> None:
 @pytest.mark.parametrize("throughput", [0.5, 1.0, 3.0])
 def test_roulette_spares_the_strong(throughput: float) -> None:
     """A path that carries half or more goes on as it is; the bounces are bounded all the same."""
-    left = survivors(carrying(throughput, 1, 1 << 12))
+    left = survivors(alive(throughput, 1, 1 << 12))
     assert len(left) == 1 << 12
     assert left.throughput == pytest.approx(throughput, rel=1e-6)
 
@@ -233,15 +233,15 @@ def test_roulette_spares_the_strong(throughput: float) -> None:
 def test_roulette_spares_branches(branches: int) -> None:
     """One of several branches carries less, and that is no reason to end it."""
     n = 1 << 14
-    assert len(survivors(carrying(0.5 / branches, 1, n), branches=branches)) == n
-    left = survivors(carrying(0.25 / branches, 1, n), branches=branches)
+    assert len(survivors(alive(0.5 / branches, 1, n), branches=branches)) == n
+    left = survivors(alive(0.25 / branches, 1, n), branches=branches)
     assert len(left) / n == pytest.approx(0.5, abs=0.02)
     assert left.throughput == pytest.approx(0.5 / branches, rel=1e-6)
 
 
 def test_roulette_waits() -> None:
     """In the first bounces only paths that carry nothing end."""
-    paths = carrying(0.01, 1, 100)
+    paths = alive(0.01, 1, 100)
     paths.throughput[:, ::2] = 0
     left = survivors(paths, stage.ROULETTE_AFTER - 1)
     assert left.pixel.tolist() == list(range(1, 100, 2))
@@ -251,7 +251,7 @@ def test_roulette_waits() -> None:
 
 def test_roulette_looks_through_refraction() -> None:
     """Radiance that glass has compressed by η² is no reason to end a path."""
-    left = survivors(carrying(0.25 / 2.25, 2.25, 1 << 14))  # of 0.25: a chance of a half
+    left = survivors(alive(0.25 / 2.25, 2.25, 1 << 14))  # of 0.25: a chance of a half
     assert len(left) / (1 << 14) == pytest.approx(0.5, abs=0.02)
 
 
@@ -260,7 +260,7 @@ def test_paths_remember_by_how_much_glass_compresses(monkeypatch: pytest.MonkeyP
     seen = []
 
     def note(paths: Paths, sampler, bounce: int, branches: int):
-        seen.append(np.unique(paths.eta2.round(4)).tolist())
+        seen.append(np.unique(paths.eta_scale.round(4)).tolist())
         return np.arange(len(paths))
 
     monkeypatch.setattr(integrators, "roulette", note)

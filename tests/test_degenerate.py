@@ -15,9 +15,9 @@ BUMPS = wf.BumpMap(wf.Texture(TEXELS, srgb=False, channel=0), 0.3)
 VARNISH = wf.Principled(0.5, 0.3, 0.2, clearcoat=1.0, sheen=0.5)
 MATERIALS = {
     "texture": wf.Diffuse(wf.Texture(TEXELS)),
-    "normal map": VARNISH.with_relief(NORMALS),
-    "bump map": VARNISH.with_relief(BUMPS),
-    "normal-mapped glass": wf.Dielectric(1.5).with_relief(NORMALS),
+    "normal map": VARNISH.with_normal_map(NORMALS),
+    "bump map": VARNISH.with_normal_map(BUMPS),
+    "normal-mapped glass": wf.Dielectric(1.5).with_normal_map(NORMALS),
 }
 PLACES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.3]])
 FACES = [[0, 1, 2], [0, 2, 3]]
@@ -48,15 +48,15 @@ def test_texture_coordinates_that_span_hardly_any_area(material, normals, axes):
         check(quad(material, uvs=narrow, normals=normals))
 
 
-@pytest.mark.parametrize("relief", [NORMALS, BUMPS], ids=["normals", "heights"])
-def test_a_relief_without_tangents_tilts_nothing(relief):
+@pytest.mark.parametrize("normal_map", [NORMALS, BUMPS], ids=["normals", "heights"])
+def test_a_relief_without_tangents_tilts_nothing(normal_map):
     """Bit by bit: where coordinates span too little to say what is along them, there is no tilt."""
-    matte = wf.Diffuse(0.5)
+    view_independent = wf.Diffuse(0.5)
     camera = wf.Camera.look_at((0.6, 0.7, 2), (0.5, 0.5, 0), size=(12, 12))
     for tiny in (1e-42, 1e-200, 0.0):
         plain, carved = (
             render(wf.Scene(quad(m, uvs=PLACES[:, :2] * [tiny, 1]), [wf.Environment(1.0)], camera), 4).rgb
-            for m in (matte, matte.with_relief(relief))
+            for m in (view_independent, view_independent.with_normal_map(normal_map))
         )
         assert np.array_equal(plain, carved)
 

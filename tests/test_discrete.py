@@ -169,7 +169,7 @@ def test_points_lie_in_cells_with_weight(weights, u):
 
 @given(weights=grids)
 def test_the_density_integrates_to_one(weights):
-    """The mean over the centres of the cells is the integral."""
+    """The mean over the centers of the cells is the integral."""
     plane = Distribution2D(weights)
     height, width = weights.shape
     x, y = (part.ravel() for part in np.meshgrid(even(width), even(height)))
@@ -228,7 +228,7 @@ def test_bad_grids_are_refused(weights, message):
 
 
 @pytest.mark.parametrize("width", [3, 49, 1000, 2047, 8191])
-def test_points_never_round_into_a_neighbour(width):
+def test_points_never_round_into_a_neighbor(width):
     """Between columns of no weight, at the very edges of each column, the density stays positive."""
     weights = np.tile(np.arange(width) % 2 == 0, (1, 1))
     share = 1 / np.count_nonzero(weights)

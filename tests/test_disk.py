@@ -18,7 +18,7 @@ def areas(mesh: wf.Mesh) -> np.ndarray:
 
 
 @given(strategies.rotations(), st.floats(1e-3, 1e3), st.integers(3, 200))
-def test_area_normal_and_centre(turn: np.ndarray, radius: float, segments: int) -> None:
+def test_area_normal_and_center(turn: np.ndarray, radius: float, segments: int) -> None:
     """All faces look along the normal, and their area is the disk's."""
     center = turn[0] * 10
     mesh = wf.Disk(center, 7 * turn[1], radius, segments=segments)

@@ -1,4 +1,4 @@
-"""Light from meshes that shine by a texture, by vertex colours, or from both sides."""
+"""Light from meshes that shine by a texture, by vertex colors, or from both sides."""
 
 import imageio.v3 as iio
 import numpy as np
@@ -10,9 +10,9 @@ from scenes import ALBEDO, ALL, BLACK, EYE, HERE, floor, polygon_irradiance, pro
 from significance import SIDE, assert_mean, assert_same_images, measure, render, repeat
 
 import wavefront as wf
-from wavefront import testing, uneven
+from wavefront import testing
 from wavefront.accel import make_accelerator
-from wavefront.bsdfs import Spatial
+from wavefront.compile.scene import compile_scene
 from wavefront.lights import (
     LightTable,
     RectangleLights,
@@ -20,7 +20,8 @@ from wavefront.lights import (
     TwoSidedRectangleLights,
     TwoSidedTriangleLights,
 )
-from wavefront.scene import compile_scene
+from wavefront.lights import textured_emission as textured_emission
+from wavefront.textures.base import BaseTexture
 from wavefront.vec import f4
 
 RNG = np.random.default_rng(0)
@@ -68,15 +69,15 @@ PARTS = {  # (row, column) -> corners
 
 @pytest.mark.parametrize("integrator", ALL)
 def test_quarters_of_a_lamp(integrator: str) -> None:
-    """The sum of what four lamps of one colour each would give, by all ways to find light."""
+    """The sum of what four lamps of one color each would give, by all ways to find light."""
     expected = sum(np.mean(QUARTERS[cell]) * irradiance(*corners) for cell, corners in PARTS.items())
     spp = 8192 if integrator == "naive" else 2048
     mean = measure(lit(lamp(texture(QUARTERS))), spp, integrator=integrator, max_bounces=1)
     assert_mean(mean, expected * ALBEDO / np.pi, 0.02)
 
 
-def test_colours_stay_where_they_are() -> None:
-    """Each channel by itself, against lamps of one colour."""
+def test_colors_stay_where_they_are() -> None:
+    """Each channel by itself, against lamps of one color."""
     whole = repeat(lit(lamp(texture(QUARTERS))), 64, max_bounces=1)
     parts = [
         wf.Rectangle(
@@ -100,7 +101,7 @@ def test_a_lamp_is_seen_as_its_texture(integrator: str) -> None:
 
 
 @pytest.mark.parametrize("integrator", ["naive", "full"])
-def test_vertex_colours_shine(integrator: str) -> None:
+def test_vertex_colors_shine(integrator: str) -> None:
     """A linear ramp of radiance on a lamp far away gives the mean's irradiance."""
     corners = [(-1, 100, -1), (1, 100, -1), (1, 100, 1), (-1, 100, 1)]
     mesh = wf.Mesh(
@@ -122,7 +123,7 @@ def test_vertex_colours_shine(integrator: str) -> None:
 
 def test_what_the_estimate_misses_is_found_by_chance(monkeypatch) -> None:
     """A stripe between the points that are looked up: no light samples, and no light lost."""
-    monkeypatch.setattr(uneven, "MOST", 4)  # the points are at 8/3 and 16/3 of every 8 texels
+    monkeypatch.setattr(textured_emission, "MOST", 4)  # the points are at 8/3 and 16/3 of every 8 texels
     stripe = np.zeros((1, 32), f4)
     stripe[0, 3:5] = 10
     low, high = (LOW[0] + 3 / 32 * 1.1, LOW[1]), (LOW[0] + 5 / 32 * 1.1, HIGH[1])
@@ -143,7 +144,7 @@ def test_the_mean_of_a_face(seed: int, width: int, height: int) -> None:
     """Over a rectangle it is the image's mean, as near as 1024 points come."""
     image = np.random.default_rng(seed).random((height, width, 3), f4)
     mesh = lamp(texture(image, wrap="clamp"))
-    mean = uneven.mean_radiance(mesh, mesh.vertices[mesh.faces])
+    mean = textured_emission.mean_radiance(mesh, mesh.vertices[mesh.faces])
     assert mean.mean(1) == pytest.approx(image.mean((0, 1)), abs=0.05)
 
 
@@ -160,7 +161,9 @@ def test_the_mean_of_many_faces() -> None:
         material=wf.Diffuse(0.5).with_alpha(0.25),
         emission=texture(values[None]),
     )
-    assert uneven.mean_radiance(mesh, corners) == pytest.approx(np.tile(values / 4, (3, 1)), rel=1e-5)
+    assert textured_emission.mean_radiance(mesh, corners) == pytest.approx(
+        np.tile(values / 4, (3, 1)), rel=1e-5
+    )
 
 
 def test_light_samples_follow_the_texture() -> None:
@@ -209,9 +212,14 @@ def test_both_sides_are_seen() -> None:
 @pytest.mark.parametrize("integrator", ["naive", "full"])
 def test_a_lamp_lights_on_both_sides(integrator: str, shape: str) -> None:
     """A floor that it faces, and one that it looks away from, with the same closed form."""
-    uneven = texture(np.ones((2, 2))) if shape == "texture" else 1.0
+    textured_emission = texture(np.ones((2, 2))) if shape == "texture" else 1.0
     up = wf.Rectangle(
-        (LOW[0], Y, LOW[1]), (0, 0, 1.1), (1.1, 0, 0), material=BLACK, emission=uneven, two_sided=True
+        (LOW[0], Y, LOW[1]),
+        (0, 0, 1.1),
+        (1.1, 0, 0),
+        material=BLACK,
+        emission=textured_emission,
+        two_sided=True,
     )
     if shape == "triangles":
         up = wf.Mesh(up.vertices, up.faces[::-1], material=BLACK, emission=1.0, two_sided=True)
@@ -314,9 +322,9 @@ def test_waves_and_workers_change_no_bit(cut: dict) -> None:
 def test_what_shines_evenly_pays_nothing() -> None:
     """No table, and rectangles stay rectangles."""
     scene = compiled(floor(), lamp(2.0))
-    assert scene.uneven is None
+    assert scene.textured_emission is None
     assert [type(kind) for kind in scene.lights.kinds] == [RectangleLights]
-    assert scene.lights.choice.__class__.__name__ == "Sole"
+    assert scene.lights.choice.__class__.__name__ == "SingleLightSampler"
 
 
 def test_dark_lights_take_no_part() -> None:
@@ -342,7 +350,7 @@ GREY = ((188 / 255 + 0.055) / 1.055) ** 2.4
 
 
 def seen(mesh: wf.Mesh, u: float, v: float, eye: float = 1) -> np.ndarray:
-    """The colour of a mesh in the unit square at z = 0, from before or behind."""
+    """The color of a mesh in the unit square at z = 0, from before or behind."""
     camera = wf.Camera.look_at((u, v, eye), (u, v, 0), fov=0.01, size=(SIDE, SIDE))
     return render(wf.Scene([mesh], camera=camera), 1, max_bounces=0).rgb.mean((0, 1))
 
@@ -478,7 +486,7 @@ def test_complaints() -> None:
         render(wf.Scene([bare]), 1)
 
 
-class Negative(Spatial):
+class Negative(BaseTexture):
     """What a user's own class may return."""
 
     def at(self, surface):

@@ -9,8 +9,9 @@ from significance import SIDE, assert_mean, assert_same_images, measure, render,
 
 import wavefront as wf
 from wavefront import testing
-from wavefront.io.images import srgb_to_linear, write_image
-from wavefront.lights import ConstantEnvironment, Sky
+from wavefront.codecs.encoding import srgb_to_linear
+from wavefront.codecs.images import write_image
+from wavefront.lights import ConstantEnvironment, EnvironmentSum
 from wavefront.vec import f4
 
 ORIGIN = np.zeros(3)
@@ -40,7 +41,7 @@ def lit_floor(*lights) -> wf.Scene:
 
 
 def cosine_map(height: int = 128) -> np.ndarray:
-    """Radiance max(cosθ, 0) about +y, at the centres of the pixels."""
+    """Radiance max(cosθ, 0) about +y, at the centers of the pixels."""
     cos = np.cos(np.pi * (np.arange(height) + 0.5) / height)
     return np.broadcast_to(np.maximum(cos, 0)[:, None, None], (height, 2 * height, 3))
 
@@ -77,7 +78,7 @@ def test_layout() -> None:
 
 @pytest.mark.parametrize("filter", ["nearest", "bilinear"])
 def test_every_pixel_is_seen_in_its_direction(filter: str) -> None:
-    """At the centres of the pixels both filters give the pixel."""
+    """At the centers of the pixels both filters give the pixel."""
     picture = noise()
     longitude = (0.5 - (np.arange(16) + 0.5) / 16) * 2 * np.pi
     theta = (np.arange(8) + 0.5)[:, None] / 8 * np.pi
@@ -207,7 +208,7 @@ SUNS = [
 def test_pdf_integrates_to_one(suns: list) -> None:
     """Summed over a fine grid of the sphere, for a map with a small sun, and a sky with two more."""
     environment = wf.Environment(sun_map(), transform=turn(0.3, 0.2))
-    record = Sky.of([light.record(ORIGIN) for light in (environment, *suns)])
+    record = EnvironmentSum.of([light.record(ORIGIN) for light in (environment, *suns)])
     n = 2000
     cos = (np.arange(n) + 0.5) / n * 2 - 1
     phi = (np.arange(2 * n) + 0.5) / n * np.pi
@@ -253,7 +254,9 @@ def test_environment_and_suns_make_one_sky() -> None:
 def test_a_sky_keeps_the_contract() -> None:
     """Also where a sun and the environment overlap."""
     lights = [wf.Environment(noise(2, 4)), SUNS[0]]
-    testing.check_light(Sky.of([light.record(ORIGIN) for light in lights]), points=[HERE], samples=200_000)
+    testing.check_light(
+        EnvironmentSum.of([light.record(ORIGIN) for light in lights]), points=[HERE], samples=200_000
+    )
 
 
 def test_a_dark_part_of_a_sky() -> None:
@@ -284,13 +287,13 @@ def test_integers_are_srgb(kind) -> None:
     assert wf.Environment(codes).radiance == pytest.approx(expected, rel=1e-6)
 
 
-def test_grey_and_alpha() -> None:
-    """One channel is grey; alpha is not used, with a warning where it would matter."""
-    grey = np.arange(8.0).reshape(2, 4)
-    rgb = np.repeat(grey[:, :, None], 3, 2)
+def test_gray_and_alpha() -> None:
+    """One channel is gray; alpha is not used, with a warning where it would matter."""
+    gray = np.arange(8.0).reshape(2, 4)
+    rgb = np.repeat(gray[:, :, None], 3, 2)
     expected = wf.Environment(rgb).radiance.tolist()
-    assert wf.Environment(grey).radiance.tolist() == expected
-    assert wf.Environment(grey[:, :, None]).radiance.tolist() == expected
+    assert wf.Environment(gray).radiance.tolist() == expected
+    assert wf.Environment(gray[:, :, None]).radiance.tolist() == expected
     assert wf.Environment(np.dstack([rgb, np.ones((2, 4))])).radiance.tolist() == expected
     with pytest.warns(UserWarning, match="Environment image: 8 pixels are transparent; alpha is not used"):
         assert wf.Environment(np.dstack([rgb, np.full((2, 4), 0.5)])).radiance.tolist() == expected
@@ -407,7 +410,7 @@ def radiance_of(radiance) -> float:
 
 def test_a_sun_before_an_even_sky_gets_all_light_samples() -> None:
     """Of a sky's two parts only what stands out is drawn; its density elsewhere is 0."""
-    sky = Sky.of([light.record(ORIGIN) for light in (wf.Environment(0.5), SUNS[0])]).compensated()
+    sky = EnvironmentSum.of([light.record(ORIGIN) for light in (wf.Environment(0.5), SUNS[0])]).compensated()
     w = directions(20_000)
     within = SUNS[0].record(ORIGIN).le(w)[0] > 0
     assert 0 < within.sum() < len(within)

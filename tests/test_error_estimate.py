@@ -49,7 +49,7 @@ def test_batches_are_few_and_not_too_few() -> None:
 
 @given(st.integers(1, 70), st.data())
 def test_cutting_changes_no_bit(count: int, data) -> None:
-    """However samples and pixels are grouped, neighbours or not."""
+    """However samples and pixels are grouped, neighbors or not."""
     samples = np.random.default_rng(count).lognormal(0, 3, (3, count, 6)).astype(f4)
     whole, pieces = filled(samples), Film(6, 1)
     groups = data.draw(st.sampled_from([((0, 2, 5), (1, 3, 4)), ((0, 1, 2), (3, 4, 5)), (range(6),)]))

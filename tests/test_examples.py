@@ -83,12 +83,12 @@ def test_furnace_prints_numbers_within_their_errors(tmp_path):
         assert abs(difference) < 6 * float(error) + 1e-5, name
         assert float(error) < 0.01 * float(exact)
         assert float(off) == pytest.approx(100 * difference / float(exact), abs=2e-3)
-    grey = 0.5 ** (1 / 2.2)
-    assert abs(picture.mean() - grey) < 0.01
-    assert np.abs(picture - grey).max() < 0.2
+    gray = 0.5 ** (1 / 2.2)
+    assert abs(picture.mean() - gray) < 0.01
+    assert np.abs(picture - gray).max() < 0.2
 
 
-def test_cornell_box_has_its_colours_where_they_belong():
+def test_cornell_box_has_its_colors_where_they_belong():
     rgb = wf.render(load("cornell_box").cornell_box(32), 16, progress=False).rgb
     left, right, floor = rgb[8:24, 2:5].mean((0, 1)), rgb[8:24, -5:-2].mean((0, 1)), rgb[-3, 8:24].mean(0)
     assert left[0] > 4 * left[1]
@@ -100,8 +100,8 @@ def test_cornell_box_has_its_colours_where_they_belong():
 def test_course_spheres_show_matte_mirror_and_glass():
     rgb = wf.render(load("course_spheres").course_spheres(48), 32, progress=False).rgb
     height, width, _ = rgb.shape
-    matte = rgb[27:31, 7:11].mean((0, 1))
-    assert matte[0] > 1.5 * matte[2]  # orange
+    view_independent = rgb[27:31, 7:11].mean((0, 1))
+    assert view_independent[0] > 1.5 * view_independent[2]  # orange
     assert (rgb.reshape(-1, 3).min(0) >= 0).all()
     assert (rgb[: height // 8].mean(), rgb[-height // 8 :].mean()) > (0.05, 0.05)  # ceiling and floor
     assert rgb[height // 3, 1, 0] > rgb[height // 3, 1, 2]  # red wall on the left
@@ -138,11 +138,11 @@ def test_material_sheet_has_every_material_of_the_package():
     assert [len(row) for row in rows] == [9] * 6
     shown = {type(material) for row in rows for material in row}
     assert shown == set(ALL) - {wf.Mirror}  # a smooth `Conductor` shows what a mirror does
-    assert any(material.relief is not None for material in rows[-1])
+    assert any(material.normal_map is not None for material in rows[-1])
     assert any(material.opacity is not None for material in rows[-1])
 
 
-def test_gltf_scene_is_honoured_whole(tmp_path):
+def test_gltf_scene_is_honored_whole(tmp_path):
     scene = load("gltf_scene").scene(tmp_path / "a.glb", 48)
     instances = [shape for shape in scene.shapes if isinstance(shape, wf.Instance)]
     assert len(instances) == 7

@@ -14,19 +14,19 @@ REACH = {"box": 0.5, "tent": TENT_RADIUS, "gaussian": GAUSSIAN_RADIUS}
 
 
 def beyond(name: str, x: float) -> float:
-    """Exact part of the samples of a pixel that lie further than x pixels to one side of its centre."""
+    """Exact part of the samples of a pixel that lie further than x pixels to one side of its center."""
     x = min(max(x, -REACH[name]), REACH[name])
     if name == "box":
         return 0.5 - x
     if name == "tent":
         return (1 - abs(x)) ** 2 / 2 if x > 0 else 1 - (1 - abs(x)) ** 2 / 2
-    inside = math.erf(GAUSSIAN_RADIUS / (GAUSSIAN_SIGMA * math.sqrt(2)))
-    return 0.5 - 0.5 * math.erf(x / (GAUSSIAN_SIGMA * math.sqrt(2))) / inside
+    back_facing = math.erf(GAUSSIAN_RADIUS / (GAUSSIAN_SIGMA * math.sqrt(2)))
+    return 0.5 - 0.5 * math.erf(x / (GAUSSIAN_SIGMA * math.sqrt(2))) / back_facing
 
 
 @pytest.mark.parametrize("name", FILTERS)
 def test_offsets_have_the_density(name: str) -> None:
-    """Stay within reach, lie around the pixel's centre, and follow the distribution, in x and y."""
+    """Stay within reach, lie around the pixel's center, and follow the distribution, in x and y."""
     u = (np.arange(4096, dtype=f4) + f4(0.5)) / f4(4096)
     for row, other in ((0, 1), (1, 0)):
         pair = np.full((2, u.size), 0.5, f4)

@@ -43,7 +43,7 @@ def test_there_and_back(z: np.ndarray, data) -> None:
 
 
 @given(strategies.unit_vectors(min_count=2), st.data())
-def test_columns_do_not_depend_on_their_neighbours(z: np.ndarray, data) -> None:
+def test_columns_do_not_depend_on_their_neighbors(z: np.ndarray, data) -> None:
     """The same bits for one column alone."""
     v = data.draw(strategies.vectors(z.shape[1]))
     k = data.draw(st.integers(0, z.shape[1] - 1))

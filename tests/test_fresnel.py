@@ -5,7 +5,7 @@ import pytest
 
 from wavefront.bsdfs import Conductor, Dielectric
 from wavefront.bsdfs.fresnel import fresnel_conductor, fresnel_dielectric
-from wavefront.state import Surface
+from wavefront.state import SurfaceInteraction
 
 F4 = np.float32
 
@@ -24,11 +24,13 @@ def toward(degrees):
     return np.array([[np.sin(theta)], [0], [np.cos(theta)]], F4)
 
 
-def surface(wo, inside):
+def surface(wo, back_facing):
     n = wo.shape[1]
     normal = np.repeat(np.array([[0], [0], [1]], F4), n, 1)
     zero, index = np.zeros(n, F4), np.zeros(n, np.intp)
-    return Surface(np.zeros((3, n), F4), zero, normal, normal, wo, index, index, np.full(n, inside))
+    return SurfaceInteraction(
+        np.zeros((3, n), F4), zero, normal, normal, wo, index, index, np.full(n, back_facing)
+    )
 
 
 @pytest.mark.parametrize(
@@ -124,8 +126,8 @@ def test_slab_of_glass_by_the_series_of_its_reflections(angle, transmitted):
     assert enter.wi[2] < 0
     assert enter.eta == pytest.approx(1.5)
     within = -enter.wi
-    inside = glass.bind(surface(within, True))
-    leave, stay = inside.sample_f(within, highest), inside.sample_f(within, lowest)
+    back_facing = glass.bind(surface(within, True))
+    leave, stay = back_facing.sample_f(within, highest), back_facing.sample_f(within, lowest)
     assert leave.wi == pytest.approx(-toward(angle), abs=1e-6)
     assert stay.wi[2] > 0
     bounce = stay.weight[0] * stay.pdf
@@ -141,6 +143,6 @@ def test_radiance_is_scaled_by_the_squared_index():
     through = np.full((3, 1), np.nextafter(F4(1), F4(0)))
     wo = toward(20)
     assert glass.sample_f(wo, through).weight == pytest.approx(1 / 2.25, rel=1e-6)
-    leaving = glass.bind(surface(wo, True)).sample_f(wo, through)
-    assert leaving.weight == pytest.approx(2.25, rel=1e-6)
-    assert leaving.eta == pytest.approx(1 / 1.5)
+    exclude_prim = glass.bind(surface(wo, True)).sample_f(wo, through)
+    assert exclude_prim.weight == pytest.approx(2.25, rel=1e-6)
+    assert exclude_prim.eta == pytest.approx(1 / 1.5)

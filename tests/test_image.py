@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wavefront as wf
-from wavefront.io.images import srgb_to_linear
+from wavefront.codecs.encoding import srgb_to_linear
 
 GAMMAS = [2.2, 1.8, 1.0, "srgb"]
 CURVES = [
@@ -62,14 +62,14 @@ def test_a_saved_jpg_differs_by_little_more(tmp_path, image, gamma, extension):
 @pytest.mark.parametrize(("gamma", "curve"), CURVES)
 @pytest.mark.parametrize("extension", ["png", "jpg"])
 def test_values_of_files_by_hand(tmp_path, gamma, curve, extension):
-    """A grey of code 100, decoded by the gamma that the file names."""
-    grey = wf.Image(np.full((16, 16, 3), curve(np.float64(100 / 255)), np.float32))
-    grey.save(tmp_path / f"a.{extension}", gamma)
+    """A gray of code 100, decoded by the gamma that the file names."""
+    gray = wf.Image(np.full((16, 16, 3), curve(np.float64(100 / 255)), np.float32))
+    gray.save(tmp_path / f"a.{extension}", gamma)
     assert (iio.imread(tmp_path / f"a.{extension}") == 100).all()
     # a png holds 1/gamma to 5 digits
     expected = float(curve(100 / 255))
     assert wf.Image.load(tmp_path / f"a.{extension}").rgb == pytest.approx(expected, rel=3e-5)
-    assert wf.compare(grey, tmp_path / f"a.{extension}").relative_mse ** 0.5 < 1e-4
+    assert wf.compare(gray, tmp_path / f"a.{extension}").relative_mse ** 0.5 < 1e-4
 
 
 def chunks(data):
@@ -161,7 +161,7 @@ def test_linear_files_are_loaded_as_they_are(tmp_path, image, extension):
     assert (wf.Image.load(tmp_path / f"a.{extension}").rgb == 8 * image.rgb).all()
 
 
-def test_grey_and_alpha_become_three_channels(tmp_path):
+def test_gray_and_alpha_become_three_channels(tmp_path):
     values = np.random.default_rng(0).random((4, 5, 4)).astype(np.float32)
     for pick, expected in ((0, [0, 0, 0]), (slice(0, 2), [0, 0, 0]), (slice(0, 4), [0, 1, 2])):
         np.save(tmp_path / "a.npy", values[..., pick])

@@ -14,17 +14,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from wavefront import files
+from wavefront.codecs import claims
+from wavefront.codecs import hdr as rgbe
+from wavefront.codecs import png_jpeg as coded
+from wavefront.codecs.encoding import linear_to_srgb, srgb_to_linear, to_8bit
+from wavefront.codecs.images import check_writable, read_image, write_channels, write_image
 from wavefront.errors import SaveError, SceneError
-from wavefront.io import claims, coded, files, rgbe
-from wavefront.io.images import (
-    check_writable,
-    linear_to_srgb,
-    read_image,
-    srgb_to_linear,
-    to_8bit,
-    write_channels,
-    write_image,
-)
 
 
 @pytest.fixture
@@ -120,7 +116,7 @@ def test_exr_keeps_attributes_and_channels(tmp_path, picture):
     assert np.array_equal(read_image(path), picture)
 
 
-def test_grey_alpha_and_16_bit(tmp_path):
+def test_gray_alpha_and_16_bit(tmp_path):
     import imageio.v3 as iio
 
     ramp = np.arange(12, dtype=np.uint16).reshape(3, 4) * 5000
@@ -363,8 +359,8 @@ def test_a_killed_process_leaves_nothing_behind(tmp_path, signal):
         pytest.skip("no files without names here")
     code = (
         "import os, signal, sys, numpy as np\n"
-        "from wavefront.io import files\n"
-        "from wavefront.io.images import write_image\n"
+        "from wavefront import files\n"
+        "from wavefront.codecs.images import write_image\n"
         f"files.os.fsync = lambda handle: os.kill(os.getpid(), signal.{signal})\n"
         "write_image(sys.argv[1], np.ones((4, 4, 3)))\n"
     )
@@ -553,7 +549,7 @@ def _claims_rows(jpg, rows):
 
 
 def test_a_jpg_with_too_few_rows_is_an_error(tmp_path):
-    """And not a picture that is grey below; nor is a large one of a few bytes."""
+    """And not a picture that is gray below; nor is a large one of a few bytes."""
     path = tmp_path / "a.jpg"
     for rows, message in ((40, "its last pixels"), (56, "its last pixels"), (65000, "bytes cannot hold")):
         path.write_bytes(_claims_rows(_jpg(32), rows))
@@ -564,7 +560,7 @@ def test_a_jpg_with_too_few_rows_is_an_error(tmp_path):
         read_image(path)
 
 
-def test_a_grey_jpg_is_read(tmp_path):
+def test_a_gray_jpg_is_read(tmp_path):
     """Its last pixel is what the decoder leaves where data are missing."""
     path = tmp_path / "a.jpg"
     for values in (128, 127, 129):
@@ -585,7 +581,7 @@ def test_all_parts_and_channels_of_an_exr_count(tmp_path, monkeypatch):
     """The library decodes them all."""
     path = tmp_path / "a.exr"
     small, flat = np.ones((4, 4), "f4"), np.zeros((300, 400), "f4")
-    monkeypatch.setattr("wavefront.io.exr.MAX_VALUES", 1_000_000)
+    monkeypatch.setattr("wavefront.codecs.exr.MAX_VALUES", 1_000_000)
     _exr([("a", {"Y": small}), ("b", {"Y": flat})], path)
     assert read_image(path).shape == (4, 4, 1)
     _exr([("a", {"Y": small}), *((f"b{k}", {"Y": flat}) for k in range(9))], path)

@@ -46,8 +46,8 @@ def glb():
     scene = trimesh.Scene()
     rough = {"metallicRoughnessTexture": image(1), "metallicFactor": 0.75, "roughnessFactor": 0.5}
     glow = {"emissiveTexture": image(2), "emissiveFactor": [0.5, 0.25, 0.0]}
-    colour = {"baseColorTexture": image(0), "baseColorFactor": [255, 200, 100, 255]}
-    urn = textured(PBRMaterial(**colour, **rough, **glow, normalTexture=image(3)))
+    color = {"baseColorTexture": image(0), "baseColorFactor": [255, 200, 100, 255]}
+    urn = textured(PBRMaterial(**color, **rough, **glow, normalTexture=image(3)))
     box = trimesh.creation.box()
     green = PBRMaterial(baseColorFactor=[10, 200, 30, 255], metallicFactor=0.0, roughnessFactor=0.25)
     box.visual = TextureVisuals(material=green)
@@ -78,7 +78,7 @@ def ply():
     return mesh
 
 
-@pytest.mark.filterwarnings("ignore:.*not honoured. Ka")  # which trimesh always writes
+@pytest.mark.filterwarnings("ignore:.*not honored. Ka")  # which trimesh always writes
 @pytest.mark.parametrize("make", [glb, obj, ply])
 def test_a_scene_in_memory_renders_as_its_file(tmp_path, make):
     held = make()

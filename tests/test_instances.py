@@ -12,14 +12,15 @@ from significance import render
 from trimesh.transformations import euler_matrix, translation_matrix
 
 import wavefront as wf
-from wavefront.accel import InstanceAccelerator, Intersections, choose, make_accelerator, most_copies
+from wavefront.accel import InstanceAccelerator, Intersections, make_accelerator, most_copies
 from wavefront.accel import instances as queries
+from wavefront.accel import registry as choose
 from wavefront.accel.embree import installed
-from wavefront.scene import CompiledScene, compile_scene
+from wavefront.compile.scene import CompiledScene, compile_scene
 from wavefront.shapes.instance import can_place, instance_bounds
+from wavefront.stages.interaction import interaction
 from wavefront.stages.intersect import intersect
-from wavefront.stages.relief import tilt
-from wavefront.stages.surface import interact
+from wavefront.stages.normal_mapping import perturb_normals
 from wavefront.state import Rays
 from wavefront.vec import dot
 
@@ -156,24 +157,24 @@ def test_surfaces_are_those_of_meshes_of_their_own(accel, smooth):
         scene = compiled(shapes, accel)
         hits = intersect(scene, query)
         lanes = hits.found
-        surface = interact(scene, query.take(lanes), hits.take(lanes))
+        surface = interaction(scene, query.take(lanes), hits.take(lanes))
         ids = scene.accelerator.closest(origin, direction, nothing(n)).prim
         assert np.array_equal(surface.prim, ids[lanes])
-        colour = np.full((9, n), np.nan)
-        colour[:, lanes] = [*surface.ng, *surface.ns, *surface.uv, surface.inside]
+        color = np.full((9, n), np.nan)
+        color[:, lanes] = [*surface.ng, *surface.ns, *surface.uv, surface.back_facing]
         groups = np.full(n, -1)
         kinds = [type(group).__name__ for group in scene.materials.groups]
         groups[lanes] = [
             sorted(set(kinds)).index(kinds[g]) for g in scene.materials.group_of.take(surface.material)
         ]
-        found.append((hits.t, colour, groups))
+        found.append((hits.t, color, groups))
     (t, values, groups), (other_t, others, other_groups) = found
     same = (apart(t, other_t) < 1e-4) & (t < np.inf)
     assert (apart(t, other_t) > 1e-4).sum() <= 2
     assert same.sum() > 500
     assert np.array_equal(groups[same], other_groups[same])
     off = np.abs(values - others)[:, same].max(0)
-    assert (off < 3e-4).mean() > 0.998  # next to an edge, the neighbour's normal
+    assert (off < 3e-4).mean() > 0.998  # next to an edge, the neighbor's normal
     assert np.unique(values[8, same]).tolist() == [0, 1]
 
 
@@ -183,7 +184,7 @@ def test_a_mirrored_instance_keeps_its_front():
     for matrix in MATRICES:
         scene = compiled([*placed(mesh, [matrix, at(50, 0, 0)])])
         middle = np.append(mesh.bounds.mean(0), 1) @ matrix.T
-        target = middle[:3] - scene.centre
+        target = middle[:3] - scene.center
         origin = np.random.default_rng(0).normal(size=(3, 200)) * 30 + target[:, None]
         direction = target[:, None] - origin
         direction /= np.linalg.norm(direction, axis=0)
@@ -191,7 +192,7 @@ def test_a_mirrored_instance_keeps_its_front():
         hits = intersect(scene, inwards)
         lanes = hits.found
         assert lanes.size > 180
-        assert not interact(scene, inwards.take(lanes), hits.take(lanes)).inside.any()
+        assert not interaction(scene, inwards.take(lanes), hits.take(lanes)).back_facing.any()
 
 
 # --- Exactness ------------------------------------------------------------------------------------
@@ -207,7 +208,7 @@ def test_no_ray_slips_through(accel, scale, shift):
     mesh = bumpy()
     matrix = at(shift, -0.7 * shift, 0.3 * shift, scale, (0.4, 1.1, 2)) @ at(0, 0, 0, (1, 0.5, 2))
     scene = compiled(placed(mesh, [matrix, at(0, 0, 0)]), accel)
-    triangles = (scene_vertices(mesh, matrix) - scene.centre)[mesh.faces]
+    triangles = (scene_vertices(mesh, matrix) - scene.center)[mesh.faces]
     rng = np.random.default_rng(1)
     face, corner = rng.integers(0, len(triangles), n), rng.integers(0, 3, n)
     along = np.select([np.arange(n) % 3 == 0, np.arange(n) % 3 == 1], [0.0, 0.5], rng.random(n))[:, None]
@@ -218,7 +219,7 @@ def test_no_ray_slips_through(accel, scale, shift):
     hits = scene.accelerator.closest(origin, direction, nothing(n))
     assert (hits.prim >= 0).all()
     assert scene.accelerator.occluded(origin, direction, np.full(n, np.inf, f4), nothing(n)).all()
-    # where they should be: float32 around the scene's centre is what limits it
+    # where they should be: float32 around the scene's center is what limits it
     room = 1e-5 * (np.abs(triangles).max() + np.abs(direction).max()) / np.linalg.norm(direction, axis=0)
     assert (np.abs(hits.t - 1) < 30 * room + 1e-4).mean() > 0.99
 
@@ -261,7 +262,7 @@ def test_points_are_no_further_off_than_their_error(accel, matrix, start, aim):
         matrix = matrix @ translation_matrix(-mesh.bounds.mean(0))
     matrices = [matrix, np.diag([-1, -1, -1, 1]) @ matrix]  # so the scene's middle is the origin
     scene = compiled(placed(mesh, matrices), accel)
-    assert scene.centre == pytest.approx([0, 0, 0], abs=1e-9)
+    assert scene.center == pytest.approx([0, 0, 0], abs=1e-9)
     origin = rng.normal(size=(3, n))
     origin *= start / np.linalg.norm(origin, axis=0)
     direction = rng.normal(size=(3, n)) * aim - origin
@@ -269,8 +270,8 @@ def test_points_are_no_further_off_than_their_error(accel, matrix, start, aim):
     hits = intersect(scene, query)
     query, hits = query.take(hits.found), hits.take(hits.found)
     assert len(hits) > 500
-    surface = interact(scene, query, hits)
-    corners = np.stack([scene_vertices(mesh, m)[mesh.faces] for m in matrices])[hits.place - 2, hits.prim]
+    surface = interaction(scene, query, hits)
+    corners = np.stack([scene_vertices(mesh, m)[mesh.faces] for m in matrices])[hits.instance - 2, hits.prim]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     off = np.abs((normal * (surface.point.T - corners[:, 0])).sum(1))
@@ -282,7 +283,7 @@ def test_only_the_triangle_of_the_instance_left_is_skipped(accel):
     """The same triangle of another instance, in the same place or behind, is hit."""
     bent = wf.Mesh([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.5]], [[0, 1, 2], [0, 2, 3]])
     scene = compiled(placed(bent, [at(0, 0, 0), at(0, 0, 1), at(0, 0, 2)]), accel)
-    origin = np.array([[0.5], [-0.5], [-1e-3 - scene.centre[2]]], f4).repeat(4, 1)
+    origin = np.array([[0.5], [-0.5], [-1e-3 - scene.center[2]]], f4).repeat(4, 1)
     direction = np.array([[0], [0], [1]], f4).repeat(4, 1)
     hits = scene.accelerator.closest(origin, direction, np.array([-1, 0, 1, 2]))
     assert hits.prim.tolist() == [0, 2, 0, 0]
@@ -315,7 +316,7 @@ def test_ties_go_to_the_lowest_id_whichever_is_traced_first(accel):
         ([*placed(second, both), *placed(first, both)], 0),
     ):
         scene = compiled(shapes, accel)
-        origin = (np.array([[1.0], [1.0], [9.0]]) - scene.centre[:, None]).astype(f4)
+        origin = (np.array([[1.0], [1.0], [9.0]]) - scene.center[:, None]).astype(f4)
         hits = scene.accelerator.closest(origin, np.array([[0], [0], [-1]], f4), nothing(1))
         assert (hits.t[0], hits.prim[0]) == (9, expected)
 
@@ -326,20 +327,20 @@ def test_the_same_bits_for_any_batch(accel, monkeypatch):
     scene = compiled(mixture(), accel)
     trace = scene.accelerator
     origin, direction = rays(n, 7)
-    leaving = np.random.default_rng(0).integers(-1, 3000, n)
+    exclude_prim = np.random.default_rng(0).integers(-1, 3000, n)
     distance = np.full(n, 5, f4)
     whole, blocked = (
-        trace.closest(origin, direction, leaving),
-        trace.occluded(origin, direction, distance, leaving),
+        trace.closest(origin, direction, exclude_prim),
+        trace.occluded(origin, direction, distance, exclude_prim),
     )
     for part in (slice(0, 1), slice(7, 8), slice(100, 164), slice(1000, 2999), slice(None, None, -1)):
         ray = np.ascontiguousarray(origin[:, part]), np.ascontiguousarray(direction[:, part])
-        assert same_bits(trace.closest(*ray, leaving[part]), piece(whole, part))
-        assert np.array_equal(trace.occluded(*ray, distance[part], leaving[part]), blocked[part])
+        assert same_bits(trace.closest(*ray, exclude_prim[part]), piece(whole, part))
+        assert np.array_equal(trace.occluded(*ray, distance[part], exclude_prim[part]), blocked[part])
     monkeypatch.setattr(queries, "PAIRS", 200)  # cuts the batch into small ones
-    assert same_bits(trace.closest(origin, direction, leaving), whole)
+    assert same_bits(trace.closest(origin, direction, exclude_prim), whole)
     monkeypatch.setattr(queries, "CHUNK", 64)
-    assert np.array_equal(trace.occluded(origin, direction, distance, leaving), blocked)
+    assert np.array_equal(trace.occluded(origin, direction, distance, exclude_prim), blocked)
 
 
 @pytest.mark.parametrize("accel", NAMES)
@@ -431,7 +432,7 @@ def test_reliefs_lie_as_on_meshes_of_their_own(smooth):
     """Bumps follow the stretch of an instance, normal maps its tangents, mirrored or not."""
     x, y = np.meshgrid(np.arange(16), np.arange(16))
     height = np.sin(x * np.pi / 4) * np.cos(y * np.pi / 4) * 0.5 + 0.5
-    mesh = bumpy(smooth, material=wf.Diffuse(0.5).with_relief(wf.BumpMap(height, 0.3)))
+    mesh = bumpy(smooth, material=wf.Diffuse(0.5).with_normal_map(wf.BumpMap(height, 0.3)))
     matrices = MATRICES[1:5]
     if smooth:  # averages around a vertex are weighted by angles, which skewed transforms change
         matrices = [at(4, 0, 0, 0.5, (0.3, 1, 2)), at(0, 4, 1, (-1, 1, 1), (1, 2, 3)), at(-3, 0, 0, 1.3)]
@@ -444,9 +445,9 @@ def test_reliefs_lie_as_on_meshes_of_their_own(smooth):
         scene = compiled(shapes)
         hits = intersect(scene, query)
         lanes = hits.found
-        surface = interact(scene, query.take(lanes), hits.take(lanes))
+        surface = interaction(scene, query.take(lanes), hits.take(lanes))
         tangents = surface.tangents.copy()
-        tilt(scene, surface)
+        perturb_normals(scene, surface)
         values = np.full((9, n), np.nan)
         values[:, lanes] = [*surface.ns, *tangents]
         found.append((hits.t, values, dot(surface.ns, surface.ng)))

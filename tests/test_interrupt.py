@@ -16,8 +16,8 @@ import pytest
 import scenes
 
 import wavefront as wf
-from wavefront.interrupt import CtrlC
-from wavefront.shared import AT_ONCE, STOP, SharedNumber
+from wavefront.scheduling.interrupt import CtrlC
+from wavefront.scheduling.shared import AT_ONCE, STOP, SharedNumber
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="signals and processes of Linux")
 EXECUTORS = ["processes", "threads"]

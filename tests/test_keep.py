@@ -12,7 +12,8 @@ import trimesh
 from significance import render
 
 import wavefront as wf
-from wavefront.accel import keep, make_accelerator
+from wavefront.accel import cache as keep
+from wavefront.accel import make_accelerator
 
 
 def scene() -> wf.Scene:

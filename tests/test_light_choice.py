@@ -5,7 +5,7 @@ import pytest
 
 import wavefront as wf
 from wavefront.lights import LightTable, PointLights, TriangleLights
-from wavefront.lights.choice import BY_POWER, ByPlace
+from wavefront.lights.samplers import BY_POWER, SpatialLightSampler
 from wavefront.vec import f4
 
 
@@ -40,7 +40,9 @@ def test_lights_that_face_away_get_what_their_power_gives() -> None:
 def test_sampling_follows_the_probabilities(k: int) -> None:
     """In every cell each of k lights is drawn as often as its pmf says; u = 0 and 1 - 2^-24 too."""
     rng = np.random.default_rng(3)
-    choice = ByPlace(-np.ones(3), np.ones(3), lambda c, r: rng.random((c.shape[1], k)) ** 4, rng.random(k))
+    choice = SpatialLightSampler(
+        -np.ones(3), np.ones(3), lambda c, r: rng.random((c.shape[1], k)) ** 4, rng.random(k)
+    )
     n = 1 << 18
     for _ in range(3):
         point = np.repeat(rng.uniform(-1, 1, (3, 1)).astype(f4), n, 1)
@@ -56,8 +58,8 @@ def test_sampling_follows_the_probabilities(k: int) -> None:
 def test_points_outside_the_grid_belong_to_its_border() -> None:
     """A point beyond the scene's bounds is chosen for like the nearest cell."""
     lights = two_points()
-    inside, outside = (np.array([[x], [0.9], [-0.9]], f4) for x in (9.99, 1e6))
-    assert lights.choice.pmf(np.array([1]), inside) == lights.choice.pmf(np.array([1]), outside)
+    back_facing, outside = (np.array([[x], [0.9], [-0.9]], f4) for x in (9.99, 1e6))
+    assert lights.choice.pmf(np.array([1]), back_facing) == lights.choice.pmf(np.array([1]), outside)
 
 
 @pytest.mark.parametrize("extent", [(0, 0, 0), (1, 0, 1), (1e-6, 1e6, 1)], ids=str)
@@ -71,6 +73,6 @@ def test_flat_and_empty_extents(extent: tuple[float, float, float]) -> None:
 def test_unknown_choice() -> None:
     """The message names the value and what is allowed."""
     with pytest.raises(
-        wf.SceneError, match=r"light_choice is 'best'; it must be one of place, power, uniform"
+        wf.SceneError, match=r"light_sampler is 'best'; it must be one of place, power, uniform"
     ):
         LightTable([], 1.0, "best")

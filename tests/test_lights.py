@@ -7,8 +7,8 @@ from significance import assert_mean, measure, render
 
 import wavefront as wf
 from wavefront.accel import make_accelerator
+from wavefront.compile.scene import compile_scene
 from wavefront.lights import ConstantEnvironment, LightTable, PointLights, SphereLights, TriangleLights
-from wavefront.scene import compile_scene
 from wavefront.vec import f4
 
 RNG = np.random.default_rng(1)
@@ -53,7 +53,7 @@ def test_lights_keep_their_contract(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", LIGHTS)
-def test_light_columns_do_not_depend_on_their_neighbours(name: str) -> None:
+def test_light_columns_do_not_depend_on_their_neighbors(name: str) -> None:
     """One point alone gets the same bits."""
     make, points = LIGHTS[name]
     light = make().take(np.zeros(64, np.intp))

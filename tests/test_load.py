@@ -19,7 +19,7 @@ from wavefront.io.load import from_trimesh, load, load_mesh, load_meshes
 from wavefront.lights import Environment
 from wavefront.render import render
 from wavefront.scene import Scene
-from wavefront.vertex_colors import VertexColors
+from wavefront.textures.vertex_colors import VertexColors
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 
@@ -289,11 +289,11 @@ def test_uvs_beyond_all_textures_are_announced(write):
 def test_what_is_not_read_is_named_once(write):
     path = write(SQUARE + "f 1 2 3\nl 1 2\nl 2 3\np 1\ncurv2 1 2\n")
     with pytest.warns(
-        UserWarning, match=r"not honoured: l \(line 6\), p \(line 8\), curv2 \(line 9\)"
+        UserWarning, match=r"not honored: l \(line 6\), p \(line 8\), curv2 \(line 9\)"
     ) as record:
         load_meshes(path)
     assert len(record) == 1
-    with pytest.raises(SceneError, match="not honoured"):
+    with pytest.raises(SceneError, match="not honored"):
         load_meshes(path, strict=True)
 
 
@@ -302,16 +302,16 @@ def test_what_is_not_read_is_named_once(write):
 )
 def test_statements_that_obj_has_for_rendering_are_named(write, line):
     path = write(f"{SQUARE}{line}\n{line}\nf 1 2 3\n")
-    with pytest.warns(UserWarning, match=rf"not honoured: {line.split()[0]} \(line 5\)$") as record:
+    with pytest.warns(UserWarning, match=rf"not honored: {line.split()[0]} \(line 5\)$") as record:
         load_meshes(path)
     assert len(record) == 1
     load_meshes(write(f"o a\ng b c\n{SQUARE}{line.split()[0]} off\nf 1 2 3\n"))
     load_meshes(write(f"{SQUARE}{line.split()[0]} 0\nf 1 2 3\n"))
 
 
-def test_numbers_after_the_colour_of_a_vertex_are_named(write):
+def test_numbers_after_the_color_of_a_vertex_are_named(write):
     path = write("v 0 0 0 1 0 0\nv 1 0 0 1 0 0 0.5\nv 0 1 0 1 0 0 0.5\nf 1 2 3\n")
-    with pytest.warns(UserWarning, match=r"not honoured: numbers of v after the sixth \(line 2\)$"):
+    with pytest.warns(UserWarning, match=r"not honored: numbers of v after the sixth \(line 2\)$"):
         (mesh,) = load_meshes(path)
     assert mesh.colors.tolist() == [[1, 0, 0, 1]] * 3
 
@@ -320,9 +320,9 @@ def test_smoothing_groups_are_named_where_normals_are_missing(write):
     some = SQUARE + "vn 0 0 1\n{}\nf 1//1 2//1 3//1\n{}\nf {}\n"
     for first, second, face in (("s 1", "s 2", "1//1 3//1 4//1"), ("s off", "s 0", "1 3 4")):
         load_meshes(write(some.format(first, second, face)))
-    with pytest.warns(UserWarning, match=r"not honoured: s, of faces without normals \(line 8\)$"):
+    with pytest.warns(UserWarning, match=r"not honored: s, of faces without normals \(line 8\)$"):
         load_meshes(write(some.format("s off", "s 3", "1 3 4")))
-    with pytest.warns(UserWarning, match=r"not honoured: s, of faces without normals \(line 5\)$"):
+    with pytest.warns(UserWarning, match=r"not honored: s, of faces without normals \(line 5\)$"):
         load_meshes(write(SQUARE + "s 1\nf 1 2 3\n"))
 
 
@@ -418,7 +418,7 @@ def test_opacity(write, lines, kind):
     assert type(one(write, f"Kd 0.5 0.5 0.5\n{lines}").material) is kind
 
 
-def test_colours_outside_their_range_are_clamped(write):
+def test_colors_outside_their_range_are_clamped(write):
     with pytest.warns(UserWarning, match=r"s\.mtl line 2: Kd is 1\.5 -1 0\.5; it must be in \[0, 1\]"):
         mesh = one(write, "Kd 1.5 -1 0.5")
     assert mesh.material.reflectance.ravel().tolist() == [1, 0, 0.5]
@@ -431,7 +431,7 @@ def test_colours_outside_their_range_are_clamped(write):
     [
         ("Kd red", r"s\.mtl line 2: Kd is 'red'; it must be numbers"),
         ("Kd nan 0 0", r"line 2: Kd is 'nan 0 0'; it must be finite"),
-        ("Kd 0 0", r"line 2: Kd has 2 numbers; a colour has 1 or 3"),
+        ("Kd 0 0", r"line 2: Kd has 2 numbers; a color has 1 or 3"),
         ("Kd", r"line 2: Kd is ''"),
         ("illum 4\nNi 0", r"line 3: Ni is 0; an index must be above 0"),
         ("illum 4\nNi 1e30", r"line 3: Ni is 1e\+30; an index must be above 0, from 1e-06 to 1e\+06"),
@@ -511,42 +511,42 @@ def test_a_file_equals_the_object_in_memory(tmp_path, extension):
     assert soup(mesh) == pytest.approx(ball.triangles, abs=1e-6)
 
 
-# ---- vertex colours ---------------------------------------------------------------------------
+# ---- vertex colors ---------------------------------------------------------------------------
 
 CODES = np.array([[255, 0, 0], [0, 188, 0], [0, 0, 100], [10, 11, 12]])
 LINEAR = np.where(CODES / 255 <= 0.04045, CODES / 255 / 12.92, ((CODES / 255 + 0.055) / 1.055) ** 2.4)
 
 
-def coloured_ply(colours, *properties):
-    """A square with colours in ASCII PLY."""
+def colored_ply(colors, *properties):
+    """A square with colors in ASCII PLY."""
     lines = ["ply", "format ascii 1.0", "element vertex 4", *(f"property float {x}" for x in "xyz")]
     lines += [*(f"property {p}" for p in properties), "element face 2"]
     lines += ["property list uchar int vertex_indices", "end_header"]
     places = ["0 0 0", "1 0 0", "1 1 0", "0 1 0"]
-    lines += [f"{place} {' '.join(map(str, row))}" for place, row in zip(places, colours, strict=True)]
+    lines += [f"{place} {' '.join(map(str, row))}" for place, row in zip(places, colors, strict=True)]
     return "\n".join([*lines, "3 0 1 2", "3 0 2 3", ""])
 
 
 BYTES = ("uchar red", "uchar green", "uchar blue")
 
 
-def test_ply_colours_are_srgb(write):
-    (mesh,) = load_meshes(write(coloured_ply(CODES, *BYTES), "a.ply"))
+def test_ply_colors_are_srgb(write):
+    (mesh,) = load_meshes(write(colored_ply(CODES, *BYTES), "a.ply"))
     assert mesh.colors == pytest.approx(np.column_stack([LINEAR, np.ones(4)]), rel=1e-5)
     assert isinstance(mesh.material.reflectance, VertexColors)
     clear = np.column_stack([CODES, [0, 51, 102, 255]])
-    with pytest.warns(UserWarning, match=r"a\.ply: not honoured: opacity of vertex colours"):
-        (mesh,) = load_meshes(write(coloured_ply(clear, *BYTES, "uchar alpha"), "a.ply"))
+    with pytest.warns(UserWarning, match=r"a\.ply: not honored: opacity of vertex colors"):
+        (mesh,) = load_meshes(write(colored_ply(clear, *BYTES, "uchar alpha"), "a.ply"))
     assert mesh.colors[:, 3].tolist() == [0, 0.2, 0.4, 1]
     floats = ("float red", "float green", "float blue")
-    (mesh,) = load_meshes(write(coloured_ply(CODES / 255, *floats), "a.ply"))
+    (mesh,) = load_meshes(write(colored_ply(CODES / 255, *floats), "a.ply"))
     assert mesh.colors[:, :3] == pytest.approx(LINEAR, rel=1e-5)
 
 
-def test_ply_colours_beside_texture_coordinates_are_named(write):
+def test_ply_colors_beside_texture_coordinates_are_named(write):
     rows = np.column_stack([CODES, [0, 1, 1, 0], [0, 0, 1, 1]])
-    text = coloured_ply(rows, *BYTES, "float s", "float t")
-    with pytest.warns(UserWarning, match="not honoured: vertex colours"):
+    text = colored_ply(rows, *BYTES, "float s", "float t")
+    with pytest.warns(UserWarning, match="not honored: vertex colors"):
         (mesh,) = load_meshes(write(text, "a.ply"))
     assert mesh.colors is None
 
@@ -574,40 +574,38 @@ def test_what_is_not_read_of_ply_is_named_once(write, vertex, face, tail, named)
     ]
     lines += ["0 1"[: 2 * tail.count("property") - 1]] if tail else []
     path = write("\n".join([*lines, ""]), "a.ply")
-    with pytest.warns(UserWarning, match=rf"a\.ply: not honoured: {named}$") as record:
+    with pytest.warns(UserWarning, match=rf"a\.ply: not honored: {named}$") as record:
         (mesh,) = load_meshes(path)
     assert len(record) == 1
     assert np.array_equal(soup(mesh)[0], [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
-    with pytest.raises(SceneError, match="not honoured"):
+    with pytest.raises(SceneError, match="not honored"):
         load_meshes(path, strict=True)
     load_mesh(path, Diffuse(0.5))
 
 
-def obj_with_colours(colours=CODES / 255):
+def obj_with_colors(colors=CODES / 255):
     places = ["0 0 0", "1 0 0", "1 1 0", "0 1 0"]
-    rows = [f"v {place} {' '.join(map(str, row))}" for place, row in zip(places, colours, strict=True)]
+    rows = [f"v {place} {' '.join(map(str, row))}" for place, row in zip(places, colors, strict=True)]
     return "\n".join([*rows, ""])
 
 
-def test_obj_colours_are_srgb(write):
-    (mesh,) = load_meshes(write(obj_with_colours() + "f 1 2 3\nf 1 3 4\n"))
+def test_obj_colors_are_srgb(write):
+    (mesh,) = load_meshes(write(obj_with_colors() + "f 1 2 3\nf 1 3 4\n"))
     assert mesh.colors == pytest.approx(np.column_stack([LINEAR, np.ones(4)]), rel=1e-5)
     material = "newmtl m\nKd 0.5 1 1\n"
-    text = "mtllib s.mtl\n" + obj_with_colours() + "usemtl m\nf 1 2 3\n"
+    text = "mtllib s.mtl\n" + obj_with_colors() + "usemtl m\nf 1 2 3\n"
     (mesh,) = load_meshes(write(text, s_mtl=material))
     assert mesh.material.reflectance.times.ravel().tolist() == [0.5, 1, 1]
-    with pytest.warns(UserWarning, match=r"not honoured: vertex colours \(material 'm'\)"):
+    with pytest.warns(UserWarning, match=r"not honored: vertex colors \(material 'm'\)"):
         (mesh,) = load_meshes(write(text, s_mtl="newmtl m\nillum 4\n"))
     assert isinstance(mesh.material, Dielectric)
 
 
-def test_obj_colours_that_are_wanting_or_too_large_are_announced(write):
-    some = obj_with_colours(CODES / 200)[:-1].rsplit(" ", 3)[0] + "\nf 1 2 3\nf 1 3 4\n"
+def test_obj_colors_that_are_wanting_or_too_large_are_announced(write):
+    some = obj_with_colors(CODES / 200)[:-1].rsplit(" ", 3)[0] + "\nf 1 2 3\nf 1 3 4\n"
     with (
-        pytest.warns(UserWarning, match="1 vertex colours are not finite, first: vertex 3"),
-        pytest.warns(
-            UserWarning, match=r"1 vertex colours are outside \[0, 1\] and were clamped, first: ver"
-        ),
+        pytest.warns(UserWarning, match="1 vertex colors are not finite, first: vertex 3"),
+        pytest.warns(UserWarning, match=r"1 vertex colors are outside \[0, 1\] and were clamped, first: ver"),
     ):
         (mesh,) = load_meshes(write(some))
     assert mesh.colors[0].tolist() == [1, 0, 0, 1]
@@ -616,7 +614,7 @@ def test_obj_colours_that_are_wanting_or_too_large_are_announced(write):
 
 @pytest.mark.parametrize("extension", ["ply", "obj"])
 @pytest.mark.parametrize("by", [trimesh.load, trimesh.load_mesh, trimesh.load_scene])
-def test_vertex_colours_in_memory_render_as_their_file(tmp_path, extension, by):
+def test_vertex_colors_in_memory_render_as_their_file(tmp_path, extension, by):
     ball = trimesh.creation.icosphere(subdivisions=1)
     ball.visual.vertex_colors = np.random.default_rng(0).integers(0, 256, (42, 3), np.uint8)
     path = tmp_path / f"ball.{extension}"
@@ -662,7 +660,7 @@ def textured_glb(write, image):
         (lambda write, _: textured_obj(write, "Ks 0.5 1 0.25", "Ns 300", "map_Kd my tex.png"), 0.1),
         (textured_glb, 0.1),
     ],
-    ids=["ply", "obj without Kd", "obj", "obj of no colour", "glossy obj", "glb"],
+    ids=["ply", "obj without Kd", "obj", "obj of no color", "glossy obj", "glb"],
 )
 def test_objects_in_memory_render_as_their_file(write, tmp_path, make, least):
     """Bit for bit; `least` is how far the pixels differ in each channel."""
@@ -712,7 +710,7 @@ def test_textures_of_ply(write, tmp_path):
         (mesh,) = load_meshes(textured_ply(write, "b.png"))
     assert isinstance(mesh.material, Diffuse)
     Image.new("RGB", (4, 4), (255, 0, 0)).save(tmp_path / "b.png")
-    with pytest.warns(UserWarning, match=r"not honoured: several textures; 'b\.png' is taken for all faces"):
+    with pytest.warns(UserWarning, match=r"not honored: several textures; 'b\.png' is taken for all faces"):
         (mesh,) = load_meshes(textured_ply(write, "a.png", "b.png"))
     assert mesh.material.reflectance.mean() == pytest.approx([1, 0, 0])
     assert load_mesh(textured_ply(write, "b.png"), Diffuse(0.25)).material.reflectance[0] == 0.25
@@ -733,7 +731,7 @@ def painted_ply(rows, faces, *properties, extra=()):
 PLACES = ["0 0 0", "1 0 0", "1 1 0", "0 1 0"]
 
 
-def test_face_colours_are_those_of_all_corners(write):
+def test_face_colors_are_those_of_all_corners(write):
     (mesh,) = load_meshes(write(painted_ply(PLACES, ["3 0 1 2 255 188 0", "3 0 2 3 0 0 51"]), "a.ply"))
     assert np.array_equal(soup(mesh)[1], [[0, 0, 0], [1, 1, 0], [0, 1, 0]])
     green, blue = ((np.array([188, 51]) / 255 + 0.055) / 1.055) ** 2.4
@@ -754,12 +752,12 @@ def test_colors_of_faces_show_beside_vertices_that_are_all_white(write):
     for found in (mesh, held):
         assert soup(found, found.colors).tolist() == [[[1, 0, 0, 1]] * 3, [[0, 1, 0, 1]] * 3]
     white[0] = f"{PLACES[0]} 0 0 255"  # a real color: those of the vertices count
-    with pytest.warns(UserWarning, match="not honoured: face colours"):
+    with pytest.warns(UserWarning, match="not honored: face colors"):
         (mesh,) = load_meshes(write(painted_ply(white, faces, extra=extra), "a.ply"))
     assert soup(mesh, mesh.colors)[0].tolist() == [[0, 0, 1, 1], [1, 1, 1, 1], [1, 1, 1, 1]]
 
 
-def test_face_colours_survive_faces_that_do_not(write):
+def test_face_colors_survive_faces_that_do_not(write):
     faces = ["3 0 1 1 255 0 0", "3 0 1 2 0 255 0", "3 0 2 3 0 0 255"]
     with pytest.warns(UserWarning, match="dropped 1 faces of zero area"):
         (mesh,) = load_meshes(write(painted_ply(PLACES, faces), "a.ply"))
@@ -775,18 +773,18 @@ def test_face_colours_survive_faces_that_do_not(write):
         ([f"{row} 9 9 9" for row in PLACES], ["3 0 1 2 255 0 0"], ["red", "green", "blue"]),
         ([f"{row} 0 1" for row in PLACES], ["3 0 1 2 255 0 0"], ["s", "t"]),
     ],
-    ids=["polygons", "beside vertex colours", "beside texture coordinates"],
+    ids=["polygons", "beside vertex colors", "beside texture coordinates"],
 )
-def test_face_colours_that_do_not_count_are_named(write, rows, faces, extra):
+def test_face_colors_that_do_not_count_are_named(write, rows, faces, extra):
     kind = "uchar" if "red" in extra else "float"
     text = painted_ply(rows, faces, extra=[f"property {kind} {x}" for x in extra])
-    with pytest.warns(UserWarning, match=r"a\.ply: not honoured: face colours \(mesh") as record:
+    with pytest.warns(UserWarning, match=r"a\.ply: not honored: face colors \(mesh") as record:
         (mesh,) = load_meshes(write(text, "a.ply"))
     assert len(record) == 1
     assert (mesh.colors is not None) == ("red" in extra)
 
 
-def test_face_colours_in_memory_render_as_their_file(tmp_path):
+def test_face_colors_in_memory_render_as_their_file(tmp_path):
     ball = trimesh.creation.icosphere(subdivisions=1)
     ball.apply_scale(0.75)
     ball.vertices = ball.vertices.astype(np.float32)
@@ -803,11 +801,11 @@ def test_face_colours_in_memory_render_as_their_file(tmp_path):
     assert np.array_equal(pictures[0], pictures[2])
 
 
-def test_load_mesh_keeps_colours_and_the_second_uvs(write):
-    mesh = load_mesh(write(obj_with_colours() + "f 1 2 3\nf 1 3 4\n"))
+def test_load_mesh_keeps_colors_and_the_second_uvs(write):
+    mesh = load_mesh(write(obj_with_colors() + "f 1 2 3\nf 1 3 4\n"))
     assert mesh.colors[:, :3] == pytest.approx(LINEAR, rel=1e-5)
     assert isinstance(mesh.material.reflectance, VertexColors)
-    assert load_mesh(write(obj_with_colours() + "f 1 2 3\n"), Diffuse(0.5)).colors is not None
+    assert load_mesh(write(obj_with_colors() + "f 1 2 3\n"), Diffuse(0.5)).colors is not None
 
 
 def test_a_scene_in_memory_equals_its_file(tmp_path):
@@ -850,9 +848,7 @@ def test_several_materials_of_one_trimesh_object_are_named():
     parts = [trimesh.visual.material.SimpleMaterial(diffuse=[255, 0, 0])] * 2
     material = trimesh.visual.material.MultiMaterial(parts)
     box.visual = trimesh.visual.TextureVisuals(uv=np.zeros((8, 2)), material=material)
-    with pytest.warns(
-        UserWarning, match=r"trimesh object: not honoured: MultiMaterial \(mesh ''\)"
-    ) as record:
+    with pytest.warns(UserWarning, match=r"trimesh object: not honored: MultiMaterial \(mesh ''\)") as record:
         from_trimesh(box)
     assert len(record) == 1
 
@@ -937,10 +933,10 @@ def test_polygons_of_several_sizes_in_a_binary_ply(write, order):
     # as long together as three quads would be, so that trimesh would read three of them
     rows = [(0, 1, 3, 2), (2, 3, 4), (1, 3, 4, 2, 0)]
     path = write(binary_ply(rows, order, before=["a"], after=["red"]), "a.ply")
-    with pytest.warns(UserWarning, match=r"a\.ply: not honoured: a of face, red of face$"):
+    with pytest.warns(UserWarning, match=r"a\.ply: not honored: a of face, red of face$"):
         (mesh,) = load_meshes(path)
     assert len(mesh.faces) == 6
-    with pytest.raises(SceneError, match="not honoured"):
+    with pytest.raises(SceneError, match="not honored"):
         load_meshes(path, strict=True)
 
 
@@ -1001,22 +997,22 @@ def test_stl(write):
     ("header", "extra", "named"),
     [
         (b"COLOR=\xff\x00\x00\xff", [0, 0], "COLOR= in the header"),
-        (b"exported", [0, 0x801F], r"colours of facets \(facet 1\)"),
+        (b"exported", [0, 0x801F], r"colors of facets \(facet 1\)"),
         (
             b"COLOR=abcd,MATERIAL=abcdefghijkl",
             [3, 0],
-            r"COLOR= .*, MATERIAL= .*, colours of facets \(facet 0\)",
+            r"COLOR= .*, MATERIAL= .*, colors of facets \(facet 0\)",
         ),
     ],
 )
-def test_colours_of_stl_are_named_once(write, header, extra, named):
-    facets = b"".join(struct.pack("<12fH", *FACET, colour) for colour in extra)
+def test_colors_of_stl_are_named_once(write, header, extra, named):
+    facets = b"".join(struct.pack("<12fH", *FACET, color) for color in extra)
     path = write(header.ljust(80) + struct.pack("<I", len(extra)) + facets, "a.stl")
-    with pytest.warns(UserWarning, match=rf"a\.stl: not honoured: {named}$") as record:
+    with pytest.warns(UserWarning, match=rf"a\.stl: not honored: {named}$") as record:
         (mesh,) = load_meshes(path)
     assert len(record) == 1
     assert len(mesh.faces) == 2
-    with pytest.raises(SceneError, match="not honoured"):
+    with pytest.raises(SceneError, match="not honored"):
         load_meshes(path, strict=True)
 
 
@@ -1157,7 +1153,7 @@ REAL = {
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="the real files are not here")
 @pytest.mark.parametrize("name", REAL)
-@pytest.mark.filterwarnings("ignore:.*(not honoured|is missing)")
+@pytest.mark.filterwarnings("ignore:.*(not honored|is missing)")
 def test_real_files_equal_what_trimesh_holds(name):
     found = load_meshes(DATA / name)
     assert sum(len(mesh.faces) for mesh in found) == REAL[name]

@@ -55,10 +55,10 @@ def test_off(write):
 )
 def test_what_is_not_read_of_off_is_named(write, data, named):
     path = write(data, "a.off")
-    with pytest.warns(UserWarning, match=rf"a\.off: not honoured: {named}$"):
+    with pytest.warns(UserWarning, match=rf"a\.off: not honored: {named}$"):
         (mesh,) = load_meshes(path)
     assert len(mesh.faces) == 2
-    with pytest.raises(SceneError, match="not honoured"):
+    with pytest.raises(SceneError, match="not honored"):
         load_meshes(path, strict=True)
 
 
@@ -174,16 +174,16 @@ def test_what_is_not_read_of_dae_is_named(write, image):
     more += "</technique_common></light></library_lights>"
     nodes = '<node><instance_light url="#l"/><instance_geometry url="#g">{bind}</instance_geometry></node>'
     path = write(dae(nodes, more=more), "a.dae")
-    with pytest.warns(UserWarning, match=r"a\.dae: not honoured: instance_light \(line \d+\)$"):
+    with pytest.warns(UserWarning, match=r"a\.dae: not honored: instance_light \(line \d+\)$"):
         load_meshes(path)
-    with pytest.raises(SceneError, match="not honoured"):
+    with pytest.raises(SceneError, match="not honored"):
         load_meshes(path, strict=True)
 
 
 def test_opacity_of_dae_is_named(write, image):
     pytest.importorskip("collada")
     clear = "</diffuse><transparent><color>1 1 1 0.5</color></transparent>"
-    with pytest.warns(UserWarning, match=r"a\.dae: not honoured: opacity of materials$"):
+    with pytest.warns(UserWarning, match=r"a\.dae: not honored: opacity of materials$"):
         load_meshes(write(dae().replace("</diffuse>", clear), "a.dae"))
 
 
@@ -301,10 +301,10 @@ def test_what_is_not_read_of_3mf_is_named(write):
     pytest.importorskip("networkx")
     materials = '<basematerials id="5"><base name="red" displaycolor="#FF0000FF"/></basematerials>'
     path = write(package(model(f'{materials}<object id="1">{MESH}</object>')), "a.3mf")
-    with pytest.warns(UserWarning, match=r"a\.3mf: not honoured: basematerials$"):
+    with pytest.warns(UserWarning, match=r"a\.3mf: not honored: basematerials$"):
         load_meshes(path)
     load_mesh(path, from_trimesh(trimesh.creation.box()).shapes[0].material)
-    with pytest.raises(SceneError, match="not honoured"):
+    with pytest.raises(SceneError, match="not honored"):
         load_meshes(path, strict=True)
 
 

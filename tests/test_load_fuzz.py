@@ -16,8 +16,8 @@ import pytest
 import trimesh
 from gltf_builder import Builder
 
+from wavefront.codecs.images import read_image, write_image
 from wavefront.errors import SceneError
-from wavefront.io.images import read_image, write_image
 from wavefront.io.load import load
 
 MEMORY = 3 << 30  # bytes

@@ -15,15 +15,15 @@ from gltf_builder import TRIANGLE, Builder
 
 from wavefront import Camera, Scene, render
 from wavefront.bsdfs import Dielectric, Diffuse, Principled, ThinDielectric
+from wavefront.codecs.encoding import srgb_to_linear
 from wavefront.errors import SceneError
 from wavefront.io import appearance, gltf_document, gltf_materials, placing
-from wavefront.io.images import srgb_to_linear
 from wavefront.io.load import from_trimesh, load, load_mesh, load_meshes
 from wavefront.lights import DirectionalLight, SpotLight
-from wavefront.relief import NormalMap
 from wavefront.shapes import Instance, Mesh
-from wavefront.textures import Texture
-from wavefront.vertex_colors import VertexColors
+from wavefront.textures.image import Texture
+from wavefront.textures.normal_map import NormalMap
+from wavefront.textures.vertex_colors import VertexColors
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 
@@ -130,7 +130,7 @@ def test_interleaved_and_offset_views(build, path):
     assert np.array_equal(mesh.uvs, [[0, 1], [1, 1], [0, 0]])
 
 
-def test_sparse_and_normalised_accessors(build, path):
+def test_sparse_and_normalized_accessors(build, path):
     build.accessor(TRIANGLE)
     at, new = build.view(np.array([2], np.uint16).tobytes()), build.view(np.float32([[0, 5, 0]]).tobytes())
     build.json["accessors"][0]["sparse"] = {
@@ -145,7 +145,7 @@ def test_sparse_and_normalised_accessors(build, path):
     assert mesh.uvs == pytest.approx(np.array([[0, 1], [1, 1], [0, 0.8]]))
 
 
-def test_quantised_texture_coordinates_are_turned_upwards(build, path):
+def test_quantized_texture_coordinates_are_turned_upwards(build, path):
     """KHR_mesh_quantization has whole numbers, for a KHR_texture_transform to scale: 1 − v may be below 0."""
     uvs, uvs1 = np.array([[0, 0], [3, 0], [0, 5]], np.uint16), np.array([[0, 200], [3, 0], [0, 5]], np.uint8)
     build.mesh({"POSITION": TRIANGLE, "TEXCOORD_0": uvs, "TEXCOORD_1": uvs1}).gltf(path)
@@ -191,7 +191,7 @@ def instanced(build, **attributes):
 
 
 def test_a_node_may_hold_many_instances(build, path):
-    quarter = np.array([[0, 0, 0, 127], [0, 0, 90, 90]], np.int8)  # normalised; lengths do not matter
+    quarter = np.array([[0, 0, 0, 127], [0, 0, 90, 90]], np.int8)  # normalized; lengths do not matter
     build = instanced(
         build,
         TRANSLATION=np.float32([[1, 0, 0], [0, 2, 0]]),
@@ -211,7 +211,7 @@ def test_a_node_may_hold_many_instances(build, path):
 
 def test_what_instances_have_besides_is_named(build, path):
     instanced(build, TRANSLATION=np.float32([[0, 0, 0]]), _COLOR=np.float32([[1, 0, 0]])).gltf(path)
-    with pytest.warns(UserWarning, match=r"not honoured: _COLOR of instances \(node 'grass'\)"):
+    with pytest.warns(UserWarning, match=r"not honored: _COLOR of instances \(node 'grass'\)"):
         assert len(load(path).shapes) == 1
 
 
@@ -391,7 +391,7 @@ def test_the_camera_of_a_file_that_trimesh_read_is_named(build, path):
         {"type": "perspective", "perspective": {"yfov": 0.5, "aspectRatio": 1, "znear": 1}}
     ]
     held = trimesh.load_scene(build.mesh().gltf(path))
-    with pytest.warns(UserWarning, match="trimesh object: not honoured: the camera of its glTF file"):
+    with pytest.warns(UserWarning, match="trimesh object: not honored: the camera of its glTF file"):
         assert from_trimesh(held).camera is None
 
 
@@ -525,7 +525,7 @@ def test_samplers(given, build):
     ],
 )
 def test_filters(build, path, sampler, expected, named):
-    """Mipmaps are not needed; a filter of its own for small pictures is not honoured."""
+    """Mipmaps are not needed; a filter of its own for small pictures is not honored."""
     info = build.image(np.uint8([[[255, 0, 0], [0, 255, 0]]]))
     build.json["samplers"] = [sampler]
     build.json["textures"][0]["sampler"] = 0
@@ -534,7 +534,7 @@ def test_filters(build, path, sampler, expected, named):
         warnings.simplefilter("always")
         (mesh,) = load_meshes(path)
     assert mesh.emission.filter == expected
-    message = r"not honoured: minFilter (magFilter counts at all distances) (materials[0].emissiveTexture)"
+    message = r"not honored: minFilter (magFilter counts at all distances) (materials[0].emissiveTexture)"
     assert [message in str(entry.message) for entry in record] == [True] * named
 
 
@@ -560,10 +560,10 @@ def test_normal_map(build, path, material, glass):
     info = build.image(codes) | {"scale": 0.5, "texCoord": 1}
     extensions = {"KHR_materials_transmission": {"transmissionFactor": 1}} if glass else {}
     (mesh,) = load_meshes(build.material(**material, normalTexture=info, extensions=extensions).gltf(path))
-    relief = mesh.material.relief
-    assert isinstance(relief, NormalMap)
-    assert (relief.strength, relief.texture.uv_set) == (0.5, 1)
-    assert at(relief.texture, 0.5, 0.5) == pytest.approx(codes[0, 0] / 255)
+    normal_map = mesh.material.normal_map
+    assert isinstance(normal_map, NormalMap)
+    assert (normal_map.strength, normal_map.texture.uv_set) == (0.5, 1)
+    assert at(normal_map.texture, 0.5, 0.5) == pytest.approx(codes[0, 0] / 255)
 
 
 def tangent_space(build, **extra):
@@ -628,7 +628,7 @@ def test_the_handedness_of_tangents_is_seen_in_the_picture(build, path, hand):
     """
     tangent_space(build, TANGENT=np.tile(np.float32([[1, 0, 0, hand]]), (3, 1)))
     (mesh,) = load_meshes(build.gltf(path))
-    mesh.material = Diffuse(1.0).with_relief(NormalMap(np.float32([[[0.5, 0.8, 0.9]]])))
+    mesh.material = Diffuse(1.0).with_normal_map(NormalMap(np.float32([[[0.5, 0.8, 0.9]]])))
     sun = DirectionalLight((0, -1, -1), np.pi)
     camera = Camera.look_at((0.3, 0.3, 5), (0.3, 0.3, 0), fov=0.1, size=(2, 2))
     seen = render(Scene([mesh], [sun], camera), 4, workers=1, progress=False).rgb
@@ -700,7 +700,7 @@ def test_the_texture_of_a_thickness_is_named(build, path):
     extensions = {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": volume}
     build.material(extensions=extensions).gltf(path)
     with pytest.warns(
-        UserWarning, match=r"not honoured: thicknessTexture \(light goes .* encloses\) \(mat"
+        UserWarning, match=r"not honored: thicknessTexture \(light goes .* encloses\) \(mat"
     ) as record:
         load(path)
     assert len(record) == 1
@@ -738,8 +738,8 @@ def test_extension_textures(given, build):
     assert at(found["specular_color"], 0.5, 0.5) == pytest.approx(texel * [2, 1, 0.5])
 
 
-def test_a_specular_colour_above_1_raises_the_reflectance_to_at_most_1(build, path):
-    """KHR_materials_specular: min(0.04 · colour, 1), of ior 1.5."""
+def test_a_specular_color_above_1_raises_the_reflectance_to_at_most_1(build, path):
+    """KHR_materials_specular: min(0.04 · color, 1), of ior 1.5."""
     build.material(extensions={"KHR_materials_specular": {"specularColorFactor": [1, 10, 100]}}).gltf(path)
     (mesh,) = load_meshes(path)
     found = mesh.material._dielectric(np.zeros(1, np.float32)).ravel()
@@ -788,30 +788,30 @@ def test_a_diffuse_texture_is_scaled_by_what_a_constant_specular_leaves(given, b
         **glossy(diffuseTexture=info, diffuseFactor=[0.5, 1, 1, 0.5], specularFactor=[0, 0.25, 0.125]),
         alphaMode="BLEND",
     )
-    grey = float(srgb_to_linear(np.float32(188 / 255)))
-    assert at(found["base_color"], 0.5, 0.5) == pytest.approx([0.375, 0, 0.75 * grey])
+    gray = float(srgb_to_linear(np.float32(188 / 255)))
+    assert at(found["base_color"], 0.5, 0.5) == pytest.approx([0.375, 0, 0.75 * gray])
     assert at(found["opacity"].alpha, 0.5, 0.5) == pytest.approx(0.1)
     assert found["specular_color"] == pytest.approx([0, 6.25, 3.125])
 
 
 @pytest.mark.parametrize("textured", [False, True])
 def test_the_texture_of_specular_and_glossiness(given, build, textured):
-    """Colours are sRGB and glossiness is linear; the images may differ in size and in set of coordinates."""
+    """Colors are sRGB and glossiness is linear; the images may differ in size and in set of coordinates."""
     both = build.image(np.uint8([[[255, 0, 0, 0], [0, 188, 0, 51]]]))
     shade = build.image(np.uint8([[[255, 255, 255]], [[0, 188, 0]]])) | {"texCoord": 1}
     group = {"specularGlossinessTexture": both, "specularFactor": [0.5, 1, 1], "glossinessFactor": 0.5}
     group |= {"diffuseTexture": shade} if textured else {"diffuseFactor": [0.25, 0.5, 1, 1]}
     found = given(**glossy(**group))
-    grey = float(srgb_to_linear(np.float32(188 / 255)))
+    gray = float(srgb_to_linear(np.float32(188 / 255)))
     assert at(found["roughness"], 0.25, 0.5) == pytest.approx(1)
     assert at(found["roughness"], 0.75, 0.5) == pytest.approx(0.9)
     assert at(found["specular_color"], 0.25, 0.5) == pytest.approx([12.5, 0, 0])
-    assert at(found["specular_color"], 0.75, 0.5) == pytest.approx([0, 25 * grey, 0])
+    assert at(found["specular_color"], 0.75, 0.5) == pytest.approx([0, 25 * gray, 0])
     points = np.float32([[0.25, 0.75, 0.75], [0.5, 0.5, 0.5]])
     rows = np.float32([[0.5] * 3, [0.25, 0.25, 0.75]])
     surface = SimpleNamespace(uv=points, uv1=rows)
-    left = np.array([0.5, 1 - grey, 1 - grey])
-    diffuse = np.array([[0, grey, 0], [0, grey, 0], [1, 1, 1]]) if textured else [0.25, 0.5, 1]
+    left = np.array([0.5, 1 - gray, 1 - gray])
+    diffuse = np.array([[0, gray, 0], [0, gray, 0], [1, 1, 1]]) if textured else [0.25, 0.5, 1]
     seen = found["base_color"].at(surface).T
     assert seen == pytest.approx(left[:, None] * diffuse, abs=1e-6)
     assert set(found["base_color"].reads) == ({"uv", "uv1"} if textured else {"uv"})
@@ -822,7 +822,7 @@ def test_specular_without_an_alpha_is_evenly_glossy(given, build):
     assert given(**glossy(specularGlossinessTexture=info, glossinessFactor=0.25))["roughness"] == 0.75
 
 
-def test_vertex_colours_multiply_the_diffuse_part_alone(build, path):
+def test_vertex_colors_multiply_the_diffuse_part_alone(build, path):
     info = build.image(np.uint8([[[255, 0, 0, 0]]]))
     build.material(**glossy(specularGlossinessTexture=info, specularFactor=[0.5, 1, 1]))
     build.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = build.accessor(COLORS)
@@ -840,7 +840,7 @@ def test_what_specular_glossiness_excludes_is_named(build, path):
     }
     build.json["extensionsRequired"] = ["KHR_materials_pbrSpecularGlossiness"]
     build.material(extensions=extensions, emissiveFactor=[1, 1, 1]).gltf(path)
-    message = r"not honoured: KHR_materials_clearcoat beside KHR_materials_pbrSpecularGlossiness \(materials"
+    message = r"not honored: KHR_materials_clearcoat beside KHR_materials_pbrSpecularGlossiness \(materials"
     with pytest.warns(UserWarning, match=message) as record:
         (mesh,) = load_meshes(path)
     assert len(record) == 1
@@ -940,7 +940,7 @@ def test_a_cone_that_opens_inwards_is_an_error(build, path):
         load(b.gltf(path))
 
 
-# ---- what is not honoured is named once ---------------------------------------------------------
+# ---- what is not honored is named once ---------------------------------------------------------
 
 
 def lose_animation(b):
@@ -963,9 +963,9 @@ def lose_camera(b):
     b.json["cameras"] = [{"type": "perspective", "perspective": {"yfov": 1}}]
 
 
-def lose_colours(b):
-    colours = b.accessor(np.ones((3, 3), np.float32))
-    b.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_1"] = colours
+def lose_colors(b):
+    colors = b.accessor(np.ones((3, 3), np.float32))
+    b.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_1"] = colors
 
 
 def lose_targets(b):
@@ -1011,7 +1011,7 @@ def lose_of_material(named, **material):
         (lose_animation, r"animations \(the file\)"),
         (lose_light, r"area light \(light 0\)"),
         (lose_camera, r"further cameras \(cameras\[0\]\)"),
-        (lose_colours, r"COLOR_1 \(mesh 'mesh0'\)"),
+        (lose_colors, r"COLOR_1 \(mesh 'mesh0'\)"),
         (lose_targets, r"morph targets \(mesh 'mesh0'\)"),
         (lose_lines, r"points and lines \(mesh 'mesh0'\)"),
         (lose_skin, r"skin \(node 'arm'\)"),
@@ -1027,17 +1027,17 @@ def lose_of_material(named, **material):
         (lose_extension, r"KHR_materials_iridescence \(the file\)"),
     ],
 )
-def test_what_is_not_honoured_is_named(build, path, lose, message):
+def test_what_is_not_honored_is_named(build, path, lose, message):
     lose(build.mesh())
     build.gltf(path)
-    with pytest.warns(UserWarning, match=r"a\.gltf: not honoured: " + message) as record:
+    with pytest.warns(UserWarning, match=r"a\.gltf: not honored: " + message) as record:
         load(path)
     assert len(record) == 1
-    with pytest.raises(SceneError, match="not honoured"):
+    with pytest.raises(SceneError, match="not honored"):
         load(path, strict=True)
 
 
-# ---- vertex colours and a second set of texture coordinates -----------------------------------------
+# ---- vertex colors and a second set of texture coordinates -----------------------------------------
 
 COLORS = np.array([[1, 0.5, 0.25], [0, 1, 0.125], [0.3, 0.1, 1]], np.float32)
 
@@ -1051,7 +1051,7 @@ COLORS = np.array([[1, 0.5, 0.25], [0, 1, 0.125], [0.3, 0.1, 1]], np.float32)
         (np.uint16([[65535, 13107, 0]] * 3), {"normalized": True}, [[1, 0.2, 0, 1]] * 3),
     ],
 )
-def test_vertex_colours_are_linear(build, path, colors, extra, expected):
+def test_vertex_colors_are_linear(build, path, colors, extra, expected):
     build.mesh({"POSITION": TRIANGLE, "COLOR_0": build.accessor(colors, **extra)}).gltf(path)
     (mesh,) = load_meshes(path)
     assert mesh.colors == pytest.approx(np.array(expected))
@@ -1060,7 +1060,7 @@ def test_vertex_colours_are_linear(build, path, colors, extra, expected):
     assert mesh.material.reflectance.times.ravel().tolist() == [1, 1, 1]
 
 
-def test_vertex_colours_multiply_the_base_colour(build, path):
+def test_vertex_colors_multiply_the_base_color(build, path):
     info = build.image(np.uint8([[[255, 0, 0], [0, 255, 0]]]))
     factor = {"baseColorFactor": [0.5, 1, 1, 1]}
     build.json["materials"] = [
@@ -1081,7 +1081,7 @@ def test_vertex_colours_multiply_the_base_colour(build, path):
 
 @pytest.mark.parametrize("mode", ["OPAQUE", "MASK", "BLEND"])
 @pytest.mark.parametrize("textured", [False, True])
-def test_the_opacity_of_vertex_colours_counts_where_the_material_fades(build, path, mode, textured):
+def test_the_opacity_of_vertex_colors_counts_where_the_material_fades(build, path, mode, textured):
     info = build.image(np.uint8([[[255, 255, 255, 51]]]))
     group = {"baseColorTexture": info} if textured else {"baseColorFactor": [1, 1, 1, 0.5]}
     clear = np.column_stack([COLORS, np.float32([0.25, 0.5, 1])])
@@ -1098,14 +1098,14 @@ def test_the_opacity_of_vertex_colours_counts_where_the_material_fades(build, pa
         assert at(opacity.alpha.times, 0.5, 0.5) == pytest.approx(0.2)
     else:
         assert opacity.alpha.times == 0.5
-    # opaque colours leave the opacity as it is
+    # opaque colors leave the opacity as it is
     build.json["accessors"][-1]["type"] = "VEC3"
     (mesh,) = load_meshes(build.gltf(path))
     plain = mesh.material.opacity
     assert plain is None if mode == "MASK" and not textured else not isinstance(plain.alpha, VertexColors)
 
 
-def test_vertex_colours_fade_a_material_that_is_opaque_itself(build, path):
+def test_vertex_colors_fade_a_material_that_is_opaque_itself(build, path):
     clear = np.column_stack([COLORS, np.float32([0.25, 0.5, 1])])
     build.material(alphaMode="BLEND")
     build.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = build.accessor(clear)
@@ -1116,23 +1116,23 @@ def test_vertex_colours_fade_a_material_that_is_opaque_itself(build, path):
     assert np.array_equal(mesh.colors, held.colors)
 
 
-def test_vertex_colours_on_glass_are_named(build, path):
+def test_vertex_colors_on_glass_are_named(build, path):
     build.material(
         pbrMetallicRoughness={"metallicFactor": 0},
         extensions={"KHR_materials_transmission": {"transmissionFactor": 1}},
     )
     build.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = build.accessor(COLORS)
-    with pytest.warns(UserWarning, match=r"not honoured: vertex colours \(mesh 'mesh0'\)"):
+    with pytest.warns(UserWarning, match=r"not honored: vertex colors \(mesh 'mesh0'\)"):
         (mesh,) = load_meshes(build.gltf(path))
     assert isinstance(mesh.material, ThinDielectric)
 
 
-def test_vertex_colours_out_of_range_are_clamped(build, path):
+def test_vertex_colors_out_of_range_are_clamped(build, path):
     beyond = np.float32([[2, 0, 0], [0, -1, 0], [0, 0, 0]])
     build.mesh({"POSITION": TRIANGLE, "COLOR_0": beyond})
     build.gltf(path)
     with pytest.warns(
-        UserWarning, match=r"2 vertex colours are outside \[0, 1\] and were clamped, first: vertex 0"
+        UserWarning, match=r"2 vertex colors are outside \[0, 1\] and were clamped, first: vertex 0"
     ):
         (mesh,) = load_meshes(path)
     assert mesh.colors.tolist() == [[1, 0, 0, 1], [0, 0, 0, 1], [0, 0, 0, 1]]
@@ -1161,11 +1161,11 @@ def test_a_third_set_of_texture_coordinates_is_named(build, path, extra):
     if extra == "attribute":
         third = build.accessor(TRIANGLE[:, :2])
         build.json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_2"] = third
-    with pytest.warns(UserWarning, match=r"not honoured: TEXCOORD_2 \(m"):
+    with pytest.warns(UserWarning, match=r"not honored: TEXCOORD_2 \(m"):
         load_meshes(build.gltf(path))
 
 
-def test_colours_with_two_components_are_refused(build, path):
+def test_colors_with_two_components_are_refused(build, path):
     build.mesh({"POSITION": TRIANGLE, "COLOR_0": COLORS[:, :2]})
     with pytest.raises(SceneError, match="has COLOR_0 with 2 components; it must have 3 or 4"):
         load(build.gltf(path))
@@ -1315,13 +1315,13 @@ def test_a_missing_image_is_named_and_left_out(build, path):
         extensions=extensions,
     )
     build.gltf(path)
-    message = r"a\.gltf: not honoured: texture 'my%20t\.png', which is missing \(images\[0\]\)"
+    message = r"a\.gltf: not honored: texture 'my%20t\.png', which is missing \(images\[0\]\)"
     with pytest.warns(UserWarning, match=message) as record:
         (mesh,) = load(path).shapes
     assert len(record) == 1
     assert mesh.material.base_color.ravel().tolist() == [0.5, 0.25, 1]
     assert (mesh.material.roughness, mesh.material.clearcoat) == (0.75, 0.5)
-    assert mesh.material.relief is None
+    assert mesh.material.normal_map is None
     assert mesh.emission.ravel().tolist() == [0, 1, 0]
     with pytest.raises(SceneError, match=message):
         load(path, strict=True)
@@ -1393,7 +1393,7 @@ def same(a, b):
     return np.array_equal(np.asarray(a), np.asarray(b))
 
 
-@pytest.mark.filterwarnings("ignore:.*not honoured")
+@pytest.mark.filterwarnings("ignore:.*not honored")
 def test_a_textured_object_in_memory_equals_its_file(tmp_path):
     from PIL import Image
 
@@ -1422,11 +1422,11 @@ def test_a_textured_object_in_memory_equals_its_file(tmp_path):
         assert mesh.two_sided
         assert held.two_sided
         assert same(mesh.material.base_color, held.material.base_color)
-        assert same(mesh.material.relief.texture, held.material.relief.texture)
+        assert same(mesh.material.normal_map.texture, held.material.normal_map.texture)
 
 
 @pytest.mark.parametrize("dressed", [False, True], ids=["plain", "material"])
-def test_vertex_colours_in_memory_equal_their_glb(tmp_path, dressed):
+def test_vertex_colors_in_memory_equal_their_glb(tmp_path, dressed):
     plane = trimesh.Trimesh(TRIANGLE, [[0, 1, 2]], process=False)
     codes = np.random.default_rng(5).integers(0, 256, (3, 4), np.uint8)
     if dressed:
@@ -1439,21 +1439,21 @@ def test_vertex_colours_in_memory_equal_their_glb(tmp_path, dressed):
     (mesh,) = load_meshes(tmp_path / "a.glb")
     assert mesh.colors == pytest.approx(codes / 255)
     held = trimesh.load_scene(tmp_path / "a.glb")
-    for other in (held,) if dressed else (held, held.to_mesh()):  # which drops colours beside a material
+    for other in (held,) if dressed else (held, held.to_mesh()):  # which drops colors beside a material
         (again,) = from_trimesh(other).shapes
         assert np.array_equal(mesh.colors, again.colors)
         assert np.array_equal(base(mesh).times, base(again).times)
 
 
 def base(mesh):
-    """The base colour of a mesh's material."""
+    """The base color of a mesh's material."""
     (key,) = vars(mesh.material).keys() & {"base_color", "reflectance"}
     return getattr(mesh.material, key)
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="the real files are not here")
 @pytest.mark.parametrize("name", ["BoxTextured.glb", "Duck.glb", "fuze.obj"])
-@pytest.mark.filterwarnings("ignore:.*not honoured")
+@pytest.mark.filterwarnings("ignore:.*not honored")
 def test_textures_of_real_files(name):
     scene = load(DATA / name)
     with warnings.catch_warnings():

@@ -12,8 +12,8 @@ from wavefront.bsdfs import Dielectric, Diffuse, Principled
 from wavefront.errors import SceneError
 from wavefront.io import appearance
 from wavefront.io.load import from_trimesh, load_meshes
-from wavefront.relief import BumpMap, NormalMap
-from wavefront.textures import Texture
+from wavefront.textures.image import Texture
+from wavefront.textures.normal_map import BumpMap, NormalMap
 
 CODES = np.random.default_rng(0).integers(0, 256, (4, 8, 3), np.uint8)
 POINTS = np.random.default_rng(1).random((2, 40), np.float32)
@@ -87,10 +87,10 @@ def test_options_place_the_image(one):
 
 def test_options_without_effect_are_named(one):
     with pytest.warns(
-        UserWarning, match=r"not honoured: -blendu of map_Kd \(material 'm'\), -texres of map_Kd"
+        UserWarning, match=r"not honored: -blendu of map_Kd \(material 'm'\), -texres of map_Kd"
     ):
         assert same(one("map_Kd -blendu off -texres 512 t.png").material.reflectance)
-    with pytest.warns(UserWarning, match="not honoured: -imfchan of map_Kd"):
+    with pytest.warns(UserWarning, match="not honored: -imfchan of map_Kd"):
         assert same(one("map_Kd -imfchan r t.png").material.reflectance)
 
 
@@ -170,20 +170,20 @@ def test_pbr_maps(given):
     "lines", [["Kd 1 0 0"], ["Pr 0.3", "Pm 1"], ["illum 7", "Ni 1.5"], ["illum 3", "Ks 1 1 1"]]
 )
 def test_norm_is_a_normal_map_of_any_material(one, lines):
-    relief = one(*lines, "norm -bm 0.5 -s 2 2 t.png").material.relief
-    assert isinstance(relief, NormalMap)
-    assert relief.strength == 0.5
-    assert same(relief.texture, srgb=False, transform=np.diag([2.0, 2, 1]))
-    assert one(*lines).material.relief is None
+    normal_map = one(*lines, "norm -bm 0.5 -s 2 2 t.png").material.normal_map
+    assert isinstance(normal_map, NormalMap)
+    assert normal_map.strength == 0.5
+    assert same(normal_map.texture, srgb=False, transform=np.diag([2.0, 2, 1]))
+    assert one(*lines).material.normal_map is None
 
 
 @pytest.mark.parametrize("keyword", ["bump", "map_bump", "map_Bump"])
 def test_bump_is_a_map_of_heights(one, keyword):
-    relief = one(f"{keyword} -bm 0.2 -mm 0.1 2 t.png").material.relief
-    assert isinstance(relief, BumpMap)
-    assert relief.height == np.float32(0.2)
-    assert same(relief.texture, srgb=False, channel="luminance", scale=2, offset=0.1)
-    chosen = one(f"{keyword} -imfchan g t.png").material.relief
+    normal_map = one(f"{keyword} -bm 0.2 -mm 0.1 2 t.png").material.normal_map
+    assert isinstance(normal_map, BumpMap)
+    assert normal_map.height == np.float32(0.2)
+    assert same(normal_map.texture, srgb=False, channel="luminance", scale=2, offset=0.1)
+    chosen = one(f"{keyword} -imfchan g t.png").material.normal_map
     assert chosen.height == 1
     assert same(chosen.texture, srgb=False, channel=1)
 
@@ -191,12 +191,12 @@ def test_bump_is_a_map_of_heights(one, keyword):
 def test_a_bump_map_that_looks_like_normals_is_one(one, tmp_path):
     codes = np.random.default_rng(1).normal([128, 128, 240], 8, (16, 16, 3)).clip(0, 255).astype(np.uint8)
     iio.imwrite(tmp_path / "n.png", codes)
-    relief = one("map_Bump -bm 0.7 n.png").material.relief
-    assert isinstance(relief, NormalMap)
-    assert relief.strength == np.float32(0.7)
-    assert isinstance(one("map_Bump -imfchan b n.png").material.relief, BumpMap)
+    normal_map = one("map_Bump -bm 0.7 n.png").material.normal_map
+    assert isinstance(normal_map, NormalMap)
+    assert normal_map.strength == np.float32(0.7)
+    assert isinstance(one("map_Bump -imfchan b n.png").material.normal_map, BumpMap)
     iio.imwrite(tmp_path / "n.png", codes[..., 2])
-    assert isinstance(one("map_Bump n.png").material.relief, BumpMap)
+    assert isinstance(one("map_Bump n.png").material.normal_map, BumpMap)
 
 
 @pytest.mark.parametrize(
@@ -213,7 +213,7 @@ def test_defects_of_reliefs(one, line, message):
         one(line)
 
 
-@pytest.mark.filterwarnings(r"ignore:.*s\.mtl. not honoured")
+@pytest.mark.filterwarnings(r"ignore:.*s\.mtl. not honored")
 @pytest.mark.parametrize(
     "line", ["map_Pr t.png", "map_Ke t.png", "map_d t.png", "norm t.png", "map_Bump t.png"]
 )
@@ -221,7 +221,7 @@ def test_images_that_trimesh_leaves_out_are_named(one, tmp_path, monkeypatch, li
     one("Kd 1 0.5 0", "map_Kd t.png", line)
     monkeypatch.chdir(tmp_path)  # where t.png is: it is not looked for
     held = trimesh.load(tmp_path / "a.obj", process=False)
-    with pytest.warns(UserWarning, match=f"not honoured: {line.split()[0].lower()}"):
+    with pytest.warns(UserWarning, match=f"not honored: {line.split()[0].lower()}"):
         (mesh,) = from_trimesh(held).shapes
     assert isinstance(mesh.material, Diffuse)
     assert mesh.emission is None
@@ -229,8 +229,8 @@ def test_images_that_trimesh_leaves_out_are_named(one, tmp_path, monkeypatch, li
 
 def test_roughness_0_is_kept_and_absent_roughness_is_matte(given):
     assert given("Pr 0")["roughness"] == 0
-    matte = given("Ps 0.5")
-    assert (matte["roughness"], matte["specular"]) == (1, 0)
+    view_independent = given("Ps 0.5")
+    assert (view_independent["roughness"], view_independent["specular"]) == (1, 0)
 
 
 @pytest.mark.parametrize("illum", [(), ("illum 2",)])
@@ -345,11 +345,11 @@ def test_map_ke(one):
         (["anisor 0.5"], "anisor"),
     ],
 )
-def test_what_is_not_honoured_is_named(one, lines, named):
-    with pytest.warns(UserWarning, match=rf"s\.mtl: not honoured: {named} \(material 'm'\)$") as record:
+def test_what_is_not_honored_is_named(one, lines, named):
+    with pytest.warns(UserWarning, match=rf"s\.mtl: not honored: {named} \(material 'm'\)$") as record:
         one("Kd 0.5 0.5 0.5", *lines)
     assert len(record) == 1
-    with pytest.raises(SceneError, match="not honoured"):
+    with pytest.raises(SceneError, match="not honored"):
         one("Kd 0.5 0.5 0.5", *lines, strict=True)
 
 

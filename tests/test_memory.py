@@ -12,14 +12,14 @@ import scenes
 import wavefront as wf
 from wavefront.film import Film
 from wavefront.memory import available_memory, check_memory
-from wavefront.work import FILM_BYTES, PICTURE_BYTES, Tally
+from wavefront.scheduling.jobs import FILM_BYTES, PICTURE_BYTES, Tally
 
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of Linux")
 
 LIMITED = """
 import resource, sys
 import wavefront as wf
-import wavefront.processes
+import wavefront.scheduling.processes
 mesh = wf.Mesh(*{mesh})
 camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), size=(96, 96))
 scene = wf.Scene([mesh, wf.Sphere((0, -100, 0), 99)], [wf.Environment(1.0)], camera)

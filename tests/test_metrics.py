@@ -7,7 +7,8 @@ import pytest
 
 import wavefront as wf
 from wavefront.cli import main
-from wavefront.io.images import linear_to_srgb, write_image
+from wavefront.codecs.encoding import linear_to_srgb
+from wavefront.codecs.images import write_image
 
 A = np.array([[[1.0, 2, 3], [1, 2, 3]], [[0, 0, 0], [4, 0, 1]]])
 B = np.array([[[1.0, 2, 3], [2, 2, 3]], [[0, 0, 0], [2, 0, 0]]])
@@ -66,8 +67,8 @@ def test_pngs_are_decoded(tmp_path) -> None:
     a = noisy(1)
     wf.Image(a).save(tmp_path / "a.png", gamma="srgb")
     assert wf.compare(tmp_path / "a.png", a).rmse < 0.004
-    grey = wf.compare(a[..., 0], a[..., :1].repeat(3, 2))
-    assert grey.rmse == 0
+    gray = wf.compare(a[..., 0], a[..., :1].repeat(3, 2))
+    assert gray.rmse == 0
 
 
 def test_flip_of_two_pngs_is_that_of_their_codes(tmp_path) -> None:

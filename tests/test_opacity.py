@@ -11,8 +11,8 @@ import wavefront as wf
 from wavefront.accel import make_accelerator
 from wavefront.accel.embree import installed
 from wavefront.bsdfs import Principled
+from wavefront.compile.scene import compile_scene
 from wavefront.sampling import sampler
-from wavefront.scene import compile_scene
 
 NO_EMBREE = pytest.mark.skipif(not installed(), reason="no embreex")
 ACCELERATORS = ["numpy", pytest.param("embree", marks=NO_EMBREE)]
@@ -165,7 +165,7 @@ def test_a_lamp_that_is_partly_there(integrator: str) -> None:
 
 
 def test_absorption_goes_on_behind_holes() -> None:
-    """What enters coloured glass where its surface is not there is weakened like the rest."""
+    """What enters colored glass where its surface is not there is weakened like the rest."""
     glass = wf.Dielectric(1.0, absorption=(0.2, 1.0, 3.0)).with_alpha(0.5)
     plate = [
         wf.Rectangle((-50, 1, -50), (0, 0, 100), (100, 0, 0), material=glass),
@@ -240,7 +240,7 @@ def test_what_is_all_there_costs_nothing() -> None:
     for material in (wf.Principled(0.5, alpha=1.0), wf.Diffuse(0.5).with_alpha(1.0)):
         assert material.opacity is None
         compiled = compile_scene(lit(wf.Sphere(HERE, 0.1, material=material)), numpy)
-        assert compiled.opacities is compiled.uneven is None
+        assert compiled.opacities is compiled.textured_emission is None
     plain, clear = wf.Diffuse(0.5), wf.Diffuse(0.2).with_alpha(0.5)
     balls = [wf.Sphere((x, 5, 0), 0.1, material=m) for x, m in enumerate((plain, clear, wf.Diffuse(0.1)))]
     assert len(compile_scene(lit(*balls), numpy).materials.groups) == 1
@@ -300,7 +300,7 @@ def test_mtl(tmp_path, lines: str, clear: float) -> None:
         (lambda: wf.Mirror().with_alpha(0.5, cutoff=-1), r"Mirror alpha_cutoff is -1; it must be at least 0"),
         (
             lambda: wf.Diffuse(0.5).with_alpha(wf.Texture(np.ones((2, 2, 4), np.float32))),
-            r"Diffuse alpha is <Texture 'array': 2 × 2>, which gives colours; choose one channel by channel=",
+            r"Diffuse alpha is <Texture 'array': 2 × 2>, which gives colors; choose one channel by channel=",
         ),
         (
             lambda: wf.Mix(wf.Diffuse(0.5), wf.Diffuse(0.1).with_alpha(0.5)),

@@ -19,17 +19,17 @@ import scenes
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import wavefront as wf
-from wavefront.parallel import MIN_PATHS, Workers, choose_executor, worker_count
-from wavefront.shared import STOP, SharedNumber, Stopped
+from wavefront.scheduling.executors import MIN_PATHS, Workers, choose_executor, worker_count
+from wavefront.scheduling.shared import STOP, SharedNumber, Stopped
 
 LINUX = sys.platform.startswith("linux")
 EXECUTORS = ["threads", pytest.param("processes", marks=pytest.mark.skipif(not LINUX, reason="needs fork"))]
 processes = pytest.mark.skipif(not LINUX, reason="needs fork")
 
 
-def run(work: Callable[[int], int], pieces: range, workers: int, executor: str) -> list[tuple[int, int]]:
+def run(work: Callable[[int], int], jobs: range, workers: int, executor: str) -> list[tuple[int, int]]:
     with Workers(work, workers, executor) as crew:
-        return list(crew.run(pieces))
+        return list(crew.run(jobs))
 
 
 @pytest.mark.parametrize("executor", EXECUTORS)
@@ -37,9 +37,9 @@ def run(work: Callable[[int], int], pieces: range, workers: int, executor: str) 
 def test_results_come_in_order(workers: int, executor: str) -> None:
     """However long each piece takes."""
 
-    def work(piece: int) -> int:
-        time.sleep(0.003 * (piece % 3))
-        return piece * piece
+    def work(job: int) -> int:
+        time.sleep(0.003 * (job % 3))
+        return job * job
 
     assert run(work, range(20), workers, executor) == [(k, k * k) for k in range(20)]
 
@@ -57,13 +57,13 @@ def test_few_pieces_are_taken_ahead(executor: str) -> None:
     """A generator of a million pieces is not drained before the first result is used."""
     taken = []
 
-    def pieces() -> Iterator[int]:
+    def jobs() -> Iterator[int]:
         for k in range(1_000_000):
             taken.append(k)
             yield k
 
     with Workers(abs, 2, executor) as crew:
-        assert next(crew.run(pieces())) == (0, 0)
+        assert next(crew.run(jobs())) == (0, 0)
         assert len(taken) <= 6
 
 
@@ -71,10 +71,10 @@ def test_few_pieces_are_taken_ahead(executor: str) -> None:
 def test_an_error_in_a_piece_reaches_the_caller(executor: str) -> None:
     """As it was raised."""
 
-    def work(piece: int) -> int:
-        if piece == 3:
+    def work(job: int) -> int:
+        if job == 3:
             raise ValueError("piece 3 failed")
-        return piece
+        return job
 
     with pytest.raises(ValueError, match="piece 3 failed"):
         run(work, range(10), 2, executor)
@@ -104,14 +104,14 @@ def test_processes_are_processes() -> None:
 def test_pieces_of_a_process_that_dies_are_done_again(tmp_path: Path) -> None:
     """By new ones; nothing is missing."""
 
-    def work(piece: int) -> int:
-        if piece in (4, 11):
+    def work(job: int) -> int:
+        if job in (4, 11):
             try:
-                (tmp_path / str(piece)).touch(exist_ok=False)
+                (tmp_path / str(job)).touch(exist_ok=False)
             except FileExistsError:
-                return piece
+                return job
             os.kill(os.getpid(), signal.SIGKILL)
-        return piece
+        return job
 
     assert run(work, range(20), 2, "processes") == [(k, k) for k in range(20)]
 
@@ -120,10 +120,10 @@ def test_pieces_of_a_process_that_dies_are_done_again(tmp_path: Path) -> None:
 def test_processes_that_die_again_and_again_are_an_error() -> None:
     """It names the piece."""
 
-    def work(piece: int) -> int:
-        if piece == 5:
+    def work(job: int) -> int:
+        if job == 5:
             os.kill(os.getpid(), signal.SIGKILL)
-        return piece
+        return job
 
     with pytest.raises(wf.RenderError, match=r"worker processes died 3 times, at last with \d .*memory"):
         run(work, range(8), 2, "processes")
@@ -134,9 +134,9 @@ def test_processes_that_die_again_and_again_are_an_error() -> None:
 def test_ctrl_c_reaches_the_parent_alone() -> None:
     """A terminal sends it to all; workers finish what they do."""
 
-    def work(piece: int) -> int:
+    def work(job: int) -> int:
         os.kill(os.getpid(), signal.SIGINT)
-        return piece
+        return job
 
     assert run(work, range(6), 2, "processes") == [(k, k) for k in range(6)]
 
@@ -146,7 +146,7 @@ def test_workers_end_with_their_parent(tmp_path: Path) -> None:
     """Even if it is killed."""
     script = (
         "import os, sys, time\n"
-        "from wavefront.parallel import Workers\n"
+        "from wavefront.scheduling.executors import Workers\n"
         "with Workers(lambda k: time.sleep(0.2) or os.getpid(), 2, 'processes') as crew:\n"
         "    for _, pid in crew.run(range(1000)):\n"
         "        print(pid, flush=True)\n"
@@ -188,14 +188,14 @@ def test_bad_worker_counts_are_named(workers: object) -> None:
 def test_a_process_that_is_killed_while_it_writes_is_no_obstacle() -> None:
     """The reader would wait for the rest of the result for ever."""
 
-    def work(piece: int) -> int:
+    def work(job: int) -> int:
         def send_half(connection: Connection, message: bytes) -> None:
             os.write(connection.fileno(), message[: len(message) // 2])
             os.kill(os.getpid(), signal.SIGSTOP)
 
-        if piece:
+        if job:
             Connection._send = send_half  # type: ignore[attr-defined]
-        return piece
+        return job
 
     begin = time.monotonic()
     with Workers(work, 1, "processes") as crew:
@@ -212,10 +212,10 @@ def test_a_stop_ends_a_run(executor: str) -> None:
     """Pieces that have not begun are not done; those under way may look, and stop too."""
     stop = SharedNumber()
 
-    def work(piece: int) -> int:
-        while piece > 0 and not stop.value:
+    def work(job: int) -> int:
+        while job > 0 and not stop.value:
             time.sleep(0.01)
-        return piece
+        return job
 
     with Workers(work, 2, executor, stop) as crew:
         results = crew.run(range(100), lambda: stop.rise_to(STOP))

@@ -150,7 +150,7 @@ def test_a_lens_is_refused_or_undone_everywhere(numbers: tuple, half: float) -> 
     assert lens.invertible(u, v).all()
 
 
-def test_undoing_does_not_depend_on_neighbours() -> None:
+def test_undoing_does_not_depend_on_neighbors() -> None:
     """The same bits alone as among others."""
     lens = Distortion(LENSES["wide"])
     x, y = np.random.default_rng(0).uniform(-0.5, 0.5, (2, 100))

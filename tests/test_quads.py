@@ -13,7 +13,7 @@ from test_accel import PLACES, aimed_rays, brute_force, check_batches, geometry,
 import wavefront as wf
 from wavefront.accel import Accelerator, Geometry, make_accelerator
 from wavefront.accel.quads import are_parallelograms, corners, find_quads
-from wavefront.scene import compile_scene
+from wavefront.compile.scene import compile_scene
 
 f4 = np.float32
 SQUARE = np.array([(0.0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
@@ -103,8 +103,8 @@ def test_no_ray_escapes_a_box(seed: int, scale: float, offset: float) -> None:
     triangles = (box((1, 0.8, 1.2), seed) * scale + offset).astype(f4)
     origin, direction = aimed_rays(triangles.astype(float), 30_000, 1)
     target = origin + direction
-    centre = triangles.mean((0, 1), dtype=float)[:, None]
-    origin = ((origin - centre) * 0.5 + centre).astype(f4)  # within the box
+    center = triangles.mean((0, 1), dtype=float)[:, None]
+    origin = ((origin - center) * 0.5 + center).astype(f4)  # within the box
     hits = make_accelerator(geometry(triangles), "numpy").closest(origin, target - origin, nothing(30_000))
     assert (hits.prim < 0).sum() == 0
 
@@ -150,15 +150,15 @@ def test_halves_are_told_apart_unless_they_look_alike() -> None:
     triangles = trapezoids(12, 5)
     rays = *random_rays(2000, 6), nothing(2000)
     both = make_accelerator(geometry(triangles), "numpy").closest(*rays)
-    alike = np.zeros(24, bool)
-    alike[[0, 1, 2, 8, 9, 22]] = True  # four quadrilaterals, and what lies between two of them
-    some = make_accelerator(replace(geometry(triangles), alike=alike), "numpy").closest(*rays)
+    broadcast = np.zeros(24, bool)
+    broadcast[[0, 1, 2, 8, 9, 22]] = True  # four quadrilaterals, and what lies between two of them
+    some = make_accelerator(replace(geometry(triangles), broadcast=broadcast), "numpy").closest(*rays)
     one = np.isin(both.prim, [1, 3, 9, 23])
     assert one.sum() > 20
     assert (both.prim % 2 == 1)[~one].sum() > 20
     np.testing.assert_array_equal(some.prim, both.prim - one)
-    alike[:] = True
-    every = make_accelerator(replace(geometry(triangles), alike=alike), "numpy").closest(*rays)
+    broadcast[:] = True
+    every = make_accelerator(replace(geometry(triangles), broadcast=broadcast), "numpy").closest(*rays)
     np.testing.assert_array_equal(every.prim, np.where(both.prim < 0, -1, both.prim // 2 * 2))
     np.testing.assert_array_equal(some.t, both.t)
     np.testing.assert_array_equal(every.t, both.t)
@@ -173,20 +173,20 @@ def alike_in(scene: wf.Scene) -> list[bool] | None:
         return make_accelerator(given, "numpy")
 
     compile_scene(scene, build)
-    return None if seen[0].alike is None else seen[0].alike.tolist()
+    return None if seen[0].broadcast is None else seen[0].broadcast.tolist()
 
 
 def test_triangles_look_alike_by_material_and_light_where_nothing_varies() -> None:
     """Halves of a lamp that are two lights are told apart, and all where normals or textures vary."""
-    grey, dark = wf.Diffuse(0.5), wf.Diffuse(0.1)
+    gray, dark = wf.Diffuse(0.5), wf.Diffuse(0.1)
     square = SQUARE, [(0, 1, 2), (0, 2, 3)]
     kite = SQUARE * (1, 1, 1) + [(0, 0, 1), (0, 0, 1), (1, 1, 1), (0, 0, 1)], square[1]
-    floor, wall = wf.Mesh(*square, material=grey), wf.Mesh(*kite, material=dark)
+    floor, wall = wf.Mesh(*square, material=gray), wf.Mesh(*kite, material=dark)
     lamp = wf.Rectangle((0, 0, 2), (1, 0, 0), (0, 1, 0), emission=1)
-    uneven = wf.Mesh(kite[0] + (0, 0, 3), square[1], emission=1)
-    assert alike_in(wf.Scene([floor, wall, lamp, uneven])) == [True, False] * 3 + [False, False]
-    assert alike_in(wf.Scene([floor, wf.Mesh(*kite, material=grey), lamp]))[:4] == [True] * 3 + [False]
-    smooth = wf.Mesh(*square, normals=np.tile((0.0, 0, 1), (4, 1)), material=grey)
+    textured_emission = wf.Mesh(kite[0] + (0, 0, 3), square[1], emission=1)
+    assert alike_in(wf.Scene([floor, wall, lamp, textured_emission])) == [True, False] * 3 + [False, False]
+    assert alike_in(wf.Scene([floor, wf.Mesh(*kite, material=gray), lamp]))[:4] == [True] * 3 + [False]
+    smooth = wf.Mesh(*square, normals=np.tile((0.0, 0, 1), (4, 1)), material=gray)
     assert alike_in(wf.Scene([smooth, wall, lamp])) is None
 
 
@@ -195,8 +195,8 @@ def test_neither_half_is_hit_by_a_ray_that_leaves_the_other() -> None:
     accelerator = make_accelerator(geometry(fan(SQUARE, SQUARE + np.array((0, 0, 1)))), "numpy")
     origin = np.array([[0.7, 0.3, -1], [0.3, 0.7, -1]], f4).T.copy()
     direction = np.array([[0, 0, 1.0]] * 2, f4).T.copy()
-    for leaving in (0, 1):
-        hits = accelerator.closest(origin, direction, np.full(2, leaving))
+    for exclude_prim in (0, 1):
+        hits = accelerator.closest(origin, direction, np.full(2, exclude_prim))
         np.testing.assert_array_equal(hits.prim, [2, 3])
     np.testing.assert_array_equal(accelerator.closest(origin, direction, nothing(2)).prim, [0, 1])
     np.testing.assert_array_equal(accelerator.closest(origin, direction, np.full(2, 2)).prim, [0, 1])

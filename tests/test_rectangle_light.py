@@ -5,8 +5,8 @@ import pytest
 
 import wavefront as wf
 from wavefront.accel import make_accelerator
+from wavefront.compile.scene import compile_scene
 from wavefront.lights import RectangleLights, TriangleLights, TwoSidedRectangleLights, first_of_pairs
-from wavefront.scene import compile_scene
 from wavefront.vec import f4
 
 WHITE = np.ones((3, 1), f4)

@@ -105,9 +105,9 @@ def test_field_of_view(integrator: str) -> None:
     camera = wf.Camera.look_at((0, 0, 0), (0, 0, -1), fov=90, size=(10, 10))
     runs = repeat(wf.Scene([light], camera=camera), 64, integrator=integrator, max_bounces=0)
     assert_mean(Mean.of(runs.mean((1, 2, 3))), 0.25, 0.001)
-    inside = np.zeros((10, 10), bool)
-    inside[3:7, 3:7] = True
-    assert (runs[:, inside] == 1).all()
+    back_facing = np.zeros((10, 10), bool)
+    back_facing[3:7, 3:7] = True
+    assert (runs[:, back_facing] == 1).all()
     assert (runs[:, [0, 1, 8, 9]] == 0).all()
 
 

@@ -10,11 +10,10 @@ from significance import Mean, render
 
 import wavefront as wf
 from wavefront.accel import make_accelerator
-from wavefront.integrators import tilt
-from wavefront.scene import compile_scene
+from wavefront.compile.scene import compile_scene
+from wavefront.stages.interaction import interaction
 from wavefront.stages.intersect import intersect
-from wavefront.stages.relief import upright
-from wavefront.stages.surface import interact
+from wavefront.stages.normal_mapping import ensure_valid_reflection, perturb_normals
 from wavefront.state import Hits, Rays
 
 F4 = np.float32
@@ -35,18 +34,18 @@ def lean(code):
     return normal / np.linalg.norm(normal)
 
 
-def normals(shape, relief, origin=(0.3, 0.4, 5), direction=(0, 0, -1), n=1):
+def normals(shape, normal_map, origin=(0.3, 0.4, 5), direction=(0, 0, -1), n=1):
     """The geometric and the shading normals, (3,) each, where a ray meets a shape with a relief."""
-    shape.material = wf.Diffuse(0.5).with_relief(relief)
+    shape.material = wf.Diffuse(0.5).with_normal_map(normal_map)
     scene = wf.Scene(shape, lights=[wf.Environment(1.0)])
     compiled = compile_scene(scene, lambda geometry: make_accelerator(geometry, "numpy"))
-    o = np.repeat((np.array(origin) - compiled.centre).astype(F4).reshape(3, 1), n, 1)
+    o = np.repeat((np.array(origin) - compiled.center).astype(F4).reshape(3, 1), n, 1)
     d = np.repeat(np.array(direction, F4).reshape(3, 1), n, 1)
     hit = compiled.accelerator.closest(o, d, np.full(n, -1))
     assert (hit.prim >= 0).all()
     rays = SimpleNamespace(origin=o, direction=d)
-    surface = interact(compiled, rays, Hits(hit.t, hit.prim, hit.b1, hit.b2))
-    tilt(compiled, surface)
+    surface = interaction(compiled, rays, Hits(hit.t, hit.prim, hit.b1, hit.b2))
+    perturb_normals(compiled, surface)
     return surface.ng[:, 0], surface.ns[:, 0]
 
 
@@ -121,7 +120,7 @@ def test_tangents_move_with_their_mesh(matrix, shared):
     """A mirrored mesh shows the mirrored relief, shared or as a mesh of its own."""
     along, across = np.array([0.6, 0.8, 0]), np.array([0.8, -0.6, 0])
     mesh = square(normals=[[0, 0, 1]] * 4, tangents=[[*along, -1]] * 4)
-    mesh.material = wf.Diffuse(0.5).with_relief(wf.NormalMap(texel(TILT)))
+    mesh.material = wf.Diffuse(0.5).with_normal_map(wf.NormalMap(texel(TILT)))
     place = np.eye(4)
     place[:3, :3] = matrix
     other = np.eye(4)
@@ -132,11 +131,11 @@ def test_tangents_move_with_their_mesh(matrix, shared):
         scene, lambda geometry: make_accelerator(geometry, "numpy"), most_copies=0 if shared else 1000
     )
     assert (compiled.instances is not None) == shared
-    o = (matrix @ np.array([0.5, 0.4, 0]) + np.array([0, 0, 5]) - compiled.centre).astype(F4).reshape(3, 1)
+    o = (matrix @ np.array([0.5, 0.4, 0]) + np.array([0, 0, 5]) - compiled.center).astype(F4).reshape(3, 1)
     d = np.array([[0], [0], [-1]], F4)
     hits = intersect(compiled, Rays(o, d, np.full(1, -1)))
-    surface = interact(compiled, Rays(o, d, np.full(1, -1)), hits)
-    tilt(compiled, surface)
+    surface = interaction(compiled, Rays(o, d, np.full(1, -1)), hits)
+    perturb_normals(compiled, surface)
     moved = [np.asarray(matrix) @ axis for axis in (along, across)]
     red = moved[0] / np.linalg.norm(moved[0])
     green = np.cross([0, 0, 1], red)
@@ -181,8 +180,8 @@ def test_tangents_are_shared_around_a_smooth_vertex():
     tube = wf.Mesh(vertices, faces, uvs=uvs, normals=np.vstack([ring, ring]))
     flat = wf.Mesh(vertices, faces, uvs=uvs)
     ray = (3.0, 0.1, 3.02), (-(0.5**0.5), 0, -(0.5**0.5))  # close to the edge at 45°
-    relief = wf.NormalMap(texel([0.6, 0.5, 1]))
-    (_, smooth), (_, edgy) = normals(tube, relief, *ray), normals(flat, relief, *ray)
+    normal_map = wf.NormalMap(texel([0.6, 0.5, 1]))
+    (_, smooth), (_, edgy) = normals(tube, normal_map, *ray), normals(flat, normal_map, *ray)
     lean_angle = np.arctan2(0.2, 1)
     assert np.arctan2(smooth[0], smooth[2]) == pytest.approx(np.pi / 4 + lean_angle, abs=0.03)
     assert np.arctan2(edgy[0], edgy[2]) == pytest.approx(np.pi / 8 + lean_angle, abs=0.001)
@@ -211,8 +210,8 @@ def test_a_bump_map_is_the_surface_that_it_shows(wrap, place):
     for height in (1.0, -0.5):
         expected = np.array([-0.3 * height, -0.5 * height, 1])
         expected /= np.linalg.norm(expected)
-        relief = wf.BumpMap(wf.Texture(ramp, srgb=False, channel=0, wrap=wrap), height)
-        assert normals(square(), relief, place)[1] == pytest.approx(expected, abs=1e-4)
+        normal_map = wf.BumpMap(wf.Texture(ramp, srgb=False, channel=0, wrap=wrap), height)
+        assert normals(square(), normal_map, place)[1] == pytest.approx(expected, abs=1e-4)
     # twice as large a surface under the same picture is half as steep
     large = wf.Mesh(np.column_stack([2 * CORNERS, np.zeros(4)]), FACES, uvs=CORNERS)
     _, ns = normals(large, wf.BumpMap(ramp), (2 * place[0], 2 * place[1], 5))
@@ -261,11 +260,11 @@ def test_the_gradient_is_the_slope_of_the_lookup(seed, wrap):
 # ---- a flat relief is none ----------------------------------------------------------------------
 
 
-def hall(relief=None, seen=(2.0, 1.4, 3.0)):
+def hall(normal_map=None, seen=(2.0, 1.4, 3.0)):
     """A smooth ball, an analytic one and a floor, with metal, glass and matte materials."""
     materials = [wf.Conductor.named("gold", roughness=0.3), wf.Dielectric(1.5), wf.OrenNayar(0.7)]
-    if relief is not None:
-        materials = [material.with_relief(relief) for material in materials]
+    if normal_map is not None:
+        materials = [material.with_normal_map(normal_map) for material in materials]
     turn = np.linspace(0, 2 * np.pi, 17)
     up = np.linspace(0.02, np.pi - 0.02, 9)
     a, b = np.meshgrid(turn, up)
@@ -282,7 +281,7 @@ def hall(relief=None, seen=(2.0, 1.4, 3.0)):
 
 
 @pytest.mark.parametrize(
-    "relief",
+    "normal_map",
     [
         wf.NormalMap(np.broadcast_to(FLAT.astype(F4), (4, 4, 3))),
         wf.NormalMap(texel(TILT), strength=0),
@@ -291,9 +290,9 @@ def hall(relief=None, seen=(2.0, 1.4, 3.0)):
     ],
     ids=["normals", "strength 0", "heights", "height 0"],
 )
-def test_a_flat_relief_changes_no_bit(relief):
+def test_a_flat_relief_changes_no_bit(normal_map):
     plain = render(hall(), 4).rgb
-    assert np.array_equal(render(hall(relief), 4).rgb, plain)
+    assert np.array_equal(render(hall(normal_map), 4).rgb, plain)
 
 
 def test_a_flat_8_bit_normal_map_changes_little():
@@ -313,13 +312,13 @@ def test_a_face_without_area_in_its_coordinates_keeps_its_normal():
 
 
 def test_wave_size_and_workers_change_no_bit():
-    relief = wf.NormalMap(np.random.default_rng(0).random((16, 16, 3), F4) * [1, 1, 0.5] + [0, 0, 0.5])
-    scene = hall(relief)
+    normal_map = wf.NormalMap(np.random.default_rng(0).random((16, 16, 3), F4) * [1, 1, 0.5] + [0, 0, 0.5])
+    scene = hall(normal_map)
     whole = render(scene, 4).rgb
     assert np.array_equal(whole, render(scene, 4, workers=3).rgb)
     bumpy = hall(wf.BumpMap(np.random.default_rng(0).random((16, 16), F4), 0.1))
-    one = normals(bumpy.shapes[1], bumpy.shapes[1].material.relief, (2.3, 0.2, 5))[1]
-    many = normals(bumpy.shapes[1], bumpy.shapes[1].material.relief, (2.3, 0.2, 5), n=1000)[1]
+    one = normals(bumpy.shapes[1], bumpy.shapes[1].material.normal_map, (2.3, 0.2, 5))[1]
+    many = normals(bumpy.shapes[1], bumpy.shapes[1].material.normal_map, (2.3, 0.2, 5), n=1000)[1]
     assert np.array_equal(one, many)
 
 
@@ -349,11 +348,13 @@ MATERIALS = [
 ]
 
 
-@pytest.mark.parametrize("relief", [STRONG, STEEP], ids=["normals", "heights"])
+@pytest.mark.parametrize("normal_map", [STRONG, STEEP], ids=["normals", "heights"])
 @pytest.mark.parametrize("material", MATERIALS, ids=lambda m: type(m).__name__)
 @pytest.mark.parametrize("angle", [0.0, 1.0, 1.5])
-def test_a_white_furnace_gains_nothing(material, relief, angle):
-    mean = Mean.of(furnace(material.with_relief(relief), angle).reshape(-1, 3).mean(1, dtype=np.float64))
+def test_a_white_furnace_gains_nothing(material, normal_map, angle):
+    mean = Mean.of(
+        furnace(material.with_normal_map(normal_map), angle).reshape(-1, 3).mean(1, dtype=np.float64)
+    )
     assert mean.error < 0.01
     assert mean.value - 4 * mean.error <= 1 + 1e-5
     assert mean.value > 0.4  # and is not black
@@ -363,7 +364,7 @@ def test_a_matte_tilted_patch_loses_what_lies_below():
     """A normal that leans by θ loses (1 - cosθ)/2 of its light to the side below the surface."""
     for code in ([0.65, 0.5, 1], [0.5, 0.85, 1]):
         cos = lean(code)[2]
-        image = furnace(wf.Diffuse(1.0).with_relief(wf.NormalMap(texel(code))))
+        image = furnace(wf.Diffuse(1.0).with_normal_map(wf.NormalMap(texel(code))))
         assert image.mean() == pytest.approx((1 + cos) / 2, abs=0.005)
 
 
@@ -373,14 +374,14 @@ def test_a_rough_metal_loses_what_docs_say(degrees, left):
     angle = np.radians(degrees)
     code = [0.5 + 0.5 * np.sin(angle), 0.5, 0.5 + 0.5 * np.cos(angle)]
     white = wf.Principled(1.0, metallic=1.0, roughness=0.3)
-    assert furnace(white.with_relief(wf.NormalMap(texel(code)))).mean() == pytest.approx(left, abs=0.008)
+    assert furnace(white.with_normal_map(wf.NormalMap(texel(code)))).mean() == pytest.approx(left, abs=0.008)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.8, 1.3, 1.55])
 def test_a_mirror_has_no_black_facets(angle):
     """However its normals lean, every ray finds the light."""
-    for relief in (STRONG, STEEP):
-        assert furnace(wf.Mirror(1.0).with_relief(relief), angle) == pytest.approx(1.0, rel=1e-5)
+    for normal_map in (STRONG, STEEP):
+        assert furnace(wf.Mirror(1.0).with_normal_map(normal_map), angle) == pytest.approx(1.0, rel=1e-5)
 
 
 @pytest.mark.filterwarnings("ignore:the picture is black")
@@ -389,7 +390,7 @@ def test_light_does_not_leak_from_behind():
     camera = wf.Camera.orthographic((0.5, 0.5, 3), (0.5, 0.5, 0), height=0.9, size=(16, 16))
     below = wf.PointLight((0.5, 0.5, -0.2), 5)
     for material in (wf.Diffuse(1.0), wf.Conductor.named("gold", 0.4)):
-        patch = square(material=material.with_relief(STRONG))
+        patch = square(material=material.with_normal_map(STRONG))
         assert render(wf.Scene([patch, lamp], [below], camera), 32).rgb.max() == 0
 
 
@@ -409,9 +410,9 @@ def on_side(wo, ng, least):
 
 def test_upright_normals_mirror_to_above_the_surface():
     n = 30_000
-    ng, tilted = directions(n, 0), directions(n, 1)
+    ng, perturbed = directions(n, 0), directions(n, 1)
     wo = on_side(directions(n, 2), ng, 1e-7)
-    ns = upright(wo, ng, ng.copy(), tilted.copy())
+    ns = ensure_valid_reflection(wo, ng, ng.copy(), perturbed.copy())
     assert ns.dtype == F4
     assert np.linalg.norm(ns, axis=0) == pytest.approx(np.ones(n), abs=1e-4)
     assert ((ns * wo).sum(0) > 0).all()
@@ -433,9 +434,9 @@ def test_a_faint_relief_changes_little_where_normals_are_smooth():
     seen = (wo * smooth).sum(0) > 0.05
     below = 2 * (wo * smooth).sum(0) * (smooth * ng).sum(0) - (wo * ng).sum(0) < 0
     assert (seen & below).sum() > 300
-    tilted = smooth + F4(1e-3) * directions(n, 3)
-    tilted = (tilted / np.linalg.norm(tilted, axis=0)).astype(F4)
-    ns = upright(wo, ng, smooth, tilted.copy())
+    perturbed = smooth + F4(1e-3) * directions(n, 3)
+    perturbed = (perturbed / np.linalg.norm(perturbed, axis=0)).astype(F4)
+    ns = ensure_valid_reflection(wo, ng, smooth, perturbed.copy())
     assert np.abs(ns - smooth)[:, seen].max() < 0.03
 
 
@@ -463,7 +464,7 @@ def test_every_integrator_sees_the_same_relief():
             "NormalMap: .* is decoded from sRGB; pass srgb=False",
         ),
         (lambda: wf.BumpMap(wf.Texture(np.zeros((2, 2), np.uint8), channel=0)), "BumpMap: .* from sRGB"),
-        (lambda: wf.BumpMap(wf.Texture(np.zeros((2, 2, 3)))), "BumpMap: .* gives colours"),
+        (lambda: wf.BumpMap(wf.Texture(np.zeros((2, 2, 3)))), "BumpMap: .* gives colors"),
         (lambda: wf.NormalMap(texel(FLAT), np.inf), "NormalMap strength is inf; it must be finite"),
         (lambda: wf.BumpMap(texel(FLAT), "high"), "BumpMap height must be a number, got 'high'"),
         (
@@ -471,12 +472,12 @@ def test_every_integrator_sees_the_same_relief():
             "NormalMap: the transform of .* is singular; it must be invertible",
         ),
         (
-            lambda: wf.Diffuse(0.5).with_relief(wf.Texture(texel(FLAT))),
+            lambda: wf.Diffuse(0.5).with_normal_map(wf.Texture(texel(FLAT))),
             "relief must be a NormalMap or a Bump",
         ),
         (
-            lambda: wf.Mix(wf.Diffuse(0.5), wf.Mirror().with_relief(STEEP)),
-            "Mix second has a relief; give it to the Mix, by with_relief",
+            lambda: wf.Mix(wf.Diffuse(0.5), wf.Mirror().with_normal_map(STEEP)),
+            "Mix second has a relief; give it to the Mix, by with_normal_map",
         ),
     ],
 )
@@ -492,11 +493,11 @@ def test_a_mesh_without_coordinates_is_named():
     assert len(found) == 1
 
 
-def test_with_relief_leaves_the_material_alone():
+def test_with_normal_map_leaves_the_material_alone():
     plain = wf.Principled(0.5)
-    carved = plain.with_relief(STEEP)
-    assert plain.relief is None
-    assert carved.relief is STEEP
+    carved = plain.with_normal_map(STEEP)
+    assert plain.normal_map is None
+    assert carved.normal_map is STEEP
     assert type(carved) is wf.Principled
     assert repr(STRONG).startswith("NormalMap(<Texture 'array': 64 × 64>")
     assert repr(STEEP).startswith("BumpMap(")

@@ -83,7 +83,7 @@ def many_triangles_whole() -> bytes:
 @pytest.mark.parametrize("workers", [1, 2, 3, 8])
 @pytest.mark.parametrize("wave_size", [1, 7, 64, 4096, None])
 def test_a_mesh_has_the_same_bits_in_any_wave_on_any_worker(wave_size: int | None, workers: int) -> None:
-    """The tree sorts rays into blocks, and none of them sees its neighbours."""
+    """The tree sorts rays into blocks, and none of them sees its neighbors."""
     cut = {} if wave_size is None else {"wave_size": wave_size}
     executor = "processes" if workers == 2 and sys.platform == "linux" else "threads"
     image = render(many_triangles(), 2, accel="numpy", workers=workers, executor=executor, **cut)
@@ -198,7 +198,7 @@ def test_bad_arguments_are_named_before_any_work(change: dict, message: str, mon
     def work(*_):
         raise AssertionError("work began before the arguments were checked")
 
-    for name in ("as_scene", "compile_scene", "trace_piece"):
+    for name in ("as_scene", "compile_scene", "trace_job"):
         monkeypatch.setattr(render_module, name, work)
     with pytest.raises(wf.SceneError, match=message):
         wf.render(small(), **{"progress": False, **change})

@@ -201,7 +201,7 @@ def shifted(sampler: Sampler, pixel: int, sample: int, bounce: int, dimension: i
     "step",
     [(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1), (512, 0, 0, 0), (0, 0, 1, -1), (1, 0, 1, 1)],
 )
-def test_independent_neighbours_are_independent(step):
+def test_independent_neighbors_are_independent(step):
     """No correlation and a uniform joint histogram of each pair of coordinates."""
     sampler = IndependentSampler(6)
     here, there = shifted(sampler, 0, 0, 0, 0), shifted(sampler, *step)
@@ -328,7 +328,7 @@ def test_owen_scrambling_keeps_the_tree(a, b, seed):
 
 
 def test_owen_scrambling_flips_each_bit_half_of_the_time():
-    """Over seeds, every output bit of a given word is fair, and so is every pair of neighbours."""
+    """Over seeds, every output bit of a given word is fair, and so is every pair of neighbors."""
     seed = module._mix_words(np.arange(1 << 14, dtype=np.uint32), np.uint32(1), np.uint32(2))
     for word in (0, 1, 0xFFFFFFFF, 0x12345678):
         x = module._owen(np.full(len(seed), word, np.uint32), seed)
@@ -373,7 +373,7 @@ def test_sobol_error_falls_faster_than_independent():
 
 
 @pytest.mark.parametrize(("samples", "most"), [(1, 0.3), (4, 0.45)])
-def test_blue_noise_cancels_between_neighbours(samples, most):
+def test_blue_noise_cancels_between_neighbors(samples, most):
     """Averaged over 4 × 4 pixels the error of a smooth function is far below that of Sobol's, RMS."""
     side, error = 64, {}
     pixel = np.arange(side * side, dtype=np.uint32).repeat(samples)
@@ -389,7 +389,7 @@ def test_blue_noise_cancels_between_neighbours(samples, most):
 
 
 def test_blue_noise_has_no_stripes():
-    """Pairs of neighbours cancel as well one above the other as side by side."""
+    """Pairs of neighbors cancel as well one above the other as side by side."""
     side, squares = 64, {"across": [], "down": []}
     pixel, sample = np.arange(side * side, dtype=np.uint32), np.zeros(side * side, np.uint32)
     for seed in range(32):

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import wavefront as wf
-from wavefront.accel import choose
-from wavefront.scale import LARGEST, SMALLEST, length_factor, scaled_shapes
-from wavefront.scene import compile_scene
+from wavefront.accel import registry as choose
+from wavefront.compile.scale import LARGEST, SMALLEST, length_factor, scaled_shapes
+from wavefront.compile.scene import compile_scene
 
 SIDE = 12
 BUMPS = np.random.default_rng(1).random((8, 8))
@@ -26,7 +26,7 @@ def room(s: float, instances: float | None = None, projection: str = "lens") -> 
         return wf.Rectangle(*(np.array(x, float) * s for x in (corner, u, v)), **more)
 
     white = wf.Diffuse(0.7)
-    bumpy = wf.Diffuse(0.6).with_relief(wf.BumpMap(BUMPS, 0.05 * s))
+    bumpy = wf.Diffuse(0.6).with_normal_map(wf.BumpMap(BUMPS, 0.05 * s))
     glass = wf.Dielectric(1.5, absorption=(2 / s, 1 / s, 0.2 / s))
     leaf = wf.Principled(0.8, transmission=0.5, absorption=0.5 / s)
     shapes: list[Any] = [

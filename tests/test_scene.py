@@ -7,7 +7,8 @@ from significance import render
 
 import wavefront as wf
 from wavefront.accel import make_accelerator
-from wavefront.scene import compile_scene, group_materials
+from wavefront.compile.materials import group_materials
+from wavefront.compile.scene import compile_scene
 from wavefront.vec import f4
 
 NAN, INF = np.nan, np.inf
@@ -158,15 +159,15 @@ def test_primitives_know_their_material_and_light() -> None:
     assert scene.lights.delta_of.tolist() == [False, False, False, True, False]
 
 
-def test_positions_are_relative_to_the_centre() -> None:
+def test_positions_are_relative_to_the_center() -> None:
     """Subtracted before anything becomes float32."""
     near, far = wf.Mesh(**TRIANGLE), wf.Mesh(np.array(TRIANGLE["vertices"]) + 2.0**40, TRIANGLE["faces"])
     a, b = compiled(near, lights=[wf.Environment()]), compiled(far, lights=[wf.Environment()])
     assert a.radius == b.radius
-    assert (a.centre + 2.0**40 == b.centre).all()
+    assert (a.center + 2.0**40 == b.center).all()
 
 
-def test_plain_colours_are_one_group() -> None:
+def test_plain_colors_are_one_group() -> None:
     """Materials that differ in constants only are shaded together, each with its own values."""
     materials = [
         wf.Diffuse(0.1),
@@ -196,10 +197,10 @@ PAIRS = [
 ]
 
 
-@pytest.mark.parametrize(("red", "grey"), PAIRS, ids=lambda material: type(material).__name__)
-def test_grouping_changes_no_picture(red: wf.Bsdf, grey: wf.Bsdf) -> None:
+@pytest.mark.parametrize(("red", "gray"), PAIRS, ids=lambda material: type(material).__name__)
+def test_grouping_changes_no_picture(red: wf.Bsdf, gray: wf.Bsdf) -> None:
     """Two materials in one group look like two renders with one material each."""
-    assert len(group_materials([red, grey]).groups) == 1
+    assert len(group_materials([red, gray]).groups) == 1
     left, right = wf.Sphere((-1, 0, 0), 1), wf.Sphere((1, 0, 0), 1)
     camera = wf.Camera.look_at((0, 0, 6), (0, 0, 0), fov=30, size=(8, 4))
 
@@ -207,12 +208,12 @@ def test_grouping_changes_no_picture(red: wf.Bsdf, grey: wf.Bsdf) -> None:
         left.material, right.material = a, b
         return render(wf.Scene([left, right], [wf.Environment()], camera), 4, max_bounces=1).rgb
 
-    both = picture(red, grey)
+    both = picture(red, gray)
     assert both[:, :4].tobytes() == picture(red, red)[:, :4].tobytes()
-    assert both[:, 4:].tobytes() == picture(grey, grey)[:, 4:].tobytes()
+    assert both[:, 4:].tobytes() == picture(gray, gray)[:, 4:].tobytes()
 
 
-def test_shading_normals_are_normalised_and_zero_ones_replaced() -> None:
+def test_shading_normals_are_normalized_and_zero_ones_replaced() -> None:
     """A mesh may bring normals of any length; a zero one takes the face's."""
     mesh = wf.Mesh(**TRIANGLE, normals=[[0, 0, 5], [0, 3, 4], [0, 0, 0]])
     scene = compiled(mesh, lights=[wf.Environment()])
@@ -292,12 +293,14 @@ def test_which_lights_are_black() -> None:
     class Glitter(wf.Diffuse):
         pass
 
-    black, grey = wf.Diffuse(0), wf.Diffuse((0, 0.1, 0))
+    black, gray = wf.Diffuse(0), wf.Diffuse((0, 0.1, 0))
     painted = wf.Diffuse(wf.Texture(np.zeros((1, 1, 3))))
 
     def found(*materials: wf.Bsdf):
         lamps = [wf.Rectangle(**SQUARE, material=m, emission=1) for m in materials]
-        return compiled(*lamps, wf.Sphere(**BALL, material=black), lights=[wf.Environment()]).black_lights
+        return compiled(
+            *lamps, wf.Sphere(**BALL, material=black), lights=[wf.Environment()]
+        ).nonscattering_lights
 
-    assert found(grey, black, Glitter(0), Ink()).tolist() == [False, True, False, True, False]
-    assert found(grey, painted, Glitter(0)) is None
+    assert found(gray, black, Glitter(0), Ink()).tolist() == [False, True, False, True, False]
+    assert found(gray, painted, Glitter(0)) is None

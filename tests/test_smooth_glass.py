@@ -8,13 +8,13 @@ from significance import ALPHA, Mean, render
 
 import wavefront as wf
 from wavefront.accel import make_accelerator
+from wavefront.compile.scene import compile_scene
 from wavefront.sampling.sampler import make_sampler
-from wavefront.scene import compile_scene
 from wavefront.stages.bounce import bounce_sample
 from wavefront.stages.generate import generate
+from wavefront.stages.interaction import interaction
 from wavefront.stages.intersect import intersect
 from wavefront.stages.shade import shading
-from wavefront.stages.surface import interact
 
 CAMERA = wf.Camera.orthographic((0, 0.3, 5), (0, 0, 0), height=1.9, size=(24, 24))
 
@@ -70,8 +70,8 @@ def test_rough_glass_loses_no_more_than_on_a_sphere():
 
 def test_normal_mapped_glass_loses_no_light():
     lean = np.random.default_rng(1).uniform(-0.15, 0.15, (32, 32, 2))
-    relief = wf.NormalMap(np.concatenate([0.5 + lean, np.ones((32, 32, 1))], 2))
-    shape = wf.Sphere((0, 0, 0), 1, material=wf.Dielectric(1.5).with_relief(relief))
+    normal_map = wf.NormalMap(np.concatenate([0.5 + lean, np.ones((32, 32, 1))], 2))
+    shape = wf.Sphere((0, 0, 0), 1, material=wf.Dielectric(1.5).with_normal_map(normal_map))
     mean = furnace(shape, spp=1, max_bounces=1000, runs=4)
     assert mean.error < 3e-3
     assert mean.value == pytest.approx(1, abs=5e-3)
@@ -97,11 +97,11 @@ def test_estimators_agree_on_tilted_clear_surfaces(kind, roughness):
 
 @pytest.mark.parametrize("lean", [0.0, 0.8])
 @pytest.mark.parametrize("roughness", [0.0, 0.3])
-@pytest.mark.parametrize("inside", [False, True])
-def test_rays_start_on_the_side_that_their_lobe_leads_to(lean, roughness, inside):
+@pytest.mark.parametrize("back_facing", [False, True])
+def test_rays_start_on_the_side_that_their_lobe_leads_to(lean, roughness, back_facing):
     """Reflected ones on that of wo by the geometric normal, refracted ones beyond."""
     camera = wf.Camera.look_at(
-        (0.2, 0.1, 0.3 if inside else 3), (1, 0, 0) if inside else (0, 0, 0), size=(64, 64)
+        (0.2, 0.1, 0.3 if back_facing else 3), (1, 0, 0) if back_facing else (0, 0, 0), size=(64, 64)
     )
     scene = wf.Scene(ball(2, wf.Dielectric(1.5, roughness), lean), [wf.Environment(1.0)], camera)
     compiled = compile_scene(scene, lambda geometry: make_accelerator(geometry, "numpy"))
@@ -109,10 +109,10 @@ def test_rays_start_on_the_side_that_their_lobe_leads_to(lean, roughness, inside
     paths = generate(compiled, camera, sampler, pixel, np.zeros_like(pixel))
     hits = intersect(compiled, paths)
     paths, hits = paths.take(hits.found), hits.take(hits.found)
-    surface = interact(compiled, paths, hits)
-    assert surface.inside.all() == inside
+    surface = interaction(compiled, paths, hits)
+    assert surface.back_facing.all() == back_facing
     out = bounce_sample(paths, shading(compiled, surface), sampler, 0)
-    crossed = out.eta2 != 1
+    crossed = out.eta_scale != 1
     cos = (out.direction * surface.ng).sum(0)
     start = ((out.origin - surface.point) * surface.ng).sum(0)
     sampled = out.throughput[0] > 0
@@ -154,5 +154,5 @@ def test_absorbing_glass_takes_all_that_gets_inside(lean):
     """Glass that is black inside shows what it reflects; a path astray would bring light through."""
     black = wf.Dielectric(1.5, reflectance=0.0, absorption=1e4)
     scene = wf.Scene(ball(2, black, lean), [wf.Environment(1.0)], CAMERA)
-    centre = render(scene, 16).rgb[6:18, 6:18]
-    assert centre.max() < 1e-3
+    center = render(scene, 16).rgb[6:18, 6:18]
+    assert center.max() < 1e-3

@@ -9,11 +9,13 @@ import scenes
 from significance import render
 
 import wavefront as wf
-from wavefront import stopping, work
 from wavefront.film import Film
-from wavefront.stopping import MIN_SPP, Clock, next_stop, passes
+from wavefront.scheduling import adaptive, scheduler
+from wavefront.scheduling import jobs as work
+from wavefront.scheduling.adaptive import MIN_SPP, next_stop, passes
+from wavefront.scheduling.jobs import split_jobs
+from wavefront.scheduling.scheduler import Scheduler
 from wavefront.vec import f4
-from wavefront.work import plan
 
 
 def lit(size: tuple[int, int] = (24, 16)) -> wf.Scene:
@@ -24,7 +26,7 @@ def lit(size: tuple[int, int] = (24, 16)) -> wf.Scene:
 
 
 def shiny(size: tuple[int, int] = (16, 12)) -> wf.Scene:
-    """A glass ball and a mirror in a coloured environment, beside a small light."""
+    """A glass ball and a mirror in a colored environment, beside a small light."""
     balls = [
         wf.Sphere((-0.6, 0.5, 0), 0.5, material=wf.Dielectric(1.5)),
         wf.Sphere((0.6, 0.5, 0), 0.5, material=wf.Mirror(0.9)),
@@ -137,7 +139,7 @@ def test_adaptive_sampling_has_no_bias_worth_mentioning(monkeypatch) -> None:
     error = means.std(ddof=1) / len(means) ** 0.5
     assert error < 0.0008
     assert abs(means.mean() - 1) < 0.002
-    monkeypatch.setattr(stopping, "TILE", 1)
+    monkeypatch.setattr(adaptive, "TILE", 1)
     assert adaptive_means(2).mean() < 0.95
 
 
@@ -153,24 +155,24 @@ class Machine:
     def run(self, pixels: int, seconds: float, setup: float = 0.0, slower: float = 1.0) -> np.ndarray:
         """Return samples of each pixel when work is handed out as `render` does it."""
         counts = np.zeros(pixels, int)
-        clock = Clock(0.0, seconds, 65_536, self.workers)
+        clock = Scheduler(0.0, seconds, 65_536, self.workers)
         self.now = setup
         free = [self.now] * self.workers
         queue: list = []
         everything = np.arange(pixels, dtype=np.uint32)
 
         def finish() -> None:
-            piece, spent, end = queue.pop(0)
+            job, spent, end = queue.pop(0)
             self.now = max(self.now, end)
-            counts[piece.pixels] += piece.samples
-            clock.note(piece, spent)
+            counts[job.pixels] += job.samples
+            clock.note(job, spent)
 
-        for piece in clock.in_time(plan(everything, 0, 10**9, clock.wave_size)):
-            spent = self.per_wave + self.per_path * piece.lanes
+        for job in clock.in_time(split_jobs(everything, 0, 10**9, clock.wave_size)):
+            spent = self.per_wave + self.per_path * job.lanes
             spent *= slower if self.now > seconds / 2 else 1
             worker = int(np.argmin(free))
             free[worker] = max(free[worker], self.now) + spent
-            queue.append((piece, spent, free[worker]))
+            queue.append((job, spent, free[worker]))
             if len(queue) > 2 * self.workers:
                 finish()
         while queue:
@@ -189,7 +191,7 @@ def test_time_is_used_and_kept(
 ) -> None:
     """Within 10 %, on fast and slow machines and where speed changes on the way."""
     machine = Machine(per_path, 2e-3, workers)
-    monkeypatch.setattr(stopping.time, "perf_counter", lambda: machine.now)
+    monkeypatch.setattr(scheduler.time, "perf_counter", lambda: machine.now)
     counts = machine.run(10_000, seconds, setup=seconds / 20, slower=slower)
     assert 0.9 * seconds <= machine.now <= (1.1 if slower > 1 else 1.02) * seconds
     assert counts.min() >= 1
@@ -200,7 +202,7 @@ def test_waves_are_sized_to_the_time(monkeypatch) -> None:
     sizes = []
     for per_path, seconds in ((1e-6, 20.0), (1e-4, 3.0)):
         machine = Machine(per_path, 2e-3, 2)
-        monkeypatch.setattr(stopping.time, "perf_counter", lambda machine=machine: machine.now)
+        monkeypatch.setattr(scheduler.time, "perf_counter", lambda machine=machine: machine.now)
         machine.run(1000, seconds)
         sizes.append(machine.last_wave_size)
     assert sizes[0] > 60_000
@@ -209,20 +211,20 @@ def test_waves_are_sized_to_the_time(monkeypatch) -> None:
 
 def wave_sizes(per_path: float, wave_size: int | None, workers: int, branches: int = 1) -> np.ndarray:
     """Lanes of all waves of 100 000 pixels and 60 samples, each path of which takes a known time."""
-    clock, lanes = Clock(0.0, None, wave_size, workers, branches), []
-    for piece in plan(np.arange(100_000, dtype=np.uint32), 0, 60, clock.wave_size):
-        clock.note(piece, per_path * piece.lanes)
-        lanes.append(piece.lanes)
+    clock, lanes = Scheduler(0.0, None, wave_size, workers, branches), []
+    for job in split_jobs(np.arange(100_000, dtype=np.uint32), 0, 60, clock.wave_size):
+        clock.note(job, per_path * job.lanes)
+        lanes.append(job.lanes)
     assert sum(lanes) == 6_000_000
     return np.array(lanes)
 
 
 def test_waves_are_large_where_that_pays() -> None:
     """Small until the speed is known and towards the end, and never larger than was asked for."""
-    least, largest = stopping.SMALL_WAVE, stopping.LARGE_WAVE
+    least, largest = scheduler.SMALL_WAVE, scheduler.LARGE_WAVE
     for workers in (1, 2, 4):
         lanes = wave_sizes(1e-6, None, workers)
-        most = min(largest, stopping.AT_ONCE // workers)
+        most = min(largest, scheduler.AT_ONCE // workers)
         assert 0.75 * most < lanes.max() <= most
         assert lanes[0] <= least
         assert lanes[-1] <= least
@@ -234,15 +236,15 @@ def test_waves_are_large_where_that_pays() -> None:
 
 def test_nobody_waits_for_a_large_wave() -> None:
     """Where paths are slow waves take about a second, or are small."""
-    assert wave_sizes(1e-6, None, 2).max() * 1.2e-5 > stopping.PATIENCE
-    assert wave_sizes(1.2e-5, None, 2).max() * 1.2e-5 <= stopping.PATIENCE
-    assert wave_sizes(1e-4, None, 2).max() <= stopping.SMALL_WAVE
+    assert wave_sizes(1e-6, None, 2).max() * 1.2e-5 > scheduler.PATIENCE
+    assert wave_sizes(1.2e-5, None, 2).max() * 1.2e-5 <= scheduler.PATIENCE
+    assert wave_sizes(1e-4, None, 2).max() <= scheduler.SMALL_WAVE
 
 
 def test_every_pixel_gets_a_sample(monkeypatch) -> None:
     """Even where there was no time for it."""
     machine = Machine(1e-3, 1e-3, 2)
-    monkeypatch.setattr(stopping.time, "perf_counter", lambda: machine.now)
+    monkeypatch.setattr(scheduler.time, "perf_counter", lambda: machine.now)
     assert (machine.run(500_000, 0.5) == 1).all()
 
 
@@ -286,15 +288,15 @@ def test_time_ends_waves_under_way() -> None:
 def test_samples_of_waves_that_time_ends_are_discarded(monkeypatch) -> None:
     """What was done before is there, as if nothing else had been asked for."""
 
-    def endless(*given) -> work.Wave:
-        *others, watch, piece = given
-        if piece.first_sample < 3:
-            return work.trace_piece(*others, watch, piece)
+    def endless(*given) -> work.JobResult:
+        *others, watch, job = given
+        if job.first_sample < 3:
+            return work.trace_job(*others, watch, job)
         while True:
             watch.look(0, watch.deadline)
 
-    monkeypatch.setattr(sys.modules["wavefront.render"], "trace_piece", endless)
-    monkeypatch.setattr(stopping, "FIRST_WAVE", 384)  # one sample of all pixels
+    monkeypatch.setattr(sys.modules["wavefront.render"], "trace_job", endless)
+    monkeypatch.setattr(scheduler, "FIRST_WAVE", 384)  # one sample of all pixels
     image = render(lit(), None, seconds=0.5)
     assert image.spp <= 3
     monkeypatch.undo()
@@ -304,14 +306,14 @@ def test_samples_of_waves_that_time_ends_are_discarded(monkeypatch) -> None:
 def test_pixels_without_a_sample_are_told(monkeypatch) -> None:
     """They are black."""
 
-    def endless_after_the_first(*given) -> work.Wave:
-        *others, watch, piece = given
-        while piece.pixels[0]:
+    def endless_after_the_first(*given) -> work.JobResult:
+        *others, watch, job = given
+        while job.pixels[0]:
             watch.look(123, watch.deadline)
-        return work.trace_piece(*others, watch, piece)
+        return work.trace_job(*others, watch, job)
 
-    monkeypatch.setattr(sys.modules["wavefront.render"], "trace_piece", endless_after_the_first)
-    monkeypatch.setattr(stopping, "FIRST_WAVE", 100)
+    monkeypatch.setattr(sys.modules["wavefront.render"], "trace_job", endless_after_the_first)
+    monkeypatch.setattr(scheduler, "FIRST_WAVE", 100)
     message = (
         r"288 pixels of 384 have no sample and are black: when seconds=0.5 were over, .* met 123 surfaces"
     )

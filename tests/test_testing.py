@@ -12,6 +12,7 @@ from wavefront.lights.environment import ConstantEnvironment
 from wavefront.lights.sphere import SphereLights
 from wavefront.lights.triangle import TriangleLights
 from wavefront.sampling import warp
+from wavefront.testing import chi2
 
 F4 = np.float32
 
@@ -22,7 +23,7 @@ F4 = np.float32
 @pytest.mark.parametrize("a", [0.5, 1, 5, 40, 400, 2000])
 def test_incomplete_gamma_agrees_with_scipy(a):
     for x in [0, 0.01 * a, 0.5 * a, 0.9 * a, a, a + 1, 1.1 * a, 2 * a, 5 * a]:
-        assert testing.gamma_q(a, x) == pytest.approx(special.gammaincc(a, x), rel=1e-9, abs=1e-13)
+        assert chi2.gamma_q(a, x) == pytest.approx(special.gammaincc(a, x), rel=1e-9, abs=1e-13)
 
 
 def test_chi_square_agrees_with_scipy():
@@ -30,7 +31,7 @@ def test_chi_square_agrees_with_scipy():
     expected = rng.uniform(10, 100, 50)
     observed = rng.poisson(expected)
     expected *= observed.sum() / expected.sum()
-    statistic, freedom, p = testing.chi_square(observed, expected)
+    statistic, freedom, p = chi2.chi_square(observed, expected)
     known = stats.chisquare(observed, expected)
     assert freedom == 49
     assert (statistic, p) == pytest.approx((known.statistic, known.pvalue), rel=1e-9)
@@ -38,23 +39,23 @@ def test_chi_square_agrees_with_scipy():
 
 def test_chi_square_pools_cells_below_five():
     observed, expected = np.array([100, 1, 2, 1, 96]), np.array([98.0, 2, 2, 2, 96])
-    _, freedom, _ = testing.chi_square(observed, expected)
+    _, freedom, _ = chi2.chi_square(observed, expected)
     assert freedom == 2
 
 
 def test_chi_square_rejects_what_cannot_happen():
-    assert testing.chi_square(np.array([10, 90]), np.array([0.0, 100]))[2] < 1e-3
+    assert chi2.chi_square(np.array([10, 90]), np.array([0.0, 100]))[2] < 1e-3
 
 
 @pytest.mark.parametrize(("count", "trials", "p"), [(480, 1000, 0.5), (3, 1000, 0.01), (0, 10, 0.3)])
 def test_binomial_agrees_with_scipy(count, trials, p):
     tails = stats.binom.cdf(count, trials, p), stats.binom.sf(count - 1, trials, p)
-    assert testing.binomial_p(count, trials, p) == pytest.approx(min(1, 2 * min(tails)), rel=1e-8)
+    assert chi2.binomial_p(count, trials, p) == pytest.approx(min(1, 2 * min(tails)), rel=1e-8)
 
 
 def test_binomial_of_a_certain_outcome():
-    assert testing.binomial_p(10, 10, 1.0) == 1
-    assert testing.binomial_p(9, 10, 1.0) == 0
+    assert chi2.binomial_p(10, 10, 1.0) == 1
+    assert chi2.binomial_p(9, 10, 1.0) == 0
 
 
 # --- Errors of one percent ------------------------------------------------------------------------
@@ -214,14 +215,14 @@ class WrongSnell(Dielectric):
 class NotMatte(Diffuse):
     """Darker seen from the side."""
 
-    matte = True
+    view_independent = True
 
     def f(self, wo, wi):
         return super().f(wo, wi) * wo[2] * wi[2]
 
 
 MUTANTS = [
-    (NotMatte(1.0), "matte"),
+    (NotMatte(1.0), "view_independent"),
     (TooDense(1.0), "integral of pdf"),
     (WrongPdf(0.5), "chi-square"),
     (WrongWeight(0.5), "weight"),

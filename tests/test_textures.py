@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wavefront.bsdfs.base import Spatial
 from wavefront.bsdfs.diffuse import Diffuse
+from wavefront.codecs.encoding import srgb_to_linear
 from wavefront.errors import SceneError
-from wavefront.io.images import srgb_to_linear
-from wavefront.textures import Texture
+from wavefront.textures.base import BaseTexture
+from wavefront.textures.image import Texture
 
 WRAPS = ("repeat", "mirror", "clamp")
 
@@ -76,7 +76,7 @@ def test_the_top_row_is_at_v_1():
         assert np.array_equal(Texture(image, filter=filter).lookup(corners).T, image.reshape(4, 3))
 
 
-def test_colours_are_decoded_before_they_are_mixed():
+def test_colors_are_decoded_before_they_are_mixed():
     image = np.array([[[0, 0, 0], [255, 255, 255]]], np.uint8)
     middle = uv((0.5, 0.5))
     assert Texture(image).lookup(middle).ravel() == pytest.approx([0.5] * 3)
@@ -93,15 +93,15 @@ def test_channels(channels):
     codes = np.arange(10, 10 + channels, dtype=np.uint8).reshape(1, 1, channels)
     middle = uv((0.5, 0.5))
     linear = srgb_to_linear(codes.ravel() / np.float32(255))
-    colour = linear[:3] if channels >= 3 else linear[[0, 0, 0]]
-    assert np.array_equal(Texture(codes).lookup(middle)[:, 0], colour)
+    color = linear[:3] if channels >= 3 else linear[[0, 0, 0]]
+    assert np.array_equal(Texture(codes).lookup(middle)[:, 0], color)
     for k in range(channels):
         found = Texture(codes, channel=k).lookup(middle)
         assert found.shape == (1,)
         alpha = channels in (2, 4) and k == channels - 1
         assert found[0] == pytest.approx(codes[0, 0, k] / 255 if alpha else linear[k])
-    grey = Texture(codes, channel="luminance").lookup(middle)
-    assert grey == pytest.approx([colour @ [0.2126, 0.7152, 0.0722]])
+    gray = Texture(codes, channel="luminance").lookup(middle)
+    assert gray == pytest.approx([color @ [0.2126, 0.7152, 0.0722]])
 
 
 def test_scale_and_offset():
@@ -128,7 +128,7 @@ def test_mean_is_the_average_of_linear_values():
     assert Texture(codes, channel=1, scale=3).mean() == pytest.approx(3 * linear[..., 1].mean())
 
 
-def test_a_lookup_does_not_depend_on_its_neighbours():
+def test_a_lookup_does_not_depend_on_its_neighbors():
     image = np.random.default_rng(0).integers(0, 256, (16, 16, 3), np.uint8)
     points = np.random.default_rng(1).random((2, 1000), np.float32) * 3
     texture = Texture(image, transform=np.diag([2.0, 3, 1]))
@@ -152,16 +152,16 @@ def test_from_a_file(tmp_path):
 
 
 def test_a_material_takes_it():
-    class Surface:
+    class SurfaceInteraction:
         uv = np.full((2, 5), 0.5, np.float32)
 
     texture = Texture(np.full((1, 1, 3), 0.25, np.float32))
-    assert isinstance(texture, Spatial)
-    bound = Diffuse(texture).bind(Surface())
+    assert isinstance(texture, BaseTexture)
+    bound = Diffuse(texture).bind(SurfaceInteraction())
     assert np.array_equal(bound.reflectance, np.full((3, 5), 0.25, np.float32))
-    Surface.uv = None
+    SurfaceInteraction.uv = None
     with pytest.raises(SceneError, match="'array': the surface has no texture coordinates"):
-        Diffuse(texture).bind(Surface())
+        Diffuse(texture).bind(SurfaceInteraction())
 
 
 @pytest.mark.parametrize(

@@ -118,9 +118,9 @@ def test_a_scene_without_lights_has_none_and_gets_none(held):
 
 
 def test_lights_that_trimesh_made_are_left_out_and_named(held):
-    """As it does for its viewer: two grey points, weak or strong by the size of the scene."""
+    """As it does for its viewer: two gray points, weak or strong by the size of the scene."""
     assert len(held.lights) == 2
-    with pytest.warns(UserWarning, match="not honoured: the lights that trimesh made for its viewer"):
+    with pytest.warns(UserWarning, match="not honored: the lights that trimesh made for its viewer"):
         assert from_trimesh(held).lights == []
     place(held, lighting.PointLight(**white(1)), np.eye(4))
     assert len(from_trimesh(held).lights) == 3  # somebody went on from them
@@ -128,7 +128,7 @@ def test_lights_that_trimesh_made_are_left_out_and_named(held):
 
 def test_what_lights_have_besides_is_named(held):
     place(held, lighting.PointLight(**white(1, radius=5.0)), np.eye(4))
-    with pytest.warns(UserWarning, match="trimesh object: light 'l': not honoured: radius"):
+    with pytest.warns(UserWarning, match="trimesh object: light 'l': not honored: radius"):
         assert len(from_trimesh(held).lights) == 1
 
 

@@ -20,17 +20,17 @@ from .errors import Interrupted, RenderError, SaveError, SceneError
 from .image import Image
 from .lighting import studio
 from .lights import DirectionalLight, Environment, PointLight, SpotLight
-from .relief import BumpMap, NormalMap
 from .render import render
 from .scene import Scene
 from .shapes import Disk, Instance, Mesh, Rectangle, Shape, Sphere
 from .suggestions import did_you_mean
-from .textures import Texture
+from .textures.image import Texture
+from .textures.normal_map import BumpMap, NormalMap
+from .textures.vertex_colors import VertexColors
 from .version import VERSION
-from .vertex_colors import VertexColors
 
 if TYPE_CHECKING:
-    from . import testing
+    pass
     from .io.load import from_trimesh, load, load_mesh
     from .metrics import Comparison, compare
 

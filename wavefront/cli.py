@@ -16,19 +16,20 @@ from typing import Any, NoReturn
 import numpy as np
 
 from .camera import Camera, image_size, upward
+from .codecs.encoding import check_exposure, check_gamma
+from .codecs.images import check_writable
 from .errors import Interrupted, RenderError, SaveError, SceneError
 from .filters import FILTERS
 from .image import Image
 from .integrators import INTEGRATORS
-from .io.images import check_exposure, check_gamma, check_writable
 from .io.load import load
 from .lighting import DEFAULT, LIGHTINGS, check_lighting
 from .metrics import compare
-from .parallel import EXECUTORS
 from .render import DEFAULT_SPP, render
 from .rescue import save_elsewhere
 from .sampling.sampler import SAMPLERS
 from .scene import Scene
+from .scheduling.executors import EXECUTORS
 from .shapes import Instance, Mesh
 from .version import VERSION
 

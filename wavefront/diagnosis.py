@@ -15,13 +15,14 @@ import numpy as np
 
 from .bsdfs import Bsdf
 from .camera import Camera
+from .compile.scene import CompiledScene
 from .image import Image
 from .lights import LightSample, SpotLight
-from .scene import CompiledScene, Scene
+from .scene import Scene
 from .shapes import Instance, Mesh, Shape
+from .stages.interaction import above, interaction
 from .stages.intersect import intersect, shadow_rays, visible
-from .stages.surface import above, interact
-from .state import Hits, Rays, Surface
+from .state import Hits, Rays, SurfaceInteraction
 from .vec import Bools, Ints, dot, f4
 
 FEWEST_PIXELS = 256  # a smaller picture is a measurement: nobody looks at it
@@ -98,7 +99,7 @@ class Sight:
         if all(bsdf.black for bsdf in self._materials_seen()):
             return "the materials of all that the camera sees reflect nothing"
         found = self._why_no_light_arrives()
-        if found is None and self._around.inside.all() and len(self._around) == GRID * GRID:
+        if found is None and self._around.back_facing.all() and len(self._around) == GRID * GRID:
             found = f"the camera is inside {self._name(self._around.prim)}, where no light gets in"
         return found or self._why_it_is_not_found()
 
@@ -120,7 +121,7 @@ class Sight:
         step = (np.arange(GRID) + 0.5) / GRID
         x, y = np.meshgrid(x0 + (x1 - x0) * step, y0 + (y1 - y0) * step)
         origin, direction = self._view.rays(
-            x.ravel().astype(f4), y.ravel().astype(f4), self._compiled.centre, None
+            x.ravel().astype(f4), y.ravel().astype(f4), self._compiled.center, None
         )
         return Rays(origin, direction, np.full(GRID * GRID, -1, np.intp))
 
@@ -129,11 +130,11 @@ class Sight:
         return intersect(self._compiled, self._rays)
 
     @cached_property
-    def _seen(self) -> Surface:
+    def _seen(self) -> SurfaceInteraction:
         return self._surface(self._rays, self._hits)
 
     @cached_property
-    def _around(self) -> Surface:
+    def _around(self) -> SurfaceInteraction:
         """What lies around the camera, in all directions."""
         n = GRID * GRID
         height = 1 - (2 * np.arange(n) + 1) / n
@@ -143,9 +144,9 @@ class Sight:
         rays = Rays(self._rays.origin[:, :1].repeat(n, 1), direction, np.full(n, -1, np.intp))
         return self._surface(rays, intersect(self._compiled, rays))
 
-    def _surface(self, rays: Rays, hits: Hits) -> Surface:
+    def _surface(self, rays: Rays, hits: Hits) -> SurfaceInteraction:
         found = hits.found
-        return interact(self._compiled, rays.take(found), hits.take(found))
+        return interaction(self._compiled, rays.take(found), hits.take(found))
 
     def _materials_seen(self) -> list[Bsdf]:
         materials = self._compiled.materials
@@ -153,7 +154,7 @@ class Sight:
 
     def _where_the_scene_is(self) -> str:
         backward = self._view.rotation[:, 2]
-        middle = self._compiled.centre - self._view.origin
+        middle = self._compiled.center - self._view.origin
         if float(middle @ backward) > 0:
             return "the middle of the scene is behind it: look the other way"
         return "it looks past the scene"
@@ -218,7 +219,7 @@ class Sight:
         name = self._name(prims)
         through = self._transmissive(self._compiled.material_of.take(prims))
         if not through.any():
-            if self._around.inside.all() and len(self._around) == GRID * GRID:
+            if self._around.back_facing.all() and len(self._around) == GRID * GRID:
                 return f"the camera is inside {name}, where no light gets in"
             return f"all that the camera sees is in the shadow of {name}"
         if self._compiled.lights.delta_of.all():

@@ -135,7 +135,7 @@ def number(
 def rgb(
     name: str, value: ArrayLike, high: float = np.inf, dtype: type[np.floating] = np.float32
 ) -> NDArray[Any]:
-    """Return a colour as a (3, 1) column, of float32 unless another type is given; a scalar means grey.
+    """Return a color as a (3, 1) column, of float32 unless another type is given; a scalar means gray.
 
     Raises
     ------

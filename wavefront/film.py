@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .exact_sum import ExactSums
 from .image import Image
 from .state import Words
-from .vec import ALL, Floats, Ints, Lanes, columns
+from .vec import ALL, Floats, Ints, Lanes, take
 
 Doubles = NDArray[np.float64]
 
@@ -94,7 +94,7 @@ class Film:
         self.batches[number][:, lanes] = self.sums.value(lanes) - before
 
     def _pair_batches(self, lanes: Lanes) -> None:
-        """Join neighbours, so that half as many batches are twice as long."""
+        """Join neighbors, so that half as many batches are twice as long."""
         for half in range(BATCHES // 2):
             pair = self.batches[2 * half : 2 * half + 2, :, lanes]
             self.batches[half][:, lanes] = pair[0] + pair[1]
@@ -114,11 +114,11 @@ class Film:
         counts = self.count[span]
         error = np.full((3, counts.size), np.nan)
         for count in _distinct(counts[counts > 1]):
-            alike = counts == count
-            lanes = ALL if alike.all() else np.flatnonzero(alike)
+            broadcast = counts == count
+            lanes = ALL if broadcast.all() else np.flatnonzero(broadcast)
             size = batch_size(count)
             used = count // size
-            batch_means = columns(self.batches[:used, :, span], lanes) / np.float64(size)
+            batch_means = take(self.batches[:used, :, span], lanes) / np.float64(size)
             error[:, lanes] = batch_means.var(0, ddof=1) * (size / count)
         return error
 

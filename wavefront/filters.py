@@ -16,9 +16,9 @@ from .vec import Floats, f4
 
 Filter: TypeAlias = Callable[[Floats], Floats]
 
-TENT_RADIUS = 1.0  # pixels from the centre to where the tent ends
+TENT_RADIUS = 1.0  # pixels from the center to where the tent ends
 GAUSSIAN_SIGMA = 0.5  # pixels
-GAUSSIAN_RADIUS = 1.5  # pixels from the centre to where the Gaussian is cut off
+GAUSSIAN_RADIUS = 1.5  # pixels from the center to where the Gaussian is cut off
 
 
 def box(u: Floats) -> Floats:
@@ -27,12 +27,12 @@ def box(u: Floats) -> Floats:
 
 
 def tent(u: Floats) -> Floats:
-    """Fall linearly from the pixel's centre to nothing at `TENT_RADIUS`, in both directions."""
+    """Fall linearly from the pixel's center to nothing at `TENT_RADIUS`, in both directions."""
     return np.stack([f4(0.5) + warp.tent(row, TENT_RADIUS) for row in u])
 
 
 def gaussian(u: Floats) -> Floats:
-    """Follow a normal distribution of `GAUSSIAN_SIGMA` around the centre, cut at `GAUSSIAN_RADIUS`."""
+    """Follow a normal distribution of `GAUSSIAN_SIGMA` around the center, cut at `GAUSSIAN_RADIUS`."""
     return np.stack([f4(0.5) + warp.gaussian(row, GAUSSIAN_SIGMA, GAUSSIAN_RADIUS) for row in u])
 
 

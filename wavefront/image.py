@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .codecs.encoding import exposed, to_8bit
+from .codecs.images import encode_png, read_linear, write_image
+from .codecs.png_jpeg import Gamma
 from .errors import SceneError
-from .io.coded import Gamma
-from .io.images import encode_png, exposed, read_linear, to_8bit, write_image
 
 
 class Image:

@@ -12,18 +12,18 @@ from typing import TypeAlias
 
 import numpy as np
 
+from .compile.scene import CompiledScene
 from .sampling.sampler import Sampler
-from .scene import CompiledScene
-from .stages.absorb import absorb
+from .stages.alpha import alpha_pass_through
 from .stages.bounce import bounce_sample, branch
-from .stages.compact import carrying, compact, going_on, keep, roulette
+from .stages.compact import alive, compact, roulette, scattering_lanes, select
+from .stages.interaction import interaction
 from .stages.intersect import intersect
-from .stages.passing import pass_through
-from .stages.relief import tilt
-from .stages.shade import Arrival, Shading, direct, emitted, mis_weighted, shading
-from .stages.surface import interact
+from .stages.medium import absorb
+from .stages.normal_mapping import perturb_normals
+from .stages.shade import Contribution, Shading, direct, emitted, mis_weighted, shading
 from .state import Hits, Paths
-from .vec import Floats, columns, f4
+from .vec import Floats, f4, take
 
 Integrator: TypeAlias = Callable[[CompiledScene, Paths, Sampler, int], Floats]
 
@@ -33,15 +33,15 @@ def li_naive(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: 
     L = np.zeros((3, len(paths)), f4)
     for bounce in range(max_bounces + 1):
         hits = intersect(scene, paths)
-        paths, hits = pass_through(scene, paths, hits, sampler, bounce)
+        paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce)
         light = emitted(scene, paths, hits)
-        deposit(L, paths, light)
-        paths, hits = compact(scene, paths, hits, going_on(scene, hits, light))
+        accumulate(L, paths, light)
+        paths, hits = compact(scene, paths, hits, scattering_lanes(scene, hits, light))
         if bounce == max_bounces or not len(paths):
             break
-        shade = arrive(scene, paths, hits)
+        shade = prepare_shading(scene, paths, hits)
         paths = bounce_sample(paths, shade, sampler, bounce)
-        paths = keep(paths, roulette(paths, sampler, bounce))
+        paths = select(paths, roulette(paths, sampler, bounce))
     return L
 
 
@@ -50,16 +50,16 @@ def li_direct_simple(scene: CompiledScene, paths: Paths, sampler: Sampler, max_b
     L = np.zeros((3, len(paths)), f4)
     for bounce in range(max_bounces + 1):
         hits = intersect(scene, paths)
-        paths, hits = pass_through(scene, paths, hits, sampler, bounce)
+        paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce)
         light = emitted(scene, paths, hits)
-        deposit(L, paths, light)
-        paths, hits = compact(scene, paths, hits, going_on(scene, hits, light))
+        accumulate(L, paths, light)
+        paths, hits = compact(scene, paths, hits, scattering_lanes(scene, hits, light))
         if bounce == max_bounces or not len(paths):
             break
-        shade = arrive(scene, paths, hits)
-        deposit(L, paths, direct(scene, paths, shade, sampler, bounce, mis=False))
+        shade = prepare_shading(scene, paths, hits)
+        accumulate(L, paths, direct(scene, paths, shade, sampler, bounce, mis=False))
         paths = bounce_sample(paths, shade, sampler, bounce)
-        paths = keep(paths, np.flatnonzero(paths.specular & carrying(paths)))
+        paths = select(paths, np.flatnonzero(paths.specular & alive(paths)))
     return L
 
 
@@ -71,16 +71,16 @@ def li_direct_mis(scene: CompiledScene, paths: Paths, sampler: Sampler, max_boun
     L = np.zeros((3, len(paths)), f4)
     for bounce in range(max_bounces + 1):
         hits = intersect(scene, paths)
-        paths, hits = pass_through(scene, paths, hits, sampler, bounce)
+        paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce)
         light = emitted(scene, paths, hits)
-        deposit(L, paths, mis_weighted(scene, paths, light))
+        accumulate(L, paths, mis_weighted(scene, paths, light))
         paths, hits = compact(scene, paths, hits, np.flatnonzero((hits.prim >= 0) & paths.specular))
         if bounce == max_bounces or not len(paths):
             break
-        shade = arrive(scene, paths, hits)
-        deposit(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
+        shade = prepare_shading(scene, paths, hits)
+        accumulate(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
         paths = bounce_sample(paths, shade, sampler, bounce)
-        paths = keep(paths, np.flatnonzero(carrying(paths)))
+        paths = select(paths, np.flatnonzero(alive(paths)))
     return L
 
 
@@ -94,16 +94,16 @@ def li_full(
     L = np.zeros((3, len(paths)), f4)
     for bounce in range(max_bounces + 1):
         hits = intersect(scene, paths)
-        paths, hits = pass_through(scene, paths, hits, sampler, bounce)
+        paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce)
         light = emitted(scene, paths, hits)
-        deposit(L, paths, mis_weighted(scene, paths, light))
-        paths, hits = compact(scene, paths, hits, going_on(scene, hits, light))
+        accumulate(L, paths, mis_weighted(scene, paths, light))
+        paths, hits = compact(scene, paths, hits, scattering_lanes(scene, hits, light))
         if bounce == max_bounces or not len(paths):
             break
-        shade = arrive(scene, paths, hits)
-        deposit(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
+        shade = prepare_shading(scene, paths, hits)
+        accumulate(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
         paths = branch(paths, shade, sampler, bounce, ways=branches if bounce == 0 else 1)
-        paths = keep(paths, roulette(paths, sampler, bounce, branches))
+        paths = select(paths, roulette(paths, sampler, bounce, branches))
     return L
 
 
@@ -116,18 +116,18 @@ INTEGRATORS: dict[str, Integrator] = {
 }
 
 
-def arrive(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
+def prepare_shading(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
     """Weaken the paths by the matter they came through, and make their surfaces ready to shade."""
-    surface = interact(scene, paths, hits)
-    tilt(scene, surface)
+    surface = interaction(scene, paths, hits)
+    perturb_normals(scene, surface)
     absorb(scene, paths.throughput, hits, surface)
     return shading(scene, surface)
 
 
-def deposit(L: Floats, paths: Paths, light: Arrival) -> None:
+def accumulate(L: Floats, paths: Paths, light: Contribution) -> None:
     """Add light that arrives on some lanes, carried on by their paths, to the slots of L."""
     if light.lanes.size:
-        slot = columns(paths.slot, light.lanes)
-        arriving = columns(paths.throughput, light.lanes) * light.radiance
+        slot = take(paths.slot, light.lanes)
+        arriving = take(paths.throughput, light.lanes) * light.radiance
         for row, channel in zip(L, arriving, strict=True):  # a row at a time: much faster
             np.add.at(row, slot, channel)

@@ -22,7 +22,7 @@ from .errors import SceneError
 from .lights import Environment
 from .scene import FRAMING_VIEW, Scene, turned_up
 from .shapes import Disk, Mesh
-from .textures import Texture
+from .textures.image import Texture
 
 Doubles = NDArray[np.float64]
 

@@ -10,11 +10,11 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .codecs.encoding import codes_to_linear
+from .codecs.png_jpeg import EXTENSIONS
 from .errors import SceneError
 from .film import EPSILON
 from .image import Image, three_channels
-from .io.coded import EXTENSIONS
-from .io.images import codes_to_linear
 
 Picture: TypeAlias = Image | ArrayLike | str | os.PathLike[str]
 Doubles = NDArray[np.float64]

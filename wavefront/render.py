@@ -12,30 +12,32 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .accel import most_copies
-from .accel.choose import CHOICES
-from .blas import reserve_buffers
+from .accel.registry import CHOICES
 from .bsdfs import Bsdf
 from .camera import Camera
+from .compile.scene import compile_scene
 from .diagnosis import warn_of_black_or_white
 from .errors import Interrupted, RenderError, SceneError, number, one_of, warn_caller
 from .exact_sum import MAX_TERMS
 from .filters import FILTERS
 from .image import Image
 from .integrators import INTEGRATORS, ONE_SAMPLE, Integrator, li_full
-from .interrupt import CtrlC
 from .lighting import check_lighting, choose_preset, lighted
 from .lights import DirectionalLight, PointLight, SpotLight
-from .lights.choose import CHOICES as LIGHT_CHOICES
-from .parallel import Workers, choose_executor, worker_count
+from .lights.table import CHOICES as LIGHT_CHOICES
 from .progress import Bar, Progress, phase
 from .sampling.sampler import make_sampler
-from .scene import Scene, compile_scene
-from .shared import Stopped
-from .stopping import Clock, passes
+from .scene import Scene
+from .scheduling.adaptive import passes
+from .scheduling.blas import reserve_buffers
+from .scheduling.executors import Workers, choose_executor, worker_count
+from .scheduling.interrupt import CtrlC
+from .scheduling.jobs import LONG_PATH, Job, JobResult, Tally, Watch, split_jobs, trace_job
+from .scheduling.scheduler import Scheduler
+from .scheduling.shared import Stopped
 from .subject import View, as_scene
 from .suggestions import suggests_keywords
 from .version import VERSION
-from .work import LONG_PATH, Piece, Tally, Watch, Wave, plan, trace_piece
 
 DEFAULT_SPP = 100
 MAX_BRANCH_SAMPLES = 2**32  # a sample's index is 32 bits of its address, and each branch has one
@@ -64,7 +66,7 @@ def render(
     noise: float | None = None,
     seconds: float | None = None,
     filter: str = "box",
-    light_choice: str = "place",
+    light_sampler: str = "place",
     branches: int = 1,
     wave_size: int | None = None,
     progress: Progress = None,
@@ -123,8 +125,8 @@ def render(
         takes over three seconds. With `noise` as well, whichever comes first.
     filter
         How the samples of a pixel are spread: "box" (evenly over the pixel), "tent" (radius 1
-        pixel) or "gaussian" (σ 0.5 pixels, cut off at 1.5 from the centre).
-    light_choice
+        pixel) or "gaussian" (σ 0.5 pixels, cut off at 1.5 from the center).
+    light_sampler
         How one light of many is chosen at a point: "place" weighs what each brings there, "power"
         its power alone, "uniform" nothing.
     branches
@@ -164,7 +166,7 @@ def render(
     estimate = _estimator(integrator, branches)
     spread = FILTERS[one_of("filter", filter, FILTERS)]
     accel = one_of("accel", accel, CHOICES)
-    light_choice = one_of("light_choice", light_choice, LIGHT_CHOICES)
+    light_sampler = one_of("light_sampler", light_sampler, LIGHT_CHOICES)
     check_lighting(lighting)
     make_sampler(sampler, seed)  # checks both before the scene is read
     workers = worker_count(workers)
@@ -183,32 +185,32 @@ def render(
             compiled = compile_scene(
                 complete,
                 subject.accelerators.maker(accel),
-                light_choice,
+                light_sampler,
                 most_copies(accel),
                 mis=integrator not in ONE_SAMPLE,
             )
         view = compiled.view(camera)
 
-    clock = Clock(begin, seconds, wave_size, workers, branches)
+    clock = Scheduler(begin, seconds, wave_size, workers, branches)
     watch = Watch(deadline=clock.deadline)
-    trace = partial(trace_piece, compiled, view, draw, spread, estimate, max_bounces, watch)
+    trace = partial(trace_job, compiled, view, draw, spread, estimate, max_bounces, watch)
     most = tally.film.count.size * spp
     executor = choose_executor(executor, workers, most * branches)
     failure: Exception | None = None
     with CtrlC(watch.stop) as ctrl_c:
         with (
             Bar(progress, most, seconds) as bar,
-            Workers[Piece, Wave](trace, workers, executor, watch.stop) as crew,
+            Workers[Job, JobResult](trace, workers, executor, watch.stop) as crew,
         ):
             patience = _Patience(watch, clock, bar, max_bounces)
             try:
                 for step in passes(tally.film, spp, noise):
-                    pieces = clock.in_time(plan(step.pixels, step.first, step.last, clock.wave_size))
-                    for piece, wave in crew.run(pieces, patience.wait):
-                        tally.add(piece, wave)
-                        clock.note(piece, wave.seconds)
+                    jobs = clock.in_time(split_jobs(step.pixels, step.first, step.last, clock.wave_size))
+                    for job, wave in crew.run(jobs, patience.wait):
+                        tally.add(job, wave)
+                        clock.note(job, wave.seconds)
                         patience.end_of_wave()
-                        bar.advance(piece.lanes, clock.elapsed)
+                        bar.advance(job.lanes, clock.elapsed)
                     if clock.up:
                         break
             except Stopped:
@@ -266,7 +268,7 @@ def _setting_up() -> Iterator[None]:
 class _Patience:
     """What is done while waves take long: time is shown, and once a warning given."""
 
-    def __init__(self, watch: Watch, clock: Clock, bar: Bar, max_bounces: int) -> None:
+    def __init__(self, watch: Watch, clock: Scheduler, bar: Bar, max_bounces: int) -> None:
         self._watch, self._clock, self._bar = watch, clock, bar
         self._max_bounces = max_bounces
         self._warned = max_bounces <= LONG_PATH

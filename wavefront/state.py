@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .frame import Frame
 from .record import record
-from .vec import Bools, Floats, Ints, Lanes, columns
+from .vec import Bools, Floats, Ints, Lanes, take
 
 Words = NDArray[np.uint32]
 
@@ -25,7 +25,7 @@ def _names(kind: type) -> tuple[str, ...]:
     return tuple(field.name for field in fields(kind))
 
 
-class Columns:
+class SoA:
     """Base of dataclasses whose fields are arrays with one column (last axis) per element.
 
     A field that is None is absent and stays absent.
@@ -47,12 +47,12 @@ class Columns:
         """Gather columns `index` (m,) of every field into a new record; of a slice, views."""
         out = object.__new__(type(self))
         for name, value in self._values():
-            setattr(out, name, None if value is None else columns(value, index))
+            setattr(out, name, None if value is None else take(value, index))
         return out
 
-    def put(self, index: Ints, columns: Self) -> None:
+    def put(self, index: Ints, take: Self) -> None:
         """Write the columns of another record over columns `index` (m,) of this one, in place."""
-        for (_, value), (_, new) in zip(self._values(), columns._values(), strict=True):
+        for (_, value), (_, new) in zip(self._values(), take._values(), strict=True):
             if value is not None:
                 value[..., index] = new
 
@@ -67,7 +67,7 @@ class Columns:
 
 
 def _joined(values: Sequence[NDArray[Any] | None]) -> NDArray[Any] | None:
-    """Join the columns of arrays; what is `alike` and the same in all of them stays one value."""
+    """Join the columns of arrays; what is `broadcast` and the same in all of them stays one value."""
     arrays = [value for value in values if value is not None]
     if not arrays:
         return None
@@ -78,12 +78,12 @@ def _joined(values: Sequence[NDArray[Any] | None]) -> NDArray[Any] | None:
 
 
 @record
-class Rays(Columns):
+class Rays(SoA):
     """What an accelerator is asked."""
 
     origin: Floats  # (3, n) start of the ray, scene units
     direction: Floats  # (3, n) unit direction
-    leaving: Ints  # (n,) primitive that the ray starts on, -1 for none
+    exclude_prim: Ints  # (n,) primitive that the ray starts on, -1 for none
 
 
 @record
@@ -96,19 +96,19 @@ class Paths(Rays):
     throughput: Floats  # (3, n) product of BSDF weights since the camera
     pdf: Floats  # (n,) density of the last BSDF sample, 1/sr; unused where specular
     specular: Bools  # (n,) no light sample could have found the last direction: delta lobe, camera
-    eta2: Floats  # (n,) square of the relative refractive index crossed so far
-    vertex: Floats | None = None  # (3, n) where the paths last scattered; None where that is `origin`
+    eta_scale: Floats  # (n,) square of the relative refractive index crossed so far
+    prev_vertex: Floats | None = None  # (3, n) where the paths last scattered; None where that is `origin`
 
 
 @record
-class Hits(Columns):
+class Hits(SoA):
     """What each ray met first."""
 
     t: Floats  # (n,) distance along the ray, scene units; inf on a miss
     prim: Ints  # (n,) row of the scene's tables, -1 on a miss; without instances it is the primitive's id
     b1: Floats | None  # (n,) barycentric weight of the second vertex; None where nothing is interpolated
     b2: Floats | None  # (n,) barycentric weight of the third vertex
-    place: Ints | None = None  # (n,) column of the scene's `InstanceTable`; None when it has none
+    instance: Ints | None = None  # (n,) column of the scene's `InstanceTable`; None when it has none
 
     @property
     def found(self) -> Ints:
@@ -117,7 +117,7 @@ class Hits(Columns):
 
 
 @record
-class Surface(Columns):
+class SurfaceInteraction(SoA):
     """Geometry at hit points. Normals face the side that the ray came from."""
 
     point: Floats  # (3, n) hit point, scene units
@@ -127,15 +127,15 @@ class Surface(Columns):
     wo: Floats  # (3, n) unit direction towards the ray's origin, world frame
     prim: Ints  # (n,) primitive id
     material: Ints  # (n,) row of the scene's material table
-    inside: Bools  # (n,) the ray came from the back side of the surface
+    back_facing: Bools  # (n,) the ray came from the back side of the surface
     # what varies over a shape, if a material of the scene reads it; shapes/attributes.py fills it in
     uv: Floats | None = None  # (2, n) texture coordinates
     uv1: Floats | None = None  # (2, n) the second set of texture coordinates
     color: Floats | None = None  # (4, n) linear RGB and opacity, given per vertex
     tangents: Floats | None = None  # (6, n) how the point moves with u and with v, scene units
     tangents1: Floats | None = None  # (6, n) the same for uv1
-    axes: Floats | None = None  # (6, n) along what red and green of a normal map lean, of any length
-    axes1: Floats | None = None  # (6, n) the same for maps that uv1 places
+    tangent_frame: Floats | None = None  # (6, n) along what red and green of a normal map lean, of any length
+    tangent_frame1: Floats | None = None  # (6, n) the same for maps that uv1 places
 
     def frame(self) -> Frame:
         """Return the shading frames, z = ns."""

@@ -25,8 +25,8 @@ ALL = slice(None)
 Array = TypeVar("Array", bound=NDArray[Any])
 
 
-def columns(a: Array, lanes: Lanes) -> Array:
-    """Columns `lanes` of (..., n), all in [0, n); views, not copies, for a slice and of what is `alike`."""
+def take(a: Array, lanes: Lanes) -> Array:
+    """Columns `lanes` of (..., n), all in [0, n); views, not copies, for a slice and of broadcasts."""
     if isinstance(lanes, slice):
         return a[..., lanes]  # type: ignore[return-value]
     if a.strides[-1]:
@@ -43,7 +43,7 @@ def put(a: Floats, lanes: Lanes, values: Floats) -> None:
         row[lanes] = new
 
 
-def alike(value: Any, n: int) -> NDArray[Any]:
+def broadcast(value: Any, n: int) -> NDArray[Any]:
     """One value for n lanes, (n,), read-only: free to keep, and free to gather."""
     one = np.asarray(value)
     out = np.ndarray(n, one.dtype, one, strides=(0,))  # a third of the time of np.broadcast_to

@@ -1,16 +1,16 @@
 """Ray queries: which surface a ray meets first, and whether anything blocks it."""
 
 from .base import Accelerator, Geometry, Intersections
-from .choose import make_accelerator, most_copies
+from .cache import AcceleratorCache
 from .instances import InstanceAccelerator, Placements
-from .keep import KeptAccelerators
+from .registry import make_accelerator, most_copies
 
 __all__ = [
     "Accelerator",
+    "AcceleratorCache",
     "Geometry",
     "InstanceAccelerator",
     "Intersections",
-    "KeptAccelerators",
     "Placements",
     "make_accelerator",
     "most_copies",

@@ -10,18 +10,18 @@ from ..vec import Bools, Floats, Ints
 
 @record
 class Geometry:
-    """What rays can hit, in float32 relative to the scene's centre.
+    """What rays can hit, in float32 relative to the scene's center.
 
     Primitive ids count the triangles first, then the spheres.
     """
 
     triangles: Floats  # (m, 3, 3) vertices: triangle, corner, xyz
-    centers: Floats  # (3, k) sphere centres
+    centers: Floats  # (3, k) sphere centers
     radii: Floats  # (k,) sphere radii
     weights: bool = True  # whether barycentric weights are needed; without them b1 and b2 are 0
     # (m,) whether a triangle and the next look the same all over, so that a hit of a flat quadrilateral of
     # both may name either; without it none do
-    alike: Bools | None = None
+    broadcast: Bools | None = None
 
 
 @record
@@ -39,13 +39,13 @@ class Accelerator(Protocol):
 
     name: str
 
-    def closest(self, origin: Floats, direction: Floats, leaving: Ints) -> Intersections:
+    def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
         """Find the nearest hit with t > 0 of rays (3, n); ties go to the lowest id.
 
-        `leaving` (n,) names the primitive each ray starts on, -1 for none: a triangle is not hit
+        `exclude_prim` (n,) names the primitive each ray starts on, -1 for none: a triangle is not hit
         again by the ray that leaves it, and of a sphere only the far side can be. Two triangles that
         make one flat quadrilateral may count as one there.
         """
 
-    def occluded(self, origin: Floats, direction: Floats, distance: Floats, leaving: Ints) -> Bools:
+    def occluded(self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints) -> Bools:
         """Tell whether anything is hit with 0 < t < `distance` (n,)."""

@@ -10,7 +10,7 @@ from ..errors import SceneError
 from ..vec import Bools, Floats, Ints, cross, dot, f4, length
 from . import triangle
 from .base import Geometry, Intersections
-from .stream import NumpyAccelerator
+from .numpy_accel import NumpyAccelerator
 
 
 def installed() -> bool:
@@ -52,37 +52,37 @@ class EmbreeAccelerator:
             self._first_sphere = len(triangles)
             self._spheres = NumpyAccelerator(Geometry(none, geometry.centers, geometry.radii))
 
-    def closest(self, origin: Floats, direction: Floats, leaving: Ints) -> Intersections:
+    def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
         """Find the nearest hit with t > 0 of rays (3, n)."""
-        hits = self._closest_triangle(origin, direction, leaving)
+        hits = self._closest_triangle(origin, direction, exclude_prim)
         if self._spheres is not None:
-            on_sphere = self._spheres.closest(origin, direction, self._sphere_left(leaving))
+            on_sphere = self._spheres.closest(origin, direction, self._sphere_left(exclude_prim))
             nearer = np.flatnonzero(on_sphere.t < hits.t)
             hits.t[nearer] = on_sphere.t.take(nearer)
             hits.prim[nearer] = on_sphere.prim.take(nearer) + self._first_sphere
             hits.b1[nearer] = hits.b2[nearer] = 0
         return hits
 
-    def occluded(self, origin: Floats, direction: Floats, distance: Floats, leaving: Ints) -> Bools:
+    def occluded(self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints) -> Bools:
         """Tell whether anything is hit with 0 < t < `distance` (n,)."""
-        blocked = self._occluded_by_triangle(origin, direction, distance, leaving)
+        blocked = self._occluded_by_triangle(origin, direction, distance, exclude_prim)
         if self._spheres is not None:
-            blocked |= self._spheres.occluded(origin, direction, distance, self._sphere_left(leaving))
+            blocked |= self._spheres.occluded(origin, direction, distance, self._sphere_left(exclude_prim))
         return blocked
 
-    def _sphere_left(self, leaving: Ints) -> Ints:
-        return np.where(leaving >= self._first_sphere, leaving - self._first_sphere, -1)
+    def _sphere_left(self, exclude_prim: Ints) -> Ints:
+        return np.where(exclude_prim >= self._first_sphere, exclude_prim - self._first_sphere, -1)
 
-    def _closest_triangle(self, origin: Floats, direction: Floats, leaving: Ints) -> Intersections:
+    def _closest_triangle(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
         """Nearest triangles of rays (3, n); lanes that met the triangle they leave look again."""
         n = origin.shape[1]
         if self._scene is None or not n:
             zero = np.zeros((2, n), f4)
             return Intersections(np.full(n, np.inf, f4), np.full(n, -1), zero[0], zero[1])
         hits = self._run(origin, direction)
-        again = np.flatnonzero(((hits.prim == leaving) | ~(hits.t > 0)) & (hits.prim >= 0))
+        again = np.flatnonzero(((hits.prim == exclude_prim) | ~(hits.t > 0)) & (hits.prim >= 0))
         if again.size:
-            self._look_beyond(origin, direction, leaving, again, hits)
+            self._look_beyond(origin, direction, exclude_prim, again, hits)
         return hits
 
     def _run(self, origin: Floats, direction: Floats) -> Intersections:
@@ -96,7 +96,7 @@ class EmbreeAccelerator:
         return Intersections(found["tfar"], prim, b1, b2)
 
     def _look_beyond(
-        self, origin: Floats, direction: Floats, leaving: Ints, again: Ints, hits: Intersections
+        self, origin: Floats, direction: Floats, exclude_prim: Ints, again: Ints, hits: Intersections
     ) -> None:
         """Trace lanes `again` from just beyond the hit that does not count, until none is left.
 
@@ -113,11 +113,13 @@ class EmbreeAccelerator:
             beyond = (t + found.t).astype(f4)
             hits.t[again], hits.prim[again] = beyond, found.prim
             hits.b1[again], hits.b2[again] = found.b1, found.b2
-            again = again.compress((found.prim >= 0) & ((found.prim == leaving.take(again)) | ~(beyond > 0)))
+            again = again.compress(
+                (found.prim >= 0) & ((found.prim == exclude_prim.take(again)) | ~(beyond > 0))
+            )
             step *= 2
 
     def _occluded_by_triangle(
-        self, origin: Floats, direction: Floats, distance: Floats, leaving: Ints
+        self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints
     ) -> Bools:
         if self._scene is None or not distance.size:
             return np.zeros(distance.size, bool)
@@ -126,12 +128,12 @@ class EmbreeAccelerator:
         answer = self._scene.run(origin.T, direction.T, dists=limit, query="OCCLUDED")
         blocked = (answer >= 0) & (distance > 0)
         # A blocked lane may have met only the triangle that it leaves.
-        lanes = np.flatnonzero(blocked & (leaving >= 0) & (leaving < len(self._planes)))
-        rays = origin.take(lanes, 1), direction.take(lanes, 1), leaving.take(lanes)
+        lanes = np.flatnonzero(blocked & (exclude_prim >= 0) & (exclude_prim < len(self._planes)))
+        rays = origin.take(lanes, 1), direction.take(lanes, 1), exclude_prim.take(lanes)
         doubtful = np.flatnonzero(~self._planes.behind(*rays))
         if doubtful.size:
             lanes = lanes.take(doubtful)
-            rays = origin.take(lanes, 1), direction.take(lanes, 1), leaving.take(lanes)
+            rays = origin.take(lanes, 1), direction.take(lanes, 1), exclude_prim.take(lanes)
             blocked[lanes] = self._closest_triangle(*rays).t < distance.take(lanes)
         return blocked
 
@@ -160,9 +162,9 @@ class Planes:
         """Return the number of triangles."""
         return self._rows.shape[1]
 
-    def behind(self, origin: Floats, direction: Floats, leaving: Ints) -> Bools:
+    def behind(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Bools:
         """Tell of which rays (3, n) the triangle that they leave (n,) is surely behind."""
-        nx, ny, nz, offset, unsure, grazing = self._rows.take(leaving, 1)
+        nx, ny, nz, offset, unsure, grazing = self._rows.take(exclude_prim, 1)
         height = nx * origin[0] + ny * origin[1] + nz * origin[2] - offset
         rise = nx * direction[0] + ny * direction[1] + nz * direction[2]
         grazing *= np.abs(direction).max(0)

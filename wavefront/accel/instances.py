@@ -63,10 +63,10 @@ class InstanceAccelerator:
         self._child = tree.child.astype(np.intp)
         self._instance = tree.prim[:, 0]
 
-    def closest(self, origin: Floats, direction: Floats, leaving: Ints) -> Intersections:
+    def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
         """Find the nearest hit with t > 0 of rays (3, n); ties go to the lowest id."""
-        hits = self._once.closest(origin, direction, self._left_once(leaving))
-        left = self._left(leaving)
+        hits = self._once.closest(origin, direction, self._left_once(exclude_prim))
+        left = self._left(exclude_prim)
         for lane, instance in self._rounds(origin, direction, hits.t):
             for number, at in self._by_mesh(instance):
                 lanes, some = lane.take(at), instance.take(at)
@@ -76,10 +76,10 @@ class InstanceAccelerator:
                 _keep_nearest(hits, lanes, found)
         return hits
 
-    def occluded(self, origin: Floats, direction: Floats, distance: Floats, leaving: Ints) -> Bools:
+    def occluded(self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints) -> Bools:
         """Tell whether anything is hit with 0 < t < `distance` (n,)."""
-        blocked = self._once.occluded(origin, direction, distance, self._left_once(leaving))
-        left = self._left(leaving)
+        blocked = self._once.occluded(origin, direction, distance, self._left_once(exclude_prim))
+        left = self._left(exclude_prim)
         reach = np.where(blocked, f4(-1), distance)
         for lane, instance in self._rounds(origin, direction, reach):
             for number, at in self._by_mesh(instance):
@@ -91,14 +91,14 @@ class InstanceAccelerator:
                 reach[lanes] = -1  # looks no further
         return blocked
 
-    def _left_once(self, leaving: Ints) -> Ints:
+    def _left_once(self, exclude_prim: Ints) -> Ints:
         """Primitives that rays leave, -1 for those of instances."""
-        return np.where(leaving < self._first, leaving, -1)
+        return np.where(exclude_prim < self._first, exclude_prim, -1)
 
-    def _left(self, leaving: Ints) -> tuple[Ints, Ints]:
+    def _left(self, exclude_prim: Ints) -> tuple[Ints, Ints]:
         """Instances that rays leave, -1 for none, and the triangles that they leave there."""
-        instance = np.searchsorted(self._placements.first, leaving, "right") - 1
-        return instance, leaving - self._placements.first.take(instance)
+        instance = np.searchsorted(self._placements.first, exclude_prim, "right") - 1
+        return instance, exclude_prim - self._placements.first.take(instance)
 
     def _local(
         self, origin: Floats, direction: Floats, left: tuple[Ints, Ints], lane: Ints, instance: Ints

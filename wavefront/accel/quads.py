@@ -1,6 +1,6 @@
 """Find pairs of triangles that are flat convex quadrilaterals, which one test serves.
 
-Walls, boxes and all that was modelled as quadrilaterals comes as such pairs: a fan (a, b, c), (a, c, d).
+Walls, boxes and all that was modeled as quadrilaterals comes as such pairs: a fan (a, b, c), (a, c, d).
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ def sphere_distance(
     """Nearest t > 0 (k,) at which rays (3, k) meet spheres, inf on a miss.
 
     Haines et al., "Precision improvements for ray/sphere intersection", Ray Tracing Gems, chapter 7:
-    the discriminant from the distance between line and centre, and the small root from the product of
+    the discriminant from the distance between line and center, and the small root from the product of
     the two. A ray that `leaves` its sphere has an exact root at 0; the other one remains.
     """
     fx, fy, fz = origin - center
@@ -71,5 +71,5 @@ def sphere_distance(
 
 
 def spheres_of(centers: Doubles, radii: Doubles, prim: Ints) -> tuple[Doubles, Doubles]:
-    """Gather centres (3, k) and radii (k,) of spheres `prim` (k,)."""
+    """Gather centers (3, k) and radii (k,) of spheres `prim` (k,)."""
     return centers.take(prim, 1), radii.take(prim)

@@ -70,7 +70,7 @@ def edge_rows(corners: Floats, center: Floats, radius: float) -> Floats:
     coordinate tutorial", 1998). `radius` bounds the distance of all corners from `center` (3,).
 
     Rows are scaled so that one threshold serves every polygon: a ray that truly hits has
-    products w0 w1, w1 w2 ... of neighbours > -1, and if they are above 1, it truly hits. For an error
+    products w0 w1, w1 w2 ... of neighbors > -1, and if they are above 1, it truly hits. For an error
     of at most e in each w, and as hits have 0 <= |w| <= 2A (twice the area), the products are above
     -e (2A + e). Sure hits are above e (2A + 3e), as a wrong sign means a w of less than e.
     """
@@ -87,7 +87,7 @@ class Sides(NamedTuple):
     """Planes of flat polygons (m), to tell on which side points are, with a bound for rounding."""
 
     plane: Doubles  # (4, m) unit normal, and the offset: on the plane, their product with (p, 1) is 0
-    uneven: Doubles  # (m,) by how much the corners may be off the plane
+    textured_emission: Doubles  # (m,) by how much the corners may be off the plane
 
     def rows(self, start: Floats, end: Floats) -> tuple[Floats, Floats]:
         """Return rows (m, 4) each for points where rays start and end, (4, n): o - center and 1.
@@ -101,8 +101,8 @@ class Sides(NamedTuple):
         # In half ulps: rounding of the point 1, of the plane 1, of the sum of four terms 4. An end is the
         # sum of a start and a product of at most near + far, so 2 near + 2 far in place of 1; and a float32 t
         # is off by as much as another such product.
-        at_start = ROUNDOFF * (normal @ (6 * near) + 6 * offset) + self.uneven
-        at_end = ROUNDOFF * (normal @ (4 * near + 8 * far) + 6 * offset) + self.uneven
+        at_start = ROUNDOFF * (normal @ (6 * near) + 6 * offset) + self.textured_emission
+        at_end = ROUNDOFF * (normal @ (4 * near + 8 * far) + 6 * offset) + self.textured_emission
         return (self.plane / at_start).T.astype(f4), (self.plane / at_end).T.astype(f4)
 
 
@@ -122,7 +122,7 @@ def side_rows(corners: Floats, center: Floats, radius: float) -> Floats:
 
     The product with (p - center, 1) has the sign of the edge functions of a ray if the polygon's plane
     lies ahead of p. It is scaled so that its product with w1 (see `edge_rows`) is above -1 for
-    every true hit that does, with p within five radii of the centre.
+    every true hit that does, with p within five radii of the center.
     """
     corner: Doubles = corners.astype(np.float64) - center
     normal = np.cross(corner[1] - corner[0], corner[2] - corner[0])
@@ -176,8 +176,8 @@ def one_sign(edges: Floats, out: Floats) -> Floats:
     count = edges.shape[1]
     products = []
     for edge in (*range(count - 1, 1, -1), 0):
-        neighbour = 1 if edge == 0 else edge - 1
-        products.append(np.multiply(edges[:, edge], edges[:, neighbour], out=edges[:, edge]))
+        neighbor = 1 if edge == 0 else edge - 1
+        products.append(np.multiply(edges[:, edge], edges[:, neighbor], out=edges[:, edge]))
     np.minimum(products[0], products[1], out=out)
     for product in products[2:]:
         np.minimum(out, product, out=out)

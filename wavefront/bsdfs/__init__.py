@@ -1,22 +1,24 @@
-"""Materials. Adding one is a file here and a line below; the parametrised tests find it there."""
+"""Materials. Adding one is a file here and a line below; the parametrized tests find it there."""
 
+from ..materials.alpha import Opacity
+from ..textures.base import BaseTexture
+from ..textures.normal_map import BaseNormalMap
 from .base import Bsdf, BsdfSample, evaluated, sampled
 from .conductor import Conductor
 from .dielectric import Dielectric
 from .diffuse import Diffuse
 from .mirror import Mirror
 from .mix import Mix
-from .opacity import Opacity
 from .oren_nayar import OrenNayar
 from .principled import Principled
-from .relief import Relief
-from .spatial import Spatial
 from .thin import ThinDielectric
 
 ALL = (Diffuse, Mirror, Dielectric, Conductor, OrenNayar, ThinDielectric, Principled, Mix)
 
 __all__ = [
     "ALL",
+    "BaseNormalMap",
+    "BaseTexture",
     "Bsdf",
     "BsdfSample",
     "Conductor",
@@ -27,8 +29,6 @@ __all__ = [
     "Opacity",
     "OrenNayar",
     "Principled",
-    "Relief",
-    "Spatial",
     "ThinDielectric",
     "evaluated",
     "sampled",

@@ -14,16 +14,16 @@ from typing import Any, Self
 import numpy as np
 
 from ..errors import SceneError
+from ..materials.alpha import Opacity, opacity
+from ..materials.emission import Emission
 from ..parameter import Parametrized, brief
 from ..record import record
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
-from ..state import Surface
-from ..vec import Bools, Floats, alike
-from .emission import Emission
-from .opacity import Opacity, opacity
-from .parameter import Scalar
-from .relief import Relief
-from .spatial import Spatial
+from ..state import SurfaceInteraction
+from ..textures.base import BaseTexture
+from ..textures.normal_map import BaseNormalMap
+from ..textures.parameter import Scalar
+from ..vec import Bools, Floats, broadcast
 
 
 @record
@@ -42,7 +42,7 @@ class Bsdf(Parametrized, ABC):
 
     A subclass gives `f`; it may give a `sample_f` and its `pdf` that follow `f` more closely than
     the cosine-weighted ones here. Parameters are attributes: constants of shape (3, 1) or (1,),
-    or `Spatial` ones, which `bind` replaces by their values at the hit points.
+    or `BaseTexture` ones, which `bind` replaces by their values at the hit points.
     """
 
     transmissive: bool = False  # light can cross the surface
@@ -51,7 +51,9 @@ class Bsdf(Parametrized, ABC):
     opacity: Opacity | None = None  # how much of the surface is there; None: all. The renderer sees to it
     absorption: Any = np.zeros((3, 1), np.float32)  # of the inside, per scene unit. The path sees to it
     emission: Emission | None = None  # what the surface sends itself. The shape that has it sees to it
-    relief: Relief | None = None  # tilts the shading normals. The renderer sees to it, no material does
+    normal_map: BaseNormalMap | None = (
+        None  # tilts the shading normals. The renderer sees to it, no material does
+    )
 
     def __repr__(self) -> str:
         """Name the parameters, the alpha and the relief."""
@@ -59,10 +61,10 @@ class Bsdf(Parametrized, ABC):
         if self.opacity is not None:
             cutoff = "" if self.opacity.cutoff is None else f", {self.opacity.cutoff:g}"
             text += f".with_alpha({brief(self.opacity.alpha)}{cutoff})"
-        return text if self.relief is None else f"{text}.with_relief({self.relief!r})"
+        return text if self.normal_map is None else f"{text}.with_normal_map({self.normal_map!r})"
 
     @property
-    def matte(self) -> bool:
+    def view_independent(self) -> bool:
         """Whether it looks alike from everywhere: no method reads wo, which is then not made ready."""
         return False
 
@@ -91,7 +93,7 @@ class Bsdf(Parametrized, ABC):
         partly.opacity = opacity(type(self).__name__, alpha, cutoff)
         return partly
 
-    def with_relief(self, relief: Relief) -> Self:
+    def with_normal_map(self, normal_map: BaseNormalMap) -> Self:
         """Return this material with a `NormalMap` or `BumpMap`.
 
         Raises
@@ -99,28 +101,28 @@ class Bsdf(Parametrized, ABC):
         SceneError
             If it is something else.
         """
-        if not isinstance(relief, Relief):
-            raise SceneError(f"relief must be a NormalMap or a BumpMap, got {relief!r}")
+        if not isinstance(normal_map, BaseNormalMap):
+            raise SceneError(f"relief must be a NormalMap or a BumpMap, got {normal_map!r}")
         carved = copy(self)
-        carved.relief = relief
+        carved.normal_map = normal_map
         return carved
 
     def scaled(self, factor: float) -> Self:
         """Return this material where lengths were multiplied by `factor`: itself if it has none."""
-        relief = None if self.relief is None else self.relief.scaled(factor)
-        absorbs = not isinstance(self.absorption, Spatial) and bool(np.any(self.absorption))
-        if factor == 1 or not (absorbs or relief is not self.relief):
+        normal_map = None if self.normal_map is None else self.normal_map.scaled(factor)
+        absorbs = not isinstance(self.absorption, BaseTexture) and bool(np.any(self.absorption))
+        if factor == 1 or not (absorbs or normal_map is not self.normal_map):
             return self
         other = copy(self)
-        other.relief = relief
+        other.normal_map = normal_map
         if absorbs:  # no float32 is so large that it would make a light path of length 0 a NaN
             per_unit = np.asarray(self.absorption, np.float64) / factor
             other.absorption = np.minimum(per_unit, np.finfo(np.float32).max).astype(np.float32)
         return other
 
-    def bind(self, surface: Surface) -> Self:
+    def bind(self, surface: SurfaceInteraction) -> Self:
         """Return this material with its spatial parameters looked up at `surface` (n columns)."""
-        varying = {name: value for name, value in vars(self).items() if isinstance(value, Spatial)}
+        varying = {name: value for name, value in vars(self).items() if isinstance(value, BaseTexture)}
         if not varying:
             return self
         bound = copy(self)
@@ -144,7 +146,7 @@ class Bsdf(Parametrized, ABC):
         """Draw a direction per column from uniform numbers `u` (`dimensions`, n) in [0, 1)."""
         wi = cosine_hemisphere(u)
         pdf = self.pdf(wo, wi)
-        return BsdfSample(wi, weigh(self.f(wo, wi), wi, pdf), pdf, alike(np.False_, len(pdf)))
+        return BsdfSample(wi, weigh(self.f(wo, wi), wi, pdf), pdf, broadcast(np.False_, len(pdf)))
 
 
 def weigh(f: Floats, wi: Floats, pdf: Floats) -> Floats:

@@ -10,12 +10,12 @@ import numpy as np
 from ..errors import one_of
 from ..parameter import Parameter
 from ..suggestions import suggests_keywords
-from ..vec import Floats, alike
+from ..textures.parameter import MAX_INDEX, Color, Scalar, color, scalar
+from ..vec import Floats, broadcast
 from .base import Bsdf, BsdfSample, weigh
 from .fresnel import fresnel_conductor
 from .microfacet import alpha_of, is_smooth, mirror_lobe, reflect, visible_normals
 from .mirror import mirrored
-from .parameter import MAX_INDEX, Colour, Scalar, colour, scalar
 
 # η and k of metals in linear Rec. 709 RGB: published measurements, weighted by the matching
 # functions of the three primaries (CIE 1931 2° by the fit of C. Wyman et al. 2013, JCGT 2(2), to
@@ -58,12 +58,12 @@ class Conductor(Bsdf):
         If a parameter is out of its range or not finite.
     """
 
-    eta = Parameter(partial(colour, high=MAX_INDEX, above_zero=True))
-    k = Parameter(partial(colour, high=MAX_INDEX))
+    eta = Parameter(partial(color, high=MAX_INDEX, above_zero=True))
+    k = Parameter(partial(color, high=MAX_INDEX))
     roughness = Parameter(scalar)
 
     @suggests_keywords
-    def __init__(self, eta: Colour, k: Colour, roughness: Scalar = 0.0) -> None:
+    def __init__(self, eta: Color, k: Color, roughness: Scalar = 0.0) -> None:
         self.eta = eta
         self.k = k
         self.roughness = roughness
@@ -111,4 +111,4 @@ class Conductor(Bsdf):
             return BsdfSample(mirrored(wo), weight, np.ones_like(wo[2]), np.ones(n, np.bool_))
         wi = reflect(wo, visible_normals(wo, alpha_of(self.roughness), u))
         f, pdf = self.evaluate(wo, wi)
-        return BsdfSample(wi, weigh(f, wi, pdf), pdf, alike(np.False_, n))
+        return BsdfSample(wi, weigh(f, wi, pdf), pdf, broadcast(np.False_, n))

@@ -9,21 +9,14 @@ from typing import Self
 import numpy as np
 
 from ..parameter import Parameter
-from ..state import Surface
+from ..state import SurfaceInteraction
 from ..suggestions import suggests_keywords
-from ..vec import Floats, alike, dot, f4
-from .base import Bsdf, BsdfSample, Spatial, weigh
+from ..textures.base import BaseTexture
+from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
+from ..vec import Floats, broadcast, dot, f4
+from .base import Bsdf, BsdfSample, weigh
 from .fresnel import fresnel_dielectric
-from .microfacet import (
-    alpha_of,
-    is_smooth,
-    mirror_lobe,
-    reflect,
-    refract,
-    refraction_lobe,
-    visible_normals,
-)
-from .parameter import Colour, Scalar, colour, refractive_index, scalar
+from .microfacet import alpha_of, is_smooth, mirror_lobe, reflect, refract, refraction_lobe, visible_normals
 
 # Closer to 1 than this, refraction bends light by less than half vectors resolve: the boundary is smooth.
 LEAST_BEND = 1e-3
@@ -60,9 +53,9 @@ class Dielectric(Bsdf):
 
     ior = Parameter(refractive_index)
     roughness = Parameter(scalar)
-    reflectance = Parameter(colour)
-    transmittance = Parameter(colour)
-    absorption = Parameter(partial(colour, high=np.inf))
+    reflectance = Parameter(color)
+    transmittance = Parameter(color)
+    absorption = Parameter(partial(color, high=np.inf))
 
     @suggests_keywords
     def __init__(
@@ -70,9 +63,9 @@ class Dielectric(Bsdf):
         ior: Scalar = 1.5,
         roughness: Scalar = 0.0,
         *,
-        reflectance: Colour = 1.0,
-        transmittance: Colour = 1.0,
-        absorption: Colour = 0.0,
+        reflectance: Color = 1.0,
+        transmittance: Color = 1.0,
+        absorption: Color = 0.0,
     ) -> None:
         self.ior = ior
         self.roughness = roughness
@@ -83,14 +76,14 @@ class Dielectric(Bsdf):
 
     def derive(self) -> None:
         """Tell whether it is smooth, and set the index as seen from outside."""
-        straight = not isinstance(self.ior, Spatial) and abs(self.ior[0] - 1) < LEAST_BEND
+        straight = not isinstance(self.ior, BaseTexture) and abs(self.ior[0] - 1) < LEAST_BEND
         self.specular = is_smooth(self.roughness) or bool(straight)
         self.eta = self.ior  # (n,) or (1,) index beyond / before; unbound, wo is outside
 
-    def bind(self, surface: Surface) -> Self:
+    def bind(self, surface: SurfaceInteraction) -> Self:
         """Look the parameters up, and turn `eta` round where `wo` is inside."""
         bound = copy(super().bind(surface))
-        bound.eta = np.where(surface.inside, f4(1) / bound.ior, bound.ior)
+        bound.eta = np.where(surface.back_facing, f4(1) / bound.ior, bound.ior)
         return bound
 
     def f(self, wo: Floats, wi: Floats) -> Floats:
@@ -145,4 +138,4 @@ class Dielectric(Bsdf):
         # A facet may send light to the wrong side of the surface: no sample.
         pdf = np.where((wi[2] > 0) == reflects, pdf, f4(0))
         eta = np.where(reflects, f4(1), self.eta)
-        return BsdfSample(wi, weigh(f, wi, pdf), pdf, alike(np.False_, len(pdf)), eta)
+        return BsdfSample(wi, weigh(f, wi, pdf), pdf, broadcast(np.False_, len(pdf)), eta)

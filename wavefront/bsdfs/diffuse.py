@@ -7,10 +7,10 @@ import numpy as np
 from ..parameter import Parameter
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..suggestions import suggests_keywords
-from ..vec import Floats, alike, f4
+from ..textures.base import BaseTexture
+from ..textures.parameter import Color, color
+from ..vec import Floats, broadcast, f4
 from .base import Bsdf, BsdfSample
-from .parameter import Colour, colour
-from .spatial import Spatial
 
 INV_PI = f4(1 / np.pi)
 
@@ -30,21 +30,25 @@ class Diffuse(Bsdf):
         If the reflectance is outside [0, 1] or not finite.
     """
 
-    reflectance = Parameter(colour)
+    reflectance = Parameter(color)
 
     @suggests_keywords
-    def __init__(self, reflectance: Colour = 0.5) -> None:
+    def __init__(self, reflectance: Color = 0.5) -> None:
         self.reflectance = reflectance
 
     @property
-    def matte(self) -> bool:
+    def view_independent(self) -> bool:
         """True, but not for subclasses, which may see to it themselves."""
         return type(self) is Diffuse
 
     @property
     def black(self) -> bool:
         """Whether the reflectance is 0, as it often is of lamps."""
-        return self.matte and not isinstance(self.reflectance, Spatial) and not self.reflectance.any()
+        return (
+            self.view_independent
+            and not isinstance(self.reflectance, BaseTexture)
+            and not self.reflectance.any()
+        )
 
     def f(self, wo: Floats, wi: Floats) -> Floats:
         """Return reflectance/π above the surface, (3, n)."""
@@ -61,4 +65,4 @@ class Diffuse(Bsdf):
         weight = np.broadcast_to(self.reflectance, wi.shape)
         if not pdf.all():
             weight = weight * (pdf > 0)
-        return BsdfSample(wi, weight, pdf, alike(np.False_, len(pdf)))
+        return BsdfSample(wi, weight, pdf, broadcast(np.False_, len(pdf)))

@@ -10,7 +10,7 @@ TINY = f4(1e-30)
 
 
 def fresnel_dielectric(cos: Floats, eta: Floats) -> tuple[Floats, Floats]:
-    """Unpolarised reflectance between two dielectrics, and the cosine of the refracted ray.
+    """Unpolarized reflectance between two dielectrics, and the cosine of the refracted ray.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def fresnel_dielectric(cos: Floats, eta: Floats) -> tuple[Floats, Floats]:
     Returns
     -------
     reflectance
-        (n,) mean over both polarisations; exactly 1 where all light is reflected internally.
+        (n,) mean over both polarizations; exactly 1 where all light is reflected internally.
     cos_refracted
         (n,) cosine beyond the boundary, at least 0; 0 where all light is reflected internally.
 
@@ -32,16 +32,16 @@ def fresnel_dielectric(cos: Floats, eta: Floats) -> tuple[Floats, Floats]:
     "Microfacet Models for Refraction through Rough Surfaces", eq. 22. Written with
     g² = cos² + (η² − 1), which is exact at η = 1 and needs no branch for total internal reflection.
     """
-    eta2 = eta * eta
+    eta_scale = eta * eta
     g = np.sqrt(np.maximum(cos * cos + (eta - f4(1)) * (eta + f4(1)), f4(0)))
     perpendicular = (cos - g) / np.maximum(cos + g, TINY)
-    parallel = (eta2 * cos - g) / np.maximum(eta2 * cos + g, TINY)
+    parallel = (eta_scale * cos - g) / np.maximum(eta_scale * cos + g, TINY)
     reflectance = f4(0.5) * (perpendicular * perpendicular + parallel * parallel)
     return np.where(g > 0, reflectance, f4(1)), np.minimum(g / eta, f4(1))
 
 
 def fresnel_conductor(cos: Floats, eta: Floats, k: Floats) -> Floats:
-    """Unpolarised reflectance of a conductor in air or vacuum, per channel, (3, n).
+    """Unpolarized reflectance of a conductor in air or vacuum, per channel, (3, n).
 
     Parameters
     ----------

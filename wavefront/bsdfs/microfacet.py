@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from ..elementary import sin_cos_turns
+from ..textures.base import BaseTexture
 from ..vec import Bools, Floats, dot, f4, normalize
-from .base import Spatial
 from .fresnel import TINY
 
 INV_PI = f4(1 / np.pi)
@@ -30,7 +30,7 @@ SMOOTH = f4(1e-3)
 
 def is_smooth(roughness: Any) -> bool:
     """Tell whether a roughness parameter means a delta lobe: a constant with α = roughness² < `SMOOTH`."""
-    return not isinstance(roughness, Spatial) and bool(roughness[0] ** 2 < SMOOTH)
+    return not isinstance(roughness, BaseTexture) and bool(roughness[0] ** 2 < SMOOTH)
 
 
 def alpha_of(roughness: Floats) -> Floats:

@@ -6,9 +6,9 @@ import numpy as np
 
 from ..parameter import Parameter
 from ..suggestions import suggests_keywords
+from ..textures.parameter import Color, color
 from ..vec import Floats
 from .base import Bsdf, BsdfSample
-from .parameter import Colour, colour
 
 
 class Mirror(Bsdf):
@@ -28,10 +28,10 @@ class Mirror(Bsdf):
 
     specular = True
 
-    reflectance = Parameter(colour)
+    reflectance = Parameter(color)
 
     @suggests_keywords
-    def __init__(self, reflectance: Colour = 1.0) -> None:
+    def __init__(self, reflectance: Color = 1.0) -> None:
         self.reflectance = reflectance
 
     def f(self, wo: Floats, wi: Floats) -> Floats:

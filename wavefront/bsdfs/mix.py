@@ -9,11 +9,11 @@ import numpy as np
 
 from ..errors import SceneError
 from ..parameter import Parameter
-from ..state import Surface
+from ..state import SurfaceInteraction
 from ..suggestions import suggests_keywords
+from ..textures.parameter import Scalar, scalar
 from ..vec import Floats, f4
 from .base import Bsdf, BsdfSample, weigh
-from .parameter import Scalar, scalar
 
 BELOW_1 = np.nextafter(f4(1), f4(0))
 
@@ -24,8 +24,8 @@ def _component(name: str, value: Any) -> Bsdf:
         raise SceneError(f"{name} must be a material, got {value!r}")
     if value.opacity is not None:
         raise SceneError(f"{name} has an alpha; give it to the Mix, by with_alpha")
-    if value.relief is not None:
-        raise SceneError(f"{name} has a relief; give it to the Mix, by with_relief")
+    if value.normal_map is not None:
+        raise SceneError(f"{name} has a relief; give it to the Mix, by with_normal_map")
     if value.emission is not None:
         raise SceneError(f"{name} has an emission; give it to the shape")
     return value
@@ -69,7 +69,7 @@ class Mix(Bsdf):
         self.specular = self.first.specular and self.second.specular
         self.absorption = _inside(self.first, self.second)
 
-    def bind(self, surface: Surface) -> Self:
+    def bind(self, surface: SurfaceInteraction) -> Self:
         """Look up the weight, and the parameters of both materials."""
         bound = copy(super().bind(surface))
         vars(bound).update(first=self.first.bind(surface), second=self.second.bind(surface))

@@ -11,10 +11,11 @@ from ..errors import SceneError
 from ..parameter import Parameter, brief
 from ..sampling.warp import cosine_hemisphere_pdf
 from ..suggestions import suggests_keywords
+from ..textures.base import BaseTexture
+from ..textures.parameter import Color, Scalar, color, scalar
 from ..vec import Floats, dot, f4
-from .base import Bsdf, Spatial
+from .base import Bsdf
 from .microfacet import INV_PI
-from .parameter import Colour, Scalar, colour, scalar
 
 A_SLOPE = f4(0.5 - 2 / (3 * np.pi))
 MEAN_SLOPE = f4(2 / 3 - 28 / (15 * np.pi))
@@ -46,12 +47,12 @@ class OrenNayar(Bsdf):
         If a parameter is out of its range or not finite.
     """
 
-    reflectance = Parameter(colour)
+    reflectance = Parameter(color)
     sigma = Parameter(partial(scalar, holds=lambda x: 0 <= x <= np.pi / 2, limit="in [0, π/2]"))
 
     @suggests_keywords
     def __init__(
-        self, reflectance: Colour = 0.5, sigma: Scalar = 0.5, *, energy_preserving: bool = False
+        self, reflectance: Color = 0.5, sigma: Scalar = 0.5, *, energy_preserving: bool = False
     ) -> None:
         self.reflectance = reflectance
         self.sigma = sigma
@@ -60,7 +61,7 @@ class OrenNayar(Bsdf):
 
     def derive(self) -> None:
         """Check what the model that preserves energy asks for."""
-        if self.energy_preserving and not isinstance(self.sigma, Spatial) and self.sigma[0] > 1:
+        if self.energy_preserving and not isinstance(self.sigma, BaseTexture) and self.sigma[0] > 1:
             found = brief(self.sigma)
             raise SceneError(f"OrenNayar sigma is {found}; it must be in [0, 1] to preserve energy")
 

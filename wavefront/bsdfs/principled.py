@@ -8,19 +8,20 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from ..materials.alpha import opacity
+from ..materials.emission import emission as emission_of
 from ..parameter import Parameter
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
-from ..state import Surface
+from ..state import SurfaceInteraction
 from ..suggestions import suggests_keywords
-from ..vec import Bools, Floats, alike, dot, f4, luminance
+from ..textures.base import BaseTexture
+from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
+from ..vec import Bools, Floats, broadcast, dot, f4, luminance
 from .albedo import gloss_tables, lookup
-from .base import Bsdf, BsdfSample, Spatial, weigh
+from .base import Bsdf, BsdfSample, weigh
 from .dielectric import LEAST_BEND
-from .emission import emission as emission_of
 from .fresnel import fresnel_dielectric
 from .microfacet import INV_PI, alpha_of, mirror_lobe, reflect, refract, refraction_lobe, visible_normals
-from .opacity import opacity
-from .parameter import Colour, Scalar, colour, refractive_index, scalar
 from .sheen import sheen_albedo, sheen_lobe
 
 COAT_F0 = 0.04
@@ -32,7 +33,7 @@ class Chances(NamedTuple):
     gloss: Floats  # reflection in the surface's microfacets
     glass: Floats  # reflection or refraction in them, by Fresnel
     coat: Floats  # reflection in the clear coat
-    matte: Floats  # cosine-weighted
+    view_independent: Floats  # cosine-weighted
 
 
 class Principled(Bsdf):
@@ -53,7 +54,7 @@ class Principled(Bsdf):
     Parameters
     ----------
     base_color
-        Albedo of the base, colour of the metal, and tint of transmitted light, in [0, 1].
+        Albedo of the base, color of the metal, and tint of transmitted light, in [0, 1].
     metallic
         From 0 (dielectric) to 1 (metal).
     roughness
@@ -67,7 +68,7 @@ class Principled(Bsdf):
     clearcoat, clearcoat_roughness
         Strength of a clear varnish of index 1.5, and its roughness, in [0, 1].
     sheen, sheen_color, sheen_roughness
-        Strength, colour and roughness of cloth fibres, in [0, 1].
+        Strength, color and roughness of cloth fibres, in [0, 1].
     specular, specular_color
         Strength, in [0, 1], and tint, at least 0, of the dielectric's reflection along the normal, which
         the tint raises to at most 1.
@@ -89,9 +90,9 @@ class Principled(Bsdf):
     """
 
     dimensions = 3
-    inside: Bools | None = None  # (n,) wo is inside; unbound, it is outside
+    back_facing: Bools | None = None  # (n,) wo is inside; unbound, it is outside
 
-    base_color = Parameter(colour)
+    base_color = Parameter(color)
     metallic = Parameter(scalar)
     roughness = Parameter(scalar)
     ior = Parameter(refractive_index)
@@ -99,17 +100,17 @@ class Principled(Bsdf):
     clearcoat = Parameter(scalar)
     clearcoat_roughness = Parameter(scalar)
     sheen = Parameter(scalar)
-    sheen_color = Parameter(colour)
+    sheen_color = Parameter(color)
     sheen_roughness = Parameter(scalar)
     specular_weight = Parameter(scalar, "specular")
-    specular_color = Parameter(partial(colour, high=np.inf))
-    absorption = Parameter(partial(colour, high=np.inf))
+    specular_color = Parameter(partial(color, high=np.inf))
+    absorption = Parameter(partial(color, high=np.inf))
     emission = Parameter(emission_of)
 
     @suggests_keywords
     def __init__(
         self,
-        base_color: Colour = 0.8,
+        base_color: Color = 0.8,
         metallic: Scalar = 0.0,
         roughness: Scalar = 0.5,
         ior: Scalar = 1.5,
@@ -119,12 +120,12 @@ class Principled(Bsdf):
         clearcoat: Scalar = 0.0,
         clearcoat_roughness: Scalar = 0.03,
         sheen: Scalar = 0.0,
-        sheen_color: Colour = 1.0,
+        sheen_color: Color = 1.0,
         sheen_roughness: Scalar = 0.3,
         specular: Scalar = 1.0,
-        specular_color: Colour = 1.0,
-        absorption: Colour = 0.0,
-        emission: Colour = 0.0,
+        specular_color: Color = 1.0,
+        absorption: Color = 0.0,
+        emission: Color = 0.0,
         alpha: Scalar = 1.0,
         alpha_cutoff: float | None = None,
         conserve_energy: bool = True,
@@ -156,12 +157,12 @@ class Principled(Bsdf):
         self._coated = _used(self.clearcoat)
         self._cloth = _used(self.sheen)
 
-    def bind(self, surface: Surface) -> Self:
+    def bind(self, surface: SurfaceInteraction) -> Self:
         """Look the parameters up, and remember on which side `wo` is."""
         bound = super().bind(surface)
         if self.transmissive and not self.thin:
             bound = copy(bound)
-            bound.inside = surface.inside
+            bound.back_facing = surface.back_facing
         return bound
 
     def f(self, wo: Floats, wi: Floats) -> Floats:
@@ -206,7 +207,7 @@ class Principled(Bsdf):
             eta = np.where(crosses, index, f4(1))
         f, pdf = self.evaluate(wo, wi)
         pdf = np.where((wi[2] < 0) == crosses, pdf, f4(0))
-        return BsdfSample(wi, weigh(f, wi, pdf), pdf, alike(np.False_, len(pdf)), eta)
+        return BsdfSample(wi, weigh(f, wi, pdf), pdf, broadcast(np.False_, len(pdf)), eta)
 
     def _base(self, wo: Floats, wi: Floats, chances: Chances) -> tuple[Floats, Floats]:
         """Metal, matte, gloss and glass: value (3, n) and their part of the density (n,)."""
@@ -217,9 +218,9 @@ class Principled(Bsdf):
         gloss = self._dielectric(weight)
         metal = self.base_color + (f4(1) - self.base_color) * weight
         below = self._under_gloss(wo, wi) if self.conserve_energy else f4(1) - gloss.max(0)
-        matte = opaque * below * np.where(wi[2] > 0, INV_PI, f4(0))
-        f = (metal * self.metallic + gloss * opaque) * value + self.base_color * matte
-        pdf = chances.gloss * density + chances.matte * cosine_hemisphere_pdf(wi)
+        view_independent = opaque * below * np.where(wi[2] > 0, INV_PI, f4(0))
+        f = (metal * self.metallic + gloss * opaque) * value + self.base_color * view_independent
+        pdf = chances.gloss * density + chances.view_independent * cosine_hemisphere_pdf(wi)
         if not self.transmissive:
             return f, pdf
         clear = (f4(1) - self.metallic) * self.transmission
@@ -258,7 +259,7 @@ class Principled(Bsdf):
             return np.ones(1, f4)
         away = self.ior - f4(1)
         bent = np.where(np.abs(away) < LEAST_BEND, f4(1 + LEAST_BEND), self.ior)
-        return bent if self.inside is None else np.where(self.inside, f4(1) / bent, bent)
+        return bent if self.back_facing is None else np.where(self.back_facing, f4(1) / bent, bent)
 
     def _under_gloss(self, wo: Floats, wi: Floats) -> Floats:
         """Part of the light that reaches the matte base and leaves it again, (n,).
@@ -303,21 +304,21 @@ class Principled(Bsdf):
         metal = luminance(self.base_color + (f4(1) - self.base_color) * weight)
         floor = f4(0.1)  # at grazing reflections Fresnel is far higher than at wo
         gloss = self.metallic * (metal + floor) + opaque * (seen + floor * (self.specular_weight > 0))
-        matte = opaque * (luminance(self.base_color) + (self.base_color > 0).any(0) * f4(0.01))
+        view_independent = opaque * (luminance(self.base_color) + (self.base_color > 0).any(0) * f4(0.01))
         glass = (f4(1) - self.metallic) * self.transmission
         if self._cloth:
-            matte = matte + self.sheen * self.sheen_color.max(0) * (f4(0.2) + weight)
+            view_independent = view_independent + self.sheen * self.sheen_color.max(0) * (f4(0.2) + weight)
         coat = self.clearcoat * (floor + _schlick(COAT_F0, wo[2])) if self._coated else f4(0)
-        total = gloss + glass + coat + matte
+        total = gloss + glass + coat + view_independent
         share = f4(1) / np.where(total > 0, total, f4(1))
         full = np.broadcast_to
         shape = wo[2].shape
-        return Chances(*(full(part * share, shape) for part in (gloss, glass, coat, matte)))
+        return Chances(*(full(part * share, shape) for part in (gloss, glass, coat, view_independent)))
 
 
 def _used(parameter: Any) -> bool:
     """Tell whether a strength is ever above 0."""
-    return isinstance(parameter, Spatial) or bool((parameter > 0).any())
+    return isinstance(parameter, BaseTexture) or bool((parameter > 0).any())
 
 
 def _fifth(cos: Floats) -> Floats:

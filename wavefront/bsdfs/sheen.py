@@ -24,7 +24,7 @@ FIT = np.array(
 
 
 def sheen_lobe(wo: Floats, wi: Floats, roughness: Floats) -> Floats:
-    """D·G/(4·cosθo·cosθi) of the fibres above the surface, (n,), without colour (eqs. 2 and 3)."""
+    """D·G/(4·cosθo·cosθi) of the fibres above the surface, (n,), without color (eqs. 2 and 3)."""
     alpha = np.maximum(roughness, LEAST_ROUGHNESS)
     h = wo + wi
     sin2 = np.clip((h[0] * h[0] + h[1] * h[1]) / np.maximum(dot(h, h), f4(1e-20)), f4(0), f4(1))

@@ -6,12 +6,12 @@ import numpy as np
 
 from ..parameter import Parameter
 from ..suggestions import suggests_keywords
+from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
 from ..vec import Floats, dot, f4
 from .base import Bsdf, BsdfSample, weigh
 from .fresnel import fresnel_dielectric
 from .microfacet import alpha_of, is_smooth, mirror_lobe, reflect, visible_normals
 from .mirror import mirrored
-from .parameter import Colour, Scalar, colour, refractive_index, scalar
 
 
 class ThinDielectric(Bsdf):
@@ -42,8 +42,8 @@ class ThinDielectric(Bsdf):
 
     ior = Parameter(refractive_index)
     roughness = Parameter(scalar)
-    reflectance = Parameter(colour)
-    transmittance = Parameter(colour)
+    reflectance = Parameter(color)
+    transmittance = Parameter(color)
 
     @suggests_keywords
     def __init__(
@@ -51,8 +51,8 @@ class ThinDielectric(Bsdf):
         ior: Scalar = 1.5,
         roughness: Scalar = 0.0,
         *,
-        reflectance: Colour = 1.0,
-        transmittance: Colour = 1.0,
+        reflectance: Color = 1.0,
+        transmittance: Color = 1.0,
     ) -> None:
         self.ior = ior
         self.roughness = roughness

@@ -327,7 +327,7 @@ class Camera:
         return ((row + np.uint32(y0)) * whole + (pixel - row * width + np.uint32(x0))).astype(np.uint32)
 
     def rays(
-        self, x: Floats, y: Floats, centre: NDArray[np.float64], lens: Floats | None = None
+        self, x: Floats, y: Floats, center: NDArray[np.float64], lens: Floats | None = None
     ) -> tuple[Floats, Floats]:
         """Return origins and unit directions (3, n) of rays through film points.
 
@@ -335,14 +335,14 @@ class Camera:
         ----------
         x, y
             (n,) film position in pixels, from the left and from the top of the whole picture.
-        centre
-            (3,) the scene's centre, to which the origins are relative.
+        center
+            (3,) the scene's center, to which the origins are relative.
         lens
             (2, n) numbers in [0, 1) that choose the point on the lens; without them rays go
             through its middle.
         """
         offset, direction = self.projection.rays(x, y, self.film, lens)
-        eye = column(self.origin - centre)
+        eye = column(self.origin - center)
         towards = normalize(self._turned(direction))
         origin = np.repeat(eye, len(x), 1) if offset is None else eye + self._turned(offset)
         return origin, towards if towards.shape[1] == len(x) else np.repeat(towards, len(x), 1)

@@ -2,7 +2,7 @@
 
 Camera space has x to the right, y up and z backward: the camera looks along -z. Film points are
 in pixels of the whole picture, x from the left and y from the top; pixel (column, row) covers
-[column, column + 1] × [row, row + 1], so that its centre lies at + 0.5.
+[column, column + 1] × [row, row + 1], so that its center lies at + 0.5.
 """
 
 from __future__ import annotations

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bsdfs import Bsdf, Dielectric, Diffuse, Principled, ThinDielectric
-from ..textures import Texture
-from ..vertex_colors import VertexColors
-from .repair import Raw
+from ..textures.image import Texture
+from ..textures.vertex_colors import VertexColors
+from .repair import RawMesh
 
 PARAMETERS = frozenset(inspect.signature(Principled).parameters)
 BASES: dict[type[Bsdf], str] = {Diffuse: "reflectance", Principled: "base_color"}
@@ -21,7 +21,7 @@ GLASS = frozenset(("base_color", "transmission", "ior", "roughness", "absorption
 
 
 @dataclass
-class Look:
+class MaterialSpec:
     """What a surface looks like."""
 
     material: Bsdf
@@ -30,55 +30,55 @@ class Look:
     lost: list[str] = field(default_factory=list)  # what the file asks for in vain
     alpha: Any = None  # number or texture where opacity counts: glTF's alpha modes MASK and BLEND
     cutoff: float | None = None  # as of `Bsdf.with_alpha`
-    # the same with its base colour multiplied by vertex colours, once made; by whether its opacity is, too
-    tinted: dict[bool, Look] = field(default_factory=dict)
+    # the same with its base color multiplied by vertex colors, once made; by whether its opacity is, too
+    tinted: dict[bool, MaterialSpec] = field(default_factory=dict)
 
 
-COLOURED = Look(Diffuse(VertexColors()))  # of a mesh that has vertex colours and no material
+COLORED = MaterialSpec(Diffuse(VertexColors()))  # of a mesh that has vertex colors and no material
 
 
-def dress(raw: Raw, look: Look | None) -> bool:
-    """Give a mesh its material and emission, and the material the mesh's vertex colours.
+def assign_material(raw: RawMesh, spec: MaterialSpec | None) -> bool:
+    """Give a mesh its material and emission, and the material the mesh's vertex colors.
 
-    Returns False if the material has no base colour that they could multiply.
+    Returns False if the material has no base color that they could multiply.
     """
-    honoured = True
+    honored = True
     if raw.colors is not None:
-        look, honoured = (
-            (COLOURED, True) if look is None else _tinted(look, look.alpha is not None and is_faint(raw))
+        spec, honored = (
+            (COLORED, True) if spec is None else _tinted(spec, spec.alpha is not None and is_faint(raw))
         )
-    if look is not None:
-        raw.material, raw.emission, raw.two_sided = look.material, look.emission, look.two_sided
-    return honoured
+    if spec is not None:
+        raw.material, raw.emission, raw.two_sided = spec.material, spec.emission, spec.two_sided
+    return honored
 
 
-def is_faint(raw: Raw) -> bool:
-    """Tell whether vertex colours are anywhere less than opaque."""
+def is_faint(raw: RawMesh) -> bool:
+    """Tell whether vertex colors are anywhere less than opaque."""
     return raw.colors is not None and bool((raw.colors[:, 3:] < 1).any())
 
 
-def _tinted(look: Look, faint: bool) -> tuple[Look, bool]:
-    name = next((name for kind, name in BASES.items() if isinstance(look.material, kind)), None)
+def _tinted(spec: MaterialSpec, faint: bool) -> tuple[MaterialSpec, bool]:
+    name = next((name for kind, name in BASES.items() if isinstance(spec.material, kind)), None)
     if name is None:
-        return look, False
-    if faint not in look.tinted:
-        material = copy(look.material)
+        return spec, False
+    if faint not in spec.tinted:
+        material = copy(spec.material)
         base = getattr(material, name)
         setattr(material, name, VertexColors(base.ravel() if isinstance(base, np.ndarray) else base))
         if faint:
-            material = material.with_alpha(VertexColors(look.alpha, channel=3), look.cutoff)
-        look.tinted[faint] = Look(material, look.emission, look.two_sided)
-    return look.tinted[faint], True
+            material = material.with_alpha(VertexColors(spec.alpha, channel=3), spec.cutoff)
+        spec.tinted[faint] = MaterialSpec(material, spec.emission, spec.two_sided)
+    return spec.tinted[faint], True
 
 
-def realise(wanted: dict[str, Any]) -> tuple[Bsdf, list[str]]:
+def build_material(wanted: dict[str, Any]) -> tuple[Bsdf, list[str]]:
     """Return a material, and the names of what is wanted in vain.
 
     Parameters
     ----------
     wanted
         Parameters of `Principled`, and others that it may get, by name, as far as they are not
-        neutral; `alpha` may be. `base_color` is always there. Values are numbers, colours or textures.
+        neutral; `alpha` may be. `base_color` is always there. Values are numbers, colors or textures.
     """
     wanted = dict(wanted)
     alpha, cutoff = wanted.pop("alpha", 1.0), wanted.pop("alpha_cutoff", None)

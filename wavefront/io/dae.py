@@ -40,7 +40,7 @@ def parse(path: str | os.PathLike[str], data: bytes, strict: bool, materials: bo
     if any(map(_is_clear, found.geometry.values())):
         lost.append("opacity of materials")
     if lost and materials:
-        warn(f"{name}: not honoured: {', '.join(lost)}", strict)
+        warn(f"{name}: not honored: {', '.join(lost)}", strict)
     if materials:
         images.report(strict)
     # pycollada leaves out what is broken, and says nothing

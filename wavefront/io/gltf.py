@@ -18,22 +18,22 @@ from .gltf_document import Document, Matrix, floats, shown
 from .gltf_meshes import primitives
 from .gltf_nodes import Node, count_placements, placements, walk
 from .placing import Places
-from .repair import Raw
+from .repair import RawMesh
 
 HEIGHT = 512  # pixels of a camera's picture; files give its shape only
 
 
 @dataclass
-class Contents:
+class GltfContents:
     """What a file holds."""
 
-    raws: list[tuple[Raw, int | None]] = field(default_factory=list)  # meshes, numbers of their materials
+    raws: list[tuple[RawMesh, int | None]] = field(default_factory=list)  # meshes, numbers of their materials
     places: Places = field(default_factory=Places)  # where they stand
     lights: list[DirectionalLight | PointLight | SpotLight] = field(default_factory=list)
     camera: Camera | None = None
 
 
-def contents(document: Document, max_instances: int) -> Contents:
+def contents(document: Document, max_instances: int) -> GltfContents:
     """Read the default scene.
 
     Parameters
@@ -48,7 +48,7 @@ def contents(document: Document, max_instances: int) -> Contents:
     SceneError
         If an element is missing or malformed, or there are more instances.
     """
-    out = Contents()
+    out = GltfContents()
     numbers: dict[int, list[int]] = {}  # of a mesh of the file: which of the raws are its parts
     of: list[int] = []  # which raw, for each that is placed
     where: list[Matrix] = []
@@ -78,7 +78,7 @@ def contents(document: Document, max_instances: int) -> Contents:
     return out
 
 
-def _parts(document: Document, out: Contents, numbers: dict[int, list[int]], mesh: Any) -> list[int]:
+def _parts(document: Document, out: GltfContents, numbers: dict[int, list[int]], mesh: Any) -> list[int]:
     """Return which raws are the parts of a mesh, which is read when it is first met."""
     if not isinstance(mesh, int) or mesh not in numbers:
         found = primitives(document, mesh)
@@ -87,7 +87,7 @@ def _parts(document: Document, out: Contents, numbers: dict[int, list[int]], mes
     return numbers[mesh]
 
 
-def _add_others(document: Document, out: Contents, node: Node) -> None:
+def _add_others(document: Document, out: GltfContents, node: Node) -> None:
     """Add the camera and the light of a node."""
     if "skin" in node.json:
         document.lose("skin", node.label)
@@ -98,7 +98,7 @@ def _add_others(document: Document, out: Contents, node: Node) -> None:
         _add_light(document, out, light, node.matrix)
 
 
-def _add_camera(document: Document, out: Contents, index: Any, matrix: Matrix) -> None:
+def _add_camera(document: Document, out: GltfContents, index: Any, matrix: Matrix) -> None:
     if out.camera is not None:
         document.lose("further cameras", f"cameras[{shown(index)}]")
         return
@@ -150,7 +150,7 @@ def _positive(lens: dict[str, Any], key: str, default: float | None) -> float:
     return value
 
 
-def _add_light(document: Document, out: Contents, index: Any, matrix: Matrix) -> None:
+def _add_light(document: Document, out: GltfContents, index: Any, matrix: Matrix) -> None:
     """Add a light of KHR_lights_punctual; candela are taken for W/sr."""
     lights = document.json.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", [])
     if not isinstance(index, int) or not 0 <= index < len(lights):
@@ -174,9 +174,9 @@ def punctual_light(light: dict[str, Any], matrix: Matrix) -> DirectionalLight | 
     SceneError
         If a value is malformed or out of range.
     """
-    colour = floats("color", light.get("color", [1, 1, 1]), 3)
+    color = floats("color", light.get("color", [1, 1, 1]), 3)
     with np.errstate(over="ignore"):
-        strength = colour * floats("intensity", [light.get("intensity", 1)], 1)
+        strength = color * floats("intensity", [light.get("intensity", 1)], 1)
     place, forward = matrix[:3, 3], -matrix[:3, 2]
     match light.get("type"):
         case "point":

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
-from .files import beside, read_bytes
+from ..files import beside, read_bytes
 
 COMPONENTS: dict[int, type[np.generic]] = {
     5120: np.int8,
@@ -61,7 +61,7 @@ class Document:
         self._buffers: dict[int, bytes] = {}
         self._files: dict[str, bytes] = {}
         self._numbers = 0  # how many were read from accessors
-        self.lost: dict[str, str] = {}  # what is not honoured -> where it was first met
+        self.lost: dict[str, str] = {}  # what is not honored -> where it was first met
 
     @contextmanager
     def inside(self, element: str) -> Iterator[None]:
@@ -84,7 +84,7 @@ class Document:
             ) from error
 
     def lose(self, what: str, where: str) -> None:
-        """Note a property that is not honoured."""
+        """Note a property that is not honored."""
         self.lost.setdefault(what, where)
 
     def get(self, kind: str, index: Any) -> dict[str, Any]:
@@ -158,12 +158,12 @@ class Document:
         return data, start, start + length, self.count(where, item, "byteStride")
 
     def accessor(self, index: Any) -> NDArray[Any]:
-        """Return the elements of an accessor, (count, width); normalised integers become float32."""
+        """Return the elements of an accessor, (count, width); normalized integers become float32."""
         item = self.get("accessors", index)
         where = f"accessors[{index}]"
         with self.inside(where):
             values = self._elements(item, where)
-            return _normalised(values) if item.get("normalized") else values
+            return _normalized(values) if item.get("normalized") else values
 
     def _elements(self, item: dict[str, Any], where: str) -> NDArray[Any]:
         kind, width = COMPONENTS.get(item.get("componentType", 0)), WIDTHS.get(item.get("type", ""))
@@ -259,7 +259,7 @@ def shown(value: Any) -> str:
     return text if len(text) <= SHOWN else text[: SHOWN - 3] + "..."
 
 
-def _normalised(values: NDArray[Any]) -> NDArray[Any]:
+def _normalized(values: NDArray[Any]) -> NDArray[Any]:
     if values.dtype.kind == "f":
         return values
     scaled = values.astype(np.float32) / np.float32(np.iinfo(values.dtype).max)

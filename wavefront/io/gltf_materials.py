@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bsdfs.parameter import MAX_INDEX
+from ..codecs.images import decode_codes
 from ..elementary import log, sin_cos_turns
 from ..errors import SceneError
-from ..relief import NormalMap
-from ..textures import Texture
-from .appearance import Look, realise
-from .files import MAX_PIXELS
+from ..files import MAX_PIXELS
+from ..textures.image import Texture
+from ..textures.normal_map import NormalMap
+from ..textures.parameter import MAX_INDEX
+from .appearance import MaterialSpec, build_material
 from .gltf_document import SHOWN, Document, floats, shown
 from .gltf_specular_glossiness import F0, BesideSpecular
-from .images import decode_codes
 
 WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 NEAREST, LINEAR = 9728, 9729
@@ -48,24 +48,24 @@ BESIDE = frozenset(  # extensions that go with specular-glossiness; the others e
 FLIP = np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]])  # between v downwards and v upwards
 
 
-class Materials:
+class GltfMaterials:
     """The materials of a document, each made once."""
 
     def __init__(self, document: Document) -> None:
         self._document = document
-        self._looks: dict[int, Look] = {}
+        self._looks: dict[int, MaterialSpec] = {}
         self._images: dict[int, NDArray[Any] | None] = {}
         self._pixels = 0  # of those
         _check_extensions(document)
 
-    def look(self, index: int) -> Look:
+    def spec(self, index: int) -> MaterialSpec:
         """Return what material `index` looks like."""
         item = self._document.get("materials", index)
         if index not in self._looks:
             where = f"materials[{index}]" + (f" {item['name']!r}" if "name" in item else "")
             with self._document.inside(where):
-                look = self._looks[index] = _Reader(self, item, where).look()
-            for what in look.lost:
+                spec = self._looks[index] = _Reader(self, item, where).spec()
+            for what in spec.lost:
                 self._document.lose(what, where)
         return self._looks[index]
 
@@ -137,7 +137,7 @@ class Materials:
 class _Reader:
     """Reads one material."""
 
-    def __init__(self, materials: Materials, item: dict[str, Any], where: str) -> None:
+    def __init__(self, materials: GltfMaterials, item: dict[str, Any], where: str) -> None:
         self._materials, self._item, self._where = materials, item, where
         self._file = materials._document.name
         self._wanted: dict[str, Any] = {}
@@ -145,10 +145,10 @@ class _Reader:
         self._alpha_given: Any = None
         self._cutoff: float | None = None
 
-    def look(self) -> Look:
+    def spec(self) -> MaterialSpec:
         """Return the look of the material."""
         extensions = self._item.get("extensions", {})
-        relief = self._relief()
+        normal_map = self._relief()
         if "KHR_materials_pbrSpecularGlossiness" in extensions:
             self._specular_glossiness(extensions["KHR_materials_pbrSpecularGlossiness"])
             self._lost += [
@@ -160,10 +160,10 @@ class _Reader:
             self._metallic_roughness(self._item.get("pbrMetallicRoughness", {}))
             self._extended(extensions)
         radiance = self._emission(extensions.get("KHR_materials_emissive_strength", {}))
-        material, lost = realise(self._wanted)
-        material = material if relief is None else material.with_relief(relief)
+        material, lost = build_material(self._wanted)
+        material = material if normal_map is None else material.with_normal_map(normal_map)
         both = bool(self._item.get("doubleSided"))
-        return Look(material, radiance, both, self._lost + lost, self._alpha_given, self._cutoff)
+        return MaterialSpec(material, radiance, both, self._lost + lost, self._alpha_given, self._cutoff)
 
     def _extended(self, extensions: dict[str, Any]) -> None:
         """Take what extends metallic-roughness."""
@@ -183,7 +183,7 @@ class _Reader:
             raise SceneError(f"{self._file}: {self._where}.{key} is {value:g}; it must be in [0, {high:g}]")
         return float(value)
 
-    def _colour(
+    def _color(
         self, group: dict[str, Any], key: str, default: list[float], high: float = 1.0
     ) -> NDArray[np.float64]:
         value = floats(f"{self._file}: {self._where}.{key}", group.get(key, default), len(default))
@@ -209,7 +209,7 @@ class _Reader:
             self._wanted[name] = value
 
     def _metallic_roughness(self, group: dict[str, Any]) -> None:
-        factor = self._colour(group, "baseColorFactor", [1.0, 1.0, 1.0, 1.0])
+        factor = self._color(group, "baseColorFactor", [1.0, 1.0, 1.0, 1.0])
         base = self._texture(group, "baseColorTexture", scale=factor[:3])
         self._wanted["base_color"] = factor[:3] if base is None else base
         self._alpha(group, "baseColorTexture", float(factor[3]), base)
@@ -223,8 +223,8 @@ class _Reader:
         The base is diffuse·(1 − max(specular)), the reflectance along the normal is specular, the roughness
         1 − glossiness. A dielectric of index 1.5 whose reflectance 0.04 is tinted is all of that exactly.
         """
-        diffuse = self._colour(group, "diffuseFactor", [1.0, 1.0, 1.0, 1.0])
-        specular = self._colour(group, "specularFactor", [1.0, 1.0, 1.0])
+        diffuse = self._color(group, "diffuseFactor", [1.0, 1.0, 1.0, 1.0])
+        specular = self._color(group, "specularFactor", [1.0, 1.0, 1.0])
         glossiness = self._number(group, "glossinessFactor", 1.0)
         map_key = "specularGlossinessTexture"
         varying = self._texture(group, map_key, scale=specular)
@@ -308,7 +308,7 @@ class _Reader:
     def _sheen(self, group: dict[str, Any] | None) -> None:
         if group is None:
             return
-        factor = self._colour(group, "sheenColorFactor", [0.0, 0.0, 0.0])
+        factor = self._color(group, "sheenColorFactor", [0.0, 0.0, 0.0])
         if not factor.any():
             return
         texture = self._texture(group, "sheenColorTexture", scale=factor)
@@ -322,7 +322,7 @@ class _Reader:
         if group is None:
             return
         self._want("specular", self._scalar(group, "specularFactor", "specularTexture", 3, 1.0), 1.0)
-        factor = self._colour(group, "specularColorFactor", [1.0, 1.0, 1.0], high=FLOAT32_MAX)
+        factor = self._color(group, "specularColorFactor", [1.0, 1.0, 1.0], high=FLOAT32_MAX)
         texture = self._texture(group, "specularColorTexture", scale=factor)
         if texture is not None or (factor != 1).any():
             self._wanted["specular_color"] = factor if texture is None else texture
@@ -333,16 +333,16 @@ class _Reader:
             return
         if "thicknessTexture" in group:
             self._lost.append("thicknessTexture (light goes through the volume that the mesh encloses)")
-        colour = self._colour(group, "attenuationColor", [1.0, 1.0, 1.0])
-        if "attenuationDistance" in group and (colour < 1).any():
+        color = self._color(group, "attenuationColor", [1.0, 1.0, 1.0])
+        if "attenuationDistance" in group and (color < 1).any():
             distance = self._number(group, "attenuationDistance", 1.0, high=np.inf)
             if distance == 0:
                 raise SceneError(f"{self._file}: {self._where}.attenuationDistance is 0; it must be above 0")
             with np.errstate(over="ignore"):
-                self._wanted["absorption"] = -log(np.maximum(colour, 1e-6).astype(np.float32)) / distance
+                self._wanted["absorption"] = -log(np.maximum(color, 1e-6).astype(np.float32)) / distance
 
     def _emission(self, strength: dict[str, Any]) -> NDArray[np.float64] | Texture | None:
-        factor = self._colour(self._item, "emissiveFactor", [0.0, 0.0, 0.0])
+        factor = self._color(self._item, "emissiveFactor", [0.0, 0.0, 0.0])
         factor = factor * self._number(strength, "emissiveStrength", 1.0, high=FLOAT32_MAX)
         if not factor.any():
             return None

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from .gltf_document import Document
-from .repair import Faces, Raw, Table, wide
+from .repair import Faces, RawMesh, Table, wide
 
 READ = ("TEXCOORD_0", "TEXCOORD_1", "COLOR_0")  # of the numbered attributes of a mesh
 TRIANGLES, STRIP, FAN = 4, 5, 6
 
 
-def primitives(document: Document, index: Any) -> list[tuple[Raw, int | None]]:
+def primitives(document: Document, index: Any) -> list[tuple[RawMesh, int | None]]:
     """Return the parts of a mesh with the numbers of their materials.
 
     Raises
@@ -43,7 +43,7 @@ def primitives(document: Document, index: Any) -> list[tuple[Raw, int | None]]:
         return out
 
 
-def _primitive(document: Document, part: dict[str, Any], mode: int, name: str) -> Raw:
+def _primitive(document: Document, part: dict[str, Any], mode: int, name: str) -> RawMesh:
     where = f"{document.name}: {name!r}"
     attributes = part.get("attributes", {})
     if "KHR_draco_mesh_compression" in part.get("extensions", {}) or "POSITION" not in attributes:
@@ -64,7 +64,7 @@ def _primitive(document: Document, part: dict[str, Any], mode: int, name: str) -
         values = attribute(document, attributes, key, widths, where, len(vertices))
         return None if values is None else wide(values)
 
-    return Raw(
+    return RawMesh(
         name,
         wide(vertices),
         _triangles(where, indices, mode, len(vertices)),
@@ -81,9 +81,9 @@ def _upright(coordinates: Table | None) -> Table | None:
     if coordinates is None:
         return None
     with np.errstate(invalid="ignore"):
-        upright = coordinates.astype(np.float32)
-        upright[:, 1] = 1 - upright[:, 1]
-    return wide(upright)
+        ensure_valid_reflection = coordinates.astype(np.float32)
+        ensure_valid_reflection[:, 1] = 1 - ensure_valid_reflection[:, 1]
+    return wide(ensure_valid_reflection)
 
 
 def attribute(

@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from ..bsdfs import Spatial
-from ..bsdfs.parameter import Colour, colour
-from ..state import Surface
-from ..textures import Texture
+from ..state import SurfaceInteraction
+from ..textures.base import BaseTexture
+from ..textures.image import Texture
+from ..textures.parameter import Color, color
 from ..vec import Floats, f4
 
 F0 = 0.04  # reflectance of a `Principled` of index 1.5 along the normal, which `specular_color` multiplies
 
 
-class BesideSpecular(Spatial):
+class BesideSpecular(BaseTexture):
     """diffuse · (1 − max(specular)), where the specular color is a texture.
 
     Parameters
@@ -30,18 +30,18 @@ class BesideSpecular(Spatial):
         diffuse one: both are looked up at the point in question.
     """
 
-    def __init__(self, diffuse: Colour, specular: Texture) -> None:
-        self.diffuse: Any = colour("diffuse", diffuse)
+    def __init__(self, diffuse: Color, specular: Texture) -> None:
+        self.diffuse: Any = color("diffuse", diffuse)
         self.specular = specular
-        reads = self.diffuse.reads if isinstance(self.diffuse, Spatial) else ()
+        reads = self.diffuse.reads if isinstance(self.diffuse, BaseTexture) else ()
         self.reads = tuple(dict.fromkeys((*reads, *specular.reads)))
 
     def __repr__(self) -> str:
         """Name both."""
         return f"BesideSpecular({self.diffuse!r}, {self.specular!r})"
 
-    def at(self, surface: Surface) -> Floats:
+    def at(self, surface: SurfaceInteraction) -> Floats:
         """Return the color at hit points, (3, n)."""
         red, green, blue = self.specular.at(surface)
         left = f4(1) - np.maximum(np.maximum(red, green), blue)
-        return left * (self.diffuse.at(surface) if isinstance(self.diffuse, Spatial) else self.diffuse)
+        return left * (self.diffuse.at(surface) if isinstance(self.diffuse, BaseTexture) else self.diffuse)

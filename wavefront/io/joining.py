@@ -9,7 +9,7 @@ from ..bsdfs import Bsdf
 from ..errors import SceneError, finite_array
 from ..shapes import Mesh
 from ..shapes.transform import moved, moved_tangents
-from .repair import Raw, build
+from .repair import RawMesh, build
 
 
 def join(
@@ -31,7 +31,7 @@ def join(
     vertices = np.concatenate([mesh.vertices for mesh in meshes])
     faces = np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts[:-1], strict=True)])
     normals = _joined([mesh.normals for mesh in meshes])
-    raw = Raw(name, *moved(matrix, vertices, faces, normals))
+    raw = RawMesh(name, *moved(matrix, vertices, faces, normals))
     raw.uvs = _joined([mesh.uvs for mesh in meshes])
     raw.uvs1 = _joined([mesh.uvs1 for mesh in meshes])
     raw.tangents = moved_tangents(matrix, _joined([mesh.tangents for mesh in meshes]))

@@ -110,7 +110,7 @@ def from_trimesh(geometry: Any) -> Scene:
     the size of the picture; a camera without a transform is placed to see all of the scene. Colors of lights
     are linear. The lights that trimesh makes up for its viewer do not count.
 
-    What trimesh itself does not keep cannot count: of glTF it rounds base colours to 8 bits, and drops
+    What trimesh itself does not keep cannot count: of glTF it rounds base colors to 8 bits, and drops
     extensions, lights, tangents and the scale of normal maps; of MTL it keeps the image of `map_Kd`
     only. `load` reads all of these.
 

@@ -24,7 +24,7 @@ How an MTL material is read:
   `-bm` is then its strength.
 - `Ns` shapes nothing but the gloss, and `Ni` nothing but glass.
 - A map whose image is missing is left out with a warning.
-- Images are sRGB where they are colours, data elsewhere. The options -s -o -clamp -mm -imfchan -bm are read.
+- Images are sRGB where they are colors, data elsewhere. The options -s -o -clamp -mm -imfchan -bm are read.
 
 Whatever else a file asks for is named in one warning per file.
 """
@@ -40,13 +40,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bsdfs import Bsdf, Dielectric, Diffuse, Mirror, Relief
-from ..bsdfs.parameter import MAX_INDEX
+from ..bsdfs import Bsdf, Dielectric, Diffuse, Mirror
 from ..errors import SceneError
-from ..relief import BumpMap, NormalMap
-from ..textures import Texture
-from .appearance import Look, realise
-from .files import beside
+from ..files import beside
+from ..textures.image import Texture
+from ..textures.normal_map import BaseNormalMap, BumpMap, NormalMap
+from ..textures.parameter import MAX_INDEX
+from .appearance import MaterialSpec, build_material
 from .repair import warn
 
 GLASS = (4, 6, 7, 9)
@@ -79,7 +79,7 @@ WHOLE = ("map_kd", "map_ke", "map_ks", "norm")  # keywords whose maps are not on
 MAPS = {*WHOLE, *RELIEFS, "map_d", *(image for _, image, _ in PBR)}  # keywords whose images are read
 CHANNELS: dict[str, Any] = {"r": 0, "g": 1, "b": 2, "m": 3, "l": "luminance"}
 
-Colour = NDArray[np.float64]
+Color = NDArray[np.float64]
 
 
 @dataclass
@@ -89,8 +89,8 @@ class Entry:
     file: str
     name: str
     lines: dict[str, tuple[str, int, str]] = field(default_factory=dict)
-    read: set[str] = field(default_factory=set)  # keywords that the look honours
-    idle_options: set[str] = field(default_factory=set)  # options of maps that are not honoured
+    read: set[str] = field(default_factory=set)  # keywords that the look honors
+    idle_options: set[str] = field(default_factory=set)  # options of maps that are not honored
     images: dict[str, NDArray[np.uint8]] = field(default_factory=dict)  # maps that are there already
     strict: bool = False
 
@@ -122,24 +122,24 @@ class Entry:
         values = self.numbers(key)
         return default if values is None else values[0]
 
-    def colour(self, key: str, default: float, high: float = 1.0) -> Colour:
-        """Return a colour (3,), clamped to [0, `high`] with a warning."""
+    def color(self, key: str, default: float, high: float = 1.0) -> Color:
+        """Return a color (3,), clamped to [0, `high`] with a warning."""
         values = self.numbers(key)
         if values is None:
             return np.full(3, default)
         if len(values) not in (1, 3):
-            raise SceneError(f"{self.where(key)} has {len(values)} numbers; a colour has 1 or 3")
-        colour = np.broadcast_to(np.array(values), 3)
-        limited = np.clip(colour, 0, high)
-        if (limited != colour).any():
+            raise SceneError(f"{self.where(key)} has {len(values)} numbers; a color has 1 or 3")
+        color = np.broadcast_to(np.array(values), 3)
+        limited = np.clip(color, 0, high)
+        if (limited != color).any():
             limit = f"in [0, {high:g}]" if np.isfinite(high) else "at least 0"
             warn(
                 f"{self.where(key)} is {self.lines[key][2]}; it must be {limit} and was clamped", self.strict
             )
         return limited
 
-    def texture(self, key: str, scale: Any = 1.0, kind: str = "colour") -> Texture | None:
-        """Return the texture of a map of the kind "colour", "scalar" or "data", None if there is none."""
+    def texture(self, key: str, scale: Any = 1.0, kind: str = "color") -> Texture | None:
+        """Return the texture of a map of the kind "color", "scalar" or "data", None if there is none."""
         if key not in self.lines:
             return None
         options, name = _map(self, key)
@@ -151,7 +151,7 @@ class Entry:
         try:
             return Texture(
                 source,
-                srgb=kind == "colour",
+                srgb=kind == "color",
                 wrap="clamp" if options.get("-clamp") == ["on"] else "repeat",
                 transform=self._placing(options),
                 channel=self._channel(options) if kind == "scalar" else None,
@@ -182,7 +182,7 @@ class Entry:
             ) from None
         return found + default[len(found) :]
 
-    def _placing(self, options: dict[str, list[str]]) -> Colour | None:
+    def _placing(self, options: dict[str, list[str]]) -> Color | None:
         if "-s" not in options and "-o" not in options:
             return None
         scale, offset = self._option(options, "-s", [1.0] * 3), self._option(options, "-o", [0.0] * 3)
@@ -241,39 +241,39 @@ def _split(line: str) -> tuple[str, str]:
     return words[0], words[1].strip() if len(words) > 1 else ""
 
 
-def looks(entries: dict[str, Entry], strict: bool = False) -> dict[str, Look]:
-    """Turn entries into looks; what is not honoured is named in one warning.
+def specs(entries: dict[str, Entry], strict: bool = False) -> dict[str, MaterialSpec]:
+    """Turn entries into looks; what is not honored is named in one warning.
 
     Raises
     ------
     SceneError
-        If a value is malformed, or `strict` and one is out of range or not honoured.
+        If a value is malformed, or `strict` and one is out of range or not honored.
     """
-    out: dict[str, Look] = {}
+    out: dict[str, MaterialSpec] = {}
     unread: dict[str, str] = {}
     for name, entry in entries.items():
-        out[name] = look(entry)
+        out[name] = spec(entry)
         for keyword in (*entry.unread(), *sorted(entry.idle_options), *out[name].lost):
             unread.setdefault(keyword, name)
     if unread:
         file = next(iter(entries.values())).file
         listed = ", ".join(f"{keyword} (material {name!r})" for keyword, name in unread.items())
-        warn(f"{file}: not honoured: {listed}", strict)
+        warn(f"{file}: not honored: {listed}", strict)
     return out
 
 
-def look(entry: Entry) -> Look:
+def spec(entry: Entry) -> MaterialSpec:
     """Turn one entry into a look; what is used is marked in `entry.read`."""
     _leave_out_missing(entry)
-    factor = entry.colour("ke", 0.0, high=np.inf)
+    factor = entry.color("ke", 0.0, high=np.inf)
     if "map_ke" in entry.lines and not factor.any():
         factor = np.ones(3)
     texture = entry.texture("map_ke", factor)
     radiance = texture if texture is not None else factor if factor.any() else None
     material, lost = _material(entry)
-    relief = _relief(entry)
-    material = material if relief is None else material.with_relief(relief)
-    return Look(material, radiance, lost=lost)
+    normal_map = _relief(entry)
+    material = material if normal_map is None else material.with_normal_map(normal_map)
+    return MaterialSpec(material, radiance, lost=lost)
 
 
 def _leave_out_missing(entry: Entry) -> None:
@@ -293,37 +293,37 @@ def _material(entry: Entry) -> tuple[Bsdf, list[str]]:
     extended = entry.has(*(key for keys in PBR for key in keys[:2]))
     if illum in GLASS or (opacity(entry) < 1 and ior != 1 and "map_d" not in entry.lines):
         return _glass(entry)
-    if illum in MIRROR and not extended and "ks" in entry.lines and entry.colour("ks", 0.0).any():
-        return Mirror(entry.colour("ks", 0.0)).with_alpha(_alpha(entry)), []
+    if illum in MIRROR and not extended and "ks" in entry.lines and entry.color("ks", 0.0).any():
+        return Mirror(entry.color("ks", 0.0)).with_alpha(_alpha(entry)), []
     physical = entry.has("pr", "map_pr", "pm", "map_pm")
     wanted = _gloss(entry, illum, physical) | _wanted(entry)
-    material, lost = realise(wanted)
+    material, lost = build_material(wanted)
     if type(material) is not Diffuse and not physical and "roughness" not in wanted:
         # a shine of its default kind would be an invention where the file does not speak of it
-        material, lost = realise({**wanted, "roughness": 1.0, "specular": 0.0})
+        material, lost = build_material({**wanted, "roughness": 1.0, "specular": 0.0})
     return material, lost
 
 
 def _gloss(entry: Entry, illum: int, physical: bool) -> dict[str, Any]:
     """Return the parameters of `Principled` for the gloss that `Ks` and `Ns` ask for, if they do."""
-    colour = _highlight(entry, illum)
+    color = _highlight(entry, illum)
     gloss: dict[str, Any] = {}
-    if colour.any():
-        gloss = _specular(entry, float(colour.max()))
-        if np.ptp(colour):
-            gloss["specular_color"] = colour / colour.max()
-    if colour.any() or (physical and "ns" in entry.lines):
+    if color.any():
+        gloss = _specular(entry, float(color.max()))
+        if np.ptp(color):
+            gloss["specular_color"] = color / color.max()
+    if color.any() or (physical and "ns" in entry.lines):
         gloss["roughness"] = 1 - float(np.sqrt(_exponent(entry) / LARGEST_NS))
     return gloss
 
 
-def _highlight(entry: Entry, illum: int) -> Colour:
+def _highlight(entry: Entry, illum: int) -> Color:
     """Return `Ks`, black where there is no highlight."""
     if illum in NO_HIGHLIGHT or entry.number("ns", LARGEST_NS) == 0:
         entry.read.update(("ks", "map_ks", "map_ns"))
         return np.zeros(3)
-    colour = entry.colour("ks", 0.0)
-    return np.ones(3) if "map_ks" in entry.lines and not colour.any() else colour
+    color = entry.color("ks", 0.0)
+    return np.ones(3) if "map_ks" in entry.lines and not color.any() else color
 
 
 def _exponent(entry: Entry) -> float:
@@ -363,7 +363,7 @@ def _alpha(entry: Entry) -> Any:
     return factor if texture is None else texture
 
 
-def _relief(entry: Entry) -> Relief | None:
+def _relief(entry: Entry) -> BaseNormalMap | None:
     """Return what tilts the normals: `norm` before `bump`, of which only one is read."""
     if "norm" in entry.lines:
         return _made(entry, "norm", _normal_map)
@@ -373,7 +373,7 @@ def _relief(entry: Entry) -> Relief | None:
     return None
 
 
-def _made(entry: Entry, key: str, make: Callable[[Entry, str], Relief]) -> Relief:
+def _made(entry: Entry, key: str, make: Callable[[Entry, str], BaseNormalMap]) -> BaseNormalMap:
     try:
         return make(entry, key)
     except SceneError as error:
@@ -406,10 +406,10 @@ def _looks_like_normals(entry: Entry, key: str) -> bool:
 
 
 def _base(entry: Entry) -> Any:
-    colour = entry.colour("kd", 1.0 if "map_kd" in entry.lines else MATTE)
+    color = entry.color("kd", 1.0 if "map_kd" in entry.lines else MATTE)
     if "map_kd" not in entry.lines:
-        return colour
-    return entry.texture("map_kd", colour if colour.any() else 1.0)
+        return color
+    return entry.texture("map_kd", color if color.any() else 1.0)
 
 
 def _glass(entry: Entry) -> tuple[Bsdf, list[str]]:
@@ -419,7 +419,7 @@ def _glass(entry: Entry) -> tuple[Bsdf, list[str]]:
         limits = f"above 0, from {1 / MAX_INDEX:g} to {MAX_INDEX:g}"
         raise SceneError(f"{entry.where('ni')} is {ior:g}; an index must be {limits}")
     entry.read.update(("d", "tr", "kd"))  # glass has no matte part: files give it a Kd all the same
-    return Dielectric(ior, _part(entry, "pr", 0.0), transmittance=entry.colour("tf", 1.0)), []
+    return Dielectric(ior, _part(entry, "pr", 0.0), transmittance=entry.color("tf", 1.0)), []
 
 
 def _part(entry: Entry, key: str, default: float) -> float:

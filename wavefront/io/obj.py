@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
-from .repair import Raw, warn
+from .repair import RawMesh, warn
 from .trimesh_loading import typed_errors
 from .words import Rows, sort_lines
 
@@ -33,7 +33,7 @@ GIVEN = np.array([[1, 0, 0], [1, 1, 0], [1, 1, 1], [1, 0, 1]], bool)
 class Obj:
     """What an OBJ file says."""
 
-    raws: list[Raw] = field(default_factory=list)  # by material; colors sRGB, NaN where a line has none
+    raws: list[RawMesh] = field(default_factory=list)  # by material; colors sRGB, NaN where a line has none
     libraries: list[str] = field(default_factory=list)  # material files, as written
     ignored: dict[str, int] = field(default_factory=dict)  # what is not read -> its first line
     smooth: int | None = None  # first line that asks for smooth faces
@@ -220,10 +220,10 @@ def _read(written: tuple[list[str], list[str]], groups: list[NDArray[np.intp]]) 
     return list(found.values())[::-1]  # it lists the last one first
 
 
-def _raw(material: str, mesh: dict[str, Any], faces: Rows, group: NDArray[np.intp]) -> Raw:
+def _raw(material: str, mesh: dict[str, Any], faces: Rows, group: NDArray[np.intp]) -> RawMesh:
     from trimesh.geometry import triangulate_quads
 
-    raw = Raw(material, mesh["vertices"], triangulate_quads(mesh["faces"]), mesh.get("vertex_normals"))
+    raw = RawMesh(material, mesh["vertices"], triangulate_quads(mesh["faces"]), mesh.get("vertex_normals"))
     raw.uvs = None if mesh["visual"] is None else mesh["visual"].uv
     raw.colors = mesh.get("vertex_colors")
     numbers, triangles = faces.numbers[group], faces.widths[group] - 2

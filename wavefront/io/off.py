@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..errors import SceneError
-from .files import decode
+from ..files import decode
 from .repair import warn
 from .trimesh_loading import by_trimesh
 
@@ -40,7 +40,7 @@ def parse(name: str, data: bytes, strict: bool, materials: bool) -> Any:
     if any(len(words) > int(words[0]) + 1 for _, words in rows[vertices : vertices + faces]):
         lost.append("colors of faces")
     if lost and materials:
-        warn(f"{name}: not honoured: {', '.join(lost)}", strict)
+        warn(f"{name}: not honored: {', '.join(lost)}", strict)
     # the counts and the rows that they cover: what follows is none of trimesh's concern
     text = [f"OFF\n{vertices} {faces} 0", *(" ".join(words) for _, words in rows[: vertices + faces])]
     return by_trimesh(name, "\n".join(text).encode(), "off")

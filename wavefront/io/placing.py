@@ -11,7 +11,7 @@ from ..errors import SceneError
 from ..shapes import Instance, Mesh
 from ..shapes.instance import can_place
 from ..shapes.transform import moved, moved_tangents
-from .repair import Raw, build
+from .repair import RawMesh, build
 
 MAX_INSTANCES = 2**20  # meshes that the nodes of a file place, unless the user allows more
 MAX_ELEMENT = 1e100  # of a matrix: larger ones have no squares
@@ -34,7 +34,7 @@ class Places:
         return cls(np.arange(count), np.tile(np.eye(4), (count, 1, 1)))
 
 
-def place_shapes(name: str, raws: list[Raw], places: Places, strict: bool) -> list[Mesh | Instance]:
+def place_shapes(name: str, raws: list[RawMesh], places: Places, strict: bool) -> list[Mesh | Instance]:
     """Build meshes, and an instance for each place of one that stands in several.
 
     Parameters
@@ -79,7 +79,7 @@ def place_shapes(name: str, raws: list[Raw], places: Places, strict: bool) -> li
     return [shape for shape in shapes if shape is not None]
 
 
-def place_meshes(name: str, raws: list[Raw], places: Places, strict: bool) -> list[Mesh]:
+def place_meshes(name: str, raws: list[RawMesh], places: Places, strict: bool) -> list[Mesh]:
     """Build a mesh of its own for each place; arguments and errors as of `place_shapes`."""
     _check_range(name, raws, places)
     sizes = np.array([len(raw.faces) for raw in raws], np.int64)
@@ -94,7 +94,7 @@ def place_meshes(name: str, raws: list[Raw], places: Places, strict: bool) -> li
     return [mesh for mesh in built if mesh is not None]
 
 
-def moved_raw(raw: Raw, matrix: Matrix) -> Raw:
+def moved_raw(raw: RawMesh, matrix: Matrix) -> RawMesh:
     """Return a mesh moved by a (4, 4) matrix."""
     vertices, faces, normals = moved(matrix, raw.vertices, raw.faces, raw.normals)
     tangents = moved_tangents(matrix, raw.tangents)
@@ -106,7 +106,7 @@ def in_range(matrices: Matrix) -> NDArray[np.bool_]:
     return np.asarray((np.abs(matrices) <= MAX_ELEMENT).all((1, 2)))
 
 
-def _check_range(name: str, raws: list[Raw], places: Places) -> None:
+def _check_range(name: str, raws: list[RawMesh], places: Places) -> None:
     bad = np.flatnonzero(~in_range(places.matrix))
     if bad.size:
         element = np.abs(places.matrix[bad[0]]).max()
@@ -116,7 +116,7 @@ def _check_range(name: str, raws: list[Raw], places: Places) -> None:
         )
 
 
-def _by_mesh(raws: list[Raw], places: Places) -> list[tuple[Raw, NDArray[np.intp]]]:
+def _by_mesh(raws: list[RawMesh], places: Places) -> list[tuple[RawMesh, NDArray[np.intp]]]:
     """Return each mesh that stands somewhere with the numbers of its places, in rising order."""
     order = np.argsort(places.raw, kind="stable")
     numbers, begins = np.unique(places.raw[order], return_index=True)

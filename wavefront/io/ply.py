@@ -40,10 +40,10 @@ def parse(path: str | os.PathLike[str], data: bytes, strict: bool, materials: bo
         lost += [f"{what} of {faces.name}" for what in faces.properties if not what.startswith("vertex_ind")]
         elements = [faces]
     if lost and materials:
-        warn(f"{name}: not honoured: {', '.join(dict.fromkeys(lost))}", strict)
+        warn(f"{name}: not honored: {', '.join(dict.fromkeys(lost))}", strict)
     textures = ply_textures(data)
     if len(textures) > 1 and materials:
-        warn(f"{name}: not honoured: several textures; {textures[-1]!r} is taken for all faces", strict)
+        warn(f"{name}: not honored: several textures; {textures[-1]!r} is taken for all faces", strict)
     images = Images(path)
     found = by_trimesh(name, data, "ply", images, skip_materials=not (textures and materials))
     images.report(strict)

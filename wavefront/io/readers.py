@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import SceneError
+from ..files import beside, decode, read_bytes
 from . import dae, gltf, mtl, obj, off, ply, stl, threemf, trimesh_objects, visuals
-from .appearance import Look, dress
+from .appearance import MaterialSpec, assign_material
 from .contents import Contents
-from .files import beside, decode, read_bytes
-from .gltf_materials import Materials
+from .gltf_materials import GltfMaterials
 from .placing import MAX_INSTANCES
 from .repair import warn
 
@@ -61,14 +61,14 @@ def _read_gltf(path: PathLike, data: bytes, wish: Wish) -> Contents:
     document = gltf.Document(path, data)
     with document.inside("the file"):
         found = gltf.contents(document, wish.max_instances)
-        looks = Materials(document)
+        specs = GltfMaterials(document)
         for raw, number in found.raws:
             # without a material, the mesh is as plain as in memory
-            if wish.materials and not dress(raw, None if number is None else looks.look(number)):
-                document.lose("vertex colours", f"mesh {raw.name!r}")
+            if wish.materials and not assign_material(raw, None if number is None else specs.spec(number)):
+                document.lose("vertex colors", f"mesh {raw.name!r}")
     if document.lost and wish.materials:
         listed = ", ".join(f"{what} ({where})" for what, where in document.lost.items())
-        warn(f"{document.name}: not honoured: {listed}", wish.strict)
+        warn(f"{document.name}: not honored: {listed}", wish.strict)
     return Contents([raw for raw, _ in found.raws], found.places, found.lights, found.camera)
 
 
@@ -77,30 +77,30 @@ def _read_obj(path: PathLike, data: bytes, wish: Wish) -> Contents:
     parsed = obj.parse(name, decode(data), strict)
     if parsed.ignored:
         listed = ", ".join(f"{keyword} (line {line})" for keyword, line in parsed.ignored.items())
-        warn(f"{name}: not honoured: {listed}", strict)
-    looks = _libraries(path, parsed.libraries, strict) if materials else {}
+        warn(f"{name}: not honored: {listed}", strict)
+    specs = _libraries(path, parsed.libraries, strict) if materials else {}
     for raw in parsed.raws:
         raw.colors = None if raw.colors is None else visuals.from_srgb(raw.colors)
-        if materials and not dress(raw, looks.get(raw.name)):
-            warn(f"{name}: not honoured: vertex colours (material {raw.name!r})", strict)
-    absent = ", ".join(repr(raw.name) for raw in parsed.raws if raw.name and raw.name not in looks)
-    if looks and absent:
+        if materials and not assign_material(raw, specs.get(raw.name)):
+            warn(f"{name}: not honored: vertex colors (material {raw.name!r})", strict)
+    absent = ", ".join(repr(raw.name) for raw in parsed.raws if raw.name and raw.name not in specs)
+    if specs and absent:
         warn(f"{name}: not in its material files: {absent}", strict)
     if materials and absent and not parsed.libraries:
         warn(f"{name}: names no material file for its materials {absent}", strict)
     return Contents.once(parsed.raws)
 
 
-def _libraries(path: PathLike, libraries: list[str], strict: bool) -> dict[str, Look]:
+def _libraries(path: PathLike, libraries: list[str], strict: bool) -> dict[str, MaterialSpec]:
     """Read the material files; a missing one is announced and left out."""
-    looks: dict[str, Look] = {}
+    specs: dict[str, MaterialSpec] = {}
     for library in dict.fromkeys(libraries):
         file = beside(path, library)
         if not os.path.exists(file):  # False, too, for names that no file can have
             warn(f"{os.fspath(path)}: material file {library!r} is missing", strict)
             continue
-        looks.update(mtl.looks(mtl.parse(file, decode(read_bytes(file)), strict), strict))
-    return looks
+        specs.update(mtl.specs(mtl.parse(file, decode(read_bytes(file)), strict), strict))
+    return specs
 
 
 def _read_ply(path: PathLike, data: bytes, wish: Wish) -> Contents:

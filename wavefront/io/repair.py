@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bsdfs import Bsdf
-from ..bsdfs.parameter import Colour
 from ..errors import SceneError
 from ..shapes import Mesh
+from ..textures.parameter import Color
 from ..vec import cross
 
 FLOAT32_MAX = float(np.finfo(np.float32).max)
@@ -37,7 +37,7 @@ def wide(values: NDArray[Any]) -> Table:
 
 
 @dataclass
-class Raw:
+class RawMesh:
     """A mesh as a file gives it."""
 
     name: str
@@ -50,12 +50,12 @@ class Raw:
     colors: Table | None = None  # (n, 3 or 4) linear
     lines: Faces | None = None  # (m,) line of the file for each face
     material: Bsdf | None = None
-    emission: Colour | None = None
+    emission: Color | None = None
     two_sided: bool = False  # the emission leaves both sides
 
 
-def with_face_colors(source: str, raw: Raw, colors: Table) -> Raw:
-    """Return the same mesh with colours (m, 4) for its faces: every corner gets a vertex of its own.
+def with_face_colors(source: str, raw: RawMesh, colors: Table) -> RawMesh:
+    """Return the same mesh with colors (m, 4) for its faces: every corner gets a vertex of its own.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def with_face_colors(source: str, raw: Raw, colors: Table) -> Raw:
     )
 
 
-def build(source: str, raw: Raw, strict: bool = False) -> Mesh | None:
+def build(source: str, raw: RawMesh, strict: bool = False) -> Mesh | None:
     """Return a sound mesh, or None when no face is left.
 
     Parameters
@@ -119,7 +119,7 @@ def build(source: str, raw: Raw, strict: bool = False) -> Mesh | None:
     )
 
 
-def _label(source: str, raw: Raw) -> str:
+def _label(source: str, raw: RawMesh) -> str:
     return f"{source}: {raw.name!r}" if raw.name else source
 
 
@@ -130,7 +130,7 @@ def _check_indices(label: str, faces: Faces, count: int) -> None:
         raise SceneError(f"{label}: face {i} uses vertex {faces[i, j]}; it must be in [0, {count - 1}]")
 
 
-def _report(label: str, raw: Raw, bad: NDArray[np.bool_], what: str, strict: bool) -> None:
+def _report(label: str, raw: RawMesh, bad: NDArray[np.bool_], what: str, strict: bool) -> None:
     found = np.flatnonzero(bad)
     if not len(found):
         return
@@ -200,13 +200,13 @@ def _uvs(label: str, what: str, uvs: Table | None, strict: bool) -> Table | None
 
 
 def _colors(label: str, colors: Table | None, strict: bool) -> Table | None:
-    colors = _finite(label, "vertex colours", colors, 1.0, strict)
+    colors = _finite(label, "vertex colors", colors, 1.0, strict)
     if colors is None:
         return None
     beyond = ((colors < 0) | (colors > 1)).any(axis=1)
     if beyond.any():
         warn(
-            f"{label}: {int(beyond.sum())} vertex colours are outside [0, 1] and were clamped, "
+            f"{label}: {int(beyond.sum())} vertex colors are outside [0, 1] and were clamped, "
             f"first: vertex {beyond.argmax()}",
             strict,
         )

@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
-from .files import decode
-from .repair import Raw, warn, wide
+from ..files import decode
+from .repair import RawMesh, warn, wide
 from .trimesh_loading import typed_errors
 from .words import sort_lines
 
-COLORS = (b"COLOR=", b"MATERIAL=")  # what Materialise Magics writes into the header
+COLORS = (b"COLOR=", b"MATERIAL=")  # what Materialize Magics writes into the header
 FACET = ("facet", "outer", "endloop", "endfacet")  # lines of a text that say nothing more
 
 
-def parse(name: str, data: bytes, strict: bool = False) -> list[Raw]:
+def parse(name: str, data: bytes, strict: bool = False) -> list[RawMesh]:
     """Read the solids of an STL file; the normals in it are those of the facets and are left out.
 
     Some programs hide colors in a binary file. There are two ways, which contradict each other, so
@@ -31,7 +31,7 @@ def parse(name: str, data: bytes, strict: bool = False) -> list[Raw]:
     """
     count = int.from_bytes(data[80:84], "little")
     if len(data) >= 84 and len(data) == 84 + 50 * count:
-        return [Raw("", *mesh) for mesh in _binary(name, data, strict)]
+        return [RawMesh("", *mesh) for mesh in _binary(name, data, strict)]
     if data.lstrip()[:5].lower() == b"solid":
         return _text(name, decode(data))
     if len(data) < 84:
@@ -52,13 +52,13 @@ def _binary(name: str, data: bytes, strict: bool) -> list[tuple[Any, Any]]:
     meshes = _read(name, data)
     extra = [mesh["face_attributes"]["stl"] for mesh in meshes]
     if extra and extra[0].any():
-        colored.append(f"colours of facets (facet {int((extra[0] != 0).argmax())})")
+        colored.append(f"colors of facets (facet {int((extra[0] != 0).argmax())})")
     if colored:
-        warn(f"{name}: not honoured: {', '.join(colored)}", strict)
+        warn(f"{name}: not honored: {', '.join(colored)}", strict)
     return [(wide(mesh["vertices"]), mesh["faces"]) for mesh in meshes]
 
 
-def _text(name: str, text: str) -> list[Raw]:
+def _text(name: str, text: str) -> list[RawMesh]:
     """Check a text, and let trimesh read its vertices; it would also look for them in the names of solids."""
     lines = [line.strip() for line in text.replace("\t", " ").split("\n")]
     (vertices, starts, ends, *_), others = sort_lines(
@@ -89,6 +89,6 @@ def _text(name: str, text: str) -> list[Raw]:
         solids.append((title, vertices.numbers[chosen[::3]]))
     meshes = _read(name, "\n".join(written).encode()) if solids else []
     return [
-        Raw(title, mesh["vertices"], mesh["faces"], lines=numbers)
+        RawMesh(title, mesh["vertices"], mesh["faces"], lines=numbers)
         for (title, numbers), mesh in zip(solids, meshes, strict=True)
     ]

@@ -38,7 +38,7 @@ def parse(name: str, data: bytes, strict: bool, materials: bool) -> Any:
     package = _Package(name, _models(name, data))
     check_expanded(name, package.children, {}, "build")
     if package.lost and materials:
-        warn(f"{name}: not honoured: {', '.join(package.lost)}", strict)
+        warn(f"{name}: not honored: {', '.join(package.lost)}", strict)
     return by_trimesh(name, data, "3mf")
 
 

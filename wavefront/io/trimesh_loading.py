@@ -11,9 +11,9 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from ..codecs.images import decode_codes
 from ..errors import SceneError
-from .files import beside, read_bytes
-from .images import decode_codes
+from ..files import beside, read_bytes
 from .repair import warn
 
 

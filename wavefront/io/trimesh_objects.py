@@ -8,33 +8,33 @@ import numpy as np
 
 from ..errors import SceneError
 from . import visuals
-from .appearance import Look, dress, is_faint
+from .appearance import MaterialSpec, assign_material, is_faint
 from .contents import Contents
 from .placing import Places
-from .repair import Raw, warn, with_face_colors
+from .repair import RawMesh, warn, with_face_colors
 
 if TYPE_CHECKING:
     import trimesh
 
-BARE = ("obj", "ply")  # files whose materials may lack a colour, where trimesh makes a grey one up
+BARE = ("obj", "ply")  # files whose materials may lack a color, where trimesh makes a gray one up
 
 
 def read(geometry: Any, source: str, strict: bool) -> Contents:
     """Return the meshes of a trimesh object with materials, and where they stand."""
     import trimesh
 
-    looks = _Visuals()
+    specs = _Visuals()
     numbers: dict[int, int] = {}
-    raws: list[Raw] = []
+    raws: list[RawMesh] = []
     nodes = _nodes(geometry, trimesh)
     for mesh, name, _ in nodes:
         if id(mesh) not in numbers:
             numbers[id(mesh)] = len(raws)
             raws.append(_raw(mesh, name, source))
-            looks.dress(raws[-1], mesh, {geometry.source.file_type, mesh.source.file_type})
-    if looks.lost:
-        listed = ", ".join(f"{what} (mesh {where!r})" for what, where in looks.lost.items())
-        warn(f"{source}: not honoured: {listed}", strict)
+            specs.assign_material(raws[-1], mesh, {geometry.source.file_type, mesh.source.file_type})
+    if specs.lost:
+        listed = ", ".join(f"{what} (mesh {where!r})" for what, where in specs.lost.items())
+        warn(f"{source}: not honored: {listed}", strict)
     of = np.array([numbers[id(mesh)] for mesh, _, _ in nodes], np.intp)
     return Contents(raws, Places(of, np.array([matrix for *_, matrix in nodes]).reshape(-1, 4, 4)))
 
@@ -57,17 +57,17 @@ def _nodes(geometry: Any, trimesh: Any) -> list[tuple[Any, str, np.ndarray]]:
     return out
 
 
-def _raw(mesh: trimesh.Trimesh, name: str, source: str) -> Raw:
+def _raw(mesh: trimesh.Trimesh, name: str, source: str) -> RawMesh:
     # asking for `vertex_normals` would compute them; the cache tells whether they are there
     normals = np.asarray(mesh.vertex_normals) if "vertex_normals" in mesh._cache.cache else None
     uvs = getattr(mesh.visual, "uv", None)
     vertices = np.asarray(mesh.vertices, np.float64)
     if uvs is not None and (np.ndim(uvs) != 2 or len(uvs) != len(vertices)):
         uvs = None
-    raw = Raw(name, vertices, np.asarray(mesh.faces), normals)
+    raw = RawMesh(name, vertices, np.asarray(mesh.faces), normals)
     raw.uvs = None if uvs is None else np.asarray(uvs, np.float64)[:, :2]
-    raw.colors = visuals.vertex_colours(mesh)
-    painted = visuals.face_colours(mesh)
+    raw.colors = visuals.vertex_colors(mesh)
+    painted = visuals.face_colors(mesh)
     return raw if painted is None else with_face_colors(source, raw, painted)
 
 
@@ -75,28 +75,28 @@ class _Visuals:
     """The looks of trimesh visuals, each made once, and what is lost of them."""
 
     def __init__(self) -> None:
-        self._looks: dict[int, Look] = {}
+        self._looks: dict[int, MaterialSpec] = {}
         self.lost: dict[str, str] = {}  # what -> where first
 
-    def dress(self, raw: Raw, mesh: trimesh.Trimesh, file_types: set[str | None]) -> None:
+    def assign_material(self, raw: RawMesh, mesh: trimesh.Trimesh, file_types: set[str | None]) -> None:
         """Give a raw mesh its material and emission; `file_types` tells what it was read from."""
         visual: Any = mesh.visual
-        look = self._look(getattr(visual, "material", None), not file_types.isdisjoint(BARE))
-        for what in look.lost if look is not None else ():
+        spec = self._look(getattr(visual, "material", None), not file_types.isdisjoint(BARE))
+        for what in spec.lost if spec is not None else ():
             self.lost.setdefault(what, raw.name)
         painted = visual.kind == "face"
-        if not dress(raw, look) or (painted and raw.colors is None):
-            self.lost.setdefault("face colours" if painted else "vertex colours", raw.name)
+        if not assign_material(raw, spec) or (painted and raw.colors is None):
+            self.lost.setdefault("face colors" if painted else "vertex colors", raw.name)
         shown = {visual.kind, "face"} if visuals.shows_face_colors(mesh) else {visual.kind}
         for element in ("vertex", "face"):
-            if element not in shown and visuals.ply_has_colours(mesh, element):
-                self.lost.setdefault(f"{element} colours", raw.name)
-        if look is None and is_faint(raw) and not visuals.is_gltf(mesh):  # where it has no say
-            self.lost.setdefault("opacity of vertex colours", raw.name)
+            if element not in shown and visuals.ply_has_colors(mesh, element):
+                self.lost.setdefault(f"{element} colors", raw.name)
+        if spec is None and is_faint(raw) and not visuals.is_gltf(mesh):  # where it has no say
+            self.lost.setdefault("opacity of vertex colors", raw.name)
 
-    def _look(self, material: Any, bare: bool) -> Look | None:
+    def _look(self, material: Any, bare: bool) -> MaterialSpec | None:
         if material is None or visuals.is_blank(material):
             return None
         if id(material) not in self._looks:
-            self._looks[id(material)] = visuals.look(material, f"trimesh material {material.name!r}", bare)
+            self._looks[id(material)] = visuals.spec(material, f"trimesh material {material.name!r}", bare)
         return self._looks[id(material)]

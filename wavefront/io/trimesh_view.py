@@ -35,7 +35,7 @@ def add_camera(scene: Scene, geometry: Any) -> None:
         return
     if geometry.source is not None and geometry.source.file_type in ("glb", "gltf"):
         # trimesh reads it without the nodes above it, so it stands in the wrong place
-        warn(f"{SOURCE}: not honoured: the camera of its glTF file; wf.load reads it", strict=False)
+        warn(f"{SOURCE}: not honored: the camera of its glTF file; wf.load reads it", strict=False)
         return
     camera = geometry.camera
     width, height = (int(side) for side in camera.resolution)
@@ -79,7 +79,7 @@ def lights(geometry: Any) -> list[DirectionalLight | PointLight | SpotLight]:
     # asking for `lights` would make some up
     given = getattr(geometry, "_lights", None) or []
     if given and all(_is_made_up(light) for light in given):
-        warn(f"{SOURCE}: not honoured: the lights that trimesh made for its viewer", strict=False)
+        warn(f"{SOURCE}: not honored: the lights that trimesh made for its viewer", strict=False)
         return []
     return [_light(geometry, light) for light in given]
 
@@ -90,7 +90,7 @@ def _light(geometry: Any, light: Any) -> DirectionalLight | PointLight | SpotLig
     if kind is None:
         raise SceneError(f"{label} is a {type(light).__name__}; it must be one of {', '.join(KINDS)}")
     if light.radius is not None:
-        warn(f"{label}: not honoured: radius", strict=False)
+        warn(f"{label}: not honored: radius", strict=False)
     matrix = _transform(geometry, light.name)
     if matrix is None:
         warn(f"{label} has no transform; it stands at the origin and looks along -z", strict=False)

@@ -8,31 +8,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bsdfs import Diffuse
-from ..relief import NormalMap
-from ..textures import Texture
+from ..codecs.encoding import srgb_to_linear
+from ..textures.image import Texture
+from ..textures.normal_map import NormalMap
 from ..vec import f4
 from . import mtl
-from .appearance import Look, realise
-from .images import srgb_to_linear
+from .appearance import MaterialSpec, build_material
 from .mtl import MATTE
 from .repair import Table
 
 
-def look(material: Any, where: str, bare: bool) -> Look:
+def spec(material: Any, where: str, bare: bool) -> MaterialSpec:
     """Return the look of a trimesh `PBRMaterial` or `SimpleMaterial`; `where` is for messages.
 
-    Where `bare`, the colours and the exponent of the highlight count only if the material has a `Kd`, `Ks`
+    Where `bare`, the colors and the exponent of the highlight count only if the material has a `Kd`, `Ks`
     or `Ns` of its own; elsewhere those that trimesh would write into a file.
     """
     if hasattr(material, "baseColorFactor"):
         return _pbr(material)
     if hasattr(material, "diffuse"):
         return _simple(material, where, bare)
-    return Look(Diffuse(MATTE), lost=[type(material).__name__])
+    return MaterialSpec(Diffuse(MATTE), lost=[type(material).__name__])
 
 
-def vertex_colours(mesh: Any) -> Table | None:
-    """Return the vertex colours of a trimesh mesh, linear (n, 4), if it has any.
+def vertex_colors(mesh: Any) -> Table | None:
+    """Return the vertex colors of a trimesh mesh, linear (n, 4), if it has any.
 
     Those of glTF files are linear. All others are sRGB: so programs show them, and so files like
     PLY mean them.
@@ -58,8 +58,8 @@ def _decoded(codes: NDArray[Any]) -> Table:
     return np.column_stack([from_srgb(codes[:, :3] / 255.0), codes[:, 3:] / 255.0])
 
 
-def face_colours(mesh: Any) -> Table | None:
-    """Return the colours of the faces of a trimesh mesh, linear (m, 4), if they are those that show.
+def face_colors(mesh: Any) -> Table | None:
+    """Return the colors of the faces of a trimesh mesh, linear (m, 4), if they are those that show.
 
     They are sRGB, as those of vertices are.
     """
@@ -78,7 +78,7 @@ def shows_face_colors(mesh: Any) -> bool:
     """
     if mesh.visual.kind == "face":
         return np.shape(mesh.visual.face_colors) == (len(mesh.faces), 4)
-    if mesh.visual.kind != "vertex" or not ply_has_colours(mesh, "face"):
+    if mesh.visual.kind != "vertex" or not ply_has_colors(mesh, "face"):
         return False
     white = bool((np.asarray(mesh.visual.vertex_colors) == 255).all())
     return white and len(_ply_face_colors(mesh)) == len(mesh.faces)
@@ -96,8 +96,8 @@ def is_gltf(mesh: Any) -> bool:
     return "from_gltf_primitive" in mesh.metadata
 
 
-def ply_has_colours(mesh: Any, element: str) -> bool:
-    """Tell whether the vertices or faces of the PLY file that trimesh read a mesh from have colours.
+def ply_has_colors(mesh: Any, element: str) -> bool:
+    """Tell whether the vertices or faces of the PLY file that trimesh read a mesh from have colors.
 
     It leaves out both beside texture coordinates, and those of faces beside those of vertices.
     """
@@ -105,11 +105,11 @@ def ply_has_colours(mesh: Any, element: str) -> bool:
     return "red" in raw.get("properties", {})
 
 
-def from_srgb(colours: Table) -> Table:
-    """Decode colours (n, k) to linear ones, rounded to 8 bits; those outside [0, 1] are kept as they are."""
-    inside = (colours >= 0) & (colours <= 1)
-    codes = np.rint(np.where(inside, colours, 0) * 255).astype(f4)
-    return np.where(inside, srgb_to_linear(codes / f4(255)), colours)
+def from_srgb(colors: Table) -> Table:
+    """Decode colors (n, k) to linear ones, rounded to 8 bits; those outside [0, 1] are kept as they are."""
+    inside = (colors >= 0) & (colors <= 1)
+    codes = np.rint(np.where(inside, colors, 0) * 255).astype(f4)
+    return np.where(inside, srgb_to_linear(codes / f4(255)), colors)
 
 
 def is_blank(material: Any) -> bool:
@@ -129,8 +129,8 @@ def pixels(image: Any) -> NDArray[np.uint8]:
     return codes[:, :, None] if codes.ndim == 2 else codes
 
 
-def _pbr(material: Any) -> Look:
-    """Read glTF's model; trimesh rounds its colours to 8 bits, and they are linear."""
+def _pbr(material: Any) -> MaterialSpec:
+    """Read glTF's model; trimesh rounds its colors to 8 bits, and they are linear."""
     factor = np.ones(4) if material.baseColorFactor is None else np.asarray(material.baseColorFactor) / 255.0
     wanted: dict[str, Any] = {"base_color": factor[:3]}
     codes = None if material.baseColorTexture is None else pixels(material.baseColorTexture)
@@ -156,14 +156,14 @@ def _pbr(material: Any) -> Look:
     radiance: Any = glow if glow.any() else None
     if radiance is not None and material.emissiveTexture is not None:
         radiance = Texture(pixels(material.emissiveTexture), scale=glow)
-    made, lost = realise(wanted)
+    made, lost = build_material(wanted)
     if material.normalTexture is not None:  # trimesh keeps no scale of it
-        made = made.with_relief(NormalMap(Texture(pixels(material.normalTexture), False)))
+        made = made.with_normal_map(NormalMap(Texture(pixels(material.normalTexture), False)))
     occluded = ["occlusionTexture"] if material.occlusionTexture is not None else []
-    return Look(made, radiance, bool(material.doubleSided), occluded + lost, alpha, cutoff)
+    return MaterialSpec(made, radiance, bool(material.doubleSided), occluded + lost, alpha, cutoff)
 
 
-def _simple(material: Any, where: str, bare: bool) -> Look:
+def _simple(material: Any, where: str, bare: bool) -> MaterialSpec:
     """Read an MTL material: trimesh keeps its lines as lists of words."""
     entry = mtl.Entry(where, str(material.name or ""))
     lines = {key: value for key, value in material.kwargs.items() if key != "name"}
@@ -180,7 +180,7 @@ def _simple(material: Any, where: str, bare: bool) -> Look:
     # of the other images trimesh keeps the names alone, and no folder to look for them
     gone = [key for key in entry.lines if _is_map(key) and key not in entry.images]
     gone = [entry.lines.pop(key)[0] for key in gone]
-    found = mtl.look(entry)
+    found = mtl.spec(entry)
     found.lost = [*gone, *entry.unread(), *found.lost]
     return found
 

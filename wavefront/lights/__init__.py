@@ -1,15 +1,15 @@
 """Lights, and how one of them is chosen."""
 
 from .base import Light, LightSample, UserLight
-from .choose import LightTable
 from .directional import DirectionalLight, DirectionalLights, SunLight
 from .environment import ConstantEnvironment, Environment
 from .image import ImageEnvironment
-from .infinite import InfiniteLight, Sky
+from .infinite import EnvironmentSum, InfiniteLight
 from .point import PointLight, PointLights
 from .rectangle import RectangleLights, TwoSidedRectangleLights, first_of_pairs
 from .sphere import SphereLights
 from .spot import SpotLight, SpotLights
+from .table import LightTable
 from .triangle import TriangleLights, TwoSidedTriangleLights
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "DirectionalLight",
     "DirectionalLights",
     "Environment",
+    "EnvironmentSum",
     "ImageEnvironment",
     "InfiniteLight",
     "Light",
@@ -25,7 +26,6 @@ __all__ = [
     "PointLight",
     "PointLights",
     "RectangleLights",
-    "Sky",
     "SphereLights",
     "SpotLight",
     "SpotLights",

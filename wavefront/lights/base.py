@@ -1,8 +1,8 @@
 """The contract of every light.
 
-A light record holds k lights of one kind, a column each (`Columns`). The methods work on n
+A light record holds k lights of one kind, a column each (`SoA`). The methods work on n
 lanes: on a record with one column that is shared by all lanes, or on one that `take` gathered to
-a column per lane. Positions are relative to the scene's centre. Every pdf is in solid angle.
+a column per lane. Positions are relative to the scene's center. Every pdf is in solid angle.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import finite_array
 from ..parameter import Parametrized
 from ..record import record
-from ..state import Columns
+from ..state import SoA
 from ..vec import Floats, f4, positive
 
 TINY = f4(1e-35)  # added to squared distances before their root is divided by; lost in any that matter
@@ -24,7 +24,7 @@ EDGE_ON = f4(1e-14)  # taken off cosines that are divided by; smaller ones count
 
 
 @record
-class LightSample(Columns):
+class LightSample(SoA):
     """Light arriving at a point from one sampled direction. A pdf of 0 means no sample."""
 
     wi: Floats  # (3, n) unit direction from the point to the light
@@ -34,7 +34,7 @@ class LightSample(Columns):
     cos_light: Floats  # (n,) cosine between the ray and the light's normal; 1 where it has none
 
 
-class Light(Columns, ABC):
+class Light(SoA, ABC):
     """k lights of one kind."""
 
     __slots__ = ()
@@ -57,14 +57,14 @@ class Light(Columns, ABC):
         """Estimate the emitted power of each light, (k,), the mean of the channels, W."""
 
     def irradiance(
-        self, centre: NDArray[np.float64], radius: float, scene_radius: float
+        self, center: NDArray[np.float64], radius: float, scene_radius: float
     ) -> NDArray[np.float64]:
         """Estimate what each light brings to balls of space, W/m²; it guides the choice of a light.
 
         Parameters
         ----------
-        centre
-            (3, c) centres of the balls.
+        center
+            (3, c) centers of the balls.
         radius
             Their radius, scene units.
         scene_radius
@@ -75,8 +75,8 @@ class Light(Columns, ABC):
         (c, k) irradiance, the mean of the channels. Here: that of a light which shines on the whole
         scene alike.
         """
-        alike = self.power(scene_radius) / (4 * np.pi * max(scene_radius, 1e-30) ** 2)
-        return np.broadcast_to(alike, (centre.shape[1], len(alike)))
+        broadcast = self.power(scene_radius) / (4 * np.pi * max(scene_radius, 1e-30) ** 2)
+        return np.broadcast_to(broadcast, (center.shape[1], len(broadcast)))
 
 
 def position(name: str, value: ArrayLike) -> NDArray[np.float64]:
@@ -92,8 +92,8 @@ class UserLight(Parametrized, ABC):
         return self
 
     @abstractmethod
-    def record(self, centre: NDArray[np.float64]) -> Light:
-        """Return the light as a record of one column, relative to `centre` (3,)."""
+    def record(self, center: NDArray[np.float64]) -> Light:
+        """Return the light as a record of one column, relative to `center` (3,)."""
 
 
 def area_pdf(d2: Floats, cos_light: Floats, area: Floats) -> Floats:
@@ -112,7 +112,7 @@ def area_pdf(d2: Floats, cos_light: Floats, area: Floats) -> Floats:
 
 
 def facing_area(
-    centre: NDArray[np.float64],
+    center: NDArray[np.float64],
     radius: float,
     middle: Floats,
     normal: Floats,
@@ -124,14 +124,14 @@ def facing_area(
 
     Parameters
     ----------
-    centre, radius
+    center, radius
         (3, c) and scalar: the balls.
     middle, normal, size, strength
         (3, k), (3, k), (k,), (k,): the areas' middle, front normal, width, and radiance times area.
     sides
         1 if they shine from the front only, else 2.
     """
-    away = centre[:, :, None] - middle[:, None, :]
+    away = center[:, :, None] - middle[:, None, :]
     height = (away * normal[:, None, :]).sum(0)
     height = np.maximum((height if sides == 1 else np.abs(height)) + radius + size, 0)
     distance = np.sqrt(np.maximum((away**2).sum(0), np.maximum(size, radius) ** 2))

@@ -48,10 +48,10 @@ class DirectionalLights(Light):
         return through_scene(self.facing.mean(0, dtype=np.float64), scene_radius)
 
     def irradiance(
-        self, centre: NDArray[np.float64], radius: float, scene_radius: float
+        self, center: NDArray[np.float64], radius: float, scene_radius: float
     ) -> NDArray[np.float64]:
         """E, everywhere; (c, k)."""
-        return facing_irradiance(self, centre)
+        return facing_irradiance(self, center)
 
 
 @record
@@ -83,10 +83,10 @@ class SunLight(InfiniteLight):
         return through_scene(irradiance, scene_radius)
 
     def irradiance(
-        self, centre: NDArray[np.float64], radius: float, scene_radius: float
+        self, center: NDArray[np.float64], radius: float, scene_radius: float
     ) -> NDArray[np.float64]:
         """E, everywhere; (c, k)."""
-        return facing_irradiance(self, centre)
+        return facing_irradiance(self, center)
 
     def _meets(self, wi: Floats) -> NDArray[np.bool_]:
         away = wi - column(self.axes[:, 2])
@@ -146,7 +146,7 @@ class DirectionalLight(UserLight):
         self.irradiance = irradiance
         self.angle = angle
 
-    def record(self, centre: NDArray[np.float64]) -> DirectionalLights | SunLight:
+    def record(self, center: NDArray[np.float64]) -> DirectionalLights | SunLight:
         """Return the light as a record of one column."""
         towards = (-self.direction).astype(f4).reshape(3, 1)
         if self.angle == 0:

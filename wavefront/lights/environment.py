@@ -63,7 +63,7 @@ class Environment(UserLight):
     transform
         (3, 3) rotation to world space from the environment's.
     filter
-        "bilinear" between the centres of the image's pixels, or "nearest".
+        "bilinear" between the centers of the image's pixels, or "nearest".
 
     Attributes
     ----------
@@ -116,6 +116,6 @@ class Environment(UserLight):
         else:
             self._radiance, self._image = rgb("Environment radiance", radiance), None
 
-    def record(self, centre: NDArray[np.float64]) -> InfiniteLight:
+    def record(self, center: NDArray[np.float64]) -> InfiniteLight:
         """Return the light as a record of one column."""
         return ConstantEnvironment(self.radiance) if self._image is None else self._image

@@ -11,12 +11,14 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..codecs.encoding import srgb_to_linear
+from ..codecs.images import read_codes
 from ..elementary import arctan2, sin_cos, sin_cos_turns
 from ..errors import SceneError
-from ..io.images import check_size, read_codes, srgb_to_linear
+from ..files import check_size
 from ..record import record
 from ..sampling.discrete import Distribution2D
-from ..textures import Texture
+from ..textures.image import Texture
 from ..vec import Floats, f4, luminance
 from .base import LightSample
 from .infinite import InfiniteLight, at_infinity, through_scene, turned
@@ -131,7 +133,7 @@ class ImageEnvironment(InfiniteLight):
 
 
 def _spread(pixels: Floats) -> NDArray[np.float64]:
-    """Mean of the bilinear lookup within each texel: its neighbours count ⅛, itself ¾, both ways.
+    """Mean of the bilinear lookup within each texel: its neighbors count ⅛, itself ¾, both ways.
 
     It is positive wherever the lookup is.
     """

@@ -30,7 +30,7 @@ class InfiniteLight(Light):
 
     @classmethod
     def concatenate(cls, records: Sequence[Self]) -> Self:
-        """Return the one light; several are joined by `Sky`."""
+        """Return the one light; several are joined by `EnvironmentSum`."""
         (record,) = records
         return record
 
@@ -44,7 +44,7 @@ class InfiniteLight(Light):
 
 
 @record
-class Sky(InfiniteLight):
+class EnvironmentSum(InfiniteLight):
     """The sum of several lights at infinity, sampled one at a time by their power.
 
     Its pdf is the mixture's, so that each sample is weighed against all ways to draw it
@@ -97,10 +97,10 @@ class Sky(InfiniteLight):
         return np.sum([part.power(scene_radius) for part in self.parts], axis=0)
 
     def irradiance(
-        self, centre: NDArray[np.float64], radius: float, scene_radius: float
+        self, center: NDArray[np.float64], radius: float, scene_radius: float
     ) -> NDArray[np.float64]:
         """Return the sum of what the parts bring, (c, 1)."""
-        return np.sum([part.irradiance(centre, radius, scene_radius) for part in self.parts], axis=0)
+        return np.sum([part.irradiance(center, radius, scene_radius) for part in self.parts], axis=0)
 
 
 def _by_power(parts: Sequence[InfiniteLight]) -> Discrete:
@@ -119,10 +119,10 @@ def through_scene(irradiance: NDArray[np.float64], scene_radius: float) -> NDArr
     return np.pi * scene_radius**2 * irradiance
 
 
-def facing_irradiance(light: Light, centre: NDArray[np.float64]) -> NDArray[np.float64]:
+def facing_irradiance(light: Light, center: NDArray[np.float64]) -> NDArray[np.float64]:
     """What lights from one direction bring to surfaces that face them, (c, k), at c places."""
-    alike = light.power(1.0) / np.pi
-    return np.broadcast_to(alike, (centre.shape[1], len(alike)))
+    broadcast = light.power(1.0) / np.pi
+    return np.broadcast_to(broadcast, (center.shape[1], len(broadcast)))
 
 
 def turned(axes: Floats, v: Floats) -> Floats:

@@ -49,10 +49,10 @@ class PointLights(Light):
         return 4 * np.pi * self.intensity.mean(0, dtype=np.float64)
 
     def irradiance(
-        self, centre: NDArray[np.float64], radius: float, scene_radius: float
+        self, center: NDArray[np.float64], radius: float, scene_radius: float
     ) -> NDArray[np.float64]:
         """I/d², with d at least the radius of the ball; (c, k)."""
-        away = self.position[:, None, :] - centre[:, :, None]
+        away = self.position[:, None, :] - center[:, :, None]
         return self.intensity.mean(0, dtype=np.float64) / np.maximum((away**2).sum(0), radius**2)
 
 
@@ -104,9 +104,9 @@ class PointLight(UserLight):
         light.intensity = scaled_intensity("PointLight intensity", self.intensity, factor)
         return light
 
-    def record(self, centre: NDArray[np.float64]) -> PointLights:
-        """Return the light as a record of one column, relative to `centre` (3,)."""
-        return PointLights((self.position - centre).astype(f4).reshape(3, 1), self.intensity.astype(f4))
+    def record(self, center: NDArray[np.float64]) -> PointLights:
+        """Return the light as a record of one column, relative to `center` (3,)."""
+        return PointLights((self.position - center).astype(f4).reshape(3, 1), self.intensity.astype(f4))
 
 
 def scaled_intensity(name: str, intensity: NDArray[np.float64], factor: float) -> NDArray[np.float64]:

@@ -122,12 +122,12 @@ class RectangleLights(Light):
         return self.sides * np.pi * self.area * self.radiance.mean(0, dtype=np.float64)
 
     def irradiance(
-        self, centre: NDArray[np.float64], radius: float, scene_radius: float
+        self, center: NDArray[np.float64], radius: float, scene_radius: float
     ) -> NDArray[np.float64]:
         """L·A·cosθ/d² of a small area at the middle; (c, k)."""
         middle = self.corner + (self.edge_u + self.edge_v) / 2
         strength = self.area * self.radiance.mean(0, dtype=np.float64)
-        return facing_area(centre, radius, middle, self.normal, np.sqrt(self.area), strength, self.sides)
+        return facing_area(center, radius, middle, self.normal, np.sqrt(self.area), strength, self.sides)
 
 
 @record

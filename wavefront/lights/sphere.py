@@ -33,7 +33,7 @@ class SphereLights(Light):
         in_cone = Frame.from_normal(axis).to_world(uniform_cone(u, np.where(outside, height, f4(1))))
         wi = np.where(outside, in_cone, uniform_sphere(u)).astype(f4)
         along = distance * dot(axis, wi)
-        beside = axis * distance - wi * along  # from the ray to the centre; d² − along² would cancel
+        beside = axis * distance - wi * along  # from the ray to the center; d² − along² would cancel
         half_chord = np.sqrt(np.maximum(self.radius**2 - dot(beside, beside), f4(0)))
         reach = np.where(outside, along - half_chord, along + half_chord)
         pdf = np.where(outside, f4(1) / (TWO_PI * height), UNIFORM_SPHERE_PDF)
@@ -58,20 +58,20 @@ class SphereLights(Light):
         return 4 * np.pi**2 * self.radius.astype(np.float64) ** 2 * self.radiance.mean(0, dtype=np.float64)
 
     def irradiance(
-        self, centre: NDArray[np.float64], radius: float, scene_radius: float
+        self, center: NDArray[np.float64], radius: float, scene_radius: float
     ) -> NDArray[np.float64]:
         """π·L·(r/d)², with d at least r and the radius of the ball; (c, k)."""
-        away = self.center[:, None, :] - centre[:, :, None]
+        away = self.center[:, None, :] - center[:, :, None]
         size = self.radius.astype(np.float64)
         strength = np.pi * size**2 * self.radiance.mean(0, dtype=np.float64)
         return strength / np.maximum((away**2).sum(0), np.maximum(size, radius) ** 2)
 
     def _towards(self, point: Floats) -> tuple[Floats, Floats]:
-        """Return the unit axis (3, n) and the distance (n,) to the centre."""
+        """Return the unit axis (3, n) and the distance (n,) to the center."""
         axis = self.center - point
         distance = np.sqrt(dot(axis, axis))
         axis = axis / np.where(distance > 0, distance, f4(1))
-        axis[2] += np.where(distance > 0, f4(0), f4(1))  # any axis will do at the centre
+        axis[2] += np.where(distance > 0, f4(0), f4(1))  # any axis will do at the center
         return axis, distance
 
     def _cone(self, distance: Floats) -> tuple[Floats, np.ndarray]:

@@ -57,10 +57,10 @@ class SpotLights(Light):
         return solid_angle * self.intensity.mean(0, dtype=np.float64)
 
     def irradiance(
-        self, centre: NDArray[np.float64], radius: float, scene_radius: float
+        self, center: NDArray[np.float64], radius: float, scene_radius: float
     ) -> NDArray[np.float64]:
         """I·falloff/d² at most, with the falloff at the part of the ball nearest to the axis; (c, k)."""
-        away = centre[:, :, None] - self.position[:, None, :]
+        away = center[:, :, None] - self.position[:, None, :]
         distance = np.sqrt((away**2).sum(0))
         far = np.maximum(distance, 1e-30)
         angle = arccos(np.clip((away * self.axis[:, None, :]).sum(0) / far, -1, 1))
@@ -160,14 +160,14 @@ class SpotLight(UserLight):
         light.intensity = scaled_intensity("SpotLight intensity", self.intensity, factor)
         return light
 
-    def record(self, centre: NDArray[np.float64]) -> SpotLights:
-        """Return the light as a record of one column, relative to `centre` (3,)."""
+    def record(self, center: NDArray[np.float64]) -> SpotLights:
+        """Return the light as a record of one column, relative to `center` (3,)."""
         half = np.radians(self.angle) / 2
         outer = 2 * sin_cos(np.float64(half / 2))[0] ** 2
         inner = 2 * sin_cos(np.float64(half * (1 - self.blend) / 2))[0] ** 2
         width = max(outer - inner, 1e-6 * outer)  # a hard edge is a very steep ramp
         return SpotLights(
-            (self.position - centre).astype(f4).reshape(3, 1),
+            (self.position - center).astype(f4).reshape(3, 1),
             self.direction.astype(f4).reshape(3, 1),
             np.array([outer], f4),
             np.array([1 / width], f4),

@@ -28,7 +28,7 @@ class TriangleLights(Light):
 
     @classmethod
     def from_triangles(cls, triangles: NDArray[np.float64], radiance: Floats) -> TriangleLights:
-        """Build from vertices (k, 3, 3), relative to the scene's centre, and radiance (3, k) or (3, 1)."""
+        """Build from vertices (k, 3, 3), relative to the scene's center, and radiance (3, k) or (3, 1)."""
         edge1 = (triangles[:, 1] - triangles[:, 0]).T
         edge2 = (triangles[:, 2] - triangles[:, 0]).T
         normal = np.cross(edge1, edge2, axis=0)
@@ -87,12 +87,12 @@ class TriangleLights(Light):
         return self.sides * np.pi * self.area * self.radiance.mean(0, dtype=np.float64)
 
     def irradiance(
-        self, centre: NDArray[np.float64], radius: float, scene_radius: float
+        self, center: NDArray[np.float64], radius: float, scene_radius: float
     ) -> NDArray[np.float64]:
         """L·A·cosθ/d² of a small area at the middle; (c, k)."""
         middle = self.corner + (self.edge1 + self.edge2) / 3
         strength = self.area * self.radiance.mean(0, dtype=np.float64)
-        return facing_area(centre, radius, middle, self.normal, np.sqrt(self.area), strength, self.sides)
+        return facing_area(center, radius, middle, self.normal, np.sqrt(self.area), strength, self.sides)
 
     def _cosine(self, wi: Floats) -> Floats:
         """Cosine (n,) of rays along wi against the normal, above 0 on sides that shine."""

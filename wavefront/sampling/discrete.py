@@ -199,7 +199,7 @@ def _within_cell(cell: Ints, rest: Floats, cells: int) -> Floats:
     """Coordinate (n,) in [0, 1) at `rest` (n,) of the way through `cell` (n,).
 
     Kept off the border by more than rounding, so that the coordinate is in the cell for `pdf` too,
-    whose neighbour may have no weight.
+    whose neighbor may have no weight.
     """
     margin = cells * 2.0**-22
     return ((cell + np.clip(rest, margin, 1 - margin, dtype=np.float64)) / cells).astype(f4)

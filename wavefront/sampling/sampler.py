@@ -154,9 +154,9 @@ class BlueNoiseSampler(Sampler):
 
     All pixels share one shuffled, Owen-scrambled sequence per stream, and each XORs a point of its
     own to it: the points of another sequence, taken along a Morton curve through the pixels. So
-    neighbours get numbers that lie far apart and complement each other, and what is wrong in one is
+    neighbors get numbers that lie far apart and complement each other, and what is wrong in one is
     made good beside it. Each square of the curve goes along or down first as a hash says, or all
-    pairs of neighbours would lie side by side, which shows as stripes. In each pixel the samples are
+    pairs of neighbors would lie side by side, which shows as stripes. In each pixel the samples are
     spread as those of `SobolSampler`, for any number of samples.
 
     After the idea of A. Ahmed and P. Wonka, Screen-Space Blue-Noise Diffusion of Monte Carlo

@@ -1,8 +1,8 @@
-"""What varies over a shape besides its place and normal: texture coordinates, vertex colours, tangents.
+"""What varies over a shape besides its place and normal: texture coordinates, vertex colors, tangents.
 
 An attribute is interpolated over the triangles from its values at their corners, and computed on
 spheres. Only those are kept that a material of the scene reads, by the name of the field of
-`Surface` that takes it.
+`SurfaceInteraction` that takes it.
 """
 
 from __future__ import annotations
@@ -78,17 +78,17 @@ NONE = (0.0,) * 6
 ATTRIBUTES = {
     "uv": _per_vertex(UV, (0, 0), lambda mesh: mesh.uvs, sphere_uv),
     "uv1": _per_vertex(UV1, (0, 0), lambda mesh: mesh.uvs1, sphere_uv),
-    "color": _per_vertex("vertex colours (colors)", (1, 1, 1, 1), lambda mesh: mesh.colors, sphere_color),
+    "color": _per_vertex("vertex colors (colors)", (1, 1, 1, 1), lambda mesh: mesh.colors, sphere_color),
     "tangents": Attribute(
         UV, NONE, lambda mesh: mesh.uvs, lambda mesh: mesh_tangents(mesh, mesh.uvs), sphere_tangents, True
     ),
     "tangents1": Attribute(
         UV1, NONE, lambda mesh: mesh.uvs1, lambda mesh: mesh_tangents(mesh, mesh.uvs1), sphere_tangents, True
     ),
-    "axes": Attribute(
+    "tangent_frame": Attribute(
         UV, NONE, lambda mesh: mesh.uvs, lambda mesh: mesh_axes(mesh, mesh.uvs), sphere_tangents, True
     ),
-    "axes1": Attribute(
+    "tangent_frame1": Attribute(
         UV1, NONE, lambda mesh: mesh.uvs1, lambda mesh: mesh_axes(mesh, mesh.uvs1), sphere_tangents, True
     ),
 }

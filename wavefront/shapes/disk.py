@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..bsdfs import Bsdf
-from ..bsdfs.parameter import Colour
 from ..elementary import sin_cos_turns
 from ..errors import SceneError, finite_array, number
 from ..suggestions import suggests_keywords
+from ..textures.parameter import Color
 from .mesh import Mesh
 
 
@@ -21,7 +21,7 @@ def Disk(
     *,
     segments: int = 64,
     material: Bsdf | None = None,
-    emission: Colour | None = None,
+    emission: Color | None = None,
     two_sided: bool = False,
     name: str = "disk",
 ) -> Mesh:

@@ -8,9 +8,10 @@ from copy import copy
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..bsdfs import Bsdf, Spatial
+from ..bsdfs import Bsdf
 from ..errors import SceneError, finite_array
 from ..suggestions import suggests_keywords
+from ..textures.base import BaseTexture
 from .base import Shape
 from .mesh import FLOAT32_MAX, Mesh, check_range
 from .transform import moved, moved_tangents
@@ -97,7 +98,7 @@ class Instance(Shape):
         return self.mesh.material
 
     @property
-    def emission(self) -> Spatial | NDArray[np.float32] | None:
+    def emission(self) -> BaseTexture | NDArray[np.float32] | None:
         """Radiance that leaves the surface, as of the mesh with the instance's material."""
         return self.mesh.emission_by(self.material)
 
@@ -174,13 +175,13 @@ def instance_bounds(instances: Sequence[Instance]) -> NDArray[np.float64]:
     numbers: dict[int, list[int]] = {}  # by mesh
     for number, instance in enumerate(instances):
         numbers.setdefault(id(instance.mesh), []).append(number)
-    for alike in numbers.values():
-        mesh = instances[alike[0]].mesh
+    for broadcast in numbers.values():
+        mesh = instances[broadcast[0]].mesh
         used = np.flatnonzero(np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices)))
         vertices = mesh.vertices.take(used, 0).T
         step = max(1, MOST_PLACED // used.size)
-        for begin in range(0, len(alike), step):
-            some = alike[begin : begin + step]
+        for begin in range(0, len(broadcast), step):
+            some = broadcast[begin : begin + step]
             transforms = np.stack([instances[number].transform for number in some])
             with np.errstate(over="ignore", invalid="ignore"):
                 placed = transforms[:, :3, :3] @ vertices + transforms[:, :3, 3:]

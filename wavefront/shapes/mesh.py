@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..bsdfs import Bsdf, Diffuse
-from ..bsdfs.parameter import Colour, colour
+from ..codecs.encoding import srgb_to_linear
 from ..errors import SceneError, finite_array
-from ..io.images import srgb_to_linear
 from ..suggestions import suggests_keywords
+from ..textures.parameter import Color, color
+from ..textures.vertex_colors import VertexColors
 from ..vec import f4
-from ..vertex_colors import VertexColors
 from .base import Shape
 
 FLOAT32_MAX = float(np.finfo(np.float32).max)
@@ -44,7 +44,7 @@ class Mesh(Shape):
         gives them, are decoded from sRGB, but for the opacity. A material that is given shows them by a
         parameter `VertexColors`.
     material
-        How the surface scatters light. By default a `Diffuse` that shows the `colors`, or is grey.
+        How the surface scatters light. By default a `Diffuse` that shows the `colors`, or is gray.
     emission
         Radiance that leaves the front side, W·sr⁻¹·m⁻²: one number or three, or a `Texture` or
         `VertexColors`, at least 0. By default that of the material, if it has one.
@@ -72,7 +72,7 @@ class Mesh(Shape):
         tangents: ArrayLike | None = None,
         colors: ArrayLike | None = None,
         material: Bsdf | None = None,
-        emission: Colour | None = None,
+        emission: Color | None = None,
         two_sided: bool = False,
         name: str = "mesh",
     ) -> None:
@@ -98,7 +98,7 @@ class Mesh(Shape):
 
     @property
     def default_material(self) -> Bsdf:
-        """A `Diffuse` that shows the vertex colors, or is grey where there are none."""
+        """A `Diffuse` that shows the vertex colors, or is gray where there are none."""
         shown = self.colors is not None
         if self._default is None or self._default[0] != shown:
             self._default = shown, Diffuse(VertexColors() if shown else 0.5)
@@ -111,7 +111,7 @@ class Mesh(Shape):
 
     @emission.setter
     def emission(self, emission: Any) -> None:
-        self._emission = None if emission is None else colour(f"{self.name}: emission", emission, np.inf)
+        self._emission = None if emission is None else color(f"{self.name}: emission", emission, np.inf)
 
     def emission_by(self, material: Bsdf) -> Any:
         """Return the emission where the mesh has this material."""
@@ -152,7 +152,7 @@ def Rectangle(
     edge_v: ArrayLike,
     *,
     material: Bsdf | None = None,
-    emission: Colour | None = None,
+    emission: Color | None = None,
     two_sided: bool = False,
     name: str = "rectangle",
 ) -> Mesh:

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..bsdfs import Bsdf, Diffuse, Spatial
+from ..bsdfs import Bsdf, Diffuse
 from ..errors import SceneError, finite_array, number, rgb
 from ..suggestions import suggests_keywords
+from ..textures.base import BaseTexture
 from .base import Shape
 from .mesh import FLOAT32_MAX, FLOAT32_MIN
 
@@ -72,7 +73,7 @@ class Sphere(Shape):
 
     @property
     def default_material(self) -> Bsdf:
-        """A grey `Diffuse`."""
+        """A gray `Diffuse`."""
         return self._default
 
     @property
@@ -84,7 +85,7 @@ class Sphere(Shape):
 
     @emission.setter
     def emission(self, emission: Any) -> None:
-        if isinstance(emission, Spatial):
+        if isinstance(emission, BaseTexture):
             raise SceneError(f"{self.name}: a sphere shines evenly; a mesh can shine by {emission!r}")
         self._emission = None if emission is None else rgb(f"{self.name}: emission", emission)
 

@@ -9,9 +9,9 @@ import numpy as np
 from ..bsdfs import BsdfSample, sampled
 from ..sampling.sampler import Dimension, Sampler
 from ..state import Paths
-from ..vec import Floats, Ints, columns, f4, normalize, signs
+from ..vec import Floats, Ints, f4, normalize, signs, take
+from .interaction import LIFT, leave
 from .shade import Shading
-from .surface import LIFT, leave
 
 
 def branch(paths: Paths, shade: Shading, sampler: Sampler, bounce: int, ways: int) -> Paths:
@@ -56,11 +56,11 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         sample=paths.sample,
         origin=leave(surface, cos_g) if (cos_g < 0).any() else shade.start,
         direction=direction,
-        leaving=surface.prim,
+        exclude_prim=surface.prim,
         throughput=throughput,
         pdf=sample.pdf,
         specular=specular,
-        eta2=paths.eta2 if sample.eta is None else paths.eta2 * sample.eta**2,
+        eta_scale=paths.eta_scale if sample.eta is None else paths.eta_scale * sample.eta**2,
     )
 
 
@@ -104,7 +104,7 @@ def _sample(shade: Shading, u: Floats) -> BsdfSample:
     )
     assert out.eta is not None
     for lanes, bsdf in shade.groups:
-        part = sampled(bsdf, columns(shade.wo, lanes), columns(u, lanes))
+        part = sampled(bsdf, take(shade.wo, lanes), take(u, lanes))
         out.wi[:, lanes], out.weight[:, lanes] = part.wi, part.weight
         out.pdf[lanes], out.specular[lanes] = part.pdf, part.specular
         if part.eta is not None:

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..compile.scene import CompiledScene
 from ..sampling.sampler import Dimension, Sampler
-from ..scene import CompiledScene
 from ..state import Hits, Paths
-from ..vec import Bools, Ints, alike, f4, highest
+from ..vec import Bools, Ints, broadcast, f4, highest
+from .interaction import material_rows
 from .shade import Emission
-from .surface import material_rows
 
 ROULETTE_AFTER = 2  # scattering events before paths may be ended
 SURE = f4(0.5)  # throughput from which on a path lives on for sure
@@ -27,7 +27,9 @@ def compact(scene: CompiledScene, paths: Paths, hits: Hits, lanes: Ints) -> tupl
     ordered, n = by_group(scene, hits, lanes), len(paths)
     if ordered is lanes and lanes.size == n:
         return paths, hits
-    arrived = replace(paths, leaving=alike(np.intp(-1), n), pdf=alike(f4(0), n), vertex=None)
+    arrived = replace(
+        paths, exclude_prim=broadcast(np.intp(-1), n), pdf=broadcast(f4(0), n), prev_vertex=None
+    )
     return arrived.take(ordered), hits.take(ordered)
 
 
@@ -43,21 +45,21 @@ def by_group(scene: CompiledScene, hits: Hits, lanes: Ints) -> Ints:
     return lanes.take(np.argsort(short, kind="stable"))
 
 
-def keep(paths: Paths, lanes: Ints) -> Paths:
+def select(paths: Paths, lanes: Ints) -> Paths:
     """Keep the given lanes of paths that set out."""
     return paths if lanes.size == len(paths) else paths.take(lanes)
 
 
-def going_on(scene: CompiledScene, hits: Hits, emission: Emission) -> Ints:
+def scattering_lanes(scene: CompiledScene, hits: Hits, emission: Emission) -> Ints:
     """Lanes (k,) of paths that met a surface, and not a lamp that is black but for its light."""
-    if scene.black_lights is None:
+    if scene.nonscattering_lights is None:
         return hits.found
     found = hits.prim >= 0
-    found[emission.lanes.compress(scene.black_lights.take(emission.light))] = False
+    found[emission.lanes.compress(scene.nonscattering_lights.take(emission.light))] = False
     return np.flatnonzero(found)
 
 
-def carrying(paths: Paths) -> Bools:
+def alive(paths: Paths) -> Bools:
     """Tell which paths still carry anything, (n,); NaN is kept, so that it is met and counted."""
     return highest(paths.throughput) != 0
 
@@ -72,8 +74,8 @@ def roulette(paths: Paths, sampler: Sampler, bounce: int, branches: int = 1) -> 
     paths that carry nothing end. A path that is one of several `branches` began with as much less.
     """
     if bounce < ROULETTE_AFTER or not len(paths):
-        return np.flatnonzero(carrying(paths))
-    chance = np.clip(highest(paths.throughput) * paths.eta2 * (branches / SURE), SMALLEST, f4(1))
+        return np.flatnonzero(alive(paths))
+    chance = np.clip(highest(paths.throughput) * paths.eta_scale * (branches / SURE), SMALLEST, f4(1))
     u = sampler.draw_1d(paths.pixel, paths.sample, bounce, Dimension.ROULETTE)
     paths.throughput /= chance
     return np.flatnonzero(~(u >= chance))  # NaN lives on, to be counted

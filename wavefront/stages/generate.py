@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..camera import Camera
+from ..compile.scene import CompiledScene
 from ..filters import Filter, box
 from ..sampling.sampler import Dimension, Sampler
-from ..scene import CompiledScene
 from ..state import Paths, Words
-from ..vec import alike, f4
+from ..vec import broadcast, f4
 
 
 def generate(
@@ -31,16 +31,16 @@ def generate(
     x = (pixel - row * np.uint32(width)).astype(f4) + jitter[0]
     y = row.astype(f4) + jitter[1]
     lens = sampler.draw_2d(pixel, sample, 0, Dimension.LENS) if camera.uses_lens else None
-    origin, direction = camera.rays(x, y, scene.centre, lens)
+    origin, direction = camera.rays(x, y, scene.center, lens)
     return Paths(
         slot=np.arange(n),
         pixel=pixel,
         sample=sample,
         origin=origin,
         direction=direction,
-        leaving=np.full(n, -1, np.intp),
+        exclude_prim=np.full(n, -1, np.intp),
         throughput=np.ones((3, n), f4),
-        pdf=alike(f4(1), n),
-        specular=alike(np.True_, n),
-        eta2=alike(f4(1), n),
+        pdf=broadcast(f4(1), n),
+        specular=broadcast(np.True_, n),
+        eta_scale=broadcast(f4(1), n),
     )

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..compile.scene import CompiledScene
 from ..lights import LightSample
 from ..record import record
-from ..scene import CompiledScene
-from ..state import Hits, Rays, Surface
-from ..vec import Bools, Floats, Ints, columns, f4, positive
+from ..state import Hits, Rays, SurfaceInteraction
+from ..vec import Bools, Floats, Ints, f4, positive, take
 
 TARGET_ERROR = f4(2**-20)  # rounding of a sampled point on a light, relative to its distance
 
@@ -24,16 +24,16 @@ class ShadowRays(Rays):
 
 def intersect(scene: CompiledScene, rays: Rays) -> Hits:
     """Find what each ray meets first."""
-    found = scene.accelerator.closest(rays.origin, rays.direction, rays.leaving)
+    found = scene.accelerator.closest(rays.origin, rays.direction, rays.exclude_prim)
     hits = Hits(found.t, found.prim, None, None)
     if scene.interpolates:
         hits.b1, hits.b2 = found.b1, found.b2
     if scene.instances is not None:
-        hits.prim, hits.place = scene.instances.locate(found.prim)
+        hits.prim, hits.instance = scene.instances.locate(found.prim)
     return hits
 
 
-def shadow_rays(surface: Surface, origin: Floats, light: LightSample, lanes: Ints) -> ShadowRays:
+def shadow_rays(surface: SurfaceInteraction, origin: Floats, light: LightSample, lanes: Ints) -> ShadowRays:
     """Return rays from some points to the sampled points on their lights.
 
     Parameters
@@ -44,18 +44,18 @@ def shadow_rays(surface: Surface, origin: Floats, light: LightSample, lanes: Int
         (k,) columns of these that get a ray.
     """
     return ShadowRays(
-        origin=columns(origin, lanes),
-        direction=columns(light.wi, lanes),
-        leaving=columns(surface.prim, lanes),
-        error=columns(surface.error, lanes),
-        distance=columns(light.distance, lanes),
-        cos_light=columns(light.cos_light, lanes),
+        origin=take(origin, lanes),
+        direction=take(light.wi, lanes),
+        exclude_prim=take(surface.prim, lanes),
+        error=take(surface.error, lanes),
+        distance=take(light.distance, lanes),
+        cos_light=take(light.cos_light, lanes),
     )
 
 
 def visible(scene: CompiledScene, rays: ShadowRays) -> Bools:
     """Tell whether nothing stands between points and the sampled points on their lights, (k,)."""
-    return ~scene.accelerator.occluded(rays.origin, rays.direction, reach(rays), rays.leaving)
+    return ~scene.accelerator.occluded(rays.origin, rays.direction, reach(rays), rays.exclude_prim)
 
 
 def reach(rays: ShadowRays) -> Floats:

@@ -7,23 +7,24 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..bsdfs import Bsdf, evaluated
+from ..compile.materials import MaterialTable
+from ..compile.scene import CompiledScene
 from ..frame import Frame
 from ..record import record
 from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
-from ..scene import CompiledScene, Materials
-from ..state import Hits, Paths, Surface
-from ..vec import Floats, Ints, alike, column, columns, dot, f4, highest
+from ..state import Hits, Paths, SurfaceInteraction
+from ..vec import Floats, Ints, broadcast, column, dot, f4, highest, take
+from .alpha import transmittance_along
+from .interaction import above, leave
 from .intersect import shadow_rays, visible
-from .passing import let_through
-from .shine import shine_at_hits, shine_at_samples
-from .surface import above, leave
+from .textured_emission import emission_at_hits, emission_at_samples
 
 UP = column((0, 0, 1))
 
 
 @record
-class Arrival:
+class Contribution:
     """Light that arrives on some lanes."""
 
     lanes: Ints  # (k,)
@@ -31,7 +32,7 @@ class Arrival:
 
 
 @record
-class Emission(Arrival):
+class Emission(Contribution):
     """Light met by rays: only the lanes that meet some."""
 
     light: Ints  # (k,) number of the light
@@ -41,7 +42,7 @@ class Emission(Arrival):
 class Shading:
     """Surfaces ready for their materials: local frames, and the lanes grouped by material."""
 
-    surface: Surface
+    surface: SurfaceInteraction
     frame: Frame
     wo: Floats  # (3, n) local frame; straight up where all materials are matte
     start: Floats  # (3, n) origins of rays that leave to the side of wo, scene units
@@ -73,38 +74,38 @@ def emitted(scene: CompiledScene, paths: Paths, hits: Hits) -> Emission:
     lanes = np.flatnonzero(scene.shines.take(hits.prim))  # a miss, -1, takes the last entry
     light = scene.light_of.take(hits.prim.take(lanes))
     radiance = scene.lights.le(light, paths.direction.take(lanes, 1))
-    if scene.uneven is not None:
-        shine_at_hits(scene, paths.take(lanes), hits.take(lanes), light, radiance)
+    if scene.textured_emission is not None:
+        emission_at_hits(scene, paths.take(lanes), hits.take(lanes), light, radiance)
     return Emission(lanes, radiance, light)
 
 
-def mis_weighted(scene: CompiledScene, paths: Paths, emission: Emission) -> Arrival:
+def mis_weighted(scene: CompiledScene, paths: Paths, emission: Emission) -> Contribution:
     """Return the emission weighted against light sampling; in full where that could not have found it."""
     sampled = np.flatnonzero(
-        ~columns(paths.specular, emission.lanes) & scene.lights.chosen_from.take(emission.light)
+        ~take(paths.specular, emission.lanes) & scene.lights.chosen_from.take(emission.light)
     )
     if not sampled.size:
         return emission
     lanes = emission.lanes.take(sampled)
-    start = columns(paths.origin if paths.vertex is None else paths.vertex, lanes)
-    pdf = scene.lights.pdf_li(emission.light.take(sampled), start, columns(paths.direction, lanes))
+    start = take(paths.origin if paths.prev_vertex is None else paths.prev_vertex, lanes)
+    pdf = scene.lights.pdf_li(emission.light.take(sampled), start, take(paths.direction, lanes))
     weight = np.ones(len(emission.lanes), f4)
-    weight[sampled] = power_heuristic(columns(paths.pdf, lanes), pdf)
-    return Arrival(emission.lanes, emission.radiance * weight)
+    weight[sampled] = power_heuristic(take(paths.pdf, lanes), pdf)
+    return Contribution(emission.lanes, emission.radiance * weight)
 
 
-def shading(scene: CompiledScene, surface: Surface) -> Shading:
+def shading(scene: CompiledScene, surface: SurfaceInteraction) -> Shading:
     """Set up local frames, and tell the groups of materials apart; `compact` has put them in order."""
     frame = surface.frame()
     groups = list(_groups(scene.materials, surface))
-    if all(bsdf.matte for _, bsdf in groups):
+    if all(bsdf.view_independent for _, bsdf in groups):
         wo = np.broadcast_to(UP, surface.wo.shape)
     else:
         wo = frame.to_local(surface.wo)
     return Shading(surface, frame, wo, above(surface), groups)
 
 
-def _groups(materials: Materials, surface: Surface) -> Iterator[tuple[slice, Bsdf]]:
+def _groups(materials: MaterialTable, surface: SurfaceInteraction) -> Iterator[tuple[slice, Bsdf]]:
     """Yield the lanes of each group of materials that is met, and its material bound to them."""
     if len(materials.groups) == 1:
         yield slice(0, len(surface)), materials.groups[0].bind(surface)
@@ -118,7 +119,7 @@ def _groups(materials: Materials, surface: Surface) -> Iterator[tuple[slice, Bsd
 
 def direct(
     scene: CompiledScene, paths: Paths, shade: Shading, sampler: Sampler, bounce: int, mis: bool
-) -> Arrival:
+) -> Contribution:
     """Return the light that one sampled light sends to each point and on along wo.
 
     With `mis` it is weighted by the power heuristic against BSDF sampling. Surfaces that have
@@ -126,12 +127,12 @@ def direct(
     """
     shade = shade.lit()
     if scene.lights.choice is None or not shade.groups:
-        return Arrival(np.zeros(0, np.intp), np.zeros((3, 0), f4))
+        return Contribution(np.zeros(0, np.intp), np.zeros((3, 0), f4))
     n = len(shade.surface)
     address = paths.pixel[:n], paths.sample[:n], bounce
     # with one light there is nothing to choose
     alone = np.count_nonzero(scene.lights.chosen_from) == 1
-    u_choice = alike(f4(0), n) if alone else sampler.draw_1d(*address, Dimension.LIGHT)
+    u_choice = broadcast(f4(0), n) if alone else sampler.draw_1d(*address, Dimension.LIGHT)
     u_point = sampler.draw_2d(*address, Dimension.LIGHT_POINT)
     # from where a reflected ray would start, so that mis_weighted finds the same densities
     light, number = scene.lights.sample_li(shade.start, u_choice, u_point)
@@ -143,19 +144,19 @@ def direct(
     through = (arriving & (cos_g < 0)).any()
     origin = leave(shade.surface, cos_g) if through else shade.start
     rays = shadow_rays(shade.surface, origin, light, lanes)
-    radiance = columns(light.radiance, lanes)
-    if scene.uneven is not None:
-        radiance = shine_at_samples(scene, rays, columns(number, lanes), u_point.take(lanes, 1), radiance)
+    radiance = take(light.radiance, lanes)
+    if scene.textured_emission is not None:
+        radiance = emission_at_samples(scene, rays, take(number, lanes), u_point.take(lanes, 1), radiance)
     if scene.opacities is not None:
-        radiance = radiance * let_through(scene, rays)
+        radiance = radiance * transmittance_along(scene, rays)
     else:
         seen = np.flatnonzero(visible(scene, rays))
-        lanes, radiance = lanes.take(seen), columns(radiance, seen)
-    pdf_light = columns(light.pdf, lanes)
+        lanes, radiance = lanes.take(seen), take(radiance, seen)
+    pdf_light = take(light.pdf, lanes)
     scale = cos.take(lanes) / pdf_light
     if mis:
-        scale *= scene.lights.mis_weight(columns(number, lanes), pdf_light, columns(pdf, lanes))
-    return Arrival(lanes, f.take(lanes, 1) * radiance * scale)
+        scale *= scene.lights.mis_weight(take(number, lanes), pdf_light, take(pdf, lanes))
+    return Contribution(lanes, f.take(lanes, 1) * radiance * scale)
 
 
 def evaluate(shade: Shading, wi: Floats) -> tuple[Floats, Floats]:
@@ -165,6 +166,6 @@ def evaluate(shade: Shading, wi: Floats) -> tuple[Floats, Floats]:
     n = wi.shape[1]
     f, pdf = np.empty((3, n), f4), np.empty(n, f4)
     for lanes, bsdf in shade.groups:
-        part_f, part_pdf = evaluated(bsdf, columns(shade.wo, lanes), columns(wi, lanes))
+        part_f, part_pdf = evaluated(bsdf, take(shade.wo, lanes), take(wi, lanes))
         f[:, lanes], pdf[lanes] = part_f, part_pdf
     return f, pdf

@@ -1,0 +1,497 @@
+"""Trace streams of rays through a tree whose nodes are matrices.
+
+A node is a matrix, and its rays are the columns of another. Around each child lies an ellipsoid, and a line
+meets an ellipsoid where a quadratic form in its Plücker coordinates is not negative: an inner node's
+product has one row per child, on the 21 products of two coordinates. A leaf's product gives the edge
+functions of its triangles. Pairs of (node, ray) are sorted by node, cut into blocks of `BLOCK` rays, and
+all blocks go through one batched product, so that the number of NumPy calls does not grow with the
+number of nodes. The root's children are taken nearest first, each ray in its own order, so that rays
+that have found their hit drop out before the next round.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..record import record
+from ..vec import Bools, Floats, Ints, f4
+from .build import build_tree, stable_order
+from .triangle import ROUNDOFF, Doubles
+
+BLOCK = 32  # rays that share one copy of a node's matrix
+BLOCK_SHIFT = 5
+CHUNK = 1 << 18  # elements of one product
+NEAR_ROUNDS = 3  # in which each ray takes the nearest child of the root; then all that are left
+TOP = 128  # children of the root at most: those of its children join it while so many fit
+
+Codes = NDArray[np.int64]
+
+
+_memory = threading.local()
+
+
+def scratch(name: str, shape: tuple[int, ...], dtype: type = f4) -> NDArray[Any]:
+    """Return this thread's buffer `name`, uninitialized; its last use ends here."""
+    size = math.prod(shape)
+    held = getattr(_memory, name, None)
+    if held is None or held.size < size:
+        held = np.empty(size, dtype)
+        setattr(_memory, name, held)
+    return held[:size].reshape(shape)
+
+
+def flat_true(mask: Bools) -> Ints:
+    """Return the flat indices of what is true in a contiguous mask."""
+    return mask.reshape(-1).nonzero()[0]
+
+
+@record
+class Ball:
+    """A ball around everything that can be hit."""
+
+    center: Floats  # (3,) float32
+    radius: float
+
+
+def bounding_ball(low: Floats, high: Floats) -> Ball:
+    """Return a ball around boxes `low`, `high` (3, m)."""
+    lowest, highest = low.min(1).astype(np.float64), high.max(1).astype(np.float64)
+    center = ((lowest + highest) / 2).astype(f4)
+    reach = np.maximum(highest - center, center - lowest)
+    return Ball(center, max(float(np.sqrt((reach * reach).sum())) * (1 + 1e-6), 1e-37))
+
+
+@dataclass
+class RayBatch:
+    """A batch of n rays, prepared."""
+
+    origin: Floats  # (3, n) as given
+    direction: Floats  # (3, n) as given
+    exclude_prim: Ints  # (n,)
+    line: Floats  # (6, n + 1) Plücker coordinates: unit direction d, then (o - center) × d; the last is NaN
+    speed: Floats  # (n,) length of `direction`
+    local: Floats | Doubles  # (3, n) o - center
+    start: Floats | None  # (4, n) o - center, 1; None if some origin is far away
+    end: Floats | None  # (4, n) the same of where rays end; None if they have no end, or start is None
+
+    @property
+    def count(self) -> int:
+        """Number of rays."""
+        return self.speed.size
+
+    @cached_property
+    def begin(self) -> Floats | Doubles:
+        """Where rays start (n,), as a distance from the point next to the center."""
+        x, y, z = self.local
+        ux, uy, uz = self.line[:3, :-1]
+        return x * ux + y * uy + z * uz
+
+
+def prepare(
+    origin: Floats, direction: Floats, exclude_prim: Ints, ball: Ball, distance: Floats | None = None
+) -> RayBatch:
+    """Compute Plücker coordinates of rays (3, n) about the ball's center, which end at `distance` (n,).
+
+    They are float32 while all origins are within two radii. Beyond, o - center loses what matters, and
+    they are computed in float64.
+    """
+    n = origin.shape[1]
+    center = ball.center[:, None]
+    start = scratch("start", (4, n))
+    start[3] = 1
+    local = np.subtract(origin, center, out=start[:3])
+    furthest = np.maximum(local.max(initial=0), -local.min(initial=0))
+    far = not float(furthest) * 3**0.5 <= 2 * ball.radius
+    work = np.multiply(direction, direction, out=scratch("work", (3, n)))
+    speed = np.add(work[0], work[1], out=scratch("speed", (n,)))
+    speed += work[2]
+    np.sqrt(speed, out=speed)
+    line = scratch("line", (6, n + 1))
+    line[:, -1] = np.nan
+    unit, moment = line[:3, :-1], line[3:, :-1]
+    np.divide(direction, speed, out=unit)
+    if far:
+        wide = scratch("wide", (8, n), np.float64)
+        local = np.subtract(origin, center, out=wide[:3], dtype=np.float64)
+        np.divide(_cross(local, direction, wide[3:]), speed, out=moment, casting="same_kind")
+        np.multiply(moment, moment, out=work)
+        # A line that passes the ball by meets nothing, and the filters do not allow for its rounding.
+        line[:, np.flatnonzero(work[0] + work[1] + work[2] > (1.01 * ball.radius) ** 2)] = np.nan
+        return RayBatch(origin, direction, exclude_prim, line, speed, local, None, None)
+    moment[:] = _cross(local, unit, scratch("moment", (5, n)))
+    end = None
+    if distance is not None:
+        length = np.divide(f4(3.01 * ball.radius), speed, out=work[0])
+        np.minimum(distance, length, out=length)
+        np.maximum(length, f4(0), out=length)
+        end = _with_one("end", direction)
+        end[:3] *= length
+        end[:3] += local
+        if not np.isfinite(end.max(initial=0) + speed.max(initial=0)):
+            return RayBatch(origin, direction, exclude_prim, line, speed, local, None, None)
+    return RayBatch(origin, direction, exclude_prim, line, speed, local, start, end)
+
+
+def _cross(a: NDArray[Any], b: NDArray[Any], work: NDArray[Any]) -> NDArray[Any]:
+    """Cross products of vectors (3, n), in work space (5, n)."""
+    for axis, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
+        np.multiply(a[i], b[j], out=work[3])
+        np.multiply(a[j], b[i], out=work[4])
+        np.subtract(work[3], work[4], out=work[axis])
+    return work[:3]
+
+
+def _with_one(name: str, points: Floats) -> Floats:
+    """Points (3, n) -> (4, n)."""
+    out = scratch(name, (4, points.shape[1]))
+    out[:3] = points
+    out[3] = 1
+    return out
+
+
+@record
+class Bvh:
+    """A tree as matrices. Lengths are in units of the ball's radius, places relative to its center."""
+
+    root: Floats  # (top, 21) quadrics of the root's children, see quadric_rows
+    top: Ints  # (top,) their slots
+    quadrics: Floats  # (nodes, width, 21) quadrics of each child, about the node's center
+    center: Floats  # (nodes, 3) where a node's moments are taken about
+    box: Floats  # (6, nodes * width) lower and upper corner of a box around each child
+    child: Ints  # (nodes * width,) child codes as in build.Tree
+    leaves: Floats  # (leaves, rows, columns) the filter's matrices
+    prim: Ints  # (leaves * leaf size,) primitive of each leaf slot
+    width: int
+    leaf_size: int
+    cost: float
+    scale: np.float32  # 1 / the ball's radius
+
+
+def build_bvh(points: Floats, leaf_size: int, width: int, ball: Ball) -> Bvh:
+    """Build the tree and its quadrics over primitives within points (corners, 3, m).
+
+    The caller fills in `leaves`.
+    """
+    low, high = points.min(0), points.max(0)
+    local = ((points - ball.center[:, None].astype(np.float64)) / ball.radius).astype(f4)
+    tree = build_tree(low, high, leaf_size, width, partial(fit_ellipsoids, local))
+    assert tree.shape is not None
+    absent = tree.low[..., 0] > tree.high[..., 0]
+    nodes = len(absent)
+    center = np.zeros((nodes, 3))
+    inner = np.flatnonzero(~absent & (tree.child >= 0))
+    shapes = tree.shape.reshape(-1, 12)
+    center[tree.child.ravel()[inner]] = shapes[inner, :3]
+    reach = np.ones(nodes)
+    reach[tree.child.ravel()[inner]] = np.linalg.norm(shapes[inner, 3:], axis=1)
+    quadrics = quadric_rows(tree.shape, center, reach)
+    quadrics[absent] = 0
+    for axis in range(3):
+        quadrics[absent, PAIRS.index((axis, axis))] = -1
+    corners = np.concatenate([tree.low.reshape(-1, 3).T, tree.high.reshape(-1, 3).T]).astype(np.float64)
+    box = (corners - np.tile(ball.center, 2)[:, None]) / ball.radius
+    box += np.repeat([-BOX_MARGIN, BOX_MARGIN], 3)[:, None]
+    top = np.flatnonzero(~absent[0])
+    child = tree.child.ravel().astype(np.intp)
+    while True:
+        inside = child.take(top) > 0
+        below = (child.take(top[inside])[:, None] * width + np.arange(width)).ravel()
+        wider = np.concatenate([top[~inside], below[~absent.ravel()[below]]])
+        if not inside.any() or wider.size > TOP:
+            break
+        top = wider
+    root = quadric_rows(shapes[None, top], np.zeros((1, 3)), np.ones(1))[0]
+    scale = f4(1 / ball.radius)
+    leaves = np.empty((0, 0, 0), f4)
+    return Bvh(
+        root=root,
+        top=top,
+        quadrics=quadrics,
+        center=center.astype(f4),
+        box=box.astype(f4),
+        child=child,
+        leaves=leaves,
+        prim=tree.prim.ravel(),
+        width=width,
+        leaf_size=leaf_size,
+        cost=tree.cost,
+        scale=scale,
+    )
+
+
+def fit_ellipsoids(points: Floats, order: Ints, start: Ints) -> Doubles:
+    """Fit ellipsoids around segments of primitives within points (corners, 3, m) -> (segments, 12).
+
+    Center, then the three half axes, as columns of a matrix: the principal axes of the points, scaled to
+    their extent along each, and then until all points are inside.
+    """
+    count = np.diff(start, append=order.size)
+    owner = np.repeat(np.arange(start.size), count)
+    chosen = points.take(order, 2)
+    weight = 1 / (count * len(points))
+    mean = np.add.reduceat(chosen.sum(0, dtype=np.float64), start, 1) * weight
+    chosen -= mean.astype(f4).take(owner, 1)
+    spread = np.empty((start.size, 3, 3))
+    for i in range(3):
+        for j in range(i + 1):
+            product = (chosen[:, i] * chosen[:, j]).sum(0)
+            spread[:, i, j] = spread[:, j, i] = np.add.reduceat(product, start) * weight
+    axes = np.linalg.eigh(spread)[1]  # columns
+    along = []
+    half = np.empty((3, start.size))
+    shift = np.empty((3, start.size))
+    for axis in range(3):
+        x, y, z = axes[:, :, axis].astype(f4).T.take(owner, 1)
+        value = chosen[:, 0] * x + chosen[:, 1] * y + chosen[:, 2] * z
+        low = np.minimum.reduceat(value.min(0), start)
+        high = np.maximum.reduceat(value.max(0), start)
+        shift[axis] = middle = ((low + high) / 2).astype(f4)
+        half[axis] = (high - low) / 2 + 2e-6
+        value -= middle.astype(f4).take(owner)
+        along.append(value)
+    half = np.maximum(half, np.maximum(0.02 * half.max(0), 1e-5))
+    norm: Floats = np.zeros(chosen.shape[::2], f4)
+    for axis in range(3):
+        value = along[axis]
+        value *= (1 / half[axis]).astype(f4).take(owner)
+        value *= value
+        norm = norm + value
+    grow = np.sqrt(np.maximum.reduceat(norm.max(0), start).astype(np.float64)) * (1 + 2e-4)
+    shape = np.empty((start.size, 12))
+    shape[:, :3] = mean.T.astype(f4) + np.einsum("sij,js->si", axes, shift)
+    shape[:, 3:] = (axes * (half * grow).T[:, None]).reshape(-1, 9)
+    return shape
+
+
+PAIRS = [(i, j) for i in range(6) for j in range(i, 6)]
+
+
+def quadric_rows(shape: Doubles, center: Doubles, reach: Doubles) -> Floats:
+    """Quadratic forms in Plücker coordinates: not below 0 where a line meets an ellipsoid.
+
+    With half axes S and center c: |adj(S) d|² - |Sᵀ (m - c × d)|² >= 0, as the map that turns the
+    ellipsoid into the unit ball turns directions d into S⁻¹ d and moments m by the cofactors of S⁻¹.
+    `shape` (nodes, width, 12), as in fit_ellipsoids; moments are about `center` (nodes, 3), and lines pass it
+    within `reach`. Rows are enlarged by a bound of the error of float32, so that no line is lost.
+    """
+    c = shape[..., :3] - center[:, None]
+    s = shape[..., 3:].reshape(*shape.shape[:2], 3, 3)
+    size2 = (s * s).sum(-2)
+    size = np.sort(np.sqrt(size2), -1)
+    unit = 1 / (size[..., 1] * size[..., 2])  # rows are scaled for |adj(S) d| <= 1
+    spread = s @ s.swapaxes(-1, -2) * (unit * unit)[..., None, None]
+    adjoint = np.cross(s[..., [1, 2, 0]], s[..., [2, 0, 1]], axis=-2) * unit[..., None, None]
+    cross = np.zeros_like(s)  # c × d = cross @ d
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        cross[..., i, j], cross[..., j, i] = -c[..., k], c[..., k]
+    form = np.empty((*s.shape[:2], 6, 6))
+    form[..., :3, :3] = adjoint @ adjoint.swapaxes(-1, -2) - cross.swapaxes(-1, -2) @ spread @ cross
+    form[..., 3:, 3:] = -spread
+    form[..., 3:, :3] = spread @ cross
+    form[..., :3, 3:] = form[..., 3:, :3].swapaxes(-1, -2)
+    moment = np.ones((len(s), 6)) * reach[:, None] * 1.01 + 1e-5
+    moment[:, :3] = 1
+    magnitude = (np.abs(form) * moment[:, None, :, None] * moment[:, None, None, :]).sum((-1, -2))
+    largest = size[..., 2] * unit
+    moment_error = 50 * ROUNDOFF
+    rounding = 30 * ROUNDOFF * magnitude + 2 * largest * moment_error + (largest * moment_error) ** 2
+    rounding += 2 * (1 + np.linalg.norm(c, axis=-1) * largest) * 4 * ROUNDOFF
+    rows = np.stack([form[..., i, j] * (1 if i == j else 2) for i, j in PAIRS], -1)
+    for i in range(3):
+        rows[..., PAIRS.index((i, i))] += 1.1 * rounding
+    return rows.astype(f4)
+
+
+def trace(
+    tree: Bvh, lanes: RayBatch, reach_now: Callable[[], Floats], visit: Callable[[Ints, Ints], None]
+) -> None:
+    """Take rays through the tree, near children of the root first.
+
+    `reach_now()` (n + 1,) is how far rays still look, less after `visit(leaves, lanes)`, which tests.
+    """
+    reach = reach_now()
+    rays = _rays(lanes, tree.scale)
+    codes = tree.child.take(tree.top)
+    slot, lane, near = _root_pairs(tree, rays, reach)
+    for last in (*[False] * NEAR_ROUNDS, True):
+        chosen = np.arange(lane.size) if last else _nearest_of_each(lane, near, lanes.count)
+        _descend(tree, rays, reach, codes.take(slot.take(chosen)), lane.take(chosen), visit)
+        reach = reach_now()
+        left = near <= reach.take(lane)
+        left[chosen] = False
+        rest = np.flatnonzero(left)
+        if not rest.size:
+            return
+        slot, lane, near = slot.take(rest), lane.take(rest), near.take(rest)
+
+
+@record
+class _Rays:
+    """Lines in units of the ball's radius about its center; at the end one that meets nothing."""
+
+    line: Floats  # (6, n + 1) Plücker coordinates
+    foot: Floats  # (3, n + 1) point next to the center, from where distances count
+    inverse: Floats  # (3, n + 1) 1 / direction
+    begin: Floats  # (n + 1,) where rays start
+
+    def span(self, box: Floats, slot: Ints, lane: Ints) -> tuple[Floats, Floats]:
+        """Return where lanes (k,) enter and leave boxes `slot` (k,) of `box` (6, slots): slab tests."""
+        enter, leave = self.begin.take(lane), np.full(lane.size, np.inf, f4)
+        for axis in range(3):
+            foot, inverse = self.foot[axis].take(lane), self.inverse[axis].take(lane)
+            first = (box[axis].take(slot) - foot) * inverse
+            second = (box[axis + 3].take(slot) - foot) * inverse
+            np.maximum(enter, np.minimum(first, second), out=enter)
+            np.minimum(leave, np.maximum(first, second), out=leave)
+        return enter, leave
+
+
+def _rays(lanes: RayBatch, scale: np.float32) -> _Rays:
+    line = lanes.line.copy()
+    line[3:] *= scale
+    dx, dy, dz, mx, my, mz = line
+    foot = np.stack([dy * mz - dz * my, dz * mx - dx * mz, dx * my - dy * mx])
+    inverse = f4(1) / np.where(line[:3] == 0, TINY, line[:3])
+    begin = lanes.begin * scale
+    begin = np.append((begin - np.abs(begin) * 1e-6 - 1e-6).astype(f4), f4(np.inf))
+    return _Rays(line, foot, inverse, begin)
+
+
+def _nearest_of_each(lane: Ints, near: Floats, count: int) -> Ints:
+    """Return the pair (k,) with the least distance of each lane that has one."""
+    key = (near + OFFSET).view(np.int32).astype(np.int64) << 32
+    key |= np.arange(lane.size)
+    none = np.iinfo(np.int64).max
+    least = np.full(count, none, np.int64)
+    np.minimum.at(least, lane, key)
+    return least.compress(least != none) & 0xFFFFFFFF
+
+
+BOX_MARGIN = 4e-6  # by which boxes are wider, for the rounding of lines
+TINY = f4(1e-30)  # in place of 0, so that 0 times the inverse is a number
+OFFSET = f4(4)  # makes distances positive, so that their bits sort like numbers
+
+
+def _root_pairs(tree: Bvh, rays: _Rays, reach: Floats) -> tuple[Ints, Ints, Floats]:
+    """All rays against the root's children -> child, lane, near distance of pairs."""
+    n, width = rays.begin.size - 1, tree.top.size
+    step = max(256, CHUNK // width)
+    box = tree.box.take(tree.top, 1)
+    parts = []
+    for at in range(0, n, step):
+        k = min(n - at, step)
+        features = scratch("features", (21, k))
+        _features(rays.line[:, at : at + k], features)
+        value = np.matmul(tree.root, features, out=scratch("product", (width, k)))
+        hit = flat_true(np.greater_equal(value, 0, out=scratch("mask", value.shape, np.bool_)))
+        slot, lane = np.divmod(hit, k)
+        lane += at
+        near, far = rays.span(box, slot, lane)
+        met = np.flatnonzero(near <= np.minimum(far, reach.take(lane)))
+        parts.append((slot.take(met), lane.take(met), near.take(met)))
+    if not parts:
+        empty = np.zeros(0, np.intp)
+        return empty, empty, np.zeros(0, f4)
+    slots, lanes, nears = zip(*parts, strict=True)
+    return np.concatenate(slots), np.concatenate(lanes), np.concatenate(nears)
+
+
+def _features(line: Floats, out: Floats) -> None:
+    """Products of all pairs of Plücker coordinates (6, ...) -> (21, ...)."""
+    for row, (i, j) in enumerate(PAIRS):
+        np.multiply(line[i], line[j], out=out[row])
+
+
+def _descend(
+    tree: Bvh,
+    rays: _Rays,
+    reach: Floats,
+    code: Ints,
+    lane: Ints,
+    visit: Callable[[Ints, Ints], None],
+) -> None:
+    """Take pairs of child code and lane down to the leaves, level by level."""
+    leaf_codes, leaf_lanes = [], []
+    while code.size:
+        is_leaf = code < 0
+        at = np.flatnonzero(is_leaf)
+        if at.size == code.size:
+            leaf_codes.append(-1 - code)
+            leaf_lanes.append(lane)
+            break
+        if at.size:
+            leaf_codes.append(-1 - code.take(at))
+            leaf_lanes.append(lane.take(at))
+            at = np.flatnonzero(~is_leaf)
+            code, lane = code.take(at), lane.take(at)
+        code, lane = _expand(tree, rays, reach, code, lane)
+    if leaf_codes:
+        visit(np.concatenate(leaf_codes), np.concatenate(leaf_lanes))
+
+
+def _expand(tree: Bvh, rays: _Rays, reach: Floats, node: Ints, lane: Ints) -> tuple[Ints, Ints]:
+    """Pairs of inner node and lane -> pairs of met child's code and lane."""
+    width = tree.width
+    nodes, block_lanes = blocks(node, lane, rays.begin.size - 1)
+    step = max(1, CHUNK // (width * BLOCK))
+    codes, lanes = [], []
+    for start in range(0, nodes.size, step):
+        chosen = nodes[start : start + step]
+        k = chosen.size
+        some = block_lanes[start * BLOCK : (start + k) * BLOCK]
+        line = scratch("rays", (6, k, BLOCK))
+        for row in range(6):
+            np.take(rays.line[row], some, 0, line[row].reshape(-1), "clip")
+        dx, dy, dz = line[:3]
+        cx, cy, cz = tree.center.take(chosen, 0).T[:, :, None]
+        line[3] -= cy * dz - cz * dy
+        line[4] -= cz * dx - cx * dz
+        line[5] -= cx * dy - cy * dx
+        features = scratch("features", (k, 21, BLOCK))
+        _features(line, features.transpose(1, 0, 2))
+        matrices = np.take(tree.quadrics, chosen, 0, scratch("nodes", (k, width, 21)), "clip")
+        value = np.matmul(matrices, features, out=scratch("product", (k, width, BLOCK)))
+        hit = flat_true(np.greater_equal(value, 0, out=scratch("mask", value.shape, np.bool_)))
+        pair = hit >> BLOCK_SHIFT
+        block = pair // width
+        slot = chosen.take(block) * width + (pair & (width - 1))
+        place = (block << BLOCK_SHIFT) + (hit & (BLOCK - 1))
+        lane = some.take(place)
+        near, far = rays.span(tree.box, slot, lane)
+        met_at = np.flatnonzero(near <= np.minimum(far, reach.take(lane)))
+        codes.append(tree.child.take(slot.take(met_at)))
+        lanes.append(lane.take(met_at))
+    return np.concatenate(codes), np.concatenate(lanes)
+
+
+def blocks(node: Ints, lane: Ints, unused: int) -> tuple[Ints, Ints]:
+    """Sort pairs by node and cut them into blocks of one node and BLOCK lanes each.
+
+    Returns the nodes (b,) and lanes (b * BLOCK,); places that are left over hold lane `unused`.
+    """
+    order = stable_order(node)
+    node, lane = node.take(order), lane.take(order)
+    first = _firsts(node)
+    count = np.diff(first, append=node.size)
+    needed = (count + (BLOCK - 1)) >> BLOCK_SHIFT
+    begin = np.cumsum(needed) - needed
+    place = np.arange(node.size) + np.repeat((begin << BLOCK_SHIFT) - first, count)
+    lanes = np.full(int(needed.sum()) * BLOCK, unused)
+    lanes[place] = lane
+    return np.repeat(node.take(first), needed), lanes
+
+
+def _firsts(values: Ints) -> Ints:
+    """Return where runs of equal values begin."""
+    begins = np.empty(values.size, bool)
+    begins[:1] = True
+    np.not_equal(values[1:], values[:-1], out=begins[1:])
+    return flat_true(begins)

@@ -1,0 +1,52 @@
+"""Accelerators that are kept from one render of a scene to the next."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import fields
+
+import numpy as np
+
+from .base import Accelerator, Geometry
+from .registry import engine, make_accelerator
+
+
+class AcceleratorCache:
+    """Makes accelerators, or hands out those of the time before where nothing has changed.
+
+    Whatever was done to a scene in between, all numbers that an accelerator is built from are
+    compared. Copies and pickles are empty.
+    """
+
+    def __init__(self) -> None:
+        self._kept: dict[str, list[tuple[Geometry, Accelerator]]] = {}
+
+    def __reduce__(self) -> tuple[type[AcceleratorCache], tuple[()]]:
+        """Leave behind what was built: some of it is memory of Embree's."""
+        return AcceleratorCache, ()
+
+    def maker(self, accel: str) -> Callable[[Geometry], Accelerator]:
+        """Return what makes the accelerators of one render, named `accel`, one after the other.
+
+        Raises
+        ------
+        SceneError
+            As `make_accelerator` does, when called.
+        """
+        before = deque(self._kept.pop(engine(accel), ()))
+        now = self._kept[engine(accel)] = []
+
+        def make(geometry: Geometry) -> Accelerator:
+            kept = before.popleft() if before else None
+            if kept is None or not _same(kept[0], geometry):
+                kept = None  # frees its memory
+                kept = geometry, make_accelerator(geometry, accel)
+            now.append(kept)
+            return kept[1]
+
+        return make
+
+
+def _same(a: Geometry, b: Geometry) -> bool:
+    return all(np.array_equal(getattr(a, each.name), getattr(b, each.name)) for each in fields(Geometry))

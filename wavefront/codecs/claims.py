@@ -1,0 +1,94 @@
+"""What the header of a png or jpg claims, checked against the bytes that are there.
+
+Decoders pad a picture that ends early, in silence, so a damaged file would pass for a sound one.
+Source of the formats: W3C, Portable Network Graphics (third edition), 2025, and ITU-T T.81.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterable, Iterator
+
+from ..errors import SceneError
+from ..files import check_size
+
+PNG = b"\x89PNG\r\n\x1a\n"
+JPG = b"\xff\xd8"
+PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # by color type
+ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))
+JPG_PIXELS_PER_BYTE = 512  # a block of 8 × 8 takes a bit at least
+PIECE = 2**18  # bytes that are inflated at once
+
+
+def check_claims(data: bytes) -> None:
+    """Check that a png or jpg can hold the picture that its header claims, before it is decoded.
+
+    Memory stays small, whatever the header says.
+
+    Raises
+    ------
+    SceneError
+        If the header is damaged, claims too many pixels, or more than there is.
+    """
+    if data.startswith(PNG):
+        _check_png(data)
+    elif data.startswith(JPG):
+        _check_jpg(data)
+    else:
+        raise SceneError("not a readable png or jpg image: its header is damaged")
+
+
+def _check_png(data: bytes) -> None:
+    header = data[16:29]
+    if len(header) < 13 or header[9] not in PNG_CHANNELS:
+        raise SceneError("not a readable png image: its header is damaged")
+    width, height = int.from_bytes(header[:4], "big"), int.from_bytes(header[4:8], "big")
+    check_size(height, width)
+    bits, interlaced = header[8] * PNG_CHANNELS[header[9]], header[12] == 1
+    need = sum(rows * (1 + (take * bits + 7) // 8) for take, rows in _passes(width, height, interlaced))
+    there = _inflated(_png_data(data), need)
+    if there < need:
+        raise SceneError(f"ends early: {width} × {height} pixels take {need} bytes; {there} are there")
+
+
+def _passes(width: int, height: int, interlaced: bool) -> Iterator[tuple[int, int]]:
+    """Yield the (columns, rows) of the pictures that a png is stored as."""
+    for x, y, dx, dy in ADAM7 if interlaced else ((0, 0, 1, 1),):
+        take, rows = -(-(width - x) // dx), -(-(height - y) // dy)
+        if take > 0 and rows > 0:
+            yield take, rows
+
+
+def _png_data(data: bytes) -> Iterator[memoryview]:
+    """Yield the compressed pixels."""
+    view, at = memoryview(data), len(PNG)
+    while at + 8 <= len(data):
+        length, kind = int.from_bytes(view[at : at + 4], "big"), view[at + 4 : at + 8]
+        if kind == b"IDAT":
+            yield view[at + 8 : at + 8 + length]
+        at += 12 + length
+
+
+def _inflated(pieces: Iterable[memoryview], need: int) -> int:
+    """Count the bytes that deflate makes of `pieces`, up to about `need`."""
+    inflate, count = zlib.decompressobj(), 0
+    for piece in pieces:
+        rest: bytes | memoryview = piece
+        while len(rest) and count < need:
+            count += len(inflate.decompress(rest, PIECE))
+            rest = inflate.unconsumed_tail
+    return count
+
+
+def _check_jpg(data: bytes) -> None:
+    at = len(JPG)
+    while at + 9 <= len(data) and data[at] == 0xFF:
+        marker, length = data[at + 1], int.from_bytes(data[at + 2 : at + 4], "big")
+        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):  # a start of frame
+            height, width = (int.from_bytes(data[at + k : at + k + 2], "big") for k in (5, 7))
+            check_size(height, width)
+            if height * width > JPG_PIXELS_PER_BYTE * (len(data) - at):
+                raise SceneError(f"ends early: {len(data) - at} bytes cannot hold {width} × {height} pixels")
+            return
+        at += 1 if marker == 0xFF else 2 + length
+    raise SceneError("not a readable jpg image: its header is damaged")

@@ -1,0 +1,88 @@
+"""Between linear values and display values."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import SceneError, number
+from ..vec import Floats
+from . import png_jpeg as coded
+from .png_jpeg import Gamma
+
+MAX_STOPS = 100
+
+
+def codes_to_linear(codes: NDArray[Any], gamma: Gamma = "srgb") -> Floats:
+    """Decode uint8 or uint16 codes (H, W, C) that count from 0 to 1; alpha is linear already."""
+    values = codes.astype(np.float32) / np.float32(np.iinfo(codes.dtype).max)
+    colors = values[..., : 3 if values.shape[2] > 2 else 1]
+    if isinstance(gamma, str):
+        colors[:] = srgb_to_linear(colors)
+    else:
+        colors[:] = colors.astype(np.float64) ** gamma
+    return values
+
+
+def srgb_to_linear(values: Floats) -> Floats:
+    """Decode sRGB values in [0, 1], any shape (IEC 61966-2-1)."""
+    values = np.asarray(values, np.float64)  # rounded at the end: float32 powers differ between machines
+    low = values / 12.92
+    high = ((values + 0.055) / 1.055) ** 2.4
+    return np.where(values <= 0.04045, low, high).astype(np.float32)
+
+
+def linear_to_srgb(values: Floats) -> Floats:
+    """Encode linear values in [0, 1] as sRGB, any shape (IEC 61966-2-1)."""
+    values = np.asarray(values, np.float64)
+    high = 1.055 * np.maximum(values, 0) ** (1 / 2.4) - 0.055
+    return np.where(values <= 0.0031308, values * 12.92, high).astype(np.float32)
+
+
+def exposed(rgb: Floats, exposure: float) -> Floats:
+    """Return values brightened by `exposure` stops, any shape."""
+    return rgb * np.float32(2.0 ** check_exposure(exposure))
+
+
+def check_exposure(exposure: float) -> float:
+    """Return `exposure` as a float.
+
+    Raises
+    ------
+    SceneError
+        If it is not a number from -100 to 100.
+    """
+    limit = f"from {-MAX_STOPS} to {MAX_STOPS}"
+    return number("exposure", exposure, lambda x: abs(x) <= MAX_STOPS, limit)
+
+
+def check_gamma(gamma: Gamma) -> Gamma:
+    """Return `gamma` as a float or "srgb".
+
+    Raises
+    ------
+    SceneError
+        If it is neither a number from 0.01 to 100 nor "srgb".
+    """
+    if gamma == "srgb":
+        return gamma
+    if isinstance(gamma, str):
+        raise SceneError(f"gamma is {gamma!r}; it must be a number above 0 or 'srgb'")
+    low, high = coded.GAMMAS
+    return number("gamma", gamma, lambda x: low <= x <= high, f"from {low:g} to {high:g}")
+
+
+def to_8bit(rgb: ArrayLike, gamma: Gamma = 2.2) -> NDArray[np.uint8]:
+    """Return linear values as display values 0 to 255, any shape; NaN becomes 0.
+
+    Raises
+    ------
+    SceneError
+        If gamma is neither a number from 0.01 to 100 nor "srgb".
+    """
+    curve = check_gamma(gamma)
+    unit = np.clip(np.nan_to_num(np.asarray(rgb, np.float32), nan=0.0, posinf=1.0, neginf=0.0), 0, 1)
+    encoded = linear_to_srgb(unit) if isinstance(curve, str) else unit.astype(np.float64) ** (1 / curve)
+    return np.round(encoded * 255).astype(np.uint8)

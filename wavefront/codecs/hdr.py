@@ -1,0 +1,137 @@
+"""Radiance .hdr pictures: shared-exponent RGBE with run-length coding.
+
+Source: G. Ward, "Real Pixels", Graphics Gems II, 1991; the Radiance file-format notes.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from ..files import check_size
+from ..vec import Floats
+
+Bytes = NDArray[np.uint8]
+SIGNATURES = (b"#?RADIANCE", b"#?RGBE")
+MIN_RUN = 4  # shorter runs cost more than they save
+
+
+def encode(pixels: Floats) -> bytes:
+    """Return a .hdr file of linear pixels (H, W, 3); negative values become 0."""
+    height, width = pixels.shape[:2]
+    header = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n".encode()
+    rgbe = to_rgbe(pixels)
+    if not 8 <= width < 32768:  # the run-length form exists only for these widths
+        return header + rgbe.tobytes()
+    start = bytes([2, 2, width >> 8, width & 255])
+    rows = (start + b"".join(_pack(row[:, k]) for k in range(4)) for row in rgbe)
+    return header + b"".join(rows)
+
+
+def decode(data: bytes) -> Floats:
+    """Return the pixels (H, W, 3) of a .hdr file, top row first.
+
+    Raises
+    ------
+    SceneError
+        If the file is not RGBE, is damaged or ends early.
+    """
+    head = re.match(rb"(#\?[^\n]*)\n(?:[^\n]+\n)*?\n([-+][XY]) (\d+) ([-+][XY]) (\d+)\n", data)
+    if not head or not head[1].startswith(SIGNATURES):
+        raise SceneError("not a Radiance .hdr picture: its header is damaged")
+    if b"FORMAT=32-bit_rle_xyze" in head[0]:
+        raise SceneError("holds XYZ colors (32-bit_rle_xyze); only RGB (32-bit_rle_rgbe) is read")
+    if (head[2], head[4]) != (b"-Y", b"+X"):
+        raise SceneError(f"rows run {(head[2] + b' ' + head[4]).decode()}; only -Y +X is read")
+    height, width = int(head[3]), int(head[5])
+    check_size(height, width)
+    return from_rgbe(_scanlines(np.frombuffer(data, np.uint8, offset=head.end()), height, width))
+
+
+def to_rgbe(pixels: Floats) -> Bytes:
+    """Return (H, W, 4) bytes: three mantissas and the exponent of the largest channel plus 128."""
+    color = np.maximum(pixels, 0).astype(np.float64)
+    peak = np.minimum(color.max(axis=-1), 2.0**127 * 0.99)
+    exponent = np.frexp(peak)[1]
+    dark = peak < 1e-32
+    mantissa = np.minimum(np.round(np.ldexp(color, (8 - exponent)[..., None])), 255)
+    rgbe = np.concatenate([mantissa, (exponent + 128)[..., None]], axis=-1)
+    rgbe[dark] = 0
+    return rgbe.astype(np.uint8)
+
+
+def from_rgbe(rgbe: Bytes) -> Floats:
+    """Return linear pixels (H, W, 3) of (H, W, 4) bytes."""
+    exponent = rgbe[..., 3].astype(np.int32)
+    values = np.ldexp(rgbe[..., :3].astype(np.float32), (exponent - 136)[..., None])
+    return np.where(exponent[..., None] > 0, values, 0).astype(np.float32)
+
+
+def _pack(values: Bytes) -> bytes:
+    """Run-length code one channel of one row."""
+    edges = np.flatnonzero(np.diff(values)) + 1
+    starts, stops = np.r_[0, edges], np.r_[edges, len(values)]
+    long = stops - starts >= MIN_RUN
+    out, done = bytearray(), 0
+    for start, stop in zip(starts[long].tolist(), stops[long].tolist(), strict=True):
+        _pack_literal(out, values[done:start])
+        for at in range(start, stop, 127):
+            out += bytes([128 + min(127, stop - at), values[at]])
+        done = stop
+    _pack_literal(out, values[done:])
+    return bytes(out)
+
+
+def _pack_literal(out: bytearray, values: Bytes) -> None:
+    for at in range(0, len(values), 128):
+        piece = values[at : at + 128]
+        out.append(len(piece))
+        out += piece.tobytes()
+
+
+def _scanlines(data: Bytes, height: int, width: int) -> Bytes:
+    if not 8 <= width < 32768 or len(data) < 4 or tuple(data[:2]) != (2, 2) or data[2] & 128:
+        return _flat(data, height, width)
+    if len(data) < height * (4 + 4 * 2 * -(-width // 127)):
+        raise SceneError(f"ends early: {len(data)} bytes cannot hold {width} × {height} pixels")
+    raw, at = data.tobytes(), 0
+    image = np.empty((height, 4, width), np.uint8)
+    for y in range(height):
+        if raw[at : at + 4] != bytes([2, 2, width >> 8, width & 255]):
+            raise SceneError(f"row {y} is damaged or missing")
+        row, at = _unpack(raw, at + 4, 4 * width, y)
+        image[y] = np.frombuffer(row, np.uint8).reshape(4, width)
+    return image.transpose(0, 2, 1)
+
+
+def _unpack(raw: bytes, at: int, size: int, y: int) -> tuple[bytes, int]:
+    """Expand runs from raw[at:] until `size` bytes are there; return them and where they ended."""
+    out = bytearray()
+    try:
+        while len(out) < size:
+            count = raw[at]
+            if count > 128:
+                out += raw[at + 1 : at + 2] * (count - 128)
+                at += 2
+            else:
+                out += raw[at + 1 : at + 1 + count]
+                at += 1 + count
+            if not count or at > len(raw):
+                break
+    except IndexError:
+        pass
+    if len(out) != size:
+        raise SceneError(f"row {y} is damaged or cut off")
+    return bytes(out), at
+
+
+def _flat(data: Bytes, height: int, width: int) -> Bytes:
+    """Pixels without run-length coding."""
+    if len(data) != 4 * height * width:
+        raise SceneError(
+            f"holds {len(data)} bytes of pixels; {width} × {height} pixels need {4 * height * width}"
+        )
+    return data.reshape(height, width, 4)

@@ -1,0 +1,227 @@
+"""Images from files and to files, by extension: png, jpg, exr, hdr, npy.
+
+Values are linear inside. Encoding for display happens here. `read_linear` decodes it again; for
+textures decoding is left to the caller, who knows whether an image holds colors or data.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Mapping
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import SaveError, SceneError
+from ..files import check_size, check_target, path_name, read_bytes, write_bytes
+from ..vec import Floats
+from . import exr
+from . import hdr as rgbe
+from . import png_jpeg as coded
+from .encoding import codes_to_linear, exposed, to_8bit
+from .exr import Attribute
+from .png_jpeg import Gamma
+
+READABLE = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".npy")
+WRITABLE = READABLE
+
+
+def check_writable(path: str | os.PathLike[str]) -> None:
+    """Make sure that an image can be written to `path`: call it before a long render.
+
+    Raises
+    ------
+    SaveError
+        If the extension is unknown, the folder is missing or not writable, or something other than a
+        regular file is there.
+    """
+    _extension(path, WRITABLE, SaveError)
+    check_target(path)
+
+
+def write_image(
+    path: str | os.PathLike[str],
+    rgb: ArrayLike,
+    *,
+    gamma: Gamma = 2.2,
+    exposure: float = 0.0,
+    attributes: Mapping[str, Attribute] | None = None,
+) -> None:
+    """Write a picture in the format that the extension of `path` names.
+
+    Parameters
+    ----------
+    path
+        Ends in .png, .jpg, .jpeg (8 bits, encoded for display), .exr, .hdr or .npy (linear).
+    rgb
+        (H, W, 3) linear values.
+    gamma
+        Values are raised to 1/gamma in png and jpg; "srgb" applies the exact sRGB curve. The file
+        says which.
+    exposure
+        Stops: values are multiplied by 2**exposure first, in every format.
+    attributes
+        Text and numbers for the header of an exr.
+
+    Raises
+    ------
+    SaveError
+        If the file cannot be written. The old file stays intact.
+    SceneError
+        If an argument is malformed.
+    """
+    extension = _extension(path, WRITABLE, SaveError)
+    pixels = exposed(_picture(rgb), exposure)
+    if extension in coded.EXTENSIONS:
+        codes = to_8bit(_finite(path, pixels), gamma)
+        data = _encoded(path, lambda: coded.encode(codes, extension, gamma))
+    elif extension == ".exr":
+        data = _encoded(path, lambda: exr.encode({"RGB": pixels}, attributes or {}))
+    elif extension == ".hdr":
+        finite = _finite(path, pixels)
+        data = _encoded(path, lambda: rgbe.encode(finite))
+    else:
+        data = _encoded(path, lambda: _encode_npy(pixels))
+    write_bytes(path, data)
+
+
+def write_channels(
+    path: str | os.PathLike[str],
+    channels: Mapping[str, ArrayLike],
+    attributes: Mapping[str, Attribute] | None = None,
+) -> None:
+    """Write named (H, W) or (H, W, 3) arrays into one exr; float32 and uint32 are kept exactly.
+
+    Raises
+    ------
+    SaveError
+        If the extension is not .exr, or the file cannot be written.
+    """
+    _extension(path, (".exr",), SaveError)
+    arrays = {}
+    for name, values in channels.items():
+        array = np.asarray(values)
+        arrays[name] = np.ascontiguousarray(array, np.uint32 if array.dtype.kind in "ui" else np.float32)
+    write_bytes(path, _encoded(path, lambda: exr.encode(arrays, attributes or {})))
+
+
+def read_image(path: str | os.PathLike[str]) -> Floats:
+    """Return the pixels of an image file, (H, W, C) float32, top row first.
+
+    8- and 16-bit values are scaled to [0, 1] and not decoded from sRGB (pngs with 16 bits per
+    color channel are read at 8). exr, hdr and npy values come as they are.
+
+    Raises
+    ------
+    SceneError
+        Naming the file: missing, of another kind, corrupt, truncated, or larger than
+        `files.MAX_PIXELS`.
+    """
+    codes = read_codes(path)
+    if codes.dtype == np.float32:
+        return codes
+    return codes.astype(np.float32) / np.float32(np.iinfo(codes.dtype).max)
+
+
+def read_codes(path: str | os.PathLike[str]) -> NDArray[Any]:
+    """Return what `read_image` does, but 8- and 16-bit values as they are stored, (H, W, C)."""
+    return _read(path)[0]
+
+
+def read_linear(path: str | os.PathLike[str]) -> Floats:
+    """Return the linear values of an image file, (H, W, C) float32, top row first.
+
+    png and jpg are decoded by the gamma that they name (gAMA or sRGB of a png, Exif of a jpg), and by
+    the sRGB curve if they name none. Alpha, the last of two or four channels, is linear.
+
+    Raises
+    ------
+    SceneError
+        As `read_image`.
+    """
+    codes, data = _read(path)
+    if codes.dtype == np.float32:
+        return codes
+    return codes_to_linear(codes, coded.gamma_of(data))
+
+
+def decode_codes(data: bytes, name: str) -> NDArray[Any]:
+    """Return the stored values (H, W, C) of a png or jpg in memory; `name` is for messages."""
+    return _decode(name, ".png", data)
+
+
+def _read(path: str | os.PathLike[str]) -> tuple[NDArray[Any], bytes]:
+    """Return the stored values of an image file, and its bytes."""
+    extension = _extension(path, READABLE)
+    data = read_bytes(path)
+    return _decode(os.fspath(path), extension, data), data
+
+
+def _decode(name: str, extension: str, data: bytes) -> NDArray[Any]:
+    readers = {".exr": exr.decode, ".hdr": rgbe.decode, ".npy": _decode_npy}
+    try:
+        return readers.get(extension, coded.decode)(data)
+    except SceneError as error:
+        raise SceneError(f"{name}: {error}") from error
+    except MemoryError as error:
+        raise SceneError(f"{name}: does not fit in memory") from error
+    # the decoders raise whatever comes to their mind on damaged bytes
+    except Exception as error:
+        raise SceneError(f"{name}: not a readable {extension[1:]} image: {error}") from error
+
+
+def encode_png(rgb: ArrayLike, gamma: Gamma = 2.2) -> bytes:
+    """Return a png file of linear values (H, W, 3)."""
+    return coded.encode(to_8bit(rgb, gamma), ".png", gamma)
+
+
+def _extension(
+    path: str | os.PathLike[str], allowed: tuple[str, ...], error: type[SceneError] = SceneError
+) -> str:
+    name = path_name(path, error)
+    extension = Path(name).suffix.lower()
+    if extension not in allowed:
+        raise error(f"{name}: extension {extension!r} is not one of {', '.join(allowed)}")
+    return extension
+
+
+def _encoded(path: str | os.PathLike[str], encode: Callable[[], bytes]) -> bytes:
+    """Return what `encode` does; whatever encoders raise becomes a SaveError."""
+    try:
+        return encode()
+    except Exception as error:
+        raise SaveError(f"{os.fspath(path)}: cannot be encoded: {error or type(error).__name__}") from error
+
+
+def _picture(rgb: ArrayLike) -> Floats:
+    pixels = np.asarray(rgb, np.float32)
+    if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.size == 0:
+        raise SceneError(f"an image must have shape (height, width, 3), got {pixels.shape}")
+    return pixels
+
+
+def _finite(path: str | os.PathLike[str], pixels: Floats) -> Floats:
+    """Replace what a format cannot hold, and say so."""
+    bad = int(np.count_nonzero(~np.isfinite(pixels).all(axis=2)))
+    if not bad:
+        return pixels
+    warnings.warn(f"{os.fspath(path)}: {bad} pixels are not finite; NaN is written as 0", stacklevel=3)
+    return np.nan_to_num(pixels, nan=0.0)
+
+
+def _encode_npy(pixels: Floats) -> bytes:
+    buffer = BytesIO()
+    np.save(buffer, pixels, allow_pickle=False)
+    return buffer.getvalue()
+
+
+def _decode_npy(data: bytes) -> Floats:
+    pixels = np.load(BytesIO(data), allow_pickle=False)
+    if pixels.ndim not in (2, 3) or pixels.dtype.kind not in "fiub":
+        raise SceneError(f"array is {pixels.dtype} of shape {pixels.shape}; an image is (H, W) or (H, W, C)")
+    check_size(pixels.shape[0], pixels.shape[1])
+    return np.atleast_3d(pixels).astype(np.float32)

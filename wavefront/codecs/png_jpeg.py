@@ -1,0 +1,146 @@
+"""Pictures of 8 and 16 bits in memory: png and jpg, written and read by imageio."""
+
+from __future__ import annotations
+
+import warnings
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SaveError, SceneError
+from .claims import JPG, check_claims
+
+Gamma = float | str  # an exponent, or "srgb" for the exact sRGB curve
+
+GAMMAS = (0.01, 100.0)  # the least and the largest exponent
+PNG_DEFLATE = zlib.Z_RLE  # runs only: rendered pictures take 3 % more bytes, and a fourth of the time
+EXTENSIONS = (".png", ".jpg", ".jpeg")
+MAX_JPG = 65500  # pixels in a row or a column, by libjpeg
+SRGB_GAMA = 45455  # what a png says beside its sRGB chunk, for readers that know gamma alone
+EXIF_IFD, COLOR_SPACE, EXIF_GAMMA = 0x8769, 0xA001, 0xA500  # tags of CIPA DC-008 (Exif 2.32)
+SRGB_SPACE, UNCALIBRATED = 1, 0xFFFF  # values of ColorSpace
+FILLER = bytes([0x5A]) * 64  # entropy-coded bytes that decode to something
+GREY = 128  # what libjpeg leaves where data ends early
+ROUNDING = 2  # codes by which a gray of interpolated colors may be off
+
+
+def encode(codes: NDArray[np.uint8], extension: str, gamma: Gamma) -> bytes:
+    """Return a png or jpg file of codes (H, W, 3); the file says how they were made.
+
+    A png gets the chunk gAMA, or sRGB as well; a jpg gets the Exif tags ColorSpace and Gamma.
+    """
+    import imageio.v3 as iio  # here, so that starting up does not pay for it
+
+    if extension == ".png":
+        options: dict[str, Any] = {"compress_type": PNG_DEFLATE, "pnginfo": _png_info(gamma)}
+        return bytes(iio.imwrite("<bytes>", codes, extension=".png", plugin="pillow", **options))
+    if max(codes.shape[:2]) > MAX_JPG:
+        raise SaveError(
+            f"a jpg has at most {MAX_JPG} rows and columns, got {codes.shape[1]} × {codes.shape[0]}"
+        )
+    options = {"quality": 95, "subsampling": 0, "exif": _exif(gamma)}
+    return bytes(iio.imwrite("<bytes>", codes, extension=".jpg", plugin="pillow", **options))
+
+
+def decode(data: bytes) -> NDArray[Any]:
+    """Return the codes (H, W, C) of a png or jpg, uint8 or uint16.
+
+    Raises
+    ------
+    SceneError
+        If the file claims more than it holds, ends early, or holds other kinds of numbers.
+    """
+    check_claims(data)
+    codes = _decode(data)
+    if data.startswith(JPG) and _ends_early(data, codes):
+        raise SceneError("ends early: its last pixels are missing")
+    if codes.dtype == np.bool_:
+        codes = codes * np.uint8(255)
+    if codes.dtype not in (np.uint8, np.uint16):
+        raise SceneError(f"holds {codes.dtype} values; only 8 and 16 bits are read")
+    return np.atleast_3d(codes)
+
+
+def gamma_of(data: bytes) -> Gamma:
+    """Return how the codes of a png or jpg are to be decoded: "srgb" where the file does not say."""
+    try:
+        with _quiet():
+            exponent = _exponent(data)
+    # cameras and editors leave damaged Exif data behind, and the reader raises what it likes
+    except Exception:
+        return "srgb"
+    return exponent if exponent is not None and GAMMAS[0] <= exponent <= GAMMAS[1] else "srgb"
+
+
+def _exponent(data: bytes) -> float | None:
+    """Return the exponent that a png or jpg names, None if it names none or sRGB."""
+    import imageio.v3 as iio
+    from PIL.Image import Exif
+
+    with iio.imopen(data, "r", plugin="pillow") as file:
+        info = file.metadata(index=0)
+    if "srgb" in info:
+        return None
+    if "gamma" in info:  # of a png: the exponent of encoding
+        return 1 / info["gamma"]
+    exif = Exif()
+    exif.load(info.get("exif", b""))
+    tags = exif.get_ifd(EXIF_IFD)
+    named = tags.get(COLOR_SPACE) != SRGB_SPACE and EXIF_GAMMA in tags
+    return float(tags[EXIF_GAMMA]) if named else None
+
+
+def _png_info(gamma: Gamma) -> Any:
+    from PIL.PngImagePlugin import PngInfo
+
+    info = PngInfo()
+    if gamma == "srgb":
+        info.add(b"sRGB", b"\0")  # rendering intent: perceptual
+    gama = SRGB_GAMA if gamma == "srgb" else round(100000 / float(gamma))
+    info.add(b"gAMA", gama.to_bytes(4, "big"))
+    return info
+
+
+def _exif(gamma: Gamma) -> bytes:
+    from PIL.Image import Exif
+    from PIL.TiffImagePlugin import IFDRational
+
+    exif = Exif()
+    tags = exif.get_ifd(EXIF_IFD)
+    tags[COLOR_SPACE] = SRGB_SPACE if gamma == "srgb" else UNCALIBRATED
+    if gamma != "srgb":
+        tags[EXIF_GAMMA] = IFDRational(round(float(gamma) * 100000), 100000)
+    return exif.tobytes()
+
+
+def _decode(data: bytes) -> NDArray[Any]:
+    import imageio.v3 as iio
+
+    with _quiet():
+        return np.asarray(iio.imread(data, plugin="pillow", index=0))
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the decoder's warnings away: of large images, whose limit is our own, and of Exif data."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+def _ends_early(data: bytes, codes: NDArray[Any]) -> bool:
+    """Return whether the pixels of a jpg end before its picture does.
+
+    The decoder then leaves gray, and would decode more if there were more: so more is appended
+    where the last pixel is gray.
+    """
+    last = codes[-1, -1].astype(np.float64)
+    luma = last @ (0.299, 0.587, 0.114) if last.shape == (3,) else last.mean()
+    end = data.rfind(b"\xff\xd9")
+    if abs(luma - GREY) > ROUNDING or end < 0:
+        return False
+    return not np.array_equal(_decode(data[:end] + FILLER + data[end:]), codes)

@@ -1,0 +1,44 @@
+"""The triangles of a scene as flat arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..shapes import Mesh
+from ..vec import Bools, Floats, Ints, cross, f4, length
+
+
+def _alike(material_of: Ints, light_of: Ints) -> Bools:
+    """Tell which triangles (m,) look like the next, where no attribute varies over them."""
+    same = np.zeros(material_of.size, np.bool_)
+    same[:-1] = (np.diff(material_of) == 0) & (np.diff(light_of) == 0)
+    return same
+
+
+def _face_normals(triangles: NDArray[np.float64]) -> Floats:
+    """Return the unit normals of triangles (m, 3, 3), (3, m); 0 where they have no area."""
+    a, b, c = np.ascontiguousarray(triangles.transpose(1, 2, 0))
+    normal = cross(b - a, c - a)
+    size = length(normal)
+    return (normal / np.where(size > 0, size, 1)).astype(f4)
+
+
+def _corner_normals(meshes: Sequence[Mesh], normals: Floats) -> tuple[Floats, Floats, Floats] | None:
+    """Return the shading normals at the three corners; flat meshes and zero normals get the face's."""
+    if all(mesh.normals is None for mesh in meshes):
+        return None
+    corners = normals.copy(), normals.copy(), normals.copy()
+    start = 0
+    for mesh in meshes:
+        end = start + len(mesh.faces)
+        if mesh.normals is not None:
+            given = np.ascontiguousarray(mesh.normals.T)
+            size = length(given)
+            given = (given / np.where(size > 0, size, 1)).astype(f4)
+            for corner, vertex in zip(corners, mesh.faces.T, strict=True):
+                np.copyto(corner[:, start:end], given.take(vertex, 1), where=size.take(vertex) > 0)
+        start = end
+    return corners

@@ -1,0 +1,237 @@
+"""The materials of a scene, numbered, grouped and tabulated."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from copy import copy
+
+import numpy as np
+
+from ..bsdfs import Bsdf
+from ..errors import SceneError
+from ..materials.alpha import Opacity
+from ..record import record
+from ..shapes import Instance, Mesh, Shape, Sphere
+from ..shapes.attributes import ATTRIBUTES
+from ..state import SurfaceInteraction
+from ..textures.base import BaseTexture
+from ..textures.normal_map import BaseNormalMap
+from ..vec import Bools, Floats, Ints, f4
+
+
+@record
+class Palette(BaseTexture):
+    """A parameter of many alike materials, one column each, looked up by the material's number."""
+
+    table: Floats  # (c, materials)
+
+    def at(self, surface: SurfaceInteraction) -> Floats:
+        """Return the column of each hit point's material."""
+        return self.table.take(surface.material, -1)
+
+
+@record
+class MaterialTable:
+    """The materials of a scene, gathered into groups that are shaded together."""
+
+    group_of: Ints  # (materials,) the group of each material
+    groups: tuple[Bsdf, ...]  # those that are `specular` at the end
+    normal_maps: tuple[tuple[int, BaseNormalMap], ...]  # the groups that have one, with it
+
+
+@record
+class Opacities:
+    """Which surfaces are only partly there, and how much of them is."""
+
+    partly: Bools  # (m + k + 1,) of each primitive, and at the end False for a miss
+    constant: Floats  # (materials,) opacity of each material; 1 where it varies
+    varying: list[tuple[int, Opacity]]  # materials whose opacity varies
+
+    def at(self, surface: SurfaceInteraction) -> Floats:
+        """Return the part of the light that meets surfaces, (n,), in [0, 1]."""
+        found = self.constant.take(surface.material)
+        for material, opacity in self.varying:
+            lanes = np.flatnonzero(surface.material == material)
+            if lanes.size:
+                found[lanes] = opacity.at(surface.take(lanes))
+        return found
+
+
+def group_materials(materials: Sequence[Bsdf]) -> MaterialTable:
+    """Merge materials that differ only in the values of constant parameters into one group each.
+
+    The merged material finds its values in a `Palette`, so a scene of a hundred plain colors is
+    shaded as one group. Groups that have only delta lobes come last.
+    """
+    members: dict[object, list[int]] = {}
+    for i, material in enumerate(materials):
+        members.setdefault(_group_key(material), []).append(i)
+    group_of = np.empty(len(materials), np.intp)
+    ordered = sorted(members.values(), key=lambda numbers: materials[numbers[0]].specular)
+    for group, numbers in enumerate(ordered):
+        group_of[numbers] = group
+    groups = tuple(_merge(materials, numbers) for numbers in ordered)
+    normal_maps = tuple(
+        (number, bsdf.normal_map) for number, bsdf in enumerate(groups) if bsdf.normal_map is not None
+    )
+    return MaterialTable(group_of, groups, normal_maps)
+
+
+def _absorption(materials: Sequence[Bsdf]) -> Floats | None:
+    """Return the absorption behind the surfaces of each material, (3, materials), if there is any.
+
+    Raises
+    ------
+    SceneError
+        If one is a texture: it belongs to the space inside, not to the surface.
+    """
+    table = np.zeros((3, len(materials)), f4)
+    for i, material in enumerate(materials):
+        value = material.absorption
+        if isinstance(value, BaseTexture):
+            raise SceneError(f"{type(material).__name__} absorption must be a color, not a texture")
+        table[:, i] = np.ravel(value)
+    return table if table.any() else None
+
+
+def _opacities(materials: Sequence[Bsdf], partly: Bools) -> Opacities | None:
+    """Return how much of the surfaces is there, None when all of them are."""
+    if not partly.any():
+        return None
+    constant, varying = np.ones(len(materials), f4), []
+    for i, material in enumerate(materials):
+        if material.opacity is None:
+            continue
+        if material.opacity.constant is None:
+            varying.append((i, material.opacity))
+        else:
+            constant[i] = material.opacity.constant
+    return Opacities(partly, constant, varying)
+
+
+def _partly_there(
+    materials: Sequence[Bsdf], material_of: Ints, meshes: Sequence[Mesh], instances: Sequence[Instance]
+) -> Bools:
+    """Tell which primitives (m + k + 1,) are only partly there in some place; a miss, at the end, is not."""
+    partly = np.array([material.opacity is not None for material in materials], np.bool_)
+    found = np.append(partly.take(material_of), False)
+    placed = {id(shape.mesh) for shape in instances if shape.material.opacity is not None}
+    start = 0
+    for mesh in meshes:
+        end = start + len(mesh.faces)
+        found[start:end] |= id(mesh) in placed
+        start = end
+    return found
+
+
+def _nonscattering_lights(
+    materials: Sequence[Bsdf], material_of: Ints, light_of: Ints, lights: int
+) -> Bools | None:
+    """Tell which lights (lights,) are surfaces of a black material; None when none is."""
+    black = np.array([material.black for material in materials], np.bool_).take(material_of)
+    found = np.zeros(lights, np.bool_)
+    found[light_of.compress(black & (light_of >= 0))] = True
+    return found if found.any() else None
+
+
+def _is_constant(value: object) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype == f4 and value.shape in ((3, 1), (1,))
+
+
+def _group_key(material: Bsdf) -> object:
+    """Materials with equal keys may be merged; one with a texture stands alone."""
+    parameters = {
+        name: value for name, value in vars(material).items() if name not in ("opacity", "emission")
+    }
+    if not all(_is_constant(v) or isinstance(v, bool | int | float | str) for v in parameters.values()):
+        return id(material)
+    shapes = tuple((k, v.shape if _is_constant(v) else v) for k, v in sorted(parameters.items()))
+    return type(material), material.specular, shapes
+
+
+def _merge(materials: Sequence[Bsdf], numbers: list[int]) -> Bsdf:
+    first = materials[numbers[0]]
+    if len(numbers) == 1:
+        return first
+    merged = copy(first)
+    for name, value in vars(first).items():
+        values = [getattr(materials[number], name) for number in numbers]
+        if _is_constant(value) and not all(np.array_equal(value, other) for other in values):
+            table = np.zeros((*value.shape[:-1], len(materials)), f4)
+            table[..., numbers] = np.concatenate(values, -1)
+            vars(merged)[name] = Palette(table)
+    return merged
+
+
+def _attributes_read(shapes: Sequence[Shape]) -> list[str]:
+    """Return the names of what materials read; warn of meshes that lack what theirs reads.
+
+    Raises
+    ------
+    SceneError
+        If a parameter reads what does not exist.
+    """
+    read: set[str] = set()
+    lacking: dict[str, dict[int, str]] = {}  # what -> the meshes that lack it, by identity, with their names
+    seen: set[tuple[int, int]] = set()  # meshes and materials of instances
+    of_material: dict[int, set[str]] = {}
+    for shape in shapes:
+        if isinstance(shape, Instance):
+            pair = id(shape.mesh), id(shape.material)
+            if pair in seen:
+                continue
+            seen.add(pair)
+        mesh = shape.mesh if isinstance(shape, Instance) else shape
+        glow = shape.emission.reads if isinstance(shape.emission, BaseTexture) else ()
+        if id(shape.material) not in of_material:
+            of_material[id(shape.material)] = _reads(shape.material)
+        for name in sorted(of_material[id(shape.material)].union(glow)):
+            if name not in ATTRIBUTES:
+                known = ", ".join(ATTRIBUTES)
+                raise SceneError(f"{shape.name}: its material reads {name!r}; it must be one of {known}")
+            read.add(name)
+            if isinstance(mesh, Mesh) and ATTRIBUTES[name].given(mesh) is None:
+                lacking.setdefault(ATTRIBUTES[name].title, {})[id(mesh)] = shape.name
+    for title, names in lacking.items():
+        warnings.warn(
+            f"{len(names)} meshes lack the {title} that their materials read, "
+            f"first: {next(iter(names.values()))!r}",
+            stacklevel=5,
+        )
+    return sorted(read)
+
+
+def _reads(material: Bsdf | Opacity) -> set[str]:
+    """Return the names of the attributes that the parameters of a material read."""
+    out: set[str] = set()
+    for value in vars(material).values():
+        if isinstance(value, BaseTexture | BaseNormalMap):
+            out.update(value.reads)
+        elif isinstance(value, Bsdf | Opacity):
+            out.update(_reads(value))
+    return out
+
+
+def _number_materials(
+    meshes: Sequence[Mesh], spheres: Sequence[Sphere], instances: Sequence[Instance]
+) -> tuple[list[Bsdf], Ints, Ints | None]:
+    """Return the distinct materials, and the numbers of each row's and of each instance's.
+
+    An instance that has the material of its mesh has the number -1; when all have, there are none.
+    """
+    numbers: dict[int, int] = {}
+    materials: list[Bsdf] = []
+    of_shape: list[int] = []
+    shapes: list[Shape] = [*meshes, *spheres, *instances]
+    for shape in shapes:
+        if id(shape.material) not in numbers:
+            numbers[id(shape.material)] = len(materials)
+            materials.append(shape.material)
+        of_shape.append(numbers[id(shape.material)])
+    rows = len(meshes) + len(spheres)
+    counts = [len(mesh.faces) for mesh in meshes] + [1] * len(spheres)
+    of_row = np.repeat(np.array(of_shape[:rows], np.intp), counts)
+    own = [instance.material is not instance.mesh.material for instance in instances]
+    replaced = np.where(own, np.array(of_shape[rows:], np.intp), -1) if any(own) else None
+    return materials, of_row, replaced

@@ -1,0 +1,175 @@
+"""The compiled scene: flat arrays for the stages."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..accel import Accelerator, Geometry, InstanceAccelerator
+from ..camera import Camera
+from ..lights import LightTable
+from ..lights.textured_emission import TexturedEmission
+from ..record import record
+from ..scene import Scene
+from ..shapes import Shape
+from ..shapes.attributes import Corners, corner_values
+from ..vec import Bools, Floats, Ints, f4
+from .geometry import _alike, _corner_normals, _face_normals
+from .instances import InstanceTable, own_frame, place, resolve
+from .lights import _gather_lights, _uneven
+from .materials import (
+    MaterialTable,
+    Opacities,
+    _absorption,
+    _attributes_read,
+    _nonscattering_lights,
+    _number_materials,
+    _opacities,
+    _partly_there,
+    group_materials,
+)
+from .scale import check_distance, check_lights, length_factor, scaled_shapes
+
+
+@record
+class CompiledScene:
+    """A scene as flat arrays, relative to its center. Triangles come first, then spheres.
+
+    A mesh that is placed several times stands in the arrays once, in its own frame. Where the scene is
+    extremely large or small, all lengths here and in what is traced are in another unit (see scale.py).
+    """
+
+    scale: float  # a power of two by which lengths of the scene are multiplied; 1 for most scenes
+    center: NDArray[np.float64]  # (3,)
+    radius: float  # of the bounding sphere
+    accelerator: Accelerator
+    triangles: int  # number of triangles
+    normals: Floats  # (3, m) unit geometric normals of the triangles
+    corner_normals: tuple[Floats, Floats, Floats] | None  # 3 × (3, m); None when no mesh is smooth
+    attributes: dict[
+        str, Corners
+    ]  # by field of `SurfaceInteraction`, those that a material reads; 3 × (width, m)
+    sphere_centers: Floats  # (3, k)
+    sphere_radii: Floats  # (k,)
+    material_of: Ints  # (m + k,) material of each primitive
+    light_of: Ints  # (m + k + 1,) light of each primitive, and at the end that of a miss; -1 for none
+    shines: Bools  # (m + k + 1,) whether there is one
+    materials: MaterialTable
+    absorption: Floats | None  # (3, materials) per unit of length; None when nothing absorbs
+    opacities: Opacities | None  # None when every surface is all there
+    lights: LightTable
+    nonscattering_lights: (
+        Bools | None
+    )  # (lights,) those whose surface scatters nothing; None when there are none
+    textured_emission: TexturedEmission | None  # the lights that do not shine evenly; None when all do
+    instances: InstanceTable | None = None  # None when every mesh is placed once
+
+    @property
+    def interpolates(self) -> bool:
+        """Whether anything varies between the corners of triangles."""
+        return bool(self.attributes) or self.corner_normals is not None
+
+    def view(self, camera: Camera) -> Camera:
+        """Return a camera of the scene in the unit of these arrays.
+
+        Raises
+        ------
+        SceneError
+            If it is so far away that float32 cannot measure its distance.
+        """
+        check_distance("Camera origin", camera.origin, self.center / self.scale, self.scale)
+        return camera.scaled(self.scale)
+
+
+def compile_scene(
+    scene: Scene,
+    make_accelerator: Any,
+    light_sampler: str = "place",
+    most_copies: int = 0,
+    mis: bool = False,
+) -> CompiledScene:
+    """Gather a scene into flat arrays.
+
+    Parameters
+    ----------
+    scene
+        What to render.
+    make_accelerator
+        Called with the `Geometry`; returns the `Accelerator`.
+    light_sampler
+        How one light of many is chosen: "place", "power" or "uniform".
+    most_copies
+        Up to so many triangles in all, each instance is built as a mesh of its own.
+    mis
+        Whether light samples are weighted against BSDF samples, so that they may leave out light from
+        all around, which those find better.
+
+    Raises
+    ------
+    SceneError
+        If an emitting shape has no area, an emitting sphere has an alpha or shines by a texture, a light
+        is too far away or too strong for the scene's size, or the choice is unknown.
+    """
+    scene.check()
+    low, high = scene.bounds
+    radius = float(np.linalg.norm(high - low)) / 2
+    scale = length_factor(radius)
+    check_lights(scene.lights, (low + high) / 2, scale)
+    low, high, radius = low * scale, high * scale, radius * scale
+    center = (low + high) / 2
+    meshes, spheres, instances = resolve(scaled_shapes(scene.shapes, scale), most_copies)
+    placed: list[Shape] = [*meshes, *spheres, *instances]
+    shared = list({id(instance.mesh): instance.mesh for instance in instances}.values())
+    once = sum(len(mesh.faces) for mesh in meshes)
+    corners = [(mesh.vertices - center).take(mesh.faces, 0) for mesh in meshes]
+    corners += [own_frame(mesh).take(mesh.faces, 0) for mesh in shared]
+    meshes += shared
+    triangles = np.concatenate(corners) if corners else np.zeros((0, 3, 3))
+    user_materials, material_of, replaced = _number_materials(meshes, spheres, instances)
+    attributes = {name: corner_values(name, meshes) for name in _attributes_read(placed)}
+    lights, light_of, environment = _gather_lights(
+        scene, scale, meshes, spheres, corners, center, (high - low) / 2, light_sampler, mis
+    )
+    centers = np.array([s.center - center for s in spheres]).reshape(-1, 3).T.astype(f4)
+    radii = np.array([s.radius for s in spheres]).astype(f4)
+    smooth = any(mesh.normals is not None for mesh in meshes)
+    triangles32 = np.ascontiguousarray(triangles, f4)
+    partly = _partly_there(user_materials, material_of, meshes, instances)
+    nonscattering_lights = _nonscattering_lights(user_materials, material_of, light_of, len(lights))
+    light_of = np.append(light_of, environment)
+    weights = bool(attributes) or smooth
+    normals = _face_normals(triangles)
+    broadcast = None if weights else _alike(material_of[:once], light_of[:once])
+    geometry = Geometry(triangles32[:once], np.ascontiguousarray(centers), radii, weights, broadcast)
+    accelerator, table = make_accelerator(geometry), None
+    if shared:
+        placements, table = place(instances, shared, center, once, len(spheres), replaced)
+        none = np.zeros((3, 0), f4), np.zeros(0, f4)
+        ends = np.cumsum([len(mesh.faces) for mesh in shared])
+        parts = np.split(triangles32[once:], ends[:-1])
+        built = [make_accelerator(Geometry(part, *none, weights)) for part in parts]
+        accelerator = InstanceAccelerator(accelerator, built, placements)
+    return CompiledScene(
+        scale=scale,
+        center=center,
+        radius=radius,
+        accelerator=accelerator,
+        triangles=len(triangles),
+        normals=normals,
+        corner_normals=_corner_normals(meshes, normals),
+        attributes=attributes,
+        sphere_centers=geometry.centers,
+        sphere_radii=geometry.radii,
+        material_of=material_of,
+        light_of=light_of,
+        shines=light_of >= 0,
+        materials=group_materials(user_materials),
+        absorption=_absorption(user_materials),
+        opacities=_opacities(user_materials, partly),
+        lights=lights,
+        nonscattering_lights=nonscattering_lights,
+        textured_emission=_uneven(meshes, len(lights), light_of),
+        instances=table,
+    )

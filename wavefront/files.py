@@ -1,0 +1,212 @@
+"""Bytes from files and to files: regular files only, whole files only, nothing outside a scene's folder."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import stat
+from pathlib import Path
+from typing import IO
+
+from .errors import SaveError, SceneError
+
+MAX_BYTES = 2**31  # larger files are refused before they are read
+MAX_PIXELS = 2**27  # 16384 × 8192; larger images are refused before they are decoded
+OPEN_FILES = "/proc/self/fd"  # Linux: the open files of the process, by number
+
+
+def read_bytes(path: str | os.PathLike[str], limit: int = MAX_BYTES) -> bytes:
+    """Return the whole content of a regular file.
+
+    Raises
+    ------
+    SceneError
+        If the file is missing, unreadable, not a regular file, or larger than `limit` bytes.
+    """
+    name = path_name(path)
+    try:
+        info = os.stat(name)
+        if stat.S_ISDIR(info.st_mode):
+            raise SceneError(f"{name}: is a folder, not a file")
+        if not stat.S_ISREG(info.st_mode):
+            raise SceneError(f"{name}: is a device or pipe; only regular files are read")
+        if info.st_size > limit:
+            raise SceneError(f"{name}: has {info.st_size} bytes; the limit is {limit}")
+        return Path(name).read_bytes()
+    except FileNotFoundError as error:
+        raise SceneError(f"{name}: there is no such file") from error
+    except (OSError, ValueError) as error:
+        if isinstance(error, SceneError):
+            raise
+        raise SceneError(f"{name}: cannot be read: {error}") from error
+
+
+def decode(data: bytes) -> str:
+    """Return text from UTF-8 or UTF-16 (by its byte order mark), else Latin-1; line ends become \\n."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        text = data.decode("utf-16", errors="replace")
+    else:
+        try:
+            text = data.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = data.decode("latin-1")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def beside(scene: str | os.PathLike[str], reference: str) -> Path:
+    """Return the path of a file that `scene` refers to by a relative name.
+
+    A scene file from elsewhere must not make the program read any file it likes, so the name has
+    to stay inside the scene's folder, also after symbolic links are followed.
+
+    Raises
+    ------
+    SceneError
+        If the name is a URI, absolute, or leads out of the folder.
+    """
+    folder = Path(os.fspath(scene)).resolve().parent
+    name = reference.replace("\\", "/")
+    if "://" in name or name.lower().startswith(("http:", "https:", "file:", "ftp:")):
+        raise SceneError(f"{scene}: refers to {reference!r}; only files in its own folder are read")
+    if name.startswith("/") or name[1:2] == ":":
+        raise SceneError(f"{scene}: refers to {reference!r}; an absolute path is not followed")
+    try:
+        target = (folder / name).resolve()
+    except (OSError, RuntimeError, ValueError) as error:
+        raise SceneError(f"{scene}: refers to {reference!r}: {error}") from error
+    if not target.is_relative_to(folder):
+        raise SceneError(f"{scene}: refers to {reference!r}, which is outside its folder")
+    return folder / name
+
+
+def check_size(height: int, width: int) -> None:
+    """Refuse images that are empty or have more than `MAX_PIXELS` pixels, with a SceneError."""
+    if height < 1 or width < 1:
+        raise SceneError(f"image has {width} × {height} pixels; it must have at least one")
+    if height * width > MAX_PIXELS:
+        raise SceneError(f"image has {width} × {height} pixels; the limit is {MAX_PIXELS}")
+
+
+def path_name(path: str | os.PathLike[str], error: type[SceneError] = SceneError) -> str:
+    """Return a path as text.
+
+    Raises
+    ------
+    SceneError
+        Or the subclass `error`, if it is neither text nor a path made of text.
+    """
+    name = os.fspath(path) if isinstance(path, os.PathLike) else path
+    if not isinstance(name, str):
+        raise error(f"path is {path!r}; it must be text or a path such as pathlib.Path")
+    return name
+
+
+def check_target(path: str | os.PathLike[str]) -> Path:
+    """Return where `path` leads, after making sure that a file can be written there.
+
+    Raises
+    ------
+    SaveError
+        If the name is not usable, the folder is missing or not writable, or something other than a
+        regular file is there.
+    """
+    name = path_name(path, SaveError)
+    try:
+        target = Path(os.path.realpath(name))
+        if not target.parent.is_dir():
+            raise SaveError(f"{name}: the folder {target.parent} does not exist")
+        _mode(target)
+        if not os.access(target.parent, os.W_OK | os.X_OK):
+            raise SaveError(f"{name}: the folder {target.parent} is not writable")
+    except SaveError:
+        raise
+    except (OSError, ValueError) as error:
+        raise SaveError(f"{name!r}: cannot be written: {error}") from error
+    return target
+
+
+def _mode(target: Path) -> int | None:
+    """Return the permissions of the file that is to be replaced, None if there is none."""
+    try:
+        mode = os.stat(target).st_mode
+    except FileNotFoundError:
+        return None
+    if stat.S_ISDIR(mode):
+        raise SaveError(f"{target}: is a folder, not a file name")
+    if not stat.S_ISREG(mode):
+        raise SaveError(f"{target}: is a device or pipe; only regular files are written")
+    return mode & 0o777
+
+
+def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
+    """Write a file so that, whatever happens, it holds either its old content or all of the new.
+
+    A file that is replaced keeps its permissions. Symbolic links are followed.
+
+    Raises
+    ------
+    SaveError
+        If it cannot be written; the old content is intact and nothing is left behind.
+    """
+    target = check_target(path)
+    scratch = target.with_name(f".wavefront-{os.urandom(6).hex()}.tmp")
+    try:
+        _write_new(scratch, data, _mode(target))
+        os.replace(scratch, target)
+    except SaveError:
+        raise
+    except OSError as error:
+        raise SaveError(f"{path}: cannot be written: {error}") from error
+    finally:
+        with contextlib.suppress(OSError):
+            scratch.unlink()
+    _sync_folder(target.parent)
+
+
+def _write_new(path: Path, data: bytes, mode: int | None) -> None:
+    """Write a new file with these permissions, or those of the umask.
+
+    Where the system can, the file has no name until it is complete: nothing is left behind, even
+    when the process is killed.
+    """
+    nameless = _open_nameless(path.parent)
+    if nameless is not None:
+        with contextlib.suppress(OSError), open(nameless, "wb") as file:
+            _fill(file, data, mode)
+            # src_dir_fd makes Python follow the link, as it says it does anyway
+            os.link(f"{OPEN_FILES}/{nameless}", path, src_dir_fd=nameless)
+            return
+    named = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+    with open(named, "wb") as file:
+        _fill(file, data, mode)
+
+
+def _fill(file: IO[bytes], data: bytes, mode: int | None) -> None:
+    """Write all data through to the disk, after setting the permissions."""
+    if mode is not None and hasattr(os, "fchmod"):
+        os.fchmod(file.fileno(), mode)
+    file.write(data)
+    file.flush()
+    os.fsync(file.fileno())
+
+
+def _open_nameless(folder: Path) -> int | None:
+    """Open a new file without a name, to be linked from `OPEN_FILES`; None where that is not possible."""
+    if not hasattr(os, "O_TMPFILE") or not os.path.isdir(OPEN_FILES):
+        return None
+    try:
+        return os.open(folder, os.O_WRONLY | os.O_TMPFILE, 0o666)
+    except OSError:  # not all file systems can
+        return None
+
+
+def _sync_folder(folder: Path) -> None:
+    """Make the new name itself durable, where the system can."""
+    if os.name != "posix":
+        return
+    with contextlib.suppress(OSError):  # a folder may be writable and not readable
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)

@@ -1,0 +1,156 @@
+"""How one light of many is chosen at a point."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..sampling.discrete import Discrete, rounded_up
+from ..vec import Floats, Ints, broadcast, f4
+
+Doubles = NDArray[np.float64]
+MOST_CELLS = 32**3
+MOST_ENTRIES = 2**21  # cells times lights
+BY_POWER = 0.05  # part of the choice that stays with the power, so that no light is ever left out
+
+
+class LightSampler(Protocol):
+    """Chooses a light for each point."""
+
+    def sample(self, point: Floats, u: Floats) -> tuple[Ints, Floats]:
+        """Return a light (n,) for each point (3, n) from u (n,), and its probability (n,)."""
+
+    def pmf(self, light: Ints, point: Floats) -> Floats:
+        """Probability (n,) that `light` (n,) is chosen at points (3, n)."""
+
+
+class SingleLightSampler:
+    """The only light, of which there is no choice."""
+
+    def sample(self, point: Floats, u: Floats) -> tuple[Ints, Floats]:
+        """Return light 0."""
+        n = point.shape[1]
+        return broadcast(np.intp(0), n), broadcast(f4(1), n)
+
+    def pmf(self, light: Ints, point: Floats) -> Floats:
+        """Return 1."""
+        return broadcast(f4(1), len(light))
+
+
+class WeightedLightSampler:
+    """The same probabilities at every point, in proportion to `weights` (k,)."""
+
+    def __init__(self, weights: Doubles) -> None:
+        self.table = Discrete(weights)
+
+    def sample(self, point: Floats, u: Floats) -> tuple[Ints, Floats]:
+        """Choose by inverting the cumulative weights."""
+        light, chance, _ = self.table.sample(u)
+        return light, chance
+
+    def pmf(self, light: Ints, point: Floats) -> Floats:
+        """Return the weight of each light."""
+        return self.table.pmf(light)
+
+
+class SubsetLightSampler:
+    """A choice of some lights only; the others are never chosen, and cost nothing.
+
+    Parameters
+    ----------
+    choice
+        Of one of the k lights.
+    chosen
+        (k,) their numbers, rising.
+    lights
+        How many lights there are in all.
+    """
+
+    def __init__(self, choice: LightSampler, chosen: Ints, lights: int) -> None:
+        self.choice, self.chosen = choice, chosen
+        self.place = np.full(lights, -1, np.intp)
+        self.place[chosen] = np.arange(len(chosen))
+
+    def sample(self, point: Floats, u: Floats) -> tuple[Ints, Floats]:
+        """Choose one of them."""
+        light, chance = self.choice.sample(point, u)
+        return self.chosen.take(light), chance
+
+    def pmf(self, light: Ints, point: Floats) -> Floats:
+        """Return the probability of each light, 0 for the others."""
+        place = self.place.take(light)
+        return np.where(place < 0, f4(0), self.choice.pmf(np.maximum(place, 0), point))
+
+
+class SpatialLightSampler:
+    """Probabilities by place: a grid whose cells each weigh all lights by what they bring there.
+
+    Lights that are near, and lights that face the cell, are chosen more often. A small part of the
+    choice stays with the power.
+
+    Parameters
+    ----------
+    low, high
+        (3,) corners of the scene, scene units.
+    irradiance
+        Called with cell centers (3, c) and the cells' radius; returns what each light brings to
+        each cell at most, (c, k).
+    power
+        (k,) estimated power of each light.
+    """
+
+    def __init__(
+        self, low: Doubles, high: Doubles, irradiance: Callable[[Doubles, float], Doubles], power: Doubles
+    ) -> None:
+        cells = int(np.clip(MOST_ENTRIES // len(power), 1, MOST_CELLS))
+        self.low, self.shape, size = _grid(low, high, cells)
+        centers = np.indices(self.shape).reshape(3, -1) + 0.5
+        weight = irradiance(self.low[:, None] + centers * size[:, None], float(np.linalg.norm(size)) / 2)
+        total = weight.sum(1, keepdims=True)
+        share = power / power.sum()
+        table = np.where(total > 0, weight / np.where(total > 0, total, 1), share)
+        table = (1 - BY_POWER) * table + BY_POWER * share
+        self.lights = len(power)
+        self.inverse_size = 1 / size
+        self.chance = table.astype(f4).ravel()
+        cumulative = np.cumsum(table, 1)
+        cumulative /= cumulative[:, -1:]
+        # where each light but the last ends, and then ones, so that a bisection halves what is left
+        self.ends = (1 << (self.lights - 1).bit_length()) - 1
+        ends = np.ones((len(table), self.ends), f4)
+        ends[:, : self.lights - 1] = rounded_up(cumulative[:, :-1])
+        self.end = ends.ravel()
+
+    def sample(self, point: Floats, u: Floats) -> tuple[Ints, Floats]:
+        """Choose by inverting the cumulative weights of each point's cell, by bisection of all at once."""
+        cell = self._cell(point)
+        light, before, step = np.zeros(len(cell), np.intp), cell * self.ends - 1, (self.ends + 1) // 2
+        while step:
+            light += (u >= self.end.take(before + light + step)) * np.intp(step)
+            step //= 2
+        return light, self.chance.take(cell * self.lights + light)
+
+    def pmf(self, light: Ints, point: Floats) -> Floats:
+        """Return the weight of each light in its point's cell."""
+        return self.chance.take(self._cell(point) * self.lights + light)
+
+    def _cell(self, point: Floats) -> Ints:
+        """Return the number of the cell of each point (n,); points outside belong to the nearest."""
+        cell = np.zeros(point.shape[1], np.intp)
+        for row, low, inverse, count in zip(point, self.low, self.inverse_size, self.shape, strict=True):
+            along = np.clip((row - f4(low)) * f4(inverse), f4(0), f4(count - 1)).astype(np.intp)
+            cell = cell * count + along
+        return cell
+
+
+def _grid(low: Doubles, high: Doubles, cells: int) -> tuple[Doubles, tuple[int, int, int], Doubles]:
+    """Return the corner, the counts and the cell size (3,) of a grid of nearly cubic cells."""
+    extent = np.maximum(high - low, 1e-3 * max(float((high - low).max()), 1e-30))
+    side = (extent.prod() / cells) ** (1 / 3)
+    counts = np.clip(np.floor(extent / side + 1e-6), 1, cells).astype(int)  # the same at every scale
+    while counts.prod() > cells:
+        counts[np.argmax(counts)] -= 1
+    return low, (int(counts[0]), int(counts[1]), int(counts[2])), extent / counts

@@ -1,0 +1,157 @@
+"""All lights of a scene in one table, and the choice of one of them per vertex."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import one_of
+from ..sampling.mis import power_heuristic
+from ..vec import ALL, Floats, Ints, Lanes, f4, put, take
+from .base import Light, LightSample
+from .samplers import (
+    LightSampler,
+    SingleLightSampler,
+    SpatialLightSampler,
+    SubsetLightSampler,
+    WeightedLightSampler,
+)
+
+CHOICES = ("place", "power", "uniform")
+
+
+class LightTable:
+    """Lights of several kinds, numbered through: kind by kind, column by column.
+
+    One light is chosen per point; the probability of the choice is part of every pdf returned here.
+
+    Parameters
+    ----------
+    kinds
+        One record per kind of light; a record holds all lights of that kind.
+    half_size
+        Half of the scene's extent along each axis (3,), or along all; scene units. The scene's
+        middle is the origin.
+    choice
+        "place" weighs lights by what they bring to a point's surroundings, "power" by their
+        estimated power alone, "uniform" not at all.
+
+    Raises
+    ------
+    SceneError
+        If the choice is unknown.
+    """
+
+    def __init__(self, kinds: Sequence[Light], half_size: ArrayLike, choice: str = "place") -> None:
+        self.kinds = tuple(kinds)
+        self.starts = np.cumsum([0, *(len(kind) for kind in kinds)])
+        self.kind_of = np.repeat(np.arange(len(kinds)), [len(kind) for kind in kinds])
+        self.delta_of = np.array([kind.delta for kind in kinds], np.bool_)[self.kind_of]
+        extent = np.broadcast_to(np.asarray(half_size, float), 3)
+        power = np.concatenate([np.zeros(0), *(kind.power(float(np.linalg.norm(extent))) for kind in kinds)])
+        self.chosen_from = power != 0  # (lights,) which take part in the choice
+        self.choice = self._make_choice(power, extent, choice)
+
+    def __len__(self) -> int:
+        """Return the number of lights."""
+        return int(self.starts[-1])
+
+    def _make_choice(
+        self, power: NDArray[np.float64], half_size: NDArray[np.float64], choice: str
+    ) -> LightSampler | None:
+        """Return the choice by name; None when nothing shines. Lights without a power take no part."""
+        one_of("light_sampler", choice, CHOICES)
+        if not power.any():
+            return None
+        if not power.all():
+            shining = [np.flatnonzero(part) for part in np.split(power, self.starts[1:-1])]
+            kinds = [kind.take(lanes) for kind, lanes in zip(self.kinds, shining, strict=True) if lanes.size]
+            chosen = LightTable(kinds, half_size, choice).choice
+            return None if chosen is None else SubsetLightSampler(chosen, np.flatnonzero(power), power.size)
+        if power.size == 1:
+            return SingleLightSampler()
+        if choice == "uniform":
+            return WeightedLightSampler(np.ones_like(power))
+        if choice == "power":
+            return WeightedLightSampler(power)
+
+        scene_radius = float(np.linalg.norm(half_size))
+
+        def irradiance(center: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
+            return np.concatenate([kind.irradiance(center, radius, scene_radius) for kind in self.kinds], 1)
+
+        return SpatialLightSampler(-half_size, half_size, irradiance, power)
+
+    def sample_li(self, point: Floats, u_choice: Floats, u: Floats) -> tuple[LightSample, Ints]:
+        """Choose a light for each point (3, n) with u_choice (n,) and sample it with u (2, n).
+
+        Returns
+        -------
+        sample
+            The light arriving; its pdf includes the probability of the choice.
+        light
+            (n,) numbers of the chosen lights.
+        """
+        assert self.choice is not None
+        light, chance = self.choice.sample(point, u_choice)
+        sample = self._sample_each(light, point, u)
+        sample.pdf = sample.pdf * chance
+        return sample, light
+
+    def pdf_li(self, light: Ints, point: Floats, wi: Floats) -> Floats:
+        """Density with which `sample_li` draws wi (3, n) towards the lights numbered `light` (n,)."""
+        if self.choice is None:
+            return np.zeros(len(light), f4)
+        pdf = np.empty(len(light), f4)
+        for kind, rows in self._by_kind(light):
+            pdf[rows] = kind.pdf_li(take(point, rows), take(wi, rows))
+        return pdf * self.choice.pmf(light, point)
+
+    def mis_weight(self, light: Ints, pdf: Floats, pdf_bsdf: Floats) -> Floats:
+        """Weight of samples of lights numbered `light` (n,) against BSDF sampling: 1 for delta lights."""
+        weight = power_heuristic(pdf, pdf_bsdf)
+        if self.delta_of.any():
+            weight[np.flatnonzero(self.delta_of.take(light))] = 1
+        return weight
+
+    def le(self, light: Ints, wi: Floats) -> Floats:
+        """Radiance (3, n) of the lights numbered `light` (n,) against wi (3, n)."""
+        if len(self.kinds) == 1:
+            return self._gathered(0, light).le(wi)
+        radiance = np.empty_like(wi)
+        for kind, rows in self._by_kind(light):
+            put(radiance, rows, kind.le(take(wi, rows)))
+        return radiance
+
+    def _sample_each(self, light: Ints, point: Floats, u: Floats) -> LightSample:
+        n = len(light)
+        out = LightSample(np.empty((3, n), f4), np.empty((3, n), f4), *np.empty((3, n), f4))
+        for kind, rows in self._by_kind(light):
+            if isinstance(rows, slice):
+                return kind.sample_li(point, u)
+            part = kind.sample_li(take(point, rows), take(u, rows))
+            put(out.wi, rows, part.wi)
+            put(out.radiance, rows, part.radiance)
+            out.pdf[rows], out.distance[rows], out.cos_light[rows] = part.pdf, part.distance, part.cos_light
+        return out
+
+    def _gathered(self, number: int, light: Ints) -> Light:
+        """Return the lights, all of one kind, with a column per lane."""
+        kind = self.kinds[number]
+        return kind if len(kind) == 1 else kind.take(light - self.starts[number])
+
+    def _by_kind(self, light: Ints) -> Iterator[tuple[Light, Lanes]]:
+        """Yield, per kind that occurs, its lights gathered to a column per lane, and those lanes."""
+        if len(self.kinds) == 1:
+            yield self._gathered(0, light), ALL
+            return
+        kind_of = self.kind_of.take(light)
+        if light.size and (kind_of == kind_of[0]).all():
+            yield self._gathered(kind_of[0], light), ALL
+            return
+        for number in range(len(self.kinds)):
+            rows = np.flatnonzero(kind_of == number)
+            if rows.size:
+                yield self._gathered(number, light.take(rows)), rows

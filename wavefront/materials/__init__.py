@@ -1,0 +1,3 @@
+"""Materials: a BSDF and what surrounds it."""
+
+__all__ = []

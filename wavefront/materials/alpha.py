@@ -1,0 +1,61 @@
+"""How much of a surface is there: leaves cut out of a square, veils, grids."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..errors import SceneError, number
+from ..state import SurfaceInteraction
+from ..textures.base import BaseTexture
+from ..textures.parameter import Scalar, scalar
+from ..vec import Floats, f4
+
+
+class Opacity:
+    """The part of the light that meets a surface; the rest goes straight on, as if nothing were there.
+
+    Parameters
+    ----------
+    alpha
+        The part, (1,) or `BaseTexture`; values outside [0, 1] count as 0 or 1.
+    cutoff
+        The surface is all there where alpha is at least this, and not there elsewhere. None blends.
+    """
+
+    def __init__(self, alpha: Any, cutoff: float | None) -> None:
+        self.alpha, self.cutoff = alpha, cutoff
+
+    @property
+    def constant(self) -> float | None:
+        """The opacity where it is the same everywhere, None where it varies."""
+        return None if isinstance(self.alpha, BaseTexture) else float(self._resolved(self.alpha)[0])
+
+    def at(self, surface: SurfaceInteraction) -> Floats:
+        """Return the opacity at hit points, (n,), in [0, 1]."""
+        if isinstance(self.alpha, BaseTexture):
+            return self._resolved(self.alpha.at(surface))
+        return np.repeat(self._resolved(self.alpha), len(surface))
+
+    def _resolved(self, alpha: Floats) -> Floats:
+        if self.cutoff is None:
+            return np.clip(alpha, f4(0), f4(1))
+        return (alpha >= f4(self.cutoff)).astype(f4)
+
+
+def opacity(name: str, alpha: Scalar, cutoff: float | None) -> Opacity | None:
+    """Return the opacity that a user asks for, None where the surface is all there.
+
+    Raises
+    ------
+    SceneError
+        If alpha is outside [0, 1] or a texture of colors, or the cutoff is below 0.
+    """
+    if isinstance(alpha, BaseTexture) and alpha.scalar is False:  # its luminance would be no one's opacity
+        raise SceneError(f"{name} alpha is {alpha!r}, which gives colors; choose one channel by channel=")
+    value = scalar(f"{name} alpha", alpha)
+    if cutoff is not None:
+        cutoff = number(f"{name} alpha_cutoff", cutoff, lambda x: x >= 0, "at least 0")
+    found = Opacity(value, cutoff)
+    return None if found.constant == 1 else found

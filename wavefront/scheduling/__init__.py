@@ -1,0 +1,3 @@
+"""Jobs, in which order they are done, and who does them."""
+
+__all__ = []

@@ -1,0 +1,74 @@
+"""When a render is done: after so many samples, at a noise level, or when its time is up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..film import Film
+from ..state import Words
+from ..vec import Ints
+
+MIN_SPP = 32  # before anything is decided by an error estimate
+TILE = 8  # pixels; decisions are made for squares of this side
+
+
+GRACE = 1.1  # times the seconds that were given: when waves under way are discarded
+
+
+@dataclass(frozen=True, slots=True)
+class Pass:
+    """Samples to take before the next decision."""
+
+    pixels: Words  # (k,) row-major indices, rising
+    first: int  # index of the first sample
+    last: int  # one past that of the last
+
+
+def passes(film: Film, spp: int, noise: float | None) -> Iterator[Pass]:
+    """Yield what is to be done, one pass after the other; each decides by what is on the film then.
+
+    Without `noise` there is one pass. With it there are more while the estimated error of the
+    picture is above `noise`, at 32, 48, 64, 96, 128 ... samples, for those tiles of 8 × 8 pixels
+    whose own error is above it. A decision depends on the film alone, never on timing, so the
+    picture is the same for any number of workers and any wave size.
+
+    A tile, not a pixel, is the unit, because samples that decide when to stop are no longer
+    unbiased: a pixel that has not yet found its bright samples would look done. In the
+    estimate of a tile no pixel weighs much. Measured (benchmarks/adaptive_bias.py) the means of a
+    Cornell box and of glass and metal are off by less than 0.1 %, and blocks of 8 × 8 pixels by 0.3 %;
+    with decisions per pixel by up to 0.6 %, and blocks by 2 %.
+    """
+    pixels = np.arange(film.count.size, dtype=np.uint32)
+    if noise is None:
+        yield Pass(pixels, 0, spp)
+        return
+    tile_of = _tiles(*film.size)
+    sizes = np.bincount(tile_of)
+    first = 0
+    while pixels.size and first < spp:
+        last = min(next_stop(first), spp)
+        yield Pass(pixels, first, last)
+        first = last
+        error = film.relative_variance()
+        if error.mean() <= noise**2:
+            return
+        noisy = np.bincount(tile_of, error) / sizes > noise**2
+        pixels = pixels[noisy[tile_of[pixels]]]
+
+
+def next_stop(samples: int) -> int:
+    """Number of samples at the decision after that at `samples`: powers of two and halfway between."""
+    if samples < MIN_SPP:
+        return MIN_SPP
+    power = 1 << (samples.bit_length() - 1)
+    return power * 3 // 2 if samples < power * 3 // 2 else power * 2
+
+
+def _tiles(width: int, height: int) -> Ints:
+    """Number of the tile of each pixel, (pixels,)."""
+    across = -(-width // TILE)
+    rows, take = np.arange(height) // TILE, np.arange(width) // TILE
+    return (rows[:, None] * across + take).reshape(-1)

@@ -1,0 +1,77 @@
+"""BLAS: one thread for each worker, and memory for its calls."""
+
+from __future__ import annotations
+
+import math
+import threading
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from ..memory import address_space_left
+
+BUFFER = (
+    64 << 20
+)  # bytes of address space; OpenBLAS takes 32 MB for each call at a time, and a thread its stack
+LARGE = 512  # rows of matrices whose product takes some milliseconds, so that two calls overlap
+
+
+class _SingleThreadedBlas:
+    """Holds BLAS to one thread for as long as anybody needs that.
+
+    The number of BLAS's threads is one for the whole process. With a limit for each render, that of two
+    overlapping ones that ends last would restore what it had found, which is the other's limit.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._users = 0
+        self._limits: Any = None
+
+    def acquire(self) -> None:
+        """Hold BLAS to one thread."""
+        with self._lock:
+            if not self._users:
+                self._limits = threadpool_limits(1, "blas")
+            self._users += 1
+
+    def release(self) -> None:
+        """Let BLAS have as many threads as before, if nobody else needs it to have one."""
+        with self._lock:
+            self._users -= 1
+            if not self._users:
+                self._limits.restore_original_limits()
+
+
+single_threaded_blas = _SingleThreadedBlas()
+
+
+def reserve_buffers(threads: int) -> None:
+    """Have OpenBLAS take the memory now that so many threads need at a time.
+
+    It ends the process when it finds none, so it should not look for it when waves have taken the rest.
+    Nothing is done where the address space has no limit: there the memory is always found.
+
+    Raises
+    ------
+    MemoryError
+        If there is not enough.
+    """
+    left = address_space_left()
+    if left == math.inf:
+        return
+    if left < threads * BUFFER:
+        raise MemoryError(f"BLAS needs {threads * BUFFER / 1e6:,.0f} MB for {threads} threads")
+    together = threading.Barrier(threads)
+    matrix = np.ones((LARGE, LARGE))
+
+    def multiply() -> None:
+        together.wait()
+        matrix @ matrix
+
+    workers = [threading.Thread(target=multiply) for _ in range(threads)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()

@@ -1,0 +1,105 @@
+"""How large jobs are, and whether there is time for more."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+
+from .adaptive import GRACE
+from .jobs import Job
+
+FIRST_WAVE = 4096  # lanes, while the speed is unknown and there is a time to keep
+SMALL_WAVE = 1 << 16  # lanes; in smaller waves a path costs more
+LARGE_WAVE = 1 << 17  # lanes; in larger waves it costs hardly less
+AT_ONCE = 1 << 19  # lanes of all workers together where that is a wave for each: 400 MB
+SHARE = 1 / 4  # part of what is left for each worker that a wave may be
+PATIENCE = 1.0  # seconds that a large wave may take, for progress waits for it
+
+
+SHORT, LONG = 1 / 60, 1 / 20  # parts of the time there is that a wave should take
+SMOOTHING = 0.3  # weight of the latest wave in what a path is expected to cost
+
+
+class Scheduler:
+    """Hands out work as long as it will be done in time; sizes waves to fit.
+
+    Parameters
+    ----------
+    begin
+        When the render began, by `time.perf_counter`.
+    seconds
+        Time that it may take; None for any.
+    wave_size
+        Lanes of the largest wave; None for what suits so many workers.
+    workers
+        Waves that are traced at once.
+    branches
+        Lanes that a path may become.
+    """
+
+    def __init__(
+        self, begin: float, seconds: float | None, wave_size: int | None, workers: int, branches: int = 1
+    ) -> None:
+        self.up = False  # work was turned away, or discarded
+        self._begin, self._seconds, self._workers = begin, seconds, workers
+        if wave_size is None:
+            wave_size = min(max(AT_ONCE // workers, SMALL_WAVE), LARGE_WAVE)
+        self._largest = max(1, wave_size // branches)
+        self._least = min(self._largest, max(1, SMALL_WAVE // branches))
+        self._size = min(FIRST_WAVE, self._largest)  # where there is a time to keep
+        self._under_way = 0  # paths
+        self._cost = 0.0  # expected seconds of a worker per path
+
+    @property
+    def elapsed(self) -> float:
+        """Seconds since the render began."""
+        return time.perf_counter() - self._begin
+
+    @property
+    def deadline(self) -> float:
+        """When waves under way are discarded, by `time.perf_counter`."""
+        return math.inf if self._seconds is None else self._begin + GRACE * self._seconds
+
+    def wave_size(self, left: int) -> int:
+        """Return how many paths a wave may have.
+
+        Large waves cost less per path. But no worker should have much to do when the others are done,
+        with all that are `left` or when the time is up, and nobody should have to wait for one.
+        """
+        patience = max(self._least, int(PATIENCE / self._cost)) if self._cost else self._least
+        if self._seconds is not None:
+            return min(patience, self._size)
+        return min(self._largest, patience, max(self._least, int(left * SHARE / self._workers)))
+
+    def in_time(self, jobs: Iterator[Job]) -> Iterator[Job]:
+        """Pass on pieces for as long as they will be done in time.
+
+        The first sample of every pixel is always taken.
+        """
+        for job in jobs:
+            self.up = job.first_sample > 0 and self._late(job.lanes)
+            if self.up:
+                return
+            self._under_way += job.lanes
+            yield job
+
+    def note(self, job: Job, spent: float) -> None:
+        """Take note that a piece is done, and how many seconds it took its worker."""
+        self._under_way -= job.lanes
+        cost = spent / job.lanes
+        self._cost = (1 - SMOOTHING) * self._cost + SMOOTHING * cost if self._cost else cost
+        if self._seconds is None:
+            return
+        # larger waves cost less per path, smaller ones end nearer to the time
+        if spent < SHORT * self._seconds:
+            self._size = max(self._size, min(self._largest, 2 * job.lanes))
+        elif spent > LONG * self._seconds:
+            self._size = min(self._size, max(1, int(job.lanes * LONG * self._seconds / spent)))
+
+    def _late(self, lanes: int) -> bool:
+        """Tell whether `lanes` more paths after those under way would come too late."""
+        if self._seconds is None:
+            return False
+        wait = (self._under_way + lanes) * self._cost / self._workers
+        return self.elapsed + wait > self._seconds

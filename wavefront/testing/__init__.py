@@ -1,0 +1,8 @@
+"""Checks of BSDFs, lights and warps, for users and for the tests."""
+
+from .bsdf import check_bsdf
+from .light import check_light
+from .report import Check, Report
+from .warp import check_warp
+
+__all__ = ["Check", "Report", "check_bsdf", "check_light", "check_warp"]

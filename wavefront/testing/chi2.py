@@ -1,0 +1,118 @@
+"""Chi-square tests of samples against their density."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from ..vec import Floats, Ints
+from .charts import Chart, Doubles
+from .quadrature import COLUMNS, ROWS, Cells, _Integrator
+from .report import Report
+
+
+def gamma_q(a: float, x: float) -> float:
+    """Regularised upper incomplete gamma function Q(a, x).
+
+    Source: NIST DLMF 8.11.4 (series, for x < a + 1) and 8.9.2 (continued fraction, by Lentz's rule).
+    """
+    if x <= 0:
+        return 1.0
+    scale = math.exp(a * math.log(x) - x - math.lgamma(a))
+    if x < a + 1:
+        term = total = 1 / a
+        n = a
+        while term > total * 1e-16:
+            n += 1
+            term *= x / n
+            total += term
+        return 1 - scale * total
+    b = x + 1 - a
+    c, d = 1e300, 1 / b
+    fraction = d
+    for i in range(1, 10_000):
+        step = -i * (i - a)
+        b += 2
+        d = 1 / (step * d + b)
+        c = b + step / c
+        fraction *= c * d
+        if abs(c * d - 1) < 1e-15:
+            break
+    return scale * fraction
+
+
+def chi_square(observed: Ints, expected: Doubles) -> tuple[float, int, float]:
+    """χ² statistic, degrees of freedom and p-value; cells below 5 expected are pooled.
+
+    The cells must cover every outcome, so that both sums are the number of samples. If even the
+    pool expects less than 5, its count is compared with the Poisson distribution instead; there
+    10⁻⁵ of all samples are allowed for, as rounding puts some just beyond the edge of a density.
+    """
+    rare = expected < 5
+    pool, pooled = float(expected[rare].sum()), int(observed[rare].sum())
+    stray = 1.0
+    observed, expected = observed[~rare], expected[~rare]
+    if pool >= 5:
+        observed, expected = np.append(observed, pooled), np.append(expected, pool)
+    elif pooled:
+        allowed = pool + 1e-5 * (float(expected.sum()) + pool)
+        stray = 1 - gamma_q(pooled, max(allowed, 1e-300))  # P(X ≥ pooled)
+    statistic = float(((observed - expected) ** 2 / expected).sum())
+    freedom = len(expected) - 1
+    p = gamma_q(freedom / 2, statistic / 2) if freedom > 0 else 1.0
+    return statistic, max(freedom, 0), p if stray == 1 else min(1.0, 2 * min(p, stray))
+
+
+def _chi_square_p(observed: Ints, expected: Doubles, missing: int, lost: float) -> float:
+    """p-value of χ² over all cells, over rows and over columns: sums show a slope that cells hide."""
+    counts, means = observed.reshape(ROWS, COLUMNS), expected.reshape(ROWS, COLUMNS)
+    views = [(counts.ravel(), means.ravel()), (counts.sum(1), means.sum(1)), (counts.sum(0), means.sum(0))]
+    p = [chi_square(np.append(o, missing), np.append(e, lost))[2] for o, e in views]
+    return min(1.0, 3 * min(p))
+
+
+def binomial_p(count: int, trials: int, probability: float) -> float:
+    """Two-sided exact binomial p-value: twice the smaller tail, at most 1."""
+    if not 0 < probability < 1:
+        return float(count == (trials if probability >= 1 else 0))
+    k = np.arange(1, trials + 1)
+    log_choose = np.concatenate([[0.0], np.cumsum(np.log((trials + 1 - k) / k))])
+    k = np.arange(trials + 1)
+    pmf = np.exp(log_choose + k * math.log(probability) + (trials - k) * math.log1p(-probability))
+    return min(1.0, 2 * min(float(pmf[: count + 1].sum()), float(pmf[count:].sum())))
+
+
+def _compare(
+    report: Report,
+    where: str,
+    chart: Chart,
+    pilot: Floats,
+    points: Floats,
+    total: int,
+    density: Callable[[Floats], Floats],
+    alpha: float,
+    singular: float = 0.0,
+) -> None:
+    """χ² of sampled points (d, m ≤ total) against a density, and the density's integral.
+
+    `total − m` of the samples gave no point, or one of a delta lobe; the probability of the
+    latter is `singular`.
+    """
+    cells = Cells.around(chart.to_square(pilot), chart.seams)
+    on_square = chart.to_square(points)
+    guide = points[:, : 1 << 17]
+    height = density(guide).astype(np.float64)
+    integrator = _Integrator(density, chart, on_square[:, : 1 << 17], height)
+    expected, unresolved = integrator.cells(cells)
+    observed = np.bincount(cells.find(on_square), minlength=ROWS * COLUMNS)
+    integral = float(expected.sum())
+    missing = total - points.shape[1]
+    fraction = points.shape[1] / total
+    noise = math.sqrt(fraction * (1 - fraction) / total)
+    report.near("integral of pdf", where, integral, fraction, 1e-4 + 4.5 * noise + unresolved)
+    if singular > 0:
+        report.at_most("sum of probabilities", where, singular + integral, 1 + 1e-4 + unresolved)
+    lost = max(1 - integral, 0.0) * total
+    report.significant("chi-square", where, _chi_square_p(observed, expected * total, missing, lost), alpha)

@@ -1,0 +1,112 @@
+"""Checks of a light."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..lights.base import Light, LightSample
+from ..vec import Floats, f4
+from .bsdf import _chunks
+from .charts import CHARTS
+from .chi2 import _compare
+from .report import PILOT, Report
+
+
+def check_light(
+    light: Any,
+    *,
+    points: ArrayLike | None = None,
+    samples: int = 1_000_000,
+    significance: float = 1e-3,
+    seed: int = 0,
+) -> Report:
+    """Prove that a light keeps the contract of `wavefront.lights.Light`.
+
+    Parameters
+    ----------
+    light
+        A light record, of which every column (the first eight) is checked, or an object with a
+        `record(center)` that gives one.
+    points
+        (m, 3) points that are lit, scene units; five points around the origin by default. They
+        must not lie on the light itself.
+    samples, significance, seed
+        As for `check_bsdf`.
+
+    Raises
+    ------
+    AssertionError
+        Naming each failed check, the point, the value measured and the one expected.
+    """
+    record: Light = light if isinstance(light, Light) else light.record(np.zeros(3))
+    report = Report(f"check_light({type(light).__name__})")
+    default = [[0, 0, 0], [2, 1, 3], [-3, 2, -1], [0.5, -4, 1], [20, 10, -30]]
+    where = np.asarray(default if points is None else points, f4).reshape(-1, 3)
+    take = min(len(record), 8)
+    alpha = 1 - (1 - significance) ** (1 / (take * len(where)))
+    for k in range(take):
+        one = record.take(np.array([k]))
+        for number, point in enumerate(where):
+            rng = np.random.default_rng([seed, k, number])
+            name = f"light {k}, point (" + ", ".join(f"{x:.4g}" for x in point) + ")"
+            _check_light_at(report, name, one, point.reshape(3, 1), rng, samples, alpha)
+    return report.raise_if_failed()
+
+
+def _check_light_at(
+    report: Report,
+    where: str,
+    light: Light,
+    point: Floats,
+    rng: np.random.Generator,
+    samples: int,
+    alpha: float,
+) -> None:
+    def draw(n: int) -> LightSample:
+        return light.sample_li(np.repeat(point, n, 1), rng.random((2, n), f4))
+
+    def density(w: Floats) -> Floats:
+        return light.pdf_li(np.repeat(point, w.shape[1], 1), w)
+
+    points = []
+    for size in _chunks(samples):
+        drawn = draw(size)
+        _check_light_samples(report, where, light, drawn, density)
+        points.append(drawn.wi[:, drawn.pdf > 0])
+    if light.delta:
+        return
+    pilot = draw(PILOT)
+    kept = pilot.wi[:, pilot.pdf > 0]
+    joined = np.concatenate(points, axis=1)
+    _compare(report, where, CHARTS["sphere"], kept, joined, samples, density, alpha)
+
+
+def _check_light_samples(
+    report: Report, where: str, light: Light, drawn: LightSample, density: Callable[[Floats], Floats]
+) -> None:
+    for name, values in (("wi", drawn.wi), ("radiance", drawn.radiance), ("pdf", drawn.pdf)):
+        report.holds("finite", f"{where}, {name}", ~np.isfinite(values), "finite numbers")
+    report.holds("not negative", f"{where}, radiance", drawn.radiance < 0, "at least 0")
+    report.holds("not negative", f"{where}, pdf", drawn.pdf < 0, "at least 0")
+    some = drawn.pdf > 0
+    if not some.any():
+        return
+    wi = np.ascontiguousarray(drawn.wi[:, some])
+    size = np.sqrt((wi.astype(np.float64) ** 2).sum(0))
+    report.at_most("unit length", where, float(np.abs(size - 1).max()), 1e-5)
+    short = float(np.mean(~(drawn.distance[some] > 0)))
+    report.at_most("distance not above 0", where, short, 1e-3)
+    pdf, le = density(wi), light.le(wi)
+    if light.delta:
+        report.holds("delta pdf", where, drawn.pdf[some] != 1, "1")
+        report.holds("delta pdf_li, le", where, (pdf != 0) | (le != 0).any(0), "0")
+        return
+    # A sample on the very edge may just miss the light again, so a few lanes may differ.
+    ratio = np.abs(pdf - drawn.pdf[some]) > 1e-3 * drawn.pdf[some]
+    report.at_most("sample pdf ≠ pdf_li", where, float(ratio.mean()), 1e-3)
+    differs = (np.abs(le - drawn.radiance[:, some]) > 1e-4 * np.maximum(le, 1e-20)).any(0)
+    report.at_most("radiance ≠ le", where, float(differs.mean()), 1e-3)

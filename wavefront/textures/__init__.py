@@ -1,0 +1,8 @@
+"""What varies over a surface: the contract, images, vertex colors, normal and bump maps, parameters."""
+
+from .base import BaseTexture
+from .image import Texture
+from .normal_map import BaseNormalMap, BumpMap, NormalMap
+from .vertex_colors import VertexColors
+
+__all__ = ["BaseNormalMap", "BaseTexture", "BumpMap", "NormalMap", "Texture", "VertexColors"]

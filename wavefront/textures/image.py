@@ -1,0 +1,300 @@
+"""Images looked up by texture coordinates: a color or a number that varies over a surface."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..codecs.encoding import srgb_to_linear
+from ..codecs.images import read_codes
+from ..errors import SceneError, finite_array, one_of
+from ..files import check_size
+from ..state import SurfaceInteraction
+from ..suggestions import suggests_keywords
+from ..vec import Floats, Ints, f4
+from .base import BaseTexture
+
+Wrap: TypeAlias = Literal["repeat", "mirror", "clamp"]
+Channel: TypeAlias = int | Literal["luminance"]
+UV_SETS = ("uv", "uv1")  # the fields of Surface
+LUMINANCE = (f4(0.2126), f4(0.7152), f4(0.0722))  # ITU-R BT.709
+
+CHUNK = 1 << 20  # texels that are looked at together
+
+
+class Texture(BaseTexture):
+    """An image on a surface, wherever a material takes a color or a number.
+
+    The top row of the image lies at v = 1, its left column at u = 0. The value is
+    `offset` + `scale` · texel.
+
+    Parameters
+    ----------
+    source
+        A file (png, jpg, exr, hdr, npy), or an array (H, W), (H, W, C), top row first: uint8 and
+        uint16 count from 0 to 1, floats are taken as they are. An array is shared, not copied.
+    srgb
+        Decode 8- and 16-bit colors from sRGB. False for data such as roughness. Alpha is never
+        decoded, and float images are linear already.
+    wrap
+        What lies outside [0, 1]: "repeat", "mirror" or "clamp"; two of them for u and v.
+    filter
+        "bilinear" between texel centers, or "nearest".
+    transform
+        (3, 3) matrix applied to (u, v, 1) first.
+    channel
+        Which channel to use as a number, from 0, or "luminance". None gives a color: the first
+        three channels, or the first where there are one or two.
+    scale, offset
+        One number, or three for a color.
+    uv_set
+        Which texture coordinates of the mesh to use: 0 for its `uvs`, 1 for its `uvs1`.
+
+    Raises
+    ------
+    SceneError
+        If the file cannot be read, or an argument is malformed.
+    """
+
+    @suggests_keywords
+    def __init__(
+        self,
+        source: str | os.PathLike[str] | ArrayLike,
+        srgb: bool = True,
+        *,
+        wrap: Wrap | tuple[Wrap, Wrap] = "repeat",
+        filter: Literal["bilinear", "nearest"] = "bilinear",
+        transform: ArrayLike | None = None,
+        channel: Channel | None = None,
+        scale: ArrayLike = 1.0,
+        offset: ArrayLike = 0.0,
+        uv_set: Literal[0, 1] = 0,
+    ) -> None:
+        codes, self.name = _codes(source)
+        self.size = (codes.shape[1], codes.shape[0])  # (width, height)
+        self.channels = self._stride = codes.shape[2]  # of the image
+        self._texels = codes.reshape(-1)  # 8-bit images stay 8-bit: a quarter of the memory
+        self._channels = _pick(self.name, channel, self._stride)
+        self._tables = [_table(codes.dtype, srgb and not _is_alpha(c, self._stride)) for c in self._channels]
+        self.srgb = srgb and codes.dtype.kind == "u"
+        self._gray = channel == "luminance"
+        self.scalar = channel is not None
+        self.wrap = _pair(wrap)
+        self.filter = one_of("filter", filter, ("bilinear", "nearest"))
+        self.transform = None if transform is None else finite_array("transform", transform, (3, 3))
+        self.scale = _factor("scale", scale, self.scalar)
+        self.offset = _factor("offset", offset, self.scalar)
+        self.uv_set = one_of("uv_set", uv_set, (0, 1))
+        self.reads = (UV_SETS[self.uv_set],)
+
+    def __repr__(self) -> str:
+        """Name the image and its size."""
+        return f"<Texture {self.name!r}: {self.size[0]} × {self.size[1]}>"
+
+    def at(self, surface: SurfaceInteraction) -> Floats:
+        """Return the values at hit points: (3, n), or (n,) when one channel was chosen."""
+        uv: Floats | None = getattr(surface, UV_SETS[self.uv_set])
+        if uv is None:
+            raise SceneError(f"texture {self.name!r}: the surface has no texture coordinates")
+        return self.lookup(uv)
+
+    def lookup(self, uv: Floats) -> Floats:
+        """Return the values at texture coordinates (2, n): (3, n), or (n,) for one channel."""
+        x, y = self._texel_space(uv)
+        rows = self._nearest(x, y) if self.filter == "nearest" else self._bilinear(x, y)
+        return self._shaped(rows)
+
+    def gradient(self, uv: Floats) -> Floats:
+        """Return the slopes of one channel along u and v, (2, n), per unit of uv (2, n).
+
+        Differences of bilinear lookups half a texel to either side: they vary without steps.
+        """
+        x, y = self._texel_space(uv)
+        half = f4(0.5)
+        across = self._shaped(self._bilinear(x + half, y)) - self._shaped(self._bilinear(x - half, y))
+        up = self._shaped(self._bilinear(x, y - half)) - self._shaped(self._bilinear(x, y + half))
+        u, v = uv if self.transform is None else _transformed(self.transform, uv)
+        across *= _unwrapped_slope(u, self.wrap[0]) * f4(self.size[0])
+        up *= _unwrapped_slope(v, self.wrap[1]) * f4(self.size[1])
+        if self.transform is None:
+            return np.stack([across, up])
+        m = self.transform.astype(f4)
+        return np.stack([across * m[0, 0] + up * m[1, 0], across * m[0, 1] + up * m[1, 1]])
+
+    def _texel_space(self, uv: Floats) -> tuple[Floats, Floats]:
+        """Return texture coordinates (2, n) in texels from the left and from the top."""
+        u, v = uv if self.transform is None else _transformed(self.transform, uv)
+        x = _unwrapped(u, self.wrap[0]) * f4(self.size[0])
+        y = (f4(1) - _unwrapped(v, self.wrap[1])) * f4(self.size[1])
+        return x, y
+
+    def mean(self) -> Floats:
+        """Return the average over the image: (3,), or () for one channel."""
+        width, height = self.size
+        everywhere = np.arange(width * height, dtype=np.intp)
+        means = [self._decoded(everywhere, k).mean(dtype=np.float64) for k in range(len(self._channels))]
+        return self._shaped([np.array([mean], f4) for mean in means])[..., 0]
+
+    def limits(self) -> tuple[float, float]:
+        """Return the least and the greatest value of the image, scaled."""
+        ends = np.stack([self.offset, self.scale + self.offset]).astype(float)
+        if self._texels.dtype.kind == "u" and ends.min() >= 0 and ends.max() <= 1:
+            return float(ends.min()), float(ends.max())  # no need to look
+        width, height = self.size
+        low, high = np.inf, -np.inf
+        for start in range(0, width * height, CHUNK):
+            texels = np.arange(start, min(start + CHUNK, width * height), dtype=np.intp)
+            values = self._shaped([self._decoded(texels, k) for k in range(len(self._channels))])
+            low, high = min(low, float(values.min())), max(high, float(values.max()))
+        return low, high
+
+    def _shaped(self, rows: list[Floats]) -> Floats:
+        """Turn channel values (n,) into (3, n) or (n,), scaled."""
+        if self._gray and len(rows) == 3:
+            rows = [LUMINANCE[0] * rows[0] + LUMINANCE[1] * rows[1] + LUMINANCE[2] * rows[2]]
+        if self.scalar:
+            return self.scale[0, 0] * rows[0] + self.offset[0, 0]
+        out = np.empty((3, len(rows[0])), f4)
+        for k in range(3):
+            np.multiply(rows[k % len(rows)], self.scale[k, 0], out=out[k])
+            out[k] += self.offset[k, 0]
+        return out
+
+    def _nearest(self, x: Floats, y: Floats) -> list[Floats]:
+        width, height = self.size
+        column, row = np.floor(x).astype(np.intp), np.floor(y).astype(np.intp)
+        texel = np.clip(row, 0, height - 1) * width + np.clip(column, 0, width - 1)
+        return [self._decoded(texel, k) for k in range(len(self._channels))]
+
+    def _bilinear(self, x: Floats, y: Floats) -> list[Floats]:
+        left, right, fx = _neighbors(x, self.size[0], self.wrap[0])
+        top, bottom, fy = _neighbors(y, self.size[1], self.wrap[1])
+        width = self.size[0]
+        out = []
+        for k in range(len(self._channels)):
+            upper = _mix(self._decoded(top * width + left, k), self._decoded(top * width + right, k), fx)
+            lower = _mix(
+                self._decoded(bottom * width + left, k), self._decoded(bottom * width + right, k), fx
+            )
+            out.append(_mix(upper, lower, fy))
+        return out
+
+    def _decoded(self, texel: Ints, k: int) -> Floats:
+        """Gather the k-th chosen channel of texels by number, (n,)."""
+        codes = self._texels.take(texel * self._stride + self._channels[k])
+        table = self._tables[k]
+        return codes if table is None else table.take(codes)
+
+
+def _codes(source: Any) -> tuple[NDArray[Any], str]:
+    """Return texels (H, W, C) as uint8 or float32, and a name for messages."""
+    if isinstance(source, str | os.PathLike):
+        codes, name = read_codes(source), Path(source).name
+    else:
+        codes, name = np.asarray(source), "array"
+    if codes.ndim == 2:
+        codes = codes[:, :, None]
+    if codes.ndim != 3 or not 1 <= codes.shape[2] <= 4 or codes.dtype.kind not in "uifb":
+        raise SceneError(
+            f"texture {name!r} is {codes.dtype} of shape {codes.shape}; it must be (H, W, 1 to 4)"
+        )
+    check_size(codes.shape[0], codes.shape[1])
+    if codes.dtype in (np.uint8, np.uint16):
+        return np.ascontiguousarray(codes), name
+    if codes.dtype.kind in "ui":
+        raise SceneError(f"texture {name!r} is {codes.dtype}; it must be uint8, uint16 or float")
+    codes = np.ascontiguousarray(codes, np.float32)
+    bad = np.argwhere(~np.isfinite(codes))
+    if len(bad):
+        row, column, _ = bad[0]
+        raise SceneError(
+            f"texture {name!r} has {len(bad)} values that are not finite, first: row {row}, column {column}"
+        )
+    return codes, name
+
+
+def _pick(name: str, channel: Channel | None, there: int) -> tuple[int, ...]:
+    """Return which channels to gather."""
+    if channel is None or channel == "luminance":
+        return (0, 1, 2) if there >= 3 else (0,)
+    if not isinstance(channel, int) or not 0 <= channel < there:
+        raise SceneError(
+            f"channel is {channel!r}; texture {name!r} has the channels 0 to {there - 1}, and 'luminance'"
+        )
+    return (channel,)
+
+
+def _is_alpha(channel: int, there: int) -> bool:
+    return there in (2, 4) and channel == there - 1
+
+
+def _table(kind: np.dtype[Any], srgb: bool) -> Floats | None:
+    """Return the linear value of every code, None where codes are values."""
+    if kind == np.float32:
+        return None
+    steps = int(np.iinfo(kind).max)
+    values = np.arange(steps + 1, dtype=f4) / f4(steps)
+    return srgb_to_linear(values) if srgb else values
+
+
+def _factor(name: str, value: ArrayLike, scalar: bool) -> Floats:
+    """Return one number or three as a (3, 1) column."""
+    single = np.ndim(value) == 0
+    if scalar and not single:
+        raise SceneError(f"{name} is {value!r}; with a channel it must be one number")
+    array = finite_array(name, value, () if single else (3,))
+    if np.abs(array).max() > np.finfo(f4).max:
+        raise SceneError(f"{name} is {value!r}; its size must be at most {np.finfo(f4).max:.3g}")
+    return np.broadcast_to(array.astype(f4).reshape(-1, 1), (3, 1)).copy()
+
+
+def _pair(wrap: Any) -> tuple[str, str]:
+    both = (wrap, wrap) if isinstance(wrap, str) else tuple(wrap)
+    if len(both) != 2:
+        raise SceneError(f"wrap is {wrap!r}; it must be one mode, or one for u and one for v")
+    u, v = (one_of("wrap", mode, ("repeat", "mirror", "clamp")) for mode in both)
+    return u, v
+
+
+def _transformed(matrix: NDArray[np.float64], uv: Floats) -> tuple[Floats, Floats]:
+    m = matrix.astype(f4)
+    return m[0, 0] * uv[0] + m[0, 1] * uv[1] + m[0, 2], m[1, 0] * uv[0] + m[1, 1] * uv[1] + m[1, 2]
+
+
+def _unwrapped(t: Floats, wrap: str) -> Floats:
+    """Bring a coordinate into [0, 1]."""
+    if wrap == "clamp":
+        return np.clip(t, f4(0), f4(1))
+    if wrap == "repeat":
+        return t - np.floor(t)
+    return f4(1) - np.abs(f4(1) - (t - f4(2) * np.floor(t * f4(0.5))))
+
+
+def _unwrapped_slope(t: Floats, wrap: str) -> Floats:
+    """Return the derivative of `_unwrapped`."""
+    if wrap == "clamp":
+        return ((t >= 0) & (t <= 1)).astype(f4)
+    if wrap == "repeat":
+        return np.ones_like(t)
+    return np.where(t - f4(2) * np.floor(t * f4(0.5)) < f4(1), f4(1), f4(-1))
+
+
+def _neighbors(x: Floats, size: int, wrap: str) -> tuple[Ints, Ints, Floats]:
+    """Return the texels before and after x (in texels), and the part of the way between their centers."""
+    x = x - f4(0.5)
+    low = np.floor(x)
+    before = low.astype(np.intp)
+    after = before + 1
+    if wrap == "repeat":
+        before, after = before % size, after % size
+    else:  # the edge texel goes on: so it does in a mirror, too
+        before, after = np.clip(before, 0, size - 1), np.clip(after, 0, size - 1)
+    return before, after, x - low
+
+
+def _mix(a: Floats, b: Floats, t: Floats) -> Floats:
+    return a + t * (b - a)

@@ -1,0 +1,196 @@
+"""Normal maps and bump maps: images that tilt the shading normals of a surface."""
+
+from __future__ import annotations
+
+import os
+from abc import ABC, abstractmethod
+from copy import copy
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import SceneError, number
+from ..state import SurfaceInteraction
+from ..suggestions import suggests_keywords
+from ..vec import Floats, Ints, cross, dot, f4, highest, normalize
+from .image import UV_SETS, Texture
+
+
+class BaseNormalMap(ABC):
+    """Fine detail of a surface, such as a normal map. The renderer applies it; no material does."""
+
+    reads: tuple[str, ...]  # fields of `SurfaceInteraction` that `perturbed` needs
+
+    def scaled(self, factor: float) -> BaseNormalMap:
+        """Return this in a scene whose lengths were multiplied by `factor`: itself if it has none."""
+        return self
+
+    @abstractmethod
+    def perturbed(self, surface: SurfaceInteraction, normal: Floats) -> tuple[Ints, Floats]:
+        """Return which columns are tilted, (k,), and their new unit normals, (3, k).
+
+        Parameters
+        ----------
+        surface
+            The hit points, n columns.
+        normal
+            (3, n) unit shading normals there, on the front side of the surface.
+        """
+
+
+FLATTEST = f4(2**-60)  # the least cosine of a tilt: float32 can square its slope
+TextureSource: TypeAlias = str | os.PathLike[str] | ArrayLike | Texture
+# the fields of Surface that belong together
+TANGENTS = {"uv": "tangents", "uv1": "tangents1"}
+AXES = {"uv": "tangent_frame", "uv1": "tangent_frame1"}
+MAX_STRENGTH = 1e9  # of a normal map; a larger one turns every normal into the surface
+MAX_HEIGHT = float(np.finfo(f4).max)  # of a bump map, scene units
+
+
+class NormalMap(BaseNormalMap):
+    """An image of normals, for `Bsdf.with_normal_map`.
+
+    Red, green and blue from 0 to 1 are components from -1 to 1 along u, along v and along the
+    shading normal, as in glTF: green points up in the image. On a mesh with tangents of its own, those
+    say what is along u and along v. Where the image gives (0.5, 0.5, 1) the surface keeps its own normal.
+
+    Parameters
+    ----------
+    image
+        A file, an array, or a `Texture` of three channels; not decoded from sRGB.
+    strength
+        Factor of the first two components.
+
+    Raises
+    ------
+    SceneError
+        If the texture gives numbers, is decoded from sRGB or has a singular transform, or the
+        strength is not finite or of a size above 1e9.
+    """
+
+    @suggests_keywords
+    def __init__(self, image: TextureSource, strength: float = 1.0) -> None:
+        self.texture = image if isinstance(image, Texture) else Texture(image, srgb=False)
+        self.strength = f4(
+            number(
+                "NormalMap strength",
+                strength,
+                lambda x: abs(x) <= MAX_STRENGTH,
+                f"finite, and at most {MAX_STRENGTH:g}",
+            )
+        )
+        if self.texture.scalar or self.texture.channels < 3:
+            raise SceneError(f"NormalMap: {self.texture!r} gives numbers; it must give three channels")
+        _check_plain("NormalMap", self.texture)
+        uv = UV_SETS[self.texture.uv_set]
+        self.reads = (uv, AXES[uv])
+        self._turn = _inverse(self.texture)  # (2, 2) from the mesh's axes of u and v to the image's
+
+    def __repr__(self) -> str:
+        """Name the image."""
+        return f"NormalMap({self.texture!r}, strength={self.strength:g})"
+
+    def perturbed(self, surface: SurfaceInteraction, normal: Floats) -> tuple[Ints, Floats]:
+        """Return the columns whose normals the image tilts, and these normals."""
+        along_u, along_v = _tangents(surface, self.reads[1])
+        x, y, z = self.texture.at(surface) * f4(2) - f4(1)
+        x, y = x * self.strength, y * self.strength
+        lanes = np.flatnonzero(((x != 0) | (y != 0)) & (dot(along_u, along_u) > 0))
+        x, y, z, normal = x.take(lanes), y.take(lanes), z.take(lanes), normal.take(lanes, 1)
+        along_u, along_v = along_u.take(lanes, 1), along_v.take(lanes, 1)
+        if self._turn is not None:
+            m = self._turn
+            along_u, along_v = (
+                along_u * m[0, 0] + along_v * m[1, 0],
+                along_u * m[0, 1] + along_v * m[1, 1],
+            )
+        tangent = normalize(along_u - normal * dot(along_u, normal))
+        bitangent = cross(normal, tangent)
+        bitangent *= np.copysign(f4(1), dot(bitangent, along_v))  # u and v may be mirrored
+        return lanes, normalize(tangent * x + bitangent * y + normal * z)
+
+
+class BumpMap(BaseNormalMap):
+    """An image of heights, for `Bsdf.with_normal_map`.
+
+    The surface itself stays where it is; its normals tilt as if it had these heights. Source:
+    J. Blinn 1978, "Simulation of Wrinkled Surfaces", in the form of M. Mikkelsen 2010, "Bump
+    Mapping Unparametrized Surfaces on the GPU", eq. 4.
+
+    Parameters
+    ----------
+    image
+        A file, an array, or a `Texture` of one channel; not decoded from sRGB.
+    height
+        How far texel 1 stands above texel 0, scene units; negative for hollows.
+
+    Raises
+    ------
+    SceneError
+        If the texture gives colors or is decoded from sRGB, or the height is not finite or of a
+        size beyond float32.
+    """
+
+    @suggests_keywords
+    def __init__(self, image: TextureSource, height: float = 1.0) -> None:
+        self.texture = (
+            image if isinstance(image, Texture) else Texture(image, srgb=False, channel="luminance")
+        )
+        self.height = f4(
+            number(
+                "BumpMap height",
+                height,
+                lambda x: abs(x) <= MAX_HEIGHT,
+                f"finite, and at most {MAX_HEIGHT:g}",
+            )
+        )
+        if not self.texture.scalar:
+            raise SceneError(f"BumpMap: {self.texture!r} gives colors; choose one by channel=")
+        _check_plain("BumpMap", self.texture)
+        uv = UV_SETS[self.texture.uv_set]
+        self.reads = (uv, TANGENTS[uv])
+
+    def scaled(self, factor: float) -> BumpMap:
+        """Return this for a scene whose lengths were multiplied by `factor`."""
+        other = copy(self)
+        other.height = f4(self.height * factor)
+        return other
+
+    def __repr__(self) -> str:
+        """Name the image."""
+        return f"BumpMap({self.texture!r}, height={self.height:g})"
+
+    def perturbed(self, surface: SurfaceInteraction, normal: Floats) -> tuple[Ints, Floats]:
+        """Return the columns whose normals the heights tilt, and these normals."""
+        along_u, along_v = _tangents(surface, self.reads[1])
+        uv: Floats = getattr(surface, self.reads[0])
+        slope_u, slope_v = self.texture.gradient(uv) * self.height
+        area = dot(normal, cross(along_u, along_v))
+        uphill = cross(along_v, normal) * slope_u + cross(normal, along_u) * slope_v
+        sound = highest(np.abs(uphill)) * FLATTEST < np.abs(area)
+        lanes = np.flatnonzero(((slope_u != 0) | (slope_v != 0)) & sound)
+        normal, uphill = normal.take(lanes, 1), uphill.take(lanes, 1)
+        return lanes, normalize(normal - uphill / area.take(lanes))
+
+
+def _tangents(surface: SurfaceInteraction, name: str) -> tuple[Floats, Floats]:
+    """Return how the point moves with u and with v, (3, n) each."""
+    both: Floats | None = getattr(surface, name)
+    if both is None:
+        raise SceneError("relief: the surface has no tangents")
+    return both[:3], both[3:]
+
+
+def _check_plain(kind: str, texture: Texture) -> None:
+    if texture.srgb:
+        raise SceneError(f"{kind}: {texture!r} is decoded from sRGB; pass srgb=False")
+
+
+def _inverse(texture: Texture) -> Floats | None:
+    if texture.transform is None:
+        return None
+    linear = texture.transform[:2, :2]
+    if np.linalg.det(linear) == 0:
+        raise SceneError(f"NormalMap: the transform of {texture!r} is singular; it must be invertible")
+    return np.linalg.inv(linear).astype(f4)

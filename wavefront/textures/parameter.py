@@ -1,0 +1,119 @@
+"""Turn what a user passes as a material parameter into constants of fixed shape, or keep a texture.
+
+A texture of numbers serves as a gray color, and a texture of colors as a number by its luminance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import SceneError, number, rgb
+from ..state import SurfaceInteraction
+from ..vec import Floats, f4, luminance
+from .base import BaseTexture
+
+MAX_INDEX = 1e6  # of refraction, and its inverse the least: squares of squares stay within float32
+
+Color: TypeAlias = ArrayLike | BaseTexture
+Scalar: TypeAlias = float | BaseTexture
+
+
+class Gray(BaseTexture):
+    """Colors with three equal channels."""
+
+    scalar = False
+
+    def __init__(self, numbers: BaseTexture) -> None:
+        self.numbers, self.reads = numbers, numbers.reads
+
+    def __repr__(self) -> str:
+        """Name the numbers."""
+        return repr(self.numbers)
+
+    def limits(self) -> tuple[float, ...]:
+        """Return those of the numbers."""
+        return self.numbers.limits()
+
+    def at(self, surface: SurfaceInteraction) -> Floats:
+        """Return the numbers as colors, (3, n)."""
+        values = self.numbers.at(surface)
+        return np.broadcast_to(values, (3, *values.shape))
+
+
+class Luminance(BaseTexture):
+    """Numbers from colors."""
+
+    scalar = True
+
+    def __init__(self, colors: BaseTexture) -> None:
+        self.colors, self.reads = colors, colors.reads
+
+    def __repr__(self) -> str:
+        """Name the colors."""
+        return repr(self.colors)
+
+    def limits(self) -> tuple[float, ...]:
+        """Return those of the colors."""
+        return self.colors.limits()
+
+    def at(self, surface: SurfaceInteraction) -> Floats:
+        """Return the luminance of the colors, (n,)."""
+        return luminance(self.colors.at(surface))
+
+
+def check_limits(name: str, value: BaseTexture, holds: Callable[[float], bool], limit: str) -> None:
+    """Check the least and the greatest of what varies over a surface, where they are known.
+
+    Raises
+    ------
+    SceneError
+        Naming what varies, the value and the limit.
+    """
+    for extreme in value.limits():
+        if not holds(extreme):
+            hint = ""
+            if 1 < extreme <= 255:
+                hint = ". Values from 0 to 255 are passed as uint8, or divided by 255; scale= multiplies them"
+            raise SceneError(f"{name}: {value!r} has the value {extreme:g}; it must be {limit}{hint}")
+
+
+def color(name: str, value: Color, high: float = 1.0, *, above_zero: bool = False) -> Any:
+    """Return a color as (3, 1) float32 within [0, `high`], or a `BaseTexture` that gives colors."""
+    if isinstance(value, BaseTexture):
+        check_limits(
+            name, value, lambda x: 0 <= x <= high, "at least 0" if np.isinf(high) else f"in [0, {high:g}]"
+        )
+        return Gray(value) if value.scalar else value
+    result = rgb(name, value, high)
+    if above_zero and not (result > 0).all():
+        raise SceneError(f"{name} is {value!r}; it must be more than 0")
+    return result
+
+
+def scalar(
+    name: str,
+    value: Scalar,
+    holds: Callable[[float], bool] = lambda x: 0 <= x <= 1,
+    limit: str = "in [0, 1]",
+) -> Any:
+    """Return a number as (1,) float32 for which `holds` is true, or a `BaseTexture` that gives numbers."""
+    if isinstance(value, BaseTexture):
+        check_limits(name, value, holds, limit)
+        return Luminance(value) if value.scalar is False else value
+    if isinstance(value, np.ndarray) and value.shape == (1,):  # as it is kept
+        value = value[0]
+    return np.array([number(name, value, holds, limit)], f4)
+
+
+def refractive_index(name: str, value: Scalar) -> Any:
+    """Return a refractive index as (1,) float32, or a `BaseTexture` that gives numbers."""
+    return scalar(
+        name,
+        value,
+        lambda x: 1 / MAX_INDEX <= x <= MAX_INDEX,
+        f"more than 0, from {1 / MAX_INDEX:g} to {MAX_INDEX:g}",
+    )

@@ -1,0 +1,53 @@
+"""The colors that a mesh gives at its vertices, as a material parameter."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..errors import SceneError
+from ..state import SurfaceInteraction
+from ..suggestions import suggests_keywords
+from ..vec import Floats
+from .base import BaseTexture
+from .parameter import Color, color, scalar
+
+
+class VertexColors(BaseTexture):
+    """The interpolated `colors` of the mesh, wherever a material takes a color or a number.
+
+    A mesh without colors, or a sphere, counts as white and opaque.
+
+    Parameters
+    ----------
+    times
+        What the colors are multiplied with, in [0, 1]: a color, a number or a texture.
+    channel
+        Which channel to use as a number: 0 to 2 for red, green and blue, 3 for the opacity. None
+        gives a color.
+
+    Raises
+    ------
+    SceneError
+        If `times` is out of range, or the channel is none of these.
+    """
+
+    @suggests_keywords
+    def __init__(self, times: Color = 1.0, channel: int | None = None) -> None:
+        if channel not in (None, 0, 1, 2, 3):
+            raise SceneError(f"VertexColors channel is {channel!r}; it must be from 0 to 3, or None")
+        self.channel = channel
+        self.scalar = channel is not None
+        factor: Any = times
+        self.times = (scalar if self.scalar else color)("VertexColors times", factor)
+        self.reads = ("color", *(self.times.reads if isinstance(self.times, BaseTexture) else ()))
+
+    def __repr__(self) -> str:
+        """Say what is multiplied."""
+        return f"VertexColors({self.times!r}, channel={self.channel!r})"
+
+    def at(self, surface: SurfaceInteraction) -> Floats:
+        """Return the values at hit points: (3, n), or (n,) when one channel was chosen."""
+        if surface.color is None:
+            raise SceneError("VertexColors: the surface has no vertex colors")
+        values = surface.color[:3] if self.channel is None else surface.color[self.channel]
+        return values * (self.times.at(surface) if isinstance(self.times, BaseTexture) else self.times)
