@@ -46,9 +46,9 @@ def hall(size: int) -> tuple[list[wf.Mesh], wf.Camera]:
 
 def places(count: int) -> np.ndarray:
     """Return (count, 3) positions spread over the ceiling."""
-    take = int(np.ceil(np.sqrt(2 * count)))
-    rows = int(np.ceil(count / take))
-    x, z = np.meshgrid((np.arange(take) + 0.5) / take, (np.arange(rows) + 0.5) / rows)
+    columns = int(np.ceil(np.sqrt(2 * count)))
+    rows = int(np.ceil(count / columns))
+    x, z = np.meshgrid((np.arange(columns) + 0.5) / columns, (np.arange(rows) + 0.5) / rows)
     spread = np.stack([x.ravel() * 38 - 19, np.full(x.size, 5.9), z.ravel() * 18 - 9], 1)
     return spread[:count]
 

@@ -49,12 +49,12 @@ def to_mitsuba(
 
 def _joined(shapes: list[Any]) -> list[Any]:
     """Join meshes without normals of their own that have the same material and emission."""
-    broadcast: dict[Any, list[wf.Mesh]] = {}
+    groups: dict[Any, list[wf.Mesh]] = {}
     for i, shape in enumerate(shapes):
         flat = isinstance(shape, wf.Mesh) and shape.normals is None
         look = (repr(_bsdf(shape.material)), repr(shape.emission)) if flat else i
-        broadcast.setdefault(look, []).append(shape)
-    return [meshes[0] if len(meshes) == 1 else _union(meshes) for meshes in broadcast.values()]
+        groups.setdefault(look, []).append(shape)
+    return [meshes[0] if len(meshes) == 1 else _union(meshes) for meshes in groups.values()]
 
 
 def _union(meshes: list[wf.Mesh]) -> wf.Mesh:

@@ -33,7 +33,7 @@ def course_spheres(size: int = 512) -> wf.Scene:
         wall(2, +1, 75, (0.75, 0.45, 0.70)),  # behind the camera
     ]
     balls = [
-        wf.Sphere((-21, 0, -4), 10, material=wf.Diffuse((0.9, 0.6, 0.2)), name="view_independent"),
+        wf.Sphere((-21, 0, -4), 10, material=wf.Diffuse((0.9, 0.6, 0.2)), name="matte"),
         wf.Sphere((0, 0, -18), 10, material=wf.Mirror(0.95), name="mirror"),
         wf.Sphere((20, 0, -4), 10, material=wf.Dielectric(1.5), name="glass"),
     ]

@@ -37,7 +37,7 @@ def courtyard(size: int) -> wf.Scene:
         wf.Rectangle(
             (-1, 0, -1), (0, 0.8, 0), (0, 0, 0.5), material=white, emission=(8, 5.6, 2.8), name="panel"
         ),
-        wf.Sphere((-0.25, 0.3, -0.1), 0.3, material=wf.Diffuse((0.8, 0.35, 0.25)), name="view_independent"),
+        wf.Sphere((-0.25, 0.3, -0.1), 0.3, material=wf.Diffuse((0.8, 0.35, 0.25)), name="matte"),
         wf.Sphere((0.45, 0.35, -0.5), 0.35, material=wf.Mirror(0.9), name="mirror"),
     ]
     camera = wf.Camera.look_at((0.1, 0.95, 3.1), (0, 0.65, -0.3), fov=36, size=(size, size))

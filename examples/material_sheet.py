@@ -21,10 +21,10 @@ CLAY, SKY, WINE = (0.75, 0.33, 0.2), (0.16, 0.4, 0.68), (0.45, 0.05, 0.09)
 
 def rows() -> list[list[wf.Bsdf]]:
     """Return nine materials for each step, three of a kind side by side."""
-    return [view_independent(), metal(), glass(), coated(), blended(), textured()]
+    return [diffuse(), metal(), glass(), coated(), blended(), textured()]
 
 
-def view_independent() -> list[wf.Bsdf]:
+def diffuse() -> list[wf.Bsdf]:
     """Return three colors of `Diffuse`, and clay ever rougher, without and with light between its facets."""
     sigmas = (0.3, 0.6, 1.0)
     rough = [wf.OrenNayar(CLAY, sigma) for sigma in sigmas]
@@ -94,9 +94,9 @@ def number(values: np.ndarray) -> wf.Texture:
 
 def normals(heights: np.ndarray, height: float) -> np.ndarray:
     """Return the normal map (H, W, 3) of heights on a ball: texel 1 stands `height` above texel 0."""
-    rows, take = heights.shape
+    rows, columns = heights.shape
     per_turn, per_half_turn = 2 * np.pi * RADIUS, np.pi * RADIUS
-    along_u = (np.roll(heights, -1, 1) - np.roll(heights, 1, 1)) * (height * take / 2 / per_turn)
+    along_u = (np.roll(heights, -1, 1) - np.roll(heights, 1, 1)) * (height * columns / 2 / per_turn)
     along_v = -np.gradient(heights, axis=0) * (height * rows / per_half_turn)  # v runs up, rows run down
     normal = np.stack([-along_u, -along_v, np.ones_like(heights)], 2)
     return 0.5 + 0.5 * normal / np.linalg.norm(normal, axis=2, keepdims=True)

@@ -198,8 +198,8 @@ def test_sigma_0_is_diffuse():
     wi = upper_hemisphere(50)
     wo = np.repeat(toward(0.3), wi.shape[1], 1)
     for preserving in (False, True):
-        view_independent = OrenNayar(0.7, 0.0, energy_preserving=preserving)
-        assert view_independent.f(wo, wi) == pytest.approx(Diffuse(0.7).f(wo, wi), rel=1e-5)
+        lambertian = OrenNayar(0.7, 0.0, energy_preserving=preserving)
+        assert lambertian.f(wo, wi) == pytest.approx(Diffuse(0.7).f(wo, wi), rel=1e-5)
 
 
 def test_thin_sheet_reflects_the_series_of_its_faces():

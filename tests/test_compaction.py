@@ -119,7 +119,7 @@ def test_compact_keeps_paths_and_hits_together(materials: tuple[wf.Bsdf, ...], n
     kept_paths, kept_hits = stage.compact(scene, paths, hits, hits.found)
     assert sorted(kept_paths.slot) == hits.found.tolist()
     expected = paths.take(kept_paths.slot)
-    spent = {name: getattr(expected, name) for name in ("exclude_prim", "pdf", "vertex")}
+    spent = {name: getattr(expected, name) for name in ("exclude_prim", "pdf", "prev_vertex")}
     assert same(replace(kept_paths, **spent), expected)
     assert same(kept_hits, hits.take(kept_paths.slot))
     group = scene.materials.group_of.take(scene.material_of.take(kept_hits.prim))
@@ -199,7 +199,7 @@ def test_found_are_the_lanes_that_hit() -> None:
     assert hits.found.tolist() == [0, 2]
 
 
-def alive(throughput: float, eta_scale: float, n: int) -> Paths:
+def carrying(throughput: float, eta_scale: float, n: int) -> Paths:
     """Paths of n different addresses, all alike."""
     paths = record(Paths, n)
     paths.pixel, paths.sample = np.arange(n, dtype=np.uint32), np.zeros(n, np.uint32)
@@ -216,7 +216,7 @@ def survivors(paths: Paths, bounce: int = stage.ROULETTE_AFTER, branches: int = 
 def test_roulette_keeps_the_mean(throughput: float) -> None:
     """A weak path survives with twice its throughput as its chance, and then carries more by as much."""
     n = 1 << 16
-    left, chance = survivors(alive(throughput, 1, n)), throughput / float(stage.SURE)
+    left, chance = survivors(carrying(throughput, 1, n)), throughput / float(stage.SURE)
     assert len(left) / n == pytest.approx(chance, abs=4 * np.sqrt(chance * (1 - chance) / n))
     assert left.throughput == pytest.approx(throughput / chance, rel=1e-6)
 
@@ -224,7 +224,7 @@ def test_roulette_keeps_the_mean(throughput: float) -> None:
 @pytest.mark.parametrize("throughput", [0.5, 1.0, 3.0])
 def test_roulette_spares_the_strong(throughput: float) -> None:
     """A path that carries half or more goes on as it is; the bounces are bounded all the same."""
-    left = survivors(alive(throughput, 1, 1 << 12))
+    left = survivors(carrying(throughput, 1, 1 << 12))
     assert len(left) == 1 << 12
     assert left.throughput == pytest.approx(throughput, rel=1e-6)
 
@@ -233,15 +233,15 @@ def test_roulette_spares_the_strong(throughput: float) -> None:
 def test_roulette_spares_branches(branches: int) -> None:
     """One of several branches carries less, and that is no reason to end it."""
     n = 1 << 14
-    assert len(survivors(alive(0.5 / branches, 1, n), branches=branches)) == n
-    left = survivors(alive(0.25 / branches, 1, n), branches=branches)
+    assert len(survivors(carrying(0.5 / branches, 1, n), branches=branches)) == n
+    left = survivors(carrying(0.25 / branches, 1, n), branches=branches)
     assert len(left) / n == pytest.approx(0.5, abs=0.02)
     assert left.throughput == pytest.approx(0.5 / branches, rel=1e-6)
 
 
 def test_roulette_waits() -> None:
     """In the first bounces only paths that carry nothing end."""
-    paths = alive(0.01, 1, 100)
+    paths = carrying(0.01, 1, 100)
     paths.throughput[:, ::2] = 0
     left = survivors(paths, stage.ROULETTE_AFTER - 1)
     assert left.pixel.tolist() == list(range(1, 100, 2))
@@ -251,7 +251,7 @@ def test_roulette_waits() -> None:
 
 def test_roulette_looks_through_refraction() -> None:
     """Radiance that glass has compressed by η² is no reason to end a path."""
-    left = survivors(alive(0.25 / 2.25, 2.25, 1 << 14))  # of 0.25: a chance of a half
+    left = survivors(carrying(0.25 / 2.25, 2.25, 1 << 14))  # of 0.25: a chance of a half
     assert len(left) / (1 << 14) == pytest.approx(0.5, abs=0.02)
 
 

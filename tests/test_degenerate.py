@@ -51,12 +51,12 @@ def test_texture_coordinates_that_span_hardly_any_area(material, normals, axes):
 @pytest.mark.parametrize("normal_map", [NORMALS, BUMPS], ids=["normals", "heights"])
 def test_a_relief_without_tangents_tilts_nothing(normal_map):
     """Bit by bit: where coordinates span too little to say what is along them, there is no tilt."""
-    view_independent = wf.Diffuse(0.5)
+    matte = wf.Diffuse(0.5)
     camera = wf.Camera.look_at((0.6, 0.7, 2), (0.5, 0.5, 0), size=(12, 12))
     for tiny in (1e-42, 1e-200, 0.0):
         plain, carved = (
             render(wf.Scene(quad(m, uvs=PLACES[:, :2] * [tiny, 1]), [wf.Environment(1.0)], camera), 4).rgb
-            for m in (view_independent, view_independent.with_normal_map(normal_map))
+            for m in (matte, matte.with_normal_map(normal_map))
         )
         assert np.array_equal(plain, carved)
 

@@ -212,13 +212,13 @@ def test_both_sides_are_seen() -> None:
 @pytest.mark.parametrize("integrator", ["naive", "full"])
 def test_a_lamp_lights_on_both_sides(integrator: str, shape: str) -> None:
     """A floor that it faces, and one that it looks away from, with the same closed form."""
-    textured_emission = texture(np.ones((2, 2))) if shape == "texture" else 1.0
+    emission = texture(np.ones((2, 2))) if shape == "texture" else 1.0
     up = wf.Rectangle(
         (LOW[0], Y, LOW[1]),
         (0, 0, 1.1),
         (1.1, 0, 0),
         material=BLACK,
-        emission=textured_emission,
+        emission=emission,
         two_sided=True,
     )
     if shape == "triangles":

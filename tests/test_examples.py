@@ -100,8 +100,8 @@ def test_cornell_box_has_its_colors_where_they_belong():
 def test_course_spheres_show_matte_mirror_and_glass():
     rgb = wf.render(load("course_spheres").course_spheres(48), 32, progress=False).rgb
     height, width, _ = rgb.shape
-    view_independent = rgb[27:31, 7:11].mean((0, 1))
-    assert view_independent[0] > 1.5 * view_independent[2]  # orange
+    diffuse = rgb[27:31, 7:11].mean((0, 1))
+    assert diffuse[0] > 1.5 * diffuse[2]  # orange
     assert (rgb.reshape(-1, 3).min(0) >= 0).all()
     assert (rgb[: height // 8].mean(), rgb[-height // 8 :].mean()) > (0.05, 0.05)  # ceiling and floor
     assert rgb[height // 3, 1, 0] > rgb[height // 3, 1, 2]  # red wall on the left

@@ -49,12 +49,12 @@ def test_three_sides_of_a_cube_can_be_told_apart_and_from_the_background() -> No
     scene = wf.Scene([cube()])
     scene.camera = scene.framing_camera(size=(64, 64))
     picture = render(scene).mean(2)
-    front, right, top, behind = (picture[rows, take].mean() for rows, take in CUBE_PARTS)
+    front, right, top, behind = (picture[rows, columns].mean() for rows, columns in CUBE_PARTS)
     assert top > 1.15 * front
     assert front > 1.5 * right
     assert right > 1.5 * behind
     even = render(scene, lighting="even").mean(2)
-    assert np.ptp([even[rows, take].mean() for rows, take in CUBE_PARTS[:3]]) < 0.02
+    assert np.ptp([even[rows, columns].mean() for rows, columns in CUBE_PARTS[:3]]) < 0.02
 
 
 @pytest.mark.parametrize("albedo", [0.02, 0.5, 0.8])
@@ -204,9 +204,9 @@ def test_the_light_stays_where_it_is_while_a_camera_goes_around() -> None:
 
 def test_up_turns_the_light() -> None:
     directions = around(100)
-    ensure_valid_reflection = arriving(wf.studio(), directions)
+    upright = arriving(wf.studio(), directions)
     turned = arriving(wf.studio(up=(0, 0, 2)), Z_UP @ directions)
-    np.testing.assert_allclose(turned, ensure_valid_reflection, atol=1e-4)
+    np.testing.assert_allclose(turned, upright, atol=1e-4)
 
 
 def test_a_z_up_mesh_looks_as_the_same_mesh_with_y_up() -> None:
@@ -214,11 +214,11 @@ def test_a_z_up_mesh_looks_as_the_same_mesh_with_y_up() -> None:
     y_up = cube()
     z_up = wf.Mesh(y_up.vertices @ Z_UP.T, y_up.faces)
     for ground in (False, True):
-        ensure_valid_reflection, turned = (
+        upright, turned = (
             wf.render(mesh, 64, size=(32, 32), up=up, ground=ground, progress=False).rgb
             for mesh, up in ((y_up, "y"), (z_up, "z"))
         )
-        assert np.abs(ensure_valid_reflection - turned).mean() < 0.01
+        assert np.abs(upright - turned).mean() < 0.01
 
 
 @pytest.mark.parametrize("origin", [(3, 1, 0), (0, 2, -5), (0, 5, 0.0)])

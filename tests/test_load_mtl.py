@@ -229,8 +229,8 @@ def test_images_that_trimesh_leaves_out_are_named(one, tmp_path, monkeypatch, li
 
 def test_roughness_0_is_kept_and_absent_roughness_is_matte(given):
     assert given("Pr 0")["roughness"] == 0
-    view_independent = given("Ps 0.5")
-    assert (view_independent["roughness"], view_independent["specular"]) == (1, 0)
+    matte = given("Ps 0.5")
+    assert (matte["roughness"], matte["specular"]) == (1, 0)
 
 
 @pytest.mark.parametrize("illum", [(), ("illum 2",)])

@@ -150,15 +150,19 @@ def test_halves_are_told_apart_unless_they_look_alike() -> None:
     triangles = trapezoids(12, 5)
     rays = *random_rays(2000, 6), nothing(2000)
     both = make_accelerator(geometry(triangles), "numpy").closest(*rays)
-    broadcast = np.zeros(24, bool)
-    broadcast[[0, 1, 2, 8, 9, 22]] = True  # four quadrilaterals, and what lies between two of them
-    some = make_accelerator(replace(geometry(triangles), broadcast=broadcast), "numpy").closest(*rays)
+    interchangeable = np.zeros(24, bool)
+    interchangeable[[0, 1, 2, 8, 9, 22]] = True  # four quadrilaterals, and what lies between two of them
+    some = make_accelerator(replace(geometry(triangles), interchangeable=interchangeable), "numpy").closest(
+        *rays
+    )
     one = np.isin(both.prim, [1, 3, 9, 23])
     assert one.sum() > 20
     assert (both.prim % 2 == 1)[~one].sum() > 20
     np.testing.assert_array_equal(some.prim, both.prim - one)
-    broadcast[:] = True
-    every = make_accelerator(replace(geometry(triangles), broadcast=broadcast), "numpy").closest(*rays)
+    interchangeable[:] = True
+    every = make_accelerator(replace(geometry(triangles), interchangeable=interchangeable), "numpy").closest(
+        *rays
+    )
     np.testing.assert_array_equal(every.prim, np.where(both.prim < 0, -1, both.prim // 2 * 2))
     np.testing.assert_array_equal(some.t, both.t)
     np.testing.assert_array_equal(every.t, both.t)
@@ -173,7 +177,7 @@ def alike_in(scene: wf.Scene) -> list[bool] | None:
         return make_accelerator(given, "numpy")
 
     compile_scene(scene, build)
-    return None if seen[0].broadcast is None else seen[0].broadcast.tolist()
+    return None if seen[0].interchangeable is None else seen[0].interchangeable.tolist()
 
 
 def test_triangles_look_alike_by_material_and_light_where_nothing_varies() -> None:
@@ -183,8 +187,8 @@ def test_triangles_look_alike_by_material_and_light_where_nothing_varies() -> No
     kite = SQUARE * (1, 1, 1) + [(0, 0, 1), (0, 0, 1), (1, 1, 1), (0, 0, 1)], square[1]
     floor, wall = wf.Mesh(*square, material=gray), wf.Mesh(*kite, material=dark)
     lamp = wf.Rectangle((0, 0, 2), (1, 0, 0), (0, 1, 0), emission=1)
-    textured_emission = wf.Mesh(kite[0] + (0, 0, 3), square[1], emission=1)
-    assert alike_in(wf.Scene([floor, wall, lamp, textured_emission])) == [True, False] * 3 + [False, False]
+    uneven = wf.Mesh(kite[0] + (0, 0, 3), square[1], emission=1)
+    assert alike_in(wf.Scene([floor, wall, lamp, uneven])) == [True, False] * 3 + [False, False]
     assert alike_in(wf.Scene([floor, wf.Mesh(*kite, material=gray), lamp]))[:4] == [True] * 3 + [False]
     smooth = wf.Mesh(*square, normals=np.tile((0.0, 0, 1), (4, 1)), material=gray)
     assert alike_in(wf.Scene([smooth, wall, lamp])) is None

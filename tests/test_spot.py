@@ -76,8 +76,8 @@ def test_power_is_the_integral_of_the_intensity(angle: float, blend: float) -> N
     theta = np.radians(angle / 2) * (np.arange(n) + 0.5) / n
     points = 2 * np.stack([np.sin(theta), -np.cos(theta), 0 * theta]).astype(f4)
     sample = light.record(ORIGIN).sample_li(points, np.zeros((2, n), f4))
-    exclude_prim = sample.radiance.mean(0, dtype=float) * sample.pdf * 4
-    power = (exclude_prim * np.sin(theta)).mean() * 2 * np.pi * np.radians(angle / 2)
+    intensity = sample.radiance.mean(0, dtype=float) * sample.pdf * 4
+    power = (intensity * np.sin(theta)).mean() * 2 * np.pi * np.radians(angle / 2)
     assert light.record(ORIGIN).power(1.0) == pytest.approx(power, rel=2e-3)
 
 
@@ -91,8 +91,8 @@ def test_no_place_is_thought_darker_than_it_is(angle: float, blend: float, seed:
     points = center + radius * offsets / np.maximum(np.linalg.norm(offsets, axis=0), 1)
     sample = light.sample_li(points.astype(f4), np.zeros((2, 200), f4))
     d = np.maximum(np.linalg.norm(points, axis=0), np.linalg.norm(center) + 1e-9)  # as from the middle
-    exclude_prim = sample.radiance[0] * sample.pdf * sample.distance**2
-    assert (exclude_prim / d**2 <= light.irradiance(center, radius, 9.0)[0, 0] * (1 + 1e-3) + 1e-6).all() or (
+    intensity = sample.radiance[0] * sample.pdf * sample.distance**2
+    assert (intensity / d**2 <= light.irradiance(center, radius, 9.0)[0, 0] * (1 + 1e-3) + 1e-6).all() or (
         np.linalg.norm(center) < radius
     )
 

@@ -114,8 +114,8 @@ class Film:
         counts = self.count[span]
         error = np.full((3, counts.size), np.nan)
         for count in _distinct(counts[counts > 1]):
-            broadcast = counts == count
-            lanes = ALL if broadcast.all() else np.flatnonzero(broadcast)
+            same = counts == count
+            lanes = ALL if same.all() else np.flatnonzero(same)
             size = batch_size(count)
             used = count // size
             batch_means = take(self.batches[:used, :, span], lanes) / np.float64(size)

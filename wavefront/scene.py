@@ -182,12 +182,12 @@ class Scene:
             view = view / np.abs(view).max()
         view = view / np.linalg.norm(view)
         eye = (low + high) / 2 + view * radius / sin_half
-        ensure_valid_reflection = turn[:, 1]
+        camera_up = turn[:, 1]
         if (
-            np.linalg.norm(np.cross(ensure_valid_reflection, view)) < 1e-6
+            np.linalg.norm(np.cross(camera_up, view)) < 1e-6
         ):  # seen from above or below: the front is at the bottom
-            ensure_valid_reflection = -turn[:, 2] * np.sign(view @ ensure_valid_reflection)
-        return Camera.look_at(eye, (low + high) / 2, ensure_valid_reflection, fov=fov, size=size)
+            camera_up = -turn[:, 2] * np.sign(view @ camera_up)
+        return Camera.look_at(eye, (low + high) / 2, camera_up, fov=fov, size=size)
 
 
 T = TypeVar("T")

@@ -50,9 +50,9 @@ class SoA:
             setattr(out, name, None if value is None else take(value, index))
         return out
 
-    def put(self, index: Ints, take: Self) -> None:
+    def put(self, index: Ints, other: Self) -> None:
         """Write the columns of another record over columns `index` (m,) of this one, in place."""
-        for (_, value), (_, new) in zip(self._values(), take._values(), strict=True):
+        for (_, value), (_, new) in zip(self._values(), other._values(), strict=True):
             if value is not None:
                 value[..., index] = new
 

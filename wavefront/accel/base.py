@@ -21,7 +21,7 @@ class Geometry:
     weights: bool = True  # whether barycentric weights are needed; without them b1 and b2 are 0
     # (m,) whether a triangle and the next look the same all over, so that a hit of a flat quadrilateral of
     # both may name either; without it none do
-    broadcast: Bools | None = None
+    interchangeable: Bools | None = None
 
 
 @record

@@ -68,9 +68,8 @@ class BruteForceTriangles:
         # The last column of these is for no primitive, -1.
         self._partner = np.full(primitives + 1, -1)
         self._partner[first] = first + 1
-        differ = (
-            np.ones(first.size, np.bool_) if geometry.broadcast is None else ~geometry.broadcast.take(first)
-        )
+        same = geometry.interchangeable
+        differ = np.ones(first.size, np.bool_) if same is None else ~same.take(first)
         self._diagonal: Floats | None = None
         if differ.any():
             self._diagonal = np.zeros((4, primitives + 1), f4)

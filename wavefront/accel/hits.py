@@ -111,10 +111,10 @@ class Candidates:
         self.parts: list[tuple[NDArray[Any], ...]] = []
         self.count = 0
 
-    def add(self, *take: NDArray[Any]) -> None:
+    def add(self, *columns: NDArray[Any]) -> None:
         """Add candidates, arrays of (k,) each."""
-        self.parts.append(take)
-        self.count += take[0].size
+        self.parts.append(columns)
+        self.count += columns[0].size
         if self.count >= DECIDE:
             self.flush()
 

@@ -132,13 +132,13 @@ class _Spheres:
                 self._decide(lanes, found, slot, lane + at)
             return
         tree = self.tree
-        take = np.full((lanes.count + 1, 12), np.nan, f4)
-        take[:-1, :11] = features.T
+        columns = np.full((lanes.count + 1, 12), np.nan, f4)
+        columns[:-1, :11] = features.T
 
         def visit(leaf: Ints, lane: Ints) -> None:
             size = tree.leaf_size
             leaves, block_lanes = blocks(leaf, lane, lanes.count)
-            rays = take.take(block_lanes, 0).reshape(-1, BLOCK, 12)[:, :, :11].transpose(0, 2, 1)
+            rays = columns.take(block_lanes, 0).reshape(-1, BLOCK, 12)[:, :, :11].transpose(0, 2, 1)
             step = max(1, CHUNK // (size * BLOCK))
             for start in range(0, leaves.size, step):
                 chosen = leaves[start : start + step]

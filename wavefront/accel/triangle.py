@@ -87,7 +87,7 @@ class Sides(NamedTuple):
     """Planes of flat polygons (m), to tell on which side points are, with a bound for rounding."""
 
     plane: Doubles  # (4, m) unit normal, and the offset: on the plane, their product with (p, 1) is 0
-    textured_emission: Doubles  # (m,) by how much the corners may be off the plane
+    deviation: Doubles  # (m,) by how much the corners may be off the plane
 
     def rows(self, start: Floats, end: Floats) -> tuple[Floats, Floats]:
         """Return rows (m, 4) each for points where rays start and end, (4, n): o - center and 1.
@@ -101,8 +101,8 @@ class Sides(NamedTuple):
         # In half ulps: rounding of the point 1, of the plane 1, of the sum of four terms 4. An end is the
         # sum of a start and a product of at most near + far, so 2 near + 2 far in place of 1; and a float32 t
         # is off by as much as another such product.
-        at_start = ROUNDOFF * (normal @ (6 * near) + 6 * offset) + self.textured_emission
-        at_end = ROUNDOFF * (normal @ (4 * near + 8 * far) + 6 * offset) + self.textured_emission
+        at_start = ROUNDOFF * (normal @ (6 * near) + 6 * offset) + self.deviation
+        at_end = ROUNDOFF * (normal @ (4 * near + 8 * far) + 6 * offset) + self.deviation
         return (self.plane / at_start).T.astype(f4), (self.plane / at_end).T.astype(f4)
 
 
@@ -114,7 +114,7 @@ def sides(table: TriangleTable, prim: Ints, corners: Floats, center: Floats) -> 
     plane = table.plane.take(prim, 1)
     plane[3] = (plane[:3] * center[:, None]).sum(0) - plane[3]
     plane /= np.sqrt((plane[:3] * plane[:3]).sum(0))
-    return Sides(plane, np.zeros(prim.size) + _unevenness(corners.astype(np.float64) - center))
+    return Sides(plane, np.zeros(prim.size) + _deviation_from_plane(corners.astype(np.float64) - center))
 
 
 def side_rows(corners: Floats, center: Floats, radius: float) -> Floats:
@@ -132,7 +132,7 @@ def side_rows(corners: Floats, center: Floats, radius: float) -> Floats:
     edge_error, edge_scale = _edge_error(corner, radius)
     area2 = _twice_area(corner)
     # 60 roundings: of a sum of four terms, and of p where it is a point along a ray.
-    error = ROUNDOFF * 60 * radius * size + _unevenness(corner) * size
+    error = ROUNDOFF * 60 * radius * size + _deviation_from_plane(corner) * size
     slack = error * (area2 + edge_error) + edge_error * (6 * radius * size + error)
     with np.errstate(all="ignore"):
         return (rows / (slack * edge_scale)[:, None]).astype(f4)
@@ -145,7 +145,7 @@ def _edge_error(corner: Doubles, radius: float) -> tuple[Doubles, Doubles]:
     span = np.linalg.norm(following - corner, axis=2)
     # By Wilkinson's bounds on six-term sums, with (o - center) rounded at a distance up to 2 radius.
     error = ROUNDOFF * (12 * np.linalg.norm(moment, axis=2) + 40 * radius * span).max(0)
-    error += _unevenness(corner) * span.sum(0)
+    error += _deviation_from_plane(corner) * span.sum(0)
     area2 = _twice_area(corner)
     with np.errstate(all="ignore"):
         return error, 1 / np.sqrt(error * (area2 + 3 * error))
@@ -157,7 +157,7 @@ def _twice_area(corner: Doubles) -> Doubles:
     return np.linalg.norm(np.cross(corner[2] - corner[0], across), axis=1)
 
 
-def _unevenness(corner: Doubles) -> Doubles | float:
+def _deviation_from_plane(corner: Doubles) -> Doubles | float:
     """How far a corner of a quadrilateral may be from the plane of the others; 0 for triangles."""
     if len(corner) == 3:
         return 0.0

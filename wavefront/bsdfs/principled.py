@@ -33,7 +33,7 @@ class Chances(NamedTuple):
     gloss: Floats  # reflection in the surface's microfacets
     glass: Floats  # reflection or refraction in them, by Fresnel
     coat: Floats  # reflection in the clear coat
-    view_independent: Floats  # cosine-weighted
+    diffuse: Floats  # cosine-weighted
 
 
 class Principled(Bsdf):
@@ -218,9 +218,9 @@ class Principled(Bsdf):
         gloss = self._dielectric(weight)
         metal = self.base_color + (f4(1) - self.base_color) * weight
         below = self._under_gloss(wo, wi) if self.conserve_energy else f4(1) - gloss.max(0)
-        view_independent = opaque * below * np.where(wi[2] > 0, INV_PI, f4(0))
-        f = (metal * self.metallic + gloss * opaque) * value + self.base_color * view_independent
-        pdf = chances.gloss * density + chances.view_independent * cosine_hemisphere_pdf(wi)
+        diffuse = opaque * below * np.where(wi[2] > 0, INV_PI, f4(0))
+        f = (metal * self.metallic + gloss * opaque) * value + self.base_color * diffuse
+        pdf = chances.gloss * density + chances.diffuse * cosine_hemisphere_pdf(wi)
         if not self.transmissive:
             return f, pdf
         clear = (f4(1) - self.metallic) * self.transmission
@@ -304,16 +304,16 @@ class Principled(Bsdf):
         metal = luminance(self.base_color + (f4(1) - self.base_color) * weight)
         floor = f4(0.1)  # at grazing reflections Fresnel is far higher than at wo
         gloss = self.metallic * (metal + floor) + opaque * (seen + floor * (self.specular_weight > 0))
-        view_independent = opaque * (luminance(self.base_color) + (self.base_color > 0).any(0) * f4(0.01))
+        diffuse = opaque * (luminance(self.base_color) + (self.base_color > 0).any(0) * f4(0.01))
         glass = (f4(1) - self.metallic) * self.transmission
         if self._cloth:
-            view_independent = view_independent + self.sheen * self.sheen_color.max(0) * (f4(0.2) + weight)
+            diffuse = diffuse + self.sheen * self.sheen_color.max(0) * (f4(0.2) + weight)
         coat = self.clearcoat * (floor + _schlick(COAT_F0, wo[2])) if self._coated else f4(0)
-        total = gloss + glass + coat + view_independent
+        total = gloss + glass + coat + diffuse
         share = f4(1) / np.where(total > 0, total, f4(1))
         full = np.broadcast_to
         shape = wo[2].shape
-        return Chances(*(full(part * share, shape) for part in (gloss, glass, coat, view_independent)))
+        return Chances(*(full(part * share, shape) for part in (gloss, glass, coat, diffuse)))
 
 
 def _used(parameter: Any) -> bool:

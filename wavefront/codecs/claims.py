@@ -45,7 +45,7 @@ def _check_png(data: bytes) -> None:
     width, height = int.from_bytes(header[:4], "big"), int.from_bytes(header[4:8], "big")
     check_size(height, width)
     bits, interlaced = header[8] * PNG_CHANNELS[header[9]], header[12] == 1
-    need = sum(rows * (1 + (take * bits + 7) // 8) for take, rows in _passes(width, height, interlaced))
+    need = sum(rows * (1 + (columns * bits + 7) // 8) for columns, rows in _passes(width, height, interlaced))
     there = _inflated(_png_data(data), need)
     if there < need:
         raise SceneError(f"ends early: {width} × {height} pixels take {need} bytes; {there} are there")
@@ -54,9 +54,9 @@ def _check_png(data: bytes) -> None:
 def _passes(width: int, height: int, interlaced: bool) -> Iterator[tuple[int, int]]:
     """Yield the (columns, rows) of the pictures that a png is stored as."""
     for x, y, dx, dy in ADAM7 if interlaced else ((0, 0, 1, 1),):
-        take, rows = -(-(width - x) // dx), -(-(height - y) // dy)
-        if take > 0 and rows > 0:
-            yield take, rows
+        columns, rows = -(-(width - x) // dx), -(-(height - y) // dy)
+        if columns > 0 and rows > 0:
+            yield columns, rows
 
 
 def _png_data(data: bytes) -> Iterator[memoryview]:

@@ -54,12 +54,12 @@ def _gather_lights(
 
     area_lights = _area_lights(meshes, corners)
     for kind in AREA_LIGHTS:
-        broadcast = [(faces, record) for faces, record in area_lights if type(record) is kind]
+        members = [(faces, record) for faces, record in area_lights if type(record) is kind]
         number = count
-        for faces, _ in broadcast:
+        for faces, _ in members:
             light_of[faces] = number + np.arange(faces.shape[1])
             number += faces.shape[1]
-        add(kind, [record for _, record in broadcast])
+        add(kind, [record for _, record in members])
     for sphere in spheres:
         if isinstance(sphere.emission, BaseTexture):
             raise SceneError(

@@ -141,8 +141,8 @@ def compile_scene(
     light_of = np.append(light_of, environment)
     weights = bool(attributes) or smooth
     normals = _face_normals(triangles)
-    broadcast = None if weights else _alike(material_of[:once], light_of[:once])
-    geometry = Geometry(triangles32[:once], np.ascontiguousarray(centers), radii, weights, broadcast)
+    interchangeable = None if weights else _alike(material_of[:once], light_of[:once])
+    geometry = Geometry(triangles32[:once], np.ascontiguousarray(centers), radii, weights, interchangeable)
     accelerator, table = make_accelerator(geometry), None
     if shared:
         placements, table = place(instances, shared, center, once, len(spheres), replaced)

@@ -81,9 +81,9 @@ def _upright(coordinates: Table | None) -> Table | None:
     if coordinates is None:
         return None
     with np.errstate(invalid="ignore"):
-        ensure_valid_reflection = coordinates.astype(np.float32)
-        ensure_valid_reflection[:, 1] = 1 - ensure_valid_reflection[:, 1]
-    return wide(ensure_valid_reflection)
+        flipped = coordinates.astype(np.float32)
+        flipped[:, 1] = 1 - flipped[:, 1]
+    return wide(flipped)
 
 
 def attribute(

@@ -75,8 +75,8 @@ class Light(SoA, ABC):
         (c, k) irradiance, the mean of the channels. Here: that of a light which shines on the whole
         scene alike.
         """
-        broadcast = self.power(scene_radius) / (4 * np.pi * max(scene_radius, 1e-30) ** 2)
-        return np.broadcast_to(broadcast, (center.shape[1], len(broadcast)))
+        irradiance = self.power(scene_radius) / (4 * np.pi * max(scene_radius, 1e-30) ** 2)
+        return np.broadcast_to(irradiance, (center.shape[1], len(irradiance)))
 
 
 def position(name: str, value: ArrayLike) -> NDArray[np.float64]:

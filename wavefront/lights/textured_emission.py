@@ -98,9 +98,9 @@ def _reads(emission: Floats | BaseTexture, opacity: Opacity | None) -> set[str]:
 def _middles(steps: int) -> tuple[Floats, Floats]:
     """Barycentric weights (steps²,) each of the middles of the parts of a triangle."""
     i, j = np.indices((steps, steps)).reshape(2, -1)
-    ensure_valid_reflection, turned = i + j < steps, i + j < steps - 1
-    b1 = np.concatenate([i[ensure_valid_reflection] + 1 / 3, i[turned] + 2 / 3]) / steps
-    b2 = np.concatenate([j[ensure_valid_reflection] + 1 / 3, j[turned] + 2 / 3]) / steps
+    upward, downward = i + j < steps, i + j < steps - 1
+    b1 = np.concatenate([i[upward] + 1 / 3, i[downward] + 2 / 3]) / steps
+    b2 = np.concatenate([j[upward] + 1 / 3, j[downward] + 2 / 3]) / steps
     return b1.astype(f4), b2.astype(f4)
 
 

@@ -70,5 +70,5 @@ def next_stop(samples: int) -> int:
 def _tiles(width: int, height: int) -> Ints:
     """Number of the tile of each pixel, (pixels,)."""
     across = -(-width // TILE)
-    rows, take = np.arange(height) // TILE, np.arange(width) // TILE
-    return (rows[:, None] * across + take).reshape(-1)
+    rows, columns = np.arange(height) // TILE, np.arange(width) // TILE
+    return (rows[:, None] * across + columns).reshape(-1)

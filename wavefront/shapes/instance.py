@@ -175,13 +175,13 @@ def instance_bounds(instances: Sequence[Instance]) -> NDArray[np.float64]:
     numbers: dict[int, list[int]] = {}  # by mesh
     for number, instance in enumerate(instances):
         numbers.setdefault(id(instance.mesh), []).append(number)
-    for broadcast in numbers.values():
-        mesh = instances[broadcast[0]].mesh
+    for members in numbers.values():
+        mesh = instances[members[0]].mesh
         used = np.flatnonzero(np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices)))
         vertices = mesh.vertices.take(used, 0).T
         step = max(1, MOST_PLACED // used.size)
-        for begin in range(0, len(broadcast), step):
-            some = broadcast[begin : begin + step]
+        for begin in range(0, len(members), step):
+            some = members[begin : begin + step]
             transforms = np.stack([instances[number].transform for number in some])
             with np.errstate(over="ignore", invalid="ignore"):
                 placed = transforms[:, :3, :3] @ vertices + transforms[:, :3, 3:]

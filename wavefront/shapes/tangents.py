@@ -28,10 +28,10 @@ def mesh_tangents(mesh: Mesh, uvs: Doubles | None) -> Doubles:
     along, across = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     (du1, dv1), (du2, dv2) = (uv[:, 1] - uv[:, 0]).T, (uv[:, 2] - uv[:, 0]).T
     area = du1 * dv2 - du2 * dv1
-    take = np.hstack([along * a[:, None] + across * b[:, None] for a, b in ((dv2, -dv1), (-du2, du1))])
-    area = np.where(np.abs(take).max(1) <= LONGEST * np.abs(area), area, 0)
+    directions = np.hstack([along * a[:, None] + across * b[:, None] for a, b in ((dv2, -dv1), (-du2, du1))])
+    area = np.where(np.abs(directions).max(1) <= LONGEST * np.abs(area), area, 0)
     sound = np.flatnonzero(area)
-    flat[sound] = take[sound] / area[sound, None]
+    flat[sound] = directions[sound] / area[sound, None]
     if mesh.normals is None:
         return np.repeat(flat[:, None], 3, 1)
     return _smooth(mesh, flat, area, _angles(corner))

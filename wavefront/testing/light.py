@@ -46,9 +46,9 @@ def check_light(
     report = Report(f"check_light({type(light).__name__})")
     default = [[0, 0, 0], [2, 1, 3], [-3, 2, -1], [0.5, -4, 1], [20, 10, -30]]
     where = np.asarray(default if points is None else points, f4).reshape(-1, 3)
-    take = min(len(record), 8)
-    alpha = 1 - (1 - significance) ** (1 / (take * len(where)))
-    for k in range(take):
+    columns = min(len(record), 8)
+    alpha = 1 - (1 - significance) ** (1 / (columns * len(where)))
+    for k in range(columns):
         one = record.take(np.array([k]))
         for number, point in enumerate(where):
             rng = np.random.default_rng([seed, k, number])

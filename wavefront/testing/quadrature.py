@@ -19,7 +19,7 @@ class Cells:
     """A grid on the unit square: rows of the first coordinate, each with its own columns."""
 
     rows: Doubles  # (ROWS + 1,) edges
-    take: Doubles  # (ROWS, COLUMNS + 1) edges within each row
+    columns: Doubles  # (ROWS, COLUMNS + 1) edges within each row
 
     @classmethod
     def around(cls, pilot: Doubles, seams: Sequence[float]) -> Cells:
@@ -34,20 +34,20 @@ class Cells:
         ]
         rows = np.append(np.concatenate(bands), seams[-1])
         where = np.clip(np.searchsorted(rows, pilot[0], "right") - 1, 0, ROWS - 1)
-        take = [_quantiles(pilot[1][where == r], 0.0, 1.0, COLUMNS) for r in range(ROWS)]
-        return cls(rows, np.stack(take))
+        columns = [_quantiles(pilot[1][where == r], 0.0, 1.0, COLUMNS) for r in range(ROWS)]
+        return cls(rows, np.stack(columns))
 
     def find(self, p: Doubles) -> Ints:
         """Return the cell of each point (2, n), (n,)."""
         row = np.clip(np.searchsorted(self.rows, p[0], "right") - 1, 0, ROWS - 1)
-        edges = (np.arange(ROWS)[:, None] + self.take[:, :-1]).ravel()
+        edges = (np.arange(ROWS)[:, None] + self.columns[:, :-1]).ravel()
         return np.searchsorted(edges, row + np.minimum(p[1], np.nextafter(1.0, 0.0)), "right") - 1
 
     def rectangles(self) -> Doubles:
         """Return the corners (a0, a1, b0, b1) of all cells, (4, ROWS·COLUMNS)."""
         a0 = np.repeat(self.rows[:-1], COLUMNS)
         a1 = np.repeat(self.rows[1:], COLUMNS)
-        return np.stack([a0, a1, self.take[:, :-1].ravel(), self.take[:, 1:].ravel()])
+        return np.stack([a0, a1, self.columns[:, :-1].ravel(), self.columns[:, 1:].ravel()])
 
 
 def _quantiles(x: Doubles, low: float, high: float, parts: int) -> Doubles:
