@@ -171,7 +171,7 @@ def test_the_checker_takes_materials_with_vertex_colors():
 @pytest.mark.parametrize(
     ("colors", "message"),
     [
-        ([[0, 0, 0]], r"mesh: colors must have shape \(4, n\), got \(1, 3\)"),
+        ([[0, 0, 0]], r"mesh: colors must have a row for each of 4 vertices, got 1"),
         ([[0, 0]] * 4, r"mesh: colors has 2 numbers per vertex; it must have 3 or 4"),
         ([[0, 0, 0], [0, 0, 0], [0, 1.5, 0], [0, 0, 0]], r"colors\[2\]\[1\] is 1\.5; it must be in \[0, 1\]"),
         ([[0, 0, 0, -1]] * 4, r"colors\[0\]\[3\] is -1"),
@@ -191,7 +191,7 @@ def test_bad_parameters():
         wf.VertexColors(2)
     with pytest.raises(wf.SceneError, match=r"uv_set is 2; it must be one of 0, 1"):
         wf.Texture(np.zeros((1, 1)), uv_set=2)
-    with pytest.raises(wf.SceneError, match=r"mesh: uvs1 must have shape \(4, 2\)"):
+    with pytest.raises(wf.SceneError, match=r"mesh: uvs1 must have a row for each of 4 vertices, got 1"):
         square(uvs1=[[0, 0]])
 
 

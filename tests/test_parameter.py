@@ -237,3 +237,52 @@ def test_faces_are_checked_again() -> None:
         render(scene, 1)
     mesh.faces, mesh.vertices = mesh.faces - 99, np.eye(4)[:, :3]
     render(scene, 1, size=(4, 4))
+
+
+def test_arrays_of_shapes_are_converted_when_they_are_assigned() -> None:
+    """As in the constructor: lists become arrays, and numbers are checked."""
+    ball = wf.Sphere((0, 0, 0), 1)
+    ball.center, ball.radius = (0, 1, 2), 3
+    assert ball.center.dtype == np.float64
+    assert ball.bounds.tolist() == [[-3, -2, -1], [3, 4, 5]]
+    triangle = wf.Mesh(np.eye(3), [[0, 1, 2]])
+    triangle.vertices = [[0, 0, 0], [2, 0, 0], [0, 2, 0]]
+    triangle.uvs = [[0, 0], [1, 0], [0, 1]]
+    triangle.colors = np.full((3, 3), 255, np.uint8)
+    assert (triangle.colors == 1).all()
+    placed = wf.Instance(triangle, np.eye(4))
+    placed.transform = np.diag([2, 2, 2, 1]).tolist()
+    assert placed.bounds.tolist() == [[0, 0, 0], [4, 4, 0]]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("center", (0, np.nan, 0), r"ball: center\[1\] is nan; it must be finite"),
+        ("center", 1, r"ball: center must have shape \(3,\)"),
+        ("radius", -1, r"ball: radius is -1; it must be above 0"),
+        ("vertices", [[0, 0]], r"mesh: vertices must have shape \(n, 3\)"),
+        ("faces", [[0.5, 1, 2]], r"mesh: faces must be integers of shape \(m, 3\)"),
+        ("normals", "up", r"mesh: normals must be numeric"),
+        ("uvs", [[0, 1e300]] * 3, r"mesh: uvs\[0\]\[1\] is 1e\+300"),
+        ("colors", np.full((3, 3), 7.0), r"mesh: colors\[0\]\[0\] is 7; it must be in \[0, 1\], or uint8"),
+        ("transform", np.zeros((4, 4)), r"mesh: transform has the last row"),
+    ],
+)
+def test_wrong_values_are_refused_when_they_are_assigned(name, value, message) -> None:
+    """And the shape keeps what it had."""
+    mesh = wf.Mesh(np.eye(3), [[0, 1, 2]])
+    shapes = [wf.Sphere((0, 0, 0), 1, name="ball"), mesh, wf.Instance(mesh, np.eye(4))]
+    shape = next(shape for shape in shapes if hasattr(shape, name))
+    before = getattr(shape, name)
+    with pytest.raises(wf.SceneError, match=message):
+        setattr(shape, name, value)
+    assert getattr(shape, name) is before
+
+
+def test_arrays_that_do_not_fit_each_other_are_refused_by_render() -> None:
+    """They may be assigned one after the other, so each alone says nothing."""
+    mesh = wf.Mesh(np.eye(3), [[0, 1, 2]], normals=np.eye(3))
+    mesh.vertices = np.eye(4)[:, :3]
+    with pytest.raises(wf.SceneError, match=r"mesh: normals must have a row for each of 4 vertices, got 3"):
+        wf.render(mesh, 1)

@@ -275,6 +275,7 @@ def closed(size: tuple[int, int]) -> wf.Scene:
     return wf.Scene([room, lamp], camera=wf.Camera.look_at((0, 0, 3), (0, 0, 0), size=size))
 
 
+@pytest.mark.filterwarnings("ignore:paths have met more than")  # as a fast machine does in the time
 def test_time_ends_waves_under_way() -> None:
     """Also those of first samples, if they take long: there is no picture then, and the error says why."""
     begin = time.perf_counter()
@@ -334,6 +335,7 @@ def test_paths_that_do_not_end_are_told(monkeypatch) -> None:
     render(lit((8, 8)), 2, max_bounces=2**16)
 
 
+@pytest.mark.filterwarnings("ignore:paths have met more than")  # as a fast machine does in the time
 def test_progress_goes_on_within_a_wave() -> None:
     """A function is called every second, so that it can also stop what takes long."""
     calls: list = []

@@ -39,7 +39,7 @@ KEYWORDS = [
     (lambda: wf.Mix(wf.Mirror(), wf.Mirror(), wieght=1), "Mix", "wieght", "weight"),
     (lambda: wf.Conductor(1, 1, rougness=0.1), "Conductor", "rougness", "roughness"),
     (lambda: wf.Conductor.named("gold", rough=0.1), "Conductor.named", "rough", "roughness"),
-    (lambda: wf.Sphere(center=(0, 0, 0), radius=1), "Sphere", "center", "center"),
+    (lambda: wf.Sphere(centre=(0, 0, 0), radius=1), "Sphere", "centre", "center"),
     (lambda: wf.Sphere(pos=(0, 0, 0), radius=1), "Sphere", "pos", "center"),
     (lambda: wf.Mesh(*TRIANGLE, vertex_colors=1), "Mesh", "vertex_colors", "colors"),
     (lambda: wf.Mesh(verts=1, tris=2), "Mesh", "verts", "vertices"),

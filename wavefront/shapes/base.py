@@ -3,13 +3,40 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..bsdfs import Bsdf
 from ..errors import SceneError
+
+
+class Checked:
+    """An attribute of a shape that is converted and checked whenever it is assigned.
+
+    Parameters
+    ----------
+    convert
+        Called with the name for messages, such as "bunny: vertices", and the value; returns what is
+        kept, or raises a SceneError.
+    """
+
+    def __init__(self, convert: Callable[[str, Any], Any]) -> None:
+        self._convert, self._name = convert, ""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        """Learn the name under which the class has it."""
+        self._name = name
+
+    def __set__(self, shape: Any, value: Any) -> None:
+        """Keep the value as it is converted, in the shape's own namespace."""
+        vars(shape)[self._name] = self._convert(f"{shape.name}: {self._name}", value)
+
+    if TYPE_CHECKING:
+
+        def __get__(self, shape: Any, owner: type) -> Any: ...
 
 
 class Shape(ABC):

@@ -12,13 +12,27 @@ from ..bsdfs import Bsdf
 from ..errors import SceneError, finite_array
 from ..suggestions import suggests_keywords
 from ..textures.base import BaseTexture
-from .base import Shape
+from .base import Checked, Shape
 from .mesh import FLOAT32_MAX, Mesh, check_range
 from .transform import moved, moved_tangents
 
 SINGULAR = 1e-12  # the least of the lengths to which a transform stretches, as a part of the greatest
 MOST_PLACED = 1 << 16  # vertices that are placed at a time
 SURE = 1e-6  # a cheap bound of that ratio that is larger leaves no doubt
+
+
+def _invertible(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """Return a (4, 4) affine matrix that can be inverted."""
+    matrix = finite_array(name, value, (4, 4))
+    if not np.array_equal(matrix[3], [0, 0, 0, 1]):
+        raise SceneError(f"{name} has the last row {matrix[3].tolist()}; it must be [0, 0, 0, 1]")
+    stretch = np.linalg.svd(matrix[:3, :3], compute_uv=False)
+    if not stretch[2] > SINGULAR * stretch[0]:
+        raise SceneError(
+            f"{name} is singular: it stretches by {stretch[2]:.3g} along one axis and {stretch[0]:.3g} "
+            f"along another; their ratio must be above {SINGULAR:g}"
+        )
+    return matrix
 
 
 class Instance(Shape):
@@ -44,6 +58,8 @@ class Instance(Shape):
         If the transform is malformed, singular, or takes a vertex beyond the range of float32.
     """
 
+    transform = Checked(_invertible)
+
     @suggests_keywords
     def __init__(
         self, mesh: Mesh, transform: ArrayLike, *, material: Bsdf | None = None, name: str | None = None
@@ -52,7 +68,7 @@ class Instance(Shape):
             raise SceneError(f"{name or 'instance'}: mesh must be a wf.Mesh, got {mesh!r}")
         self.name = mesh.name if name is None else name
         self.mesh = mesh
-        self.transform = _invertible(f"{self.name}: transform", transform)
+        self.transform = transform
         self.material = material
         check_range(self.name, _placed(self.transform, mesh.vertices).T)
 
@@ -83,7 +99,8 @@ class Instance(Shape):
         out = []
         for matrix in matrices:
             instance = cls.__new__(cls)
-            instance.name, instance.mesh, instance.transform = label, mesh, matrix
+            instance.name, instance.mesh = label, mesh
+            vars(instance)["transform"] = matrix  # it has been checked
             instance.material = material
             out.append(instance)
         return out
@@ -132,20 +149,6 @@ class Instance(Shape):
         instance.transform[:3, :3] *= factor / own
         instance.transform[:3, 3] *= factor
         return instance
-
-
-def _invertible(name: str, value: ArrayLike) -> NDArray[np.float64]:
-    """Return a (4, 4) affine matrix that can be inverted."""
-    matrix = finite_array(name, value, (4, 4))
-    if not np.array_equal(matrix[3], [0, 0, 0, 1]):
-        raise SceneError(f"{name} has the last row {matrix[3].tolist()}; it must be [0, 0, 0, 1]")
-    stretch = np.linalg.svd(matrix[:3, :3], compute_uv=False)
-    if not stretch[2] > SINGULAR * stretch[0]:
-        raise SceneError(
-            f"{name} is singular: it stretches by {stretch[2]:.3g} along one axis and {stretch[0]:.3g} "
-            f"along another; their ratio must be above {SINGULAR:g}"
-        )
-    return matrix
 
 
 def can_place(mesh: Mesh, transforms: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,11 +16,85 @@ from ..suggestions import suggests_keywords
 from ..textures.parameter import Color, color
 from ..textures.vertex_colors import VertexColors
 from ..vec import f4
-from .base import Shape
+from .base import Checked, Shape
 
 FLOAT32_MAX = float(np.finfo(np.float32).max)
 MOST_DOUBLINGS = 60  # from 1 to the lengths of vectors that stay as given
 FLOAT32_MIN = float(np.finfo(np.float32).tiny)
+
+
+def _faces(name: str, faces: ArrayLike) -> NDArray[np.intp]:
+    try:
+        array = np.asarray(faces)
+    except ValueError as error:
+        raise SceneError(f"{name} must be integers of shape (m, 3), got rows of several lengths") from error
+    if array.size == 0:
+        raise SceneError(f"{name.removesuffix(': faces')}: has no faces")
+    if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "iu":
+        raise SceneError(f"{name} must be integers of shape (m, 3), got {array.dtype} of shape {array.shape}")
+    return array.astype(np.intp)
+
+
+def _positions(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Return positions (n, 3) that float32 can hold."""
+    array = finite_array(name, values, (None, 3))
+    _check_float32(name, array)
+    return array
+
+
+def _vectors(name: str, values: ArrayLike | None, width: int = 3) -> NDArray[np.float64] | None:
+    """Return vectors (n, width) of which only directions count, none of them too long or short to square.
+
+    By powers of two, so that directions stay what they are.
+    """
+    if values is None:
+        return None
+    array = finite_array(name, values, (None, width))
+    exponent = np.frexp(np.abs(array[:, :3]).max(1, initial=0))[1]
+    extreme = np.flatnonzero(np.abs(exponent) > MOST_DOUBLINGS)
+    if extreme.size:
+        array = array.copy()
+        array[extreme, :3] = np.ldexp(array[extreme, :3], -exponent[extreme, None])
+    return array
+
+
+def _coordinates(name: str, values: ArrayLike | None) -> NDArray[np.float64] | None:
+    """Return texture coordinates (n, 2) that float32 can hold."""
+    if values is None:
+        return None
+    array = finite_array(name, values, (None, 2))
+    _check_float32(name, array)
+    return array
+
+
+def _colors(name: str, values: ArrayLike | None) -> NDArray[np.float64] | None:
+    """Return (n, 4) linear colors in [0, 1]; without an opacity they are opaque."""
+    if values is None:
+        return None
+    array = finite_array(name, values, (None, None))
+    codes = getattr(values, "dtype", None)
+    if codes in (np.uint8, np.uint16):
+        most = np.iinfo(codes).max
+        array[:, :3] = srgb_to_linear(array[:, :3].astype(f4) / f4(most))
+        array[:, 3:] /= most
+    if array.shape[1] not in (3, 4):
+        raise SceneError(f"{name} has {array.shape[1]} numbers per vertex; it must have 3 or 4")
+    bad = np.argwhere((array < 0) | (array > 1))
+    if len(bad):
+        i, j = bad[0]
+        raise SceneError(f"{name}[{i}][{j}] is {array[i, j]:g}; it must be in [0, 1], or uint8")
+    return array if array.shape[1] == 4 else np.column_stack([array, np.ones(len(array))])
+
+
+def check_range(name: str, vertices: NDArray[np.float64]) -> None:
+    _check_float32(f"{name}: vertices", vertices)
+
+
+def _check_float32(name: str, rows: NDArray[np.float64]) -> None:
+    bad = np.argwhere(np.abs(rows) > FLOAT32_MAX)
+    if len(bad):
+        i, j = bad[0]
+        raise SceneError(f"{name}[{i}][{j}] is {rows[i, j]:g}; its size must be at most {FLOAT32_MAX:.3g}")
 
 
 class Mesh(Shape):
@@ -60,6 +135,13 @@ class Mesh(Shape):
         beyond float32, an index is out of range, there is no face, or there are tangents without normals.
     """
 
+    vertices = Checked(_positions)
+    faces = Checked(_faces)
+    normals = Checked(_vectors)
+    uvs, uvs1 = Checked(_coordinates), Checked(_coordinates)
+    tangents = Checked(partial(_vectors, width=4))
+    colors = Checked(_colors)
+
     @suggests_keywords
     def __init__(
         self,
@@ -77,20 +159,17 @@ class Mesh(Shape):
         name: str = "mesh",
     ) -> None:
         self.name = name
-        self.vertices = finite_array(f"{name}: vertices", vertices, (None, 3))
-        self.faces = _faces(name, faces, len(self.vertices))
-        self.normals = _vectors(f"{name}: normals", normals, len(self.vertices), 3)
-        self.uvs = _coordinates(f"{name}: uvs", uvs, len(self.vertices))
-        self.uvs1 = _coordinates(f"{name}: uvs1", uvs1, len(self.vertices))
-        self.tangents = _vectors(f"{name}: tangents", tangents, len(self.vertices), 4)
-        if self.tangents is not None and self.normals is None:
-            raise SceneError(f"{name}: has tangents without normals; pass both")
-        self.colors = _colors(f"{name}: colors", colors, len(self.vertices))
+        self.vertices = vertices
+        self.faces = faces
+        self.normals = normals
+        self.uvs, self.uvs1 = uvs, uvs1
+        self.tangents = tangents
+        self.colors = colors
+        self.check()
         self.material = material
         self._default: tuple[bool, Bsdf] | None = None  # whether it shows colors, and the material
         self.emission = emission
         self.two_sided = two_sided
-        check_range(name, self.vertices)
 
     def __repr__(self) -> str:
         """Name the mesh and its size."""
@@ -120,15 +199,28 @@ class Mesh(Shape):
         return material.emission.radiance
 
     def check(self) -> None:
-        """Check what must hold between arrays that may have been changed one after the other.
+        """Check what must hold between arrays, which may have been assigned one after the other.
 
         Raises
         ------
         SceneError
-            If faces have an index that no vertex has.
+            If a face has an index that no vertex has, an array has not one row for each vertex, or there
+            are tangents without normals.
         """
-        if self.faces.max() >= len(self.vertices) or self.faces.min() < 0:
-            _faces(self.name, self.faces, len(self.vertices))  # raises
+        count = len(self.vertices)
+        if self.faces.max() >= count or self.faces.min() < 0:
+            i, j = np.argwhere((self.faces < 0) | (self.faces >= count))[0]
+            raise SceneError(
+                f"{self.name}: faces[{i}][{j}] is {self.faces[i, j]}; it must be in [0, {count - 1}]"
+            )
+        for name in ("normals", "uvs", "uvs1", "tangents", "colors"):
+            values = getattr(self, name)
+            if values is not None and len(values) != count:
+                raise SceneError(
+                    f"{self.name}: {name} must have a row for each of {count} vertices, got {len(values)}"
+                )
+        if self.tangents is not None and self.normals is None:
+            raise SceneError(f"{self.name}: has tangents without normals; pass both")
 
     def scaled(self, factor: float) -> Mesh:
         """Return the mesh with all lengths multiplied by `factor`, and the same material."""
@@ -184,81 +276,3 @@ def Rectangle(
         two_sided=two_sided,
         name=name,
     )
-
-
-def _faces(name: str, faces: ArrayLike, count: int) -> NDArray[np.intp]:
-    try:
-        array = np.asarray(faces)
-    except ValueError as error:
-        raise SceneError(
-            f"{name}: faces must be integers of shape (m, 3), got rows of several lengths"
-        ) from error
-    if array.size == 0:
-        raise SceneError(f"{name}: has no faces")
-    if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "iu":
-        raise SceneError(
-            f"{name}: faces must be integers of shape (m, 3), got {array.dtype} of shape {array.shape}"
-        )
-    bad = np.argwhere((array < 0) | (array >= count))
-    if len(bad):
-        i, j = bad[0]
-        raise SceneError(f"{name}: faces[{i}][{j}] is {array[i, j]}; it must be in [0, {count - 1}]")
-    return array.astype(np.intp)
-
-
-def _per_vertex(name: str, values: ArrayLike | None, count: int, width: int) -> NDArray[np.float64] | None:
-    return None if values is None else finite_array(name, values, (count, width))
-
-
-def _vectors(name: str, values: ArrayLike | None, count: int, width: int) -> NDArray[np.float64] | None:
-    """Return vectors (count, width) of which only directions count, none of them too long or short to square.
-
-    By powers of two, so that directions stay what they are.
-    """
-    array = _per_vertex(name, values, count, width)
-    if array is None:
-        return None
-    exponent = np.frexp(np.abs(array[:, :3]).max(1, initial=0))[1]
-    extreme = np.flatnonzero(np.abs(exponent) > MOST_DOUBLINGS)
-    if extreme.size:
-        array = array.copy()
-        array[extreme, :3] = np.ldexp(array[extreme, :3], -exponent[extreme, None])
-    return array
-
-
-def _coordinates(name: str, values: ArrayLike | None, count: int) -> NDArray[np.float64] | None:
-    """Return texture coordinates (count, 2) that float32 can hold."""
-    array = _per_vertex(name, values, count, 2)
-    if array is not None:
-        _check_float32(name, array)
-    return array
-
-
-def _colors(name: str, values: ArrayLike | None, count: int) -> NDArray[np.float64] | None:
-    """Return (n, 4) linear colors in [0, 1]; without an opacity they are opaque."""
-    if values is None:
-        return None
-    array = finite_array(name, values, (count, None))
-    codes = getattr(values, "dtype", None)
-    if codes in (np.uint8, np.uint16):
-        most = np.iinfo(codes).max
-        array[:, :3] = srgb_to_linear(array[:, :3].astype(f4) / f4(most))
-        array[:, 3:] /= most
-    if array.shape[1] not in (3, 4):
-        raise SceneError(f"{name} has {array.shape[1]} numbers per vertex; it must have 3 or 4")
-    bad = np.argwhere((array < 0) | (array > 1))
-    if len(bad):
-        i, j = bad[0]
-        raise SceneError(f"{name}[{i}][{j}] is {array[i, j]:g}; it must be in [0, 1], or uint8")
-    return array if array.shape[1] == 4 else np.column_stack([array, np.ones(count)])
-
-
-def check_range(name: str, vertices: NDArray[np.float64]) -> None:
-    _check_float32(f"{name}: vertices", vertices)
-
-
-def _check_float32(name: str, rows: NDArray[np.float64]) -> None:
-    bad = np.argwhere(np.abs(rows) > FLOAT32_MAX)
-    if len(bad):
-        i, j = bad[0]
-        raise SceneError(f"{name}[{i}][{j}] is {rows[i, j]:g}; its size must be at most {FLOAT32_MAX:.3g}")

@@ -12,8 +12,22 @@ from ..bsdfs import Bsdf, Diffuse
 from ..errors import SceneError, finite_array, number, rgb
 from ..suggestions import suggests_keywords
 from ..textures.base import BaseTexture
-from .base import Shape
+from .base import Checked, Shape
 from .mesh import FLOAT32_MAX, FLOAT32_MIN
+
+
+def _center(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    center = finite_array(name, value, (3,))
+    beyond = np.flatnonzero(np.abs(center) > FLOAT32_MAX)
+    if len(beyond):
+        i = beyond[0]
+        raise SceneError(f"{name}[{i}] is {center[i]:g}; its size must be at most {FLOAT32_MAX:.3g}")
+    return center
+
+
+def _radius(name: str, value: float) -> float:
+    limit = f"above 0, from {FLOAT32_MIN:.3g} to {FLOAT32_MAX:.3g}"
+    return number(name, value, lambda x: FLOAT32_MIN <= x <= FLOAT32_MAX, limit)
 
 
 class Sphere(Shape):
@@ -39,6 +53,9 @@ class Sphere(Shape):
         If an argument is malformed, or the emission is a texture.
     """
 
+    center = Checked(_center)
+    radius = Checked(_radius)
+
     @suggests_keywords
     def __init__(
         self,
@@ -50,19 +67,8 @@ class Sphere(Shape):
         name: str = "sphere",
     ) -> None:
         self.name = name
-        self.center = finite_array(f"{name}: center", center, (3,))
-        self.radius = number(
-            f"{name}: radius",
-            radius,
-            lambda x: FLOAT32_MIN <= x <= FLOAT32_MAX,
-            f"above 0, from {FLOAT32_MIN:.3g} to {FLOAT32_MAX:.3g}",
-        )
-        beyond = np.flatnonzero(np.abs(self.center) > FLOAT32_MAX)
-        if len(beyond):
-            i = beyond[0]
-            raise SceneError(
-                f"{name}: center[{i}] is {self.center[i]:g}; its size must be at most {FLOAT32_MAX:.3g}"
-            )
+        self.center = center
+        self.radius = radius
         self.material = material
         self._default = Diffuse(0.5)
         self.emission = emission
