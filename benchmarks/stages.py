@@ -31,12 +31,12 @@ STAGES = (
     "alpha_pass_through",
     "emitted",
     "mis_weighted",
-    "interact",
+    "interaction",
     "shading",
     "direct",
     "branch",
     "roulette",
-    "deposit",
+    "accumulate",
 )
 
 

@@ -11,7 +11,8 @@ import wavefront as wf
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-LINK = re.compile(r"\]\(([^)#]+)(#[^)]*)?\)")
+LINK = re.compile(r"\]\(([^)#]*)(?:#([^)]*))?\)")
+HEADING = re.compile(r"^#+ (.*)$", re.MULTILINE)
 MOST_SPP = 1
 
 
@@ -41,11 +42,33 @@ def test_there_are_blocks_to_run():
     assert len(list(blocks())) >= 9
 
 
-@pytest.mark.parametrize("document", [*DOCUMENTS, ROOT / "CHANGELOG.md"], ids=lambda path: path.name)
+def anchors(document):
+    """Return the names that GitHub gives to the headings of a document."""
+    headings = HEADING.findall(document.read_text("utf-8"))
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize(
+    "document",
+    [*DOCUMENTS, ROOT / "CHANGELOG.md", ROOT / "benchmarks" / "README.md"],
+    ids=lambda path: str(path.relative_to(ROOT)),
+)
 def test_links_lead_somewhere(document):
-    links = [match[1] for match in LINK.finditer(document.read_text("utf-8"))]
-    missing = [link for link in links if ":" not in link and not (document.parent / link).exists()]
+    links = LINK.findall(document.read_text("utf-8"))
+    missing = []
+    for path, anchor in links:
+        target = document.parent / path if path else document
+        if ":" in path:
+            continue
+        if not target.exists() or (anchor and anchor not in anchors(target)):
+            missing.append(f"{path}#{anchor}")
     assert missing == []
+
+
+def test_the_index_lists_every_document():
+    pages = {path for path, _ in LINK.findall((ROOT / "docs" / "index.md").read_text("utf-8"))}
+    documents = {path.name for path in (ROOT / "docs").glob("*.md")}
+    assert documents - pages == {"index.md"}
 
 
 def test_every_public_name_is_written_about():
