@@ -109,7 +109,7 @@ if __name__ == "__main__":
         base = 0.0
         for count in (10, 1000):
             scene = lit(kind, count, options.size)
-            for choice in ("place", "power", "uniform"):
+            for choice in ("spatial", "power", "uniform"):
                 variance, seconds = measure(scene, choice, options)
                 base = base or variance * seconds
                 row = f"{count} {kind}"

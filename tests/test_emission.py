@@ -333,7 +333,7 @@ def test_dark_lights_take_no_part() -> None:
     dark = TriangleLights.concatenate([record.take(np.array([0])), record])
     dark.radiance[:, 0] = 0
     point, u, v = RNG.random((3, 100), f4), RNG.random(100, f4), RNG.random((2, 100), f4)
-    for choice in ("place", "power", "uniform"):
+    for choice in ("spatial", "power", "uniform"):
         plain, mixed = LightTable([record], 5.0, choice), LightTable([dark], 5.0, choice)
         (a, first), (b, second) = (table.sample_li(point, u, v) for table in (plain, mixed))
         assert (second == first + 1).all()

@@ -143,7 +143,7 @@ def test_old_ones_are_gone_before_new_ones_are_built(monkeypatch: pytest.MonkeyP
     """Memory does not hold both."""
     subject = scene()
     look(subject)
-    ((_, accelerator),) = subject.accelerators._kept["numpy"]
+    _, ((_, accelerator),) = subject.accelerators._kept["numpy"]
     old = weakref.ref(accelerator)
     del accelerator
     alive = []

@@ -68,7 +68,7 @@ def test_light_columns_do_not_depend_on_their_neighbors(name: str) -> None:
 # --- Choice ---------------------------------------------------------------------------------------
 
 
-def table(choice: str = "place") -> LightTable:
+def table(choice: str = "spatial") -> LightTable:
     """All kinds of light together."""
     kinds = [
         triangles(),
@@ -92,7 +92,7 @@ def test_choice_is_proportional_to_power() -> None:
     )
 
 
-@pytest.mark.parametrize("choice", ["place", "power", "uniform"])
+@pytest.mark.parametrize("choice", ["spatial", "power", "uniform"])
 def test_samples_of_a_table_are_those_of_the_chosen_light(choice: str) -> None:
     """Every light is chosen as often as its probability says, which is part of the pdf."""
     lights, n = table(choice), 1 << 16

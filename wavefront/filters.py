@@ -11,6 +11,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from .registry import Registry
 from .sampling import warp
 from .vec import Floats, f4
 
@@ -36,4 +37,6 @@ def gaussian(u: Floats) -> Floats:
     return np.stack([f4(0.5) + warp.gaussian(row, GAUSSIAN_SIGMA, GAUSSIAN_RADIUS) for row in u])
 
 
-FILTERS: dict[str, Filter] = {"box": box, "tent": tent, "gaussian": gaussian}
+FILTERS: Registry[Filter] = Registry(
+    "filter", "a function of u (2, n)", {"box": box, "tent": tent, "gaussian": gaussian}
+)

@@ -13,6 +13,7 @@ from typing import TypeAlias
 import numpy as np
 
 from .compile.scene import CompiledScene
+from .registry import Registry
 from .sampling.sampler import Sampler
 from .stages.alpha import alpha_pass_through
 from .stages.bounce import bounce_sample, branch
@@ -107,13 +108,12 @@ def li_full(
     return L
 
 
-ONE_SAMPLE = ("naive", "direct_simple")  # that find light in one way, and so weigh no samples
-INTEGRATORS: dict[str, Integrator] = {
-    "naive": li_naive,
-    "direct_simple": li_direct_simple,
-    "direct_mis": li_direct_mis,
-    "full": li_full,
-}
+WITH_MIS: tuple[Integrator, ...] = (li_direct_mis, li_full)  # weigh light samples against BSDF samples
+INTEGRATORS: Registry[Integrator] = Registry(
+    "integrator",
+    "a function of (scene, paths, sampler, max_bounces)",
+    {"naive": li_naive, "direct_simple": li_direct_simple, "direct_mis": li_direct_mis, "full": li_full},
+)
 
 
 def prepare_shading(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:

@@ -12,25 +12,26 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .accel import most_copies
-from .accel.registry import CHOICES
+from .accel.registry import ACCELERATORS, AcceleratorMaker
 from .bsdfs import Bsdf
 from .camera import Camera
 from .compile.scene import compile_scene
 from .diagnosis import warn_of_black_or_white
-from .errors import Interrupted, RenderError, SceneError, number, one_of, warn_caller
+from .errors import Interrupted, RenderError, SceneError, number, warn_caller
 from .exact_sum import MAX_TERMS
-from .filters import FILTERS
+from .filters import FILTERS, Filter
 from .image import Image
-from .integrators import INTEGRATORS, ONE_SAMPLE, Integrator, li_full
+from .integrators import INTEGRATORS, WITH_MIS, Integrator, li_full
 from .lighting import check_lighting, choose_preset, lighted
 from .lights import DirectionalLight, PointLight, SpotLight
-from .lights.table import CHOICES as LIGHT_CHOICES
+from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
 from .progress import Bar, Progress, phase
-from .sampling.sampler import make_sampler
+from .sampling.sampler import SAMPLERS, SamplerMaker, make_sampler
 from .scene import Scene
 from .scheduling.adaptive import passes
 from .scheduling.blas import reserve_buffers
-from .scheduling.executors import Workers, choose_executor, worker_count
+from .scheduling.crew import PoolMaker
+from .scheduling.executors import EXECUTORS, Workers, choose_executor, worker_count
 from .scheduling.interrupt import CtrlC
 from .scheduling.jobs import LONG_PATH, Job, JobResult, Tally, Watch, split_jobs, trace_job
 from .scheduling.scheduler import Scheduler
@@ -56,17 +57,17 @@ def render(
     up: ArrayLike | None = None,
     lighting: str | None = "auto",
     ground: bool = False,
-    integrator: str = "full",
+    integrator: str | Integrator = "full",
     max_bounces: int = 12,
     seed: int = 0,
-    sampler: str = "sobol",
-    accel: str = "auto",
+    sampler: str | SamplerMaker = "sobol",
+    accel: str | AcceleratorMaker = "auto",
     workers: int | None = None,
-    executor: str | None = None,
+    executor: str | PoolMaker | None = None,
     noise: float | None = None,
     seconds: float | None = None,
-    filter: str = "box",
-    light_sampler: str = "place",
+    filter: str | Filter = "box",
+    light_sampler: str | LightSamplerMaker = "spatial",
     branches: int = 1,
     wave_size: int | None = None,
     progress: Progress = None,
@@ -127,7 +128,7 @@ def render(
         How the samples of a pixel are spread: "box" (evenly over the pixel), "tent" (radius 1
         pixel) or "gaussian" (σ 0.5 pixels, cut off at 1.5 from the center).
     light_sampler
-        How one light of many is chosen at a point: "place" weighs what each brings there, "power"
+        How one light of many is chosen at a point: "spatial" weighs what each brings there, "power"
         its power alone, "uniform" nothing.
     branches
         In how many ways the path of a sample goes on from the first surface, at most 64; only "full"
@@ -164,9 +165,9 @@ def render(
     if wave_size is not None:
         wave_size = _whole("wave_size", wave_size, 1, 2**24)
     estimate = _estimator(integrator, branches)
-    spread = FILTERS[one_of("filter", filter, FILTERS)]
-    accel = one_of("accel", accel, CHOICES)
-    light_sampler = one_of("light_sampler", light_sampler, LIGHT_CHOICES)
+    spread = FILTERS.find(filter)
+    ACCELERATORS.find(accel)
+    LIGHT_SAMPLERS.find(light_sampler)
     check_lighting(lighting)
     make_sampler(sampler, seed)  # checks both before the scene is read
     workers = worker_count(workers)
@@ -187,7 +188,7 @@ def render(
                 subject.accelerators.maker(accel),
                 light_sampler,
                 most_copies(accel),
-                mis=integrator not in ONE_SAMPLE,
+                mis=INTEGRATORS.find(integrator) in WITH_MIS,
             )
         view = compiled.view(camera)
 
@@ -222,15 +223,15 @@ def render(
         image = tally.image(
             {
                 "lighting": preset,
-                "integrator": integrator,
+                "integrator": INTEGRATORS.label(integrator),
                 "max_bounces": max_bounces,
                 "seed": seed,
-                "sampler": sampler,
-                "filter": filter,
+                "sampler": SAMPLERS.label(sampler),
+                "filter": FILTERS.label(filter),
                 "branches": branches,
                 "accelerator": compiled.accelerator.name,
                 "workers": workers,
-                "executor": executor,
+                "executor": EXECUTORS.label(executor),
                 "seconds": clock.elapsed,
                 "spp": tally.samples / tally.film.count.size,
                 "samples": tally.samples,
@@ -248,7 +249,7 @@ def render(
     if clock.up:
         _check_first_samples(image, seconds, watch.surfaces.value)
     tally.bad.report(image)
-    warn_of_black_or_white(image, complete, compiled, view, integrator, max_bounces)
+    warn_of_black_or_white(image, complete, compiled, view, INTEGRATORS.label(integrator), max_bounces)
     if noise is not None and (clock.up or tally.film.count.max() == spp):
         _warn_of_noise(image, noise)
     return image
@@ -333,13 +334,14 @@ def _check_first_samples(image: Image, seconds: float | None, surfaces: int) -> 
         warn_caller(f"{without} pixels of {image.counts.size} have no sample and are black: {why}")
 
 
-def _estimator(integrator: str, branches: int) -> Integrator:
+def _estimator(integrator: str | Integrator, branches: int) -> Integrator:
     """Return the integrator with this name, for paths with so many branches."""
-    estimate = INTEGRATORS[one_of("integrator", integrator, INTEGRATORS)]
+    estimate = INTEGRATORS.find(integrator)
     if branches == 1:
         return estimate
-    if integrator != "full":
-        raise SceneError(f"branches is {branches}; with integrator={integrator!r} it must be 1")
+    if estimate is not li_full:
+        label = INTEGRATORS.label(integrator)
+        raise SceneError(f"branches is {branches}; with integrator={label!r} it must be 1")
     return partial(li_full, branches=branches)
 
 
@@ -374,7 +376,7 @@ def _warn_of_noise(image: Image, asked: float) -> None:
     )
 
 
-def _warn_unseen_lights(scene: Scene, integrator: str) -> None:
+def _warn_unseen_lights(scene: Scene, integrator: str | Integrator) -> None:
     unseen = [
         light
         for light in scene.lights

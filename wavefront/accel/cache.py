@@ -9,7 +9,7 @@ from dataclasses import fields
 import numpy as np
 
 from .base import Accelerator, Geometry
-from .registry import engine, make_accelerator
+from .registry import ACCELERATORS, AcceleratorMaker, engine, make_accelerator
 
 
 class AcceleratorCache:
@@ -20,22 +20,26 @@ class AcceleratorCache:
     """
 
     def __init__(self) -> None:
-        self._kept: dict[str, list[tuple[Geometry, Accelerator]]] = {}
+        self._kept: dict[str, tuple[AcceleratorMaker, list[tuple[Geometry, Accelerator]]]] = {}
 
     def __reduce__(self) -> tuple[type[AcceleratorCache], tuple[()]]:
         """Leave behind what was built: some of it is memory of Embree's."""
         return AcceleratorCache, ()
 
-    def maker(self, accel: str) -> Callable[[Geometry], Accelerator]:
-        """Return what makes the accelerators of one render, named `accel`, one after the other.
+    def maker(self, accel: str | AcceleratorMaker) -> Callable[[Geometry], Accelerator]:
+        """Return what makes the accelerators of one render, given by name or class, one after the other.
 
         Raises
         ------
         SceneError
             As `make_accelerator` does, when called.
         """
-        before = deque(self._kept.pop(engine(accel), ()))
-        now = self._kept[engine(accel)] = []
+        kind = engine(accel)
+        label = ACCELERATORS.label(kind)
+        same_kind, last = self._kept.pop(label, (kind, []))
+        before = deque(last if same_kind is kind else ())
+        now: list[tuple[Geometry, Accelerator]] = []
+        self._kept[label] = kind, now
 
         def make(geometry: Geometry) -> Accelerator:
             kept = before.popleft() if before else None

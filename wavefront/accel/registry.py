@@ -1,33 +1,50 @@
-"""Choose the accelerator by name."""
+"""The table of accelerators."""
 
 from __future__ import annotations
 
-from ..errors import one_of
+from collections.abc import Callable
+from typing import TypeAlias
+
+from ..registry import Registry
 from .base import Accelerator, Geometry
 from .embree import EmbreeAccelerator, installed
 from .numpy_accel import NumpyAccelerator
 
-CHOICES = ("auto", "numpy", "embree")
+AcceleratorMaker: TypeAlias = Callable[[Geometry], Accelerator]
+
 COPIES = 1 << 18  # triangles of instances, in all, up to which Embree is faster with one mesh of them
 
 
-def make_accelerator(geometry: Geometry, accel: str) -> Accelerator:
-    """Build the accelerator named `accel`; "auto" takes Embree where it is installed.
+def automatic(geometry: Geometry) -> Accelerator:
+    """Build an Embree accelerator where Embree is installed, else one in NumPy."""
+    return engine("auto")(geometry)
+
+
+ACCELERATORS: Registry[AcceleratorMaker] = Registry(
+    "accel",
+    "a class of accelerators",
+    {"auto": automatic, "numpy": NumpyAccelerator, "embree": EmbreeAccelerator},
+)
+
+
+def make_accelerator(geometry: Geometry, accel: str | AcceleratorMaker) -> Accelerator:
+    """Build an accelerator, given by name or by its class; "auto" takes Embree where it is installed.
 
     Raises
     ------
     SceneError
         If the name is unknown, or Embree is asked for and not installed.
     """
-    one_of("accel", accel, CHOICES)
-    return EmbreeAccelerator(geometry) if engine(accel) == "embree" else NumpyAccelerator(geometry)
+    return engine(accel)(geometry)
 
 
-def most_copies(accel: str) -> int:
+def most_copies(accel: str | AcceleratorMaker) -> int:
     """Return up to how many triangles in all it is faster to build each instance as a mesh of its own."""
-    return COPIES if engine(accel) == "embree" else 0
+    return COPIES if engine(accel) is EmbreeAccelerator else 0
 
 
-def engine(accel: str) -> str:
-    """Return what `accel` stands for: "embree" or "numpy"."""
-    return "embree" if accel == "embree" or (accel == "auto" and installed()) else "numpy"
+def engine(accel: str | AcceleratorMaker) -> AcceleratorMaker:
+    """Return the class of accelerators that `accel` stands for."""
+    if accel == "auto":
+        return EmbreeAccelerator if installed() else NumpyAccelerator
+    return ACCELERATORS.find(accel)

@@ -21,6 +21,7 @@ from ..lights import (
     TwoSidedTriangleLights,
     first_of_pairs,
 )
+from ..lights.samplers import LightSamplerMaker
 from ..lights.textured_emission import EmissionSource, TexturedEmission, has_textured_emission, mean_radiance
 from ..scene import Scene
 from ..shapes import Mesh, Sphere
@@ -38,7 +39,7 @@ def _gather_lights(
     corners: Sequence[NDArray[np.float64]],
     center: NDArray[np.float64],
     half_size: NDArray[np.float64],
-    choice: str,
+    choice: str | LightSamplerMaker,
     mis: bool,
 ) -> tuple[LightTable, Ints, int]:
     """Return the table of lights, the light of each primitive, and that of rays that hit nothing."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..accel import Accelerator, Geometry, InstanceAccelerator
 from ..camera import Camera
 from ..lights import LightTable
+from ..lights.samplers import LightSamplerMaker
 from ..lights.textured_emission import TexturedEmission
 from ..record import record
 from ..scene import Scene
@@ -86,7 +87,7 @@ class CompiledScene:
 def compile_scene(
     scene: Scene,
     make_accelerator: Any,
-    light_sampler: str = "place",
+    light_sampler: str | LightSamplerMaker = "spatial",
     most_copies: int = 0,
     mis: bool = False,
 ) -> CompiledScene:
@@ -99,7 +100,7 @@ def compile_scene(
     make_accelerator
         Called with the `Geometry`; returns the `Accelerator`.
     light_sampler
-        How one light of many is chosen: "place", "power" or "uniform".
+        How one light of many is chosen: see `LIGHT_SAMPLERS`.
     most_copies
         Up to so many triangles in all, each instance is built as a mesh of its own.
     mis

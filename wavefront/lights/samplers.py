@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..registry import Registry
 from ..sampling.discrete import Discrete, rounded_up
 from ..vec import Floats, Ints, broadcast, f4
 
@@ -25,6 +26,18 @@ class LightSampler(Protocol):
 
     def pmf(self, light: Ints, point: Floats) -> Floats:
         """Probability (n,) that `light` (n,) is chosen at points (3, n)."""
+
+
+class Irradiance(Protocol):
+    """What each light brings to parts of the scene."""
+
+    def __call__(self, center: Doubles, radius: float, /) -> Doubles:
+        """Return a bound on the irradiance (c, k) by each light within `radius` of points `center` (3, c)."""
+
+
+# Called with the power (k,) of each light, all above 0; half of the scene's extent (3,), whose middle is the
+# origin; and the lights' irradiance. All lengths are scene units.
+LightSamplerMaker: TypeAlias = Callable[[Doubles, Doubles, Irradiance], LightSampler]
 
 
 class SingleLightSampler:
@@ -102,9 +115,7 @@ class SpatialLightSampler:
         (k,) estimated power of each light.
     """
 
-    def __init__(
-        self, low: Doubles, high: Doubles, irradiance: Callable[[Doubles, float], Doubles], power: Doubles
-    ) -> None:
+    def __init__(self, low: Doubles, high: Doubles, irradiance: Irradiance, power: Doubles) -> None:
         cells = int(np.clip(MOST_ENTRIES // len(power), 1, MOST_CELLS))
         self.low, self.shape, size = _grid(low, high, cells)
         centers = np.indices(self.shape).reshape(3, -1) + 0.5
@@ -144,6 +155,28 @@ class SpatialLightSampler:
             along = np.clip((row - f4(low)) * f4(inverse), f4(0), f4(count - 1)).astype(np.intp)
             cell = cell * count + along
         return cell
+
+
+def spatial(power: Doubles, half_size: Doubles, irradiance: Irradiance) -> LightSampler:
+    """Weigh lights by what they bring to a point's surroundings."""
+    return SpatialLightSampler(-half_size, half_size, irradiance, power)
+
+
+def by_power(power: Doubles, half_size: Doubles, irradiance: Irradiance) -> LightSampler:
+    """Weigh lights by their power, everywhere alike."""
+    return WeightedLightSampler(power)
+
+
+def uniform(power: Doubles, half_size: Doubles, irradiance: Irradiance) -> LightSampler:
+    """Choose every light equally often."""
+    return WeightedLightSampler(np.ones_like(power))
+
+
+LIGHT_SAMPLERS: Registry[LightSamplerMaker] = Registry(
+    "light_sampler",
+    "a function of (power, half_size, irradiance)",
+    {"spatial": spatial, "power": by_power, "uniform": uniform},
+)
 
 
 def _grid(low: Doubles, high: Doubles, cells: int) -> tuple[Doubles, tuple[int, int, int], Doubles]:

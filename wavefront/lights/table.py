@@ -7,19 +7,16 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import one_of
 from ..sampling.mis import power_heuristic
 from ..vec import ALL, Floats, Ints, Lanes, f4, put, take
 from .base import Light, LightSample
 from .samplers import (
+    LIGHT_SAMPLERS,
     LightSampler,
+    LightSamplerMaker,
     SingleLightSampler,
-    SpatialLightSampler,
     SubsetLightSampler,
-    WeightedLightSampler,
 )
-
-CHOICES = ("place", "power", "uniform")
 
 
 class LightTable:
@@ -35,8 +32,8 @@ class LightTable:
         Half of the scene's extent along each axis (3,), or along all; scene units. The scene's
         middle is the origin.
     choice
-        "place" weighs lights by what they bring to a point's surroundings, "power" by their
-        estimated power alone, "uniform" not at all.
+        A name in `LIGHT_SAMPLERS`, or a function as in that table. Where there is only one light, it is
+        not called.
 
     Raises
     ------
@@ -44,7 +41,9 @@ class LightTable:
         If the choice is unknown.
     """
 
-    def __init__(self, kinds: Sequence[Light], half_size: ArrayLike, choice: str = "place") -> None:
+    def __init__(
+        self, kinds: Sequence[Light], half_size: ArrayLike, choice: str | LightSamplerMaker = "spatial"
+    ) -> None:
         self.kinds = tuple(kinds)
         self.starts = np.cumsum([0, *(len(kind) for kind in kinds)])
         self.kind_of = np.repeat(np.arange(len(kinds)), [len(kind) for kind in kinds])
@@ -59,30 +58,25 @@ class LightTable:
         return int(self.starts[-1])
 
     def _make_choice(
-        self, power: NDArray[np.float64], half_size: NDArray[np.float64], choice: str
+        self, power: NDArray[np.float64], half_size: NDArray[np.float64], choice: str | LightSamplerMaker
     ) -> LightSampler | None:
-        """Return the choice by name; None when nothing shines. Lights without a power take no part."""
-        one_of("light_sampler", choice, CHOICES)
+        """Return the light sampler; None when nothing shines. Lights without a power take no part."""
+        make = LIGHT_SAMPLERS.find(choice)
         if not power.any():
             return None
         if not power.all():
             shining = [np.flatnonzero(part) for part in np.split(power, self.starts[1:-1])]
             kinds = [kind.take(lanes) for kind, lanes in zip(self.kinds, shining, strict=True) if lanes.size]
-            chosen = LightTable(kinds, half_size, choice).choice
+            chosen = LightTable(kinds, half_size, make).choice
             return None if chosen is None else SubsetLightSampler(chosen, np.flatnonzero(power), power.size)
         if power.size == 1:
             return SingleLightSampler()
-        if choice == "uniform":
-            return WeightedLightSampler(np.ones_like(power))
-        if choice == "power":
-            return WeightedLightSampler(power)
-
         scene_radius = float(np.linalg.norm(half_size))
 
         def irradiance(center: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
             return np.concatenate([kind.irradiance(center, radius, scene_radius) for kind in self.kinds], 1)
 
-        return SpatialLightSampler(-half_size, half_size, irradiance, power)
+        return make(power, half_size, irradiance)
 
     def sample_li(self, point: Floats, u_choice: Floats, u: Floats) -> tuple[LightSample, Ints]:
         """Choose a light for each point (3, n) with u_choice (n,) and sample it with u (2, n).

@@ -7,14 +7,17 @@ All arithmetic is whole-array and modulo 2³² or 2⁶⁴.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import lru_cache
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SceneError, one_of
+from ..errors import SceneError
+from ..registry import Registry
 from ..state import Words
 from ..vec import Floats, f4
 
@@ -59,10 +62,15 @@ def numbers_of(dimension: Dimension) -> range:
 class Sampler(ABC):
     """Uniform numbers by address.
 
+    A sampler has no state: its numbers are functions of the seed and the address alone, and the numbers of
+    one lane do not depend on which lanes stand beside it.
+
     Parameters
     ----------
     seed
         Any integer in [0, 2⁶⁴).
+    width
+        Width of the picture, pixels: pixel indices are row-major.
 
     Raises
     ------
@@ -70,10 +78,10 @@ class Sampler(ABC):
         If the seed is not such an integer.
     """
 
-    def __init__(self, seed: int = 0) -> None:
+    def __init__(self, seed: int = 0, width: int = 1) -> None:
         if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or not 0 <= seed <= _MASK64:
             raise SceneError(f"seed is {seed!r}; it must be an integer in [0, 2**64)")
-        self.seed = int(seed)
+        self.seed, self.width = int(seed), width
 
     @abstractmethod
     def draw_1d(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Floats:
@@ -162,18 +170,7 @@ class BlueNoiseSampler(Sampler):
     After the idea of A. Ahmed and P. Wonka, Screen-Space Blue-Noise Diffusion of Monte Carlo
     Sampling Error via Hierarchical Ordering of Pixels, SIGGRAPH Asia 2020, which needs the number of
     samples beforehand; the XOR in place of a longer index is what frees it from that.
-
-    Parameters
-    ----------
-    seed
-        Any integer in [0, 2⁶⁴).
-    width
-        Of the picture, pixels.
     """
-
-    def __init__(self, seed: int = 0, width: int = 1) -> None:
-        super().__init__(seed)
-        self.width = u4(width)
 
     def draw_1d(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Floats:
         """Numbers in [0, 1), (n,): the first coordinate of `draw_2d`."""
@@ -183,8 +180,9 @@ class BlueNoiseSampler(Sampler):
         """Points in [0, 1)², (2, n)."""
         stream = _stream(self.seed, bounce, dimension)
         first = np.zeros(len(pixel), u4)
-        row = pixel // self.width
-        place = _every_second_bit(pixel - row * self.width) | _every_second_bit(row) << u4(1)
+        width = u4(self.width)
+        row = pixel // width
+        place = _every_second_bit(pixel - row * width) | _every_second_bit(row) << u4(1)
         another = _stream(self.seed ^ _GOLDEN, bounce, dimension)
         own = _sequence(another, _turn_squares(place, another.words[0]), first)
         out = np.empty((2, len(pixel)), f4)
@@ -193,21 +191,23 @@ class BlueNoiseSampler(Sampler):
         return out
 
 
-SAMPLERS = ("sobol", "bluenoise", "independent")
+SamplerMaker: TypeAlias = Callable[[int, int], Sampler]  # called with the seed and the width
+SAMPLERS: Registry[SamplerMaker] = Registry(
+    "sampler",
+    "a subclass of wf.Sampler",
+    {"sobol": SobolSampler, "bluenoise": BlueNoiseSampler, "independent": IndependentSampler},
+)
 
 
-def make_sampler(name: str, seed: int = 0, width: int = 1) -> Sampler:
-    """Return the sampler called `name` for images `width` pixels wide.
+def make_sampler(sampler: str | SamplerMaker, seed: int = 0, width: int = 1) -> Sampler:
+    """Return a sampler, given by name or by its class, for images `width` pixels wide.
 
     Raises
     ------
     SceneError
         If there is no such sampler, or the seed is out of range.
     """
-    one_of("sampler", name, SAMPLERS)
-    if name == "bluenoise":
-        return BlueNoiseSampler(seed, width)
-    return SobolSampler(seed) if name == "sobol" else IndependentSampler(seed)
+    return SAMPLERS.find(sampler)(seed, width)
 
 
 def _mix64(x: int) -> int:

@@ -1,13 +1,14 @@
-"""A crew of threads that does pieces of work, and what any crew can do."""
+"""The contract of a group of workers, and the groups that a pool of `concurrent.futures` makes."""
 
 from __future__ import annotations
 
 import math
 import time
 from collections.abc import Callable, Collection
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures import wait as wait_for_futures
-from typing import Any, Protocol
+from functools import partial
+from typing import Any, Protocol, TypeAlias
 
 from .shared import AT_ONCE, SharedNumber, Stopped
 
@@ -36,22 +37,34 @@ class Stoppable:
         return self._work(job)
 
 
-class Threads:
-    """A pool of threads."""
+CrewMaker: TypeAlias = Callable[[Stoppable, int, SharedNumber], Crew]  # of work, for so many workers
+PoolMaker: TypeAlias = Callable[[int], Executor]  # called with the number of workers
 
-    def __init__(self, work: Stoppable, count: int, stop: SharedNumber) -> None:
+
+class Pool:
+    """The workers of a pool that `make` returns, such as `ThreadPoolExecutor`."""
+
+    def __init__(self, make: PoolMaker, work: Stoppable, count: int, stop: SharedNumber) -> None:
         self._work, self._stop = work, stop
-        self._pool = ThreadPoolExecutor(count, "wavefront")
+        self._pool = make(count)
 
     def submit(self, job: Any) -> Future[Any]:
-        """Give a piece to the first thread that is free."""
+        """Give a piece to the first worker that is free."""
         return self._pool.submit(self._work, job)
 
     def end(self, running: Collection[Future[Any]]) -> None:
-        """Wait for the threads, which stop at their next look; at a second Ctrl-C leave them to it."""
+        """Wait for the workers, which stop at their next check; after a second Ctrl-C do not wait."""
         self._pool.shutdown(wait=False)
         if all_done(running, math.inf, self._stop):
             self._pool.shutdown(wait=True)
+
+
+def pooled(make: PoolMaker) -> CrewMaker:
+    """Return what starts workers in pools that `make` returns."""
+    return partial(Pool, make)
+
+
+Threads = pooled(partial(ThreadPoolExecutor, thread_name_prefix="wavefront"))
 
 
 def all_done(futures: Collection[Future[Any]], patience: float, stop: SharedNumber) -> bool:

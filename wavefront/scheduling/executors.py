@@ -19,18 +19,37 @@ from concurrent.futures.process import BrokenProcessPool
 from types import TracebackType
 from typing import Generic, Self, TypeVar
 
-from ..errors import RenderError, SceneError, one_of
+from ..errors import RenderError, SceneError
+from ..registry import Registry
 from .blas import reserve_buffers, single_threaded_blas
-from .crew import Crew, Stoppable, Threads
+from .crew import Crew, CrewMaker, PoolMaker, Stoppable, Threads, pooled
 from .shared import STOP, SharedNumber, Stopped
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
-EXECUTORS = ("processes", "threads")
 MIN_PATHS = 1 << 18  # fewer are traced sooner than processes are started
 RETRIES = 2  # times that lost processes are replaced
 POLL = 0.1  # seconds between two looks at whether work is to stop
+
+
+def _processes(work: Stoppable, count: int, stop: SharedNumber) -> Crew:
+    from .processes import Processes  # here, because not every system can fork
+
+    return Processes(work, count, stop)
+
+
+def _threads(work: Stoppable, count: int, stop: SharedNumber) -> Crew:
+    reserve_buffers(count)
+    return Threads(work, count, stop)
+
+
+EXECUTORS: Registry[CrewMaker] = Registry(
+    "executor",
+    "a function that returns a concurrent.futures.Executor",
+    {"processes": _processes, "threads": _threads},
+    adapt=pooled,
+)
 
 
 def worker_count(workers: int | None) -> int:
@@ -48,8 +67,8 @@ def worker_count(workers: int | None) -> int:
     return workers
 
 
-def choose_executor(executor: str | None, workers: int, paths: int) -> str:
-    """Return "threads" or "processes": what was asked for, or what is faster for so many paths.
+def choose_executor(executor: str | PoolMaker | None, workers: int, paths: int) -> str | PoolMaker:
+    """Return what was asked for, else "threads" or "processes", whichever is faster for so many paths.
 
     Raises
     ------
@@ -57,7 +76,7 @@ def choose_executor(executor: str | None, workers: int, paths: int) -> str:
         If the name is unknown, or processes are asked for where they cannot be had.
     """
     if executor is not None:
-        one_of("executor", executor, EXECUTORS)
+        EXECUTORS.find(executor)
     obstacle = _obstacle_to_processes()
     if executor == "processes" and obstacle:
         raise SceneError(f"executor is 'processes', but {obstacle}; use 'threads'")
@@ -90,17 +109,22 @@ class Workers(Generic[Job, Result]):
     count
         Number of workers.
     executor
-        "threads" or "processes".
+        A name in `EXECUTORS`, or a function that returns a pool for a number of workers.
     stop
         At STOP no piece is begun any more, and work that looks at it may raise `Stopped`; at AT_ONCE
         nobody waits for pieces under way. Leaving the context sets it to STOP.
     """
 
     def __init__(
-        self, work: Callable[[Job], Result], count: int, executor: str, stop: SharedNumber | None = None
+        self,
+        work: Callable[[Job], Result],
+        count: int,
+        executor: str | PoolMaker,
+        stop: SharedNumber | None = None,
     ) -> None:
         self._stop = SharedNumber() if stop is None else stop
-        self._work, self._count, self._executor = Stoppable(work, self._stop), count, executor
+        self._work, self._count = Stoppable(work, self._stop), count
+        self._make = EXECUTORS.find(executor)
         self._crew: Crew | None = None
         self._running: deque[tuple[Job, Future[Result]]] = deque()
         self._retries = RETRIES
@@ -181,15 +205,7 @@ class Workers(Generic[Job, Result]):
     def _submit(self, job: Job) -> Future[Result]:
         try:
             if self._crew is None:
-                self._crew = self._start()
+                self._crew = self._make(self._work, self._count, self._stop)
             return self._crew.submit(job)
         except (RuntimeError, OSError) as error:  # a limit of threads, processes or memory
             raise RenderError(f"a worker cannot be started: {error}; use fewer workers") from error
-
-    def _start(self) -> Crew:
-        if self._executor == "threads":
-            reserve_buffers(self._count)
-            return Threads(self._work, self._count, self._stop)
-        from .processes import Processes  # here, because not every system can fork
-
-        return Processes(self._work, self._count, self._stop)

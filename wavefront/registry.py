@@ -1,0 +1,95 @@
+"""Tables of named things: one table for each kind that users can add to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Generic, TypeVar
+
+from .errors import SceneError, one_of
+
+T = TypeVar("T")
+
+
+class Registry(Mapping[str, T], Generic[T]):
+    """Things of one kind by name.
+
+    A setting of this kind takes a name in the table, or a thing of this kind in place of a name.
+
+    Parameters
+    ----------
+    setting
+        The name of the setting, for messages.
+    expected
+        What a thing of this kind is, for messages.
+    entries
+        The built-in ones, by name.
+    accepts
+        Returns True for a thing of this kind; by default for everything that can be called.
+    adapt
+        Turns a thing that a user gives into an entry of the table; by default it is one already.
+    """
+
+    def __init__(
+        self,
+        setting: str,
+        expected: str,
+        entries: Mapping[str, T],
+        accepts: Callable[[Any], bool] = callable,
+        adapt: Callable[[Any], T] = lambda thing: thing,
+    ) -> None:
+        self.setting, self.expected = setting, expected
+        self._entries, self._accepts, self._adapt = dict(entries), accepts, adapt
+
+    def __getitem__(self, name: str) -> T:
+        """Return the thing called `name`."""
+        return self._entries[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Go through the names, the built-in ones first."""
+        return iter(self._entries)
+
+    def __len__(self) -> int:
+        """Return the number of names."""
+        return len(self._entries)
+
+    def find(self, value: Any, setting: str | None = None) -> T:
+        """Return the thing that a setting names, or the setting itself if it is such a thing.
+
+        Parameters
+        ----------
+        value
+            A name in the table, or a thing of this kind.
+        setting
+            What the message calls the setting, in place of the table's own word.
+
+        Raises
+        ------
+        SceneError
+            If it is neither. The message lists all names and suggests the nearest.
+        """
+        if not isinstance(value, str) and self._accepts(value):
+            return self._adapt(value)
+        return self._entries[one_of(setting or self.setting, value, self._entries)]
+
+    def label(self, value: Any) -> str:
+        """Return the name of what `find` takes: its name in the table, else that of the function or class."""
+        if isinstance(value, str):
+            return value
+        named = (name for name, entry in self._entries.items() if entry is value)
+        return next(named, getattr(value, "__name__", type(value).__name__))
+
+    def register(self, name: str, thing: Any) -> None:
+        """Add a thing under a name of its own.
+
+        Raises
+        ------
+        SceneError
+            If the name is not a string or is taken, or the thing is not of this kind.
+        """
+        if not isinstance(name, str) or not name:
+            raise SceneError(f"the name of {self.expected} must be a string, got {name!r}")
+        if name in self._entries:
+            raise SceneError(f"{self.setting} {name!r} is registered already; choose another name")
+        if not self._accepts(thing):
+            raise SceneError(f"{self.setting} {name!r} is {thing!r}; it must be {self.expected}")
+        self._entries[name] = self._adapt(thing)
