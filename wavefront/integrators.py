@@ -1,8 +1,8 @@
 """The four estimators of the light that reaches the camera: one ladder, simplest first.
 
-Each takes a wave of paths round the loop intersect → pass through → shade → bounce-sample → compact
-and returns the radiance of every path's slot, (3, n). `max_bounces` counts scattering events: with 0
-only light seen directly is found, with 1 direct light as well.
+Each takes a wave of paths through the loop intersect → compact → shade → bounce-sample and returns the
+radiance of every path's slot, (3, n). `max_bounces` counts scattering events: with 0 only light seen
+directly is found, with 1 direct light as well.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from .registry import Registry
 from .sampling.sampler import Sampler
 from .stages.alpha import alpha_pass_through
 from .stages.bounce import bounce_sample, branch
-from .stages.compact import alive, compact, roulette, scattering_lanes, select
+from .stages.compact import alive, compact, roulette, scattering_lanes, select, specular_lanes
 from .stages.interaction import interaction
 from .stages.intersect import intersect
 from .stages.medium import absorb
 from .stages.normal_mapping import perturb_normals
-from .stages.shade import Contribution, Shading, direct, emitted, mis_weighted, shading
-from .state import Hits, Paths
-from .vec import Floats, f4, take
+from .stages.shade import Shading, direct, emitted, mis_weighted, shading
+from .state import Contribution, Hits, Paths
+from .vec import Floats, Ints, f4, take
 
 Integrator: TypeAlias = Callable[[CompiledScene, Paths, Sampler, int], Floats]
 
@@ -33,11 +33,7 @@ def li_naive(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: 
     """Follow BSDF samples only; light is found by chance."""
     L = np.zeros((3, len(paths)), f4)
     for bounce in range(max_bounces + 1):
-        hits = intersect(scene, paths)
-        paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce)
-        light = emitted(scene, paths, hits)
-        accumulate(L, paths, light)
-        paths, hits = compact(scene, paths, hits, scattering_lanes(scene, hits, light))
+        paths, hits = intersect_and_compact(scene, paths, sampler, bounce, L, mis=False)
         if bounce == max_bounces or not len(paths):
             break
         shade = prepare_shading(scene, paths, hits)
@@ -50,11 +46,7 @@ def li_direct_simple(scene: CompiledScene, paths: Paths, sampler: Sampler, max_b
     """Emission and one light sample at the first surface that is not specular."""
     L = np.zeros((3, len(paths)), f4)
     for bounce in range(max_bounces + 1):
-        hits = intersect(scene, paths)
-        paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce)
-        light = emitted(scene, paths, hits)
-        accumulate(L, paths, light)
-        paths, hits = compact(scene, paths, hits, scattering_lanes(scene, hits, light))
+        paths, hits = intersect_and_compact(scene, paths, sampler, bounce, L, mis=False)
         if bounce == max_bounces or not len(paths):
             break
         shade = prepare_shading(scene, paths, hits)
@@ -71,11 +63,7 @@ def li_direct_mis(scene: CompiledScene, paths: Paths, sampler: Sampler, max_boun
     """
     L = np.zeros((3, len(paths)), f4)
     for bounce in range(max_bounces + 1):
-        hits = intersect(scene, paths)
-        paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce)
-        light = emitted(scene, paths, hits)
-        accumulate(L, paths, mis_weighted(scene, paths, light))
-        paths, hits = compact(scene, paths, hits, np.flatnonzero((hits.prim >= 0) & paths.specular))
+        paths, hits = intersect_and_compact(scene, paths, sampler, bounce, L, mis=True, keep=specular_lanes)
         if bounce == max_bounces or not len(paths):
             break
         shade = prepare_shading(scene, paths, hits)
@@ -94,11 +82,7 @@ def li_full(
     """
     L = np.zeros((3, len(paths)), f4)
     for bounce in range(max_bounces + 1):
-        hits = intersect(scene, paths)
-        paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce)
-        light = emitted(scene, paths, hits)
-        accumulate(L, paths, mis_weighted(scene, paths, light))
-        paths, hits = compact(scene, paths, hits, scattering_lanes(scene, hits, light))
+        paths, hits = intersect_and_compact(scene, paths, sampler, bounce, L, mis=True)
         if bounce == max_bounces or not len(paths):
             break
         shade = prepare_shading(scene, paths, hits)
@@ -116,6 +100,27 @@ INTEGRATORS: Registry[Integrator] = Registry(
 )
 
 
+def intersect_and_compact(
+    scene: CompiledScene,
+    paths: Paths,
+    sampler: Sampler,
+    bounce: int,
+    L: Floats,
+    mis: bool,
+    keep: Callable[[CompiledScene, Paths, Hits, Contribution], Ints] = scattering_lanes,
+) -> tuple[Paths, Hits]:
+    """Follow paths to their next surfaces, add the light that they meet to L, and keep some of them.
+
+    With `mis` the light is weighted against light sampling. `keep` returns the lanes of the paths that
+    scatter; the others end here.
+    """
+    hits = intersect(scene, paths)
+    paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce)
+    emission = emitted(scene, paths, hits)
+    accumulate(L, paths, mis_weighted(scene, paths, emission) if mis else emission)
+    return compact(scene, paths, hits, keep(scene, paths, hits, emission))
+
+
 def prepare_shading(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
     """Weaken the paths by the matter they came through, and make their surfaces ready to shade."""
     surface = interaction(scene, paths, hits)
@@ -124,10 +129,10 @@ def prepare_shading(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
     return shading(scene, surface)
 
 
-def accumulate(L: Floats, paths: Paths, light: Contribution) -> None:
-    """Add light that arrives on some lanes, carried on by their paths, to the slots of L."""
-    if light.lanes.size:
-        slot = take(paths.slot, light.lanes)
-        arriving = take(paths.throughput, light.lanes) * light.radiance
+def accumulate(L: Floats, paths: Paths, contribution: Contribution) -> None:
+    """Add a contribution, times the throughput of its paths, to the slots of L."""
+    if contribution.lanes.size:
+        slot = take(paths.slot, contribution.lanes)
+        arriving = take(paths.throughput, contribution.lanes) * contribution.radiance
         for row, channel in zip(L, arriving, strict=True):  # a row at a time: much faster
             np.add.at(row, slot, channel)

@@ -140,3 +140,16 @@ class SurfaceInteraction(SoA):
     def frame(self) -> Frame:
         """Return the shading frames, z = ns."""
         return Frame.from_normal(self.ns)
+
+
+@record
+class Contribution(SoA):
+    """Light that arrives at the camera along some paths: emission that they met, or direct light.
+
+    Everything that is added to a picture is a contribution, so its parts by light, or by how they were
+    found, are sums over contributions.
+    """
+
+    lanes: Ints  # (k,) columns of the paths
+    radiance: Floats  # (3, k) that reaches the last vertex of each path, W·sr⁻¹·m⁻²
+    light: Ints  # (k,) number of the light, as in the scene's `LightTable`

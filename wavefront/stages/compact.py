@@ -8,10 +8,9 @@ import numpy as np
 
 from ..compile.scene import CompiledScene
 from ..sampling.sampler import Dimension, Sampler
-from ..state import Hits, Paths
-from ..vec import Bools, Ints, broadcast, f4, highest
+from ..state import Contribution, Hits, Paths
+from ..vec import Bools, Ints, broadcast, f4, highest, take
 from .interaction import material_rows
-from .shade import Emission
 
 ROULETTE_AFTER = 2  # scattering events before paths may be ended
 SURE = f4(0.5)  # throughput from which on a path lives on for sure
@@ -50,13 +49,19 @@ def select(paths: Paths, lanes: Ints) -> Paths:
     return paths if lanes.size == len(paths) else paths.take(lanes)
 
 
-def scattering_lanes(scene: CompiledScene, hits: Hits, emission: Emission) -> Ints:
-    """Lanes (k,) of paths that met a surface, and not a lamp that is black but for its light."""
+def scattering_lanes(scene: CompiledScene, paths: Paths, hits: Hits, emission: Contribution) -> Ints:
+    """Return the lanes (k,) of paths that met a surface, unless it is a light that scatters nothing."""
     if scene.nonscattering_lights is None:
         return hits.found
     found = hits.prim >= 0
     found[emission.lanes.compress(scene.nonscattering_lights.take(emission.light))] = False
     return np.flatnonzero(found)
+
+
+def specular_lanes(scene: CompiledScene, paths: Paths, hits: Hits, emission: Contribution) -> Ints:
+    """Return those of `scattering_lanes` whose last direction no light sample could have found."""
+    lanes = scattering_lanes(scene, paths, hits, emission)
+    return lanes.compress(take(paths.specular, lanes))
 
 
 def alive(paths: Paths) -> Bools:

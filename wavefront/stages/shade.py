@@ -13,29 +13,14 @@ from ..frame import Frame
 from ..record import record
 from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
-from ..state import Hits, Paths, SurfaceInteraction
-from ..vec import Floats, Ints, broadcast, column, dot, f4, highest, take
+from ..state import Contribution, Hits, Paths, SurfaceInteraction
+from ..vec import Floats, broadcast, column, dot, f4, highest, take
 from .alpha import transmittance_along
 from .interaction import above, leave
 from .intersect import shadow_rays, visible
 from .textured_emission import emission_at_hits, emission_at_samples
 
 UP = column((0, 0, 1))
-
-
-@record
-class Contribution:
-    """Light that arrives on some lanes."""
-
-    lanes: Ints  # (k,)
-    radiance: Floats  # (3, k) W·sr⁻¹·m⁻²
-
-
-@record
-class Emission(Contribution):
-    """Light met by rays: only the lanes that meet some."""
-
-    light: Ints  # (k,) number of the light
 
 
 @record
@@ -69,17 +54,17 @@ class Shading:
         return np.abs(local[2]) * (local[2] * cos_g > 0), cos_g
 
 
-def emitted(scene: CompiledScene, paths: Paths, hits: Hits) -> Emission:
+def emitted(scene: CompiledScene, paths: Paths, hits: Hits) -> Contribution:
     """Return the light that the paths' rays meet: emitting surfaces, and the environment on a miss."""
     lanes = np.flatnonzero(scene.shines.take(hits.prim))  # a miss, -1, takes the last entry
     light = scene.light_of.take(hits.prim.take(lanes))
     radiance = scene.lights.le(light, paths.direction.take(lanes, 1))
     if scene.textured_emission is not None:
         emission_at_hits(scene, paths.take(lanes), hits.take(lanes), light, radiance)
-    return Emission(lanes, radiance, light)
+    return Contribution(lanes, radiance, light)
 
 
-def mis_weighted(scene: CompiledScene, paths: Paths, emission: Emission) -> Contribution:
+def mis_weighted(scene: CompiledScene, paths: Paths, emission: Contribution) -> Contribution:
     """Return the emission weighted against light sampling; in full where that could not have found it."""
     sampled = np.flatnonzero(
         ~take(paths.specular, emission.lanes) & scene.lights.chosen_from.take(emission.light)
@@ -91,7 +76,7 @@ def mis_weighted(scene: CompiledScene, paths: Paths, emission: Emission) -> Cont
     pdf = scene.lights.pdf_li(emission.light.take(sampled), start, take(paths.direction, lanes))
     weight = np.ones(len(emission.lanes), f4)
     weight[sampled] = power_heuristic(take(paths.pdf, lanes), pdf)
-    return Contribution(emission.lanes, emission.radiance * weight)
+    return Contribution(emission.lanes, emission.radiance * weight, emission.light)
 
 
 def shading(scene: CompiledScene, surface: SurfaceInteraction) -> Shading:
@@ -127,7 +112,8 @@ def direct(
     """
     shade = shade.lit()
     if scene.lights.choice is None or not shade.groups:
-        return Contribution(np.zeros(0, np.intp), np.zeros((3, 0), f4))
+        nothing = np.zeros(0, np.intp)
+        return Contribution(nothing, np.zeros((3, 0), f4), nothing)
     n = len(shade.surface)
     address = paths.pixel[:n], paths.sample[:n], bounce
     # with one light there is nothing to choose
@@ -144,19 +130,19 @@ def direct(
     through = (arriving & (cos_g < 0)).any()
     origin = leave(shade.surface, cos_g) if through else shade.start
     rays = shadow_rays(shade.surface, origin, light, lanes)
-    radiance = take(light.radiance, lanes)
+    radiance, number = take(light.radiance, lanes), take(number, lanes)
     if scene.textured_emission is not None:
-        radiance = emission_at_samples(scene, rays, take(number, lanes), u_point.take(lanes, 1), radiance)
+        radiance = emission_at_samples(scene, rays, number, u_point.take(lanes, 1), radiance)
     if scene.opacities is not None:
         radiance = radiance * transmittance_along(scene, rays)
     else:
         seen = np.flatnonzero(visible(scene, rays))
-        lanes, radiance = lanes.take(seen), take(radiance, seen)
+        lanes, radiance, number = lanes.take(seen), take(radiance, seen), take(number, seen)
     pdf_light = take(light.pdf, lanes)
     scale = cos.take(lanes) / pdf_light
     if mis:
-        scale *= scene.lights.mis_weight(take(number, lanes), pdf_light, take(pdf, lanes))
-    return Contribution(lanes, f.take(lanes, 1) * radiance * scale)
+        scale *= scene.lights.mis_weight(number, pdf_light, take(pdf, lanes))
+    return Contribution(lanes, f.take(lanes, 1) * radiance * scale, number)
 
 
 def evaluate(shade: Shading, wi: Floats) -> tuple[Floats, Floats]:
