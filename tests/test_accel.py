@@ -568,7 +568,7 @@ def test_embree_never_meets_a_triangle_that_is_surely_behind() -> None:
         direction = rng.normal(size=(n, 3))
         direction -= normal * (direction @ normal * (1 - 10.0 ** rng.uniform(-7, 0, n)))[:, None]
         direction = (direction / np.linalg.norm(direction, axis=1)[:, None]).T.astype(f4)
-        behind = accelerator._planes.behind(origin, direction, np.zeros(n, int))
+        behind = accelerator._planes.certainly_missed(origin, direction, np.zeros(n, int))
         hit = np.isfinite(accelerator.closest(origin, direction, nothing(n)).t)
         assert not (behind & hit).any()
         sure, met, cases = sure + behind.sum(), met + hit.sum(), cases + n

@@ -1,4 +1,4 @@
-"""The contract of an accelerator: the one place where ray queries plug in."""
+"""The interface of accelerators: all ray queries of a render go through it."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ class Geometry:
     centers: Floats  # (3, k) sphere centers
     radii: Floats  # (k,) sphere radii
     weights: bool = True  # whether barycentric weights are needed; without them b1 and b2 are 0
-    # (m,) whether a triangle and the next look the same all over, so that a hit of a flat quadrilateral of
-    # both may name either; without it none do
+    # (m,) whether a triangle and the next one have the same material, light and attributes everywhere, so
+    # that either id may be reported for a hit of the flat quadrilateral that they form; None: no triangles
     interchangeable: Bools | None = None
 
 
 @record
 class Intersections:
-    """The nearest surface along each ray."""
+    """The nearest hit of each ray."""
 
     t: Floats  # (n,) distance along the direction, inf on a miss
     prim: Ints  # (n,) primitive id, -1 on a miss
@@ -35,17 +35,17 @@ class Intersections:
 
 
 class Accelerator(Protocol):
-    """Answers ray queries. Results are the same bits for any batch size or order of rays."""
+    """Answers ray queries. Results do not depend on the size of a batch or the order of its rays."""
 
     name: str
 
     def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
-        """Find the nearest hit with t > 0 of rays (3, n); ties go to the lowest id.
+        """Return the nearest hits with t > 0 of rays (3, n); of equal distances, the lowest primitive id.
 
-        `exclude_prim` (n,) names the primitive each ray starts on, -1 for none: a triangle is not hit
-        again by the ray that leaves it, and of a sphere only the far side can be. Two triangles that
-        make one flat quadrilateral may count as one there.
+        `exclude_prim` (n,) is the primitive that each ray starts on, -1 for none. A ray does not hit the
+        triangle that it starts on, and hits a sphere that it starts on only on the far side. Two triangles
+        that form one flat quadrilateral may be excluded together.
         """
 
     def occluded(self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints) -> Bools:
-        """Tell whether anything is hit with 0 < t < `distance` (n,)."""
+        """Return a mask (n,) of the rays that hit anything with 0 < t < `distance` (n,)."""

@@ -1,9 +1,9 @@
-"""Few triangles, without a tree: all rays against all, as one matrix product.
+"""Tests of all rays against all triangles, for scenes of few triangles: one matrix product without a tree.
 
-Pairs of triangles that make a quadrilateral are tested as one: four edges and one plane for two times
-three and two. Most rays need no list of candidates. One that meets a single polygon, and surely, gets its
-distance in turn with its neighbors; a shadow ray that surely meets a polygon between its ends is
-blocked, and one that surely meets none is free. The others are decided pair by pair.
+Two triangles that form a quadrilateral are tested as one polygon, by four edges and one plane. Most rays
+need no list of candidates: a ray that certainly hits exactly one polygon gets its distance in a vectorized
+step, and a shadow ray is decided if it certainly hits a polygon between its ends, or certainly hits none.
+All other pairs are tested one by one (exact.py).
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from ..vec import Bools, Floats, Ints, f4
 from . import triangle
 from .base import Geometry
 from .bvh import Ball, RayBatch, flat_true, scratch
-from .exact import TriangleDecisions
-from .hits import AnyHit, Candidates, HitRecord
+from .exact import TriangleTests
+from .hits import AnyHit, Candidates, HitAccumulator
 from .quads import are_parallelograms, corners, diagonal_planes, find_quads, planes
-from .triangle import Sides, TriangleTable, one_sign, pairs_of_one_sign
+from .triangle import PolygonPlanes, TriangleTable, least_adjacent_product, least_opposite_product
 
 CHUNK = 1 << 19  # elements of one product
 Bytes = NDArray[np.uint8]
@@ -30,28 +30,29 @@ Bytes = NDArray[np.uint8]
 
 @record
 class Polygons:
-    """Polygons of one kind, as matrices."""
+    """Polygons of one kind as a matrix."""
 
-    rows: Floats  # (edges * m, 6) see triangle.edge_rows
-    at: slice  # their places among all polygons
+    rows: Floats  # (edges * m, 6) Plücker rows of the edges, see triangle.edge_rows
+    at: slice  # their range among all polygons
     parallelograms: bool
 
     def test(self, line: Floats, side: Floats | None, out: Floats) -> None:
-        """Test lines (6, k): above 1 in `out` (m, k) where they surely pass inside, not below -1 if they do.
+        """Test lines (6, k) against the polygons.
 
-        Sides (m, k) of points, where there are any, are multiplied by an edge function.
+        `out` (m, k) becomes above 1 where a line certainly passes inside, and below -1 only where it does
+        not. `side` (m, k), if given, is multiplied by an edge function in place, for `triangle.side_rows`.
         """
         m, k = out.shape
         edges = np.matmul(self.rows, line, out=scratch("product", (len(self.rows), k))).reshape(1, -1, m, k)
         if side is not None:
             side *= edges[0, 1]
-        (pairs_of_one_sign if self.parallelograms else one_sign)(edges, out[None])
+        (least_opposite_product if self.parallelograms else least_adjacent_product)(edges, out[None])
 
 
 class BruteForceTriangles:
-    """Those triangles of `geometry` that have the `ids` (k,).
+    """The triangles `ids` (k,) of `geometry`.
 
-    Quadrilaterals get one plane in `table`: theirs differ by the rounding of their corners.
+    The two triangles of a quadrilateral get one common plane in `table`.
     """
 
     tree = None
@@ -65,7 +66,7 @@ class BruteForceTriangles:
         single = ids[~np.isin(ids, [first, first + 1])]
         quads = corners(triangles, first)
         table.plane[:, first] = table.plane[:, first + 1] = planes(quads)
-        # The last column of these is for no primitive, -1.
+        # Index -1, the last one, is for misses.
         self._partner = np.full(primitives + 1, -1)
         self._partner[first] = first + 1
         same = geometry.interchangeable
@@ -85,22 +86,22 @@ class BruteForceTriangles:
         )
 
     def _gather(self, kinds: list[tuple[Floats, Ints]], ball: Ball) -> None:
-        """Make matrices of parallelograms, other quadrilaterals and triangles: corners, triangle ids."""
+        """Build the matrices of each kind of polygon, given by corners (e, m, 3) and triangle ids (m,)."""
         self._polygons, begin = [], 0
-        sides, ahead = [], []
+        polygon_planes, side_rows = [], []
         for number, (corner, prim) in enumerate(kinds):
             if prim.size:
                 rows = triangle.edge_rows(corner, ball.center, ball.radius).reshape(-1, 6)
                 self._polygons.append(Polygons(rows, slice(begin, begin + prim.size), number == 0))
-                ahead.append(triangle.side_rows(corner, ball.center, ball.radius))
-                sides.append(triangle.sides(self._table, prim, corner, ball.center))
+                side_rows.append(triangle.side_rows(corner, ball.center, ball.radius))
+                polygon_planes.append(triangle.polygon_planes(self._table, prim, corner, ball.center))
                 begin += prim.size
         self._count = begin
         self._rows = sum(len(polygons.rows) for polygons in self._polygons)
         self._number = np.arange(1, begin + 1, dtype=np.uint8)[:, None]
-        # Of these, the first is for no polygon.
+        # Index 0 is for no polygon.
         self._prim = np.concatenate([[-1], *(prim for _, prim in kinds)])
-        self._named = np.maximum(self._prim, 0)  # distances to none are NaN
+        self._prim_or_first = np.maximum(self._prim, 0)  # index 0 has t = NaN, a miss
         self._plane = np.full((4, begin + 1), np.nan)
         self._plane[:, 1:] = self._table.plane.take(self._prim[1:], 1)
         self._slot = np.zeros(self._partner.size, np.intp)
@@ -108,47 +109,51 @@ class BruteForceTriangles:
         half = np.flatnonzero(self._partner.take(self._prim) >= 0)
         self._slot[self._partner.take(self._prim.take(half))] = half
         if begin:
-            self._ahead = np.concatenate(ahead)
-            self._sides = Sides(*(np.concatenate(parts, -1) for parts in zip(*sides, strict=True)))
+            self._side_rows = np.concatenate(side_rows)
+            self._planes = PolygonPlanes(
+                *(np.concatenate(parts, -1) for parts in zip(*polygon_planes, strict=True))
+            )
 
-    def search(self, lanes: RayBatch, found: HitRecord) -> None:
-        """Give all hits that may matter to `found`; those of a quadrilateral as hits of its first half."""
+    def find_hits(self, batch: RayBatch, found: HitAccumulator) -> None:
+        """Add all hits to `found`; those of a quadrilateral as hits of its first triangle."""
         if not self._count:
             return
-        decisions = TriangleDecisions(self._table, lanes, found, self._partner)
-        more: list[tuple[Ints, Bytes]] = []
-        for part, exclude_prim in self._parts(lanes):
-            value, met = self._filter(lanes, part, exclude_prim)
-            sure = np.greater(value, 1, out=scratch("sure", met.shape, np.bool_))
-            sure &= met
-            hits = _sum(sure)
-            self._doubt(met, sure, np.flatnonzero(hits != _sum(met)), decisions, part.start)
-            number = sure.view(np.uint8)
+        tests = TriangleTests(self._table, batch, found, self._partner)
+        further: list[tuple[Ints, Bytes]] = []
+        for part, exclude_prim in self._parts(batch):
+            value, met = self._filter(batch, part, exclude_prim)
+            certain = np.greater(value, 1, out=scratch("certain", met.shape, np.bool_))
+            certain &= met
+            hits = _sum(certain)
+            self._add_uncertain(met, certain, np.flatnonzero(hits != _sum(met)), tests, part.start)
+            number = certain.view(np.uint8)
             number *= self._number
             highest = np.maximum.reduce(number, 0).astype(np.intp)
-            t = triangle.plane_distance(self._plane, highest, lanes.origin[:, part], lanes.direction[:, part])
-            found.add_each(part, self._named.take(highest), t)
+            t = triangle.plane_distance(self._plane, highest, batch.origin[:, part], batch.direction[:, part])
+            found.add_slice(part, self._prim_or_first.take(highest), t)
             several = np.flatnonzero(hits > 1)
             number = number.take(several, 1)
             number[highest.take(several) - 1, np.arange(several.size)] = 0
-            more.append((several + part.start, number))
-        self._decide_more(more, lanes, found)
-        decisions.finish()
+            further.append((several + part.start, number))
+        self._add_further_hits(further, batch, found)
+        tests.finish()
 
-    def _doubt(
-        self, met: Bools, sure: Bools, lane: Ints, decisions: TriangleDecisions, first_lane: int
+    def _add_uncertain(
+        self, met: Bools, certain: Bools, lane: Ints, tests: TriangleTests, first_lane: int
     ) -> None:
-        """Leave it to `decisions` whether some lanes (c,) hit what of (m, k) they have met, not surely."""
+        """Pass uncertain pairs of lanes (c,) to `tests`, by masks (m, k) of possible and certain hits."""
         if lane.size:
-            unsure = met.take(lane, 1) > sure.take(lane, 1)
-            slot, place = np.divmod(flat_true(unsure), lane.size)
-            decisions.doubt(self._prim.take(slot + 1), lane.take(place) + first_lane)
+            uncertain = met.take(lane, 1) > certain.take(lane, 1)
+            slot, place = np.divmod(flat_true(uncertain), lane.size)
+            tests.add_uncertain(self._prim.take(slot + 1), lane.take(place) + first_lane)
 
-    def _decide_more(self, more: list[tuple[Ints, Bytes]], lanes: RayBatch, found: HitRecord) -> None:
-        """Decide how far other sure hits are: lanes (c,), and numbers (m, c) of polygons, 0 for none."""
-        lane = np.concatenate([lane for lane, _ in more])
-        number = np.concatenate([number for _, number in more], 1)
-        origin, direction = lanes.origin.take(lane, 1), lanes.direction.take(lane, 1)
+    def _add_further_hits(
+        self, further: list[tuple[Ints, Bytes]], batch: RayBatch, found: HitAccumulator
+    ) -> None:
+        """Add the remaining certain hits: lanes (c,), and numbers (m, c) of their polygons, 0 for none."""
+        lane = np.concatenate([lane for lane, _ in further])
+        number = np.concatenate([number for _, number in further], 1)
+        origin, direction = batch.origin.take(lane, 1), batch.direction.take(lane, 1)
         while lane.size:
             chosen = np.maximum.reduce(number, 0).astype(np.intp)
             left = np.flatnonzero(chosen)
@@ -159,20 +164,20 @@ class BruteForceTriangles:
             found.add(lane, self._prim.take(chosen), t)
             number[chosen - 1, np.arange(lane.size)] = 0
 
-    def block(self, lanes: RayBatch, found: AnyHit) -> None:
-        """Tell `found` which lanes are blocked."""
-        if lanes.start is None or lanes.end is None or not self._count:
-            return self.search(lanes, found)
-        decisions = TriangleDecisions(self._table, lanes, found, self._partner)
-        unsure = Candidates(decisions.decide)
-        start_rows, end_rows = self._sides.rows(lanes.start, lanes.end)
-        for part, exclude_prim in self._parts(lanes):
-            value = self._lines(lanes, part, None)
+    def find_blocked(self, batch: RayBatch, found: AnyHit) -> None:
+        """Mark the blocked lanes in `found`."""
+        if batch.start is None or batch.end is None or not self._count:
+            return self.find_hits(batch, found)
+        tests = TriangleTests(self._table, batch, found, self._partner)
+        uncertain = Candidates(tests.add)
+        start_rows, end_rows = self._planes.rows(batch.start, batch.end)
+        for part, exclude_prim in self._parts(batch):
+            value = self._lines(batch, part, None)
             m, k = value.shape
-            start = np.matmul(start_rows, lanes.start[:, part], out=scratch("side", (m, k)))
-            end = np.matmul(end_rows, lanes.end[:, part], out=scratch("end side", (m, k)))
-            padded = scratch("least", (m + 1, k))  # the first row: of no polygon
-            # Above 1: the line surely passes inside, and the ends are surely on different sides.
+            start = np.matmul(start_rows, batch.start[:, part], out=scratch("side", (m, k)))
+            end = np.matmul(end_rows, batch.end[:, part], out=scratch("end side", (m, k)))
+            padded = scratch("least", (m + 1, k))  # the first row is for no polygon
+            # Above 1: the line certainly passes inside, and the ends are certainly on different sides.
             least = np.maximum(start, end, out=padded[1:])
             np.minimum(least, value, out=least)
             lower = np.minimum(start, end, out=start)
@@ -185,62 +190,65 @@ class BruteForceTriangles:
             rest = np.flatnonzero((most >= -1) > blocked)
             slot, place = np.divmod(flat_true(least.take(rest, 1) >= -1), max(rest.size, 1))
             lane = rest.take(place)
-            unsure.add(self._prim.take(slot + 1), lane + part.start, value.reshape(-1).take(slot * k + lane))
-        unsure.flush()
-        decisions.finish()
+            uncertain.add(
+                self._prim.take(slot + 1), lane + part.start, value.reshape(-1).take(slot * k + lane)
+            )
+        uncertain.flush()
+        tests.finish()
         return None
 
-    def _parts(self, lanes: RayBatch) -> Iterator[tuple[slice, Ints | None]]:
-        """Yield equal parts of the lanes, and where in (m + 1, k) the polygons are that they leave, flat."""
-        n = lanes.count
-        left = self._slot.take(lanes.exclude_prim) if lanes.exclude_prim.max(initial=-1) >= 0 else None
+    def _parts(self, batch: RayBatch) -> Iterator[tuple[slice, Ints | None]]:
+        """Yield slices of the batch, and the flat indices of their excluded polygons in (m + 1, k)."""
+        n = batch.count
+        excluded = self._slot.take(batch.exclude_prim) if batch.exclude_prim.max(initial=-1) >= 0 else None
         parts = -(-n * self._rows // CHUNK)
         step = -(-n // parts)
         step += -step % 16
         for at in range(0, n, step):
             part = slice(at, min(at + step, n))
-            if left is None:
+            if excluded is None:
                 yield part, None
                 continue
             k = part.stop - at
-            flat = left[part] * k
+            flat = excluded[part] * k
             flat += np.arange(k)
             yield part, flat
 
-    def _filter(self, lanes: RayBatch, part: slice, exclude_prim: Ints | None) -> tuple[Floats, Bools]:
-        """Test lines against all polygons -> how sure (m, k), and which ones the rays may meet (m, k)."""
-        if lanes.start is None:
-            value = least = self._lines(lanes, part, None)
+    def _filter(self, batch: RayBatch, part: slice, exclude_prim: Ints | None) -> tuple[Floats, Bools]:
+        """Return the filter's values (m, k) of a slice of the batch, and a mask (m, k) of possible hits."""
+        if batch.start is None:
+            value = least = self._lines(batch, part, None)
         else:
-            points = lanes.start[:, part]
-            side = np.matmul(self._ahead, points, out=scratch("side", (self._count, points.shape[1])))
-            value = self._lines(lanes, part, side)
+            points = batch.start[:, part]
+            side = np.matmul(self._side_rows, points, out=scratch("side", (self._count, points.shape[1])))
+            value = self._lines(batch, part, side)
             least = np.minimum(value, side, out=side)
-        met = scratch("met", (self._count + 1, value.shape[1]), np.bool_)  # the first row: of no polygon
+        met = scratch("met", (self._count + 1, value.shape[1]), np.bool_)  # the first row is for no polygon
         np.greater_equal(least, -1, out=met[1:])
         if exclude_prim is not None:
             met.reshape(-1)[exclude_prim] = False
         return value, met[1:]
 
-    def _lines(self, lanes: RayBatch, part: slice, side: Floats | None) -> Floats:
-        line = lanes.line[:, part]
+    def _lines(self, batch: RayBatch, part: slice, side: Floats | None) -> Floats:
+        """Return the values (m, k) of `Polygons.test` for a slice of the batch."""
+        line = batch.line[:, part]
         value = scratch("value", (self._count, line.shape[1]))
         for polygons in self._polygons:
             polygons.test(line, None if side is None else side[polygons.at], value[polygons.at])
         return value
 
-    def halves(self, prim: Ints, lanes: RayBatch, t: Floats) -> Ints:
-        """Tell which half of a quadrilateral was hit at t (n,): primitives (n,), -1 for a miss.
+    def resolve_quads(self, prim: Ints, batch: RayBatch, t: Floats) -> Ints:
+        """Return the triangles (n,) that were hit at t (n,), given the first triangle of each quadrilateral.
 
-        Of halves that look alike the first is as good.
+        A miss is -1. Of triangles that are interchangeable, the first one is returned.
         """
         if self._diagonal is None:
             return prim
-        px, py, pz = lanes.origin + lanes.direction * t
+        px, py, pz = batch.origin + batch.direction * t
         x, y, z, offset = (row.take(prim) for row in self._diagonal)
         return prim + (x * px + y * py + z * pz + offset > 0)
 
 
 def _sum(bytes_: NDArray[Any]) -> Bytes:
-    """Add up bytes (m, k) of each column."""
+    """Return the sums of bytes (m, k) over each column."""
     return np.add.reduce(bytes_.view(np.uint8), 0, dtype=np.uint8)

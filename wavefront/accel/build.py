@@ -1,9 +1,9 @@
 """Build a tree of boxes over primitives, level by level, in whole-array operations.
 
 Every pass splits all nodes of one level at once: primitives are sorted by node and position, and each
-node is cut where the surface area heuristic is lowest (Goldsmith and Salmon 1987; binned as in Wald,
-"On fast construction of SAH-based bounding volume hierarchies", 2007). As leaves are matrices of a
-fixed number of rows, a leaf costs the same however full it is: cuts lie at multiples of the leaf size.
+node is split where the surface area heuristic is lowest (Goldsmith and Salmon 1987; binned as in Wald,
+"On fast construction of SAH-based bounding volume hierarchies", 2007). A leaf is a matrix of a fixed
+number of rows, so its cost does not depend on how full it is: splits lie at multiples of the leaf size.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from numpy.typing import NDArray
 from ..record import record
 from ..vec import Floats, Ints, f4
 
-EMPTY = f4(3e38)  # the box that no ray meets runs from EMPTY to -EMPTY
-MAX_CUTS = 16  # cuts tried per node and axis
+EMPTY = f4(3e38)  # an empty box, which no ray meets, extends from EMPTY to -EMPTY
+MAX_BINS = 16  # splits tried per node and axis
 
 
 @record
 class Tree:
-    """A wide tree. A child code c >= 0 is inner node c, c < 0 is leaf -1 - c."""
+    """A tree with `width` children per node. A child code c >= 0 is inner node c, c < 0 is leaf -1 - c."""
 
     low: Floats  # (nodes, width, 3) lower corners of the children's boxes, EMPTY where there is none
     high: Floats  # (nodes, width, 3) upper corners, -EMPTY where there is none
     child: NDArray[np.int32]  # (nodes, width) child codes, 0 where there is none
     prim: Ints  # (leaves, leaf size) primitives of each leaf, -1 where there is none
     cost: float  # SAH: expected boxes and leaves visited by a random line through the root's box
-    shape: NDArray[np.float64] | None  # (nodes, width, k) what `fit` made of each child
+    shape: NDArray[np.float64] | None  # (nodes, width, k) the result of `fit` for each child
 
 
 def build_tree(
@@ -41,7 +41,7 @@ def build_tree(
 ) -> Tree:
     """Build over boxes `low`, `high` (3, m), m > 0. `width` is a power of two.
 
-    `fit` turns segments (order, starts) of primitives into rows of numbers, to be kept for each child.
+    `fit` returns the rows `Tree.shape` of segments of primitives, given the order and the segments' starts.
     """
     m = low.shape[1]
     order, original = np.arange(m), np.arange(m)
@@ -55,14 +55,14 @@ def build_tree(
         parent = np.arange(parents)
         for _ in range(width.bit_length() - 1):
             order, start, count, parent = _split(order, start, count, parent, low, high, leaf_size)
-        piece_low = np.minimum.reduceat(low.take(order, 1), start, 1) if start.size else low[:, :0]
-        piece_high = np.maximum.reduceat(high.take(order, 1), start, 1)
+        child_low = np.minimum.reduceat(low.take(order, 1), start, 1) if start.size else low[:, :0]
+        child_high = np.maximum.reduceat(high.take(order, 1), start, 1)
         rank = np.arange(start.size) - np.searchsorted(parent, parent)
         leaf = count <= leaf_size
         code = np.where(leaf, -leaves - np.cumsum(leaf), nodes + parents - 1 + np.cumsum(~leaf))
         box = np.full((2, parents, width, 3), EMPTY, f4)
         box[1] = -EMPTY
-        box[0, parent, rank], box[1, parent, rank] = piece_low.T, piece_high.T
+        box[0, parent, rank], box[1, parent, rank] = child_low.T, child_high.T
         slots = np.zeros((parents, width), np.int32)
         slots[parent, rank] = code
         if fit is not None:
@@ -70,7 +70,7 @@ def build_tree(
             shape = np.ones((parents, width, fitted.shape[1]))
             shape[parent, rank] = fitted
             shapes.append(shape)
-        area_sum += float(_area(piece_low, piece_high).sum())
+        area_sum += float(_area(child_low, child_high).sum())
         lows.append(box[0])
         highs.append(box[1])
         children.append(slots)
@@ -78,8 +78,8 @@ def build_tree(
         nodes += parents
         leaves += int(leaf.sum())
         inner = np.flatnonzero(~leaf)
-        order, start, count = _keep(order, start, count, inner)
-        # Boxes that are split together move together, which spares the next levels cache misses.
+        order, start, count = _select_segments(order, start, count, inner)
+        # Boxes of one node are stored together, which avoids cache misses on the next levels.
         low, high, original = low.take(order, 1), high.take(order, 1), original.take(order)
         order = np.arange(order.size)
     return Tree(
@@ -93,22 +93,22 @@ def build_tree(
 
 
 def _area(low: Floats, high: Floats) -> Floats:
-    """Half the surface area of boxes (3, ...)."""
+    """Return half the surface area of boxes (3, ...)."""
     with np.errstate(over="ignore"):  # of empty boxes
         x, y, z = np.maximum(high - low, 0)
     return x * y + y * z + z * x
 
 
 def _leaf_members(order: Ints, start: Ints, count: Ints, leaf_size: int) -> Ints:
-    """Primitives of each leaf, sorted, -1 beyond its count -> (leaves, leaf_size)."""
+    """Return the primitives of each leaf, padded with -1, (leaves, leaf_size)."""
     column = np.arange(leaf_size)
     used = column < count[:, None]
     at = np.where(used, start[:, None] + column, 0)
     return np.where(used, order.take(at), -1)
 
 
-def _keep(order: Ints, start: Ints, count: Ints, chosen: Ints) -> tuple[Ints, Ints, Ints]:
-    """Drop the primitives of all segments but the chosen ones."""
+def _select_segments(order: Ints, start: Ints, count: Ints, chosen: Ints) -> tuple[Ints, Ints, Ints]:
+    """Return order, start and count of the chosen segments alone."""
     start, count = start.take(chosen), count.take(chosen)
     ends = np.cumsum(count)
     begins = ends - count
@@ -119,38 +119,41 @@ def _keep(order: Ints, start: Ints, count: Ints, chosen: Ints) -> tuple[Ints, In
 def _split(
     order: Ints, start: Ints, count: Ints, parent: Ints, low: Floats, high: Floats, leaf_size: int
 ) -> tuple[Ints, Ints, Ints, Ints]:
-    """Cut every segment of more than `leaf_size` primitives in two."""
+    """Split every segment of more than `leaf_size` primitives in two."""
     large = np.flatnonzero(count > leaf_size)
     if not large.size:
         return order, start, count, parent
-    ids, begin, size = _keep(order, start, count, large)
+    ids, begin, size = _select_segments(order, start, count, large)
     best_cost = np.full(large.size, np.inf)
-    best_cut = np.zeros(large.size, np.intp)
+    best_split = np.zeros(large.size, np.intp)
     best_ids = ids.copy()
     owner = np.repeat(np.arange(large.size), size)
     for axis in range(3):
         middle = low[axis].take(ids) + high[axis].take(ids)
         sorted_ids = ids.take(_argsort_within(owner, begin, middle))
-        cost, cut = _best_cut(sorted_ids, begin, size, low, high, leaf_size)
+        cost, split = _best_split(sorted_ids, begin, size, low, high, leaf_size)
         better = cost < best_cost
         best_cost = np.where(better, cost, best_cost)
-        best_cut = np.where(better, cut, best_cut)
+        best_split = np.where(better, split, best_split)
         best_ids = np.where(better.take(owner), sorted_ids, best_ids)
     new_order = order.copy()
     new_order[np.arange(ids.size) + np.repeat(start.take(large) - begin, size)] = best_ids
-    cuts = np.zeros(start.size, np.intp)
-    cuts[large] = best_cut
-    repeat = np.where(cuts > 0, 2, 1)
+    splits = np.zeros(start.size, np.intp)
+    splits[large] = best_split
+    repeat = np.where(splits > 0, 2, 1)
     second = np.cumsum(repeat)[large] - 1
     new_start, new_count, new_parent = (np.repeat(x, repeat) for x in (start, count, parent))
-    new_count[second - 1] = best_cut
-    new_start[second] += best_cut
-    new_count[second] -= best_cut
+    new_count[second - 1] = best_split
+    new_start[second] += best_split
+    new_count[second] -= best_split
     return new_order, new_start, new_count, new_parent
 
 
 def _argsort_within(owner: Ints, begin: Ints, key: Floats) -> Ints:
-    """Sort segments, which begin at `begin` and whose number is `owner`, each by 65 536 steps of its keys."""
+    """Return the order that sorts each segment by its keys, rounded to 16 bits of their range.
+
+    `begin` is where segments begin, and `owner` the number of each element's segment.
+    """
     with np.errstate(all="ignore"):
         low = np.minimum.reduceat(key, begin)
         size = np.maximum.reduceat(key, begin) - low
@@ -161,7 +164,7 @@ def _argsort_within(owner: Ints, begin: Ints, key: Floats) -> Ints:
 
 
 def stable_order(values: Ints) -> Ints:
-    """Sort stably: by 16 bits at a time, which NumPy does by radix, five times as fast as by comparison."""
+    """Return a stable sorting order, by 16 bits at a time: NumPy's radix sort is five times as fast."""
     order = np.argsort(values.astype(np.uint16), kind="stable")
     shift = 16
     while values.size and int(values.max()) >> shift:
@@ -170,17 +173,17 @@ def stable_order(values: Ints) -> Ints:
     return order
 
 
-def _best_cut(
+def _best_split(
     ids: Ints, begin: Ints, size: Ints, low: Floats, high: Floats, leaf_size: int
 ) -> tuple[NDArray[np.float64], Ints]:
-    """Find each segment's best cut of its sorted `ids`: cost and number of primitives before it."""
-    step = leaf_size * -(-size // (leaf_size * MAX_CUTS))
+    """Return the cost of each segment's best split, and the number of its sorted `ids` before it."""
+    step = leaf_size * -(-size // (leaf_size * MAX_BINS))
     chunks = -(-size // step)
     total = int(chunks.sum())
     owner = np.repeat(np.arange(size.size), chunks)
     rank = np.arange(total) - np.repeat(np.cumsum(chunks) - chunks, chunks)
     at = begin.take(owner) + rank * step.take(owner)
-    box = np.full((2, 3, size.size, MAX_CUTS), EMPTY, f4)
+    box = np.full((2, 3, size.size, MAX_BINS), EMPTY, f4)
     box[1] = -EMPTY
     for axis in range(3):
         box[0, axis, owner, rank] = np.minimum.reduceat(low[axis].take(ids), at)
@@ -190,7 +193,7 @@ def _best_cut(
         np.minimum.accumulate(box[0, :, :, ::-1], 2)[:, :, ::-1],
         np.maximum.accumulate(box[1, :, :, ::-1], 2)[:, :, ::-1],
     )
-    before = np.arange(1, MAX_CUTS) * step[:, None]
+    before = np.arange(1, MAX_BINS) * step[:, None]
     after = size[:, None] - before
     leaves_before, leaves_after = before // leaf_size, -(-after // leaf_size)
     cost = left[:, :-1].astype(np.float64) * leaves_before + right[:, 1:] * leaves_after

@@ -1,12 +1,11 @@
-"""Trace streams of rays through a tree whose nodes are matrices.
+"""A bounding volume hierarchy for batches of rays, traversed by matrix products.
 
-A node is a matrix, and its rays are the columns of another. Around each child lies an ellipsoid, and a line
-meets an ellipsoid where a quadratic form in its Plücker coordinates is not negative: an inner node's
-product has one row per child, on the 21 products of two coordinates. A leaf's product gives the edge
-functions of its triangles. Pairs of (node, ray) are sorted by node, cut into blocks of `BLOCK` rays, and
-all blocks go through one batched product, so that the number of NumPy calls does not grow with the
-number of nodes. The root's children are taken nearest first, each ray in its own order, so that rays
-that have found their hit drop out before the next round.
+Each child of a node is bounded by an ellipsoid. A line meets an ellipsoid where a quadratic form in its
+Plücker coordinates is not negative, so an inner node is a matrix of one row per child, which multiplies the
+21 products of two coordinates of each ray. The matrix of a leaf gives the edge functions of its triangles.
+Pairs of node and ray are sorted by node and split into blocks of `BLOCK` rays, and one batched product
+tests all blocks, so that the number of NumPy calls does not grow with the number of nodes. Each ray visits
+the children of the root in the order of their distance; rays that have a nearer hit leave out the rest.
 """
 
 from __future__ import annotations
@@ -29,8 +28,8 @@ from .triangle import ROUNDOFF, Doubles
 BLOCK = 32  # rays that share one copy of a node's matrix
 BLOCK_SHIFT = 5
 CHUNK = 1 << 18  # elements of one product
-NEAR_ROUNDS = 3  # in which each ray takes the nearest child of the root; then all that are left
-TOP = 128  # children of the root at most: those of its children join it while so many fit
+NEAR_ROUNDS = 3  # rounds in which each ray visits its nearest child of the root; then it visits all others
+TOP = 128  # most children of the root: inner children are replaced by their own while these fit
 
 Codes = NDArray[np.int64]
 
@@ -39,7 +38,7 @@ _memory = threading.local()
 
 
 def scratch(name: str, shape: tuple[int, ...], dtype: type = f4) -> NDArray[Any]:
-    """Return this thread's buffer `name`, uninitialized; its last use ends here."""
+    """Return this thread's buffer `name`, uninitialized; earlier arrays from it become invalid."""
     size = math.prod(shape)
     held = getattr(_memory, name, None)
     if held is None or held.size < size:
@@ -49,47 +48,47 @@ def scratch(name: str, shape: tuple[int, ...], dtype: type = f4) -> NDArray[Any]
 
 
 def flat_true(mask: Bools) -> Ints:
-    """Return the flat indices of what is true in a contiguous mask."""
+    """Return the flat indices of the true elements of a contiguous mask."""
     return mask.reshape(-1).nonzero()[0]
 
 
 @record
 class Ball:
-    """A ball around everything that can be hit."""
+    """A bounding ball of all primitives."""
 
     center: Floats  # (3,) float32
     radius: float
 
 
 def bounding_ball(low: Floats, high: Floats) -> Ball:
-    """Return a ball around boxes `low`, `high` (3, m)."""
+    """Return a bounding ball of boxes `low`, `high` (3, m)."""
     lowest, highest = low.min(1).astype(np.float64), high.max(1).astype(np.float64)
     center = ((lowest + highest) / 2).astype(f4)
-    reach = np.maximum(highest - center, center - lowest)
-    return Ball(center, max(float(np.sqrt((reach * reach).sum())) * (1 + 1e-6), 1e-37))
+    extent = np.maximum(highest - center, center - lowest)
+    return Ball(center, max(float(np.sqrt((extent * extent).sum())) * (1 + 1e-6), 1e-37))
 
 
 @dataclass
 class RayBatch:
-    """A batch of n rays, prepared."""
+    """A batch of n rays with their Plücker coordinates."""
 
     origin: Floats  # (3, n) as given
     direction: Floats  # (3, n) as given
     exclude_prim: Ints  # (n,)
     line: Floats  # (6, n + 1) Plücker coordinates: unit direction d, then (o - center) × d; the last is NaN
-    speed: Floats  # (n,) length of `direction`
+    direction_length: Floats  # (n,) length of `direction`
     local: Floats | Doubles  # (3, n) o - center
     start: Floats | None  # (4, n) o - center, 1; None if some origin is far away
-    end: Floats | None  # (4, n) the same of where rays end; None if they have no end, or start is None
+    end: Floats | None  # (4, n) the same of the rays' end points; None if they have none, or start is None
 
     @property
     def count(self) -> int:
         """Number of rays."""
-        return self.speed.size
+        return self.direction_length.size
 
     @cached_property
     def begin(self) -> Floats | Doubles:
-        """Where rays start (n,), as a distance from the point next to the center."""
+        """Signed distance of the origins (n,) along the line, from its point nearest to the center."""
         x, y, z = self.local
         ux, uy, uz = self.line[:3, :-1]
         return x * ux + y * uy + z * uz
@@ -98,10 +97,10 @@ class RayBatch:
 def prepare(
     origin: Floats, direction: Floats, exclude_prim: Ints, ball: Ball, distance: Floats | None = None
 ) -> RayBatch:
-    """Compute Plücker coordinates of rays (3, n) about the ball's center, which end at `distance` (n,).
+    """Compute Plücker coordinates of rays (3, n) about the ball's center.
 
-    They are float32 while all origins are within two radii. Beyond, o - center loses what matters, and
-    they are computed in float64.
+    `distance` (n,) is where shadow rays end. The coordinates are computed in float32 if all origins are
+    within two radii of the center, and else in float64, because o - center would lose too many digits.
     """
     n = origin.shape[1]
     center = ball.center[:, None]
@@ -111,37 +110,37 @@ def prepare(
     furthest = np.maximum(local.max(initial=0), -local.min(initial=0))
     far = not float(furthest) * 3**0.5 <= 2 * ball.radius
     work = np.multiply(direction, direction, out=scratch("work", (3, n)))
-    speed = np.add(work[0], work[1], out=scratch("speed", (n,)))
-    speed += work[2]
-    np.sqrt(speed, out=speed)
+    direction_length = np.add(work[0], work[1], out=scratch("direction_length", (n,)))
+    direction_length += work[2]
+    np.sqrt(direction_length, out=direction_length)
     line = scratch("line", (6, n + 1))
     line[:, -1] = np.nan
     unit, moment = line[:3, :-1], line[3:, :-1]
-    np.divide(direction, speed, out=unit)
+    np.divide(direction, direction_length, out=unit)
     if far:
         wide = scratch("wide", (8, n), np.float64)
         local = np.subtract(origin, center, out=wide[:3], dtype=np.float64)
-        np.divide(_cross(local, direction, wide[3:]), speed, out=moment, casting="same_kind")
+        np.divide(_cross(local, direction, wide[3:]), direction_length, out=moment, casting="same_kind")
         np.multiply(moment, moment, out=work)
-        # A line that passes the ball by meets nothing, and the filters do not allow for its rounding.
+        # A line outside the ball hits nothing; the error bounds of the filters do not hold for it.
         line[:, np.flatnonzero(work[0] + work[1] + work[2] > (1.01 * ball.radius) ** 2)] = np.nan
-        return RayBatch(origin, direction, exclude_prim, line, speed, local, None, None)
+        return RayBatch(origin, direction, exclude_prim, line, direction_length, local, None, None)
     moment[:] = _cross(local, unit, scratch("moment", (5, n)))
     end = None
     if distance is not None:
-        length = np.divide(f4(3.01 * ball.radius), speed, out=work[0])
+        length = np.divide(f4(3.01 * ball.radius), direction_length, out=work[0])
         np.minimum(distance, length, out=length)
         np.maximum(length, f4(0), out=length)
         end = _with_one("end", direction)
         end[:3] *= length
         end[:3] += local
-        if not np.isfinite(end.max(initial=0) + speed.max(initial=0)):
-            return RayBatch(origin, direction, exclude_prim, line, speed, local, None, None)
-    return RayBatch(origin, direction, exclude_prim, line, speed, local, start, end)
+        if not np.isfinite(end.max(initial=0) + direction_length.max(initial=0)):
+            return RayBatch(origin, direction, exclude_prim, line, direction_length, local, None, None)
+    return RayBatch(origin, direction, exclude_prim, line, direction_length, local, start, end)
 
 
 def _cross(a: NDArray[Any], b: NDArray[Any], work: NDArray[Any]) -> NDArray[Any]:
-    """Cross products of vectors (3, n), in work space (5, n)."""
+    """Return cross products of vectors (3, n), in the first rows of `work` (5, n)."""
     for axis, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
         np.multiply(a[i], b[j], out=work[3])
         np.multiply(a[j], b[i], out=work[4])
@@ -150,7 +149,7 @@ def _cross(a: NDArray[Any], b: NDArray[Any], work: NDArray[Any]) -> NDArray[Any]
 
 
 def _with_one(name: str, points: Floats) -> Floats:
-    """Points (3, n) -> (4, n)."""
+    """Append a row of ones to points (3, n), in the buffer `name`."""
     out = scratch(name, (4, points.shape[1]))
     out[:3] = points
     out[3] = 1
@@ -159,13 +158,13 @@ def _with_one(name: str, points: Floats) -> Floats:
 
 @record
 class Bvh:
-    """A tree as matrices. Lengths are in units of the ball's radius, places relative to its center."""
+    """A tree as matrices. Lengths are in units of the ball's radius, positions relative to its center."""
 
     root: Floats  # (top, 21) quadrics of the root's children, see quadric_rows
-    top: Ints  # (top,) their slots
+    top: Ints  # (top,) columns of the root's children in `box` and `child`
     quadrics: Floats  # (nodes, width, 21) quadrics of each child, about the node's center
-    center: Floats  # (nodes, 3) where a node's moments are taken about
-    box: Floats  # (6, nodes * width) lower and upper corner of a box around each child
+    center: Floats  # (nodes, 3) reference points of the moments
+    box: Floats  # (6, nodes * width) lower and upper corner of each child's box
     child: Ints  # (nodes * width,) child codes as in build.Tree
     leaves: Floats  # (leaves, rows, columns) the filter's matrices
     prim: Ints  # (leaves * leaf size,) primitive of each leaf slot
@@ -190,9 +189,9 @@ def build_bvh(points: Floats, leaf_size: int, width: int, ball: Ball) -> Bvh:
     inner = np.flatnonzero(~absent & (tree.child >= 0))
     shapes = tree.shape.reshape(-1, 12)
     center[tree.child.ravel()[inner]] = shapes[inner, :3]
-    reach = np.ones(nodes)
-    reach[tree.child.ravel()[inner]] = np.linalg.norm(shapes[inner, 3:], axis=1)
-    quadrics = quadric_rows(tree.shape, center, reach)
+    radius = np.ones(nodes)
+    radius[tree.child.ravel()[inner]] = np.linalg.norm(shapes[inner, 3:], axis=1)
+    quadrics = quadric_rows(tree.shape, center, radius)
     quadrics[absent] = 0
     for axis in range(3):
         quadrics[absent, PAIRS.index((axis, axis))] = -1
@@ -228,10 +227,10 @@ def build_bvh(points: Floats, leaf_size: int, width: int, ball: Ball) -> Bvh:
 
 
 def fit_ellipsoids(points: Floats, order: Ints, start: Ints) -> Doubles:
-    """Fit ellipsoids around segments of primitives within points (corners, 3, m) -> (segments, 12).
+    """Fit a bounding ellipsoid to each segment of primitives with points (corners, 3, m).
 
-    Center, then the three half axes, as columns of a matrix: the principal axes of the points, scaled to
-    their extent along each, and then until all points are inside.
+    Returns (segments, 12): the center, then the three half axes as columns of a matrix. These are the
+    principal axes of the points, scaled to the extent along each, and then until all points are inside.
     """
     count = np.diff(start, append=order.size)
     owner = np.repeat(np.arange(start.size), count)
@@ -274,13 +273,13 @@ def fit_ellipsoids(points: Floats, order: Ints, start: Ints) -> Doubles:
 PAIRS = [(i, j) for i in range(6) for j in range(i, 6)]
 
 
-def quadric_rows(shape: Doubles, center: Doubles, reach: Doubles) -> Floats:
-    """Quadratic forms in Plücker coordinates: not below 0 where a line meets an ellipsoid.
+def quadric_rows(shape: Doubles, center: Doubles, radius: Doubles) -> Floats:
+    """Return quadratic forms in Plücker coordinates, not negative where a line meets an ellipsoid.
 
     With half axes S and center c: |adj(S) d|² - |Sᵀ (m - c × d)|² >= 0, as the map that turns the
     ellipsoid into the unit ball turns directions d into S⁻¹ d and moments m by the cofactors of S⁻¹.
-    `shape` (nodes, width, 12), as in fit_ellipsoids; moments are about `center` (nodes, 3), and lines pass it
-    within `reach`. Rows are enlarged by a bound of the error of float32, so that no line is lost.
+    `shape` (nodes, width, 12) is as in `fit_ellipsoids`. Moments are about `center` (nodes, 3), and
+    lines pass it within `radius` (nodes,). Rows include a bound of the float32 error: no hit is missed.
     """
     c = shape[..., :3] - center[:, None]
     s = shape[..., 3:].reshape(*shape.shape[:2], 3, 3)
@@ -297,7 +296,7 @@ def quadric_rows(shape: Doubles, center: Doubles, reach: Doubles) -> Floats:
     form[..., 3:, 3:] = -spread
     form[..., 3:, :3] = spread @ cross
     form[..., :3, 3:] = form[..., 3:, :3].swapaxes(-1, -2)
-    moment = np.ones((len(s), 6)) * reach[:, None] * 1.01 + 1e-5
+    moment = np.ones((len(s), 6)) * radius[:, None] * 1.01 + 1e-5
     moment[:, :3] = 1
     magnitude = (np.abs(form) * moment[:, None, :, None] * moment[:, None, None, :]).sum((-1, -2))
     largest = size[..., 2] * unit
@@ -311,21 +310,30 @@ def quadric_rows(shape: Doubles, center: Doubles, reach: Doubles) -> Floats:
 
 
 def trace(
-    tree: Bvh, lanes: RayBatch, reach_now: Callable[[], Floats], visit: Callable[[Ints, Ints], None]
+    tree: Bvh, batch: RayBatch, t_far_now: Callable[[], Floats], visit: Callable[[Ints, Ints], None]
 ) -> None:
-    """Take rays through the tree, near children of the root first.
+    """Traverse the tree, near children of the root first.
 
-    `reach_now()` (n + 1,) is how far rays still look, less after `visit(leaves, lanes)`, which tests.
+    Parameters
+    ----------
+    batch
+        n rays.
+    t_far_now
+        Returns the largest distance at which a hit still matters, (n + 1,). It decreases with the hits that
+        `visit` finds. Distances count along the line from its point nearest to the ball's center, in units
+        of the ball's radius.
+    visit
+        Tests pairs of leaves (k,) and lanes (k,).
     """
-    reach = reach_now()
-    rays = _rays(lanes, tree.scale)
+    t_far = t_far_now()
+    rays = _lines(batch, tree.scale)
     codes = tree.child.take(tree.top)
-    slot, lane, near = _root_pairs(tree, rays, reach)
+    slot, lane, near = _root_pairs(tree, rays, t_far)
     for last in (*[False] * NEAR_ROUNDS, True):
-        chosen = np.arange(lane.size) if last else _nearest_of_each(lane, near, lanes.count)
-        _descend(tree, rays, reach, codes.take(slot.take(chosen)), lane.take(chosen), visit)
-        reach = reach_now()
-        left = near <= reach.take(lane)
+        chosen = np.arange(lane.size) if last else _nearest_of_each(lane, near, batch.count)
+        _descend(tree, rays, t_far, codes.take(slot.take(chosen)), lane.take(chosen), visit)
+        t_far = t_far_now()
+        left = near <= t_far.take(lane)
         left[chosen] = False
         rest = np.flatnonzero(left)
         if not rest.size:
@@ -334,16 +342,16 @@ def trace(
 
 
 @record
-class _Rays:
-    """Lines in units of the ball's radius about its center; at the end one that meets nothing."""
+class _Lines:
+    """The lines of n rays in units of the ball's radius, about its center, and one that meets nothing."""
 
     line: Floats  # (6, n + 1) Plücker coordinates
-    foot: Floats  # (3, n + 1) point next to the center, from where distances count
+    foot: Floats  # (3, n + 1) point of the line nearest to the center; distances count from it
     inverse: Floats  # (3, n + 1) 1 / direction
-    begin: Floats  # (n + 1,) where rays start
+    begin: Floats  # (n + 1,) distances of the origins
 
     def span(self, box: Floats, slot: Ints, lane: Ints) -> tuple[Floats, Floats]:
-        """Return where lanes (k,) enter and leave boxes `slot` (k,) of `box` (6, slots): slab tests."""
+        """Return the entry and exit distances of lanes (k,) at boxes `slot` (k,) of `box` (6, slots)."""
         enter, leave = self.begin.take(lane), np.full(lane.size, np.inf, f4)
         for axis in range(3):
             foot, inverse = self.foot[axis].take(lane), self.inverse[axis].take(lane)
@@ -354,19 +362,19 @@ class _Rays:
         return enter, leave
 
 
-def _rays(lanes: RayBatch, scale: np.float32) -> _Rays:
-    line = lanes.line.copy()
+def _lines(batch: RayBatch, scale: np.float32) -> _Lines:
+    line = batch.line.copy()
     line[3:] *= scale
     dx, dy, dz, mx, my, mz = line
     foot = np.stack([dy * mz - dz * my, dz * mx - dx * mz, dx * my - dy * mx])
     inverse = f4(1) / np.where(line[:3] == 0, TINY, line[:3])
-    begin = lanes.begin * scale
+    begin = batch.begin * scale
     begin = np.append((begin - np.abs(begin) * 1e-6 - 1e-6).astype(f4), f4(np.inf))
-    return _Rays(line, foot, inverse, begin)
+    return _Lines(line, foot, inverse, begin)
 
 
 def _nearest_of_each(lane: Ints, near: Floats, count: int) -> Ints:
-    """Return the pair (k,) with the least distance of each lane that has one."""
+    """Return the index of the nearest pair of each lane that has one."""
     key = (near + OFFSET).view(np.int32).astype(np.int64) << 32
     key |= np.arange(lane.size)
     none = np.iinfo(np.int64).max
@@ -375,13 +383,13 @@ def _nearest_of_each(lane: Ints, near: Floats, count: int) -> Ints:
     return least.compress(least != none) & 0xFFFFFFFF
 
 
-BOX_MARGIN = 4e-6  # by which boxes are wider, for the rounding of lines
-TINY = f4(1e-30)  # in place of 0, so that 0 times the inverse is a number
+BOX_MARGIN = 4e-6  # added to boxes on all sides, for the rounding of lines
+TINY = f4(1e-30)  # replaces 0 in directions, so that 0 times the inverse is not NaN
 OFFSET = f4(4)  # makes distances positive, so that their bits sort like numbers
 
 
-def _root_pairs(tree: Bvh, rays: _Rays, reach: Floats) -> tuple[Ints, Ints, Floats]:
-    """All rays against the root's children -> child, lane, near distance of pairs."""
+def _root_pairs(tree: Bvh, rays: _Lines, t_far: Floats) -> tuple[Ints, Ints, Floats]:
+    """Return child, lane and entry distance of the pairs of ray and root's child that meet."""
     n, width = rays.begin.size - 1, tree.top.size
     step = max(256, CHUNK // width)
     box = tree.box.take(tree.top, 1)
@@ -395,7 +403,7 @@ def _root_pairs(tree: Bvh, rays: _Rays, reach: Floats) -> tuple[Ints, Ints, Floa
         slot, lane = np.divmod(hit, k)
         lane += at
         near, far = rays.span(box, slot, lane)
-        met = np.flatnonzero(near <= np.minimum(far, reach.take(lane)))
+        met = np.flatnonzero(near <= np.minimum(far, t_far.take(lane)))
         parts.append((slot.take(met), lane.take(met), near.take(met)))
     if not parts:
         empty = np.zeros(0, np.intp)
@@ -405,20 +413,20 @@ def _root_pairs(tree: Bvh, rays: _Rays, reach: Floats) -> tuple[Ints, Ints, Floa
 
 
 def _features(line: Floats, out: Floats) -> None:
-    """Products of all pairs of Plücker coordinates (6, ...) -> (21, ...)."""
+    """Write the products of all pairs of Plücker coordinates (6, ...) to `out` (21, ...)."""
     for row, (i, j) in enumerate(PAIRS):
         np.multiply(line[i], line[j], out=out[row])
 
 
 def _descend(
     tree: Bvh,
-    rays: _Rays,
-    reach: Floats,
+    rays: _Lines,
+    t_far: Floats,
     code: Ints,
     lane: Ints,
     visit: Callable[[Ints, Ints], None],
 ) -> None:
-    """Take pairs of child code and lane down to the leaves, level by level."""
+    """Traverse the subtrees of pairs of child code and lane, level by level, and visit the leaves."""
     leaf_codes, leaf_lanes = [], []
     while code.size:
         is_leaf = code < 0
@@ -432,13 +440,13 @@ def _descend(
             leaf_lanes.append(lane.take(at))
             at = np.flatnonzero(~is_leaf)
             code, lane = code.take(at), lane.take(at)
-        code, lane = _expand(tree, rays, reach, code, lane)
+        code, lane = _expand(tree, rays, t_far, code, lane)
     if leaf_codes:
         visit(np.concatenate(leaf_codes), np.concatenate(leaf_lanes))
 
 
-def _expand(tree: Bvh, rays: _Rays, reach: Floats, node: Ints, lane: Ints) -> tuple[Ints, Ints]:
-    """Pairs of inner node and lane -> pairs of met child's code and lane."""
+def _expand(tree: Bvh, rays: _Lines, t_far: Floats, node: Ints, lane: Ints) -> tuple[Ints, Ints]:
+    """Test pairs of inner node and lane; return the codes and lanes of the children that are met."""
     width = tree.width
     nodes, block_lanes = blocks(node, lane, rays.begin.size - 1)
     step = max(1, CHUNK // (width * BLOCK))
@@ -466,16 +474,16 @@ def _expand(tree: Bvh, rays: _Rays, reach: Floats, node: Ints, lane: Ints) -> tu
         place = (block << BLOCK_SHIFT) + (hit & (BLOCK - 1))
         lane = some.take(place)
         near, far = rays.span(tree.box, slot, lane)
-        met_at = np.flatnonzero(near <= np.minimum(far, reach.take(lane)))
+        met_at = np.flatnonzero(near <= np.minimum(far, t_far.take(lane)))
         codes.append(tree.child.take(slot.take(met_at)))
         lanes.append(lane.take(met_at))
     return np.concatenate(codes), np.concatenate(lanes)
 
 
 def blocks(node: Ints, lane: Ints, unused: int) -> tuple[Ints, Ints]:
-    """Sort pairs by node and cut them into blocks of one node and BLOCK lanes each.
+    """Sort pairs by node and split them into blocks of one node and BLOCK lanes each.
 
-    Returns the nodes (b,) and lanes (b * BLOCK,); places that are left over hold lane `unused`.
+    Returns the nodes (b,) and lanes (b * BLOCK,), padded with lane `unused`.
     """
     order = stable_order(node)
     node, lane = node.take(order), lane.take(order)

@@ -1,4 +1,4 @@
-"""Ray queries through Embree (package embreex); spheres stay with NumPy."""
+"""Ray queries by Embree (package embreex); spheres are traced by NumPy."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .numpy_accel import NumpyAccelerator
 
 
 def installed() -> bool:
-    """Tell whether embreex can be imported."""
+    """Return whether embreex can be imported."""
     try:
         import embreex.rtcore_scene  # noqa: F401
     except ImportError:
@@ -23,7 +23,7 @@ def installed() -> bool:
 
 
 class EmbreeAccelerator:
-    """Triangles through Embree, spheres through NumPy; see base.Accelerator."""
+    """Triangles by Embree, spheres by NumPy; see base.Accelerator."""
 
     name = "embree"
 
@@ -38,14 +38,14 @@ class EmbreeAccelerator:
         triangles = np.ascontiguousarray(geometry.triangles, f4)
         with np.errstate(all="ignore"):
             ids = np.flatnonzero(triangle.has_area(triangles))
-        self._ids = np.append(ids, -1)  # by Embree's number, at the end that of a miss
+        self._ids = np.append(ids, -1)  # (k + 1,) ids by Embree's primitive; the last one is for misses
         self._scene: Any = None
         if ids.size:
             self._scene = EmbreeScene(robust=True)
             TriangleMesh(self._scene, triangles if ids.size == len(triangles) else triangles.take(ids, 0))
             rays = np.zeros((1, 3), f4)
             self._scene.run(rays, rays + f4(1))  # build now, not in the first of many threads
-        self._planes = Planes(triangles)
+        self._planes = TrianglePlanes(triangles)
         self._spheres: NumpyAccelerator | None = None
         if geometry.radii.size:
             none = np.zeros((0, 3, 3), f4)
@@ -53,10 +53,10 @@ class EmbreeAccelerator:
             self._spheres = NumpyAccelerator(Geometry(none, geometry.centers, geometry.radii))
 
     def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
-        """Find the nearest hit with t > 0 of rays (3, n)."""
+        """Return the nearest hits with t > 0 of rays (3, n)."""
         hits = self._closest_triangle(origin, direction, exclude_prim)
         if self._spheres is not None:
-            on_sphere = self._spheres.closest(origin, direction, self._sphere_left(exclude_prim))
+            on_sphere = self._spheres.closest(origin, direction, self._exclude_sphere(exclude_prim))
             nearer = np.flatnonzero(on_sphere.t < hits.t)
             hits.t[nearer] = on_sphere.t.take(nearer)
             hits.prim[nearer] = on_sphere.prim.take(nearer) + self._first_sphere
@@ -64,57 +64,57 @@ class EmbreeAccelerator:
         return hits
 
     def occluded(self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints) -> Bools:
-        """Tell whether anything is hit with 0 < t < `distance` (n,)."""
+        """Return a mask (n,) of the rays that hit anything with 0 < t < `distance` (n,)."""
         blocked = self._occluded_by_triangle(origin, direction, distance, exclude_prim)
         if self._spheres is not None:
-            blocked |= self._spheres.occluded(origin, direction, distance, self._sphere_left(exclude_prim))
+            blocked |= self._spheres.occluded(origin, direction, distance, self._exclude_sphere(exclude_prim))
         return blocked
 
-    def _sphere_left(self, exclude_prim: Ints) -> Ints:
+    def _exclude_sphere(self, exclude_prim: Ints) -> Ints:
         return np.where(exclude_prim >= self._first_sphere, exclude_prim - self._first_sphere, -1)
 
     def _closest_triangle(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
-        """Nearest triangles of rays (3, n); lanes that met the triangle they leave look again."""
+        """Return the nearest hits of triangles; rays that hit their excluded triangle are traced again."""
         n = origin.shape[1]
         if self._scene is None or not n:
             zero = np.zeros((2, n), f4)
             return Intersections(np.full(n, np.inf, f4), np.full(n, -1), zero[0], zero[1])
         hits = self._run(origin, direction)
-        again = np.flatnonzero(((hits.prim == exclude_prim) | ~(hits.t > 0)) & (hits.prim >= 0))
-        if again.size:
-            self._look_beyond(origin, direction, exclude_prim, again, hits)
+        repeat = np.flatnonzero(((hits.prim == exclude_prim) | ~(hits.t > 0)) & (hits.prim >= 0))
+        if repeat.size:
+            self._trace_beyond(origin, direction, exclude_prim, repeat, hits)
         return hits
 
     def _run(self, origin: Floats, direction: Floats) -> Intersections:
-        """Ask Embree for what rays (3, n) meet first."""
+        """Return Embree's nearest hits of rays (3, n)."""
         far = np.full(origin.shape[1], np.inf, f4)
-        # it reads columns where they are
+        # Embree reads the transposed views without a copy.
         found = self._scene.run(origin.T, direction.T, dists=far, query="INTERSECT", output=1)
         prim, b1, b2 = self._ids.take(found["primID"]), found["u"], found["v"]
         missed = np.flatnonzero(prim < 0)
         b1[missed] = b2[missed] = 0
         return Intersections(found["tfar"], prim, b1, b2)
 
-    def _look_beyond(
-        self, origin: Floats, direction: Floats, exclude_prim: Ints, again: Ints, hits: Intersections
+    def _trace_beyond(
+        self, origin: Floats, direction: Floats, exclude_prim: Ints, repeat: Ints, hits: Intersections
     ) -> None:
-        """Trace lanes `again` from just beyond the hit that does not count, until none is left.
+        """Trace lanes `repeat` again from just beyond their invalid hits, until all hits are valid.
 
-        Embree cannot leave out a primitive. The step doubles each time, from a few roundings of the
-        origin on.
+        embreex cannot exclude a primitive. The step is a few roundings of the origin at first, and doubles
+        each time.
         """
         step = 4 * triangle.ROUNDOFF
-        while again.size:
-            start, along = origin.take(again, 1).astype(np.float64), direction.take(again, 1)
+        while repeat.size:
+            start, along = origin.take(repeat, 1).astype(np.float64), direction.take(repeat, 1)
             size = np.abs(start).max(0) / np.abs(along).max(0)
-            t = hits.t.take(again).astype(np.float64)
+            t = hits.t.take(repeat).astype(np.float64)
             t += step * (size + t)
             found = self._run((start + t * along).astype(f4), along)
             beyond = (t + found.t).astype(f4)
-            hits.t[again], hits.prim[again] = beyond, found.prim
-            hits.b1[again], hits.b2[again] = found.b1, found.b2
-            again = again.compress(
-                (found.prim >= 0) & ((found.prim == exclude_prim.take(again)) | ~(beyond > 0))
+            hits.t[repeat], hits.prim[repeat] = beyond, found.prim
+            hits.b1[repeat], hits.b2[repeat] = found.b1, found.b2
+            repeat = repeat.compress(
+                (found.prim >= 0) & ((found.prim == exclude_prim.take(repeat)) | ~(beyond > 0))
             )
             step *= 2
 
@@ -123,23 +123,23 @@ class EmbreeAccelerator:
     ) -> Bools:
         if self._scene is None or not distance.size:
             return np.zeros(distance.size, bool)
-        # Embree counts a hit at exactly the distance; we do not.
+        # Embree includes a hit at exactly the distance; `occluded` does not.
         limit = np.nextafter(distance, f4(0))
         answer = self._scene.run(origin.T, direction.T, dists=limit, query="OCCLUDED")
         blocked = (answer >= 0) & (distance > 0)
-        # A blocked lane may have met only the triangle that it leaves.
+        # A lane may be blocked only by its excluded triangle.
         lanes = np.flatnonzero(blocked & (exclude_prim >= 0) & (exclude_prim < len(self._planes)))
         rays = origin.take(lanes, 1), direction.take(lanes, 1), exclude_prim.take(lanes)
-        doubtful = np.flatnonzero(~self._planes.behind(*rays))
-        if doubtful.size:
-            lanes = lanes.take(doubtful)
+        uncertain = np.flatnonzero(~self._planes.certainly_missed(*rays))
+        if uncertain.size:
+            lanes = lanes.take(uncertain)
             rays = origin.take(lanes, 1), direction.take(lanes, 1), exclude_prim.take(lanes)
             blocked[lanes] = self._closest_triangle(*rays).t < distance.take(lanes)
         return blocked
 
 
-class Planes:
-    """The planes of triangles (m, 3, 3), to tell which rays surely do not meet the triangle that they leave.
+class TrianglePlanes:
+    """The planes of triangles (m, 3, 3), to find rays that certainly miss their excluded triangle.
 
     Embree takes t from v·N and d·N in float32, where v goes from the origin to a corner and N is the
     cross product of two edges, differences of such v. With E the extent of the triangle along each axis,
@@ -162,10 +162,10 @@ class Planes:
         """Return the number of triangles."""
         return self._rows.shape[1]
 
-    def behind(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Bools:
-        """Tell of which rays (3, n) the triangle that they leave (n,) is surely behind."""
-        nx, ny, nz, offset, unsure, grazing = self._rows.take(exclude_prim, 1)
+    def certainly_missed(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Bools:
+        """Return a mask of the rays (3, n) whose excluded triangle (n,) is certainly behind them."""
+        nx, ny, nz, offset, height_error, rise_error = self._rows.take(exclude_prim, 1)
         height = nx * origin[0] + ny * origin[1] + nz * origin[2] - offset
         rise = nx * direction[0] + ny * direction[1] + nz * direction[2]
-        grazing *= np.abs(direction).max(0)
-        return (height * rise > 0) & (np.abs(height) > unsure) & (np.abs(rise) > grazing)
+        rise_error *= np.abs(direction).max(0)
+        return (height * rise > 0) & (np.abs(height) > height_error) & (np.abs(rise) > rise_error)

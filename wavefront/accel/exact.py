@@ -1,4 +1,4 @@
-"""Decide element by element which candidates of the triangles' filters are hits, and where."""
+"""Exact ray-triangle tests in float64, for the pairs that the float32 filters have not ruled out."""
 
 from __future__ import annotations
 
@@ -9,67 +9,70 @@ import numpy as np
 from ..vec import Floats, Ints
 from . import triangle
 from .bvh import RayBatch
-from .hits import Candidates, HitRecord
+from .hits import Candidates, HitAccumulator
 from .triangle import TriangleTable
 
 
-class TriangleDecisions:
-    """Decisions of one batch of rays; hits go to `found`.
+class TriangleTests:
+    """Tests of one batch of rays; hits are added to `found`.
 
     Parameters
     ----------
     table
         The triangles.
-    lanes, found
-        The rays, and what they have found.
+    batch, found
+        The rays, and their hits so far.
     partner
-        (m,) the other half of the quadrilateral that starts with a triangle, -1 for none. Absent where
-        the filter knows no quadrilaterals.
+        (m,) the second triangle of the quadrilateral whose first triangle this is, -1 for none. None if
+        the filter tests no quadrilaterals.
     """
 
     def __init__(
-        self, table: TriangleTable, lanes: RayBatch, found: HitRecord, partner: Ints | None = None
+        self, table: TriangleTable, batch: RayBatch, found: HitAccumulator, partner: Ints | None = None
     ) -> None:
-        self.table, self.lanes, self.found, self.partner = table, lanes, found, partner
-        # not a method of this: a cycle of references would keep all rays until the garbage collector runs
-        self._doubts = Candidates(partial(_decide_doubts, table, lanes, found))
+        self.table, self.batch, self.found, self.partner = table, batch, found, partner
+        # Not a bound method: a reference cycle would keep all rays until the garbage collector runs.
+        self._uncertain = Candidates(partial(_test_uncertain, table, batch, found))
 
-    def decide(self, prim: Ints, lane: Ints, value: Floats) -> None:
-        """Decide candidates: triangles (k,), lanes (k,) and the filter's values (k,), sure hits above 1.
+    def add(self, prim: Ints, lane: Ints, value: Floats) -> None:
+        """Add candidates: triangles (k,), lanes (k,) and the filter's values (k,).
 
-        Triangles that the rays leave must not be among them.
+        A value above 1 is certainly a hit. No candidate may be the triangle that its ray starts on.
         """
-        unsure = np.flatnonzero(value <= 1)
-        if unsure.size:
-            self.doubt(prim.take(unsure), lane.take(unsure))
-            sure = np.flatnonzero(~(value <= 1))
-            prim, lane = prim.take(sure), lane.take(sure)
-        origin, direction = self.lanes.origin.take(lane, 1), self.lanes.direction.take(lane, 1)
+        uncertain = np.flatnonzero(value <= 1)
+        if uncertain.size:
+            self.add_uncertain(prim.take(uncertain), lane.take(uncertain))
+            certain = np.flatnonzero(~(value <= 1))
+            prim, lane = prim.take(certain), lane.take(certain)
+        origin, direction = self.batch.origin.take(lane, 1), self.batch.direction.take(lane, 1)
         self.found.add(lane, prim, triangle.plane_distance(self.table.plane, prim, origin, direction))
 
-    def doubt(self, prim: Ints, lane: Ints) -> None:
-        """Take unsure candidates: triangles (k,), the first ones of quadrilaterals, and lanes (k,)."""
-        self._doubts.add(prim, prim, lane)
+    def add_uncertain(self, prim: Ints, lane: Ints) -> None:
+        """Add candidates for the exact test: triangles (k,) and lanes (k,).
+
+        The first triangle of a quadrilateral stands for both.
+        """
+        self._uncertain.add(prim, prim, lane)
         if self.partner is not None:
             other = self.partner.take(prim)
             halves = np.flatnonzero(other >= 0)
-            self._doubts.add(other.take(halves), prim.take(halves), lane.take(halves))
+            self._uncertain.add(other.take(halves), prim.take(halves), lane.take(halves))
 
     def finish(self) -> None:
-        """Decide what is left."""
-        self._doubts.flush()
+        """Test the remaining candidates."""
+        self._uncertain.flush()
 
 
-def _decide_doubts(
-    table: TriangleTable, lanes: RayBatch, found: HitRecord, prim: Ints, first: Ints, lane: Ints
+def _test_uncertain(
+    table: TriangleTable, batch: RayBatch, found: HitAccumulator, prim: Ints, first: Ints, lane: Ints
 ) -> None:
-    """Decide the few pairs (k,) that the filter cannot.
+    """Test the pairs (k,) that the filter has left open.
 
-    The halves `prim` (k,) of a quadrilateral count as hits of its `first`: which half is told later, in
-    one way for hits of both kinds.
+    A hit of triangle `prim` (k,) of a quadrilateral is recorded as a hit of its `first` triangle (k,);
+    `BruteForceTriangles.resolve_quads` finds out which of the two was hit.
     """
-    origin = lanes.origin.take(lane, 1).astype(np.float64)
-    direction = lanes.direction.take(lane, 1).astype(np.float64)
+    origin = batch.origin.take(lane, 1).astype(np.float64)
+    direction = batch.direction.take(lane, 1).astype(np.float64)
     vertices = triangle.vertices_from(table, prim, origin)
     t = triangle.plane_distance(table.plane, prim, origin, direction)
     t = triangle.clamp_to_triangle(t, vertices, direction)

@@ -1,4 +1,4 @@
-"""What a batch of rays has found so far, and the candidates still to be decided."""
+"""The hits of a batch of rays so far, and a buffer of candidates that are still to be tested."""
 
 from __future__ import annotations
 
@@ -12,102 +12,105 @@ from ..vec import Floats, Ints, f4
 from .bvh import Ball, Codes, RayBatch
 from .triangle import ROUNDOFF, Doubles
 
-PRIM_BITS = 31  # of a sortable word, below those of t
-NO_HIT = 0x7F7FFFFF << PRIM_BITS  # of a miss: t = inf
-DECIDE = 1 << 14  # candidates decided at a time
+PRIM_BITS = 31  # low bits of a packed hit; those of t are above
+NO_HIT = 0x7F7FFFFF << PRIM_BITS  # a packed miss: t = inf
+CANDIDATE_BATCH = 1 << 14  # candidates tested at a time
 
 
-class HitRecord(Protocol):
-    """Takes hits, and says how far rays still look."""
+class HitAccumulator(Protocol):
+    """Receives hits, and returns the distance up to which further ones matter."""
 
     def add(self, lane: Ints, prim: Ints, t: Doubles) -> None:
-        """Take hits of lanes (k,) at t; those with t <= 0, NaN or inf are none."""
+        """Add hits of lanes (k,) at t (k,); t <= 0, NaN and inf are misses."""
 
-    def add_each(self, part: slice, prim: Ints, t: Doubles) -> None:
-        """Take one hit of each lane of a part, (k,)."""
+    def add_slice(self, part: slice, prim: Ints, t: Doubles) -> None:
+        """Add one hit of each lane of a slice, (k,)."""
 
-    def reach(self) -> Floats:
-        """Return how far each of n rays looks, as `traverse.trace` wants it, (n + 1,)."""
+    def t_far(self) -> Floats:
+        """Return the largest distance at which a hit still matters, as `bvh.trace` takes it, (n + 1,)."""
 
 
 class ClosestHit:
-    """The nearest hit of each lane so far, as one sortable word: bits of t, then the primitive."""
+    """The nearest hit of each lane so far.
 
-    def __init__(self, lanes: RayBatch, ball: Ball) -> None:
-        self.lanes, self.ball = lanes, ball
-        self.key = np.full(lanes.count, NO_HIT, np.int64)
+    A hit is packed into one integer, the bits of t above those of the primitive.
+    """
+
+    def __init__(self, batch: RayBatch, ball: Ball) -> None:
+        self.batch, self.ball = batch, ball
+        self.packed = np.full(batch.count, NO_HIT, np.int64)
 
     def add(self, lane: Ints, prim: Ints, t: Doubles) -> None:
-        """Record hits of lanes (k,) at t; those with t <= 0, NaN or inf are none."""
-        np.minimum.at(self.key, lane, _keys(prim, t))
+        """Add hits of lanes (k,) at t (k,); t <= 0, NaN and inf are misses."""
+        np.minimum.at(self.packed, lane, _pack(prim, t))
 
-    def add_each(self, part: slice, prim: Ints, t: Doubles) -> None:
-        """Record one hit of each lane of a part, (k,)."""
-        np.minimum(self.key[part], _keys(prim, t), out=self.key[part])
+    def add_slice(self, part: slice, prim: Ints, t: Doubles) -> None:
+        """Add one hit of each lane of a slice, (k,)."""
+        np.minimum(self.packed[part], _pack(prim, t), out=self.packed[part])
 
-    def reach(self) -> Floats:
-        """Look no further than the nearest hit."""
-        return _reach(distances(self.key), self.lanes, self.ball)
+    def t_far(self) -> Floats:
+        """Return the distances of the nearest hits, as `bvh.trace` takes them, (n + 1,)."""
+        return _line_t_far(unpack_t(self.packed), self.batch, self.ball)
 
 
 class AnyHit:
-    """Which lanes are blocked so far."""
+    """A mask of the lanes that are blocked so far."""
 
-    def __init__(self, lanes: RayBatch, ball: Ball, distance: Floats) -> None:
-        self.lanes, self.ball, self.distance = lanes, ball, distance
+    def __init__(self, batch: RayBatch, ball: Ball, distance: Floats) -> None:
+        self.batch, self.ball, self.distance = batch, ball, distance
         self.blocked = np.zeros(distance.size, bool)
 
     def add(self, lane: Ints, prim: Ints, t: Doubles) -> None:
-        """Block the lanes (k,) with 0 < t < distance."""
+        """Block lanes (k,) that have a hit with 0 < t < distance."""
         rounded = t.astype(f4)
         self.blocked[lane.compress((rounded > 0) & (rounded < self.distance.take(lane)))] = True
 
-    def add_each(self, part: slice, prim: Ints, t: Doubles) -> None:
-        """Block lanes of a part with 0 < t < distance, (k,)."""
+    def add_slice(self, part: slice, prim: Ints, t: Doubles) -> None:
+        """Block the lanes of a slice that have a hit with 0 < t < distance, (k,)."""
         rounded = t.astype(f4)
         self.blocked[part] |= (rounded > 0) & (rounded < self.distance[part])
 
-    def reach(self) -> Floats:
-        """Look as far as the distance, and no more when blocked."""
-        return _reach(np.where(self.blocked, f4(-np.inf), self.distance), self.lanes, self.ball)
+    def t_far(self) -> Floats:
+        """Return the rays' lengths, or -inf where a ray is blocked, as `bvh.trace` takes them, (n + 1,)."""
+        return _line_t_far(np.where(self.blocked, f4(-np.inf), self.distance), self.batch, self.ball)
 
 
-def _keys(prim: Ints, t: Doubles) -> Codes:
-    """Words that sort like t, those with equal t like `prim`; what is no hit sorts no lower than NO_HIT."""
-    bits = t.astype(f4).view(np.uint32)  # negative numbers and NaN are above inf
-    bits -= np.uint32(1)  # now 0 is, too
-    key = bits.astype(np.int64)
-    key <<= PRIM_BITS
-    key |= prim
-    return key
+def _pack(prim: Ints, t: Doubles) -> Codes:
+    """Pack hits (k,) into integers that sort by t, then by primitive; misses sort no lower than NO_HIT."""
+    bits = t.astype(f4).view(np.uint32)  # as integers, negative numbers and NaN are above inf
+    bits -= np.uint32(1)  # so that 0 wraps round to above inf, too
+    packed = bits.astype(np.int64)
+    packed <<= PRIM_BITS
+    packed |= prim
+    return packed
 
 
-def distances(key: Codes) -> Floats:
-    """Return the t (n,) of sortable words; inf of NO_HIT."""
-    return ((key >> PRIM_BITS) + 1).astype(np.uint32).view(f4)
+def unpack_t(packed: Codes) -> Floats:
+    """Return the t (n,) of packed hits; inf for NO_HIT."""
+    return ((packed >> PRIM_BITS) + 1).astype(np.uint32).view(f4)
 
 
-def prims(key: Codes) -> Ints:
-    """Return the primitives (n,) of sortable words; -1 of NO_HIT."""
-    prim = key & ((1 << PRIM_BITS) - 1)
-    prim[np.flatnonzero(key == NO_HIT)] = -1
+def unpack_prim(packed: Codes) -> Ints:
+    """Return the primitives (n,) of packed hits; -1 for NO_HIT."""
+    prim = packed & ((1 << PRIM_BITS) - 1)
+    prim[np.flatnonzero(packed == NO_HIT)] = -1
     return prim
 
 
-def _reach(t: Floats, lanes: RayBatch, ball: Ball) -> Floats:
-    """Turn t into distances from the point next to the center, in units of the ball's radius; rounded up."""
-    far = t * lanes.speed
+def _line_t_far(t: Floats, batch: RayBatch, ball: Ball) -> Floats:
+    """Return t (n,) as `bvh.trace` takes it, (n + 1,): from the line's foot, in ball radii, rounded up."""
+    far = t * batch.direction_length
     out = np.zeros(t.size + 1, f4)
-    out[:-1] = (far + lanes.begin + 8 * ROUNDOFF * (far + np.abs(lanes.begin))) * f4(1 / ball.radius)
+    out[:-1] = (far + batch.begin + 8 * ROUNDOFF * (far + np.abs(batch.begin))) * f4(1 / ball.radius)
     out[:-1] += f4(1e-6)
     return out
 
 
 class Candidates:
-    """Collects small arrays of candidates, so that they are decided a few thousand at a time."""
+    """Collects small arrays of candidates, and passes them on a few thousand at a time."""
 
-    def __init__(self, decide: Callable[..., None]) -> None:
-        self.decide = decide
+    def __init__(self, test: Callable[..., None]) -> None:
+        self.test = test
         self.parts: list[tuple[NDArray[Any], ...]] = []
         self.count = 0
 
@@ -115,11 +118,11 @@ class Candidates:
         """Add candidates, arrays of (k,) each."""
         self.parts.append(columns)
         self.count += columns[0].size
-        if self.count >= DECIDE:
+        if self.count >= CANDIDATE_BATCH:
             self.flush()
 
     def flush(self) -> None:
-        """Decide what has been collected."""
+        """Pass on what has been collected."""
         if self.count:
-            self.decide(*(np.concatenate(column) for column in zip(*self.parts, strict=True)))
+            self.test(*(np.concatenate(column) for column in zip(*self.parts, strict=True)))
         self.parts, self.count = [], 0

@@ -1,10 +1,10 @@
-"""Ray queries in scenes where a mesh is placed many times: built once, with rays brought to it.
+"""Ray queries in scenes with instances: one accelerator for each mesh, and rays in the mesh's coordinates.
 
-Every instance has a box. A tree over the boxes gives the pairs of ray and instance that may meet, and each
-ray takes its instances nearest first: in every round the rays of all pairs are turned into the frames of
-their meshes and traced there together, one call for each distinct mesh, and instances that begin
-beyond a ray's nearest hit drop out. Directions are not made unit in a mesh's frame, so that
-distances stay those of the scene.
+A tree over the bounding boxes of the instances gives the pairs of ray and instance that may meet. Each ray
+visits its instances in the order of their distance. In every round the rays of all pairs are transformed
+to the coordinates of their meshes and traced there, with one call for each distinct mesh; then instances
+beyond a ray's nearest hit are dropped. Transformed directions are not normalized, so that t stays the
+distance in the scene.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from .build import build_tree
 
 WIDTH = 8  # children of a node
 CHUNK = 1 << 16  # boxes tested at a time
-LANE_BITS = 16  # rays that look for their instances at a time: two to this power at most
-PAIRS = 1 << 20  # pairs held at a time; where there are more, fewer rays are taken
+LANE_BITS = 16  # at most 2^LANE_BITS rays traverse the tree at a time
+PAIRS = 1 << 20  # pairs held at a time; a batch that has more is halved
 ROUNDING = f4(1e-6)  # bound of the relative error of distances to boxes
 
 Doubles = NDArray[np.float64]
@@ -30,31 +30,31 @@ Doubles = NDArray[np.float64]
 
 @record
 class Placements:
-    """Where the instances stand, one column each."""
+    """The transforms and bounding boxes of the instances, one column each."""
 
-    mesh: Ints  # (k,) which of the meshes
-    first: Ints  # (k,) primitive id of its first triangle, rising
-    to_local: Doubles  # (12, k) (3, 4) matrix from the scene to the mesh's own frame, row by row
-    low: Floats  # (3, k) lower corner of a box that has room for rounding, scene units
+    mesh: Ints  # (k,) index of the mesh
+    first: Ints  # (k,) primitive id of its first triangle, ascending
+    to_local: Doubles  # (12, k) the (3, 4) matrix from the scene to the mesh's coordinates, row by row
+    low: Floats  # (3, k) lower corner of the bounding box, enlarged for rounding, scene units
     high: Floats  # (3, k) upper corner
 
 
 class InstanceAccelerator:
-    """Instances, and beside them everything that is placed once; see base.Accelerator.
+    """Instances, and all primitives that are not instanced; see base.Accelerator.
 
     Parameters
     ----------
-    once
-        Holds what is placed once; its primitive ids come first.
+    single
+        The accelerator of the primitives that are not instanced; their ids come first.
     meshes
-        Hold the distinct meshes, each in its own frame.
+        The accelerators of the distinct meshes, each in the mesh's coordinates.
     placements
         The instances.
     """
 
-    def __init__(self, once: Accelerator, meshes: Sequence[Accelerator], placements: Placements) -> None:
-        self.name = once.name
-        self._once, self._meshes, self._placements = once, meshes, placements
+    def __init__(self, single: Accelerator, meshes: Sequence[Accelerator], placements: Placements) -> None:
+        self.name = single.name
+        self._single, self._meshes, self._placements = single, meshes, placements
         self._first = int(placements.first[0])
         tree = build_tree(placements.low, placements.high, 1, WIDTH)
         self._low, self._high = (
@@ -64,46 +64,46 @@ class InstanceAccelerator:
         self._instance = tree.prim[:, 0]
 
     def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
-        """Find the nearest hit with t > 0 of rays (3, n); ties go to the lowest id."""
-        hits = self._once.closest(origin, direction, self._left_once(exclude_prim))
-        left = self._left(exclude_prim)
+        """Return the nearest hits with t > 0 of rays (3, n); of equal distances, the lowest primitive id."""
+        hits = self._single.closest(origin, direction, self._exclude_single(exclude_prim))
+        excluded = self._exclude_instanced(exclude_prim)
         for lane, instance in self._rounds(origin, direction, hits.t):
             for number, at in self._by_mesh(instance):
                 lanes, some = lane.take(at), instance.take(at)
-                rays = self._local(origin, direction, left, lanes, some)
+                rays = self._local(origin, direction, excluded, lanes, some)
                 found = self._meshes[number].closest(*rays)
                 found.prim += np.where(found.prim >= 0, self._placements.first.take(some), 0)
-                _keep_nearest(hits, lanes, found)
+                _update_closest(hits, lanes, found)
         return hits
 
     def occluded(self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints) -> Bools:
-        """Tell whether anything is hit with 0 < t < `distance` (n,)."""
-        blocked = self._once.occluded(origin, direction, distance, self._left_once(exclude_prim))
-        left = self._left(exclude_prim)
-        reach = np.where(blocked, f4(-1), distance)
-        for lane, instance in self._rounds(origin, direction, reach):
+        """Return a mask (n,) of the rays that hit anything with 0 < t < `distance` (n,)."""
+        blocked = self._single.occluded(origin, direction, distance, self._exclude_single(exclude_prim))
+        excluded = self._exclude_instanced(exclude_prim)
+        t_far = np.where(blocked, f4(-1), distance)
+        for lane, instance in self._rounds(origin, direction, t_far):
             for number, at in self._by_mesh(instance):
                 lanes, some = lane.take(at), instance.take(at)
-                start, along, leaves = self._local(origin, direction, left, lanes, some)
-                met = self._meshes[number].occluded(start, along, distance.take(lanes), leaves)
+                start, along, excluded_prim = self._local(origin, direction, excluded, lanes, some)
+                met = self._meshes[number].occluded(start, along, distance.take(lanes), excluded_prim)
                 lanes = lanes.compress(met)
                 blocked[lanes] = True
-                reach[lanes] = -1  # looks no further
+                t_far[lanes] = -1  # ends the search
         return blocked
 
-    def _left_once(self, exclude_prim: Ints) -> Ints:
-        """Primitives that rays leave, -1 for those of instances."""
+    def _exclude_single(self, exclude_prim: Ints) -> Ints:
+        """Return the excluded primitives (n,), -1 for those of instances."""
         return np.where(exclude_prim < self._first, exclude_prim, -1)
 
-    def _left(self, exclude_prim: Ints) -> tuple[Ints, Ints]:
-        """Instances that rays leave, -1 for none, and the triangles that they leave there."""
+    def _exclude_instanced(self, exclude_prim: Ints) -> tuple[Ints, Ints]:
+        """Return the instances (n,) of excluded primitives, -1 for none, and their triangles in the mesh."""
         instance = np.searchsorted(self._placements.first, exclude_prim, "right") - 1
         return instance, exclude_prim - self._placements.first.take(instance)
 
     def _local(
-        self, origin: Floats, direction: Floats, left: tuple[Ints, Ints], lane: Ints, instance: Ints
+        self, origin: Floats, direction: Floats, excluded: tuple[Ints, Ints], lane: Ints, instance: Ints
     ) -> tuple[Floats, Floats, Ints]:
-        """Rays `lane` (p,) in the frames of the meshes that are `instance` (p,) of."""
+        """Return rays `lane` (p,) in mesh coordinates of `instance` (p,): origin, direction, exclude_prim."""
         m = self._placements.to_local.take(instance, 1).reshape(3, 4, -1)
         x, y, z = origin.take(lane, 1)
         dx, dy, dz = direction.take(lane, 1)
@@ -112,29 +112,29 @@ class InstanceAccelerator:
             a, b, c, shift = m[axis]
             start[axis] = a * x + b * y + c * z + shift
             along[axis] = a * dx + b * dy + c * dz
-        leaves, triangle = (of_lane.take(lane) for of_lane in left)
-        return start, along, np.where(leaves == instance, triangle, -1)
+        excluded_instance, triangle = (of_lane.take(lane) for of_lane in excluded)
+        return start, along, np.where(excluded_instance == instance, triangle, -1)
 
     def _by_mesh(self, instance: Ints) -> Iterator[tuple[int, Ints]]:
-        """Yield each distinct mesh that occurs, and where."""
+        """Yield each distinct mesh of `instance` (p,), and the indices of its instances there."""
         mesh = self._placements.mesh.take(instance)
         order = np.argsort(mesh, kind="stable")
         numbers, begins = np.unique(mesh.take(order), return_index=True)
         yield from zip(numbers.tolist(), np.split(order, begins[1:]), strict=True)
 
-    def _rounds(self, origin: Floats, direction: Floats, reach: Floats) -> Iterator[tuple[Ints, Ints]]:
+    def _rounds(self, origin: Floats, direction: Floats, t_far: Floats) -> Iterator[tuple[Ints, Ints]]:
         """Yield pairs of lane and instance to trace, round by round.
 
-        `reach` (n,) is how far rays still look; the caller lowers it.
+        `t_far` (n,) is the largest distance at which a hit still matters; the caller lowers it.
         """
         n = origin.shape[1]
         parts = [(at, min(at + (1 << LANE_BITS), n)) for at in range(0, n, 1 << LANE_BITS)]
         while parts:
             begin, end = parts.pop()
             part = slice(begin, end)
-            pairs = self._pairs(origin[:, part], direction[:, part], reach[part])
+            pairs = self._pairs(origin[:, part], direction[:, part], t_far[part])
             if pairs is not None:
-                for lane, instance in _nearest_first(pairs, reach[part], self._instance_bits):
+                for lane, instance in _nearest_first(pairs, t_far[part], self._instance_bits):
                     yield lane + begin, instance
             else:
                 middle = (begin + end) // 2
@@ -144,41 +144,42 @@ class InstanceAccelerator:
     def _instance_bits(self) -> int:
         return max(1, (self._placements.mesh.size - 1).bit_length())
 
-    def _pairs(self, origin: Floats, direction: Floats, reach: Floats) -> NDArray[np.int64] | None:
-        """Find the pairs of ray and instance that may meet, as sortable keys; None if they are too many."""
+    def _pairs(self, origin: Floats, direction: Floats, t_far: Floats) -> NDArray[np.int64] | None:
+        """Return the packed pairs of ray and instance that may meet, sorted; None if more than PAIRS."""
         with np.errstate(all="ignore"):
             inverse = f4(1) / direction
-        code, lane = np.zeros(reach.size, np.intp), np.arange(reach.size)
-        keys = [np.zeros(0, np.int64)]
+        code, lane = np.zeros(t_far.size, np.intp), np.arange(t_far.size)
+        packed = [np.zeros(0, np.int64)]
         total = 0
         while code.size:
             codes, lanes = [], []
             for at in range(0, code.size, CHUNK // WIDTH):
                 some = lane[at : at + CHUNK // WIDTH]
                 child, lane_met, near = self._children_met(
-                    code[at : at + CHUNK // WIDTH], some, origin, inverse, reach
+                    code[at : at + CHUNK // WIDTH], some, origin, inverse, t_far
                 )
                 leaf = np.flatnonzero(child < 0)
                 instance = self._instance.take(-1 - child.take(leaf))
-                keys.append(_pack(lane_met.take(leaf), near.take(leaf), instance, self._instance_bits))
+                packed.append(_pack(lane_met.take(leaf), near.take(leaf), instance, self._instance_bits))
                 inner = np.flatnonzero(child > 0)
                 codes.append(child.take(inner))
                 lanes.append(lane_met.take(inner))
                 total += child.size
-                if total > PAIRS and reach.size > 1:
+                if total > PAIRS and t_far.size > 1:
                     return None
             code, lane = np.concatenate(codes), np.concatenate(lanes)
-        return np.sort(np.concatenate(keys))
+        return np.sort(np.concatenate(packed))
 
     def _children_met(
-        self, node: Ints, lane: Ints, origin: Floats, inverse: Floats, reach: Floats
+        self, node: Ints, lane: Ints, origin: Floats, inverse: Floats, t_far: Floats
     ) -> tuple[Ints, Ints, Floats]:
-        """Pairs of node and lane (p,) -> child codes, lanes and entry distances of the boxes that rays meet.
+        """Test the boxes of the children of nodes (p,) against rays `lane` (p,).
 
-        NaN, from a ray along the face of a box, counts as met.
+        Returns child codes, lanes and entry distances of the boxes that are met. NaN, from a ray along the
+        face of a box, counts as met.
         """
         near = np.zeros((WIDTH, node.size), f4)
-        far = np.broadcast_to(reach.take(lane) * (1 + ROUNDING), near.shape)
+        far = np.broadcast_to(t_far.take(lane) * (1 + ROUNDING), near.shape)
         with np.errstate(all="ignore"):
             for axis in range(3):
                 start, scale = origin[axis].take(lane), inverse[axis].take(lane)
@@ -194,28 +195,30 @@ class InstanceAccelerator:
 
 
 def _pack(lane: Ints, near: Floats, instance: Ints, bits: int) -> NDArray[np.int64]:
-    """Make keys that sort by lane, then distance, then instance; distances are rounded down to fit.
+    """Pack pairs (p,) into integers that sort by lane, then distance, then instance.
 
-    Bits of floats that are not negative sort like the floats.
+    Distances lose low bits where there are many instances. The bits of floats that are not negative sort
+    like the floats.
     """
-    kept = _near_bits(bits)
-    distance = near.view(np.int32).astype(np.int64) >> (31 - kept)
-    return (lane << (kept + bits)) | (distance << bits) | instance
+    near_bits = _distance_bits(bits)
+    distance = near.view(np.int32).astype(np.int64) >> (31 - near_bits)
+    return (lane << (near_bits + bits)) | (distance << bits) | instance
 
 
-def _near_bits(bits: int) -> int:
+def _distance_bits(bits: int) -> int:
+    """Return the number of bits for a distance, beside `bits` for an instance and those of a lane."""
     return min(31, 63 - LANE_BITS - bits)
 
 
-def _nearest_first(keys: NDArray[np.int64], reach: Floats, bits: int) -> Iterator[tuple[Ints, Ints]]:
-    """Yield the pairs of sorted keys in rounds: each ray's next one, then two, four and so on.
+def _nearest_first(packed: NDArray[np.int64], t_far: Floats, bits: int) -> Iterator[tuple[Ints, Ints]]:
+    """Yield lanes and instances of sorted pairs in rounds: one pair of each ray, then two, four ...
 
-    Pairs whose instance begins beyond the ray's reach by then are left out.
+    Pairs that begin beyond the ray's current `t_far` are left out.
     """
-    kept = _near_bits(bits)
-    instance = keys & ((1 << bits) - 1)
-    near = (((keys >> bits) & ((1 << kept) - 1)) << (31 - kept)).astype(np.int32).view(f4)
-    lane = keys >> (bits + kept)
+    near_bits = _distance_bits(bits)
+    instance = packed & ((1 << bits) - 1)
+    near = (((packed >> bits) & ((1 << near_bits) - 1)) << (31 - near_bits)).astype(np.int32).view(f4)
+    lane = packed >> (bits + near_bits)
     at = np.flatnonzero(np.append(True, lane[1:] != lane[:-1])[: lane.size])
     last = np.append(at[1:], lane.size)[: at.size]
     taken = 1
@@ -223,18 +226,18 @@ def _nearest_first(keys: NDArray[np.int64], reach: Floats, bits: int) -> Iterato
         count = np.minimum(last - at, taken)
         ends = np.cumsum(count)
         place = np.arange(int(ends[-1])) + np.repeat(at - ends + count, count)
-        place = place.compress(near.take(place) <= reach.take(lane.take(place)))
+        place = place.compress(near.take(place) <= t_far.take(lane.take(place)))
         if place.size:
             yield lane.take(place), instance.take(place)
         at = at + count
         more = np.flatnonzero(at < last)
-        more = more.compress(near.take(at.take(more)) <= reach.take(lane.take(at.take(more))))
+        more = more.compress(near.take(at.take(more)) <= t_far.take(lane.take(at.take(more))))
         at, last = at.take(more), last.take(more)
         taken *= 2
 
 
-def _keep_nearest(hits: Intersections, lane: Ints, found: Intersections) -> None:
-    """Record what was found on `lane` (p,), which may occur several times, where it is nearer."""
+def _update_closest(hits: Intersections, lane: Ints, found: Intersections) -> None:
+    """Replace hits on lanes (p,), of which some may be equal, by those of `found` that are nearer."""
     t, prim = hits.t.take(lane), hits.prim.take(lane)
     nearer = np.flatnonzero((found.t < t) | ((found.t == t) & (found.prim < prim) & (found.prim >= 0)))
     nearer = nearer.take(np.lexsort((found.prim.take(nearer), found.t.take(nearer), lane.take(nearer))))

@@ -1,6 +1,6 @@
-"""Find pairs of triangles that are flat convex quadrilaterals, which one test serves.
+"""Find pairs of triangles that form flat convex quadrilaterals, so that one test serves both.
 
-Walls, boxes and all that was modeled as quadrilaterals comes as such pairs: a fan (a, b, c), (a, c, d).
+Meshes that were modeled as quadrilaterals, such as walls and boxes, have such pairs: (a, b, c), (a, c, d).
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ import numpy as np
 from ..vec import Bools, Floats, Ints
 from .triangle import ROUNDOFF, Doubles
 
-FLATNESS = 2 * ROUNDOFF  # distance of the diagonals, relative to the coordinates
+FLATNESS = 2 * ROUNDOFF  # largest distance between the diagonals, relative to the coordinates
 
 
 def find_quads(triangles: Floats) -> Ints:
-    """Return the first of each pair of consecutive triangles (m, 3, 3) that make a quadrilateral, (k,).
+    """Return the first of each pair of consecutive triangles (m, 3, 3) that form a quadrilateral, (k,).
 
-    No triangle is in two pairs. All have an area, and their corners are off one plane by no more than
-    half a unit in the last place of the coordinates, which is what rounding does to them.
+    No triangle is in two pairs. The corners are coplanar within the rounding of their coordinates, and no
+    triangle is degenerate.
     """
     corner = corners(triangles, np.arange(len(triangles) - 1))
     a, b, c, d = corner.astype(np.float64)
@@ -30,23 +30,24 @@ def find_quads(triangles: Floats) -> Ints:
     apart = np.abs((normal * (b - a)).sum(1))
     flat = apart <= FLATNESS * np.abs(corner).max((0, 2)) * size
     found = np.flatnonzero(fan & convex & flat)
-    # Of pairs that overlap, every other one stands.
+    # Of overlapping pairs in a row, every other one is kept.
     place = np.arange(found.size)
     starts = np.append(True, np.diff(found) > 1)[: found.size]
     return found[(place - np.maximum.accumulate(np.where(starts, place, 0))) % 2 == 0]
 
 
 def corners(triangles: Floats, first: Ints) -> Floats:
-    """Return the corners (4, k, 3) of quadrilaterals, in order round them."""
+    """Return the corners (4, k, 3) of quadrilaterals, in order around them."""
     one, other = triangles.take(first, 0), triangles.take(first + 1, 0)
     return np.stack([one[:, 0], one[:, 1], one[:, 2], other[:, 2]])
 
 
 def are_parallelograms(corner: Floats, radius: float) -> Bools:
-    """Tell which quadrilaterals (4, k, 3) in a ball are parallelograms, but for rounding.
+    """Return a mask of the quadrilaterals (4, k, 3) that are parallelograms, within the rounding error.
 
-    Opposite edge functions of a line that meets the ball then add up to d·n within the area |n|; see
-    `triangle.pairs_of_one_sign`.
+    `radius` is that of a ball around them. For a line that meets the ball, opposite edge functions of a
+    parallelogram then add up to d·n, with an error below the area |n|: see
+    `triangle.least_opposite_product`.
     """
     a, b, c, d = corner.astype(np.float64)
     skew = np.linalg.norm(a - b + c - d, axis=1)
@@ -54,7 +55,7 @@ def are_parallelograms(corner: Floats, radius: float) -> Bools:
 
 
 def planes(corner: Floats) -> Doubles:
-    """Return planes (4, k) midway between the diagonals of quadrilaterals (4, k, 3): normal n, and n·p."""
+    """Return planes (4, k), n and n·p, midway between the diagonals of quadrilaterals (4, k, 3)."""
     a, b, c, d = corner.astype(np.float64)
     normal = np.cross(c - a, d - b)
     return np.concatenate([normal.T, ((normal * (a + b)).sum(1) / 2)[None]])

@@ -1,4 +1,4 @@
-"""Rays against analytic spheres: a filter for matrix products and the exact roots."""
+"""Ray-sphere tests: a float32 filter by matrix products, and the exact roots in float64."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .triangle import ROUNDOFF, Doubles
 
 
 def sphere_rows(centers: Doubles, radii: Doubles, center: Floats, radius: float) -> Floats:
-    """Return the filter's rows of k spheres -> (k, 11) float32.
+    """Return the filter's rows for k spheres, (k, 11) float32.
 
     A line with unit direction d and moment m about `center` passes a sphere at c (relative to
     `center`) at a squared distance of |m - c × d|², so
@@ -17,7 +17,7 @@ def sphere_rows(centers: Doubles, radii: Doubles, center: Floats, radius: float)
         r² - |m|² + 2 c·(d × m) - |c|² + (c·d)²
 
     is not negative on a hit. It is linear in the eleven numbers of `line_features`. Rows are scaled so
-    that no hit is below -1; `radius` bounds everything from `center`.
+    that the product of a hit is at least -1. `radius` is that of a ball about `center` around all spheres.
     """
     c = centers - np.asarray(center, np.float64)[:, None]
     x, y, z = c
@@ -35,7 +35,7 @@ def line_features(direction: Floats, moment: Floats) -> Floats:
     dx, dy, dz = direction
     mx, my, mz = moment
     out = np.empty((11, dx.size), f4)
-    out[0] = 1 + 0 * dx  # NaN for lines that are none
+    out[0] = 1 + 0 * dx  # NaN for invalid lines
     out[1] = mx * mx + my * my + mz * mz
     out[2] = dy * mz - dz * my
     out[3] = dz * mx - dx * mz
@@ -48,11 +48,11 @@ def line_features(direction: Floats, moment: Floats) -> Floats:
 def sphere_distance(
     center: Doubles, radius: Doubles, origin: Doubles, direction: Doubles, leaves: Bools
 ) -> Doubles:
-    """Nearest t > 0 (k,) at which rays (3, k) meet spheres, inf on a miss.
+    """Return the least t > 0 (k,) at which rays (3, k) hit spheres, inf on a miss.
 
     Haines et al., "Precision improvements for ray/sphere intersection", Ray Tracing Gems, chapter 7:
-    the discriminant from the distance between line and center, and the small root from the product of
-    the two. A ray that `leaves` its sphere has an exact root at 0; the other one remains.
+    the discriminant from the distance between line and center, and the smaller root from the product of
+    the two. A ray that starts on its sphere (`leaves`) has one root at exactly 0; the other one is returned.
     """
     fx, fy, fz = origin - center
     dx, dy, dz = direction

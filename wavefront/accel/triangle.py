@@ -1,11 +1,10 @@
-"""Rays against triangles, one (ray, triangle) pair per element: who is hit, where, and how far.
+"""Ray-triangle tests: a float32 filter by matrix products, and an exact test of single pairs.
 
-Two tests share this file. `edge_rows` serves the fast one: the sign of an edge function is the sign
-of the product of the ray's and the edge's Plücker coordinates, six numbers each, so a matrix product
-tests all rays against all edges in float32. It only sorts pairs into *misses*, *hits*, and a thin
-*unsure* band that is wider than its rounding error. `hits_watertight` decides the unsure ones by signs
-that are exact, so that no ray slips between two triangles and the result never depends on how BLAS
-happened to round.
+An edge function is the product of the Plücker coordinates of ray and edge, six numbers each, so a matrix
+product with the rows of `edge_rows` tests all rays against all edges in float32. This filter classifies
+pairs as misses, certain hits and, within a bound of its rounding error, uncertain ones. `hits_watertight`
+tests the uncertain pairs by exact signs. So no ray passes between two adjacent triangles, and the result
+does not depend on how BLAS rounds.
 """
 
 from __future__ import annotations
@@ -21,14 +20,14 @@ from ..vec import Bools, Floats, Ints, cross, f4
 Doubles = NDArray[np.float64]
 
 ROUNDOFF = 2.0**-24  # half an ulp of float32
-TINY = 1e-30  # least extent of points, so that no row is infinite
-# Column i: the axes that become x, y and z for rays that run mostly along axis i.
+TINY = 1e-30  # added to the extent of points, so that no row is infinite
+# Column i: the axes that become x, y and z for rays whose largest component is along axis i.
 AXES = np.array([[1, 2, 0], [2, 0, 1], [0, 1, 2]])
 
 
 @record
 class TriangleTable:
-    """What the element-by-element decision reads, float64, one column per triangle (m)."""
+    """Float64 data of the exact tests, one column per triangle (m)."""
 
     corners: Doubles  # (9, m) x, y, z of the first, second and third vertex
     plane: Doubles  # (4, m) normal n = (b - a) × (c - a), and n·a
@@ -54,7 +53,7 @@ def triangle_table(triangles: Floats) -> TriangleTable:
 
 
 def has_area(triangles: Floats) -> Bools:
-    """Tell which triangles (m, 3, 3) are not degenerate; a degenerate one is never hit."""
+    """Return a mask of the triangles (m, 3, 3) that are not degenerate; a degenerate one is never hit."""
     a, b, c = np.ascontiguousarray(triangles.transpose(1, 2, 0), np.float64)
     normal = cross(b - a, c - a)
     with np.errstate(all="ignore"):
@@ -66,13 +65,13 @@ def edge_rows(corners: Floats, center: Floats, radius: float) -> Floats:
     """Return the Plücker rows of the edges of convex polygons, corners (e, m, 3) -> (e, m, 6) float32.
 
     With a ray as (d, (o - center) × d), |d| = 1, the product w of a row and a ray is the volume
-    spanned by ray and edge: the ray passes inside if all have one sign (Shoemake, "Plücker
+    spanned by ray and edge; the ray passes inside if all w have the same sign (Shoemake, "Plücker
     coordinate tutorial", 1998). `radius` bounds the distance of all corners from `center` (3,).
 
-    Rows are scaled so that one threshold serves every polygon: a ray that truly hits has
-    products w0 w1, w1 w2 ... of neighbors > -1, and if they are above 1, it truly hits. For an error
-    of at most e in each w, and as hits have 0 <= |w| <= 2A (twice the area), the products are above
-    -e (2A + e). Sure hits are above e (2A + 3e), as a wrong sign means a w of less than e.
+    Rows are scaled so that the same thresholds hold for every polygon. If a ray hits, the products
+    w0 w1, w1 w2 ... of adjacent edges are above -1; if they are above 1, the ray hits. Proof: each w
+    has an error of at most e, and hits have 0 <= |w| <= 2A (twice the area), so their products are
+    above -e (2A + e). A product above e (2A + 3e) is certain: a w of the wrong sign is less than e.
     """
     corner: Doubles = corners.astype(np.float64) - center
     following = np.roll(corner, -1, 0)
@@ -83,46 +82,49 @@ def edge_rows(corners: Floats, center: Floats, radius: float) -> Floats:
     return rows.astype(f4)
 
 
-class Sides(NamedTuple):
-    """Planes of flat polygons (m), to tell on which side points are, with a bound for rounding."""
+class PolygonPlanes(NamedTuple):
+    """Planes of flat polygons (m), to find on which side points are, with error bounds."""
 
-    plane: Doubles  # (4, m) unit normal, and the offset: on the plane, their product with (p, 1) is 0
-    deviation: Doubles  # (m,) by how much the corners may be off the plane
+    plane: Doubles  # (4, m) unit normal and offset: their product with (p, 1) is 0 on the plane
+    deviation: Doubles  # (m,) largest distance of a corner from the plane
 
     def rows(self, start: Floats, end: Floats) -> tuple[Floats, Floats]:
-        """Return rows (m, 4) each for points where rays start and end, (4, n): o - center and 1.
+        """Return rows (m, 4) for the start points and rows (m, 4) for the end points of rays.
 
-        Their products with them are beyond 1 or -1 where it is sure on which side the point is. For
-        the end, a float32 distance t to the plane is then less than the ray's length as well.
+        Points (4, n) are p - center and 1. The product of a row and a point is above 1 or below -1 where
+        the point is certainly on that side of the plane. For end points, the float32 distance t of the
+        plane is then certainly less than the ray's length.
         """
         near, far = np.abs(start[:3]).max(1), np.abs(end[:3]).max(1)
         near, far = near.astype(np.float64) + TINY, far.astype(np.float64) + TINY
         normal, offset = np.abs(self.plane[:3].T), np.abs(self.plane[3])
-        # In half ulps: rounding of the point 1, of the plane 1, of the sum of four terms 4. An end is the
-        # sum of a start and a product of at most near + far, so 2 near + 2 far in place of 1; and a float32 t
-        # is off by as much as another such product.
+        # Errors in half ulps: 1 for the point, 1 for the plane, 4 for the sum of four terms. An end point is
+        # the sum of a start point and a product of at most near + far, so its error is 2 near + 2 far in
+        # place of 1; the error of a float32 t adds as much again.
         at_start = ROUNDOFF * (normal @ (6 * near) + 6 * offset) + self.deviation
         at_end = ROUNDOFF * (normal @ (4 * near + 8 * far) + 6 * offset) + self.deviation
         return (self.plane / at_start).T.astype(f4), (self.plane / at_end).T.astype(f4)
 
 
-def sides(table: TriangleTable, prim: Ints, corners: Floats, center: Floats) -> Sides:
-    """Return the planes of flat polygons, corners (e, m, 3), that begin with triangles `prim` (m,).
+def polygon_planes(table: TriangleTable, prim: Ints, corners: Floats, center: Floats) -> PolygonPlanes:
+    """Return the planes about `center` (3,) of flat polygons with corners (e, m, 3).
 
-    They are those that t is computed with, about `center` (3,).
+    They are the planes of their first triangles `prim` (m,) in the table, from which t is computed.
     """
     plane = table.plane.take(prim, 1)
     plane[3] = (plane[:3] * center[:, None]).sum(0) - plane[3]
     plane /= np.sqrt((plane[:3] * plane[:3]).sum(0))
-    return Sides(plane, np.zeros(prim.size) + _deviation_from_plane(corners.astype(np.float64) - center))
+    return PolygonPlanes(
+        plane, np.zeros(prim.size) + _deviation_from_plane(corners.astype(np.float64) - center)
+    )
 
 
 def side_rows(corners: Floats, center: Floats, radius: float) -> Floats:
-    """Return rows (m, 4) that tell on which side of flat polygons, corners (e, m, 3), a point lies.
+    """Return rows (m, 4) that find on which side of flat polygons, corners (e, m, 3), a point lies.
 
-    The product with (p - center, 1) has the sign of the edge functions of a ray if the polygon's plane
-    lies ahead of p. It is scaled so that its product with w1 (see `edge_rows`) is above -1 for
-    every true hit that does, with p within five radii of the center.
+    The product with (p - center, 1) has the sign of the edge functions of a ray from p if the ray reaches
+    the polygon's plane at t > 0. Rows are scaled so that the product of this and w1 (see `edge_rows`) is
+    above -1 for every such hit, with p within five radii of the center.
     """
     corner: Doubles = corners.astype(np.float64) - center
     normal = np.cross(corner[1] - corner[0], corner[2] - corner[0])
@@ -131,7 +133,7 @@ def side_rows(corners: Floats, center: Floats, radius: float) -> Floats:
     size = np.linalg.norm(normal, axis=1)
     edge_error, edge_scale = _edge_error(corner, radius)
     area2 = _twice_area(corner)
-    # 60 roundings: of a sum of four terms, and of p where it is a point along a ray.
+    # 60 rounding errors: those of a sum of four terms, and those of p if it is a point along a ray.
     error = ROUNDOFF * 60 * radius * size + _deviation_from_plane(corner) * size
     slack = error * (area2 + edge_error) + edge_error * (6 * radius * size + error)
     with np.errstate(all="ignore"):
@@ -139,7 +141,7 @@ def side_rows(corners: Floats, center: Floats, radius: float) -> Floats:
 
 
 def _edge_error(corner: Doubles, radius: float) -> tuple[Doubles, Doubles]:
-    """Bound the float32 error of edge functions of corners (e, m, 3), and the scale of their rows."""
+    """Return bounds (m,) of the float32 error of edge functions, and the scale (m,) of their rows."""
     following = np.roll(corner, -1, 0)
     moment = np.cross(corner, following)
     span = np.linalg.norm(following - corner, axis=2)
@@ -152,13 +154,13 @@ def _edge_error(corner: Doubles, radius: float) -> tuple[Doubles, Doubles]:
 
 
 def _twice_area(corner: Doubles) -> Doubles:
-    """Twice the area of triangles or quadrilaterals (e, m, 3)."""
+    """Return twice the area of triangles or quadrilaterals (e, m, 3)."""
     across = corner[-1] - corner[1] if len(corner) == 4 else corner[2] - corner[1]
     return np.linalg.norm(np.cross(corner[2] - corner[0], across), axis=1)
 
 
 def _deviation_from_plane(corner: Doubles) -> Doubles | float:
-    """How far a corner of a quadrilateral may be from the plane of the others; 0 for triangles."""
+    """Return a bound of the distance between a corner and the plane of the others; 0 for triangles."""
     if len(corner) == 3:
         return 0.0
     a, b, c, d = corner
@@ -168,10 +170,10 @@ def _deviation_from_plane(corner: Doubles) -> Doubles | float:
         return volume / np.minimum(*(np.linalg.norm(half, axis=1) for half in halves))
 
 
-def one_sign(edges: Floats, out: Floats) -> Floats:
-    """Edge functions (b, e, m, k) -> the least of w0 w1, w1 w2 ..., above 0 where all have one sign.
+def least_adjacent_product(edges: Floats, out: Floats) -> Floats:
+    """Return the least of w0 w1, w1 w2 ... of edge functions (b, e, m, k).
 
-    Overwrites all edges but the second.
+    It is positive where all signs are equal. Overwrites all edges but the second.
     """
     count = edges.shape[1]
     products = []
@@ -184,34 +186,34 @@ def one_sign(edges: Floats, out: Floats) -> Floats:
     return out
 
 
-def pairs_of_one_sign(edges: Floats, out: Floats) -> Floats:
-    """Edge functions (b, 4, m, k) of parallelograms -> the lesser of w0 w2 and w1 w3; see `one_sign`.
+def least_opposite_product(edges: Floats, out: Floats) -> Floats:
+    """Return the lesser of w0 w2 and w1 w3 of edge functions (b, 4, m, k) of parallelograms.
 
-    Opposite edges have one sum, d·n, so they cannot both have the other sign, that of an outside.
-    Overwrites the last two edges.
+    Both pairs of opposite edges have the same sum, d·n, so that all signs are equal where both products are
+    positive: see `least_adjacent_product`. Overwrites the last two edges.
     """
     pairs = np.multiply(edges[:, :2], edges[:, 2:], out=edges[:, 2:])
     return np.minimum(pairs[:, 0], pairs[:, 1], out=out)
 
 
 def vertices_from(table: TriangleTable, prim: Ints, origin: Doubles) -> Doubles:
-    """Return the vertices of triangles `prim` (k,) as seen from points (3, k): corner, axis, k."""
+    """Return the vertices of triangles `prim` (k,) relative to points (3, k): (corner, axis, k)."""
     return table.corners.take(prim, 1).reshape(3, 3, -1) - origin
 
 
 def hits_watertight(vertices: Doubles, direction: Doubles) -> Bools:
-    """Decide for triangles, seen from where rays start (3, 3, k), whether the rays' lines pass inside.
+    """Return a mask (k,) of the rays whose lines pass through triangles (3, 3, k), relative to their origins.
 
     Woop, Benthin, Wald, "Watertight ray/triangle intersection", JCGT 2(1), 2013: shear space so that
-    the ray runs along z, and test the origin against the projected edges. The projected vertices are
-    rounded to float32, so that in float64 their products are exact and so is the sign of a difference
-    of two: the triangles of a mesh stay a mesh, without gaps.
+    the ray is the z axis, and test the origin against the projected edges. The projected vertices are
+    rounded to float32, so that float64 products of them are exact, and so is the sign of a difference of
+    two: adjacent triangles have no gap between them.
     """
     axes = AXES.take(np.abs(direction).argmax(0), 1)
     place = axes * direction.shape[1] + np.arange(direction.shape[1])
-    turned = vertices.reshape(3, -1).take(place, 1)
+    permuted = vertices.reshape(3, -1).take(place, 1)
     along = direction.reshape(-1).take(place)
-    projected = (turned[:, :2] - along[:2] / along[2] * turned[:, 2:]).astype(f4).astype(np.float64)
+    projected = (permuted[:, :2] - along[:2] / along[2] * permuted[:, 2:]).astype(f4).astype(np.float64)
     before, after = projected.take([2, 0, 1], 0), projected.take([1, 2, 0], 0)
     edges = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
     low, high = np.minimum.reduce(edges, 0), np.maximum.reduce(edges, 0)
@@ -221,17 +223,17 @@ def hits_watertight(vertices: Doubles, direction: Doubles) -> Bools:
 def plane_distance(
     plane: Doubles, chosen: Ints, origin: Floats | Doubles, direction: Floats | Doubles
 ) -> Doubles:
-    """Distance t to planes `chosen` (k,) of all (4, m), see TriangleTable, along rays (3, k), float64."""
+    """Return the distance t (k,) of planes `chosen` (k,) of `plane` (4, m) along rays (3, k), float64."""
     nx, ny, nz, offset = (row.take(chosen) for row in plane)
     top = offset - (nx * origin[0] + ny * origin[1] + nz * origin[2])
     return top / (nx * direction[0] + ny * direction[1] + nz * direction[2])
 
 
 def clamp_to_triangle(t: Doubles, vertices: Doubles, direction: Doubles) -> Doubles:
-    """Keep t (k,) within the stretch of the ray beside its triangle, as seen from its start (3, 3, k).
+    """Clip t (k,) to the extent of triangles (3, 3, k), relative to the rays' origins, along the rays.
 
-    A ray that runs in a triangle's plane has a plane distance of 0/0. The margin leaves every ray that
-    crosses the plane at a measurable angle alone.
+    For a ray in the triangle's plane t is 0/0. The margin is wide enough not to change t for rays that
+    cross the plane at a measurable angle.
     """
     depths = (vertices * direction).sum(1) / (direction * direction).sum(0)
     low, high = depths.min(0), depths.max(0)
@@ -242,7 +244,7 @@ def clamp_to_triangle(t: Doubles, vertices: Doubles, direction: Doubles) -> Doub
 def barycentrics(
     table: TriangleTable, prim: Ints, origin: Doubles, direction: Doubles
 ) -> tuple[Floats, Floats]:
-    """Weights (k,) of the second and third vertex where rays (3, k) cross triangles `prim` (k,)."""
+    """Return the weights (k,) of the second and third vertex where rays cross triangles `prim` (k,)."""
     t = plane_distance(table.plane, prim, origin, direction)
     x = origin[0] + t * direction[0]
     y = origin[1] + t * direction[1]
