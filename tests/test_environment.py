@@ -331,7 +331,7 @@ BAD = {
     "text": ({"radiance": np.full((2, 4, 3), "x")}, "it must be"),
     "black": ({"radiance": PICTURE * 0}, r"every pixel of the Environment is black; Environment\(0\) is"),
     "no file": ({"radiance": "missing.exr"}, "missing.exr"),
-    "no image": ({"radiance": "sky.obj"}, "extension '.obj' is not one of"),
+    "no image": ({"radiance": "sky.obj"}, "extension is '.obj'; it must be one of"),
     "filter": (
         {"radiance": PICTURE, "filter": "cubic"},
         "filter is 'cubic'; it must be one of bilinear, nearest",

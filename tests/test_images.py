@@ -147,8 +147,11 @@ def test_float_formats_keep_nan(tmp_path, picture):
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("a.tga", r"a\.tga: extension '\.tga' is not one of \.png, \.jpg, \.jpeg, \.exr, \.hdr, \.npy"),
-        ("a", r"extension '' is not one of"),
+        (
+            "a.tga",
+            r"a\.tga: extension is '\.tga'; it must be one of \.png, \.jpg, \.jpeg, \.exr, \.hdr, \.npy",
+        ),
+        ("a", r"extension is ''; it must be one of"),
         ("missing/a.png", r"a\.png: the folder .*missing does not exist"),
         ("folder.png", r"folder\.png: is a folder"),
     ],
@@ -391,7 +394,7 @@ def test_damaged_images_are_named(tmp_path, picture, extension, part, capfd):
 def test_missing_folder_and_other_kinds(tmp_path):
     with pytest.raises(SceneError, match=r"no\.png: there is no such file"):
         read_image(tmp_path / "no.png")
-    with pytest.raises(SceneError, match=r"extension '\.gif' is not one of"):
+    with pytest.raises(SceneError, match=r"extension is '\.gif'; it must be one of"):
         read_image(tmp_path / "no.gif")
     (tmp_path / "d.png").mkdir()
     with pytest.raises(SceneError, match=r"d\.png: is a folder"):

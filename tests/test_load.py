@@ -345,7 +345,7 @@ def test_missing_folder_extension(tmp_path):
     for name in ("a.zip", "a.fbx", "a"):
         (tmp_path / name).write_text("x")
         with pytest.raises(
-            SceneError, match=r"is not one of \.obj, \.ply, \.stl, \.glb, \.gltf, \.off, \.dae, \.3mf"
+            SceneError, match=r"it must be one of \.obj, \.ply, \.stl, \.glb, \.gltf, \.off, \.dae, \.3mf"
         ):
             load(tmp_path / name)
 

@@ -105,7 +105,7 @@ def test_options_without_effect_are_named(one):
             "map_Pr -imfchan m t.png",
             r"line 2: map_Pr: channel is 3; texture 't\.png' has the channels 0 to 2",
         ),
-        ("map_Kd t.tga", r"line 2: map_Kd: .*t\.tga: extension '\.tga' is not one of"),
+        ("map_Kd t.tga", r"line 2: map_Kd: .*t\.tga: extension is '\.tga'; it must be one of"),
         (
             "map_Kd ../t.png",
             r"line 2: map_Kd: .*s\.mtl: refers to '\.\./t\.png', which is outside its folder",

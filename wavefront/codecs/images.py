@@ -11,23 +11,30 @@ import warnings
 from collections.abc import Callable, Mapping
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SaveError, SceneError
 from ..files import check_size, check_target, path_name, read_bytes, write_bytes
+from ..registry import Registry
 from ..vec import Floats
 from . import exr
 from . import hdr as rgbe
 from . import png_jpeg as coded
-from .encoding import codes_to_linear, exposed, to_8bit
+from .encoding import check_gamma, codes_to_linear, exposed, to_8bit
 from .exr import Attribute
 from .png_jpeg import Gamma
 
-READABLE = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".npy")
-WRITABLE = READABLE
+T = TypeVar("T")
+
+Attributes: TypeAlias = Mapping[str, Attribute]
+Decoder: TypeAlias = Callable[
+    [bytes], NDArray[Any]
+]  # returns uint8 or uint16 codes, or linear float32, (H, W, C)
+# called with linear values (H, W, 3), the gamma and the attributes; returns the file
+Encoder: TypeAlias = Callable[[Floats, Gamma, Attributes], bytes]
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
@@ -39,7 +46,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
         If the extension is unknown, the folder is missing or not writable, or something other than a
         regular file is there.
     """
-    _extension(path, WRITABLE, SaveError)
+    _find(IMAGE_WRITERS, path, SaveError)
     check_target(path)
 
 
@@ -74,19 +81,12 @@ def write_image(
     SceneError
         If an argument is malformed.
     """
-    extension = _extension(path, WRITABLE, SaveError)
+    encode = _find(IMAGE_WRITERS, path, SaveError)
     pixels = exposed(_picture(rgb), exposure)
-    if extension in coded.EXTENSIONS:
-        codes = to_8bit(_finite(path, pixels), gamma)
-        data = _encoded(path, lambda: coded.encode(codes, extension, gamma))
-    elif extension == ".exr":
-        data = _encoded(path, lambda: exr.encode({"RGB": pixels}, attributes or {}))
-    elif extension == ".hdr":
-        finite = _finite(path, pixels)
-        data = _encoded(path, lambda: rgbe.encode(finite))
-    else:
-        data = _encoded(path, lambda: _encode_npy(pixels))
-    write_bytes(path, data)
+    check_gamma(gamma)
+    if Path(path).suffix.lower() in FINITE:
+        pixels = _finite(path, pixels)
+    write_bytes(path, _encoded(path, lambda: encode(pixels, gamma, attributes or {})))
 
 
 def write_channels(
@@ -101,7 +101,7 @@ def write_channels(
     SaveError
         If the extension is not .exr, or the file cannot be written.
     """
-    _extension(path, (".exr",), SaveError)
+    _find(EXR_ONLY, path, SaveError)
     arrays = {}
     for name, values in channels.items():
         array = np.asarray(values)
@@ -151,27 +151,26 @@ def read_linear(path: str | os.PathLike[str]) -> Floats:
 
 def decode_codes(data: bytes, name: str) -> NDArray[Any]:
     """Return the stored values (H, W, C) of a png or jpg in memory; `name` is for messages."""
-    return _decode(name, ".png", data)
+    return _decode(name, coded.decode, data, "png")
 
 
 def _read(path: str | os.PathLike[str]) -> tuple[NDArray[Any], bytes]:
     """Return the stored values of an image file, and its bytes."""
-    extension = _extension(path, READABLE)
+    decode = _find(IMAGE_READERS, path)
     data = read_bytes(path)
-    return _decode(os.fspath(path), extension, data), data
+    return _decode(os.fspath(path), decode, data, Path(path).suffix.lower()[1:]), data
 
 
-def _decode(name: str, extension: str, data: bytes) -> NDArray[Any]:
-    readers = {".exr": exr.decode, ".hdr": rgbe.decode, ".npy": _decode_npy}
+def _decode(name: str, decode: Decoder, data: bytes, kind: str) -> NDArray[Any]:
     try:
-        return readers.get(extension, coded.decode)(data)
+        return decode(data)
     except SceneError as error:
         raise SceneError(f"{name}: {error}") from error
     except MemoryError as error:
         raise SceneError(f"{name}: does not fit in memory") from error
     # the decoders raise whatever comes to their mind on damaged bytes
     except Exception as error:
-        raise SceneError(f"{name}: not a readable {extension[1:]} image: {error}") from error
+        raise SceneError(f"{name}: not a readable {kind} image: {error}") from error
 
 
 def encode_png(rgb: ArrayLike, gamma: Gamma = 2.2) -> bytes:
@@ -179,14 +178,13 @@ def encode_png(rgb: ArrayLike, gamma: Gamma = 2.2) -> bytes:
     return coded.encode(to_8bit(rgb, gamma), ".png", gamma)
 
 
-def _extension(
-    path: str | os.PathLike[str], allowed: tuple[str, ...], error: type[SceneError] = SceneError
-) -> str:
+def _find(table: Registry[T], path: str | os.PathLike[str], error: type[SceneError] = SceneError) -> T:
+    """Return what a table has for the extension of a path."""
     name = path_name(path, error)
-    extension = Path(name).suffix.lower()
-    if extension not in allowed:
-        raise error(f"{name}: extension {extension!r} is not one of {', '.join(allowed)}")
-    return extension
+    try:
+        return table.find(Path(name).suffix.lower(), f"{name}: extension")
+    except SceneError as unknown:
+        raise error(str(unknown)) from None
 
 
 def _encoded(path: str | os.PathLike[str], encode: Callable[[], bytes]) -> bytes:
@@ -225,3 +223,54 @@ def _decode_npy(data: bytes) -> Floats:
         raise SceneError(f"array is {pixels.dtype} of shape {pixels.shape}; an image is (H, W) or (H, W, C)")
     check_size(pixels.shape[0], pixels.shape[1])
     return np.atleast_3d(pixels).astype(np.float32)
+
+
+def _encode_8bit(extension: str) -> Encoder:
+    return lambda pixels, gamma, attributes: coded.encode(to_8bit(pixels, gamma), extension, gamma)
+
+
+def _without_metadata(encode: Callable[[Floats], bytes]) -> Encoder:
+    """Return an encoder that keeps linear values, and neither a gamma nor attributes."""
+    return lambda pixels, gamma, attributes: encode(pixels)
+
+
+def _checked_pixels(decode: Callable[[bytes], Any]) -> Decoder:
+    """Return a decoder that checks what `decode`, a user's own function, returns."""
+
+    def checked(data: bytes) -> NDArray[Any]:
+        pixels = np.asarray(decode(data))
+        if pixels.ndim != 3 or not 1 <= pixels.shape[2] <= 4 or not pixels.size:
+            raise SceneError(f"the reader returned the shape {pixels.shape}; an image is (H, W, 1 to 4)")
+        return pixels if pixels.dtype in (np.uint8, np.uint16) else pixels.astype(np.float32)
+
+    return checked
+
+
+def _exr(pixels: Floats, gamma: Gamma, attributes: Attributes) -> bytes:
+    return exr.encode({"RGB": pixels}, attributes)
+
+
+IMAGE_READERS: Registry[Decoder] = Registry(
+    "extension",
+    "a function of bytes that returns pixels (H, W, C)",
+    {
+        **dict.fromkeys(coded.EXTENSIONS, coded.decode),
+        ".exr": exr.decode,
+        ".hdr": rgbe.decode,
+        ".npy": _decode_npy,
+    },
+    adapt=_checked_pixels,
+)
+IMAGE_WRITERS: Registry[Encoder] = Registry(
+    "extension",
+    "a function of linear pixels (H, W, 3) that returns bytes",
+    {
+        **{extension: _encode_8bit(extension) for extension in coded.EXTENSIONS},
+        ".exr": _exr,
+        ".hdr": _without_metadata(rgbe.encode),
+        ".npy": _without_metadata(_encode_npy),
+    },
+    adapt=_without_metadata,
+)
+EXR_ONLY = Registry("extension", "an encoder", {".exr": _exr})  # what holds named channels
+FINITE = (*coded.EXTENSIONS, ".hdr")  # formats that hold neither NaN nor infinities

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..camera import Camera
-from ..lights import DirectionalLight, PointLight, SpotLight
+from ..lights import DirectionalLight, PointLight, SpotLight, UserLight
+from ..shapes import Shape
 from .placing import Places
 from .repair import RawMesh
 
@@ -17,8 +18,9 @@ class Contents:
 
     raws: list[RawMesh]
     places: Places
-    lights: Sequence[DirectionalLight | PointLight | SpotLight] = ()
+    lights: Sequence[UserLight] = ()
     camera: Camera | None = None
+    shapes: Sequence[Shape] = ()  # further ones, built already
 
     @classmethod
     def once(cls, raws: list[RawMesh]) -> Contents:

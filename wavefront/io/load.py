@@ -13,7 +13,7 @@ from ..bsdfs import Bsdf
 from ..errors import SceneError
 from ..progress import Progress, phase
 from ..scene import Scene
-from ..shapes import Mesh
+from ..shapes import Instance, Mesh, Shape
 from . import trimesh_objects, trimesh_view
 from .joining import join
 from .placing import MAX_INSTANCES, place_meshes, place_shapes
@@ -53,8 +53,8 @@ def load(
     """
     with _phase(path, progress):
         name, contents = os.fspath(path), read(path, Wish(strict, max_instances=max_instances))
-        shapes = _some(name, place_shapes(name, contents.raws, contents.places, strict))
-        return Scene(shapes, contents.lights, contents.camera)
+        placed = place_shapes(name, contents.raws, contents.places, strict)
+        return Scene(_some(name, [*placed, *contents.shapes]), contents.lights, contents.camera)
 
 
 def load_mesh(
@@ -92,7 +92,16 @@ def load_mesh(
 def load_meshes(path: PathLike, *, strict: bool = False, materials: bool = True) -> list[Mesh]:
     """Read the meshes of a file, one for each material and node; arguments as for `load`."""
     name, contents = os.fspath(path), read(path, Wish(strict, materials))
-    return _some(name, place_meshes(name, contents.raws, contents.places, strict))
+    placed = place_meshes(name, contents.raws, contents.places, strict)
+    return _some(name, [*placed, *(_as_mesh(name, shape) for shape in contents.shapes)])
+
+
+def _as_mesh(name: str, shape: Shape) -> Mesh:
+    if isinstance(shape, Instance):
+        return shape.to_mesh()
+    if not isinstance(shape, Mesh):
+        raise SceneError(f"{name}: {shape.name} is a {type(shape).__name__}, not a mesh; use wf.load")
+    return shape
 
 
 def _phase(path: PathLike, progress: Progress) -> AbstractContextManager[None]:

@@ -6,14 +6,17 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 from ..errors import SceneError
 from ..files import beside, decode, read_bytes
+from ..registry import Registry
+from ..scene import Scene
 from . import dae, gltf, mtl, obj, off, ply, stl, threemf, trimesh_objects, visuals
 from .appearance import MaterialSpec, assign_material
 from .contents import Contents
 from .gltf_materials import GltfMaterials
-from .placing import MAX_INSTANCES
+from .placing import MAX_INSTANCES, Places
 from .repair import warn
 
 PathLike = str | os.PathLike[str]
@@ -38,13 +41,12 @@ def read(path: PathLike, wish: Wish) -> Contents:
     """
     name = os.fspath(path)
     extension = Path(name).suffix.lower()
-    if extension not in READERS:
-        raise SceneError(f"{name}: extension {extension!r} is not one of {', '.join(READERS)}")
+    parse = READERS.find(extension, f"{name}: extension")
     data = read_bytes(path)
-    if extension not in ARCHIVES:
+    if extension in PLAIN:
         _refuse(name, data)
     try:
-        return READERS[extension](path, data, wish)
+        return parse(path, data, wish)
     except MemoryError as error:
         raise SceneError(f"{name}: does not fit in memory") from error
 
@@ -132,14 +134,33 @@ def _read_3mf(path: PathLike, data: bytes, wish: Wish) -> Contents:
     return trimesh_objects.read(threemf.parse(name, data, wish.strict, wish.materials), name, wish.strict)
 
 
-READERS: dict[str, Callable[[PathLike, bytes, Wish], Contents]] = {
-    ".obj": _read_obj,
-    ".ply": _read_ply,
-    ".stl": _read_stl,
-    ".glb": _read_gltf,
-    ".gltf": _read_gltf,
-    ".off": _read_off,
-    ".dae": _read_dae,
-    ".3mf": _read_3mf,
-}
-ARCHIVES = (".3mf",)  # kinds that are archives by themselves
+def _from_scene(load: Callable[[str, bytes], Scene]) -> Reader:
+    """Return a reader that gives what `load`, a user's own function, makes of a file."""
+
+    def read_scene(path: PathLike, data: bytes, wish: Wish) -> Contents:
+        name = os.fspath(path)
+        scene = load(name, data)
+        if not isinstance(scene, Scene):
+            raise SceneError(f"{name}: its reader returned {type(scene).__name__}; it must return a wf.Scene")
+        return Contents([], Places.once(0), scene.lights, scene.camera, scene.shapes)
+
+    return read_scene
+
+
+Reader: TypeAlias = Callable[[PathLike, bytes, Wish], Contents]
+READERS: Registry[Reader] = Registry(
+    "extension",
+    "a function of (path, data) that returns a wf.Scene",
+    {
+        ".obj": _read_obj,
+        ".ply": _read_ply,
+        ".stl": _read_stl,
+        ".glb": _read_gltf,
+        ".gltf": _read_gltf,
+        ".off": _read_off,
+        ".dae": _read_dae,
+        ".3mf": _read_3mf,
+    },
+    adapt=_from_scene,
+)
+PLAIN = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off", ".dae")  # formats that are no archives

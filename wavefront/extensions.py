@@ -1,0 +1,176 @@
+"""Functions that add a user's own things to the tables that settings are looked up in.
+
+A name belongs to one thing for as long as the program runs. Worker processes know all names that were registered
+before they were started. What is used once need not be registered: the settings of `render` take the thing
+itself in place of a name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from .accel.registry import ACCELERATORS, AcceleratorMaker
+from .codecs.images import IMAGE_READERS, IMAGE_WRITERS
+from .errors import SceneError
+from .filters import FILTERS, Filter
+from .integrators import INTEGRATORS, Integrator
+from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
+from .sampling.sampler import SAMPLERS, SamplerMaker
+from .scene import Scene
+from .scheduling.crew import PoolMaker
+from .scheduling.executors import EXECUTORS
+from .vec import Floats
+
+
+def register_integrator(name: str, integrator: Integrator) -> None:
+    """Let `render(integrator=name)` use an integrator.
+
+    Parameters
+    ----------
+    name
+        A name that is not taken.
+    integrator
+        Called with the compiled scene, the paths of a wave, the sampler and `max_bounces`; returns the radiance of
+        each path, (3, n), in the order of the paths. `wf.stages` has the steps that it may be made of.
+
+    Raises
+    ------
+    SceneError
+        If the name is taken, or the integrator is not a function.
+    """
+    INTEGRATORS.register(name, integrator)
+
+
+def register_sampler(name: str, sampler: SamplerMaker) -> None:
+    """Let `render(sampler=name)` use a sampler.
+
+    Parameters
+    ----------
+    name
+        A name that is not taken.
+    sampler
+        A subclass of `Sampler`, or a function; it is called with the seed and the width of the picture.
+
+    Raises
+    ------
+    SceneError
+        If the name is taken, or the sampler cannot be called.
+    """
+    SAMPLERS.register(name, sampler)
+
+
+def register_filter(name: str, filter: Filter) -> None:
+    """Let `render(filter=name)` use a reconstruction filter.
+
+    Parameters
+    ----------
+    name
+        A name that is not taken.
+    filter
+        Called with u (2, n) in [0, 1)²; returns positions (2, n) in pixels from the corner of the pixel, distributed
+        as the filter weighs them.
+
+    Raises
+    ------
+    SceneError
+        If the name is taken, or the filter is not a function.
+    """
+    FILTERS.register(name, filter)
+
+
+def register_light_sampler(name: str, light_sampler: LightSamplerMaker) -> None:
+    """Let `render(light_sampler=name)` use a light sampler.
+
+    Parameters
+    ----------
+    name
+        A name that is not taken.
+    light_sampler
+        Called with the estimated power (k,) of each light, all above 0; half of the scene's extent (3,), whose middle
+        is the origin; and a function that takes points (3, c) and a radius, and returns a bound on the irradiance
+        (c, k) by each light within the radius of each point. Lengths are scene units. Returns a `LightSampler`. It is
+        not called for scenes with one light.
+
+    Raises
+    ------
+    SceneError
+        If the name is taken, or the light sampler cannot be called.
+    """
+    LIGHT_SAMPLERS.register(name, light_sampler)
+
+
+def register_accelerator(name: str, accelerator: AcceleratorMaker) -> None:
+    """Let `render(accel=name)` use an accelerator.
+
+    Parameters
+    ----------
+    name
+        A name that is not taken.
+    accelerator
+        A class or a function; it is called with a `Geometry` and returns an `Accelerator`.
+
+    Raises
+    ------
+    SceneError
+        If the name is taken, or the accelerator cannot be called.
+    """
+    ACCELERATORS.register(name, accelerator)
+
+
+def register_executor(name: str, executor: PoolMaker) -> None:
+    """Let `render(executor=name)` use workers of another kind.
+
+    Parameters
+    ----------
+    name
+        A name that is not taken.
+    executor
+        Called with the number of workers; returns a `concurrent.futures.Executor` whose workers share the memory of
+        this process, as those of `ThreadPoolExecutor` do.
+
+    Raises
+    ------
+    SceneError
+        If the name is taken, or the executor cannot be called.
+    """
+    EXECUTORS.register(name, executor)
+
+
+def register_format(
+    extension: str,
+    *,
+    load: Callable[[str, bytes], Scene] | None = None,
+    read_image: Callable[[bytes], Any] | None = None,
+    write_image: Callable[[Floats], bytes] | None = None,
+) -> None:
+    """Let scenes or pictures be read from files, or pictures be written to files, of another format.
+
+    Parameters
+    ----------
+    extension
+        How the names of such files end, such as ".xyz"; upper and lower case are the same.
+    load
+        Called with the path and the bytes of a file; returns its `Scene`. `wf.load`, `wf.load_mesh` and `render`
+        use it.
+    read_image
+        Called with the bytes of a file; returns pixels (H, W, 1 to 4): linear floats, or uint8 or uint16 that are
+        encoded as sRGB. `Texture`, `Environment` and `Image.load` use it.
+    write_image
+        Called with linear float32 pixels (H, W, 3); returns the bytes of a file. `Image.save` uses it.
+
+    Raises
+    ------
+    SceneError
+        If the extension does not begin with a dot or is taken, or no function is given.
+    """
+    if not isinstance(extension, str) or not extension.startswith(".") or len(extension) < 2:
+        raise SceneError(f"extension is {extension!r}; it must begin with a dot, as '.xyz' does")
+    from .io.readers import READERS  # here, as few programs read scenes of their own formats
+
+    given = [(READERS, load), (IMAGE_READERS, read_image), (IMAGE_WRITERS, write_image)]
+    if all(function is None for _, function in given):
+        raise SceneError("register_format needs load, read_image or write_image")
+    for table, function in given:
+        if function is not None:
+            table.register(extension.lower(), function)
