@@ -3,6 +3,8 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from . import elementary, integrators, vec
+from .accel import Accelerator, Geometry, Intersections
 from .bsdfs import (
     Bsdf,
     BsdfSample,
@@ -17,20 +19,33 @@ from .bsdfs import (
 )
 from .camera import Camera
 from .errors import Interrupted, RenderError, SaveError, SceneError
+from .extensions import (
+    register_accelerator,
+    register_executor,
+    register_filter,
+    register_format,
+    register_integrator,
+    register_light_sampler,
+    register_sampler,
+)
+from .frame import Frame
 from .image import Image
 from .lighting import studio
 from .lights import DirectionalLight, Environment, PointLight, SpotLight
+from .lights.samplers import LightSampler
 from .render import render
+from .sampling import warp
+from .sampling.sampler import Sampler
 from .scene import Scene
 from .shapes import Disk, Instance, Mesh, Rectangle, Shape, Sphere
 from .suggestions import did_you_mean
+from .textures.base import BaseTexture
 from .textures.image import Texture
 from .textures.normal_map import BumpMap, NormalMap
 from .textures.vertex_colors import VertexColors
 from .version import VERSION
 
 if TYPE_CHECKING:
-    pass
     from .io.load import from_trimesh, load, load_mesh
     from .metrics import Comparison, compare
 
@@ -46,6 +61,8 @@ _LATER = {  # what many programs do without is imported when they ask for it
 }
 
 __all__ = [
+    "Accelerator",
+    "BaseTexture",
     "Bsdf",
     "BsdfSample",
     "BumpMap",
@@ -57,9 +74,13 @@ __all__ = [
     "DirectionalLight",
     "Disk",
     "Environment",
+    "Frame",
+    "Geometry",
     "Image",
     "Instance",
     "Interrupted",
+    "Intersections",
+    "LightSampler",
     "Mesh",
     "Mirror",
     "Mix",
@@ -69,6 +90,7 @@ __all__ = [
     "Principled",
     "Rectangle",
     "RenderError",
+    "Sampler",
     "SaveError",
     "Scene",
     "SceneError",
@@ -79,12 +101,23 @@ __all__ = [
     "ThinDielectric",
     "VertexColors",
     "compare",
+    "elementary",
     "from_trimesh",
+    "integrators",
     "load",
     "load_mesh",
+    "register_accelerator",
+    "register_executor",
+    "register_filter",
+    "register_format",
+    "register_integrator",
+    "register_light_sampler",
+    "register_sampler",
     "render",
     "studio",
     "testing",
+    "vec",
+    "warp",
 ]
 
 

@@ -1,8 +1,8 @@
 """Functions that add a user's own things to the tables that settings are looked up in.
 
-A name belongs to one thing for as long as the program runs. Worker processes know all names that were registered
-before they were started. What is used once need not be registered: the settings of `render` take the thing
-itself in place of a name.
+A name belongs to one thing for as long as the program runs. Worker processes know all names that were
+registered before they were started. What is used once need not be registered: the settings of `render` take
+the thing itself in place of a name.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from .errors import SceneError
 from .filters import FILTERS, Filter
 from .integrators import INTEGRATORS, Integrator
 from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
+from .registry import Registry
 from .sampling.sampler import SAMPLERS, SamplerMaker
 from .scene import Scene
 from .scheduling.crew import PoolMaker
@@ -31,8 +32,9 @@ def register_integrator(name: str, integrator: Integrator) -> None:
     name
         A name that is not taken.
     integrator
-        Called with the compiled scene, the paths of a wave, the sampler and `max_bounces`; returns the radiance of
-        each path, (3, n), in the order of the paths. `wf.stages` has the steps that it may be made of.
+        Called with the compiled scene, the paths of a wave, the sampler and `max_bounces`; returns the
+        radiance of each path, (3, n), in the order of the paths. `wf.integrators` has the steps that it may
+        be made of.
 
     Raises
     ------
@@ -68,8 +70,8 @@ def register_filter(name: str, filter: Filter) -> None:
     name
         A name that is not taken.
     filter
-        Called with u (2, n) in [0, 1)²; returns positions (2, n) in pixels from the corner of the pixel, distributed
-        as the filter weighs them.
+        Called with u (2, n) in [0, 1)²; returns positions (2, n) in pixels from the corner of the pixel,
+        distributed as the filter weighs them.
 
     Raises
     ------
@@ -87,10 +89,10 @@ def register_light_sampler(name: str, light_sampler: LightSamplerMaker) -> None:
     name
         A name that is not taken.
     light_sampler
-        Called with the estimated power (k,) of each light, all above 0; half of the scene's extent (3,), whose middle
-        is the origin; and a function that takes points (3, c) and a radius, and returns a bound on the irradiance
-        (c, k) by each light within the radius of each point. Lengths are scene units. Returns a `LightSampler`. It is
-        not called for scenes with one light.
+        Called with the estimated power (k,) of each light, all above 0; half of the scene's extent (3,),
+        whose middle is the origin; and a function that takes points (3, c) and a radius, and returns a bound
+        on the irradiance (c, k) by each light within the radius of each point. Lengths are scene units.
+        Returns a `LightSampler`. It is not called for scenes with one light.
 
     Raises
     ------
@@ -126,8 +128,8 @@ def register_executor(name: str, executor: PoolMaker) -> None:
     name
         A name that is not taken.
     executor
-        Called with the number of workers; returns a `concurrent.futures.Executor` whose workers share the memory of
-        this process, as those of `ThreadPoolExecutor` do.
+        Called with the number of workers; returns a `concurrent.futures.Executor` whose workers share the
+        memory of this process, as those of `ThreadPoolExecutor` do.
 
     Raises
     ------
@@ -151,11 +153,11 @@ def register_format(
     extension
         How the names of such files end, such as ".xyz"; upper and lower case are the same.
     load
-        Called with the path and the bytes of a file; returns its `Scene`. `wf.load`, `wf.load_mesh` and `render`
-        use it.
+        Called with the path and the bytes of a file; returns its `Scene`. `wf.load`, `wf.load_mesh` and
+        `render` use it.
     read_image
-        Called with the bytes of a file; returns pixels (H, W, 1 to 4): linear floats, or uint8 or uint16 that are
-        encoded as sRGB. `Texture`, `Environment` and `Image.load` use it.
+        Called with the bytes of a file; returns pixels (H, W, 1 to 4): linear floats, or uint8 or uint16 that
+        are encoded as sRGB. `Texture`, `Environment` and `Image.load` use it.
     write_image
         Called with linear float32 pixels (H, W, 3); returns the bytes of a file. `Image.save` uses it.
 
@@ -168,7 +170,11 @@ def register_format(
         raise SceneError(f"extension is {extension!r}; it must begin with a dot, as '.xyz' does")
     from .io.readers import READERS  # here, as few programs read scenes of their own formats
 
-    given = [(READERS, load), (IMAGE_READERS, read_image), (IMAGE_WRITERS, write_image)]
+    given: list[tuple[Registry[Any], Any]] = [
+        (READERS, load),
+        (IMAGE_READERS, read_image),
+        (IMAGE_WRITERS, write_image),
+    ]
     if all(function is None for _, function in given):
         raise SceneError("register_format needs load, read_image or write_image")
     for table, function in given:

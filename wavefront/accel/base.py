@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Protocol
 
 from ..record import record
@@ -37,8 +38,9 @@ class Intersections:
 class Accelerator(Protocol):
     """Answers ray queries. Results do not depend on the size of a batch or the order of its rays."""
 
-    name: str
+    name: str  # what the metadata of pictures calls it
 
+    @abstractmethod
     def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
         """Return the nearest hits with t > 0 of rays (3, n); of equal distances, the lowest primitive id.
 
@@ -47,5 +49,6 @@ class Accelerator(Protocol):
         that form one flat quadrilateral may be excluded together.
         """
 
+    @abstractmethod
     def occluded(self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints) -> Bools:
         """Return a mask (n,) of the rays that hit anything with 0 < t < `distance` (n,)."""

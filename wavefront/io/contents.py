@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..camera import Camera
-from ..lights import DirectionalLight, PointLight, SpotLight, UserLight
+from ..lights import UserLight
 from ..shapes import Shape
 from .placing import Places
 from .repair import RawMesh

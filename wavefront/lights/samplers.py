@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable
 from typing import Protocol, TypeAlias
 
@@ -21,9 +22,11 @@ BY_POWER = 0.05  # part of the choice that stays with the power, so that no ligh
 class LightSampler(Protocol):
     """Chooses a light for each point."""
 
+    @abstractmethod
     def sample(self, point: Floats, u: Floats) -> tuple[Ints, Floats]:
         """Return a light (n,) for each point (3, n) from u (n,), and its probability (n,)."""
 
+    @abstractmethod
     def pmf(self, light: Ints, point: Floats) -> Floats:
         """Probability (n,) that `light` (n,) is chosen at points (3, n)."""
 
