@@ -101,7 +101,8 @@ def render(
         Adds a level ground under the scene that catches its shadow and fades into the background. It
         belongs to the picture alone: the scene, its bounds and the numbers of its shapes stay.
     integrator
-        "full", "direct_mis", "direct_simple" or "naive".
+        "full", "direct_mis", "direct_simple" or "naive". This and the other settings that take names also
+        take a thing of your own, such as a function; docs/extending.md has an example of each.
     max_bounces
         Scattering events along a path: 0 shows only light seen directly, 1 direct light.
     seed
