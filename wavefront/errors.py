@@ -1,4 +1,4 @@
-"""The errors that users meet, and checks of arguments."""
+"""Error types, and checks of arguments."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class RenderError(RuntimeError):
 class Interrupted(KeyboardInterrupt):
     """A render that Ctrl-C stopped.
 
-    It is a KeyboardInterrupt, so that a script stops unless it catches this one.
+    It is a KeyboardInterrupt, so a script stops unless it catches it.
 
     Attributes
     ----------
@@ -57,9 +57,9 @@ class Interrupted(KeyboardInterrupt):
         self.image = image
 
     def _render_traceback_(self) -> list[str]:
-        """Show the picture in a notebook: IPython asks for this in place of the traceback."""
+        """Show the picture in a notebook: IPython calls this in place of printing a traceback."""
         if self.image is not None:
-            from IPython.display import display  # it runs, or nobody would ask
+            from IPython.display import display  # IPython is installed: it called this method
 
             display(self.image)
         return [f"{type(self).__name__}: {self}"]
@@ -105,7 +105,7 @@ def one_of(name: str, value: Any, choices: Collection[Any]) -> Any:
     Raises
     ------
     SceneError
-        Naming them all, and the one that may be meant.
+        If it is not. The message lists all choices and suggests the nearest.
     """
     if not isinstance(value, str | int) or value not in choices:
         hint = did_you_mean(value, [choice for choice in choices if isinstance(choice, str)])
@@ -140,10 +140,10 @@ def rgb(
     Raises
     ------
     SceneError
-        If it is not one or three finite numbers in [0, `high`], or is beyond the type.
+        If it is not one or three finite numbers in [0, `high`], or exceeds the type.
     """
     scalar = np.ndim(value) == 0
-    if np.shape(value) == (3, 1):  # as it is kept
+    if np.shape(value) == (3, 1):  # as stored
         value = np.ravel(value)
     array = finite_array(name, value, () if scalar else (3,))
     largest = float(np.finfo(dtype).max)
@@ -158,7 +158,7 @@ def rgb(
 
 
 def rotation_matrix(name: str, value: ArrayLike, tolerance: float = 1e-4) -> NDArray[np.float64]:
-    """Return a (3, 3) rotation; one that is off by rounding is replaced by the nearest exact one.
+    """Return a (3, 3) rotation, replaced by the nearest exact rotation if it is inexact by rounding.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Bytes from files and to files: regular files only, whole files only, nothing outside a scene's folder."""
+"""Reading and writing of files: regular files only, whole files only, nothing outside a scene's folder."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ def decode(data: bytes) -> str:
 def beside(scene: str | os.PathLike[str], reference: str) -> Path:
     """Return the path of a file that `scene` refers to by a relative name.
 
-    A scene file from elsewhere must not make the program read any file it likes, so the name has
-    to stay inside the scene's folder, also after symbolic links are followed.
+    A scene file from elsewhere must not make the program read arbitrary files. So the target must be inside
+    the scene's folder, also after symbolic links are followed.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def path_name(path: str | os.PathLike[str], error: type[SceneError] = SceneError
 
 
 def check_target(path: str | os.PathLike[str]) -> Path:
-    """Return where `path` leads, after making sure that a file can be written there.
+    """Return the target of `path` after checking that a file can be written there.
 
     Raises
     ------
@@ -139,14 +139,14 @@ def _mode(target: Path) -> int | None:
 
 
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
-    """Write a file so that, whatever happens, it holds either its old content or all of the new.
+    """Write a file so that it always holds either its old content or all of the new content.
 
     A file that is replaced keeps its permissions. Symbolic links are followed.
 
     Raises
     ------
     SaveError
-        If it cannot be written; the old content is intact and nothing is left behind.
+        If it cannot be written. The old content is intact, and no other file remains.
     """
     target = check_target(path)
     scratch = target.with_name(f".wavefront-{os.urandom(6).hex()}.tmp")
@@ -166,14 +166,14 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
 def _write_new(path: Path, data: bytes, mode: int | None) -> None:
     """Write a new file with these permissions, or those of the umask.
 
-    Where the system can, the file has no name until it is complete: nothing is left behind, even
-    when the process is killed.
+    Where the system supports it, the file has no name until it is complete: no partial file remains,
+    even when the process is killed.
     """
     nameless = _open_nameless(path.parent)
     if nameless is not None:
         with contextlib.suppress(OSError), open(nameless, "wb") as file:
             _fill(file, data, mode)
-            # src_dir_fd makes Python follow the link, as it says it does anyway
+            # src_dir_fd makes Python follow the link, as it is documented to do without
             os.link(f"{OPEN_FILES}/{nameless}", path, src_dir_fd=nameless)
             return
     named = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
@@ -182,7 +182,7 @@ def _write_new(path: Path, data: bytes, mode: int | None) -> None:
 
 
 def _fill(file: IO[bytes], data: bytes, mode: int | None) -> None:
-    """Write all data through to the disk, after setting the permissions."""
+    """Set the permissions, write all data and flush it to the disk."""
     if mode is not None and hasattr(os, "fchmod"):
         os.fchmod(file.fileno(), mode)
     file.write(data)
@@ -196,12 +196,12 @@ def _open_nameless(folder: Path) -> int | None:
         return None
     try:
         return os.open(folder, os.O_WRONLY | os.O_TMPFILE, 0o666)
-    except OSError:  # not all file systems can
+    except OSError:  # not all file systems support it
         return None
 
 
 def _sync_folder(folder: Path) -> None:
-    """Make the new name itself durable, where the system can."""
+    """Flush the folder's entry of the new file to the disk, where the system supports it."""
     if os.name != "posix":
         return
     with contextlib.suppress(OSError):  # a folder may be writable and not readable

@@ -1,4 +1,4 @@
-"""An Image is a rendered picture as data."""
+"""Rendered pictures as data."""
 
 from __future__ import annotations
 
@@ -24,20 +24,19 @@ class Image:
     spp
         Samples per pixel; the rounded mean where pixels differ.
     metadata
-        What was rendered and how: lighting (the preset that was added, or None), integrator, max_bounces,
-        seed, sampler, filter, accelerator, workers, executor, seconds (wall time), spp (mean over pixels),
-        samples, rays, bad_samples, interrupted, version (of this package), numpy, and noise (estimated
-        relative error of the picture).
+        Settings and results of the render: lighting (the preset that was added, or None), integrator,
+        max_bounces, seed, sampler, filter, accelerator, workers, executor, seconds (wall time), spp (mean
+        over pixels), samples, rays, bad_samples, interrupted, version (of this package), numpy, and noise
+        (estimated relative error of the picture).
     counts
         (H, W) int64 samples of each pixel.
     variance
         (H, W, 3) float32 estimated variance of one sample; NaN where there are fewer than two.
     standard_error
-        (H, W, 3) float32 estimated standard error of `rgb`, from the scatter of 2 to 8 batches of
-        samples, so that the gain of stratified sampling shows in it, if not all of it; NaN where
-        there are fewer than two samples.
+        (H, W, 3) float32 estimated standard error of `rgb`, from the scatter of 2 to 8 batches of samples. It
+        includes most of the gain of stratified sampling. NaN where there are fewer than two samples.
 
-    The last three are None in an image that was not rendered.
+    `counts`, `variance` and `standard_error` are None in an image that was not rendered.
     """
 
     def __init__(
@@ -58,7 +57,7 @@ class Image:
         self.standard_error = standard_error
 
     def __repr__(self) -> str:
-        """Give the size and the sample count."""
+        """Return the size and the sample count."""
         height, width = self.rgb.shape[:2]
         return f"<Image {width}x{height}, {self.spp} spp>"
 
@@ -79,9 +78,8 @@ class Image:
     def load(cls, path: str | os.PathLike[str]) -> Image:
         """Read a picture by its extension, as linear values.
 
-        png and jpg files are decoded by the gamma that they name, as those that `save` writes do, and
-        by the sRGB curve if they name none. exr, hdr and npy are linear. Alpha is left out; one channel
-        becomes three.
+        png and jpg files are decoded by the gamma that they record, as files of `save` do, and by the sRGB
+        curve if they record none. exr, hdr and npy are linear. Alpha is ignored; one channel becomes three.
 
         Parameters
         ----------
@@ -91,7 +89,7 @@ class Image:
         Raises
         ------
         SceneError
-            Naming the file: missing, of another kind, corrupt, truncated, or too large.
+            If the file is missing, of another kind, corrupt, truncated, or too large. The message names it.
         """
         pixels = read_linear(path)
         if not 1 <= pixels.shape[2] <= 4:
@@ -99,7 +97,7 @@ class Image:
         return cls(three_channels(pixels))
 
     def to_uint8(self, gamma: Gamma = 2.2, exposure: float = 0.0) -> NDArray[np.uint8]:
-        """Return the picture as (H, W, 3) codes for display, those that `save` writes into a png.
+        """Return the picture as (H, W, 3) codes for display, the same that `save` writes into a png.
 
         Parameters
         ----------
@@ -118,15 +116,15 @@ class Image:
     def save(self, path: str | os.PathLike[str], gamma: Gamma = 2.2, exposure: float = 0.0) -> None:
         """Write the picture by its extension: png or jpg for display; exr, hdr and npy linear.
 
-        The file holds its old content or all of the new, never a part. It keeps its permissions, and a
-        symbolic link is followed.
+        The file holds its old content or all of the new content, never a part. It keeps its permissions, and
+        symbolic links are followed.
 
         Parameters
         ----------
         path
             Where to write.
         gamma
-            png and jpg hold value^(1/gamma), and say so; "srgb" is the exact sRGB curve.
+            png and jpg hold value^(1/gamma), and record gamma; "srgb" is the exact sRGB curve.
         exposure
             Stops (factors of 2) by which the picture is brightened first, in every format.
 

@@ -1,4 +1,4 @@
-"""How much memory there is, so that what cannot be had is refused before work."""
+"""Available memory, so that a picture that needs more is refused before any work."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if sys.platform != "win32":
 
 
 def address_space_left() -> float:
-    """Bytes that this process may still map under its limit (`ulimit -v`); infinite without one."""
+    """Return how many bytes this process may still map (`ulimit -v`); infinite without a limit."""
     if not sys.platform.startswith("linux"):
         return math.inf
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
@@ -24,12 +24,12 @@ def address_space_left() -> float:
 
 
 def available_memory() -> float:
-    """Bytes that can still be allocated; infinite where nobody says."""
+    """Return the number of bytes that can still be allocated; infinite where it is unknown."""
     return min(address_space_left(), _free_memory())
 
 
 def _free_memory() -> float:
-    """Bytes that the machine can give without swapping."""
+    """Return how many bytes the machine can provide without swapping."""
     try:
         lines = Path("/proc/meminfo").read_text().splitlines()
     except OSError:
@@ -39,12 +39,12 @@ def _free_memory() -> float:
 
 
 def check_memory(what: str, needed: int) -> None:
-    """Check that there are so many bytes.
+    """Check that `needed` bytes are available.
 
     Raises
     ------
     SceneError
-        If there are not, naming what they are for.
+        If they are not. The message says what they are for.
     """
     available = available_memory()
     if needed > available:

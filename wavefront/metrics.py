@@ -1,4 +1,4 @@
-"""How far one picture is from another."""
+"""Measures of the difference between two pictures."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ Doubles = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """How far picture a is from the reference b, over linear values of all pixels and channels.
+    """Difference of picture a from the reference b, over linear values of all pixels and channels.
 
-    `print` it for a table.
+    `print` shows it as a table.
     """
 
     relative_mse: float  # mean of (a − b)²/(b² + ε), ε = 0.01 · mean(b)²
@@ -33,11 +33,11 @@ class Comparison:
     mean_a: Doubles  # (3,) mean of each channel
     mean_b: Doubles  # (3,)
     flip: float | None  # mean FLIP error, 0 to 1; None where it could not be computed
-    flip_absent: str  # why not
+    flip_absent: str  # the reason why it is None
     difference: Image = field(repr=False)  # |a − b|
 
     def __str__(self) -> str:
-        """Give a table of all numbers."""
+        """Return a table of all numbers."""
         rows = [
             ("relative MSE", f"{self.relative_mse:.6g} (relative error {self.relative_mse**0.5:.3%})"),
             ("RMSE", f"{self.rmse:.6g}"),
@@ -50,10 +50,10 @@ class Comparison:
 
 
 def compare(a: Picture, b: Picture) -> Comparison:
-    """Measure how far picture `a` is from the reference `b`.
+    """Measure the difference of picture `a` from the reference `b`.
 
-    Relative MSE divides by the reference, so that dark parts count as bright ones do; ε keeps
-    black pixels from deciding. Its root is what `render(noise=...)` brings down. Source: F.
+    Relative MSE divides by the reference, so dark parts count as much as bright ones; ε limits the weight of
+    black pixels. Its root is the error that `render(noise=...)` limits. Source: F.
     Rousselle, C. Knaus and M. Zwicker, Adaptive Sampling and Reconstruction using Greedy Error
     Minimization, 2011, there with a fixed ε for pictures in [0, 1].
 
@@ -64,8 +64,8 @@ def compare(a: Picture, b: Picture) -> Comparison:
     Parameters
     ----------
     a, b
-        Images, paths that `Image.load` reads, or arrays (H, W), (H, W, 3) or (H, W, 4): uint8 and
-        uint16 are sRGB codes that count from 0 to 1, all others are linear values. Alpha is left out.
+        Images, paths that `Image.load` reads, or arrays (H, W), (H, W, 3) or (H, W, 4). Arrays of uint8 and
+        uint16 are sRGB codes that stand for 0 to 1, all others are linear values. Alpha is ignored.
 
     Raises
     ------
@@ -138,6 +138,6 @@ def _flip(left: Doubles, right: Doubles, coded: bool) -> tuple[float | None, str
         return None, "not computed: the reference is black"
     test, reference = (np.maximum(x, 0).astype(np.float32) for x in (left, right))
     kind = "LDR" if coded else "HDR"
-    # linear values in both cases: inputsRGB says that they are not sRGB codes
+    # both pictures are linear values, not sRGB codes
     mean = evaluate(reference, test, kind, inputsRGB=False, applyMagma=False)[1]
     return (float(mean), "") if np.isfinite(mean) else (None, "not computed: no exposure suits the pictures")

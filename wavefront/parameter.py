@@ -13,15 +13,15 @@ MISSING = object()
 class Parameter:
     """An attribute that is converted and checked whenever it is assigned, in the constructor or later.
 
-    It stands in the instance's own namespace, so reading it costs what reading any attribute does.
+    The value is stored in the instance's own namespace, so reading it costs no more than any attribute.
 
     Parameters
     ----------
     convert
-        Called with the name for messages, such as "Diffuse reflectance", and the value; returns what is
-        kept, or raises a SceneError. What it returns it must take as well.
+        Called with the name for messages, such as "Diffuse reflectance", and the value; returns the value
+        to store, or raises a SceneError. It must also accept its own results.
     argument
-        What the constructor calls it, if not by its name; for messages.
+        Name of the constructor's argument, if it differs from the attribute; for messages.
     """
 
     def __init__(self, convert: Callable[[str, Any], Any], argument: str | None = None) -> None:
@@ -29,11 +29,11 @@ class Parameter:
         self._name = self._title = ""
 
     def __set_name__(self, owner: type, name: str) -> None:
-        """Learn the name under which the class has it."""
+        """Record the name of the attribute."""
         self._name, self._title = name, f"{owner.__name__} {self._argument or name}"
 
     def __set__(self, instance: Any, value: Any) -> None:
-        """Keep the value as it is converted; a later one changes what follows from it, too."""
+        """Store the converted value. After the constructor, recompute the values that follow from it."""
         values = vars(instance)
         known, before = self._name in values, values.get(self._name)
         values[self._name] = self._convert(self._title, value)
@@ -50,19 +50,19 @@ class Parameter:
 
 
 class Parametrized:
-    """Something with parameters, which it shows."""
+    """Base of classes with parameters; `repr` shows them."""
 
     def derive(self) -> None:
-        """Compute what follows from several parameters. Constructors end with it."""
+        """Compute the values that follow from several parameters. Constructors call it at the end."""
 
     def __repr__(self) -> str:
-        """Name the arguments that would make it; of those by name alone, what is not the default."""
+        """Return the call that makes it; keyword-only arguments are shown if they are not the default."""
         return f"{type(self).__name__}({', '.join(shown(self))})"
 
 
 def shown(thing: Any) -> list[str]:
     """Return "name=value" of the constructor's arguments that an object has as attributes."""
-    import inspect  # here, as few programs ask
+    import inspect  # imported here, since few programs need it
 
     out = []
     for name, parameter in inspect.signature(type(thing)).parameters.items():
@@ -79,7 +79,7 @@ def shown(thing: Any) -> list[str]:
 
 
 def brief(value: Any) -> str:
-    """Return a value as a user would write it: equal channels as one number, few digits."""
+    """Return a value as a user would write it: equal channels as one number, six digits at most."""
     if isinstance(value, np.ndarray | np.generic | tuple | list):
         numbers = np.ravel(value)
         if numbers.dtype.kind not in "fiu" or numbers.size > 4:

@@ -1,4 +1,4 @@
-"""How far a render has come, shown as a bar or told to a function; what else takes long, by its name."""
+"""Progress of a render, shown as a bar or passed to a function, and a line for other work that takes long."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ TICK = 1  # seconds between updates while nothing is done
 
 
 class Bar:
-    """Shows progress, or calls the user's function with it.
+    """Shows the progress of a render, or passes it to the user's function.
 
     Parameters
     ----------
     progress
-        True or None shows a bar, False none; a function is called with what is done and the total.
+        True or None shows a bar, False shows none; a function is called with the progress and the total.
     samples
-        The most samples there will be.
+        Number of samples at most.
     seconds
-        The time there is, which is then what counts.
+        Time limit; if given, progress counts seconds in place of samples.
     """
 
     def __init__(self, progress: Progress, samples: int, seconds: float | None) -> None:
@@ -33,7 +33,7 @@ class Bar:
         self._timed = seconds is not None
         self._total = samples if seconds is None else seconds
         self._done: float = 0
-        self._told: float = 0  # when, in seconds
+        self._told: float = 0  # time of the last report, in seconds
         self._bar: Any = None
 
     def __enter__(self) -> Self:
@@ -44,7 +44,7 @@ class Bar:
             self._bar.close()
 
     def advance(self, samples: int, elapsed: float) -> None:
-        """Take note of further samples, at a time in seconds."""
+        """Record further samples, `elapsed` seconds after the start."""
         before = self._done
         self._done = min(elapsed, self._total) if self._timed else before + samples
         self._told = elapsed
@@ -57,9 +57,9 @@ class Bar:
             self._callback(self._done, self._total)
 
     def wait(self, surfaces: int, elapsed: float) -> None:
-        """Take note that no samples have come, at a time in seconds, and how many surfaces a path has met.
+        """Record that no samples have arrived, and how many surfaces the longest path has met.
 
-        It may be called often: something is shown, or the user's function called, every `TICK` seconds.
+        It may be called often: the bar is updated, or the user's function called, every `TICK` seconds.
         """
         if elapsed - self._told < TICK:
             return
@@ -68,7 +68,7 @@ class Bar:
             self._bar.set_postfix_str(f"paths of {surfaces} surfaces under way")
 
     def _appear(self, elapsed: float) -> Any:
-        from tqdm import tqdm  # here, so that starting up and short renders do not pay for it
+        from tqdm import tqdm  # imported here, to keep start-up and short renders quick
 
         style: dict[str, Any] = {"unit_scale": True}
         if self._timed:
@@ -82,21 +82,21 @@ class Bar:
 def phase(title: str, progress: Progress = None) -> Iterator[None]:
     """Show a line with a title and the time spent, if the block takes longer than `DELAY` seconds.
 
-    A thread writes the line, so the block needs no calls in it. The thread has ended when the block has.
+    A thread writes the line, so the block needs no calls. The thread ends with the block.
 
     Parameters
     ----------
     title
         What is being done, such as "loading bunny.obj".
     progress
-        True or None shows the line. False shows none, and neither does a function: it counts samples.
+        True or None shows the line. False shows none, and neither does a function, which counts samples.
     """
     if progress is not None and progress is not True:
         yield
         return
     ended = threading.Event()
     writer = threading.Thread(target=_show, args=(title, ended), daemon=True)
-    with suppress(RuntimeError):  # where no further thread can be had there is no line
+    with suppress(RuntimeError):  # without a thread there is no line
         writer.start()
     try:
         yield
@@ -107,7 +107,7 @@ def phase(title: str, progress: Progress = None) -> Iterator[None]:
 
 
 def _show(title: str, ended: threading.Event) -> None:
-    """Write the line of a phase until it has ended."""
+    """Write the line of a phase until `ended` is set."""
     start = time.monotonic()
     if ended.wait(DELAY):
         return

@@ -1,4 +1,4 @@
-"""A finished picture is not lost because it cannot be saved where it was meant to go."""
+"""Saving a finished picture elsewhere when it cannot be saved at its path."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from pathlib import Path
 
 from .errors import SaveError
 
-MAX_STEM = 40  # characters of a name that are kept
-ALWAYS = ".npy"  # holds any picture
+MAX_STEM = 40  # characters of the name that are kept
+ALWAYS = ".npy"  # can store any picture
 
 
 def save_elsewhere(save: Callable[[Path], None], path: str) -> Path | None:
-    """Save a picture that could not be saved at `path` at a place of its own.
+    """Save a picture that could not be saved at `path` under another name.
 
     Parameters
     ----------
     save
         Saves the picture at a path, by its extension.
     path
-        Where it was meant to go.
+        The path that failed.
 
     Returns
     -------
     Path
-        Where it is: beside `path`, in the current folder or in the system's folder for temporary
-        files, as png, jpg, exr, hdr or npy like `path`, else as npy. No file is replaced. None if
-        nothing can be written anywhere.
+        The new path: in the folder of `path`, in the current folder or in the system's folder for temporary
+        files, in the format of `path`, else as npy. No file is replaced. None if none of these can be
+        written.
     """
     extension = Path(path).suffix.lower()
     for ending in dict.fromkeys((extension, ALWAYS)):
@@ -46,12 +46,12 @@ def _folders(path: str) -> Iterator[Path]:
     for find in (lambda: os.path.dirname(os.path.realpath(path)), os.getcwd, tempfile.gettempdir):
         try:
             yield Path(find())
-        except (OSError, ValueError):  # the folder is gone, or the name is none
+        except (OSError, ValueError):  # the folder does not exist any more, or the name is invalid
             continue
 
 
 def _free_name(folder: Path, stem: str, ending: str) -> Path:
-    """Return a name that no file has."""
+    """Return a path at which there is no file."""
     place, count = folder / f"{stem}-saved{ending}", 1
     while os.path.lexists(place):
         count += 1

@@ -1,4 +1,4 @@
-""" "Did you mean": the known name that is meant by an unknown one."""
+"""Suggestions for unknown names: "did you mean"."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import ParamSpec, TypeVar
 P = ParamSpec("P")
 R = TypeVar("R")
 
-# What other programs call things, in lower case without underscores, and what is meant here: the first
-# of these that is known where the name was used.
+# Names in other programs, in lower case without underscores, and the names here. The first one that is known
+# where the name was used is suggested.
 SYNONYMS: dict[str, tuple[str, ...]] = {
     "albedo": ("reflectance", "base_color"),
     "at": ("target",),
@@ -91,7 +91,7 @@ SYNONYMS: dict[str, tuple[str, ...]] = {
 
 
 def meant(name: str, known: Iterable[str]) -> str | None:
-    """Return the known name that `name` stands for or is a misspelling of; None if there is none."""
+    """Return the known name of which `name` is a synonym or a misspelling; None if there is none."""
     plain = {_plain(other): other for other in known}
     word = _plain(name)
     if word in plain:
@@ -104,15 +104,15 @@ def meant(name: str, known: Iterable[str]) -> str | None:
 
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:
-    """Return "; did you mean 'x'?" for an unknown name, or "" where nothing is near."""
+    """Return "; did you mean 'x'?" for an unknown name, or "" where no known name is similar."""
     found = meant(name, known) if isinstance(name, str) else None
     return "" if found is None else f"; did you mean {found!r}?"
 
 
 def suggests_keywords(function: Callable[P, R]) -> Callable[P, R]:
-    """Let a function answer an unknown keyword argument with the one that is meant.
+    """Let a function suggest a known keyword argument for an unknown one.
 
-    It stays a TypeError, as Python has it, and the signature is that of the function.
+    The error is a TypeError, as in Python, and the signature is that of the function.
     """
     code = function.__code__
     known = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]

@@ -1,1 +1,1 @@
-"""Files: meshes and materials in, images in and out."""
+"""Reading of scene files: meshes, materials, lights, cameras."""

@@ -1,4 +1,4 @@
-"""What a file or a trimesh object holds, whatever its kind."""
+"""The content of a file or a trimesh object, whatever its format."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .repair import RawMesh
 
 @dataclass
 class Contents:
-    """What a file holds."""
+    """The content of a file."""
 
     raws: list[RawMesh]
     places: Places
@@ -24,5 +24,5 @@ class Contents:
 
     @classmethod
     def once(cls, raws: list[RawMesh]) -> Contents:
-        """Return meshes that stand where their vertices are."""
+        """Return meshes that are placed once each, without a transform."""
         return cls(raws, Places.once(len(raws)))

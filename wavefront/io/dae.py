@@ -1,6 +1,6 @@
-"""COLLADA (.dae) by trimesh and pycollada, after a look at what the file refers to.
+"""COLLADA (.dae), read by trimesh and pycollada after a check of its references.
 
-Positions are as they are written: trimesh applies neither `up_axis` nor `unit`.
+Positions are those of the file: trimesh applies neither `up_axis` nor `unit`.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ def parse(path: str | os.PathLike[str], data: bytes, strict: bool, materials: bo
     Raises
     ------
     SceneError
-        If pycollada is missing, or naming the file and what is wrong in it.
+        If pycollada is missing, or the file is malformed; the message names the file and the error.
     """
     name = os.fspath(path)
     need(name, ".dae", ("collada", "pycollada"))
-    if zipfile.is_zipfile(BytesIO(data)):  # one may stand behind other bytes
+    if zipfile.is_zipfile(BytesIO(data)):  # an archive may begin after other bytes
         raise SceneError(f"{name}: is an archive; unpack it first")
     document = _Document(name, data)
     check_expanded(name, document.children, document.sizes, "scene")
@@ -43,7 +43,7 @@ def parse(path: str | os.PathLike[str], data: bytes, strict: bool, materials: bo
         warn(f"{name}: not honored: {', '.join(lost)}", strict)
     if materials:
         images.report(strict)
-    # pycollada leaves out what is broken, and says nothing
+    # pycollada drops damaged parts without a warning
     there = total(name, document.children, lambda node: document.primitives.get(node, 0), "scene")
     absent = there - len(found.graph.nodes_geometry)
     if there and absent == there:
@@ -59,12 +59,12 @@ def _is_clear(mesh: Any) -> bool:
 
 
 class _Document:
-    """What the nodes of a file hold and refer to, and what is not read."""
+    """The contents and references of a file's nodes, and the elements that are not read."""
 
     def __init__(self, name: str, data: bytes) -> None:
         self.children: dict[str, list[str]] = {}
         self.sizes: dict[str, int] = {}  # bytes of the geometries
-        self.primitives: dict[str, int] = {}  # how many there are in each geometry
+        self.primitives: dict[str, int] = {}  # their number in each geometry
         self.lost: dict[str, int] = {}  # tag -> first line
         self._inside: list[str] = []
         self._geometry = ("", 0)

@@ -1,7 +1,7 @@
-"""glTF 2.0 (.gltf, .glb): what the default scene holds; its cameras and lights.
+"""glTF 2.0 (.gltf, .glb): the content of the default scene, with its cameras and lights.
 
 Source: Khronos Group, glTF 2.0 specification and the ratified KHR extensions. Everything is read
-from the JSON itself, so numbers are exact and every index is checked.
+from the JSON itself, so numbers are exact, and every index is checked.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from .gltf_nodes import Node, count_placements, placements, walk
 from .placing import Places
 from .repair import RawMesh
 
-HEIGHT = 512  # pixels of a camera's picture; files give its shape only
+HEIGHT = 512  # pixels of a camera's picture; files give only its aspect ratio
 
 
 @dataclass
 class GltfContents:
-    """What a file holds."""
+    """The content of a file."""
 
     raws: list[tuple[RawMesh, int | None]] = field(default_factory=list)  # meshes, numbers of their materials
-    places: Places = field(default_factory=Places)  # where they stand
+    places: Places = field(default_factory=Places)  # of the meshes
     lights: list[DirectionalLight | PointLight | SpotLight] = field(default_factory=list)
     camera: Camera | None = None
 
@@ -41,16 +41,16 @@ def contents(document: Document, max_instances: int) -> GltfContents:
     document
         The file.
     max_instances
-        How many meshes its nodes may place together.
+        Number of meshes at most that all its nodes place.
 
     Raises
     ------
     SceneError
-        If an element is missing or malformed, or there are more instances.
+        If an element is missing or malformed, or the nodes place more meshes.
     """
     out = GltfContents()
-    numbers: dict[int, list[int]] = {}  # of a mesh of the file: which of the raws are its parts
-    of: list[int] = []  # which raw, for each that is placed
+    numbers: dict[int, list[int]] = {}  # by mesh of the file: the indices of its parts among `out.raws`
+    of: list[int] = []  # index among `out.raws` of each placed mesh
     where: list[Matrix] = []
     for node in walk(document):
         json = node.json
@@ -79,7 +79,7 @@ def contents(document: Document, max_instances: int) -> GltfContents:
 
 
 def _parts(document: Document, out: GltfContents, numbers: dict[int, list[int]], mesh: Any) -> list[int]:
-    """Return which raws are the parts of a mesh, which is read when it is first met."""
+    """Return the indices of a mesh's parts among `out.raws`; the mesh is read at its first use."""
     if not isinstance(mesh, int) or mesh not in numbers:
         found = primitives(document, mesh)
         numbers[mesh] = list(range(len(out.raws), len(out.raws) + len(found)))
@@ -127,19 +127,19 @@ def camera_at(matrix: Matrix, fov: float, size: tuple[int, int]) -> Camera:
 
 
 def _pose(matrix: Matrix) -> tuple[Matrix, Matrix, Matrix]:
-    """Return where a camera is, what it looks at, and what is up; a scale of its node has no say."""
+    """Return the origin, target and up vector of a camera; the scale of its node has no effect."""
     origin, backward, up = matrix[:3, 3], _near_one(matrix[:3, 2]), _near_one(matrix[:3, 1])
     return origin, origin - backward / (np.linalg.norm(backward) or 1.0), up
 
 
 def _near_one(vector: Matrix) -> Matrix:
-    """Return a vector multiplied by the power of two that makes its size about 1, so that it has squares."""
+    """Return a vector multiplied by a power of two, so that its size is about 1 and it can be squared."""
     _, exponent = np.frexp(np.abs(vector).max())
     return np.ldexp(vector, -exponent)
 
 
 def _size(aspect: float) -> tuple[int, int]:
-    """Return (width, height) in pixels of a picture of which only width / height is known."""
+    """Return (width, height) in pixels of a picture with a given aspect ratio."""
     return max(1, round(HEIGHT * aspect)), HEIGHT
 
 
@@ -151,7 +151,7 @@ def _positive(lens: dict[str, Any], key: str, default: float | None) -> float:
 
 
 def _add_light(document: Document, out: GltfContents, index: Any, matrix: Matrix) -> None:
-    """Add a light of KHR_lights_punctual; candela are taken for W/sr."""
+    """Add a light of KHR_lights_punctual; candela count as W/sr."""
     lights = document.json.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", [])
     if not isinstance(index, int) or not 0 <= index < len(lights):
         raise SceneError(f"light {shown(index)} does not exist; there are {len(lights)}")
@@ -167,7 +167,7 @@ def _add_light(document: Document, out: GltfContents, index: Any, matrix: Matrix
 
 
 def punctual_light(light: dict[str, Any], matrix: Matrix) -> DirectionalLight | PointLight | SpotLight | None:
-    """Return a light of KHR_lights_punctual, whose node has a matrix to the scene; None for other types.
+    """Return a light of KHR_lights_punctual by the matrix of its node to the scene; None for other types.
 
     Raises
     ------

@@ -31,18 +31,18 @@ COMPONENTS: dict[int, type[np.generic]] = {
     5126: np.float32,
 }
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-MAX_ELEMENTS = 2**28  # in one accessor, whatever backs it
+MAX_ELEMENTS = 2**28  # in one accessor, with or without data
 MAX_NUMBERS = 2**29  # in all accessors that are read, as several meshes may share one
-MAX_COUNT = 2**53  # of bytes or elements: up to here JSON's numbers are whole everywhere
+MAX_COUNT = 2**53  # of bytes or elements: all JSON readers represent whole numbers up to here exactly
 LARGEST = float(np.finfo(np.float64).max)
 SHOWN = 80  # characters of a value in a message
-# what reading JSON of the wrong shape raises: a list for a number, text for a list
+# errors of reading JSON of the wrong structure: a list in place of a number, text in place of a list
 MALFORMED = (TypeError, KeyError, AttributeError, IndexError, ValueError, OverflowError)
 Matrix = NDArray[np.float64]
 
 
 class Document:
-    """The JSON of a file and the bytes that it refers to. Lookups that fail name the file and the element."""
+    """The JSON of a file and the bytes that it refers to. Errors name the file and the element."""
 
     def __init__(self, path: str | os.PathLike[str], data: bytes) -> None:
         self.path = path
@@ -60,8 +60,8 @@ class Document:
             raise SceneError(f"{self.name}: is glTF version {shown(version)}; only version 2 is read")
         self._buffers: dict[int, bytes] = {}
         self._files: dict[str, bytes] = {}
-        self._numbers = 0  # how many were read from accessors
-        self.lost: dict[str, str] = {}  # what is not honored -> where it was first met
+        self._numbers = 0  # numbers that were read from accessors
+        self.lost: dict[str, str] = {}  # property that is not honored -> its first place
 
     @contextmanager
     def inside(self, element: str) -> Iterator[None]:
@@ -70,7 +70,7 @@ class Document:
         Raises
         ------
         SceneError
-            In place of one that does not name the file, and of those that malformed JSON leads to.
+            In place of an error that does not name the file, and of errors by malformed JSON.
         """
         try:
             yield
@@ -84,7 +84,7 @@ class Document:
             ) from error
 
     def lose(self, what: str, where: str) -> None:
-        """Note a property that is not honored."""
+        """Record a property that is not honored."""
         self.lost.setdefault(what, where)
 
     def get(self, kind: str, index: Any) -> dict[str, Any]:
@@ -110,7 +110,7 @@ class Document:
         return value
 
     def uri(self, uri: Any, where: str) -> bytes:
-        """Return what a URI holds: data in the file itself, or a file beside it, which is read once."""
+        """Return the content of a URI: data in the URI itself, or a file in the same folder, read once."""
         if not isinstance(uri, str):
             raise SceneError(f"{self.name}: {where}.uri is {shown(uri)}; it must be text")
         if not uri.startswith("data:"):
@@ -192,7 +192,7 @@ class Document:
     def _strided(
         self, item: dict[str, Any], count: int, width: int, kind: type[np.generic], where: str
     ) -> NDArray[Any]:
-        """Return the elements (count, width) that an item's buffer view holds from its offset on."""
+        """Return the elements (count, width) of an item's buffer view, from its offset on."""
         data, start, end, stride = self.view(item["bufferView"])
         size = np.dtype(kind).itemsize * width
         stride = stride or size
@@ -231,7 +231,7 @@ def table(rows: list[Any], width: int, where: Callable[[int], str]) -> Matrix:
     Raises
     ------
     SceneError
-        Naming the first row that is something else, as `where` calls it.
+        If a row is something else. The message names the first such row by `where`.
     """
     sound = set(map(type, rows)) <= {list} and set(map(len, rows)) <= {width}
     if sound and set(map(type, chain.from_iterable(rows))) <= {int, float}:

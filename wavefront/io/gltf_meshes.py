@@ -14,7 +14,7 @@ from ..errors import SceneError
 from .gltf_document import Document
 from .repair import Faces, RawMesh, Table, wide
 
-READ = ("TEXCOORD_0", "TEXCOORD_1", "COLOR_0")  # of the numbered attributes of a mesh
+READ = ("TEXCOORD_0", "TEXCOORD_1", "COLOR_0")  # attributes of a mesh with a number in their name
 TRIANGLES, STRIP, FAN = 4, 5, 6
 
 
@@ -115,7 +115,7 @@ def _triangles(where: str, indices: NDArray[Any], mode: int, count: int) -> Face
         return indices.astype(np.intp).reshape(-1, 3)
     if len(indices) < 3:
         raise SceneError(f"{where} has {len(indices)} indices; a strip or fan needs at least 3")
-    # glTF forbids the largest index; where a file has it, graphics hardware begins a new strip or fan
+    # glTF forbids the largest index; where it occurs, it begins a new strip, as in graphics hardware
     largest = np.iinfo(indices.dtype).max
     restart = (indices == largest) & (largest >= count)
     indices = indices.astype(np.intp)
@@ -126,6 +126,6 @@ def _triangles(where: str, indices: NDArray[Any], mode: int, count: int) -> Face
     faces = np.stack([first, second, third], axis=1)
     odd = (place[:-2] - begin) % 2 == 1
     if mode == STRIP:
-        faces[odd] = faces[odd][:, [1, 0, 2]]  # every second triangle of a strip runs the other way
-    apart = (first != second) & (second != third) & (third != first)  # triangles of a line join strips
+        faces[odd] = faces[odd][:, [1, 0, 2]]  # every second triangle of a strip has the opposite orientation
+    apart = (first != second) & (second != third) & (third != first)  # degenerate triangles join strips
     return faces[apart & ~restart[:-2] & ~restart[1:-1] & ~restart[2:]]

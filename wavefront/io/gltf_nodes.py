@@ -1,4 +1,4 @@
-"""Nodes of glTF: the tree, its matrices, and nodes whose mesh stands in many places.
+"""Nodes of glTF: the tree, its matrices, and nodes with instances of a mesh.
 
 Source: Khronos Group, glTF 2.0 specification, chapter 3.5, and EXT_mesh_gpu_instancing.
 """
@@ -17,7 +17,7 @@ from .placing import MAX_ELEMENT, in_range
 from .repair import wide
 
 TOO_LARGE = f"has an element whose size is above {MAX_ELEMENT:g}"
-INSTANCE_ATTRIBUTES: dict[str, list[float]] = {  # what an instance without it has
+INSTANCE_ATTRIBUTES: dict[str, list[float]] = {  # values of an instance without the attribute
     "TRANSLATION": [0, 0, 0],
     "ROTATION": [0, 0, 0, 1],
     "SCALE": [1, 1, 1],
@@ -34,7 +34,7 @@ class Node:
 
     @property
     def label(self) -> str:
-        """Its name, for messages."""
+        """Name of the node, for messages."""
         return f"node {self.json.get('name', '?')!r}"
 
 
@@ -44,13 +44,13 @@ def walk(document: Document) -> list[Node]:
     Raises
     ------
     SceneError
-        If a node is missing or malformed, is reached twice, or lies outside the range of numbers.
+        If a node is missing or malformed, is reached twice, or has a matrix beyond the supported range.
     """
     stack = [(index, -1, 0) for index in _roots(document)]
     seen: set[int] = set()
     indices: list[int] = []
     found: list[dict[str, Any]] = []
-    parents: list[int] = []  # number of the parent among those found, -1 for none
+    parents: list[int] = []  # index of the parent in `found`, -1 for none
     depths: list[int] = []
     while stack:
         index, parent, depth = stack.pop()
@@ -76,7 +76,7 @@ def walk(document: Document) -> list[Node]:
 
 
 def _roots(document: Document) -> list[Any]:
-    """Return the numbers of the nodes that have no parent in the default scene."""
+    """Return the indices of the root nodes of the default scene."""
     if "scenes" in document.json:
         index = document.json.get("scene", 0)
         roots = document.get("scenes", index).get("nodes", [])
@@ -90,7 +90,7 @@ def _roots(document: Document) -> list[Any]:
 
 
 def _to_scene(local: Matrix, parents: np.ndarray, depths: np.ndarray) -> Matrix:
-    """Return matrices (n, 4, 4) to the scene, from those to the parents; one level after the other."""
+    """Return matrices (n, 4, 4) to the scene from the matrices to the parents, level by level."""
     world = np.empty((len(local) + 1, 4, 4))
     world[-1] = np.eye(4)  # the parent of the roots
     order = np.argsort(depths, kind="stable")
@@ -102,7 +102,7 @@ def _to_scene(local: Matrix, parents: np.ndarray, depths: np.ndarray) -> Matrix:
 
 
 def _local(document: Document, indices: list[int], nodes: list[dict[str, Any]]) -> Matrix:
-    """Return the own matrices (n, 4, 4) of nodes: given, or translation · rotation · scale."""
+    """Return the local matrices (n, 4, 4) of nodes: as given, or translation · rotation · scale."""
 
     def rows(key: str, default: list[float] | None, width: int, at: np.ndarray) -> Matrix:
         values = [nodes[i].get(key, default) for i in at.tolist()]
@@ -123,7 +123,7 @@ def _local(document: Document, indices: list[int], nodes: list[dict[str, Any]]) 
 
 
 def count_placements(document: Document, node: Node) -> int:
-    """Return how often a node's mesh stands in the scene: once, or as EXT_mesh_gpu_instancing says."""
+    """Return the number of a node's instances: one, or the number in EXT_mesh_gpu_instancing."""
     attributes = _instancing(node)
     if not attributes:
         return 1
@@ -138,7 +138,7 @@ def count_placements(document: Document, node: Node) -> int:
 
 
 def placements(document: Document, node: Node, count: int) -> Matrix:
-    """Return where a node's mesh stands, (count, 4, 4) matrices to the scene."""
+    """Return the matrices (count, 4, 4) of a node's instances to the scene."""
     attributes = _instancing(node)
     if not attributes:
         return node.matrix[None]
@@ -162,7 +162,7 @@ def placements(document: Document, node: Node, count: int) -> Matrix:
 
 
 def _instancing(node: Node) -> dict[str, Any]:
-    """Return the attributes of EXT_mesh_gpu_instancing, none where a node's mesh stands once."""
+    """Return the attributes of EXT_mesh_gpu_instancing; none if the node does not have it."""
     extension = node.json.get("extensions", {}).get("EXT_mesh_gpu_instancing", {})
     return extension.get("attributes") or {}
 

@@ -26,8 +26,8 @@ class BesideSpecular(BaseTexture):
     diffuse
         A color in [0, 1], or a texture.
     specular
-        A texture of colors in [0, 1]. Its image, its wrapping and its place may differ from those of the
-        diffuse one: both are looked up at the point in question.
+        A texture of colors in [0, 1]. Its image, wrapping and texture coordinates may differ from those of
+        the diffuse texture: both are looked up at each hit point.
     """
 
     def __init__(self, diffuse: Color, specular: Texture) -> None:
@@ -37,7 +37,7 @@ class BesideSpecular(BaseTexture):
         self.reads = tuple(dict.fromkeys((*reads, *specular.reads)))
 
     def __repr__(self) -> str:
-        """Name both."""
+        """Return the call that makes it."""
         return f"BesideSpecular({self.diffuse!r}, {self.specular!r})"
 
     def at(self, surface: SurfaceInteraction) -> Floats:

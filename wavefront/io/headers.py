@@ -1,4 +1,4 @@
-"""What a PLY file claims, checked against what it holds. The reading itself is left to trimesh."""
+"""Checks of a PLY header against the size of the file. trimesh then reads the file."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class Element:
 
     name: str
     count: int
-    size: int = 0  # least bytes of one
-    words: int = 0  # words of one in a text; of a list, only its length
-    lists: int = 0  # how many of its properties are lists
+    size: int = 0  # bytes of one at least
+    words: int = 0  # words of one in a text; a list counts as one word, its length
+    lists: int = 0  # number of its properties that are lists
     properties: list[str] = field(default_factory=list)  # their names
-    kinds: list[tuple[str, ...]] = field(default_factory=list)  # their types; of a list, its length's first
+    kinds: list[tuple[str, ...]] = field(default_factory=list)  # types; of a list, that of its length first
 
 
 def check_ply(name: str, data: bytes) -> list[Element]:
@@ -41,7 +41,7 @@ def check_ply(name: str, data: bytes) -> list[Element]:
     Raises
     ------
     SceneError
-        If the header is damaged, claims more than there is, or a line of a text is malformed.
+        If the header is damaged or claims more than the file has, or a line of a text is malformed.
     """
     end = re.search(rb"end_header[^\n]*\n", data[: 1 << 20])
     if not data.startswith(b"ply") or end is None:
@@ -61,7 +61,7 @@ def check_ply(name: str, data: bytes) -> list[Element]:
 
 
 def unread(elements: list[Element]) -> list[str]:
-    """Return the names of elements and properties that nothing is made of."""
+    """Return the names of elements and properties that are not used."""
     out = []
     for element in elements:
         if element.count and element.name not in READ:
@@ -74,7 +74,7 @@ def unread(elements: list[Element]) -> list[str]:
 
 
 def ply_textures(data: bytes) -> list[str]:
-    """Return the images that the comments of a PLY header name, as MeshLab writes them."""
+    """Return the images that are named in the comments of a PLY header, as MeshLab writes them."""
     header = data[: data.find(b"end_header")].decode("latin-1")
     return [name for name in re.findall(r"(?im)^comment\s+texturefile\s+(.*?)\s*$", header) if name]
 
@@ -102,7 +102,7 @@ def _elements(name: str, header: str) -> list[Element]:
 
 
 def _check_lines(name: str, elements: list[Element], body: str, first: int) -> None:
-    """Check that every line of a text has the words that its element needs."""
+    """Check that every line of a text has the number of words of its element."""
     lines = [
         (number, words) for number, line in enumerate(body.split("\n"), first) if (words := line.split())
     ]
@@ -118,7 +118,7 @@ def _check_lines(name: str, elements: list[Element], body: str, first: int) -> N
 
 
 def _check_words(name: str, element: Element, number: int, words: list[str]) -> None:
-    """One list stands first, as in every face that is written; its length says how many words follow."""
+    """Check one line. A list comes first, as in all faces; its length is the number of words that follow."""
     need = element.words
     if element.lists:
         if not _is_count(words[0]):

@@ -1,4 +1,4 @@
-"""XML files, looked through before a library reads them: no entities, a limit to what they multiply to."""
+"""Checks of XML files before a library reads them: no entities, and a limit for their expanded size."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from xml.parsers import expat
 
 from ..errors import SceneError
 
-MAX_DEPTH = 128  # of nodes in nodes
-MAX_EXPANDED = 2**31  # bytes of a file with every reference replaced by what it refers to
-NODE_BYTES = 2**11  # what a node counts for at least; it bounds how many there are
+MAX_DEPTH = 128  # nesting of nodes
+MAX_EXPANDED = 2**31  # bytes of a file with every reference replaced by its target
+NODE_BYTES = 2**11  # bytes that a node counts at least; this limits the number of nodes
 
 
 def look_through(
@@ -26,8 +26,8 @@ def look_through(
     Raises
     ------
     SceneError
-        If the file is not well formed, or has a document type: it could define entities, which multiply
-        or name other files.
+        If the file is not well formed, or has a document type, which could define entities that expand
+        or refer to other files.
     """
     parser = expat.ParserCreate(namespace_separator=" ")
 
@@ -50,12 +50,12 @@ def look_through(
 
 
 def check_expanded(name: str, children: Mapping[str, list[str]], sizes: Mapping[str, int], root: str) -> None:
-    """Check what a file grows to when each node is put where others refer to it; arguments as of `total`.
+    """Check the size of a file with all references replaced by their targets; arguments as of `total`.
 
     Raises
     ------
     SceneError
-        If it is too large, too deep, or a node holds itself.
+        If it is too large or too deep, or a node contains itself.
     """
     size = total(name, children, lambda node: sizes.get(node, 0) + NODE_BYTES, root)
     if size > MAX_EXPANDED:
@@ -66,7 +66,7 @@ def check_expanded(name: str, children: Mapping[str, list[str]], sizes: Mapping[
 
 
 def total(name: str, children: Mapping[str, list[str]], own: Callable[[str], int], root: str) -> int:
-    """Return the sum over all nodes, each as often as others refer to it.
+    """Return the sum over all nodes, each counted once for each reference to it.
 
     Parameters
     ----------
@@ -75,14 +75,14 @@ def total(name: str, children: Mapping[str, list[str]], own: Callable[[str], int
     children
         The nodes that each node refers to or holds; one may occur several times.
     own
-        What a node counts for.
+        Returns the count of a node.
     root
         The node to begin with.
 
     Raises
     ------
     SceneError
-        If the nodes are too deep, or a node holds itself.
+        If the nodes are too deep, or a node contains itself.
     """
     known: dict[str, int] = {}
 

@@ -1,9 +1,9 @@
-"""Wavefront OBJ: trimesh reads the geometry, after a check for what it passes over.
+"""Wavefront OBJ. trimesh reads the geometry, after a check for errors that it ignores.
 
-trimesh takes index 0 for the first vertex, counts backwards from the end of the file and not from the face's
-own line, and drops short lines, and the uvs and normals of faces that mix forms. So every line is checked,
-and those that it would misread are written anew. It gets the lines of v, vt, vn and f and no others, with
-numbers for the names of materials, which may hold anything.
+trimesh takes index 0 for the first vertex, counts negative indices from the end of the file and not from the
+face's own line, and drops short lines and the uvs and normals of faces of mixed forms. So every line is
+checked, and lines that it would misread are rewritten. trimesh gets only the lines of v, vt, vn and f, with
+numbers in place of the names of materials, which may contain any characters.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ from .repair import RawMesh, warn
 from .trimesh_loading import typed_errors
 from .words import Rows, sort_lines
 
-NAMES = ("o", "g")  # keywords that say nothing about what a surface looks like
-OFF = ("off", "0")  # values with which a keyword asks for nothing
+NAMES = ("o", "g")  # keywords without an effect on the look of a surface
+OFF = ("off", "0")  # values that switch a keyword off
 INDEX = b"0123456789+-/ "
-# which of v, vt, vn a corner has, by its number of slashes; 3 where two stand side by side
+# which of v, vt, vn a corner has, by its number of slashes; row 3 is for two adjacent slashes
 GIVEN = np.array([[1, 0, 0], [1, 1, 0], [1, 1, 1], [1, 0, 1]], bool)
 
 
 @dataclass
 class Obj:
-    """What an OBJ file says."""
+    """The content of an OBJ file."""
 
     raws: list[RawMesh] = field(default_factory=list)  # by material; colors sRGB, NaN where a line has none
     libraries: list[str] = field(default_factory=list)  # material files, as written
-    ignored: dict[str, int] = field(default_factory=dict)  # what is not read -> its first line
-    smooth: int | None = None  # first line that asks for smooth faces
+    ignored: dict[str, int] = field(default_factory=dict)  # keyword that is not read -> its first line
+    smooth: int | None = None  # first line that requests smooth faces
 
 
 def parse(name: str, text: str, strict: bool = False) -> Obj:
@@ -45,7 +45,7 @@ def parse(name: str, text: str, strict: bool = False) -> Obj:
     Raises
     ------
     SceneError
-        Naming the file, the line, what stands there and what is allowed.
+        If a line is malformed. The message names the file, the line, its text and what is allowed.
     """
     lines = _clean(text)
     (*tables, faces), others = sort_lines(lines, "v", "vt", "vn", "f")
@@ -64,7 +64,7 @@ def parse(name: str, text: str, strict: bool = False) -> Obj:
     written = _check_faces(name, faces, tables, label, strict)
     order = np.argsort(label, kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
-    groups.sort(key=lambda group: int(group[0]))  # materials as they are first used
+    groups.sort(key=lambda group: int(group[0]))  # materials in the order of their first use
     titles = list(names)
     with typed_errors(name, "obj"):
         meshes = _read(written, groups)
@@ -76,7 +76,7 @@ def parse(name: str, text: str, strict: bool = False) -> Obj:
 
 
 def _clean(text: str) -> list[str]:
-    """Return the lines without comments; what a backslash continues stays on its first line."""
+    """Return the lines without comments; lines that a backslash continues are joined to their first line."""
     if "\\\n" in text:
         text = re.sub(
             r"(?m)^(?:.*\\\n)+.*", lambda m: m[0].replace("\\\n", " ") + "\n" * m[0].count("\\\n"), text
@@ -84,13 +84,13 @@ def _clean(text: str) -> list[str]:
     lines = list(map(str.strip, text.replace("\t", " ").split("\n")))
     if "#" not in text:
         return lines
-    # a name may hold a #, so only whole-line comments and those behind numbers go
+    # a name may contain a #, so only whole-line comments and comments after numbers are removed
     named = ("usemtl", "mtllib", "o ", "g ")
     return [x if "#" not in x or x.startswith(named) else x.partition("#")[0].rstrip() for x in lines]
 
 
 def _statements(name: str, lines: list[str], others: NDArray[np.intp]) -> tuple[Obj, list[str], list[int]]:
-    """Read what is not geometry; also return the materials in order, and where all but the first start."""
+    """Read all lines but geometry; also return the materials in order, and where all but the first begin."""
     out, materials, changes = Obj(), [""], []
     for at in others.tolist():
         keyword, _, rest = lines[at].partition(" ")
@@ -111,10 +111,10 @@ def _statements(name: str, lines: list[str], others: NDArray[np.intp]) -> tuple[
 def _check_faces(
     name: str, faces: Rows, tables: list[Rows], label: NDArray[np.intp], strict: bool
 ) -> tuple[list[str], list[str]]:
-    """Return the lines of v, vt, vn, and what follows the f of every face, as trimesh reads them right.
+    """Return the lines of v, vt, vn, and the corners of every face, in a form that trimesh reads correctly.
 
-    Of the faces of one material, by `label`, all get a vt and a vn if any has: a vt of 0, and a vn of length
-    0 for each face without one, which is flat.
+    If one face of a material (`label`) has a vt or a vn, all faces of the material get one: a vt of 0, and a
+    vn of length 0 for a face without normals, which is flat.
     """
     index, given = _indices(name, faces)
     parent = np.repeat(np.arange(len(label)), faces.widths)
@@ -147,7 +147,7 @@ def _check_faces(
 
 
 def _indices(name: str, faces: Rows) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Return the indices (k, 3) of all corners as written, and which of them there are."""
+    """Return the indices (k, 3) of all corners as written, and a mask of the indices that are given."""
     few = np.flatnonzero(faces.widths < 3)
     if len(few):
         text, number = faces.texts[few[0]].strip(), faces.numbers[few[0]]
@@ -164,7 +164,7 @@ def _indices(name: str, faces: Rows) -> tuple[NDArray[np.int64], NDArray[np.bool
 
 
 def _corners(text: str) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Read corners, of which each follows a blank; raises ValueError or OverflowError."""
+    """Read corners, each after a blank; raises ValueError or OverflowError."""
     text = re.sub(r"(?<=\d)/+(?= |$)", "", text) if "/ " in text or text.endswith("/") else text
     data = text.encode()
     form = _forms(data, len(text.split()))
@@ -172,9 +172,7 @@ def _corners(text: str) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     if data.translate(None, INDEX):
         raise ValueError
     numbers = np.fromstring(split, np.int64, sep=" ") if "-" not in text and "+" not in text else None
-    if (
-        numbers is None or numbers.max(initial=0) >= 10**18
-    ):  # it stops at signs and goes no further than int64
+    if numbers is None or numbers.max(initial=0) >= 10**18:  # NumPy stops at signs and is limited to int64
         numbers = np.array(list(map(int, split.split())), np.int64)
     if form.max() >= len(GIVEN) or GIVEN[form].sum() != len(numbers):
         raise ValueError
@@ -184,19 +182,19 @@ def _corners(text: str) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
 
 
 def _forms(text: bytes, count: int) -> NDArray[np.intp]:
-    """Return the row of `GIVEN` for each of `count` corners; a larger number for what is none."""
+    """Return the row of `GIVEN` for each of `count` corners; a larger number for a malformed corner."""
     if b"/" not in text:
         return np.zeros(count, np.intp)
     codes = np.frombuffer(text, np.uint8)
     slash, blank = codes == ord("/"), codes == ord(" ")
-    word = (np.cumsum(blank[:-1] & ~blank[1:]) - 1)[slash[1:]]  # of every slash
+    word = (np.cumsum(blank[:-1] & ~blank[1:]) - 1)[slash[1:]]  # positions of the slashes
     return np.bincount(word, minlength=count) + np.bincount(word[slash[:-1][slash[1:]]], minlength=count)
 
 
 def _resolve(
     name: str, rows: Rows, index: NDArray[np.int64], given: NDArray[np.bool_], at: NDArray[np.intp]
 ) -> None:
-    """Turn indices from 1, or counting back from the lines `at`, into indices from 0, in place."""
+    """Convert indices from 1, or back from the lines `at`, to indices from 0, in place."""
     before, size = np.searchsorted(rows.numbers, at), len(rows.texts)
     zero_based = np.where(index > 0, index - 1, before + index)
     bad = given & ((index == 0) | (zero_based < 0) | (zero_based >= size))
@@ -208,16 +206,16 @@ def _resolve(
 
 
 def _read(written: tuple[list[str], list[str]], groups: list[NDArray[np.intp]]) -> list[dict[str, Any]]:
-    """Let trimesh read what `_check_faces` returns; one mesh for each group of faces."""
+    """Read the lines of `_check_faces` by trimesh; return one mesh for each group of faces."""
     from trimesh.exchange.obj import load_obj
 
     lines, faces = written
     for number, group in enumerate(groups):
         texts = [faces[i] for i in group.tolist()] if len(groups) > 1 else faces
         lines += [f"usemtl {number}", "f" + "\nf".join(texts)]
-    # the loader itself: a trimesh object would round colors to 8 bits
+    # the loader is called directly: a trimesh object would round colors to 8 bits
     found = load_obj(StringIO("\n".join(lines)), skip_materials=True)["geometry"]
-    return list(found.values())[::-1]  # it lists the last one first
+    return list(found.values())[::-1]  # the loader lists the last mesh first
 
 
 def _raw(material: str, mesh: dict[str, Any], faces: Rows, group: NDArray[np.intp]) -> RawMesh:
@@ -227,6 +225,6 @@ def _raw(material: str, mesh: dict[str, Any], faces: Rows, group: NDArray[np.int
     raw.uvs = None if mesh["visual"] is None else mesh["visual"].uv
     raw.colors = mesh.get("vertex_colors")
     numbers, triangles = faces.numbers[group], faces.widths[group] - 2
-    # of quads alone, trimesh lists all first halves, then all second halves
+    # of a mesh of quads, trimesh lists all first halves, then all second halves
     raw.lines = np.tile(numbers, 2) if (triangles == 2).all() else np.repeat(numbers, triangles)
     return raw

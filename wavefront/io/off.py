@@ -1,4 +1,4 @@
-"""OFF by trimesh, after a check of its text: trimesh passes over what is too short, and over colors."""
+"""OFF, read by trimesh after a check of its text: trimesh ignores short lines, and colors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def parse(name: str, data: bytes, strict: bool, materials: bool) -> Any:
     Raises
     ------
     SceneError
-        Naming the file and the line.
+        If a line is malformed. The message names the file and the line.
     """
     lines = [line.partition("#")[0].split() for line in decode(data).split("\n")]
     rows = [(number, words) for number, words in enumerate(lines, 1) if words]
@@ -41,7 +41,7 @@ def parse(name: str, data: bytes, strict: bool, materials: bool) -> Any:
         lost.append("colors of faces")
     if lost and materials:
         warn(f"{name}: not honored: {', '.join(lost)}", strict)
-    # the counts and the rows that they cover: what follows is none of trimesh's concern
+    # only the counts and the rows that they cover: trimesh would also read the lines after them
     text = [f"OFF\n{vertices} {faces} 0", *(" ".join(words) for _, words in rows[: vertices + faces])]
     return by_trimesh(name, "\n".join(text).encode(), "off")
 

@@ -1,4 +1,4 @@
-"""Where the meshes of a file stand: a mesh that stands in several places is built once."""
+"""The placements of a file's meshes: a mesh that is placed several times is built once."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from ..shapes.instance import can_place
 from ..shapes.transform import moved, moved_tangents
 from .repair import RawMesh, build
 
-MAX_INSTANCES = 2**20  # meshes that the nodes of a file place, unless the user allows more
-MAX_ELEMENT = 1e100  # of a matrix: larger ones have no squares
-MAX_COPIES = 2**14  # meshes that cannot be instances, as their matrices are singular
-MAX_COPIED_FACES = 2**25  # triangles in copies of meshes, where every place gets a mesh of its own
+MAX_INSTANCES = 2**20  # meshes that the nodes of a file may place by default
+MAX_ELEMENT = 1e100  # of a matrix: the squares of larger elements overflow
+MAX_COPIES = 2**14  # meshes that cannot be instances, because their matrices are singular
+MAX_COPIED_FACES = 2**25  # triangles in copies of meshes, where each placement becomes a mesh
 
 Matrix = NDArray[np.float64]
 
 
 @dataclass
 class Places:
-    """Where meshes stand, in the order of the scene's shapes."""
+    """Placements of meshes, in the order of the scene's shapes."""
 
-    raw: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))  # (n,) which of the meshes
+    raw: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))  # (n,) index of the mesh
     matrix: Matrix = field(default_factory=lambda: np.zeros((0, 4, 4)))  # (n, 4, 4) to the scene
 
     @classmethod
     def once(cls, count: int) -> Places:
-        """Return the places of meshes that stand once each, where their vertices are."""
+        """Return the placements of meshes that are placed once each, without a transform."""
         return cls(np.arange(count), np.tile(np.eye(4), (count, 1, 1)))
 
 
 def place_shapes(name: str, raws: list[RawMesh], places: Places, strict: bool) -> list[Mesh | Instance]:
-    """Build meshes, and an instance for each place of one that stands in several.
+    """Build meshes, and an instance for each placement of a mesh with several.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def place_shapes(name: str, raws: list[RawMesh], places: Places, strict: bool) -
     raws
         The distinct meshes.
     places
-        Where they stand.
+        Their placements.
     strict
         As for `build`.
 
@@ -80,7 +80,7 @@ def place_shapes(name: str, raws: list[RawMesh], places: Places, strict: bool) -
 
 
 def place_meshes(name: str, raws: list[RawMesh], places: Places, strict: bool) -> list[Mesh]:
-    """Build a mesh of its own for each place; arguments and errors as of `place_shapes`."""
+    """Build a mesh for each placement; arguments and errors as of `place_shapes`."""
     _check_range(name, raws, places)
     sizes = np.array([len(raw.faces) for raw in raws], np.int64)
     total = int(sizes.take(places.raw).sum())
@@ -102,7 +102,7 @@ def moved_raw(raw: RawMesh, matrix: Matrix) -> RawMesh:
 
 
 def in_range(matrices: Matrix) -> NDArray[np.bool_]:
-    """Return which matrices (n, 4, 4) have only elements that can be worked with, (n,); NaN is none."""
+    """Return a mask (n,) of the matrices (n, 4, 4) whose elements are all in the supported range."""
     return np.asarray((np.abs(matrices) <= MAX_ELEMENT).all((1, 2)))
 
 
@@ -117,7 +117,7 @@ def _check_range(name: str, raws: list[RawMesh], places: Places) -> None:
 
 
 def _by_mesh(raws: list[RawMesh], places: Places) -> list[tuple[RawMesh, NDArray[np.intp]]]:
-    """Return each mesh that stands somewhere with the numbers of its places, in rising order."""
+    """Return each mesh that is placed, with the numbers of its placements in rising order."""
     order = np.argsort(places.raw, kind="stable")
     numbers, begins = np.unique(places.raw[order], return_index=True)
     return list(zip((raws[i] for i in numbers), np.split(order, begins)[1:], strict=True))

@@ -1,7 +1,7 @@
-"""PLY: trimesh reads it, after a check of what it claims.
+"""PLY, read by trimesh after a check of its header.
 
-Triangle strips, and polygons of several sizes in a binary file, are written anew as triangles first: trimesh
-passes over the ones and refuses the others.
+Triangle strips, and polygons of several sizes in a binary file, are first rewritten as triangles: trimesh
+ignores strips and refuses such polygons.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ ORDERS: dict[str, Literal["little", "big"]] = {"<": "little", ">": "big"}
 
 
 def parse(path: str | os.PathLike[str], data: bytes, strict: bool, materials: bool) -> tuple[Any, int]:
-    """Return what trimesh reads from a PLY file, and how many faces there must be.
+    """Return the trimesh object of a PLY file, and the number of its faces by the header.
 
     Raises
     ------
     SceneError
-        Naming the file, and the line of a text.
+        If the file is malformed. The message names the file, and the line of a text.
     """
     name = os.fspath(path)
     elements = check_ply(name, data)
@@ -51,7 +51,7 @@ def parse(path: str | os.PathLike[str], data: bytes, strict: bool, materials: bo
 
 
 def _with_triangles(name: str, data: bytes, elements: list[Element]) -> tuple[bytes, Element | None]:
-    """Return a file that trimesh can read, and the element that was written anew, with its new count."""
+    """Return a file that trimesh can read, and the element that was rewritten, with its new count."""
     found = [i for i, element in enumerate(elements) if element.name in FACES and element.count]
     if not found or any(element.lists for element in elements[: found[0]]):
         return data, None
@@ -99,7 +99,7 @@ def _layout(element: Element) -> tuple[int, int, int, int]:
 
 
 def _are_alike(body: bytes, element: Element, order: str) -> bool:
-    """Return whether the lists of all rows are as long as the first one, as trimesh takes for granted."""
+    """Return whether the lists of all rows are as long as the first one, as trimesh assumes."""
     before, length, entry, after = _layout(element)
     first = body[before : before + length]
     size = before + length + int.from_bytes(first, ORDERS[order]) * entry + after
@@ -134,7 +134,7 @@ def _split(name: str, lists: list[NDArray[np.int64]]) -> NDArray[np.int64]:
 
 
 def _unrolled(strips: list[NDArray[np.int64]]) -> NDArray[np.int64]:
-    """Return the triangles (m, 3) of strips, which -1 begins anew; one that repeats a corner is none."""
+    """Return the triangles (m, 3) of strips. -1 begins a new one. Degenerate ones are dropped."""
     parts = [np.zeros((0, 3), np.int64)]
     for strip in strips:
         for run in np.split(strip, np.flatnonzero(strip == -1)):

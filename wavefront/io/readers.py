@@ -1,4 +1,4 @@
-"""The kinds of files that are read, and what reads each."""
+"""The file formats, and the reader of each."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ PathLike = str | os.PathLike[str]
 
 @dataclass(frozen=True)
 class Wish:
-    """How a file is to be read."""
+    """Options of reading a file."""
 
-    strict: bool = False  # refuse what would be repaired or left out
-    materials: bool = True  # what the meshes are made of counts
-    max_instances: int = MAX_INSTANCES  # meshes that the nodes of a file may place
+    strict: bool = False  # refuse files that need a repair or have unsupported properties
+    materials: bool = True  # read materials
+    max_instances: int = MAX_INSTANCES  # number of meshes at most that the nodes of a file place
 
 
 def read(path: PathLike, wish: Wish) -> Contents:
-    """Read a file of any kind.
+    """Read a file of any supported format.
 
     Raises
     ------
     SceneError
-        Naming the file, the line or element, the value and the limit.
+        If it cannot be read. The message names the file, the line or element, the value and the limit.
     """
     name = os.fspath(path)
     extension = Path(name).suffix.lower()
@@ -65,7 +65,7 @@ def _read_gltf(path: PathLike, data: bytes, wish: Wish) -> Contents:
         found = gltf.contents(document, wish.max_instances)
         specs = GltfMaterials(document)
         for raw, number in found.raws:
-            # without a material, the mesh is as plain as in memory
+            # without a material, the mesh gets the default material, as in memory
             if wish.materials and not assign_material(raw, None if number is None else specs.spec(number)):
                 document.lose("vertex colors", f"mesh {raw.name!r}")
     if document.lost and wish.materials:
@@ -94,11 +94,11 @@ def _read_obj(path: PathLike, data: bytes, wish: Wish) -> Contents:
 
 
 def _libraries(path: PathLike, libraries: list[str], strict: bool) -> dict[str, MaterialSpec]:
-    """Read the material files; a missing one is announced and left out."""
+    """Read the material files; warn of missing ones."""
     specs: dict[str, MaterialSpec] = {}
     for library in dict.fromkeys(libraries):
         file = beside(path, library)
-        if not os.path.exists(file):  # False, too, for names that no file can have
+        if not os.path.exists(file):  # also False for invalid names
             warn(f"{os.fspath(path)}: material file {library!r} is missing", strict)
             continue
         specs.update(mtl.specs(mtl.parse(file, decode(read_bytes(file)), strict), strict))

@@ -1,4 +1,4 @@
-"""STL: trimesh reads binary files and texts, after a check of what they claim against what they hold."""
+"""STL: binary files and texts, read by trimesh after a check of their counts."""
 
 from __future__ import annotations
 
@@ -14,20 +14,21 @@ from .repair import RawMesh, warn, wide
 from .trimesh_loading import typed_errors
 from .words import sort_lines
 
-COLORS = (b"COLOR=", b"MATERIAL=")  # what Materialize Magics writes into the header
-FACET = ("facet", "outer", "endloop", "endfacet")  # lines of a text that say nothing more
+COLORS = (b"COLOR=", b"MATERIAL=")  # keywords that Materialize Magics writes into the header
+FACET = ("facet", "outer", "endloop", "endfacet")  # keywords of a text without further information
 
 
 def parse(name: str, data: bytes, strict: bool = False) -> list[RawMesh]:
-    """Read the solids of an STL file; the normals in it are those of the facets and are left out.
+    """Read the solids of an STL file. Its normals are those of the facets and are not read.
 
-    Some programs hide colors in a binary file. There are two ways, which contradict each other, so
-    these are left out with a warning.
+    Some programs store colors in a binary file. There are two conventions, which contradict each other, so
+    colors are left out with a warning.
 
     Raises
     ------
     SceneError
-        Naming the file, and the line of a text; or if `strict` and there are colors.
+        If the file is malformed, or `strict` and it has colors. The message names the file, and the line of a
+        text.
     """
     count = int.from_bytes(data[80:84], "little")
     if len(data) >= 84 and len(data) == 84 + 50 * count:
@@ -59,12 +60,12 @@ def _binary(name: str, data: bytes, strict: bool) -> list[tuple[Any, Any]]:
 
 
 def _text(name: str, text: str) -> list[RawMesh]:
-    """Check a text, and let trimesh read its vertices; it would also look for them in the names of solids."""
+    """Check a text, and read its vertices by trimesh, which must not see the names of solids."""
     lines = [line.strip() for line in text.replace("\t", " ").split("\n")]
     (vertices, starts, ends, *_), others = sort_lines(
         [line.lower() for line in lines], "vertex", "solid", "endsolid", *FACET
     )
-    solid = np.searchsorted(starts.numbers, vertices.numbers) - 1  # of each vertex
+    solid = np.searchsorted(starts.numbers, vertices.numbers) - 1  # index of each vertex's solid
     closed = (
         np.searchsorted(ends.numbers, vertices.numbers) > np.searchsorted(ends.numbers, starts.numbers)[solid]
     )

@@ -1,6 +1,6 @@
-"""3MF by trimesh: the one archive that is opened, after a look at what it unpacks to and refers to.
+"""3MF, read by trimesh after a check of its unpacked size and its references. No other archive is opened.
 
-Positions are as they are written, mostly in millimeters with z up; colors and materials are not read.
+Positions are those of the file, mostly in millimeters with z up. Colors and materials are not read.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def parse(name: str, data: bytes, strict: bool, materials: bool) -> Any:
     Raises
     ------
     SceneError
-        If lxml or networkx is missing, or naming the file and what is wrong in it.
+        If lxml or networkx is missing, or the file is malformed; the message names the file and the error.
     """
     need(name, ".3mf", ("lxml", "lxml"), ("networkx", "networkx"))
     package = _Package(name, _models(name, data))
@@ -43,7 +43,7 @@ def parse(name: str, data: bytes, strict: bool, materials: bool) -> Any:
 
 
 def _models(name: str, data: bytes) -> dict[str, bytes]:
-    """Return the members that hold geometry."""
+    """Return the members of the archive that contain geometry."""
     try:
         with zipfile.ZipFile(BytesIO(data)) as archive:
             members = archive.infolist()
@@ -61,7 +61,7 @@ def _models(name: str, data: bytes) -> dict[str, bytes]:
 
 
 class _Package:
-    """What the objects of a package refer to, and what is not read."""
+    """The references of a package's objects, and the elements that are not read."""
 
     def __init__(self, name: str, models: dict[str, bytes]) -> None:
         self.children: dict[str, list[str]] = {}
@@ -85,7 +85,7 @@ class _Package:
 
             look_through(f"{name}: {member}", content, begin)
         for member in sorted(referred):
-            if meshes.get(member, 0) > 1:  # trimesh takes all of them for each reference
+            if meshes.get(member, 0) > 1:  # trimesh uses all of them for each reference
                 raise SceneError(
                     f"{name}: refers to {member}, which holds {meshes[member]} meshes; only one is read"
                 )

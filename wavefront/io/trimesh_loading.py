@@ -1,4 +1,4 @@
-"""Files by trimesh's loaders: errors become SceneErrors, and images come only from the file's own folder."""
+"""Loading files by trimesh: errors become SceneErrors; images are read only from the file's own folder."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .repair import warn
 
 
 class Images:
-    """The images beside a file, for trimesh, which itself passes over missing and broken ones."""
+    """The images in a file's folder, for trimesh, which itself ignores missing and damaged images."""
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = path
@@ -42,7 +42,7 @@ class Images:
         raise FileNotFoundError(reference)
 
     def report(self, strict: bool) -> None:
-        """Announce the images that are missing; raise the first error that trimesh passed over."""
+        """Warn of missing images; raise the first error that trimesh ignored."""
         if self.error is not None:
             raise self.error
         for name in dict.fromkeys(self.missing):
@@ -50,7 +50,7 @@ class Images:
 
 
 def by_trimesh(name: str, data: bytes, kind: str, images: Any = None, skip_materials: bool = False) -> Any:
-    """Return the trimesh scene that a file holds, as it is written: nothing merged or dropped.
+    """Return the trimesh scene of a file, with nothing merged or dropped.
 
     Parameters
     ----------
@@ -61,14 +61,14 @@ def by_trimesh(name: str, data: bytes, kind: str, images: Any = None, skip_mater
     kind
         Its extension, without the dot.
     images
-        Where trimesh gets other files from.
+        The resolver by which trimesh reads other files.
     skip_materials
-        As of trimesh's loaders of kinds that have it.
+        The argument of that name of trimesh's loaders that have it.
 
     Raises
     ------
     SceneError
-        For whatever trimesh raises, except that memory is short.
+        For any error of trimesh but MemoryError.
     """
     import trimesh
 
@@ -81,7 +81,7 @@ def by_trimesh(name: str, data: bytes, kind: str, images: Any = None, skip_mater
 
 @contextmanager
 def typed_errors(name: str, kind: str) -> Iterator[None]:
-    """Turn whatever a loader raises into a SceneError, except that memory is short; keep NumPy quiet."""
+    """Convert any error of a loader but MemoryError to a SceneError; silence NumPy's warnings."""
     try:
         with np.errstate(all="ignore"):
             yield

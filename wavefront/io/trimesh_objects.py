@@ -1,4 +1,4 @@
-"""Meshes, materials and places of trimesh objects."""
+"""Meshes, materials and placements of trimesh objects."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from .repair import RawMesh, warn, with_face_colors
 if TYPE_CHECKING:
     import trimesh
 
-BARE = ("obj", "ply")  # files whose materials may lack a color, where trimesh makes a gray one up
+BARE = ("obj", "ply")  # formats whose materials may lack a color; trimesh then invents a gray one
 
 
 def read(geometry: Any, source: str, strict: bool) -> Contents:
-    """Return the meshes of a trimesh object with materials, and where they stand."""
+    """Return the meshes of a trimesh object with their materials and placements."""
     import trimesh
 
     specs = _Visuals()
@@ -51,14 +51,14 @@ def _nodes(geometry: Any, trimesh: Any) -> list[tuple[Any, str, np.ndarray]]:
         mesh = geometry.geometry[key]
         if isinstance(mesh, trimesh.Trimesh):
             out.append((mesh, str(key), np.asarray(matrix, np.float64)))
-    # trimesh lists what these files hold last first
+    # trimesh lists the meshes of these files in reverse order
     if geometry.source is not None and geometry.source.file_type in ("obj", "glb", "gltf"):
         out.reverse()
     return out
 
 
 def _raw(mesh: trimesh.Trimesh, name: str, source: str) -> RawMesh:
-    # asking for `vertex_normals` would compute them; the cache tells whether they are there
+    # reading `vertex_normals` would compute them; the cache shows whether they exist
     normals = np.asarray(mesh.vertex_normals) if "vertex_normals" in mesh._cache.cache else None
     uvs = getattr(mesh.visual, "uv", None)
     vertices = np.asarray(mesh.vertices, np.float64)
@@ -72,14 +72,14 @@ def _raw(mesh: trimesh.Trimesh, name: str, source: str) -> RawMesh:
 
 
 class _Visuals:
-    """The looks of trimesh visuals, each made once, and what is lost of them."""
+    """The materials of trimesh visuals, each made once, and their unsupported properties."""
 
     def __init__(self) -> None:
         self._looks: dict[int, MaterialSpec] = {}
-        self.lost: dict[str, str] = {}  # what -> where first
+        self.lost: dict[str, str] = {}  # property -> its first place
 
     def assign_material(self, raw: RawMesh, mesh: trimesh.Trimesh, file_types: set[str | None]) -> None:
-        """Give a raw mesh its material and emission; `file_types` tells what it was read from."""
+        """Give a raw mesh its material and emission; `file_types` are the formats that it was read from."""
         visual: Any = mesh.visual
         spec = self._look(getattr(visual, "material", None), not file_types.isdisjoint(BARE))
         for what in spec.lost if spec is not None else ():
@@ -91,7 +91,7 @@ class _Visuals:
         for element in ("vertex", "face"):
             if element not in shown and visuals.ply_has_colors(mesh, element):
                 self.lost.setdefault(f"{element} colors", raw.name)
-        if spec is None and is_faint(raw) and not visuals.is_gltf(mesh):  # where it has no say
+        if spec is None and is_faint(raw) and not visuals.is_gltf(mesh):  # where it has no effect
             self.lost.setdefault("opacity of vertex colors", raw.name)
 
     def _look(self, material: Any, bare: bool) -> MaterialSpec | None:

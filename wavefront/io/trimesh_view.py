@@ -1,4 +1,4 @@
-"""The camera and the lights of trimesh scenes, as far as somebody gave them."""
+"""The camera and the lights of trimesh scenes, if they were set."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ MADE_UP = (60, 60, 60, 255)  # color of trimesh's own lights
 
 
 def add_camera(scene: Scene, geometry: Any) -> None:
-    """Give a scene the camera that somebody gave the trimesh scene it was made of.
+    """Give a scene the camera that was set in its trimesh scene.
 
-    Its resolution is the size of the picture. A camera without a transform is moved to where it sees the
-    whole scene.
+    The resolution of the camera is the size of the picture. A camera without a transform is placed to see
+    the whole scene.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def add_camera(scene: Scene, geometry: Any) -> None:
     if not getattr(geometry, "has_camera", False):
         return
     if geometry.source is not None and geometry.source.file_type in ("glb", "gltf"):
-        # trimesh reads it without the nodes above it, so it stands in the wrong place
+        # trimesh ignores the parent nodes of the camera, so its position is wrong
         warn(f"{SOURCE}: not honored: the camera of its glTF file; wf.load reads it", strict=False)
         return
     camera = geometry.camera
@@ -56,8 +56,8 @@ def add_camera(scene: Scene, geometry: Any) -> None:
 def _pixel_aspect(camera: Any) -> float:
     """Return the width of a pixel over its height.
 
-    It follows from the focal lengths. But where the sides of the picture are to each other as the angles
-    are, which trimesh does by default, that is a rule of thumb, and pixels are square, as in its viewer.
+    It follows from the focal lengths. But if the sides of the picture have the ratio of the angles, which is
+    trimesh's default and an approximation, pixels are square, as in its viewer.
     """
     (width, height), (across, up) = camera.resolution, camera.fov
     if abs(width - height * across / up) < 1:
@@ -66,17 +66,17 @@ def _pixel_aspect(camera: Any) -> float:
 
 
 def lights(geometry: Any) -> list[DirectionalLight | PointLight | SpotLight]:
-    """Return the lights that somebody gave a trimesh scene.
+    """Return the lights that were set in a trimesh scene.
 
-    They are those of KHR_lights_punctual, and shine along -z of their nodes. A scene whose lights nobody
-    set, or trimesh itself when it showed the scene, has none.
+    They have the meaning of KHR_lights_punctual and shine along -z of their nodes. Lights that trimesh added
+    for its viewer do not count.
 
     Raises
     ------
     SceneError
         If a light is malformed.
     """
-    # asking for `lights` would make some up
+    # reading `lights` would add default lights
     given = getattr(geometry, "_lights", None) or []
     if given and all(_is_made_up(light) for light in given):
         warn(f"{SOURCE}: not honored: the lights that trimesh made for its viewer", strict=False)
@@ -109,7 +109,7 @@ def _light(geometry: Any, light: Any) -> DirectionalLight | PointLight | SpotLig
 
 
 def _is_made_up(light: Any) -> bool:
-    """Return whether a light is as trimesh makes them for scenes that have none."""
+    """Return whether a light is one that trimesh adds to scenes without lights."""
     return (
         type(light).__name__ == "PointLight"
         and str(light.name).startswith("light_")

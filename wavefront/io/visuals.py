@@ -1,4 +1,4 @@
-"""Materials of trimesh objects, read as their files would be."""
+"""Materials of trimesh objects, read as in their files."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from .repair import Table
 
 
 def spec(material: Any, where: str, bare: bool) -> MaterialSpec:
-    """Return the look of a trimesh `PBRMaterial` or `SimpleMaterial`; `where` is for messages.
+    """Return the material of a trimesh `PBRMaterial` or `SimpleMaterial`; `where` is for messages.
 
-    Where `bare`, the colors and the exponent of the highlight count only if the material has a `Kd`, `Ks`
-    or `Ns` of its own; elsewhere those that trimesh would write into a file.
+    If `bare`, the colors and the exponent of the highlight count only if the material has its own `Kd`, `Ks`
+    or `Ns`. Otherwise those that trimesh would write into a file count.
     """
     if hasattr(material, "baseColorFactor"):
         return _pbr(material)
@@ -34,15 +34,14 @@ def spec(material: Any, where: str, bare: bool) -> MaterialSpec:
 def vertex_colors(mesh: Any) -> Table | None:
     """Return the vertex colors of a trimesh mesh, linear (n, 4), if it has any.
 
-    Those of glTF files are linear. All others are sRGB: so programs show them, and so files like
-    PLY mean them.
+    Those of glTF files are linear. All others are sRGB, as programs display them and as in PLY files.
     """
     visual = mesh.visual
     if visual.kind == "vertex":
         codes = np.asarray(visual.vertex_colors)
         linear = is_gltf(mesh)
     elif "color" in getattr(visual, "vertex_attributes", {}):
-        codes = np.asarray(visual.vertex_attributes["color"])  # with a material; only glTF has that
+        codes = np.asarray(visual.vertex_attributes["color"])  # beside a material; only glTF has these
         linear = True
     else:
         return None
@@ -59,9 +58,9 @@ def _decoded(codes: NDArray[Any]) -> Table:
 
 
 def face_colors(mesh: Any) -> Table | None:
-    """Return the colors of the faces of a trimesh mesh, linear (m, 4), if they are those that show.
+    """Return the colors of the faces of a trimesh mesh, linear (m, 4), if the mesh shows them.
 
-    They are sRGB, as those of vertices are.
+    They are sRGB codes in the mesh, as those of vertices are.
     """
     if not shows_face_colors(mesh):
         return None
@@ -71,10 +70,10 @@ def face_colors(mesh: Any) -> Table | None:
 
 
 def shows_face_colors(mesh: Any) -> bool:
-    """Return whether a trimesh mesh shows colors of its faces, one for each.
+    """Return whether a trimesh mesh shows a color for each of its faces.
 
-    Of a PLY file with colors of both, trimesh takes those of the vertices; where they are all white, some
-    program filled them in, and those of the faces count.
+    Of a PLY file with colors of vertices and faces, trimesh uses those of the vertices. If these are all
+    white, they are defaults of some program, and the colors of the faces count.
     """
     if mesh.visual.kind == "face":
         return np.shape(mesh.visual.face_colors) == (len(mesh.faces), 4)
@@ -85,35 +84,35 @@ def shows_face_colors(mesh: Any) -> bool:
 
 
 def _ply_face_colors(mesh: Any) -> NDArray[Any]:
-    """Return the colors of faces as their PLY file has them, (m, 3 or 4)."""
+    """Return the colors of faces as stored in the PLY file, (m, 3 or 4)."""
     element = mesh.metadata["_ply_raw"]["face"]
     names = [name for name in ("red", "green", "blue", "alpha") if name in element["properties"]]
     return np.column_stack([np.asarray(element["data"][name]) for name in names])
 
 
 def is_gltf(mesh: Any) -> bool:
-    """Tell whether trimesh read a mesh from a glTF file: it leaves a mark on every one."""
+    """Return whether trimesh read a mesh from a glTF file: it marks such meshes."""
     return "from_gltf_primitive" in mesh.metadata
 
 
 def ply_has_colors(mesh: Any, element: str) -> bool:
-    """Tell whether the vertices or faces of the PLY file that trimesh read a mesh from have colors.
+    """Return whether the vertices or faces of a mesh's PLY file have colors.
 
-    It leaves out both beside texture coordinates, and those of faces beside those of vertices.
+    trimesh ignores both if there are texture coordinates, and those of faces if vertices have colors.
     """
     raw = mesh.metadata.get("_ply_raw", {}).get(element, {})
     return "red" in raw.get("properties", {})
 
 
 def from_srgb(colors: Table) -> Table:
-    """Decode colors (n, k) to linear ones, rounded to 8 bits; those outside [0, 1] are kept as they are."""
+    """Decode colors (n, k), rounded to 8 bits, to linear values; those outside [0, 1] are unchanged."""
     inside = (colors >= 0) & (colors <= 1)
     codes = np.rint(np.where(inside, colors, 0) * 255).astype(f4)
     return np.where(inside, srgb_to_linear(codes / f4(255)), colors)
 
 
 def is_blank(material: Any) -> bool:
-    """Tell whether trimesh made a material up for a mesh that has texture coordinates and nothing more."""
+    """Return whether a material is trimesh's default for a mesh with only texture coordinates."""
     image = getattr(material, "image", None)
     plain = getattr(material, "kwargs", None) == {} and material.name in (None, "", "material_0")
     return (
@@ -157,7 +156,7 @@ def _pbr(material: Any) -> MaterialSpec:
     if radiance is not None and material.emissiveTexture is not None:
         radiance = Texture(pixels(material.emissiveTexture), scale=glow)
     made, lost = build_material(wanted)
-    if material.normalTexture is not None:  # trimesh keeps no scale of it
+    if material.normalTexture is not None:  # trimesh does not keep its scale
         made = made.with_normal_map(NormalMap(Texture(pixels(material.normalTexture), False)))
     occluded = ["occlusionTexture"] if material.occlusionTexture is not None else []
     return MaterialSpec(made, radiance, bool(material.doubleSided), occluded + lost, alpha, cutoff)
@@ -177,7 +176,7 @@ def _simple(material: Any, where: str, bare: bool) -> MaterialSpec:
     if material.image is not None:
         entry.images["map_kd"] = pixels(material.image)
         entry.lines["map_kd"] = ("map_kd", 0, "image")
-    # of the other images trimesh keeps the names alone, and no folder to look for them
+    # of the other images trimesh keeps only the names, without a folder
     gone = [key for key in entry.lines if _is_map(key) and key not in entry.images]
     gone = [entry.lines.pop(key)[0] for key in gone]
     found = mtl.spec(entry)

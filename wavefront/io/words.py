@@ -1,4 +1,4 @@
-"""The lines of a text sorted by their first word, without a loop over them, and a check of their numbers."""
+"""Sorting the lines of a text by their first word, without a loop over lines, and checking their numbers."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 
-NUMERIC = b"0123456789+-.eEnaifNAIFtyTY"  # the characters of numbers, nan and infinity included
-KEYWORD = 9  # bytes of a first word that are kept; one more than the longest that is looked for
+NUMERIC = b"0123456789+-.eEnaifNAIFtyTY"  # the characters of numbers, including nan and infinity
+KEYWORD = 9  # bytes of a first word that are compared; one more than the longest keyword
 
 
 @dataclass
@@ -20,11 +20,11 @@ class Rows:
 
     keyword: str
     numbers: NDArray[np.intp]  # (n,) line of the file, from 1
-    widths: NDArray[np.intp]  # (n,) how many words follow the keyword
+    widths: NDArray[np.intp]  # (n,) number of words after the keyword
     texts: list[str]  # n, each empty or with a blank before every word
 
     def resized(self, width: int, fill: str) -> list[str]:
-        """Return the texts with `width` words each: the first ones, filled up with `fill`."""
+        """Return the texts with `width` words each: cut off, or padded with `fill`."""
         if (self.widths == width).all():
             return self.texts
         words = (text.split()[:width] for text in self.texts)
@@ -49,7 +49,7 @@ class Rows:
         return None
 
     def check_numbers(self, name: str, least: int) -> None:
-        """Check that every line has `least` numbers or more; the SceneError names the file and the line."""
+        """Check that every line has at least `least` numbers; the SceneError names the file and the line."""
         if (self.widths < least).any():
             i = int((self.widths < least).argmax())
             raise SceneError(
