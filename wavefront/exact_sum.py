@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .vec import Lanes
+from .vec import Doubles, Lanes
 
 WIDTH = 26  # bits of a bin
 MAX_TERMS = 1 << (53 - WIDTH)  # sums of more terms may need more than the 53 bits of a float64
@@ -26,8 +26,6 @@ _LIMITS = np.ldexp(1.0, WIDTH * (_BINS + 1) - 1)
 _ROUNDERS = np.ldexp(1.5, 52 + WIDTH * _BINS)
 _LIMIT_TO_ROUNDER = 1.5 * 2.0**27
 _TO_NEXT = np.ldexp(1.0, -WIDTH)
-
-Doubles = NDArray[np.float64]
 
 
 class ExactSums:

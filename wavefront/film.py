@@ -6,14 +6,11 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .exact_sum import ExactSums
 from .image import Image
 from .state import Words
-from .vec import ALL, Floats, Ints, Lanes, take
-
-Doubles = NDArray[np.float64]
+from .vec import ALL, Doubles, Floats, Ints, Lanes, take
 
 BATCHES = 8  # at most
 WHOLE_BATCH = 4  # samples; batches are no shorter where a pixel has two such

@@ -13,7 +13,7 @@ from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .bsdfs import Diffuse
 from .camera import Camera, upward
@@ -23,8 +23,7 @@ from .lights import Environment
 from .scene import FRAMING_VIEW, Scene, turned_up
 from .shapes import Disk, Mesh
 from .textures.image import Texture
-
-Doubles = NDArray[np.float64]
+from .vec import Doubles
 
 HEIGHT, WIDTH = 128, 256  # pixels of an environment's image
 GROUND_REACH = 6.0  # radius of the ground in radii of the scene

@@ -8,16 +8,16 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .codecs.encoding import codes_to_linear
 from .codecs.png_jpeg import EXTENSIONS
 from .errors import SceneError
 from .film import EPSILON
 from .image import Image, three_channels
+from .vec import Doubles
 
 Picture: TypeAlias = Image | ArrayLike | str | os.PathLike[str]
-Doubles = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,12 +6,14 @@ columns stand beside it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.floating[Any]]  # float32; the stubs lose the width in arithmetic
+Doubles = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Bools = NDArray[np.bool_]
 
@@ -19,6 +21,10 @@ Lanes: TypeAlias = Ints | slice  # some columns, by index or from one to another
 
 f4 = np.float32
 ZERO, INF = f4(0), f4(np.inf)
+TWO_PI, INV_PI, INV_TWO_PI, INV_FOUR_PI = f4(2 * np.pi), f4(1 / np.pi), f4(0.5 / np.pi), f4(0.25 / np.pi)
+BELOW_ONE = f4(1 - 2.0**-24)  # the largest number below 1
+FLOAT32_MAX = float(np.finfo(f4).max)
+TINY = f4(1e-30)  # in place of a divisor that is 0 or less: products of it with usual numbers are finite
 ALL = slice(None)
 
 
@@ -82,7 +88,12 @@ def highest(a: Floats) -> Floats:
     return np.maximum(np.maximum(a[0], a[1]), a[2])
 
 
-def luminance(rgb: Floats) -> Floats:
+def interpolate(a: Floats, b: Floats, c: Floats, b1: Floats, b2: Floats) -> Floats:
+    """Interpolate values at the corners of triangles, (..., n), with barycentric weights b1, b2 (n,)."""
+    return a * (f4(1) - b1 - b2) + b * b1 + c * b2
+
+
+def luminance(rgb: Floats | Sequence[Floats]) -> Floats:
     """Relative luminance of linear Rec. 709 RGB, (3, n) -> (n,) (ITU-R BT.709)."""
     return f4(0.2126) * rgb[0] + f4(0.7152) * rgb[1] + f4(0.0722) * rgb[2]
 

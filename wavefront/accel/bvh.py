@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..record import record
-from ..vec import Bools, Floats, Ints, f4
+from ..vec import TINY, Bools, Doubles, Floats, Ints, f4
 from .build import build_tree, stable_order
-from .triangle import ROUNDOFF, Doubles
+from .triangle import ROUNDOFF
 
 BLOCK = 32  # rays that share one copy of a node's matrix
 BLOCK_SHIFT = 5
@@ -367,7 +367,7 @@ def _lines(batch: RayBatch, scale: np.float32) -> _Lines:
     line[3:] *= scale
     dx, dy, dz, mx, my, mz = line
     foot = np.stack([dy * mz - dz * my, dz * mx - dx * mz, dx * my - dy * mx])
-    inverse = f4(1) / np.where(line[:3] == 0, TINY, line[:3])
+    inverse = f4(1) / np.where(line[:3] == 0, TINY, line[:3])  # 0 times the inverse must not be NaN
     begin = batch.begin * scale
     begin = np.append((begin - np.abs(begin) * 1e-6 - 1e-6).astype(f4), f4(np.inf))
     return _Lines(line, foot, inverse, begin)
@@ -384,7 +384,6 @@ def _nearest_of_each(lane: Ints, near: Floats, count: int) -> Ints:
 
 
 BOX_MARGIN = 4e-6  # added to boxes on all sides, for the rounding of lines
-TINY = f4(1e-30)  # replaces 0 in directions, so that 0 times the inverse is not NaN
 OFFSET = f4(4)  # makes distances positive, so that their bits sort like numbers
 
 

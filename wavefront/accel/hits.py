@@ -8,9 +8,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..vec import Floats, Ints, f4
+from ..vec import Doubles, Floats, Ints, f4
 from .bvh import Ball, Codes, RayBatch
-from .triangle import ROUNDOFF, Doubles
+from .triangle import ROUNDOFF
 
 PRIM_BITS = 31  # low bits of a packed hit; those of t are above
 NO_HIT = 0x7F7FFFFF << PRIM_BITS  # a packed miss: t = inf

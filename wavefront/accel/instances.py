@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..record import record
-from ..vec import Bools, Floats, Ints, f4
+from ..vec import Bools, Doubles, Floats, Ints, f4
 from .base import Accelerator, Intersections
 from .build import build_tree
 
@@ -24,8 +24,6 @@ CHUNK = 1 << 16  # boxes tested at a time
 LANE_BITS = 16  # at most 2^LANE_BITS rays traverse the tree at a time
 PAIRS = 1 << 20  # pairs held at a time; a batch that has more is halved
 ROUNDING = f4(1e-6)  # bound of the relative error of distances to boxes
-
-Doubles = NDArray[np.float64]
 
 
 @record

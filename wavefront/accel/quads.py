@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..vec import Bools, Floats, Ints
-from .triangle import ROUNDOFF, Doubles
+from ..vec import Bools, Doubles, Floats, Ints
+from .triangle import ROUNDOFF
 
 FLATNESS = 2 * ROUNDOFF  # largest distance between the diagonals, relative to the coordinates
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..vec import Bools, Floats, Ints, f4
-from .triangle import ROUNDOFF, Doubles
+from ..vec import Bools, Doubles, Floats, Ints, f4
+from .triangle import ROUNDOFF
 
 
 def sphere_rows(centers: Doubles, radii: Doubles, center: Floats, radius: float) -> Floats:

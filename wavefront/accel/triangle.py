@@ -12,15 +12,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..record import record
-from ..vec import Bools, Floats, Ints, cross, f4
-
-Doubles = NDArray[np.float64]
+from ..vec import Bools, Doubles, Floats, Ints, cross, f4
 
 ROUNDOFF = 2.0**-24  # half an ulp of float32
-TINY = 1e-30  # added to the extent of points, so that no row is infinite
+LEAST_EXTENT = 1e-30  # added to the extent of points, so that no row is infinite
 # Column i: the axes that become x, y and z for rays whose largest component is along axis i.
 AXES = np.array([[1, 2, 0], [2, 0, 1], [0, 1, 2]])
 
@@ -96,7 +93,7 @@ class PolygonPlanes(NamedTuple):
         plane is then certainly less than the ray's length.
         """
         near, far = np.abs(start[:3]).max(1), np.abs(end[:3]).max(1)
-        near, far = near.astype(np.float64) + TINY, far.astype(np.float64) + TINY
+        near, far = near.astype(np.float64) + LEAST_EXTENT, far.astype(np.float64) + LEAST_EXTENT
         normal, offset = np.abs(self.plane[:3].T), np.abs(self.plane[3])
         # Errors in half ulps: 1 for the point, 1 for the plane, 4 for the sum of four terms. An end point is
         # the sum of a start point and a product of at most near + far, so its error is 2 near + 2 far in

@@ -9,10 +9,8 @@ from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..suggestions import suggests_keywords
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, color
-from ..vec import Floats, broadcast, f4
+from ..vec import INV_PI, Floats, broadcast
 from .base import Bsdf, BsdfSample
-
-INV_PI = f4(1 / np.pi)
 
 
 class Diffuse(Bsdf):

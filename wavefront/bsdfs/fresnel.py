@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..vec import Floats, f4
-
-TINY = f4(1e-30)
+from ..vec import TINY, Floats, f4
 
 
 def fresnel_dielectric(cos: Floats, eta: Floats) -> tuple[Floats, Floats]:

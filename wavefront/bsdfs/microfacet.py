@@ -17,11 +17,7 @@ import numpy as np
 
 from ..elementary import sin_cos_turns
 from ..textures.base import BaseTexture
-from ..vec import Bools, Floats, dot, f4, normalize
-from .fresnel import TINY
-
-INV_PI = f4(1 / np.pi)
-TWO_PI = f4(2 * np.pi)
+from ..vec import INV_PI, TINY, Bools, Floats, dot, f4, normalize
 
 # Below this α a lobe is narrower than 0.1°, and half vectors of float32 directions no longer
 # resolve it: constants below count as smooth, and textures are raised to it.

@@ -13,9 +13,8 @@ from ..sampling.warp import cosine_hemisphere_pdf
 from ..suggestions import suggests_keywords
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, color, scalar
-from ..vec import Floats, dot, f4
+from ..vec import INV_PI, Floats, dot, f4
 from .base import Bsdf
-from .microfacet import INV_PI
 
 A_SLOPE = f4(0.5 - 2 / (3 * np.pi))
 MEAN_SLOPE = f4(2 / 3 - 28 / (15 * np.pi))

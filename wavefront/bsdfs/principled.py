@@ -16,12 +16,12 @@ from ..state import SurfaceInteraction
 from ..suggestions import suggests_keywords
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
-from ..vec import Bools, Floats, broadcast, dot, f4, luminance
+from ..vec import INV_PI, Bools, Floats, broadcast, dot, f4, luminance
 from .albedo import gloss_tables, lookup
 from .base import Bsdf, BsdfSample, weigh
 from .dielectric import LEAST_BEND
 from .fresnel import fresnel_dielectric
-from .microfacet import INV_PI, alpha_of, mirror_lobe, reflect, refract, refraction_lobe, visible_normals
+from .microfacet import alpha_of, mirror_lobe, reflect, refract, refraction_lobe, visible_normals
 from .sheen import sheen_albedo, sheen_lobe
 
 COAT_F0 = 0.04

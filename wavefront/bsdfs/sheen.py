@@ -12,9 +12,8 @@ import numpy as np
 
 from ..elementary import exp, log
 from ..sampling.warp import uniform_hemisphere
-from ..vec import Floats, dot, f4
+from ..vec import TWO_PI, Floats, dot, f4
 from .albedo import lookup, tabulate
-from .microfacet import TWO_PI
 
 LEAST_ROUGHNESS = f4(0.07)  # below it the distribution is a spike at the horizon
 # Rows a, b, c, d, e of the paper's table 1: for roughness 0, and 1.

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError
-
-Doubles = NDArray[np.float64]
+from ..vec import Doubles
 
 NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 COUNTS = (4, 5, 8, 12, 14)  # of coefficients that OpenCV gives; the last ones, of two other models, must be 0

@@ -12,17 +12,15 @@ from collections.abc import Sequence
 from copy import copy
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..elementary import sin_cos, sin_cos_turns
 from ..errors import SceneError, finite_array, number
 from ..parameter import Parametrized
 from ..sampling.warp import uniform_disk
-from ..vec import Floats, column, f4
+from ..vec import Doubles, Floats, column, f4
 from .distortion import GRID, Distortion
 
 Size = tuple[int, int]
-Doubles = NDArray[np.float64]
 
 
 class Projection(Parametrized, ABC):

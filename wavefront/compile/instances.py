@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..accel import Placements
 from ..errors import SceneError
@@ -14,12 +13,10 @@ from ..record import record
 from ..shapes import Instance, Mesh, Shape, Sphere
 from ..shapes.instance import instance_bounds
 from ..state import SoA
-from ..vec import Floats, Ints, f4
+from ..vec import Doubles, Floats, Ints, f4
 
 SKEW = 1e3  # instances that are stretched more along one axis than along another are not shared
 BOX_ROOM = 2.0**-20  # added to boxes on all sides, relative to their size and distance from the center
-
-Doubles = NDArray[np.float64]
 
 
 @record

@@ -17,6 +17,7 @@ from ..files import MAX_PIXELS
 from ..textures.image import Texture
 from ..textures.normal_map import NormalMap
 from ..textures.parameter import MAX_INDEX
+from ..vec import FLOAT32_MAX
 from .appearance import MaterialSpec, build_material
 from .gltf_document import SHOWN, Document, floats, shown
 from .gltf_specular_glossiness import F0, BesideSpecular
@@ -40,7 +41,6 @@ KNOWN = frozenset(
         "texture_transform",
     )
 ) | {"EXT_mesh_gpu_instancing"}
-FLOAT32_MAX = float(np.finfo(np.float32).max)
 MAX_ALL_PIXELS = 4 * MAX_PIXELS  # of all images of a file, decoded
 BESIDE = frozenset(  # extensions that go with specular-glossiness; the others exclude it
     ("KHR_materials_pbrSpecularGlossiness", "KHR_materials_emissive_strength", "KHR_texture_transform")

@@ -13,9 +13,8 @@ from ..bsdfs import Bsdf
 from ..errors import SceneError
 from ..shapes import Mesh
 from ..textures.parameter import Color
-from ..vec import cross
+from ..vec import FLOAT32_MAX, cross
 
-FLOAT32_MAX = float(np.finfo(np.float32).max)
 MAX_UV = 2.0**24  # float32 has no fractions above, and textures only read those
 FLAT = 1e-14  # a face is degenerate if twice its area is below this part of its longest edge squared
 

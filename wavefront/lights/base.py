@@ -19,7 +19,7 @@ from ..record import record
 from ..state import SoA
 from ..vec import Floats, f4, positive
 
-TINY = f4(1e-35)  # added to squared distances before their root is divided by; lost in any that matter
+LEAST_SQUARE = f4(1e-35)  # added to squared distances before their root, so that nothing is divided by 0
 EDGE_ON = f4(1e-14)  # taken off cosines that are divided by; smaller ones count as those of a dark side
 
 

@@ -14,11 +14,10 @@ from ..parameter import Parameter
 from ..record import record
 from ..sampling.warp import uniform_cone
 from ..suggestions import suggests_keywords
-from ..vec import Floats, column, dot, f4
+from ..vec import TWO_PI, Floats, column, dot, f4
 from .base import Light, LightSample, UserLight
 from .infinite import InfiniteLight, at_infinity, facing_irradiance, through_scene, turned
 
-TWO_PI = f4(2 * np.pi)
 MIN_ANGLE = 0.01  # degrees; float32 directions cannot tell a smaller disk's edge to a percent
 
 

@@ -13,12 +13,10 @@ from ..errors import one_of, rgb, rotation_matrix
 from ..record import record
 from ..sampling.warp import uniform_sphere
 from ..suggestions import suggests_keywords
-from ..vec import Floats, f4
+from ..vec import INV_FOUR_PI, Floats, f4
 from .base import LightSample, UserLight
 from .image import ImageEnvironment, environment_pixels
 from .infinite import InfiniteLight, at_infinity, through_scene
-
-UNIFORM_SPHERE_PDF = f4(1 / (4 * np.pi))
 
 
 @record
@@ -36,11 +34,11 @@ class ConstantEnvironment(InfiniteLight):
         """Draw a direction uniformly on the sphere."""
         wi = uniform_sphere(u)
         radiance = np.broadcast_to(self.radiance, wi.shape)
-        return at_infinity(wi, radiance, np.full(wi.shape[1], UNIFORM_SPHERE_PDF, f4))
+        return at_infinity(wi, radiance, np.full(wi.shape[1], INV_FOUR_PI, f4))
 
     def pdf_li(self, point: Floats, wi: Floats) -> Floats:
         """Return 1/4π."""
-        return np.full(wi.shape[1], UNIFORM_SPHERE_PDF, f4)
+        return np.full(wi.shape[1], INV_FOUR_PI, f4)
 
     def le(self, wi: Floats) -> Floats:
         """Return the radiance, (3, n)."""

@@ -19,13 +19,10 @@ from ..files import check_size
 from ..record import record
 from ..sampling.discrete import Distribution2D
 from ..textures.image import Texture
-from ..vec import Floats, f4, luminance
+from ..vec import INV_PI, INV_TWO_PI, Floats, f4, luminance
 from .base import LightSample
 from .infinite import InfiniteLight, at_infinity, through_scene, turned
 
-INV_PI = f4(1 / np.pi)
-INV_TWO_PI = f4(0.5 / np.pi)
-TWO_PI = f4(2 * np.pi)
 LEAST_SHARE = 1e-3  # of the light of an image that is worth light samples
 
 

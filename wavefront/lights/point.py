@@ -12,10 +12,8 @@ from ..errors import SceneError, rgb
 from ..parameter import Parameter
 from ..record import record
 from ..suggestions import suggests_keywords
-from ..vec import Floats, dot, f4
+from ..vec import FLOAT32_MAX, Floats, dot, f4
 from .base import Light, LightSample, UserLight, position
-
-FLOAT32_MAX = float(np.finfo(f4).max)
 
 
 @record

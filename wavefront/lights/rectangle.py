@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..record import record
 from ..sampling.spherical import SphericalRectangle
 from ..vec import Bools, Floats, Ints, dot, f4, put
-from .base import TINY, Light, LightSample, area_pdf, facing_area
+from .base import LEAST_SQUARE, Light, LightSample, area_pdf, facing_area
 
 NEAR = f4(2)  # squared distance, in areas, within which solid angle is sampled
 ROOT_NEAR = np.sqrt(NEAR)
@@ -58,7 +58,7 @@ class RectangleLights(Light):
         for lanes, seen in near:
             put(wi, lanes, seen.sample(u.take(lanes, 1)))
         d2 = dot(wi, wi)
-        distance = np.sqrt(d2 + TINY)
+        distance = np.sqrt(d2 + LEAST_SQUARE)
         wi /= distance
         cos_light = height / distance
         pdf = area_pdf(d2, cos_light, self.area)

@@ -7,13 +7,11 @@ from collections.abc import Callable
 from typing import Protocol, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..registry import Registry
 from ..sampling.discrete import Discrete, rounded_up
-from ..vec import Floats, Ints, broadcast, f4
+from ..vec import Doubles, Floats, Ints, broadcast, f4
 
-Doubles = NDArray[np.float64]
 MOST_CELLS = 32**3
 MOST_ENTRIES = 2**21  # cells times lights
 BY_POWER = 0.05  # part of the choice that stays with the power, so that no light is ever left out

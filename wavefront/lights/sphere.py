@@ -8,11 +8,8 @@ from numpy.typing import NDArray
 from ..frame import Frame
 from ..record import record
 from ..sampling.warp import uniform_cone, uniform_sphere
-from ..vec import Floats, dot, f4
+from ..vec import INV_FOUR_PI, TWO_PI, Floats, dot, f4
 from .base import Light, LightSample
-
-UNIFORM_SPHERE_PDF = f4(1 / (4 * np.pi))
-TWO_PI = f4(2 * np.pi)
 
 
 @record
@@ -36,7 +33,7 @@ class SphereLights(Light):
         beside = axis * distance - wi * along  # from the ray to the center; d² − along² would cancel
         half_chord = np.sqrt(np.maximum(self.radius**2 - dot(beside, beside), f4(0)))
         reach = np.where(outside, along - half_chord, along + half_chord)
-        pdf = np.where(outside, f4(1) / (TWO_PI * height), UNIFORM_SPHERE_PDF)
+        pdf = np.where(outside, f4(1) / (TWO_PI * height), INV_FOUR_PI)
         radiance = np.broadcast_to(self.radiance, wi.shape)
         return LightSample(wi, radiance, pdf, reach, half_chord / self.radius)
 
@@ -47,7 +44,7 @@ class SphereLights(Light):
         away = wi - axis
         meets = f4(0.5) * dot(away, away) <= height * f4(1 + 2**-20)  # 1 − cosθ without cancellation
         cone = np.where(meets, f4(1) / (TWO_PI * height), f4(0))
-        return np.where(outside, cone, UNIFORM_SPHERE_PDF)
+        return np.where(outside, cone, INV_FOUR_PI)
 
     def le(self, wi: Floats) -> Floats:
         """Return the radiance, (3, n)."""

@@ -11,7 +11,7 @@ from ..shapes import Mesh
 from ..shapes.attributes import Corners, corner_values
 from ..state import SurfaceInteraction
 from ..textures.base import BaseTexture
-from ..vec import Floats, Ints, cross, f4, normalize
+from ..vec import Floats, Ints, cross, f4, interpolate, normalize
 
 MOST_SAMPLES = 1 << 18  # points of a mesh that are looked up, if possible
 LEAST, MOST = 4, 32  # parts that an edge of a face is cut into
@@ -124,4 +124,4 @@ def _points(triangles: NDArray[np.float64], b1: Floats, b2: Floats) -> SurfaceIn
 def _interpolated(corners: Corners, b1: Floats, b2: Floats) -> Floats:
     """Values (width, m·k) at weights b1, b2 (k,) from those at the corners, 3 × (width, m)."""
     a, b, c = (corner[:, :, None] for corner in corners)
-    return (a * (f4(1) - b1 - b2) + b * b1 + c * b2).reshape(len(a), -1)
+    return interpolate(a, b, c, b1, b2).reshape(len(a), -1)

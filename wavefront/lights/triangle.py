@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..record import record
 from ..sampling.warp import uniform_triangle
 from ..vec import Floats, cross, dot, f4
-from .base import TINY, Light, LightSample, area_pdf, facing_area
+from .base import LEAST_SQUARE, Light, LightSample, area_pdf, facing_area
 
 
 @record
@@ -47,7 +47,7 @@ class TriangleLights(Light):
         wi += self.corner
         wi -= point
         d2 = dot(wi, wi)
-        distance = np.sqrt(d2 + TINY)
+        distance = np.sqrt(d2 + LEAST_SQUARE)
         wi /= distance
         cos_light = self._cosine(wi)
         pdf = area_pdf(d2, cos_light, self.area)

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError
-from ..vec import Floats, Ints, f4
+from ..vec import BELOW_ONE, Floats, Ints, f4
 
-_BELOW_ONE = f4(1 - 2.0**-24)
 _LARGE = 1 << 19  # items from which a guide table is kept short, for memory
 
 
@@ -84,7 +83,7 @@ class _Inversion:
                 target += row[short]
             flat[short] = np.searchsorted(self._sorted, target, side="right")
         rest = (u - self._start.take(flat)) / self._probability.take(flat)
-        return flat, np.clip(rest, 0, _BELOW_ONE).astype(f4)
+        return flat, np.clip(rest, 0, BELOW_ONE).astype(f4)
 
 
 def rounded_up(x: NDArray[np.float64]) -> Floats:

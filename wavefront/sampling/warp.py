@@ -9,15 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..elementary import log, sin_cos, sin_cos_turns
-from ..vec import Floats, f4, positive
+from ..vec import BELOW_ONE, INV_FOUR_PI, INV_PI, INV_TWO_PI, TINY, Floats, f4, positive
 
-INV_PI = f4(1 / np.pi)
-INV_TWO_PI = f4(0.5 / np.pi)
-INV_FOUR_PI = f4(0.25 / np.pi)
 HALF_PI = f4(np.pi / 2)
 QUARTER_PI = f4(np.pi / 4)
-_TINY = f4(1e-30)  # keeps 0/0 away
-_BELOW_ONE = 1 - 2.0**-24
 
 
 def cosine_hemisphere(u: Floats) -> Floats:
@@ -111,7 +106,7 @@ def uniform_disk(u: Floats) -> Floats:
     radius = np.maximum(size_a, size_b)
     # Angle in the first octant, then mirrored at the diagonal by arithmetic: `where` on random
     # masks is several times slower.
-    octant = np.minimum(size_a, size_b) * QUARTER_PI / np.maximum(radius, _TINY)
+    octant = np.minimum(size_a, size_b) * QUARTER_PI / np.maximum(radius, TINY)
     steep = (size_b >= size_a).astype(f4)
     phi = steep * HALF_PI + (f4(1) - f4(2) * steep) * octant
     out = np.empty_like(u)
@@ -212,7 +207,7 @@ def tent_inverse(x: Floats, radius: float = 1.0) -> Floats:
 def gaussian(u: Floats, sigma: float = 0.5, radius: float = 1.5) -> Floats:
     """Offsets (n,) of a normal distribution cut off at ±radius, from u (n,)."""
     inside = math.erf(radius / (sigma * math.sqrt(2)))
-    span = f4(min(inside, _BELOW_ONE))  # the inverse of ±1 is infinite
+    span = f4(min(inside, float(BELOW_ONE)))  # the inverse of ±1 is infinite
     x = _erfinv((f4(2) * u - f4(1)) * span) * f4(sigma * math.sqrt(2))
     return np.clip(x, f4(-radius), f4(radius))
 

@@ -12,8 +12,9 @@ from ..bsdfs import Bsdf
 from ..errors import SceneError, finite_array
 from ..suggestions import suggests_keywords
 from ..textures.base import BaseTexture
+from ..vec import FLOAT32_MAX
 from .base import Checked, Shape
-from .mesh import FLOAT32_MAX, Mesh, check_range
+from .mesh import Mesh, check_range
 from .transform import moved, moved_tangents
 
 SINGULAR = 1e-12  # the least of the lengths to which a transform stretches, as a part of the greatest

@@ -15,10 +15,9 @@ from ..errors import SceneError, finite_array
 from ..suggestions import suggests_keywords
 from ..textures.parameter import Color, color
 from ..textures.vertex_colors import VertexColors
-from ..vec import f4
+from ..vec import FLOAT32_MAX, f4
 from .base import Checked, Shape
 
-FLOAT32_MAX = float(np.finfo(np.float32).max)
 MOST_DOUBLINGS = 60  # from 1 to the lengths of vectors that stay as given
 FLOAT32_MIN = float(np.finfo(np.float32).tiny)
 

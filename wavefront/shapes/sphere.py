@@ -12,8 +12,9 @@ from ..bsdfs import Bsdf, Diffuse
 from ..errors import SceneError, finite_array, number, rgb
 from ..suggestions import suggests_keywords
 from ..textures.base import BaseTexture
+from ..vec import FLOAT32_MAX
 from .base import Checked, Shape
-from .mesh import FLOAT32_MAX, FLOAT32_MIN
+from .mesh import FLOAT32_MIN
 
 
 def _center(name: str, value: ArrayLike) -> NDArray[np.float64]:

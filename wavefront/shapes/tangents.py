@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..elementary import arccos
+from ..vec import Doubles
 from .mesh import Mesh
 
-Doubles = NDArray[np.float64]
 LONGEST = 2.0**60  # of tangents: float32 can square them
 
 

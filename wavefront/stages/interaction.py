@@ -8,7 +8,7 @@ from ..compile.instances import InstanceTable
 from ..compile.scene import CompiledScene
 from ..shapes.attributes import ATTRIBUTES, Corners
 from ..state import Hits, Rays, SurfaceInteraction
-from ..vec import ALL, Floats, Ints, Lanes, dot, f4, highest, length, normalize, signs, take
+from ..vec import ALL, Floats, Ints, Lanes, dot, f4, highest, interpolate, length, normalize, signs, take
 
 # o + t·d carries at most three roundings of half an ulp (2⁻²⁴) of its terms; this is five times that.
 POINT_ERROR = f4(2**-21)
@@ -157,4 +157,4 @@ def _interpolate(corners: list[Floats], hits: Hits) -> Floats:
     a, b, c = corners
     assert hits.b1 is not None
     assert hits.b2 is not None
-    return a * (f4(1) - hits.b1 - hits.b2) + b * hits.b1 + c * hits.b2
+    return interpolate(a, b, c, hits.b1, hits.b2)

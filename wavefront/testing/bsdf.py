@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from ..bsdfs.base import Bsdf, BsdfSample
 from ..state import SurfaceInteraction
-from ..vec import Bools, Floats, f4
-from .charts import CHARTS, Doubles, _uniform_sphere
+from ..vec import Bools, Doubles, Floats, f4
+from .charts import CHARTS, _uniform_sphere
 from .chi2 import _compare, binomial_p
 from .report import PAIRS, PILOT, Report
 

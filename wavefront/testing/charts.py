@@ -6,11 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..vec import Floats, f4
-
-Doubles = NDArray[np.float64]
+from ..vec import Doubles, Floats, f4
 
 
 @dataclass(frozen=True, slots=True)

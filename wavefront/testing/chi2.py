@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..vec import Floats, Ints
-from .charts import Chart, Doubles
+from ..vec import Doubles, Floats, Ints
+from .charts import Chart
 from .quadrature import COLUMNS, ROWS, Cells, _Integrator
 from .report import Report
 

@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..vec import Bools, Floats, Ints
-from .charts import Chart, Doubles
+from ..vec import Bools, Doubles, Floats, Ints
+from .charts import Chart
 
 ROWS, COLUMNS = 20, 40
 

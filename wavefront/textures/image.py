@@ -15,13 +15,12 @@ from ..errors import SceneError, finite_array, one_of
 from ..files import check_size
 from ..state import SurfaceInteraction
 from ..suggestions import suggests_keywords
-from ..vec import Floats, Ints, f4
+from ..vec import Floats, Ints, f4, luminance
 from .base import BaseTexture
 
 Wrap: TypeAlias = Literal["repeat", "mirror", "clamp"]
 Channel: TypeAlias = int | Literal["luminance"]
 UV_SETS = ("uv", "uv1")  # the fields of Surface
-LUMINANCE = (f4(0.2126), f4(0.7152), f4(0.0722))  # ITU-R BT.709
 
 CHUNK = 1 << 20  # texels that are looked at together
 
@@ -155,7 +154,7 @@ class Texture(BaseTexture):
     def _shaped(self, rows: list[Floats]) -> Floats:
         """Turn channel values (n,) into (3, n) or (n,), scaled."""
         if self._gray and len(rows) == 3:
-            rows = [LUMINANCE[0] * rows[0] + LUMINANCE[1] * rows[1] + LUMINANCE[2] * rows[2]]
+            rows = [luminance(rows)]
         if self.scalar:
             return self.scale[0, 0] * rows[0] + self.offset[0, 0]
         out = np.empty((3, len(rows[0])), f4)
