@@ -1,8 +1,8 @@
-"""Why a picture is black or white: the likely cause, found from the scene.
+"""The likely cause of a black or white picture.
 
-A few rays through the picture, and samples of light where they meet a surface, tell what is wrong. The checks
-go from what explains all of it to what explains less, and the first one that holds is named. They run for
-pictures alone that show nothing.
+The cause is found by a grid of camera rays and by light samples at the surfaces that they meet. The checks
+run from the most general cause to the most special one, and the first cause that applies is named. They run
+only for pictures that are black or white all over.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from .stages.intersect import intersect, shadow_rays, visible
 from .state import Hits, Rays, SurfaceInteraction
 from .vec import Bools, Ints, dot, f4
 
-FEWEST_PIXELS = 256  # a smaller picture is a measurement: nobody looks at it
-BLACK = (0.5 / 255) ** 2.2  # radiance below which a PNG holds 0
-DIM = 1e-3  # radiance below which a picture is black to the eye
+FEWEST_PIXELS = 256  # smaller pictures are measurements and are not checked
+BLACK = (0.5 / 255) ** 2.2  # radiance below which the code in a PNG is 0
+DIM = 1e-3  # radiance below which a picture looks black
 GRID = 16  # rays across the picture and down
-SAMPLES = 16  # of light at each point that is seen
+SAMPLES = 16  # light samples at each visible point
 
 
 def warn_of_black_or_white(
@@ -40,13 +40,13 @@ def warn_of_black_or_white(
     Parameters
     ----------
     image
-        What was rendered.
+        The picture.
     scene, compiled
-        What it shows, as it was put together and as it was rendered.
+        Its scene, as the user made it and as it was rendered.
     view
         The camera, in the units of `compiled`.
     integrator, max_bounces
-        How it was rendered.
+        Settings of the render.
     """
     if image.rgb.shape[0] * image.rgb.shape[1] < FEWEST_PIXELS:
         return
@@ -68,7 +68,7 @@ def warn_of_black_or_white(
 
 
 class Sight:
-    """What a camera sees of a scene, by a grid of rays."""
+    """The part of a scene that a camera sees, by a grid of rays."""
 
     def __init__(
         self, scene: Scene, compiled: CompiledScene, view: Camera, integrator: str, max_bounces: int
@@ -78,7 +78,7 @@ class Sight:
 
     @property
     def lights_are_off(self) -> bool:
-        """Whether there are lights, and each was told to send nothing."""
+        """True if there are lights, and all have zero radiance."""
         lights = self._compiled.lights
         if not len(lights) or lights.choice is not None:
             return False
@@ -113,7 +113,7 @@ class Sight:
             return f"the camera sees nothing but {self._name(self._seen.prim)}, which shines; {fix}"
         return f"its darkest pixel is {darkest:.3g}, and 1 is white; {fix}"
 
-    # --- What is seen ---------------------------------------------------------------------------------
+    # --- Visible surfaces -----------------------------------------------------------------------------
 
     @cached_property
     def _rays(self) -> Rays:
@@ -135,10 +135,10 @@ class Sight:
 
     @cached_property
     def _around(self) -> SurfaceInteraction:
-        """What lies around the camera, in all directions."""
+        """The surfaces around the camera, in all directions."""
         n = GRID * GRID
         height = 1 - (2 * np.arange(n) + 1) / n
-        turn = np.arange(n) * np.pi * (3 - np.sqrt(5))  # the golden angle spreads points evenly
+        turn = np.arange(n) * np.pi * (3 - np.sqrt(5))  # steps by the golden angle distribute points evenly
         level = np.sqrt(1 - height**2)
         direction = np.stack([level * np.cos(turn), height, level * np.sin(turn)]).astype(f4)
         rays = Rays(self._rays.origin[:, :1].repeat(n, 1), direction, np.full(n, -1, np.intp))
@@ -169,10 +169,10 @@ class Sight:
         numbers = np.searchsorted(ends, prims, "right")
         return repr(ordered[int(np.bincount(numbers).argmax())].name)
 
-    # --- What light reaches ---------------------------------------------------------------------------
+    # --- Light at surfaces ----------------------------------------------------------------------------
 
     def _why_no_light_arrives(self) -> str | None:
-        """Return what keeps light samples from all points that are seen; None if some arrive, or none are."""
+        """Return why light samples reach no visible point; None if some do, or there are no light samples."""
         if self._compiled.lights.choice is None:
             return None
         shining = facing = False
@@ -192,7 +192,7 @@ class Sight:
         return self._why_it_is_blocked(np.concatenate(blockers))
 
     def _light_samples(self) -> Iterator[tuple[LightSample, Bools]]:
-        """Yield samples of light at the points that are seen, and which of them carry any."""
+        """Yield light samples at the visible points, and a mask of those with radiance."""
         random = np.random.default_rng(0)
         n = len(self._seen)
         for _ in range(SAMPLES):
@@ -235,7 +235,7 @@ class Sight:
         return f"light comes through {name} alone, too seldom to be found by so few samples"
 
     def _why_it_is_not_found(self) -> str:
-        """Return why light that there is does not reach the camera."""
+        """Return why light that exists does not reach the camera."""
         if self._integrator == "naive" and self._compiled.lights.delta_of.all():
             return "the naive integrator meets lights by chance, and lights without size never"
         if self._integrator in ("direct_simple", "direct_mis"):

@@ -1,8 +1,8 @@
 """Ready-made light for scenes that have none of their own, and a ground that catches their shadow.
 
-The light of a preset is one image of an environment: a gradient with soft boxes painted into it. The boxes
-are above the horizon, as the lamps of a studio are. Below it and a little above it lies the backdrop, which a
-camera that looks level or down sees behind the scene.
+The light of a preset is an environment image: a gradient with soft boxes. The boxes are above the horizon, as
+in a photo studio. The image below and slightly above the horizon is the backdrop that a camera sees behind
+the scene if it looks horizontally or down.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from .vec import Doubles
 
 HEIGHT, WIDTH = 128, 256  # pixels of an environment's image
 GROUND_REACH = 6.0  # radius of the ground in radii of the scene
-GROUND_FADE = 0.25  # part of the ground's radius at which it begins to fade out
+GROUND_FADE = 0.25  # width of the faded rim, relative to the ground's radius
 MOST_GROUND = 0.9  # albedo of the ground at most
-GROUND_GAP = 1e-4  # between the scene and the ground, part of the scene's half height
+GROUND_GAP = 1e-4  # distance of the ground from the scene, relative to the scene's half height
 OWN_LIGHT_GROUND = 0.4  # albedo of the ground where no preset is used
 
 
@@ -41,8 +41,8 @@ class SoftBox:
     elevation: float  # degrees above the horizon
     width: float  # degrees, below 180
     height: float  # degrees, below 180
-    radiance: tuple[float, float, float]  # W·sr⁻¹·m⁻² in its middle
-    feather: float = 0.35  # part of the half width over which it fades out
+    radiance: tuple[float, float, float]  # W·sr⁻¹·m⁻² at the center
+    feather: float = 0.35  # width of the soft edge, relative to the half width
 
     def radiance_at(self, directions: Doubles) -> Doubles:
         """Return the radiance (H, W, 3) from unit directions (3, H, W): x right, y up, z to the camera."""
@@ -108,9 +108,9 @@ def _tinted(radiance: float, warmth: float) -> tuple[float, float, float]:
     return radiance * (1 + warmth), radiance, radiance * (1 - warmth)
 
 
-# A surface that faces the brightest side gets 0.9 to 1.1 times what an even environment of radiance 1
-# brings, so white keeps its shading. A camera at the height of that of `Scene.framing_camera` sees none
-# of the boxes, from whichever side.
+# A surface that faces the brightest side gets 0.9 to 1.1 times the irradiance of a constant environment of
+# radiance 1, so white surfaces are not clipped. A camera at the height of `Scene.framing_camera` sees no box,
+# from any side.
 PRESETS = {
     "studio": Preset(
         ((-1, 0.1), (-0.4, 0.1), (0.12, 0.045), (0.95, 0.18)),
@@ -150,16 +150,16 @@ def studio(preset: str = DEFAULT, *, up: ArrayLike = "y", camera: Camera | None 
         and back light, smaller, with harder shadows. "cloudy": an overcast sky, brightest overhead. "even":
         the same from all around.
     up
-        What is up in the scene: (3,), or the name of an axis, such as "z".
+        Up direction of the scene: (3,), or the name of an axis, such as "z".
     camera
-        Left, right, front and behind are those of this camera. By default they are those of
-        `Scene.framing_camera`, from wherever the scene is then rendered: the light stays where it is while a
-        camera goes around the scene.
+        Left, right, front and behind are relative to this camera. By default they are relative to
+        `Scene.framing_camera`, also if another camera renders the scene: the light stays in place while a
+        camera moves around the scene.
 
     Returns
     -------
     list
-        One `Environment`. All light comes from infinitely far away, so that it suits scenes of any size.
+        One `Environment`. Its light comes from infinity, so it suits scenes of any size.
 
     Raises
     ------
@@ -175,7 +175,7 @@ def studio(preset: str = DEFAULT, *, up: ArrayLike = "y", camera: Camera | None 
 
 
 def check_lighting(lighting: str | None) -> None:
-    """Check what `render` was given as `lighting`.
+    """Check the setting `lighting` of `render`.
 
     Raises
     ------
@@ -190,12 +190,12 @@ def check_lighting(lighting: str | None) -> None:
 def choose_preset(scene: Scene, lighting: str | None) -> str | None:
     """Return the preset that lights a scene; None for none.
 
-    "auto" is the default preset where nothing in the scene shines, with a warning, and none elsewhere.
+    "auto" means the default preset, with a warning, for a scene without lights, and none for other scenes.
 
     Raises
     ------
     SceneError
-        If a preset was asked for and the scene has an `Environment`.
+        If a preset is requested and the scene has an `Environment`.
     """
     if lighting == "auto":
         if scene.emits:
@@ -210,9 +210,9 @@ def choose_preset(scene: Scene, lighting: str | None) -> str | None:
 
 
 def _say_that_it_is_lit() -> None:
-    """Warn of the default light, from this line: Python shows a warning once for each line.
+    """Warn of the default light, at this line: Python shows a warning once for each line.
 
-    Where warnings are errors it is kept back: the default is documented and harms no picture.
+    Where warnings are errors, no warning is given: the default is documented and is not an error.
     """
     with suppress(UserWarning):
         warnings.warn(
@@ -223,7 +223,7 @@ def _say_that_it_is_lit() -> None:
 
 
 def lighted(scene: Scene, preset: str | None, *, ground: bool = False, up: ArrayLike = "y") -> Scene:
-    """Return the scene with the light of a preset, and with a ground; the scene itself stays as it is."""
+    """Return a copy of the scene with the light of a preset and a ground; the scene itself without both."""
     if preset is None and not ground:
         return scene
     complete = copy(scene)  # keeps the accelerators of the last render
@@ -237,13 +237,13 @@ def lighted(scene: Scene, preset: str | None, *, ground: bool = False, up: Array
 def _ground(scene: Scene, preset: str | None, up: ArrayLike) -> Mesh:
     """Return a level disk under a scene that fades out towards its rim.
 
-    Where it is not in shadow it is as bright as the lower half of the preset's environment, so that no edge
-    and no horizon shows.
+    Outside of shadows it is as bright as the lower half of the preset's environment, so neither an edge nor a
+    horizon is visible.
     """
     low, high = scene.bounds
     center, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     vertical = turned_up(upward("up", up))[:, 1]
-    depth = float(np.abs(vertical) @ (high - low)) / 2  # of the box's lowest corner under its middle
+    depth = float(np.abs(vertical) @ (high - low)) / 2  # of the lowest corner of the box below its center
     if preset is None:
         albedo = (OWN_LIGHT_GROUND,) * 3
     else:
@@ -266,7 +266,9 @@ def _axes(up: ArrayLike, camera: Camera | None) -> Doubles:
     vertical = turn[:, 1]
     front = turn @ FRAMING_VIEW if camera is None else camera.rotation[:, 2]
     if np.linalg.norm(np.cross(vertical, front)) < STEEP and camera is not None:
-        front = -camera.rotation[:, 1] * np.sign(vertical @ front)  # its lower edge when it looks down
+        front = -camera.rotation[:, 1] * np.sign(
+            vertical @ front
+        )  # towards the lower edge of its picture if it looks down
     right = np.cross(vertical, front)
     right /= np.linalg.norm(right)
     return np.stack([right, vertical, np.cross(right, vertical)], 1)

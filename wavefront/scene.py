@@ -1,4 +1,4 @@
-"""Scenes: what the user puts together, and the flat arrays that a render works on."""
+"""Scenes: shapes, lights and a camera, as the user puts them together."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .shapes import Instance, Mesh, Shape
 from .shapes.instance import instance_bounds
 from .suggestions import suggests_keywords
 
-FRAMING_VIEW = 0.35, 0.3, 1.0  # from the middle of a scene whose up is y to the camera that frames it
+FRAMING_VIEW = 0.35, 0.3, 1.0  # direction from the center of a scene to its framing camera, where y is up
 
 
 class Scene:
@@ -27,19 +27,19 @@ class Scene:
     Parameters
     ----------
     shapes
-        `Mesh`, `Sphere` and `Instance` objects, and what `Rectangle` and `Disk` return; one with an
-        emission is a light. Objects of trimesh are converted.
+        `Mesh`, `Sphere` and `Instance` objects, and what `Rectangle` and `Disk` return; shapes with
+        an emission are lights. Objects of trimesh are converted.
     lights
         `PointLight`, `SpotLight`, `DirectionalLight` and `Environment` objects, at most one
-        `Environment`. A scene where nothing shines is rendered in the light of a studio: see `render`.
+        `Environment`. A scene without any light is rendered in the light of a studio: see `render`.
     camera
-        Without one the scene is framed.
+        Without a camera, `render` uses `framing_camera`.
 
     Notes
     -----
-    All of it may be changed between renders; what is assigned or put into the lists is checked as it is
-    here. What a render builds to find the nearest surfaces is kept with the scene, and used again as long
-    as every vertex and sphere is where it was.
+    All of it may be changed between renders. Values that are assigned or added to the lists are checked as
+    in the constructor. The accelerator of a render is kept with the scene, and is used again as long as no
+    vertex and no sphere has moved.
 
     Raises
     ------
@@ -57,18 +57,18 @@ class Scene:
         self.shapes = shapes
         self.lights = lights
         self.camera = camera
-        self.accelerators = AcceleratorCache()  # of the last render, for the next
+        self.accelerators = AcceleratorCache()  # of the last render, for the next one
         self.check()
 
     def __repr__(self) -> str:
-        """Count what the scene holds."""
+        """Return the numbers of shapes and lights."""
         return (
             f"<Scene: {len(self.shapes)} shapes, {len(self.lights)} lights, camera={self.camera is not None}>"
         )
 
     @property
     def shapes(self) -> list[Shape]:
-        """What the scene is made of."""
+        """The shapes of the scene."""
         return self._shapes
 
     @shapes.setter
@@ -77,7 +77,7 @@ class Scene:
 
     @property
     def lights(self) -> list[UserLight]:
-        """What shines beside the shapes."""
+        """The lights of the scene, besides emitting shapes."""
         return self._lights
 
     @lights.setter
@@ -86,7 +86,7 @@ class Scene:
 
     @property
     def camera(self) -> Camera | None:
-        """What sees the scene; None frames it."""
+        """The camera; None means `framing_camera`."""
         return self._camera
 
     @camera.setter
@@ -101,7 +101,7 @@ class Scene:
         Raises
         ------
         SceneError
-            If an item is something else, or a second `Environment`; the scene is then as it was.
+            If an item is something else, or a second `Environment`; the scene is then unchanged.
         """
         shapes = Shapes([item for item in items if not isinstance(item, UserLight)])
         lights = Lights([*self.lights, *(item for item in items if isinstance(item, UserLight))])
@@ -111,7 +111,7 @@ class Scene:
         return self
 
     def check(self) -> None:
-        """Check what must hold of the scene as a whole.
+        """Check the scene as a whole.
 
         Raises
         ------
@@ -135,7 +135,7 @@ class Scene:
 
     @property
     def emits(self) -> bool:
-        """Whether anything in the scene shines."""
+        """True if the scene has any light."""
         return bool(self.lights) or any(shape.emission is not None for shape in self.shapes)
 
     @suggests_keywords
@@ -147,7 +147,7 @@ class Scene:
         up: ArrayLike = (0, 1, 0),
         direction: ArrayLike | None = None,
     ) -> Camera:
-        """Return a camera that sees the whole scene: from the front, a little above and to the right.
+        """Return a camera that sees the whole scene, from the front and slightly above and to the right.
 
         Parameters
         ----------
@@ -156,10 +156,10 @@ class Scene:
         size
             (width, height) in pixels.
         up
-            What is up in the picture: (3,), or the name of an axis, such as "z" for most STL and CAD
-            files. With "y" the front is where z points, with "z" where -y does.
+            Up direction of the picture: (3,), or the name of an axis, such as "z" for most STL and CAD
+            files. With "y" the front is the side of +z, with "z" that of -y.
         direction
-            (3,) from where the scene is seen instead: from its middle to the camera, of any length.
+            (3,) direction from the center of the scene to the camera, of any length, in place of the default.
 
         Raises
         ------
@@ -185,42 +185,42 @@ class Scene:
         camera_up = turn[:, 1]
         if (
             np.linalg.norm(np.cross(camera_up, view)) < 1e-6
-        ):  # seen from above or below: the front is at the bottom
+        ):  # seen from above or below: the front is at the bottom of the picture
             camera_up = -turn[:, 2] * np.sign(view @ camera_up)
         return Camera.look_at(eye, (low + high) / 2, camera_up, fov=fov, size=size)
 
 
 T = TypeVar("T")
 Importer: TypeAlias = Callable[[Any], Scene]
-_IMPORTERS: dict[str, Importer] = {}  # by the package of an object's type
+_IMPORTERS: dict[str, Importer] = {}  # by the package of an object's class
 
 
 def register_importer(package: str, convert: Importer) -> None:
-    """Let objects of a package's types stand wherever a scene takes shapes.
+    """Let scenes take objects of a package's classes in place of shapes.
 
     Parameters
     ----------
     package
-        The first part of the name of the modules that define the types.
+        First part of the name of the modules that define the classes.
     convert
-        Called with an object; returns a scene, of which the shapes are taken.
+        Called with an object; returns a scene, whose shapes are used.
     """
     _IMPORTERS[package] = convert
 
 
 def importer(item: Any) -> Importer | None:
-    """Return what turns an object of another package into a scene, None where nothing does."""
+    """Return the function that converts an object of another package to a scene, or None."""
     packages = (kind.__module__.split(".")[0] for kind in type(item).__mro__)
     return next((_IMPORTERS[package] for package in packages if package in _IMPORTERS), None)
 
 
 class CheckedList(list[T], ABC):
-    """A list that checks and converts what is put into it.
+    """A list that checks and converts its elements.
 
     Parameters
     ----------
     items
-        A list, or a lone element.
+        A list, or a single element.
     """
 
     name: ClassVar[str]
@@ -232,7 +232,7 @@ class CheckedList(list[T], ABC):
 
     @abstractmethod
     def converted(self, item: Any) -> list[T] | None:
-        """Return the elements that an item stands for, None if it stands for none."""
+        """Return the elements for an item, None if the item is not allowed."""
 
     def append(self, item: Any) -> None:
         """Add an element at the end."""
@@ -260,7 +260,7 @@ class CheckedList(list[T], ABC):
             super().__setitem__(slice(first, first + 1), self._all([value], first))
 
     def _all(self, items: Any, first: int) -> list[T]:
-        """Return the elements that items stand for; the first will be number `first` of the list."""
+        """Return the elements for items; `first` is the index of the first one in the list, for messages."""
         if isinstance(items, str | dict) or not isinstance(items, Iterable):
             raise SceneError(f"{self.name} must be a list of {self.allowed}, got {items!r}")
         found: list[T] = []

@@ -1,4 +1,4 @@
-"""Shapes: what a scene is made of."""
+"""Shapes: meshes, spheres and instances."""
 
 from .base import Shape
 from .disk import Disk

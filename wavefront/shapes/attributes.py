@@ -1,8 +1,8 @@
-"""What varies over a shape besides its place and normal: texture coordinates, vertex colors, tangents.
+"""Vertex attributes: texture coordinates, vertex colors, tangents.
 
-An attribute is interpolated over the triangles from its values at their corners, and computed on
-spheres. Only those are kept that a material of the scene reads, by the name of the field of
-`SurfaceInteraction` that takes it.
+An attribute is interpolated over a triangle from its values at the corners, and computed on spheres. Only
+attributes that a material of the scene reads are compiled, under the name of their field of
+`SurfaceInteraction`.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ Corners: TypeAlias = tuple[Floats, Floats, Floats]  # (width, m) values at the t
 
 @dataclass(frozen=True)
 class Attribute:
-    """Where the values of an attribute come from."""
+    """The source of the values of an attribute."""
 
     title: str  # for messages
-    default: tuple[float, ...]  # what a mesh without it has everywhere
-    given: Callable[[Mesh], NDArray[np.float64] | None]  # what the user gives for it
-    corners: Callable[[Mesh], NDArray[np.float64]]  # (m, 3, width), if it is given
+    default: tuple[float, ...]  # value of a mesh without it, everywhere
+    given: Callable[[Mesh], NDArray[np.float64] | None]  # the user's array for it
+    corners: Callable[[Mesh], NDArray[np.float64]]  # (m, 3, width), if the mesh has it
     on_spheres: Callable[[Floats, Floats], Floats]  # from outward unit normals (3, n) and radii: (width, n)
-    vectors: bool = False  # whether these are vectors, three numbers each, which instances turn and stretch
+    vectors: bool = False  # whether these are vectors of three numbers each, which instances transform
 
 
 def sphere_uv(normal: Floats, radius: Floats) -> Floats:

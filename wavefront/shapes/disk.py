@@ -25,19 +25,19 @@ def Disk(
     two_sided: bool = False,
     name: str = "disk",
 ) -> Mesh:
-    """Return a disk as a mesh: a regular polygon that has exactly the disk's area.
+    """Return a disk as a mesh: a regular polygon with exactly the area of the disk.
 
     Parameters
     ----------
     center
         (3,) scene units.
     normal
-        (3,) where the front looks, of any length.
+        (3,) normal of the front, of any length.
     radius
         Of the disk, scene units, above 0.
     segments
-        Corners of the polygon, from 3 to 65536. From 16 on its rim lies within
-        0.34·(π/segments)²·radius of the circle: 0.08 % of the radius for 64.
+        Corners of the polygon, from 3 to 65536. From 16 on, its distance from the circle is at most
+        0.34·(π/segments)²·radius: 0.08 % of the radius for 64.
     material, emission, two_sided, name
         As for `Mesh`. Texture coordinates span the square around the disk.
 

@@ -17,9 +17,9 @@ from .base import Checked, Shape
 from .mesh import Mesh, check_range
 from .transform import moved, moved_tangents
 
-SINGULAR = 1e-12  # the least of the lengths to which a transform stretches, as a part of the greatest
-MOST_PLACED = 1 << 16  # vertices that are placed at a time
-SURE = 1e-6  # a cheap bound of that ratio that is larger leaves no doubt
+SINGULAR = 1e-12  # least scale of a transform along an axis, relative to the greatest
+MOST_PLACED = 1 << 16  # vertices that are transformed at once
+SURE = 1e-6  # above this value, a cheap bound of that ratio is sufficient
 
 
 def _invertible(name: str, value: ArrayLike) -> NDArray[np.float64]:
@@ -37,19 +37,19 @@ def _invertible(name: str, value: ArrayLike) -> NDArray[np.float64]:
 
 
 class Instance(Shape):
-    """A mesh somewhere else: moved, turned, scaled, mirrored or sheared.
+    """A mesh placed by an affine transform: moved, rotated, scaled, mirrored or sheared.
 
-    A mesh that is placed many times takes the memory of one, and is prepared for rays once.
+    Many instances of a mesh store its arrays once and build its tree once.
 
     Parameters
     ----------
     mesh
         The mesh; instances of one mesh share the object.
     transform
-        (4, 4) affine matrix from the mesh's coordinates to the scene's, as it multiplies columns: the
-        shift is its last column. It must be invertible. One that mirrors leaves the front the front.
+        (4, 4) affine matrix from the mesh's coordinates to the scene's, for column vectors: the translation
+        is its last column. It must be invertible. A reflection keeps the front side.
     material
-        How this instance scatters light; by default as the mesh does.
+        Material of this instance; by default that of the mesh.
     name
         Used in messages; by default that of the mesh.
 
@@ -78,7 +78,7 @@ class Instance(Shape):
     def many(
         cls, mesh: Mesh, transforms: ArrayLike, *, material: Bsdf | None = None, name: str | None = None
     ) -> list[Instance]:
-        """Return instances of one mesh, much faster than one by one.
+        """Return instances of one mesh, much faster than by single calls.
 
         Parameters
         ----------
@@ -90,7 +90,7 @@ class Instance(Shape):
         Raises
         ------
         SceneError
-            As for `Instance`, naming the first transform that is wrong.
+            As for `Instance`. The message names the first invalid transform.
         """
         label = mesh.name if name is None else name
         matrices = finite_array(f"{label}: transforms", transforms, (None, 4, 4))
@@ -107,7 +107,7 @@ class Instance(Shape):
         return out
 
     def __repr__(self) -> str:
-        """Name the instance and where the mesh's origin is placed."""
+        """Return the name and the position of the mesh's origin."""
         return f"<Instance {self.name!r} of {self.mesh!r}: at {self.transform[:3, 3].tolist()}>"
 
     @property
@@ -126,7 +126,7 @@ class Instance(Shape):
         return instance_bounds([self])[0]
 
     def to_mesh(self) -> Mesh:
-        """Return a mesh of its own, with the vertices where the instance has them."""
+        """Return a mesh with the transformed vertices of the instance."""
         mesh = copy(self.mesh)
         mesh.name, mesh.material = self.name, self.material
         mesh.vertices, mesh.faces, mesh.normals = moved(
@@ -141,9 +141,9 @@ class Instance(Shape):
         Parameters
         ----------
         factor
-            Of lengths in the scene.
+            Factor of the lengths in the scene.
         mesh, own
-            What it places: its mesh, with the lengths there multiplied by `own`.
+            The mesh of the new instance: its mesh, with lengths multiplied by `own`.
         """
         instance = copy(self)
         instance.mesh, instance.transform = mesh, self.transform.copy()
@@ -153,18 +153,18 @@ class Instance(Shape):
 
 
 def can_place(mesh: Mesh, transforms: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which finite transforms (n, 4, 4) an `Instance` of the mesh can have, (n,)."""
+    """Return a mask (n,) of the finite transforms (n, 4, 4) that are valid for an `Instance` of the mesh."""
     good = (transforms[:, 3] == (0, 0, 0, 1)).all(1)
     linear = transforms[:, :3, :3]
-    # the ratio of the least stretch to the greatest is at least |det| / (sum of all squares)^1.5, which is
-    # cheap; only where that leaves it open are the stretches computed. Scaled, so that nothing overflows.
+    # The ratio of the least scale to the greatest is at least |det| / (sum of all squares)^1.5, which is
+    # cheap. Only where this bound does not decide, the scales are computed. Normalized against overflow.
     largest = np.abs(linear).max((1, 2))
     unit = linear / np.where(largest > 0, largest, 1)[:, None, None]
     least = np.abs(np.linalg.det(unit)) / np.maximum((unit**2).sum((1, 2)), 1) ** 1.5
     open_ = np.flatnonzero(good & (least < SURE))
     stretch = np.linalg.svd(linear[open_], compute_uv=False)
     good[open_] = stretch[:, 2] > SINGULAR * stretch[:, 0]
-    # the same for the range: a bound first, then the vertices themselves
+    # the same for the range: first a bound, then the vertices themselves
     reach = np.abs(mesh.vertices).max(0)
     with np.errstate(over="ignore", invalid="ignore"):
         bound = (np.abs(linear) * reach).sum(2) + np.abs(transforms[:, :3, 3])
@@ -174,7 +174,7 @@ def can_place(mesh: Mesh, transforms: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def instance_bounds(instances: Sequence[Instance]) -> NDArray[np.float64]:
-    """Return the `bounds` of instances, (n, 2, 3), those of one mesh together."""
+    """Return the `bounds` of instances, (n, 2, 3); instances of one mesh are computed together."""
     out = np.empty((len(instances), 2, 3))
     numbers: dict[int, list[int]] = {}  # by mesh
     for number, instance in enumerate(instances):
@@ -194,6 +194,6 @@ def instance_bounds(instances: Sequence[Instance]) -> NDArray[np.float64]:
 
 
 def _placed(transform: NDArray[np.float64], vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return where a transform places vertices (n, 3), (3, n)."""
+    """Return the transformed vertices (3, n) of vertices (n, 3)."""
     with np.errstate(over="ignore", invalid="ignore"):
         return transform[:3, :3] @ vertices.T + transform[:3, 3:]

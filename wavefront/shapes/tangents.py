@@ -1,4 +1,4 @@
-"""How the points of a mesh move with its texture coordinates, and what normal maps make of it."""
+"""Tangents of meshes: derivatives by texture coordinates, and the tangent frames of normal maps."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ LONGEST = 2.0**60  # of tangents: float32 can square them
 def mesh_tangents(mesh: Mesh, uvs: Doubles | None) -> Doubles:
     """Return dP/du and dP/dv at the corners of the faces, (m, 3, 6), scene units.
 
-    They are constant on the facets of a flat mesh. On a smooth one they are averaged around each
-    vertex over the faces that share it and are not mirrored against each other, weighted by their
-    angles there, as in M. Mikkelsen 2008, "Simulation of Wrinkled Surfaces Revisited", section 3.4
-    (MikkTSpace). Zero where the texture coordinates of a face span no area, or so little that the
-    tangents are longer than `LONGEST`.
+    They are constant on the facets of a flat mesh. On a smooth mesh they are averaged at each vertex over
+    the faces that share it and have the same orientation of texture coordinates, weighted by their angles,
+    as in M. Mikkelsen 2008, "Simulation of Wrinkled Surfaces Revisited", section 3.4
+    (MikkTSpace). Zero where the texture coordinates of a face span no area, or so small an area
+    that the tangents are longer than `LONGEST`.
     """
     flat = np.zeros((len(mesh.faces), 6))
     if uvs is None:
@@ -37,10 +37,10 @@ def mesh_tangents(mesh: Mesh, uvs: Doubles | None) -> Doubles:
 
 
 def mesh_axes(mesh: Mesh, uvs: Doubles | None) -> Doubles:
-    """Return along what red and green of normal maps lean at the corners of the faces, (m, 3, 6).
+    """Return the axes of red and green of normal maps at the corners of the faces, (m, 3, 6).
 
-    Those are the mesh's own tangents and bitangents (glTF 2.0, section 3.7.2.1: normal × tangent · w),
-    without them dP/du and dP/dv. Lengths do not count.
+    These are the mesh's own tangents and bitangents (glTF 2.0, section 3.7.2.1: normal × tangent · w), or
+    else dP/du and dP/dv. Their lengths have no meaning.
     """
     if mesh.tangents is None or mesh.normals is None:
         return mesh_tangents(mesh, uvs)
@@ -50,7 +50,7 @@ def mesh_axes(mesh: Mesh, uvs: Doubles | None) -> Doubles:
 
 
 def _smooth(mesh: Mesh, flat: Doubles, area: Doubles, angles: Doubles) -> Doubles:
-    """Average the tangents (m, 6) of faces around each vertex: directions and lengths apart."""
+    """Average the tangents (m, 6) of faces at each vertex, directions and lengths separately."""
     groups = (2 * mesh.faces + (area > 0)[:, None]).ravel()
     weights = (angles * (area != 0)[:, None]).ravel()
     total = np.bincount(groups, weights)

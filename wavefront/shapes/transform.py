@@ -12,7 +12,7 @@ IDENTITY = np.eye(4)
 def moved_tangents(matrix: np.ndarray, tangents: np.ndarray | None) -> np.ndarray | None:
     """Apply a (4, 4) affine matrix to tangents (n, 4); a reflection changes their handedness.
 
-    Those that it takes to zero stay zero.
+    Tangents that become zero stay zero.
     """
     if tangents is None or (matrix == IDENTITY).all():
         return tangents
@@ -25,7 +25,7 @@ def moved_tangents(matrix: np.ndarray, tangents: np.ndarray | None) -> np.ndarra
 def moved(
     matrix: np.ndarray, vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-    """Apply a (4, 4) affine matrix; a reflection also turns the faces, so that fronts stay fronts."""
+    """Apply a (4, 4) affine matrix; a reflection also reverses the faces, to keep their front sides."""
     linear, shift = matrix[:3, :3], matrix[:3, 3]
     if (matrix == IDENTITY).all():
         return vertices, faces, normals
@@ -35,7 +35,7 @@ def moved(
     if mirrored:
         faces = faces[:, ::-1]
     if normals is not None:
-        # the matrix of cofactors turns normals also where a flat thing is scaled by 0 across
+        # the matrix of cofactors transforms normals also if the scale along them is 0
         a, b, c = linear.T
         cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
         normals = normals @ (-cofactors if mirrored else cofactors).T
