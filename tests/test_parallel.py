@@ -319,3 +319,33 @@ def test_ctrl_c_stops_processes() -> None:
         pictures.append(np.asarray(caught.value.image).tobytes())
     assert pictures[0] == pictures[1]
     assert not multiprocessing.active_children()
+
+
+@processes
+def test_a_queue_of_results_is_closed_by_two_threads_at_once() -> None:
+    """As when stopped workers are killed while the pool shuts down: no file is closed twice."""
+    from wavefront.scheduling.processes import _Fork
+
+    interval = sys.getswitchinterval()
+    failures: list[OSError] = []
+
+    def attempt(close: Callable[[], None]) -> None:
+        try:
+            close()
+        except OSError as error:
+            failures.append(error)
+
+    sys.setswitchinterval(1e-6)
+    try:
+        for _ in range(300):
+            queue = _Fork().SimpleQueue()
+            threads = [
+                threading.Thread(target=attempt, args=(close,)) for close in (queue.close, queue.close_writer)
+            ]
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join()
+    finally:
+        sys.setswitchinterval(interval)
+    assert failures == []

@@ -148,7 +148,7 @@ def test_tangents_move_with_their_mesh(matrix, shared):
 def test_bad_tangents():
     with pytest.raises(wf.SceneError, match="mesh: has tangents without normals; pass both"):
         square(tangents=[[1, 0, 0, 1]] * 4)
-    with pytest.raises(wf.SceneError, match=r"mesh: tangents must have shape \(4, 4\), got \(4, 3\)"):
+    with pytest.raises(wf.SceneError, match=r"mesh: tangents must have shape \(n, 4\), got \(4, 3\)"):
         square(normals=[[0, 0, 1]] * 4, tangents=[[1, 0, 0]] * 4)
 
 

@@ -20,6 +20,7 @@ from contextlib import contextmanager, suppress
 from multiprocessing.connection import wait
 from multiprocessing.context import ForkContext, ForkProcess
 from multiprocessing.process import BaseProcess
+from multiprocessing.queues import SimpleQueue
 from typing import Any
 
 import numpy as np
@@ -69,6 +70,24 @@ class Processes:
             raise
 
 
+class _ResultQueue(SimpleQueue):
+    """A queue that two threads may close at once: a connection that is closed twice closes another file."""
+
+    def __init__(self, *, ctx: Any) -> None:
+        super().__init__(ctx=ctx)
+        self._closing = threading.Lock()
+
+    def close(self) -> None:
+        """Close both ends."""
+        with self._closing:
+            super().close()
+
+    def close_writer(self) -> None:
+        """Close the end that is written to, so that nobody waits for more."""
+        with self._closing:
+            self._writer.close()
+
+
 class _Fork(ForkContext):
     """Makes what a pool of processes consists of, and remembers it, so that it can be ended from outside."""
 
@@ -85,7 +104,7 @@ class _Fork(ForkContext):
 
     def SimpleQueue(self) -> Any:
         """Make the queue of results."""
-        queue = super().SimpleQueue()
+        queue = _ResultQueue(ctx=self.get_context())
         self._results.append(queue)
         return queue
 
@@ -111,7 +130,7 @@ class _Fork(ForkContext):
         for process in self._alive(0):
             process.kill()
         for queue in self._results:
-            queue._writer.close()
+            queue.close_writer()
 
     def _alive(self, timeout: float) -> list[BaseProcess]:
         """Return the processes that have not ended; if there are any, wait so long for one to end."""
