@@ -85,7 +85,7 @@ class _ResultQueue(SimpleQueue):
     def close_writer(self) -> None:
         """Close the end that is written to, so that nobody waits for more."""
         with self._closing:
-            self._writer.close()
+            self._writer.close()  # type: ignore[attr-defined]
 
 
 class _Fork(ForkContext):
