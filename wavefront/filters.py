@@ -1,7 +1,7 @@
-"""Reconstruction filters, by where in and around its pixel a sample falls.
+"""Reconstruction filters, by filter importance sampling.
 
-A sample counts only for its own pixel and with weight 1; how its position is distributed is the
-filter. So samples of different pixels share nothing, and no filter has negative lobes.
+A sample counts only for its own pixel and with weight 1; the distribution of its position is the filter.
+So pixels share no samples, and no filter has negative lobes.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ GAUSSIAN_RADIUS = 1.5  # pixels from the center to where the Gaussian is cut off
 
 
 def box(u: Floats) -> Floats:
-    """Fill the pixel evenly: u (2, n) in [0, 1)² is the position from its corner, (2, n) pixels."""
+    """Distribute uniformly: u (2, n) in [0, 1)² is the position from the pixel's corner, in pixels."""
     return u
 
 
