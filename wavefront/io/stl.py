@@ -1,38 +1,35 @@
-"""STL: binary files and texts, read by trimesh after a check of their counts."""
+"""STL: trimesh reads binary files and texts, after a check of what they claim against what they hold."""
 
 from __future__ import annotations
 
-from io import BytesIO
-from typing import Any
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import SceneError
 from ..files import decode
+from .lines import NUMBER, check_lines, words
 from .repair import RawMesh, warn, wide
-from .trimesh_loading import typed_errors
-from .words import sort_lines
+from .trimesh_loading import geometries
 
-COLORS = (b"COLOR=", b"MATERIAL=")  # keywords that Materialize Magics writes into the header
-FACET = ("facet", "outer", "endloop", "endfacet")  # keywords of a text without further information
+COLORS = (b"COLOR=", b"MATERIAL=")  # what Materialize Magics writes into the header
+OTHERS = ("", "facet", "outer", "endloop", "endfacet")  # lines of a text that say nothing more
 
 
 def parse(name: str, data: bytes, strict: bool = False) -> list[RawMesh]:
-    """Read the solids of an STL file. Its normals are those of the facets and are not read.
+    """Read the solids of an STL file; the normals in it are those of the facets and are left out.
 
-    Some programs store colors in a binary file. There are two conventions, which contradict each other, so
-    colors are left out with a warning.
+    Some programs hide colors in a binary file. There are two ways, which contradict each other, so
+    these are left out with a warning.
 
     Raises
     ------
     SceneError
-        If the file is malformed, or `strict` and it has colors. The message names the file, and the line of a
-        text.
+        Naming the file, and the line of a text; or if `strict` and there are colors.
     """
     count = int.from_bytes(data[80:84], "little")
     if len(data) >= 84 and len(data) == 84 + 50 * count:
-        return [RawMesh("", *mesh) for mesh in _binary(name, data, strict)]
+        return _binary(name, data, strict)
     if data.lstrip()[:5].lower() == b"solid":
         return _text(name, decode(data))
     if len(data) < 84:
@@ -40,56 +37,54 @@ def parse(name: str, data: bytes, strict: bool = False) -> list[RawMesh]:
     raise SceneError(f"{name}: claims {count} faces, {84 + 50 * count} bytes; it has {len(data)}")
 
 
-def _read(name: str, data: bytes) -> list[dict[str, Any]]:
+def _binary(name: str, data: bytes, strict: bool) -> list[RawMesh]:
     from trimesh.exchange.stl import load_stl
 
-    with typed_errors(name, "stl"):
-        found = load_stl(BytesIO(data))
-    return list(found["geometry"].values()) if "geometry" in found else [found]
-
-
-def _binary(name: str, data: bytes, strict: bool) -> list[tuple[Any, Any]]:
     colored = [f"{word.decode()} in the header" for word in COLORS if word in data[:80]]
-    meshes = _read(name, data)
+    meshes = geometries(name, "stl", load_stl, data)
     extra = [mesh["face_attributes"]["stl"] for mesh in meshes]
     if extra and extra[0].any():
         colored.append(f"colors of facets (facet {int((extra[0] != 0).argmax())})")
     if colored:
         warn(f"{name}: not honored: {', '.join(colored)}", strict)
-    return [(wide(mesh["vertices"]), mesh["faces"]) for mesh in meshes]
+    return [RawMesh("", wide(mesh["vertices"]), mesh["faces"]) for mesh in meshes]
 
 
 def _text(name: str, text: str) -> list[RawMesh]:
-    """Check a text, and read its vertices by trimesh, which must not see the names of solids."""
-    lines = [line.strip() for line in text.replace("\t", " ").split("\n")]
-    (vertices, starts, ends, *_), others = sort_lines(
-        [line.lower() for line in lines], "vertex", "solid", "endsolid", *FACET
-    )
-    solid = np.searchsorted(starts.numbers, vertices.numbers) - 1  # index of each vertex's solid
-    closed = (
-        np.searchsorted(ends.numbers, vertices.numbers) > np.searchsorted(ends.numbers, starts.numbers)[solid]
-    )
-    bad = np.sort(np.r_[others + 1, vertices.numbers[closed]])
-    if len(bad):
-        raise SceneError(f"{name} line {bad[0]}: {lines[bad[0] - 1][:40]!r} is not STL")
-    if len(ends.numbers) == 0 or ends.numbers[-1] < starts.numbers[-1]:
+    """Check a text, and let trimesh read its vertices; it would also look for them in the names of solids."""
+    from trimesh.exchange.stl import load_stl_ascii
+
+    lines = [line.strip() for line in text.split("\n")]
+    solids: list[tuple[str, list[int]]] = []  # name, lines of the vertices
+    inside = False
+    for at, keyword in enumerate(check_lines(lines, partial(_check, name))):
+        inside = keyword == "solid" or (inside and keyword != "endsolid")
+        if keyword == "solid":
+            solids.append((lines[at][5:].strip(), []))
+        elif keyword == "vertex" and inside:
+            solids[-1][1].append(at)
+        elif keyword == "vertex":
+            raise SceneError(f"{name} line {at + 1}: {lines[at][:40]!r} is not STL")
+    if inside:
         raise SceneError(f"{name}: ends early: the text has no endsolid")
-    wrong = vertices.numbers[vertices.widths != 3][:1].tolist() or vertices.not_a_number()
-    if wrong:
-        rest = lines[wrong[0] - 1].partition(" ")[2]
-        raise SceneError(f"{name} line {wrong[0]}: vertex is {rest!r}; it must be 3 numbers")
-    solids: list[tuple[str, NDArray[np.intp]]] = []  # name, line of each facet's first vertex
-    written: list[str] = []
-    for chosen in np.split(np.arange(len(solid)), np.flatnonzero(np.diff(solid)) + 1) if len(solid) else []:
-        title = lines[starts.numbers[solid[chosen[0]]] - 1][5:].strip()
-        if len(chosen) % 3:
-            raise SceneError(
-                f"{name}: solid {title!r} has {len(chosen)} vertices; facets need a multiple of 3"
-            )
-        written += [f"solid {len(solids)}", *("vertex" + vertices.texts[i] for i in chosen), "endsolid"]
-        solids.append((title, vertices.numbers[chosen[::3]]))
-    meshes = _read(name, "\n".join(written).encode()) if solids else []
-    return [
-        RawMesh(title, mesh["vertices"], mesh["faces"], lines=numbers)
-        for (title, numbers), mesh in zip(solids, meshes, strict=True)
-    ]
+    raws = []
+    for title, vertices in solids:
+        if len(vertices) % 3:
+            has = f"has {len(vertices)} vertices; facets need a multiple of 3"
+            raise SceneError(f"{name}: solid {title!r} {has}")
+        written = "\n".join(["solid", *(lines[at] for at in vertices), "endsolid"]).encode()
+        for mesh in geometries(name, "stl", load_stl_ascii, written):
+            numbers = np.array(vertices[::3]) + 1
+            raws.append(RawMesh(title, mesh["vertices"], mesh["faces"], lines=numbers))
+    return raws
+
+
+def _check(name: str, number: int, line: str) -> str:
+    """Return the keyword of a line; raise a SceneError if no line of its form is right."""
+    keyword, *rest = words(line.lower()) or [""]
+    if keyword not in (*OTHERS, "vertex", "solid", "endsolid"):
+        raise SceneError(f"{name} line {number}: {line[:40]!r} is not STL")
+    if keyword == "vertex" and not (len(rest) == 3 and all(map(NUMBER.fullmatch, rest))):
+        text = line[6:].strip()
+        raise SceneError(f"{name} line {number}: vertex is {text!r}; it must be 3 numbers")
+    return keyword

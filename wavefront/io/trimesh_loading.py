@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from typing import Any
@@ -77,6 +77,19 @@ def by_trimesh(name: str, data: bytes, kind: str, images: Any = None, skip_mater
         if kind == "dae":
             return _unprocessed(trimesh.exchange.dae.load_collada(BytesIO(data), images))
         return trimesh.load_scene(BytesIO(data), file_type=kind, process=False, resolver=images, **options)
+
+
+def geometries(name: str, kind: str, load: Callable[[BytesIO], Any], data: bytes) -> list[dict[str, Any]]:
+    """Return what one of trimesh's loaders reads, before a trimesh object rounds colors and joins vertices.
+
+    Raises
+    ------
+    SceneError
+        For whatever the loader raises, except that memory is short.
+    """
+    with typed_errors(name, kind):
+        found = load(BytesIO(data))
+    return list(found["geometry"].values()) if "geometry" in found else [found]
 
 
 @contextmanager
