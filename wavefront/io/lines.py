@@ -1,4 +1,4 @@
-"""A check of every line of a text that looks only once at lines that differ in nothing but their digits."""
+"""Checking the lines of a text, where lines that differ only in their digits are checked once."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ NUMBER = re.compile(r"[-+]?((\d+\.?\d*|\.\d+)(e[-+]?\d+)?|inf|infinity|nan)", re
 
 
 def words(line: str) -> list[str]:
-    """Return the words of a line; as in C, no blank but those of ASCII separates them."""
-    return re.findall(r"\S+", line, re.ASCII)
+    """Return what blanks separate; other white space is part of the words."""
+    return [word for word in line.split(" ") if word]
 
 
 def check_lines(lines: list[str], check: Callable[[int, str], Result]) -> list[Result]:
@@ -29,8 +29,7 @@ def check_lines(lines: list[str], check: Callable[[int, str], Result]) -> list[R
         the result for the first of them, so it may not depend on the values of numbers.
     """
     forms = "\n".join(lines).encode().translate(DIGITS).split(b"\n")
-    results: dict[bytes, Result] = {}
-    for number, (form, line) in enumerate(zip(forms, lines, strict=True), 1):
-        if form not in results:
-            results[form] = check(number, line)
+    first = dict(zip(reversed(forms), range(len(forms), 0, -1), strict=True))
+    numbers = sorted(first.items(), key=lambda item: item[1])
+    results = {form: check(number, lines[number - 1]) for form, number in numbers}
     return [results[form] for form in forms]

@@ -1,18 +1,20 @@
-"""Wavefront OBJ: trimesh reads the geometry, after a check for what it would misread or pass over.
+"""Wavefront OBJ. trimesh reads the geometry, after a check for errors that it ignores.
 
-trimesh takes index 0 for the first vertex, counts backwards from the end of the file and not from the face's
-own line, and drops short lines, and the uvs and normals of faces that mix forms. It gets the lines of v, vt,
-vn and f and no others, with numbers for the names of materials, which may hold anything.
+trimesh takes index 0 for the first vertex, counts negative indices from the end of the file and not from the
+face's own line, and drops short lines and the uvs and normals of faces of mixed forms. So every line is
+checked, and faces that it would misread are rewritten. trimesh gets only the lines of v, vt, vn and f, with
+numbers in place of the names of materials, which may contain any characters.
 """
 
 from __future__ import annotations
 
 import re
 from bisect import bisect
+from collections import defaultdict
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,31 +23,46 @@ from .lines import NUMBER, check_lines, words
 from .repair import RawMesh, warn
 from .trimesh_loading import geometries
 
-SILENT = ("", "o", "g")  # keywords that say nothing about what a surface looks like
-OFF = ("off", "0")  # values with which a keyword asks for nothing
-LEAST = {"v": 3, "vt": 1, "vn": 3, "f": 3}  # words that a line must have
+UNSEEN = ("", "o", "g")  # keywords without an effect on the look of a surface
+OFF = ("off", "0")  # values that switch a keyword off
+NAMED = ("usemtl", "mtllib", "o ", "g ")  # statements with a name, which may contain a #
+LEAST = {"v": 3, "vt": 1, "vn": 3, "f": 3}  # least number of words of a line
+NUMBERS = (NUMBER, ", which is not a number", "numbers", "must have")
 INDEX = r"[-+]?0{0,99}\d{1,19}"
 CORNER = re.compile(rf"{INDEX}(/({INDEX})?(/{INDEX})?)?/*", re.ASCII)
+CORNERS = (CORNER, "; a corner is v, v/vt, v//vn or v/vt/vn", "corners", "needs")
 PLAIN = {"1": [0], "1/1": [0, 1], "1//1": [0, 2], "1/1/1": [0, 1, 2]}  # which of v, vt, vn a corner has
-
-Rows = dict[str, list[int]]  # the lines of v, vt and vn, from 0
 
 
 @dataclass
 class Obj:
-    """What an OBJ file says."""
+    """The content of an OBJ file."""
 
     raws: list[RawMesh] = field(default_factory=list)  # by material; colors sRGB, NaN where a line has none
     libraries: list[str] = field(default_factory=list)  # material files, as written
-    ignored: dict[str, int] = field(default_factory=dict)  # what is not read -> its first line
+    ignored: dict[str, int] = field(default_factory=dict)  # keyword that is not read -> its first line
 
 
 class Kind(NamedTuple):
-    """What a line is, whatever its digits."""
+    """The kind of a line, whatever its digits."""
 
     keyword: str = ""  # v, vt, vn or f; empty for all others
-    width: int = 0  # how many words follow
-    form: str = ""  # of f: how all corners look, with 1 for every number; empty if they differ
+    width: int = 0  # number of words that follow
+    form: str = ""  # of f: the corners with 1 for every number; empty if they differ
+
+
+@dataclass
+class _Lines:
+    """The lines of a file. Lines are counted from 0."""
+
+    name: str  # of the file
+    texts: list[str]
+    kinds: list[Kind]
+    rows: dict[str, list[int]] = field(default_factory=lambda: {"v": [], "vt": [], "vn": []})  # by keyword
+    groups: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))  # of f, by material
+    absent: dict[str, str] = field(
+        default_factory=dict
+    )  # vt, vn that faces use but no line gives -> a message
 
 
 def parse(name: str, text: str, strict: bool = False) -> Obj:
@@ -54,71 +71,59 @@ def parse(name: str, text: str, strict: bool = False) -> Obj:
     Raises
     ------
     SceneError
-        Naming the file, the line, what stands there and what is allowed.
+        If a line is malformed. The message names the file, the line, its text and what is allowed.
     """
-    lines = _clean(text)
-    kinds = check_lines(lines, partial(_check, name))
-    out, material, smooth = Obj(), "", []
-    rows: Rows = {"v": [], "vt": [], "vn": []}
-    groups: dict[str, list[int]] = {}  # the lines of f, from 0, by material
-    for at, (keyword, width, _) in enumerate(kinds):
+    texts = _clean(text)
+    lines, out, smooth = _Lines(name, texts, check_lines(texts, partial(_check, name))), Obj(), []
+    material = ""
+    for at, (keyword, width, _) in enumerate(lines.kinds):
         if keyword == "f":
-            groups.setdefault(material, []).append(at)
+            lines.groups[material].append(at)
         elif keyword:
-            rows[keyword].append(at)
+            lines.rows[keyword].append(at)
             if width > 6 and keyword == "v":
                 out.ignored.setdefault("numbers of v after the sixth", at + 1)
         else:
-            keyword, _, rest = lines[at].partition(" ")
+            keyword, _, rest = (part.strip() for part in texts[at].partition(" "))
             if keyword == "usemtl":
-                material = rest.strip()
+                material = rest
             elif keyword == "mtllib":
-                out.libraries.append(rest.strip())
-            elif keyword == "s" and rest.strip() not in OFF:
+                out.libraries.append(rest)
+            elif keyword == "s" and rest not in OFF:
                 smooth.append(at + 1)
-            elif keyword not in SILENT and rest.strip() not in OFF:
+            elif keyword not in UNSEEN and rest not in OFF:
                 out.ignored.setdefault(keyword, at + 1)
-    if not groups:
+    if not lines.groups:
         raise SceneError(f"{name}: has no faces")
-    written = _tables(lines, kinds, rows) + _faces(name, lines, kinds, rows, list(groups.values()), strict)
-    out.raws = _read(name, "\n".join(written).encode())
-    for raw, (material, group) in zip(out.raws, groups.items(), strict=True):
-        numbers, triangles = np.array(group) + 1, np.array([kinds[at].width - 2 for at in group])
-        raw.name = material
-        # of quads alone, trimesh lists all first halves, then all second halves
-        raw.lines = np.tile(numbers, 2) if (triangles == 2).all() else np.repeat(numbers, triangles)
+    meshes = geometries(name, "obj", "\n".join(_tables(lines) + _faces(lines)).encode())
+    for message in lines.absent.values():
+        warn(message, strict)
+    # trimesh lists the last mesh first
+    out.raws = [_raw(lines, *mesh) for mesh in zip(lines.groups, reversed(meshes), strict=True)]
     if smooth and any(raw.normals is None or not raw.normals.any(axis=1).all() for raw in out.raws):
         out.ignored["s, of faces without normals"] = smooth[0]
     return out
 
 
 def _clean(text: str) -> list[str]:
-    """Return the lines without comments; what a backslash continues stays on its first line."""
+    """Return the lines without comments; lines that a backslash continues are joined to their first line."""
     if "\\\n" in text:
         text = re.sub(
             r"(?m)^(?:.*\\\n)+.*", lambda m: m[0].replace("\\\n", " ") + "\n" * m[0].count("\\\n"), text
         )
-    lines = list(map(str.strip, text.replace("\t", " ").split("\n")))
-    if "#" not in text:
-        return lines
-    # a name may hold a #, so only whole-line comments and those behind numbers go
-    named = ("usemtl", "mtllib", "o ", "g ")
-    return [x if "#" not in x or x.startswith(named) else x.partition("#")[0].rstrip() for x in lines]
+    lines = map(str.strip, text.replace("\t", " ").split("\n"))
+    return [x if "#" not in x or x.startswith(NAMED) else x.partition("#")[0].rstrip() for x in lines]
 
 
 def _check(name: str, number: int, line: str) -> Kind:
-    """Return the kind of a line; raise a SceneError if no line of its form is right."""
+    """Return the kind of a line; raise a SceneError if lines of its form are malformed."""
     keyword, *rest = words(line) or [""]
     place = f"{name} line {number}"
     if keyword not in LEAST:
         if keyword and not keyword.isidentifier():
             raise SceneError(f"{place}: {line[:40]!r} is not OBJ")
         return Kind()
-    pattern, rule, what, must = (
-        (CORNER, "; a corner is v, v/vt, v//vn or v/vt/vn", "corners", "needs")
-        if keyword == "f"
-        else (NUMBER, ", which is not a number", "numbers", "must have")
-    )
+    pattern, rule, what, must = CORNERS if keyword == "f" else NUMBERS
     for word in rest:
         if not pattern.fullmatch(word):
             raise SceneError(f"{place}: {keyword} holds {word!r}{rule}")
@@ -129,77 +134,72 @@ def _check(name: str, number: int, line: str) -> Kind:
     return Kind(keyword, len(rest), forms.pop() if len(forms) == 1 else "")
 
 
-def _tables(lines: list[str], kinds: list[Kind], rows: Rows) -> list[str]:
+def _tables(lines: _Lines) -> list[str]:
     """Return the lines of v, vt and vn, all of one keyword with the same number of words."""
-    colored = any(kinds[at].width >= 6 for at in rows["v"])
-    out = []
-    for keyword, width, fill in (("v", 6 if colored else 3, "nan"), ("vt", 2, "0"), ("vn", 3, "0")):
-        for at in rows[keyword]:
-            right = kinds[at].width == width
-            out.append(lines[at] if right else " ".join([*words(lines[at]), *[fill] * width][: width + 1]))
-    return out
-
-
-def _faces(
-    name: str, lines: list[str], kinds: list[Kind], rows: Rows, groups: list[list[int]], strict: bool
-) -> list[str]:
-    """Return lines of f of which trimesh makes a mesh for each group.
-
-    What stands among them besides is for the faces that have no vt or vn, while others of their group have:
-    a vt of 0, and a vn of length 0 for each face, which is flat.
-    """
-    written: list[str] = []
-    absent: dict[str, str] = {}  # of vt and vn, where the first is that no line gives
-    for number, group in enumerate(groups):
-        faces = [lines[at] for at in group]
-        if not _is_plain(faces, {kinds[at].form for at in group}, rows):
-            faces = _rewritten(name, lines, group, rows, absent)
-            written += ["vt 0 0"] + ["vn 0 0 0"] * len(group)
-        if len({kinds[at].width for at in group}) > 1:
-            faces = [triangle for face in faces for triangle in _fan(face)]
-        written += [f"usemtl {number}", *faces]
-    for what in absent.values():
-        warn(what, strict)
+    written = []
+    for keyword, least, fill in (("v", 3, " nan"), ("vt", 2, " 0"), ("vn", 3, "")):
+        rows = [(lines.texts[at], lines.kinds[at].width) for at in lines.rows[keyword]]
+        most = max([least, *(width for _, width in rows)])
+        if keyword == "vn" and most > 3:  # trimesh drops normals of four numbers
+            rows = [(" ".join(words(text)[:4]), 3) for text, _ in rows]
+        written += [text + fill * (most - width) for text, width in rows]
     return written
 
 
-def _is_plain(faces: list[str], forms: set[str], rows: Rows) -> bool:
+def _faces(lines: _Lines) -> list[str]:
+    """Return lines from which trimesh makes a mesh for each group of faces.
+
+    If one face of a group has a vt or a vn, all faces of the group get one: a vt of 0, and a vn of length 0
+    for a face without normals, which is flat. Their lines follow those of the file.
+    """
+    written: list[str] = []
+    for number, group in enumerate(lines.groups.values()):
+        faces = [lines.texts[at] for at in group]
+        if not _is_plain(lines, group, faces):
+            faces = _rewritten(lines, group)
+            written += ["vt 0 0"] + ["vn 0 0 0"] * len(group)
+        if len({lines.kinds[at].width for at in group}) > 1:
+            faces = [triangle for face in faces for triangle in _fan(face)]
+        written += [f"usemtl {number}", *faces]
+    return written
+
+
+def _is_plain(lines: _Lines, group: list[int], faces: list[str]) -> bool:
     """Return True if all faces have the same form, and all indices count from 1 and are in range."""
+    forms = {lines.kinds[at].form for at in group}
     columns = PLAIN.get(forms.pop() if len(forms) == 1 else "")
     if columns is None:
         return False
-    limits = np.array([len(row) for row in rows.values()])[columns]
+    sizes = np.array([len(rows) for rows in lines.rows.values()])
     text = "".join(face[1:] for face in faces).replace("/", " ")
     indices = np.fromstring(text, np.int64, sep=" ").reshape(-1, len(columns))
-    return bool(indices.min() > 0 and (indices.max(axis=0) <= limits).all())
+    return bool(indices.min() > 0 and (indices.max(axis=0) <= sizes[columns]).all())
 
 
-def _rewritten(
-    name: str, lines: list[str], group: list[int], rows: Rows, absent: dict[str, str]
-) -> list[str]:
-    """Return the faces with indices from 1, all with a vt and a vn if any has: one after the file's."""
-    faces = [[_corner(name, at, word, rows, absent) for word in words(lines[at])[1:]] for at in group]
-    for column, keyword in enumerate(rows):
+def _rewritten(lines: _Lines, group: list[int]) -> list[str]:
+    """Return the faces of a group with indices from 1, and with those that `_faces` adds."""
+    faces = [[_corner(lines, at, word) for word in words(lines.texts[at])[1:]] for at in group]
+    for column, (keyword, rows) in enumerate(lines.rows.items()):
         if any(corner[column] for face in faces for corner in face):
             for number, face in enumerate(faces, 1):
                 for corner in face:
-                    corner[column] = corner[column] or len(rows[keyword]) + (number if keyword == "vn" else 1)
+                    corner[column] = corner[column] or len(rows) + (number if keyword == "vn" else 1)
     texts = (
         ["/".join(str(index or "") for index in corner).rstrip("/") for corner in face] for face in faces
     )
     return ["f " + " ".join(corners) for corners in texts]
 
 
-def _corner(name: str, at: int, word: str, rows: Rows, absent: dict[str, str]) -> list[int]:
+def _corner(lines: _Lines, at: int, word: str) -> list[int]:
     """Return the indices from 1 of v, vt and vn at a corner of a face in line `at`; 0 for none."""
     corner = [0, 0, 0]
-    for column, (keyword, text) in enumerate(zip(rows, word.split("/"), strict=False)):
+    for column, ((keyword, rows), text) in enumerate(zip(lines.rows.items(), word.split("/"), strict=False)):
         if not text:
             continue
-        index, size, before = int(text), len(rows[keyword]), bisect(rows[keyword], at)
-        message = f"{name} line {at + 1}: f uses {keyword} {index}; "
+        index, size, before = int(text), len(rows), bisect(rows, at)
+        message = f"{lines.name} line {at + 1}: f uses {keyword} {index}; "
         if column and not size:
-            absent.setdefault(keyword, message + "there is none, so all are left out")
+            lines.absent.setdefault(keyword, message + "there is none, so all are left out")
             continue
         corner[column] = index if index > 0 else before + 1 + index
         if index == 0 or not 0 < corner[column] <= size:
@@ -209,26 +209,22 @@ def _corner(name: str, at: int, word: str, rows: Rows, absent: dict[str, str]) -
 
 
 def _fan(face: str) -> list[str]:
-    """Return the triangles of a face as trimesh makes them, which takes it long where polygons mix."""
+    """Return the triangles of a face as trimesh makes them; trimesh is slow at groups of mixed polygons."""
     _, first, *others = face.split()
     if len(others) == 3:
         return [f"f {first} {others[0]} {others[1]}", f"f {others[1]} {others[2]} {first}"]
     return [f"f {first} {second} {third}" for second, third in pairwise(others)]
 
 
-def _read(name: str, data: bytes) -> list[RawMesh]:
-    from trimesh.exchange.obj import load_obj
+def _raw(lines: _Lines, material: str, mesh: dict[str, Any]) -> RawMesh:
+    """Return the mesh of the faces of a material."""
     from trimesh.geometry import triangulate_quads
 
-    return [
-        RawMesh(
-            "",
-            mesh["vertices"],
-            triangulate_quads(mesh["faces"]),
-            mesh.get("vertex_normals"),
-            mesh["visual"] and mesh["visual"].uv,
-            colors=mesh.get("vertex_colors"),
-        )
-        # it lists the last one first
-        for mesh in reversed(geometries(name, "obj", partial(load_obj, skip_materials=True), data))
-    ]
+    group, uvs = lines.groups[material], mesh["visual"] and mesh["visual"].uv
+    faces = triangulate_quads(mesh["faces"])
+    raw = RawMesh(material, mesh["vertices"], faces, mesh.get("vertex_normals"), uvs)
+    raw.colors = mesh.get("vertex_colors")
+    numbers, triangles = np.array(group) + 1, np.array([lines.kinds[at].width - 2 for at in group])
+    # of a mesh of quads, trimesh lists all first halves, then all second halves
+    raw.lines = np.tile(numbers, 2) if (triangles == 2).all() else np.repeat(numbers, triangles)
+    return raw

@@ -1,4 +1,4 @@
-"""STL: trimesh reads binary files and texts, after a check of what they claim against what they hold."""
+"""STL: binary files and texts, read by trimesh after a check of their counts."""
 
 from __future__ import annotations
 
@@ -12,20 +12,21 @@ from .lines import NUMBER, check_lines, words
 from .repair import RawMesh, warn, wide
 from .trimesh_loading import geometries
 
-COLORS = (b"COLOR=", b"MATERIAL=")  # what Materialize Magics writes into the header
-OTHERS = ("", "facet", "outer", "endloop", "endfacet")  # lines of a text that say nothing more
+COLORS = (b"COLOR=", b"MATERIAL=")  # keywords that Materialize Magics writes into the header
+OTHERS = ("", "facet", "outer", "endloop", "endfacet")  # lines of a text without further information
 
 
 def parse(name: str, data: bytes, strict: bool = False) -> list[RawMesh]:
-    """Read the solids of an STL file; the normals in it are those of the facets and are left out.
+    """Read the solids of an STL file. Its normals are those of the facets and are not read.
 
-    Some programs hide colors in a binary file. There are two ways, which contradict each other, so
-    these are left out with a warning.
+    Some programs store colors in a binary file. There are two conventions, which contradict each other, so
+    colors are left out with a warning.
 
     Raises
     ------
     SceneError
-        Naming the file, and the line of a text; or if `strict` and there are colors.
+        If the file is malformed, or `strict` and it has colors. The message names the file, and the line of a
+        text.
     """
     count = int.from_bytes(data[80:84], "little")
     if len(data) >= 84 and len(data) == 84 + 50 * count:
@@ -38,10 +39,8 @@ def parse(name: str, data: bytes, strict: bool = False) -> list[RawMesh]:
 
 
 def _binary(name: str, data: bytes, strict: bool) -> list[RawMesh]:
-    from trimesh.exchange.stl import load_stl
-
     colored = [f"{word.decode()} in the header" for word in COLORS if word in data[:80]]
-    meshes = geometries(name, "stl", load_stl, data)
+    meshes = geometries(name, "stl", data)
     extra = [mesh["face_attributes"]["stl"] for mesh in meshes]
     if extra and extra[0].any():
         colored.append(f"colors of facets (facet {int((extra[0] != 0).argmax())})")
@@ -51,10 +50,8 @@ def _binary(name: str, data: bytes, strict: bool) -> list[RawMesh]:
 
 
 def _text(name: str, text: str) -> list[RawMesh]:
-    """Check a text, and let trimesh read its vertices; it would also look for them in the names of solids."""
-    from trimesh.exchange.stl import load_stl_ascii
-
-    lines = [line.strip() for line in text.split("\n")]
+    """Check a text, and read its vertices by trimesh, which must not see the names of solids."""
+    lines = [line.strip() for line in text.replace("\t", " ").split("\n")]
     solids: list[tuple[str, list[int]]] = []  # name, lines of the vertices
     inside = False
     for at, keyword in enumerate(check_lines(lines, partial(_check, name))):
@@ -73,14 +70,14 @@ def _text(name: str, text: str) -> list[RawMesh]:
             has = f"has {len(vertices)} vertices; facets need a multiple of 3"
             raise SceneError(f"{name}: solid {title!r} {has}")
         written = "\n".join(["solid", *(lines[at] for at in vertices), "endsolid"]).encode()
-        for mesh in geometries(name, "stl", load_stl_ascii, written):
+        for mesh in geometries(name, "stl", written):
             numbers = np.array(vertices[::3]) + 1
             raws.append(RawMesh(title, mesh["vertices"], mesh["faces"], lines=numbers))
     return raws
 
 
 def _check(name: str, number: int, line: str) -> str:
-    """Return the keyword of a line; raise a SceneError if no line of its form is right."""
+    """Return the keyword of a line; raise a SceneError if lines of its form are malformed."""
     keyword, *rest = words(line.lower()) or [""]
     if keyword not in (*OTHERS, "vertex", "solid", "endsolid"):
         raise SceneError(f"{name} line {number}: {line[:40]!r} is not STL")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from typing import Any
@@ -79,16 +79,18 @@ def by_trimesh(name: str, data: bytes, kind: str, images: Any = None, skip_mater
         return trimesh.load_scene(BytesIO(data), file_type=kind, process=False, resolver=images, **options)
 
 
-def geometries(name: str, kind: str, load: Callable[[BytesIO], Any], data: bytes) -> list[dict[str, Any]]:
-    """Return what one of trimesh's loaders reads, before a trimesh object rounds colors and joins vertices.
+def geometries(name: str, kind: str, data: bytes) -> list[dict[str, Any]]:
+    """Return the meshes that trimesh's loader reads; a trimesh object would round their colors to 8 bits.
 
     Raises
     ------
     SceneError
-        For whatever the loader raises, except that memory is short.
+        For any error of the loader but MemoryError.
     """
+    from trimesh.exchange.load import mesh_loaders
+
     with typed_errors(name, kind):
-        found = load(BytesIO(data))
+        found = mesh_loaders[kind](BytesIO(data))
     return list(found["geometry"].values()) if "geometry" in found else [found]
 
 
