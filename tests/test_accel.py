@@ -13,8 +13,19 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rays import (
+    PLACES,
+    aimed_rays,
+    brute_force,
+    check_batches,
+    geometry,
+    nothing,
+    random_rays,
+    same_bits,
+    sphere_mesh,
+)
 
-from wavefront.accel import Accelerator, Geometry, make_accelerator
+from wavefront.accel import Accelerator, make_accelerator
 from wavefront.accel.build import build_tree, stable_order
 from wavefront.accel.embree import installed
 from wavefront.accel.numpy_accel import leaf_size_for
@@ -25,63 +36,7 @@ DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 NAMES = ["numpy", pytest.param("embree", marks=pytest.mark.skipif(not installed(), reason="no embreex"))]
 
 
-def geometry(triangles: object = (), centers: object = (), radii: object = ()) -> Geometry:
-    return Geometry(
-        np.asarray(triangles, f4).reshape(-1, 3, 3),
-        np.ascontiguousarray(np.asarray(centers, f4).reshape(-1, 3).T),
-        np.asarray(radii, f4).reshape(-1),
-    )
-
-
-def sphere_mesh(subdivisions: int) -> np.ndarray:
-    return np.asarray(trimesh.creation.icosphere(subdivisions=subdivisions).triangles)
-
-
-def random_rays(n: int, seed: int, reach: float = 1.5) -> tuple[np.ndarray, np.ndarray]:
-    rng = np.random.default_rng(seed)
-    origin = rng.uniform(-reach, reach, (3, n))
-    direction = rng.uniform(-1, 1, (3, n)) - origin
-    return origin.astype(f4), (direction / np.linalg.norm(direction, axis=0)).astype(f4)
-
-
-def nothing(n: int) -> np.ndarray:
-    return np.full(n, -1)
-
-
-def brute_force(triangles: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> tuple:
-    """Möller-Trumbore in float64: t (m, n), and the least barycentric weight (m, n)."""
-    a, b, c = (triangles[:, i, :, None].astype(float) for i in range(3))
-    o, d = origin[None].astype(float), direction[None].astype(float)
-    e1, e2 = b - a, c - a
-    p = np.cross(d, e2, axis=1)
-    s = o - a
-    q = np.cross(s, e1, axis=1)
-    with np.errstate(all="ignore"):
-        scale = 1 / (e1 * p).sum(1)
-        u, v, t = (s * p).sum(1) * scale, (d * q).sum(1) * scale, (e2 * q).sum(1) * scale
-    return t, np.minimum(np.minimum(u, v), 1 - u - v)
-
-
-def same_bits(a: object, b: object) -> bool:
-    return all(getattr(a, k).tobytes() == getattr(b, k).tobytes() for k in ("t", "prim", "b1", "b2"))
-
-
 # --- watertightness -------------------------------------------------------------------------------
-
-
-def aimed_rays(triangles: np.ndarray, n: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Rays from inside a mesh around its center: a third each at vertices, edges and anywhere."""
-    rng = np.random.default_rng(seed)
-    low, high = triangles.min((0, 1)), triangles.max((0, 1))
-    center, size = (low + high) / 2.0, (high - low).max()
-    origin = (center + rng.uniform(-0.2, 0.2, (n, 3)) * size).astype(f4)
-    face, corner = rng.integers(0, len(triangles), n), rng.integers(0, 3, n)
-    along = np.select([np.arange(n) % 3 == 0, np.arange(n) % 3 == 1], [0.0, 0.5], rng.random(n))[:, None]
-    target = triangles[face, corner] * (1 - along) + triangles[face, (corner + 1) % 3] * along
-    return np.ascontiguousarray(origin.T), np.ascontiguousarray((target - origin).T, f4)
-
-
-PLACES = [(1, 0), (1e6, 0), (1e-6, 0), (1, 1e5), (1e-6, 0.1), (1e6, 1e11)]
 
 
 @pytest.mark.parametrize(("scale", "offset"), PLACES)
@@ -227,24 +182,6 @@ def small() -> Accelerator:
 @pytest.fixture(params=["mixed", "small"])
 def accelerator(request: pytest.FixtureRequest) -> Iterator[Accelerator]:
     return request.getfixturevalue(request.param)
-
-
-def check_batches(accelerator: Accelerator, size: int) -> None:
-    """The same bits, `size` rays at a time."""
-    n = 300 if size == 1 else 9000
-    origin, direction = random_rays(n, 6)
-    origin[:, ::5] = 0  # through vertices too
-    exclude_prim = np.random.default_rng(7).integers(-1, 37, n)
-    distance = np.full(n, 0.7, f4)
-    whole = accelerator.closest(origin, direction, exclude_prim)
-    blocked = accelerator.occluded(origin, direction, distance, exclude_prim)
-    for at in range(0, n, size):
-        p = slice(at, at + size)
-        part = accelerator.closest(origin[:, p], direction[:, p], exclude_prim[p])
-        for name in ("t", "prim", "b1", "b2"):
-            np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[p])
-        part_blocked = accelerator.occluded(origin[:, p], direction[:, p], distance[p], exclude_prim[p])
-        np.testing.assert_array_equal(part_blocked, blocked[p])
 
 
 @pytest.mark.parametrize("size", [1, 7, 64, 4096])

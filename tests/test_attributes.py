@@ -112,7 +112,9 @@ def test_faces_of_real_files_have_the_colors_of_their_image(name):
         wf.Scene(mesh, [wf.Environment(1.0)]), lambda parts: make_accelerator(parts, "numpy")
     )
     middles, normals = held.triangles_center, held.face_normals
-    origin = (middles + normals * 1e-3 * scene.radius - scene.center).T.astype(np.float32)
+    origin = (
+        middles + normals * 1e-3 * np.linalg.norm(np.ptp(held.bounds, axis=0)) / 2 - scene.center
+    ).T.astype(np.float32)
     rays = Rays(origin, np.ascontiguousarray(-normals.T, np.float32), np.full(len(middles), -1))
     surface = interaction(scene, rays, intersect(scene, rays))
     (key,) = vars(mesh.material).keys() & {"base_color", "reflectance"}

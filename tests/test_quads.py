@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_accel import PLACES, aimed_rays, brute_force, check_batches, geometry, nothing, random_rays
+from rays import PLACES, aimed_rays, brute_force, check_batches, geometry, nothing, random_rays
 
 import wavefront as wf
 from wavefront.accel import Accelerator, Geometry, make_accelerator

@@ -10,12 +10,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from wavefront.sampling import warp
-from wavefront.sampling.spherical import (
-    SphericalRectangle,
-    SphericalTriangle,
-    solid_angle_rectangle,
-    solid_angle_triangle,
-)
+from wavefront.sampling.spherical import SphericalRectangle
 
 BELOW_ONE = float(np.float32(1 - 2.0**-24))
 TURN = 2 * np.pi
@@ -310,52 +305,11 @@ def test_error_functions_against_scipy():
 # Solid angles
 
 
-def corners(*rows: tuple[float, float, float]) -> list[np.ndarray]:
-    """Unit directions, (3, 1) each."""
-    return [f4(*row).reshape(3, 1) / np.linalg.norm(row).astype(np.float32) for row in rows]
-
-
-def test_solid_angles_of_reference():
-    """Reference values 18: an octant π/2; a 2 × 2 rectangle at height 1 2.094395."""
-    octant = corners((1, 0, 0), (0, 1, 0), (0, 0, 1))
-    assert solid_angle_triangle(*octant)[0] == pytest.approx(np.pi / 2, abs=1e-6)
-    assert SphericalTriangle.of(*octant).solid_angle[0] == pytest.approx(np.pi / 2, abs=1e-6)
+def test_solid_angle_of_reference():
+    """A 2 × 2 rectangle at height 1 covers 2.094395."""
     rectangle = [f4(*row).reshape(3, 1) for row in ((-1, -1, 1), (2, 0, 0), (0, 2, 0))]
-    assert solid_angle_rectangle(*rectangle)[0] == pytest.approx(2.094395, abs=1e-6)
     assert SphericalRectangle.of(*rectangle).solid_angle[0] == pytest.approx(2.094395, abs=1e-6)
 
-
-@pytest.mark.parametrize("size", [1e-1, 1e-2, 1e-3, 1e-4])
-def test_small_triangles_have_the_area_over_the_squared_distance(size):
-    """Seen face on, against float64 on the same corners: no digits are lost to the size."""
-    a, b, c = corners((0.6, 0, 0.8), (0.6 + 0.8 * size, 0, 0.8 - 0.6 * size), (0.6, size, 0.8))
-    exact = np.abs(np.linalg.det(np.concatenate([a, b, c], axis=1).astype(np.float64)))
-    exact = 2 * np.arctan2(
-        exact, 1 + sum(float((p.astype(float) * q).sum()) for p, q in ((a, b), (a, c), (b, c)))
-    )
-    assert solid_angle_triangle(a, b, c)[0] == pytest.approx(exact, rel=2e-6)
-    assert SphericalTriangle.of(c, b, a).solid_angle[0] == pytest.approx(exact, rel=2e-6)
-    assert exact == pytest.approx(size**2 / 2, rel=2 * size + 1e-3)
-
-
-def test_large_triangles_pass_half_of_the_sphere():
-    """Three corners just below the equator cover almost half of the sphere, and no sample leaves it."""
-    a, b, c = corners(*[(np.cos(t), np.sin(t), -0.2) for t in (0, TURN / 3, 2 * TURN / 3)])
-    below = solid_angle_triangle(a, b, c)[0]
-    assert 0 < below < TURN
-    triangle = SphericalTriangle.of(a, b, c)
-    w = triangle.sample(square(50))
-    assert (w[2] < 0).all()
-
-
-TRIANGLES = {
-    "octant": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
-    "clockwise": ((0, 0, 1), (0, 1, 0), (1, 0, 0)),
-    "slanted": ((0.9, 0.1, 0.4), (0.2, 0.8, 0.5), (-0.5, -0.3, 0.6)),
-    "large": ((1, 0.1, -0.1), (-0.6, 1, 0.1), (-0.6, -1, 0.2)),
-    "small": ((1, 0, 0), (1, 0.02, 0), (1, 0.01, 0.02)),
-}
-triangles = pytest.mark.parametrize("name", TRIANGLES)
 
 RECTANGLES = {
     "facing": ((-1, -1, 1), (2, 0, 0), (0, 2, 0)),
@@ -367,30 +321,8 @@ RECTANGLES = {
 rectangles = pytest.mark.parametrize("name", RECTANGLES)
 
 
-def triangle_of(name: str) -> SphericalTriangle:
-    return SphericalTriangle.of(*corners(*TRIANGLES[name]))
-
-
 def rectangle_of(name: str) -> SphericalRectangle:
     return SphericalRectangle.of(*(f4(*row).reshape(3, 1) for row in RECTANGLES[name]))
-
-
-@triangles
-def test_directions_to_triangles_round_trip(name):
-    triangle, u = triangle_of(name), square(40)
-    w = triangle.sample(u)
-    assert w.dtype == np.float32
-    assert np.linalg.norm(w.astype(float), axis=0) == pytest.approx(1, abs=5e-7)
-    assert triangle.inverse(w) == pytest.approx(u, abs=2e-3 if name == "small" else 5e-5)
-
-
-@triangles
-def test_directions_lie_in_the_triangle(name):
-    a, b, c = (corner[:, 0].astype(np.float64) for corner in corners(*TRIANGLES[name]))
-    w = triangle_of(name).sample(square(40)).astype(np.float64).T
-    turn = np.sign(np.dot(np.cross(a, b), c))
-    for p, q in ((a, b), (b, c), (c, a)):
-        assert (turn * w @ np.cross(p, q) > -2e-7).all()
 
 
 @rectangles
@@ -417,27 +349,6 @@ def test_points_lie_in_the_rectangle(name):
     assert np.abs((p * np.cross(edge_u, edge_v, axis=0)).sum(axis=0)).max() < 10 * reach
 
 
-@triangles
-def test_directions_to_triangles_are_uniform(name):
-    """Chi-square in the plane through the corners, where a solid angle is an area × cos/distance²."""
-    a, b, c = (corner[:, 0].astype(np.float64) for corner in corners(*TRIANGLES[name]))
-    w = triangle_of(name).sample(random_square(11)).astype(np.float64)
-    weights = np.linalg.solve(np.stack([a, b, c], axis=1), w)  # w = αa + βb + γc
-    b1, b2 = weights[1:] / weights.sum(axis=0)
-    # Cells of equal barycentric area, as for the flat triangle; expectations by quadrature.
-    row = np.clip(((1 - (1 - b1) ** 2) * 20).astype(int), 0, 19)
-    column = np.clip((b2 / np.maximum(1 - b1, 1e-12) * 40).astype(int), 0, 39)
-    observed = np.bincount(row * 40 + column, minlength=800)
-    s, t = ((np.arange(k * 16) + 0.5) / (k * 16) for k in (20, 40))
-    s, t = np.meshgrid(1 - np.sqrt(1 - s), t, indexing="ij")
-    p = a[:, None, None] * (1 - s - t * (1 - s)) + b[:, None, None] * s + c[:, None, None] * (t * (1 - s))
-    density = np.linalg.norm(p, axis=0) ** -3  # cos/distance², up to a constant
-    expected = density.reshape(20, 16, 40, 16).mean(axis=(1, 3))
-    expected *= np.abs(np.linalg.det(np.stack([a, b, c]))) / 2 / 800  # dω = det/|p|³ · dA over 2·area
-    assert expected.sum() == pytest.approx(float(triangle_of(name).solid_angle[0]), rel=1e-3)
-    check_counts(observed, (expected / expected.sum() * 1e6).ravel())
-
-
 @rectangles
 def test_points_of_rectangles_are_uniform_in_solid_angle(name):
     corner, edge_u, edge_v = (np.array(row, float) for row in RECTANGLES[name])
@@ -455,11 +366,6 @@ def test_points_of_rectangles_are_uniform_in_solid_angle(name):
 
 
 def test_shapes_that_cover_nothing_have_no_density():
-    flat = SphericalTriangle.of(*corners((1, 0, 0), (1, 0.5, 0), (1, 1, 0)))
-    assert flat.pdf()[0] == 0 or flat.solid_angle[0] < 1e-6
-    point = SphericalTriangle.of(*corners((1, 0, 0), (1, 0, 0), (1, 0, 0)))
-    assert point.pdf()[0] == 0
-    assert np.isfinite(point.sample(square(2)[:, :1])).all()
     edge_on = SphericalRectangle.of(*(f4(*row).reshape(3, 1) for row in ((1, 1, 0), (1, 0, 0), (0, 1, 0))))
     assert edge_on.pdf()[0] == 0
     assert np.isfinite(edge_on.sample(square(2)[:, :1])).all()
@@ -495,13 +401,6 @@ def test_points_stay_in_a_rectangle_that_touches_the_plane_of_sight():
 def test_a_shape_per_lane():
     """Lanes are independent: many shapes at once give the bits of one at a time."""
     u = random_square(9, 5)
-    stacked = [
-        np.concatenate(parts, axis=1)
-        for parts in zip(*(corners(*t) for t in TRIANGLES.values()), strict=True)
-    ]
-    together = SphericalTriangle.of(*stacked).sample(u)
-    for i, name in enumerate(TRIANGLES):
-        assert (triangle_of(name).sample(u[:, i : i + 1])[:, 0] == together[:, i]).all()
     stacked = [f4(*column).T.copy() for column in zip(*RECTANGLES.values(), strict=True)]
     together = SphericalRectangle.of(*stacked).sample(u)
     for i, name in enumerate(RECTANGLES):

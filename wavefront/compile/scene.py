@@ -44,7 +44,6 @@ class CompiledScene:
 
     scale: float  # a power of two by which lengths of the scene are multiplied; 1 for most scenes
     center: NDArray[np.float64]  # (3,)
-    radius: float  # of the bounding sphere
     accelerator: Accelerator
     triangles: int  # number of triangles
     normals: Floats  # (3, m) unit geometric normals of the triangles
@@ -118,7 +117,7 @@ def compile_scene(
     radius = float(np.linalg.norm(high - low)) / 2
     scale = length_factor(radius)
     check_lights(scene.lights, (low + high) / 2, scale)
-    low, high, radius = low * scale, high * scale, radius * scale
+    low, high = low * scale, high * scale
     center = (low + high) / 2
     meshes, spheres, instances = resolve(scaled_shapes(scene.shapes, scale), most_copies)
     placed: list[Shape] = [*meshes, *spheres, *instances]
@@ -155,7 +154,6 @@ def compile_scene(
     return CompiledScene(
         scale=scale,
         center=center,
-        radius=radius,
         accelerator=accelerator,
         triangles=len(triangles),
         normals=normals,

@@ -1,4 +1,4 @@
-"""Weights that combine two ways of sampling one integral."""
+"""The weight that combines two ways of sampling one integral."""
 
 from __future__ import annotations
 
@@ -16,19 +16,9 @@ def power_heuristic(pdf: Floats, other: Floats) -> Floats:
     Source: E. Veach and L. Guibas, Optimally Combining Sampling Techniques, SIGGRAPH 1995,
     section 4, β = 2.
     """
-    return _weight(pdf, other, squared=True)
-
-
-def balance_heuristic(pdf: Floats, other: Floats) -> Floats:
-    """Like `power_heuristic` with β = 1: pdf / (pdf + other) (section 3.3 of the same paper)."""
-    return _weight(pdf, other, squared=False)
-
-
-def _weight(pdf: Floats, other: Floats, squared: bool) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore", over="ignore", under="ignore"):
         ratio = other / pdf  # inf is right: the weight becomes 0
-        if squared:
-            ratio *= ratio
+        ratio *= ratio
         weight = f4(1) / (f4(1) + ratio)
     # 0/0 and inf/inf are the cases that are left: no sample, and two delta-like densities.
     equal = np.isnan(weight)

@@ -1,7 +1,4 @@
-"""Uniform sampling of the solid angle that a triangle or a rectangle covers.
-
-Each record prepares what a sample and its density share, a column per lane.
-"""
+"""Uniform sampling of the solid angle that a rectangle covers."""
 
 from __future__ import annotations
 
@@ -17,97 +14,11 @@ from ..vec import Floats, cross, dot, f4, normalize
 Reals = NDArray[np.floating]  # float64 or float32
 
 
-def solid_angle_triangle(a: Floats, b: Floats, c: Floats) -> Floats:
-    """Solid angle (n,) in sr of the triangle with unit directions a, b, c (3, n) to its corners.
-
-    The determinant is taken of differences of the corners, which keeps it exact to rounding of
-    the input when the triangle is small.
-
-    Source: A. Van Oosterom and J. Strackee, The Solid Angle of a Plane Triangle, 1983, eq. 8.
-    """
-    volume = np.abs(dot(a, cross(b - a, c - a)))
-    return f4(2) * np.arctan2(volume, f4(1) + dot(a, b) + dot(a, c) + dot(b, c))
-
-
-def solid_angle_rectangle(corner: Floats, edge_u: Floats, edge_v: Floats) -> Floats:
-    """Solid angle (n,) in sr of a parallelogram: `corner` (3, n) from the point, edges (3, n or 1)."""
-    a, b = normalize(corner), normalize(corner + edge_u)
-    c, d = normalize(corner + edge_u + edge_v), normalize(corner + edge_v)
-    return solid_angle_triangle(a, b, c) + solid_angle_triangle(a, c, d)
-
-
-@record
-class SphericalTriangle:
-    """Triangles on the unit sphere, sampled uniformly in solid angle.
-
-    Accurate as long as the corners, as float32 directions, describe the triangle: below about
-    1e-3 rad across, sample its area instead.
-
-    Source: J. Arvo, Stratified Sampling of Spherical Triangles, SIGGRAPH 1995, in the form without
-    angles of C. Peters, BRDF Importance Sampling for Polygonal Lights, SIGGRAPH 2021, section 4.
-    """
-
-    a: Floats  # (3, n) unit direction to the first corner
-    b: Floats  # (3, n) unit direction to the second corner, where the slices meet
-    c: Floats  # (3, n) unit direction to the third corner
-    volume: Floats  # (n,) determinant of a, b, c, signed
-    rest: Floats  # (n,) a·c + b·c
-    base: Floats  # (n,) 1 + a·b
-    half_angle: Floats  # (n,) half of the solid angle, with the sign of `volume`
-
-    @classmethod
-    def of(cls, a: Floats, b: Floats, c: Floats) -> Self:
-        """Prepare the triangles with unit directions a, b, c (3, n) to their corners."""
-        volume = dot(a, cross(b - a, c - a))
-        rest = dot(a, c) + dot(b, c)
-        base = f4(1) + dot(a, b)
-        return cls(a, b, c, volume, rest, base, np.arctan2(volume, base + rest))
-
-    @property
-    def solid_angle(self) -> Floats:
-        """Solid angle, (n,), sr."""
-        return f4(2) * np.abs(self.half_angle)
-
-    def pdf(self) -> Floats:
-        """Density within the triangle, (n,), 1/sr; 0 where the triangle covers nothing."""
-        return _reciprocal(self.solid_angle)
-
-    def sample(self, u: Floats) -> Floats:
-        """Unit directions (3, n) from u (2, n)."""
-        return normalize(_between(self.b, self._on_edge(u[0]), u[1]))
-
-    def inverse(self, w: Floats) -> Floats:
-        """Return the u (2, n) that `sample` maps to w (3, n)."""
-        on_edge = normalize(cross(cross(self.b, w), cross(self.c, self.a)))
-        on_edge *= np.where(dot(on_edge, self.a + self.c) < 0, f4(-1), f4(1))
-        near, far = w - self.b, on_edge - self.b
-        out = np.empty((2, w.shape[1]), f4)
-        np.multiply(solid_angle_triangle(self.a, self.b, on_edge), self.pdf(), out=out[0])
-        np.multiply(dot(near, near), _reciprocal(dot(far, far)), out=out[1])
-        return out
-
-    def _on_edge(self, share: Floats) -> Floats:
-        """Points (3, n) of edge a–c such that triangle a, b, x has `share` (n,) of the solid angle.
-
-        With x the reflection of a about α·a + β·c, the formula for the solid angle of a, b, x is
-        linear in α and β.
-        """
-        angle = share * self.half_angle
-        cos, sin = np.cos(angle), np.sin(angle)
-        alpha = self.volume * cos - self.rest * sin
-        beta = self.base * sin
-        edge = self.c - self.a
-        rise = dot(edge, self.a)
-        along = alpha + beta + beta * rise
-        across = (edge - rise * self.a) * beta
-        across2 = dot(across, across)
-        scale = f4(2) * _reciprocal(along * along + across2)
-        return self.a + (along * across - across2 * self.a) * scale
-
-
 @record
 class SphericalRectangle:
     """Rectangles seen from a point each, sampled uniformly in solid angle.
+
+    It prepares what a sample and its density share, a column per lane.
 
     In the rectangle's frame, at distance z, the part up to x covers F(x) − F(x₀) with
     F = asin(b₁c) − asin(b₀c), c = x/√(x² + z²), bᵢ = yᵢ/√(yᵢ² + z²); solved for c this is
@@ -189,17 +100,6 @@ class SphericalRectangle:
         out[0] = (_swept(self.b, _sine(x, self.z)) - self.start) / self.angle
         out[1] = (_sine(y, depth) - h0) / (h1 - h0)
         return out
-
-
-def _between(start: Floats, end: Floats, u: Floats) -> Floats:
-    """Unit vectors (3, n) on the arcs from `start` to `end` (3, n), 1 − cosine proportional to u (n,).
-
-    Written as steps from `start`, so that a short arc keeps its digits.
-    """
-    chord = end - start
-    depth = f4(0.5) * dot(chord, chord)  # 1 − cosine of the whole arc
-    t = np.sqrt(u * (f4(2) - u * depth) * _reciprocal(f4(2) - depth))
-    return start + t * chord + (depth * (t - u)) * start
 
 
 def _reciprocal(x: Floats) -> Floats:
