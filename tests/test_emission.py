@@ -18,6 +18,7 @@ from wavefront.lights import (
     RectangleLights,
     TriangleLights,
     TwoSidedRectangleLights,
+    TwoSidedTexturedTriangleLights,
     TwoSidedTriangleLights,
 )
 from wavefront.lights import textured_emission as textured_emission
@@ -223,8 +224,12 @@ def test_a_lamp_lights_on_both_sides(integrator: str, shape: str) -> None:
     )
     if shape == "triangles":
         up = wf.Mesh(up.vertices, up.faces[::-1], material=BLACK, emission=1.0, two_sided=True)
-    kinds = {"rectangle": TwoSidedRectangleLights}
-    assert isinstance(compiled(floor(), up).lights.kinds[0], kinds.get(shape, TwoSidedTriangleLights))
+    kinds = {
+        "rectangle": TwoSidedRectangleLights,
+        "triangles": TwoSidedTriangleLights,
+        "texture": TwoSidedTexturedTriangleLights,
+    }
+    assert type(compiled(floor(), up).lights.kinds[0]) is kinds[shape]
     spp = 4096 if integrator == "naive" else 512
     mean = measure(lit(up), spp, integrator=integrator, max_bounces=1)
     assert_mean(mean, irradiance() * ALBEDO / np.pi, 0.02)
@@ -267,7 +272,7 @@ def test_power_doubles(one: type, both: type) -> None:
     assert lights(both).power(1.0) == pytest.approx(2 * lights(one).power(1.0))
     normal = lights(one).normal[:, :1].astype(float)
     record = lights(one)
-    edges = (record.edge1, record.edge2) if one is TriangleLights else (record.edge_u, record.edge_v)
+    edges = (record.edge_u, record.edge_v)
     share = 1 / 3 if one is TriangleLights else 1 / 2
     middle = (record.corner + share * (edges[0] + edges[1]))[:, :1].astype(float)
     before, behind = (
@@ -322,7 +327,7 @@ def test_waves_and_workers_change_no_bit(cut: dict) -> None:
 def test_what_shines_evenly_pays_nothing() -> None:
     """No table, and rectangles stay rectangles."""
     scene = compiled(floor(), lamp(2.0))
-    assert scene.textured_emission is None
+    assert scene.lights.varies is None
     assert [type(kind) for kind in scene.lights.kinds] == [RectangleLights]
     assert scene.lights.choice.__class__.__name__ == "SingleLightSampler"
 

@@ -240,7 +240,7 @@ def test_what_is_all_there_costs_nothing() -> None:
     for material in (wf.Principled(0.5, alpha=1.0), wf.Diffuse(0.5).with_alpha(1.0)):
         assert material.opacity is None
         compiled = compile_scene(lit(wf.Sphere(HERE, 0.1, material=material)), numpy)
-        assert compiled.opacities is compiled.textured_emission is None
+        assert compiled.opacities is compiled.lights.varies is None
     plain, clear = wf.Diffuse(0.5), wf.Diffuse(0.2).with_alpha(0.5)
     balls = [wf.Sphere((x, 5, 0), 0.1, material=m) for x, m in enumerate((plain, clear, wf.Diffuse(0.1)))]
     assert len(compile_scene(lit(*balls), numpy).materials.groups) == 1

@@ -17,7 +17,7 @@ from .bsdfs import Bsdf
 from .camera import Camera
 from .compile.scene import CompiledScene
 from .image import Image
-from .lights import LightSample, SpotLight
+from .lights import LightSample
 from .scene import Scene
 from .shapes import Instance, Mesh, Shape
 from .stages.interaction import above, interaction
@@ -211,8 +211,9 @@ class Sight:
         return clear.take(materials.group_of.take(rows))
 
     def _how_to_turn_lights(self) -> str:
-        if any(isinstance(light, SpotLight) for light in self._scene.lights):
-            return "direct the SpotLight, or widen its cone"
+        hints = [light.hint for light in self._scene.lights if light.hint is not None]
+        if hints:
+            return hints[0]
         return "reverse their faces, or give them two_sided=True"
 
     def _why_it_is_blocked(self, prims: Ints) -> str:

@@ -23,7 +23,6 @@ from .filters import FILTERS, Filter
 from .image import Image
 from .integrators import INTEGRATORS, WITH_MIS, Integrator, li_full
 from .lighting import check_lighting, choose_preset, lighted
-from .lights import DirectionalLight, PointLight, SpotLight
 from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
 from .progress import Bar, Progress, phase
 from .sampling.sampler import SAMPLERS, SamplerMaker, make_sampler
@@ -378,12 +377,9 @@ def _warn_of_noise(image: Image, asked: float) -> None:
 
 
 def _warn_unseen_lights(scene: Scene, integrator: str | Integrator) -> None:
-    unseen = [
-        light
-        for light in scene.lights
-        if isinstance(light, PointLight | SpotLight)
-        or (isinstance(light, DirectionalLight) and light.angle == 0)
-    ]
-    if integrator == "naive" and unseen:
+    if integrator != "naive":
+        return
+    unseen = [light for light in scene.lights if light.delta]
+    if unseen:
         kinds = ", ".join(sorted({type(light).__name__ for light in unseen}))
         warn_caller(f"the naive integrator cannot find lights without size ({kinds})")

@@ -13,7 +13,7 @@ from .accel import AcceleratorCache
 from .camera import Camera, field_of_view, image_size, upward
 from .elementary import arctan2, sin_cos
 from .errors import SceneError, finite_array
-from .lights import Environment, UserLight
+from .lights import Environment, Light
 from .shapes import Instance, Mesh, Shape
 from .shapes.instance import instance_bounds
 from .suggestions import suggests_keywords
@@ -51,7 +51,7 @@ class Scene:
     def __init__(
         self,
         shapes: Iterable[Any] | Any,
-        lights: Iterable[UserLight] | UserLight = (),
+        lights: Iterable[Light] | Light = (),
         camera: Camera | None = None,
     ) -> None:
         self.shapes = shapes
@@ -76,7 +76,7 @@ class Scene:
         self._shapes = Shapes(shapes)
 
     @property
-    def lights(self) -> list[UserLight]:
+    def lights(self) -> list[Light]:
         """The lights of the scene, besides emitting shapes."""
         return self._lights
 
@@ -103,8 +103,8 @@ class Scene:
         SceneError
             If an item is something else, or a second `Environment`; the scene is then unchanged.
         """
-        shapes = Shapes([item for item in items if not isinstance(item, UserLight)])
-        lights = Lights([*self.lights, *(item for item in items if isinstance(item, UserLight))])
+        shapes = Shapes([item for item in items if not isinstance(item, Light)])
+        lights = Lights([*self.lights, *(item for item in items if isinstance(item, Light))])
         _check_environments(lights)
         self.shapes.extend(shapes)
         self._lights = lights
@@ -286,18 +286,18 @@ class Shapes(CheckedList[Shape]):
         return None if convert is None else convert(item).shapes
 
 
-class Lights(CheckedList[UserLight]):
+class Lights(CheckedList[Light]):
     """The lights of a scene."""
 
     name = "lights"
     allowed = "wf.PointLight, wf.SpotLight, wf.DirectionalLight, wf.Environment"
 
-    def converted(self, item: Any) -> list[UserLight] | None:
+    def converted(self, item: Any) -> list[Light] | None:
         """Return a light."""
-        return [item] if isinstance(item, UserLight) else None
+        return [item] if isinstance(item, Light) else None
 
 
-def _check_environments(lights: Sequence[UserLight]) -> None:
+def _check_environments(lights: Sequence[Light]) -> None:
     if sum(isinstance(light, Environment) for light in lights) > 1:
         raise SceneError("the scene has more than one Environment; at most one is allowed")
 

@@ -28,7 +28,7 @@ def _names(kind: type) -> tuple[str, ...]:
 class SoA:
     """Base of dataclasses whose fields are arrays with one column (last axis) per element.
 
-    A field that is None is absent and stays absent.
+    A field that is no array is shared by all elements; one that is None is absent.
     """
 
     __slots__ = ()
@@ -41,19 +41,23 @@ class SoA:
         """Return the number of columns."""
         kind: Any = type(self)
         values = (getattr(self, name) for name in _names(kind))
-        return int(next(value.shape[-1] for value in values if value is not None))
+        return int(next(value.shape[-1] for value in values if isinstance(value, np.ndarray)))
+
+    def shared(self) -> list[Any]:
+        """Return the values that all elements share; records are only joined where these are the same."""
+        return [value for _, value in self._values() if not isinstance(value, np.ndarray)]
 
     def take(self, index: Lanes) -> Self:
         """Gather columns `index` (m,) of every field into a new record; of a slice, views."""
         out = object.__new__(type(self))
         for name, value in self._values():
-            setattr(out, name, None if value is None else take(value, index))
+            setattr(out, name, take(value, index) if isinstance(value, np.ndarray) else value)
         return out
 
     def put(self, index: Ints, other: Self) -> None:
         """Write the columns of another record over columns `index` (m,) of this one, in place."""
         for (_, value), (_, new) in zip(self._values(), other._values(), strict=True):
-            if value is not None:
+            if isinstance(value, np.ndarray):
                 value[..., index] = new
 
     @classmethod
@@ -66,11 +70,11 @@ class SoA:
         return out
 
 
-def _joined(values: Sequence[NDArray[Any] | None]) -> NDArray[Any] | None:
+def _joined(values: Sequence[Any]) -> Any:
     """Join the columns of arrays; what is `broadcast` and the same in all of them stays one value."""
-    arrays = [value for value in values if value is not None]
+    arrays = [value for value in values if isinstance(value, np.ndarray)]
     if not arrays:
-        return None
+        return values[0]
     first, shape = arrays[0], arrays[0].shape[:-1]
     if all(a.strides[-1] == 0 and np.array_equal(a[..., :1], first[..., :1]) for a in arrays):
         return np.broadcast_to(first[..., :1], (*shape, sum(a.shape[-1] for a in arrays)))

@@ -14,7 +14,7 @@ import numpy as np
 from .bsdfs import Bsdf
 from .camera import Camera, image_size, upward
 from .errors import SceneError
-from .lights import UserLight
+from .lights import Light
 from .progress import Progress
 from .scene import Scene, importer, register_importer
 from .shapes import Instance, Mesh, Shape
@@ -113,8 +113,8 @@ def _is_pair(subject: Any) -> bool:
 
 def _joined(subjects: Sequence[Any], material: Bsdf | None, progress: Progress) -> Scene:
     """Return one scene of all; the camera is the first that there is."""
-    lights = [item for item in subjects if isinstance(item, UserLight)]
-    parts = [as_scene(item, material, progress) for item in subjects if not isinstance(item, UserLight)]
+    lights = [item for item in subjects if isinstance(item, Light)]
+    parts = [as_scene(item, material, progress) for item in subjects if not isinstance(item, Light)]
     cameras = [part.camera for part in parts if part.camera is not None]
     return Scene(
         [shape for part in parts for shape in part.shapes],

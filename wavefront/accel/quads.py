@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..shapes.fans import are_fans, disjoint_pairs
 from ..vec import Bools, Doubles, Floats, Ints
 from .triangle import ROUNDOFF
 
@@ -21,7 +22,6 @@ def find_quads(triangles: Floats) -> Ints:
     """
     corner = corners(triangles, np.arange(len(triangles) - 1))
     a, b, c, d = corner.astype(np.float64)
-    fan = (triangles[1:, 0] == triangles[:-1, 0]).all(1) & (triangles[1:, 1] == triangles[:-1, 2]).all(1)
     normal = np.cross(c - a, d - b)
     size = np.linalg.norm(normal, axis=1)
     convex = np.isfinite(size) & (size > 0)
@@ -29,11 +29,7 @@ def find_quads(triangles: Floats) -> Ints:
         convex &= (np.cross(at - before, after - at) * normal).sum(1) > 0
     apart = np.abs((normal * (b - a)).sum(1))
     flat = apart <= FLATNESS * np.abs(corner).max((0, 2)) * size
-    found = np.flatnonzero(fan & convex & flat)
-    # Of overlapping pairs in a row, every other one is kept.
-    place = np.arange(found.size)
-    starts = np.append(True, np.diff(found) > 1)[: found.size]
-    return found[(place - np.maximum.accumulate(np.where(starts, place, 0))) % 2 == 0]
+    return disjoint_pairs(np.flatnonzero(are_fans(triangles) & convex & flat))
 
 
 def corners(triangles: Floats, first: Ints) -> Floats:

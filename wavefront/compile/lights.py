@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,26 +13,31 @@ from ..lights import (
     EnvironmentSum,
     InfiniteLight,
     Light,
+    LightRecord,
     LightTable,
     RectangleLights,
     SphereLights,
+    TexturedTriangleLights,
     TriangleLights,
     TwoSidedRectangleLights,
+    TwoSidedTexturedTriangleLights,
     TwoSidedTriangleLights,
     first_of_pairs,
 )
 from ..lights.samplers import LightSamplerMaker
-from ..lights.textured_emission import EmissionSource, TexturedEmission, has_textured_emission, mean_radiance
+from ..lights.textured_emission import has_textured_emission, mean_radiance
 from ..scene import Scene
-from ..shapes import Mesh, Sphere
+from ..shapes import Mesh, Shape, Sphere
 from ..textures.base import BaseTexture
 from ..vec import Floats, Ints, f4
 
-AREA_LIGHTS = (RectangleLights, TwoSidedRectangleLights, TriangleLights, TwoSidedTriangleLights)
+# A record, and the primitives of its lights: (..., k) a column per light, or (..., m) of one light, or none.
+Part: TypeAlias = tuple[LightRecord, Ints | None]
 
 
-def _gather_lights(
+def gather_lights(
     scene: Scene,
+    scaled: Sequence[Shape],
     scale: float,
     meshes: Sequence[Mesh],
     spheres: Sequence[Sphere],
@@ -42,87 +47,115 @@ def _gather_lights(
     choice: str | LightSamplerMaker,
     mis: bool,
 ) -> tuple[LightTable, Ints, int]:
-    """Return the table of lights, the light of each primitive, and that of rays that hit nothing."""
-    kinds: list[Light] = []
-    light_of = np.full(sum(len(part) for part in corners) + len(spheres), -1, np.intp)
+    """Return the table of lights, the light of each primitive, and that of rays that hit nothing.
+
+    Parameters
+    ----------
+    scene
+        What is rendered.
+    scaled, scale
+        Its shapes with all lengths multiplied by `scale`, in the same order.
+    meshes, spheres, corners
+        What is traced, and the corners (m, 3, 3) of the meshes' triangles, relative to `center` (3,).
+    half_size
+        Half of the scene's extent, (3,).
+    choice, mis
+        As for `compile_scene`.
+
+    Raises
+    ------
+    SceneError
+        If a light is malformed, or a shape cannot shine as it should.
+    """
+    triangles = sum(len(part) for part in corners)
+    starts = np.cumsum([0, *(len(part) for part in corners)])
+    first_row = {id(mesh): int(start) for mesh, start in zip(meshes, starts, strict=False)}
+    first_row.update((id(sphere), triangles + number) for number, sphere in enumerate(spheres))
+    parts: list[Part] = [*_area_lights(meshes, corners), *_sphere_lights(spheres, triangles, center)]
+    groups: dict[object, list[LightRecord]] = {}
+    infinite: list[InfiniteLight] = []
+    surfaces: list[Part] = []
+    for light in scene.lights:
+        record = (light if scale == 1 else light.scaled(scale)).record(center)
+        if not isinstance(record, LightRecord):
+            raise SceneError(f"{type(light).__name__}: record must return a wf.LightRecord, got {record!r}")
+        if isinstance(record, InfiniteLight):
+            infinite.append(record.compensated() if mis else record)
+        elif light.shape is not None:
+            surfaces.append((record, _rows_of(light, record, scene.shapes, scaled, first_row)))
+        else:
+            groups.setdefault((type(record), *map(id, record.shared())), []).append(record)
+    parts += [(type(records[0]).concatenate(records), None) for records in groups.values()]
+    parts += surfaces
+    light_of = np.full(triangles + len(spheres), -1, np.intp)
     count = 0
+    for record, rows in parts:
+        if rows is not None:
+            if (light_of[rows] >= 0).any():
+                raise SceneError(f"{type(record).__name__}: its shape shines already")
+            light_of[rows] = count + np.arange(len(record))
+        count += len(record)
+    kinds = [record for record, _ in parts]
+    if infinite:
+        kinds.append(EnvironmentSum.of(infinite))
+    return LightTable(kinds, half_size, choice), light_of, count if infinite else -1
 
-    def add(kind: type[Light], records: list[Any]) -> None:
-        nonlocal count
-        if records:
-            kinds.append(kind.concatenate(records))
-            count += len(kinds[-1])
 
-    area_lights = _area_lights(meshes, corners)
-    for kind in AREA_LIGHTS:
-        members = [(faces, record) for faces, record in area_lights if type(record) is kind]
-        number = count
-        for faces, _ in members:
-            light_of[faces] = number + np.arange(faces.shape[1])
-            number += faces.shape[1]
-        add(kind, [record for _, record in members])
-    for sphere in spheres:
+def _rows_of(
+    light: Light,
+    record: LightRecord,
+    shapes: Sequence[Shape],
+    scaled: Sequence[Shape],
+    first_row: dict[int, int],
+) -> Ints:
+    """Return the primitives (m,) of the shape of a light."""
+    name, shape = type(light).__name__, light.shape
+    assert shape is not None
+    same = [traced for given, traced in zip(shapes, scaled, strict=True) if given is shape]
+    if not same:
+        raise SceneError(f"{name}: its shape {shape.name!r} is not in the scene; add it to the shapes")
+    if id(same[0]) not in first_row:
+        raise SceneError(f"{name}: its shape {shape.name!r} must be a wf.Mesh or a wf.Sphere")
+    if shape.material.opacity is not None:
+        raise SceneError(f"{name}: its shape {shape.name!r} must be opaque; its material has an alpha")
+    faces = len(shape.faces) if isinstance(shape, Mesh) else 1
+    if len(record) not in (1, faces):
+        raise SceneError(
+            f"{name}: record has {len(record)} columns; it must have 1, or {faces}, one for each face"
+        )
+    return first_row[id(same[0])] + np.arange(faces)
+
+
+def _sphere_lights(spheres: Sequence[Sphere], first_row: int, center: NDArray[np.float64]) -> list[Part]:
+    """Return the lights of emitting spheres, if there are any."""
+    emitting = [number for number, sphere in enumerate(spheres) if sphere.emission is not None]
+    for number in emitting:
+        sphere = spheres[number]
         if isinstance(sphere.emission, BaseTexture):
             raise SceneError(
                 f"{sphere.name}: a sphere shines evenly; a mesh can shine by {sphere.emission!r}"
             )
-        if sphere.emission is not None and sphere.material.opacity is not None:
+        if sphere.material.opacity is not None:
             raise SceneError(
                 f"{sphere.name}: a sphere that shines must be all there; its material has an alpha"
             )
-    start = sum(len(part) for part in corners)
-    emitting = np.array([sphere.emission is not None for sphere in spheres], np.bool_)
-    light_of[start + np.flatnonzero(emitting)] = count + np.arange(emitting.sum())
-    add(
-        SphereLights,
-        [
-            SphereLights((s.center - center).astype(f4).reshape(3, 1), np.array([s.radius], f4), s.emission)
-            for s in spheres
-            if s.emission is not None
-        ],
-    )
-    groups: dict[type[Light], list[Any]] = {}
-    infinite: list[InfiniteLight] = []
-    for light in scene.lights:
-        record = (light if scale == 1 else light.scaled(scale)).record(center)
-        if isinstance(record, InfiniteLight):
-            infinite.append(record.compensated() if mis else record)
-        else:
-            groups.setdefault(type(record), []).append(record)
-    for record_type, records in groups.items():
-        add(record_type, records)
-    environment = count if infinite else -1
-    if infinite:
-        kinds.append(EnvironmentSum.of(infinite))
-    return LightTable(kinds, half_size, choice), light_of, environment
+    if not emitting:
+        return []
+    lights = [_sphere_light(spheres[number], center) for number in emitting]
+    return [(SphereLights.concatenate(lights), first_row + np.array(emitting))]
 
 
-def _uneven(meshes: Sequence[Mesh], lights: int, light_of: Ints) -> TexturedEmission | None:
-    """Return the lights that do not shine evenly, None when all do."""
-    textured_emission = TexturedEmission(np.full(lights, -1, np.intp), np.full(lights, -1, np.intp), [])
-    numbers: dict[tuple[int, bool], int] = {}
-    start = 0
-    for mesh in meshes:
-        end = start + len(mesh.faces)
-        if mesh.emission is not None and has_textured_emission(mesh):
-            key = id(mesh.emission), mesh.two_sided
-            if key not in numbers:
-                numbers[key] = len(numbers)
-                textured_emission.sources.append(EmissionSource(mesh.emission, mesh.two_sided))
-            triangles = start + np.flatnonzero(light_of[start:end] >= 0)
-            number = light_of.take(triangles)
-            textured_emission.triangle[number], textured_emission.source[number] = triangles, numbers[key]
-        start = end
-    return textured_emission if textured_emission.sources else None
+def _sphere_light(sphere: Sphere, center: NDArray[np.float64]) -> SphereLights:
+    """Return the light of an emitting sphere, relative to `center` (3,)."""
+    middle = (sphere.center - center).astype(f4).reshape(3, 1)
+    return SphereLights(middle, np.array([sphere.radius], f4), sphere.emission)
 
 
-def _area_lights(
-    meshes: Sequence[Mesh], corners: Sequence[NDArray[np.float64]]
-) -> list[tuple[Ints, RectangleLights | TriangleLights]]:
+def _area_lights(meshes: Sequence[Mesh], corners: Sequence[NDArray[np.float64]]) -> list[Part]:
     """Return the emitting rectangles and triangles of all meshes, a record for each kind.
 
     Only what shines evenly is taken for rectangles, as their points have no barycentric weights.
-    With each record come its faces: (2, k) for rectangles, (1, k) for triangles.
+    With each record come its faces: (2, k) for rectangles, (k,) for triangles.
     """
     emitting = [number for number, mesh in enumerate(meshes) if mesh.emission is not None]
     if not emitting:
@@ -133,23 +166,46 @@ def _area_lights(
     face = np.concatenate([np.arange(starts[number], starts[number + 1]) for number in emitting])
     triangles = np.concatenate([corners[number] for number in emitting])
     radiance = np.concatenate([_radiance(meshes[number], corners[number]) for number in emitting], 1)
+    emissions, source_of = _textured_emissions(meshes)
+    source = source_of[mesh_of]
     shining = _with_area(meshes, mesh_of, triangles)
-    even = shining[~np.array([has_textured_emission(mesh) for mesh in meshes])[mesh_of[shining]]]
+    even = shining[source[shining] < 0]
     first = first_of_pairs(triangles[even], mesh_of[even])
     pairs = even[np.stack([first, first + 1])]
     alone = shining[~np.isin(shining, pairs)]
     two_sided = np.array([mesh.two_sided for mesh in meshes])[mesh_of]
-    found: list[tuple[Ints, RectangleLights | TriangleLights]] = []
-    for chosen, rectangles, singles in (
-        (~two_sided, RectangleLights, TriangleLights),
-        (two_sided, TwoSidedRectangleLights, TwoSidedTriangleLights),
-    ):
-        pair, single = pairs[:, chosen[pairs[0]]], alone[chosen[alone]]
+    found: list[Part] = []
+    for rectangles, side in ((RectangleLights, ~two_sided), (TwoSidedRectangleLights, two_sided)):
+        pair = pairs[:, side[pairs[0]]]
         if pair.size:
-            found.append((face[pair], rectangles.from_pairs(triangles[pair[0]], radiance[:, pair[0]])))
-        if single.size:
-            found.append((face[single][None], singles.from_triangles(triangles[single], radiance[:, single])))
+            found.append((rectangles.from_pairs(triangles[pair[0]], radiance[:, pair[0]]), face[pair]))
+    for plain, textured, side in (
+        (TriangleLights, TexturedTriangleLights, ~two_sided),
+        (TwoSidedTriangleLights, TwoSidedTexturedTriangleLights, two_sided),
+    ):
+        single = alone[side[alone]]
+        given = triangles[single], radiance[:, single]
+        if (source[single] >= 0).any():
+            prim = np.where(source[single] >= 0, face[single], -1)
+            found.append((textured.textured(*given, prim, source[single], emissions), face[single]))
+        elif single.size:
+            found.append((plain.from_triangles(*given), face[single]))
     return found
+
+
+def _textured_emissions(meshes: Sequence[Mesh]) -> tuple[tuple[Floats | BaseTexture, ...], Ints]:
+    """Return the distinct emissions of meshes that do not shine evenly, and their numbers, -1 for none."""
+    numbers: dict[int, int] = {}
+    emissions: list[Floats | BaseTexture] = []
+    of_mesh = np.full(len(meshes), -1, np.intp)
+    for number, mesh in enumerate(meshes):
+        if mesh.emission is None or not has_textured_emission(mesh):
+            continue
+        if id(mesh.emission) not in numbers:
+            numbers[id(mesh.emission)] = len(emissions)
+            emissions.append(mesh.emission)
+        of_mesh[number] = numbers[id(mesh.emission)]
+    return tuple(emissions), of_mesh
 
 
 def _radiance(mesh: Mesh, triangles: NDArray[np.float64]) -> Floats:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..bsdfs import Bsdf
 from ..errors import SceneError
-from ..lights import PointLight, SpotLight
+from ..lights import Light
 from ..shapes import Instance, Mesh, Shape, Sphere
 
 # Radii of scenes that stay as they are. There is more room above: parts of a scene are only ever smaller.
@@ -79,7 +79,7 @@ def _with_material(shape: Any, material: Bsdf) -> Any:
     return changed
 
 
-def check_lights(lights: Iterable[object], center: NDArray[np.float64], factor: float) -> None:
+def check_lights(lights: Iterable[Light], center: NDArray[np.float64], factor: float) -> None:
     """Check that no light is so far away that float32 cannot square its distance.
 
     Raises
@@ -88,8 +88,9 @@ def check_lights(lights: Iterable[object], center: NDArray[np.float64], factor: 
         If the position of one is.
     """
     for light in lights:
-        if isinstance(light, PointLight | SpotLight):
-            check_distance(f"{type(light).__name__} position", light.position, center, factor)
+        if light.bounds is not None:
+            for corner in light.bounds:
+                check_distance(f"{type(light).__name__} position", corner, center, factor)
 
 
 def check_distance(

@@ -11,7 +11,6 @@ from ..accel import Accelerator, Geometry, InstanceAccelerator
 from ..camera import Camera
 from ..lights import LightTable
 from ..lights.samplers import LightSamplerMaker
-from ..lights.textured_emission import TexturedEmission
 from ..record import record
 from ..scene import Scene
 from ..shapes import Shape
@@ -19,7 +18,7 @@ from ..shapes.attributes import Corners, corner_values
 from ..vec import Bools, Floats, Ints, f4
 from .geometry import _alike, _corner_normals, _face_normals
 from .instances import InstanceTable, own_frame, place, resolve
-from .lights import _gather_lights, _uneven
+from .lights import gather_lights
 from .materials import (
     MaterialTable,
     Opacities,
@@ -63,7 +62,6 @@ class CompiledScene:
     nonscattering_lights: (
         Bools | None
     )  # (lights,) those whose surface scatters nothing; None when there are none
-    textured_emission: TexturedEmission | None  # the lights that do not shine evenly; None when all do
     instances: InstanceTable | None = None  # None when every mesh is placed once
 
     @property
@@ -119,7 +117,8 @@ def compile_scene(
     check_lights(scene.lights, (low + high) / 2, scale)
     low, high = low * scale, high * scale
     center = (low + high) / 2
-    meshes, spheres, instances = resolve(scaled_shapes(scene.shapes, scale), most_copies)
+    scaled = scaled_shapes(scene.shapes, scale)
+    meshes, spheres, instances = resolve(scaled, most_copies)
     placed: list[Shape] = [*meshes, *spheres, *instances]
     shared = list({id(instance.mesh): instance.mesh for instance in instances}.values())
     once = sum(len(mesh.faces) for mesh in meshes)
@@ -129,8 +128,8 @@ def compile_scene(
     triangles = np.concatenate(corners) if corners else np.zeros((0, 3, 3))
     user_materials, material_of, replaced = _number_materials(meshes, spheres, instances)
     attributes = {name: corner_values(name, meshes) for name in _attributes_read(placed)}
-    lights, light_of, environment = _gather_lights(
-        scene, scale, meshes, spheres, corners, center, (high - low) / 2, light_sampler, mis
+    lights, light_of, environment = gather_lights(
+        scene, scaled, scale, meshes, spheres, corners, center, (high - low) / 2, light_sampler, mis
     )
     centers = np.array([s.center - center for s in spheres]).reshape(-1, 3).T.astype(f4)
     radii = np.array([s.radius for s in spheres]).astype(f4)
@@ -169,6 +168,5 @@ def compile_scene(
         opacities=_opacities(user_materials, partly),
         lights=lights,
         nonscattering_lights=nonscattering_lights,
-        textured_emission=_uneven(meshes, len(lights), light_of),
         instances=table,
     )

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..camera import Camera
-from ..lights import UserLight
+from ..lights import Light
 from ..shapes import Shape
 from .placing import Places
 from .repair import RawMesh
@@ -18,7 +18,7 @@ class Contents:
 
     raws: list[RawMesh]
     places: Places
-    lights: Sequence[UserLight] = ()
+    lights: Sequence[Light] = ()
     camera: Camera | None = None
     shapes: Sequence[Shape] = ()  # further ones, built already
 

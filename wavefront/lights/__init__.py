@@ -1,6 +1,6 @@
 """Lights, and how one of them is chosen."""
 
-from .base import Light, LightSample, UserLight
+from .base import DeltaLight, Light, LightRecord, LightSample
 from .directional import DirectionalLight, DirectionalLights, SunLight
 from .environment import ConstantEnvironment, Environment
 from .image import ImageEnvironment
@@ -10,10 +10,12 @@ from .rectangle import RectangleLights, TwoSidedRectangleLights, first_of_pairs
 from .sphere import SphereLights
 from .spot import SpotLight, SpotLights
 from .table import LightTable
+from .textured_emission import TexturedTriangleLights, TwoSidedTexturedTriangleLights
 from .triangle import TriangleLights, TwoSidedTriangleLights
 
 __all__ = [
     "ConstantEnvironment",
+    "DeltaLight",
     "DirectionalLight",
     "DirectionalLights",
     "Environment",
@@ -21,6 +23,7 @@ __all__ = [
     "ImageEnvironment",
     "InfiniteLight",
     "Light",
+    "LightRecord",
     "LightSample",
     "LightTable",
     "PointLight",
@@ -30,9 +33,10 @@ __all__ = [
     "SpotLight",
     "SpotLights",
     "SunLight",
+    "TexturedTriangleLights",
     "TriangleLights",
     "TwoSidedRectangleLights",
+    "TwoSidedTexturedTriangleLights",
     "TwoSidedTriangleLights",
-    "UserLight",
     "first_of_pairs",
 ]

@@ -1,26 +1,24 @@
 """The contract of every light.
 
-A light record holds k lights of one kind, a column each (`SoA`). The methods work on n
-lanes: on a record with one column that is shared by all lanes, or on one that `take` gathered to
-a column per lane. Positions are relative to the scene's center. Every pdf is in solid angle.
+A `Light` is what a scene holds. For a render it gives a `LightRecord`, which holds k lights of one kind,
+a column each (`SoA`). The methods of a record work on n lanes: on a record with one column that is shared
+by all lanes, or on one that `take` gathered to a column per lane. Positions are relative to the scene's
+center. Every pdf is in solid angle.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import finite_array
-from ..parameter import Parametrized
+from ..errors import SceneError, finite_array
 from ..record import record
-from ..state import SoA
-from ..vec import Floats, f4, positive
-
-LEAST_SQUARE = f4(1e-35)  # added to squared distances before their root, so that nothing is divided by 0
-EDGE_ON = f4(1e-14)  # taken off cosines that are divided by; smaller ones count as those of a dark side
+from ..shapes import Shape
+from ..state import SoA, SurfaceInteraction
+from ..vec import Bools, Floats, Ints, f4
 
 
 @record
@@ -32,13 +30,68 @@ class LightSample(SoA):
     pdf: Floats  # (n,) solid-angle density, 1/sr (of a delta light: 1)
     distance: Floats  # (n,) to the sampled point, scene units; inf for a light at infinity
     cos_light: Floats  # (n,) cosine between the ray and the light's normal; 1 where it has none
+    # of lights whose radiance is looked up on the surface, with `le`, instead of being given here:
+    prim: Ints | None = None  # (n,) triangle of the sampled point; -1 for a sample with its own radiance
+    b1: Floats | None = None  # (n,) barycentric weight of its second vertex there
+    b2: Floats | None = None  # (n,) barycentric weight of its third vertex
 
 
-class Light(SoA, ABC):
-    """k lights of one kind."""
+class Light(ABC):
+    """What shines in a scene beside the shapes with an emission: an element of `Scene(lights=...)`."""
 
     __slots__ = ()
-    delta: ClassVar[bool] = False  # no BSDF sample can meet it: its samples take no MIS weight
+    shape: Shape | None = None  # the mesh or sphere of the scene whose surface shines; None for no surface
+    hint: ClassVar[str | None] = None  # how to turn the light to what it misses, for messages
+
+    @abstractmethod
+    def record(self, center: NDArray[np.float64]) -> LightRecord:
+        """Return the light as a record, with positions relative to `center` (3,).
+
+        It has one column; that of a light with a `shape` may have one for each of its faces.
+        """
+
+    @property
+    def delta(self) -> bool:
+        """Whether no ray can meet the light, so that light samples alone find it."""
+        return self.record(np.zeros(3)).delta
+
+    @property
+    def bounds(self) -> NDArray[np.float64] | None:
+        """Lower and upper corner (2, 3) of where the light is, scene units; None if it is nowhere."""
+        return None
+
+    def scaled(self, factor: float) -> Light:
+        """Return the light for a scene whose lengths were multiplied by `factor`, with equal irradiance.
+
+        Only scenes of extreme size are scaled.
+
+        Raises
+        ------
+        SceneError
+            If the light does not define how.
+        """
+        raise SceneError(
+            f"{type(self).__name__} has no scaled(factor), which a scene as large or small as this needs"
+        )
+
+
+class LightRecord(SoA, Light):
+    """k lights of one kind; a light of a scene that is its own record has one.
+
+    A subclass is a dataclass. Each field is an array with a column per light, or a value that the
+    lights share.
+    """
+
+    __slots__ = ()
+    delta: ClassVar[bool] = False  # no BSDF sample meets it: its samples take no MIS weight
+    varies: ClassVar[bool | Bools] = False  # whether, or (k,) which lights, shine by `le(wi, surface)`
+    reads: ClassVar[tuple[str, ...]] = ()  # attributes of the surface that `le` reads, such as "uv"
+
+    def record(self, center: NDArray[np.float64]) -> LightRecord:
+        """Return the light relative to `center` (3,); a light that is its own record defines how."""
+        raise SceneError(
+            f"{type(self).__name__} has no record(center), which returns the light relative to the center"
+        )
 
     @abstractmethod
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
@@ -46,15 +99,21 @@ class Light(SoA, ABC):
 
     @abstractmethod
     def pdf_li(self, point: Floats, wi: Floats) -> Floats:
-        """Density with which `sample_li` draws wi (3, n), (n,); 0 where the ray misses the light."""
+        """Return the density (n,) with which `sample_li` draws wi (3, n); 0 where a ray misses the light."""
 
     @abstractmethod
-    def le(self, wi: Floats) -> Floats:
-        """Radiance (3, n) carried against wi by rays that meet the light; 0 from a side that is dark."""
+    def le(self, wi: Floats, surface: SurfaceInteraction | None = None) -> Floats:
+        """Return the radiance (3, n) carried against wi by rays that meet the light; 0 from a dark side.
+
+        `surface` (n columns) is where they meet it, for lights that vary; others get None.
+        """
 
     @abstractmethod
     def power(self, scene_radius: float) -> NDArray[np.float64]:
-        """Estimate the emitted power of each light, (k,), the mean of the channels, W."""
+        """Estimate the emitted power of each light, (k,), the mean of the channels, W.
+
+        A light without power gets no samples.
+        """
 
     def irradiance(
         self, center: NDArray[np.float64], radius: float, scene_radius: float
@@ -75,8 +134,23 @@ class Light(SoA, ABC):
         (c, k) irradiance, the mean of the channels. Here: that of a light which shines on the whole
         scene alike.
         """
-        irradiance = self.power(scene_radius) / (4 * np.pi * max(scene_radius, 1e-30) ** 2)
-        return np.broadcast_to(irradiance, (center.shape[1], len(irradiance)))
+        broadcast = self.power(scene_radius) / (4 * np.pi * max(scene_radius, 1e-30) ** 2)
+        return np.broadcast_to(broadcast, (center.shape[1], len(broadcast)))
+
+
+class DeltaLight(LightRecord):
+    """k lights without a surface, such as points and parallel rays, which no ray can meet."""
+
+    __slots__ = ()
+    delta: ClassVar[bool] = True
+
+    def pdf_li(self, point: Floats, wi: Floats) -> Floats:
+        """Return 0: no sampled direction meets the light."""
+        return np.zeros(wi.shape[1], f4)
+
+    def le(self, wi: Floats, surface: SurfaceInteraction | None = None) -> Floats:
+        """Return 0: the light is never seen."""
+        return np.zeros_like(wi)
 
 
 def position(name: str, value: ArrayLike) -> NDArray[np.float64]:
@@ -84,55 +158,32 @@ def position(name: str, value: ArrayLike) -> NDArray[np.float64]:
     return finite_array(name, value, (3,))
 
 
-class UserLight(Parametrized, ABC):
-    """A light as a user makes it, beside the shapes of a scene."""
+def sampled_li(light: LightRecord, point: Floats, u: Floats) -> LightSample:
+    """Return what a light samples from points (3, n) with u (2, n).
 
-    def scaled(self, factor: float) -> UserLight:
-        """Return the light for a scene whose lengths were multiplied by `factor`: itself if it has none."""
-        return self
-
-    @abstractmethod
-    def record(self, center: NDArray[np.float64]) -> Light:
-        """Return the light as a record of one column, relative to `center` (3,)."""
-
-
-def area_pdf(d2: Floats, cos_light: Floats, area: Floats) -> Floats:
-    """Solid-angle density d²/(A·cosθ) of points drawn uniformly from an area; 0 on a dark side; (n,).
-
-    Parameters
-    ----------
-    d2
-        (n,) squared distances of the points.
-    cos_light
-        (n,) cosines at the points, above 0 on a side that shines.
-    area
-        (n,) or (1,).
+    Raises
+    ------
+    SceneError
+        If the light returns arrays of other shapes than `LightSample` has.
     """
-    return positive(d2 / ((cos_light - EDGE_ON) * area))
-
-
-def facing_area(
-    center: NDArray[np.float64],
-    radius: float,
-    middle: Floats,
-    normal: Floats,
-    size: Floats,
-    strength: NDArray[np.float64],
-    sides: int,
-) -> NDArray[np.float64]:
-    """Irradiance at most that areas bring to balls of space, (c, k).
-
-    Parameters
-    ----------
-    center, radius
-        (3, c) and scalar: the balls.
-    middle, normal, size, strength
-        (3, k), (3, k), (k,), (k,): the areas' middle, front normal, width, and radiance times area.
-    sides
-        1 if they shine from the front only, else 2.
-    """
-    away = center[:, :, None] - middle[:, None, :]
-    height = (away * normal[:, None, :]).sum(0)
-    height = np.maximum((height if sides == 1 else np.abs(height)) + radius + size, 0)
-    distance = np.sqrt(np.maximum((away**2).sum(0), np.maximum(size, radius) ** 2))
-    return strength * np.minimum(height / distance, 1) / distance**2
+    sample = light.sample_li(point, u)
+    n = point.shape[1]
+    if (
+        np.shape(sample.wi) != (3, n)
+        or np.shape(sample.radiance) != (3, n)
+        or not np.shape(sample.pdf) == np.shape(sample.distance) == np.shape(sample.cos_light) == (n,)
+    ):
+        found: dict[str, tuple[Any, tuple[int, ...]]] = {
+            "wi": (sample.wi, (3, n)),
+            "radiance": (sample.radiance, (3, n)),
+            "pdf": (sample.pdf, (n,)),
+            "distance": (sample.distance, (n,)),
+            "cos_light": (sample.cos_light, (n,)),
+        }
+        for name, (array, due) in found.items():
+            if np.shape(array) != due:
+                raise SceneError(
+                    f"{type(light).__name__}: sample_li's {name} has the shape {np.shape(array)}; "
+                    f"it must have {'(3, n)' if len(due) == 2 else '(n,)'} = {due}"
+                )
+    return sample

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,22 +10,22 @@ from numpy.typing import ArrayLike, NDArray
 from ..elementary import sin_cos
 from ..errors import SceneError, finite_array, number, rgb
 from ..frame import Frame
-from ..parameter import Parameter
+from ..parameter import Parameter, Parametrized
 from ..record import record
 from ..sampling.warp import uniform_cone
+from ..state import SurfaceInteraction
 from ..suggestions import suggests_keywords
 from ..vec import TWO_PI, Floats, column, dot, f4
-from .base import Light, LightSample, UserLight
+from .base import DeltaLight, Light, LightSample
 from .infinite import InfiniteLight, at_infinity, facing_irradiance, through_scene, turned
 
 MIN_ANGLE = 0.01  # degrees; float32 directions cannot tell a smaller disk's edge to a percent
 
 
 @record
-class DirectionalLights(Light):
+class DirectionalLights(DeltaLight):
     """k lights whose rays are parallel."""
 
-    delta: ClassVar[bool] = True
     towards: Floats  # (3, k) unit direction to the light
     facing: Floats  # (3, k) W·m⁻² on a surface that faces the light
 
@@ -33,14 +33,6 @@ class DirectionalLights(Light):
         """Return the direction; the radiance is the irradiance of a surface that faces it."""
         wi = np.broadcast_to(self.towards, point.shape)
         return at_infinity(wi, np.broadcast_to(self.facing, point.shape), np.ones(point.shape[1], f4))
-
-    def pdf_li(self, point: Floats, wi: Floats) -> Floats:
-        """Return 0: no sampled direction is exactly the light's."""
-        return np.zeros(wi.shape[1], f4)
-
-    def le(self, wi: Floats) -> Floats:
-        """Return 0: the light is never seen."""
-        return np.zeros_like(wi)
 
     def power(self, scene_radius: float) -> NDArray[np.float64]:
         """E through the disk of the scene, πR²."""
@@ -71,7 +63,7 @@ class SunLight(InfiniteLight):
         """Return 1/(solid angle of the disk) within it."""
         return np.where(self._meets(wi), f4(1) / (TWO_PI * self.height), f4(0))
 
-    def le(self, wi: Floats) -> Floats:
+    def le(self, wi: Floats, surface: SurfaceInteraction | None = None) -> Floats:
         """Return the radiance within the disk, (3, n)."""
         return self.radiance * self._meets(wi)
 
@@ -113,7 +105,7 @@ def _angle(name: str, value: float) -> float:
     return number(name, value, lambda x: x == 0 or MIN_ANGLE <= x <= 180, allowed)
 
 
-class DirectionalLight(UserLight):
+class DirectionalLight(Parametrized, Light):
     """Light from one direction, infinitely far away, such as the sun's.
 
     Parameters
@@ -144,6 +136,10 @@ class DirectionalLight(UserLight):
         self.direction = direction
         self.irradiance = irradiance
         self.angle = angle
+
+    def scaled(self, factor: float) -> Self:
+        """Return the light: it has no length."""
+        return self
 
     def record(self, center: NDArray[np.float64]) -> DirectionalLights | SunLight:
         """Return the light as a record of one column."""

@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import one_of, rgb, rotation_matrix
+from ..parameter import Parametrized
 from ..record import record
 from ..sampling.warp import uniform_sphere
+from ..state import SurfaceInteraction
 from ..suggestions import suggests_keywords
 from ..vec import INV_FOUR_PI, Floats, f4
-from .base import LightSample, UserLight
+from .base import Light, LightSample
 from .image import ImageEnvironment, environment_pixels
 from .infinite import InfiniteLight, at_infinity, through_scene
 
@@ -40,7 +42,7 @@ class ConstantEnvironment(InfiniteLight):
         """Return 1/4π."""
         return np.full(wi.shape[1], INV_FOUR_PI, f4)
 
-    def le(self, wi: Floats) -> Floats:
+    def le(self, wi: Floats, surface: SurfaceInteraction | None = None) -> Floats:
         """Return the radiance, (3, n)."""
         return np.broadcast_to(self.radiance, wi.shape)
 
@@ -49,7 +51,7 @@ class ConstantEnvironment(InfiniteLight):
         return self.share * through_scene(4 * np.pi * self.radiance.mean(0, dtype=np.float64), scene_radius)
 
 
-class Environment(UserLight):
+class Environment(Parametrized, Light):
     """Light that arrives from infinitely far away, wherever a ray leaves the scene.
 
     Parameters
@@ -113,6 +115,10 @@ class Environment(UserLight):
             self._radiance, self._image = image.mean, image
         else:
             self._radiance, self._image = rgb("Environment radiance", radiance), None
+
+    def scaled(self, factor: float) -> Self:
+        """Return the light: it has no length."""
+        return self
 
     def record(self, center: NDArray[np.float64]) -> InfiniteLight:
         """Return the light as a record of one column."""

@@ -18,6 +18,7 @@ from ..errors import SceneError
 from ..files import check_size
 from ..record import record
 from ..sampling.discrete import Distribution2D
+from ..state import SurfaceInteraction
 from ..textures.image import Texture
 from ..vec import INV_PI, INV_TWO_PI, Floats, f4, luminance
 from .base import LightSample
@@ -110,7 +111,7 @@ class ImageEnvironment(InfiniteLight):
         row = np.minimum((y * f4(len(self.density))).astype(np.intp), len(self.density) - 1)
         return self.texels.pdf(x, y) * self.density.take(row)
 
-    def le(self, wi: Floats) -> Floats:
+    def le(self, wi: Floats, surface: SurfaceInteraction | None = None) -> Floats:
         """Return the radiance of the image in direction wi, (3, n)."""
         return self._lookup(*self._place(wi))
 

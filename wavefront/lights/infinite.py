@@ -11,14 +11,23 @@ from numpy.typing import NDArray
 
 from ..record import record
 from ..sampling.discrete import Discrete
+from ..state import SurfaceInteraction
 from ..vec import Floats, Lanes, column, f4
-from .base import Light, LightSample
+from .base import LightRecord, LightSample
 
 
-class InfiniteLight(Light):
+class InfiniteLight(LightRecord):
     """A light that rays meet where they leave the scene. A record holds one, shared by all lanes."""
 
     __slots__ = ()
+
+    def record(self, center: NDArray[np.float64]) -> Self:
+        """Return the light: it is the same from everywhere."""
+        return self
+
+    def scaled(self, factor: float) -> Self:
+        """Return the light: it has no length."""
+        return self
 
     def __len__(self) -> int:
         """Return 1."""
@@ -85,7 +94,7 @@ class EnvironmentSum(InfiniteLight):
             pdf += chance * part.pdf_li(point, wi)
         return pdf
 
-    def le(self, wi: Floats) -> Floats:
+    def le(self, wi: Floats, surface: SurfaceInteraction | None = None) -> Floats:
         """Return the sum of the parts' radiances, (3, n)."""
         radiance = np.zeros_like(wi)
         for part in self.parts:
@@ -119,7 +128,7 @@ def through_scene(irradiance: NDArray[np.float64], scene_radius: float) -> NDArr
     return np.pi * scene_radius**2 * irradiance
 
 
-def facing_irradiance(light: Light, center: NDArray[np.float64]) -> NDArray[np.float64]:
+def facing_irradiance(light: LightRecord, center: NDArray[np.float64]) -> NDArray[np.float64]:
     """What lights from one direction bring to surfaces that face them, (c, k), at c places."""
     irradiance = light.power(1.0) / np.pi
     return np.broadcast_to(irradiance, (center.shape[1], len(irradiance)))

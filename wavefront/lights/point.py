@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError, rgb
-from ..parameter import Parameter
+from ..parameter import Parameter, Parametrized
 from ..record import record
 from ..suggestions import suggests_keywords
 from ..vec import FLOAT32_MAX, Floats, dot, f4
-from .base import Light, LightSample, UserLight, position
+from .base import DeltaLight, Light, LightSample, position
 
 
 @record
-class PointLights(Light):
+class PointLights(DeltaLight):
     """k points that shine equally in all directions."""
 
-    delta: ClassVar[bool] = True
     position: Floats  # (3, k) scene units
     intensity: Floats  # (3, k) W/sr
 
@@ -33,14 +31,6 @@ class PointLights(Light):
         distance = np.sqrt(safe)
         pdf = np.where(lit, f4(1), f4(0))
         return LightSample(away / distance, self.intensity / safe, pdf, distance, np.ones_like(distance))
-
-    def pdf_li(self, point: Floats, wi: Floats) -> Floats:
-        """Return 0: no sampled direction can meet a point."""
-        return np.zeros(wi.shape[1], f4)
-
-    def le(self, wi: Floats) -> Floats:
-        """Return 0: a point is never seen."""
-        return np.zeros_like(wi)
 
     def power(self, scene_radius: float) -> NDArray[np.float64]:
         """4πI."""
@@ -65,7 +55,7 @@ def intensity_of(name: str, value: ArrayLike) -> NDArray[np.float64]:
     return rgb(name, value, dtype=np.float64)
 
 
-class PointLight(UserLight):
+class PointLight(Parametrized, Light):
     """A point that shines equally in all directions.
 
     Parameters
@@ -81,6 +71,7 @@ class PointLight(UserLight):
         If an argument is malformed.
     """
 
+    delta = True
     position = Parameter(position)
     intensity = Parameter(intensity_of)
 
@@ -88,6 +79,11 @@ class PointLight(UserLight):
     def __init__(self, position: ArrayLike, intensity: ArrayLike) -> None:
         self.position = position
         self.intensity = intensity
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """The position, twice, (2, 3)."""
+        return np.stack([self.position, self.position])
 
     def scaled(self, factor: float) -> PointLight:
         """Return the light for a scene whose lengths were multiplied by `factor`: the same irradiance there.

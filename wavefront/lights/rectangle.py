@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from ..record import record
 from ..sampling.spherical import SphericalRectangle
+from ..shapes.fans import are_fans, disjoint_pairs
 from ..vec import Bools, Floats, Ints, dot, f4, put
-from .base import LEAST_SQUARE, Light, LightSample, area_pdf, facing_area
+from .base import LightSample
+from .planar import LEAST_SQUARE, PlanarLights, TwoSided, area_pdf
 
 NEAR = f4(2)  # squared distance, in areas, within which solid angle is sampled
 ROOT_NEAR = np.sqrt(NEAR)
@@ -21,31 +23,20 @@ SQUARE = 1e-6  # how far, relative to its sides, a pair of triangles may be from
 
 
 @record
-class RectangleLights(Light):
-    """k rectangles that emit from their front side."""
+class RectangleLights(PlanarLights):
+    """k rectangles, with perpendicular edges, that emit from their front side."""
 
-    corner: Floats  # (3, k) scene units
-    edge_u: Floats  # (3, k) from the corner; edge_u × edge_v is the front
-    edge_v: Floats  # (3, k) from the corner, perpendicular to edge_u
-    normal: Floats  # (3, k) unit normal of the front side
-    area: Floats  # (k,)
-    radiance: Floats  # (3, k) W·sr⁻¹·m⁻²
-
-    sides: ClassVar[int] = 1  # that shine
+    parallelograms: ClassVar[float] = 1
+    middle: ClassVar[int] = 2
 
     @classmethod
-    def from_pairs(cls, triangles: NDArray[np.float64], radiance: Floats) -> RectangleLights:
+    def from_pairs(cls, triangles: NDArray[np.float64], radiance: Floats) -> Self:
         """Build from the first triangle of each pair, (k, 3, 3), and radiance (3, k) or (3, 1).
 
         The corners of a pair are p, p + u, p + u + v and p, p + u + v, p + v.
         """
-        corner, edge_u = triangles[:, 0].T, (triangles[:, 1] - triangles[:, 0]).T
-        edge_v = (triangles[:, 2] - triangles[:, 1]).T
-        normal = np.cross(edge_u, edge_v, axis=0)
-        area = np.linalg.norm(normal, axis=0)
-        p, u, v, n = (np.ascontiguousarray(rows, f4) for rows in (corner, edge_u, edge_v, normal / area))
-        each = np.broadcast_to(radiance, (3, len(triangles))).astype(f4)
-        return cls(p, u, v, n, area.astype(f4), each)
+        a, b, c = triangles.transpose(1, 2, 0)
+        return cls.from_edges(a, b - a, c - b, radiance)
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
         """Draw a point uniformly by area, or from nearby a direction uniformly in solid angle."""
@@ -82,10 +73,6 @@ class RectangleLights(Light):
         """Height (n,) of points over the front."""
         return dot(self.normal, point) - dot(self.normal, self.corner)
 
-    def _facing(self, rise: Floats) -> Floats:
-        """Turn heights, or cosines, over the front (n,) into those over a side that shines."""
-        return rise
-
     def _near(self, point: Floats, height: Floats) -> Iterator[tuple[Ints, SphericalRectangle]]:
         """Yield lanes of points that get light and are close to the middle, for the rectangle's size.
 
@@ -113,54 +100,26 @@ class RectangleLights(Light):
         some = self._at(lanes)
         return SphericalRectangle.of(some.corner - point.take(lanes, 1), some.edge_u, some.edge_v, dtype)
 
-    def le(self, wi: Floats) -> Floats:
-        """Return the radiance on rays that come upon a side that shines, (3, n)."""
-        return self.radiance * (self._facing(-dot(self.normal, wi)) > 0)
-
-    def power(self, scene_radius: float) -> NDArray[np.float64]:
-        """π·A·L for each side."""
-        return self.sides * np.pi * self.area * self.radiance.mean(0, dtype=np.float64)
-
-    def irradiance(
-        self, center: NDArray[np.float64], radius: float, scene_radius: float
-    ) -> NDArray[np.float64]:
-        """L·A·cosθ/d² of a small area at the middle; (c, k)."""
-        middle = self.corner + (self.edge_u + self.edge_v) / 2
-        strength = self.area * self.radiance.mean(0, dtype=np.float64)
-        return facing_area(center, radius, middle, self.normal, np.sqrt(self.area), strength, self.sides)
-
 
 @record
-class TwoSidedRectangleLights(RectangleLights):
+class TwoSidedRectangleLights(TwoSided, RectangleLights):
     """k rectangles that emit from both sides."""
-
-    sides: ClassVar[int] = 2
-
-    def _facing(self, rise: Floats) -> Floats:
-        return np.abs(rise)
 
 
 def first_of_pairs(triangles: NDArray[np.float64], mesh_of: Ints) -> Ints:
     """Find consecutive triangles (m, 3, 3) that make a rectangle: indices (k,) of the first of each.
 
     `mesh_of` (m,) numbers their meshes; both must be of the same.
-
-    They share the diagonal from the first corner of both to the third of the first and the second
-    of the second, as `Rectangle` and fans of quadrilaterals lay them out.
     """
     a, b, c = (triangles[:-1, i] for i in range(3))
     d = triangles[1:, 2]
-    shared = (triangles[1:, 0] == a).all(1) & (triangles[1:, 1] == c).all(1)
     u, v = b - a, c - b
     size_u, size_v = np.linalg.norm(u, axis=1), np.linalg.norm(v, axis=1)
     closes = np.linalg.norm(d - a - v, axis=1) <= SQUARE * (size_u + size_v)
     square = np.abs((u * v).sum(1)) <= SQUARE * size_u * size_v
-    one_mesh = mesh_of[:-1] == mesh_of[1:]
-    found = np.flatnonzero(one_mesh & shared & closes & square & (size_u > 0) & (size_v > 0))
-    # in a run of pairs that overlap, every other one stands
-    place = np.arange(len(found))
-    starts = np.append(True, np.diff(found) > 1)[: len(found)]
-    return found[(place - np.maximum.accumulate(np.where(starts, place, 0))) % 2 == 0]
+    same_mesh = mesh_of[:-1] == mesh_of[1:]
+    rectangles = same_mesh & are_fans(triangles) & closes & square & (size_u > 0) & (size_v > 0)
+    return disjoint_pairs(np.flatnonzero(rectangles))
 
 
 def _within(p: Floats, edge: Floats) -> Bools:

@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 from ..frame import Frame
 from ..record import record
 from ..sampling.warp import uniform_cone, uniform_sphere
+from ..state import SurfaceInteraction
 from ..vec import INV_FOUR_PI, TWO_PI, Floats, dot, f4
-from .base import Light, LightSample
+from .base import LightRecord, LightSample
 
 
 @record
-class SphereLights(Light):
+class SphereLights(LightRecord):
     """k spheres that emit on both sides."""
 
     center: Floats  # (3, k) scene units
@@ -46,7 +47,7 @@ class SphereLights(Light):
         cone = np.where(meets, f4(1) / (TWO_PI * height), f4(0))
         return np.where(outside, cone, INV_FOUR_PI)
 
-    def le(self, wi: Floats) -> Floats:
+    def le(self, wi: Floats, surface: SurfaceInteraction | None = None) -> Floats:
         """Return the radiance, (3, n)."""
         return np.broadcast_to(self.radiance, wi.shape)
 

@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..elementary import arccos, arcsin, sin_cos, sin_cos_turns
 from ..errors import SceneError, finite_array, number
-from ..parameter import Parameter
+from ..parameter import Parameter, Parametrized
 from ..record import record
 from ..suggestions import suggests_keywords
 from ..vec import Floats, dot, f4
-from .base import Light, LightSample, UserLight, position
+from .base import DeltaLight, Light, LightSample, position
 from .directional import unit
 from .point import intensity_of, scaled_intensity
 
 
 @record
-class SpotLights(Light):
+class SpotLights(DeltaLight):
     """k points that shine into a cone each."""
 
-    delta: ClassVar[bool] = True
     position: Floats  # (3, k) scene units
     axis: Floats  # (3, k) unit direction in which the light shines
     outer: Floats  # (k,) 1 − cos of the angle at which the light ends
@@ -41,14 +39,6 @@ class SpotLights(Light):
         strength = self._falloff(wi)
         pdf = np.where(apart & (strength > 0), f4(1), f4(0))
         return LightSample(wi, self.intensity * (strength / safe), pdf, distance, np.ones_like(distance))
-
-    def pdf_li(self, point: Floats, wi: Floats) -> Floats:
-        """Return 0: no sampled direction can meet a point."""
-        return np.zeros(wi.shape[1], f4)
-
-    def le(self, wi: Floats) -> Floats:
-        """Return 0: a point is never seen."""
-        return np.zeros_like(wi)
 
     def power(self, scene_radius: float) -> NDArray[np.float64]:
         """2πI·(h_inner + (h_outer − h_inner)/3), the integral of the falloff; h = 1 − cos."""
@@ -88,7 +78,7 @@ def _blend(name: str, value: float) -> float:
     return number(name, value, lambda x: 0 <= x <= 1, "in [0, 1]")
 
 
-class SpotLight(UserLight):
+class SpotLight(Parametrized, Light):
     """A point that shines into a cone.
 
     Parameters
@@ -116,6 +106,8 @@ class SpotLight(UserLight):
         If an argument is malformed or out of range.
     """
 
+    hint = "direct the SpotLight, or widen its cone"
+    delta = True
     position = Parameter(position)
     intensity = Parameter(intensity_of)
     direction = Parameter(unit)
@@ -146,6 +138,11 @@ class SpotLight(UserLight):
             self.direction = direction
         self.angle = angle
         self.blend = blend
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """The position, twice, (2, 3)."""
+        return np.stack([self.position, self.position])
 
     def scaled(self, factor: float) -> SpotLight:
         """Return the light for a scene whose lengths were multiplied by `factor`: the same irradiance there.

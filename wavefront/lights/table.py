@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..sampling.mis import power_heuristic
+from ..state import SurfaceInteraction
 from ..vec import ALL, Floats, Ints, Lanes, f4, put, take
-from .base import Light, LightSample
+from .base import LightRecord, LightSample, sampled_li
 from .samplers import (
     LIGHT_SAMPLERS,
     LightSampler,
@@ -42,11 +43,15 @@ class LightTable:
     """
 
     def __init__(
-        self, kinds: Sequence[Light], half_size: ArrayLike, choice: str | LightSamplerMaker = "spatial"
+        self, kinds: Sequence[LightRecord], half_size: ArrayLike, choice: str | LightSamplerMaker = "spatial"
     ) -> None:
         self.kinds = tuple(kinds)
         self.starts = np.cumsum([0, *(len(kind) for kind in kinds)])
         self.kind_of = np.repeat(np.arange(len(kinds)), [len(kind) for kind in kinds])
+        varies = np.concatenate([np.zeros(0), *(np.broadcast_to(kind.varies, len(kind)) for kind in kinds)])
+        self.varies = (
+            varies.astype(np.bool_) if varies.any() else None
+        )  # (lights,) those with `le` by surface
         self.delta_of = np.array([kind.delta for kind in kinds], np.bool_)[self.kind_of]
         extent = np.broadcast_to(np.asarray(half_size, float), 3)
         power = np.concatenate([np.zeros(0), *(kind.power(float(np.linalg.norm(extent))) for kind in kinds)])
@@ -110,33 +115,62 @@ class LightTable:
             weight[np.flatnonzero(self.delta_of.take(light))] = 1
         return weight
 
-    def le(self, light: Ints, wi: Floats) -> Floats:
-        """Radiance (3, n) of the lights numbered `light` (n,) against wi (3, n)."""
+    def le(
+        self, light: Ints, wi: Floats, surface_at: Callable[[Ints], SurfaceInteraction] | None = None
+    ) -> Floats:
+        """Return the radiance (3, n) of the lights numbered `light` (n,) against wi (3, n).
+
+        `surface_at` is called with the lanes (k,) whose lights vary, if there are any, and returns the
+        surfaces there.
+        """
+        if self.varies is None:
+            return self._le(light, wi, None)
+        varies = self.varies.take(light)
+        lanes, even = np.flatnonzero(varies), np.flatnonzero(~varies)
+        if not lanes.size:
+            return self._le(light, wi, None)
+        assert surface_at is not None
+        radiance = np.empty_like(wi)
+        put(radiance, even, self._le(light.take(even), take(wi, even), None))
+        put(radiance, lanes, self._le(light.take(lanes), take(wi, lanes), surface_at(lanes)))
+        return radiance
+
+    def _le(self, light: Ints, wi: Floats, surface: SurfaceInteraction | None) -> Floats:
         if len(self.kinds) == 1:
-            return self._gathered(0, light).le(wi)
+            return _radiance(self._gathered(0, light), wi, surface)
         radiance = np.empty_like(wi)
         for kind, rows in self._by_kind(light):
-            put(radiance, rows, kind.le(take(wi, rows)))
+            put(
+                radiance,
+                rows,
+                _radiance(kind, take(wi, rows), None if surface is None else surface.take(rows)),
+            )
         return radiance
 
     def _sample_each(self, light: Ints, point: Floats, u: Floats) -> LightSample:
         n = len(light)
         out = LightSample(np.empty((3, n), f4), np.empty((3, n), f4), *np.empty((3, n), f4))
+        where: tuple[Ints, Floats, Floats] | None = None
         for kind, rows in self._by_kind(light):
             if isinstance(rows, slice):
-                return kind.sample_li(point, u)
-            part = kind.sample_li(take(point, rows), take(u, rows))
+                return sampled_li(kind, point, u)
+            part = sampled_li(kind, take(point, rows), take(u, rows))
             put(out.wi, rows, part.wi)
             put(out.radiance, rows, part.radiance)
             out.pdf[rows], out.distance[rows], out.cos_light[rows] = part.pdf, part.distance, part.cos_light
+            if part.prim is not None:
+                where = where or (np.full(n, -1, np.intp), np.zeros(n, f4), np.zeros(n, f4))
+                where[0][rows], where[1][rows], where[2][rows] = part.prim, part.b1, part.b2
+        if where is not None:
+            out.prim, out.b1, out.b2 = where
         return out
 
-    def _gathered(self, number: int, light: Ints) -> Light:
+    def _gathered(self, number: int, light: Ints) -> LightRecord:
         """Return the lights, all of one kind, with a column per lane."""
         kind = self.kinds[number]
         return kind if len(kind) == 1 else kind.take(light - self.starts[number])
 
-    def _by_kind(self, light: Ints) -> Iterator[tuple[Light, Lanes]]:
+    def _by_kind(self, light: Ints) -> Iterator[tuple[LightRecord, Lanes]]:
         """Yield, per kind that occurs, its lights gathered to a column per lane, and those lanes."""
         if len(self.kinds) == 1:
             yield self._gathered(0, light), ALL
@@ -149,3 +183,8 @@ class LightTable:
             rows = np.flatnonzero(kind_of == number)
             if rows.size:
                 yield self._gathered(number, light.take(rows)), rows
+
+
+def _radiance(kind: LightRecord, wi: Floats, surface: SurfaceInteraction | None) -> Floats:
+    """Return the radiance of lights; those that shine evenly need not take a surface."""
+    return kind.le(wi) if surface is None else kind.le(wi, surface)

@@ -1,6 +1,8 @@
-"""Meshes that do not shine evenly: by a texture, or because they are only partly there."""
+"""Emission that varies over a mesh: by a texture, or because alpha is below 1."""
 
 from __future__ import annotations
+
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,48 +13,79 @@ from ..shapes import Mesh
 from ..shapes.attributes import Corners, corner_values
 from ..state import SurfaceInteraction
 from ..textures.base import BaseTexture
-from ..vec import Floats, Ints, cross, f4, interpolate, normalize
+from ..vec import Bools, Floats, Ints, cross, f4, interpolate, normalize
+from .base import LightSample
+from .planar import TwoSided
+from .triangle import TriangleLights
 
 MOST_SAMPLES = 1 << 18  # points of a mesh that are looked up, if possible
 LEAST, MOST = 4, 32  # parts that an edge of a face is cut into
 
 
 @record
-class EmissionSource:
-    """What one or more meshes send."""
+class TexturedTriangleLights(TriangleLights):
+    """k triangles that emit from their front side, some of them by a texture or less where alpha is below 1.
 
-    emission: Floats | BaseTexture  # (3, 1), or colors, W·sr⁻¹·m⁻²
-    two_sided: bool
+    Those are sampled by area as all triangles are; their radiance is looked up at the sampled point.
+    """
 
-    def radiance(self, surface: SurfaceInteraction) -> Floats:
-        """Return what points send towards wo where they are there, (3, n) or (3, 1)."""
-        value = self.emission
-        if isinstance(value, BaseTexture):
-            value = np.maximum(value.at(surface), f4(0))
-        return value if self.two_sided else value * ~surface.back_facing
+    prim: Ints  # (k,) triangle of the scene, -1 for one that shines evenly
+    source: Ints  # (k,) number of its emission, -1 for one that shines evenly
+    emissions: tuple[Floats | BaseTexture, ...]  # (3, 1), or colors, W·sr⁻¹·m⁻²
+
+    @classmethod
+    def textured(
+        cls,
+        triangles: NDArray[np.float64],
+        radiance: Floats,
+        prim: Ints,
+        source: Ints,
+        emissions: tuple[Floats | BaseTexture, ...],
+    ) -> Self:
+        """Build from vertices (k, 3, 3), relative to the scene's center, mean radiance (3, k) and fields."""
+        even = TriangleLights.from_triangles(triangles, radiance)
+        flat = even.corner, even.edge_u, even.edge_v, even.normal, even.area, even.radiance
+        return cls(*flat, prim=prim, source=source, emissions=emissions)
+
+    @property
+    def varies(self) -> Bools:  # type: ignore[override]
+        """Which of the triangles do not shine evenly, (k,)."""
+        return self.source >= 0
+
+    def sample_li(self, point: Floats, u: Floats) -> LightSample:
+        """Pick a point uniformly by area, and say where on the triangle it is."""
+        sample = TriangleLights.sample_li(self, point, u)
+        sample.prim = np.broadcast_to(self.prim, point.shape[1:])
+        sample.b1, sample.b2 = self.weights(u)
+        return sample
+
+    def le(self, wi: Floats, surface: SurfaceInteraction | None = None) -> Floats:
+        """Return the radiance of points on the triangles, (3, n), where they are opaque."""
+        if surface is None:
+            return TriangleLights.le(self, wi)
+        radiance = np.empty_like(wi)
+        source = np.broadcast_to(self.source, wi.shape[1:])
+        for number, emission in enumerate(self.emissions):
+            lanes = np.flatnonzero(source == number)
+            if lanes.size:
+                at = surface.take(lanes)
+                value = emission_at(emission, at)
+                radiance[:, lanes] = value if self.sides == 2 else value * ~at.back_facing
+        return radiance
 
 
 @record
-class TexturedEmission:
-    """The lights that do not shine evenly."""
+class TwoSidedTexturedTriangleLights(TwoSided, TexturedTriangleLights):
+    """k triangles that emit from both sides, some of them by a texture."""
 
-    triangle: Ints  # (lights,) triangle of such a light, -1 for all others
-    source: Ints  # (lights,) its number in `sources`, -1 for all others
-    sources: list[EmissionSource]
 
-    def radiance(self, light: Ints, surface: SurfaceInteraction) -> Floats:
-        """Return what points on lights (n,) send towards wo where they are there, (3, n)."""
-        out = np.empty((3, len(light)), f4)
-        source = self.source.take(light)
-        for number, kind in enumerate(self.sources):
-            lanes = np.flatnonzero(source == number)
-            if lanes.size:
-                out[:, lanes] = kind.radiance(surface.take(lanes))
-        return out
+def emission_at(emission: Floats | BaseTexture, surface: SurfaceInteraction) -> Floats:
+    """Return an emission, a constant (3, 1) or a texture, at points: (3, n) or (3, 1)."""
+    return np.maximum(emission.at(surface), f4(0)) if isinstance(emission, BaseTexture) else emission
 
 
 def has_textured_emission(mesh: Mesh) -> bool:
-    """Tell whether the points of a mesh that shines differ in what they send."""
+    """Return True for a mesh that shines whose points differ in what they send."""
     return isinstance(mesh.emission, BaseTexture) or mesh.material.opacity is not None
 
 
@@ -69,8 +102,8 @@ def mean_radiance(mesh: Mesh, triangles: NDArray[np.float64]) -> Floats:
         (m, 3, 3) corners of its faces, relative to the scene's center.
     """
     assert mesh.emission is not None
-    source, opacity = EmissionSource(mesh.emission, two_sided=True), mesh.material.opacity
-    attributes = {name: corner_values(name, [mesh]) for name in _reads(source.emission, opacity)}
+    emission, opacity = mesh.emission, mesh.material.opacity
+    attributes = {name: corner_values(name, [mesh]) for name in _reads(emission, opacity)}
     steps = int(np.clip(np.sqrt(MOST_SAMPLES / len(triangles)), LEAST, MOST))
     b1, b2 = _middles(steps)
     mean = np.empty((3, len(triangles)), f4)
@@ -81,7 +114,7 @@ def mean_radiance(mesh: Mesh, triangles: NDArray[np.float64]) -> Floats:
         for name, corners in attributes.items():
             a, b, c = (corner[:, faces] for corner in corners)
             setattr(surface, name, _interpolated((a, b, c), b1, b2))
-        value = source.radiance(surface)
+        value = emission_at(emission, surface)
         if opacity is not None:
             value = value * opacity.at(surface)
         each = np.broadcast_to(value, (3, len(surface))).reshape(3, -1, len(b1))

@@ -10,15 +10,15 @@ from ..bsdfs import Bsdf, evaluated
 from ..compile.materials import MaterialTable
 from ..compile.scene import CompiledScene
 from ..frame import Frame
+from ..lights import LightSample
 from ..record import record
 from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
 from ..state import Contribution, Hits, Paths, SurfaceInteraction
-from ..vec import Floats, broadcast, column, dot, f4, highest, take
+from ..vec import Floats, Ints, broadcast, column, dot, f4, highest, take
 from .alpha import transmittance_along
-from .interaction import above, leave
-from .intersect import shadow_rays, visible
-from .textured_emission import emission_at_hits, emission_at_samples
+from .interaction import above, interaction, leave
+from .intersect import ShadowRays, shadow_rays, visible
 
 UP = column((0, 0, 1))
 
@@ -58,9 +58,12 @@ def emitted(scene: CompiledScene, paths: Paths, hits: Hits) -> Contribution:
     """Return the light that the paths' rays meet: emitting surfaces, and the environment on a miss."""
     lanes = np.flatnonzero(scene.shines.take(hits.prim))  # a miss, -1, takes the last entry
     light = scene.light_of.take(hits.prim.take(lanes))
-    radiance = scene.lights.le(light, paths.direction.take(lanes, 1))
-    if scene.textured_emission is not None:
-        emission_at_hits(scene, paths.take(lanes), hits.take(lanes), light, radiance)
+
+    def surface_at(some: Ints) -> SurfaceInteraction:
+        shining = lanes.take(some)
+        return interaction(scene, paths.take(shining), hits.take(shining))
+
+    radiance = scene.lights.le(light, paths.direction.take(lanes, 1), surface_at)
     return Contribution(lanes, radiance, light)
 
 
@@ -130,9 +133,8 @@ def direct(
     through = (arriving & (cos_g < 0)).any()
     origin = leave(shade.surface, cos_g) if through else shade.start
     rays = shadow_rays(shade.surface, origin, light, lanes)
-    radiance, number = take(light.radiance, lanes), take(number, lanes)
-    if scene.textured_emission is not None:
-        radiance = emission_at_samples(scene, rays, number, u_point.take(lanes, 1), radiance)
+    number = take(number, lanes)
+    radiance = radiance_at_samples(scene, rays, light, lanes, number)
     if scene.opacities is not None:
         radiance = radiance * transmittance_along(scene, rays)
     else:
@@ -143,6 +145,39 @@ def direct(
     if mis:
         scale *= scene.lights.mis_weight(number, pdf_light, take(pdf, lanes))
     return Contribution(lanes, f.take(lanes, 1) * radiance * scale, number)
+
+
+def radiance_at_samples(
+    scene: CompiledScene, rays: ShadowRays, light: LightSample, lanes: Ints, number: Ints
+) -> Floats:
+    """Return the radiance (3, k) of some light samples, looked up on the surface of lights that vary there.
+
+    A surface with an alpha sends as much less: paths meet it less often.
+
+    Parameters
+    ----------
+    rays, number
+        k rays to the sampled points, and the numbers (k,) of the lights.
+    light, lanes
+        n samples, and which of them (k,) these are.
+    """
+    radiance = take(light.radiance, lanes)
+    if light.prim is None:
+        return radiance
+    prim = light.prim.take(lanes)
+    some = np.flatnonzero(prim >= 0)
+    if not some.size:
+        return radiance
+    at, rays = lanes.take(some), rays.take(some)
+    assert light.b1 is not None
+    assert light.b2 is not None
+    surface = interaction(
+        scene, rays, Hits(rays.distance, prim.take(some), light.b1.take(at), light.b2.take(at))
+    )
+    found = scene.lights.le(number.take(some), rays.direction, surface.take)
+    radiance = radiance.copy()
+    radiance[:, some] = found if scene.opacities is None else found * scene.opacities.at(surface)
+    return radiance
 
 
 def evaluate(shade: Shading, wi: Floats) -> tuple[Floats, Floats]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..lights.base import Light, LightSample
+from ..lights.base import LightRecord, LightSample
 from ..vec import Floats, f4
 from .bsdf import _chunks
 from .charts import CHARTS
@@ -24,7 +24,7 @@ def check_light(
     significance: float = 1e-3,
     seed: int = 0,
 ) -> Report:
-    """Prove that a light keeps the contract of `wavefront.lights.Light`.
+    """Prove that a light keeps the contract of `wavefront.lights.LightRecord`.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def check_light(
     AssertionError
         Naming each failed check, the point, the value measured and the one expected.
     """
-    record: Light = light if isinstance(light, Light) else light.record(np.zeros(3))
+    record: LightRecord = light if isinstance(light, LightRecord) else light.record(np.zeros(3))
     report = Report(f"check_light({type(light).__name__})")
     default = [[0, 0, 0], [2, 1, 3], [-3, 2, -1], [0.5, -4, 1], [20, 10, -30]]
     where = np.asarray(default if points is None else points, f4).reshape(-1, 3)
@@ -60,7 +60,7 @@ def check_light(
 def _check_light_at(
     report: Report,
     where: str,
-    light: Light,
+    light: LightRecord,
     point: Floats,
     rng: np.random.Generator,
     samples: int,
@@ -86,7 +86,7 @@ def _check_light_at(
 
 
 def _check_light_samples(
-    report: Report, where: str, light: Light, drawn: LightSample, density: Callable[[Floats], Floats]
+    report: Report, where: str, light: LightRecord, drawn: LightSample, density: Callable[[Floats], Floats]
 ) -> None:
     for name, values in (("wi", drawn.wi), ("radiance", drawn.radiance), ("pdf", drawn.pdf)):
         report.holds("finite", f"{where}, {name}", ~np.isfinite(values), "finite numbers")

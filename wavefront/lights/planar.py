@@ -1,0 +1,97 @@
+"""What emitting triangles and rectangles share: a plane, an area, and sides that shine."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..record import record
+from ..state import SurfaceInteraction
+from ..vec import Floats, dot, f4, positive
+from .base import LightRecord
+
+LEAST_SQUARE = f4(1e-35)  # added to squared distances before their root, so that nothing is divided by 0
+EDGE_ON = f4(1e-14)  # taken off cosines that are divided by; smaller ones count as those of a dark side
+
+
+@record
+class PlanarLights(LightRecord):
+    """k flat lights that emit from their front side, given by a corner and two edges."""
+
+    corner: Floats  # (3, k) scene units
+    edge_u: Floats  # (3, k) from the corner; edge_u × edge_v is the front
+    edge_v: Floats  # (3, k) from the corner
+    normal: Floats  # (3, k) unit normal of the front side
+    area: Floats  # (k,) squared scene units
+    radiance: Floats  # (3, k) W·sr⁻¹·m⁻²; of one that does not shine evenly, its mean
+
+    sides: ClassVar[int] = 1  # that shine
+    parallelograms: ClassVar[float]  # area, in parallelograms of the edges
+    middle: ClassVar[int]  # the middle is corner + (edge_u + edge_v)/middle
+
+    @classmethod
+    def from_edges(
+        cls,
+        corner: NDArray[np.float64],
+        edge_u: NDArray[np.float64],
+        edge_v: NDArray[np.float64],
+        radiance: Floats,
+    ) -> Self:
+        """Build from corners, relative to the scene's center, edges, and radiance, (3, k) each or (3, 1)."""
+        normal = np.cross(edge_u, edge_v, axis=0)
+        size = np.linalg.norm(normal, axis=0)
+        p, u, v, n = (np.ascontiguousarray(rows, f4) for rows in (corner, edge_u, edge_v, normal / size))
+        each = np.broadcast_to(radiance, p.shape).astype(f4)
+        return cls(p, u, v, n, (cls.parallelograms * size).astype(f4), each)
+
+    def le(self, wi: Floats, surface: SurfaceInteraction | None = None) -> Floats:
+        """Return the radiance on rays that come upon a side that shines, (3, n)."""
+        return self.radiance * (self._facing(-dot(self.normal, wi)) > 0)
+
+    def power(self, scene_radius: float) -> NDArray[np.float64]:
+        """π·A·L for each side."""
+        return self.sides * np.pi * self.area * self.radiance.mean(0, dtype=np.float64)
+
+    def irradiance(
+        self, center: NDArray[np.float64], radius: float, scene_radius: float
+    ) -> NDArray[np.float64]:
+        """L·A·cosθ/d² at most, with the area at the middle; (c, k)."""
+        middle = self.corner + (self.edge_u + self.edge_v) / self.middle
+        size = np.sqrt(self.area)
+        away = center[:, :, None] - middle[:, None, :]
+        height = (away * self.normal[:, None, :]).sum(0)
+        height = np.maximum((height if self.sides == 1 else np.abs(height)) + radius + size, 0)
+        distance = np.sqrt(np.maximum((away**2).sum(0), np.maximum(size, radius) ** 2))
+        strength = self.area * self.radiance.mean(0, dtype=np.float64)
+        return strength * np.minimum(height / distance, 1) / distance**2
+
+    def _facing(self, rise: Floats) -> Floats:
+        """Turn heights, or cosines, over the front (n,) into those over a side that shines."""
+        return rise
+
+
+class TwoSided:
+    """Makes planar lights emit from both sides."""
+
+    __slots__ = ()
+    sides: ClassVar[int] = 2
+
+    def _facing(self, rise: Floats) -> Floats:
+        return np.abs(rise)
+
+
+def area_pdf(d2: Floats, cos_light: Floats, area: Floats) -> Floats:
+    """Return the solid-angle density d²/(A·cosθ) of points drawn uniformly from an area; 0 on a dark side.
+
+    Parameters
+    ----------
+    d2
+        (n,) squared distances of the points.
+    cos_light
+        (n,) cosines at the points, above 0 on a side that shines.
+    area
+        (n,) or (1,).
+    """
+    return positive(d2 / ((cos_light - EDGE_ON) * area))
