@@ -64,7 +64,7 @@ class Cycles:
                 "name": f"{shape.name}{i}",
                 "vertices": shape.vertices.tolist(),
                 "faces": shape.faces.tolist(),
-                "color": shape.material.reflectance.ravel().tolist(),
+                "color": shape.material.bsdf.reflectance.ravel().tolist(),
                 "emission": None if shape.emission is None else shape.emission.ravel().tolist(),
             }
             for i, shape in enumerate(cornell_box(SIZE).shapes)

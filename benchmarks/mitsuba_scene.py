@@ -52,7 +52,7 @@ def _joined(shapes: list[Any]) -> list[Any]:
     groups: dict[Any, list[wf.Mesh]] = {}
     for i, shape in enumerate(shapes):
         flat = isinstance(shape, wf.Mesh) and shape.normals is None
-        look = (repr(_bsdf(shape.material)), repr(shape.emission)) if flat else i
+        look = (repr(_bsdf(shape.material.bsdf)), repr(shape.emission)) if flat else i
         groups.setdefault(look, []).append(shape)
     return [meshes[0] if len(meshes) == 1 else _union(meshes) for meshes in groups.values()]
 
@@ -90,7 +90,7 @@ def _bsdf(material: wf.Bsdf) -> dict[str, Any]:
 
 def _mesh(mi: Any, shape: wf.Mesh, number: int) -> Any:
     properties = mi.Properties()
-    properties["bsdf"] = mi.load_dict(_bsdf(shape.material))
+    properties["bsdf"] = mi.load_dict(_bsdf(shape.material.bsdf))
     properties["face_normals"] = shape.normals is None
     if shape.emission is not None:
         properties["emitter"] = mi.load_dict({"type": "area", "radiance": _rgb(shape.emission)})
@@ -112,7 +112,7 @@ def _sphere(shape: wf.Sphere) -> dict[str, Any]:
         "type": "sphere",
         "center": shape.center.tolist(),
         "radius": shape.radius,
-        "bsdf": _bsdf(shape.material),
+        "bsdf": _bsdf(shape.material.bsdf),
     }
     if shape.emission is not None:
         made["emitter"] = {"type": "area", "radiance": _rgb(shape.emission)}

@@ -44,7 +44,11 @@ def glass() -> list[wf.Bsdf]:
     tint = (0.7, 0.85, 0.95)
     shells = [wf.ThinDielectric(1.5, roughness, transmittance=tint) for roughness in (0.0, 0.25, 0.5)]
     colors = [(0.15, 0.9, 2.6), (1.8, 0.35, 0.7), (2.2, 0.9, 0.2)]  # leave amber, green, blue
-    return [*solid, *shells, *(wf.Dielectric(1.5, absorption=color) for color in colors)]
+    return [
+        *solid,
+        *shells,
+        *(wf.Material(wf.Dielectric(1.5), interior=wf.Medium(color)) for color in colors),
+    ]
 
 
 def coated() -> list[wf.Bsdf]:
@@ -78,12 +82,12 @@ def textured() -> list[wf.Bsdf]:
         wf.Diffuse(wf.Texture(colors)),
         wf.Conductor.named("copper", number(0.1 + 0.5 * checks)),
         wf.Mix(wf.Diffuse((0.12, 0.12, 0.14)), wf.Conductor.named("gold", 0.2), number(bands > 0.5)),
-        wf.OrenNayar((0.7, 0.68, 0.6), 0.4).with_normal_map(wf.BumpMap(waves, 0.12)),
-        wf.Conductor.named("aluminium", 0.15).with_normal_map(wf.BumpMap(waves, 0.04)),
-        wf.Principled(WINE, 0, 0.35).with_normal_map(wf.NormalMap(normals(quilt, 0.06))),
-        wf.Diffuse((0.8, 0.35, 0.1)).with_alpha(0.45),
-        wf.Diffuse((0.2, 0.45, 0.4)).with_alpha(number(bands)),
-        wf.Conductor.named("gold", 0.3).with_alpha(number(waves), cutoff=0.5),
+        wf.Material(wf.OrenNayar((0.7, 0.68, 0.6), 0.4), normal_map=wf.BumpMap(waves, 0.12)),
+        wf.Material(wf.Conductor.named("aluminium", 0.15), normal_map=wf.BumpMap(waves, 0.04)),
+        wf.Material(wf.Principled(WINE, 0, 0.35), normal_map=wf.NormalMap(normals(quilt, 0.06))),
+        wf.Material(wf.Diffuse((0.8, 0.35, 0.1)), alpha=0.45),
+        wf.Material(wf.Diffuse((0.2, 0.45, 0.4)), alpha=number(bands)),
+        wf.Material(wf.Conductor.named("gold", 0.3), alpha=number(waves), alpha_cutoff=0.5),
     ]
 
 

@@ -55,12 +55,12 @@ def add(name: str, shapes: Any, lights: Iterable[Any] = (), camera: wf.Camera = 
 for material in (
     wf.OrenNayar(0.7, 0.5),
     wf.OrenNayar(0.7, 0.5, energy_preserving=True),
-    wf.Dielectric(1.5, absorption=(1, 2, 0.3)),
+    wf.Material(wf.Dielectric(1.5), interior=wf.Medium((1, 2, 0.3))),
     wf.Dielectric(1.5, 0.4),
     wf.Conductor.named("gold", 0.3),
     wf.ThinDielectric(1.5, 0.2),
     wf.Principled((0.8, 0.3, 0.2), 0.3, 0.4, clearcoat=0.7, sheen=0.8),
-    wf.Principled(0.9, transmission=0.8, roughness=0.2, absorption=0.4),
+    wf.Material(wf.Principled(0.9, transmission=0.8, roughness=0.2), interior=wf.Medium(0.4)),
     wf.Diffuse(COLORS),
 ):
     add(f"{len(hashes)} {type(material).__name__}", [ball(material), LAMP], [wf.Environment(0.3)])
@@ -75,8 +75,12 @@ add(
     [wf.DirectionalLight((1, -2, -1), 3, angle=1), SKY],
 )
 add("spots", [ball(GREY)], SPOTS)
-add("bumps", [net(GREY.with_normal_map(wf.BumpMap(rng.random((16, 16)), 0.05)))], [SKY])
-add("normal map", [net(GREY.with_normal_map(wf.NormalMap(0.5 + 0.3 * rng.random((16, 16, 3)))))], [SKY])
+add("bumps", [net(wf.Material(GREY, normal_map=wf.BumpMap(rng.random((16, 16)), 0.05)))], [SKY])
+add(
+    "normal map",
+    [net(wf.Material(GREY, normal_map=wf.NormalMap(0.5 + 0.3 * rng.random((16, 16, 3)))))],
+    [SKY],
+)
 add(
     "lens",
     [ball(GREY), LAMP],

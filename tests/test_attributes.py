@@ -81,7 +81,7 @@ def test_a_patch_of_a_real_file_shows_its_texture():
     expected = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
 
     (mesh,) = wf.load(DATA / "BoxTextured.glb").shapes
-    mesh.material = wf.Diffuse(mesh.material.base_color)
+    mesh.material = wf.Diffuse(mesh.material.bsdf.base_color)
     camera = wf.Camera.orthographic((0, 0, 2), (0, 0, 0), height=1, size=(size, size))
     scene = wf.Scene(mesh, [wf.Environment(1.0)], camera)
     found = render(scene, 4, integrator="naive", max_bounces=1).rgb
@@ -117,8 +117,8 @@ def test_faces_of_real_files_have_the_colors_of_their_image(name):
     ).T.astype(np.float32)
     rays = Rays(origin, np.ascontiguousarray(-normals.T, np.float32), np.full(len(middles), -1))
     surface = interaction(scene, rays, intersect(scene, rays))
-    (key,) = vars(mesh.material).keys() & {"base_color", "reflectance"}
-    found = getattr(mesh.material, key).at(surface).T
+    (key,) = vars(mesh.material.bsdf).keys() & {"base_color", "reflectance"}
+    found = getattr(mesh.material.bsdf, key).at(surface).T
     off = np.abs(found - expected).max(1)
     assert np.quantile(off, 0.75) < 0.05  # near an edge in the image, the texel and the mean of four differ
     assert found.mean(0) == pytest.approx(expected.mean(0), rel=0.02)

@@ -15,9 +15,9 @@ BUMPS = wf.BumpMap(wf.Texture(TEXELS, srgb=False, channel=0), 0.3)
 VARNISH = wf.Principled(0.5, 0.3, 0.2, clearcoat=1.0, sheen=0.5)
 MATERIALS = {
     "texture": wf.Diffuse(wf.Texture(TEXELS)),
-    "normal map": VARNISH.with_normal_map(NORMALS),
-    "bump map": VARNISH.with_normal_map(BUMPS),
-    "normal-mapped glass": wf.Dielectric(1.5).with_normal_map(NORMALS),
+    "normal map": wf.Material(VARNISH, normal_map=NORMALS),
+    "bump map": wf.Material(VARNISH, normal_map=BUMPS),
+    "normal-mapped glass": wf.Material(wf.Dielectric(1.5), normal_map=NORMALS),
 }
 PLACES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.3]])
 FACES = [[0, 1, 2], [0, 2, 3]]
@@ -56,7 +56,7 @@ def test_a_relief_without_tangents_tilts_nothing(normal_map):
     for tiny in (1e-42, 1e-200, 0.0):
         plain, carved = (
             render(wf.Scene(quad(m, uvs=PLACES[:, :2] * [tiny, 1]), [wf.Environment(1.0)], camera), 4).rgb
-            for m in (matte, matte.with_normal_map(normal_map))
+            for m in (matte, wf.Material(matte, normal_map=normal_map))
         )
         assert np.array_equal(plain, carved)
 

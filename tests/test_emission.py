@@ -159,7 +159,7 @@ def test_the_mean_of_many_faces() -> None:
         corners.reshape(-1, 3),
         np.arange(3 * n).reshape(-1, 3),
         uvs=np.stack([uvs, uvs], 1),
-        material=wf.Diffuse(0.5).with_alpha(0.25),
+        material=wf.Material(wf.Diffuse(0.5), alpha=0.25),
         emission=texture(values[None]),
     )
     assert textured_emission.mean_radiance(mesh, corners) == pytest.approx(
@@ -290,7 +290,7 @@ def gallery(size: tuple[int, int] = (16, 8)) -> wf.Scene:
     """Screens that shine on one side or both, one with holes, between glossy walls and a matte ball."""
     rng = np.random.default_rng(5)
     image = texture(rng.random((4, 4, 3)) ** 2 * 4)
-    leaf = wf.Diffuse(0.5).with_alpha(texture(rng.random((3, 3)), channel=0), cutoff=0.4)
+    leaf = wf.Material(wf.Diffuse(0.5), alpha=texture(rng.random((3, 3)), channel=0), alpha_cutoff=0.4)
     shapes: list[wf.Mesh | wf.Sphere] = [
         floor(half=3),
         wf.Rectangle((-1.6, 0.3, 0.5), (1, 0, -0.7), (0, 1.2, 0), material=BLACK, emission=image),
@@ -417,7 +417,7 @@ def test_one_mesh_keeps_its_emission(tmp_path) -> None:
 # --- Emission of materials -------------------------------------------------------------------------
 
 
-GLOW = wf.Principled(0.3, emission=(1, 2, 3))
+GLOW = wf.Material(wf.Principled(0.3), emission=(1, 2, 3))
 
 
 def two_pictures(first, second) -> list[np.ndarray]:
@@ -440,15 +440,15 @@ def test_a_material_makes_a_light_of_its_shape() -> None:
     assert a.max() > 1
     assert np.array_equal(a, b)
     assert wf.Rectangle(*square, material=GLOW, emission=5.0).emission.ravel().tolist() == [5, 5, 5]
-    assert wf.Principled(0.3, emission=0.0).emission is None
-    assert wf.Rectangle(*square, material=wf.Principled(0.3, emission=0.0)).emission is None
+    assert wf.Material(wf.Principled(0.3), emission=0.0).emission is None
+    assert wf.Rectangle(*square, material=wf.Material(wf.Principled(0.3), emission=0.0)).emission is None
 
 
 def test_a_material_may_shine_by_a_texture() -> None:
     """As a mesh with a textured emission does, seen from both sides where it is two-sided."""
     square = ((-1, 0, 0), (2, 0, 0), (0, 1, 0))
     glow = texture(QUARTERS)
-    mesh = wf.Rectangle(*square, material=wf.Principled(0.3, emission=glow), two_sided=True)
+    mesh = wf.Rectangle(*square, material=wf.Material(wf.Principled(0.3), emission=glow), two_sided=True)
     same = wf.Rectangle(*square, material=wf.Principled(0.3), emission=glow, two_sided=True)
     a, b = two_pictures([mesh], [same])
     assert a.max() > 0.1
@@ -479,13 +479,13 @@ def test_complaints() -> None:
         wf.Sphere(HERE, 1, emission=texture(QUARTERS))
     with pytest.raises(wf.SceneError, match="rectangle: emission"):
         lamp("bright")
-    ball = wf.Sphere(HERE, 1, material=wf.Principled(0.5, emission=texture(QUARTERS)), name="moon")
+    ball = wf.Sphere(
+        HERE, 1, material=wf.Material(wf.Principled(0.5), emission=texture(QUARTERS)), name="moon"
+    )
     with pytest.raises(wf.SceneError, match="moon: a sphere shines evenly; a mesh can shine by <Texture"):
         render(wf.Scene([ball]), 1)
-    with pytest.raises(wf.SceneError, match=r"Principled emission\[1\] is -1; it must be at least 0"):
-        wf.Principled(0.5, emission=(0, -1, 0))
-    with pytest.raises(wf.SceneError, match="Mix second has an emission; give it to the shape"):
-        wf.Mix(wf.Diffuse(0.5), GLOW)
+    with pytest.raises(wf.SceneError, match=r"Material emission\[1\] is -1; it must be at least 0"):
+        wf.Material(wf.Principled(0.5), emission=(0, -1, 0))
     bare = wf.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], emission=texture(QUARTERS))
     with pytest.warns(UserWarning, match=r"1 meshes lack the texture coordinates \(uvs\).*first: 'mesh'"):
         render(wf.Scene([bare]), 1)

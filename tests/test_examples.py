@@ -12,6 +12,7 @@ import pytest
 
 import wavefront as wf
 from wavefront.bsdfs import ALL
+from wavefront.materials import as_material
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 SHAPES = {  # the picture of --size 24, (height, width)
@@ -136,10 +137,11 @@ def test_estimators_agree_where_they_estimate_the_same(tmp_path):
 def test_material_sheet_has_every_material_of_the_package():
     rows = load("material_sheet").rows()
     assert [len(row) for row in rows] == [9] * 6
-    shown = {type(material) for row in rows for material in row}
+    materials = [[as_material("ball", item) for item in row] for row in rows]
+    shown = {type(material.bsdf) for row in materials for material in row}
     assert shown == set(ALL) - {wf.Mirror}  # a smooth `Conductor` shows what a mirror does
-    assert any(material.normal_map is not None for material in rows[-1])
-    assert any(material.opacity is not None for material in rows[-1])
+    assert any(material.normal_map is not None for material in materials[-1])
+    assert any(material.opacity is not None for material in materials[-1])
 
 
 def test_gltf_scene_is_honored_whole(tmp_path):
@@ -150,7 +152,7 @@ def test_gltf_scene_is_honored_whole(tmp_path):
     assert [type(light) for light in scene.lights] == [wf.SpotLight, wf.Environment]
     assert sum(shape.emission is not None for shape in scene.shapes) == 1
     assert sum(shape.material.opacity is not None for shape in scene.shapes) == 1
-    assert sum(shape.material.transmissive for shape in scene.shapes) == 1
+    assert sum(shape.material.bsdf.transmissive for shape in scene.shapes) == 1
     rgb = wf.render(scene, 16, progress=False).rgb
     urn, ball, bare = rgb[9, 20:25].mean(0), rgb[16:19, 31:36].mean((0, 1)), rgb[27:].mean((0, 1))
     assert urn[2] > 1.5 * urn[0]  # blue glaze

@@ -396,7 +396,7 @@ def test_pictures_are_those_of_meshes_of_their_own(accel):
 
 def test_absorption_is_that_of_the_instances_material():
     """Red glass in one place and clear glass in another, of one mesh."""
-    clear, red = wf.Dielectric(1.5), wf.Dielectric(1.5, absorption=(0, 3, 3))
+    clear, red = wf.Dielectric(1.5), wf.Material(wf.Dielectric(1.5), interior=wf.Medium((0, 3, 3)))
     mesh = bumpy(smooth=True, material=clear)
     shapes = [wf.Instance(mesh, at(-3, 0, 0)), wf.Instance(mesh, at(0, 0, 0), material=red)]
     camera = wf.Camera.look_at((1.5, 1, 6), (1.5, 1, 0), fov=50, size=(16, 8))
@@ -409,7 +409,7 @@ def test_absorption_is_that_of_the_instances_material():
 @pytest.mark.filterwarnings("ignore:the picture is black")
 def test_an_alpha_may_be_that_of_some_instances(of_mesh):
     """Half-transparent in one place and solid in another, of one mesh; shadows too."""
-    solid, half = wf.Diffuse(0), wf.Diffuse(0).with_alpha(0.5)
+    solid, half = wf.Diffuse(0), wf.Material(wf.Diffuse(0), alpha=0.5)
     square = wf.Mesh(
         [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]],
         [[0, 1, 2], [0, 2, 3]],
@@ -432,7 +432,7 @@ def test_reliefs_lie_as_on_meshes_of_their_own(smooth):
     """Bumps follow the stretch of an instance, normal maps its tangents, mirrored or not."""
     x, y = np.meshgrid(np.arange(16), np.arange(16))
     height = np.sin(x * np.pi / 4) * np.cos(y * np.pi / 4) * 0.5 + 0.5
-    mesh = bumpy(smooth, material=wf.Diffuse(0.5).with_normal_map(wf.BumpMap(height, 0.3)))
+    mesh = bumpy(smooth, material=wf.Material(wf.Diffuse(0.5), normal_map=wf.BumpMap(height, 0.3)))
     matrices = MATRICES[1:5]
     if smooth:  # averages around a vertex are weighted by angles, which skewed transforms change
         matrices = [at(4, 0, 0, 0.5, (0.3, 1, 2)), at(0, 4, 1, (-1, 1, 1), (1, 2, 3)), at(-3, 0, 0, 1.3)]
@@ -541,10 +541,12 @@ def test_an_instance_is_a_shape():
     shape = wf.Instance(mesh, MATRICES[3])
     own = shape.to_mesh()
     assert shape.bounds == pytest.approx(own.bounds)
-    assert shape.material is RED
+    assert shape.material is mesh.material
+    assert shape.material.bsdf is RED
     assert shape.emission is mesh.emission
     shape.material = BLUE
-    assert (shape.material, mesh.material, shape.to_mesh().material) == (BLUE, RED, BLUE)
+    found = [thing.material.bsdf for thing in (shape, mesh, shape.to_mesh())]
+    assert found == [BLUE, RED, BLUE]
     assert own.vertices == pytest.approx(scene_vertices(mesh, MATRICES[3]))
     assert wf.Scene(shape).bounds == pytest.approx(own.bounds)
     assert repr(wf.Instance(TRIANGLE, at(1, 2, 3))) == (
@@ -638,7 +640,7 @@ def test_many_instances_are_those_made_one_by_one():
     for options in ({}, {"material": material, "name": "red"}):
         for one, transform in zip(wf.Instance.many(mesh, transforms, **options), transforms, strict=True):
             alone = wf.Instance(mesh, transform, **options)
-            assert (one.name, one.mesh, one.material) == (alone.name, mesh, alone.material)
+            assert (one.name, one.mesh, one.material.bsdf) == (alone.name, mesh, alone.material.bsdf)
             assert np.array_equal(one.transform, transform)
             assert np.array_equal(one.bounds, alone.bounds)
     assert wf.Instance.many(mesh, np.zeros((0, 4, 4))) == []

@@ -130,7 +130,7 @@ def test_no_number_is_used_twice(integrator: str, branches: int, monkeypatch: py
     monkeypatch.setattr(import_module("wavefront.render"), "make_sampler", record)
     scene = scenes.everything((12, 9))
     veils = [
-        wf.Rectangle((-2, -2, z), (4, 0, 0), (0, 4, 0), material=wf.Diffuse(0.5).with_alpha(0.3))
+        wf.Rectangle((-2, -2, z), (4, 0, 0), (0, 4, 0), material=wf.Material(wf.Diffuse(0.5), alpha=0.3))
         for z in (1.1, 1.2, 1.3)
     ]
     blend = wf.Sphere((0.2, 0.3, 0.2), 0.2, material=wf.Mix(wf.Diffuse(0.7), wf.Dielectric(1.5, 0.3)))

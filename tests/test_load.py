@@ -50,7 +50,7 @@ def test_triangle(write):
     assert np.array_equal(mesh.faces, [[0, 1, 2]])
     assert mesh.normals is None
     assert mesh.uvs is None
-    assert mesh.material.reflectance.ravel() == pytest.approx([0.5] * 3)
+    assert mesh.material.bsdf.reflectance.ravel() == pytest.approx([0.5] * 3)
 
 
 def test_load_gives_a_scene(write):
@@ -137,7 +137,7 @@ def test_encodings_and_line_ends(write, encoding):
     text = ("mtllib s.mtl\n" + SQUARE + "usemtl Fläche\nf 1 2 3\n").replace("\n", "\r\n")
     (mesh,) = load_meshes(write(text.encode(encoding), s_mtl="newmtl Fläche\nKd 1 0 0\n".encode(encoding)))
     assert (mesh.name, len(mesh.faces)) == ("Fläche", 1)
-    assert mesh.material.reflectance.ravel().tolist() == [1, 0, 0]
+    assert mesh.material.bsdf.reflectance.ravel().tolist() == [1, 0, 0]
 
 
 @pytest.mark.parametrize("name", [b"caf\xe9.obj", "図.OBJ".encode(), b"a b.obj"])
@@ -378,8 +378,8 @@ def one(write, mtl, **kwargs):
 
 def test_kd_and_ke(write):
     mesh = one(write, "Kd 0.1 0.2 0.3\nKe 4 5 6")
-    assert isinstance(mesh.material, Diffuse)
-    assert mesh.material.reflectance.ravel() == pytest.approx([0.1, 0.2, 0.3])
+    assert isinstance(mesh.material.bsdf, Diffuse)
+    assert mesh.material.bsdf.reflectance.ravel() == pytest.approx([0.1, 0.2, 0.3])
     assert mesh.emission.ravel().tolist() == [4, 5, 6]
     assert one(write, "Kd 0.1").emission is None
     assert one(write, "Ke 0 0 0").emission is None
@@ -388,18 +388,18 @@ def test_kd_and_ke(write):
 @pytest.mark.parametrize("illum", [4, 6, 7, 9])
 def test_glass(write, illum):
     mesh = one(write, f"Kd 1 1 1\nNi 1.33\nTf 0.5 1 1\nillum {illum}")
-    assert isinstance(mesh.material, Dielectric)
-    assert mesh.material.ior == pytest.approx(1.33)
-    assert mesh.material.transmittance.ravel() == pytest.approx([0.5, 1, 1])
-    assert one(write, f"illum {illum}").material.ior == pytest.approx(1.5)
+    assert isinstance(mesh.material.bsdf, Dielectric)
+    assert mesh.material.bsdf.ior == pytest.approx(1.33)
+    assert mesh.material.bsdf.transmittance.ravel() == pytest.approx([0.5, 1, 1])
+    assert one(write, f"illum {illum}").material.bsdf.ior == pytest.approx(1.5)
 
 
 @pytest.mark.parametrize("illum", [3, 5, 8])
 def test_mirror(write, illum):
     mesh = one(write, f"Kd 0 0 0\nKs 0.9 0.8 0.7\nillum {illum}")
-    assert isinstance(mesh.material, Mirror)
-    assert mesh.material.reflectance.ravel() == pytest.approx([0.9, 0.8, 0.7])
-    assert isinstance(one(write, f"Kd 1 1 1\nKs 0 0 0\nillum {illum}").material, Diffuse)
+    assert isinstance(mesh.material.bsdf, Mirror)
+    assert mesh.material.bsdf.reflectance.ravel() == pytest.approx([0.9, 0.8, 0.7])
+    assert isinstance(one(write, f"Kd 1 1 1\nKs 0 0 0\nillum {illum}").material.bsdf, Diffuse)
 
 
 @pytest.mark.parametrize(
@@ -415,13 +415,13 @@ def test_mirror(write, illum):
     ],
 )
 def test_opacity(write, lines, kind):
-    assert type(one(write, f"Kd 0.5 0.5 0.5\n{lines}").material) is kind
+    assert type(one(write, f"Kd 0.5 0.5 0.5\n{lines}").material.bsdf) is kind
 
 
 def test_colors_outside_their_range_are_clamped(write):
     with pytest.warns(UserWarning, match=r"s\.mtl line 2: Kd is 1\.5 -1 0\.5; it must be in \[0, 1\]"):
         mesh = one(write, "Kd 1.5 -1 0.5")
-    assert mesh.material.reflectance.ravel().tolist() == [1, 0, 0.5]
+    assert mesh.material.bsdf.reflectance.ravel().tolist() == [1, 0, 0.5]
     with pytest.raises(SceneError, match=r"s\.mtl line 2: Kd"):
         one(write, "Kd 1.5 -1 0.5", strict=True)
 
@@ -455,8 +455,8 @@ def test_names_with_spaces_and_several_libraries(write):
         **{"a b_mtl": "newmtl my red\nKd 1 0 0\n", "c_mtl": "newmtl\tother\nKd 0 1 0\n"},
     )
     red, other = load_meshes(path)
-    assert red.material.reflectance.ravel().tolist() == [1, 0, 0]
-    assert other.material.reflectance.ravel().tolist() == [0, 1, 0]
+    assert red.material.bsdf.reflectance.ravel().tolist() == [1, 0, 0]
+    assert other.material.bsdf.reflectance.ravel().tolist() == [0, 1, 0]
 
 
 def test_a_missing_library_and_a_missing_material(write):
@@ -491,7 +491,7 @@ def test_a_library_in_a_folder_below(write, tmp_path):
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "s.mtl").write_text("newmtl m\nKd 1 0 0\n")
     (mesh,) = load_meshes(write(f"mtllib sub\\s.mtl\n{SQUARE}usemtl m\nf 1 2 3\n"))
-    assert mesh.material.reflectance.ravel().tolist() == [1, 0, 0]
+    assert mesh.material.bsdf.reflectance.ravel().tolist() == [1, 0, 0]
 
 
 # ---- PLY, STL, in memory ----------------------------------------------------------------------
@@ -533,7 +533,7 @@ BYTES = ("uchar red", "uchar green", "uchar blue")
 def test_ply_colors_are_srgb(write):
     (mesh,) = load_meshes(write(colored_ply(CODES, *BYTES), "a.ply"))
     assert mesh.colors == pytest.approx(np.column_stack([LINEAR, np.ones(4)]), rel=1e-5)
-    assert isinstance(mesh.material.reflectance, VertexColors)
+    assert isinstance(mesh.material.bsdf.reflectance, VertexColors)
     clear = np.column_stack([CODES, [0, 51, 102, 255]])
     with pytest.warns(UserWarning, match=r"a\.ply: not honored: opacity of vertex colors"):
         (mesh,) = load_meshes(write(colored_ply(clear, *BYTES, "uchar alpha"), "a.ply"))
@@ -595,10 +595,10 @@ def test_obj_colors_are_srgb(write):
     material = "newmtl m\nKd 0.5 1 1\n"
     text = "mtllib s.mtl\n" + obj_with_colors() + "usemtl m\nf 1 2 3\n"
     (mesh,) = load_meshes(write(text, s_mtl=material))
-    assert mesh.material.reflectance.times.ravel().tolist() == [0.5, 1, 1]
+    assert mesh.material.bsdf.reflectance.times.ravel().tolist() == [0.5, 1, 1]
     with pytest.warns(UserWarning, match=r"not honored: vertex colors \(material 'm'\)"):
         (mesh,) = load_meshes(write(text, s_mtl="newmtl m\nillum 4\n"))
-    assert isinstance(mesh.material, Dielectric)
+    assert isinstance(mesh.material.bsdf, Dielectric)
 
 
 def test_obj_colors_that_are_wanting_or_too_large_are_announced(write):
@@ -708,12 +708,12 @@ def test_textures_of_ply(write, tmp_path):
 
     with pytest.warns(UserWarning, match=r"a\.ply: texture 'b\.png' is missing"):
         (mesh,) = load_meshes(textured_ply(write, "b.png"))
-    assert isinstance(mesh.material, Diffuse)
+    assert isinstance(mesh.material.bsdf, Diffuse)
     Image.new("RGB", (4, 4), (255, 0, 0)).save(tmp_path / "b.png")
     with pytest.warns(UserWarning, match=r"not honored: several textures; 'b\.png' is taken for all faces"):
         (mesh,) = load_meshes(textured_ply(write, "a.png", "b.png"))
-    assert mesh.material.reflectance.mean() == pytest.approx([1, 0, 0])
-    assert load_mesh(textured_ply(write, "b.png"), Diffuse(0.25)).material.reflectance[0] == 0.25
+    assert mesh.material.bsdf.reflectance.mean() == pytest.approx([1, 0, 0])
+    assert load_mesh(textured_ply(write, "b.png"), Diffuse(0.25)).material.bsdf.reflectance[0] == 0.25
     with pytest.raises(SceneError, match=r"a\.ply: refers to '\.\./b\.png', which is outside its folder"):
         load_meshes(textured_ply(write, "../b.png"))
     (tmp_path / "b.png").write_bytes(b"\x89PNG")
@@ -737,7 +737,7 @@ def test_face_colors_are_those_of_all_corners(write):
     green, blue = ((np.array([188, 51]) / 255 + 0.055) / 1.055) ** 2.4
     expected = [[[1, green, 0, 1]], [[0, 0, blue, 1]]]
     assert soup(mesh, mesh.colors) == pytest.approx(np.repeat(expected, 3, 1), rel=1e-6)
-    assert isinstance(mesh.material.reflectance, VertexColors)
+    assert isinstance(mesh.material.bsdf.reflectance, VertexColors)
 
 
 def test_colors_of_faces_show_beside_vertices_that_are_all_white(write):
@@ -804,7 +804,7 @@ def test_face_colors_in_memory_render_as_their_file(tmp_path):
 def test_load_mesh_keeps_colors_and_the_second_uvs(write):
     mesh = load_mesh(write(obj_with_colors() + "f 1 2 3\nf 1 3 4\n"))
     assert mesh.colors[:, :3] == pytest.approx(LINEAR, rel=1e-5)
-    assert isinstance(mesh.material.reflectance, VertexColors)
+    assert isinstance(mesh.material.bsdf.reflectance, VertexColors)
     assert load_mesh(write(obj_with_colors() + "f 1 2 3\n"), Diffuse(0.5)).colors is not None
 
 
@@ -1084,7 +1084,7 @@ def test_load_mesh_joins_and_places(write):
     glass = Dielectric(1.5)
     matrix = np.array([[0, -2, 0, 5], [2, 0, 0, 0], [0, 0, 2, 0], [0, 0, 0, 1.0]])
     mesh = load_mesh(path, glass, matrix)
-    assert mesh.material is glass
+    assert mesh.material.bsdf is glass
     assert mesh.emission is None
     assert mesh.name == "scene"
     assert np.array_equal(soup(mesh)[0], [[5, 0, 0], [5, 2, 0], [3, 2, 0]])
@@ -1094,7 +1094,7 @@ def test_load_mesh_joins_and_places(write):
 def test_load_mesh_without_material_takes_the_file_s(write):
     path = write(f"mtllib s.mtl\n{SQUARE}usemtl m\nf 1 2 3\n", s_mtl="newmtl m\nKd 1 0 0\nKe 2 2 2\n")
     mesh = load_mesh(path)
-    assert mesh.material.reflectance.ravel().tolist() == [1, 0, 0]
+    assert mesh.material.bsdf.reflectance.ravel().tolist() == [1, 0, 0]
     assert mesh.emission.ravel().tolist() == [2, 2, 2]
     with warnings.catch_warnings():
         warnings.simplefilter("error")

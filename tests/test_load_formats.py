@@ -148,7 +148,10 @@ def test_dae(write, image):
     assert np.array_equal(soup(mesh)[:, :, 0], [[5, 6, 6], [5, 6, 5]])
     assert np.array_equal(soup(mesh, mesh.normals)[:, 0], [[0, 0, 1], [0, 1, 0]])
     assert np.array_equal(soup(mesh, mesh.uvs)[0], [[0, 0], [1, 0], [1, 1]])
-    assert getattr(mesh.material, "base_color", None) is not None or mesh.material.reflectance is not None
+    assert (
+        getattr(mesh.material.bsdf, "base_color", None) is not None
+        or mesh.material.bsdf.reflectance is not None
+    )
     assert len(load(path).shapes) == 1
 
 

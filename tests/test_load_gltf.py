@@ -20,6 +20,7 @@ from wavefront.errors import SceneError
 from wavefront.io import appearance, gltf_document, gltf_materials, placing
 from wavefront.io.load import from_trimesh, load, load_mesh, load_meshes
 from wavefront.lights import DirectionalLight, SpotLight
+from wavefront.materials import Material
 from wavefront.shapes import Instance, Mesh
 from wavefront.textures.image import Texture
 from wavefront.textures.normal_map import NormalMap
@@ -65,7 +66,7 @@ def test_triangle_in_both_containers(build, tmp_path):
         assert np.array_equal(soup(mesh)[0], TRIANGLE)
         assert np.array_equal(mesh.normals, [[0, 0, 1]] * 3)
         assert np.array_equal(mesh.uvs, [[0, 0.75], [1, 0.75], [0, 0]])  # v upwards
-        assert mesh.material.reflectance.ravel() == pytest.approx([0.5] * 3)
+        assert mesh.material.bsdf.reflectance.ravel() == pytest.approx([0.5] * 3)
 
 
 def test_an_external_buffer_with_a_space_in_its_name(build, path):
@@ -434,7 +435,7 @@ class Recorder(Diffuse):
     def __init__(
         self, base_color, metallic=0, roughness=0.5, ior=1.5, transmission=0, clearcoat=0,
         clearcoat_roughness=0, sheen_color=0, sheen_roughness=0, specular=1, specular_color=1,
-        absorption=0, sheen=0, anisotropy=0, thin=False,
+        sheen=0, anisotropy=0, thin=False,
     ):  # fmt: skip
         self.given = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
         super().__init__(0.5)
@@ -448,7 +449,8 @@ def given(monkeypatch, build, path):
 
     def load_given(**material):
         (mesh,) = load_meshes(build.material(**material).gltf(path))
-        return mesh.material.given | {"emission": mesh.emission, "opacity": mesh.material.opacity}
+        material = mesh.material
+        return material.bsdf.given | {"emission": mesh.emission, "opacity": material.opacity}
 
     return load_given
 
@@ -628,7 +630,7 @@ def test_the_handedness_of_tangents_is_seen_in_the_picture(build, path, hand):
     """
     tangent_space(build, TANGENT=np.tile(np.float32([[1, 0, 0, hand]]), (3, 1)))
     (mesh,) = load_meshes(build.gltf(path))
-    mesh.material = Diffuse(1.0).with_normal_map(NormalMap(np.float32([[[0.5, 0.8, 0.9]]])))
+    mesh.material = Material(Diffuse(1.0), normal_map=NormalMap(np.float32([[[0.5, 0.8, 0.9]]])))
     sun = DirectionalLight((0, -1, -1), np.pi)
     camera = Camera.look_at((0.3, 0.3, 5), (0.3, 0.3, 0), fov=0.1, size=(2, 2))
     seen = render(Scene([mesh], [sun], camera), 4, workers=1, progress=False).rgb
@@ -689,10 +691,21 @@ def test_extensions(given, extension, expected):
     assert {k: found[k] for k in expected} == expected
 
 
-def test_volume_is_beer_lambert(given):
-    volume = {"thicknessFactor": 1, "attenuationColor": [0.5, 1, 1], "attenuationDistance": 2}
-    found = given(extensions={"KHR_materials_volume": volume})
-    assert np.exp(-2 * found["absorption"]) == pytest.approx([0.5, 1, 1])
+@pytest.mark.parametrize(
+    ("transmission", "thickness", "encloses"), [(0.5, 1, True), (1, 1, True), (0, 1, False), (0.5, 0, False)]
+)
+def test_volume_is_beer_lambert(build, path, transmission, thickness, encloses):
+    """There is a medium where light gets in, and the surface is no thin sheet."""
+    volume = {"thicknessFactor": thickness, "attenuationColor": [0.5, 1, 1], "attenuationDistance": 2}
+    entry = {"transmissionFactor": transmission}
+    build.material(extensions={"KHR_materials_transmission": entry, "KHR_materials_volume": volume}).gltf(
+        path
+    )
+    (mesh,) = load_meshes(path)
+    medium = mesh.material.interior
+    assert (medium is not None) == encloses
+    if encloses:
+        assert np.exp(-2 * medium.absorption.ravel()) == pytest.approx([0.5, 1, 1])
 
 
 def test_the_texture_of_a_thickness_is_named(build, path):
@@ -742,7 +755,7 @@ def test_a_specular_color_above_1_raises_the_reflectance_to_at_most_1(build, pat
     """KHR_materials_specular: min(0.04 · color, 1), of ior 1.5."""
     build.material(extensions={"KHR_materials_specular": {"specularColorFactor": [1, 10, 100]}}).gltf(path)
     (mesh,) = load_meshes(path)
-    found = mesh.material._dielectric(np.zeros(1, np.float32)).ravel()
+    found = mesh.material.bsdf._dielectric(np.zeros(1, np.float32)).ravel()
     assert found == pytest.approx([0.04, 0.4, 1])
 
 
@@ -761,7 +774,7 @@ def test_specular_glossiness_reflects_as_its_formulas_say(build, path):
     }  # fmt: skip
     metal = {"baseColorFactor": [1, 0, 0, 1]}  # does not count beside it
     (mesh,) = load_meshes(build.material(**glossy(**group), pbrMetallicRoughness=metal).gltf(path))
-    material = mesh.material
+    material = mesh.material.bsdf
     material.conserve_energy = False  # the appendix to the letter
     wo, wi = (np.float32([[np.sin(t)], [0], [np.cos(t)]]) for t in (0.3, -0.9))
     half = (wo + wi) / np.linalg.norm(wo + wi)
@@ -828,8 +841,8 @@ def test_vertex_colors_multiply_the_diffuse_part_alone(build, path):
     build.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = build.accessor(COLORS)
     (mesh,) = load_meshes(build.gltf(path))
     surface = SimpleNamespace(uv=np.float32([[0.5], [0.5]]), color=np.float32([[0.5], [1], [0], [1]]))
-    assert mesh.material.base_color.at(surface).ravel() == pytest.approx([0.25, 0.5, 0])
-    assert at(mesh.material.specular_color, 0.5, 0.5) == pytest.approx([12.5, 0, 0])
+    assert mesh.material.bsdf.base_color.at(surface).ravel() == pytest.approx([0.25, 0.5, 0])
+    assert at(mesh.material.bsdf.specular_color, 0.5, 0.5) == pytest.approx([12.5, 0, 0])
 
 
 def test_what_specular_glossiness_excludes_is_named(build, path):
@@ -876,26 +889,26 @@ VOLUME = {"thicknessFactor": 1, "attenuationColor": [0.5, 1, 1], "attenuationDis
 
 def test_a_sheet_without_thickness_is_thin(build, path):
     (mesh,) = load_meshes(build.material(**GLASS).gltf(path))
-    assert type(mesh.material) is ThinDielectric
-    assert mesh.material.roughness == pytest.approx([0.25])
-    assert mesh.material.transmittance.ravel() == pytest.approx([1, 0.5, 0])
+    assert type(mesh.material.bsdf) is ThinDielectric
+    assert mesh.material.bsdf.roughness == pytest.approx([0.25])
+    assert mesh.material.bsdf.transmittance.ravel() == pytest.approx([1, 0.5, 0])
 
 
 def test_a_volume_is_glass_that_absorbs(build, path):
     extensions = {**GLASS["extensions"], "KHR_materials_volume": VOLUME, "KHR_materials_ior": {"ior": 1.33}}
     (mesh,) = load_meshes(build.material(**GLASS | {"extensions": extensions}).gltf(path))
-    assert type(mesh.material) is Dielectric
-    assert mesh.material.ior == pytest.approx([1.33])
-    assert mesh.material.absorption.ravel() == pytest.approx([np.log(2) / 2, 0, 0])
+    assert type(mesh.material.bsdf) is Dielectric
+    assert mesh.material.bsdf.ior == pytest.approx([1.33])
+    assert mesh.material.interior.absorption.ravel() == pytest.approx([np.log(2) / 2, 0, 0])
 
 
 def test_everything_else_is_principled(build, path):
     group = {"metallicFactor": 0.25, "roughnessFactor": 0.75, "baseColorFactor": [1, 0.5, 0, 1]}
     (mesh,) = load_meshes(build.material(pbrMetallicRoughness=group).gltf(path))
-    assert type(mesh.material) is Principled
-    assert mesh.material.metallic == pytest.approx([0.25])
-    assert mesh.material.roughness == pytest.approx([0.75])
-    assert mesh.material.base_color.ravel() == pytest.approx([1, 0.5, 0])
+    assert type(mesh.material.bsdf) is Principled
+    assert mesh.material.bsdf.metallic == pytest.approx([0.25])
+    assert mesh.material.bsdf.roughness == pytest.approx([0.75])
+    assert mesh.material.bsdf.base_color.ravel() == pytest.approx([1, 0.5, 0])
 
 
 def test_what_principled_refuses_is_named(build, path, monkeypatch):
@@ -1055,9 +1068,9 @@ def test_vertex_colors_are_linear(build, path, colors, extra, expected):
     build.mesh({"POSITION": TRIANGLE, "COLOR_0": build.accessor(colors, **extra)}).gltf(path)
     (mesh,) = load_meshes(path)
     assert mesh.colors == pytest.approx(np.array(expected))
-    assert isinstance(mesh.material, Diffuse)
-    assert isinstance(mesh.material.reflectance, VertexColors)
-    assert mesh.material.reflectance.times.ravel().tolist() == [1, 1, 1]
+    assert isinstance(mesh.material.bsdf, Diffuse)
+    assert isinstance(mesh.material.bsdf.reflectance, VertexColors)
+    assert mesh.material.bsdf.reflectance.times.ravel().tolist() == [1, 1, 1]
 
 
 def test_vertex_colors_multiply_the_base_color(build, path):
@@ -1074,9 +1087,9 @@ def test_vertex_colors_multiply_the_base_color(build, path):
     build.json["scenes"][0]["nodes"] = [0, 1, 2, 3]
     first, second, plain, textured = load_meshes(build.gltf(path))
     assert first.material is second.material  # made once
-    assert first.material.base_color.times.ravel().tolist() == [0.5, 1, 1]
-    assert plain.material.base_color.ravel().tolist() == [0.5, 1, 1]
-    assert isinstance(textured.material.base_color.times, Texture)
+    assert first.material.bsdf.base_color.times.ravel().tolist() == [0.5, 1, 1]
+    assert plain.material.bsdf.base_color.ravel().tolist() == [0.5, 1, 1]
+    assert isinstance(textured.material.bsdf.base_color.times, Texture)
 
 
 @pytest.mark.parametrize("mode", ["OPAQUE", "MASK", "BLEND"])
@@ -1124,7 +1137,7 @@ def test_vertex_colors_on_glass_are_named(build, path):
     build.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = build.accessor(COLORS)
     with pytest.warns(UserWarning, match=r"not honored: vertex colors \(mesh 'mesh0'\)"):
         (mesh,) = load_meshes(build.gltf(path))
-    assert isinstance(mesh.material, ThinDielectric)
+    assert isinstance(mesh.material.bsdf, ThinDielectric)
 
 
 def test_vertex_colors_out_of_range_are_clamped(build, path):
@@ -1151,7 +1164,7 @@ def test_a_second_set_of_texture_coordinates(build, path):
         corners = {"POSITION": TRIANGLE, "TEXCOORD_0": TRIANGLE[:, :2], "TEXCOORD_1": second}
         (mesh,) = load_meshes(again.mesh(corners, material=0).gltf(path))
         assert mesh.uvs1 == pytest.approx(second * [1, -1] + [0, 1])
-        assert mesh.material.base_color.uv_set == expected
+        assert mesh.material.bsdf.base_color.uv_set == expected
 
 
 @pytest.mark.parametrize("extra", ["attribute", "texture"])
@@ -1319,15 +1332,15 @@ def test_a_missing_image_is_named_and_left_out(build, path):
     with pytest.warns(UserWarning, match=message) as record:
         (mesh,) = load(path).shapes
     assert len(record) == 1
-    assert mesh.material.base_color.ravel().tolist() == [0.5, 0.25, 1]
-    assert (mesh.material.roughness, mesh.material.clearcoat) == (0.75, 0.5)
+    assert mesh.material.bsdf.base_color.ravel().tolist() == [0.5, 0.25, 1]
+    assert (mesh.material.bsdf.roughness, mesh.material.bsdf.clearcoat) == (0.75, 0.5)
     assert mesh.material.normal_map is None
     assert mesh.emission.ravel().tolist() == [0, 1, 0]
     with pytest.raises(SceneError, match=message):
         load(path, strict=True)
     iio.imwrite(path.parent / "my t.png", np.zeros((2, 2, 3), np.uint8))
     (mesh,) = load(path, strict=True).shapes
-    assert isinstance(mesh.material.base_color, Texture)
+    assert isinstance(mesh.material.bsdf.base_color, Texture)
 
 
 def test_damaged_images_are_named(build, path):
@@ -1421,7 +1434,7 @@ def test_a_textured_object_in_memory_equals_its_file(tmp_path):
         assert same(mesh.emission, held.emission)
         assert mesh.two_sided
         assert held.two_sided
-        assert same(mesh.material.base_color, held.material.base_color)
+        assert same(mesh.material.bsdf.base_color, held.material.bsdf.base_color)
         assert same(mesh.material.normal_map.texture, held.material.normal_map.texture)
 
 
@@ -1447,8 +1460,8 @@ def test_vertex_colors_in_memory_equal_their_glb(tmp_path, dressed):
 
 def base(mesh):
     """The base color of a mesh's material."""
-    (key,) = vars(mesh.material).keys() & {"base_color", "reflectance"}
-    return getattr(mesh.material, key)
+    (key,) = vars(mesh.material.bsdf).keys() & {"base_color", "reflectance"}
+    return getattr(mesh.material.bsdf, key)
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="the real files are not here")
@@ -1460,9 +1473,9 @@ def test_textures_of_real_files(name):
         warnings.simplefilter("ignore", DeprecationWarning)
         held = trimesh.load(DATA / name, process=False)
     for a, b in zip(scene.shapes, from_trimesh(held).shapes, strict=True):
-        (key,) = vars(a.material).keys() & {"base_color", "reflectance"}
-        assert isinstance(getattr(a.material, key), Texture)
-        assert same(getattr(a.material, key), getattr(b.material, key))
+        (key,) = vars(a.material.bsdf).keys() & {"base_color", "reflectance"}
+        assert isinstance(getattr(a.material.bsdf, key), Texture)
+        assert same(getattr(a.material.bsdf, key), getattr(b.material.bsdf, key))
     if name == "Duck.glb":
         # the camera hangs below a node that scales by 0.01
         assert scene.camera.origin == pytest.approx([4.00113, 4.63264, -4.31078], rel=1e-5)

@@ -52,7 +52,7 @@ def given(monkeypatch, one):
     """Load a material as the parameters that `Principled` would be given."""
     monkeypatch.setattr(appearance, "Principled", Recorder)
     monkeypatch.setattr(appearance, "PARAMETERS", frozenset(inspect.signature(Recorder).parameters))
-    return lambda *lines: one(*lines).material.given
+    return lambda *lines: one(*lines).material.bsdf.given
 
 
 def same(texture, **arguments):
@@ -61,27 +61,27 @@ def same(texture, **arguments):
 
 
 def test_map_kd_is_multiplied_by_kd(one):
-    assert same(one("Kd 1 0.5 0", "map_Kd t.png").material.reflectance, scale=[1, 0.5, 0])
-    assert same(one("map_Kd t.png").material.reflectance)
-    assert same(one("Kd 0 0 0", "map_Kd t.png").material.reflectance)
+    assert same(one("Kd 1 0.5 0", "map_Kd t.png").material.bsdf.reflectance, scale=[1, 0.5, 0])
+    assert same(one("map_Kd t.png").material.bsdf.reflectance)
+    assert same(one("Kd 0 0 0", "map_Kd t.png").material.bsdf.reflectance)
 
 
 @pytest.mark.parametrize("name", ["a b.png", "1 2 3.png", "sub\\c.png", "sub/c.png", "ü#1.png"])
 def test_names_of_images(one, tmp_path, name):
     (tmp_path / "sub").mkdir()
     iio.imwrite(tmp_path / name.replace("\\", "/"), CODES)
-    assert same(one(f"map_Kd {name}").material.reflectance)
-    assert same(one(f"map_Kd -s 1 1 1 {name}").material.reflectance)
+    assert same(one(f"map_Kd {name}").material.bsdf.reflectance)
+    assert same(one(f"map_Kd -s 1 1 1 {name}").material.bsdf.reflectance)
 
 
 def test_options_place_the_image(one):
-    found = one("map_Kd -s 2 3 1 -o 0.25 0.5 t.png").material.reflectance
+    found = one("map_Kd -s 2 3 1 -o 0.25 0.5 t.png").material.bsdf.reflectance
     assert same(found, transform=[[2, 0, 0.25], [0, 3, 0.5], [0, 0, 1]])
-    assert same(one("map_Kd -s 2 t.png").material.reflectance, transform=np.diag([2.0, 1, 1]))
-    clamped = one("map_Kd -clamp on -o 0.7 t.png").material.reflectance
+    assert same(one("map_Kd -s 2 t.png").material.bsdf.reflectance, transform=np.diag([2.0, 1, 1]))
+    clamped = one("map_Kd -clamp on -o 0.7 t.png").material.bsdf.reflectance
     assert same(clamped, wrap="clamp", transform=[[1, 0, 0.7], [0, 1, 0], [0, 0, 1]])
     assert same(
-        one("Kd 0.5 0.5 0.5", "map_Kd -mm 0.25 0.5 t.png").material.reflectance, scale=0.25, offset=0.125
+        one("Kd 0.5 0.5 0.5", "map_Kd -mm 0.25 0.5 t.png").material.bsdf.reflectance, scale=0.25, offset=0.125
     )
 
 
@@ -89,9 +89,9 @@ def test_options_without_effect_are_named(one):
     with pytest.warns(
         UserWarning, match=r"not honored: -blendu of map_Kd \(material 'm'\), -texres of map_Kd"
     ):
-        assert same(one("map_Kd -blendu off -texres 512 t.png").material.reflectance)
+        assert same(one("map_Kd -blendu off -texres 512 t.png").material.bsdf.reflectance)
     with pytest.warns(UserWarning, match="not honored: -imfchan of map_Kd"):
-        assert same(one("map_Kd -imfchan r t.png").material.reflectance)
+        assert same(one("map_Kd -imfchan r t.png").material.bsdf.reflectance)
 
 
 @pytest.mark.parametrize(
@@ -137,8 +137,8 @@ def test_missing_images_are_announced_and_left_out(one, lines, missing, plain):
         mesh = one(*lines)
     assert len(record) == 1
     expected = one(*plain)
-    assert type(mesh.material) is type(expected.material) is Diffuse
-    assert np.array_equal(mesh.material.reflectance, expected.material.reflectance)
+    assert type(mesh.material.bsdf) is type(expected.material.bsdf) is Diffuse
+    assert np.array_equal(mesh.material.bsdf.reflectance, expected.material.bsdf.reflectance)
     assert mesh.emission is None
     with pytest.raises(SceneError, match=rf"s\.mtl {missing}.* is missing$"):
         one(*lines, strict=True)
@@ -223,7 +223,7 @@ def test_images_that_trimesh_leaves_out_are_named(one, tmp_path, monkeypatch, li
     held = trimesh.load(tmp_path / "a.obj", process=False)
     with pytest.warns(UserWarning, match=f"not honored: {line.split()[0].lower()}"):
         (mesh,) = from_trimesh(held).shapes
-    assert isinstance(mesh.material, Diffuse)
+    assert isinstance(mesh.material.bsdf, Diffuse)
     assert mesh.emission is None
 
 
@@ -237,7 +237,7 @@ def test_roughness_0_is_kept_and_absent_roughness_is_matte(given):
 @pytest.mark.parametrize(("ns", "roughness"), [(1e-3, 0.999), (10, 0.9), (250, 0.5), (1000, 0), (1e5, 0)])
 def test_ks_and_ns_are_a_gloss(one, illum, ns, roughness):
     """The reflectance along the normal is 0.08 · Ks, the roughness 1 − √(Ns/1000), as in Blender."""
-    found = one("Kd 0.25 0.5 1", "Ks 1 0.5 0.25", f"Ns {ns}", *illum).material
+    found = one("Kd 0.25 0.5 1", "Ks 1 0.5 0.25", f"Ns {ns}", *illum).material.bsdf
     assert isinstance(found, Principled)
     assert found.base_color.ravel().tolist() == [0.25, 0.5, 1]
     assert found.roughness == pytest.approx([roughness])
@@ -246,14 +246,15 @@ def test_ks_and_ns_are_a_gloss(one, illum, ns, roughness):
 
 
 def test_the_gloss_that_blender_writes_is_that_of_principled(one):
-    found, plain = one("Kd 0.5 0.5 0.5", "Ks 0.5 0.5 0.5", "Ns 250", "Ni 1.45").material, Principled(0.5)
+    found = one("Kd 0.5 0.5 0.5", "Ks 0.5 0.5 0.5", "Ns 250", "Ni 1.45").material.bsdf
+    plain = Principled(0.5)
     assert vars(found).keys() == vars(plain).keys()
     for name, value in vars(plain).items():
         assert value is None or getattr(found, name) == pytest.approx(value), name
 
 
 def test_a_faint_gloss_is_faint_at_grazing_angles_too(one):
-    faint = one("Ks 0.05 0.05 0.05", "Ns 250").material
+    faint = one("Ks 0.05 0.05 0.05", "Ns 250").material.bsdf
     assert faint._dielectric(np.zeros(1, np.float32)) == pytest.approx(np.full((3, 1), 0.004), rel=1e-5)
     assert faint._dielectric(np.ones(1, np.float32)) == pytest.approx(np.full((3, 1), 0.2))
 
@@ -268,7 +269,7 @@ def test_a_faint_gloss_is_faint_at_grazing_angles_too(one):
     ],
 )
 def test_without_a_highlight_a_surface_is_matte(one, lines):
-    assert isinstance(one("Kd 0.5 0.5 0.5", *lines).material, Diffuse)
+    assert isinstance(one("Kd 0.5 0.5 0.5", *lines).material.bsdf, Diffuse)
 
 
 def test_a_gloss_without_an_exponent_is_as_rough_as_can_be(given):
@@ -299,7 +300,7 @@ def test_map_ks_is_the_strength_of_the_gloss(given):
 
 
 def test_a_map_of_the_gloss_counts_by_its_luminance(one):
-    strength = one("Ks 1 1 1", "map_Ks t.png").material.specular_weight
+    strength = one("Ks 1 1 1", "map_Ks t.png").material.bsdf.specular_weight
     assert strength.scalar
     seen = Texture(CODES).lookup(POINTS)
     surface = SimpleNamespace(uv=POINTS)
@@ -320,7 +321,7 @@ def test_alpha(one):
     assert one("d 0.5", "Ks 1 1 1", "illum 3").material.opacity.constant == 0.5
     assert one("Kd 1 1 1").material.opacity is None
     found = one("d 0.5", "Ni 1.5", "map_d t.png").material  # a cut-out, not glass
-    assert isinstance(found, Diffuse)
+    assert isinstance(found.bsdf, Diffuse)
     assert same(found.opacity.alpha, srgb=False, channel="luminance", scale=0.5)
     assert found.opacity.cutoff is None
 
@@ -360,16 +361,16 @@ def test_values_that_change_nothing_are_quiet(one):
 
 
 def test_comments_may_follow_numbers(one):
-    assert one("# a comment", "Kd 1 0 0 # red").material.reflectance.ravel().tolist() == [1, 0, 0]
+    assert one("# a comment", "Kd 1 0 0 # red").material.bsdf.reflectance.ravel().tolist() == [1, 0, 0]
 
 
 def test_glass_keeps_a_kd_quiet(one):
     mesh = one("Kd 0.8 0.8 0.8", "Ni 1.5", "d 0.1", "illum 4")
-    assert isinstance(mesh.material, Dielectric)
-    assert one("Pr 0.3", "illum 4").material.roughness == pytest.approx([0.3])
+    assert isinstance(mesh.material.bsdf, Dielectric)
+    assert one("Pr 0.3", "illum 4").material.bsdf.roughness == pytest.approx([0.3])
 
 
 def test_the_pbr_extension_is_principled(one):
-    found = one("Kd 0.5 0.5 0.5", "Pr 0.3", "Pm 1").material
+    found = one("Kd 0.5 0.5 0.5", "Pr 0.3", "Pm 1").material.bsdf
     assert isinstance(found, Principled)
     assert (found.roughness, found.metallic) == (pytest.approx([0.3]), pytest.approx([1]))

@@ -23,7 +23,7 @@ HALF = np.array([[0.0, 1.0]], np.float32)  # nothing at u < ½, all there at u >
 
 def veil(alpha, y: float = 1.0, half: float = 20.0, cutoff: float | None = None, **rest) -> wf.Mesh:
     """A square that faces down, only partly there; u runs along x."""
-    material = rest.pop("material", BLACK).with_alpha(alpha, cutoff)
+    material = wf.Material(rest.pop("material", BLACK), alpha=alpha, alpha_cutoff=cutoff)
     return wf.Rectangle(
         (-half, y, -half), (2 * half, 0, 0), (0, 0, 2 * half), material=material, name="veil", **rest
     )
@@ -48,7 +48,9 @@ def lit(*things, lamp: wf.Mesh = LAMP) -> wf.Scene:
 
 def before_a_wall(alpha: float) -> wf.Scene:
     """A sheet that reflects 0.5 before a wall of 2, seen head on."""
-    sheet = wf.Rectangle((-9, -9, 0), (18, 0, 0), (0, 18, 0), material=wf.Diffuse(0.5).with_alpha(alpha))
+    sheet = wf.Rectangle(
+        (-9, -9, 0), (18, 0, 0), (0, 18, 0), material=wf.Material(wf.Diffuse(0.5), alpha=alpha)
+    )
     wall = wf.Rectangle((-9, -9, -1), (18, 0, 0), (0, 18, 0), material=BLACK, emission=2.0)
     camera = wf.Camera.look_at((0.3, 0.2, 5), (0.3, 0.2, 0), fov=1e-6, size=(SIDE, SIDE))
     return wf.Scene([sheet, wall], [wf.Environment(1.0)], camera)
@@ -68,7 +70,8 @@ def test_each_sheet_decides_for_itself(sampler: str) -> None:
     """Three sheets let (1 - alpha)³ through; one random number for all of them would let more."""
     wall = before_a_wall(0.0).shapes[1]
     sheets = [
-        wf.Rectangle((-9, -9, z), (18, 0, 0), (0, 18, 0), material=BLACK.with_alpha(0.4)) for z in range(3)
+        wf.Rectangle((-9, -9, z), (18, 0, 0), (0, 18, 0), material=wf.Material(BLACK, alpha=0.4))
+        for z in range(3)
     ]
     scene = wf.Scene([*sheets, wall], camera=before_a_wall(0.0).camera)
     mean = measure(scene, 4096, integrator="naive", max_bounces=0, sampler=sampler)
@@ -77,7 +80,7 @@ def test_each_sheet_decides_for_itself(sampler: str) -> None:
 
 def test_a_sphere_is_passed_twice() -> None:
     """Its near and its far side, by the camera and within the wall's light."""
-    ball = wf.Sphere((0.3, 0.2, 2), 0.7, material=BLACK.with_alpha(0.3))
+    ball = wf.Sphere((0.3, 0.2, 2), 0.7, material=wf.Material(BLACK, alpha=0.3))
     scene = before_a_wall(0.0)
     scene.shapes[0] = ball
     assert_mean(measure(scene, 4096, max_bounces=1), 2 * 0.7**2, 0.003, rounding=10 / (64 * 4096 * 0.49))
@@ -113,7 +116,7 @@ def test_shadow_of_sheets(integrator: str, accel: str) -> None:
 @pytest.mark.parametrize("integrator", ["naive", "full"])
 def test_shadow_of_a_sphere(integrator: str) -> None:
     """Light crosses it twice."""
-    ball = wf.Sphere((0, 1, 0), 0.7, material=BLACK.with_alpha(0.3))
+    ball = wf.Sphere((0, 1, 0), 0.7, material=wf.Material(BLACK, alpha=0.3))
     lamp = panel((-0.3, -0.3), (0.3, 0.3), 2.0)
     whole = polygon_irradiance([(-0.3, 2, -0.3), (-0.3, 2, 0.3), (0.3, 2, 0.3), (0.3, 2, -0.3)])
     spp = 8192 if integrator == "naive" else 256
@@ -157,7 +160,7 @@ def test_a_lamp_that_is_partly_there(integrator: str) -> None:
     left = polygon_irradiance([(-0.5, 2, -0.4), (-0.5, 2, 0.7), (0.05, 2, 0.7), (0.05, 2, -0.4)])
     for alpha, expected in ((0.4, 0.4 * UNSHADED), (mask(1 - HALF), left)):
         lamp = wf.Rectangle(
-            (-0.5, 2, -0.4), (1.1, 0, 0), (0, 0, 1.1), material=BLACK.with_alpha(alpha), emission=1.0
+            (-0.5, 2, -0.4), (1.1, 0, 0), (0, 0, 1.1), material=wf.Material(BLACK, alpha=alpha), emission=1.0
         )
         spp = 4096 if integrator == "naive" else 1024
         mean = measure(lit(lamp=lamp), spp, integrator=integrator, max_bounces=1)
@@ -166,7 +169,7 @@ def test_a_lamp_that_is_partly_there(integrator: str) -> None:
 
 def test_absorption_goes_on_behind_holes() -> None:
     """What enters colored glass where its surface is not there is weakened like the rest."""
-    glass = wf.Dielectric(1.0, absorption=(0.2, 1.0, 3.0)).with_alpha(0.5)
+    glass = wf.Material(wf.Dielectric(1.0), alpha=0.5, interior=wf.Medium((0.2, 1.0, 3.0)))
     plate = [
         wf.Rectangle((-50, 1, -50), (0, 0, 100), (100, 0, 0), material=glass),
         wf.Rectangle((-50, 0.5, -50), (100, 0, 0), (0, 0, 100), material=glass),
@@ -189,13 +192,13 @@ def leaves(size: tuple[int, int] = (16, 8)) -> wf.Scene:
     leaf = mask(rng.random((6, 6)))
     shapes: list[wf.Mesh | wf.Sphere] = [floor(), panel((-1, -1), (1, 1), 3.0, emission=4.0)]
     for material in (
-        wf.Diffuse((0.3, 0.6, 0.2)).with_alpha(leaf, cutoff=0.5),
-        wf.Principled((0.6, 0.3, 0.2), roughness=0.4, alpha=leaf),
-        wf.Diffuse(0.7).with_alpha(0.4),
+        wf.Material(wf.Diffuse((0.3, 0.6, 0.2)), alpha=leaf, alpha_cutoff=0.5),
+        wf.Material(wf.Principled((0.6, 0.3, 0.2), roughness=0.4), alpha=leaf),
+        wf.Material(wf.Diffuse(0.7), alpha=0.4),
     ):
         for corner, u, v in rng.normal(size=(8, 3, 3)):
             shapes.append(wf.Rectangle(corner + above, u, v, material=material))
-    shapes.append(wf.Sphere((0.4, 0.6, 0.8), 0.5, material=wf.Dielectric(1.5).with_alpha(0.7)))
+    shapes.append(wf.Sphere((0.4, 0.6, 0.8), 0.5, material=wf.Material(wf.Dielectric(1.5), alpha=0.7)))
     camera = wf.Camera.look_at((0, 1.5, 6), (0, 1, 0), fov=40, size=size)
     return wf.Scene(shapes, [wf.Environment(0.2)], camera)
 
@@ -237,11 +240,11 @@ def test_scale_and_place_change_nothing(scale: float, shift: float) -> None:
 
 def test_what_is_all_there_costs_nothing() -> None:
     """Opacities of 1 leave no trace in the compiled scene, and cost no material its group."""
-    for material in (wf.Principled(0.5, alpha=1.0), wf.Diffuse(0.5).with_alpha(1.0)):
-        assert material.opacity is None
-        compiled = compile_scene(lit(wf.Sphere(HERE, 0.1, material=material)), numpy)
-        assert compiled.opacities is compiled.lights.varies is None
-    plain, clear = wf.Diffuse(0.5), wf.Diffuse(0.2).with_alpha(0.5)
+    material = wf.Material(wf.Diffuse(0.5), alpha=1.0)
+    assert material.opacity is None
+    compiled = compile_scene(lit(wf.Sphere(HERE, 0.1, material=material)), numpy)
+    assert compiled.opacities is compiled.lights.varies is None
+    plain, clear = wf.Diffuse(0.5), wf.Material(wf.Diffuse(0.2), alpha=0.5)
     balls = [wf.Sphere((x, 5, 0), 0.1, material=m) for x, m in enumerate((plain, clear, wf.Diffuse(0.1)))]
     assert len(compile_scene(lit(*balls), numpy).materials.groups) == 1
 
@@ -272,7 +275,7 @@ def test_gltf(tmp_path, mode: str, factor: float, clear: float) -> None:
     group = {"baseColorTexture": info, "baseColorFactor": [1, 1, 1, factor]}
     build.material(pbrMetallicRoughness=group, alphaMode=mode, alphaCutoff=0.3)
     (mesh,) = wf.load(build.gltf(tmp_path / "a.gltf"), strict=True).shapes
-    assert isinstance(mesh.material, Principled)
+    assert isinstance(mesh.material.bsdf, Principled)
     assert behind(mesh) == pytest.approx(clear, abs=0.005)
 
 
@@ -295,19 +298,23 @@ def test_mtl(tmp_path, lines: str, clear: float) -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: wf.Diffuse(0.5).with_alpha(1.5), r"Diffuse alpha is 1\.5; it must be in \[0, 1\]"),
-        (lambda: wf.Principled(alpha=-0.1), r"Principled alpha is -0\.1; it must be in \[0, 1\]"),
-        (lambda: wf.Mirror().with_alpha(0.5, cutoff=-1), r"Mirror alpha_cutoff is -1; it must be at least 0"),
+        (lambda: wf.Material(wf.Diffuse(0.5), alpha=1.5), r"Material alpha is 1\.5; it must be in \[0, 1\]"),
         (
-            lambda: wf.Diffuse(0.5).with_alpha(wf.Texture(np.ones((2, 2, 4), np.float32))),
-            r"Diffuse alpha is <Texture 'array': 2 × 2>, which gives colors; choose one channel by channel=",
+            lambda: wf.Material(wf.Mirror(), alpha=0.5, alpha_cutoff=-1),
+            r"Material alpha_cutoff is -1; it must be at least 0",
         ),
         (
-            lambda: wf.Mix(wf.Diffuse(0.5), wf.Diffuse(0.1).with_alpha(0.5)),
-            "Mix second has an alpha; give it to the Mix, by with_alpha",
+            lambda: wf.Material(wf.Diffuse(0.5), alpha=wf.Texture(np.ones((2, 2, 4), np.float32))),
+            r"Material alpha is <Texture 'array': 2 × 2>, which gives colors; choose one channel by channel=",
         ),
         (
-            lambda: render(wf.Scene([wf.Sphere(HERE, 1, material=BLACK.with_alpha(0.5), emission=1.0)]), 1),
+            lambda: wf.Mix(wf.Diffuse(0.5), wf.Material(wf.Diffuse(0.1), alpha=0.5)),
+            r"Mix second must be a Bsdf such as wf.Diffuse\(0.5\), got Material\(bsdf=",
+        ),
+        (
+            lambda: render(
+                wf.Scene([wf.Sphere(HERE, 1, material=wf.Material(BLACK, alpha=0.5), emission=1.0)]), 1
+            ),
             "sphere: a sphere that shines must be all there; its material has an alpha",
         ),
     ],
@@ -322,7 +329,7 @@ def test_a_ray_through_more_veils_than_there_are_numbers_is_an_error(monkeypatch
     """Two decisions must never share a random number."""
     monkeypatch.setitem(sampler.REPEATED, sampler.Dimension.OPACITY, 9)
     veils = [
-        wf.Rectangle((-2, -2, z), (4, 0, 0), (0, 4, 0), material=wf.Diffuse(0.5).with_alpha(0.01))
+        wf.Rectangle((-2, -2, z), (4, 0, 0), (0, 4, 0), material=wf.Material(wf.Diffuse(0.5), alpha=0.01))
         for z in (1.0, 0.5, 0.0)
     ]
     camera = wf.Camera.look_at((0, 0, 3), (0, 0, 0), size=(4, 4))

@@ -17,7 +17,7 @@ MATERIALS = {  # a material, and for each of its parameters a new value
     "Conductor": (wf.Conductor.named("gold"), {"eta": 2.0, "k": (1, 2, 3), **ROUGH}),
     "Dielectric": (
         wf.Dielectric(),
-        {"ior": 1.3, **ROUGH, "reflectance": 0.5, "transmittance": 0.6, "absorption": (1, 0, 0)},
+        {"ior": 1.3, **ROUGH, "reflectance": 0.5, "transmittance": 0.6},
     ),
     "ThinDielectric": (wf.ThinDielectric(), {"ior": 1.3, **ROUGH, "reflectance": 0.5, "transmittance": 0.6}),
     "OrenNayar": (wf.OrenNayar(), {"reflectance": 0.7, "sigma": 0.1}),
@@ -25,6 +25,16 @@ MATERIALS = {  # a material, and for each of its parameters a new value
         wf.Mix(wf.Diffuse(0.3), wf.Diffuse(0.6)),
         {"first": wf.Mirror(0.5), "second": wf.Dielectric(1.5), "weight": 0.25},
     ),
+    "Material": (
+        wf.Material(wf.Dielectric()),
+        {
+            "bsdf": wf.Diffuse(0.3),
+            "alpha": 0.75,
+            "normal_map": wf.NormalMap(np.full((1, 1, 3), 0.6)),
+            "interior": wf.Medium(0.5),
+        },
+    ),
+    "shining Material": (wf.Material(wf.Diffuse()), {"emission": 0.5}),
     "Principled": (
         wf.Principled(),
         {
@@ -35,7 +45,6 @@ MATERIALS = {  # a material, and for each of its parameters a new value
             "transmission": 0.5,
             "clearcoat": 1.0,
             "sheen": 0.5,
-            "emission": 0.5,
         },
     ),
 }
@@ -79,7 +88,7 @@ def wf_parameters(kind: type) -> list[str]:
         (wf.Conductor(1, 1), "eta", 0, r"Conductor eta is 0; it must be more than 0"),
         (wf.Dielectric(), "ior", -1, r"Dielectric ior is -1; it must be more than 0"),
         (wf.OrenNayar(0.5, 1, energy_preserving=True), "sigma", 1.5, r"sigma is .*1.5.*to preserve energy"),
-        (wf.Mix(wf.Mirror(), wf.Mirror()), "first", 3, r"Mix first must be a material, got 3"),
+        (wf.Mix(wf.Mirror(), wf.Mirror()), "first", 3, r"Mix first must be a Bsdf such as .*, got 3"),
         (wf.Principled(), "metallic", np.nan, r"Principled metallic is nan"),
         (wf.PointLight((0, 0, 0), 1), "intensity", -1, r"PointLight intensity is -1; it must be at least 0"),
         (wf.PointLight((0, 0, 0), 1), "position", (0, 1), r"PointLight position must have shape \(3,\)"),
@@ -119,7 +128,7 @@ def test_lights_change_as_they_are_assigned() -> None:
 def test_none_brings_the_default_back() -> None:
     ball = wf.Sphere((0, 0, 0), 1, material=wf.Mirror())
     ball.material = None
-    assert type(ball.material) is wf.Diffuse
+    assert type(ball.material.bsdf) is wf.Diffuse
 
 
 def test_copies_keep_their_parameters() -> None:
@@ -132,10 +141,16 @@ def test_copies_keep_their_parameters() -> None:
     ("thing", "text"),
     [
         (wf.Diffuse(0.8), "Diffuse(reflectance=0.8)"),
-        (wf.Diffuse((0.8, 0.2, 0.1)).with_alpha(0.5), "Diffuse(reflectance=(0.8, 0.2, 0.1)).with_alpha(0.5)"),
+        (
+            wf.Material(wf.Diffuse((0.8, 0.2, 0.1)), alpha=0.5),
+            "Material(bsdf=Diffuse(reflectance=(0.8, 0.2, 0.1)), alpha=0.5)",
+        ),
         (wf.Diffuse(wf.VertexColors()), "Diffuse(reflectance=VertexColors("),
         (wf.Dielectric(1.5), "Dielectric(ior=1.5, roughness=0)"),
-        (wf.Dielectric(absorption=(1, 0, 0)), "Dielectric(ior=1.5, roughness=0, absorption=(1, 0, 0))"),
+        (
+            wf.Material(wf.Dielectric(), interior=wf.Medium((1, 0, 0))),
+            "Material(bsdf=Dielectric(ior=1.5, roughness=0), interior=Medium(absorption=(1, 0, 0)))",
+        ),
         (
             wf.Mix(wf.Mirror(), wf.Diffuse()),
             "Mix(first=Mirror(reflectance=1), second=Diffuse(reflectance=0.5), weight",
@@ -198,7 +213,7 @@ OUT_OF_RANGE = {
     "roughness": (lambda: wf.Conductor(1, 1, floats(1.5, channel=0)), rf"Conductor roughness.* 1.5{RANGE}"),
     "eta": (lambda: wf.Conductor(floats(-1), 1), r"Conductor eta.* -1; it must be"),
     "ior": (lambda: wf.Dielectric(floats(0, channel=0)), r"Dielectric ior.* 0; it must be more than 0"),
-    "alpha": (lambda: wf.Diffuse().with_alpha(floats(3, channel=0)), rf"Diffuse alpha.* 3{RANGE}"),
+    "alpha": (lambda: wf.Material(wf.Diffuse(), alpha=floats(3, channel=0)), rf"Material alpha.* 3{RANGE}"),
     "times": (lambda: wf.VertexColors(floats(3)), rf"VertexColors times.* 3{RANGE}"),
     "emission": (
         lambda: wf.Mesh(np.eye(3), [[0, 1, 2]], emission=floats(-3)),

@@ -36,7 +36,7 @@ def lean(code):
 
 def normals(shape, normal_map, origin=(0.3, 0.4, 5), direction=(0, 0, -1), n=1):
     """The geometric and the shading normals, (3,) each, where a ray meets a shape with a relief."""
-    shape.material = wf.Diffuse(0.5).with_normal_map(normal_map)
+    shape.material = wf.Material(wf.Diffuse(0.5), normal_map=normal_map)
     scene = wf.Scene(shape, lights=[wf.Environment(1.0)])
     compiled = compile_scene(scene, lambda geometry: make_accelerator(geometry, "numpy"))
     o = np.repeat((np.array(origin) - compiled.center).astype(F4).reshape(3, 1), n, 1)
@@ -120,7 +120,7 @@ def test_tangents_move_with_their_mesh(matrix, shared):
     """A mirrored mesh shows the mirrored relief, shared or as a mesh of its own."""
     along, across = np.array([0.6, 0.8, 0]), np.array([0.8, -0.6, 0])
     mesh = square(normals=[[0, 0, 1]] * 4, tangents=[[*along, -1]] * 4)
-    mesh.material = wf.Diffuse(0.5).with_normal_map(wf.NormalMap(texel(TILT)))
+    mesh.material = wf.Material(wf.Diffuse(0.5), normal_map=wf.NormalMap(texel(TILT)))
     place = np.eye(4)
     place[:3, :3] = matrix
     other = np.eye(4)
@@ -264,7 +264,7 @@ def hall(normal_map=None, seen=(2.0, 1.4, 3.0)):
     """A smooth ball, an analytic one and a floor, with metal, glass and matte materials."""
     materials = [wf.Conductor.named("gold", roughness=0.3), wf.Dielectric(1.5), wf.OrenNayar(0.7)]
     if normal_map is not None:
-        materials = [material.with_normal_map(normal_map) for material in materials]
+        materials = [wf.Material(material, normal_map=normal_map) for material in materials]
     turn = np.linspace(0, 2 * np.pi, 17)
     up = np.linspace(0.02, np.pi - 0.02, 9)
     a, b = np.meshgrid(turn, up)
@@ -353,7 +353,7 @@ MATERIALS = [
 @pytest.mark.parametrize("angle", [0.0, 1.0, 1.5])
 def test_a_white_furnace_gains_nothing(material, normal_map, angle):
     mean = Mean.of(
-        furnace(material.with_normal_map(normal_map), angle).reshape(-1, 3).mean(1, dtype=np.float64)
+        furnace(wf.Material(material, normal_map=normal_map), angle).reshape(-1, 3).mean(1, dtype=np.float64)
     )
     assert mean.error < 0.01
     assert mean.value - 4 * mean.error <= 1 + 1e-5
@@ -364,7 +364,7 @@ def test_a_matte_tilted_patch_loses_what_lies_below():
     """A normal that leans by θ loses (1 - cosθ)/2 of its light to the side below the surface."""
     for code in ([0.65, 0.5, 1], [0.5, 0.85, 1]):
         cos = lean(code)[2]
-        image = furnace(wf.Diffuse(1.0).with_normal_map(wf.NormalMap(texel(code))))
+        image = furnace(wf.Material(wf.Diffuse(1.0), normal_map=wf.NormalMap(texel(code))))
         assert image.mean() == pytest.approx((1 + cos) / 2, abs=0.005)
 
 
@@ -374,14 +374,18 @@ def test_a_rough_metal_loses_what_docs_say(degrees, left):
     angle = np.radians(degrees)
     code = [0.5 + 0.5 * np.sin(angle), 0.5, 0.5 + 0.5 * np.cos(angle)]
     white = wf.Principled(1.0, metallic=1.0, roughness=0.3)
-    assert furnace(white.with_normal_map(wf.NormalMap(texel(code)))).mean() == pytest.approx(left, abs=0.008)
+    assert furnace(wf.Material(white, normal_map=wf.NormalMap(texel(code)))).mean() == pytest.approx(
+        left, abs=0.008
+    )
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.8, 1.3, 1.55])
 def test_a_mirror_has_no_black_facets(angle):
     """However its normals lean, every ray finds the light."""
     for normal_map in (STRONG, STEEP):
-        assert furnace(wf.Mirror(1.0).with_normal_map(normal_map), angle) == pytest.approx(1.0, rel=1e-5)
+        assert furnace(wf.Material(wf.Mirror(1.0), normal_map=normal_map), angle) == pytest.approx(
+            1.0, rel=1e-5
+        )
 
 
 @pytest.mark.filterwarnings("ignore:the picture is black")
@@ -390,7 +394,7 @@ def test_light_does_not_leak_from_behind():
     camera = wf.Camera.orthographic((0.5, 0.5, 3), (0.5, 0.5, 0), height=0.9, size=(16, 16))
     below = wf.PointLight((0.5, 0.5, -0.2), 5)
     for material in (wf.Diffuse(1.0), wf.Conductor.named("gold", 0.4)):
-        patch = square(material=material.with_normal_map(STRONG))
+        patch = square(material=wf.Material(material, normal_map=STRONG))
         assert render(wf.Scene([patch, lamp], [below], camera), 32).rgb.max() == 0
 
 
@@ -472,12 +476,12 @@ def test_every_integrator_sees_the_same_relief():
             "NormalMap: the transform of .* is singular; it must be invertible",
         ),
         (
-            lambda: wf.Diffuse(0.5).with_normal_map(wf.Texture(texel(FLAT))),
-            "relief must be a NormalMap or a Bump",
+            lambda: wf.Material(wf.Diffuse(0.5), normal_map=wf.Texture(texel(FLAT))),
+            "Material normal_map must be a NormalMap or a BumpMap, got <Texture",
         ),
         (
-            lambda: wf.Mix(wf.Diffuse(0.5), wf.Mirror().with_normal_map(STEEP)),
-            "Mix second has a relief; give it to the Mix, by with_normal_map",
+            lambda: wf.Mix(wf.Diffuse(0.5), wf.Material(wf.Mirror(), normal_map=STEEP)),
+            "Mix second must be a Bsdf such as",
         ),
     ],
 )
@@ -493,12 +497,7 @@ def test_a_mesh_without_coordinates_is_named():
     assert len(found) == 1
 
 
-def test_with_normal_map_leaves_the_material_alone():
-    plain = wf.Principled(0.5)
-    carved = plain.with_normal_map(STEEP)
-    assert plain.normal_map is None
-    assert carved.normal_map is STEEP
-    assert type(carved) is wf.Principled
+def test_maps_show_their_image():
     assert repr(STRONG).startswith("NormalMap(<Texture 'array': 64 × 64>")
     assert repr(STEEP).startswith("BumpMap(")
 

@@ -176,7 +176,7 @@ def test_plain_colors_are_one_group() -> None:
         wf.Dielectric(1.5),
         wf.Dielectric(1.3),
         wf.Principled((0.1, 0.2, 0.9), roughness=0.3),
-        wf.Principled(0.5, metallic=1.0, emission=2.0),
+        wf.Material(wf.Principled(0.5, metallic=1.0), emission=2.0),
         wf.Principled(0.5, clearcoat=1.0),  # with a lobe that the others lack
     ]
     grouped = group_materials(materials)

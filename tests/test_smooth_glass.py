@@ -71,7 +71,7 @@ def test_rough_glass_loses_no_more_than_on_a_sphere():
 def test_normal_mapped_glass_loses_no_light():
     lean = np.random.default_rng(1).uniform(-0.15, 0.15, (32, 32, 2))
     normal_map = wf.NormalMap(np.concatenate([0.5 + lean, np.ones((32, 32, 1))], 2))
-    shape = wf.Sphere((0, 0, 0), 1, material=wf.Dielectric(1.5).with_normal_map(normal_map))
+    shape = wf.Sphere((0, 0, 0), 1, material=wf.Material(wf.Dielectric(1.5), normal_map=normal_map))
     mean = furnace(shape, spp=1, max_bounces=1000, runs=4)
     assert mean.error < 3e-3
     assert mean.value == pytest.approx(1, abs=5e-3)
@@ -152,7 +152,7 @@ def test_nothing_leaks_through_walls_with_strongly_tilted_normals(name, lean):
 @pytest.mark.parametrize("lean", [0.0, 0.5])
 def test_absorbing_glass_takes_all_that_gets_inside(lean):
     """Glass that is black inside shows what it reflects; a path astray would bring light through."""
-    black = wf.Dielectric(1.5, reflectance=0.0, absorption=1e4)
+    black = wf.Material(wf.Dielectric(1.5, reflectance=0.0), interior=wf.Medium(1e4))
     scene = wf.Scene(ball(2, black, lean), [wf.Environment(1.0)], CAMERA)
     center = render(scene, 16).rgb[6:18, 6:18]
     assert center.max() < 1e-3

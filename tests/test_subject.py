@@ -46,7 +46,7 @@ def test_a_material_for_what_has_none(kind, obj) -> None:
     found = render(subject, 2, material=RED, size=(6, 6)).rgb
     assert found.tobytes() == render(wf.Mesh(*TRIANGLE, material=RED), 2, size=(6, 6)).rgb.tobytes()
     assert not mesh.has_material
-    assert mesh.material.reflectance.ravel().tolist() == [0.5] * 3
+    assert mesh.material.bsdf.reflectance.ravel().tolist() == [0.5] * 3
 
 
 @pytest.mark.parametrize(

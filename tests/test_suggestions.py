@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import wavefront as wf
-from wavefront.suggestions import SYNONYMS, meant
+from wavefront.suggestions import SYNONYMS, meant, suggests_keywords
 
 BALL = wf.Sphere((0, 0, 0), 1)
 TRIANGLE = [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]
@@ -66,6 +66,48 @@ def test_unknown_keywords(call, function: str, name: str, known: str | None) -> 
         call()
     hint = "" if known is None else f"; did you mean {known!r}?"
     assert str(caught.value) == f"{function}() got an unexpected keyword argument {name!r}{hint}"
+
+
+@pytest.mark.parametrize(
+    ("call", "hint"),
+    [
+        (lambda: wf.Diffuse(0.5, alpha=0.3), "wf.Material(bsdf, alpha=...)"),
+        (lambda: wf.Mirror(alpha_cutoff=0.3), "wf.Material(bsdf, alpha=..., alpha_cutoff=...)"),
+        (lambda: wf.Principled(emission=1), "wf.Material(bsdf, emission=...)"),
+        (lambda: wf.Dielectric(absorption=1), "wf.Material(bsdf, interior=wf.Medium(absorption=...))"),
+        (lambda: wf.Conductor.named("gold", normal_map=1), "wf.Material(bsdf, normal_map=...)"),
+    ],
+)
+def test_keywords_of_materials_are_told_on_bsdfs(call, hint: str) -> None:
+    """A BSDF only scatters; what to write for the rest is in the message."""
+    with pytest.raises(TypeError) as caught:
+        call()
+    assert str(caught.value).endswith(f"; write {hint}")
+
+
+@pytest.mark.parametrize("name", ["with_alpha", "with_normal_map", "absorption", "emission", "opacity"])
+def test_attributes_of_materials_are_told_on_bsdfs(name: str) -> None:
+    """Others are unknown as in Python, and nothing is found that is not there."""
+    for bsdf in (wf.Diffuse(), wf.Principled(), wf.Mix(wf.Diffuse(), wf.Mirror())):
+        with pytest.raises(AttributeError, match=rf"has no attribute '{name}'; write wf\.Material\(bsdf, "):
+            getattr(bsdf, name)
+        assert not hasattr(bsdf, name)
+    with pytest.raises(AttributeError, match=r"'Diffuse' object has no attribute 'shade'$"):
+        _ = wf.Diffuse().shade
+
+
+def test_a_bsdf_may_have_a_parameter_of_such_a_name() -> None:
+    """Of a user's own class: then it is one like any other."""
+
+    class Waxed(wf.Diffuse):
+        @suggests_keywords
+        def __init__(self, alpha: float) -> None:
+            super().__init__(0.5)
+            self.alpha = alpha
+
+    assert Waxed(alpha=0.5).alpha == 0.5
+    with pytest.raises(TypeError, match=r"unexpected keyword argument 'emission'; write wf\.Material"):
+        Waxed(emission=1)
 
 
 def test_errors_from_within_stay_as_they_are() -> None:

@@ -166,5 +166,5 @@ def test_a_lit_scene_needs_no_warning(held):
         image = wf.render(held, spp=4, max_bounces=1, workers=1, progress=False)
     # albedo/π · I/d², at a distance of 4.5
     assert image.rgb.shape == (4, 4, 3)
-    albedo = from_trimesh(held).shapes[0].material.reflectance.mean()
+    albedo = from_trimesh(held).shapes[0].material.bsdf.reflectance.mean()
     assert image.rgb.mean() == pytest.approx(albedo / np.pi * 100 / 4.5**2, rel=0.02)

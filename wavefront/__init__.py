@@ -33,6 +33,8 @@ from .image import Image
 from .lighting import studio
 from .lights import DirectionalLight, Environment, PointLight, SpotLight
 from .lights.samplers import LightSampler
+from .materials import Material
+from .media import Medium
 from .render import render
 from .sampling import warp
 from .sampling.sampler import Sampler
@@ -81,6 +83,8 @@ __all__ = [
     "Interrupted",
     "Intersections",
     "LightSampler",
+    "Material",
+    "Medium",
     "Mesh",
     "Mirror",
     "Mix",

@@ -256,7 +256,7 @@ def _info(options: argparse.Namespace) -> int:
     print(f"camera: {'in the file' if scene.camera else 'none; the scene will be framed'}")
     for shape in scene.shapes:
         glow = "" if shape.emission is None else ", emits"
-        print(f"  {shape!r} {type(shape.material).__name__}{glow}")
+        print(f"  {shape!r} {type(shape.material.bsdf).__name__}{glow}")
     return 0
 
 

@@ -20,6 +20,7 @@ from .camera import Camera, upward
 from .elementary import sin_cos_turns
 from .errors import SceneError
 from .lights import Environment
+from .materials import Material
 from .scene import FRAMING_VIEW, Scene, turned_up
 from .shapes import Disk, Mesh
 from .textures.image import Texture
@@ -255,7 +256,7 @@ def _ground(scene: Scene, preset: str | None, up: ArrayLike) -> Mesh:
         center - vertical * depth * (1 + GROUND_GAP),
         vertical,
         GROUND_REACH * radius,
-        material=Diffuse(albedo).with_alpha(Texture(alpha, channel=0, wrap="clamp")),
+        material=Material(Diffuse(albedo), alpha=Texture(alpha, channel=0, wrap="clamp")),
         name="ground",
     )
 

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from .accel import most_copies
 from .accel.registry import ACCELERATORS, AcceleratorMaker
-from .bsdfs import Bsdf
 from .camera import Camera
 from .compile.scene import compile_scene
 from .diagnosis import warn_of_black_or_white
@@ -24,6 +23,7 @@ from .image import Image
 from .integrators import INTEGRATORS, WITH_MIS, Integrator, li_full
 from .lighting import check_lighting, choose_preset, lighted
 from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
+from .materials import MaterialLike
 from .progress import Bar, Progress, phase
 from .sampling.sampler import SAMPLERS, SamplerMaker, make_sampler
 from .scene import Scene
@@ -52,7 +52,7 @@ def render(
     *,
     camera: Camera | None = None,
     size: tuple[int, int] | None = None,
-    material: Bsdf | None = None,
+    material: MaterialLike | None = None,
     up: ArrayLike | None = None,
     lighting: str | None = "auto",
     ground: bool = False,

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from .bsdfs import Bsdf
 from .camera import Camera, image_size, upward
 from .errors import SceneError
 from .lights import Light
+from .materials import Material, MaterialLike, as_material
 from .progress import Progress
 from .scene import Scene, importer, register_importer
 from .shapes import Instance, Mesh, Shape
@@ -26,7 +26,7 @@ CAN_BE_RENDERED = (
 )
 
 
-def as_scene(subject: Any, material: Bsdf | None = None, progress: Progress = None) -> Scene:
+def as_scene(subject: Any, material: MaterialLike | None = None, progress: Progress = None) -> Scene:
     """Return what `render` was given as a `Scene`.
 
     Parameters
@@ -43,8 +43,8 @@ def as_scene(subject: Any, material: Bsdf | None = None, progress: Progress = No
     SceneError
         If it is nothing that can be rendered, or the material is meant for what has one of its own.
     """
-    if material is not None and not isinstance(material, Bsdf):
-        raise SceneError(f"material must be a material such as wf.Diffuse(0.5), got {material!r}")
+    if material is not None:
+        material = as_material("material", material)
     if isinstance(subject, Scene):
         if material is not None:
             raise SceneError("material is for bare meshes; in a wf.Scene set those of its shapes")
@@ -111,7 +111,7 @@ def _is_pair(subject: Any) -> bool:
     )
 
 
-def _joined(subjects: Sequence[Any], material: Bsdf | None, progress: Progress) -> Scene:
+def _joined(subjects: Sequence[Any], material: Material | None, progress: Progress) -> Scene:
     """Return one scene of all; the camera is the first that there is."""
     lights = [item for item in subjects if isinstance(item, Light)]
     parts = [as_scene(item, material, progress) for item in subjects if not isinstance(item, Light)]
@@ -123,7 +123,7 @@ def _joined(subjects: Sequence[Any], material: Bsdf | None, progress: Progress) 
     )
 
 
-def _made_of(shape: Shape, material: Bsdf | None) -> Shape:
+def _made_of(shape: Shape, material: Material | None) -> Shape:
     """Return a user's shape with a material; the user's own stays as it is."""
     if material is None:
         return shape
@@ -135,7 +135,7 @@ def _made_of(shape: Shape, material: Bsdf | None) -> Shape:
     return bare
 
 
-def _all_made_of(scene: Scene, material: Bsdf | None) -> Scene:
+def _all_made_of(scene: Scene, material: Material | None) -> Scene:
     """Give all shapes of a scene that was just read a material in place of their own."""
     for shape in scene.shapes if material is not None else ():
         bare = shape.mesh if isinstance(shape, Instance) else shape

@@ -90,6 +90,20 @@ SYNONYMS: dict[str, tuple[str, ...]] = {
 }
 
 
+# What is looked for on a BSDF and belongs to a material, by keyword or attribute, and what to write.
+MATERIAL_ARGUMENTS: dict[str, str] = {
+    "absorption": "wf.Material(bsdf, interior=wf.Medium(absorption=...))",
+    "alpha": "wf.Material(bsdf, alpha=...)",
+    "alpha_cutoff": "wf.Material(bsdf, alpha=..., alpha_cutoff=...)",
+    "emission": "wf.Material(bsdf, emission=...)",
+    "interior": "wf.Material(bsdf, interior=...)",
+    "normal_map": "wf.Material(bsdf, normal_map=...)",
+    "opacity": "wf.Material(bsdf, alpha=...)",
+    "with_alpha": "wf.Material(bsdf, alpha=...)",
+    "with_normal_map": "wf.Material(bsdf, normal_map=...)",
+}
+
+
 def meant(name: str, known: Iterable[str]) -> str | None:
     """Return the known name of which `name` is a synonym or a misspelling; None if there is none."""
     plain = {_plain(other): other for other in known}
@@ -112,7 +126,8 @@ def did_you_mean(name: object, known: Iterable[str]) -> str:
 def suggests_keywords(function: Callable[P, R]) -> Callable[P, R]:
     """Let a function suggest a known keyword argument for an unknown one.
 
-    The error is a TypeError, as in Python, and the signature is that of the function.
+    The error is a TypeError, as in Python, and the signature is that of the function. A class may have
+    `given_elsewhere`: for keywords that belong to another class, what to write.
     """
     code = function.__code__
     known = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
@@ -122,7 +137,8 @@ def suggests_keywords(function: Callable[P, R]) -> Callable[P, R]:
     def checked(*args: P.args, **kwargs: P.kwargs) -> R:
         for name in kwargs:
             if name not in known:
-                hint = did_you_mean(name, known)
+                elsewhere = getattr(args[0], "given_elsewhere", {}) if args else {}
+                hint = f"; write {elsewhere[name]}" if name in elsewhere else did_you_mean(name, known)
                 raise TypeError(f"{title}() got an unexpected keyword argument {name!r}{hint}")
         return function(*args, **kwargs)
 

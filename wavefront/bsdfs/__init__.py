@@ -1,8 +1,5 @@
-"""Materials. Adding one is a file here and a line below; the parametrized tests find it there."""
+"""Scattering models. Adding one is a file here and a line below; the parametrized tests find it there."""
 
-from ..materials.alpha import Opacity
-from ..textures.base import BaseTexture
-from ..textures.normal_map import BaseNormalMap
 from .base import Bsdf, BsdfSample, evaluated, sampled
 from .conductor import Conductor
 from .dielectric import Dielectric
@@ -17,8 +14,6 @@ ALL = (Diffuse, Mirror, Dielectric, Conductor, OrenNayar, ThinDielectric, Princi
 
 __all__ = [
     "ALL",
-    "BaseNormalMap",
-    "BaseTexture",
     "Bsdf",
     "BsdfSample",
     "Conductor",
@@ -26,7 +21,6 @@ __all__ = [
     "Diffuse",
     "Mirror",
     "Mix",
-    "Opacity",
     "OrenNayar",
     "Principled",
     "ThinDielectric",

@@ -1,28 +1,25 @@
-"""The contract of every material.
+"""The contract of every BSDF.
 
 Directions are in the local shading frame: z is the shading normal on the side of `wo`, so
 `wo[2] > 0` always; `wi[2] > 0` is reflection and `wi[2] < 0` transmission. The renderer turns
-the frame, so no material does. All arrays hold live columns only.
+the frame, so no BSDF does. All arrays hold live columns only.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from copy import copy
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from ..errors import SceneError
-from ..materials.alpha import Opacity, opacity
-from ..materials.emission import Emission
-from ..parameter import Parametrized, brief
+from ..parameter import Parametrized
 from ..record import record
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..state import SurfaceInteraction
+from ..suggestions import MATERIAL_ARGUMENTS
 from ..textures.base import BaseTexture
-from ..textures.normal_map import BaseNormalMap
-from ..textures.parameter import Scalar
 from ..vec import Bools, Floats, broadcast
 
 
@@ -38,7 +35,7 @@ class BsdfSample:
 
 
 class Bsdf(Parametrized, ABC):
-    """A material: how a surface scatters light.
+    """How a surface scatters light. A `Material` holds one, and everything else about the surface.
 
     A subclass gives `f`; it may give a `sample_f` and its `pdf` that follow `f` more closely than
     the cosine-weighted ones here. Parameters are attributes: constants of shape (3, 1) or (1,),
@@ -47,81 +44,29 @@ class Bsdf(Parametrized, ABC):
 
     transmissive: bool = False  # light can cross the surface
     dimensions: int = 2  # rows of u that sample_f reads
+    given_elsewhere: ClassVar[dict[str, str]] = MATERIAL_ARGUMENTS  # for messages
     specular: bool = False  # every lobe is a delta: f and pdf are 0, light sampling is skipped
-    opacity: Opacity | None = None  # how much of the surface is there; None: all. The renderer sees to it
-    absorption: Any = np.zeros((3, 1), np.float32)  # of the inside, per scene unit. The path sees to it
-    emission: Emission | None = None  # what the surface sends itself. The shape that has it sees to it
-    normal_map: BaseNormalMap | None = (
-        None  # tilts the shading normals. The renderer sees to it, no material does
-    )
 
-    def __repr__(self) -> str:
-        """Name the parameters, the alpha and the relief."""
-        text = super().__repr__()
-        if self.opacity is not None:
-            cutoff = "" if self.opacity.cutoff is None else f", {self.opacity.cutoff:g}"
-            text += f".with_alpha({brief(self.opacity.alpha)}{cutoff})"
-        return text if self.normal_map is None else f"{text}.with_normal_map({self.normal_map!r})"
+    if not TYPE_CHECKING:  # a type checker would take every name for an attribute
+
+        def __getattr__(self, name: str) -> Any:
+            """Raise an AttributeError, which says what to write for what belongs to a `Material`."""
+            hint = f"; write {self.given_elsewhere[name]}" if name in self.given_elsewhere else ""
+            text = f"{type(self).__name__!r} object has no attribute {name!r}{hint}"
+            raise AttributeError(text, name=name, obj=self)
 
     @property
     def view_independent(self) -> bool:
-        """Whether it looks alike from everywhere: no method reads wo, which is then not made ready."""
+        """True if no method reads wo, which is then not computed."""
         return False
 
     @property
     def black(self) -> bool:
-        """Whether it scatters nothing at all: paths end on lamps of it."""
+        """True if it scatters nothing: paths end on it."""
         return False
 
-    def with_alpha(self, alpha: Scalar, cutoff: float | None = None) -> Self:
-        """Return this material for a surface that is only partly there.
-
-        Parameters
-        ----------
-        alpha
-            Part of the light that meets the surface, in [0, 1]: a number, or a `Texture` of one
-            channel. The rest goes straight on as if there were nothing, and so do shadow rays.
-        cutoff
-            If given, the surface is all there where alpha is at least this, and nothing elsewhere.
-
-        Raises
-        ------
-        SceneError
-                If an argument is out of its range.
-        """
-        partly = copy(self)
-        partly.opacity = opacity(type(self).__name__, alpha, cutoff)
-        return partly
-
-    def with_normal_map(self, normal_map: BaseNormalMap) -> Self:
-        """Return this material with a `NormalMap` or `BumpMap`.
-
-        Raises
-        ------
-        SceneError
-            If it is something else.
-        """
-        if not isinstance(normal_map, BaseNormalMap):
-            raise SceneError(f"relief must be a NormalMap or a BumpMap, got {normal_map!r}")
-        carved = copy(self)
-        carved.normal_map = normal_map
-        return carved
-
-    def scaled(self, factor: float) -> Self:
-        """Return this material where lengths were multiplied by `factor`: itself if it has none."""
-        normal_map = None if self.normal_map is None else self.normal_map.scaled(factor)
-        absorbs = not isinstance(self.absorption, BaseTexture) and bool(np.any(self.absorption))
-        if factor == 1 or not (absorbs or normal_map is not self.normal_map):
-            return self
-        other = copy(self)
-        other.normal_map = normal_map
-        if absorbs:  # no float32 is so large that it would make a light path of length 0 a NaN
-            per_unit = np.asarray(self.absorption, np.float64) / factor
-            other.absorption = np.minimum(per_unit, np.finfo(np.float32).max).astype(np.float32)
-        return other
-
     def bind(self, surface: SurfaceInteraction) -> Self:
-        """Return this material with its spatial parameters looked up at `surface` (n columns)."""
+        """Return this BSDF with its spatial parameters looked up at `surface` (n columns)."""
         varying = {name: value for name, value in vars(self).items() if isinstance(value, BaseTexture)}
         if not varying:
             return self
@@ -139,7 +84,7 @@ class Bsdf(Parametrized, ABC):
         return np.where(wo[2] > 0, cosine_hemisphere_pdf(wi), np.float32(0))
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
-        """Return `f` and `pdf` together, for materials where they share work."""
+        """Return `f` and `pdf` together, for BSDFs where they share work."""
         return self.f(wo, wi), self.pdf(wo, wi)
 
     def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
@@ -156,12 +101,12 @@ def weigh(f: Floats, wi: Floats, pdf: Floats) -> Floats:
 
 
 def evaluated(bsdf: Bsdf, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
-    """Return f (3, n) and the pdf (n,) of a material.
+    """Return f (3, n) and the pdf (n,) of a BSDF.
 
     Raises
     ------
     SceneError
-        If the material returns arrays of other shapes.
+        If the BSDF returns arrays of other shapes.
     """
     f, pdf = bsdf.evaluate(wo, wi)
     n = wi.shape[1]
@@ -171,12 +116,12 @@ def evaluated(bsdf: Bsdf, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
 
 
 def sampled(bsdf: Bsdf, wo: Floats, u: Floats) -> BsdfSample:
-    """Return what a material samples for wo (3, n) with u (dimensions, n).
+    """Return what a BSDF samples for wo (3, n) with u (dimensions, n).
 
     Raises
     ------
     SceneError
-        If the material returns arrays of other shapes than `BsdfSample` has.
+        If the BSDF returns arrays of other shapes than `BsdfSample` has.
     """
     out = bsdf.sample_f(wo, u[: bsdf.dimensions])
     n = wo.shape[1]

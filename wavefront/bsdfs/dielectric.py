@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from copy import copy
-from functools import partial
 from typing import Self
 
 import numpy as np
@@ -38,9 +37,6 @@ class Dielectric(Bsdf):
         A whole ball in even light loses 0.06 % at 0.1, 4 % at 0.32, 18 % at 0.5, 41 % at 0.71, 65 % at 1.
     reflectance, transmittance
         Tints of the reflected and of the refracted light per channel, in [0, 1]. 1 is physical.
-    absorption
-        What the inside absorbs, per channel and scene unit of path length, at least 0: radiance
-        falls by exp(−absorption · length) (Beer and Lambert). The path applies it, not the boundary.
 
     Raises
     ------
@@ -55,7 +51,6 @@ class Dielectric(Bsdf):
     roughness = Parameter(scalar)
     reflectance = Parameter(color)
     transmittance = Parameter(color)
-    absorption = Parameter(partial(color, high=np.inf))
 
     @suggests_keywords
     def __init__(
@@ -65,13 +60,11 @@ class Dielectric(Bsdf):
         *,
         reflectance: Color = 1.0,
         transmittance: Color = 1.0,
-        absorption: Color = 0.0,
     ) -> None:
         self.ior = ior
         self.roughness = roughness
         self.reflectance = reflectance
         self.transmittance = transmittance
-        self.absorption = absorption
         self.derive()
 
     def derive(self) -> None:

@@ -1,4 +1,4 @@
-"""A surface that is one material here and another there."""
+"""Blends of two BSDFs."""
 
 from __future__ import annotations
 
@@ -19,36 +19,26 @@ BELOW_1 = np.nextafter(f4(1), f4(0))
 
 
 def _component(name: str, value: Any) -> Bsdf:
-    """Return a material that can be a part of another."""
+    """Return a BSDF that can be a part of another."""
     if not isinstance(value, Bsdf):
-        raise SceneError(f"{name} must be a material, got {value!r}")
-    if value.opacity is not None:
-        raise SceneError(f"{name} has an alpha; give it to the Mix, by with_alpha")
-    if value.normal_map is not None:
-        raise SceneError(f"{name} has a relief; give it to the Mix, by with_normal_map")
-    if value.emission is not None:
-        raise SceneError(f"{name} has an emission; give it to the shape")
+        raise SceneError(f"{name} must be a Bsdf such as wf.Diffuse(0.5), got {value!r}")
     return value
 
 
 class Mix(Bsdf):
-    """A blend of two materials: (1 − weight)·first + weight·second.
+    """A blend of two BSDFs: (1 − weight)·first + weight·second.
 
     Parameters
     ----------
     first, second
-        The materials; either may itself be a `Mix`.
+        The BSDFs; either may itself be a `Mix`.
     weight
         Part of the second, in [0, 1]: a number or a texture.
-
-    The matter inside belongs to no point of the surface: its `absorption` is that of the part that
-    lets light through. Where both do, they must absorb alike.
 
     Raises
     ------
     SceneError
-        If the weight is outside [0, 1], something else than a material is given, a material has
-        an alpha, a relief or an emission of its own, or both let light through but absorb differently.
+        If the weight is outside [0, 1], or something else than a `Bsdf` is given.
     """
 
     dimensions = 3
@@ -64,13 +54,12 @@ class Mix(Bsdf):
         self.derive()
 
     def derive(self) -> None:
-        """See what both materials come to."""
+        """Set the flags from those of both."""
         self.transmissive = self.first.transmissive or self.second.transmissive
         self.specular = self.first.specular and self.second.specular
-        self.absorption = _inside(self.first, self.second)
 
     def bind(self, surface: SurfaceInteraction) -> Self:
-        """Look up the weight, and the parameters of both materials."""
+        """Look up the weight, and the parameters of both BSDFs."""
         bound = copy(super().bind(surface))
         vars(bound).update(first=self.first.bind(surface), second=self.second.bind(surface))
         return bound
@@ -84,15 +73,15 @@ class Mix(Bsdf):
         return self._blend(self.first.pdf(wo, wi), self.second.pdf(wo, wi))
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
-        """Return `f` and `pdf` of both materials, blended."""
+        """Return `f` and `pdf` of both BSDFs, blended."""
         f1, pdf1 = self.first.evaluate(wo, wi)
         f2, pdf2 = self.second.evaluate(wo, wi)
         return self._blend(f1, f2), self._blend(pdf1, pdf2)
 
     def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
-        """Choose a material by u[2], use the rest of u[2] again, and weigh by both.
+        """Choose a BSDF by u[2], use the rest of u[2] again, and weigh by both.
 
-        A sample of a delta lobe keeps its weight: the other material has no value there.
+        A sample of a delta lobe keeps its weight: the other BSDF has no value there.
         """
         chance = np.broadcast_to(self.weight, wo[2].shape)
         second = u[2] < chance
@@ -112,18 +101,6 @@ class Mix(Bsdf):
 
     def _blend(self, first: Floats, second: Floats) -> Floats:
         return first + (second - first) * self.weight
-
-
-def _inside(first: Bsdf, second: Bsdf) -> Any:
-    """Return the absorption of the matter behind a mixture."""
-    clear = [part.absorption for part in (first, second) if part.transmissive]
-    if len(clear) == 2 and not np.array_equal(*clear):
-        a, b = (np.ravel(value).tolist() for value in clear)
-        raise SceneError(
-            f"Mix first has the absorption {a}, second {b}; where both let light through, "
-            "they must absorb alike"
-        )
-    return clear[0] if clear else Bsdf.absorption
 
 
 def _eta(one: BsdfSample, two: BsdfSample, second: np.ndarray) -> Floats:

@@ -8,8 +8,6 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from ..materials.alpha import opacity
-from ..materials.emission import emission as emission_of
 from ..parameter import Parameter
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..state import SurfaceInteraction
@@ -42,8 +40,7 @@ class Principled(Bsdf):
     With only `base_color`, `metallic` and `roughness` this is the metallic-roughness material of
     the glTF 2.0 specification, appendix B: mix(dielectric, metal, metallic) with Schlick's Fresnel,
     GGX with α = roughness², height-correlated Smith shadowing and a Lambertian base. The others
-    follow glTF's extensions KHR_materials_ior, _specular, _transmission, _volume, _clearcoat and
-    _sheen, except that
+    follow glTF's extensions KHR_materials_ior, _specular, _transmission, _clearcoat and _sheen, except that
     - the matte base gets the light that the gloss leaves over by the albedo of the gloss, so that a
       white surface reflects all light and no more; the appendix's mix by Fresnel in the half vector,
       which reflects up to 1.9 times the light at grazing angles, comes with `conserve_energy=False`;
@@ -72,13 +69,6 @@ class Principled(Bsdf):
     specular, specular_color
         Strength, in [0, 1], and tint, at least 0, of the dielectric's reflection along the normal, which
         the tint raises to at most 1.
-    absorption
-        What the inside absorbs, per channel and scene unit, as for `Dielectric`. There is an inside
-        only where light is transmitted, and behind no `thin` surface.
-    emission
-        Radiance that surfaces of this material send, as the emission of a `Mesh`, which goes before it.
-    alpha, alpha_cutoff
-        How much of the surface is there, as by `with_alpha`.
     conserve_energy
         Lay the gloss over the matte base so that no light is gained; False follows glTF's appendix
         to the letter.
@@ -104,8 +94,6 @@ class Principled(Bsdf):
     sheen_roughness = Parameter(scalar)
     specular_weight = Parameter(scalar, "specular")
     specular_color = Parameter(partial(color, high=np.inf))
-    absorption = Parameter(partial(color, high=np.inf))
-    emission = Parameter(emission_of)
 
     @suggests_keywords
     def __init__(
@@ -124,10 +112,6 @@ class Principled(Bsdf):
         sheen_roughness: Scalar = 0.3,
         specular: Scalar = 1.0,
         specular_color: Color = 1.0,
-        absorption: Color = 0.0,
-        emission: Color = 0.0,
-        alpha: Scalar = 1.0,
-        alpha_cutoff: float | None = None,
         conserve_energy: bool = True,
     ) -> None:
         self.base_color = base_color
@@ -143,17 +127,12 @@ class Principled(Bsdf):
         self.sheen_roughness = sheen_roughness
         self.specular_weight = specular
         self.specular_color = specular_color
-        self.absorption = absorption
-        self.emission = emission
-        self.opacity = opacity("Principled", alpha, alpha_cutoff)
         self.conserve_energy = conserve_energy
         self.derive()
 
     def derive(self) -> None:
-        """See which lobes there are; only what light enters absorbs."""
+        """Set which lobes there are."""
         self.transmissive = _used(self.transmission)
-        if not self.transmissive or self.thin:
-            vars(self)["absorption"] = Bsdf.absorption
         self._coated = _used(self.clearcoat)
         self._cloth = _used(self.sheen)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..bsdfs import Bsdf
 from ..errors import SceneError
-from ..materials.alpha import Opacity
+from ..materials import Material, Opacity
 from ..record import record
 from ..shapes import Instance, Mesh, Shape, Sphere
 from ..shapes.attributes import ATTRIBUTES
@@ -22,7 +22,7 @@ from ..vec import Bools, Floats, Ints, f4
 
 @record
 class Palette(BaseTexture):
-    """A parameter of many alike materials, one column each, looked up by the material's number."""
+    """A parameter of the BSDFs of many materials, one column each, looked up by the material's number."""
 
     table: Floats  # (c, materials)
 
@@ -33,11 +33,12 @@ class Palette(BaseTexture):
 
 @record
 class MaterialTable:
-    """The materials of a scene, gathered into groups that are shaded together."""
+    """The materials of a scene: BSDFs, gathered into groups that are shaded together, and normal maps."""
 
     group_of: Ints  # (materials,) the group of each material
     groups: tuple[Bsdf, ...]  # those that are `specular` at the end
-    normal_maps: tuple[tuple[int, BaseNormalMap], ...]  # the groups that have one, with it
+    normal_map_of: Ints  # (materials,) the normal map of each material, -1 for none
+    normal_maps: tuple[BaseNormalMap, ...]
 
 
 @record
@@ -58,44 +59,37 @@ class Opacities:
         return found
 
 
-def group_materials(materials: Sequence[Bsdf]) -> MaterialTable:
-    """Merge materials that differ only in the values of constant parameters into one group each.
+def group_materials(materials: Sequence[Material]) -> MaterialTable:
+    """Merge BSDFs that differ only in the values of constant parameters into one group each.
 
-    The merged material finds its values in a `Palette`, so a scene of a hundred plain colors is
-    shaded as one group. Groups that have only delta lobes come last.
+    The merged BSDF finds its values in a `Palette`, so a scene of a hundred plain colors is shaded as
+    one group. Groups that have only delta lobes come last.
     """
+    bsdfs = [material.bsdf for material in materials]
     members: dict[object, list[int]] = {}
-    for i, material in enumerate(materials):
-        members.setdefault(_group_key(material), []).append(i)
+    for i, bsdf in enumerate(bsdfs):
+        members.setdefault(_group_key(bsdf), []).append(i)
     group_of = np.empty(len(materials), np.intp)
-    ordered = sorted(members.values(), key=lambda numbers: materials[numbers[0]].specular)
+    ordered = sorted(members.values(), key=lambda numbers: bsdfs[numbers[0]].specular)
     for group, numbers in enumerate(ordered):
         group_of[numbers] = group
-    groups = tuple(_merge(materials, numbers) for numbers in ordered)
-    normal_maps = tuple(
-        (number, bsdf.normal_map) for number, bsdf in enumerate(groups) if bsdf.normal_map is not None
-    )
-    return MaterialTable(group_of, groups, normal_maps)
+    groups = tuple(_merge(bsdfs, numbers) for numbers in ordered)
+    normal_maps = {id(m.normal_map): m.normal_map for m in materials if m.normal_map is not None}
+    number_of = {key: number for number, key in enumerate(normal_maps)}
+    normal_map_of = np.array([number_of.get(id(material.normal_map), -1) for material in materials], np.intp)
+    return MaterialTable(group_of, groups, normal_map_of, tuple(normal_maps.values()))
 
 
-def _absorption(materials: Sequence[Bsdf]) -> Floats | None:
-    """Return the absorption behind the surfaces of each material, (3, materials), if there is any.
-
-    Raises
-    ------
-    SceneError
-        If one is a texture: it belongs to the space inside, not to the surface.
-    """
+def _absorption(materials: Sequence[Material]) -> Floats | None:
+    """Return the absorption behind the surfaces of each material, (3, materials), if there is any."""
     table = np.zeros((3, len(materials)), f4)
     for i, material in enumerate(materials):
-        value = material.absorption
-        if isinstance(value, BaseTexture):
-            raise SceneError(f"{type(material).__name__} absorption must be a color, not a texture")
-        table[:, i] = np.ravel(value)
+        if material.interior is not None:
+            table[:, i] = np.ravel(material.interior.absorption)
     return table if table.any() else None
 
 
-def _opacities(materials: Sequence[Bsdf], partly: Bools) -> Opacities | None:
+def _opacities(materials: Sequence[Material], partly: Bools) -> Opacities | None:
     """Return how much of the surfaces is there, None when all of them are."""
     if not partly.any():
         return None
@@ -111,9 +105,9 @@ def _opacities(materials: Sequence[Bsdf], partly: Bools) -> Opacities | None:
 
 
 def _partly_there(
-    materials: Sequence[Bsdf], material_of: Ints, meshes: Sequence[Mesh], instances: Sequence[Instance]
+    materials: Sequence[Material], material_of: Ints, meshes: Sequence[Mesh], instances: Sequence[Instance]
 ) -> Bools:
-    """Tell which primitives (m + k + 1,) are only partly there in some place; a miss, at the end, is not."""
+    """Return a mask of the primitives (m + k + 1,) with an opacity below 1; a miss, at the end, has none."""
     partly = np.array([material.opacity is not None for material in materials], np.bool_)
     found = np.append(partly.take(material_of), False)
     placed = {id(shape.mesh) for shape in instances if shape.material.opacity is not None}
@@ -126,10 +120,10 @@ def _partly_there(
 
 
 def _nonscattering_lights(
-    materials: Sequence[Bsdf], material_of: Ints, light_of: Ints, lights: int
+    materials: Sequence[Material], material_of: Ints, light_of: Ints, lights: int
 ) -> Bools | None:
-    """Tell which lights (lights,) are surfaces of a black material; None when none is."""
-    black = np.array([material.black for material in materials], np.bool_).take(material_of)
+    """Return a mask of the lights (lights,) whose surface has a black BSDF; None when none has."""
+    black = np.array([material.bsdf.black for material in materials], np.bool_).take(material_of)
     found = np.zeros(lights, np.bool_)
     found[light_of.compress(black & (light_of >= 0))] = True
     return found if found.any() else None
@@ -139,26 +133,24 @@ def _is_constant(value: object) -> bool:
     return isinstance(value, np.ndarray) and value.dtype == f4 and value.shape in ((3, 1), (1,))
 
 
-def _group_key(material: Bsdf) -> object:
-    """Materials with equal keys may be merged; one with a texture stands alone."""
-    parameters = {
-        name: value for name, value in vars(material).items() if name not in ("opacity", "emission")
-    }
+def _group_key(bsdf: Bsdf) -> object:
+    """Return equal keys for BSDFs that may be merged; one with a texture is merged with itself alone."""
+    parameters = vars(bsdf)
     if not all(_is_constant(v) or isinstance(v, bool | int | float | str) for v in parameters.values()):
-        return id(material)
+        return id(bsdf)
     shapes = tuple((k, v.shape if _is_constant(v) else v) for k, v in sorted(parameters.items()))
-    return type(material), material.specular, shapes
+    return type(bsdf), bsdf.specular, shapes
 
 
-def _merge(materials: Sequence[Bsdf], numbers: list[int]) -> Bsdf:
-    first = materials[numbers[0]]
+def _merge(bsdfs: Sequence[Bsdf], numbers: list[int]) -> Bsdf:
+    first = bsdfs[numbers[0]]
     if len(numbers) == 1:
         return first
     merged = copy(first)
     for name, value in vars(first).items():
-        values = [getattr(materials[number], name) for number in numbers]
+        values = [getattr(bsdfs[number], name) for number in numbers]
         if _is_constant(value) and not all(np.array_equal(value, other) for other in values):
-            table = np.zeros((*value.shape[:-1], len(materials)), f4)
+            table = np.zeros((*value.shape[:-1], len(bsdfs)), f4)
             table[..., numbers] = np.concatenate(values, -1)
             vars(merged)[name] = Palette(table)
     return merged
@@ -202,36 +194,49 @@ def _attributes_read(shapes: Sequence[Shape]) -> list[str]:
     return sorted(read)
 
 
-def _reads(material: Bsdf | Opacity) -> set[str]:
-    """Return the names of the attributes that the parameters of a material read."""
+def _reads(material: Material) -> set[str]:
+    """Return the names of the attributes that a material reads, but for its emission."""
+    out = _parameters_read(material.bsdf)
+    if material.opacity is not None:
+        out |= _parameters_read(material.opacity)
+    return out if material.normal_map is None else out.union(material.normal_map.reads)
+
+
+def _parameters_read(thing: Bsdf | Opacity) -> set[str]:
     out: set[str] = set()
-    for value in vars(material).values():
-        if isinstance(value, BaseTexture | BaseNormalMap):
+    for value in vars(thing).values():
+        if isinstance(value, BaseTexture):
             out.update(value.reads)
-        elif isinstance(value, Bsdf | Opacity):
-            out.update(_reads(value))
+        elif isinstance(value, Bsdf):
+            out |= _parameters_read(value)
     return out
 
 
 def _number_materials(
     meshes: Sequence[Mesh], spheres: Sequence[Sphere], instances: Sequence[Instance]
-) -> tuple[list[Bsdf], Ints, Ints | None]:
+) -> tuple[list[Material], Ints, Ints | None]:
     """Return the distinct materials, and the numbers of each row's and of each instance's.
 
     An instance that has the material of its mesh has the number -1; when all have, there are none.
     """
-    numbers: dict[int, int] = {}
-    materials: list[Bsdf] = []
+    numbers: dict[tuple[int, ...], int] = {}
+    materials: list[Material] = []
     of_shape: list[int] = []
     shapes: list[Shape] = [*meshes, *spheres, *instances]
     for shape in shapes:
-        if id(shape.material) not in numbers:
-            numbers[id(shape.material)] = len(materials)
+        key = _identity(shape.material)
+        if key not in numbers:
+            numbers[key] = len(materials)
             materials.append(shape.material)
-        of_shape.append(numbers[id(shape.material)])
+        of_shape.append(numbers[key])
     rows = len(meshes) + len(spheres)
     counts = [len(mesh.faces) for mesh in meshes] + [1] * len(spheres)
     of_row = np.repeat(np.array(of_shape[:rows], np.intp), counts)
     own = [instance.material is not instance.mesh.material for instance in instances]
     replaced = np.where(own, np.array(of_shape[rows:], np.intp), -1) if any(own) else None
     return materials, of_row, replaced
+
+
+def _identity(material: Material) -> tuple[int, ...]:
+    """Return equal keys for materials of the same parts, such as two that hold one BSDF and nothing else."""
+    return tuple(map(id, vars(material).values()))

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bsdfs import Bsdf
 from ..errors import SceneError
 from ..lights import Light
+from ..materials import Material
 from ..shapes import Instance, Mesh, Shape, Sphere
 
 # Radii of scenes that stay as they are. There is more room above: parts of a scene are only ever smaller.
@@ -43,9 +43,9 @@ def scaled_shapes(shapes: Sequence[Shape], factor: float) -> list[Shape]:
     own = {key: length_factor(_radius(mesh)) for key, mesh in placed.items()}
     if factor == 1 and all(each == 1 for each in own.values()):
         return list(shapes)
-    materials: dict[int, Bsdf] = {}
+    materials: dict[int, Material] = {}
 
-    def material(given: Bsdf) -> Bsdf:
+    def material(given: Material) -> Material:
         if id(given) not in materials:
             materials[id(given)] = given.scaled(factor)
         return materials[id(given)]
@@ -70,7 +70,7 @@ def _radius(mesh: Mesh) -> float:
     return float(np.linalg.norm(np.ptp(mesh.bounds, axis=0))) / 2
 
 
-def _with_material(shape: Any, material: Bsdf) -> Any:
+def _with_material(shape: Any, material: Material) -> Any:
     """Return a shape with this material: itself where it has it."""
     if shape.material is material:
         return shape

@@ -1,4 +1,4 @@
-"""What a file says of a surface, in the words of `Principled`, and the material that comes nearest."""
+"""What a file says of a surface, as parameters of `Principled`, and the nearest material."""
 
 from __future__ import annotations
 
@@ -11,30 +11,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bsdfs import Bsdf, Dielectric, Diffuse, Principled, ThinDielectric
+from ..materials import Material
+from ..media import Medium
 from ..textures.image import Texture
+from ..textures.normal_map import BaseNormalMap
 from ..textures.vertex_colors import VertexColors
 from .repair import RawMesh
 
 PARAMETERS = frozenset(inspect.signature(Principled).parameters)
 BASES: dict[type[Bsdf], str] = {Diffuse: "reflectance", Principled: "base_color"}
-GLASS = frozenset(("base_color", "transmission", "ior", "roughness", "absorption", "thin"))
+GLASS = frozenset(("base_color", "transmission", "ior", "roughness", "thin"))
 
 
 @dataclass
 class MaterialSpec:
     """What a surface looks like."""
 
-    material: Bsdf
+    material: Material
     emission: NDArray[np.float64] | Texture | None = None  # radiance, (3,) or varying
     two_sided: bool = False  # the emission leaves both sides
     lost: list[str] = field(default_factory=list)  # what the file asks for in vain
     alpha: Any = None  # number or texture where opacity counts: glTF's alpha modes MASK and BLEND
-    cutoff: float | None = None  # as of `Bsdf.with_alpha`
+    cutoff: float | None = None  # as `alpha_cutoff` of `Material`
     # the same with its base color multiplied by vertex colors, once made; by whether its opacity is, too
     tinted: dict[bool, MaterialSpec] = field(default_factory=dict)
 
 
-COLORED = MaterialSpec(Diffuse(VertexColors()))  # of a mesh that has vertex colors and no material
+COLORED = MaterialSpec(Material(Diffuse(VertexColors())))  # of a mesh that has vertex colors and no material
 
 
 def assign_material(raw: RawMesh, spec: MaterialSpec | None) -> bool:
@@ -53,46 +56,55 @@ def assign_material(raw: RawMesh, spec: MaterialSpec | None) -> bool:
 
 
 def is_faint(raw: RawMesh) -> bool:
-    """Tell whether vertex colors are anywhere less than opaque."""
+    """Return True where a vertex color is less than opaque."""
     return raw.colors is not None and bool((raw.colors[:, 3:] < 1).any())
 
 
 def _tinted(spec: MaterialSpec, faint: bool) -> tuple[MaterialSpec, bool]:
-    name = next((name for kind, name in BASES.items() if isinstance(spec.material, kind)), None)
+    name = next((name for kind, name in BASES.items() if isinstance(spec.material.bsdf, kind)), None)
     if name is None:
         return spec, False
     if faint not in spec.tinted:
-        material = copy(spec.material)
-        base = getattr(material, name)
-        setattr(material, name, VertexColors(base.ravel() if isinstance(base, np.ndarray) else base))
+        material, bsdf = copy(spec.material), copy(spec.material.bsdf)
+        base = getattr(bsdf, name)
+        setattr(bsdf, name, VertexColors(base.ravel() if isinstance(base, np.ndarray) else base))
+        material.bsdf = bsdf
         if faint:
-            material = material.with_alpha(VertexColors(spec.alpha, channel=3), spec.cutoff)
+            material.alpha, material.alpha_cutoff = VertexColors(spec.alpha, channel=3), spec.cutoff
         spec.tinted[faint] = MaterialSpec(material, spec.emission, spec.two_sided)
     return spec.tinted[faint], True
 
 
-def build_material(wanted: dict[str, Any]) -> tuple[Bsdf, list[str]]:
-    """Return a material, and the names of what is wanted in vain.
+def build_material(
+    wanted: dict[str, Any], normal_map: BaseNormalMap | None = None
+) -> tuple[Material, list[str]]:
+    """Return a material, and the names of the parameters that nothing honors.
 
     Parameters
     ----------
     wanted
         Parameters of `Principled`, and others that it may get, by name, as far as they are not
-        neutral; `alpha` may be. `base_color` is always there. Values are numbers, colors or textures.
+        neutral; `base_color` is always there. `alpha` and `alpha_cutoff` are those of `Material`,
+        `absorption` is that of the interior. Values are numbers, colors or textures.
+    normal_map
+        Of the material.
     """
     wanted = dict(wanted)
-    alpha, cutoff = wanted.pop("alpha", 1.0), wanted.pop("alpha_cutoff", None)
-    material, lost = _solid(wanted)
-    return material.with_alpha(alpha, cutoff), lost
+    alpha, cutoff = wanted.pop("alpha", None), wanted.pop("alpha_cutoff", None)
+    absorption = wanted.pop("absorption", None)
+    bsdf, lost = _build_bsdf(wanted)
+    encloses = bsdf.transmissive and not wanted.get("thin")  # light travels through the interior
+    interior = Medium(absorption) if encloses and absorption is not None else None
+    return Material(bsdf, alpha=alpha, alpha_cutoff=cutoff, normal_map=normal_map, interior=interior), lost
 
 
-def _solid(wanted: dict[str, Any]) -> tuple[Bsdf, list[str]]:
-    """Return a material that is all there, and the names of what is wanted in vain."""
+def _build_bsdf(wanted: dict[str, Any]) -> tuple[Bsdf, list[str]]:
+    """Return a BSDF, and the names of the parameters that it does not honor."""
     lost = [name for name in wanted if name not in PARAMETERS]
     known = {name: value for name, value in wanted.items() if name in PARAMETERS}
     if known.keys() == {"base_color"}:
         return Diffuse(known["base_color"]), lost
-    # what is all glass is better off with the materials that know nothing else: they can be smooth
+    # for pure glass the BSDFs of glass are better: they can be smooth
     transmission = known.get("transmission", 0.0)
     if known.keys() <= GLASS and not isinstance(transmission, Texture) and transmission == 1:
         return _glass(known), lost
@@ -103,4 +115,4 @@ def _glass(known: dict[str, Any]) -> Bsdf:
     ior, roughness, tint = known.get("ior", 1.5), known.get("roughness", 0.5), known["base_color"]
     if known.get("thin"):
         return ThinDielectric(ior, roughness, transmittance=tint)
-    return Dielectric(ior, roughness, transmittance=tint, absorption=known.get("absorption", 0.0))
+    return Dielectric(ior, roughness, transmittance=tint)

@@ -160,8 +160,7 @@ class _Reader:
             self._metallic_roughness(self._item.get("pbrMetallicRoughness", {}))
             self._extended(extensions)
         radiance = self._emission(extensions.get("KHR_materials_emissive_strength", {}))
-        material, lost = build_material(self._wanted)
-        material = material if normal_map is None else material.with_normal_map(normal_map)
+        material, lost = build_material(self._wanted, normal_map)
         both = bool(self._item.get("doubleSided"))
         return MaterialSpec(material, radiance, both, self._lost + lost, self._alpha_given, self._cutoff)
 

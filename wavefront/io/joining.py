@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..bsdfs import Bsdf
 from ..errors import SceneError, finite_array
+from ..materials import MaterialLike, as_material
 from ..shapes import Mesh
 from ..shapes.transform import moved, moved_tangents
 from .repair import RawMesh, build
 
 
 def join(
-    meshes: list[Mesh], name: str, material: Bsdf | None = None, transform: ArrayLike | None = None
+    meshes: list[Mesh], name: str, material: MaterialLike | None = None, transform: ArrayLike | None = None
 ) -> Mesh:
     """Return one mesh with the triangles of all.
 
@@ -36,7 +36,7 @@ def join(
     raw.uvs1 = _joined([mesh.uvs1 for mesh in meshes])
     raw.tangents = moved_tangents(matrix, _joined([mesh.tangents for mesh in meshes]))
     raw.colors = _joined([mesh.colors for mesh in meshes])
-    raw.material = meshes[0].material if material is None else material
+    raw.material = meshes[0].material if material is None else as_material("material", material)
     if material is None:
         glow = meshes[0].emission
         raw.emission = glow[:, 0] if isinstance(glow, np.ndarray) else glow

@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 
 from numpy.typing import ArrayLike
 
-from ..bsdfs import Bsdf
 from ..errors import SceneError
+from ..materials import MaterialLike
 from ..progress import Progress, phase
 from ..scene import Scene
 from ..shapes import Instance, Mesh, Shape
@@ -59,7 +59,7 @@ def load(
 
 def load_mesh(
     path: PathLike,
-    material: Bsdf | None = None,
+    material: MaterialLike | None = None,
     transform: ArrayLike | None = None,
     *,
     strict: bool = False,

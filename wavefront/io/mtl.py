@@ -40,9 +40,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bsdfs import Bsdf, Dielectric, Diffuse, Mirror
+from ..bsdfs import Dielectric, Diffuse, Mirror
 from ..errors import SceneError
 from ..files import beside
+from ..materials import Material
 from ..textures.image import Texture
 from ..textures.normal_map import BaseNormalMap, BumpMap, NormalMap
 from ..textures.parameter import MAX_INDEX
@@ -271,8 +272,7 @@ def spec(entry: Entry) -> MaterialSpec:
     texture = entry.texture("map_ke", factor)
     radiance = texture if texture is not None else factor if factor.any() else None
     material, lost = _material(entry)
-    normal_map = _relief(entry)
-    material = material if normal_map is None else material.with_normal_map(normal_map)
+    material.normal_map = _relief(entry)
     return MaterialSpec(material, radiance, lost=lost)
 
 
@@ -285,20 +285,20 @@ def _leave_out_missing(entry: Entry) -> None:
             del entry.lines[key]
 
 
-def _material(entry: Entry) -> tuple[Bsdf, list[str]]:
+def _material(entry: Entry) -> tuple[Material, list[str]]:
     illum = int(entry.number("illum", 2))
     if not 0 <= illum <= LARGEST_ILLUM:
         entry.read.discard("illum")
     ior = entry.number("ni", 1.0)
     extended = entry.has(*(key for keys in PBR for key in keys[:2]))
     if illum in GLASS or (opacity(entry) < 1 and ior != 1 and "map_d" not in entry.lines):
-        return _glass(entry)
+        return Material(_glass(entry)), []
     if illum in MIRROR and not extended and "ks" in entry.lines and entry.color("ks", 0.0).any():
-        return Mirror(entry.color("ks", 0.0)).with_alpha(_alpha(entry)), []
+        return Material(Mirror(entry.color("ks", 0.0)), alpha=_alpha(entry)), []
     physical = entry.has("pr", "map_pr", "pm", "map_pm")
     wanted = _gloss(entry, illum, physical) | _wanted(entry)
     material, lost = build_material(wanted)
-    if type(material) is not Diffuse and not physical and "roughness" not in wanted:
+    if type(material.bsdf) is not Diffuse and not physical and "roughness" not in wanted:
         # a shine of its default kind would be an invention where the file does not speak of it
         material, lost = build_material({**wanted, "roughness": 1.0, "specular": 0.0})
     return material, lost
@@ -412,14 +412,14 @@ def _base(entry: Entry) -> Any:
     return entry.texture("map_kd", color if color.any() else 1.0)
 
 
-def _glass(entry: Entry) -> tuple[Bsdf, list[str]]:
+def _glass(entry: Entry) -> Dielectric:
     opacity(entry)
     ior = entry.number("ni", GLASS_IOR)
     if not 1 / MAX_INDEX <= ior <= MAX_INDEX:
         limits = f"above 0, from {1 / MAX_INDEX:g} to {MAX_INDEX:g}"
         raise SceneError(f"{entry.where('ni')} is {ior:g}; an index must be {limits}")
     entry.read.update(("d", "tr", "kd"))  # glass has no matte part: files give it a Kd all the same
-    return Dielectric(ior, _part(entry, "pr", 0.0), transmittance=entry.color("tf", 1.0)), []
+    return Dielectric(ior, _part(entry, "pr", 0.0), transmittance=entry.color("tf", 1.0))
 
 
 def _part(entry: Entry, key: str, default: float) -> float:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bsdfs import Bsdf
 from ..errors import SceneError
+from ..materials import Material
 from ..shapes import Mesh
 from ..textures.parameter import Color
 from ..vec import FLOAT32_MAX, cross
@@ -48,7 +48,7 @@ class RawMesh:
     tangents: Table | None = None  # (n, 4) as of `Mesh`; without normals they do not count
     colors: Table | None = None  # (n, 3 or 4) linear
     lines: Faces | None = None  # (m,) line of the file for each face
-    material: Bsdf | None = None
+    material: Material | None = None
     emission: Color | None = None
     two_sided: bool = False  # the emission leaves both sides
 

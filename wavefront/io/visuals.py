@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..bsdfs import Diffuse
 from ..codecs.encoding import srgb_to_linear
+from ..materials import Material
 from ..textures.image import Texture
 from ..textures.normal_map import NormalMap
 from ..vec import f4
@@ -28,7 +29,7 @@ def spec(material: Any, where: str, bare: bool) -> MaterialSpec:
         return _pbr(material)
     if hasattr(material, "diffuse"):
         return _simple(material, where, bare)
-    return MaterialSpec(Diffuse(MATTE), lost=[type(material).__name__])
+    return MaterialSpec(Material(Diffuse(MATTE)), lost=[type(material).__name__])
 
 
 def vertex_colors(mesh: Any) -> Table | None:
@@ -155,9 +156,10 @@ def _pbr(material: Any) -> MaterialSpec:
     radiance: Any = glow if glow.any() else None
     if radiance is not None and material.emissiveTexture is not None:
         radiance = Texture(pixels(material.emissiveTexture), scale=glow)
-    made, lost = build_material(wanted)
+    normal_map = None
     if material.normalTexture is not None:  # trimesh does not keep its scale
-        made = made.with_normal_map(NormalMap(Texture(pixels(material.normalTexture), False)))
+        normal_map = NormalMap(Texture(pixels(material.normalTexture), False))
+    made, lost = build_material(wanted, normal_map)
     occluded = ["occlusionTexture"] if material.occlusionTexture is not None else []
     return MaterialSpec(made, radiance, bool(material.doubleSided), occluded + lost, alpha, cutoff)
 

@@ -1,3 +1,6 @@
-"""Materials: a BSDF and what surrounds it."""
+"""Materials: a BSDF and everything else that a surface is made of."""
 
-__all__ = []
+from .alpha import Opacity
+from .material import Material, MaterialLike, as_material
+
+__all__ = ["Material", "MaterialLike", "Opacity", "as_material"]

@@ -1,4 +1,4 @@
-"""How much of a surface is there: leaves cut out of a square, veils, grids."""
+"""Opacity: leaves cut out of a rectangle, veils, grids."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import SceneError, number
+from ..errors import SceneError
 from ..state import SurfaceInteraction
 from ..textures.base import BaseTexture
 from ..textures.parameter import Scalar, scalar
@@ -14,14 +14,14 @@ from ..vec import Floats, f4
 
 
 class Opacity:
-    """The part of the light that meets a surface; the rest goes straight on, as if nothing were there.
+    """The fraction of the light that meets a surface; the rest goes straight on, as if nothing were there.
 
     Parameters
     ----------
     alpha
-        The part, (1,) or `BaseTexture`; values outside [0, 1] count as 0 or 1.
+        The fraction, (1,) or `BaseTexture`; values outside [0, 1] count as 0 or 1.
     cutoff
-        The surface is all there where alpha is at least this, and not there elsewhere. None blends.
+        Where alpha is at least this, the surface is opaque; elsewhere it is absent. None blends.
     """
 
     def __init__(self, alpha: Any, cutoff: float | None) -> None:
@@ -44,18 +44,14 @@ class Opacity:
         return (alpha >= f4(self.cutoff)).astype(f4)
 
 
-def opacity(name: str, alpha: Scalar, cutoff: float | None) -> Opacity | None:
-    """Return the opacity that a user asks for, None where the surface is all there.
+def alpha_value(name: str, alpha: Scalar) -> Any:
+    """Return alpha as (1,) float32 in [0, 1], or a `BaseTexture` that gives numbers.
 
     Raises
     ------
     SceneError
-        If alpha is outside [0, 1] or a texture of colors, or the cutoff is below 0.
+        If it is outside [0, 1], or a texture of colors.
     """
     if isinstance(alpha, BaseTexture) and alpha.scalar is False:  # its luminance would be no one's opacity
-        raise SceneError(f"{name} alpha is {alpha!r}, which gives colors; choose one channel by channel=")
-    value = scalar(f"{name} alpha", alpha)
-    if cutoff is not None:
-        cutoff = number(f"{name} alpha_cutoff", cutoff, lambda x: x >= 0, "at least 0")
-    found = Opacity(value, cutoff)
-    return None if found.constant == 1 else found
+        raise SceneError(f"{name} is {alpha!r}, which gives colors; choose one channel by channel=")
+    return scalar(name, alpha)

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bsdfs import Bsdf
-from ..errors import SceneError
+from ..materials import Material, MaterialLike, as_material
 
 
 class Checked:
@@ -49,20 +48,16 @@ class Shape(ABC):
     """
 
     name: str
-    _material: Bsdf | None = None  # as it was given
+    _material: Material | None = None  # what was given
 
     @property
-    def material(self) -> Bsdf:
-        """How the surface scatters light. Assigning None brings the default back."""
+    def material(self) -> Material:
+        """What the surface is made of. Assigning a `Bsdf` wraps it, None brings the default back."""
         return self.default_material if self._material is None else self._material
 
     @material.setter
-    def material(self, material: Bsdf | None) -> None:
-        if material is not None and not isinstance(material, Bsdf):
-            raise SceneError(
-                f"{self.name}: material must be a material such as wf.Diffuse(0.5), got {material!r}"
-            )
-        self._material = material
+    def material(self, material: MaterialLike | None) -> None:
+        self._material = None if material is None else as_material(f"{self.name}: material", material)
 
     @property
     def has_material(self) -> bool:
@@ -71,7 +66,7 @@ class Shape(ABC):
 
     @property
     @abstractmethod
-    def default_material(self) -> Bsdf:
+    def default_material(self) -> Material:
         """The material of a shape that was given none."""
 
     @property

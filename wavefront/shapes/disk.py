@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..bsdfs import Bsdf
 from ..elementary import sin_cos_turns
 from ..errors import SceneError, finite_array, number
+from ..materials import MaterialLike
 from ..suggestions import suggests_keywords
 from ..textures.parameter import Color
 from .mesh import Mesh
@@ -20,7 +20,7 @@ def Disk(
     radius: float,
     *,
     segments: int = 64,
-    material: Bsdf | None = None,
+    material: MaterialLike | None = None,
     emission: Color | None = None,
     two_sided: bool = False,
     name: str = "disk",

@@ -8,8 +8,8 @@ from copy import copy
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..bsdfs import Bsdf
 from ..errors import SceneError, finite_array
+from ..materials import Material, MaterialLike, as_material
 from ..suggestions import suggests_keywords
 from ..textures.base import BaseTexture
 from ..vec import FLOAT32_MAX
@@ -49,7 +49,7 @@ class Instance(Shape):
         (4, 4) affine matrix from the mesh's coordinates to the scene's, for column vectors: the translation
         is its last column. It must be invertible. A reflection keeps the front side.
     material
-        Material of this instance; by default that of the mesh.
+        The `Material` or `Bsdf` of this instance; by default the material of the mesh.
     name
         Used in messages; by default that of the mesh.
 
@@ -63,7 +63,12 @@ class Instance(Shape):
 
     @suggests_keywords
     def __init__(
-        self, mesh: Mesh, transform: ArrayLike, *, material: Bsdf | None = None, name: str | None = None
+        self,
+        mesh: Mesh,
+        transform: ArrayLike,
+        *,
+        material: MaterialLike | None = None,
+        name: str | None = None,
     ) -> None:
         if not isinstance(mesh, Mesh):
             raise SceneError(f"{name or 'instance'}: mesh must be a wf.Mesh, got {mesh!r}")
@@ -76,7 +81,12 @@ class Instance(Shape):
     @classmethod
     @suggests_keywords
     def many(
-        cls, mesh: Mesh, transforms: ArrayLike, *, material: Bsdf | None = None, name: str | None = None
+        cls,
+        mesh: Mesh,
+        transforms: ArrayLike,
+        *,
+        material: MaterialLike | None = None,
+        name: str | None = None,
     ) -> list[Instance]:
         """Return instances of one mesh, much faster than by single calls.
 
@@ -97,12 +107,13 @@ class Instance(Shape):
         bad = np.flatnonzero(~can_place(mesh, matrices))
         if bad.size:
             cls(mesh, matrices[bad[0]], name=f"{label}: transforms[{bad[0]}]")  # raises
+        shared = None if material is None else as_material(f"{label}: material", material)
         out = []
         for matrix in matrices:
             instance = cls.__new__(cls)
             instance.name, instance.mesh = label, mesh
             vars(instance)["transform"] = matrix  # it has been checked
-            instance.material = material
+            instance.material = shared
             out.append(instance)
         return out
 
@@ -111,7 +122,7 @@ class Instance(Shape):
         return f"<Instance {self.name!r} of {self.mesh!r}: at {self.transform[:3, 3].tolist()}>"
 
     @property
-    def default_material(self) -> Bsdf:
+    def default_material(self) -> Material:
         """The mesh's material."""
         return self.mesh.material
 

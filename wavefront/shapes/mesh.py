@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..bsdfs import Bsdf, Diffuse
+from ..bsdfs import Diffuse
 from ..codecs.encoding import srgb_to_linear
 from ..errors import SceneError, finite_array
+from ..materials import Material, MaterialLike
 from ..suggestions import suggests_keywords
 from ..textures.parameter import Color, color
 from ..textures.vertex_colors import VertexColors
@@ -118,7 +119,8 @@ class Mesh(Shape):
         gives them, are decoded from sRGB, but for the opacity. A material that is given shows them by a
         parameter `VertexColors`.
     material
-        How the surface scatters light. By default a `Diffuse` that shows the `colors`, or is gray.
+        What the surface is made of: a `Material` or a `Bsdf`. By default a `Diffuse` that shows the
+        `colors`, or is gray.
     emission
         Radiance that leaves the front side, W·sr⁻¹·m⁻²: one number or three, or a `Texture` or
         `VertexColors`, at least 0. By default that of the material, if it has one.
@@ -152,7 +154,7 @@ class Mesh(Shape):
         uvs1: ArrayLike | None = None,
         tangents: ArrayLike | None = None,
         colors: ArrayLike | None = None,
-        material: Bsdf | None = None,
+        material: MaterialLike | None = None,
         emission: Color | None = None,
         two_sided: bool = False,
         name: str = "mesh",
@@ -166,7 +168,7 @@ class Mesh(Shape):
         self.colors = colors
         self.check()
         self.material = material
-        self._default: tuple[bool, Bsdf] | None = None  # whether it shows colors, and the material
+        self._default: tuple[bool, Material] | None = None  # whether it shows colors, and the material
         self.emission = emission
         self.two_sided = two_sided
 
@@ -175,11 +177,11 @@ class Mesh(Shape):
         return f"<Mesh {self.name!r}: {len(self.vertices)} vertices, {len(self.faces)} faces>"
 
     @property
-    def default_material(self) -> Bsdf:
+    def default_material(self) -> Material:
         """A `Diffuse` that shows the vertex colors, or is gray where there are none."""
         shown = self.colors is not None
         if self._default is None or self._default[0] != shown:
-            self._default = shown, Diffuse(VertexColors() if shown else 0.5)
+            self._default = shown, Material(Diffuse(VertexColors() if shown else 0.5))
         return self._default[1]
 
     @property
@@ -191,11 +193,9 @@ class Mesh(Shape):
     def emission(self, emission: Any) -> None:
         self._emission = None if emission is None else color(f"{self.name}: emission", emission, np.inf)
 
-    def emission_by(self, material: Bsdf) -> Any:
+    def emission_by(self, material: Material) -> Any:
         """Return the emission where the mesh has this material."""
-        if self._emission is not None or material.emission is None:
-            return self._emission
-        return material.emission.radiance
+        return material.emission if self._emission is None else self._emission
 
     def check(self) -> None:
         """Check what must hold between arrays, which may have been assigned one after the other.
@@ -242,7 +242,7 @@ def Rectangle(
     edge_u: ArrayLike,
     edge_v: ArrayLike,
     *,
-    material: Bsdf | None = None,
+    material: MaterialLike | None = None,
     emission: Color | None = None,
     two_sided: bool = False,
     name: str = "rectangle",

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..bsdfs import Bsdf, Diffuse
+from ..bsdfs import Diffuse
 from ..errors import SceneError, finite_array, number, rgb
+from ..materials import Material, MaterialLike
 from ..suggestions import suggests_keywords
 from ..textures.base import BaseTexture
 from ..vec import FLOAT32_MAX
@@ -41,7 +42,7 @@ class Sphere(Shape):
     radius
         Scene units, above 0.
     material
-        How the surface scatters light; its outside is the front.
+        What the surface is made of: a `Material` or a `Bsdf`. Its outside is the front.
     emission
         Radiance W·sr⁻¹·m⁻², one number or three, the same everywhere; it leaves the surface on both
         sides. By default that of the material, if it has one.
@@ -63,7 +64,7 @@ class Sphere(Shape):
         center: ArrayLike,
         radius: float,
         *,
-        material: Bsdf | None = None,
+        material: MaterialLike | None = None,
         emission: ArrayLike | None = None,
         name: str = "sphere",
     ) -> None:
@@ -71,7 +72,7 @@ class Sphere(Shape):
         self.center = center
         self.radius = radius
         self.material = material
-        self._default = Diffuse(0.5)
+        self._default = Material(Diffuse(0.5))
         self.emission = emission
 
     def __repr__(self) -> str:
@@ -79,16 +80,14 @@ class Sphere(Shape):
         return f"<Sphere {self.name!r}: center {self.center.tolist()}, radius {self.radius:g}>"
 
     @property
-    def default_material(self) -> Bsdf:
+    def default_material(self) -> Material:
         """A gray `Diffuse`."""
         return self._default
 
     @property
     def emission(self) -> Any:
         """Radiance that leaves the surface: the sphere's own, or else its material's; None if dark."""
-        if self._emission is not None or self.material.emission is None:
-            return self._emission
-        return self.material.emission.radiance
+        return self.material.emission if self._emission is None else self._emission
 
     @emission.setter
     def emission(self, emission: Any) -> None:

@@ -13,14 +13,14 @@ SHALLOWER = f4(0.9)  # but no more than this part of wo's own
 
 
 def perturb_normals(scene: CompiledScene, surface: SurfaceInteraction) -> None:
-    """Apply, in place, the reliefs of materials to the shading normals."""
+    """Apply, in place, the normal maps and bump maps of materials to the shading normals."""
     materials = scene.materials
     if not materials.normal_maps:
         return
     surface.ns = surface.ns.copy()  # it may be ng itself
-    group_of = materials.group_of.take(surface.material)
-    for number, normal_map in materials.normal_maps:
-        lanes = np.flatnonzero(group_of == number)
+    normal_map_of = materials.normal_map_of.take(surface.material)
+    for number, normal_map in enumerate(materials.normal_maps):
+        lanes = np.flatnonzero(normal_map_of == number)
         if not lanes.size:
             continue
         part = surface.take(lanes)

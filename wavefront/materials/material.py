@@ -1,0 +1,145 @@
+"""What a surface is made of."""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import Any, Self, TypeAlias
+
+import numpy as np
+
+from ..bsdfs import Bsdf
+from ..errors import SceneError, number
+from ..media import Medium
+from ..parameter import Parameter, Parametrized
+from ..suggestions import suggests_keywords
+from ..textures.normal_map import BaseNormalMap
+from ..textures.parameter import Color, Scalar, color
+from .alpha import Opacity, alpha_value
+
+
+def _bsdf(name: str, value: Any) -> Bsdf:
+    if not isinstance(value, Bsdf):
+        raise SceneError(f"{name} must be a Bsdf such as wf.Diffuse(0.5), got {value!r}")
+    return value
+
+
+def _alpha(name: str, value: Any) -> Any:
+    return None if value is None else alpha_value(name, value)
+
+
+def _cutoff(name: str, value: Any) -> float | None:
+    return None if value is None else number(name, value, lambda x: x >= 0, "at least 0")
+
+
+def _normal_map(name: str, value: Any) -> BaseNormalMap | None:
+    if value is not None and not isinstance(value, BaseNormalMap):
+        raise SceneError(f"{name} must be a NormalMap or a BumpMap, got {value!r}")
+    return value
+
+
+def _emission(name: str, value: Any) -> Any:
+    """Return a radiance as (3, 1) float32 or a texture of colors; None where it is black."""
+    radiance = None if value is None else color(name, value, np.inf)
+    return None if isinstance(radiance, np.ndarray) and not radiance.any() else radiance
+
+
+def _interior(name: str, value: Any) -> Medium | None:
+    if value is not None and not isinstance(value, Medium):
+        raise SceneError(f"{name} must be a Medium such as wf.Medium(absorption=1), got {value!r}")
+    return value
+
+
+class Material(Parametrized):
+    """A BSDF, and everything else that a surface is made of.
+
+    Wherever a material is taken, a `Bsdf` alone is taken too and stands for `Material(bsdf)`.
+
+    Parameters
+    ----------
+    bsdf
+        How the surface scatters light.
+    alpha
+        The fraction of the light that meets the surface, in [0, 1]: a number, or a `Texture` of one
+        channel. The rest goes straight on as if there were nothing, and so do shadow rays. None: all.
+    alpha_cutoff
+        If given, the surface is opaque where alpha is at least this, and absent elsewhere.
+    normal_map
+        A `NormalMap` or `BumpMap`, which perturbs the shading normals.
+    emission
+        Radiance that shapes of this material send, W·sr⁻¹·m⁻², at least 0: a number, three numbers, or
+        a texture. The emission of a shape goes before it.
+    interior
+        The `Medium` behind the surface. A ray that meets the surface from its back side has crossed it.
+
+    Attributes
+    ----------
+    opacity
+        What alpha and its cutoff come to: an `Opacity`, None where the surface is opaque everywhere.
+
+    Raises
+    ------
+    SceneError
+        If a parameter is of the wrong type or out of its range.
+    """
+
+    bsdf = Parameter(_bsdf)
+    alpha = Parameter(_alpha)
+    alpha_cutoff = Parameter(_cutoff)
+    normal_map = Parameter(_normal_map)
+    emission = Parameter(_emission)
+    interior = Parameter(_interior)
+    opacity: Opacity | None
+
+    @suggests_keywords
+    def __init__(
+        self,
+        bsdf: Bsdf,
+        *,
+        alpha: Scalar | None = None,
+        alpha_cutoff: float | None = None,
+        normal_map: BaseNormalMap | None = None,
+        emission: Color | None = None,
+        interior: Medium | None = None,
+    ) -> None:
+        self.bsdf = bsdf
+        self.alpha = alpha
+        self.alpha_cutoff = alpha_cutoff
+        self.normal_map = normal_map
+        self.emission = emission
+        self.interior = interior
+        self.derive()
+
+    def derive(self) -> None:
+        """Set the opacity."""
+        opacity = None if self.alpha is None else Opacity(self.alpha, self.alpha_cutoff)
+        self.opacity = None if opacity is None or opacity.constant == 1 else opacity
+
+    def scaled(self, factor: float) -> Self:
+        """Return this material where lengths were multiplied by `factor`: itself if it has no lengths."""
+        if factor == 1:
+            return self
+        normal_map = None if self.normal_map is None else self.normal_map.scaled(factor)
+        interior = None if self.interior is None else self.interior.scaled(factor)
+        if normal_map is self.normal_map and interior is self.interior:
+            return self
+        other = copy(self)
+        other.normal_map, other.interior = normal_map, interior
+        return other
+
+
+MaterialLike: TypeAlias = Material | Bsdf
+
+
+def as_material(name: str, value: Any) -> Material:
+    """Return a material; a `Bsdf` becomes one that has nothing else.
+
+    Raises
+    ------
+    SceneError
+        If the value, called `name`, is neither.
+    """
+    if isinstance(value, Material):
+        return value
+    if isinstance(value, Bsdf):
+        return Material(value)
+    raise SceneError(f"{name} must be a material such as wf.Diffuse(0.5), got {value!r}")

@@ -1,0 +1,5 @@
+"""Media: what fills the space inside shapes."""
+
+from .medium import Medium
+
+__all__ = ["Medium"]
