@@ -179,7 +179,7 @@ def test_plain_colors_are_one_group() -> None:
         wf.Material(wf.Principled(0.5, metallic=1.0), emission=2.0),
         wf.Principled(0.5, clearcoat=1.0),  # with a lobe that the others lack
     ]
-    grouped = group_materials(materials)
+    grouped = group_materials([as_material("", material) for material in materials])
     assert grouped.group_of.tolist() == [0, 3, 0, 4, 4, 1, 1, 2]
     assert len(grouped.groups) == 5
 
@@ -200,7 +200,7 @@ PAIRS = [
 @pytest.mark.parametrize(("red", "gray"), PAIRS, ids=lambda material: type(material).__name__)
 def test_grouping_changes_no_picture(red: wf.Bsdf, gray: wf.Bsdf) -> None:
     """Two materials in one group look like two renders with one material each."""
-    assert len(group_materials([red, gray]).groups) == 1
+    assert len(group_materials([wf.Material(red), wf.Material(gray)]).groups) == 1
     left, right = wf.Sphere((-1, 0, 0), 1), wf.Sphere((1, 0, 0), 1)
     camera = wf.Camera.look_at((0, 0, 6), (0, 0, 0), fov=30, size=(8, 4))
 

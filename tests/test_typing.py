@@ -53,7 +53,9 @@ def picture(side: int) -> wf.Image:
     return image
 
 
-def first(shapes: list[wf.Shape]) -> wf.Bsdf:
+def first(shapes: list[wf.Shape]) -> wf.Material:
+    shapes[0].material.bsdf.reflectance = 0.5
+    shapes[0].material = wf.Material(wf.Dielectric(), alpha=0.5, interior=wf.Medium((1, 2, 3)))
     return shapes[0].material
 """
 
@@ -64,6 +66,8 @@ BAD = {
     "wf.Scene([wf.Sphere((0, 0, 0), 1)], camera=(0, 0, 5))": "arg-type",
     'wf.Camera.look_at((0, 0, 5), (0, 0, 0), fov="wide")': "arg-type",
     'wf.Mesh([[0, 0, 0]], [[0, 0, 0]]).material = "red"': "assignment",
+    "wf.Diffuse().with_alpha(0.5)": "attr-defined",
+    "wf.Material(0.5)": "arg-type",
     "wf.Environment().emission": "attr-defined",
 }
 
