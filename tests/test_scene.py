@@ -9,6 +9,7 @@ import wavefront as wf
 from wavefront.accel import make_accelerator
 from wavefront.compile.materials import group_materials
 from wavefront.compile.scene import compile_scene
+from wavefront.materials import as_material
 from wavefront.vec import f4
 
 NAN, INF = np.nan, np.inf

@@ -49,7 +49,7 @@ MAX_HEIGHT = float(np.finfo(f4).max)  # of a bump map, scene units
 
 
 class NormalMap(BaseNormalMap):
-    """An image of normals, for `Bsdf.with_normal_map`.
+    """An image of normals, for `Material(normal_map=...)`.
 
     Red, green and blue from 0 to 1 are components from -1 to 1 along u, along v and along the
     shading normal, as in glTF: green points up in the image. On a mesh with tangents of its own, those
@@ -112,7 +112,7 @@ class NormalMap(BaseNormalMap):
 
 
 class BumpMap(BaseNormalMap):
-    """An image of heights, for `Bsdf.with_normal_map`.
+    """An image of heights, for `Material(normal_map=...)`.
 
     The surface itself stays where it is; its normals tilt as if it had these heights. Source:
     J. Blinn 1978, "Simulation of Wrinkled Surfaces", in the form of M. Mikkelsen 2010, "Bump
