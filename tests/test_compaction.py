@@ -216,7 +216,7 @@ def survivors(paths: Paths, bounce: int = stage.ROULETTE_AFTER, branches: int = 
 def test_roulette_keeps_the_mean(throughput: float) -> None:
     """A weak path survives with twice its throughput as its chance, and then carries more by as much."""
     n = 1 << 16
-    left, chance = survivors(carrying(throughput, 1, n)), throughput / float(stage.SURE)
+    left, chance = survivors(carrying(throughput, 1, n)), throughput / float(stage.ROULETTE_THRESHOLD)
     assert len(left) / n == pytest.approx(chance, abs=4 * np.sqrt(chance * (1 - chance) / n))
     assert left.throughput == pytest.approx(throughput / chance, rel=1e-6)
 

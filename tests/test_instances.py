@@ -446,7 +446,7 @@ def test_reliefs_lie_as_on_meshes_of_their_own(smooth):
         hits = intersect(scene, query)
         lanes = hits.found
         surface = interaction(scene, query.take(lanes), hits.take(lanes))
-        tangents = surface.tangents.copy()
+        tangents = surface.dpduv.copy()
         perturb_normals(scene, surface)
         values = np.full((9, n), np.nan)
         values[:, lanes] = [*surface.ns, *tangents]

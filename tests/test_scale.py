@@ -9,7 +9,7 @@ import pytest
 
 import wavefront as wf
 from wavefront.accel import registry as choose
-from wavefront.compile.scale import LARGEST, SMALLEST, length_factor, scaled_shapes
+from wavefront.compile.scale import MAX_RADIUS, MIN_RADIUS, length_factor, scaled_shapes
 from wavefront.compile.scene import compile_scene
 
 SIDE = 12
@@ -103,9 +103,9 @@ def test_ordinary_scenes_stay_as_they_are() -> None:
     scene = room(1.0)
     shapes = scaled_shapes(scene.shapes, 1.0)
     assert all(one is other for one, other in zip(shapes, scene.shapes, strict=True))
-    for size in (SMALLEST, 1e-3, 1.0, 1e5, LARGEST, 0.0):
+    for size in (MIN_RADIUS, 1e-3, 1.0, 1e5, MAX_RADIUS, 0.0):
         assert length_factor(size) == 1
-    for size in (1e-38, 1e-30, SMALLEST**1.01, LARGEST**1.01, 1e30, 5e38):
+    for size in (1e-38, 1e-30, MIN_RADIUS**1.01, MAX_RADIUS**1.01, 1e30, 5e38):
         assert 1 <= size * length_factor(size) < 2
         assert np.frexp(length_factor(size))[0] == 0.5  # a power of two
 

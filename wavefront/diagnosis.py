@@ -20,7 +20,7 @@ from .image import Image
 from .lights import LightSample
 from .scene import Scene
 from .shapes import Instance, Mesh, Shape
-from .stages.interaction import above, interaction
+from .stages.interaction import interaction, origin_above
 from .stages.intersect import intersect, shadow_rays, visible
 from .state import Hits, Rays, SurfaceInteraction
 from .vec import Bools, Ints, dot, f4
@@ -181,7 +181,7 @@ class Sight:
             shining |= bool(lanes.any())
             lanes &= (dot(self._seen.ng, light.wi) > 0) | self._transmissive(self._seen.material)
             facing |= bool(lanes.any())
-            rays = shadow_rays(self._seen, above(self._seen), light, np.flatnonzero(lanes))
+            rays = shadow_rays(self._seen, origin_above(self._seen), light, np.flatnonzero(lanes))
             if visible(self._compiled, rays).any():
                 return None
             blockers.append(self._first_met(rays))
@@ -197,7 +197,7 @@ class Sight:
         n = len(self._seen)
         for _ in range(SAMPLES):
             u = random.random((3, n), f4)
-            light, _ = self._compiled.lights.sample_li(above(self._seen), u[0], u[1:])
+            light, _ = self._compiled.lights.sample_li(origin_above(self._seen), u[0], u[1:])
             yield light, (light.pdf > 0) & (light.radiance > 0).any(0)
 
     def _first_met(self, rays: Rays) -> Ints:

@@ -1,9 +1,9 @@
 """Elementary functions with the same bits on every machine.
 
-NumPy computes sin, exp, arctan2 and their like by code that differs between AVX-512, AVX2 and SSE, or
-leaves them to the C library; they differ in the last bit. The functions here are made of what IEEE 754
-rounds in one way only: sums, products, quotients, roots and comparisons, an array at a time. Everything
-that reaches a picture takes them from here, in float32 or float64.
+NumPy computes sin, exp, arctan2 and others by code that differs between AVX-512, AVX2 and SSE, or calls the
+C library; the results differ in the last bit. The functions here consist of operations that IEEE 754 rounds
+in one way only: sums, products, quotients, square roots and comparisons. All code that affects a picture
+uses them, in float32 or float64.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ F4, F8 = np.dtype(np.float32), np.dtype(np.float64)
 
 
 def sin_cos_turns(turns: Reals) -> tuple[Reals, Reals]:
-    """Sine and cosine of 2π·turns, to an ulp of 1 or two.
+    """Return sine and cosine of 2π·turns, with an error of at most two ulps of 1.
 
-    With v the distance to the nearest whole turn, they are cosine and sine of an angle of at most a quarter
-    of a turn, ¼ − |v|, which needs no cases.
+    With v the difference to the nearest integer, they are the cosine and the sine of ¼ − |v| turns, an angle
+    in [−¼, ¼], so that no range reduction by cases is needed.
     """
     t: Any = turns
     v = t - np.rint(t)
@@ -38,17 +38,17 @@ def sin_cos_turns(turns: Reals) -> tuple[Reals, Reals]:
 
 
 def sin_cos(x: Reals) -> tuple[Reals, Reals]:
-    """Sine and cosine of angles x in [−π/2, π/2], radians; the sine keeps its digits at small ones."""
+    """Return sine and cosine of angles x in [−π/2, π/2], radians; the sine is accurate for small x, too."""
     angle: Any = x
     z = angle * angle
     return angle * _horner(z, _SIN[z.dtype]), _horner(z, _COS[z.dtype])
 
 
 def arctan2(y: Reals, x: Reals) -> Reals:
-    """Angle of the point (x, y), radians in [−π, π]; 0 or ±π for (±0, 0).
+    """Return the angle of the point (x, y), radians in [−π, π]; 0 or ±π for (±0, 0).
 
-    The tangent of half the angle to the nearest axis, t/(1 + √(1 + t²)), is at most √2 − 1: there a
-    polynomial of five terms is enough for float32, and of eleven for float64.
+    The tangent of half the angle to the nearest axis, t/(1 + √(1 + t²)), is at most √2 − 1. In this range a
+    polynomial of five terms is accurate enough for float32, and one of eleven for float64.
     """
     wide: Any = np.abs(x)
     high: Any = np.abs(y)
@@ -59,7 +59,7 @@ def arctan2(y: Reals, x: Reals) -> Reals:
     t = np.minimum(wide, high) / larger
     t /= one + np.sqrt(one + t * t)
     angle = t * _horner(t * t, _TWICE_ARCTAN[t.dtype])
-    steep = (high > wide).astype(kind)  # the nearest axis is y: by arithmetic, faster than by choice
+    steep = (high > wide).astype(kind)  # 1 if the nearest axis is y; arithmetic is faster than np.where
     angle *= one - kind(2) * steep
     angle += steep * kind(math.pi / 2)
     behind = np.signbit(x).astype(kind)
@@ -69,25 +69,25 @@ def arctan2(y: Reals, x: Reals) -> Reals:
 
 
 def arccos(x: Reals) -> Reals:
-    """Angle in [0, π], radians, whose cosine is x in [−1, 1]."""
-    return arctan2(_other_side(x), x)
+    """Return the angle in [0, π], radians, whose cosine is x in [−1, 1]."""
+    return arctan2(_sine_of_cosine(x), x)
 
 
 def arcsin(x: Reals) -> Reals:
-    """Angle in [−π/2, π/2], radians, whose sine is x in [−1, 1]."""
-    return arctan2(x, _other_side(x))
+    """Return the angle in [−π/2, π/2], radians, whose sine is x in [−1, 1]."""
+    return arctan2(x, _sine_of_cosine(x))
 
 
-def _other_side(x: Any) -> Any:
-    """√(1 − x²): the cosine of an angle whose sine is x, or the other way round."""
+def _sine_of_cosine(x: Any) -> Any:
+    """Return √(1 − x²), the sine of an angle whose cosine is x."""
     one = x.dtype.type(1)
     return np.sqrt((one - x) * (one + x))
 
 
 def exp(x: Floats) -> Floats:
-    """e to the x, float32; 0 below −87, and that of 88 above 88.
+    """Return e to the power x, float32; 0 for x below −87, and exp(88) for x above 88.
 
-    x = n·ln 2 + r with |r| ≤ ln 2/2; 2ⁿ is put together from its bits.
+    x = n·ln 2 + r with |r| ≤ ln 2/2; 2ⁿ is made from its bits.
     """
     inside = x.clip(_LEAST_EXPONENT, _GREATEST_EXPONENT)
     n = np.rint(inside * _INVERSE_LN_2)
@@ -98,7 +98,7 @@ def exp(x: Floats) -> Floats:
 
 
 def log(x: Floats) -> Floats:
-    """Natural logarithm of normal float32 numbers x above 0.
+    """Return the natural logarithm of normal float32 numbers x above 0.
 
     x = m·2ⁿ with m in [√½, √2), and log m = 2·artanh((m − 1)/(m + 1)).
     """
@@ -111,7 +111,7 @@ def log(x: Floats) -> Floats:
 
 
 def _horner(x: Any, coefficients: tuple[Any, ...]) -> Any:
-    """Polynomial of x with coefficients of its type, highest power first."""
+    """Return a polynomial of x; coefficients have its type, those of the highest power first."""
     total = x * coefficients[0]
     for coefficient in coefficients[1:-1]:
         total += coefficient
@@ -121,18 +121,18 @@ def _horner(x: Any, coefficients: tuple[Any, ...]) -> Any:
 
 
 def _series(first: int, count: int, unit: float, kind: np.dtype[Any]) -> tuple[Any, ...]:
-    """Coefficients (−1)ᵏ·unitⁿ/n! of Taylor's series of sine or cosine, n = first + 2k, highest first."""
+    """Return the Taylor coefficients (−1)ᵏ·unitⁿ/n! of sine or cosine, n = first + 2k, highest first."""
     powers = [first + 2 * k for k in range(count)]
     return tuple(kind.type((-1) ** k * unit**n / math.factorial(n)) for k, n in enumerate(powers))[::-1]
 
 
-# As many terms as leave a remainder at π/2 below half an ulp of 1.
+# The numbers of terms for a remainder below half an ulp of 1 at π/2.
 _TERMS: dict[np.dtype[Any], int] = {F4: 7, F8: 12}
 _COS = {kind: _series(0, count, 1.0, kind) for kind, count in _TERMS.items()}
 _SIN = {kind: _series(1, count, 1.0, kind) for kind, count in _TERMS.items()}
 _COS_TURNS = {kind: _series(0, count, 2 * math.pi, kind) for kind, count in _TERMS.items()}
 _SIN_TURNS = {kind: _series(1, count, 2 * math.pi, kind) for kind, count in _TERMS.items()}
-# 2·arctan(√z)/√z for z in [0, (√2 − 1)²], by interpolation at Chebyshev's nodes: to 4e-8 and 7e-17.
+# 2·arctan(√z)/√z for z in [0, (√2 − 1)²], interpolated at Chebyshev nodes; errors 4e-8 and 7e-17.
 # fmt: off
 _TWICE_ARCTAN = {
     F4: tuple(np.float32(c) for c in (
@@ -152,5 +152,5 @@ _INVERSE_LN_2 = np.float32(1 / math.log(2))
 _LN_2_HIGH = np.float32(0.693359375)  # nine bits: its products with exponents are exact
 _LN_2_LOW = np.float32(math.log(2) - 0.693359375)
 _LEAST_EXPONENT, _GREATEST_EXPONENT = np.float32(-87), np.float32(88)
-_TO_EXPONENT = np.float32(1.5 * 2**23 + 127)  # adds a whole number into the lowest bits
+_TO_EXPONENT = np.float32(1.5 * 2**23 + 127)  # the sum has the integer in its lowest bits
 _ROOT_HALF_BITS = np.int32(np.float32(math.sqrt(0.5)).view(np.int32))

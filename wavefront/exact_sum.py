@@ -1,8 +1,8 @@
-"""Sums of float32 numbers whose bits depend neither on the order of the terms nor on how they are grouped.
+"""Reproducible sums of float32 numbers: the bits do not depend on order or grouping of the terms.
 
 A float64 sum rounds at every step, so its last bits depend on the order. Here every term is rounded
-once, to a multiple of a unit that follows from the largest term alone, and all sums of multiples are
-exact. Two sums of different terms therefore add up to the sum of all terms, bit for bit.
+once, to a multiple of a unit that depends only on the largest term, and sums of these multiples are exact.
+So the sum of two partial sums equals the sum of all terms, bit for bit.
 
 Source: J. Demmel and H. D. Nguyen, "Parallel Reproducible Summation", IEEE Transactions on Computers
 64(7), 2015, with bins of `WIDTH` bits and two levels.
@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from .vec import Doubles, Lanes
 
 WIDTH = 26  # bits of a bin
-MAX_TERMS = 1 << (53 - WIDTH)  # sums of more terms may need more than the 53 bits of a float64
+MAX_TERMS = 1 << (53 - WIDTH)  # a sum of more terms may need more than the 53 bits of a float64
 LOWEST, HIGHEST = -6, 4  # bins that hold all float32 numbers
 
 _BINS = np.arange(LOWEST, HIGHEST + 1)
-# The largest term of each bin: half a unit of the bin above, so that it is rounded to 0 there.
+# The largest term of each bin: half a unit of the next bin, where it is rounded to 0.
 _LIMITS = np.ldexp(1.0, WIDTH * (_BINS + 1) - 1)
-# Adding this and taking it away rounds a term to a multiple of 2^(WIDTH · bin).
+# Adding and subtracting this rounds a term to a multiple of 2^(WIDTH · bin).
 _ROUNDERS = np.ldexp(1.5, 52 + WIDTH * _BINS)
 _LIMIT_TO_ROUNDER = 1.5 * 2.0**27
 _TO_NEXT = np.ldexp(1.0, -WIDTH)
@@ -47,13 +47,13 @@ class ExactSums:
         self.bins = np.zeros(shape, np.int8)  # counted from LOWEST
 
     def value(self, lanes: Lanes = slice(None)) -> Doubles:
-        """Return the sums of some columns, (c, k), rounded once."""
+        """Return the sums of some columns, (c, k), rounded to float64."""
         return np.asarray(self.high[:, lanes] + self.low[:, lanes])
 
     def add(self, lanes: Lanes, terms: Doubles) -> None:
-        """Add terms (c, m, k) to columns `lanes` (k of them, all different).
+        """Add terms (c, m, k) to k distinct columns `lanes`.
 
-        The terms are finite float32 values held as float64. They are overwritten.
+        The terms are finite float32 values in a float64 array, which is overwritten.
         """
         rounder = self._rounder(lanes, terms)[:, None]
         high = terms + rounder
@@ -62,12 +62,12 @@ class ExactSums:
         rounder = rounder * _TO_NEXT
         rest += rounder
         rest -= rounder
-        # multiples of one unit: exact in any order
+        # Sums of multiples of one unit are exact in any order.
         self.high[:, lanes] += _total(high)
         self.low[:, lanes] += _total(rest)
 
     def merge(self, other: ExactSums) -> None:
-        """Add sums of other terms, as if those had been added here one by one."""
+        """Add the sums of other terms; the result is as if those terms had been added here."""
         bins = np.maximum(self.bins, other.bins)
         self.high, self.low = _raised(self.high, self.low, bins - self.bins)
         high, low = _raised(other.high, other.low, bins - other.bins)
@@ -76,7 +76,7 @@ class ExactSums:
         self.bins = bins
 
     def _rounder(self, lanes: Lanes, terms: Doubles) -> Doubles:
-        """Raise the bins (c, k) to hold the terms; return the numbers that round to them."""
+        """Raise the bins (c, k) to hold the terms; return the numbers that round terms to these bins."""
         largest = np.abs(terms).max(1) if terms.shape[1] > 1 or terms.min() < 0 else terms[:, 0]
         bins = self.bins[:, lanes]
         rounder = _ROUNDERS.take(bins, mode="wrap")
@@ -89,10 +89,10 @@ class ExactSums:
 
 
 def _total(terms: Doubles) -> Doubles:
-    """Sum terms (c, m, k) over m."""
+    """Return sums of terms (c, m, k) over m."""
     return terms[:, 0] if terms.shape[1] == 1 else np.asarray(terms.sum(1))
 
 
 def _raised(high: Doubles, low: Doubles, steps: NDArray[np.int8]) -> tuple[Doubles, Doubles]:
-    """Return sums (c, k) so many bins further up; what is less than half a unit there is rounded to 0."""
+    """Return the two levels of sums (c, k) after raising the bins by `steps` (c, k); low parts become 0."""
     return np.where(steps == 0, high, 0), np.where(steps == 0, low, np.where(steps == 1, high, 0))

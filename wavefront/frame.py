@@ -1,4 +1,4 @@
-"""Local <-> world: an orthonormal frame whose z axis is a given unit vector."""
+"""Orthonormal frames with a given z axis: transforms between local and world coordinates."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class Frame:
 
         x = (1, 0, 0) + σz₀·(a·z₀, a·z₁, −1),  y = (0, σ, 0) + z₁·(a·z₀, a·z₁, −1)  and  z.
 
-    Written out, both ways between local and world share most of their products, so that x and y
-    need not be stored.
+    With x and y written out, both transforms share most of their products, so that x and y need not be
+    stored.
 
     Source: Duff et al. 2017, "Building an Orthonormal Basis, Revisited", JCGT 6(1), listing 3.
     """
@@ -29,12 +29,12 @@ class Frame:
 
     @classmethod
     def from_normal(cls, z: Floats) -> Frame:
-        """Build frames around unit normals (3, n) without branches."""
+        """Return frames whose z axes are unit normals (3, n)."""
         sign = signs(z[2])
         return cls(z, sign, f4(-1) / (sign + z[2]), sign * z[0])
 
     def take(self, lanes: slice) -> Frame:
-        """Return the frames of some columns."""
+        """Return the frames of a slice of columns."""
         return Frame(self.z[:, lanes], self.sign[lanes], self.a[lanes], self.z0[lanes])
 
     @property
@@ -48,7 +48,7 @@ class Frame:
         return self.to_world(column((0, 1, 0)))
 
     def to_local(self, v: Floats) -> Floats:
-        """World (3, n) -> local (3, n)."""
+        """Transform world vectors (3, n) to local vectors (3, n)."""
         z, out = self.z, np.empty_like(self.z)
         along = z[0] * v[0]
         along += z[1] * v[1]
@@ -64,7 +64,7 @@ class Frame:
         return out
 
     def to_world(self, v: Floats) -> Floats:
-        """Local (3, n) -> world (3, n)."""
+        """Transform local vectors (3, n) to world vectors (3, n)."""
         z, out = self.z, np.empty_like(self.z)
         down = self.z0 * v[0]
         down += z[1] * v[1]

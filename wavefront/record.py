@@ -1,4 +1,4 @@
-"""Records: named arrays that belong together."""
+"""Records: dataclasses of arrays."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ Record = TypeVar("Record")
 
 @dataclass_transform(eq_default=False)
 def record(cls: type[Record]) -> type[Record]:
-    """Make a class a dataclass with slots that is not compared or printed field by field.
+    """Return a class as a dataclass with slots, without `__eq__` and `__repr__`.
 
-    Arrays have no truth value, so a comparison of records would fail, and each method that is not
-    written saves some of the time that `import wavefront` takes.
+    Comparison of records would fail, because arrays have no truth value. Every method that is not generated
+    saves time in `import wavefront`.
     """
     return dataclass(slots=True, eq=False, repr=False)(cls)

@@ -1,4 +1,4 @@
-"""The records that travel round the loop: structures of arrays, one column per path.
+"""The records that the stages pass on: structures of arrays with one column per path.
 
 Each field is declared once, with its shape and unit; `take`, `concatenate` and `len` are derived.
 """
@@ -26,9 +26,9 @@ def _names(kind: type) -> tuple[str, ...]:
 
 
 class SoA:
-    """Base of dataclasses whose fields are arrays with one column (last axis) per element.
+    """Structure of arrays: base of dataclasses of arrays with one column (last axis) per element.
 
-    A field that is no array is shared by all elements; one that is None is absent.
+    A field that is not an array is shared by all elements; one that is None is absent.
     """
 
     __slots__ = ()
@@ -48,21 +48,21 @@ class SoA:
         return [value for _, value in self._values() if not isinstance(value, np.ndarray)]
 
     def take(self, index: Lanes) -> Self:
-        """Gather columns `index` (m,) of every field into a new record; of a slice, views."""
+        """Return columns `index` (m,) of every field as a new record; views for a slice."""
         out = object.__new__(type(self))
         for name, value in self._values():
             setattr(out, name, take(value, index) if isinstance(value, np.ndarray) else value)
         return out
 
     def put(self, index: Ints, other: Self) -> None:
-        """Write the columns of another record over columns `index` (m,) of this one, in place."""
+        """Write the columns of another record to columns `index` (m,) of this one."""
         for (_, value), (_, new) in zip(self._values(), other._values(), strict=True):
             if isinstance(value, np.ndarray):
                 value[..., index] = new
 
     @classmethod
     def concatenate(cls, records: Sequence[Self]) -> Self:
-        """Join the columns of several records of one type."""
+        """Return a record of the columns of several records of one type."""
         out = object.__new__(cls)
         kind: Any = cls
         for name in _names(kind):
@@ -71,7 +71,7 @@ class SoA:
 
 
 def _joined(values: Sequence[Any]) -> Any:
-    """Join the columns of arrays; what is `broadcast` and the same in all of them stays one value."""
+    """Concatenate arrays along the last axis; equal arrays from `broadcast` give one such array."""
     arrays = [value for value in values if isinstance(value, np.ndarray)]
     if not arrays:
         return values[0]
@@ -83,7 +83,7 @@ def _joined(values: Sequence[Any]) -> Any:
 
 @record
 class Rays(SoA):
-    """What an accelerator is asked."""
+    """Rays for an accelerator."""
 
     origin: Floats  # (3, n) start of the ray, scene units
     direction: Floats  # (3, n) unit direction
@@ -92,37 +92,37 @@ class Rays(SoA):
 
 @record
 class Paths(Rays):
-    """Live paths: the ray that each follows, and what it has gathered on the way."""
+    """Paths: the current ray, throughput and random-number address of each."""
 
-    slot: Ints  # (n,) column of the radiance buffer that this path owns
+    slot: Ints  # (n,) column of the radiance buffer
     pixel: Words  # (n,) row-major pixel index: first part of the random-number address
     sample: Words  # (n,) sample index within the pixel: second part of the address
     throughput: Floats  # (3, n) product of BSDF weights since the camera
     pdf: Floats  # (n,) density of the last BSDF sample, 1/sr; unused where specular
-    specular: Bools  # (n,) no light sample could have found the last direction: delta lobe, camera
+    specular: Bools  # (n,) the last direction is of a delta lobe or the camera: light sampling cannot find it
     eta_scale: Floats  # (n,) square of the relative refractive index crossed so far
     prev_vertex: Floats | None = None  # (3, n) where the paths last scattered; None where that is `origin`
 
 
 @record
 class Hits(SoA):
-    """What each ray met first."""
+    """The nearest hit of each ray."""
 
     t: Floats  # (n,) distance along the ray, scene units; inf on a miss
-    prim: Ints  # (n,) row of the scene's tables, -1 on a miss; without instances it is the primitive's id
-    b1: Floats | None  # (n,) barycentric weight of the second vertex; None where nothing is interpolated
+    prim: Ints  # (n,) row of the scene's tables, -1 on a miss; the primitive id in scenes without instances
+    b1: Floats | None  # (n,) barycentric weight of the second vertex; None if the scene interpolates nothing
     b2: Floats | None  # (n,) barycentric weight of the third vertex
     instance: Ints | None = None  # (n,) column of the scene's `InstanceTable`; None when it has none
 
     @property
     def found(self) -> Ints:
-        """Indices of the lanes that hit something."""
+        """Lanes that hit a surface."""
         return np.flatnonzero(self.prim >= 0)
 
 
 @record
 class SurfaceInteraction(SoA):
-    """Geometry at hit points. Normals face the side that the ray came from."""
+    """The surface geometry at hit points. Normals are on the side that the ray came from."""
 
     point: Floats  # (3, n) hit point, scene units
     error: Floats  # (n,) bound on the rounding error of `point`, scene units
@@ -132,14 +132,14 @@ class SurfaceInteraction(SoA):
     prim: Ints  # (n,) primitive id
     material: Ints  # (n,) row of the scene's material table
     back_facing: Bools  # (n,) the ray came from the back side of the surface
-    # what varies over a shape, if a material of the scene reads it; shapes/attributes.py fills it in
+    # attributes (shapes/attributes.py), None unless a material of the scene reads them
     uv: Floats | None = None  # (2, n) texture coordinates
     uv1: Floats | None = None  # (2, n) the second set of texture coordinates
     color: Floats | None = None  # (4, n) linear RGB and opacity, given per vertex
-    tangents: Floats | None = None  # (6, n) how the point moves with u and with v, scene units
-    tangents1: Floats | None = None  # (6, n) the same for uv1
-    tangent_frame: Floats | None = None  # (6, n) along what red and green of a normal map lean, of any length
-    tangent_frame1: Floats | None = None  # (6, n) the same for maps that uv1 places
+    dpduv: Floats | None = None  # (6, n) dpdu and dpdv, the derivatives of the point by u and v, scene units
+    dpduv1: Floats | None = None  # (6, n) the same for uv1
+    tangent_frame: Floats | None = None  # (6, n) tangent and bitangent of normal maps, of any length
+    tangent_frame1: Floats | None = None  # (6, n) the same for uv1
 
     def frame(self) -> Frame:
         """Return the shading frames, z = ns."""

@@ -1,4 +1,4 @@
-"""Meshes that are placed several times: which are worth sharing, and what shading needs to know of them."""
+"""Instances: which of them share one mesh, and the data of instances that tracing and shading need."""
 
 from __future__ import annotations
 
@@ -15,52 +15,52 @@ from ..shapes.instance import instance_bounds
 from ..state import SoA
 from ..vec import Doubles, Floats, Ints, f4
 
-SKEW = 1e3  # instances that are stretched more along one axis than along another are not shared
-BOX_ROOM = 2.0**-20  # added to boxes on all sides, relative to their size and distance from the center
+SKEW = 1e3  # instances whose scales along two axes have a larger ratio become meshes of their own
+BOX_ROOM = 2.0**-20  # margin of boxes on all sides, relative to their size and distance from the center
 
 
 @record
 class InstanceTable(SoA):
-    """What shading needs of instances.
+    """Data of instances for shading.
 
-    One column for each "place": first what is placed once, its triangles and then its spheres, then the
-    instances. Triangles of instances have primitive ids of their own, but share the rows of the
-    scene's tables.
+    The first two columns, with identity transforms, are for the triangles and the spheres that are not
+    instanced; then there is a column for each instance. Triangles of instances have distinct primitive
+    ids, but those of one mesh share the rows of the scene's tables.
     """
 
-    first: Ints  # (p,) first primitive id of each place, rising
-    shift: Ints  # (p,) primitive id less its row
-    linear: Floats  # (9, p) matrix that turns vectors of the mesh into the scene's, row by row
+    first: Ints  # (p,) first primitive id, ascending
+    shift: Ints  # (p,) primitive id minus table row
+    linear: Floats  # (9, p) matrix from vectors of the mesh to vectors of the scene, row by row
     normal: Floats  # (9, p) the same for normals, scaled so that their lengths are at most 1
-    reach: Floats  # (p,) half the diagonal of the mesh's box, by the same factor; 0 for what is placed once
-    material: Ints | None  # (p,) material in place of the mesh's, -1 for none; None if there is none at all
+    radius: Floats  # (p,) half the diagonal of the mesh's box, times the same factor; 0 if not instanced
+    material: Ints | None  # (p,) material that replaces the mesh's, -1 for none; None if no instance has one
 
     def locate(self, prim: Ints) -> tuple[Ints, Ints]:
-        """Primitive ids (n,) -> rows of the scene's tables and places; a miss, -1, stays one."""
-        place = np.searchsorted(self.first[1:], prim, "right")
-        return prim - self.shift.take(place), place
+        """Return the table rows (n,) and columns here (n,) of primitive ids (n,); -1, a miss, stays -1."""
+        instance = np.searchsorted(self.first[1:], prim, "right")
+        return prim - self.shift.take(instance), instance
 
-    def turn(self, normals: Floats) -> Floats:
-        """Unit normals of meshes (3, p), one for each column -> normals in the scene, of any length."""
+    def normals_to_scene(self, normals: Floats) -> Floats:
+        """Transform unit normals (3, p) of meshes to the scene; the results have any length."""
         return _times(self.normal, normals)
 
-    def stretch(self, vectors: Floats) -> Floats:
-        """Vectors in meshes (3·k, p), k for each column -> vectors in the scene."""
+    def vectors_to_scene(self, vectors: Floats) -> Floats:
+        """Transform vectors (3·k, p) of meshes, k for each column, to the scene."""
         return np.concatenate([_times(self.linear, vectors[i : i + 3]) for i in range(0, len(vectors), 3)])
 
 
 def _times(m: Floats, vectors: Floats) -> Floats:
-    """Matrices (9, p), row by row, times vectors (3, p)."""
+    """Return the products of matrices (9, p), row by row, and vectors (3, p)."""
     x, y, z = vectors
     return np.stack([m[i] * x + m[i + 1] * y + m[i + 2] * z for i in (0, 3, 6)])
 
 
-def resolve(shapes: Sequence[Shape], most_copies: int) -> tuple[list[Mesh], list[Sphere], list[Instance]]:
-    """Sort shapes by kind; instances that had better not share their mesh become meshes.
+def sort_shapes(shapes: Sequence[Shape], most_copies: int) -> tuple[list[Mesh], list[Sphere], list[Instance]]:
+    """Sort shapes by kind, and convert instances to meshes where sharing has no advantage.
 
-    Those are all, where they come to no more than `most_copies` triangles together; those of emitting
-    meshes, as each triangle is a light; that of a mesh placed once; and very skewed ones, as float32
-    is not enough in the mesh's own frame.
+    These are all instances, if they have no more than `most_copies` triangles together; instances of
+    emitting meshes, because each triangle is a light; the only instance of a mesh; and very skewed
+    instances, because float32 is not precise enough in the mesh's coordinates.
     """
     total = sum(len(shape.mesh.faces) for shape in shapes if isinstance(shape, Instance))
     copies = Counter(id(shape.mesh) for shape in shapes if isinstance(shape, Instance))
@@ -83,22 +83,22 @@ def resolve(shapes: Sequence[Shape], most_copies: int) -> tuple[list[Mesh], list
 
 
 def _shareable(instances: Sequence[Instance]) -> set[int]:
-    """Return the identities of the instances that shine by no light and are not very skewed."""
+    """Return the identities of the instances that emit no light and are not very skewed."""
     if not instances:
         return set()
     linear = np.stack([instance.transform[:3, :3] for instance in instances])
-    stretch = np.linalg.svd(linear, compute_uv=False)
-    even = (stretch[:, 0] <= SKEW * stretch[:, 2]).tolist()
+    scales = np.linalg.svd(linear, compute_uv=False)
+    even = (scales[:, 0] <= SKEW * scales[:, 2]).tolist()
     pairs = zip(instances, even, strict=True)
     return {id(instance) for instance, fits in pairs if fits and instance.emission is None}
 
 
 def own_frame(mesh: Mesh) -> Doubles:
-    """Return the vertices (n, 3) as they are traced: relative to the middle of the mesh's box."""
+    """Return the vertices (n, 3) of an instanced mesh as they are traced: relative to its box's center."""
     return mesh.vertices - mesh.bounds.mean(0)
 
 
-def place(
+def place_instances(
     instances: Sequence[Instance],
     shared: Sequence[Mesh],
     center: Doubles,
@@ -106,21 +106,21 @@ def place(
     spheres: int,
     material: Ints | None,
 ) -> tuple[Placements, InstanceTable]:
-    """Compute where instances stand.
+    """Return the data of instances for tracing and for shading.
 
     Parameters
     ----------
     instances
         k of them.
     shared
-        The distinct meshes that they are of. Their rows follow one another, after those of triangles
-        that are placed once and before those of spheres.
+        The distinct meshes of the instances. Their table rows follow one another, after those of
+        triangles that are not instanced and before those of spheres.
     center
         (3,) of the scene.
     triangles, spheres
-        How many are placed once.
+        The numbers of those that are not instanced.
     material
-        (k,) material of each instance in place of the mesh's, -1 for none.
+        (k,) the material of each instance that replaces the mesh's, -1 for none.
     """
     numbers = {id(mesh): number for number, mesh in enumerate(shared)}
     mesh_of = np.array([numbers[id(instance.mesh)] for instance in instances], np.intp)
@@ -144,18 +144,20 @@ def place(
         low=np.ascontiguousarray((boxes[:, 0] - room).T, f4),
         high=np.ascontiguousarray((boxes[:, 1] + room).T, f4),
     )
-    longest = np.linalg.norm(inverse, 2, (1, 2))  # of unit vectors of the scene, in the mesh's frame
+    longest = np.linalg.norm(
+        inverse, 2, (1, 2)
+    )  # length of a scene's unit vector in mesh coordinates, at most
     table = InstanceTable(
         first=np.concatenate([[0, triangles], first]),
         shift=np.concatenate([[0, -int(sizes.sum())], first - rows.take(mesh_of)]),
         linear=_after_identities(linear),
         normal=_after_identities(inverse.transpose(0, 2, 1) / longest[:, None, None]),
-        reach=np.concatenate([[0, 0], np.linalg.norm(halves, axis=1) / longest]).astype(f4),
+        radius=np.concatenate([[0, 0], np.linalg.norm(halves, axis=1) / longest]).astype(f4),
         material=None if material is None else np.concatenate([[-1, -1], material]),
     )
     return placements, table
 
 
 def _after_identities(matrices: Doubles) -> Floats:
-    """Return matrices (k, 3, 3), after those of the two places of what is placed once, as (9, k + 2)."""
+    """Return two identity matrices and then matrices (k, 3, 3), as (9, k + 2)."""
     return np.concatenate([[np.eye(3)] * 2, matrices]).reshape(-1, 9).T.astype(f4, order="C")

@@ -1,10 +1,9 @@
-"""Scenes of extreme size, brought to a unit of length in which float32 has room.
+"""Scenes of extreme size are rendered in another unit of length, for the range of float32.
 
-Ray queries and light samples multiply up to three lengths, and shading divides by squares of them. Where a
-scene is some 10¹³ units large, or 10⁻¹⁴, such products leave the range of float32 without a word. Such a
-scene is rendered in another unit of length: every length is multiplied by one power of two, which rounds
-nothing. What a picture holds is free of lengths; what a render returns in scene units is divided by the
-factor.
+Ray queries and light samples multiply up to three lengths, and shading divides by squares of them. If a
+scene is about 10¹³ or 10⁻¹⁴ units large, such products overflow or underflow in float32. Every length of
+such a scene is multiplied by one power of two, which is exact. Radiance does not depend on the unit of
+length; lengths that a render returns are divided by the factor.
 """
 
 from __future__ import annotations
@@ -21,14 +20,14 @@ from ..lights import Light
 from ..materials import Material
 from ..shapes import Instance, Mesh, Shape, Sphere
 
-# Radii of scenes that stay as they are. There is more room above: parts of a scene are only ever smaller.
-SMALLEST, LARGEST = 2.0**-20, 2.0**24
-FARTHEST = 2.0**60  # of cameras and lights from the scene's center, as the render counts lengths
+# Radii of scenes that are not scaled. The upper limit is nearer: no part of a scene is larger than it.
+MIN_RADIUS, MAX_RADIUS = 2.0**-20, 2.0**24
+MAX_DISTANCE = 2.0**60  # of cameras and lights from the scene's center, in scaled units
 
 
 def length_factor(radius: float) -> float:
-    """Return the power of two that brings a radius beyond the safe range into [1, 2); within it 1."""
-    if radius == 0 or SMALLEST <= radius <= LARGEST:
+    """Return 1 for a radius in the safe range, else the power of two that scales it into [1, 2)."""
+    if radius == 0 or MIN_RADIUS <= radius <= MAX_RADIUS:
         return 1.0
     return 2.0 ** (1 - int(np.frexp(radius)[1]))
 
@@ -36,8 +35,8 @@ def length_factor(radius: float) -> float:
 def scaled_shapes(shapes: Sequence[Shape], factor: float) -> list[Shape]:
     """Return shapes, and their materials, with all lengths multiplied by `factor`.
 
-    Meshes that are placed by instances are traced in frames of their own, so each gets a factor of its
-    own, and the transforms make up for it. What is shared stays shared.
+    Instanced meshes are traced in their own coordinates, so each has its own factor, which the transforms
+    cancel. Shared meshes and materials stay shared.
     """
     placed = {id(shape.mesh): shape.mesh for shape in shapes if isinstance(shape, Instance)}
     own = {key: length_factor(_radius(mesh)) for key, mesh in placed.items()}
@@ -101,18 +100,18 @@ def check_distance(
     Parameters
     ----------
     name
-        Of the position, for the message.
+        Name of the position, for the message.
     center
         (3,) of the scene, scene units.
     factor
-        By which lengths are multiplied for the render.
+        Lengths are multiplied by this for the render.
 
     Raises
     ------
     SceneError
         If it cannot.
     """
-    distance, limit = float(np.linalg.norm(position - center)), FARTHEST / factor
+    distance, limit = float(np.linalg.norm(position - center)), MAX_DISTANCE / factor
     if not distance <= limit:
         raise SceneError(
             f"{name} is {position.tolist()}, {distance:.3g} from the center of the scene; "

@@ -17,7 +17,7 @@ from ..shapes import Shape
 from ..shapes.attributes import Corners, corner_values
 from ..vec import Bools, Floats, Ints, f4
 from .geometry import _alike, _corner_normals, _face_normals
-from .instances import InstanceTable, own_frame, place, resolve
+from .instances import InstanceTable, own_frame, place_instances, sort_shapes
 from .lights import gather_lights
 from .materials import (
     MaterialTable,
@@ -118,7 +118,7 @@ def compile_scene(
     low, high = low * scale, high * scale
     center = (low + high) / 2
     scaled = scaled_shapes(scene.shapes, scale)
-    meshes, spheres, instances = resolve(scaled, most_copies)
+    meshes, spheres, instances = sort_shapes(scaled, most_copies)
     placed: list[Shape] = [*meshes, *spheres, *instances]
     shared = list({id(instance.mesh): instance.mesh for instance in instances}.values())
     once = sum(len(mesh.faces) for mesh in meshes)
@@ -144,7 +144,7 @@ def compile_scene(
     geometry = Geometry(triangles32[:once], np.ascontiguousarray(centers), radii, weights, interchangeable)
     accelerator, table = make_accelerator(geometry), None
     if shared:
-        placements, table = place(instances, shared, center, once, len(spheres), replaced)
+        placements, table = place_instances(instances, shared, center, once, len(spheres), replaced)
         none = np.zeros((3, 0), f4), np.zeros(0, f4)
         ends = np.cumsum([len(mesh.faces) for mesh in shared])
         parts = np.split(triangles32[once:], ends[:-1])

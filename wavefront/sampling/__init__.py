@@ -1,1 +1,1 @@
-"""Random numbers by address, and the maps that turn them into directions, points and choices."""
+"""Random numbers by address, and the warps that map them to directions, points and choices."""

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import SceneError
 from ..vec import BELOW_ONE, Floats, Ints, f4
 
-_LARGE = 1 << 19  # items from which a guide table is kept short, for memory
+_LARGE = 1 << 19  # tables of more items get fewer cells per item, to save memory
 
 
 def _checked(name: str, weights: ArrayLike, ndim: int) -> NDArray[np.float64]:
@@ -31,10 +31,10 @@ def _checked(name: str, weights: ArrayLike, ndim: int) -> NDArray[np.float64]:
 
 
 class _Inversion:
-    """Finds the item whose share of [0, 1) holds u, in one of several rows of k items.
+    """Finds the item whose interval of [0, 1) contains u, in one of several rows of k items.
 
     A guide table gives the item at which the search starts, for each of a power of two of cells of
-    [0, 1), so that most lanes need no search at all.
+    [0, 1), so that most lanes need no search.
 
     Source: H.-C. Chen and Y. Asau, On Generating Random Variates from an Empirical Distribution,
     1974 (guide tables).
@@ -50,8 +50,8 @@ class _Inversion:
         self._probability = probability.ravel()
         upto = np.cumsum(probability, axis=1)
         self._start = (upto - probability).ravel()
-        # Rounded up, a float32 edge splits float32 numbers exactly as the float64 sum does, and a
-        # row's last one is 1 whatever its rounding error.
+        # A float32 edge that is rounded up separates float32 numbers exactly as the float64 sum does. The
+        # last one of a row becomes 1 in spite of rounding errors.
         edge = rounded_up(upto)
         self._edge = edge.ravel()
         self._sorted = (edge + np.arange(rows, dtype=np.float64)[:, None]).ravel()
@@ -60,21 +60,21 @@ class _Inversion:
         self._first = _first_items(edge, self._cells)
 
     def find(self, u: Floats, row: Ints | None = None) -> tuple[Ints, Floats]:
-        """Items for u (n,) in [0, 1), of rows `row` (n,), of the first by default.
+        """Return the items for u (n,) in [0, 1), of rows `row` (n,), by default of the first row.
 
         Returns
         -------
         flat
             (n,) intp: row·k + item.
         rest
-            (n,) u stretched over the item's share, in [0, 1).
+            (n,) position of u within the item's interval, in [0, 1).
         """
         cell = (u * f4(self._cells)).astype(np.intp)
         if row is not None:
             cell += row * self._cells
         flat = self._first.take(cell).astype(np.intp)
         short = np.flatnonzero(self._edge.take(flat) <= u)
-        for _ in range(2):  # most of the others end at the next item or the one after
+        for _ in range(2):  # most lanes end after one or two steps
             flat[short] += 1
             short = short[self._edge.take(flat[short]) <= u[short]]
         if len(short):
@@ -87,14 +87,14 @@ class _Inversion:
 
 
 def rounded_up(x: NDArray[np.float64]) -> Floats:
-    """The smallest float32 that is not below x, at most 1."""
+    """Return the smallest float32 that is not below x, at most 1."""
     near = np.minimum(x, 1).astype(f4)
     np.nextafter(near, f4(2), out=near, where=near < x)
     return np.minimum(near, f4(1), out=near)
 
 
 def _first_items(edge: Floats, cells: int) -> NDArray[np.int32]:
-    """For each row and each cell c, the flat index of the first item that ends beyond c/cells."""
+    """Return the flat index of the first item that ends beyond c/cells, for each row and cell c."""
     rows, items = edge.shape
     ends = np.ceil(edge * f4(cells)).astype(np.intp)  # exact: cells is a power of two
     ends += np.arange(rows)[:, None] * (cells + 1)
@@ -104,7 +104,7 @@ def _first_items(edge: Floats, cells: int) -> NDArray[np.int32]:
 
 
 class Discrete:
-    """A choice among k items with probabilities proportional to `weights` (k,).
+    """A discrete distribution of k items with probabilities proportional to `weights` (k,).
 
     Raises
     ------
@@ -114,7 +114,7 @@ class Discrete:
 
     def __init__(self, weights: ArrayLike) -> None:
         array = _checked("weights", weights, 1)
-        array = array / array.max()  # keeps the sum of huge or tiny weights in range
+        array = array / array.max()  # against overflow and underflow of the sum
         self.probability: NDArray[np.float64] = array / array.sum()
         self._inversion = _Inversion(self.probability[None])
         self._pmf = self.probability.astype(f4)
@@ -124,11 +124,11 @@ class Discrete:
         return len(self._pmf)
 
     def pmf(self, index: Ints) -> Floats:
-        """Probability of items `index` (n,), (n,)."""
+        """Return the probabilities (n,) of items `index` (n,)."""
         return self._pmf.take(index)
 
     def sample(self, u: Floats) -> tuple[Ints, Floats, Floats]:
-        """Choose an item per number u (n,) in [0, 1).
+        """Return an item for each number u (n,) in [0, 1).
 
         Returns
         -------
@@ -137,7 +137,7 @@ class Discrete:
         pmf
             (n,) probability of the item.
         rest
-            (n,) u stretched over the item's share, again uniform in [0, 1).
+            (n,) position of u within the item's interval, again uniform in [0, 1).
         """
         if len(self) == 1:
             return np.zeros(u.shape, np.intp), np.ones(u.shape, f4), u
@@ -166,7 +166,7 @@ class Distribution2D:
         self._density = (array / array.mean()).astype(f4).ravel()
 
     def sample(self, u: Floats) -> tuple[Floats, Floats, Floats]:
-        """Points from u (2, n): u[0] chooses x, u[1] chooses y.
+        """Return points for u (2, n): u[0] selects x, u[1] selects y.
 
         Returns
         -------
@@ -187,7 +187,7 @@ class Distribution2D:
         return self._density.reshape(self.shape).astype(np.float64)
 
     def pdf(self, x: Floats, y: Floats) -> Floats:
-        """Density over the unit square at x, y (n,) in [0, 1], (n,)."""
+        """Return the density over the unit square, (n,), at x, y (n,) in [0, 1]."""
         height, width = self.shape
         column = np.clip((x * f4(width)).astype(np.intp), 0, width - 1)
         row = np.clip((y * f4(height)).astype(np.intp), 0, height - 1)
@@ -195,10 +195,10 @@ class Distribution2D:
 
 
 def _within_cell(cell: Ints, rest: Floats, cells: int) -> Floats:
-    """Coordinate (n,) in [0, 1) at `rest` (n,) of the way through `cell` (n,).
+    """Return the coordinate (n,) in [0, 1) at the relative position `rest` (n,) within `cell` (n,).
 
-    Kept off the border by more than rounding, so that the coordinate is in the cell for `pdf` too,
-    whose neighbor may have no weight.
+    It stays further from the cell's border than rounding errors, so that `pdf` finds the same cell: the next
+    cell may have weight 0.
     """
     margin = cells * 2.0**-22
     return ((cell + np.clip(rest, margin, 1 - margin, dtype=np.float64)) / cells).astype(f4)

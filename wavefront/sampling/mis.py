@@ -1,4 +1,4 @@
-"""The weight that combines two ways of sampling one integral."""
+"""The weight of multiple importance sampling."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from ..vec import Floats, f4
 
 
 def power_heuristic(pdf: Floats, other: Floats) -> Floats:
-    """Weight of a sample drawn with density `pdf` (n,) that could have been drawn with `other` (n,).
+    """Return MIS weights (n,) of samples of density `pdf` (n,), given the other technique's density `other`.
 
-    pdf² / (pdf² + other²), and 0 where `pdf` is 0. The ratio of the smaller density to the
-    larger is what gets squared, so nothing overflows and nothing is divided by zero.
+    The weight is pdf² / (pdf² + other²), and 0 where `pdf` is 0. It is computed from the square of the
+    ratio of the densities, against overflow.
 
     Source: E. Veach and L. Guibas, Optimally Combining Sampling Techniques, SIGGRAPH 1995,
     section 4, β = 2.
     """
     with np.errstate(divide="ignore", invalid="ignore", over="ignore", under="ignore"):
-        ratio = other / pdf  # inf is right: the weight becomes 0
+        ratio = other / pdf  # inf gives the weight 0
         ratio *= ratio
         weight = f4(1) / (f4(1) + ratio)
-    # 0/0 and inf/inf are the cases that are left: no sample, and two delta-like densities.
+    # NaN remains for 0/0, no sample, and inf/inf, two delta-like densities.
     equal = np.isnan(weight)
     if equal.any():
         weight[equal] = np.where(pdf[equal] > 0, f4(0.5), f4(0))

@@ -1,7 +1,7 @@
 """Random numbers by address: pure functions of (seed, pixel, sample, bounce, dimension).
 
-No sampler has a state, so a number does not depend on which wave, worker or machine asks for it.
-All arithmetic is whole-array and modulo 2³² or 2⁶⁴.
+No sampler has a state, so a number does not depend on the wave, worker or machine that computes it.
+All arithmetic is modulo 2³² or 2⁶⁴, on whole arrays.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ u4 = np.uint32
 u8 = np.uint64
 
 _MASK64 = (1 << 64) - 1
-_GOLDEN = 0x9E3779B97F4A7C15  # 2⁶⁴ over the golden ratio, SplitMix64's step
-_UNIT = f4(2.0**-24)  # one step of a 24-bit fraction: the largest number is 1 − 2⁻²⁴, exact in float32
+_GOLDEN = 0x9E3779B97F4A7C15  # 2⁶⁴ divided by the golden ratio, SplitMix64's increment
+_UNIT = f4(2.0**-24)  # the unit of 24-bit fractions: the largest one, 1 − 2⁻²⁴, is exact in float32
 
 VARIANTS = 16  # shuffled and scrambled copies of the Sobol sequence per stream; a power of two
 BLOCK = 256  # consecutive samples per table; a power of two
 
 
 class Dimension(IntEnum):
-    """Every random decision of a path vertex. (bounce, dimension) addresses one stream.
+    """The random decisions at a path vertex. (bounce, dimension) addresses one stream.
 
     A decision that repeats at one vertex has a range of numbers (`numbers_of`). New decisions get
     numbers above all ranges, so that pictures of old seeds do not change.
@@ -47,8 +47,8 @@ class Dimension(IntEnum):
     LIGHT_POINT = 3  # 2-D: which point of the light
     LOBE = 4  # 1-D: which lobe of the BSDF
     DIRECTION = 5  # 2-D: direction within the lobe
-    ROULETTE = 6  # 1-D: whether the path goes on
-    OPACITY = 7  # 1-D: whether the surface is there; repeats along the ray, up to 2²⁰
+    ROULETTE = 6  # 1-D: whether the path survives Russian roulette
+    OPACITY = 7  # 1-D: whether the path hits a surface with alpha; repeats along the ray, up to 2²⁰
 
 
 REPEATED = {Dimension.OPACITY: 2**20}  # decisions that repeat, and one past the last of their numbers
@@ -62,8 +62,8 @@ def numbers_of(dimension: Dimension) -> range:
 class Sampler(ABC):
     """Uniform numbers by address.
 
-    A sampler has no state: its numbers are functions of the seed and the address alone, and the numbers of
-    one lane do not depend on which lanes stand beside it.
+    A sampler has no state: its numbers depend only on the seed and the address, and those of a lane do not
+    depend on the other lanes.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Sampler(ABC):
     Raises
     ------
     SceneError
-        If the seed is not such an integer.
+        If the seed is out of range or not an integer.
     """
 
     def __init__(self, seed: int = 0, width: int = 1) -> None:
@@ -85,35 +85,35 @@ class Sampler(ABC):
 
     @abstractmethod
     def draw_1d(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Floats:
-        """Numbers in [0, 1), (n,), for pixel indices (n,) and sample indices (n,)."""
+        """Return numbers in [0, 1), (n,), for pixel indices (n,) and sample indices (n,)."""
 
     @abstractmethod
     def draw_2d(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Floats:
-        """Points in [0, 1)², (2, n), for pixel indices (n,) and sample indices (n,)."""
+        """Return points in [0, 1)², (2, n), for pixel indices (n,) and sample indices (n,)."""
 
 
 class IndependentSampler(Sampler):
     """Independent uniform numbers from a counter-based hash.
 
-    The 64-bit word (pixel, sample) goes through a bijective hash that is keyed per
-    (seed, bounce, dimension); its upper and lower halves are the two coordinates.
+    The 64-bit word (pixel, sample) is hashed by a bijection with keys for (seed, bounce, dimension); its
+    upper and lower halves are the two coordinates.
     """
 
     def draw_1d(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Floats:
-        """Numbers in [0, 1), (n,)."""
+        """Return numbers in [0, 1), (n,)."""
         word = self._hash(pixel, sample, bounce, dimension)
         return _high_fraction(word, np.empty(len(word), f4))
 
     def draw_2d(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Floats:
-        """Points in [0, 1)², (2, n)."""
+        """Return points in [0, 1)², (2, n)."""
         word = self._hash(pixel, sample, bounce, dimension)
         out = np.empty((2, len(word)), f4)
-        _fraction(word.astype(u4), out[1])  # the lower half
+        _fraction(word.astype(u4), out[1])  # the lower half of the word
         _high_fraction(word, out[0])
         return out
 
     def _hash(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Longs:
-        """64 random bits per lane, (n,)."""
+        """Return 64 random bits per lane, (n,)."""
         word = pixel.astype(u8)
         word <<= u8(32)
         word |= sample
@@ -123,21 +123,20 @@ class IndependentSampler(Sampler):
 class SobolSampler(Sampler):
     """Padded two-dimensional Sobol points, shuffled and Owen-scrambled per pixel and stream.
 
-    Every aligned block of 2ᵐ samples of one pixel and stream is a (0, m, 2)-net, so any number
-    of samples is well spread; there may be up to 2³².
+    Every aligned block of 2ᵐ samples of one pixel and stream is a (0, m, 2)-net, so that any number of
+    samples, up to 2³², is well distributed.
 
-    A stream (bounce, dimension) has `VARIANTS` shuffled and Owen-scrambled copies of the Sobol
-    sequence. A hash of the pixel chooses one of them, and gives a word per coordinate that is
-    XORed to it. An Owen scramble followed by an XOR is distributed as an Owen scramble, so each
-    pixel has that scramble's error and a set of points of its own, while the costly part is done
-    once per table and not once per path.
+    A stream (bounce, dimension) has `VARIANTS` shuffled and Owen-scrambled copies of the Sobol sequence. A
+    hash of the pixel selects one of them, and a word for each coordinate that is XORed to it. An Owen
+    scramble followed by an XOR has the distribution of an Owen scramble, so each pixel has the error of one
+    and a distinct set of points. The scrambling itself is computed once per table, not once per path.
 
     Source: B. Burley, Practical Hash-based Owen Scrambling, JCGT 9(4), 2020 (padding, shuffling
     and scrambling by hash); A. Owen, Randomly Permuted (t,m,s)-Nets and (t,s)-Sequences, 1995.
     """
 
     def draw_1d(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Floats:
-        """Numbers in [0, 1), (n,): the first coordinate of `draw_2d`."""
+        """Return the first coordinate of `draw_2d`, (n,)."""
         stream = _stream(self.seed, bounce, dimension)
         word = _mix_words(pixel, stream.words[0], stream.words[1])
         x = _points(stream, sample, word & u4(VARIANTS - 1), 1)[0]
@@ -145,7 +144,7 @@ class SobolSampler(Sampler):
         return _fraction(x, np.empty(len(x), f4))
 
     def draw_2d(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Floats:
-        """Points in [0, 1)², (2, n)."""
+        """Return points in [0, 1)², (2, n)."""
         stream = _stream(self.seed, bounce, dimension)
         word = _mix_words(pixel, stream.words[0], stream.words[1])
         x, y = _points(stream, sample, word & u4(VARIANTS - 1), 2)
@@ -158,33 +157,32 @@ class SobolSampler(Sampler):
 
 
 class BlueNoiseSampler(Sampler):
-    """Sobol points whose error is spread as blue noise over the screen.
+    """Sobol points whose error is distributed as blue noise over the screen.
 
-    All pixels share one shuffled, Owen-scrambled sequence per stream, and each XORs a point of its
-    own to it: the points of another sequence, taken along a Morton curve through the pixels. So
-    neighbors get numbers that lie far apart and complement each other, and what is wrong in one is
-    made good beside it. Each square of the curve goes along or down first as a hash says, or all
-    pairs of neighbors would lie side by side, which shows as stripes. In each pixel the samples are
-    spread as those of `SobolSampler`, for any number of samples.
+    All pixels share one shuffled, Owen-scrambled sequence per stream. Each pixel XORs a point to it, from a
+    second sequence that is indexed along a Morton curve through the pixels. So neighbors get well-separated
+    numbers, and their errors tend to cancel. A hash decides for each square of the curve whether it runs
+    along or down first; otherwise all pairs of neighbors would be horizontal, which is visible as stripes.
+    Within a pixel the samples are distributed as those of `SobolSampler`, for any number of samples.
 
-    After the idea of A. Ahmed and P. Wonka, Screen-Space Blue-Noise Diffusion of Monte Carlo
-    Sampling Error via Hierarchical Ordering of Pixels, SIGGRAPH Asia 2020, which needs the number of
-    samples beforehand; the XOR in place of a longer index is what frees it from that.
+    Based on A. Ahmed and P. Wonka, Screen-Space Blue-Noise Diffusion of Monte Carlo Sampling Error via
+    Hierarchical Ordering of Pixels, SIGGRAPH Asia 2020, which needs the number of samples in advance; the
+    XOR in place of a longer index removes this requirement.
     """
 
     def draw_1d(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Floats:
-        """Numbers in [0, 1), (n,): the first coordinate of `draw_2d`."""
+        """Return the first coordinate of `draw_2d`, (n,)."""
         return self.draw_2d(pixel, sample, bounce, dimension)[0]
 
     def draw_2d(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Floats:
-        """Points in [0, 1)², (2, n)."""
+        """Return points in [0, 1)², (2, n)."""
         stream = _stream(self.seed, bounce, dimension)
         first = np.zeros(len(pixel), u4)
         width = u4(self.width)
         row = pixel // width
         place = _every_second_bit(pixel - row * width) | _every_second_bit(row) << u4(1)
         another = _stream(self.seed ^ _GOLDEN, bounce, dimension)
-        own = _sequence(another, _turn_squares(place, another.words[0]), first)
+        own = _sequence(another, _mirror_squares(place, another.words[0]), first)
         out = np.empty((2, len(pixel)), f4)
         for word, shift, numbers in zip(_points(stream, sample, first, 2), own, out, strict=True):
             _fraction(word ^ shift, numbers)
@@ -211,7 +209,7 @@ def make_sampler(sampler: str | SamplerMaker, seed: int = 0, width: int = 1) -> 
 
 
 def _mix64(x: int) -> int:
-    """SplitMix64's output function, a bijection of 64-bit integers (Stafford's variant 13)."""
+    """Return SplitMix64's output function of x, a bijection of 64-bit integers (Stafford's variant 13)."""
     x = ((x ^ (x >> 30)) * 0xBF58476D1CE4E5B9) & _MASK64
     x = ((x ^ (x >> 27)) * 0x94D049BB133111EB) & _MASK64
     return x ^ (x >> 31)
@@ -227,7 +225,7 @@ class Stream:
 
 @lru_cache(maxsize=4096)
 def _stream(seed: int, bounce: int, dimension: int) -> Stream:
-    """Hash an address into keys. Every bit of each part counts."""
+    """Return the keys of a stream, which depend on every bit of the address."""
     state = _mix64(seed)
     for part in (bounce, dimension):
         state = _mix64((state ^ part) + _GOLDEN & _MASK64)
@@ -237,10 +235,9 @@ def _stream(seed: int, bounce: int, dimension: int) -> Stream:
 
 
 def _mix_longs(x: Longs, key: np.uint64, tweak: np.uint64) -> Longs:
-    """SplitMix64's output function on lanes (n,), in place, keyed before and between its rounds.
+    """Apply SplitMix64's output function to x (n,), in place, with a key before and between its rounds.
 
-    The second key keeps two streams from holding the same numbers at addresses that differ by
-    one XOR.
+    Without the second key, two streams would have the same numbers at addresses that differ by an XOR.
     """
     shifted = np.empty_like(x)
     x ^= key
@@ -254,7 +251,7 @@ def _mix_longs(x: Longs, key: np.uint64, tweak: np.uint64) -> Longs:
 
 
 def _mix_words(x: Words, key: np.uint32, tweak: np.uint32) -> Words:
-    """Bijective 32-bit hash of lanes (n,), keyed like `_mix_longs`.
+    """Return a bijective 32-bit hash of x (n,), with keys as in `_mix_longs`.
 
     Source: C. Wellons, Prospecting for Hash Functions, 2018, lowbias32.
     """
@@ -270,7 +267,7 @@ def _mix_words(x: Words, key: np.uint32, tweak: np.uint32) -> Words:
 
 
 def _mix_again(x: Words, key: np.uint32) -> Words:
-    """Second word of 32 random bits, in place, from the random bits x (n,)."""
+    """Return a second word of 32 random bits, in place, from random bits x (n,)."""
     x += key
     x *= u4(0x9E3779B1)
     shifted = x >> u4(15)
@@ -281,10 +278,10 @@ def _mix_again(x: Words, key: np.uint32) -> Words:
 
 
 def _points(stream: Stream, sample: Words, variant: Words, coordinates: int) -> list[Words]:
-    """Points `sample` (n,) of copies `variant` (n,) of a stream's sequence.
+    """Return points `sample` (n,) of copies `variant` (n,) of a stream's sequence.
 
-    Returns the first `coordinates` coordinates as 32-bit fractions, (n,) each. Waves of a few
-    consecutive samples, which is what a renderer traces, read them from a table.
+    These are the first `coordinates` coordinates as 32-bit fractions, (n,) each. They are read from a table
+    for waves of a few consecutive samples, as in a render.
     """
     first, last = _extent(sample)
     block = first // BLOCK
@@ -300,38 +297,38 @@ def _points(stream: Stream, sample: Words, variant: Words, coordinates: int) -> 
 
 
 def _extent(sample: Words) -> tuple[int, int]:
-    """Return the lowest and the highest of the indices (n,); 0 of none."""
+    """Return the lowest and the highest of the indices (n,); 0 if there are none."""
     if not len(sample):
         return 0, 0
-    if sample.strides == (0,):  # all alike
+    if sample.strides == (0,):  # one value, from vec.broadcast
         return int(sample[0]), int(sample[0])
     return int(sample.min()), int(sample.max())
 
 
 @lru_cache(maxsize=256)
 def _table(stream: Stream, block: int) -> Words:
-    """Points of all copies of a stream's sequence, (2, BLOCK·VARIANTS), sample by sample."""
+    """Return BLOCK points of all copies of a stream's sequence, (2, BLOCK·VARIANTS), ordered by sample."""
     sample = np.arange(BLOCK, dtype=u4).repeat(VARIANTS) + u4(block * BLOCK)
     variant = np.tile(np.arange(VARIANTS, dtype=u4), BLOCK)
     table = _sequence(stream, sample, variant)
-    table.flags.writeable = False  # the cache hands out one array to all
+    table.flags.writeable = False  # the cache shares the array
     return table
 
 
 def _sequence(stream: Stream, sample: Words, variant: Words) -> Words:
-    """Shuffled and Owen-scrambled Sobol points as 32-bit fractions, (2, n)."""
+    """Return shuffled and Owen-scrambled Sobol points as 32-bit fractions, (2, n)."""
     counter = np.arange(3 * VARIANTS, dtype=u4)
     seeds = _mix_words(_mix_words(counter, stream.words[3], stream.words[0]), *stream.words[1:3])
     shuffle, scramble_x, scramble_y = seeds.reshape(3, VARIANTS).take(variant, axis=1)
     index = _reverse(_owen(_reverse(sample), shuffle))
-    # The first coordinate is the reversed index, so that two of its reversals cancel.
+    # The first coordinate is the reversed index, so two reversals cancel.
     x = _reverse(_owen(index, scramble_x))
     y = _reverse(_owen(_pascal(index), scramble_y))
     return np.stack([x, y])
 
 
 def _owen(x: Words, seed: Words) -> Words:
-    """Owen-scramble bit-reversed fractions x (n,): each bit is flipped by a hash of those below it.
+    """Return bit-reversed fractions x (n,), Owen-scrambled: a hash of the lower bits flips each bit.
 
     Source: S. Laine and T. Karras, Stratified Sampling for Stochastic Transparency, EGSR 2011,
     with the steps and constants of N. Vegdahl, Building a Better LK Hash, 2021.
@@ -345,7 +342,7 @@ def _owen(x: Words, seed: Words) -> Words:
 
 
 def _pascal(index: Words) -> Words:
-    """Second Sobol coordinate of `index` (n,), its bits reversed.
+    """Return the second Sobol coordinate of `index` (n,), bit-reversed.
 
     The generator matrix is Pascal's triangle modulo 2: bit i of the result is the XOR of the bits
     j of the index for which i is a subset of j, a transform of five steps.
@@ -357,16 +354,16 @@ def _pascal(index: Words) -> Words:
 
 
 def _every_second_bit(x: Words) -> Words:
-    """Move the lower 16 bits of each lane (n,) to the even places."""
+    """Return the lower 16 bits of x (n,), moved to the even bits."""
     for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
         x = (x | x << u4(shift)) & u4(mask)
     return x
 
 
-def _turn_squares(place: Words, key: np.uint32) -> Words:
-    """Mirror some squares of a Morton curve at their diagonal: swap bits 2i and 2i + 1 of `place` (n,).
+def _mirror_squares(place: Words, key: np.uint32) -> Words:
+    """Mirror random squares of a Morton curve at their diagonal: swap bits 2i and 2i + 1 of `place` (n,).
 
-    Whether to do so is a hash of the bits above, by which the square is known, as in `_owen`.
+    Whether a square is mirrored is a hash of the higher bits, which identify the square, as in `_owen`.
     """
     turned = _reverse(place)
     flips = _reverse(_owen(turned, np.full_like(turned, key)) ^ turned)
@@ -375,7 +372,7 @@ def _turn_squares(place: Words, key: np.uint32) -> Words:
 
 
 def _reverse(x: Words) -> Words:
-    """The 32 bits of each lane (n,) in reverse order."""
+    """Return x (n,) with its 32 bits in reverse order."""
     x = x.byteswap()
     for shift, mask in ((4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
         x = (x >> u4(shift)) & u4(mask) | (x & u4(mask)) << u4(shift)
@@ -383,15 +380,15 @@ def _reverse(x: Words) -> Words:
 
 
 def _fraction(word: Words, out: Floats) -> Floats:
-    """The top 24 bits of `word` (n,), which is overwritten, as a number in [0, 1)."""
+    """Return the top 24 bits of `word` (n,) as numbers in [0, 1) in `out`; `word` is overwritten."""
     word >>= u4(8)
-    np.copyto(out, word.view(np.int32), casting="unsafe")  # signed converts twice as fast
+    np.copyto(out, word.view(np.int32), casting="unsafe")  # signed integers convert twice as fast
     out *= _UNIT
     return out
 
 
 def _high_fraction(word: Longs, out: Floats) -> Floats:
-    """The top 24 bits of `word` (n,), which is overwritten, as a number in [0, 1)."""
+    """Return the top 24 bits of `word` (n,) as numbers in [0, 1) in `out`; `word` is overwritten."""
     word >>= u8(40)
     np.copyto(out, word.view(np.int64), casting="unsafe")
     out *= _UNIT

@@ -16,14 +16,14 @@ Reals = NDArray[np.floating]  # float64 or float32
 
 @record
 class SphericalRectangle:
-    """Rectangles seen from a point each, sampled uniformly in solid angle.
+    """Rectangles, each seen from one point, sampled uniformly in solid angle.
 
     It prepares what a sample and its density share, a column per lane.
 
     In the rectangle's frame, at distance z, the part up to x covers F(x) − F(x₀) with
     F = asin(b₁c) − asin(b₀c), c = x/√(x² + z²), bᵢ = yᵢ/√(yᵢ² + z²); solved for c this is
-    c = sin F/√(b₀² + b₁² − 2b₀b₁ cos F). F is a small difference where the rectangle is seen edge-on,
-    so it is in float64, unless the caller knows that it is not: float32 takes two fifths of the time.
+    c = sin F/√(b₀² + b₁² − 2b₀b₁ cos F). F is a small difference where the rectangle is seen edge-on and
+    then needs float64; otherwise float32 is enough, in two fifths of the time.
 
     Source: C. Ureña, M. Fajardo, A. King, An Area-Preserving Parametrization for Spherical
     Rectangles, EGSR 2013, with a form of its eq. 8 that needs no case for the sign of x.
@@ -44,14 +44,14 @@ class SphericalRectangle:
     def of(
         cls, corner: Floats, edge_u: Floats, edge_v: Floats, dtype: type[np.floating] = np.float64
     ) -> Self:
-        """Prepare rectangles.
+        """Return rectangles.
 
         Parameters
         ----------
         corner
             (3, n) vector from the point to one corner.
         edge_u, edge_v
-            (3, n) or (3, 1) perpendicular edges that leave that corner.
+            (3, n) or (3, 1) perpendicular edges from that corner.
         dtype
             Of the calculation: float64, or float32.
         """
@@ -73,11 +73,11 @@ class SphericalRectangle:
         return self.angle.astype(f4, copy=False)
 
     def pdf(self) -> Floats:
-        """Density within the rectangle, (n,), 1/sr; 0 where it covers nothing."""
+        """Density within the rectangle, (n,), 1/sr; 0 where its solid angle is 0."""
         return _reciprocal(self.solid_angle)
 
     def sample(self, u: Floats) -> Floats:
-        """Vectors (3, n) from the point to points of the rectangle, from u (2, n)."""
+        """Return vectors (3, n) from the point to points of the rectangle, for u (2, n)."""
         swept = self.start + u[0] * self.angle
         b0, b1 = self.b
         sin, cos = sin_cos(0.5 * swept)
@@ -103,29 +103,29 @@ class SphericalRectangle:
 
 
 def _reciprocal(x: Floats) -> Floats:
-    """1/x, and 0 where x (n,) is not positive."""
+    """Return 1/x, 0 where x (n,) is not positive."""
     return np.where(x > 0, f4(1) / np.where(x > 0, x, f4(1)), f4(0))
 
 
 def _dot(a: Floats, b: Floats, dtype: type[np.floating]) -> Reals:
-    """Dot product of (3, n) columns in another type, (n,)."""
+    """Return the dot products (n,) of vectors (3, n), computed in `dtype`."""
     return dot(a.astype(dtype, copy=False), b.astype(dtype, copy=False))
 
 
 def _sine(side: Reals, height: Reals) -> Reals:
-    """side/√(side² + height²), (n,), and 0 where both are 0."""
+    """Return side/√(side² + height²), (n,), 0 where both are 0."""
     size = np.sqrt(side * side + height * height)
     return side / np.where(size > 0, size, 1.0)
 
 
 def _from_sine(sine: Reals, height: Reals, bounds: tuple[Reals, Reals]) -> Reals:
-    """Side (n,) with this sine at `height`, kept within `bounds` against rounding."""
+    """Return the side (n,) with this sine at `height`, clipped to `bounds` against rounding."""
     cosine = np.sqrt(np.maximum(1 - sine * sine, np.finfo(sine.dtype).tiny))
     return np.clip(sine * height / cosine, bounds[0], bounds[1])
 
 
 def _swept(b: tuple[Reals, Reals], c: Reals) -> Reals:
-    """Solid angle F (n,) between x = 0 and x, signed, where c = x/√(x² + z²): by sine and cosine of it."""
+    """Return the signed solid angle F (n,) between x = 0 and x, where c = x/√(x² + z²)."""
     one = c.dtype.type(1)
     s0, s1 = b[0] * c, b[1] * c
     c0, c1 = np.sqrt((one - s0) * (one + s0)), np.sqrt((one - s1) * (one + s1))

@@ -1,4 +1,4 @@
-"""Maps from the unit square to shapes, in threes: sample, pdf, inverse."""
+"""Warps of the unit square: for each a map `name`, its density `name_pdf` and `name_inverse`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ QUARTER_PI = f4(np.pi / 4)
 
 
 def cosine_hemisphere(u: Floats) -> Floats:
-    """Directions (3, n) around +z with density cosθ/π, from u (2, n).
+    """Return directions (3, n) around +z with density cosθ/π, for u (2, n).
 
     Source: P. Dutré, Global Illumination Compendium, eq. 35:
     x = cos(2πr₁)√(1−r₂), y = sin(2πr₁)√(1−r₂), z = √r₂.
@@ -31,7 +31,7 @@ def cosine_hemisphere(u: Floats) -> Floats:
 
 
 def cosine_hemisphere_pdf(w: Floats) -> Floats:
-    """Density of `cosine_hemisphere` at unit directions w (3, n), 1/sr."""
+    """Return the density of `cosine_hemisphere` at unit directions w (3, n), 1/sr."""
     return positive(w[2]) * INV_PI
 
 
@@ -41,12 +41,12 @@ def cosine_hemisphere_inverse(w: Floats) -> Floats:
 
 
 def uniform_hemisphere(u: Floats) -> Floats:
-    """Directions (3, n) around +z with density 1/(2π), from u (2, n) (ibid., eq. 34)."""
+    """Return directions (3, n) around +z with density 1/(2π), for u (2, n) (ibid., eq. 34)."""
     return _around_z(u[0], f4(1) - u[1], u[1])
 
 
 def uniform_hemisphere_pdf(w: Floats) -> Floats:
-    """Density of `uniform_hemisphere` at unit directions w (3, n), 1/sr."""
+    """Return the density of `uniform_hemisphere` at unit directions w (3, n), 1/sr."""
     return np.where(w[2] >= 0, INV_TWO_PI, f4(0))
 
 
@@ -56,12 +56,12 @@ def uniform_hemisphere_inverse(w: Floats) -> Floats:
 
 
 def uniform_sphere(u: Floats) -> Floats:
-    """Directions (3, n) with density 1/(4π), from u (2, n) (ibid., eq. 33)."""
+    """Return directions (3, n) with density 1/(4π), for u (2, n) (ibid., eq. 33)."""
     return _around_z(u[0], f4(1) - f4(2) * u[1], f4(2) * u[1])
 
 
 def uniform_sphere_pdf(w: Floats) -> Floats:
-    """Density of `uniform_sphere` at unit directions w (3, n), 1/sr."""
+    """Return the density of `uniform_sphere` at unit directions w (3, n), 1/sr."""
     return np.full(w.shape[1], INV_FOUR_PI)
 
 
@@ -71,19 +71,19 @@ def uniform_sphere_inverse(w: Floats) -> Floats:
 
 
 def uniform_cone(u: Floats, one_minus_cos: Floats) -> Floats:
-    """Directions (3, n) within a cone around +z, uniform in solid angle, from u (2, n).
+    """Return directions (3, n) within a cone around +z, uniform in solid angle, for u (2, n).
 
     Parameters
     ----------
     one_minus_cos
-        (n,) or scalar: 1 − cosθmax, which keeps its digits where the cone is tiny.
+        (n,) or scalar: 1 − cosθmax, which is accurate for narrow cones.
     """
     depth = u[1] * one_minus_cos
     return _around_z(u[0], f4(1) - depth, depth)
 
 
 def uniform_cone_pdf(one_minus_cos: Floats) -> Floats:
-    """Density of `uniform_cone` within the cone, 1/sr: 1/(2π(1 − cosθmax)); 0 for an empty cone."""
+    """Return the density of `uniform_cone`, 1/sr: 1/(2π(1 − cosθmax)); 0 for an empty cone."""
     size = np.asarray(one_minus_cos, f4)
     return np.where(size > 0, INV_TWO_PI / np.where(size > 0, size, f4(1)), f4(0))
 
@@ -91,20 +91,20 @@ def uniform_cone_pdf(one_minus_cos: Floats) -> Floats:
 def uniform_cone_inverse(w: Floats, one_minus_cos: Floats) -> Floats:
     """Return the u (2, n) that `uniform_cone` maps to w (3, n)."""
     sin2 = w[0] * w[0] + w[1] * w[1]
-    # 1 − cosθ = sin²θ/(1 + cosθ) keeps its digits near the axis, where 1 − w[2] loses them.
+    # 1 − cosθ = sin²θ/(1 + cosθ) is accurate near the axis, unlike 1 − w[2].
     depth = np.where(w[2] > 0, sin2 / (f4(1) + np.maximum(w[2], f4(0))), f4(1) - w[2])
     return _stack(_turn(w), depth / one_minus_cos)
 
 
 def uniform_disk(u: Floats) -> Floats:
-    """Points (2, n) of the unit disk with density 1/π, from u (2, n), by concentric squares.
+    """Return points (2, n) of the unit disk with density 1/π, for u (2, n), by concentric squares.
 
     Source: P. Shirley and K. Chiu, A Low Distortion Map Between Disk and Square, 1997.
     """
     a, b = f4(2) * u - f4(1)
     size_a, size_b = np.abs(a), np.abs(b)
     radius = np.maximum(size_a, size_b)
-    # Angle in the first octant, then mirrored at the diagonal by arithmetic: `where` on random
+    # The angle in the first octant is mirrored at the diagonal by arithmetic, because np.where with random
     # masks is several times slower.
     octant = np.minimum(size_a, size_b) * QUARTER_PI / np.maximum(radius, TINY)
     steep = (size_b >= size_a).astype(f4)
@@ -117,7 +117,7 @@ def uniform_disk(u: Floats) -> Floats:
 
 
 def uniform_disk_pdf(p: Floats) -> Floats:
-    """Density of `uniform_disk` at points p (2, n), per unit area."""
+    """Return the density of `uniform_disk` at points p (2, n), per unit area."""
     return np.where(p[0] * p[0] + p[1] * p[1] <= 1, INV_PI, f4(0))
 
 
@@ -134,10 +134,10 @@ def uniform_disk_inverse(p: Floats) -> Floats:
 
 
 def uniform_triangle(u: Floats) -> Floats:
-    """Barycentric weights b1, b2 (2, n) of the second and third vertex, uniform, from u (2, n).
+    """Return barycentric weights b1, b2 (2, n) of the second and third vertex, uniform, for u (2, n).
 
-    The low-distortion map: it bends the square onto the triangle without collapsing an edge to a
-    point, so stratified points stay further apart than by the square-root map, and it is cheaper.
+    The low-distortion map does not collapse an edge of the square to a point, so stratified points stay
+    further apart than with the square-root map; it is also faster.
 
     Source: E. Heitz, A Low-Distortion Map Between Triangle and Square, 2019.
     """
@@ -146,7 +146,7 @@ def uniform_triangle(u: Floats) -> Floats:
 
 
 def uniform_triangle_pdf(b: Floats) -> Floats:
-    """Density of `uniform_triangle` at b (2, n), per unit of barycentric area: 2 within."""
+    """Return the density of `uniform_triangle` at b (2, n), per unit of barycentric area: 2 inside."""
     inside = (b[0] >= 0) & (b[1] >= 0) & (b[0] + b[1] <= 1)
     return np.where(inside, f4(2), f4(0))
 
@@ -159,7 +159,7 @@ def uniform_triangle_inverse(b: Floats) -> Floats:
 
 
 def _stack(a: Floats, b: Floats) -> Floats:
-    """Two rows (n,) as one contiguous (2, n) array."""
+    """Return two rows (n,) as one contiguous array (2, n)."""
     out = np.empty((2, len(a)), f4)
     out[0] = a
     out[1] = b
@@ -167,14 +167,14 @@ def _stack(a: Floats, b: Floats) -> Floats:
 
 
 def _turn(w: Floats) -> Floats:
-    """Azimuth of w (3, n) as a fraction of a turn, (n,) in [0, 1)."""
+    """Return the azimuth of w (3, n) divided by 2π, (n,) in [0, 1)."""
     turn = np.arctan2(w[1], w[0]) * INV_TWO_PI
     turn += turn < 0
     return np.where(turn < 1, turn, f4(0))
 
 
 def _around_z(turn: Floats, z: Floats, depth: Floats) -> Floats:
-    """Unit vectors (3, n) at azimuth 2π·turn and height z = 1 − depth, all (n,)."""
+    """Return unit vectors (3, n) of azimuth 2π·turn (n,) and z = 1 − depth (n,)."""
     sin, cos = sin_cos_turns(turn)
     radius = np.sqrt(np.maximum(depth * (f4(1) + z), f4(0)))  # 1 − z² without cancellation
     out = np.empty((3, len(turn)), f4)
@@ -185,7 +185,7 @@ def _around_z(turn: Floats, z: Floats, depth: Floats) -> Floats:
 
 
 def tent(u: Floats, radius: float = 1.0) -> Floats:
-    """Offsets (n,) in (−radius, radius) with density falling linearly to 0, from u (n,)."""
+    """Return offsets (n,) in (−radius, radius) with a density that falls linearly to 0, for u (n,)."""
     left = u < f4(0.5)
     side = np.where(left, u, f4(1) - u)  # 1 − u is exact for u in [0.5, 1)
     reach = f4(1) - np.sqrt(f4(2) * side)
@@ -193,7 +193,7 @@ def tent(u: Floats, radius: float = 1.0) -> Floats:
 
 
 def tent_pdf(x: Floats, radius: float = 1.0) -> Floats:
-    """Density of `tent` at x (n,), per unit length: (1 − |x|/radius)/radius."""
+    """Return the density of `tent` at x (n,), per unit length: (1 − |x|/radius)/radius."""
     return np.maximum(f4(1) - np.abs(x) / f4(radius), f4(0)) / f4(radius)
 
 
@@ -205,7 +205,7 @@ def tent_inverse(x: Floats, radius: float = 1.0) -> Floats:
 
 
 def gaussian(u: Floats, sigma: float = 0.5, radius: float = 1.5) -> Floats:
-    """Offsets (n,) of a normal distribution cut off at ±radius, from u (n,)."""
+    """Return offsets (n,) of a normal distribution truncated at ±radius, for u (n,)."""
     inside = math.erf(radius / (sigma * math.sqrt(2)))
     span = f4(min(inside, float(BELOW_ONE)))  # the inverse of ±1 is infinite
     x = _erfinv((f4(2) * u - f4(1)) * span) * f4(sigma * math.sqrt(2))
@@ -213,7 +213,7 @@ def gaussian(u: Floats, sigma: float = 0.5, radius: float = 1.5) -> Floats:
 
 
 def gaussian_pdf(x: Floats, sigma: float = 0.5, radius: float = 1.5) -> Floats:
-    """Density of `gaussian` at x (n,), per unit length; 0 beyond the radius."""
+    """Return the density of `gaussian` at x (n,), per unit length; 0 beyond the radius."""
     inside = math.erf(radius / (sigma * math.sqrt(2)))
     scale = f4(1 / (inside * sigma * math.sqrt(2 * math.pi)))
     t = x * f4(1 / sigma)
@@ -227,7 +227,7 @@ def gaussian_inverse(x: Floats, sigma: float = 0.5, radius: float = 1.5) -> Floa
 
 
 def _erfinv(y: Floats) -> Floats:
-    """Inverse error function of y (n,) in (−1, 1), to about 3e-7 relative.
+    """Return the inverse error function of y (n,) in (−1, 1), with a relative error of about 3e-7.
 
     Source: M. Giles, Approximating the erfinv Function, GPU Computing Gems 2, 2011, table 2.
     """
@@ -240,7 +240,7 @@ def _erfinv(y: Floats) -> Floats:
 
 
 def _erf(x: Floats) -> Floats:
-    """Error function of x (n,), to 2e-7 absolute.
+    """Return the error function of x (n,), with an absolute error of 2e-7.
 
     Source: W. Press et al., Numerical Recipes, 2nd edition, section 6.2, function erfcc.
     """
@@ -251,7 +251,7 @@ def _erf(x: Floats) -> Floats:
 
 
 def _polynomial(x: NDArray[Any], coefficients: tuple[float, ...]) -> NDArray[Any]:
-    """Horner's rule, highest power first, in the precision of x (n,)."""
+    """Return a polynomial of x (n,), coefficients of the highest power first, in the precision of x."""
     total = np.full_like(x, coefficients[0])
     for coefficient in coefficients[1:]:
         total *= x

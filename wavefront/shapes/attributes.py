@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..elementary import arccos, arctan2
 from ..vec import Floats, f4
 from .mesh import Mesh
-from .tangents import mesh_axes, mesh_tangents
+from .tangents import mesh_dpduv, mesh_tangent_frame
 
 Corners: TypeAlias = tuple[Floats, Floats, Floats]  # (width, m) values at the three corners of triangles
 
@@ -35,15 +35,15 @@ class Attribute:
 
 
 def sphere_uv(normal: Floats, radius: Floats) -> Floats:
-    """Longitude and latitude as texture coordinates, (2, n)."""
+    """Return longitude and latitude as texture coordinates, (2, n)."""
     uv = np.empty((2, normal.shape[1]), f4)
     uv[0] = arctan2(normal[0], normal[2]) * f4(0.5 / np.pi) + f4(0.5)
     uv[1] = f4(1) - arccos(np.clip(normal[1], f4(-1), f4(1))) * f4(1 / np.pi)
     return uv
 
 
-def sphere_tangents(normal: Floats, radius: Floats) -> Floats:
-    """Derivatives of the point by longitude and latitude as texture coordinates, (6, n)."""
+def sphere_dpduv(normal: Floats, radius: Floats) -> Floats:
+    """Return the derivatives of the point by these texture coordinates, (6, n)."""
     x, y, z = normal
     out = np.zeros((6, normal.shape[1]), f4)
     around, up = f4(2 * np.pi) * radius, f4(np.pi) * radius
@@ -55,7 +55,7 @@ def sphere_tangents(normal: Floats, radius: Floats) -> Floats:
 
 
 def sphere_color(normal: Floats, radius: Floats) -> Floats:
-    """White and opaque, (4, n)."""
+    """Return opaque white, (4, n)."""
     return np.ones((4, normal.shape[1]), f4)
 
 
@@ -79,23 +79,28 @@ ATTRIBUTES = {
     "uv": _per_vertex(UV, (0, 0), lambda mesh: mesh.uvs, sphere_uv),
     "uv1": _per_vertex(UV1, (0, 0), lambda mesh: mesh.uvs1, sphere_uv),
     "color": _per_vertex("vertex colors (colors)", (1, 1, 1, 1), lambda mesh: mesh.colors, sphere_color),
-    "tangents": Attribute(
-        UV, NONE, lambda mesh: mesh.uvs, lambda mesh: mesh_tangents(mesh, mesh.uvs), sphere_tangents, True
+    "dpduv": Attribute(
+        UV, NONE, lambda mesh: mesh.uvs, lambda mesh: mesh_dpduv(mesh, mesh.uvs), sphere_dpduv, True
     ),
-    "tangents1": Attribute(
-        UV1, NONE, lambda mesh: mesh.uvs1, lambda mesh: mesh_tangents(mesh, mesh.uvs1), sphere_tangents, True
+    "dpduv1": Attribute(
+        UV1, NONE, lambda mesh: mesh.uvs1, lambda mesh: mesh_dpduv(mesh, mesh.uvs1), sphere_dpduv, True
     ),
     "tangent_frame": Attribute(
-        UV, NONE, lambda mesh: mesh.uvs, lambda mesh: mesh_axes(mesh, mesh.uvs), sphere_tangents, True
+        UV, NONE, lambda mesh: mesh.uvs, lambda mesh: mesh_tangent_frame(mesh, mesh.uvs), sphere_dpduv, True
     ),
     "tangent_frame1": Attribute(
-        UV1, NONE, lambda mesh: mesh.uvs1, lambda mesh: mesh_axes(mesh, mesh.uvs1), sphere_tangents, True
+        UV1,
+        NONE,
+        lambda mesh: mesh.uvs1,
+        lambda mesh: mesh_tangent_frame(mesh, mesh.uvs1),
+        sphere_dpduv,
+        True,
     ),
 }
 
 
 def corner_values(name: str, meshes: Sequence[Mesh]) -> Corners:
-    """Return the values of an attribute at the corners of all triangles."""
+    """Return the values of an attribute at the three corners of all triangles, 3 × (width, m)."""
     attribute = ATTRIBUTES[name]
     width = len(attribute.default)
     corners = np.empty((3, width, sum(len(mesh.faces) for mesh in meshes)), f4)

@@ -19,7 +19,7 @@ from .transform import moved, moved_tangents
 
 SINGULAR = 1e-12  # least scale of a transform along an axis, relative to the greatest
 MOST_PLACED = 1 << 16  # vertices that are transformed at once
-SURE = 1e-6  # above this value, a cheap bound of that ratio is sufficient
+CERTAINLY_REGULAR = 1e-6  # above this value, a cheap bound of that ratio is sufficient
 
 
 def _invertible(name: str, value: ArrayLike) -> NDArray[np.float64]:
@@ -172,7 +172,7 @@ def can_place(mesh: Mesh, transforms: NDArray[np.float64]) -> NDArray[np.bool_]:
     largest = np.abs(linear).max((1, 2))
     unit = linear / np.where(largest > 0, largest, 1)[:, None, None]
     least = np.abs(np.linalg.det(unit)) / np.maximum((unit**2).sum((1, 2)), 1) ** 1.5
-    open_ = np.flatnonzero(good & (least < SURE))
+    open_ = np.flatnonzero(good & (least < CERTAINLY_REGULAR))
     stretch = np.linalg.svd(linear[open_], compute_uv=False)
     good[open_] = stretch[:, 2] > SINGULAR * stretch[:, 0]
     # the same for the range: first a bound, then the vertices themselves

@@ -8,49 +8,49 @@ from ..elementary import arccos
 from ..vec import Doubles
 from .mesh import Mesh
 
-LONGEST = 2.0**60  # of tangents: float32 can square them
+MAX_LENGTH = 2.0**60  # of derivatives: float32 can square them
 
 
-def mesh_tangents(mesh: Mesh, uvs: Doubles | None) -> Doubles:
+def mesh_dpduv(mesh: Mesh, uvs: Doubles | None) -> Doubles:
     """Return dP/du and dP/dv at the corners of the faces, (m, 3, 6), scene units.
 
     They are constant on the facets of a flat mesh. On a smooth mesh they are averaged at each vertex over
     the faces that share it and have the same orientation of texture coordinates, weighted by their angles,
     as in M. Mikkelsen 2008, "Simulation of Wrinkled Surfaces Revisited", section 3.4
     (MikkTSpace). Zero where the texture coordinates of a face span no area, or so small an area
-    that the tangents are longer than `LONGEST`.
+    that the derivatives are longer than `MAX_LENGTH`.
     """
     flat = np.zeros((len(mesh.faces), 6))
     if uvs is None:
         return np.repeat(flat[:, None], 3, 1)
     corner, uv = mesh.vertices[mesh.faces], uvs[mesh.faces]
-    along, across = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    edge1, edge2 = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     (du1, dv1), (du2, dv2) = (uv[:, 1] - uv[:, 0]).T, (uv[:, 2] - uv[:, 0]).T
     area = du1 * dv2 - du2 * dv1
-    directions = np.hstack([along * a[:, None] + across * b[:, None] for a, b in ((dv2, -dv1), (-du2, du1))])
-    area = np.where(np.abs(directions).max(1) <= LONGEST * np.abs(area), area, 0)
-    sound = np.flatnonzero(area)
-    flat[sound] = directions[sound] / area[sound, None]
+    directions = np.hstack([edge1 * a[:, None] + edge2 * b[:, None] for a, b in ((dv2, -dv1), (-du2, du1))])
+    area = np.where(np.abs(directions).max(1) <= MAX_LENGTH * np.abs(area), area, 0)
+    regular = np.flatnonzero(area)
+    flat[regular] = directions[regular] / area[regular, None]
     if mesh.normals is None:
         return np.repeat(flat[:, None], 3, 1)
     return _smooth(mesh, flat, area, _angles(corner))
 
 
-def mesh_axes(mesh: Mesh, uvs: Doubles | None) -> Doubles:
-    """Return the axes of red and green of normal maps at the corners of the faces, (m, 3, 6).
+def mesh_tangent_frame(mesh: Mesh, uvs: Doubles | None) -> Doubles:
+    """Return the tangent frames of normal maps at the corners of the faces, (m, 3, 6).
 
     These are the mesh's own tangents and bitangents (glTF 2.0, section 3.7.2.1: normal × tangent · w), or
     else dP/du and dP/dv. Their lengths have no meaning.
     """
     if mesh.tangents is None or mesh.normals is None:
-        return mesh_tangents(mesh, uvs)
+        return mesh_dpduv(mesh, uvs)
     tangents = mesh.tangents[:, :3]
-    across = np.cross(mesh.normals, tangents) * np.where(mesh.tangents[:, 3:] < 0, -1.0, 1.0)
-    return np.hstack([tangents, across])[mesh.faces]
+    bitangents = np.cross(mesh.normals, tangents) * np.where(mesh.tangents[:, 3:] < 0, -1.0, 1.0)
+    return np.hstack([tangents, bitangents])[mesh.faces]
 
 
 def _smooth(mesh: Mesh, flat: Doubles, area: Doubles, angles: Doubles) -> Doubles:
-    """Average the tangents (m, 6) of faces at each vertex, directions and lengths separately."""
+    """Average the derivatives (m, 6) of faces at each vertex, directions and lengths separately."""
     groups = (2 * mesh.faces + (area > 0)[:, None]).ravel()
     weights = (angles * (area != 0)[:, None]).ravel()
     total = np.bincount(groups, weights)

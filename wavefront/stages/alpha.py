@@ -1,9 +1,9 @@
-"""The way through surfaces that are only partly there.
+"""Alpha: paths and shadow rays at surfaces whose opacity is below 1.
 
-A path that comes upon one meets it with a probability that is its opacity there, and otherwise goes
-straight on from just behind it; that is no scattering event. A shadow ray is weakened by
-1 − opacity instead: the same mean with less noise. Every step leaves a surface behind for good, so
-both ways come to an end by themselves; nothing else bounds the number of steps.
+A path hits such a surface with a probability equal to its opacity there (stochastic alpha); otherwise it
+continues straight on from just behind the surface, which is not a scattering event. A shadow ray is
+multiplied by 1 − opacity instead, which has the same mean and less noise. Every step leaves one more
+surface behind, so both loops end.
 """
 
 from __future__ import annotations
@@ -18,25 +18,30 @@ from ..errors import RenderError
 from ..sampling.sampler import Dimension, Sampler, numbers_of
 from ..state import Hits, Paths, Rays, SurfaceInteraction
 from ..vec import Floats, dot, f4
-from .interaction import interaction, leave
-from .intersect import ShadowRays, intersect, reach, visible
+from .interaction import interaction, offset_origin
+from .intersect import ShadowRays, intersect, shadow_ray_length, visible
 from .medium import absorb
 
-Going = TypeVar("Going", bound=Rays)
+AnyRays = TypeVar("AnyRays", bound=Rays)
 
 
 def alpha_pass_through(
     scene: CompiledScene, paths: Paths, hits: Hits, sampler: Sampler, bounce: int
 ) -> tuple[Paths, Hits]:
-    """Take paths through what is not there for them, to the first surface that is.
+    """Move paths on through the surfaces that they pass, to the first surface that they hit.
 
-    Their `origin` is then behind the last surface that they passed, their `prev_vertex` where they
-    scattered last. Each partial surface along a ray has a random number of its own.
+    Afterwards `origin` is behind the last surface that a path has passed, and `prev_vertex` is where it
+    scattered last. Each of the surfaces along a ray has a random number of its own.
+
+    Raises
+    ------
+    RenderError
+        If a ray meets more surfaces than there are random numbers for.
     """
     if scene.opacities is None:
         return paths, hits
-    partly = scene.opacities.partly
-    lanes = np.flatnonzero(partly.take(hits.prim))  # a miss, -1, takes the last entry
+    translucent = scene.opacities.partly
+    lanes = np.flatnonzero(translucent.take(hits.prim))  # a miss, -1, takes the last entry
     if not lanes.size:
         return paths, hits
     paths = replace(
@@ -54,18 +59,18 @@ def alpha_pass_through(
         passing = np.flatnonzero(u >= scene.opacities.at(surface))
         lanes, here, surface = lanes.take(passing), here.take(passing), surface.take(passing)
         absorb(scene, here.throughput, at.take(passing), surface)
-        here = _behind(here, surface)
+        here = _continue_behind(here, surface)
         paths.origin[:, lanes], paths.exclude_prim[lanes] = here.origin, here.exclude_prim
         paths.throughput[:, lanes] = here.throughput
         hits.put(lanes, intersect(scene, here))
-        lanes = lanes.compress(partly.take(hits.prim.take(lanes)))
+        lanes = lanes.compress(translucent.take(hits.prim.take(lanes)))
     return paths, hits
 
 
 def transmittance_along(scene: CompiledScene, rays: ShadowRays) -> Floats:
-    """Return the part of the light that gets along shadow rays, (3, k).
+    """Return the transmittance of shadow rays, (3, k).
 
-    Only rays that something stands in the way of are followed, from surface to surface.
+    Only rays that hit anything are traced on from surface to surface.
     """
     assert scene.opacities is not None
     part = np.ones_like(rays.direction)
@@ -73,24 +78,24 @@ def transmittance_along(scene: CompiledScene, rays: ShadowRays) -> Floats:
     rays = rays.take(lanes)
     while lanes.size:
         hits = intersect(scene, rays)
-        between = hits.t < reach(rays)
-        partly = scene.opacities.partly.take(hits.prim)
-        part[:, lanes.compress(between & ~partly)] = 0
-        met = np.flatnonzero(between & partly)
+        between = hits.t < shadow_ray_length(rays)
+        translucent = scene.opacities.partly.take(hits.prim)
+        part[:, lanes.compress(between & ~translucent)] = 0
+        met = np.flatnonzero(between & translucent)
         lanes, rays, hits = lanes.take(met), rays.take(met), hits.take(met)
         surface = interaction(scene, rays, hits)
         left = part.take(lanes, 1) * (f4(1) - scene.opacities.at(surface))
         absorb(scene, left, hits, surface)
         part[:, lanes] = left
         rays = replace(
-            _behind(rays, surface), error=rays.error + surface.error, distance=rays.distance - hits.t
+            _continue_behind(rays, surface), error=rays.error + surface.error, distance=rays.distance - hits.t
         )
         on = np.flatnonzero(left.max(0) != 0)
         lanes, rays = lanes.take(on), rays.take(on)
     return part
 
 
-def _behind(rays: Going, surface: SurfaceInteraction) -> Going:
-    """Return rays as they go on from just behind the surfaces that they pass."""
-    origin = leave(surface, dot(surface.ng, rays.direction))
+def _continue_behind(rays: AnyRays, surface: SurfaceInteraction) -> AnyRays:
+    """Return rays that continue from just behind the surfaces."""
+    origin = offset_origin(surface, dot(surface.ng, rays.direction))
     return replace(rays, origin=origin, exclude_prim=surface.prim)

@@ -10,7 +10,7 @@ from ..bsdfs import BsdfSample, sampled
 from ..sampling.sampler import Dimension, Sampler
 from ..state import Paths
 from ..vec import Floats, Ints, f4, normalize, signs, take
-from .interaction import LIFT, leave
+from .interaction import LIFT, offset_origin
 from .shade import Shading
 
 
@@ -54,7 +54,7 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         slot=paths.slot,
         pixel=paths.pixel,
         sample=paths.sample,
-        origin=leave(surface, cos_g) if (cos_g < 0).any() else shade.start,
+        origin=offset_origin(surface, cos_g) if (cos_g < 0).any() else shade.start,
         direction=direction,
         exclude_prim=surface.prim,
         throughput=throughput,

@@ -1,4 +1,4 @@
-"""Which paths live on."""
+"""Compaction: which paths continue, and Russian roulette."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from ..state import Contribution, Hits, Paths
 from ..vec import Bools, Ints, broadcast, f4, highest, take
 from .interaction import material_rows
 
-ROULETTE_AFTER = 2  # scattering events before paths may be ended
-SURE = f4(0.5)  # throughput from which on a path lives on for sure
-SMALLEST = np.finfo(f4).tiny  # keeps the division finite on lanes that end anyway
+ROULETTE_AFTER = 2  # scattering events before Russian roulette may end paths
+ROULETTE_THRESHOLD = f4(0.5)  # paths of at least this throughput always survive
+TINY = np.finfo(f4).tiny  # least probability of survival: keeps the division finite where a path ends
 
 
 def compact(scene: CompiledScene, paths: Paths, hits: Hits, lanes: Ints) -> tuple[Paths, Hits]:
-    """Keep the given lanes of paths and hits, all of which hit something, ordered by groups of materials.
+    """Return the given lanes of paths and hits, ordered by material group; all must have hit a surface.
 
-    Each group is then a slice, whose columns need not be gathered to be shaded. What the paths
-    needed only on their way to the hits is not kept.
+    Each group is then a slice, so that shading needs no gather. Fields of the paths that are needed only
+    before the hit (`exclude_prim`, `pdf`, `prev_vertex`) are not kept.
     """
     ordered, n = by_group(scene, hits, lanes), len(paths)
     if ordered is lanes and lanes.size == n:
@@ -33,19 +33,19 @@ def compact(scene: CompiledScene, paths: Paths, hits: Hits, lanes: Ints) -> tupl
 
 
 def by_group(scene: CompiledScene, hits: Hits, lanes: Ints) -> Ints:
-    """Order lanes (k,) by the groups of the materials that they hit; the same array if they are."""
+    """Return lanes (k,) ordered by the groups of their materials; the same array if they are in order."""
     materials = scene.materials
     if len(materials.groups) == 1:
         return lanes
     group = materials.group_of.take(material_rows(scene, hits, lanes))
     if (group[1:] >= group[:-1]).all():
         return lanes
-    short = group.astype(np.min_scalar_type(len(materials.groups)))  # sorted by radix
+    short = group.astype(np.min_scalar_type(len(materials.groups)))  # NumPy sorts small integers by radix
     return lanes.take(np.argsort(short, kind="stable"))
 
 
 def select(paths: Paths, lanes: Ints) -> Paths:
-    """Keep the given lanes of paths that set out."""
+    """Return the given lanes of paths."""
     return paths if lanes.size == len(paths) else paths.take(lanes)
 
 
@@ -65,22 +65,25 @@ def specular_lanes(scene: CompiledScene, paths: Paths, hits: Hits, emission: Con
 
 
 def alive(paths: Paths) -> Bools:
-    """Tell which paths still carry anything, (n,); NaN is kept, so that it is met and counted."""
+    """Return a mask (n,) of the paths whose throughput is not 0. NaN counts: it must reach the picture."""
     return highest(paths.throughput) != 0
 
 
 def roulette(paths: Paths, sampler: Sampler, bounce: int, branches: int = 1) -> Ints:
-    """Choose the lanes that live on, and make them carry more, so that the mean stays.
+    """Return the lanes of paths that survive, and divide their throughput by the probability of that.
 
-    Where the largest channel of the throughput, with the compression of radiance by refraction taken
-    out, is below `SURE`, the chance to survive is their ratio, and the path carries `SURE` from then
-    on (E. Veach, thesis 1997, §10.4.1; pbrt-v4, §13.2.1). Most of the work is saved on paths that carry
-    little, and most of the noise comes from ending those that carry much. In the first events only
-    paths that carry nothing end. A path that is one of several `branches` began with as much less.
+    The probability is the ratio of the path's throughput and `ROULETTE_THRESHOLD`, at most 1. The throughput
+    counts by its largest channel, without the scaling of radiance by refraction (`eta_scale`), and relative
+    to 1 / `branches`, with which the paths of a branched path begin. During the first `ROULETTE_AFTER`
+    events only paths without throughput end.
+
+    Sources: E. Veach, thesis 1997, §10.4.1; pbrt-v4, §13.2.1.
     """
     if bounce < ROULETTE_AFTER or not len(paths):
         return np.flatnonzero(alive(paths))
-    chance = np.clip(highest(paths.throughput) * paths.eta_scale * (branches / SURE), SMALLEST, f4(1))
+    chance = np.clip(
+        highest(paths.throughput) * paths.eta_scale * (branches / ROULETTE_THRESHOLD), TINY, f4(1)
+    )
     u = sampler.draw_1d(paths.pixel, paths.sample, bounce, Dimension.ROULETTE)
     paths.throughput /= chance
-    return np.flatnonzero(~(u >= chance))  # NaN lives on, to be counted
+    return np.flatnonzero(~(u >= chance))  # NaN survives, so that it reaches the picture

@@ -1,4 +1,4 @@
-"""Camera samples become paths."""
+"""The first stage: camera rays become paths."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from ..vec import broadcast, f4
 def generate(
     scene: CompiledScene, camera: Camera, sampler: Sampler, pixel: Words, sample: Words, filter: Filter = box
 ) -> Paths:
-    """Start a path at a random place in or around each pixel.
+    """Return paths that start at the camera, one for each pair of pixel and sample.
 
     Parameters
     ----------
     pixel, sample
         (n,) row-major pixel index, within the camera's window, and sample index.
     filter
-        Where in and around its pixel a sample falls.
+        Distributes the samples of a pixel in and around it.
     """
     width, n = camera.film[0], len(pixel)
     pixel = camera.address(pixel)

@@ -1,4 +1,4 @@
-"""From a hit to the geometry of the surface there, and off it again."""
+"""The surface geometry at hits, and the origins of rays that leave surfaces."""
 
 from __future__ import annotations
 
@@ -10,58 +10,60 @@ from ..shapes.attributes import ATTRIBUTES, Corners
 from ..state import Hits, Rays, SurfaceInteraction
 from ..vec import ALL, Floats, Ints, Lanes, dot, f4, highest, interpolate, length, normalize, signs, take
 
-# o + t·d carries at most three roundings of half an ulp (2⁻²⁴) of its terms; this is five times that.
+# o + t·d has at most three rounding errors of half an ulp (2⁻²⁴) of its terms; this is five times as much.
 POINT_ERROR = f4(2**-21)
 MIN_COS = f4(1e-3)  # the least cosine between wo and the shading normal
-LIFT = f4(0.01)  # the cosine against `ng` to which directions that lead below the surface are raised
+LIFT = f4(0.01)  # directions below the surface are raised to this cosine with `ng`
 
 
 def interaction(scene: CompiledScene, rays: Rays, hits: Hits) -> SurfaceInteraction:
-    """Gather the geometry at hits; every ray must have one."""
+    """Return the surface geometry at hits; every ray must have hit a surface."""
     point = rays.origin + rays.direction * hits.t
-    placed = _places(scene, hits)
+    instances = _instances_of(scene, hits)
     error: Floats = POINT_ERROR * (highest(np.abs(point)) + hits.t)
     wo = -rays.direction
     ng = normals(scene, hits.prim, point)
-    if placed is not None:
-        ng, error = _turned(placed, hits, ng, error)
-    ns = _shading_normals(scene, hits, placed, ng)
+    if instances is not None:
+        ng, error = _normals_to_scene(instances, hits, ng, error)
+    ns = _shading_normals(scene, hits, instances, ng)
     facing = dot(ng, wo)
     side, back_facing = signs(facing), np.signbit(facing)
     ng = ng * side
-    ns = ng if ns is None else towards(wo, ns * side)
-    prim = hits.prim if placed is None else hits.prim + placed.shift
+    ns = ng if ns is None else visible_normals(wo, ns * side)
+    prim = hits.prim if instances is None else hits.prim + instances.shift
     surface = SurfaceInteraction(point, error, ng, ns, wo, prim, material_rows(scene, hits, ALL), back_facing)
     for name, corners in scene.attributes.items():
         values = _attribute(scene, name, corners, hits, point)
-        if placed is not None and ATTRIBUTES[name].vectors:
-            values = placed.stretch(values)
+        if instances is not None and ATTRIBUTES[name].vectors:
+            values = instances.vectors_to_scene(values)
         setattr(surface, name, values)
     return surface
 
 
-def _places(scene: CompiledScene, hits: Hits) -> InstanceTable | None:
-    """Where the hit meshes stand, a column per hit; None in a scene without instances."""
+def _instances_of(scene: CompiledScene, hits: Hits) -> InstanceTable | None:
+    """Return the instance data of each hit; None in a scene without instances."""
     if scene.instances is None or hits.instance is None:
         return None
     return scene.instances.take(hits.instance)
 
 
-def _turned(placed: InstanceTable, hits: Hits, ng: Floats, error: Floats) -> tuple[Floats, Floats]:
-    """Turn unit normals of meshes into the scene's, and enlarge the errors (n,) of hit points.
+def _normals_to_scene(
+    instances: InstanceTable, hits: Hits, ng: Floats, error: Floats
+) -> tuple[Floats, Floats]:
+    """Transform unit normals of meshes to the scene, and enlarge the errors (n,) of hit points.
 
-    On an instance the ray was rounded once more, in the mesh's frame: its origin, which is no further
-    away there than the mesh reaches and t together, and its direction. Lengths along a normal come
-    from that frame into the scene by division by the length of the turned normal.
+    The ray of an instance was rounded once more, in the mesh's coordinates: its direction, and its origin,
+    whose distance there is at most t and the mesh's radius together. Division by the length of the
+    transformed normal converts a length along the normal from these coordinates to the scene.
     """
-    ng = placed.turn(ng)
+    ng = instances.normals_to_scene(ng)
     size = length(ng)
     size = np.where(size > 0, size, f4(1))
-    return ng / size, error + POINT_ERROR * (placed.reach + hits.t) / size
+    return ng / size, error + POINT_ERROR * (instances.radius + hits.t) / size
 
 
 def material_rows(scene: CompiledScene, hits: Hits, lanes: Lanes) -> Ints:
-    """Rows (k,) of the material table that some lanes of the hits have."""
+    """Return the rows (k,) of the material table at some lanes of the hits."""
     material = scene.material_of.take(take(hits.prim, lanes))
     if scene.instances is None or scene.instances.material is None or hits.instance is None:
         return material
@@ -70,9 +72,9 @@ def material_rows(scene: CompiledScene, hits: Hits, lanes: Lanes) -> Ints:
 
 
 def normals(scene: CompiledScene, prim: Ints, point: Floats) -> Floats:
-    """Unit geometric normals (3, n) of the front side at points on primitives.
+    """Return the unit geometric normals (3, n) of the front side at points on primitives.
 
-    Points on spheres are moved onto the sphere, in place.
+    Points of spheres are projected onto the sphere, in place.
     """
     if not len(scene.sphere_radii):
         return scene.normals.take(prim, 1)
@@ -87,21 +89,22 @@ def normals(scene: CompiledScene, prim: Ints, point: Floats) -> Floats:
     return ng
 
 
-def above(surface: SurfaceInteraction) -> Floats:
-    """Origins (3, n) of rays that leave a surface to the side of wo."""
+def origin_above(surface: SurfaceInteraction) -> Floats:
+    """Return the origins (3, n) of rays that leave a surface on the side of wo."""
     return surface.point + surface.ng * surface.error
 
 
-def leave(surface: SurfaceInteraction, cos: Floats) -> Floats:
-    """Origins (3, n) of rays that leave a surface: moved off it, to a side, by the points' errors.
+def offset_origin(surface: SurfaceInteraction, cos: Floats) -> Floats:
+    """Return the origins (3, n) of rays that leave a surface.
 
-    `cos` (n,) is the cosine between the rays and `ng`.
+    Points are moved off the surface by their error bounds, to the side that the sign of `cos` (n,) gives,
+    the cosine between the rays and `ng`.
     """
     return surface.point + surface.ng * (surface.error * signs(cos))
 
 
-def towards(wo: Floats, ns: Floats) -> Floats:
-    """Bend shading normals that look away from wo until they make a small positive cosine with it."""
+def visible_normals(wo: Floats, ns: Floats) -> Floats:
+    """Bend shading normals (3, n) that face away from wo, in place, to a positive cosine with wo."""
     cos = dot(ns, wo)
     away = np.flatnonzero(cos < MIN_COS)
     if away.size:
@@ -118,15 +121,15 @@ def _onto_sphere(scene: CompiledScene, sphere: Ints, point: Floats) -> Floats:
 
 
 def _shading_normals(
-    scene: CompiledScene, hits: Hits, placed: InstanceTable | None, ng: Floats
+    scene: CompiledScene, hits: Hits, instances: InstanceTable | None, ng: Floats
 ) -> Floats | None:
-    """Interpolate the corners' normals, (3, n); None when the scene has only flat facets."""
+    """Return the interpolated vertex normals, (3, n); None if no mesh of the scene has any."""
     if scene.corner_normals is None:
         return None
     corners = _at_corners(scene.corner_normals, hits, scene.triangles)
-    if placed is not None:
-        # each by itself, as a mesh of its own would have them: a skewed transform changes their lengths
-        corners = [normalize(placed.turn(corner)) for corner in corners]
+    if instances is not None:
+        # Each is normalized, as in a mesh of its own: a skewed transform changes their lengths.
+        corners = [normalize(instances.normals_to_scene(corner)) for corner in corners]
     ns = normalize(_interpolate(corners, hits))
     flat = (hits.prim >= scene.triangles) | ~(dot(ns, ng) > 0)
     np.copyto(ns, ng, where=flat)
@@ -134,7 +137,7 @@ def _shading_normals(
 
 
 def _attribute(scene: CompiledScene, name: str, corners: Corners, hits: Hits, point: Floats) -> Floats:
-    """Return what varies over shapes at hits: interpolated on triangles, computed on spheres."""
+    """Return an attribute at hits, (c, n): interpolated on triangles, computed on spheres."""
     if scene.triangles:
         values = _interpolate(_at_corners(corners, hits, scene.triangles), hits)
     else:
@@ -148,7 +151,7 @@ def _attribute(scene: CompiledScene, name: str, corners: Corners, hits: Hits, po
 
 
 def _at_corners(table: Corners, hits: Hits, triangles: int) -> list[Floats]:
-    """Gather the values at the corners of the triangles hit, 3 × (c, n); any triangle's on spheres."""
+    """Return the values at the corners of hit triangles, 3 × (c, n); those of any triangle for spheres."""
     prim = np.minimum(hits.prim, triangles - 1)
     return [corner.take(prim, 1) for corner in table]
 

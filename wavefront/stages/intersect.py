@@ -1,4 +1,4 @@
-"""Where rays meet surfaces."""
+"""Ray queries of the stages: nearest hits and shadow rays."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ TARGET_ERROR = f4(2**-20)  # rounding of a sampled point on a light, relative to
 class ShadowRays(Rays):
     """Rays from points towards sampled points on lights."""
 
-    error: Floats  # (n,) bound on the rounding error of where they start, scene units
+    error: Floats  # (n,) bound on the rounding error of the points that they start from, scene units
     distance: Floats  # (n,) to the sampled point, scene units; inf for a light at infinity
     cos_light: Floats  # (n,) cosine between the ray and the light's normal; 1 where it has none
 
 
 def intersect(scene: CompiledScene, rays: Rays) -> Hits:
-    """Find what each ray meets first."""
+    """Return the nearest hit of each ray."""
     found = scene.accelerator.closest(rays.origin, rays.direction, rays.exclude_prim)
     hits = Hits(found.t, found.prim, None, None)
     if scene.interpolates:
@@ -39,9 +39,9 @@ def shadow_rays(surface: SurfaceInteraction, origin: Floats, light: LightSample,
     Parameters
     ----------
     surface, origin, light
-        n points, where rays from there start, (3, n), and the samples drawn at the points.
+        n points, the origins (3, n) of rays that leave them, and a light sample for each point.
     lanes
-        (k,) columns of these that get a ray.
+        (k,) the columns that get a ray.
     """
     return ShadowRays(
         origin=take(origin, lanes),
@@ -54,15 +54,17 @@ def shadow_rays(surface: SurfaceInteraction, origin: Floats, light: LightSample,
 
 
 def visible(scene: CompiledScene, rays: ShadowRays) -> Bools:
-    """Tell whether nothing stands between points and the sampled points on their lights, (k,)."""
-    return ~scene.accelerator.occluded(rays.origin, rays.direction, reach(rays), rays.exclude_prim)
+    """Return a mask (k,) of the shadow rays that nothing blocks."""
+    return ~scene.accelerator.occluded(
+        rays.origin, rays.direction, shadow_ray_length(rays), rays.exclude_prim
+    )
 
 
-def reach(rays: ShadowRays) -> Floats:
-    """Length (n,) of shadow rays, which end just before the light.
+def shadow_ray_length(rays: ShadowRays) -> Floats:
+    """Return the lengths (n,) of shadow rays, which end just before the light.
 
-    Both ends are off by a known error; along a ray that meets the light's surface under a small
-    cosine an error is 1/cosine times as long.
+    The error bounds of both end points are subtracted, divided by the cosine between the ray and the
+    light's normal.
     """
     grazing = f4(1) / np.clip(rays.cos_light, f4(2) * TARGET_ERROR, f4(1))
     return positive(rays.distance * (f4(1) - TARGET_ERROR * grazing) - f4(2) * rays.error * grazing)

@@ -1,4 +1,4 @@
-"""Shading normals tilted by normal maps and bump maps."""
+"""Shading normals perturbed by normal maps and bump maps."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import numpy as np
 from ..compile.scene import CompiledScene
 from ..state import SurfaceInteraction
 from ..vec import Floats, dot, f4, normalize
-from .interaction import LIFT, towards
+from .interaction import LIFT, visible_normals
 
-SHALLOWER = f4(0.9)  # but no more than this part of wo's own
+SHALLOWER = f4(0.9)  # reflected directions are raised to at most this part of wo's cosine with `ng`
 
 
 def perturb_normals(scene: CompiledScene, surface: SurfaceInteraction) -> None:
@@ -32,19 +32,19 @@ def perturb_normals(scene: CompiledScene, surface: SurfaceInteraction) -> None:
 
 
 def ensure_valid_reflection(wo: Floats, ng: Floats, smooth: Floats, perturbed: Floats) -> Floats:
-    """Return tilted normals (3, n) about which wo mirrors to above the geometric surface.
+    """Return perturbed normals (3, n) about which wo is reflected to above the geometric surface.
 
-    Where the mirrored direction would lie lower than `LIFT`, it is raised to there, and the normal
-    half-way between it and wo is taken: a mirror has no black facets, and rough reflection loses
-    little. It is not raised above where the normal `smooth`, without the relief, would mirror it to,
-    so that a faint relief changes little. What else would leave below the surface is lost
-    (stages/shade.py and bounce.py compare the sides): no light leaks and none is gained.
+    Where the cosine of the reflected direction with `ng` would be below `LIFT`, the direction is raised to
+    that cosine, and the half vector of it and wo becomes the normal: a mirror has no black facets, and rough
+    reflection loses little energy. The cosine is not raised above that of a reflection about `smooth`, the
+    normal without the map, so that a weak map changes little. Other samples that lead below the surface are
+    rejected (stages/shade.py and bounce.py compare the sides), so that no light leaks and none is gained.
 
     Source: A. Keller et al. 2017, "The Iray Light Transport Simulation and Rendering System",
-    arXiv:1705.01263, appendix A.3; raised along the geometric normal, for the tilted one may point
-    below the surface, and to the height that Blender's Cycles uses.
+    arXiv:1705.01263, appendix A.3. Here directions are raised along the geometric normal, because the
+    perturbed one may point below the surface, and to the cosine that Blender's Cycles uses.
     """
-    perturbed = towards(wo, perturbed)
+    perturbed = visible_normals(wo, perturbed)
     wo_cos = dot(wo, ng)
     own = f4(2) * dot(smooth, wo) * dot(smooth, ng) - wo_cos
     least = np.minimum(np.minimum(SHALLOWER * wo_cos, LIFT), own)
@@ -54,4 +54,4 @@ def ensure_valid_reflection(wo: Floats, ng: Floats, smooth: Floats, perturbed: F
     if low.size:
         raised = normalize(mirrored.take(low, 1) + ng.take(low, 1) * missing.take(low))
         perturbed[:, low] = normalize(raised + wo.take(low, 1))
-    return towards(wo, perturbed)  # rounding, where wo itself grazes the surface
+    return visible_normals(wo, perturbed)  # against rounding errors where wo grazes the surface

@@ -17,7 +17,7 @@ from ..sampling.sampler import Dimension, Sampler
 from ..state import Contribution, Hits, Paths, SurfaceInteraction
 from ..vec import Floats, Ints, broadcast, column, dot, f4, highest, take
 from .alpha import transmittance_along
-from .interaction import above, interaction, leave
+from .interaction import interaction, offset_origin, origin_above
 from .intersect import ShadowRays, shadow_rays, visible
 
 UP = column((0, 0, 1))
@@ -90,7 +90,7 @@ def shading(scene: CompiledScene, surface: SurfaceInteraction) -> Shading:
         wo = np.broadcast_to(UP, surface.wo.shape)
     else:
         wo = frame.to_local(surface.wo)
-    return Shading(surface, frame, wo, above(surface), groups)
+    return Shading(surface, frame, wo, origin_above(surface), groups)
 
 
 def _groups(materials: MaterialTable, surface: SurfaceInteraction) -> Iterator[tuple[slice, Bsdf]]:
@@ -131,7 +131,7 @@ def direct(
     arriving = (light.pdf > 0) & (highest(f) * cos != 0)  # NaN stays, to be counted
     lanes = np.flatnonzero(arriving)
     through = (arriving & (cos_g < 0)).any()
-    origin = leave(shade.surface, cos_g) if through else shade.start
+    origin = offset_origin(shade.surface, cos_g) if through else shade.start
     rays = shadow_rays(shade.surface, origin, light, lanes)
     number = take(number, lanes)
     radiance = radiance_at_samples(scene, rays, light, lanes, number)

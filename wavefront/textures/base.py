@@ -1,4 +1,4 @@
-"""What varies over surfaces."""
+"""The interface of textures."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ from ..vec import Floats
 
 
 class BaseTexture(ABC):
-    """A material parameter that varies over surfaces, such as a texture."""
+    """A parameter of materials and lights that varies over surfaces, such as an image."""
 
     reads: tuple[str, ...] = ("uv",)  # fields of `SurfaceInteraction` that `at` needs: "uv", "uv1", "color"
-    scalar: bool | None = None  # `at` returns numbers (n,), not colors; None: what the parameter is
+    scalar: bool | None = (
+        None  # whether `at` returns numbers (n,) rather than colors; None: either, as the parameter needs
+    )
 
     def limits(self) -> tuple[float, ...]:
-        """Return the least and the greatest value, or nothing where they are not known."""
+        """Return the least and the greatest value, or () where they are not known."""
         return ()
 
     @abstractmethod

@@ -1,4 +1,4 @@
-"""Images looked up by texture coordinates: a color or a number that varies over a surface."""
+"""Image textures: colors or numbers that are looked up by texture coordinates."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from .base import BaseTexture
 
 Wrap: TypeAlias = Literal["repeat", "mirror", "clamp"]
 Channel: TypeAlias = int | Literal["luminance"]
-UV_SETS = ("uv", "uv1")  # the fields of Surface
+UV_SETS = ("uv", "uv1")  # fields of `SurfaceInteraction`
 
-CHUNK = 1 << 20  # texels that are looked at together
+CHUNK = 1 << 20  # texels that are read at a time
 
 
 class Texture(BaseTexture):
-    """An image on a surface, wherever a material takes a color or a number.
+    """An image on a surface, for any material parameter that is a color or a number.
 
     The top row of the image lies at v = 1, its left column at u = 0. The value is
     `offset` + `scale` · texel.
@@ -35,12 +35,12 @@ class Texture(BaseTexture):
     ----------
     source
         A file (png, jpg, exr, hdr, npy), or an array (H, W), (H, W, C), top row first: uint8 and
-        uint16 count from 0 to 1, floats are taken as they are. An array is shared, not copied.
+        uint16 are scaled to [0, 1], floats are used unchanged. An array is shared, not copied.
     srgb
         Decode 8- and 16-bit colors from sRGB. False for data such as roughness. Alpha is never
         decoded, and float images are linear already.
     wrap
-        What lies outside [0, 1]: "repeat", "mirror" or "clamp"; two of them for u and v.
+        The continuation outside [0, 1]: "repeat", "mirror" or "clamp"; two of them for u and v.
     filter
         "bilinear" between texel centers, or "nearest".
     transform
@@ -76,7 +76,7 @@ class Texture(BaseTexture):
         codes, self.name = _codes(source)
         self.size = (codes.shape[1], codes.shape[0])  # (width, height)
         self.channels = self._stride = codes.shape[2]  # of the image
-        self._texels = codes.reshape(-1)  # 8-bit images stay 8-bit: a quarter of the memory
+        self._texels = codes.reshape(-1)  # not as float32: 8-bit images take a quarter of the memory
         self._channels = _pick(self.name, channel, self._stride)
         self._tables = [_table(codes.dtype, srgb and not _is_alpha(c, self._stride)) for c in self._channels]
         self.srgb = srgb and codes.dtype.kind == "u"
@@ -108,9 +108,9 @@ class Texture(BaseTexture):
         return self._shaped(rows)
 
     def gradient(self, uv: Floats) -> Floats:
-        """Return the slopes of one channel along u and v, (2, n), per unit of uv (2, n).
+        """Return the derivatives of one channel by u and v, (2, n), at texture coordinates (2, n).
 
-        Differences of bilinear lookups half a texel to either side: they vary without steps.
+        They are differences of bilinear lookups half a texel to either side, which are continuous.
         """
         x, y = self._texel_space(uv)
         half = f4(0.5)
@@ -142,7 +142,7 @@ class Texture(BaseTexture):
         """Return the least and the greatest value of the image, scaled."""
         ends = np.stack([self.offset, self.scale + self.offset]).astype(float)
         if self._texels.dtype.kind == "u" and ends.min() >= 0 and ends.max() <= 1:
-            return float(ends.min()), float(ends.max())  # no need to look
+            return float(ends.min()), float(ends.max())  # integer texels are in [0, 1]
         width, height = self.size
         low, high = np.inf, -np.inf
         for start in range(0, width * height, CHUNK):
@@ -152,7 +152,7 @@ class Texture(BaseTexture):
         return low, high
 
     def _shaped(self, rows: list[Floats]) -> Floats:
-        """Turn channel values (n,) into (3, n) or (n,), scaled."""
+        """Return channel values (n,) as (3, n) or (n,), scaled and offset."""
         if self._gray and len(rows) == 3:
             rows = [luminance(rows)]
         if self.scalar:
@@ -183,7 +183,7 @@ class Texture(BaseTexture):
         return out
 
     def _decoded(self, texel: Ints, k: int) -> Floats:
-        """Gather the k-th chosen channel of texels by number, (n,)."""
+        """Return the linear values of the k-th chosen channel of texels (n,)."""
         codes = self._texels.take(texel * self._stride + self._channels[k])
         table = self._tables[k]
         return codes if table is None else table.take(codes)
@@ -217,7 +217,7 @@ def _codes(source: Any) -> tuple[NDArray[Any], str]:
 
 
 def _pick(name: str, channel: Channel | None, there: int) -> tuple[int, ...]:
-    """Return which channels to gather."""
+    """Return the indices of the channels that the texture reads."""
     if channel is None or channel == "luminance":
         return (0, 1, 2) if there >= 3 else (0,)
     if not isinstance(channel, int) or not 0 <= channel < there:
@@ -232,7 +232,7 @@ def _is_alpha(channel: int, there: int) -> bool:
 
 
 def _table(kind: np.dtype[Any], srgb: bool) -> Floats | None:
-    """Return the linear value of every code, None where codes are values."""
+    """Return the linear value of every integer code, None for float images."""
     if kind == np.float32:
         return None
     steps = int(np.iinfo(kind).max)
@@ -265,7 +265,7 @@ def _transformed(matrix: NDArray[np.float64], uv: Floats) -> tuple[Floats, Float
 
 
 def _unwrapped(t: Floats, wrap: str) -> Floats:
-    """Bring a coordinate into [0, 1]."""
+    """Return a coordinate mapped into [0, 1]."""
     if wrap == "clamp":
         return np.clip(t, f4(0), f4(1))
     if wrap == "repeat":
@@ -283,14 +283,14 @@ def _unwrapped_slope(t: Floats, wrap: str) -> Floats:
 
 
 def _neighbors(x: Floats, size: int, wrap: str) -> tuple[Ints, Ints, Floats]:
-    """Return the texels before and after x (in texels), and the part of the way between their centers."""
+    """Return the texels before and after x (n,), in texels, and the weight of the second one."""
     x = x - f4(0.5)
     low = np.floor(x)
     before = low.astype(np.intp)
     after = before + 1
     if wrap == "repeat":
         before, after = before % size, after % size
-    else:  # the edge texel goes on: so it does in a mirror, too
+    else:  # the edge texel continues, also where the image is mirrored
         before, after = np.clip(before, 0, size - 1), np.clip(after, 0, size - 1)
     return before, after, x - low
 

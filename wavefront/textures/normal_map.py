@@ -1,4 +1,4 @@
-"""Normal maps and bump maps: images that tilt the shading normals of a surface."""
+"""Normal maps and bump maps: images that perturb the shading normals of a surface."""
 
 from __future__ import annotations
 
@@ -18,33 +18,33 @@ from .image import UV_SETS, Texture
 
 
 class BaseNormalMap(ABC):
-    """Fine detail of a surface, such as a normal map. The renderer applies it; no material does."""
+    """The interface of normal maps and bump maps, which the stage `perturb_normals` applies."""
 
     reads: tuple[str, ...]  # fields of `SurfaceInteraction` that `perturbed` needs
 
     def scaled(self, factor: float) -> BaseNormalMap:
-        """Return this in a scene whose lengths were multiplied by `factor`: itself if it has none."""
+        """Return the map for a scene scaled by `factor`: itself, unless it has lengths."""
         return self
 
     @abstractmethod
     def perturbed(self, surface: SurfaceInteraction, normal: Floats) -> tuple[Ints, Floats]:
-        """Return which columns are tilted, (k,), and their new unit normals, (3, k).
+        """Return the lanes whose normals change, (k,), and their new unit normals, (3, k).
 
         Parameters
         ----------
         surface
-            The hit points, n columns.
+            n hit points.
         normal
             (3, n) unit shading normals there, on the front side of the surface.
         """
 
 
-FLATTEST = f4(2**-60)  # the least cosine of a tilt: float32 can square its slope
+MIN_COS = f4(2**-60)  # least cosine between old and new normal: float32 can square the slope
 TextureSource: TypeAlias = str | os.PathLike[str] | ArrayLike | Texture
-# the fields of Surface that belong together
-TANGENTS = {"uv": "tangents", "uv1": "tangents1"}
-AXES = {"uv": "tangent_frame", "uv1": "tangent_frame1"}
-MAX_STRENGTH = 1e9  # of a normal map; a larger one turns every normal into the surface
+# fields of `SurfaceInteraction`, by set of texture coordinates
+DERIVATIVES = {"uv": "dpduv", "uv1": "dpduv1"}
+TANGENT_FRAMES = {"uv": "tangent_frame", "uv1": "tangent_frame1"}
+MAX_STRENGTH = 1e9  # of a normal map; a larger one would make every normal tangential
 MAX_HEIGHT = float(np.finfo(f4).max)  # of a bump map, scene units
 
 
@@ -52,8 +52,8 @@ class NormalMap(BaseNormalMap):
     """An image of normals, for `Material(normal_map=...)`.
 
     Red, green and blue from 0 to 1 are components from -1 to 1 along u, along v and along the
-    shading normal, as in glTF: green points up in the image. On a mesh with tangents of its own, those
-    say what is along u and along v. Where the image gives (0.5, 0.5, 1) the surface keeps its own normal.
+    shading normal, as in glTF: green points up in the image. The `tangents` of a mesh, if it has any,
+    replace the directions of u and v. Where the image has (0.5, 0.5, 1) the normal does not change.
 
     Parameters
     ----------
@@ -84,23 +84,23 @@ class NormalMap(BaseNormalMap):
             raise SceneError(f"NormalMap: {self.texture!r} gives numbers; it must give three channels")
         _check_plain("NormalMap", self.texture)
         uv = UV_SETS[self.texture.uv_set]
-        self.reads = (uv, AXES[uv])
-        self._turn = _inverse(self.texture)  # (2, 2) from the mesh's axes of u and v to the image's
+        self.reads = (uv, TANGENT_FRAMES[uv])
+        self._to_image = _inverse(self.texture)  # (2, 2) from the mesh's directions of u and v to the image's
 
     def __repr__(self) -> str:
         """Name the image."""
         return f"NormalMap({self.texture!r}, strength={self.strength:g})"
 
     def perturbed(self, surface: SurfaceInteraction, normal: Floats) -> tuple[Ints, Floats]:
-        """Return the columns whose normals the image tilts, and these normals."""
-        along_u, along_v = _tangents(surface, self.reads[1])
+        """Return the lanes whose normals the image changes, (k,), and their new normals, (3, k)."""
+        along_u, along_v = _halves(surface, self.reads[1])
         x, y, z = self.texture.at(surface) * f4(2) - f4(1)
         x, y = x * self.strength, y * self.strength
         lanes = np.flatnonzero(((x != 0) | (y != 0)) & (dot(along_u, along_u) > 0))
         x, y, z, normal = x.take(lanes), y.take(lanes), z.take(lanes), normal.take(lanes, 1)
         along_u, along_v = along_u.take(lanes, 1), along_v.take(lanes, 1)
-        if self._turn is not None:
-            m = self._turn
+        if self._to_image is not None:
+            m = self._to_image
             along_u, along_v = (
                 along_u * m[0, 0] + along_v * m[1, 0],
                 along_u * m[0, 1] + along_v * m[1, 1],
@@ -114,8 +114,8 @@ class NormalMap(BaseNormalMap):
 class BumpMap(BaseNormalMap):
     """An image of heights, for `Material(normal_map=...)`.
 
-    The surface itself stays where it is; its normals tilt as if it had these heights. Source:
-    J. Blinn 1978, "Simulation of Wrinkled Surfaces", in the form of M. Mikkelsen 2010, "Bump
+    The normals become those of a surface that is displaced by these heights; the surface itself does not
+    change. Source: J. Blinn 1978, "Simulation of Wrinkled Surfaces", in the form of M. Mikkelsen 2010, "Bump
     Mapping Unparametrized Surfaces on the GPU", eq. 4.
 
     Parameters
@@ -123,7 +123,7 @@ class BumpMap(BaseNormalMap):
     image
         A file, an array, or a `Texture` of one channel; not decoded from sRGB.
     height
-        How far texel 1 stands above texel 0, scene units; negative for hollows.
+        Displacement of texel 1 relative to texel 0, scene units; negative to invert the relief.
 
     Raises
     ------
@@ -149,10 +149,10 @@ class BumpMap(BaseNormalMap):
             raise SceneError(f"BumpMap: {self.texture!r} gives colors; choose one by channel=")
         _check_plain("BumpMap", self.texture)
         uv = UV_SETS[self.texture.uv_set]
-        self.reads = (uv, TANGENTS[uv])
+        self.reads = (uv, DERIVATIVES[uv])
 
     def scaled(self, factor: float) -> BumpMap:
-        """Return this for a scene whose lengths were multiplied by `factor`."""
+        """Return the map for a scene whose lengths were multiplied by `factor`."""
         other = copy(self)
         other.height = f4(self.height * factor)
         return other
@@ -162,23 +162,23 @@ class BumpMap(BaseNormalMap):
         return f"BumpMap({self.texture!r}, height={self.height:g})"
 
     def perturbed(self, surface: SurfaceInteraction, normal: Floats) -> tuple[Ints, Floats]:
-        """Return the columns whose normals the heights tilt, and these normals."""
-        along_u, along_v = _tangents(surface, self.reads[1])
+        """Return the lanes whose normals the heights change, (k,), and their new normals, (3, k)."""
+        along_u, along_v = _halves(surface, self.reads[1])
         uv: Floats = getattr(surface, self.reads[0])
         slope_u, slope_v = self.texture.gradient(uv) * self.height
         area = dot(normal, cross(along_u, along_v))
-        uphill = cross(along_v, normal) * slope_u + cross(normal, along_u) * slope_v
-        sound = highest(np.abs(uphill)) * FLATTEST < np.abs(area)
-        lanes = np.flatnonzero(((slope_u != 0) | (slope_v != 0)) & sound)
-        normal, uphill = normal.take(lanes, 1), uphill.take(lanes, 1)
-        return lanes, normalize(normal - uphill / area.take(lanes))
+        surface_gradient = cross(along_v, normal) * slope_u + cross(normal, along_u) * slope_v
+        regular = highest(np.abs(surface_gradient)) * MIN_COS < np.abs(area)
+        lanes = np.flatnonzero(((slope_u != 0) | (slope_v != 0)) & regular)
+        normal, surface_gradient = normal.take(lanes, 1), surface_gradient.take(lanes, 1)
+        return lanes, normalize(normal - surface_gradient / area.take(lanes))
 
 
-def _tangents(surface: SurfaceInteraction, name: str) -> tuple[Floats, Floats]:
-    """Return how the point moves with u and with v, (3, n) each."""
+def _halves(surface: SurfaceInteraction, name: str) -> tuple[Floats, Floats]:
+    """Return the two vectors (3, n) of a field: along u and along v."""
     both: Floats | None = getattr(surface, name)
     if both is None:
-        raise SceneError("relief: the surface has no tangents")
+        raise SceneError("normal map: the surface has no tangents")
     return both[:3], both[3:]
 
 

@@ -1,6 +1,6 @@
-"""Turn what a user passes as a material parameter into constants of fixed shape, or keep a texture.
+"""Convert the arguments of materials to constants of fixed shape, or to textures of the right kind.
 
-A texture of numbers serves as a gray color, and a texture of colors as a number by its luminance.
+A texture of numbers is used as a gray color, and a texture of colors as a number by its luminance.
 """
 
 from __future__ import annotations
@@ -16,7 +16,9 @@ from ..state import SurfaceInteraction
 from ..vec import Floats, f4, luminance
 from .base import BaseTexture
 
-MAX_INDEX = 1e6  # of refraction, and its inverse the least: squares of squares stay within float32
+MAX_INDEX = (
+    1e6  # largest index of refraction; the least is its inverse: fourth powers stay in the range of float32
+)
 
 Color: TypeAlias = ArrayLike | BaseTexture
 Scalar: TypeAlias = float | BaseTexture
@@ -35,7 +37,7 @@ class Gray(BaseTexture):
         return repr(self.numbers)
 
     def limits(self) -> tuple[float, ...]:
-        """Return those of the numbers."""
+        """Return the limits of the numbers."""
         return self.numbers.limits()
 
     def at(self, surface: SurfaceInteraction) -> Floats:
@@ -57,7 +59,7 @@ class Luminance(BaseTexture):
         return repr(self.colors)
 
     def limits(self) -> tuple[float, ...]:
-        """Return those of the colors."""
+        """Return the limits of the colors."""
         return self.colors.limits()
 
     def at(self, surface: SurfaceInteraction) -> Floats:
@@ -66,12 +68,12 @@ class Luminance(BaseTexture):
 
 
 def check_limits(name: str, value: BaseTexture, holds: Callable[[float], bool], limit: str) -> None:
-    """Check the least and the greatest of what varies over a surface, where they are known.
+    """Check the least and the greatest value of a texture, where they are known.
 
     Raises
     ------
     SceneError
-        Naming what varies, the value and the limit.
+        With the texture, the value and the limit.
     """
     for extreme in value.limits():
         if not holds(extreme):
@@ -104,7 +106,7 @@ def scalar(
     if isinstance(value, BaseTexture):
         check_limits(name, value, holds, limit)
         return Luminance(value) if value.scalar is False else value
-    if isinstance(value, np.ndarray) and value.shape == (1,):  # as it is kept
+    if isinstance(value, np.ndarray) and value.shape == (1,):  # as stored in a material
         value = value[0]
     return np.array([number(name, value, holds, limit)], f4)
 

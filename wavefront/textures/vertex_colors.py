@@ -1,4 +1,4 @@
-"""The colors that a mesh gives at its vertices, as a material parameter."""
+"""Vertex colors of a mesh as a material parameter."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from .parameter import Color, color, scalar
 
 
 class VertexColors(BaseTexture):
-    """The interpolated `colors` of the mesh, wherever a material takes a color or a number.
+    """The interpolated `colors` of the mesh, for any material parameter that is a color or a number.
 
-    A mesh without colors, or a sphere, counts as white and opaque.
+    A mesh without colors, and a sphere, is opaque white.
 
     Parameters
     ----------
     times
-        What the colors are multiplied with, in [0, 1]: a color, a number or a texture.
+        Factor of the colors, in [0, 1]: a color, a number or a texture.
     channel
         Which channel to use as a number: 0 to 2 for red, green and blue, 3 for the opacity. None
         gives a color.
@@ -28,7 +28,7 @@ class VertexColors(BaseTexture):
     Raises
     ------
     SceneError
-        If `times` is out of range, or the channel is none of these.
+        If `times` is out of range, or the channel is invalid.
     """
 
     @suggests_keywords
@@ -42,7 +42,7 @@ class VertexColors(BaseTexture):
         self.reads = ("color", *(self.times.reads if isinstance(self.times, BaseTexture) else ()))
 
     def __repr__(self) -> str:
-        """Say what is multiplied."""
+        """Name the factor and the channel."""
         return f"VertexColors({self.times!r}, channel={self.channel!r})"
 
     def at(self, surface: SurfaceInteraction) -> Floats:
