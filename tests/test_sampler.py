@@ -406,7 +406,7 @@ def test_blue_noise_has_no_stripes():
 def test_turned_squares_hold_together(start, key):
     """Pixels of one square of the curve stay in one square, at every scale."""
     place = np.arange(1 << 12, dtype=np.uint32) + np.uint32(start << 12)
-    turned = module._turn_squares(place, np.uint32(key))
+    turned = module._mirror_squares(place, np.uint32(key))
     assert (np.sort(turned & 0xFFF) == np.arange(1 << 12)).all()
     for shift in range(2, 13, 2):
         squares = (turned >> shift).reshape(-1, 1 << shift)
@@ -415,7 +415,7 @@ def test_turned_squares_hold_together(start, key):
 
 def test_half_of_the_squares_are_turned():
     place = np.arange(1 << 16, dtype=np.uint32)
-    turned = module._turn_squares(place, np.uint32(0x9E3779B9)) ^ place
+    turned = module._mirror_squares(place, np.uint32(0x9E3779B9)) ^ place
     for level in range(0, 10, 2):
         second = (place >> level & 3) == 1
         assert (turned[second] >> level & 3 == 3).mean() == pytest.approx(0.5, abs=0.12)
