@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from wavefront.accel import Accelerator, Geometry, make_accelerator
 from wavefront.accel.build import build_tree
-from wavefront.scheduling.executors import Workers
+from wavefront.scheduling.pool import WorkerPool
 
 f4 = np.float32
 Array = NDArray[np.float32]
@@ -147,10 +147,10 @@ def two_workers(accelerator: Accelerator, origin: Array, direction: Array) -> fl
         return accelerator.closest(origin[:, some], direction[:, some], np.full(part.size, -1)).t
 
     def seconds(count: int) -> float:
-        with Workers(run, count, "processes") as crew:
-            list(crew.run(parts))  # starts them
+        with WorkerPool(run, count, "processes") as pool:
+            list(pool.run(parts))  # starts them
             start = time.perf_counter()
-            list(crew.run(parts))
+            list(pool.run(parts))
             return time.perf_counter() - start
 
     return seconds(1) / seconds(2)

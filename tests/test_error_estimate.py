@@ -9,6 +9,7 @@ from significance import render
 
 import wavefront as wf
 from wavefront.film import OUTLIERS, Film, batch_size
+from wavefront.scheduling.accumulator import film_image
 from wavefront.vec import f4
 
 
@@ -71,7 +72,7 @@ def test_no_scatter_is_no_error() -> None:
     assert not film.squared_error().any()
     assert film.noise() == 0
     lone = filled(np.ones((3, 1, 4)))
-    image = lone.image({})
+    image = film_image(lone, {})
     assert np.isnan(image.variance).all()
     assert np.isnan(image.standard_error).all()
     assert np.isnan(lone.noise())
@@ -84,13 +85,13 @@ def test_pixels_have_their_own_counts() -> None:
     film = Film(2, 2)
     film.add(pixels(0, 1, 2), samples[:, :16, :3])
     film.add(pixels(0, 2), samples[:, 16:, [0, 2]])
-    image = film.image({})
+    image = film_image(film, {})
     assert image.counts.tolist() == [[64, 16], [64, 0]]
     assert image.spp == 36
     assert image.rgb[1, 1].tolist() == [0, 0, 0]
     assert np.isnan(image.standard_error[1, 1]).all()
     for k, count in ((0, 64), (1, 16), (2, 64)):
-        alone = filled(samples[:, :count, k : k + 1]).image({})
+        alone = film_image(filled(samples[:, :count, k : k + 1]), {})
         assert (image.standard_error.reshape(-1, 3)[k] == alone.standard_error).all()
         assert (image.variance.reshape(-1, 3)[k] == alone.variance).all()
 

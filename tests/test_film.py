@@ -36,7 +36,7 @@ def test_pixels_are_means_in_row_major_order() -> None:
     """Row 0 first, left to right; a pixel without samples is black."""
     film = Film(3, 2)
     film.add(pixels(0, 5), np.arange(30, dtype=f4).reshape(3, 2, 5))
-    rgb = film.image({}).rgb
+    rgb = film.estimates().mean.reshape(2, 3, 3)
     assert rgb.shape == (2, 3, 3)
     assert rgb.dtype == np.float32
     assert rgb[0, 1].tolist() == [(1 + 6) / 2, (11 + 16) / 2, (21 + 26) / 2]

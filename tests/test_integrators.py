@@ -1,7 +1,6 @@
 """The four estimators against each other, where they estimate the same thing."""
 
 from functools import cache
-from importlib import import_module
 from itertools import combinations
 
 import numpy as np
@@ -10,6 +9,7 @@ import scenes
 from significance import Mean, assert_same_images, render, repeat
 
 import wavefront as wf
+from wavefront import settings
 from wavefront.sampling.sampler import Dimension, Sampler, make_sampler
 from wavefront.stages import compact as compact_stage
 
@@ -127,7 +127,7 @@ def test_no_number_is_used_twice(integrator: str, branches: int, monkeypatch: py
         given.append(Once(*address))
         return given[-1]
 
-    monkeypatch.setattr(import_module("wavefront.render"), "make_sampler", record)
+    monkeypatch.setattr(settings, "make_sampler", record)
     scene = scenes.everything((12, 9))
     veils = [
         wf.Rectangle((-2, -2, z), (4, 0, 0), (0, 4, 0), material=wf.Material(wf.Diffuse(0.5), alpha=0.3))

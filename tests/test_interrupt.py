@@ -16,8 +16,8 @@ import pytest
 import scenes
 
 import wavefront as wf
-from wavefront.scheduling.interrupt import CtrlC
-from wavefront.scheduling.shared import AT_ONCE, STOP, SharedNumber
+from wavefront.scheduling.interrupt import InterruptHandler
+from wavefront.scheduling.shared import AT_ONCE, STOP, SharedInt
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="signals and processes of Linux")
 EXECUTORS = ["processes", "threads"]
@@ -178,7 +178,7 @@ def test_ctrl_c_while_a_scene_is_set_up() -> None:
 def compile_scene(*_, **__):
     print("compiling", flush=True)
     time.sleep(60)
-sys.modules["wavefront.render"].compile_scene = compile_scene
+sys.modules["wavefront.session"].compile_scene = compile_scene
 try:
     wf.render(light, 1)
 except wf.Interrupted as stop:
@@ -215,11 +215,11 @@ sys.exit(wavefront.cli.main(["render", {str(scene)!r}, *options]))
 
 def test_presses_are_counted() -> None:
     """The first asks, the second hurries, the third is an error anywhere."""
-    stop = SharedNumber()
-    with CtrlC(stop) as ctrl_c:
-        assert (ctrl_c.pressed, stop.value) == (False, 0)
+    stop = SharedInt()
+    with InterruptHandler(stop) as handler:
+        assert (handler.pressed, stop.value) == (False, 0)
         signal.raise_signal(signal.SIGINT)
-        assert (ctrl_c.pressed, stop.value) == (True, STOP)
+        assert (handler.pressed, stop.value) == (True, STOP)
         signal.raise_signal(signal.SIGINT)
         assert stop.value == AT_ONCE
         with pytest.raises(KeyboardInterrupt):
@@ -232,10 +232,10 @@ def test_a_handler_of_the_programs_own_stays() -> None:
     calls: list = []
     before = signal.signal(signal.SIGINT, lambda *call: calls.append(call))
     try:
-        with CtrlC(SharedNumber()) as ctrl_c:
+        with InterruptHandler(SharedInt()) as handler:
             signal.raise_signal(signal.SIGINT)
         assert len(calls) == 1
-        assert not ctrl_c.pressed
+        assert not handler.pressed
     finally:
         signal.signal(signal.SIGINT, before)
 

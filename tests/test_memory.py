@@ -10,15 +10,17 @@ import pytest
 import scenes
 
 import wavefront as wf
+from wavefront import session
 from wavefront.film import Film
 from wavefront.memory import available_memory, check_memory
-from wavefront.scheduling.jobs import FILM_BYTES, PICTURE_BYTES, Tally
+from wavefront.scheduling.accumulator import FILM_BYTES, PICTURE_BYTES, Accumulator, film_image
 
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of Linux")
 
 LIMITED = """
 import resource, sys
 import wavefront as wf
+from wavefront import session
 import wavefront.scheduling.processes
 mesh = wf.Mesh(*{mesh})
 camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), size=(96, 96))
@@ -79,13 +81,13 @@ def test_the_film_is_as_large_as_is_checked() -> None:
     arrays = [film.count, film.squares, film.batches, *vars(film.sums).values()]
     size = sum(each.nbytes for each in arrays if isinstance(each, np.ndarray))
     assert size == pytest.approx(FILM_BYTES * 10_000, rel=0.01)
-    image = film.image({})
+    image = film_image(film, {})
     assert image.rgb.nbytes + image.variance.nbytes + image.standard_error.nbytes < PICTURE_BYTES * 10_000
 
 
 def test_the_picture_so_far_is_kept_when_memory_runs_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """Even if the last allocation failed."""
-    monkeypatch.setattr(Tally, "add", fail_after(Tally.add, 4))
+    monkeypatch.setattr(Accumulator, "add", fail_after(Accumulator.add, 4))
     with pytest.raises(wf.RenderError, match="out of memory: no room; use fewer workers") as caught:
         wf.render(scenes.everything(), 64, wave_size=300, workers=1, progress=False)
     assert 0 < caught.value.image.metadata["samples"] <= 4 * 300
@@ -93,7 +95,7 @@ def test_the_picture_so_far_is_kept_when_memory_runs_out(monkeypatch: pytest.Mon
 
 def test_no_memory_for_the_scene_is_an_error_without_a_picture(monkeypatch: pytest.MonkeyPatch) -> None:
     """It has a type, too."""
-    monkeypatch.setattr(sys.modules["wavefront.render"], "compile_scene", fail_after(abs, 0))
+    monkeypatch.setattr(session, "compile_scene", fail_after(abs, 0))
     with pytest.raises(wf.RenderError, match="out of memory while the scene was set up: no room") as caught:
         wf.render(scenes.everything(), 1, progress=False)
     assert caught.value.image is None

@@ -19,8 +19,9 @@ import scenes
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import wavefront as wf
-from wavefront.scheduling.executors import MIN_PATHS, Workers, choose_executor, worker_count
-from wavefront.scheduling.shared import STOP, SharedNumber, Stopped
+from wavefront.scheduling.executors import MIN_PATHS, choose_executor, worker_count
+from wavefront.scheduling.pool import WorkerPool
+from wavefront.scheduling.shared import STOP, SharedInt, Stopped
 
 LINUX = sys.platform.startswith("linux")
 EXECUTORS = ["threads", pytest.param("processes", marks=pytest.mark.skipif(not LINUX, reason="needs fork"))]
@@ -28,8 +29,8 @@ processes = pytest.mark.skipif(not LINUX, reason="needs fork")
 
 
 def run(work: Callable[[int], int], jobs: range, workers: int, executor: str) -> list[tuple[int, int]]:
-    with Workers(work, workers, executor) as crew:
-        return list(crew.run(jobs))
+    with WorkerPool(work, workers, executor) as pool:
+        return list(pool.run(jobs))
 
 
 @pytest.mark.parametrize("executor", EXECUTORS)
@@ -47,8 +48,8 @@ def test_results_come_in_order(workers: int, executor: str) -> None:
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_several_runs_share_the_workers(executor: str) -> None:
     """The second starts none anew."""
-    with Workers(lambda k: (k, os.getpid(), threading.get_ident()), 2, executor) as crew:
-        seen = [{result[1:] for _, result in crew.run(range(20))} for _ in range(2)]
+    with WorkerPool(lambda k: (k, os.getpid(), threading.get_ident()), 2, executor) as pool:
+        seen = [{result[1:] for _, result in pool.run(range(20))} for _ in range(2)]
     assert len(seen[0] | seen[1]) <= 2
 
 
@@ -62,8 +63,8 @@ def test_few_pieces_are_taken_ahead(executor: str) -> None:
             taken.append(k)
             yield k
 
-    with Workers(abs, 2, executor) as crew:
-        assert next(crew.run(jobs())) == (0, 0)
+    with WorkerPool(abs, 2, executor) as pool:
+        assert next(pool.run(jobs())) == (0, 0)
         assert len(taken) <= 6
 
 
@@ -85,8 +86,8 @@ def test_no_worker_is_left(executor: str) -> None:
     """Neither after the end nor after an early stop."""
     before = threading.active_count()
     run(abs, range(10), 3, executor)
-    with Workers(abs, 3, executor) as crew:
-        next(crew.run(range(10)))
+    with WorkerPool(abs, 3, executor) as pool:
+        next(pool.run(range(10)))
     assert threading.active_count() == before
     assert not multiprocessing.active_children()
 
@@ -94,8 +95,8 @@ def test_no_worker_is_left(executor: str) -> None:
 @processes
 def test_processes_are_processes() -> None:
     """As many as asked for, and none of them this one."""
-    with Workers(lambda k: time.sleep(0.05) or os.getpid(), 3, "processes") as crew:
-        pids = {pid for _, pid in crew.run(range(30))}
+    with WorkerPool(lambda k: time.sleep(0.05) or os.getpid(), 3, "processes") as pool:
+        pids = {pid for _, pid in pool.run(range(30))}
     assert len(pids) == 3
     assert os.getpid() not in pids
 
@@ -146,9 +147,9 @@ def test_workers_end_with_their_parent(tmp_path: Path) -> None:
     """Even if it is killed."""
     script = (
         "import os, sys, time\n"
-        "from wavefront.scheduling.executors import Workers\n"
-        "with Workers(lambda k: time.sleep(0.2) or os.getpid(), 2, 'processes') as crew:\n"
-        "    for _, pid in crew.run(range(1000)):\n"
+        "from wavefront.scheduling.pool import WorkerPool\n"
+        "with WorkerPool(lambda k: time.sleep(0.2) or os.getpid(), 2, 'processes') as pool:\n"
+        "    for _, pid in pool.run(range(1000)):\n"
         "        print(pid, flush=True)\n"
     )
     parent = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
@@ -198,8 +199,8 @@ def test_a_process_that_is_killed_while_it_writes_is_no_obstacle() -> None:
         return job
 
     begin = time.monotonic()
-    with Workers(work, 1, "processes") as crew:
-        assert next(crew.run(range(3))) == (0, 0)
+    with WorkerPool(work, 1, "processes") as pool:
+        assert next(pool.run(range(3))) == (0, 0)
         (child,) = multiprocessing.active_children()
         while Path(f"/proc/{child.pid}/stat").read_text().rpartition(")")[2].split()[0] != "T":
             time.sleep(0.01)
@@ -210,15 +211,15 @@ def test_a_process_that_is_killed_while_it_writes_is_no_obstacle() -> None:
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_a_stop_ends_a_run(executor: str) -> None:
     """Pieces that have not begun are not done; those under way may look, and stop too."""
-    stop = SharedNumber()
+    stop = SharedInt()
 
     def work(job: int) -> int:
         while job > 0 and not stop.value:
             time.sleep(0.01)
         return job
 
-    with Workers(work, 2, executor, stop) as crew:
-        results = crew.run(range(100), lambda: stop.rise_to(STOP))
+    with WorkerPool(work, 2, executor, stop) as pool:
+        results = pool.run(range(100), lambda: stop.rise_to(STOP))
         assert next(results) == (0, 0)
         with pytest.raises(Stopped):
             list(results)
@@ -231,9 +232,10 @@ def blas_threads() -> set[int]:
 def test_overlapping_workers_share_the_limit_of_blas() -> None:
     """It stays until the last of them has ended, and then all is as before, in whatever order they end."""
     with threadpool_limits(2, "blas"):
-        first, second = Workers(abs, 1, "threads"), Workers(abs, 1, "threads")
-        first.__enter__()
-        second.__enter__()
+        first, second = WorkerPool(abs, 1, "threads"), WorkerPool(abs, 1, "threads")
+        for pool in (first, second):
+            pool.__enter__()
+            assert list(pool.run([-1])) == [(-1, 1)]  # workers start with the first job
         assert blas_threads() == {1}
         first.__exit__(None, None, None)
         assert blas_threads() == {1}

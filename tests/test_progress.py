@@ -1,6 +1,5 @@
 """The bar: late, so that short renders have none, and right from when it appears."""
 
-import sys
 import threading
 import time
 
@@ -9,6 +8,7 @@ import scenes
 
 import wavefront as wf
 from wavefront import progress as module
+from wavefront import session
 from wavefront.io import readers
 from wavefront.io.load import load, load_mesh
 from wavefront.progress import DELAY, Bar, phase
@@ -124,14 +124,13 @@ def test_loading_is_a_phase(load, progress, tmp_path, monkeypatch, capsys) -> No
 
 def test_building_a_scene_shows_a_line(monkeypatch, capsys) -> None:
     """Where it takes long, and is not asked to be quiet."""
-    render = sys.modules["wavefront.render"]
-    compile_scene = render.compile_scene
+    compile_scene = session.compile_scene
 
     def slowly(*given, **options):
         time.sleep(0.3)
         return compile_scene(*given, **options)
 
-    monkeypatch.setattr(render, "compile_scene", slowly)
+    monkeypatch.setattr(session, "compile_scene", slowly)
     monkeypatch.setattr(module, "DELAY", 0.05)
     for quiet in (False, True):
         wf.render(scenes.everything(), 1, progress=False if quiet else None)

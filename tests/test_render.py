@@ -2,7 +2,6 @@
 
 import sys
 from functools import cache
-from importlib import import_module
 
 import numpy as np
 import pytest
@@ -11,11 +10,11 @@ import trimesh
 from significance import render
 
 import wavefront as wf
+from wavefront import session
 from wavefront.bsdfs import BsdfSample
 from wavefront.sampling.sampler import SAMPLERS
 from wavefront.vec import f4
 
-render_module = import_module("wavefront.render")  # `wavefront.render` is the function
 BALL = wf.Sphere((0, 0, 0), 1)
 SPP = 5
 
@@ -199,7 +198,7 @@ def test_bad_arguments_are_named_before_any_work(change: dict, message: str, mon
         raise AssertionError("work began before the arguments were checked")
 
     for name in ("as_scene", "compile_scene", "trace_job"):
-        monkeypatch.setattr(render_module, name, work)
+        monkeypatch.setattr(session, name, work)
     with pytest.raises(wf.SceneError, match=message):
         wf.render(small(), **{"progress": False, **change})
 

@@ -1,6 +1,5 @@
 """Stopping by noise or time: right errors, no bias, the same bits, and the time that was given."""
 
-import sys
 import time
 
 import numpy as np
@@ -9,11 +8,11 @@ import scenes
 from significance import render
 
 import wavefront as wf
+from wavefront import outcome, session
 from wavefront.film import Film
-from wavefront.scheduling import adaptive, scheduler
-from wavefront.scheduling import jobs as work
+from wavefront.scheduling import adaptive, scheduler, tracing
 from wavefront.scheduling.adaptive import MIN_SPP, next_stop, passes
-from wavefront.scheduling.jobs import split_jobs
+from wavefront.scheduling.jobs import Job, JobResult, View, split_jobs
 from wavefront.scheduling.scheduler import Scheduler
 from wavefront.vec import f4
 
@@ -36,6 +35,7 @@ def shiny(size: tuple[int, int] = (16, 12)) -> wf.Scene:
     return wf.Scene([scenes.floor(), *balls], [wf.Environment((0.3, 0.4, 0.5))], camera)
 
 
+VIEW = View(lit().camera)
 SCENES = {"lit": lit, "shiny": shiny}
 
 # --- Noise ----------------------------------------------------------------------------------------
@@ -165,9 +165,9 @@ class Machine:
             job, spent, end = queue.pop(0)
             self.now = max(self.now, end)
             counts[job.pixels] += job.samples
-            clock.note(job, spent)
+            clock.job_done(job, spent)
 
-        for job in clock.in_time(split_jobs(everything, 0, 10**9, clock.wave_size)):
+        for job in clock.in_time(split_jobs(VIEW, everything, 0, 10**9, clock.wave_size)):
             spent = self.per_wave + self.per_path * job.lanes
             spent *= slower if self.now > seconds / 2 else 1
             worker = int(np.argmin(free))
@@ -177,7 +177,7 @@ class Machine:
                 finish()
         while queue:
             finish()
-        assert clock.up
+        assert clock.time_up
         self.last_wave_size = clock.wave_size(10**9)
         return counts
 
@@ -212,8 +212,8 @@ def test_waves_are_sized_to_the_time(monkeypatch) -> None:
 def wave_sizes(per_path: float, wave_size: int | None, workers: int, branches: int = 1) -> np.ndarray:
     """Lanes of all waves of 100 000 pixels and 60 samples, each path of which takes a known time."""
     clock, lanes = Scheduler(0.0, None, wave_size, workers, branches), []
-    for job in split_jobs(np.arange(100_000, dtype=np.uint32), 0, 60, clock.wave_size):
-        clock.note(job, per_path * job.lanes)
+    for job in split_jobs(VIEW, np.arange(100_000, dtype=np.uint32), 0, 60, clock.wave_size):
+        clock.job_done(job, per_path * job.lanes)
         lanes.append(job.lanes)
     assert sum(lanes) == 6_000_000
     return np.array(lanes)
@@ -224,7 +224,7 @@ def test_waves_are_large_where_that_pays() -> None:
     least, largest = scheduler.SMALL_WAVE, scheduler.LARGE_WAVE
     for workers in (1, 2, 4):
         lanes = wave_sizes(1e-6, None, workers)
-        most = min(largest, scheduler.AT_ONCE // workers)
+        most = min(largest, scheduler.LANES_AT_ONCE // workers)
         assert 0.75 * most < lanes.max() <= most
         assert lanes[0] <= least
         assert lanes[-1] <= least
@@ -236,8 +236,8 @@ def test_waves_are_large_where_that_pays() -> None:
 
 def test_nobody_waits_for_a_large_wave() -> None:
     """Where paths are slow waves take about a second, or are small."""
-    assert wave_sizes(1e-6, None, 2).max() * 1.2e-5 > scheduler.PATIENCE
-    assert wave_sizes(1.2e-5, None, 2).max() * 1.2e-5 <= scheduler.PATIENCE
+    assert wave_sizes(1e-6, None, 2).max() * 1.2e-5 > scheduler.MAX_WAVE_SECONDS
+    assert wave_sizes(1.2e-5, None, 2).max() * 1.2e-5 <= scheduler.MAX_WAVE_SECONDS
     assert wave_sizes(1e-4, None, 2).max() <= scheduler.SMALL_WAVE
 
 
@@ -289,14 +289,13 @@ def test_time_ends_waves_under_way() -> None:
 def test_samples_of_waves_that_time_ends_are_discarded(monkeypatch) -> None:
     """What was done before is there, as if nothing else had been asked for."""
 
-    def endless(*given) -> work.JobResult:
-        *others, watch, job = given
+    def endless(tracer: tracing.Tracer, monitor: tracing.WaveMonitor, job: Job) -> JobResult:
         if job.first_sample < 3:
-            return work.trace_job(*others, watch, job)
+            return tracing.trace_job(tracer, monitor, job)
         while True:
-            watch.look(0, watch.deadline)
+            monitor.check(0, job.view.deadline)
 
-    monkeypatch.setattr(sys.modules["wavefront.render"], "trace_job", endless)
+    monkeypatch.setattr(session, "trace_job", endless)
     monkeypatch.setattr(scheduler, "FIRST_WAVE", 384)  # one sample of all pixels
     image = render(lit(), None, seconds=0.5)
     assert image.spp <= 3
@@ -307,13 +306,12 @@ def test_samples_of_waves_that_time_ends_are_discarded(monkeypatch) -> None:
 def test_pixels_without_a_sample_are_told(monkeypatch) -> None:
     """They are black."""
 
-    def endless_after_the_first(*given) -> work.JobResult:
-        *others, watch, job = given
+    def endless_after_the_first(tracer: tracing.Tracer, monitor: tracing.WaveMonitor, job: Job) -> JobResult:
         while job.pixels[0]:
-            watch.look(123, watch.deadline)
-        return work.trace_job(*others, watch, job)
+            monitor.check(123, job.view.deadline)
+        return tracing.trace_job(tracer, monitor, job)
 
-    monkeypatch.setattr(sys.modules["wavefront.render"], "trace_job", endless_after_the_first)
+    monkeypatch.setattr(session, "trace_job", endless_after_the_first)
     monkeypatch.setattr(scheduler, "FIRST_WAVE", 100)
     message = (
         r"288 pixels of 384 have no sample and are black: when seconds=0.5 were over, .* met 123 surfaces"
@@ -326,8 +324,9 @@ def test_pixels_without_a_sample_are_told(monkeypatch) -> None:
 
 def test_paths_that_do_not_end_are_told(monkeypatch) -> None:
     """Once, where more than 1 000 bounces are allowed, and more than 1 000 surfaces met."""
-    assert work.LONG_PATH == 1000
-    monkeypatch.setattr(sys.modules["wavefront.render"], "LONG_PATH", 50)
+    assert outcome.LONG_PATH == 1000
+    monkeypatch.setattr(session, "LONG_PATH", 50)
+    monkeypatch.setattr(outcome, "LONG_PATH", 50)
     with pytest.warns(UserWarning, match=r"more than 50 surfaces.*max_bounces=60.*absorb") as caught:
         wf.render(closed((2, 2)), 4, max_bounces=60, wave_size=8, progress=False)
     assert [warning.filename for warning in caught] == [__file__]

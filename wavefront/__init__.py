@@ -39,6 +39,7 @@ from .render import render
 from .sampling import warp
 from .sampling.sampler import Sampler
 from .scene import Scene
+from .session import Session
 from .shapes import Disk, Instance, Mesh, Rectangle, Shape, Sphere
 from .suggestions import did_you_mean
 from .textures.base import BaseTexture
@@ -98,6 +99,7 @@ __all__ = [
     "SaveError",
     "Scene",
     "SceneError",
+    "Session",
     "Shape",
     "Sphere",
     "SpotLight",

@@ -8,8 +8,9 @@ import signal
 import sys
 import threading
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import Field, fields
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -19,17 +20,14 @@ from .camera import Camera, image_size, upward
 from .codecs.encoding import check_exposure, check_gamma
 from .codecs.images import check_writable
 from .errors import Interrupted, RenderError, SaveError, SceneError
-from .filters import FILTERS
 from .image import Image
-from .integrators import INTEGRATORS
 from .io.load import load
-from .lighting import DEFAULT, LIGHTINGS, check_lighting
+from .lighting import check_lighting
 from .metrics import compare
-from .render import DEFAULT_SPP, render
+from .render import render
 from .rescue import save_elsewhere
-from .sampling.sampler import SAMPLERS
 from .scene import Scene
-from .scheduling.executors import EXECUTORS
+from .settings import Settings
 from .shapes import Instance, Mesh
 from .version import VERSION
 
@@ -115,33 +113,9 @@ def _add_render(commands: Any) -> None:
     command = commands.add_parser("render", help="render a scene file", formatter_class=_Help)
     command.add_argument("scene", help="obj, ply, stl, glb or gltf file")
     command.add_argument("-o", "--output", default="out.png", help="png, jpg, exr, hdr or npy file to write")
-    command.add_argument(
-        "--spp",
-        type=int,
-        help=f"samples per pixel (default: {DEFAULT_SPP}); the most there may be with --noise or --seconds",
-    )
-    command.add_argument("--noise", type=float, help="go on to this relative error, such as 0.02")
-    command.add_argument("--seconds", type=float, help="go on until this time is used")
-    command.add_argument("--filter", choices=FILTERS, default="box", help="spread of samples over a pixel")
-    command.add_argument(
-        "--size", type=_size, help="WIDTHxHEIGHT in pixels (default: the camera's, or 512x512)"
-    )
-    command.add_argument(
-        "--lighting",
-        type=_lighting,
-        metavar="PRESET",
-        default="auto",
-        help=f"light to add: {', '.join(LIGHTINGS)}, none, or auto, which is {DEFAULT} where nothing shines",
-    )
-    command.add_argument("--ground", action="store_true", help="add a ground that catches the shadow")
-    command.add_argument("--integrator", choices=INTEGRATORS, default="full", help="estimator of light")
-    command.add_argument("--max-bounces", type=int, default=12, help="scattering events along a path")
-    command.add_argument("--branches", type=int, default=1, help="ways a path goes on from its first surface")
-    command.add_argument("--sampler", choices=SAMPLERS, default="sobol", help="source of random numbers")
-    command.add_argument("--seed", type=int, default=0, help="same seed, same picture")
-    command.add_argument("--accel", default="auto", help="ray queries: auto, numpy or embree")
-    command.add_argument("--workers", type=int, help="waves traced at once (default: one per core)")
-    command.add_argument("--executor", choices=EXECUTORS, help="what workers are (default: the faster here)")
+    for each in fields(Settings):
+        if each.metadata.get("option"):
+            _add_setting(command, each)
     where = {"type": _vector, "metavar": "X,Y,Z"}
     command.add_argument("--origin", **where, help="camera position; replaces the file's camera")
     command.add_argument(
@@ -150,17 +124,23 @@ def _add_render(commands: Any) -> None:
     command.add_argument(
         "--direction", **where, help="from where a scene is framed: from its middle to the camera"
     )
-    command.add_argument(
-        "--up",
-        type=_up,
-        metavar="X,Y,Z",
-        help="what is up in the scene, or an axis such as z, as in most stl and CAD files (default: y)",
-    )
     command.add_argument("--fov", type=_fov, help=f"vertical field of view, degrees (default: {FOV:g})")
     command.add_argument("--gamma", type=_gamma, default=2.2, help='for png and jpg: a number or "srgb"')
     command.add_argument("--exposure", type=_exposure, default=0.0, help="stops, applied when saving")
     command.add_argument("--quiet", action="store_true", help="no progress bar")
     command.set_defaults(run=_render)
+
+
+def _add_setting(command: argparse.ArgumentParser, setting: Field[Any]) -> None:
+    """Add the option of a setting that has one."""
+    how: dict[str, Any] = {"help": setting.metadata["option"], "default": setting.default}
+    if setting.type == "bool":
+        how["action"] = "store_true"
+    else:
+        how["type"] = PARSERS.get(setting.name) or TYPES[str(setting.type).split(" ")[0]]
+        how["choices"] = setting.metadata["choices"]
+        how["metavar"] = METAVARS.get(setting.name)
+    command.add_argument("--" + setting.name.replace("_", "-"), **how)
 
 
 def _render(options: argparse.Namespace) -> int:
@@ -173,21 +153,7 @@ def _render(options: argparse.Namespace) -> int:
     try:
         image = render(
             scene,
-            options.spp,
-            up=options.up,
-            lighting=options.lighting,
-            ground=options.ground,
-            integrator=options.integrator,
-            max_bounces=options.max_bounces,
-            seed=options.seed,
-            sampler=options.sampler,
-            accel=options.accel,
-            workers=options.workers,
-            executor=options.executor,
-            noise=options.noise,
-            seconds=options.seconds,
-            filter=options.filter,
-            branches=options.branches,
+            **{name: getattr(options, name) for name in RENDER_OPTIONS},
             progress=progress,
         )
     except Interrupted as stop:
@@ -346,6 +312,15 @@ def _finite(text: str) -> float:
     if not np.isfinite(number):
         raise argparse.ArgumentTypeError(f"{text!r} is not a finite number")
     return number
+
+
+TYPES: dict[str, Callable[[str], Any]] = {"int": int, "float": float, "str": str}
+PARSERS: dict[str, Callable[[str], Any]] = {"size": _size, "lighting": _lighting, "up": _up}
+METAVARS = {"lighting": "PRESET", "up": "X,Y,Z"}
+CAMERA_OPTIONS = ("size",)  # settings that the command line uses for its own camera
+RENDER_OPTIONS = [
+    each.name for each in fields(Settings) if each.metadata.get("option") and each.name not in CAMERA_OPTIONS
+]
 
 
 if __name__ == "__main__":

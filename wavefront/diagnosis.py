@@ -7,7 +7,6 @@ only for pictures that are black or white all over.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from functools import cached_property
 
@@ -16,6 +15,7 @@ import numpy as np
 from .bsdfs import Bsdf
 from .camera import Camera
 from .compile.scene import CompiledScene
+from .errors import warn_caller
 from .image import Image
 from .lights import LightSample
 from .scene import Scene
@@ -55,16 +55,15 @@ def warn_of_black_or_white(
         return
     sight = Sight(scene, compiled, view, integrator, max_bounces)
     if darkest > 1:
-        warnings.warn(f"the picture is white: {sight.why_white(darkest)}", stacklevel=3)
+        warn_caller(f"the picture is white: {sight.why_white(darkest)}")
     elif brightest > BLACK:
         stops = int(np.ceil(np.log2(0.5 / brightest)))
-        warnings.warn(
+        warn_caller(
             f"the picture is almost black: its brightest pixel is {brightest:.2g}, and 1 is white; "
-            f"save(..., exposure={stops}) shows it, or lights {2**stops} times as bright",
-            stacklevel=3,
+            f"save(..., exposure={stops}) shows it, or lights {2**stops} times as bright"
         )
     elif not sight.lights_are_off:
-        warnings.warn(f"the picture is black: {sight.why_black()}", stacklevel=3)
+        warn_caller(f"the picture is black: {sight.why_black()}")
 
 
 class Sight:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
 from .exact_sum import ExactSums
-from .image import Image
+from .record import record
 from .state import Words
 from .vec import ALL, Doubles, Floats, Ints, Lanes, take
 
@@ -151,28 +150,29 @@ class Film:
         for start in range(0, self.count.size, CHUNK):
             yield slice(start, min(start + CHUNK, self.count.size))
 
-    def image(self, metadata: dict[str, Any]) -> Image:
-        """Make a picture of what there is; a pixel without samples is black. Its noise joins the metadata."""
-        width, height = self.size
-        rgb, variance, error = (np.empty((width * height, 3), np.float32) for _ in range(3))
-        relative, floor = np.empty(width * height), self._floor()
+    def estimates(self) -> Estimates:
+        """Estimate the picture and its errors; a pixel without samples is black."""
+        pixels = self.count.size
+        mean, variance, error = (np.empty((pixels, 3), np.float32) for _ in range(3))
+        relative, floor = np.empty(pixels), self._floor()
         for span in self._chunks():
             squared_error = self.squared_error(span)
             with np.errstate(over="ignore"):  # what is beyond float32 is infinite
-                rgb[span] = self.mean(span).T
+                mean[span] = self.mean(span).T
                 variance[span] = self.variance(span).T
                 error[span] = np.sqrt(squared_error).T
             relative[span] = self._relative(squared_error, span, floor)
-        noise = float(np.sqrt(_without_outliers(relative).mean()))
-        shape = height, width, 3
-        return Image(
-            rgb.reshape(shape),
-            round(float(self.count.mean())),
-            {**metadata, "noise": noise},
-            counts=self.count.reshape(height, width),
-            variance=variance.reshape(shape),
-            standard_error=error.reshape(shape),
-        )
+        return Estimates(mean, variance, error, float(np.sqrt(_without_outliers(relative).mean())))
+
+
+@record
+class Estimates:
+    """What the samples on a film come to."""
+
+    mean: Floats  # (pixels, 3)
+    variance: Floats  # (pixels, 3) of one sample; NaN for fewer than two
+    standard_error: Floats  # (pixels, 3) of `mean`; NaN for fewer than two samples
+    noise: float  # relative error of the picture
 
 
 def _without_outliers(relative: Doubles) -> Doubles:

@@ -1,3 +1,3 @@
-"""Jobs, in which order they are done, and who does them."""
+"""Jobs: how a render is split into them, in which order they are done, and by which workers."""
 
 __all__ = []

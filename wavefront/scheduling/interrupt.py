@@ -1,4 +1,4 @@
-"""Ctrl-C as a question that is answered between two waves, not as an error anywhere."""
+"""Ctrl-C sets a stop flag, which is checked between two waves, instead of raising an error anywhere."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ import threading
 from types import FrameType
 from typing import Self
 
-from .shared import AT_ONCE, STOP, SharedNumber
+from .shared import AT_ONCE, STOP, SharedInt
 
 
-class CtrlC:
-    """Within this context Ctrl-C stops the work that looks at `stop`, and raises nothing.
+class InterruptHandler:
+    """A context in which Ctrl-C sets a stop flag and raises nothing.
 
     A KeyboardInterrupt could come while samples are added to the film, or while worker processes are
     being ended, and leave half of it undone. The first Ctrl-C therefore sets `stop` to STOP, the second
-    to AT_ONCE, and only a third raises. Python calls handlers of signals in the main thread alone, so in
+    to AT_ONCE, and only a third raises. Python calls signal handlers in the main thread alone, so in
     another thread the context does nothing, and neither where the program has a handler of its own.
+    The context can be entered again within itself; the outermost exit restores Python's handler.
 
     Attributes
     ----------
@@ -24,25 +25,30 @@ class CtrlC:
         Whether Ctrl-C was pressed.
     """
 
-    def __init__(self, stop: SharedNumber) -> None:
+    def __init__(self, stop: SharedInt) -> None:
         self.pressed = False
         self._stop = stop
-        self._installed = False
+        self._depth = 0  # of contexts since the handler was installed
 
     def __enter__(self) -> Self:
-        """Answer Ctrl-C from now on."""
+        """Install the handler."""
         in_main_thread = threading.current_thread() is threading.main_thread()
-        if in_main_thread and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-            signal.signal(signal.SIGINT, self._answer)
-            self._installed = True
+        if self._depth and in_main_thread:
+            self._depth += 1
+        elif in_main_thread and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            signal.signal(signal.SIGINT, self._handle)
+            self._depth = 1
         return self
 
     def __exit__(self, *error: object) -> None:
         """Let Ctrl-C raise KeyboardInterrupt again."""
-        if self._installed:
+        if not self._depth or threading.current_thread() is not threading.main_thread():
+            return
+        self._depth -= 1
+        if not self._depth:
             signal.signal(signal.SIGINT, signal.default_int_handler)
 
-    def _answer(self, number: int, frame: FrameType | None) -> None:
+    def _handle(self, number: int, frame: FrameType | None) -> None:
         if self.pressed and self._stop.value >= AT_ONCE:
             raise KeyboardInterrupt
         self._stop.rise_to(AT_ONCE if self.pressed else STOP)

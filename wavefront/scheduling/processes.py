@@ -1,8 +1,8 @@
-"""A crew of forked processes.
+"""Workers that are forked processes.
 
-They share the memory of the process that forked them, which nobody writes. Their end is the difficult part:
-one that is stopped or busy must not be waited for, and one that is killed while it reads or writes leaves a
-pipe behind on which `concurrent.futures` would wait for ever.
+They share the memory of the process that forked them, which nobody writes. Ending them is the difficult
+part: nobody may wait for a process that is suspended or busy, and a process that is killed while it reads or
+writes leaves a pipe behind on which `concurrent.futures` would wait forever.
 """
 
 from __future__ import annotations
@@ -25,42 +25,42 @@ from typing import Any
 
 import numpy as np
 
-from .crew import LOOK, Stoppable, all_done
-from .shared import AT_ONCE, SharedNumber
+from .shared import AT_ONCE, SharedInt
+from .workers import POLL_INTERVAL, StoppableWork, all_done
 
-PATIENCE = 1.0  # seconds that processes have to end by themselves
-LAST_WORDS = 0.2  # seconds from SIGTERM to SIGKILL
+END_TIMEOUT = 1.0  # seconds that processes have to end by themselves
+TERM_TIMEOUT = 0.2  # seconds from SIGTERM to SIGKILL
 LARGEST_BLOCK = 31 << 20  # bytes; larger ones do not move glibc's limits
 
 
-class Processes:
+class ForkedWorkers:
     """A pool of forked processes."""
 
-    def __init__(self, work: Stoppable, count: int, stop: SharedNumber) -> None:
+    def __init__(self, work: StoppableWork, count: int, stop: SharedInt) -> None:
         self._stop = stop
         self._context = _Fork()
-        self._pool = ProcessPoolExecutor(count, self._context, _adopt, (work,))
+        self._pool = ProcessPoolExecutor(count, self._context, _initialize_worker, (work,))
         with _forking():
             self._pool.submit(int)  # the first task starts all processes
 
     def submit(self, job: Any) -> Future[Any]:
-        """Give a piece to the first process that is free; if one has died, the future says so."""
+        """Give a job to the first process that is free; if one has died, the future says so."""
         try:
-            return self._pool.submit(_do, job)
+            return self._pool.submit(_run, job)
         except BrokenProcessPool as error:
             failed: Future[Any] = Future()
             failed.set_exception(error)
             return failed
 
-    def end(self, running: Collection[Future[Any]]) -> None:
-        """Let the processes end when their pieces are done or stopped, or else kill them.
+    def shutdown(self, running: Collection[Future[Any]]) -> None:
+        """Let the processes end when their jobs are done or stopped, or else kill them.
 
-        Processes with pieces that are not done are killed before the pool is shut down: a pool that
-        is shut down waits for its queue to be read, and finds out no longer that nobody is left to.
+        Processes with jobs that are not done are killed before the pool is shut down: a pool that
+        is shut down waits until its queue is read, and does not notice that no reader is left.
         """
         watchdog = threading.Thread(target=self._context.end_processes, args=(self._stop,), daemon=True)
         try:
-            if not all_done(running, PATIENCE, self._stop):
+            if not all_done(running, END_TIMEOUT, self._stop):
                 self._context.kill()
             watchdog.start()
             self._pool.shutdown(wait=True)
@@ -89,7 +89,7 @@ class _ResultQueue(SimpleQueue):
 
 
 class _Fork(ForkContext):
-    """Makes what a pool of processes consists of, and remembers it, so that it can be ended from outside."""
+    """A context that records the processes and queues of a pool, so that they can be ended from outside."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -108,24 +108,24 @@ class _Fork(ForkContext):
         self._results.append(queue)
         return queue
 
-    def end_processes(self, stop: SharedNumber) -> None:
-        """Wait for all processes to end, and kill those that do not within `PATIENCE`."""
-        end = time.monotonic() + PATIENCE
-        while self._alive(LOOK):
+    def end_processes(self, stop: SharedInt) -> None:
+        """Wait for all processes to end, and kill those that do not within `END_TIMEOUT`."""
+        end = time.monotonic() + END_TIMEOUT
+        while self._alive(POLL_INTERVAL):
             if stop.value >= AT_ONCE or time.monotonic() > end:
                 self.kill()
                 return
 
     def kill(self) -> None:
-        """End all processes by SIGTERM, and those that are stopped, and so do not hear it, by SIGKILL.
+        """End all processes by SIGTERM, and those that are suspended, and so do not react to it, by SIGKILL.
 
-        One that was ended while it wrote a result leaves a reader that waits for the rest, unless all
-        writers are closed.
+        A process that was ended while it wrote a result leaves a reader that waits for the rest, unless
+        all writers are closed.
         """
         for process in self._alive(0):
             process.terminate()
-        end = time.monotonic() + LAST_WORDS
-        while self._alive(LOOK) and time.monotonic() < end:
+        end = time.monotonic() + TERM_TIMEOUT
+        while self._alive(POLL_INTERVAL) and time.monotonic() < end:
             pass
         for process in self._alive(0):
             process.kill()
@@ -143,7 +143,7 @@ class _Fork(ForkContext):
 
 @contextmanager
 def _forking() -> Iterator[None]:
-    """Let children be deaf to Ctrl-C, which the parent answers.
+    """Fork children that ignore Ctrl-C, which the parent handles.
 
     Forking beside other threads is what Python warns of: a lock that one of them holds stays held in
     the child. Ours take none but their own and those that Python and the C library renew.
@@ -157,13 +157,13 @@ def _forking() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-_adopted: Callable[[Any], Any]  # in a worker process: its work
+_work: Callable[[Any], Any]  # in a worker process
 
 
-def _adopt(work: Callable[[Any], Any]) -> None:
-    """Begin life as a worker process, which ends with its parent."""
-    global _adopted
-    _adopted = work
+def _initialize_worker(work: Callable[[Any], Any]) -> None:
+    """Prepare a worker process, which ends with its parent."""
+    global _work
+    _work = work
     _prepare_heap()
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -189,5 +189,5 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
-def _do(job: Any) -> Any:
-    return _adopted(job)
+def _run(job: Any) -> Any:
+    return _work(job)

@@ -1,4 +1,4 @@
-"""How large jobs are, and whether there is time for more."""
+"""The scheduler: how large jobs are, and whether there is time for more."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from .jobs import Job
 FIRST_WAVE = 4096  # lanes, while the speed is unknown and there is a time to keep
 SMALL_WAVE = 1 << 16  # lanes; in smaller waves a path costs more
 LARGE_WAVE = 1 << 17  # lanes; in larger waves it costs hardly less
-AT_ONCE = 1 << 19  # lanes of all workers together where that is a wave for each: 400 MB
+LANES_AT_ONCE = 1 << 19  # lanes of all workers together where that is a wave for each: 400 MB
 SHARE = 1 / 4  # part of what is left for each worker that a wave may be
-PATIENCE = 1.0  # seconds that a large wave may take, for progress waits for it
+MAX_WAVE_SECONDS = 1.0  # seconds that a large wave may take, for progress waits for it
 
 
 SHORT, LONG = 1 / 60, 1 / 20  # parts of the time there is that a wave should take
@@ -22,7 +22,7 @@ SMOOTHING = 0.3  # weight of the latest wave in what a path is expected to cost
 
 
 class Scheduler:
-    """Hands out work as long as it will be done in time; sizes waves to fit.
+    """Sizes jobs, and admits jobs for as long as they will be done in time.
 
     Parameters
     ----------
@@ -41,10 +41,10 @@ class Scheduler:
     def __init__(
         self, begin: float, seconds: float | None, wave_size: int | None, workers: int, branches: int = 1
     ) -> None:
-        self.up = False  # work was turned away, or discarded
+        self.time_up = False  # jobs were not admitted any more
         self._begin, self._seconds, self._workers = begin, seconds, workers
         if wave_size is None:
-            wave_size = min(max(AT_ONCE // workers, SMALL_WAVE), LARGE_WAVE)
+            wave_size = min(max(LANES_AT_ONCE // workers, SMALL_WAVE), LARGE_WAVE)
         self._largest = max(1, wave_size // branches)
         self._least = min(self._largest, max(1, SMALL_WAVE // branches))
         self._size = min(FIRST_WAVE, self._largest)  # where there is a time to keep
@@ -64,28 +64,28 @@ class Scheduler:
     def wave_size(self, left: int) -> int:
         """Return how many paths a wave may have.
 
-        Large waves cost less per path. But no worker should have much to do when the others are done,
-        with all that are `left` or when the time is up, and nobody should have to wait for one.
+        Large waves cost less per path. But no worker should have much to do when the others are done
+        with all that are `left`, or when the time is up, and nobody should have to wait long for a wave.
         """
-        patience = max(self._least, int(PATIENCE / self._cost)) if self._cost else self._least
+        short = max(self._least, int(MAX_WAVE_SECONDS / self._cost)) if self._cost else self._least
         if self._seconds is not None:
-            return min(patience, self._size)
-        return min(self._largest, patience, max(self._least, int(left * SHARE / self._workers)))
+            return min(short, self._size)
+        return min(self._largest, short, max(self._least, int(left * SHARE / self._workers)))
 
     def in_time(self, jobs: Iterator[Job]) -> Iterator[Job]:
-        """Pass on pieces for as long as they will be done in time.
+        """Yield the jobs for as long as they will be done in time.
 
         The first sample of every pixel is always taken.
         """
         for job in jobs:
-            self.up = job.first_sample > 0 and self._late(job.lanes)
-            if self.up:
+            self.time_up = job.first_sample > 0 and self._late(job.lanes)
+            if self.time_up:
                 return
             self._under_way += job.lanes
             yield job
 
-    def note(self, job: Job, spent: float) -> None:
-        """Take note that a piece is done, and how many seconds it took its worker."""
+    def job_done(self, job: Job, spent: float) -> None:
+        """Record that a job is done, and how many seconds it took its worker."""
         self._under_way -= job.lanes
         cost = spent / job.lanes
         self._cost = (1 - SMOOTHING) * self._cost + SMOOTHING * cost if self._cost else cost
@@ -98,7 +98,7 @@ class Scheduler:
             self._size = min(self._size, max(1, int(job.lanes * LONG * self._seconds / spent)))
 
     def _late(self, lanes: int) -> bool:
-        """Tell whether `lanes` more paths after those under way would come too late."""
+        """Return True if `lanes` more paths after those under way would be done too late."""
         if self._seconds is None:
             return False
         wait = (self._under_way + lanes) * self._cost / self._workers

@@ -1,17 +1,16 @@
-"""What `render` is given, as a scene and the camera that sees it."""
+"""What can be rendered, as a scene and the camera that sees it."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .camera import Camera, image_size, upward
+from .camera import Camera
 from .errors import SceneError
 from .lights import Light
 from .materials import Material, MaterialLike, as_material
@@ -65,45 +64,28 @@ def as_scene(subject: Any, material: MaterialLike | None = None, progress: Progr
     raise SceneError(f"cannot render {type(subject).__name__}: give {CAN_BE_RENDERED}")
 
 
-@dataclass
-class View:
-    """How `render` was asked to see a scene.
+def choose_camera(scene: Scene, camera: Camera | None, size: tuple[int, int] | None, up: Any) -> Camera:
+    """Return the camera that sees a scene.
 
-    Attributes
+    Parameters
     ----------
+    scene
+        What is seen.
     camera
-        In place of the scene's own.
+        In place of the scene's own. Without either the scene is framed.
     size
         (width, height) in pixels, in place of the camera's.
     up
-        What is up in the scene: it turns the camera that frames a scene without one, and ready-made light.
-
-    Raises
-    ------
-    SceneError
-        If one is malformed.
+        (3,) what is up in the scene: it turns the camera that frames it.
     """
-
-    camera: Camera | None
-    size: tuple[int, int] | None
-    up: Any
-
-    def __post_init__(self) -> None:
-        if self.camera is not None and not isinstance(self.camera, Camera):
-            raise SceneError(f"camera must be a wf.Camera, got {self.camera!r}")
-        self.size = None if self.size is None else image_size(self.size)
-        self.up = upward("up", "y" if self.up is None else self.up)
-
-    def of(self, scene: Scene) -> Camera:
-        """Return the camera that sees the scene."""
-        camera = self.camera or scene.camera
-        if camera is None:
-            return scene.framing_camera(size=self.size or SIZE, up=self.up)
-        return camera if self.size is None else camera.resized(self.size)
+    camera = camera or scene.camera
+    if camera is None:
+        return scene.framing_camera(size=size or SIZE, up=up)
+    return camera if size is None else camera.resized(size)
 
 
 def _is_pair(subject: Any) -> bool:
-    """Tell whether something is (vertices, faces)."""
+    """Return True for (vertices, faces)."""
     if not isinstance(subject, tuple) or len(subject) != 2:
         return False
     return all(isinstance(part, np.ndarray | list | tuple) for part in subject) and not any(

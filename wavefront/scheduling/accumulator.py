@@ -1,0 +1,116 @@
+"""The accumulator adds up the results of jobs, and makes the picture so far from them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..errors import RenderError, warn_caller
+from ..film import Film
+from ..image import Image
+from ..memory import check_memory
+from .jobs import Job, JobResult
+
+MAX_BAD_SAMPLES = 1e-4  # part of all samples that may be lost to NaN before it is an error
+FILM_BYTES = 179  # of a pixel of the film
+PICTURE_BYTES = 64  # of a pixel of the picture, and of what is needed to make it
+SPARE_BYTES = 16 << 20
+
+
+class Accumulator:
+    """Sums over all jobs that are done.
+
+    Raises
+    ------
+    SceneError
+        If there is not enough memory for the film and the picture.
+
+    Attributes
+    ----------
+    film
+        The sums of their samples.
+    bad
+        Those of them that were not finite.
+    rays
+        Queries of the accelerator.
+    """
+
+    def __init__(self, width: int, height: int) -> None:
+        pixels = width * height
+        picture = PICTURE_BYTES * pixels + SPARE_BYTES
+        check_memory(f"a picture of {width}x{height} pixels", FILM_BYTES * pixels + picture)
+        self.film, self.bad, self.rays = Film(width, height), BadSamples(), 0
+        self._reserve: Any = np.empty(picture, np.uint8)  # for the picture so far when memory has run out
+
+    @property
+    def samples(self) -> int:
+        """Number of samples on the film."""
+        return int(self.film.count.sum())
+
+    def add(self, job: Job, result: JobResult) -> None:
+        """Add the result of a job, the next of its pixels."""
+        self.film.add(job.pixels, result.radiance)
+        self.bad.count_in(job, result)
+        self.rays += result.rays
+
+    def release_reserve(self) -> None:
+        """Free the memory that is kept for the last picture."""
+        self._reserve = None
+
+    def image(self, metadata: dict[str, Any]) -> Image:
+        """Return the picture so far; numbers of samples, rays and noise join the metadata."""
+        samples = self.samples
+        counts = {
+            "spp": samples / self.film.count.size,
+            "samples": samples,
+            "rays": self.rays,
+            "bad_samples": self.bad.count,
+        }
+        return film_image(self.film, {**metadata, **counts})
+
+
+def film_image(film: Film, metadata: dict[str, Any]) -> Image:
+    """Return the picture on a film; a pixel without samples is black. Its noise joins the metadata."""
+    width, height = film.size
+    shape = height, width, 3
+    estimates = film.estimates()
+    return Image(
+        estimates.mean.reshape(shape),
+        round(float(film.count.mean())),
+        {**metadata, "noise": estimates.noise},
+        counts=film.count.reshape(height, width).copy(),
+        variance=estimates.variance.reshape(shape),
+        standard_error=estimates.standard_error.reshape(shape),
+    )
+
+
+class BadSamples:
+    """Counts samples that were not finite; none is dropped in silence."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.first = ""
+
+    def count_in(self, job: Job, result: JobResult) -> None:
+        """Count the bad lanes of a result and remember the first of all."""
+        if result.bad.size and not self.count:
+            sample, pixel = divmod(int(result.bad[0]), job.pixels.size)
+            self.first = f"pixel {job.pixels[pixel]}, sample {job.first_sample + sample}"
+        self.count += result.bad.size
+
+    def report(self, image: Image) -> None:
+        """Warn of bad samples in a picture.
+
+        Raises
+        ------
+        RenderError
+            If they are more than 1e-4 of all. It has the picture, where they count as black.
+        """
+        if not self.count:
+            return
+        samples = image.metadata["samples"]
+        message = f"{self.count} of {samples} samples were not finite and count as black; first: {self.first}"
+        if self.count > MAX_BAD_SAMPLES * samples:
+            raise RenderError(message, image)
+        warn_caller(message)

@@ -1,0 +1,133 @@
+"""The loop of a render: passes become jobs, and the results of the jobs go to the accumulator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterable, Iterator
+from typing import TypeAlias
+
+from ..errors import RenderError
+from ..progress import Bar, Progress
+from .accumulator import Accumulator
+from .adaptive import Pass, passes
+from .jobs import Job, JobResult, View, split_jobs
+from .pool import WorkerPool
+from .scheduler import Scheduler
+from .shared import SharedInt, Stopped
+
+PassSplitter: TypeAlias = Callable[[Pass], Iterable[Pass]]
+
+
+class RenderLoop:
+    """The loop that renders one view.
+
+    Parameters
+    ----------
+    view
+        What is rendered.
+    accumulator
+        Takes the results.
+    scheduler
+        Sizes the jobs and keeps the time.
+    spp, noise, seconds, progress
+        As for `render`; `spp` is the most samples that a pixel may get.
+
+    Attributes
+    ----------
+    stopped
+        Whether jobs under way were discarded, because the stop flag was set or the time was up.
+    interrupted
+        Whether the user's function or signal handler raised KeyboardInterrupt.
+    failure
+        The error that ended the loop, if one did.
+    """
+
+    def __init__(
+        self,
+        view: View,
+        accumulator: Accumulator,
+        scheduler: Scheduler,
+        *,
+        spp: int,
+        noise: float | None,
+        seconds: float | None,
+        progress: Progress,
+    ) -> None:
+        self.view, self.accumulator, self.scheduler = view, accumulator, scheduler
+        self.spp = spp
+        self._noise, self._seconds, self._progress = noise, seconds, progress
+        self.stopped = self.interrupted = False
+        self.failure: Exception | None = None
+
+    def sweeps(
+        self,
+        pool: WorkerPool[Job, JobResult],
+        surfaces: SharedInt,
+        wave_done: Callable[[], object],
+        split: PassSplitter,
+    ) -> Generator[bool]:
+        """Trace everything; yield when all pixels of a pass have the same number of samples.
+
+        Nothing is yielded after the last jobs.
+
+        Parameters
+        ----------
+        pool
+            Traces the jobs.
+        surfaces
+            How many surfaces the longest path under way has met.
+        wave_done
+            Called when a job is done, and every now and then while none is.
+        split
+            Splits a pass into shorter ones.
+
+        Yields
+        ------
+        bool
+            True at the end of a pass, or of a shorter one.
+        """
+        most = self.accumulator.film.count.size * self.spp
+        with Bar(self._progress, most, self._seconds) as bar:
+
+            def waiting() -> None:
+                bar.wait(surfaces.value, self.scheduler.elapsed)
+                wave_done()
+
+            try:
+                for step in passes(self.accumulator.film, self.spp, self._noise):
+                    if step.first:
+                        yield True
+                    parts = list(split(step))
+                    for job, result in pool.run(self.scheduler.in_time(self._jobs(parts)), waiting):
+                        self.accumulator.add(job, result)
+                        self.scheduler.job_done(job, result.seconds)
+                        wave_done()
+                        surfaces.reset()
+                        bar.advance(job.lanes, self.scheduler.elapsed)
+                        if job.pixels[-1] == step.pixels[-1] and job.end < step.last:
+                            yield any(job.end == part.last for part in parts)
+                    if self.scheduler.time_up:
+                        return
+            except Stopped:
+                self.stopped = True
+            except KeyboardInterrupt:
+                self.interrupted = True
+            except (MemoryError, RenderError) as error:
+                self.failure = error
+
+    def _jobs(self, parts: Iterable[Pass]) -> Iterator[Job]:
+        for part in parts:
+            yield from split_jobs(self.view, part.pixels, part.first, part.last, self.scheduler.wave_size)
+
+
+def undivided(step: Pass) -> Iterator[Pass]:
+    """Yield a pass as it is."""
+    yield step
+
+
+def doubling(step: Pass) -> Iterator[Pass]:
+    """Split a pass where the number of samples of a pixel is a power of two."""
+    first = step.first
+    while first < step.last:
+        last = min(step.last, 1 << first.bit_length())
+        yield Pass(step.pixels, first, last)
+        first = last

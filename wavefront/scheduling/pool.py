@@ -1,0 +1,214 @@
+"""A pool of workers that does jobs and returns the results in the order of the jobs."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future
+from concurrent.futures import wait as wait_for_futures
+from concurrent.futures.process import BrokenProcessPool
+from types import TracebackType
+from typing import Generic, Self, TypeVar
+
+from ..errors import RenderError
+from .blas import single_threaded_blas
+from .executors import EXECUTORS
+from .shared import AT_ONCE, STOP, SharedInt, Stopped
+from .workers import ExecutorMaker, StoppableWork, Workers, all_done
+
+Job = TypeVar("Job")
+Result = TypeVar("Result")
+
+RETRIES = 2  # times that lost processes are replaced
+POLL_INTERVAL = 0.1  # seconds between two checks whether work is to stop
+CANCEL_TIMEOUT = 1.0  # seconds that jobs have to end when they are canceled
+IDLE_TIMEOUT = 10.0  # seconds after which idle workers end where no context keeps them
+
+
+class WorkerPool(Generic[Job, Result]):
+    """Workers that do one kind of work, as a context manager.
+
+    Workers start with the first job, and BLAS is held to one thread per worker while there are any. Within
+    the context they stay until its end. Without a context they end when they were idle for
+    `IDLE_TIMEOUT` seconds, and start again with the next job.
+
+    Parameters
+    ----------
+    work
+        Turns a job into its result. Processes have a copy of all that it refers to, as it was when
+        they started; jobs and results are pickled.
+    count
+        Number of workers.
+    executor
+        A name in `EXECUTORS`, or a function that returns an executor for a number of workers.
+    stop
+        The stop flag. At STOP no job is begun any more, and work that checks the flag may raise `Stopped`;
+        at AT_ONCE nobody waits for jobs under way. `close` sets it to STOP.
+    """
+
+    def __init__(
+        self,
+        work: Callable[[Job], Result],
+        count: int,
+        executor: str | ExecutorMaker,
+        stop: SharedInt | None = None,
+    ) -> None:
+        self._stop = SharedInt() if stop is None else stop
+        self._work, self._count = StoppableWork(work, self._stop), count
+        self._make = EXECUTORS.find(executor)
+        self._workers: Workers | None = None
+        self._running: deque[tuple[Job, Future[Result]]] = deque()
+        self._retries = RETRIES
+        self._kept = False  # by a context
+        self._last_use = 0.0
+        self._lock = threading.RLock()  # of the workers and the deque; the idle timer takes it, too
+        self._idle_timer: threading.Thread | None = None
+        self._closed = threading.Event()
+
+    def __enter__(self) -> Self:
+        """Keep workers that are idle."""
+        self._kept = True
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the pool."""
+        self.close()
+
+    def close(self) -> None:
+        """Stop the jobs under way and end all workers; the pool cannot be used again.
+
+        Threads end at their next check of the stop flag. Processes that have not ended after a second are
+        killed.
+        """
+        self._stop.rise_to(STOP)
+        self._closed.set()
+        try:
+            self._end_workers()
+        finally:
+            timer = self._idle_timer
+            if timer is not None and timer is not threading.current_thread():
+                timer.join()
+
+    def run(
+        self, jobs: Iterable[Job], waiting: Callable[[], object] = lambda: None
+    ) -> Iterator[tuple[Job, Result]]:
+        """Yield each job with its result, in the order of the jobs.
+
+        Few jobs are under way at once, so memory does not grow with their number. While no result
+        comes, `waiting` is called every `POLL_INTERVAL` seconds.
+
+        Raises
+        ------
+        Stopped
+            If the stop flag is set, or a job raised it.
+        RenderError
+            If worker processes die again and again.
+        """
+        for job in jobs:
+            self._submit(job)
+            if len(self._running) > 2 * self._count:
+                yield self._first(waiting)
+        while self._running:
+            yield self._first(waiting)
+
+    def cancel(self) -> None:
+        """Stop the jobs under way and discard their results; the workers stay for other jobs."""
+        with self._lock:
+            futures = [future for _, future in self._running]
+            self._running.clear()
+        before = self._stop.value
+        self._stop.rise_to(STOP)
+        if not all_done(futures, CANCEL_TIMEOUT, self._stop):
+            self._end_workers(futures)
+        if before == 0 and self._stop.value < AT_ONCE:
+            self._stop.reset()
+
+    def _first(self, waiting: Callable[[], object]) -> tuple[Job, Result]:
+        """Wait for the first of the jobs under way; if workers died, give all jobs to new ones."""
+        while True:
+            job, future = self._running[0]
+            while not wait_for_futures([future], POLL_INTERVAL).done:
+                waiting()
+                if self._stop.value:
+                    raise Stopped
+            try:
+                result = future.result()
+            except BrokenProcessPool:
+                self._replace(job)
+                continue
+            with self._lock:
+                self._running.popleft()
+                self._last_use = time.monotonic()
+            return job, result
+
+    def _replace(self, job: Job) -> None:
+        """Give all jobs under way to new processes."""
+        if not self._retries:
+            raise RenderError(
+                f"worker processes died {RETRIES + 1} times, at last with {job} under way; were they "
+                "killed for lack of memory? Use fewer workers or a smaller wave_size"
+            ) from None
+        self._retries -= 1
+        with self._lock:
+            again = [each for each, _ in self._running]
+            self._end_workers()
+            for each in again:
+                self._submit(each)
+
+    def _submit(self, job: Job) -> None:
+        try:
+            with self._lock:
+                if self._workers is None:
+                    self._start_workers()
+                assert self._workers is not None
+                self._running.append((job, self._workers.submit(job)))
+                self._last_use = time.monotonic()
+        except (RuntimeError, OSError) as error:  # a limit of threads, processes or memory
+            raise RenderError(f"a worker cannot be started: {error}; use fewer workers") from error
+
+    def _start_workers(self) -> None:
+        single_threaded_blas.acquire()
+        try:
+            self._workers = self._make(self._work, self._count, self._stop)
+        except BaseException:
+            single_threaded_blas.release()
+            raise
+        if not self._kept and self._idle_timer is None:
+            self._idle_timer = threading.Thread(target=self._end_idle_workers, daemon=True)
+            self._idle_timer.start()
+
+    def _end_workers(self, running: list[Future[Result]] | None = None) -> None:
+        """End all workers; `running` are the futures that may not be done, by default those under way."""
+        with self._lock:
+            workers, self._workers = self._workers, None
+            futures = [future for _, future in self._running] if running is None else running
+            self._running.clear()
+        if workers is None:
+            return
+        try:
+            workers.shutdown(futures)
+        finally:
+            single_threaded_blas.release()
+
+    def _end_idle_workers(self) -> None:
+        """End the workers when they were idle for `IDLE_TIMEOUT` seconds. Runs in a thread of its own.
+
+        Results that nobody has fetched yet are kept.
+        """
+        left = IDLE_TIMEOUT
+        while not self._closed.wait(left):
+            with self._lock:
+                if self._kept or not all(future.done() for _, future in self._running):
+                    self._last_use = time.monotonic()
+                left = self._last_use + IDLE_TIMEOUT - time.monotonic()
+                if left > 0 and self._workers is not None:
+                    continue
+                workers, self._workers, self._idle_timer = self._workers, None, None
+                if workers is not None:
+                    workers.shutdown([])
+                    single_threaded_blas.release()
+                return

@@ -1,0 +1,116 @@
+"""Tracing a job: one wave of paths from the camera to its radiance."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..accel.base import Accelerator, Intersections
+from ..compile.scene import CompiledScene
+from ..filters import Filter
+from ..integrators import Integrator
+from ..sampling.sampler import Sampler
+from ..stages.generate import generate
+from ..state import Words
+from ..vec import Bools, Floats, Ints, broadcast
+from .jobs import Job, JobResult
+from .shared import SharedInt, Stopped
+
+FIRST_SAMPLE_TIMEOUT = 3.0  # seconds that a wave of first samples may take even if the time is up
+
+
+@dataclass(frozen=True)
+class WaveMonitor:
+    """What all workers share: the stop flag, and how long the paths under way are."""
+
+    stop: SharedInt = field(default_factory=SharedInt)
+    surfaces: SharedInt = field(default_factory=SharedInt)  # along the longest path under way
+
+    def check(self, surfaces: int, deadline: float) -> None:
+        """Record that a wave has come to another surface of its paths.
+
+        Raises
+        ------
+        Stopped
+            If the stop flag is set, or the wave's deadline is over.
+        """
+        self.surfaces.rise_to(surfaces)
+        if self.stop.value or time.perf_counter() > deadline:
+            raise Stopped
+
+
+@dataclass(frozen=True)
+class Tracer:
+    """How jobs are traced: what all views of a session have in common."""
+
+    scene: CompiledScene
+    sampler: Callable[[int], Sampler]  # of a picture so many pixels wide
+    filter: Filter
+    integrator: Integrator
+    max_bounces: int
+
+
+def trace_job(tracer: Tracer, monitor: WaveMonitor, job: Job) -> JobResult:
+    """Trace one wave of paths from the camera to its radiance.
+
+    Raises
+    ------
+    Stopped
+        If `monitor` or the deadline ends the wave between two bounces.
+    """
+    begin = time.perf_counter()
+    k, n = job.pixels.size, job.samples
+    camera, deadline = job.view.camera, job.view.deadline
+    if not job.first_sample:
+        deadline = max(deadline, begin + FIRST_SAMPLE_TIMEOUT)
+    accelerator = MonitoredAccelerator(tracer.scene.accelerator, monitor, deadline)
+    scene = replace(tracer.scene, accelerator=accelerator)
+    sampler = tracer.sampler(camera.film[0])
+    paths = generate(scene, camera, sampler, np.tile(job.pixels, n), _samples(job), tracer.filter)
+    radiance = tracer.integrator(scene, paths, sampler, tracer.max_bounces)
+    bad = np.flatnonzero(~np.isfinite(radiance).all(0))
+    radiance[:, bad] = 0
+    return JobResult(radiance.reshape(3, n, k), bad, accelerator.rays, time.perf_counter() - begin)
+
+
+def _samples(job: Job) -> Words:
+    """Index of the sample of each path of a job, (lanes,)."""
+    if job.samples == 1:
+        return broadcast(np.uint32(job.first_sample), job.pixels.size)
+    samples = np.arange(job.first_sample, job.end, dtype=np.uint32)
+    return np.repeat(samples, job.pixels.size)
+
+
+class MonitoredAccelerator:
+    """An accelerator for one wave: passes rays on to another one, counts them, and ends the wave in time.
+
+    Every bounce of every integrator asks for the nearest surfaces, so here a wave can be ended between
+    two bounces, and no integrator needs to know of it.
+    """
+
+    def __init__(self, accelerator: Accelerator, monitor: WaveMonitor, deadline: float) -> None:
+        self.name = accelerator.name
+        self.rays = 0
+        self._accelerator, self._monitor, self._deadline = accelerator, monitor, deadline
+        self._surfaces = 0
+
+    def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
+        """Find the nearest hits of rays (3, n).
+
+        Raises
+        ------
+        Stopped
+            If the wave is to end.
+        """
+        self._monitor.check(self._surfaces, self._deadline)
+        self._surfaces += 1
+        self.rays += origin.shape[1]
+        return self._accelerator.closest(origin, direction, exclude_prim)
+
+    def occluded(self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints) -> Bools:
+        """Return True for each of the rays (3, n) that something blocks."""
+        self.rays += origin.shape[1]
+        return self._accelerator.occluded(origin, direction, distance, exclude_prim)

@@ -1,0 +1,388 @@
+"""A session: a render that can be watched, stopped and pointed at another view."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator
+from functools import lru_cache, partial
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .accel import most_copies
+from .accel.registry import AcceleratorMaker
+from .bsdfs import Bsdf
+from .camera import Camera, image_size
+from .compile.scene import compile_scene
+from .diagnosis import warn_of_black_or_white
+from .errors import RenderError
+from .filters import FILTERS, Filter
+from .image import Image
+from .integrators import INTEGRATORS, WITH_MIS, Integrator
+from .lighting import choose_preset, lighted
+from .lights.samplers import LightSamplerMaker
+from .outcome import (
+    LONG_PATH,
+    check_first_samples,
+    interrupted,
+    render_error,
+    setup_errors,
+    warn_of_long_paths,
+    warn_of_noise,
+    warn_of_unseen_lights,
+)
+from .progress import Progress, phase
+from .renderable import as_scene, choose_camera
+from .sampling.sampler import SAMPLERS, SamplerMaker
+from .scheduling.accumulator import Accumulator
+from .scheduling.blas import reserve_buffers
+from .scheduling.executors import EXECUTORS
+from .scheduling.interrupt import InterruptHandler
+from .scheduling.jobs import Job, JobResult, View
+from .scheduling.loop import PassSplitter, RenderLoop, doubling, undivided
+from .scheduling.pool import WorkerPool
+from .scheduling.scheduler import Scheduler
+from .scheduling.shared import STOP
+from .scheduling.tracing import Tracer, WaveMonitor, trace_job
+from .scheduling.workers import ExecutorMaker
+from .settings import Settings, check_camera
+from .suggestions import suggests_keywords
+from .version import VERSION
+
+SNAPSHOT_INTERVAL = 1.0  # seconds between two pictures of a long pass
+
+
+class Session:
+    """A render that can be watched, stopped and pointed at another view.
+
+    Iteration goes on with the render and yields the picture so far after each pass: at 1, 2, 4, 8 ... samples
+    per pixel, or where `noise` decides anew, and at least about once a second where the passes over all
+    pixels take no longer. The last picture is that of `render`, bit for bit. While the caller looks at a
+    picture, workers go on with the next few waves.
+
+    As a context manager the session keeps its workers until the end of the block, and leaves no
+    process, thread or shared memory behind it, also after an error or Ctrl-C. Outside of a block, workers
+    that were idle for 10 seconds end, and start again when they are needed.
+
+    Parameters
+    ----------
+    scene, spp, camera, size, material, up, lighting, ground
+        As for `render`.
+    integrator, max_bounces, seed, sampler, accel, filter, light_sampler, branches
+        As for `render`.
+    workers, executor, noise, seconds, wave_size, progress
+        As for `render`.
+
+    Raises
+    ------
+    SceneError
+        If an argument or the scene is malformed.
+    Interrupted
+        After Ctrl-C while a picture is waited for.
+    RenderError
+        If the render cannot go on.
+    """
+
+    @suggests_keywords
+    def __init__(
+        self,
+        scene: Any,
+        spp: int | None = None,
+        *,
+        camera: Camera | None = None,
+        size: tuple[int, int] | None = None,
+        material: Bsdf | None = None,
+        up: ArrayLike | None = None,
+        lighting: str | None = "auto",
+        ground: bool = False,
+        integrator: str | Integrator = "full",
+        max_bounces: int = 12,
+        seed: int = 0,
+        sampler: str | SamplerMaker = "sobol",
+        accel: str | AcceleratorMaker = "auto",
+        workers: int | None = None,
+        executor: str | ExecutorMaker | None = None,
+        noise: float | None = None,
+        seconds: float | None = None,
+        filter: str | Filter = "box",
+        light_sampler: str | LightSamplerMaker = "spatial",
+        branches: int = 1,
+        wave_size: int | None = None,
+        progress: Progress = None,
+    ) -> None:
+        begin = time.perf_counter()
+        self._in_block = self._closed = False
+        self._settings = Settings(
+            spp=spp,
+            camera=camera,
+            size=size,
+            material=material,
+            up=up,
+            lighting=lighting,
+            ground=ground,
+            integrator=integrator,
+            max_bounces=max_bounces,
+            seed=seed,
+            sampler=sampler,
+            accel=accel,
+            workers=workers,
+            executor=executor,
+            noise=noise,
+            seconds=seconds,
+            filter=filter,
+            light_sampler=light_sampler,
+            branches=branches,
+            wave_size=wave_size,
+            progress=progress,
+        )
+        with setup_errors():
+            self._set_up(scene, begin)
+
+    def _set_up(self, subject: Any, begin: float) -> None:
+        """Compile the scene and begin the first picture."""
+        settings = self._settings
+        reserve_buffers(1)
+        self._scene = as_scene(subject, settings.material, settings.progress)
+        camera = choose_camera(self._scene, settings.camera, settings.size, settings.up_vector)
+        accumulator = Accumulator(*camera.size)
+        self._preset = choose_preset(self._scene, settings.lighting)
+        self._lighted = lighted(self._scene, self._preset, ground=settings.ground, up=settings.up_vector)
+        warn_of_unseen_lights(self._lighted, settings.integrator)
+        with phase("building the scene", settings.progress):
+            self._compiled = compile_scene(
+                self._lighted,
+                self._scene.accelerators.maker(settings.accel),
+                settings.light_sampler,
+                most_copies(settings.accel),
+                mis=INTEGRATORS.find(settings.integrator) in WITH_MIS,
+            )
+        self._tracer = Tracer(
+            self._compiled,
+            lru_cache(settings.sampler_for),
+            FILTERS.find(settings.filter),
+            settings.estimator(),
+            settings.max_bounces,
+        )
+        self._make_pool(settings.executor_for(camera.size))
+        self._begin_picture(camera, accumulator, begin)
+
+    def _make_pool(self, executor: str | ExecutorMaker) -> None:
+        """Make a pool of workers, which start with the first job."""
+        self._executor = executor
+        self._monitor = WaveMonitor()
+        self.interrupt_handler = InterruptHandler(self._monitor.stop)
+        work = partial(trace_job, self._tracer, self._monitor)
+        self._pool = WorkerPool[Job, JobResult](
+            work, self._settings.worker_count, executor, self._monitor.stop
+        )
+        if self._in_block:
+            self._pool.__enter__()
+
+    def _begin_picture(self, camera: Camera, accumulator: Accumulator, begin: float) -> None:
+        """Get ready for a picture of a view; `begin` is when it was asked for, by `time.perf_counter`."""
+        settings = self._settings
+        scheduler = Scheduler(
+            begin, settings.seconds, settings.wave_size, settings.worker_count, settings.branches
+        )
+        self._loop = RenderLoop(
+            View(self._compiled.view(camera), scheduler.deadline),
+            accumulator,
+            scheduler,
+            spp=settings.max_spp,
+            noise=settings.noise,
+            seconds=settings.seconds,
+            progress=settings.progress,
+        )
+        self._sweeps: Generator[bool] | None = None
+        self._last_snapshot = begin
+        self._stopped = self._ended = self._warned = False
+
+    # --- Use ------------------------------------------------------------------------------------------
+
+    def __enter__(self) -> Self:
+        """Keep the workers until the end of the block."""
+        self._in_block = True
+        self._pool.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the session."""
+        self._in_block = False
+        self.close()
+
+    def __iter__(self) -> Self:
+        """Go on with the render; a second loop goes on where the first one was left."""
+        return self
+
+    def __next__(self) -> Image:
+        """Render until there is another picture, and return it.
+
+        Raises
+        ------
+        StopIteration
+            If the last picture was returned, or the session was stopped or closed.
+        Interrupted
+            After Ctrl-C; its `image` is the picture so far.
+        RenderError
+            If the render cannot go on; its `image` is the picture so far.
+        """
+        if self._ended:
+            raise StopIteration
+        with self.interrupt_handler:
+            for pass_ended in () if self._stopped else self._sweeps_of(doubling):
+                if pass_ended or time.perf_counter() - self._last_snapshot >= SNAPSHOT_INTERVAL:
+                    snapshot = self._image()
+                    self._last_snapshot = time.perf_counter()
+                    return snapshot
+            image = self._end()
+        if image is None:
+            raise StopIteration
+        return image
+
+    def run(self) -> Image:
+        """Render to the end and return the picture.
+
+        Raises
+        ------
+        Interrupted
+            After Ctrl-C; its `image` is the picture so far.
+        RenderError
+            If the render cannot go on, or is over already.
+        """
+        if self._ended:
+            raise RenderError("the render is over; set_camera begins another picture")
+        with self.interrupt_handler:
+            for _ in () if self._stopped else self._sweeps_of(undivided):
+                pass
+            image = self._end()
+        if image is None:
+            raise RenderError("the render was stopped before there was a picture")
+        return image
+
+    def set_camera(self, camera: Camera | None, size: tuple[int, int] | None = None) -> None:
+        """Begin another picture of the same scene, without compiling it again.
+
+        What was rendered so far is dropped. Workers that have been started go on with the new picture, and
+        `seconds` count from now on.
+
+        Parameters
+        ----------
+        camera
+            What sees the scene; None for the scene's own camera, or one that frames it.
+        size
+            (width, height) in pixels, in place of the camera's.
+
+        Raises
+        ------
+        SceneError
+            If one of them is malformed. The picture that was begun is not changed.
+        """
+        begin = time.perf_counter()
+        if self._closed:
+            raise RenderError("the session is closed")
+        check_camera("camera", camera)
+        size = None if size is None else image_size(size)
+        camera = choose_camera(self._scene, camera, size, self._settings.up_vector)
+        self._compiled.view(camera)  # checks its distance
+        accumulator = Accumulator(*camera.size)
+        with self.interrupt_handler:
+            self._discard_sweeps()
+            self._pool.cancel()
+        executor = self._settings.executor_for(camera.size)
+        if self._monitor.stop.value or (executor, self._executor) == ("processes", "threads"):
+            self._pool.close()
+            self._make_pool(executor)
+        self._begin_picture(camera, accumulator, begin)
+
+    def stop(self) -> None:
+        """End the render: the loop ends, with the picture so far where one is waited for.
+
+        It can be called from another thread, and from a function that is given as `progress`.
+        """
+        self._stopped = True
+        self._monitor.stop.rise_to(STOP)
+
+    def close(self) -> None:
+        """End the render and all workers; the session cannot be used again."""
+        with self.interrupt_handler:
+            self._closed = self._ended = True
+            self._discard_sweeps()
+            self._pool.close()
+
+    # --- The picture ----------------------------------------------------------------------------------
+
+    def _sweeps_of(self, split: PassSplitter) -> Generator[bool]:
+        """Return the loop that was begun, or begin it."""
+        if self._sweeps is None:
+            self._sweeps = self._loop.sweeps(self._pool, self._monitor.surfaces, self._watch_paths, split)
+        return self._sweeps
+
+    def _discard_sweeps(self) -> None:
+        if self._sweeps is not None:
+            self._sweeps.close()
+
+    def _watch_paths(self) -> None:
+        """Warn once of paths that do not end."""
+        long = self._settings.max_bounces > LONG_PATH and self._monitor.surfaces.value > LONG_PATH
+        if long and not self._warned:
+            self._warned = True
+            warn_of_long_paths(self._settings.max_bounces)
+
+    def _end(self) -> Image | None:
+        """Return the last picture when the loop is over, or raise what ended it; None if there is none."""
+        loop, settings = self._loop, self._settings
+        self._ended = True
+        pressed = loop.interrupted or self.interrupt_handler.pressed
+        if loop.failure is not None or pressed:
+            self._pool.close()
+        else:
+            self._pool.cancel()
+        loop.accumulator.release_reserve()
+        image = self._image(cut_short=pressed or self._stopped)
+        if loop.failure is not None:
+            raise render_error(loop.failure, image) from loop.failure
+        if pressed:
+            raise interrupted(image, settings.target_spp)
+        if self._stopped:
+            return image if loop.accumulator.samples else None
+        time_up = loop.stopped or loop.scheduler.time_up
+        if time_up:
+            check_first_samples(image, settings.seconds, self._monitor.surfaces.value)
+        loop.accumulator.bad.report(image)
+        warn_of_black_or_white(
+            image,
+            self._lighted,
+            self._compiled,
+            loop.view.camera,
+            INTEGRATORS.label(settings.integrator),
+            settings.max_bounces,
+        )
+        if settings.noise is not None and (time_up or loop.accumulator.film.count.max() == settings.max_spp):
+            warn_of_noise(image, settings.noise)
+        return image
+
+    def _image(self, cut_short: bool = False) -> Image:
+        """Return the picture so far."""
+        settings = self._settings
+        return self._loop.accumulator.image(
+            {
+                "lighting": self._preset,
+                "integrator": INTEGRATORS.label(settings.integrator),
+                "max_bounces": settings.max_bounces,
+                "seed": settings.seed,
+                "sampler": SAMPLERS.label(settings.sampler),
+                "filter": FILTERS.label(settings.filter),
+                "branches": settings.branches,
+                "accelerator": self._compiled.accelerator.name,
+                "workers": settings.worker_count,
+                "executor": EXECUTORS.label(self._executor),
+                "seconds": self._loop.scheduler.elapsed,
+                "interrupted": cut_short,
+                "version": VERSION,
+                "numpy": np.__version__,
+            }
+        )

@@ -1,0 +1,303 @@
+"""The settings of a render: one declaration of their names, defaults, checks and help texts.
+
+`render` and `Session` have a parameter, and the command line most often an option, for each of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import field, fields
+from functools import partial
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .accel.registry import ACCELERATORS, AcceleratorMaker
+from .bsdfs import Bsdf
+from .camera import Camera, image_size, upward
+from .errors import SceneError, number
+from .exact_sum import MAX_TERMS
+from .filters import FILTERS, Filter
+from .integrators import INTEGRATORS, Integrator, li_full
+from .lighting import DEFAULT, LIGHTINGS, check_lighting
+from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
+from .progress import Progress
+from .record import record
+from .registry import Registry
+from .sampling.sampler import SAMPLERS, Sampler, SamplerMaker, make_sampler
+from .scheduling.executors import EXECUTORS, choose_executor, worker_count
+from .scheduling.workers import ExecutorMaker
+
+DEFAULT_SPP = 100
+MAX_BRANCH_SAMPLES = 2**32  # a sample's index is 32 bits of its address, and each branch has one
+MAX_BRANCHES = 64
+MAX_SPP_FOR_NOISE = 2**16  # where only `noise` was given
+
+Check: TypeAlias = Callable[[str, Any], Any]  # of the name and the value; returns the value as it is kept
+
+
+def setting(
+    default: Any,
+    text: str,
+    *,
+    option: str | None = None,
+    check: Check | None = None,
+    choices: Registry[Any] | None = None,
+) -> Any:
+    """Declare a setting.
+
+    Parameters
+    ----------
+    default
+        Its value where none is given.
+    text
+        What it means, for the documentation of `render`.
+    option
+        The help text of its command-line option; None where it has none.
+    check
+        Checks a value that was given, and returns it as it is kept.
+    choices
+        The table of its names.
+    """
+    if choices is not None:
+        check = partial(_check_choice, choices)
+        check = optional(check) if default is None else check
+    return field(
+        default=default, metadata={"text": text, "option": option, "check": check, "choices": choices}
+    )
+
+
+def _check_choice(choices: Registry[Any], name: str, value: Any) -> Any:
+    choices.find(value, name)
+    return value
+
+
+def optional(check: Check) -> Check:
+    """Return a check that lets None pass."""
+    return lambda name, value: None if value is None else check(name, value)
+
+
+def whole_number(low: int, high: int) -> Check:
+    """Return a check for integers from `low` to `high`."""
+
+    def check(name: str, value: Any) -> int:
+        whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+        if not whole or not low <= value <= high:
+            raise SceneError(f"{name} is {value!r}; it must be a whole number from {low} to {high}")
+        return int(value)
+
+    return check
+
+
+def above_zero(name: str, value: Any) -> float:
+    """Check that a number is positive and finite."""
+    return number(name, value, lambda x: x > 0, "above 0")
+
+
+def check_camera(name: str, value: Any) -> Camera | None:
+    """Check that something is a camera, or None."""
+    if value is not None and not isinstance(value, Camera):
+        raise SceneError(f"{name} must be a wf.Camera, got {value!r}")
+    return value
+
+
+def check_preset(name: str, value: Any) -> str | None:
+    """Check the name of a preset."""
+    check_lighting(value)
+    return value
+
+
+@record
+class Settings:
+    """The settings of a render, checked.
+
+    Raises
+    ------
+    SceneError
+        If one is malformed, or two of them exclude each other.
+    """
+
+    spp: int | None = setting(
+        None,
+        "Samples per pixel, at least 1; by default 100. With `noise` or `seconds` the most that a "
+        "pixel gets; by default then 65536, and with `seconds` as many as there is time for.",
+        option="samples per pixel (default: 100); the most there may be with --noise or --seconds",
+    )
+    camera: Camera | None = setting(
+        None,
+        "What sees the scene, in place of the scene's own camera. Without either the scene is framed.",
+        check=check_camera,
+    )
+    size: tuple[int, int] | None = setting(
+        None,
+        "(width, height) in pixels, in place of the camera's; by default (512, 512).",
+        option="WIDTHxHEIGHT in pixels (default: the camera's, or 512x512)",
+        check=optional(lambda name, value: image_size(value)),
+    )
+    material: Bsdf | None = setting(
+        None,
+        "What bare meshes are made of: those of files and of trimesh, where it replaces what they "
+        "say, (vertices, faces), and shapes that were given no material.",
+    )
+    up: ArrayLike | None = setting(
+        None,
+        'What is up in the scene: a vector (3,), or the name of an axis, such as "z" for most STL and '
+        'CAD files; by default "y". It turns the camera that frames a scene without one, and the '
+        "`lighting` and the `ground`.",
+        option="what is up in the scene, or an axis such as z, as in most stl and CAD files (default: y)",
+    )
+    lighting: str | None = setting(
+        "auto",
+        '"studio", "softbox", "three_point", "cloudy" or "even": adds the light of that name, which '
+        '`studio` describes, to the scene\'s own. "auto" adds "studio" where nothing shines, with a '
+        "warning, and nothing elsewhere; None adds nothing.",
+        option=f"light to add: {', '.join(LIGHTINGS)}, none, "
+        f"or auto, which is {DEFAULT} where nothing shines",
+        check=check_preset,
+    )
+    ground: bool = setting(
+        False,
+        "Adds a level ground under the scene that catches its shadow and fades into the background. "
+        "It belongs to the picture alone: the scene, its bounds and the numbers of its shapes stay.",
+        option="add a ground that catches the shadow",
+    )
+    integrator: str | Integrator = setting(
+        "full",
+        '"full", "direct_mis", "direct_simple" or "naive". This and the other settings that take names '
+        "also take a thing of your own, such as a function; docs/extending.md has an example of each.",
+        option="estimator of light",
+        choices=INTEGRATORS,
+    )
+    max_bounces: int = setting(
+        12,
+        "Scattering events along a path: 0 shows only light seen directly, 1 direct light.",
+        option="scattering events along a path",
+        check=whole_number(0, 2**16),
+    )
+    seed: int = setting(
+        0,
+        "The same seed gives the same picture, bit for bit, unless `seconds` is given.",
+        option="same seed, same picture",
+    )
+    sampler: str | SamplerMaker = setting(
+        "sobol",
+        '"sobol"; "bluenoise", whose error at few samples is even to the eye; or "independent".',
+        option="source of random numbers",
+        choices=SAMPLERS,
+    )
+    accel: str | AcceleratorMaker = setting(
+        "auto",
+        'Ray queries by "numpy", by "embree" (`pip install embreex`), or "auto".',
+        option="ray queries: auto, numpy or embree",
+        choices=ACCELERATORS,
+    )
+    workers: int | None = setting(
+        None,
+        "How many waves are traced at once; by default one per core.",
+        option="waves traced at once (default: one per core)",
+    )
+    executor: str | ExecutorMaker | None = setting(
+        None,
+        'What workers are: "processes" or "threads". By default processes, which are faster, on Linux '
+        "when there is work for more than a moment, and threads otherwise. The picture is the same.",
+        option="what workers are (default: the faster here)",
+        choices=EXECUTORS,
+    )
+    noise: float | None = setting(
+        None,
+        "Go on until the estimated relative error of the picture is no more than this: 0.02 means "
+        "2 %. It is the root of the relative MSE that `compare` would find against a converged picture. "
+        "Noisy parts get more samples than calm ones, and every pixel at least 32. When `spp` or "
+        "`seconds` end the render above it, a warning says so.",
+        option="go on to this relative error, such as 0.02",
+        check=optional(above_zero),
+    )
+    seconds: float | None = setting(
+        None,
+        "Go on until this time is used, scene setup included; waves that are still under way a tenth "
+        "later are discarded. Every pixel gets its first sample all the same, unless a wave of them "
+        "takes over three seconds. With `noise` as well, whichever comes first.",
+        option="go on until this time is used",
+        check=optional(above_zero),
+    )
+    filter: str | Filter = setting(
+        "box",
+        'How the samples of a pixel are spread: "box" (evenly over the pixel), "tent" (radius 1 '
+        'pixel) or "gaussian" (σ 0.5 pixels, cut off at 1.5 from the center).',
+        option="spread of samples over a pixel",
+        choices=FILTERS,
+    )
+    light_sampler: str | LightSamplerMaker = setting(
+        "spatial",
+        'How one light of many is chosen at a point: "spatial" weighs what each brings there, "power" '
+        'its power alone, "uniform" nothing.',
+        choices=LIGHT_SAMPLERS,
+    )
+    branches: int = setting(
+        1,
+        "In how many ways the path of a sample goes on from the first surface, at most 64; only "
+        '"full" has any. Two to four make a sample dearer, but less noisy by more where most of the '
+        "noise is in indirect light, as in a room.",
+        option="ways a path goes on from its first surface",
+        check=whole_number(1, MAX_BRANCHES),
+    )
+    wave_size: int | None = setting(
+        None,
+        "The most paths that are traced together by one worker; by default what suits their number "
+        "and speed, at most 131 072. The picture does not depend on it.",
+        check=optional(whole_number(1, 2**24)),
+    )
+    progress: Progress = setting(
+        None,
+        "By default a bar appears when a render takes over two seconds. False shows none; a function "
+        "is called with how much is done and how much there is at most: samples, or seconds where "
+        "`seconds` is given. While a wave takes long it is called every second.",
+    )
+    max_spp: int = field(init=False)  # the most samples that a pixel may get
+    worker_count: int = field(init=False)
+    up_vector: NDArray[np.float64] = field(init=False)  # (3,)
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            check = each.metadata.get("check")
+            if check is not None:
+                setattr(self, each.name, check(each.name, getattr(self, each.name)))
+        self.max_spp = self._most_samples()
+        self.worker_count = worker_count(self.workers)
+        self.up_vector = upward("up", "y" if self.up is None else self.up)
+        self.estimator()
+        self.sampler_for(1)
+        self.executor_for((0, 0))
+
+    @property
+    def target_spp(self) -> int | None:
+        """Samples that every pixel gets; None where noise or time decides."""
+        return self.max_spp if self.noise is None and self.seconds is None else None
+
+    def estimator(self) -> Integrator:
+        """Return the integrator for paths with so many branches."""
+        integrator = INTEGRATORS.find(self.integrator)
+        if self.branches == 1:
+            return integrator
+        if integrator is not li_full:
+            label = INTEGRATORS.label(self.integrator)
+            raise SceneError(f"branches is {self.branches}; with integrator={label!r} it must be 1")
+        return partial(li_full, branches=self.branches)
+
+    def sampler_for(self, width: int) -> Sampler:
+        """Return the sampler of a picture that is `width` pixels wide."""
+        return make_sampler(self.sampler, self.seed, width)
+
+    def executor_for(self, size: tuple[int, int]) -> str | ExecutorMaker:
+        """Return the executor for a picture of a size (width, height)."""
+        paths = size[0] * size[1] * self.max_spp * self.branches
+        return choose_executor(self.executor, self.worker_count, paths)
+
+    def _most_samples(self) -> int:
+        most = min(MAX_TERMS, MAX_BRANCH_SAMPLES // self.branches)
+        if self.spp is not None:
+            return int(whole_number(1, most)("spp", self.spp))
+        if self.seconds is not None:
+            return most
+        return DEFAULT_SPP if self.noise is None else MAX_SPP_FOR_NOISE
