@@ -42,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
     if isinstance(sys.stdout, io.TextIOWrapper):  # names of files may be in no encoding
         sys.stdout.reconfigure(errors="backslashreplace")
-    options = _parser().parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
+    options = parser().parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
     with _sigterm_exits(), warnings.catch_warnings():
         warnings.simplefilter("always", UserWarning)
         warnings.showwarning = lambda message, *_: _show_warning(message)
@@ -86,10 +86,11 @@ def _joined(arguments: Sequence[str]) -> list[str]:
     return joined
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="wavefront", description="A path tracer in whole-array NumPy.")
-    parser.add_argument("--version", action="version", version=VERSION)
-    commands = parser.add_subparsers(required=True, metavar="command")
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
+    top = argparse.ArgumentParser(prog="wavefront", description="A path tracer in whole-array NumPy.")
+    top.add_argument("--version", action="version", version=VERSION)
+    commands = top.add_subparsers(required=True, metavar="command")
     _add_render(commands)
     info = commands.add_parser("info", help="say what a scene file holds")
     info.add_argument("scene", help="obj, ply, stl, glb or gltf file")
@@ -99,7 +100,7 @@ def _parser() -> argparse.ArgumentParser:
     measure.add_argument("reference", help="the same, of the same size")
     measure.add_argument("-o", "--output", help="where to write the absolute difference")
     measure.set_defaults(run=_compare)
-    return parser
+    return top
 
 
 class _Help(argparse.ArgumentDefaultsHelpFormatter):

@@ -19,8 +19,8 @@ from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
 from .registry import Registry
 from .sampling.sampler import SAMPLERS, SamplerMaker
 from .scene import Scene
-from .scheduling.crew import PoolMaker
 from .scheduling.executors import EXECUTORS
+from .scheduling.workers import ExecutorMaker
 from .vec import Floats
 
 
@@ -120,7 +120,7 @@ def register_accelerator(name: str, accelerator: AcceleratorMaker) -> None:
     ACCELERATORS.register(name, accelerator)
 
 
-def register_executor(name: str, executor: PoolMaker) -> None:
+def register_executor(name: str, executor: ExecutorMaker) -> None:
     """Let `render(executor=name)` use workers of another kind.
 
     Parameters

@@ -233,7 +233,11 @@ class Session:
         if self._ended:
             raise StopIteration
         with self.interrupt_handler:
-            for pass_ended in () if self._stopped else self._sweeps_of(doubling):
+            if self._stopped:  # since the last picture
+                self._ended = True
+                self._pool.cancel()
+                raise StopIteration
+            for pass_ended in self._sweeps_of(doubling):
                 if pass_ended or time.perf_counter() - self._last_snapshot >= SNAPSHOT_INTERVAL:
                     snapshot = self._image()
                     self._last_snapshot = time.perf_counter()

@@ -1,0 +1,314 @@
+"""Sessions: the picture while it grows, other views with the same workers, and nothing left at the end."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import scenes
+from test_interrupt import children, end_of, runs, script, wait_for
+
+import wavefront as wf
+from wavefront import session as module
+from wavefront.scheduling import pool
+
+LINUX = sys.platform.startswith("linux")
+needs_fork = pytest.mark.skipif(not LINUX, reason="needs fork")
+EXECUTORS = ["threads", pytest.param("processes", marks=needs_fork)]
+QUIET = {"progress": False}
+
+
+def everything() -> wf.Scene:
+    return scenes.everything()
+
+
+def same(a: wf.Image, b: wf.Image) -> bool:
+    """Return True if all parts of two pictures have the same bits."""
+    parts = ("rgb", "counts", "variance", "standard_error")
+    return all(getattr(a, part).tobytes() == getattr(b, part).tobytes() for part in parts)
+
+
+def nothing_left() -> bool:
+    """Return True if there is neither a child process nor a thread of a session."""
+    return not multiprocessing.active_children() and threading.active_count() == 1
+
+
+def eventually(condition: Callable[[], bool], seconds: float = 30) -> bool:
+    """Wait until a condition holds, at most so long."""
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.02)
+    return condition()
+
+
+# --- The picture while it grows -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_a_picture_after_every_pass(executor: str) -> None:
+    """Doubling, with samples, error and time; the last one is that of render."""
+    options = {"workers": 2, "executor": executor, "wave_size": 700, **QUIET}
+    with wf.Session(everything(), 24, **options) as session:
+        images = list(session)
+        assert list(session) == []
+    assert [image.spp for image in images if image.spp in (1, 2, 4, 8, 16, 24)] == [1, 2, 4, 8, 16, 24]
+    seconds = [image.metadata["seconds"] for image in images]
+    assert seconds == sorted(seconds)
+    assert np.isnan(images[0].metadata["noise"])
+    assert all(image.metadata["noise"] > 0 for image in images[1:])
+    assert [image.metadata["samples"] for image in images] == [int(image.counts.sum()) for image in images]
+    plain = wf.render(everything(), 24, **options)
+    assert same(images[-1], plain)
+    assert images[-1].metadata.keys() == plain.metadata.keys()
+    assert not images[-1].metadata["interrupted"]
+
+
+def test_each_picture_is_that_of_a_shorter_render() -> None:
+    """And it does not change when the render goes on."""
+    with wf.Session(everything(), 8, workers=1, **QUIET) as session:
+        images = list(session)
+    for image in images:
+        assert same(image, wf.render(everything(), image.spp, workers=1, **QUIET))
+
+
+def test_long_passes_show_pictures_in_between(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At a count that all pixels have."""
+    monkeypatch.setattr(module, "SNAPSHOT_INTERVAL", 0.0)
+    with wf.Session(everything(), 16, workers=1, wave_size=200, **QUIET) as session:
+        images = list(session)
+    assert len(images) > 5  # at 1, 2, 4, 8 and 16
+    assert [image.spp for image in images] == sorted({image.spp for image in images})
+    assert all((image.counts == image.spp).all() for image in images)
+
+
+def test_noise_gives_a_picture_at_each_decision() -> None:
+    """Among others; the last one is that of render."""
+    options = {"noise": 0.05, "workers": 1, **QUIET}
+    with wf.Session(everything(), 128, **options) as session, pytest.warns(UserWarning, match="not reached"):
+        images = list(session)
+    assert [image.counts.max() for image in images[:6]] == [1, 2, 4, 8, 16, 32]
+    with pytest.warns(UserWarning, match="not reached"):
+        assert same(images[-1], wf.render(everything(), 128, **options))
+
+
+def test_time_ends_a_session() -> None:
+    """As it ends a render."""
+    with wf.Session(everything(), seconds=0.3, workers=1, **QUIET) as session:
+        images = list(session)
+    assert images[-1].counts.min() >= 1
+    assert images[-1].metadata["seconds"] > 0.2
+
+
+def test_run_goes_on_where_a_loop_was_left() -> None:
+    """A loop does, too."""
+    plain = wf.render(everything(), 16, **QUIET)
+    for finish in (lambda session: session.run(), lambda session: list(session)[-1]):
+        with wf.Session(everything(), 16, **QUIET) as session:
+            assert next(session).spp == 1
+            for image in session:
+                if image.spp == 4:
+                    break
+            assert same(finish(session), plain)
+            with pytest.raises(wf.RenderError, match="the render is over"):
+                session.run()
+
+
+# --- Another view ---------------------------------------------------------------------------------
+
+
+def view(x: float, size: tuple[int, int] = (20, 15)) -> wf.Camera:
+    return wf.Camera.look_at((x, 0.5, 3.9), (0, 0, 0), size=size)
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
+@pytest.mark.parametrize("sampler", ["sobol", "bluenoise"])
+def test_another_camera_compiles_nothing_and_starts_no_worker(
+    executor: str, sampler: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its picture is that of a render, also in another size, and when the first one was not finished."""
+    options = {"sampler": sampler, "workers": 2, "executor": executor, "wave_size": 300, **QUIET}
+    plain = [wf.render(everything(), 6, camera=view(x, size), **options) for x, size in VIEWS]
+    compiled = []
+    compile_scene = module.compile_scene
+    monkeypatch.setattr(module, "compile_scene", lambda *a, **k: compiled.append(1) or compile_scene(*a, **k))
+    with wf.Session(everything(), 6, camera=view(0), **options) as session:
+        next(session)
+        workers = {each.pid for each in multiprocessing.active_children()}
+        threads = set(threading.enumerate())
+        for (x, size), expected in zip(VIEWS, plain, strict=True):
+            session.set_camera(view(x), size)
+            assert same(session.run(), expected)
+        assert {each.pid for each in multiprocessing.active_children()} == workers
+        assert set(threading.enumerate()) <= threads
+        assert len(workers) == (2 if executor == "processes" else 0)
+    assert compiled == [1]
+
+
+VIEWS = [(0.4, (20, 15)), (-0.4, (12, 10)), (0.0, (24, 8))]
+
+
+def test_the_camera_may_be_left_to_the_scene() -> None:
+    """None is the camera of the scene, or one that frames it."""
+    with wf.Session(wf.Sphere((0, 0, 0), 1), 2, size=(8, 6), lighting="even", **QUIET) as session:
+        first = session.run()
+        session.set_camera(None, (8, 6))
+        assert same(first, session.run())
+
+
+def test_bad_cameras_leave_the_session_as_it_is() -> None:
+    """And say what is wrong."""
+    with wf.Session(everything(), 4, **QUIET) as session:
+        next(session)
+        with pytest.raises(wf.SceneError, match=r"camera must be a wf\.Camera"):
+            session.set_camera("front")  # type: ignore[arg-type]
+        with pytest.raises(wf.SceneError, match="size is"):
+            session.set_camera(None, (0, 3))
+        assert same(session.run(), wf.render(everything(), 4, **QUIET))
+
+
+def test_time_begins_anew_with_another_camera() -> None:
+    """The limit is for one picture; workers that were started hear of the new deadline."""
+    options = {"seconds": 0.4, "workers": 2, "executor": "processes" if LINUX else "threads"}
+    with wf.Session(everything(), **options, **QUIET) as session:
+        session.run()
+        time.sleep(0.5)
+        session.set_camera(view(0.4))
+        image = session.run()
+    assert image.counts.min() >= 1
+    assert image.spp > 1
+
+
+# --- Stopping -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_stop_in_the_loop_ends_it(executor: str) -> None:
+    """Another camera begins anew, with the same workers."""
+    options = {"workers": 2, "executor": executor, "wave_size": 300, **QUIET}
+    seen = []
+    with wf.Session(everything(), 100_000, **options) as session:
+        for image in session:
+            seen.append(image.spp)
+            if image.spp >= 4:
+                session.stop()
+        assert seen == [1, 2, 4]
+        workers = {each.pid for each in multiprocessing.active_children()}
+        session.set_camera(view(0.4))
+        assert next(session).spp == 1
+        assert {each.pid for each in multiprocessing.active_children()} == workers
+
+
+def test_stop_from_another_thread_gives_the_picture_so_far() -> None:
+    """It is the last one, and says that it was cut short."""
+    with wf.Session(everything(), 10_000_000, workers=2, wave_size=2000, **QUIET) as session:
+        timer = threading.Timer(0.5, session.stop)
+        timer.start()
+        image = session.run()
+        timer.join()
+        assert image.metadata["interrupted"]
+        assert image.metadata["samples"] > 0
+        assert list(session) == []
+
+
+def test_stop_before_there_is_a_picture() -> None:
+    """A loop has no rounds; run has nothing to return."""
+    with wf.Session(everything(), 4, **QUIET) as session:
+        session.stop()
+        assert list(session) == []
+        session.set_camera(None)
+        session.stop()
+        with pytest.raises(wf.RenderError, match="stopped before there was a picture"):
+            session.run()
+
+
+# --- Nothing is left ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
+@pytest.mark.parametrize("end", ["leave", "error", "close"])
+def test_nothing_is_left(executor: str, end: str) -> None:
+    """After the block, an error in it, and without a block after close."""
+    before = threading.active_count()
+    options = {"workers": 2, "executor": executor, "wave_size": 300, **QUIET}
+    session = wf.Session(everything(), 100_000, **options)
+    if end == "close":
+        next(session)
+        session.close()
+    elif end == "leave":
+        with session:
+            next(session)
+    else:
+        with pytest.raises(ZeroDivisionError), session:
+            _ = next(session).spp / 0
+    assert not multiprocessing.active_children()
+    assert threading.active_count() == before
+    assert list(session) == []
+    session.close()  # once more does no harm
+    with pytest.raises(wf.RenderError, match="the session is closed"):
+        session.set_camera(None)
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_idle_workers_end_and_start_again(executor: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Outside of a block, after a time; what they have done is not lost."""
+    assert pool.IDLE_TIMEOUT == 10
+    monkeypatch.setattr(pool, "IDLE_TIMEOUT", 0.3)
+    before = threading.active_count()
+    session = wf.Session(everything(), 16, workers=2, executor=executor, wave_size=300, **QUIET)
+    assert next(session).spp == 1
+    assert eventually(lambda: not multiprocessing.active_children() and threading.active_count() == before)
+    assert same(session.run(), wf.render(everything(), 16, **QUIET))
+    session.close()
+    assert threading.active_count() == before
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_workers_stay_within_a_block(executor: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However long the loop looks at a picture."""
+    monkeypatch.setattr(pool, "IDLE_TIMEOUT", 0.05)
+    options = {"workers": 2, "executor": executor, "wave_size": 300, **QUIET}
+    session = wf.Session(everything(), 100_000, **options)
+    next(session)
+    with session:
+        next(session)
+        threads, children = set(threading.enumerate()), multiprocessing.active_children()
+        time.sleep(0.5)
+        assert set(multiprocessing.active_children()) == set(children)
+        assert set(threading.enumerate()) == threads
+
+
+@needs_fork
+@pytest.mark.parametrize("where", ["waiting", "looking"])
+@pytest.mark.parametrize("executor", ["processes", "threads"])
+def test_ctrl_c_leaves_nothing(executor: str, where: str) -> None:
+    """While a picture is waited for, with the picture so far; in the loop's body it is Python's own."""
+    body = f"""
+try:
+    with wf.Session(light, 10_000_000, workers=2, executor={executor!r}, progress=False) as session:
+        for image in session:
+            print("tracing", flush=True)
+            if {where!r} == "looking":
+                time.sleep(60)
+except KeyboardInterrupt as stop:
+    print(type(stop).__name__, "left", left(), flush=True)
+"""
+    with script(body) as process:
+        wait_for(process, "tracing")
+        workers = children(process)
+        if where == "waiting":
+            time.sleep(0.2)
+        os.killpg(process.pid, signal.SIGINT)
+        output = end_of(process, time.monotonic())
+    names = ("Interrupted",) if where == "waiting" else ("KeyboardInterrupt",)
+    if where == "waiting":  # it may come between two pictures
+        names += ("KeyboardInterrupt",)
+    assert any(f"{name} left []" in output for name in names), output
+    assert len(workers) == (2 if executor == "processes" else 0)
+    assert not any(map(runs, workers))
