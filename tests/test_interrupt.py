@@ -9,7 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -216,7 +216,7 @@ sys.exit(wavefront.cli.main(["render", {str(scene)!r}, *options]))
 def test_presses_are_counted() -> None:
     """The first asks, the second hurries, the third is an error anywhere."""
     stop = SharedInt()
-    with InterruptHandler(stop) as handler:
+    with suppress(KeyboardInterrupt), InterruptHandler(stop) as handler:
         assert (handler.pressed, stop.value) == (False, 0)
         signal.raise_signal(signal.SIGINT)
         assert (handler.pressed, stop.value) == (True, STOP)
@@ -225,6 +225,23 @@ def test_presses_are_counted() -> None:
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_press_is_not_lost() -> None:
+    """When nothing is raised for it within the context, the outermost exit raises."""
+    handler = InterruptHandler(SharedInt())
+
+    def press_within() -> None:
+        with handler:
+            with handler:
+                signal.raise_signal(signal.SIGINT)
+            assert signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+
+    with pytest.raises(KeyboardInterrupt):
+        press_within()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    with handler:  # once for each press
+        pass
 
 
 def test_a_handler_of_the_programs_own_stays() -> None:

@@ -13,6 +13,7 @@ from .filters import Filter
 from .image import Image
 from .integrators import Integrator
 from .lights.samplers import LightSamplerMaker
+from .outcome import interrupted
 from .progress import Progress
 from .sampling.sampler import SamplerMaker
 from .scheduling.workers import ExecutorMaker
@@ -157,5 +158,9 @@ def render(
         wave_size=wave_size,
         progress=progress,
     )
-    with session.interrupt_handler, session:  # Ctrl-C is handled until the last worker has ended
-        return session.run()
+    with session.interrupt_handler as ctrl_c:  # until the last worker has ended
+        with session:
+            image = session.run()
+        if ctrl_c.pressed:
+            raise interrupted(image, None)
+    return image

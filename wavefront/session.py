@@ -241,7 +241,8 @@ class Session:
                 if pass_ended or time.perf_counter() - self._last_snapshot >= SNAPSHOT_INTERVAL:
                     snapshot = self._image()
                     self._last_snapshot = time.perf_counter()
-                    return snapshot
+                    if not self.interrupt_handler.pressed:
+                        return snapshot
             image = self._end()
         if image is None:
             raise StopIteration
@@ -293,13 +294,14 @@ class Session:
         camera = choose_camera(self._scene, camera, size, self._settings.up_vector)
         self._compiled.view(camera)  # checks its distance
         accumulator = Accumulator(*camera.size)
+        executor = self._settings.executor_for(camera.size)
         with self.interrupt_handler:
             self._discard_sweeps()
-            self._pool.cancel()
-        executor = self._settings.executor_for(camera.size)
-        if self._monitor.stop.value or (executor, self._executor) == ("processes", "threads"):
-            self._pool.close()
-            self._make_pool(executor)
+            if not self._pool.closed:
+                self._pool.cancel()
+            if self._monitor.stop.value or (executor, self._executor) == ("processes", "threads"):
+                self._pool.close()
+                self._make_pool(executor)
         self._begin_picture(camera, accumulator, begin)
 
     def stop(self) -> None:
@@ -340,19 +342,33 @@ class Session:
         """Return the last picture when the loop is over, or raise what ended it; None if there is none."""
         loop, settings = self._loop, self._settings
         self._ended = True
-        pressed = loop.interrupted or self.interrupt_handler.pressed
-        if loop.failure is not None or pressed:
+        if loop.failure is not None or self._interrupted:
             self._pool.close()
         else:
             self._pool.cancel()
         loop.accumulator.release_reserve()
-        image = self._image(cut_short=pressed or self._stopped)
+        image = self._image(cut_short=self._interrupted or self._stopped)
         if loop.failure is not None:
             raise render_error(loop.failure, image) from loop.failure
-        if pressed:
+        if not self._interrupted and not self._stopped:
+            self._report(image)
+        if self._interrupted:
             raise interrupted(image, settings.target_spp)
-        if self._stopped:
-            return image if loop.accumulator.samples else None
+        return image if loop.accumulator.samples else None
+
+    @property
+    def _interrupted(self) -> bool:
+        return self._loop.interrupted or self.interrupt_handler.pressed
+
+    def _report(self, image: Image) -> None:
+        """Warn of what is wrong with the last picture.
+
+        Raises
+        ------
+        RenderError
+            If there is no picture, or too many samples are not finite.
+        """
+        loop, settings = self._loop, self._settings
         time_up = loop.stopped or loop.scheduler.time_up
         if time_up:
             check_first_samples(image, settings.seconds, self._monitor.surfaces.value)
@@ -367,7 +383,6 @@ class Session:
         )
         if settings.noise is not None and (time_up or loop.accumulator.film.count.max() == settings.max_spp):
             warn_of_noise(image, settings.noise)
-        return image
 
     def _image(self, cut_short: bool = False) -> Image:
         """Return the picture so far."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
-from types import FrameType
+from types import FrameType, TracebackType
 from typing import Self
 
 from .shared import AT_ONCE, STOP, SharedInt
@@ -17,7 +17,8 @@ class InterruptHandler:
     being ended, and leave half of it undone. The first Ctrl-C therefore sets `stop` to STOP, the second
     to AT_ONCE, and only a third raises. Python calls signal handlers in the main thread alone, so in
     another thread the context does nothing, and neither where the program has a handler of its own.
-    The context can be entered again within itself; the outermost exit restores Python's handler.
+    The context can be entered again within itself. The outermost exit restores Python's handler, and raises
+    KeyboardInterrupt if Ctrl-C was pressed and nothing else is raised.
 
     Attributes
     ----------
@@ -29,6 +30,7 @@ class InterruptHandler:
         self.pressed = False
         self._stop = stop
         self._depth = 0  # of contexts since the handler was installed
+        self._answered = True  # with an exception, each first Ctrl-C
 
     def __enter__(self) -> Self:
         """Install the handler."""
@@ -40,16 +42,23 @@ class InterruptHandler:
             self._depth = 1
         return self
 
-    def __exit__(self, *error: object) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         """Let Ctrl-C raise KeyboardInterrupt again."""
         if not self._depth or threading.current_thread() is not threading.main_thread():
             return
         self._depth -= 1
-        if not self._depth:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+        if self._depth:
+            return
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        answered, self._answered = self._answered or kind is not None, True
+        if not answered:
+            raise KeyboardInterrupt
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         if self.pressed and self._stop.value >= AT_ONCE:
             raise KeyboardInterrupt
         self._stop.rise_to(AT_ONCE if self.pressed else STOP)
-        self.pressed = True
+        if not self.pressed:
+            self.pressed, self._answered = True, False

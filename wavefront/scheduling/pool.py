@@ -115,16 +115,23 @@ class WorkerPool(Generic[Job, Result]):
         while self._running:
             yield self._first(waiting)
 
+    @property
+    def closed(self) -> bool:
+        """Whether `close` was called."""
+        return self._closed.is_set()
+
     def cancel(self) -> None:
-        """Stop the jobs under way and discard their results; the workers stay for other jobs."""
+        """Stop the jobs under way and discard their results; the workers stay for other jobs.
+
+        The stop flag is 0 afterwards, unless it is AT_ONCE.
+        """
         with self._lock:
             futures = [future for _, future in self._running]
             self._running.clear()
-        before = self._stop.value
         self._stop.rise_to(STOP)
         if not all_done(futures, CANCEL_TIMEOUT, self._stop):
             self._end_workers(futures)
-        if before == 0 and self._stop.value < AT_ONCE:
+        if self._stop.value < AT_ONCE:
             self._stop.reset()
 
     def _first(self, waiting: Callable[[], object]) -> tuple[Job, Result]:
