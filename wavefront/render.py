@@ -7,12 +7,12 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from .accel.registry import AcceleratorMaker
-from .bsdfs import Bsdf
 from .camera import Camera
 from .filters import Filter
 from .image import Image
 from .integrators import Integrator
 from .lights.samplers import LightSamplerMaker
+from .materials import MaterialLike
 from .outcome import interrupted
 from .progress import Progress
 from .sampling.sampler import SamplerMaker
@@ -28,7 +28,7 @@ def render(
     *,
     camera: Camera | None = None,
     size: tuple[int, int] | None = None,
-    material: Bsdf | None = None,
+    material: MaterialLike | None = None,
     up: ArrayLike | None = None,
     lighting: str | None = "auto",
     ground: bool = False,

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from .accel import most_copies
 from .accel.registry import AcceleratorMaker
-from .bsdfs import Bsdf
 from .camera import Camera, image_size
 from .compile.scene import compile_scene
 from .diagnosis import warn_of_black_or_white
@@ -23,6 +22,7 @@ from .image import Image
 from .integrators import INTEGRATORS, WITH_MIS, Integrator
 from .lighting import choose_preset, lighted
 from .lights.samplers import LightSamplerMaker
+from .materials import MaterialLike
 from .outcome import (
     LONG_PATH,
     check_first_samples,
@@ -93,7 +93,7 @@ class Session:
         *,
         camera: Camera | None = None,
         size: tuple[int, int] | None = None,
-        material: Bsdf | None = None,
+        material: MaterialLike | None = None,
         up: ArrayLike | None = None,
         lighting: str | None = "auto",
         ground: bool = False,

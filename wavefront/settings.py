@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .accel.registry import ACCELERATORS, AcceleratorMaker
-from .bsdfs import Bsdf
 from .camera import Camera, image_size, upward
 from .errors import SceneError, number
 from .exact_sum import MAX_TERMS
@@ -22,6 +21,7 @@ from .filters import FILTERS, Filter
 from .integrators import INTEGRATORS, Integrator, li_full
 from .lighting import DEFAULT, LIGHTINGS, check_lighting
 from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
+from .materials import MaterialLike
 from .progress import Progress
 from .record import record
 from .registry import Registry
@@ -135,7 +135,7 @@ class Settings:
         option="WIDTHxHEIGHT in pixels (default: the camera's, or 512x512)",
         check=optional(lambda name, value: image_size(value)),
     )
-    material: Bsdf | None = setting(
+    material: MaterialLike | None = setting(
         None,
         "What bare meshes are made of: those of files and of trimesh, where it replaces what they "
         "say, (vertices, faces), and shapes that were given no material.",
