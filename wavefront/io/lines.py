@@ -9,7 +9,7 @@ from typing import TypeVar
 Result = TypeVar("Result")
 
 DIGITS = bytes.maketrans(b"123456789", b"0" * 9)
-NUMBER = re.compile(r"[-+]?((\d+\.?\d*|\.\d+)(e[-+]?\d+)?|inf|infinity|nan)", re.ASCII | re.IGNORECASE)
+NUMBER = re.compile(r"[-+]?((\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?|inf|infinity|nan)", re.ASCII | re.IGNORECASE)
 
 
 def words(line: str) -> list[str]:

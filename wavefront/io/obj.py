@@ -27,6 +27,7 @@ UNSEEN = ("", "o", "g")  # keywords without an effect on the look of a surface
 OFF = ("off", "0")  # values that switch a keyword off
 NAMED = ("usemtl", "mtllib", "o ", "g ")  # statements with a name, which may contain a #
 LEAST = {"v": 3, "vt": 1, "vn": 3, "f": 3}  # least number of words of a line
+MOST = {"v": 6, "vt": 2, "vn": 3}  # number of words of a line that are read
 NUMBERS = (NUMBER, ", which is not a number", "numbers", "must have")
 INDEX = r"[-+]?0{0,99}\d{1,19}"
 CORNER = re.compile(rf"{INDEX}(/({INDEX})?(/{INDEX})?)?/*", re.ASCII)
@@ -60,9 +61,7 @@ class _Lines:
     kinds: list[Kind]
     rows: dict[str, list[int]] = field(default_factory=lambda: {"v": [], "vt": [], "vn": []})  # by keyword
     groups: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))  # of f, by material
-    absent: dict[str, str] = field(
-        default_factory=dict
-    )  # vt, vn that faces use but no line gives -> a message
+    absent: dict[str, str] = field(default_factory=dict)  # keyword that only faces use -> message
 
 
 def parse(name: str, text: str, strict: bool = False) -> Obj:
@@ -81,6 +80,8 @@ def parse(name: str, text: str, strict: bool = False) -> Obj:
             lines.groups[material].append(at)
         elif keyword:
             lines.rows[keyword].append(at)
+            if width > MOST[keyword]:
+                texts[at] = " ".join(words(texts[at])[: MOST[keyword] + 1])
             if width > 6 and keyword == "v":
                 out.ignored.setdefault("numbers of v after the sixth", at + 1)
         else:
@@ -130,19 +131,17 @@ def _check(name: str, number: int, line: str) -> Kind:
     if len(rest) < LEAST[keyword]:
         has = f"{keyword} has {len(rest)} {what} ({line[len(keyword) :].strip()!r})"
         raise SceneError(f"{place}: {has}; it {must} at least {LEAST[keyword]}")
-    forms = {re.sub(r"\d+", "1", word) for word in rest}
+    forms = {re.sub(r"\d+", "1", word) for word in rest if keyword == "f"}
     return Kind(keyword, len(rest), forms.pop() if len(forms) == 1 else "")
 
 
 def _tables(lines: _Lines) -> list[str]:
-    """Return the lines of v, vt and vn, all of one keyword with the same number of words."""
+    """Return the lines of v, vt and vn, padded so that all of one keyword have the same number of words."""
     written = []
     for keyword, least, fill in (("v", 3, " nan"), ("vt", 2, " 0"), ("vn", 3, "")):
-        rows = [(lines.texts[at], lines.kinds[at].width) for at in lines.rows[keyword]]
-        most = max([least, *(width for _, width in rows)])
-        if keyword == "vn" and most > 3:  # trimesh drops normals of four numbers
-            rows = [(" ".join(words(text)[:4]), 3) for text, _ in rows]
-        written += [text + fill * (most - width) for text, width in rows]
+        rows = lines.rows[keyword]
+        width = min(MOST[keyword], max([least, *(lines.kinds[at].width for at in rows)]))
+        written += [lines.texts[at] + fill * (width - lines.kinds[at].width) for at in rows]
     return written
 
 
@@ -184,10 +183,10 @@ def _rewritten(lines: _Lines, group: list[int]) -> list[str]:
             for number, face in enumerate(faces, 1):
                 for corner in face:
                     corner[column] = corner[column] or len(rows) + (number if keyword == "vn" else 1)
-    texts = (
-        ["/".join(str(index or "") for index in corner).rstrip("/") for corner in face] for face in faces
-    )
-    return ["f " + " ".join(corners) for corners in texts]
+    return [
+        "f " + " ".join("/".join(str(i or "") for i in corner).rstrip("/") for corner in face)
+        for face in faces
+    ]
 
 
 def _corner(lines: _Lines, at: int, word: str) -> list[int]:
