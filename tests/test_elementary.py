@@ -21,14 +21,13 @@ from wavefront import elementary
 HERE = Path(__file__).parent
 PACKAGE = Path(wavefront.__file__).parent
 FUNCTIONS = r"np\.(exp2?|expm1|log2?|log1p|log10|sin|cos|tan|arc\w+|sinh|cosh|tanh|power|cbrt|hypot)\("
-# What reaches no picture: projection of points, advice, a metric, inverses of warps, spherical triangles.
+# What reaches no picture: projection of points, advice, a metric, inverses of warps.
 ALLOWED = {
     "camera/distortion.py": 3,
     "camera/projection.py": 2,
     "diagnosis.py": 4,
     "metrics.py": 1,
     "sampling/warp.py": 4,
-    "sampling/spherical.py": 4,
 }
 
 

@@ -14,10 +14,10 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from .vec import Floats
+
 # float32 or float64, of any shape; results are of the same type
 Reals = TypeVar("Reals", bound=NDArray[np.floating[Any]] | np.floating[Any])
-
-Floats = NDArray[np.floating[Any]]  # float32, of any shape
 
 F4, F8 = np.dtype(np.float32), np.dtype(np.float64)
 

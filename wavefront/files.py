@@ -41,7 +41,7 @@ def read_bytes(path: str | os.PathLike[str], limit: int = MAX_BYTES) -> bytes:
         raise SceneError(f"{name}: cannot be read: {error}") from error
 
 
-def decode(data: bytes) -> str:
+def decode_text(data: bytes) -> str:
     """Return text from UTF-8 or UTF-16 (by its byte order mark), else Latin-1; line ends become \\n."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         text = data.decode("utf-16", errors="replace")

@@ -57,10 +57,10 @@ class Parametrized:
 
     def __repr__(self) -> str:
         """Return the call that makes it; keyword-only arguments are shown if they are not the default."""
-        return f"{type(self).__name__}({', '.join(shown(self))})"
+        return f"{type(self).__name__}({', '.join(named_arguments(self))})"
 
 
-def shown(thing: Any) -> list[str]:
+def named_arguments(thing: Any) -> list[str]:
     """Return "name=value" of the constructor's arguments that an object has as attributes."""
     import inspect  # imported here, since few programs need it
 

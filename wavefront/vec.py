@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.floating[Any]]  # float32; NumPy's stubs do not keep the width in arithmetic
 Doubles = NDArray[np.float64]
+Bytes = NDArray[np.uint8]
 Ints = NDArray[np.intp]
 Bools = NDArray[np.bool_]
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..record import record
-from ..vec import Bools, Floats, Ints, f4
+from ..vec import Bools, Bytes, Floats, Ints, f4
 from . import triangle
 from .base import Geometry
 from .bvh import Ball, RayBatch, flat_true, scratch
@@ -25,7 +25,6 @@ from .quads import are_parallelograms, corners, diagonal_planes, find_quads, pla
 from .triangle import PolygonPlanes, TriangleTable, least_adjacent_product, least_opposite_product
 
 CHUNK = 1 << 19  # elements of one product
-Bytes = NDArray[np.uint8]
 
 
 @record

@@ -13,13 +13,13 @@ from ..errors import SceneError
 from ..files import check_size
 from ..vec import Floats
 
-Attribute = str | int | float
+HeaderValue = str | int | float
 
 MAX_VALUES = 2**27  # of all channels of all parts: 512 MB as float32
 VALUES_PER_BYTE = 16  # larger files may hold more: so many values for each byte of the file
 
 
-def encode(channels: Mapping[str, NDArray[Any]], attributes: Mapping[str, Attribute]) -> bytes:
+def encode(channels: Mapping[str, NDArray[Any]], attributes: Mapping[str, HeaderValue]) -> bytes:
     """Return an exr file of channels (H, W) or (H, W, 3), float32 or uint32, by name."""
     import OpenEXR  # here, so that starting up does not pay for it
 

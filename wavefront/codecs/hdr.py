@@ -8,13 +8,11 @@ from __future__ import annotations
 import re
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import SceneError
 from ..files import check_size
-from ..vec import Floats
+from ..vec import Bytes, Floats
 
-Bytes = NDArray[np.uint8]
 SIGNATURES = (b"#?RADIANCE", b"#?RGBE")
 MIN_RUN = 4  # shorter runs cost more than they save
 

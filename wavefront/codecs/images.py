@@ -24,12 +24,12 @@ from . import exr
 from . import hdr as rgbe
 from . import png_jpeg as coded
 from .encoding import check_gamma, codes_to_linear, exposed, to_8bit
-from .exr import Attribute
+from .exr import HeaderValue
 from .png_jpeg import Gamma
 
 T = TypeVar("T")
 
-Attributes: TypeAlias = Mapping[str, Attribute]
+Attributes: TypeAlias = Mapping[str, HeaderValue]
 Decoder: TypeAlias = Callable[
     [bytes], NDArray[Any]
 ]  # returns uint8 or uint16 codes, or linear float32, (H, W, C)
@@ -56,7 +56,7 @@ def write_image(
     *,
     gamma: Gamma = 2.2,
     exposure: float = 0.0,
-    attributes: Mapping[str, Attribute] | None = None,
+    attributes: Mapping[str, HeaderValue] | None = None,
 ) -> None:
     """Write a picture in the format that the extension of `path` names.
 
@@ -92,7 +92,7 @@ def write_image(
 def write_channels(
     path: str | os.PathLike[str],
     channels: Mapping[str, ArrayLike],
-    attributes: Mapping[str, Attribute] | None = None,
+    attributes: Mapping[str, HeaderValue] | None = None,
 ) -> None:
     """Write named (H, W) or (H, W, 3) arrays into one exr; float32 and uint32 are kept exactly.
 

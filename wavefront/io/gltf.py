@@ -14,7 +14,8 @@ import numpy as np
 from ..camera import Camera
 from ..errors import SceneError
 from ..lights import DirectionalLight, PointLight, SpotLight
-from .gltf_document import Document, Matrix, floats, shown
+from ..shapes.transform import Matrix
+from .gltf_document import Document, floats, shown
 from .gltf_meshes import primitives
 from .gltf_nodes import Node, count_placements, placements, walk
 from .placing import Places

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from ..files import beside, read_bytes
+from ..shapes.transform import Matrix
 
 COMPONENTS: dict[int, type[np.generic]] = {
     5120: np.int8,
@@ -38,7 +39,6 @@ LARGEST = float(np.finfo(np.float64).max)
 SHOWN = 80  # characters of a value in a message
 # errors of reading JSON of the wrong structure: a list in place of a number, text in place of a list
 MALFORMED = (TypeError, KeyError, AttributeError, IndexError, ValueError, OverflowError)
-Matrix = NDArray[np.float64]
 
 
 class Document:

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import SceneError
-from .gltf_document import Document, Matrix, shown, table
+from ..shapes.transform import Matrix
+from .gltf_document import Document, shown, table
 from .gltf_meshes import attribute
 from .placing import MAX_ELEMENT, in_range
 from .repair import wide

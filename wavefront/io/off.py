@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..errors import SceneError
-from ..files import decode
+from ..files import decode_text
 from .repair import warn
 from .trimesh_loading import by_trimesh
 
@@ -20,7 +20,7 @@ def parse(name: str, data: bytes, strict: bool, materials: bool) -> Any:
     SceneError
         If a line is malformed. The message names the file and the line.
     """
-    lines = [line.partition("#")[0].split() for line in decode(data).split("\n")]
+    lines = [line.partition("#")[0].split() for line in decode_text(data).split("\n")]
     rows = [(number, words) for number, words in enumerate(lines, 1) if words]
     header = rows[0][1][0].upper() if rows else ""
     if header not in HEADERS:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from ..errors import SceneError
-from ..files import beside, decode, read_bytes
+from ..files import beside, decode_text, read_bytes
 from ..registry import Registry
 from ..scene import Scene
 from . import dae, gltf, mtl, obj, off, ply, stl, threemf, trimesh_objects, visuals
@@ -76,7 +76,7 @@ def _read_gltf(path: PathLike, data: bytes, wish: Wish) -> Contents:
 
 def _read_obj(path: PathLike, data: bytes, wish: Wish) -> Contents:
     name, strict, materials = os.fspath(path), wish.strict, wish.materials
-    parsed = obj.parse(name, decode(data), strict)
+    parsed = obj.parse(name, decode_text(data), strict)
     if parsed.ignored:
         listed = ", ".join(f"{keyword} (line {line})" for keyword, line in parsed.ignored.items())
         warn(f"{name}: not honored: {listed}", strict)
@@ -101,7 +101,7 @@ def _libraries(path: PathLike, libraries: list[str], strict: bool) -> dict[str, 
         if not os.path.exists(file):  # also False for invalid names
             warn(f"{os.fspath(path)}: material file {library!r} is missing", strict)
             continue
-        specs.update(mtl.specs(mtl.parse(file, decode(read_bytes(file)), strict), strict))
+        specs.update(mtl.specs(mtl.parse(file, decode_text(read_bytes(file)), strict), strict))
     return specs
 
 

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from ..errors import SceneError
-from ..files import decode
+from ..files import decode_text
 from .lines import NUMBER, check_lines, words
 from .repair import RawMesh, warn, wide
 from .trimesh_loading import geometries
@@ -32,7 +32,7 @@ def parse(name: str, data: bytes, strict: bool = False) -> list[RawMesh]:
     if len(data) >= 84 and len(data) == 84 + 50 * count:
         return _binary(name, data, strict)
     if data.lstrip()[:5].lower() == b"solid":
-        return _text(name, decode(data))
+        return _text(name, decode_text(data))
     if len(data) < 84:
         raise SceneError(f"{name}: has {len(data)} bytes; a binary STL has at least 84")
     raise SceneError(f"{name}: claims {count} faces, {84 + 50 * count} bytes; it has {len(data)}")

@@ -11,8 +11,8 @@ from ..camera.projection import Perspective
 from ..errors import SceneError
 from ..lights import DirectionalLight, PointLight, SpotLight
 from ..scene import Scene
+from ..shapes.transform import Matrix
 from . import gltf
-from .gltf_document import Matrix
 from .repair import warn
 
 SOURCE = "trimesh object"

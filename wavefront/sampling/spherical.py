@@ -11,7 +11,6 @@ from ..elementary import arctan2, sin_cos
 from ..record import record
 from ..vec import Floats, cross, dot, f4, normalize
 
-Reals = NDArray[np.floating]  # float64 or float32
 
 
 @record
@@ -33,12 +32,12 @@ class SphericalRectangle:
     y_axis: Floats  # (3, n or 1) unit vector along the second edge
     z_axis: Floats  # (3, n or 1) unit normal
     height: Floats  # (n,) signed distance of the plane along z_axis
-    x: tuple[Reals, Reals]  # (n,) each: bounds along x_axis
-    y: tuple[Reals, Reals]  # (n,) each: bounds along y_axis
-    z: Reals  # (n,) distance of the plane
-    b: tuple[Reals, Reals]  # (n,) each: yᵢ/√(yᵢ² + z²)
-    start: Reals  # (n,) F at the lower bound of x
-    angle: Reals  # (n,) solid angle, sr
+    x: tuple[Floats, Floats]  # (n,) each: bounds along x_axis
+    y: tuple[Floats, Floats]  # (n,) each: bounds along y_axis
+    z: Floats  # (n,) distance of the plane
+    b: tuple[Floats, Floats]  # (n,) each: yᵢ/√(yᵢ² + z²)
+    start: Floats  # (n,) F at the lower bound of x
+    angle: Floats  # (n,) solid angle, sr
 
     @classmethod
     def of(
@@ -107,24 +106,24 @@ def _reciprocal(x: Floats) -> Floats:
     return np.where(x > 0, f4(1) / np.where(x > 0, x, f4(1)), f4(0))
 
 
-def _dot(a: Floats, b: Floats, dtype: type[np.floating]) -> Reals:
+def _dot(a: Floats, b: Floats, dtype: type[np.floating]) -> Floats:
     """Return the dot products (n,) of vectors (3, n), computed in `dtype`."""
     return dot(a.astype(dtype, copy=False), b.astype(dtype, copy=False))
 
 
-def _sine(side: Reals, height: Reals) -> Reals:
+def _sine(side: Floats, height: Floats) -> Floats:
     """Return side/√(side² + height²), (n,), 0 where both are 0."""
     size = np.sqrt(side * side + height * height)
     return side / np.where(size > 0, size, 1.0)
 
 
-def _from_sine(sine: Reals, height: Reals, bounds: tuple[Reals, Reals]) -> Reals:
+def _from_sine(sine: Floats, height: Floats, bounds: tuple[Floats, Floats]) -> Floats:
     """Return the side (n,) with this sine at `height`, clipped to `bounds` against rounding."""
     cosine = np.sqrt(np.maximum(1 - sine * sine, np.finfo(sine.dtype).tiny))
     return np.clip(sine * height / cosine, bounds[0], bounds[1])
 
 
-def _swept(b: tuple[Reals, Reals], c: Reals) -> Reals:
+def _swept(b: tuple[Floats, Floats], c: Floats) -> Floats:
     """Return the signed solid angle F (n,) between x = 0 and x, where c = x/√(x² + z²)."""
     one = c.dtype.type(1)
     s0, s1 = b[0] * c, b[1] * c

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import SceneError
+
+Matrix = NDArray[np.float64]  # (4, 4), or several
 
 IDENTITY = np.eye(4)
 
