@@ -15,6 +15,7 @@ MODULES = {  # what several rooms have under one name, and why
     "instances": "their compilation, and their acceleration",
     "image": "the picture, and what is made of an image: a texture, an environment",
     "alpha": "the parameter, and the stage that acts by it",
+    "medium": "what a material encloses, and the stage that weakens light by it",
     "sphere": "the shape, its intersection, and the light it makes",
     "triangle": "the intersection of triangles, and the light they make",
     "warp": "the functions, and the check of them",
@@ -44,10 +45,7 @@ def named(node: ast.stmt) -> tuple[str, str] | None:
         return "function", node.name
     target = node.targets[0] if isinstance(node, ast.Assign) else getattr(node, "target", None)
     if isinstance(node, ast.Assign | ast.AnnAssign) and isinstance(target, ast.Name):
-        variable = isinstance(node.value, ast.Call) and ast.unparse(node.value.func) in (
-            "TypeVar",
-            "ParamSpec",
-        )
+        made = ast.unparse(node.value.func) if isinstance(node.value, ast.Call) else ""
         if target.id[0].isupper() and not target.id.isupper() and made not in ("TypeVar", "ParamSpec"):
             return "class", target.id
     return None

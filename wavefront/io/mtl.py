@@ -47,6 +47,7 @@ from ..materials import Material
 from ..textures.image import Texture
 from ..textures.normal_map import BaseNormalMap, BumpMap, NormalMap
 from ..textures.parameter import MAX_INDEX
+from ..vec import Doubles
 from .appearance import MaterialSpec, build_material
 from .repair import warn
 
@@ -79,8 +80,6 @@ RELIEFS = ("norm", "map_bump", "bump")  # keywords whose maps have a multiplier,
 WHOLE = ("map_kd", "map_ke", "map_ks", "norm")  # keywords whose maps are not one channel of an image
 MAPS = {*WHOLE, *RELIEFS, "map_d", *(image for _, image, _ in PBR)}  # keywords whose images are read
 CHANNELS: dict[str, Any] = {"r": 0, "g": 1, "b": 2, "m": 3, "l": "luminance"}
-
-Color = NDArray[np.float64]
 
 
 @dataclass
@@ -123,7 +122,7 @@ class Entry:
         values = self.numbers(key)
         return default if values is None else values[0]
 
-    def color(self, key: str, default: float, high: float = 1.0) -> Color:
+    def color(self, key: str, default: float, high: float = 1.0) -> Doubles:
         """Return a color (3,), clamped to [0, `high`] with a warning."""
         values = self.numbers(key)
         if values is None:
@@ -183,7 +182,7 @@ class Entry:
             ) from None
         return found + default[len(found) :]
 
-    def _placing(self, options: dict[str, list[str]]) -> Color | None:
+    def _placing(self, options: dict[str, list[str]]) -> Doubles | None:
         if "-s" not in options and "-o" not in options:
             return None
         scale, offset = self._option(options, "-s", [1.0] * 3), self._option(options, "-o", [0.0] * 3)
@@ -291,7 +290,7 @@ def _material(entry: Entry) -> tuple[Material, list[str]]:
         entry.read.discard("illum")
     ior = entry.number("ni", 1.0)
     extended = entry.has(*(key for keys in PBR for key in keys[:2]))
-    if illum in GLASS or (opacity(entry) < 1 and ior != 1 and "map_d" not in entry.lines):
+    if illum in GLASS or (alpha_of_entry(entry) < 1 and ior != 1 and "map_d" not in entry.lines):
         return Material(_glass(entry)), []
     if illum in MIRROR and not extended and "ks" in entry.lines and entry.color("ks", 0.0).any():
         return Material(Mirror(entry.color("ks", 0.0)), alpha=_alpha(entry)), []
@@ -317,7 +316,7 @@ def _gloss(entry: Entry, illum: int, physical: bool) -> dict[str, Any]:
     return gloss
 
 
-def _highlight(entry: Entry, illum: int) -> Color:
+def _highlight(entry: Entry, illum: int) -> Doubles:
     """Return `Ks`, black where there is no highlight."""
     if illum in NO_HIGHLIGHT or entry.number("ns", LARGEST_NS) == 0:
         entry.read.update(("ks", "map_ks", "map_ns"))
@@ -357,7 +356,7 @@ def _wanted(entry: Entry) -> dict[str, Any]:
 
 def _alpha(entry: Entry) -> Any:
     """Return how much of the surface is there: a number or a texture."""
-    factor = opacity(entry)
+    factor = alpha_of_entry(entry)
     entry.read.update(("d", "tr"))
     texture = entry.texture("map_d", factor, "scalar")
     return factor if texture is None else texture
@@ -413,7 +412,7 @@ def _base(entry: Entry) -> Any:
 
 
 def _glass(entry: Entry) -> Dielectric:
-    opacity(entry)
+    alpha_of_entry(entry)
     ior = entry.number("ni", GLASS_IOR)
     if not 1 / MAX_INDEX <= ior <= MAX_INDEX:
         limits = f"above 0, from {1 / MAX_INDEX:g} to {MAX_INDEX:g}"
@@ -460,7 +459,7 @@ def _is_number(word: str) -> bool:
     return True
 
 
-def opacity(entry: Entry) -> float:
+def alpha_of_entry(entry: Entry) -> float:
     """Return the opacity in [0, 1] from `d` and `Tr`, by the rule at the top of this file."""
     if "d" in entry.lines:
         value = entry.number("d", 1.0)

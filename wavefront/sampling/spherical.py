@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..elementary import arctan2, sin_cos
 from ..record import record
 from ..vec import Floats, cross, dot, f4, normalize
-
 
 
 @record

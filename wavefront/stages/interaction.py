@@ -29,7 +29,7 @@ def interaction(scene: CompiledScene, rays: Rays, hits: Hits) -> SurfaceInteract
     facing = dot(ng, wo)
     side, back_facing = signs(facing), np.signbit(facing)
     ng = ng * side
-    ns = ng if ns is None else visible_normals(wo, ns * side)
+    ns = ng if ns is None else face_viewer(wo, ns * side)
     prim = hits.prim if instances is None else hits.prim + instances.shift
     surface = SurfaceInteraction(point, error, ng, ns, wo, prim, material_rows(scene, hits, ALL), back_facing)
     for name, corners in scene.attributes.items():
@@ -103,7 +103,7 @@ def offset_origin(surface: SurfaceInteraction, cos: Floats) -> Floats:
     return surface.point + surface.ng * (surface.error * signs(cos))
 
 
-def visible_normals(wo: Floats, ns: Floats) -> Floats:
+def face_viewer(wo: Floats, ns: Floats) -> Floats:
     """Bend shading normals (3, n) that face away from wo, in place, to a positive cosine with wo."""
     cos = dot(ns, wo)
     away = np.flatnonzero(cos < MIN_COS)

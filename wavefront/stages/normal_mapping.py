@@ -7,7 +7,7 @@ import numpy as np
 from ..compile.scene import CompiledScene
 from ..state import SurfaceInteraction
 from ..vec import Floats, dot, f4, normalize
-from .interaction import LIFT, visible_normals
+from .interaction import LIFT, face_viewer
 
 SHALLOWER = f4(0.9)  # reflected directions are raised to at most this part of wo's cosine with `ng`
 
@@ -44,7 +44,7 @@ def ensure_valid_reflection(wo: Floats, ng: Floats, smooth: Floats, perturbed: F
     arXiv:1705.01263, appendix A.3. Here directions are raised along the geometric normal, because the
     perturbed one may point below the surface, and to the cosine that Blender's Cycles uses.
     """
-    perturbed = visible_normals(wo, perturbed)
+    perturbed = face_viewer(wo, perturbed)
     wo_cos = dot(wo, ng)
     own = f4(2) * dot(smooth, wo) * dot(smooth, ng) - wo_cos
     least = np.minimum(np.minimum(SHALLOWER * wo_cos, LIFT), own)
@@ -54,4 +54,4 @@ def ensure_valid_reflection(wo: Floats, ng: Floats, smooth: Floats, perturbed: F
     if low.size:
         raised = normalize(mirrored.take(low, 1) + ng.take(low, 1) * missing.take(low))
         perturbed[:, low] = normalize(raised + wo.take(low, 1))
-    return visible_normals(wo, perturbed)  # against rounding errors where wo grazes the surface
+    return face_viewer(wo, perturbed)  # against rounding errors where wo grazes the surface
