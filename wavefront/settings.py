@@ -34,7 +34,9 @@ MAX_BRANCH_SAMPLES = 2**32  # a sample's index is 32 bits of its address, and ea
 MAX_BRANCHES = 64
 MAX_SPP_FOR_NOISE = 2**16  # where only `noise` was given
 
-Check: TypeAlias = Callable[[str, Any], Any]  # of the name and the value; returns the value as it is kept
+SettingCheck: TypeAlias = Callable[
+    [str, Any], Any
+]  # of the name and the value; returns the value as it is kept
 
 
 def setting(
@@ -42,7 +44,7 @@ def setting(
     text: str,
     *,
     option: str | None = None,
-    check: Check | None = None,
+    check: SettingCheck | None = None,
     choices: Registry[Any] | None = None,
 ) -> Any:
     """Declare a setting.
@@ -73,12 +75,12 @@ def _check_choice(choices: Registry[Any], name: str, value: Any) -> Any:
     return value
 
 
-def optional(check: Check) -> Check:
+def optional(check: SettingCheck) -> SettingCheck:
     """Return a check that lets None pass."""
     return lambda name, value: None if value is None else check(name, value)
 
 
-def whole_number(low: int, high: int) -> Check:
+def whole_number(low: int, high: int) -> SettingCheck:
     """Return a check for integers from `low` to `high`."""
 
     def check(name: str, value: Any) -> int:
@@ -91,19 +93,19 @@ def whole_number(low: int, high: int) -> Check:
 
 
 def above_zero(name: str, value: Any) -> float:
-    """Check that a number is positive and finite."""
+    """SettingCheck that a number is positive and finite."""
     return number(name, value, lambda x: x > 0, "above 0")
 
 
 def check_camera(name: str, value: Any) -> Camera | None:
-    """Check that something is a camera, or None."""
+    """SettingCheck that something is a camera, or None."""
     if value is not None and not isinstance(value, Camera):
         raise SceneError(f"{name} must be a wf.Camera, got {value!r}")
     return value
 
 
 def check_preset(name: str, value: Any) -> str | None:
-    """Check the name of a preset."""
+    """SettingCheck the name of a preset."""
     check_lighting(value)
     return value
 
