@@ -1,7 +1,7 @@
 """A material of your own in about 20 lines: a retro-reflector, as on road signs and bicycles.
 
 It sends light back to where it came from. The class gives the three methods of the contract, a
-checker proves them right, and a picture by the light of a headlamp shows what it does.
+checker proves them right, and a picture by the light of a headlight shows what it does.
 
 python examples/own_material.py [out.png] [--spp 64] [--size 400]
 """
@@ -49,9 +49,9 @@ def road_at_night(size: int) -> wf.Scene:
             wf.Sphere((-1.7, 0.6, z), 0.6, material=wf.Diffuse(orange)),
             wf.Sphere((1.7, 0.6, z), 0.6, material=RetroReflector(orange, exponent=40)),
         ]
-    headlamp = wf.PointLight((0, 2, 2.2), intensity=22)
+    headlight = wf.PointLight((0, 2, 2.2), intensity=22)
     camera = wf.Camera.look_at((0, 2.4, 2), (0, 0.4, -6), fov=50, size=(size, size * 5 // 8))
-    return wf.Scene(shapes, [headlamp], camera)
+    return wf.Scene(shapes, [headlight], camera)
 
 
 if __name__ == "__main__":

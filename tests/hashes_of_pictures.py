@@ -20,8 +20,8 @@ choose.COPIES = 0  # instances are traced as such
 rng = np.random.default_rng(0)
 GREY = wf.Diffuse(0.6)
 FLOOR = wf.Rectangle((-3, 0, -3), (0, 0, 6), (6, 0, 0), material=GREY)
-LAMP = wf.Rectangle((-0.5, 2, -0.5), (1, 0, 0), (0, 0, 1), emission=6)
-LOW_LAMP = wf.Rectangle((-0.5, 0.3, 0.5), (1, 0, 0), (0, 0.02, 0.5), emission=6, two_sided=True)
+EMITTER = wf.Rectangle((-0.5, 2, -0.5), (1, 0, 0), (0, 0, 1), emission=6)
+LOW_LIGHT = wf.Rectangle((-0.5, 0.3, 0.5), (1, 0, 0), (0, 0.02, 0.5), emission=6, two_sided=True)
 SKY = wf.Environment(rng.random((16, 32, 3)).astype(np.float32))
 SPOTS = [wf.SpotLight((k - 2, 2, 1), 4, target=(0, 0, 0), angle=50) for k in range(5)]
 COLORS = wf.Texture((rng.random((16, 16, 3)) * 255).astype(np.uint8))
@@ -63,8 +63,8 @@ for material in (
     wf.Material(wf.Principled(0.9, transmission=0.8, roughness=0.2), interior=wf.Medium(0.4)),
     wf.Diffuse(COLORS),
 ):
-    add(f"{len(hashes)} {type(material).__name__}", [ball(material), LAMP], [wf.Environment(0.3)])
-add("rectangle", [ball(GREY), LOW_LAMP])
+    add(f"{len(hashes)} {type(material).__name__}", [ball(material), EMITTER], [wf.Environment(0.3)])
+add("rectangle", [ball(GREY), LOW_LIGHT])
 add(
     "sphere and disk",
     [wf.Sphere((0, 1, 0), 0.3, emission=4), wf.Disk((1, 2, 0), (0, -1, 0), 0.5, emission=4)],
@@ -83,11 +83,16 @@ add(
 )
 add(
     "lens",
-    [ball(GREY), LAMP],
+    [ball(GREY), EMITTER],
     camera=wf.Camera.look_at((0.5, 1.5, 4), (0, 0.4, 0), aperture=0.3, size=(32, 24)),
 )
-add("panorama", [ball(GREY), LAMP], camera=wf.Camera.panorama((1, 0.5, 1), size=(32, 16)))
-add("framed", [ball(GREY), LAMP], camera=wf.Scene([FLOOR]).framing_camera(size=(30, 20)), filter="gaussian")
+add("panorama", [ball(GREY), EMITTER], camera=wf.Camera.panorama((1, 0.5, 1), size=(32, 16)))
+add(
+    "framed",
+    [ball(GREY), EMITTER],
+    camera=wf.Scene([FLOOR]).framing_camera(size=(30, 20)),
+    filter="gaussian",
+)
 transform = np.array([[0.6, 0.4, 0, 0.3], [-0.3, 0.5, 0.1, 0.5], [0, 0.1, 0.7, 0], [0, 0, 0, 1]])
 moved = transform + np.array([[0, 0, 0, -0.9], [0, 0, 0, 0.2], [0, 0, 0, 0], [0, 0, 0, 0]])
 add("instances", [wf.Instance(mesh, matrix) for mesh in [net(GREY)] for matrix in (transform, moved)], [SKY])

@@ -26,10 +26,10 @@ v -0.5 2 -0.5
 v 0.5 2 -0.5
 v 0.5 2 0.5
 v -0.5 2 0.5
-usemtl lamp
+usemtl light
 f 5 6 7 8
 """
-MATERIALS = "newmtl red\nKd 0.8 0.1 0.1\nnewmtl lamp\nKd 0 0 0\nKe 6 6 6\n"
+MATERIALS = "newmtl red\nKd 0.8 0.1 0.1\nnewmtl light\nKd 0 0 0\nKe 6 6 6\n"
 TRIANGLE = b'{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}], "nodes": [{"mesh": 0}, \
 {"camera": 0, "translation": [0, 0, 4]}], "cameras": [{"type": "perspective", "perspective": {"yfov": 0.7, \
 "aspectRatio": 2.0, "znear": 0.1}}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}], \
@@ -166,7 +166,7 @@ def test_camera_options_place_the_camera(obj, fast):
     red, green, _ = np.load(output).mean((0, 1))
     assert red > 4 * green  # nothing but the red floor
     main(["render", obj, *options, "--origin", "0,1,0", "--target", "0,9,0", "--up=0,0,-1", "--fov", "20"])
-    np.testing.assert_allclose(np.load(output), 6)  # nothing but the lamp
+    np.testing.assert_allclose(np.load(output), 6)  # nothing but the light
 
 
 def test_negative_vectors_need_no_equals_sign(obj, fast):

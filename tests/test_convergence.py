@@ -41,11 +41,11 @@ def test_sobol_halves_the_error(converged: np.ndarray) -> None:
 
 
 def test_sobol_is_steeper_where_the_picture_is_smooth() -> None:
-    """On a plain floor under one lamp the error falls faster than 1/spp, by which independent's falls."""
+    """On a plain floor under one light the error falls faster than 1/spp, by which independent's falls."""
     floor = wf.Rectangle((-9, 0, 9), (18, 0, 0), (0, 0, -18))
-    lamp = wf.Rectangle((-1, 2, -1), (2, 0, 0), (0, 0, 2), emission=1.0)
+    light = wf.Rectangle((-1, 2, -1), (2, 0, 0), (0, 0, 2), emission=1.0)
     camera = wf.Camera.look_at((0, 1.5, 2.5), (0, 0, 0), fov=30, size=(16, 16))
-    scene = wf.Scene([floor, lamp], camera=camera)
+    scene = wf.Scene([floor, light], camera=camera)
     exact = wf.render(scene, 1 << 14, max_bounces=1, seed=7, accel="numpy", progress=False).rgb
     slope = {}
     for sampler in ("sobol", "independent"):

@@ -128,8 +128,8 @@ def test_instances_that_shrink_and_flatten(material):
 
 def test_what_is_brighter_than_float32_is_infinite_without_a_warning():
     """Its variance is; the picture itself is not."""
-    lamp = quad(wf.Diffuse(0.0), emission=1e25)
+    area_light = quad(wf.Diffuse(0.0), emission=1e25)
     camera = wf.Camera.look_at((0.6, 0.7, 2), (0.5, 0.5, 0), size=(12, 12))
-    image = render(wf.Scene(lamp, camera=camera), 4)
+    image = render(wf.Scene(area_light, camera=camera), 4)
     assert np.isfinite(image.rgb).all()
     assert image.rgb.max() == pytest.approx(1e25)

@@ -11,7 +11,7 @@ SIZE = (16, 16)
 BALL = wf.Sphere((0, 0, 0), 1, name="ball")
 FRONT = wf.Camera.look_at((0, 0, 5), (0, 0, 0), size=SIZE)
 SHELL = wf.Sphere((0, 0, 5), 0.5, name="shell")  # around the camera
-LAMP = wf.Sphere((3, 3, 3), 0.5, emission=20.0, name="lamp")
+EMITTER = wf.Sphere((3, 3, 3), 0.5, emission=20.0, name="light")
 PANEL = wf.Rectangle((-1, 3, -1), (2, 0, 0), (0, 0, 2))  # faces down
 FLOOR = wf.Rectangle((-3, -1, 3), (6, 0, 0), (0, 0, -6), name="floor")
 BULB = wf.Sphere((0, 0.5, 0), 0.5, material=wf.Dielectric(1.5), name="bulb")
@@ -32,13 +32,13 @@ def upside_down(mesh: wf.Mesh) -> wf.Mesh:
 BLACK = {
     "no light": ([BALL], [], {"lighting": None}, "nothing in the scene shines; lighting='studio' lights it"),
     "looks away": (
-        [BALL, LAMP],
+        [BALL, EMITTER],
         [],
         {"camera": wf.Camera.look_at((0, 0, 5), (0, 0, 9), size=SIZE)},
         "the camera sees no shape; the middle of the scene is behind it: look the other way",
     ),
     "looks past": (
-        [BALL, LAMP],
+        [BALL, EMITTER],
         [],
         {"camera": wf.Camera.look_at((0, 0, 5), (-9, 0, 0), size=SIZE)},
         "the camera sees no shape; it looks past the scene",
@@ -61,7 +61,12 @@ BLACK = {
         {},
         "the camera sees only the sides of surfaces that are turned away from the lights",
     ),
-    "camera inside": ([BALL, SHELL, LAMP], [], {}, "the camera is inside 'shell', where no light gets in"),
+    "camera inside": (
+        [BALL, SHELL, EMITTER],
+        [],
+        {},
+        "the camera is inside 'shell', where no light gets in",
+    ),
     "camera inside, light around": (
         [BALL, SHELL],
         [wf.Environment(1)],
@@ -80,7 +85,7 @@ BLACK = {
         {"camera": BESIDE},
         "'bulb' lets light through, but bends it, and no path meets a light without size there",
     ),
-    "lamp in glass, direct light": (
+    "light in glass, direct light": (
         [FLOOR, BULB, wf.Sphere((0, 0.5, 0), 0.1, emission=9.0)],
         [],
         {"camera": BESIDE, "integrator": "direct_simple"},
@@ -120,7 +125,7 @@ WHITE = {
         [wf.PointLight((0, 0, 3), 1000)],
         "its darkest pixel is .*, and 1 is white",
     ),
-    "inside a lamp": (
+    "inside a light": (
         [BALL, wf.Sphere((0, 0, 5), 0.5, emission=4.0, name="sun")],
         [],
         "the camera sees nothing but 'sun', which shines; save.*exposure=-3. shows",
@@ -142,10 +147,10 @@ def test_a_white_picture_names_its_cause(cause: str) -> None:
 
 
 QUIET = {
-    "in order": ([BALL, LAMP], [], {}),
+    "in order": ([BALL, EMITTER], [], {}),
     "even light": ([BALL], [wf.Environment(1)], {}),
     "lights that are off": ([BALL], [wf.PointLight((0, 0, 5), 0)], {}),
-    "a dark lamp": ([wf.Sphere((0, 0, 0), 1, emission=0.0)], [], {}),
+    "a dark light": ([wf.Sphere((0, 0, 0), 1, emission=0.0)], [], {}),
     "darkness around": ([BALL], [wf.Environment(0)], {}),
     "one bright spot": ([BALL, wf.Sphere((0, 0, 2), 0.3, emission=1.0, material=wf.Diffuse(0))], [], {}),
     "one lit pixel": ([wf.Sphere((0, 0, -50), 0.5, emission=1.0)], [], {}),

@@ -29,7 +29,7 @@ RNG = np.random.default_rng(0)
 LOW, HIGH, Y = (-0.5, -0.4), (0.6, 0.7), 2.0
 
 
-def lamp(emission, **rest) -> wf.Mesh:
+def area_light(emission, **rest) -> wf.Mesh:
     """A rectangle above the origin that faces down; u runs along x and v along z."""
     (x, z), u, v = LOW, HIGH[0] - LOW[0], HIGH[1] - LOW[1]
     return wf.Rectangle((x, Y, z), (u, 0, 0), (0, 0, v), emission=emission, **{"material": BLACK, **rest})
@@ -69,17 +69,17 @@ PARTS = {  # (row, column) -> corners
 
 
 @pytest.mark.parametrize("integrator", ALL)
-def test_quarters_of_a_lamp(integrator: str) -> None:
-    """The sum of what four lamps of one color each would give, by all ways to find light."""
+def test_quarters_of_a_light(integrator: str) -> None:
+    """The sum of what four lights of one color each would give, by all ways to find light."""
     expected = sum(np.mean(QUARTERS[cell]) * irradiance(*corners) for cell, corners in PARTS.items())
     spp = 8192 if integrator == "naive" else 2048
-    mean = measure(lit(lamp(texture(QUARTERS))), spp, integrator=integrator, max_bounces=1)
+    mean = measure(lit(area_light(texture(QUARTERS))), spp, integrator=integrator, max_bounces=1)
     assert_mean(mean, expected * ALBEDO / np.pi, 0.02)
 
 
 def test_colors_stay_where_they_are() -> None:
-    """Each channel by itself, against lamps of one color."""
-    whole = repeat(lit(lamp(texture(QUARTERS))), 64, max_bounces=1)
+    """Each channel by itself, against lights of one color."""
+    whole = repeat(lit(area_light(texture(QUARTERS))), 64, max_bounces=1)
     parts = [
         wf.Rectangle(
             (x0, Y, z0), (x1 - x0, 0, 0), (0, 0, z1 - z0), material=BLACK, emission=QUARTERS[cell].tolist()
@@ -90,9 +90,9 @@ def test_colors_stay_where_they_are() -> None:
 
 
 @pytest.mark.parametrize("integrator", ALL)
-def test_a_lamp_is_seen_as_its_texture(integrator: str) -> None:
+def test_a_light_is_seen_as_its_texture(integrator: str) -> None:
     """By the camera, from below and through a mirror; from behind it is dark."""
-    scene = wf.Scene([lamp(texture(QUARTERS))])
+    scene = wf.Scene([area_light(texture(QUARTERS))])
     for (row, column), (low, high) in PARTS.items():
         at = ((low[0] + high[0]) / 2, Y, (low[1] + high[1]) / 2)
         for eye, seen in ((-3, QUARTERS[row, column]), (7, np.zeros(3))):
@@ -103,7 +103,7 @@ def test_a_lamp_is_seen_as_its_texture(integrator: str) -> None:
 
 @pytest.mark.parametrize("integrator", ["naive", "full"])
 def test_vertex_colors_shine(integrator: str) -> None:
-    """A linear ramp of radiance on a lamp far away gives the mean's irradiance."""
+    """A linear ramp of radiance on a light far away gives the mean's irradiance."""
     corners = [(-1, 100, -1), (1, 100, -1), (1, 100, 1), (-1, 100, 1)]
     mesh = wf.Mesh(
         corners,
@@ -129,7 +129,7 @@ def test_what_the_estimate_misses_is_found_by_chance(monkeypatch) -> None:
     stripe[0, 3:5] = 10
     low, high = (LOW[0] + 3 / 32 * 1.1, LOW[1]), (LOW[0] + 5 / 32 * 1.1, HIGH[1])
     expected = 10 * irradiance(low, high) * ALBEDO / np.pi
-    striped = lamp(texture(stripe))
+    striped = area_light(texture(stripe))
     assert compiled(floor(), striped).lights.choice is None
     behind = wf.Sphere((0, 12, 0), 0.01, material=BLACK, emission=1.0)  # so that there is a choice
     for things in ((), (behind,)):
@@ -144,7 +144,7 @@ def test_what_the_estimate_misses_is_found_by_chance(monkeypatch) -> None:
 def test_the_mean_of_a_face(seed: int, width: int, height: int) -> None:
     """Over a rectangle it is the image's mean, as near as 1024 points come."""
     image = np.random.default_rng(seed).random((height, width, 3), f4)
-    mesh = lamp(texture(image, wrap="clamp"))
+    mesh = area_light(texture(image, wrap="clamp"))
     mean = textured_emission.mean_radiance(mesh, mesh.vertices[mesh.faces])
     assert mean.mean(1) == pytest.approx(image.mean((0, 1)), abs=0.05)
 
@@ -203,7 +203,7 @@ def test_both_sides_are_seen() -> None:
     """From above and from below, evenly or by a texture."""
     for emission in (3.0, texture(np.full((2, 2), 3.0))):
         for both in (False, True):
-            scene = wf.Scene([lamp(emission, two_sided=both)])
+            scene = wf.Scene([area_light(emission, two_sided=both)])
             for eye in (-3, 7):
                 scene.camera = wf.Camera.look_at((0, eye, 0), (0, Y, 0), (0, 0, 1), fov=1, size=(2, 2))
                 assert (render(scene, 1).rgb == (3 if both or eye < 0 else 0)).all()
@@ -211,7 +211,7 @@ def test_both_sides_are_seen() -> None:
 
 @pytest.mark.parametrize("shape", ["rectangle", "triangles", "texture"])
 @pytest.mark.parametrize("integrator", ["naive", "full"])
-def test_a_lamp_lights_on_both_sides(integrator: str, shape: str) -> None:
+def test_a_light_lights_on_both_sides(integrator: str, shape: str) -> None:
     """A floor that it faces, and one that it looks away from, with the same closed form."""
     emission = texture(np.ones((2, 2))) if shape == "texture" else 1.0
     up = wf.Rectangle(
@@ -326,7 +326,7 @@ def test_waves_and_workers_change_no_bit(cut: dict) -> None:
 
 def test_what_shines_evenly_pays_nothing() -> None:
     """No table, and rectangles stay rectangles."""
-    scene = compiled(floor(), lamp(2.0))
+    scene = compiled(floor(), area_light(2.0))
     assert scene.lights.varies is None
     assert [type(kind) for kind in scene.lights.kinds] == [RectangleLights]
     assert scene.lights.choice.__class__.__name__ == "SingleLightSampler"
@@ -474,11 +474,11 @@ def test_instances_shine_by_the_material_they_have() -> None:
 
 
 def test_complaints() -> None:
-    """A sphere shines evenly; a mesh without coordinates is named; a lamp needs a number or a texture."""
+    """A sphere shines evenly; a mesh without coordinates is named; a light needs a number or a texture."""
     with pytest.raises(wf.SceneError, match="sphere: a sphere shines evenly; a mesh can shine by <Texture"):
         wf.Sphere(HERE, 1, emission=texture(QUARTERS))
     with pytest.raises(wf.SceneError, match="rectangle: emission"):
-        lamp("bright")
+        area_light("bright")
     ball = wf.Sphere(
         HERE, 1, material=wf.Material(wf.Principled(0.5), emission=texture(QUARTERS)), name="moon"
     )
@@ -501,9 +501,9 @@ class Negative(BaseTexture):
 
 def test_values_below_0_count_as_0() -> None:
     """Those of a user's own class, whose values are not known before; an image that has some is refused."""
-    scene = lit(lamp(Negative()))
+    scene = lit(area_light(Negative()))
     assert not render(scene, 4, max_bounces=1).rgb.any()
     with pytest.raises(
         wf.SceneError, match=r"emission: <Texture 'array'.* has the value -5; it must be at least 0"
     ):
-        lamp(texture([[-5.0, -5.0]]))
+        area_light(texture([[-5.0, -5.0]]))

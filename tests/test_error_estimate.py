@@ -163,8 +163,8 @@ def test_metadata_says_what_was_done() -> None:
     assert found["seconds"] > 0
     assert found["numpy"] == np.__version__
     assert found["version"]
-    lamp = wf.Scene([scenes.floor()], [wf.PointLight((0, 2, 0), 1)], scenes.probe((0, 0, 0), (0.1, 1, 0)))
-    for integrator, each in (("direct_simple", 2), ("full", 3)):  # the camera's, to the lamp, onwards
-        assert render(lamp, 3, integrator=integrator, max_bounces=1).metadata["rays"] == each * 3 * 64
+    light = wf.Scene([scenes.floor()], [wf.PointLight((0, 2, 0), 1)], scenes.probe((0, 0, 0), (0.1, 1, 0)))
+    for integrator, each in (("direct_simple", 2), ("full", 3)):  # the camera's, to the light, onwards
+        assert render(light, 3, integrator=integrator, max_bounces=1).metadata["rays"] == each * 3 * 64
     rays = [render(lit(), 4, **cut).metadata["rays"] for cut in ({}, {"wave_size": 50, "workers": 2})]
     assert rays[0] == rays[1]

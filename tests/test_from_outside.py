@@ -30,12 +30,12 @@ def example(title: str, name: str):
 
 
 def room(material=None, lights=(), *, shape=None):
-    """A floor, a lamp of two triangles and a thing on the floor."""
+    """A floor, a light of two triangles and a thing on the floor."""
     floor = wf.Rectangle((-3, 0, 3), (6, 0, 0), (0, 0, -6), material=wf.Diffuse(0.5))
-    lamp = wf.Rectangle((-1, 3, -1), (2, 0, 0), (0, 0, 2), emission=(9, 8, 6))
+    area_light = wf.Rectangle((-1, 3, -1), (2, 0, 0), (0, 0, 2), emission=(9, 8, 6))
     thing = wf.Rectangle((-1, 0, 0), (2, 0, 0), (0, 1.5, -1), material=material or wf.Diffuse(0.7))
     camera = wf.Camera.look_at((0, 1.5, 5), (0, 0.7, 0), size=SIZE)
-    return wf.Scene([floor, lamp, shape or thing], list(lights), camera)
+    return wf.Scene([floor, area_light, shape or thing], list(lights), camera)
 
 
 def picture(scene, spp=8, **settings):

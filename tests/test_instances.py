@@ -464,10 +464,10 @@ def test_reliefs_lie_as_on_meshes_of_their_own(smooth):
 
 def test_bright_lone_and_skewed_meshes_are_not_shared():
     """They are as good as meshes of their own: the same bits."""
-    lamp = bumpy(emission=3)
+    light = bumpy(emission=3)
     cases = [
         [wf.Instance(bumpy(), MATRICES[3])],
-        placed(lamp, MATRICES[:3]),
+        placed(light, MATRICES[:3]),
         placed(bumpy(), [at(0, 0, 0, (1, 1, 0.9e-3)), at(2, 0, 0, (1, 1, 0.9e-3))]),
     ]
     for shapes in cases:
@@ -552,8 +552,8 @@ def test_an_instance_is_a_shape():
     assert repr(wf.Instance(TRIANGLE, at(1, 2, 3))) == (
         "<Instance 'tri' of <Mesh 'tri': 3 vertices, 1 faces>: at [1.0, 2.0, 3.0]>"
     )
-    lamp = wf.Mesh(TRIANGLE.vertices, TRIANGLE.faces, emission=1)
-    assert render(wf.Instance(lamp, np.eye(4)), 1, max_bounces=0).rgb.max() == 1
+    light = wf.Mesh(TRIANGLE.vertices, TRIANGLE.faces, emission=1)
+    assert render(wf.Instance(light, np.eye(4)), 1, max_bounces=0).rgb.max() == 1
 
 
 def test_bounds_are_of_vertices_that_faces_use():

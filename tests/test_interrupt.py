@@ -28,9 +28,9 @@ CLOSED = """
 import multiprocessing, sys, threading, time
 import wavefront as wf
 room = wf.Sphere((0, 0, 0), 5, material=wf.Diffuse(1.0))
-lamp = wf.Sphere((0, 0, -3), 0.1, emission=1)
+light = wf.Sphere((0, 0, -3), 0.1, emission=1)
 camera = wf.Camera.look_at((0, 0, 3), (0, 0, 0), size=(64, 64))
-closed = wf.Scene([room, lamp], camera=camera)
+closed = wf.Scene([room, light], camera=camera)
 light = wf.Scene([wf.Sphere((0, 0, 0), 1)], [wf.Environment(1.0)], camera)
 def telling(done, total):
     print("tracing", flush=True)

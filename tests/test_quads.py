@@ -181,17 +181,17 @@ def alike_in(scene: wf.Scene) -> list[bool] | None:
 
 
 def test_triangles_look_alike_by_material_and_light_where_nothing_varies() -> None:
-    """Halves of a lamp that are two lights are told apart, and all where normals or textures vary."""
+    """Halves of a light that are two lights are told apart, and all where normals or textures vary."""
     gray, dark = wf.Diffuse(0.5), wf.Diffuse(0.1)
     square = SQUARE, [(0, 1, 2), (0, 2, 3)]
     kite = SQUARE * (1, 1, 1) + [(0, 0, 1), (0, 0, 1), (1, 1, 1), (0, 0, 1)], square[1]
     floor, wall = wf.Mesh(*square, material=gray), wf.Mesh(*kite, material=dark)
-    lamp = wf.Rectangle((0, 0, 2), (1, 0, 0), (0, 1, 0), emission=1)
+    light = wf.Rectangle((0, 0, 2), (1, 0, 0), (0, 1, 0), emission=1)
     uneven = wf.Mesh(kite[0] + (0, 0, 3), square[1], emission=1)
-    assert alike_in(wf.Scene([floor, wall, lamp, uneven])) == [True, False] * 3 + [False, False]
-    assert alike_in(wf.Scene([floor, wf.Mesh(*kite, material=gray), lamp]))[:4] == [True] * 3 + [False]
+    assert alike_in(wf.Scene([floor, wall, light, uneven])) == [True, False] * 3 + [False, False]
+    assert alike_in(wf.Scene([floor, wf.Mesh(*kite, material=gray), light]))[:4] == [True] * 3 + [False]
     smooth = wf.Mesh(*square, normals=np.tile((0.0, 0, 1), (4, 1)), material=gray)
-    assert alike_in(wf.Scene([smooth, wall, lamp])) is None
+    assert alike_in(wf.Scene([smooth, wall, light])) is None
 
 
 def test_neither_half_is_hit_by_a_ray_that_leaves_the_other() -> None:

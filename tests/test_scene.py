@@ -150,9 +150,11 @@ def test_framing_camera_sees_everything() -> None:
 def test_primitives_know_their_material_and_light() -> None:
     """Triangles of all meshes first, then spheres; lights number their own faces."""
     dark = wf.Mesh(**TRIANGLE)
-    lamp = wf.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2], [0, 2, 3]], emission=2.0)
+    area_light = wf.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2], [0, 2, 3]], emission=2.0)
     glow = wf.Sphere((5, 0, 0), 1, emission=3.0)
-    scene = compiled(dark, glow, lamp, wf.Sphere(**BALL), lights=[wf.PointLight(**POINT), wf.Environment()])
+    scene = compiled(
+        dark, glow, area_light, wf.Sphere(**BALL), lights=[wf.PointLight(**POINT), wf.Environment()]
+    )
     assert scene.triangles == 3
     assert scene.material_of.tolist() == [0, 1, 1, 2, 3]
     assert scene.light_of.tolist() == [-1, 0, 1, 2, -1, 4]
@@ -268,7 +270,7 @@ class Ink(wf.Diffuse):
         self.number = 1
 
 
-def test_paths_end_on_black_lamps(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_paths_end_on_black_lights(monkeypatch: pytest.MonkeyPatch) -> None:
     """They shine, but are not shaded; the picture is the same bit for bit if they are."""
     room = [
         wf.Sphere((0, 0, 0), 10, material=wf.Diffuse(0.5)),
@@ -298,9 +300,9 @@ def test_which_lights_are_black() -> None:
     painted = wf.Diffuse(wf.Texture(np.zeros((1, 1, 3))))
 
     def found(*materials: wf.Bsdf):
-        lamps = [wf.Rectangle(**SQUARE, material=m, emission=1) for m in materials]
+        area_lights = [wf.Rectangle(**SQUARE, material=m, emission=1) for m in materials]
         return compiled(
-            *lamps, wf.Sphere(**BALL, material=black), lights=[wf.Environment()]
+            *area_lights, wf.Sphere(**BALL, material=black), lights=[wf.Environment()]
         ).nonscattering_lights
 
     assert found(gray, black, Glitter(0), Ink()).tolist() == [False, True, False, True, False]

@@ -81,8 +81,8 @@ def test_normal_mapped_glass_loses_no_light():
 @pytest.mark.parametrize("kind", [wf.Dielectric, wf.ThinDielectric])
 def test_estimators_agree_on_tilted_clear_surfaces(kind, roughness):
     """Directions that are turned have no density: no light sample finds them, and none counts twice."""
-    lamp = wf.Sphere((0, 3, 0), 1.0, material=wf.Diffuse(0.0), emission=4.0)
-    scene = wf.Scene([ball(1, kind(1.5, roughness), lean=0.6), lamp], [wf.Environment(0.5)], CAMERA)
+    area_light = wf.Sphere((0, 3, 0), 1.0, material=wf.Diffuse(0.0), emission=4.0)
+    scene = wf.Scene([ball(1, kind(1.5, roughness), lean=0.6), area_light], [wf.Environment(0.5)], CAMERA)
     options = {"max_bounces": 6}
     means = [
         np.array(
@@ -141,11 +141,11 @@ OPAQUE = {
 @pytest.mark.parametrize("lean", [0.5, 2.0])
 @pytest.mark.parametrize("name", OPAQUE)
 def test_nothing_leaks_through_walls_with_strongly_tilted_normals(name, lean):
-    """A lamp and a point light within a closed ball are not seen from outside."""
-    lamp = wf.Sphere((0, 0, 0), 0.4, material=wf.Diffuse(0.0), emission=10.0)
+    """A light and a point light within a closed ball are not seen from outside."""
+    area_light = wf.Sphere((0, 0, 0), 0.4, material=wf.Diffuse(0.0), emission=10.0)
     point = wf.PointLight((0.5, 0, 0.2), 10)
     for integrator, lights in (("naive", []), ("full", [point])):
-        scene = wf.Scene([ball(2, OPAQUE[name], lean), lamp], lights, CAMERA)
+        scene = wf.Scene([ball(2, OPAQUE[name], lean), area_light], lights, CAMERA)
         assert render(scene, 16, integrator=integrator).rgb.max() == 0
 
 

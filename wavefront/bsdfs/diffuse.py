@@ -41,7 +41,7 @@ class Diffuse(Bsdf):
 
     @property
     def black(self) -> bool:
-        """Whether the reflectance is 0, as it often is of lamps."""
+        """Whether the reflectance is 0, as it often is of lights."""
         return (
             self.view_independent
             and not isinstance(self.reflectance, BaseTexture)

@@ -11,14 +11,14 @@ from ..shapes import Mesh
 from ..vec import Bools, Floats, Ints, cross, f4, length
 
 
-def _alike(material_of: Ints, light_of: Ints) -> Bools:
+def same_as_next(material_of: Ints, light_of: Ints) -> Bools:
     """Return a mask (m,) of the triangles that have the material and light of the next one."""
     same = np.zeros(material_of.size, np.bool_)
     same[:-1] = (np.diff(material_of) == 0) & (np.diff(light_of) == 0)
     return same
 
 
-def _face_normals(triangles: NDArray[np.float64]) -> Floats:
+def compute_face_normals(triangles: NDArray[np.float64]) -> Floats:
     """Return the unit normals (3, m) of triangles (m, 3, 3); 0 where a triangle is degenerate."""
     a, b, c = np.ascontiguousarray(triangles.transpose(1, 2, 0))
     normal = cross(b - a, c - a)
@@ -26,7 +26,7 @@ def _face_normals(triangles: NDArray[np.float64]) -> Floats:
     return (normal / np.where(size > 0, size, 1)).astype(f4)
 
 
-def _corner_normals(meshes: Sequence[Mesh], normals: Floats) -> tuple[Floats, Floats, Floats] | None:
+def compute_corner_normals(meshes: Sequence[Mesh], normals: Floats) -> tuple[Floats, Floats, Floats] | None:
     """Return the shading normals at the three corners, 3 × (3, m); None if no mesh has vertex normals.
 
     Meshes without vertex normals, and normals of length 0, get the face normal.

@@ -21,7 +21,7 @@ from ..vec import Bools, Floats, Ints, f4
 
 
 @record
-class Palette(BaseTexture):
+class ParameterTable(BaseTexture):
     """A parameter of the BSDFs of many materials, one column each, looked up by the material's number."""
 
     table: Floats  # (c, materials)
@@ -43,9 +43,9 @@ class MaterialTable:
 
 @record
 class Opacities:
-    """Which surfaces are only partly there, and how much of them is."""
+    """Which surfaces are only translucent there, and how much of them is."""
 
-    partly: Bools  # (m + k + 1,) of each primitive, and at the end False for a miss
+    translucent: Bools  # (m + k + 1,) of each primitive, and at the end False for a miss
     constant: Floats  # (materials,) opacity of each material; 1 where it varies
     varying: list[tuple[int, Opacity]]  # materials whose opacity varies
 
@@ -62,7 +62,7 @@ class Opacities:
 def group_materials(materials: Sequence[Material]) -> MaterialTable:
     """Merge BSDFs that differ only in the values of constant parameters into one group each.
 
-    The merged BSDF finds its values in a `Palette`, so a scene of a hundred plain colors is shaded as
+    The merged BSDF finds its values in a `ParameterTable`, so a scene of a hundred plain colors is shaded as
     one group. Groups that have only delta lobes come last.
     """
     bsdfs = [material.bsdf for material in materials]
@@ -80,7 +80,7 @@ def group_materials(materials: Sequence[Material]) -> MaterialTable:
     return MaterialTable(group_of, groups, normal_map_of, tuple(normal_maps.values()))
 
 
-def _absorption(materials: Sequence[Material]) -> Floats | None:
+def absorption_table(materials: Sequence[Material]) -> Floats | None:
     """Return the absorption behind the surfaces of each material, (3, materials), if there is any."""
     table = np.zeros((3, len(materials)), f4)
     for i, material in enumerate(materials):
@@ -89,9 +89,9 @@ def _absorption(materials: Sequence[Material]) -> Floats | None:
     return table if table.any() else None
 
 
-def _opacities(materials: Sequence[Material], partly: Bools) -> Opacities | None:
+def opacity_table(materials: Sequence[Material], translucent: Bools) -> Opacities | None:
     """Return how much of the surfaces is there, None when all of them are."""
-    if not partly.any():
+    if not translucent.any():
         return None
     constant, varying = np.ones(len(materials), f4), []
     for i, material in enumerate(materials):
@@ -101,15 +101,15 @@ def _opacities(materials: Sequence[Material], partly: Bools) -> Opacities | None
             varying.append((i, material.opacity))
         else:
             constant[i] = material.opacity.constant
-    return Opacities(partly, constant, varying)
+    return Opacities(translucent, constant, varying)
 
 
-def _partly_there(
+def find_translucent(
     materials: Sequence[Material], material_of: Ints, meshes: Sequence[Mesh], instances: Sequence[Instance]
 ) -> Bools:
     """Return a mask of the primitives (m + k + 1,) with an opacity below 1; a miss, at the end, has none."""
-    partly = np.array([material.opacity is not None for material in materials], np.bool_)
-    found = np.append(partly.take(material_of), False)
+    translucent = np.array([material.opacity is not None for material in materials], np.bool_)
+    found = np.append(translucent.take(material_of), False)
     placed = {id(shape.mesh) for shape in instances if shape.material.opacity is not None}
     start = 0
     for mesh in meshes:
@@ -119,7 +119,7 @@ def _partly_there(
     return found
 
 
-def _nonscattering_lights(
+def find_nonscattering_lights(
     materials: Sequence[Material], material_of: Ints, light_of: Ints, lights: int
 ) -> Bools | None:
     """Return a mask of the lights (lights,) whose surface has a black BSDF; None when none has."""
@@ -152,11 +152,11 @@ def _merge(bsdfs: Sequence[Bsdf], numbers: list[int]) -> Bsdf:
         if _is_constant(value) and not all(np.array_equal(value, other) for other in values):
             table = np.zeros((*value.shape[:-1], len(bsdfs)), f4)
             table[..., numbers] = np.concatenate(values, -1)
-            vars(merged)[name] = Palette(table)
+            vars(merged)[name] = ParameterTable(table)
     return merged
 
 
-def _attributes_read(shapes: Sequence[Shape]) -> list[str]:
+def attributes_read(shapes: Sequence[Shape]) -> list[str]:
     """Return the names of what materials read; warn of meshes that lack what theirs reads.
 
     Raises
@@ -212,7 +212,7 @@ def _parameters_read(thing: Bsdf | Opacity) -> set[str]:
     return out
 
 
-def _number_materials(
+def number_materials(
     meshes: Sequence[Mesh], spheres: Sequence[Sphere], instances: Sequence[Instance]
 ) -> tuple[list[Material], Ints, Ints | None]:
     """Return the distinct materials, and the numbers of each row's and of each instance's.

@@ -16,19 +16,19 @@ from ..scene import Scene
 from ..shapes import Shape
 from ..shapes.attributes import Corners, corner_values
 from ..vec import Bools, Floats, Ints, f4
-from .geometry import _alike, _corner_normals, _face_normals
+from .geometry import compute_corner_normals, compute_face_normals, same_as_next
 from .instances import InstanceTable, own_frame, place_instances, sort_shapes
 from .lights import gather_lights
 from .materials import (
     MaterialTable,
     Opacities,
-    _absorption,
-    _attributes_read,
-    _nonscattering_lights,
-    _number_materials,
-    _opacities,
-    _partly_there,
+    absorption_table,
+    attributes_read,
+    find_nonscattering_lights,
+    find_translucent,
     group_materials,
+    number_materials,
+    opacity_table,
 )
 from .scale import check_distance, check_lights, length_factor, scaled_shapes
 
@@ -126,8 +126,8 @@ def compile_scene(
     corners += [own_frame(mesh).take(mesh.faces, 0) for mesh in shared]
     meshes += shared
     triangles = np.concatenate(corners) if corners else np.zeros((0, 3, 3))
-    user_materials, material_of, replaced = _number_materials(meshes, spheres, instances)
-    attributes = {name: corner_values(name, meshes) for name in _attributes_read(placed)}
+    user_materials, material_of, replaced = number_materials(meshes, spheres, instances)
+    attributes = {name: corner_values(name, meshes) for name in attributes_read(placed)}
     lights, light_of, environment = gather_lights(
         scene, scaled, scale, meshes, spheres, corners, center, (high - low) / 2, light_sampler, mis
     )
@@ -135,12 +135,12 @@ def compile_scene(
     radii = np.array([s.radius for s in spheres]).astype(f4)
     smooth = any(mesh.normals is not None for mesh in meshes)
     triangles32 = np.ascontiguousarray(triangles, f4)
-    partly = _partly_there(user_materials, material_of, meshes, instances)
-    nonscattering_lights = _nonscattering_lights(user_materials, material_of, light_of, len(lights))
+    translucent = find_translucent(user_materials, material_of, meshes, instances)
+    nonscattering_lights = find_nonscattering_lights(user_materials, material_of, light_of, len(lights))
     light_of = np.append(light_of, environment)
     weights = bool(attributes) or smooth
-    normals = _face_normals(triangles)
-    interchangeable = None if weights else _alike(material_of[:once], light_of[:once])
+    normals = compute_face_normals(triangles)
+    interchangeable = None if weights else same_as_next(material_of[:once], light_of[:once])
     geometry = Geometry(triangles32[:once], np.ascontiguousarray(centers), radii, weights, interchangeable)
     accelerator, table = make_accelerator(geometry), None
     if shared:
@@ -156,7 +156,7 @@ def compile_scene(
         accelerator=accelerator,
         triangles=len(triangles),
         normals=normals,
-        corner_normals=_corner_normals(meshes, normals),
+        corner_normals=compute_corner_normals(meshes, normals),
         attributes=attributes,
         sphere_centers=geometry.centers,
         sphere_radii=geometry.radii,
@@ -164,8 +164,8 @@ def compile_scene(
         light_of=light_of,
         shines=light_of >= 0,
         materials=group_materials(user_materials),
-        absorption=_absorption(user_materials),
-        opacities=_opacities(user_materials, partly),
+        absorption=absorption_table(user_materials),
+        opacities=opacity_table(user_materials, translucent),
         lights=lights,
         nonscattering_lights=nonscattering_lights,
         instances=table,

@@ -40,7 +40,7 @@ def alpha_pass_through(
     """
     if scene.opacities is None:
         return paths, hits
-    translucent = scene.opacities.partly
+    translucent = scene.opacities.translucent
     lanes = np.flatnonzero(translucent.take(hits.prim))  # a miss, -1, takes the last entry
     if not lanes.size:
         return paths, hits
@@ -79,7 +79,7 @@ def transmittance_along(scene: CompiledScene, rays: ShadowRays) -> Floats:
     while lanes.size:
         hits = intersect(scene, rays)
         between = hits.t < shadow_ray_length(rays)
-        translucent = scene.opacities.partly.take(hits.prim)
+        translucent = scene.opacities.translucent.take(hits.prim)
         part[:, lanes.compress(between & ~translucent)] = 0
         met = np.flatnonzero(between & translucent)
         lanes, rays, hits = lanes.take(met), rays.take(met), hits.take(met)

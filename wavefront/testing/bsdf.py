@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from ..bsdfs.base import Bsdf, BsdfSample
 from ..state import SurfaceInteraction
 from ..vec import Bools, Doubles, Floats, f4
-from .charts import CHARTS, _uniform_sphere
-from .chi2 import _compare, binomial_p
+from .charts import CHARTS, uniform_directions
+from .chi2 import binomial_p, check_density
 from .report import PAIRS, PILOT, Report
 
 
@@ -150,7 +150,7 @@ def _check_view(
     pilot = view.sample(rng.random((dimensions, PILOT), f4))
     points, lobes = [], list[_Lobe]()
     total, squares = np.zeros(3), np.zeros(3)
-    for size in _chunks(samples):
+    for size in chunk_sizes(samples):
         drawn = view.sample(rng.random((dimensions, size), f4))
         _check_samples(report, view, drawn)
         carried = drawn.weight.astype(np.float64)
@@ -178,10 +178,10 @@ def _check_view(
         report.significant("delta lobe (binomial)", f"{where}, wi_z {lobe.wi[2]:.4g}", p, alpha)
     singular = min(1.0, sum(lobe.probability for lobe in lobes))
     kept = pilot.wi[:, (pilot.pdf > 0) & ~pilot.specular]
-    _compare(report, where, CHARTS["sphere"], kept, drawn_points, samples, view.pdf, alpha, singular)
+    check_density(report, where, CHARTS["sphere"], kept, drawn_points, samples, view.pdf, alpha, singular)
 
 
-def _chunks(n: int) -> Iterator[int]:
+def chunk_sizes(n: int) -> Iterator[int]:
     """Split n into sizes of at most 2¹⁸."""
     for start in range(0, n, 1 << 18):
         yield min(1 << 18, n - start)
@@ -191,7 +191,7 @@ def _check_arrays(report: Report, view: _View, rng: np.random.Generator) -> None
     """Shapes, types, and that no lane depends on the lanes beside it."""
     where, n = str(view), 1000
     u = rng.random((view.bsdf.dimensions, n), f4)
-    w = _uniform_sphere(rng, n)
+    w = uniform_directions(rng, n)
 
     def run(lanes: slice) -> list[NDArray[Any]]:
         drawn = view.sample(np.ascontiguousarray(u[:, lanes]))
@@ -223,7 +223,7 @@ def _check_matte(report: Report, view: _View, rng: np.random.Generator) -> None:
     """No method of a matte material reads wo."""
     n = 1000
     bound, wo = view.at(n)
-    w, u = _uniform_sphere(rng, n), rng.random((bound.dimensions, n), f4)
+    w, u = uniform_directions(rng, n), rng.random((bound.dimensions, n), f4)
     here, above = (
         [*bound.evaluate(v, w), bound.sample_f(v, u).wi, bound.sample_f(v, u).weight]
         for v in (wo, np.repeat(_direction(0, 0), n, 1))
@@ -280,7 +280,7 @@ def _text(w: Floats) -> str:
 def _check_support(report: Report, view: _View, rng: np.random.Generator, points: Floats) -> None:
     """f is finite and not negative, and wherever it is positive so is the pdf."""
     where = str(view)
-    for w in (_uniform_sphere(rng, 1 << 16), points[:, : 1 << 16]):
+    for w in (uniform_directions(rng, 1 << 16), points[:, : 1 << 16]):
         f, pdf = view.f(w), view.pdf(w)
         for name, values in (("f", f), ("pdf", pdf)):
             report.holds("finite", f"{where}, {name}()", ~np.isfinite(values), "finite numbers")
@@ -327,7 +327,7 @@ def _check_reciprocity(report: Report, view: _View, rng: np.random.Generator) ->
     drawn = view.sample(rng.random((view.bsdf.dimensions, PAIRS), f4))
     eta = np.ones_like(drawn.pdf) if drawn.eta is None else drawn.eta
     kept = np.flatnonzero((drawn.pdf > 0) & ~drawn.specular & (np.abs(drawn.wi[2]) > 1e-3))
-    up = _uniform_sphere(rng, PAIRS)
+    up = uniform_directions(rng, PAIRS)
     up[2] = np.maximum(np.abs(up[2]), 1e-3)
     up /= np.sqrt((up * up).sum(0))
     wi = np.concatenate([drawn.wi[:, kept], up], axis=1)

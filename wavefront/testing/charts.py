@@ -70,5 +70,5 @@ CHARTS = {
 }
 
 
-def _uniform_sphere(rng: np.random.Generator, n: int) -> Floats:
+def uniform_directions(rng: np.random.Generator, n: int) -> Floats:
     return _square_to_sphere(rng.random((2, n)))

@@ -84,7 +84,7 @@ def binomial_p(count: int, trials: int, probability: float) -> float:
     return min(1.0, 2 * min(float(pmf[: count + 1].sum()), float(pmf[count:].sum())))
 
 
-def _compare(
+def check_density(
     report: Report,
     where: str,
     chart: Chart,

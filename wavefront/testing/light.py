@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from ..lights.base import LightRecord, LightSample
 from ..vec import Floats, f4
-from .bsdf import _chunks
+from .bsdf import chunk_sizes
 from .charts import CHARTS
-from .chi2 import _compare
+from .chi2 import check_density
 from .report import PILOT, Report
 
 
@@ -73,7 +73,7 @@ def _check_light_at(
         return light.pdf_li(np.repeat(point, w.shape[1], 1), w)
 
     points = []
-    for size in _chunks(samples):
+    for size in chunk_sizes(samples):
         drawn = draw(size)
         _check_light_samples(report, where, light, drawn, density)
         points.append(drawn.wi[:, drawn.pdf > 0])
@@ -82,7 +82,7 @@ def _check_light_at(
     pilot = draw(PILOT)
     kept = pilot.wi[:, pilot.pdf > 0]
     joined = np.concatenate(points, axis=1)
-    _compare(report, where, CHARTS["sphere"], kept, joined, samples, density, alpha)
+    check_density(report, where, CHARTS["sphere"], kept, joined, samples, density, alpha)
 
 
 def _check_light_samples(

@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from ..vec import Floats, f4
-from .bsdf import _chunks
+from .bsdf import chunk_sizes
 from .charts import CHARTS
-from .chi2 import _compare
+from .chi2 import check_density
 from .report import PILOT, Report
 
 
@@ -48,7 +48,7 @@ def check_warp(
     """
     report = Report(f"check_warp({getattr(sample, '__name__', 'sample')})")
     rng = np.random.default_rng(seed)
-    points = np.concatenate([sample(rng.random((2, size), f4)) for size in _chunks(samples)], axis=1)
+    points = np.concatenate([sample(rng.random((2, size), f4)) for size in chunk_sizes(samples)], axis=1)
     report.holds("finite", domain, ~np.isfinite(points), "finite numbers")
     density = pdf(points[:, : 1 << 16])
     edge = float(np.mean(~(density > 0)))  # rounding may put a few on the very border
@@ -62,5 +62,5 @@ def check_warp(
         error = np.abs(again - points[:, : 1 << 16]).max(0)
         report.at_most("round trip", domain, float(error.max()), tolerance)
     pilot = sample(rng.random((2, PILOT), f4))
-    _compare(report, domain, chart, pilot, points, samples, pdf, significance)
+    check_density(report, domain, chart, pilot, points, samples, pdf, significance)
     return report.raise_if_failed()

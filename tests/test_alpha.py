@@ -34,13 +34,13 @@ def mask(values, **arguments) -> wf.Texture:
     return wf.Texture(np.asarray(values, np.float32), filter="nearest", channel=0, **arguments)
 
 
-LAMP = panel((-0.5, -0.4), (0.6, 0.7), 2.0)
+AREA_LIGHT = panel((-0.5, -0.4), (0.6, 0.7), 2.0)
 UNSHADED = polygon_irradiance([(-0.5, 2, -0.4), (-0.5, 2, 0.7), (0.6, 2, 0.7), (0.6, 2, -0.4)])
 
 
-def lit(*things, lamp: wf.Mesh = LAMP) -> wf.Scene:
-    """A floor under a lamp and other things, seen at the origin from close by."""
-    return wf.Scene([floor(), lamp, *things], camera=probe(HERE, 0.1 * EYE))
+def lit(*things, area_light: wf.Mesh = AREA_LIGHT) -> wf.Scene:
+    """A floor under a light and other things, seen at the origin from close by."""
+    return wf.Scene([floor(), area_light, *things], camera=probe(HERE, 0.1 * EYE))
 
 
 # --- In front of things ----------------------------------------------------------------------------
@@ -89,7 +89,7 @@ def test_a_sphere_is_passed_twice() -> None:
 def test_what_is_not_there_is_no_event() -> None:
     """Fifty sheets before a light and no bounce allowed."""
     sheets = [veil(0.0, y) for y in np.linspace(0.1, 1.9, 50)]
-    scene = wf.Scene([*sheets, LAMP], camera=probe((0, 2, 0), HERE))
+    scene = wf.Scene([*sheets, AREA_LIGHT], camera=probe((0, 2, 0), HERE))
     for integrator in ALL:
         assert (render(scene, 1, integrator=integrator, max_bounces=0).rgb == 1).all()
 
@@ -106,7 +106,7 @@ def test_the_environment_behind(integrator: str) -> None:
 
 @pytest.mark.parametrize(("integrator", "accel"), PAIRS)
 def test_shadow_of_sheets(integrator: str, accel: str) -> None:
-    """Two sheets, and a lamp seen through them by both kinds of samples."""
+    """Two sheets, and a light seen through them by both kinds of samples."""
     scene = lit(veil(0.3, 0.5), veil(0.5, 1.0))
     spp = 4096 if integrator == "naive" else 1024
     mean = measure(scene, spp, integrator=integrator, accel=accel, max_bounces=1)
@@ -117,15 +117,15 @@ def test_shadow_of_sheets(integrator: str, accel: str) -> None:
 def test_shadow_of_a_sphere(integrator: str) -> None:
     """Light crosses it twice."""
     ball = wf.Sphere((0, 1, 0), 0.7, material=wf.Material(BLACK, alpha=0.3))
-    lamp = panel((-0.3, -0.3), (0.3, 0.3), 2.0)
+    area_light = panel((-0.3, -0.3), (0.3, 0.3), 2.0)
     whole = polygon_irradiance([(-0.3, 2, -0.3), (-0.3, 2, 0.3), (0.3, 2, 0.3), (0.3, 2, -0.3)])
     spp = 8192 if integrator == "naive" else 256
-    mean = measure(lit(ball, lamp=lamp), spp, integrator=integrator, max_bounces=1)
+    mean = measure(lit(ball, area_light=area_light), spp, integrator=integrator, max_bounces=1)
     assert_mean(mean, 0.49 * whole * ALBEDO / np.pi, 0.04)
 
 
 @pytest.mark.parametrize("integrator", ["naive", "full"])
-def test_half_of_a_lamp_through_a_cut_out(integrator: str) -> None:
+def test_half_of_a_light_through_a_cut_out(integrator: str) -> None:
     """A sheet that is not there where x < 0 hides the other half exactly."""
     left = polygon_irradiance([(-0.5, 2, -0.4), (-0.5, 2, 0.7), (0, 2, 0.7), (0, 2, -0.4)])
     spp = 4096 if integrator == "naive" else 1024
@@ -155,15 +155,15 @@ def test_shadow_of_a_checkerboard(cutoff: float | None, accel: str) -> None:
 
 
 @pytest.mark.parametrize("integrator", ALL)
-def test_a_lamp_that_is_partly_there(integrator: str) -> None:
+def test_a_light_that_is_partly_there(integrator: str) -> None:
     """By light samples and by paths it shines as much as is there of it, evenly or not."""
     left = polygon_irradiance([(-0.5, 2, -0.4), (-0.5, 2, 0.7), (0.05, 2, 0.7), (0.05, 2, -0.4)])
     for alpha, expected in ((0.4, 0.4 * UNSHADED), (mask(1 - HALF), left)):
-        lamp = wf.Rectangle(
+        area_light = wf.Rectangle(
             (-0.5, 2, -0.4), (1.1, 0, 0), (0, 0, 1.1), material=wf.Material(BLACK, alpha=alpha), emission=1.0
         )
         spp = 4096 if integrator == "naive" else 1024
-        mean = measure(lit(lamp=lamp), spp, integrator=integrator, max_bounces=1)
+        mean = measure(lit(area_light=area_light), spp, integrator=integrator, max_bounces=1)
         assert_mean(mean, expected * ALBEDO / np.pi, 0.02)
 
 
@@ -187,7 +187,7 @@ def test_absorption_goes_on_behind_holes() -> None:
 
 
 def leaves(size: tuple[int, int] = (16, 8)) -> wf.Scene:
-    """A shelf of leaves cut out of squares, a veil and a glass ball, before a lamp."""
+    """A shelf of leaves cut out of squares, a veil and a glass ball, before a light."""
     rng, above = np.random.default_rng(3), np.array([0, 1.2, 0])
     leaf = mask(rng.random((6, 6)))
     shapes: list[wf.Mesh | wf.Sphere] = [floor(), panel((-1, -1), (1, 1), 3.0, emission=4.0)]
@@ -258,10 +258,10 @@ def numpy(geometry):
 
 
 def behind(mesh: wf.Mesh) -> float:
-    """How much of a lamp below shows through a mesh at z = 0 in the unit square, away from its edges."""
-    lamp = wf.Rectangle((-9, -9, -1), (18, 0, 0), (0, 18, 0), material=BLACK, emission=1.0)
+    """How much of a light below shows through a mesh at z = 0 in the unit square, away from its edges."""
+    area_light = wf.Rectangle((-9, -9, -1), (18, 0, 0), (0, 18, 0), material=BLACK, emission=1.0)
     camera = wf.Camera.orthographic((0.25, 0.25, 1), (0.25, 0.25, 0), height=0.2, size=(SIDE, SIDE))
-    return float(render(wf.Scene([mesh, lamp], camera=camera), 256, max_bounces=0).rgb.mean())
+    return float(render(wf.Scene([mesh, area_light], camera=camera), 256, max_bounces=0).rgb.mean())
 
 
 @pytest.mark.parametrize(

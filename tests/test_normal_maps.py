@@ -390,12 +390,12 @@ def test_a_mirror_has_no_black_facets(angle):
 
 @pytest.mark.filterwarnings("ignore:the picture is black")
 def test_light_does_not_leak_from_behind():
-    lamp = square(z=-0.5, emission=5.0)
+    area_light = square(z=-0.5, emission=5.0)
     camera = wf.Camera.orthographic((0.5, 0.5, 3), (0.5, 0.5, 0), height=0.9, size=(16, 16))
     below = wf.PointLight((0.5, 0.5, -0.2), 5)
     for material in (wf.Diffuse(1.0), wf.Conductor.named("gold", 0.4)):
         patch = square(material=wf.Material(material, normal_map=STRONG))
-        assert render(wf.Scene([patch, lamp], [below], camera), 32).rgb.max() == 0
+        assert render(wf.Scene([patch, area_light], [below], camera), 32).rgb.max() == 0
 
 
 def directions(n, seed):

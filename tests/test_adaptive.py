@@ -271,8 +271,8 @@ def test_ten_seconds_are_ten_seconds(name: str) -> None:
 def closed(size: tuple[int, int]) -> wf.Scene:
     """A room in which no light is lost, so that no path ends before `max_bounces`."""
     room = wf.Sphere((0, 0, 0), 5, material=wf.Diffuse(1.0))
-    lamp = wf.Sphere((0, 0, -3), 0.1, emission=1)
-    return wf.Scene([room, lamp], camera=wf.Camera.look_at((0, 0, 3), (0, 0, 0), size=size))
+    light = wf.Sphere((0, 0, -3), 0.1, emission=1)
+    return wf.Scene([room, light], camera=wf.Camera.look_at((0, 0, 3), (0, 0, 0), size=size))
 
 
 @pytest.mark.filterwarnings("ignore:paths have met more than")  # as a fast machine does in the time
