@@ -1,4 +1,4 @@
-"""What a file says of a surface, as parameters of `Principled`, and the nearest material."""
+"""Materials of files: parameters by the names of `Principled`, and the classes that fit them."""
 
 from __future__ import annotations
 
@@ -25,25 +25,27 @@ GLASS = frozenset(("base_color", "transmission", "ior", "roughness", "thin"))
 
 @dataclass
 class MaterialSpec:
-    """What a surface looks like."""
+    """The appearance of a surface in a file."""
 
     material: Material
     emission: NDArray[np.float64] | Texture | None = None  # radiance, (3,) or varying
     two_sided: bool = False  # the emission leaves both sides
-    lost: list[str] = field(default_factory=list)  # what the file asks for in vain
-    alpha: Any = None  # number or texture where opacity counts: glTF's alpha modes MASK and BLEND
+    lost: list[str] = field(default_factory=list)  # properties that are not supported
+    alpha: Any = None  # number or texture in glTF's alpha modes MASK and BLEND
     cutoff: float | None = None  # as `alpha_cutoff` of `Material`
-    # the same with its base color multiplied by vertex colors, once made; by whether its opacity is, too
+    # the same with base color times vertex colors; the key says whether opacity is multiplied, too
     tinted: dict[bool, MaterialSpec] = field(default_factory=dict)
 
 
-COLORED = MaterialSpec(Material(Diffuse(VertexColors())))  # of a mesh that has vertex colors and no material
+COLORED = MaterialSpec(
+    Material(Diffuse(VertexColors()))
+)  # of a mesh with vertex colors and without a material
 
 
 def assign_material(raw: RawMesh, spec: MaterialSpec | None) -> bool:
-    """Give a mesh its material and emission, and the material the mesh's vertex colors.
+    """Set the material and emission of a mesh, and multiply the base color by its vertex colors.
 
-    Returns False if the material has no base color that they could multiply.
+    Returns False if the material has no base color to multiply.
     """
     honored = True
     if raw.colors is not None:
@@ -78,14 +80,14 @@ def _tinted(spec: MaterialSpec, faint: bool) -> tuple[MaterialSpec, bool]:
 def build_material(
     wanted: dict[str, Any], normal_map: BaseNormalMap | None = None
 ) -> tuple[Material, list[str]]:
-    """Return a material, and the names of the parameters that nothing honors.
+    """Return a material, and the names of the unsupported parameters.
 
     Parameters
     ----------
     wanted
-        Parameters of `Principled`, and others that it may get, by name, as far as they are not
-        neutral; `base_color` is always there. `alpha` and `alpha_cutoff` are those of `Material`,
-        `absorption` is that of the interior. Values are numbers, colors or textures.
+        Parameters by name, without neutral values: those of `Principled`, `alpha` and `alpha_cutoff` of
+        `Material`, and `absorption` of its interior. `base_color` is always included. Values are numbers,
+        colors or textures.
     normal_map
         Of the material.
     """

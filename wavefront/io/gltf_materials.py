@@ -1,6 +1,6 @@
 """Materials and textures of glTF: metallic-roughness, specular-glossiness and the KHR extensions.
 
-They are read from the JSON's own floats.
+Their numbers are those of the JSON, unrounded.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .gltf_specular_glossiness import F0, BesideSpecular
 
 WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 NEAREST, LINEAR = 9728, 9729
-# extensions whose every property is looked at here or in gltf.py
+# extensions whose properties are all read here or in gltf.py
 KNOWN = frozenset(
     "KHR_" + name
     for name in (
@@ -42,24 +42,24 @@ KNOWN = frozenset(
     )
 ) | {"EXT_mesh_gpu_instancing"}
 MAX_ALL_PIXELS = 4 * MAX_PIXELS  # of all images of a file, decoded
-BESIDE = frozenset(  # extensions that go with specular-glossiness; the others exclude it
+BESIDE = frozenset(  # extensions that may occur with specular-glossiness; the others exclude it
     ("KHR_materials_pbrSpecularGlossiness", "KHR_materials_emissive_strength", "KHR_texture_transform")
 )
-FLIP = np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]])  # between v downwards and v upwards
+FLIP = np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]])  # converts between v downwards and v upwards
 
 
 class GltfMaterials:
-    """The materials of a document, each made once."""
+    """The materials of a document, each built once."""
 
     def __init__(self, document: Document) -> None:
         self._document = document
         self._looks: dict[int, MaterialSpec] = {}
         self._images: dict[int, NDArray[Any] | None] = {}
-        self._pixels = 0  # of those
+        self._pixels = 0  # of these images
         _check_extensions(document)
 
     def spec(self, index: int) -> MaterialSpec:
-        """Return what material `index` looks like."""
+        """Return the appearance of material `index`."""
         item = self._document.get("materials", index)
         if index not in self._looks:
             where = f"materials[{index}]" + (f" {item['name']!r}" if "name" in item else "")
@@ -96,7 +96,7 @@ class GltfMaterials:
         )
 
     def _filter(self, sampler: dict[str, Any], where: str) -> Any:
-        """Return how texels are looked up, near and far alike; samples of a pixel do what mipmaps are for."""
+        """Return the filter for all distances; samples of a pixel replace mipmaps."""
         near, far = sampler.get("magFilter"), sampler.get("minFilter")
         if {near, far} == {NEAREST, LINEAR}:
             self._document.lose("minFilter (magFilter counts at all distances)", where)
@@ -146,7 +146,7 @@ class _Reader:
         self._cutoff: float | None = None
 
     def spec(self) -> MaterialSpec:
-        """Return the look of the material."""
+        """Return the appearance of the material."""
         extensions = self._item.get("extensions", {})
         normal_map = self._relief()
         if "KHR_materials_pbrSpecularGlossiness" in extensions:
@@ -165,7 +165,7 @@ class _Reader:
         return MaterialSpec(material, radiance, both, self._lost + lost, self._alpha_given, self._cutoff)
 
     def _extended(self, extensions: dict[str, Any]) -> None:
-        """Take what extends metallic-roughness."""
+        """Read the extensions of metallic-roughness."""
         self._ior(extensions.get("KHR_materials_ior"))
         self._transmission(
             extensions.get("KHR_materials_transmission"), extensions.get("KHR_materials_volume")
@@ -217,10 +217,10 @@ class _Reader:
         self._wanted["roughness"] = self._scalar(group, "roughnessFactor", "metallicRoughnessTexture", 1, 1.0)
 
     def _specular_glossiness(self, group: dict[str, Any]) -> None:
-        """Take the parameters of KHR_materials_pbrSpecularGlossiness, which goes before metallic-roughness.
+        """Read the parameters of KHR_materials_pbrSpecularGlossiness, which replace metallic-roughness.
 
-        The base is diffuse·(1 − max(specular)), the reflectance along the normal is specular, the roughness
-        1 − glossiness. A dielectric of index 1.5 whose reflectance 0.04 is tinted is all of that exactly.
+        The base is diffuse·(1 − max(specular)), the reflectance along the normal is specular, and the
+        roughness is 1 − glossiness. A dielectric of index 1.5 with a tinted reflectance of 0.04 equals it.
         """
         diffuse = self._color(group, "diffuseFactor", [1.0, 1.0, 1.0, 1.0])
         specular = self._color(group, "specularFactor", [1.0, 1.0, 1.0])
@@ -243,7 +243,7 @@ class _Reader:
                 )
 
     def _alpha(self, group: dict[str, Any], key: str, factor: float, base: Texture | None) -> None:
-        """Take the opacity of a base color: a factor, and the fourth channel of the texture `key`."""
+        """Read the opacity of a base color: a factor, and the fourth channel of the texture `key`."""
         mode = self._item.get("alphaMode", "OPAQUE")
         if mode not in ("OPAQUE", "MASK", "BLEND"):
             raise SceneError(
@@ -278,7 +278,7 @@ class _Reader:
         if group is None:
             return
         ior = self._number(group, "ior", 1.5, high=MAX_INDEX)
-        if ior < 1:  # 0 stands for infinity: everything is reflected
+        if ior < 1:  # 0 means an infinite index: everything is reflected
             self._lost.append(f"ior {ior:g}")
         else:
             self._want("ior", ior, 1.5)
@@ -327,7 +327,7 @@ class _Reader:
             self._wanted["specular_color"] = factor if texture is None else texture
 
     def _volume(self, group: dict[str, Any] | None) -> None:
-        """Beer–Lambert: `attenuationColor` is what is left after `attenuationDistance`."""
+        """Beer–Lambert: `attenuationColor` is the transmittance over `attenuationDistance`."""
         if group is None:
             return
         if "thicknessTexture" in group:
@@ -371,8 +371,8 @@ def _uv_matrix(document: Document, move: dict[str, Any], where: str) -> NDArray[
     scale = floats(place + " scale", move.get("scale", [1, 1]), 2)
     angle = floats(place + " rotation", [move.get("rotation", 0)], 1)[0]
     sin, cos = sin_cos_turns(np.float64(angle / (2 * np.pi)))
-    # the signs follow the extension's example (a quarter turn that lands in the lower left), which
-    # is how viewers do it; the GLSL beside that example turns the other way
+    # the signs follow the extension's example (a quarter turn that ends in the lower left), as viewers do;
+    # the GLSL beside that example turns in the opposite direction
     moved = np.array(
         [[cos * scale[0], sin * scale[1], offset[0]], [-sin * scale[0], cos * scale[1], offset[1]], [0, 0, 1]]
     )

@@ -1,4 +1,4 @@
-"""Several meshes made one."""
+"""Joining several meshes to one."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .repair import RawMesh, build
 def join(
     meshes: list[Mesh], name: str, material: MaterialLike | None = None, transform: ArrayLike | None = None
 ) -> Mesh:
-    """Return one mesh with the triangles of all.
+    """Return one mesh with the triangles of all meshes.
 
     Raises
     ------
     SceneError
-        If there are several materials and `material` does not say which to use.
+        If there are several materials and `material` is not given.
     """
     if material is None and len({id(mesh.material) for mesh in meshes}) > 1:
         raise SceneError(f"{name}: has {len(meshes)} materials; pass one, or use wf.load")
@@ -48,6 +48,6 @@ def join(
 
 
 def _joined(parts: list[np.ndarray | None]) -> np.ndarray | None:
-    """Concatenate what every part has."""
+    """Concatenate an array if every part has it."""
     there = [part for part in parts if part is not None]
     return np.concatenate(there) if len(there) == len(parts) else None

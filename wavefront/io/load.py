@@ -33,23 +33,23 @@ def load(
 
     The last two need the packages of the extra `formats`: `pip install pycollada lxml networkx`.
 
-    A mesh that several nodes of a glTF file have is read once, and becomes an `Instance` for each.
+    A mesh of several nodes of a glTF file is read once, and becomes an `Instance` for each node.
 
     Parameters
     ----------
     path
         The file. Files that it refers to are read only from its own folder.
     strict
-        Refuse what would otherwise be repaired or left out with a warning.
+        Raise an error in place of each warning of a repair or of an unsupported property.
     progress
-        Where reading takes more than 2 s, True or None shows a line that says so; False shows nothing.
+        If reading takes more than 2 s, True or None shows a line with the file's name; False shows nothing.
     max_instances
-        How many meshes a glTF file may place; one of a few bytes may place millions.
+        Number of meshes at most that a glTF file places: a file of a few bytes may place millions.
 
     Raises
     ------
     SceneError
-        Naming the file, the line or element, the value and the limit.
+        If the file cannot be read. The message names the file, the line or element, the value and the limit.
     """
     with _phase(path, progress):
         name, contents = os.fspath(path), read(path, Wish(strict, max_instances=max_instances))
@@ -72,8 +72,8 @@ def load_mesh(
     path
         As for `load`.
     material
-        What the mesh is made of. Without it, the material and the emission of the file, which must
-        then have only one.
+        Material of the mesh. By default the material and the emission of the file, which must then have only
+        one.
     transform
         (4, 4) matrix applied to the vertices.
     strict, progress
@@ -109,19 +109,19 @@ def _phase(path: PathLike, progress: Progress) -> AbstractContextManager[None]:
 
 
 def from_trimesh(geometry: Any) -> Scene:
-    """Turn a `trimesh.Trimesh` or `trimesh.Scene` into a scene, as if it had been read from a file.
+    """Convert a `trimesh.Trimesh` or `trimesh.Scene` to a scene, as if it had been read from a file.
 
-    Normals are used where the object holds them: given by its file, or computed because somebody
-    asked for `vertex_normals`. Trimesh's own exporters follow the same rule. Geometry that stands in a
-    scene's graph several times becomes an `Instance` for each.
+    Normals are used if the object has them: from its file, or computed by an access to
+    `vertex_normals`. Trimesh's own exporters follow the same rule. Geometry that occurs several times in a
+    scene's graph becomes an `Instance` for each time.
 
-    The camera and the lights of a trimesh scene are used if somebody set them. The camera's resolution is
-    the size of the picture; a camera without a transform is placed to see all of the scene. Colors of lights
-    are linear. The lights that trimesh makes up for its viewer do not count.
+    The camera and the lights of a trimesh scene are used if they were set. The camera's resolution is the
+    size of the picture; a camera without a transform is placed to see all of the scene. Colors of lights
+    are linear. Lights that trimesh adds for its viewer do not count.
 
-    What trimesh itself does not keep cannot count: of glTF it rounds base colors to 8 bits, and drops
-    extensions, lights, tangents and the scale of normal maps; of MTL it keeps the image of `map_Kd`
-    only. `load` reads all of these.
+    Some properties of files are lost in trimesh: of glTF it rounds base colors to 8 bits, and drops
+    extensions, lights, tangents and the scale of normal maps; of MTL it keeps only the image of `map_Kd`.
+    `load` reads all of these.
 
     Raises
     ------

@@ -6,27 +6,28 @@ How an MTL material is read:
   beside a `map_Kd` counts as white, since some exporters write that.
 - `illum` 4, 6, 7 and 9 are glass with the index `Ni` (1.5 when absent), tinted by `Tf`, rough by `Pr`.
 - `illum` 3, 5 and 8 are mirrors of reflectance `Ks`, if `Ks` is not black and there is no `Pr` or `Pm`.
-- `illum` 0 and 1 ask for no highlight, and so does an `Ns` of 0, which MeshLab writes beside `Ks 1 1 1`:
-  such a surface is matte, whatever its `Ks`.
-- All others, and surfaces without an `illum`, have a gloss over the matte part if `Ks` or a `map_Ks` gives
-  one, by the rules of Blender's importer (obj_import_mtl.cc, set_bsdf_socket_values): its reflectance
-  seen along the normal is 0.08 · `Ks`, its roughness 1 - √(`Ns` / 1000). Without an `Ns` the roughness is 1,
-  where Blender has 0 if `illum` is 2. Below a reflectance of 0.02 the gloss is weaker at grazing angles,
-  too, as in S. Lagarde and C. de Rousiers 2014, "Moving Frostbite to PBR". `map_Ks` counts by its luminance.
+- `illum` 0 and 1 mean no highlight, and so does an `Ns` of 0, which MeshLab writes beside `Ks 1 1 1`: such a
+  surface is matte, whatever its `Ks`.
+- All others, and surfaces without an `illum`, have a glossy coat over the matte part if `Ks` or a `map_Ks`
+  is not black, by the rules of Blender's importer (obj_import_mtl.cc, set_bsdf_socket_values). The
+  reflectance of the coat along the normal is 0.08 · `Ks`, its roughness 1 - √(`Ns` / 1000). Without an `Ns` the roughness
+  is 1, where Blender has 0 if `illum` is 2. Below a reflectance of 0.02 the coat is also weaker at grazing
+  angles, as in S. Lagarde and C. de Rousiers 2014, "Moving Frostbite to PBR". `map_Ks` counts by its
+  luminance.
 - `Pr Pm Ps Pc Pcr aniso` and their maps, `norm` and `map_d` (the PBR extension) are the parameters of
-  the same names of `Principled`. `Pr` goes before `Ns`; beside `Pr` or `Pm`, what asks for no highlight
-  leaves the usual one of reflectance 0.04.
+  the same names of `Principled`. `Pr` replaces `Ns`. Beside `Pr` or `Pm`, a surface without a highlight
+  keeps the default one of reflectance 0.04.
 - Opacity is `d`; without a `d` it is 1 - `Tr`, except that `Tr 1` alone means opaque: that is how
-  MeshLab writes it, and a material that cannot be seen has no other use. A surface that is less
+  MeshLab writes it, and an invisible material would be useless. A surface that is less
   than opaque and has an index `Ni` other than 1 is glass.
-- `norm` is a normal map. `bump`, or `map_Bump`, holds heights, of which 1 is `-bm` (1 when absent) scene
-  units; but an image that looks like a normal map is one, for that is how Blender writes them, and
-  `-bm` is then its strength.
-- `Ns` shapes nothing but the gloss, and `Ni` nothing but glass.
+- `norm` is a normal map. `bump`, or `map_Bump`, contains heights: 1 stands for `-bm` (1 when absent) scene
+  units. But an image that looks like a normal map is one, because Blender writes normal maps so, and `-bm` is
+  then its strength.
+- `Ns` affects only the gloss, and `Ni` only glass.
 - A map whose image is missing is left out with a warning.
 - Images are sRGB where they are colors, data elsewhere. The options -s -o -clamp -mm -imfchan -bm are read.
 
-Whatever else a file asks for is named in one warning per file.
+All other properties of a file are named in one warning.
 """
 
 from __future__ import annotations
@@ -54,16 +55,16 @@ from .repair import warn
 GLASS = (4, 6, 7, 9)
 MIRROR = (3, 5, 8)
 NO_HIGHLIGHT = (0, 1)
-LARGEST_ILLUM = 9  # of those that change what a surface looks like
+LARGEST_ILLUM = 9  # keywords that change the look of a surface
 GLASS_IOR = 1.5
-MATTE = 0.5  # reflectance where a file gives none
-KS_F0 = 0.08  # the reflectance that `Ks 1` stands for
-LEAST_F0 = 0.02  # of dielectrics; what reflects less is weaker at all angles
+MATTE = 0.5  # default reflectance
+KS_F0 = 0.08  # the reflectance of `Ks 1`
+LEAST_F0 = 0.02  # of dielectrics; a lower reflectance is weaker at all angles
 LARGEST_NS = 1000.0
-# values that change nothing
+# values without an effect
 NEUTRAL = {"ka": 0.0, "kd": 0.0, "ks": 0.0, "tf": 1.0, "d": 1.0, "tr": 0.0, "sharpness": 60.0}
 
-# keyword of a number, of the map that goes with it, and what Principled calls it
+# keyword of a number, keyword of its map, and its name in Principled
 PBR = (
     ("pr", "map_pr", "roughness"),
     ("pm", "map_pm", "metallic"),
@@ -72,7 +73,7 @@ PBR = (
     ("pcr", "map_pcr", "clearcoat_roughness"),
     ("aniso", "map_aniso", "anisotropy"),
 )
-# options of a map that take this many words; those not named here take up to three numbers
+# number of words of a map's options; options not listed here take up to three numbers
 OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-mm": 2}
 OPTIONS |= {"-texres": 1, "-type": 1, "-bm": 1}
 READ = frozenset(("-s", "-o", "-mm", "-clamp", "-imfchan"))
@@ -89,18 +90,18 @@ class Entry:
     file: str
     name: str
     lines: dict[str, tuple[str, int, str]] = field(default_factory=dict)
-    read: set[str] = field(default_factory=set)  # keywords that the look honors
+    read: set[str] = field(default_factory=set)  # keywords that the material uses
     idle_options: set[str] = field(default_factory=set)  # options of maps that are not honored
-    images: dict[str, NDArray[np.uint8]] = field(default_factory=dict)  # maps that are there already
+    images: dict[str, NDArray[np.uint8]] = field(default_factory=dict)  # maps that were read already
     strict: bool = False
 
     def where(self, key: str) -> str:
-        """Name file, line (where there is one) and keyword for a message."""
+        """Return file, line (if there is one) and keyword for a message."""
         keyword, number, _ = self.lines[key]
         return f"{self.file} line {number}: {keyword}" if number else f"{self.file}: {keyword}"
 
     def has(self, *keys: str) -> bool:
-        """Tell whether any of the keywords is there."""
+        """Return whether any of the keywords occurs."""
         return any(key in self.lines for key in keys)
 
     def numbers(self, key: str) -> list[float] | None:
@@ -162,7 +163,7 @@ class Entry:
             raise SceneError(f"{self.where(key)}: {error}") from error
 
     def beside(self, key: str, name: str) -> Path:
-        """Return the path of a file that a line names."""
+        """Return the path of the file in a line."""
         try:
             return beside(self.file, name)
         except SceneError as error:
@@ -195,13 +196,13 @@ class Entry:
         return CHANNELS[word]
 
     def unread(self) -> list[str]:
-        """Return the keywords, as written, that ask for something the look does not give."""
+        """Return the keywords, as written, that the material does not support."""
         return [keyword for key, (keyword, _, _) in self.lines.items() if not self._idle(key)]
 
     def _idle(self, key: str) -> bool:
         if key in self.read:
             return True
-        if key in ("ns", "ni"):  # where there is neither a gloss nor glass, they mean nothing
+        if key in ("ns", "ni"):  # without a gloss or glass they have no effect
             return True
         return key in NEUTRAL and set(self.lines[key][2].split()) <= _spellings(NEUTRAL[key])
 
@@ -211,7 +212,7 @@ def _spellings(value: float) -> set[str]:
 
 
 def parse(path: str | os.PathLike[str], text: str, strict: bool = False) -> dict[str, Entry]:
-    """Split MTL text into materials; a name may hold spaces.
+    """Split MTL text into materials; a name may contain spaces.
 
     Raises
     ------
@@ -242,7 +243,7 @@ def _split(line: str) -> tuple[str, str]:
 
 
 def specs(entries: dict[str, Entry], strict: bool = False) -> dict[str, MaterialSpec]:
-    """Turn entries into looks; what is not honored is named in one warning.
+    """Convert entries to materials; unsupported properties are named in one warning.
 
     Raises
     ------
@@ -263,7 +264,7 @@ def specs(entries: dict[str, Entry], strict: bool = False) -> dict[str, Material
 
 
 def spec(entry: Entry) -> MaterialSpec:
-    """Turn one entry into a look; what is used is marked in `entry.read`."""
+    """Convert one entry to a material; the keywords that it uses are added to `entry.read`."""
     _leave_out_missing(entry)
     factor = entry.color("ke", 0.0, high=np.inf)
     if "map_ke" in entry.lines and not factor.any():
@@ -276,7 +277,7 @@ def spec(entry: Entry) -> MaterialSpec:
 
 
 def _leave_out_missing(entry: Entry) -> None:
-    """Announce maps whose files are missing; the material is what it is without them."""
+    """Warn of maps whose files are missing; the material is read without them."""
     for key in [key for key in entry.lines if key in MAPS and key not in entry.images]:
         name = _map(entry, key)[1]
         if name and not os.path.exists(entry.beside(key, name)):
@@ -298,13 +299,13 @@ def _material(entry: Entry) -> tuple[Material, list[str]]:
     wanted = _gloss(entry, illum, physical) | _wanted(entry)
     material, lost = build_material(wanted)
     if type(material.bsdf) is not Diffuse and not physical and "roughness" not in wanted:
-        # a shine of its default kind would be an invention where the file does not speak of it
+        # a default gloss would be an invention if the file has none
         material, lost = build_material({**wanted, "roughness": 1.0, "specular": 0.0})
     return material, lost
 
 
 def _gloss(entry: Entry, illum: int, physical: bool) -> dict[str, Any]:
-    """Return the parameters of `Principled` for the gloss that `Ks` and `Ns` ask for, if they do."""
+    """Return the parameters of `Principled` for the gloss of `Ks` and `Ns`, if there is one."""
     color = _highlight(entry, illum)
     gloss: dict[str, Any] = {}
     if color.any():
@@ -326,7 +327,7 @@ def _highlight(entry: Entry, illum: int) -> Doubles:
 
 
 def _exponent(entry: Entry) -> float:
-    """Return `Ns` in [0, `LARGEST_NS`]; larger ones are none sharper."""
+    """Return `Ns`, clamped to [0, `LARGEST_NS`]: larger values do not sharpen the highlight."""
     value = entry.number("ns", 0.0)
     if value < 0:
         warn(f"{entry.where('ns')} is {value:g}; it must be at least 0 and was clamped", entry.strict)
@@ -343,7 +344,7 @@ def _specular(entry: Entry, strength: float) -> dict[str, Any]:
 
 
 def _wanted(entry: Entry) -> dict[str, Any]:
-    """Return the parameters of `Principled` that a file asks for."""
+    """Return the parameters of `Principled` in a file."""
     wanted: dict[str, Any] = {"base_color": _base(entry)}
     for key, image, name in PBR:
         factor = _part(entry, key, 1.0)
@@ -355,7 +356,7 @@ def _wanted(entry: Entry) -> dict[str, Any]:
 
 
 def _alpha(entry: Entry) -> Any:
-    """Return how much of the surface is there: a number or a texture."""
+    """Return the opacity: a number or a texture."""
     factor = alpha_of_entry(entry)
     entry.read.update(("d", "tr"))
     texture = entry.texture("map_d", factor, "scalar")
@@ -363,7 +364,7 @@ def _alpha(entry: Entry) -> Any:
 
 
 def _relief(entry: Entry) -> BaseNormalMap | None:
-    """Return what tilts the normals: `norm` before `bump`, of which only one is read."""
+    """Return the normal map or bump map. If there are both, only `norm` is read."""
     if "norm" in entry.lines:
         return _made(entry, "norm", _normal_map)
     for key in ("map_bump", "bump"):
@@ -393,7 +394,7 @@ def _bump_map(entry: Entry, key: str) -> BumpMap:
 
 
 def _looks_like_normals(entry: Entry, key: str) -> bool:
-    """Tell whether an image is on average the bluish (0.5, 0.5, 1) of normals that hardly tilt."""
+    """Return whether the mean of an image is about (0.5, 0.5, 1), as in normal maps."""
     if "-imfchan" in _map(entry, key)[0]:
         return False
     texture = entry.texture(key, kind="data")
@@ -417,7 +418,7 @@ def _glass(entry: Entry) -> Dielectric:
     if not 1 / MAX_INDEX <= ior <= MAX_INDEX:
         limits = f"above 0, from {1 / MAX_INDEX:g} to {MAX_INDEX:g}"
         raise SceneError(f"{entry.where('ni')} is {ior:g}; an index must be {limits}")
-    entry.read.update(("d", "tr", "kd"))  # glass has no matte part: files give it a Kd all the same
+    entry.read.update(("d", "tr", "kd"))  # glass has no matte part, but files give it a Kd
     return Dielectric(ior, _part(entry, "pr", 0.0), transmittance=entry.color("tf", 1.0))
 
 
@@ -430,7 +431,7 @@ def _part(entry: Entry, key: str, default: float) -> float:
 
 
 def _map(entry: Entry, key: str) -> tuple[dict[str, list[str]], str]:
-    """Split the rest of a map line into its options and the file name, which may hold spaces."""
+    """Split the rest of a map line into its options and the file name, which may contain spaces."""
     rest = entry.lines[key][2]
     options: dict[str, list[str]] = {}
     while rest.startswith("-"):
@@ -469,6 +470,6 @@ def alpha_of_entry(entry: Entry) -> float:
         value = 1.0 if clear == 1 else 1.0 - clear
     if value == 1:
         entry.read.update(("d", "tr"))
-    else:  # only what the material then makes of it counts as read
+    else:  # only keywords that the material then uses count as read
         entry.read.difference_update(("d", "tr"))
     return min(max(value, 0.0), 1.0)

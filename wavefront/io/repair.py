@@ -1,4 +1,4 @@
-"""Checks and repairs on the way from a file's arrays to a `Mesh`. A repair is always announced."""
+"""Checks and repairs of a file's arrays before they become a `Mesh`. Each repair gives a warning."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from ..shapes import Mesh
 from ..textures.parameter import Color
 from ..vec import FLOAT32_MAX, cross
 
-MAX_UV = 2.0**24  # float32 has no fractions above, and textures only read those
-FLAT = 1e-14  # a face is degenerate if twice its area is below this part of its longest edge squared
+MAX_UV = 2.0**24  # above, float32 has no fractions, which textures need
+FLAT = 1e-14  # a face is degenerate if twice its area is below this multiple of its longest edge squared
 
 Table = NDArray[np.float64]
 Faces = NDArray[np.intp]
 
 
 def warn(message: str, strict: bool) -> None:
-    """Announce a repair; when strict, refuse instead with a SceneError."""
+    """Warn of a repair; if strict, raise a SceneError instead."""
     if strict:
         raise SceneError(message)
     warnings.warn(message, UserWarning, stacklevel=2)
 
 
 def wide(values: NDArray[Any]) -> Table:
-    """Return numbers as float64. A signalling NaN is one like any other, and is dealt with later."""
+    """Return numbers as float64. A signaling NaN is treated like any NaN, later."""
     with np.errstate(invalid="ignore"):
         return values.astype(np.float64)
 
 
 @dataclass
 class RawMesh:
-    """A mesh as a file gives it."""
+    """A mesh as in a file."""
 
     name: str
     vertices: Table  # (n, 3)
@@ -45,7 +45,7 @@ class RawMesh:
     normals: Table | None = None  # (n, 3); a row of zeros means none
     uvs: Table | None = None  # (n, 2)
     uvs1: Table | None = None  # (n, 2)
-    tangents: Table | None = None  # (n, 4) as of `Mesh`; without normals they do not count
+    tangents: Table | None = None  # (n, 4) as of `Mesh`; ignored without normals
     colors: Table | None = None  # (n, 3 or 4) linear
     lines: Faces | None = None  # (m,) line of the file for each face
     material: Material | None = None
@@ -54,7 +54,7 @@ class RawMesh:
 
 
 def with_face_colors(source: str, raw: RawMesh, colors: Table) -> RawMesh:
-    """Return the same mesh with colors (m, 4) for its faces: every corner gets a vertex of its own.
+    """Return the same mesh with colors (m, 4) of its faces: every corner becomes a separate vertex.
 
     Raises
     ------
@@ -74,16 +74,16 @@ def with_face_colors(source: str, raw: RawMesh, colors: Table) -> RawMesh:
 
 
 def build(source: str, raw: RawMesh, strict: bool = False) -> Mesh | None:
-    """Return a sound mesh, or None when no face is left.
+    """Return a valid mesh, or None if no face is left.
 
     Parameters
     ----------
     source
         File name, for messages.
     raw
-        What the file gives.
+        The mesh of the file.
     strict
-        Refuse what would otherwise be repaired with a warning.
+        Raise an error in place of each warning of a repair.
 
     Raises
     ------
@@ -141,13 +141,13 @@ def _has_area(vertices: Table, faces: Faces) -> NDArray[np.bool_]:
     a, b, c = vertices.take(faces, 0).transpose(1, 2, 0)
     edges = np.stack([b - a, c - b, a - c])  # (3, 3, m)
     longest = np.abs(edges).max(axis=(0, 1))
-    # divided by the longest edge first, so that squares neither overflow nor vanish
+    # first divided by the longest edge, so that squares neither overflow nor underflow
     unit = edges / np.where(longest > 0, longest, 1)
     return np.asarray(np.abs(cross(unit[0], unit[1])).max(axis=0) > FLAT)
 
 
 def _normals(label: str, normals: Table | None, vertices: Table, faces: Faces, strict: bool) -> Table | None:
-    """Return unit normals; vertices without one get that of a face that uses them."""
+    """Return unit normals; vertices without a normal get that of a face that uses them."""
     if normals is None:
         return None
     normals = np.array(normals, np.float64)
@@ -171,7 +171,7 @@ def _normals(label: str, normals: Table | None, vertices: Table, faces: Faces, s
 
 
 def _finite(label: str, what: str, values: Table | None, otherwise: float, strict: bool) -> Table | None:
-    """Return values per vertex, where they are not finite in float32 replaced by `otherwise`."""
+    """Return values per vertex; values that are not finite in float32 are replaced by `otherwise`."""
     if values is None:
         return None
     values = np.array(values, np.float64)
@@ -183,7 +183,7 @@ def _finite(label: str, what: str, values: Table | None, otherwise: float, stric
 
 
 def _uvs(label: str, what: str, uvs: Table | None, strict: bool) -> Table | None:
-    """Return texture coordinates, with 0 for those that name no place on a texture."""
+    """Return texture coordinates; invalid ones are replaced by 0."""
     uvs = _finite(label, what, uvs, 0.0, strict)
     if uvs is None:
         return None
