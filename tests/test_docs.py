@@ -1,6 +1,8 @@
 """Every Python block of the README and the documents runs, and no link leads nowhere."""
 
 import re
+import tomllib
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +71,24 @@ def test_the_index_lists_every_document():
     pages = {path for path, _ in LINK.findall((ROOT / "docs" / "index.md").read_text("utf-8"))}
     documents = {path.name for path in (ROOT / "docs").glob("*.md")}
     assert documents - pages == {"index.md"}
+
+
+def test_the_rooms_of_the_architecture_are_the_layers():
+    """The table has every module and folder, in the order in which imports may point."""
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"][
+        "contracts"
+    ]
+    layers = [re.findall(r"wavefront\.(\w+)", layer) for layer in reversed(contracts[0]["layers"])]
+    level = {name: number for number, layer in enumerate(layers) for name in layer}
+    table = (ROOT / "docs" / "architecture.md").read_text("utf-8").partition("## Rooms")[2]
+    rows = [
+        re.findall(r"`(\w+)(?:\.py|/)`", row) for row in re.findall(r"^\| (`.*?) \|", table, re.MULTILINE)
+    ]
+    rooms = [[level[name] for name in row] for row in rows if row and row[0] in level]
+    modules = {path.stem for path in (ROOT / "wavefront").iterdir() if path.suffix in (".py", "")}
+    assert {name for row in rows for name in row} >= modules - {"__init__", "__pycache__"}
+    for below, above in pairwise(rooms):
+        assert max(below) <= min(above)
 
 
 def test_every_public_name_is_written_about():

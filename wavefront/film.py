@@ -1,4 +1,4 @@
-"""The film adds samples up to pixels."""
+"""The film: sums of samples for each pixel, and estimates of their error."""
 
 from __future__ import annotations
 
@@ -12,25 +12,24 @@ from .state import Words
 from .vec import ALL, Doubles, Floats, Ints, Lanes, take
 
 BATCHES = 8  # at most
-WHOLE_BATCH = 4  # samples; batches are no shorter where a pixel has two such
-EPSILON = 1e-2  # of the squared mean of a picture, added to squares that errors are divided by
-OUTLIERS = 1e-3  # part of the pixels whose error counts no more than that of the worst other one
-CHUNK = 16384  # pixels, or samples, that are summed up together: few enough for the cache
+WHOLE_BATCH = 4  # samples; batches are at least this long if a pixel has two of them
+EPSILON = 1e-2  # relative to the squared mean of a picture; added to the squares by which errors are divided
+OUTLIERS = 1e-3  # fraction of the pixels whose error is limited to that of the worst other pixel
+CHUNK = 16384  # pixels, or samples, that are added together: few enough for the cache
 
 
 class Film:
-    """Sums of samples per pixel, and what is needed to tell how noisy they are.
+    """Sums of samples per pixel, and the sums that the error estimate needs.
 
-    The sums are exact (`ExactSums`), so the picture does not depend on how a render was cut into
-    pieces, nor on which of two films took which samples before they were merged.
+    The sums are exact (`ExactSums`), so the picture depends neither on the division of a render
+    into jobs nor on the division of samples between two films that are merged.
 
-    The samples of a stratified sampler depend on each other, so their own scatter says little of
-    the error of their mean. Consecutive samples therefore form batches of `batch_size`, a power of
-    two that doubles as samples come, so that 4 to 8 batches are full from the sixteenth sample on.
-    Aligned blocks of Sobol points are stratified like their beginning, and so the scatter of the
-    batches' means shows the gain within a batch. It does not show the gain between batches: for
-    Sobol points the error is over-estimated, by 7 to 15 % in scenes of few and many kinds of
-    light at 16 and 64 samples, by less later. Independent samples have no such bias.
+    The samples of a stratified sampler depend on each other, so their scatter does not give the error of
+    their mean. Consecutive samples therefore form batches of `batch_size`, a power of two that doubles with
+    the number of samples, so that 4 to 8 batches are full from the sixteenth sample on. Aligned blocks of
+    Sobol points are stratified like the first block, so the scatter of the batches' means includes the gain
+    within a batch. It does not include the gain between batches: for Sobol points the error is
+    over-estimated, by 7 to 15 % at 16 and 64 samples, by less later. Independent samples have no such bias.
 
     Memory is 179 bytes per pixel, whatever the number of samples.
     """
@@ -80,9 +79,9 @@ class Film:
         self.count[lanes] = count
 
     def _close_batch(self, lanes: Lanes, number: int) -> None:
-        """Note the sum of the batch that is full: what is in the sums and in no batch before it.
+        """Store the sum of a full batch: the sums less all batches before it.
 
-        The rounding errors of the batches do not add up, since each batch makes up for those before it.
+        Rounding errors of batches do not accumulate, since each batch corrects those before it.
         """
         before = np.zeros_like(self.squares[:, lanes])
         for batch in self.batches[:number]:
@@ -90,13 +89,13 @@ class Film:
         self.batches[number][:, lanes] = self.sums.value(lanes) - before
 
     def _pair_batches(self, lanes: Lanes) -> None:
-        """Join neighbors, so that half as many batches are twice as long."""
+        """Add pairs of batches, so that half as many batches are twice as long."""
         for half in range(BATCHES // 2):
             pair = self.batches[2 * half : 2 * half + 2, :, lanes]
             self.batches[half][:, lanes] = pair[0] + pair[1]
 
     def mean(self, span: slice = slice(None)) -> Doubles:
-        """Means of the samples of pixels, (3, k); 0 where there is none."""
+        """Return the means of the samples of pixels, (3, k); 0 for pixels without samples."""
         return self.sums.value(span) / np.maximum(self.count[span], 1)
 
     def variance(self, span: slice = slice(None)) -> Doubles:
@@ -121,9 +120,9 @@ class Film:
     def relative_variance(self) -> Doubles:
         """Estimate the squared relative error of each pixel, the mean of its channels, (pixels,).
 
-        Relative to the square of the channel plus `EPSILON` of the picture's squared mean, so that
-        black pixels do not count for much. The worst `OUTLIERS` of the pixels count no more
-        than the worst of the others: fireflies must not decide on a whole picture.
+        It is relative to the square of the channel plus `EPSILON` times the picture's squared mean, which
+        limits the weight of black pixels. The error of the worst `OUTLIERS` of the pixels is limited to that
+        of the worst other pixel, so that fireflies do not dominate the picture.
         """
         floor = self._floor()
         out = np.empty(self.count.size)
@@ -132,11 +131,11 @@ class Film:
         return _without_outliers(out)
 
     def noise(self) -> float:
-        """Estimate the relative error of the picture: what `render(noise=...)` brings down."""
+        """Estimate the relative error of the picture, which `render(noise=...)` limits."""
         return float(np.sqrt(self.relative_variance().mean()))
 
     def _relative(self, squared_error: Doubles, span: slice, floor: float) -> Doubles:
-        """Squared errors (3, k) of some pixels relative to their brightness, (k,)."""
+        """Return squared errors (3, k) of some pixels relative to their brightness, (k,)."""
         return np.asarray((squared_error / (np.square(self.mean(span)) + floor)).mean(0))
 
     def _floor(self) -> float:
@@ -146,7 +145,7 @@ class Film:
         return float(sum(self.mean(span).sum() for span in self._chunks()) / (3 * self.count.size))
 
     def _chunks(self) -> Iterator[slice]:
-        """Cut the pixels up, so that temporary arrays stay small."""
+        """Yield spans of pixels, so that temporary arrays stay small."""
         for start in range(0, self.count.size, CHUNK):
             yield slice(start, min(start + CHUNK, self.count.size))
 
@@ -157,7 +156,7 @@ class Film:
         relative, floor = np.empty(pixels), self._floor()
         for span in self._chunks():
             squared_error = self.squared_error(span)
-            with np.errstate(over="ignore"):  # what is beyond float32 is infinite
+            with np.errstate(over="ignore"):  # values beyond float32 become infinite
                 mean[span] = self.mean(span).T
                 variance[span] = self.variance(span).T
                 error[span] = np.sqrt(squared_error).T
@@ -176,33 +175,33 @@ class Estimates:
 
 
 def _without_outliers(relative: Doubles) -> Doubles:
-    """Bring the worst `OUTLIERS` of the pixels down to the worst of the others."""
+    """Limit the worst `OUTLIERS` of the pixels to the worst of the others."""
     worst = relative.size - 1 - int(OUTLIERS * relative.size)
     return np.minimum(relative, np.partition(relative, worst)[worst])
 
 
 def _distinct(values: Ints) -> list[int]:
-    """Return what values there are, rising, as np.unique does, which loads numpy.ma first."""
+    """Return the distinct values in rising order, like np.unique, which would import numpy.ma."""
     ordered = np.sort(values)
     return ordered[np.diff(ordered, prepend=-1) > 0].tolist()
 
 
 def batch_size(count: int) -> int:
-    """Samples per batch of a pixel that has `count` samples: a power of two that doubles at times."""
+    """Return the samples per batch of a pixel with `count` samples: a power of two."""
     power = 1 << (count - 1).bit_length()
     return max(1, min(WHOLE_BATCH, power // 4), power // BATCHES)
 
 
 def _span(pixels: Words) -> Lanes:
-    """Return rising indices as a slice where they have no gaps: much faster to add to."""
+    """Return rising indices as a slice if they have no gaps, which is much faster to add to."""
     first, last = int(pixels[0]), int(pixels[-1])
     return slice(first, last + 1) if last - first + 1 == pixels.size else pixels.astype(np.intp)
 
 
 def _add_in_order(sums: Doubles, rows: Doubles) -> None:
-    """Add rows (3, n, k) to sums (3, k), strictly one after the other.
+    """Add rows (3, n, k) to sums (3, k), strictly in order.
 
-    A sum along the axis would pair terms up by the array's layout, and so round differently.
+    `sum` along the axis would group terms by the layout of the array, and so round differently.
     """
     if rows.shape[1] < rows.shape[2]:
         for row in rows.swapaxes(0, 1):

@@ -10,10 +10,10 @@ How an MTL material is read:
   surface is matte, whatever its `Ks`.
 - All others, and surfaces without an `illum`, have a glossy coat over the matte part if `Ks` or a `map_Ks`
   is not black, by the rules of Blender's importer (obj_import_mtl.cc, set_bsdf_socket_values). The
-  reflectance of the coat along the normal is 0.08 · `Ks`, its roughness 1 - √(`Ns` / 1000). Without an `Ns` the roughness
-  is 1, where Blender has 0 if `illum` is 2. Below a reflectance of 0.02 the coat is also weaker at grazing
-  angles, as in S. Lagarde and C. de Rousiers 2014, "Moving Frostbite to PBR". `map_Ks` counts by its
-  luminance.
+  reflectance of the coat along the normal is 0.08 · `Ks`, its roughness 1 - √(`Ns` / 1000). Without an `Ns`
+  the roughness is 1, where Blender has 0 if `illum` is 2. Below a reflectance of 0.02 the coat is also
+  weaker at grazing angles, as in S. Lagarde and C. de Rousiers 2014, "Moving Frostbite to PBR". `map_Ks`
+  counts by its luminance.
 - `Pr Pm Ps Pc Pcr aniso` and their maps, `norm` and `map_d` (the PBR extension) are the parameters of
   the same names of `Principled`. `Pr` replaces `Ns`. Beside `Pr` or `Pm`, a surface without a highlight
   keeps the default one of reflectance 0.04.
