@@ -31,7 +31,17 @@ from .extensions import (
 from .frame import Frame
 from .image import Image
 from .lighting import studio
-from .lights import DirectionalLight, Environment, PointLight, SpotLight
+from .lights import (
+    DeltaLight,
+    DirectionalLight,
+    Environment,
+    InfiniteLight,
+    Light,
+    LightRecord,
+    LightSample,
+    PointLight,
+    SpotLight,
+)
 from .lights.samplers import LightSampler
 from .materials import Material
 from .media import Medium
@@ -72,6 +82,7 @@ __all__ = [
     "Camera",
     "Comparison",
     "Conductor",
+    "DeltaLight",
     "Dielectric",
     "Diffuse",
     "DirectionalLight",
@@ -80,9 +91,13 @@ __all__ = [
     "Frame",
     "Geometry",
     "Image",
+    "InfiniteLight",
     "Instance",
     "Interrupted",
     "Intersections",
+    "Light",
+    "LightRecord",
+    "LightSample",
     "LightSampler",
     "Material",
     "Medium",

@@ -30,7 +30,7 @@ class Scene:
         `Mesh`, `Sphere` and `Instance` objects, and what `Rectangle` and `Disk` return; shapes with
         an emission are lights. Objects of trimesh are converted.
     lights
-        `PointLight`, `SpotLight`, `DirectionalLight` and `Environment` objects, at most one
+        `PointLight`, `SpotLight`, `DirectionalLight` and `Environment` objects, or any `Light`; at most one
         `Environment`. A scene without any light is rendered in the light of a studio: see `render`.
     camera
         Without a camera, `render` uses `framing_camera`.
@@ -290,7 +290,7 @@ class Lights(CheckedList[Light]):
     """The lights of a scene."""
 
     name = "lights"
-    allowed = "wf.PointLight, wf.SpotLight, wf.DirectionalLight, wf.Environment"
+    allowed = "wf.PointLight, wf.SpotLight, wf.DirectionalLight, wf.Environment, or a wf.Light of your own"
 
     def converted(self, item: Any) -> list[Light] | None:
         """Return a light."""

@@ -28,6 +28,7 @@ from ..lights.samplers import LightSamplerMaker
 from ..lights.textured_emission import has_textured_emission, mean_radiance
 from ..scene import Scene
 from ..shapes import Mesh, Shape, Sphere
+from ..shapes.attributes import ATTRIBUTES
 from ..textures.base import BaseTexture
 from ..vec import Floats, Ints, f4
 
@@ -79,6 +80,11 @@ def gather_lights(
         record = (light if scale == 1 else light.scaled(scale)).record(center)
         if not isinstance(record, LightRecord):
             raise SceneError(f"{type(light).__name__}: record must return a wf.LightRecord, got {record!r}")
+        unknown = [name for name in record.reads if name not in ATTRIBUTES]
+        if unknown:
+            raise SceneError(
+                f"{type(light).__name__} reads {unknown[0]!r}; it must be one of {', '.join(ATTRIBUTES)}"
+            )
         if isinstance(record, InfiniteLight):
             infinite.append(record.compensated() if mis else record)
         elif light.shape is not None:

@@ -108,7 +108,7 @@ def compile_scene(
     ------
     SceneError
         If an emitting shape has no area, an emitting sphere has an alpha or shines by a texture, a light
-        is too far away or too strong for the scene's size, or the choice is unknown.
+        is malformed, too far away or too strong for the scene's size, or the choice is unknown.
     """
     scene.check()
     low, high = scene.bounds
@@ -127,10 +127,11 @@ def compile_scene(
     meshes += shared
     triangles = np.concatenate(corners) if corners else np.zeros((0, 3, 3))
     user_materials, material_of, replaced = number_materials(meshes, spheres, instances)
-    attributes = {name: corner_values(name, meshes) for name in attributes_read(placed)}
     lights, light_of, environment = gather_lights(
         scene, scaled, scale, meshes, spheres, corners, center, (high - low) / 2, light_sampler, mis
     )
+    read = sorted({*attributes_read(placed), *lights.reads})
+    attributes = {name: corner_values(name, meshes) for name in read}
     centers = np.array([s.center - center for s in spheres]).reshape(-1, 3).T.astype(f4)
     radii = np.array([s.radius for s in spheres]).astype(f4)
     smooth = any(mesh.normals is not None for mesh in meshes)

@@ -52,6 +52,7 @@ class LightTable:
         self.varies = (
             varies.astype(np.bool_) if varies.any() else None
         )  # (lights,) those with `le` by surface
+        self.reads = {name for kind in kinds for name in kind.reads}  # attributes of surfaces, for `le`
         self.delta_of = np.array([kind.delta for kind in kinds], np.bool_)[self.kind_of]
         extent = np.broadcast_to(np.asarray(half_size, float), 3)
         power = np.concatenate([np.zeros(0), *(kind.power(float(np.linalg.norm(extent))) for kind in kinds)])
@@ -127,12 +128,12 @@ class LightTable:
             return self._le(light, wi, None)
         varies = self.varies.take(light)
         lanes, even = np.flatnonzero(varies), np.flatnonzero(~varies)
-        if not lanes.size:
-            return self._le(light, wi, None)
-        assert surface_at is not None
         radiance = np.empty_like(wi)
-        put(radiance, even, self._le(light.take(even), take(wi, even), None))
-        put(radiance, lanes, self._le(light.take(lanes), take(wi, lanes), surface_at(lanes)))
+        if even.size:
+            put(radiance, even, self._le(light.take(even), take(wi, even), None))
+        if lanes.size:
+            assert surface_at is not None
+            put(radiance, lanes, self._le(light.take(lanes), take(wi, lanes), surface_at(lanes)))
         return radiance
 
     def _le(self, light: Ints, wi: Floats, surface: SurfaceInteraction | None) -> Floats:
