@@ -76,7 +76,7 @@ class Light(ABC):
 
 
 class LightRecord(SoA, Light):
-    """k lights of one kind; a light of a scene that is its own record has one.
+    """The lights of one kind in a scene, k of them; a light that is its own record holds one.
 
     A subclass is a dataclass. Each field is an array with a column per light, or a value that the
     lights share.
@@ -139,7 +139,7 @@ class LightRecord(SoA, Light):
 
 
 class DeltaLight(LightRecord):
-    """k lights without a surface, such as points and parallel rays, which no ray can meet."""
+    """Lights without a surface, such as points and parallel rays, which no ray can meet."""
 
     __slots__ = ()
     delta: ClassVar[bool] = True
