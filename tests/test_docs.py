@@ -67,6 +67,15 @@ def test_links_lead_somewhere(document):
     assert missing == []
 
 
+def test_files_named_in_the_documents_exist():
+    """But for the appendices, which name files of their time."""
+    files = {f"/{path.relative_to(ROOT).as_posix()}" for path in ROOT.glob("*/**/*.py")}
+    for document in DOCUMENTS:
+        for name in re.findall(r"`([\w/]+\.py)`", document.read_text("utf-8")):
+            found = any(file.endswith(f"/{name}") for file in files)
+            assert found or document.name.startswith("appendix_"), f"{document.name}: {name}"
+
+
 def test_the_index_lists_every_document():
     pages = {path for path, _ in LINK.findall((ROOT / "docs" / "index.md").read_text("utf-8"))}
     documents = {path.name for path in (ROOT / "docs").glob("*.md")}
