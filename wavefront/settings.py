@@ -93,19 +93,19 @@ def whole_number(low: int, high: int) -> SettingCheck:
 
 
 def above_zero(name: str, value: Any) -> float:
-    """SettingCheck that a number is positive and finite."""
+    """Check that a number is positive and finite."""
     return number(name, value, lambda x: x > 0, "above 0")
 
 
 def check_camera(name: str, value: Any) -> Camera | None:
-    """SettingCheck that something is a camera, or None."""
+    """Check that something is a camera, or None."""
     if value is not None and not isinstance(value, Camera):
         raise SceneError(f"{name} must be a wf.Camera, got {value!r}")
     return value
 
 
 def check_preset(name: str, value: Any) -> str | None:
-    """SettingCheck the name of a preset."""
+    """Check the name of a preset."""
     check_lighting(value)
     return value
 

@@ -84,7 +84,7 @@ class Bsdf(Parametrized, ABC):
         return np.where(wo[2] > 0, cosine_hemisphere_pdf(wi), np.float32(0))
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
-        """Return `f` and `pdf` together, for BSDFs where they share work."""
+        """Return `f` and `pdf` together; `JointBsdf` is for BSDFs where they share work."""
         return self.f(wo, wi), self.pdf(wo, wi)
 
     def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
@@ -92,6 +92,22 @@ class Bsdf(Parametrized, ABC):
         wi = cosine_hemisphere(u)
         pdf = self.pdf(wo, wi)
         return BsdfSample(wi, weigh(self.f(wo, wi), wi, pdf), pdf, broadcast(np.False_, len(pdf)))
+
+
+class JointBsdf(Bsdf):
+    """A BSDF whose value and density share work: a subclass gives `evaluate` in place of `f` and `pdf`."""
+
+    def f(self, wo: Floats, wi: Floats) -> Floats:
+        """Return the first part of `evaluate`, (3, n)."""
+        return self.evaluate(wo, wi)[0]
+
+    def pdf(self, wo: Floats, wi: Floats) -> Floats:
+        """Return the second part of `evaluate`, (n,)."""
+        return self.evaluate(wo, wi)[1]
+
+    @abstractmethod
+    def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
+        """Return `f` (3, n) and `pdf` (n,); 0 for delta lobes."""
 
 
 def weigh(f: Floats, wi: Floats, pdf: Floats) -> Floats:

@@ -12,7 +12,7 @@ from ..parameter import Parameter
 from ..suggestions import suggests_keywords
 from ..textures.parameter import MAX_INDEX, Color, Scalar, color, scalar
 from ..vec import Floats, broadcast
-from .base import Bsdf, BsdfSample, weigh
+from .base import BsdfSample, JointBsdf, weigh
 from .fresnel import fresnel_conductor
 from .microfacet import alpha_of, is_smooth, mirror_lobe, reflect, visible_normals
 from .mirror import mirrored
@@ -36,7 +36,7 @@ METALS = {
 SPELLINGS = {"aluminum": "aluminium", "chrome": "chromium"}
 
 
-class Conductor(Bsdf):
+class Conductor(JointBsdf):
     """A metal, by its complex refractive index η + ik: a mirror, or a rough (GGX) surface.
 
     Light that meets the rough surface more than once is not followed, so a rough metal is darker
@@ -86,18 +86,8 @@ class Conductor(Bsdf):
         key = name.lower() if isinstance(name, str) else name
         return cls(*METALS[one_of("Conductor name", SPELLINGS.get(key, key), METALS)], roughness)
 
-    def f(self, wo: Floats, wi: Floats) -> Floats:
-        """Return F·D·G/(4·cosθo·cosθi), (3, n); 0 for a mirror."""
-        return self.evaluate(wo, wi)[0]
-
-    def pdf(self, wo: Floats, wi: Floats) -> Floats:
-        """Return the density of reflections in visible normals, (n,); 0 for a mirror."""
-        if self.specular:
-            return np.zeros_like(wi[2])
-        return mirror_lobe(wo, wi, alpha_of(self.roughness))[1]
-
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
-        """Return `f` and `pdf`, which share the microfacet's density."""
+        """Return F·D·G/(4·cosθo·cosθi) and the density of reflections in visible normals; 0 for a mirror."""
         if self.specular:
             return np.zeros_like(wi), np.zeros_like(wi[2])
         value, pdf, cos = mirror_lobe(wo, wi, alpha_of(self.roughness))

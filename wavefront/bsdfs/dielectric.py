@@ -13,7 +13,7 @@ from ..suggestions import suggests_keywords
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
 from ..vec import Floats, broadcast, dot, f4
-from .base import Bsdf, BsdfSample, weigh
+from .base import BsdfSample, JointBsdf, weigh
 from .fresnel import fresnel_dielectric
 from .microfacet import alpha_of, is_smooth, mirror_lobe, reflect, refract, refraction_lobe, visible_normals
 
@@ -21,7 +21,7 @@ from .microfacet import alpha_of, is_smooth, mirror_lobe, reflect, refract, refr
 LEAST_BEND = 1e-3
 
 
-class Dielectric(Bsdf):
+class Dielectric(JointBsdf):
     """A clear boundary that reflects and refracts; the shape's inside has index `ior`.
 
     Parameters
@@ -78,14 +78,6 @@ class Dielectric(Bsdf):
         bound = copy(super().bind(surface))
         bound.eta = np.where(surface.back_facing, f4(1) / bound.ior, bound.ior)
         return bound
-
-    def f(self, wo: Floats, wi: Floats) -> Floats:
-        """Return the rough boundary's value, (3, n), for radiance; 0 for a smooth one."""
-        return self.evaluate(wo, wi)[0]
-
-    def pdf(self, wo: Floats, wi: Floats) -> Floats:
-        """Return the density of `sample_f`, (n,); 0 for a smooth boundary."""
-        return self.evaluate(wo, wi)[1]
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
         """Return `f` and `pdf` (Walter et al. 2007, eqs. 20 and 21)."""

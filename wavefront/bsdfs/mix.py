@@ -13,7 +13,7 @@ from ..state import SurfaceInteraction
 from ..suggestions import suggests_keywords
 from ..textures.parameter import Scalar, scalar
 from ..vec import Floats, f4
-from .base import Bsdf, BsdfSample, weigh
+from .base import Bsdf, BsdfSample, JointBsdf, weigh
 
 BELOW_1 = np.nextafter(f4(1), f4(0))
 
@@ -25,7 +25,7 @@ def _component(name: str, value: Any) -> Bsdf:
     return value
 
 
-class Mix(Bsdf):
+class Mix(JointBsdf):
     """A blend of two BSDFs: (1 − weight)·first + weight·second.
 
     Parameters
@@ -63,14 +63,6 @@ class Mix(Bsdf):
         bound = copy(super().bind(surface))
         vars(bound).update(first=self.first.bind(surface), second=self.second.bind(surface))
         return bound
-
-    def f(self, wo: Floats, wi: Floats) -> Floats:
-        """Return the blended value, (3, n)."""
-        return self._blend(self.first.f(wo, wi), self.second.f(wo, wi))
-
-    def pdf(self, wo: Floats, wi: Floats) -> Floats:
-        """Return the blended density, (n,)."""
-        return self._blend(self.first.pdf(wo, wi), self.second.pdf(wo, wi))
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
         """Return `f` and `pdf` of both BSDFs, blended."""

@@ -16,7 +16,7 @@ from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
 from ..vec import INV_PI, Bools, Floats, broadcast, dot, f4, luminance
 from .albedo import gloss_tables, lookup
-from .base import Bsdf, BsdfSample, weigh
+from .base import BsdfSample, JointBsdf, weigh
 from .dielectric import LEAST_BEND
 from .fresnel import fresnel_dielectric
 from .microfacet import alpha_of, mirror_lobe, reflect, refract, refraction_lobe, visible_normals
@@ -34,7 +34,7 @@ class Chances(NamedTuple):
     diffuse: Floats  # cosine-weighted
 
 
-class Principled(Bsdf):
+class Principled(JointBsdf):
     """Metal, plastic, glass, cloth and varnish by a few intuitive parameters.
 
     With only `base_color`, `metallic` and `roughness` this is the metallic-roughness material of
@@ -143,14 +143,6 @@ class Principled(Bsdf):
             bound = copy(bound)
             bound.back_facing = surface.back_facing
         return bound
-
-    def f(self, wo: Floats, wi: Floats) -> Floats:
-        """Return the sum of all lobes, (3, n)."""
-        return self.evaluate(wo, wi)[0]
-
-    def pdf(self, wo: Floats, wi: Floats) -> Floats:
-        """Return the density of `sample_f`, (n,)."""
-        return self.evaluate(wo, wi)[1]
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
         """Return `f` and `pdf`: the base, then sheen and coat laid over it."""

@@ -8,13 +8,13 @@ from ..parameter import Parameter
 from ..suggestions import suggests_keywords
 from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
 from ..vec import Floats, dot, f4
-from .base import Bsdf, BsdfSample, weigh
+from .base import BsdfSample, JointBsdf, weigh
 from .fresnel import fresnel_dielectric
 from .microfacet import alpha_of, is_smooth, mirror_lobe, reflect, visible_normals
 from .mirror import mirrored
 
 
-class ThinDielectric(Bsdf):
+class ThinDielectric(JointBsdf):
     """A sheet of clear material without thickness: it reflects, and lets light straight through.
 
     All reflections between its two faces are summed: with R of one face it reflects 2R/(1 + R)
@@ -63,14 +63,6 @@ class ThinDielectric(Bsdf):
     def derive(self) -> None:
         """Tell whether it is smooth."""
         self.specular = is_smooth(self.roughness)
-
-    def f(self, wo: Floats, wi: Floats) -> Floats:
-        """Return the rough sheet's value, (3, n); 0 for a smooth one."""
-        return self.evaluate(wo, wi)[0]
-
-    def pdf(self, wo: Floats, wi: Floats) -> Floats:
-        """Return the density of `sample_f`, (n,); 0 for a smooth sheet."""
-        return self.evaluate(wo, wi)[1]
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
         """Return `f` and `pdf`: below the sheet the lobe above it, mirrored."""
