@@ -70,7 +70,7 @@ class Conductor(JointBsdf):
         self.derive()
 
     def derive(self) -> None:
-        """Tell whether it is a mirror."""
+        """Return whether the roughness is 0."""
         self.specular = is_smooth(self.roughness)
 
     @classmethod

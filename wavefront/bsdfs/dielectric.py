@@ -68,7 +68,7 @@ class Dielectric(JointBsdf):
         self.derive()
 
     def derive(self) -> None:
-        """Tell whether it is smooth, and set the index as seen from outside."""
+        """Update what follows from the parameters: whether the roughness is 0, and the index as seen from outside."""
         straight = not isinstance(self.ior, BaseTexture) and abs(self.ior[0] - 1) < LEAST_BEND
         self.specular = is_smooth(self.roughness) or bool(straight)
         self.eta = self.ior  # (n,) or (1,) index beyond / before; unbound, wo is outside

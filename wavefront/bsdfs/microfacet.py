@@ -25,7 +25,7 @@ SMOOTH = f4(1e-3)
 
 
 def is_smooth(roughness: Any) -> bool:
-    """Tell whether a roughness parameter means a delta lobe: a constant with α = roughness² < `SMOOTH`."""
+    """Return whether a roughness gives a delta lobe: a constant with α = roughness² < `SMOOTH`."""
     return not isinstance(roughness, BaseTexture) and bool(roughness[0] ** 2 < SMOOTH)
 
 

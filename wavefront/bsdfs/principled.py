@@ -288,7 +288,7 @@ class Principled(JointBsdf):
 
 
 def _used(parameter: Any) -> bool:
-    """Tell whether a strength is ever above 0."""
+    """Return whether a strength is above 0 anywhere."""
     return isinstance(parameter, BaseTexture) or bool((parameter > 0).any())
 
 

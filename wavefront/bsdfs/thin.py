@@ -61,7 +61,7 @@ class ThinDielectric(JointBsdf):
         self.derive()
 
     def derive(self) -> None:
-        """Tell whether it is smooth."""
+        """Return whether the roughness is 0."""
         self.specular = is_smooth(self.roughness)
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:

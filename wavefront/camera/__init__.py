@@ -1,4 +1,4 @@
-"""Cameras: a point of the film, and of the lens, becomes a ray."""
+"""Cameras: rays through points of the film and of the lens."""
 
 from .base import Camera, field_of_view, image_size, upward
 from .projection import Orthographic, Panorama, Perspective, Projection

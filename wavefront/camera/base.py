@@ -1,4 +1,4 @@
-"""The camera: where it stands, what it projects, and which part of the picture is rendered."""
+"""The camera: its pose, its projection, and the part of the picture that is rendered."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .distortion import Distortion
 from .projection import Orthographic, Panorama, Perspective, Projection
 
 MAX_SIDE = 65_536  # pixels; a row-major pixel index then fits in 32 bits
-RADIANS = (0.2, 3.2)  # fields of view that are more often meant in radians than in degrees
+RADIANS = (0.2, 3.2)  # a field of view in this range is probably in radians
 Window = tuple[int, int, int, int]
 
 
@@ -33,7 +33,7 @@ class Camera:
     rotation
         (3, 3) columns: right, up and backward in world space.
     projection
-        How film points become rays.
+        The map from film points to rays.
     film
         (width, height) in pixels of the whole picture.
     window
@@ -63,7 +63,7 @@ class Camera:
         crop = "" if self.size == self.film else f" of {self.film[0]} × {self.film[1]}"
         return f"<Camera: {self.projection!r} at {brief(self.origin)} towards {ahead}, {size}{crop}>"
 
-    # --- Ways to make one -----------------------------------------------------------------------
+    # --- Constructors ---------------------------------------------------------------------------
 
     @classmethod
     @suggests_keywords
@@ -87,7 +87,7 @@ class Camera:
         origin, target
             (3,) position, and the point in the middle of the picture.
         up
-            What is up in the picture: (3,), or the name of an axis, such as "z".
+            The up direction of the picture: (3,), or the name of an axis, such as "z".
         fov
             Vertical field of view, degrees.
         size
@@ -100,8 +100,8 @@ class Camera:
             Moves the film (right, up) in its plane, as fractions of the picture's width and
             height: the view moves without a change of perspective.
         crop
-            (x0, y0, x1, y1) in pixels from the left and the top: renders only that window, and in
-            it the very pixels of the whole picture.
+            (x0, y0, x1, y1) in pixels from the left and the top: renders only that window, with the same
+            pixels as in the whole picture.
 
         Raises
         ------
@@ -178,7 +178,7 @@ class Camera:
     ) -> Camera:
         """Place a calibrated camera in OpenCV's convention: x right, y down, z forward.
 
-        A world point X is seen at the film point K·(R·X + t), divided by its third component.
+        A world point X is projected to the film point K·(R·X + t), divided by its third component.
 
         Parameters
         ----------
@@ -199,8 +199,8 @@ class Camera:
         Raises
         ------
         SceneError
-            If K has another form, R is no rotation, an argument is out of range, or the distortion cannot
-            be undone inside the picture.
+            If K has another form, R is not a rotation, an argument is out of range, or the distortion is not
+            invertible inside the picture.
         """
         if size is None:
             raise SceneError("from_intrinsics needs size=(width, height), that of the calibrated pictures")
@@ -233,7 +233,7 @@ class Camera:
         size: tuple[int, int] = (512, 512),
         crop: Window | None = None,
     ) -> Camera:
-        """Place a camera whose rays are parallel; it sees what lies ahead of the film at `origin`.
+        """Place a camera with parallel rays, which start on the film at `origin`.
 
         Parameters
         ----------
@@ -301,7 +301,7 @@ class Camera:
 
     @property
     def size(self) -> tuple[int, int]:
-        """(width, height) in pixels of what is rendered."""
+        """(width, height) in pixels of the window that is rendered."""
         x0, y0, x1, y1 = self.window
         return x1 - x0, y1 - y0
 
@@ -318,7 +318,7 @@ class Camera:
         return self.projection.uses_lens
 
     def address(self, pixel: Words) -> Words:
-        """Row-major index (n,) in the whole picture of pixels (n,) that are numbered in the window."""
+        """Return the row-major index (n,) in the whole picture of pixels (n,) of the window."""
         if self.size == self.film:
             return pixel
         x0, y0, _, _ = self.window
@@ -338,8 +338,7 @@ class Camera:
         center
             (3,) the scene's center, to which the origins are relative.
         lens
-            (2, n) numbers in [0, 1) that choose the point on the lens; without them rays go
-            through its middle.
+            (2, n) numbers in [0, 1) that select the point on the lens; None for its center.
         """
         offset, direction = self.projection.rays(x, y, self.film, lens)
         eye = column(self.origin - center)
@@ -348,7 +347,7 @@ class Camera:
         return origin, towards if towards.shape[1] == len(x) else np.repeat(towards, len(x), 1)
 
     def project(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return where points of the world are seen, and how far away they are.
+        """Return the film positions and depths of points of the world.
 
         Parameters
         ----------
@@ -376,7 +375,7 @@ class Camera:
         return np.ascontiguousarray(pixels.T), depth
 
     def _turned(self, v: Floats) -> Floats:
-        """Camera space (3, n) -> world space (3, n)."""
+        """Transform vectors (3, n) of camera space to world space."""
         right, up, backward = (column(axis) for axis in self.rotation.T)
         return right * v[0] + up * v[1] + backward * v[2]
 
@@ -423,7 +422,7 @@ def _extrinsics(R: ArrayLike, t: ArrayLike | None) -> tuple[NDArray[np.float64],
 
 
 def upward(name: str, value: ArrayLike) -> NDArray[np.float64]:
-    """Return what is up in a picture, (3,) of any length, from a vector or the name of an axis.
+    """Return the up vector of a picture, (3,) of any length, from a vector or the name of an axis.
 
     Raises
     ------

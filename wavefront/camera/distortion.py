@@ -1,4 +1,4 @@
-"""Lens distortion by the model of Brown and Conrady, as OpenCV calibrates it."""
+"""Lens distortion by the Brown-Conrady model, with OpenCV's parameters."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from ..errors import SceneError
 from ..vec import Doubles
 
 NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
-COUNTS = (4, 5, 8, 12, 14)  # of coefficients that OpenCV gives; the last ones, of two other models, must be 0
-STEPS = 10  # of Newton's method; it has converged after four for the lenses of most cameras
+COUNTS = (4, 5, 8, 12, 14)  # of OpenCV's coefficients; those after the eighth must be 0
+STEPS = 10  # of Newton's method; four are enough for most lenses
 TOLERANCE = 1e-9  # of undistorted points, in focal lengths
 GRID = 65  # points along each side of the picture where the inverse is checked
-WAY = 32  # points on the way from the axis to a point where the model is checked for folds
+PATH_POINTS = 32  # points between the axis and a point where the model is checked for folds
 
 
 class Distortion:
     """Radial and tangential distortion of a lens.
 
-    A point (x, y) of the plane at distance 1, x to the right and y down, is seen where an undistorted lens
-    sees (x·R + 2·p1·x·y + p2·(r² + 2x²), y·R + p1·(r² + 2y²) + 2·p2·x·y), with
+    A point (x, y) of the plane at distance 1, x to the right and y down, is seen where a lens without
+    distortion sees (x·R + 2·p1·x·y + p2·(r² + 2x²), y·R + p1·(r² + 2y²) + 2·p2·x·y), with
     R = (1 + k1·r² + k2·r⁴ + k3·r⁶) / (1 + k4·r² + k5·r⁴ + k6·r⁶). Source: D. Brown 1966, "Decentering
     Distortion of Lenses"; the denominator, the order and the signs are OpenCV's.
 
@@ -34,7 +34,7 @@ class Distortion:
     Raises
     ------
     SceneError
-        If they are not numeric, not finite, or of another number.
+        If they are not numeric or not finite, or their number is wrong.
     """
 
     def __init__(self, coefficients: ArrayLike) -> None:
@@ -61,7 +61,7 @@ class Distortion:
         return f"Distortion({', '.join(f'{name}={value:g}' for name, value in there if value)})"
 
     def apply(self, x: Doubles, y: Doubles) -> tuple[Doubles, Doubles]:
-        """Return where points (n,) are seen, (n,) each."""
+        """Return the distorted coordinates of points (n,), (n,) each."""
         _, _, p1, p2, *_ = self.coefficients
         r2 = x * x + y * y
         ratio, _, _ = self._radial(r2)
@@ -71,12 +71,12 @@ class Distortion:
         )
 
     def undo(self, x: Doubles, y: Doubles) -> tuple[Doubles, Doubles]:
-        """Return the points (n,) that are seen at x, y (n,), by Newton's method.
+        """Return the points (n,) whose distorted coordinates are x, y (n,), by Newton's method.
 
-        The number of steps is the same for all points, so that none depends on the others.
+        The number of steps is fixed, so that a point does not depend on the others.
         """
         u, v = x, y
-        with np.errstate(all="ignore"):  # points that have none, outside of the picture
+        with np.errstate(all="ignore"):  # of points outside the picture that have no inverse
             for _ in range(STEPS):
                 seen_u, seen_v = self.apply(u, v)
                 du, dv = x - seen_u, y - seen_v
@@ -85,8 +85,8 @@ class Distortion:
         return u, v
 
     def invertible(self, x: Doubles, y: Doubles) -> NDArray[np.bool_]:
-        """Tell at which points (n,) the model has not folded on the way from the axis, (n,)."""
-        way = np.arange(1, WAY + 1)[:, None] / WAY
+        """Return a mask (n,) of the points between which and the axis the model does not fold."""
+        way = np.arange(1, PATH_POINTS + 1)[:, None] / PATH_POINTS
         with np.errstate(all="ignore"):
             _, _, _, det, bottom = self._slopes(way * x, way * y)
             return np.asarray(((det > 0) & (bottom > 0)).all(0))
@@ -97,14 +97,14 @@ class Distortion:
         Parameters
         ----------
         x, y
-            (n,) where they are seen.
+            (n,) distorted coordinates.
         name
-            Called with the number of a point; returns where it is, for the message.
+            Returns the name of a point, given its number, for the message.
 
         Raises
         ------
         SceneError
-            If one cannot.
+            If a point cannot be.
         """
         u, v = self.undo(x, y)
         with np.errstate(all="ignore"):

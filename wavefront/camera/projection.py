@@ -1,4 +1,4 @@
-"""How a camera maps its film to rays: one contract, one class for each kind of lens.
+"""Projections: maps from film points to rays, one class for each kind of lens.
 
 Camera space has x to the right, y up and z backward: the camera looks along -z. Film points are
 in pixels of the whole picture, x from the left and y from the top; pixel (column, row) covers
@@ -24,17 +24,17 @@ Size = tuple[int, int]
 
 
 class Projection(Parametrized, ABC):
-    """The contract: film points to rays in camera space."""
+    """The interface of projections: film points to rays in camera space."""
 
     uses_lens: bool = False  # rays start at a sampled point of a lens
 
     def scaled(self, factor: float) -> Projection:
-        """Return this in a scene whose lengths were multiplied by `factor`: itself where it holds none."""
+        """Return the projection for a scene scaled by `factor`: itself, unless it has lengths."""
         return self
 
     @abstractmethod
     def rays(self, x: Floats, y: Floats, film: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
-        """Return where rays start and where they go, in camera space.
+        """Return the origins and directions of rays in camera space.
 
         Parameters
         ----------
@@ -43,19 +43,19 @@ class Projection(Parametrized, ABC):
         film
             (width, height) of the whole picture in pixels.
         lens
-            (2, n) numbers in [0, 1) that choose the point on the lens; None for its middle.
+            (2, n) numbers in [0, 1) that select the point on the lens; None for its center.
 
         Returns
         -------
         offset
-            (3, n) start relative to the camera, scene units; None when all start at the camera.
+            (3, n) origins relative to the camera, scene units; None if all are at the camera.
         direction
             (3, n) or (3, 1), of any length above 0.
         """
 
     @abstractmethod
     def project(self, points: Doubles, film: Size) -> tuple[Doubles, Doubles]:
-        """Return where points are seen; the inverse of `rays` through the middle of the lens.
+        """Return the film positions of points, the inverse of `rays` through the center of the lens.
 
         Parameters
         ----------
@@ -78,12 +78,12 @@ class Projection(Parametrized, ABC):
         Raises
         ------
         SceneError
-            If one has none.
+            If a point has none.
         """
 
 
 class Perspective(Projection):
-    """A pinhole, or a thin lens that is sharp at one distance.
+    """A pinhole, or a thin lens that is in focus at one distance.
 
     Parameters
     ----------
@@ -99,9 +99,9 @@ class Perspective(Projection):
     focus
         Distance of the sharp plane, measured along the view axis, scene units.
     skew
-        By how much the columns lean: K[0][1]/K[0][0] of a calibrated camera.
+        K[0][1]/K[0][0] of a calibrated camera.
     distortion
-        Of the lens; None for straight lines that stay straight.
+        Of the lens; None for a lens without distortion.
 
     Notes
     -----
@@ -143,7 +143,7 @@ class Perspective(Projection):
         return lens
 
     def rays(self, x: Floats, y: Floats, film: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
-        """Aim through the film, or from a point of the lens at where the middle's ray is in focus."""
+        """Return rays through the film, or from lens points to the points in focus."""
         width, height = film
         sin, cos = sin_cos(np.float64(np.radians(self.fov) / 2))
         pitch = 2 * (sin / cos) / height
@@ -161,7 +161,7 @@ class Perspective(Projection):
         return offset, direction
 
     def project(self, points: Doubles, film: Size) -> tuple[Doubles, Doubles]:
-        """Divide by the depth, distort, and measure in pixels."""
+        """Return perspective projections with distortion, and depths."""
         depth = -points[2]
         ahead = np.where(depth > 0, depth, np.nan)
         x, y = points[0] / ahead, -points[1] / ahead
@@ -172,7 +172,7 @@ class Perspective(Projection):
         return np.stack([(x + self.skew * y) * focal[0] + middle[0], y * focal[1] + middle[1]]), depth
 
     def check(self, film: Size) -> None:
-        """Check that the distortion can be undone at points all over the film."""
+        """Check that the distortion is invertible at a grid of film points."""
         if self.distortion is None:
             return
         width, height = film
@@ -189,13 +189,13 @@ class Perspective(Projection):
         return middle, (focal / self.pixel_aspect, focal)
 
     def _seen(self, x: Doubles, y: Doubles, film: Size) -> tuple[Doubles, Doubles]:
-        """Film points in pixels -> points of the plane at distance 1, y down, distorted."""
+        """Convert film points in pixels to distorted points of the plane at distance 1, y down."""
         middle, focal = self._intrinsics(film)
         down = (y - middle[1]) / focal[1]
         return (x - middle[0]) / focal[0] - self.skew * down, down
 
     def _undistorted(self, x: Doubles, y: Doubles, film: Size) -> tuple[Doubles, Doubles]:
-        """Film points in pixels -> points of the plane at distance 1, y up."""
+        """Convert film points in pixels to points of the plane at distance 1, y up, without distortion."""
         right, down = self._seen(x, y, film)
         if self.distortion is not None:
             right, down = self.distortion.undo(right, down)
@@ -224,7 +224,7 @@ class Orthographic(Projection):
         return Orthographic(self.height * factor)
 
     def rays(self, x: Floats, y: Floats, film: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
-        """Start on the film, and go straight ahead."""
+        """Return rays that start on the film, along the view axis."""
         width, height = film
         pitch = f4(self.height / height)
         offset = np.zeros((3, len(x)), f4)
@@ -233,7 +233,7 @@ class Orthographic(Projection):
         return offset, column((0, 0, -1))
 
     def project(self, points: Doubles, film: Size) -> tuple[Doubles, Doubles]:
-        """Drop the depth, and measure in pixels."""
+        """Return parallel projections, and depths."""
         width, height = film
         depth, pitch = -points[2], self.height / height
         x, y = np.where(depth >= 0, points[:2], np.nan)
@@ -243,11 +243,11 @@ class Orthographic(Projection):
 class Panorama(Projection):
     """All directions, by longitude and latitude: 360° across and 180° down the picture.
 
-    It is the map of `wf.Environment`: what a camera that looks along +z renders is an environment.
+    It is the mapping of `wf.Environment`: the render of a camera that looks along +z is an environment.
     """
 
     def rays(self, x: Floats, y: Floats, film: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
-        """Turn by longitude to the right and by latitude up."""
+        """Return directions by longitude, to the right, and latitude, up."""
         width, height = film
         sin, cos = sin_cos_turns((x - f4(width / 2)) * f4(1 / width))  # of the longitude
         height_up, level = sin_cos_turns((f4(height / 2) - y) * f4(0.5 / height))  # of the latitude
@@ -258,7 +258,7 @@ class Panorama(Projection):
         return None, direction
 
     def project(self, points: Doubles, film: Size) -> tuple[Doubles, Doubles]:
-        """Measure longitude and latitude; the depth is the distance."""
+        """Return longitude and latitude in pixels, and distances as depths."""
         width, height = film
         x, y, z = points
         distance = np.sqrt(x * x + y * y + z * z)

@@ -1,6 +1,6 @@
-"""What the header of a png or jpg claims, checked against the bytes that are there.
+"""Checks of the header of a png or jpg against the size of its data.
 
-Decoders pad a picture that ends early, in silence, so a damaged file would pass for a sound one.
+Decoders silently pad a picture that ends early, so a damaged file would be accepted.
 Source of the formats: W3C, Portable Network Graphics (third edition), 2025, and ITU-T T.81.
 """
 
@@ -16,19 +16,19 @@ PNG = b"\x89PNG\r\n\x1a\n"
 JPG = b"\xff\xd8"
 PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # by color type
 ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))
-JPG_PIXELS_PER_BYTE = 512  # a block of 8 × 8 takes a bit at least
-PIECE = 2**18  # bytes that are inflated at once
+JPG_PIXELS_PER_BYTE = 512  # at most: a block of 8 × 8 pixels takes at least a bit
+CHUNK = 2**18  # bytes that are inflated at once
 
 
 def check_claims(data: bytes) -> None:
     """Check that a png or jpg can hold the picture that its header claims, before it is decoded.
 
-    Memory stays small, whatever the header says.
+    The memory for this check does not depend on the size that the header claims.
 
     Raises
     ------
     SceneError
-        If the header is damaged, claims too many pixels, or more than there is.
+        If the header is damaged, or claims too many pixels or more than the file can hold.
     """
     if data.startswith(PNG):
         _check_png(data)
@@ -52,7 +52,7 @@ def _check_png(data: bytes) -> None:
 
 
 def _passes(width: int, height: int, interlaced: bool) -> Iterator[tuple[int, int]]:
-    """Yield the (columns, rows) of the pictures that a png is stored as."""
+    """Yield the (columns, rows) of each pass of a png."""
     for x, y, dx, dy in ADAM7 if interlaced else ((0, 0, 1, 1),):
         columns, rows = -(-(width - x) // dx), -(-(height - y) // dy)
         if columns > 0 and rows > 0:
@@ -60,7 +60,7 @@ def _passes(width: int, height: int, interlaced: bool) -> Iterator[tuple[int, in
 
 
 def _png_data(data: bytes) -> Iterator[memoryview]:
-    """Yield the compressed pixels."""
+    """Yield the compressed pixel data."""
     view, at = memoryview(data), len(PNG)
     while at + 8 <= len(data):
         length, kind = int.from_bytes(view[at : at + 4], "big"), view[at + 4 : at + 8]
@@ -70,12 +70,12 @@ def _png_data(data: bytes) -> Iterator[memoryview]:
 
 
 def _inflated(pieces: Iterable[memoryview], need: int) -> int:
-    """Count the bytes that deflate makes of `pieces`, up to about `need`."""
+    """Return the inflated size of `pieces`, counted up to about `need` bytes."""
     inflate, count = zlib.decompressobj(), 0
     for piece in pieces:
         rest: bytes | memoryview = piece
         while len(rest) and count < need:
-            count += len(inflate.decompress(rest, PIECE))
+            count += len(inflate.decompress(rest, CHUNK))
             rest = inflate.unconsumed_tail
     return count
 

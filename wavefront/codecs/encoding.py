@@ -1,4 +1,4 @@
-"""Between linear values and display values."""
+"""Conversion between linear values and display values."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MAX_STOPS = 100
 
 
 def codes_to_linear(codes: NDArray[Any], gamma: Gamma = "srgb") -> Floats:
-    """Decode uint8 or uint16 codes (H, W, C) that count from 0 to 1; alpha is linear already."""
+    """Return the linear values of uint8 or uint16 codes (H, W, C); alpha is not decoded."""
     values = codes.astype(np.float32) / np.float32(np.iinfo(codes.dtype).max)
     colors = values[..., : 3 if values.shape[2] > 2 else 1]
     if isinstance(gamma, str):
@@ -27,7 +27,7 @@ def codes_to_linear(codes: NDArray[Any], gamma: Gamma = "srgb") -> Floats:
 
 
 def srgb_to_linear(values: Floats) -> Floats:
-    """Decode sRGB values in [0, 1], any shape (IEC 61966-2-1)."""
+    """Return the linear values of sRGB values in [0, 1], any shape (IEC 61966-2-1)."""
     values = np.asarray(values, np.float64)  # rounded at the end: float32 powers differ between machines
     low = values / 12.92
     high = ((values + 0.055) / 1.055) ** 2.4
@@ -35,14 +35,14 @@ def srgb_to_linear(values: Floats) -> Floats:
 
 
 def linear_to_srgb(values: Floats) -> Floats:
-    """Encode linear values in [0, 1] as sRGB, any shape (IEC 61966-2-1)."""
+    """Return linear values in [0, 1] as sRGB values, any shape (IEC 61966-2-1)."""
     values = np.asarray(values, np.float64)
     high = 1.055 * np.maximum(values, 0) ** (1 / 2.4) - 0.055
     return np.where(values <= 0.0031308, values * 12.92, high).astype(np.float32)
 
 
 def exposed(rgb: Floats, exposure: float) -> Floats:
-    """Return values brightened by `exposure` stops, any shape."""
+    """Return values multiplied by 2 to the power `exposure`, any shape."""
     return rgb * np.float32(2.0 ** check_exposure(exposure))
 
 

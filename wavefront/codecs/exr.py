@@ -1,4 +1,4 @@
-"""OpenEXR pictures in memory. What a header claims is checked before anything is decoded."""
+"""OpenEXR pictures in memory. Headers are checked before pixels are decoded."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from ..vec import Floats
 HeaderValue = str | int | float
 
 MAX_VALUES = 2**27  # of all channels of all parts: 512 MB as float32
-VALUES_PER_BYTE = 16  # larger files may hold more: so many values for each byte of the file
+VALUES_PER_BYTE = 16  # for larger files, the limit is this number of values per byte of the file
 
 
 def encode(channels: Mapping[str, NDArray[Any]], attributes: Mapping[str, HeaderValue]) -> bytes:
     """Return an exr file of channels (H, W) or (H, W, 3), float32 or uint32, by name."""
-    import OpenEXR  # here, so that starting up does not pay for it
+    import OpenEXR  # imported here to keep `import wavefront` quick
 
     header = {**attributes, "compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     buffer = BytesIO()
@@ -32,7 +32,7 @@ def encode(channels: Mapping[str, NDArray[Any]], attributes: Mapping[str, Header
 def decode(data: bytes) -> Floats:
     """Return the pixels of the first part of an exr file, (H, W, C) float32, top row first.
 
-    C are R, G, B and A as far as they are there, else the first channel by name.
+    The channels C are R, G, B and A if they exist, else the first channel by name.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def decode(data: bytes) -> Floats:
 
     claimed = OpenEXR.File(BytesIO(data), header_only=True).parts
     height, width = _check_claims(claimed, len(data))
-    # the library decodes every part, and leaves out those that it cannot decode
+    # OpenEXR decodes all parts, and leaves out those that it cannot decode.
     parts = OpenEXR.File(BytesIO(data), separate_channels=True).parts
     read = {(part.part_index, part.name()) for part in parts}
     for part in claimed:
@@ -64,7 +64,7 @@ def decode(data: bytes) -> Floats:
 
 
 def _check_claims(parts: list[Any], size: int) -> tuple[int, int]:
-    """Return (height, width) of the first part, after checking what all of them claim."""
+    """Check the headers of all parts, and return (height, width) of the first one."""
     import OpenEXR
 
     if not parts:

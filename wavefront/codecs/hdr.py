@@ -14,7 +14,7 @@ from ..files import check_size
 from ..vec import Bytes, Floats
 
 SIGNATURES = (b"#?RADIANCE", b"#?RGBE")
-MIN_RUN = 4  # shorter runs cost more than they save
+MIN_RUN = 4  # shorter runs take more bytes than literals
 
 
 def encode(pixels: Floats) -> bytes:
@@ -69,7 +69,7 @@ def from_rgbe(rgbe: Bytes) -> Floats:
 
 
 def _pack(values: Bytes) -> bytes:
-    """Run-length code one channel of one row."""
+    """Return the run-length code of one channel of one row."""
     edges = np.flatnonzero(np.diff(values)) + 1
     starts, stops = np.r_[0, edges], np.r_[edges, len(values)]
     long = stops - starts >= MIN_RUN
@@ -106,7 +106,7 @@ def _scanlines(data: Bytes, height: int, width: int) -> Bytes:
 
 
 def _unpack(raw: bytes, at: int, size: int, y: int) -> tuple[bytes, int]:
-    """Expand runs from raw[at:] until `size` bytes are there; return them and where they ended."""
+    """Return `size` bytes expanded from the runs at raw[at:], and the index after the last run."""
     out = bytearray()
     try:
         while len(out) < size:
@@ -127,7 +127,7 @@ def _unpack(raw: bytes, at: int, size: int, y: int) -> tuple[bytes, int]:
 
 
 def _flat(data: Bytes, height: int, width: int) -> Bytes:
-    """Pixels without run-length coding."""
+    """Return pixels (H, W, 4) that are stored without run-length coding."""
     if len(data) != 4 * height * width:
         raise SceneError(
             f"holds {len(data)} bytes of pixels; {width} × {height} pixels need {4 * height * width}"

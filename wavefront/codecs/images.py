@@ -1,7 +1,7 @@
-"""Images from files and to files, by extension: png, jpg, exr, hdr, npy.
+"""Reading and writing of image files by extension: png, jpg, exr, hdr, npy.
 
-Values are linear inside. Encoding for display happens here. `read_linear` decodes it again; for
-textures decoding is left to the caller, who knows whether an image holds colors or data.
+Values in the package are linear. `write_image` encodes them for display, and `read_linear` decodes them. The
+other readers do not decode: a texture may hold colors or data, which only the caller knows.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ Encoder: TypeAlias = Callable[[Floats, Gamma, Attributes], bytes]
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
-    """Make sure that an image can be written to `path`: call it before a long render.
+    """Check that an image can be written to `path`, before a long render.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def write_image(
     exposure: float = 0.0,
     attributes: Mapping[str, HeaderValue] | None = None,
 ) -> None:
-    """Write a picture in the format that the extension of `path` names.
+    """Write a picture in the format of the extension of `path`.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def write_image(
         Values are raised to 1/gamma in png and jpg; "srgb" applies the exact sRGB curve. The file
         says which.
     exposure
-        Stops: values are multiplied by 2**exposure first, in every format.
+        Values are multiplied by 2**exposure first, in every format.
     attributes
         Text and numbers for the header of an exr.
 
@@ -113,12 +113,12 @@ def read_image(path: str | os.PathLike[str]) -> Floats:
     """Return the pixels of an image file, (H, W, C) float32, top row first.
 
     8- and 16-bit values are scaled to [0, 1] and not decoded from sRGB (pngs with 16 bits per
-    color channel are read at 8). exr, hdr and npy values come as they are.
+    color channel are read at 8). exr, hdr and npy values are returned unchanged.
 
     Raises
     ------
     SceneError
-        Naming the file: missing, of another kind, corrupt, truncated, or larger than
+        With the name of the file, if it is missing, of another format, damaged, truncated, or larger than
         `files.MAX_PIXELS`.
     """
     codes = read_codes(path)
@@ -128,15 +128,15 @@ def read_image(path: str | os.PathLike[str]) -> Floats:
 
 
 def read_codes(path: str | os.PathLike[str]) -> NDArray[Any]:
-    """Return what `read_image` does, but 8- and 16-bit values as they are stored, (H, W, C)."""
+    """Return the pixels of an image file as stored, uint8, uint16 or float32, (H, W, C)."""
     return _read(path)[0]
 
 
 def read_linear(path: str | os.PathLike[str]) -> Floats:
     """Return the linear values of an image file, (H, W, C) float32, top row first.
 
-    png and jpg are decoded by the gamma that they name (gAMA or sRGB of a png, Exif of a jpg), and by
-    the sRGB curve if they name none. Alpha, the last of two or four channels, is linear.
+    png and jpg are decoded by the gamma in the file (gAMA or sRGB of a png, Exif of a jpg), or by the
+    sRGB curve if it has none. Alpha, the last of two or four channels, is linear.
 
     Raises
     ------
@@ -168,7 +168,7 @@ def _decode(name: str, decode: Decoder, data: bytes, kind: str) -> NDArray[Any]:
         raise SceneError(f"{name}: {error}") from error
     except MemoryError as error:
         raise SceneError(f"{name}: does not fit in memory") from error
-    # the decoders raise whatever comes to their mind on damaged bytes
+    # decoders raise exceptions of any type on damaged data
     except Exception as error:
         raise SceneError(f"{name}: not a readable {kind} image: {error}") from error
 
@@ -179,7 +179,7 @@ def encode_png(rgb: ArrayLike, gamma: Gamma = 2.2) -> bytes:
 
 
 def _find(table: Registry[T], path: str | os.PathLike[str], error: type[SceneError] = SceneError) -> T:
-    """Return what a table has for the extension of a path."""
+    """Return the entry of a table for the extension of a path."""
     name = path_name(path, error)
     try:
         return table.find(Path(name).suffix.lower(), f"{name}: extension")
@@ -188,7 +188,7 @@ def _find(table: Registry[T], path: str | os.PathLike[str], error: type[SceneErr
 
 
 def _encoded(path: str | os.PathLike[str], encode: Callable[[], bytes]) -> bytes:
-    """Return what `encode` does; whatever encoders raise becomes a SaveError."""
+    """Return the result of `encode`; convert its exceptions to SaveError."""
     try:
         return encode()
     except Exception as error:
@@ -203,7 +203,7 @@ def _picture(rgb: ArrayLike) -> Floats:
 
 
 def _finite(path: str | os.PathLike[str], pixels: Floats) -> Floats:
-    """Replace what a format cannot hold, and say so."""
+    """Replace NaN and infinities, with a warning, for a format that cannot hold them."""
     bad = int(np.count_nonzero(~np.isfinite(pixels).all(axis=2)))
     if not bad:
         return pixels

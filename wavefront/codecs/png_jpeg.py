@@ -17,23 +17,23 @@ from .claims import JPG, check_claims
 Gamma = float | str  # an exponent, or "srgb" for the exact sRGB curve
 
 GAMMAS = (0.01, 100.0)  # the least and the largest exponent
-PNG_DEFLATE = zlib.Z_RLE  # runs only: rendered pictures take 3 % more bytes, and a fourth of the time
+PNG_DEFLATE = zlib.Z_RLE  # run lengths only: for renders 3 % larger files in a fourth of the time
 EXTENSIONS = (".png", ".jpg", ".jpeg")
 MAX_JPG = 65500  # pixels in a row or a column, by libjpeg
-SRGB_GAMA = 45455  # what a png says beside its sRGB chunk, for readers that know gamma alone
+SRGB_GAMA = 45455  # gAMA of an sRGB png, for readers that do not know the sRGB chunk
 EXIF_IFD, COLOR_SPACE, EXIF_GAMMA = 0x8769, 0xA001, 0xA500  # tags of CIPA DC-008 (Exif 2.32)
 SRGB_SPACE, UNCALIBRATED = 1, 0xFFFF  # values of ColorSpace
-FILLER = bytes([0x5A]) * 64  # entropy-coded bytes that decode to something
-GREY = 128  # what libjpeg leaves where data ends early
-ROUNDING = 2  # codes by which a gray of interpolated colors may be off
+FILLER = bytes([0x5A]) * 64  # entropy-coded bytes that decode to pixels
+GREY = 128  # libjpeg's pixel value where data ends early
+ROUNDING = 2  # largest error of a gray after color interpolation, in codes
 
 
 def encode(codes: NDArray[np.uint8], extension: str, gamma: Gamma) -> bytes:
-    """Return a png or jpg file of codes (H, W, 3); the file says how they were made.
+    """Return a png or jpg file of codes (H, W, 3), with metadata of their encoding.
 
     A png gets the chunk gAMA, or sRGB as well; a jpg gets the Exif tags ColorSpace and Gamma.
     """
-    import imageio.v3 as iio  # here, so that starting up does not pay for it
+    import imageio.v3 as iio  # imported here to keep `import wavefront` quick
 
     if extension == ".png":
         options: dict[str, Any] = {"compress_type": PNG_DEFLATE, "pnginfo": _png_info(gamma)}
@@ -66,18 +66,18 @@ def decode(data: bytes) -> NDArray[Any]:
 
 
 def gamma_of(data: bytes) -> Gamma:
-    """Return how the codes of a png or jpg are to be decoded: "srgb" where the file does not say."""
+    """Return the gamma of a png or jpg, "srgb" if the file has none."""
     try:
         with _quiet():
             exponent = _exponent(data)
-    # cameras and editors leave damaged Exif data behind, and the reader raises what it likes
+    # the reader raises exceptions of any type on damaged Exif data, which some cameras and editors write
     except Exception:
         return "srgb"
     return exponent if exponent is not None and GAMMAS[0] <= exponent <= GAMMAS[1] else "srgb"
 
 
 def _exponent(data: bytes) -> float | None:
-    """Return the exponent that a png or jpg names, None if it names none or sRGB."""
+    """Return the exponent in the metadata of a png or jpg, None if there is none or it is sRGB."""
     import imageio.v3 as iio
     from PIL.Image import Exif
 
@@ -126,7 +126,7 @@ def _decode(data: bytes) -> NDArray[Any]:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep the decoder's warnings away: of large images, whose limit is our own, and of Exif data."""
+    """Suppress the decoder's warnings of large images, which have another limit here, and of Exif data."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
@@ -135,8 +135,8 @@ def _quiet() -> Iterator[None]:
 def _ends_early(data: bytes, codes: NDArray[Any]) -> bool:
     """Return whether the pixels of a jpg end before its picture does.
 
-    The decoder then leaves gray, and would decode more if there were more: so more is appended
-    where the last pixel is gray.
+    The decoder fills missing pixels with gray. If the last pixel is gray, data is appended and decoded again:
+    pixels that change were missing.
     """
     last = codes[-1, -1].astype(np.float64)
     luma = last @ (0.299, 0.587, 0.114) if last.shape == (3,) else last.mean()

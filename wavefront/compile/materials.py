@@ -22,12 +22,12 @@ from ..vec import Bools, Floats, Ints, f4
 
 @record
 class ParameterTable(BaseTexture):
-    """A parameter of the BSDFs of many materials, one column each, looked up by the material's number."""
+    """The values of one parameter for the BSDFs of many materials, one column per material."""
 
     table: Floats  # (c, materials)
 
     def at(self, surface: SurfaceInteraction) -> Floats:
-        """Return the column of each hit point's material."""
+        """Return the values of the hit points' materials, (c, n)."""
         return self.table.take(surface.material, -1)
 
 
@@ -36,21 +36,21 @@ class MaterialTable:
     """The materials of a scene: BSDFs, gathered into groups that are shaded together, and normal maps."""
 
     group_of: Ints  # (materials,) the group of each material
-    groups: tuple[Bsdf, ...]  # those that are `specular` at the end
+    groups: tuple[Bsdf, ...]  # groups that are `specular` come last
     normal_map_of: Ints  # (materials,) the normal map of each material, -1 for none
     normal_maps: tuple[BaseNormalMap, ...]
 
 
 @record
 class Opacities:
-    """Which surfaces are only translucent there, and how much of them is."""
+    """The opacities of a scene's surfaces (alpha)."""
 
-    translucent: Bools  # (m + k + 1,) of each primitive, and at the end False for a miss
+    has_alpha: Bools  # (m + k + 1,) of primitives; the last entry, False, is for a miss
     constant: Floats  # (materials,) opacity of each material; 1 where it varies
     varying: list[tuple[int, Opacity]]  # materials whose opacity varies
 
     def at(self, surface: SurfaceInteraction) -> Floats:
-        """Return the part of the light that meets surfaces, (n,), in [0, 1]."""
+        """Return the opacities at hit points, (n,), in [0, 1]."""
         found = self.constant.take(surface.material)
         for material, opacity in self.varying:
             lanes = np.flatnonzero(surface.material == material)
@@ -89,9 +89,9 @@ def absorption_table(materials: Sequence[Material]) -> Floats | None:
     return table if table.any() else None
 
 
-def opacity_table(materials: Sequence[Material], translucent: Bools) -> Opacities | None:
-    """Return how much of the surfaces is there, None when all of them are."""
-    if not translucent.any():
+def opacity_table(materials: Sequence[Material], has_alpha: Bools) -> Opacities | None:
+    """Return the opacities of materials, None if all surfaces are opaque."""
+    if not has_alpha.any():
         return None
     constant, varying = np.ones(len(materials), f4), []
     for i, material in enumerate(materials):
@@ -101,15 +101,15 @@ def opacity_table(materials: Sequence[Material], translucent: Bools) -> Opacitie
             varying.append((i, material.opacity))
         else:
             constant[i] = material.opacity.constant
-    return Opacities(translucent, constant, varying)
+    return Opacities(has_alpha, constant, varying)
 
 
-def find_translucent(
+def find_alpha(
     materials: Sequence[Material], material_of: Ints, meshes: Sequence[Mesh], instances: Sequence[Instance]
 ) -> Bools:
     """Return a mask of the primitives (m + k + 1,) with an opacity below 1; a miss, at the end, has none."""
-    translucent = np.array([material.opacity is not None for material in materials], np.bool_)
-    found = np.append(translucent.take(material_of), False)
+    has_alpha = np.array([material.opacity is not None for material in materials], np.bool_)
+    found = np.append(has_alpha.take(material_of), False)
     placed = {id(shape.mesh) for shape in instances if shape.material.opacity is not None}
     start = 0
     for mesh in meshes:
@@ -157,15 +157,15 @@ def _merge(bsdfs: Sequence[Bsdf], numbers: list[int]) -> Bsdf:
 
 
 def attributes_read(shapes: Sequence[Shape]) -> list[str]:
-    """Return the names of what materials read; warn of meshes that lack what theirs reads.
+    """Return the names of the attributes that materials read; warn of meshes that lack any of theirs.
 
     Raises
     ------
     SceneError
-        If a parameter reads what does not exist.
+        If a parameter reads an unknown attribute.
     """
     read: set[str] = set()
-    lacking: dict[str, dict[int, str]] = {}  # what -> the meshes that lack it, by identity, with their names
+    lacking: dict[str, dict[int, str]] = {}  # attribute -> names of the meshes that lack it, by identity
     seen: set[tuple[int, int]] = set()  # meshes and materials of instances
     of_material: dict[int, set[str]] = {}
     for shape in shapes:
@@ -215,9 +215,9 @@ def _parameters_read(thing: Bsdf | Opacity) -> set[str]:
 def number_materials(
     meshes: Sequence[Mesh], spheres: Sequence[Sphere], instances: Sequence[Instance]
 ) -> tuple[list[Material], Ints, Ints | None]:
-    """Return the distinct materials, and the numbers of each row's and of each instance's.
+    """Return the distinct materials, and their numbers for each table row and for each instance.
 
-    An instance that has the material of its mesh has the number -1; when all have, there are none.
+    The number of an instance with its mesh's material is -1; the last result is None if all have that.
     """
     numbers: dict[tuple[int, ...], int] = {}
     materials: list[Material] = []

@@ -24,8 +24,8 @@ from .materials import (
     Opacities,
     absorption_table,
     attributes_read,
+    find_alpha,
     find_nonscattering_lights,
-    find_translucent,
     group_materials,
     number_materials,
     opacity_table,
@@ -57,7 +57,7 @@ class CompiledScene:
     shines: Bools  # (m + k + 1,) whether there is one
     materials: MaterialTable
     absorption: Floats | None  # (3, materials) per unit of length; None when nothing absorbs
-    opacities: Opacities | None  # None when every surface is all there
+    opacities: Opacities | None  # None when every surface is opaque
     lights: LightTable
     nonscattering_lights: (
         Bools | None
@@ -66,11 +66,11 @@ class CompiledScene:
 
     @property
     def interpolates(self) -> bool:
-        """Whether anything varies between the corners of triangles."""
+        """Whether any value is interpolated over triangles."""
         return bool(self.attributes) or self.corner_normals is not None
 
     def view(self, camera: Camera) -> Camera:
-        """Return a camera of the scene in the unit of these arrays.
+        """Return a camera of the scene in the unit of length of these arrays.
 
         Raises
         ------
@@ -99,10 +99,9 @@ def compile_scene(
     light_sampler
         How one light of many is chosen: see `LIGHT_SAMPLERS`.
     most_copies
-        Up to so many triangles in all, each instance is built as a mesh of its own.
+        Up to this total of instanced triangles, each instance becomes a mesh of its own.
     mis
-        Whether light samples are weighted against BSDF samples, so that they may leave out light from
-        all around, which those find better.
+        Whether light samples are combined with BSDF samples by MIS. Environments then use MIS compensation.
 
     Raises
     ------
@@ -136,7 +135,7 @@ def compile_scene(
     radii = np.array([s.radius for s in spheres]).astype(f4)
     smooth = any(mesh.normals is not None for mesh in meshes)
     triangles32 = np.ascontiguousarray(triangles, f4)
-    translucent = find_translucent(user_materials, material_of, meshes, instances)
+    has_alpha = find_alpha(user_materials, material_of, meshes, instances)
     nonscattering_lights = find_nonscattering_lights(user_materials, material_of, light_of, len(lights))
     light_of = np.append(light_of, environment)
     weights = bool(attributes) or smooth
@@ -166,7 +165,7 @@ def compile_scene(
         shines=light_of >= 0,
         materials=group_materials(user_materials),
         absorption=absorption_table(user_materials),
-        opacities=opacity_table(user_materials, translucent),
+        opacities=opacity_table(user_materials, has_alpha),
         lights=lights,
         nonscattering_lights=nonscattering_lights,
         instances=table,

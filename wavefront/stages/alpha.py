@@ -40,8 +40,8 @@ def alpha_pass_through(
     """
     if scene.opacities is None:
         return paths, hits
-    translucent = scene.opacities.translucent
-    lanes = np.flatnonzero(translucent.take(hits.prim))  # a miss, -1, takes the last entry
+    has_alpha = scene.opacities.has_alpha
+    lanes = np.flatnonzero(has_alpha.take(hits.prim))  # a miss, -1, takes the last entry
     if not lanes.size:
         return paths, hits
     paths = replace(
@@ -63,7 +63,7 @@ def alpha_pass_through(
         paths.origin[:, lanes], paths.exclude_prim[lanes] = here.origin, here.exclude_prim
         paths.throughput[:, lanes] = here.throughput
         hits.put(lanes, intersect(scene, here))
-        lanes = lanes.compress(translucent.take(hits.prim.take(lanes)))
+        lanes = lanes.compress(has_alpha.take(hits.prim.take(lanes)))
     return paths, hits
 
 
@@ -79,9 +79,9 @@ def transmittance_along(scene: CompiledScene, rays: ShadowRays) -> Floats:
     while lanes.size:
         hits = intersect(scene, rays)
         between = hits.t < shadow_ray_length(rays)
-        translucent = scene.opacities.translucent.take(hits.prim)
-        part[:, lanes.compress(between & ~translucent)] = 0
-        met = np.flatnonzero(between & translucent)
+        has_alpha = scene.opacities.has_alpha.take(hits.prim)
+        part[:, lanes.compress(between & ~has_alpha)] = 0
+        met = np.flatnonzero(between & has_alpha)
         lanes, rays, hits = lanes.take(met), rays.take(met), hits.take(met)
         surface = interaction(scene, rays, hits)
         left = part.take(lanes, 1) * (f4(1) - scene.opacities.at(surface))

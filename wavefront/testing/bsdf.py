@@ -36,24 +36,24 @@ class _View:
         return self.bsdf.bind(_surface(wo, np.full(n, self.back_facing))), wo
 
     def sample(self, u: Floats) -> BsdfSample:
-        """Sample with u (dimensions, n)."""
+        """Return samples for u (dimensions, n)."""
         bound, wo = self.at(u.shape[1])
         return bound.sample_f(wo, u)
 
     def f(self, wi: Floats) -> Floats:
-        """Evaluate f at wi (3, n)."""
+        """Return f at wi (3, n)."""
         bound, wo = self.at(wi.shape[1])
         return bound.f(wo, wi)
 
     def pdf(self, wi: Floats) -> Floats:
-        """Evaluate the pdf at wi (3, n)."""
+        """Return the pdf at wi (3, n)."""
         bound, wo = self.at(wi.shape[1])
         return bound.pdf(wo, wi)
 
 
 @dataclass(slots=True)
 class _Lobe:
-    """A delta lobe as the samples show it."""
+    """A delta lobe, as found from samples."""
 
     wi: Doubles  # (3,)
     probability: float
@@ -72,7 +72,7 @@ def check_bsdf(
     significance: float = 1e-3,
     seed: int = 0,
 ) -> Report:
-    """Prove that a material keeps the contract of `wavefront.bsdfs.Bsdf`.
+    """Check that a BSDF fulfills the contract of `wavefront.bsdfs.Bsdf`.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def check_bsdf(
     Raises
     ------
     AssertionError
-        Naming each failed check, the direction, the value measured and the one expected.
+        With each failed check, its direction, and the measured and expected values.
     """
     report = Report(f"check_bsdf({type(bsdf).__name__})")
     sides = (False, True) if bsdf.transmissive else (False,)
@@ -146,7 +146,7 @@ def _check_view(
     dimensions = view.bsdf.dimensions
     _check_arrays(report, view, rng)
     if view.bsdf.view_independent:
-        _check_matte(report, view, rng)
+        _check_view_independent(report, view, rng)
     pilot = view.sample(rng.random((dimensions, PILOT), f4))
     points, lobes = [], list[_Lobe]()
     total, squares = np.zeros(3), np.zeros(3)
@@ -155,7 +155,7 @@ def _check_view(
         _check_samples(report, view, drawn)
         carried = drawn.weight.astype(np.float64)
         if drawn.eta is not None:
-            carried *= drawn.eta.astype(np.float64) ** 2  # radiance back to energy
+            carried *= drawn.eta.astype(np.float64) ** 2  # converts radiance to energy
         total += carried.sum(1)
         squares += (carried**2).sum(1)
         if not _merge_lobes(lobes, drawn):
@@ -173,7 +173,7 @@ def _check_view(
         text = f"at least {albedo[0] - slack[low]:.6g}"
         report.add("albedo (least)", where, mean[low], text, float((albedo[0] - mean[low]) / slack[low]))
     for lobe in lobes:
-        copies = max(1, round(lobe.count / (samples * lobe.probability)))  # lobes that look the same
+        copies = max(1, round(lobe.count / (samples * lobe.probability)))  # equal lobes
         p = binomial_p(lobe.count, samples, min(1.0, copies * lobe.probability))
         report.significant("delta lobe (binomial)", f"{where}, wi_z {lobe.wi[2]:.4g}", p, alpha)
     singular = min(1.0, sum(lobe.probability for lobe in lobes))
@@ -188,7 +188,7 @@ def chunk_sizes(n: int) -> Iterator[int]:
 
 
 def _check_arrays(report: Report, view: _View, rng: np.random.Generator) -> None:
-    """Shapes, types, and that no lane depends on the lanes beside it."""
+    """Check shapes and types, and that no lane depends on other lanes."""
     where, n = str(view), 1000
     u = rng.random((view.bsdf.dimensions, n), f4)
     w = uniform_directions(rng, n)
@@ -219,8 +219,8 @@ def _check_arrays(report: Report, view: _View, rng: np.random.Generator) -> None
         report.at_most("evaluate = f, pdf", f"{where}, {('f', 'pdf')[k]}", float(error.max()), 1e-5)
 
 
-def _check_matte(report: Report, view: _View, rng: np.random.Generator) -> None:
-    """No method of a matte material reads wo."""
+def _check_view_independent(report: Report, view: _View, rng: np.random.Generator) -> None:
+    """Check that no method of a view-independent BSDF reads wo."""
     n = 1000
     bound, wo = view.at(n)
     w, u = uniform_directions(rng, n), rng.random((bound.dimensions, n), f4)
@@ -235,7 +235,7 @@ def _check_matte(report: Report, view: _View, rng: np.random.Generator) -> None:
 
 
 def _check_samples(report: Report, view: _View, drawn: BsdfSample) -> None:
-    """Properties of single samples."""
+    """Check the properties of single samples."""
     where = str(view)
     for name, values in (("wi", drawn.wi), ("weight", drawn.weight), ("pdf", drawn.pdf)):
         report.holds("finite", f"{where}, {name}", ~np.isfinite(values), "finite numbers")
@@ -278,7 +278,7 @@ def _text(w: Floats) -> str:
 
 
 def _check_support(report: Report, view: _View, rng: np.random.Generator, points: Floats) -> None:
-    """f is finite and not negative, and wherever it is positive so is the pdf."""
+    """Check that f is finite and not negative, and the pdf is positive where f is."""
     where = str(view)
     for w in (uniform_directions(rng, 1 << 16), points[:, : 1 << 16]):
         f, pdf = view.f(w), view.pdf(w)
@@ -296,7 +296,7 @@ def _check_support(report: Report, view: _View, rng: np.random.Generator, points
 
 
 def _merge_lobes(lobes: list[_Lobe], drawn: BsdfSample, limit: int = 16) -> bool:
-    """Count specular samples by lobe; False if there are more than `limit` different ones."""
+    """Count specular samples by lobe; return whether there are at most `limit` lobes."""
     eta = np.ones_like(drawn.pdf) if drawn.eta is None else drawn.eta
     left = np.flatnonzero(drawn.specular & (drawn.pdf > 0))
     while len(left):
@@ -323,7 +323,7 @@ def _alike(a: _Lobe, b: _Lobe) -> bool:
 
 
 def _check_reciprocity(report: Report, view: _View, rng: np.random.Generator) -> None:
-    """Swapping both directions changes f by the square of the relative index only."""
+    """Check that exchanging wo and wi changes f only by the square of the relative index."""
     drawn = view.sample(rng.random((view.bsdf.dimensions, PAIRS), f4))
     eta = np.ones_like(drawn.pdf) if drawn.eta is None else drawn.eta
     kept = np.flatnonzero((drawn.pdf > 0) & ~drawn.specular & (np.abs(drawn.wi[2]) > 1e-3))
@@ -340,8 +340,8 @@ def _check_reciprocity(report: Report, view: _View, rng: np.random.Generator) ->
     back = view.bsdf.bind(_surface(wo2, across ^ view.back_facing)).f(wo2, wi2).astype(np.float64)
     scale = np.maximum(np.maximum(forth, back).max(0), 1e-12)
     error = np.abs(forth - back).max(0) / scale
-    # Near grazing angles float32 leaves few digits of some cosines: one pair in a hundred may differ
-    # by more than 0.3 %, none by more than 5 %.
+    # Near grazing angles some cosines have few digits in float32: one pair in a hundred may differ by more
+    # than 0.3 %, none by more than 5 %.
     order = np.argsort(error)
     for name, k, limit in (
         ("reciprocity", order[int(0.99 * (len(order) - 1))], 3e-3),
@@ -352,7 +352,7 @@ def _check_reciprocity(report: Report, view: _View, rng: np.random.Generator) ->
 
 
 def _swap(wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
-    """Exchange wo and wi (3, n), seen from wi's side: turned about x where that is below."""
+    """Return wi and wo (3, n) exchanged, rotated by 180° about x where wi is below the surface."""
     turn = np.where(wi[2] < 0, f4(-1), f4(1)) * np.array([[1], [1], [1]], f4)
     turn[0] = 1
     return wi * turn, wo * turn

@@ -1,4 +1,4 @@
-"""Maps between the unit square and the domains that directions and points come from."""
+"""Equal-area maps between the unit square and the domains of warps."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Chart:
 
 
 def _turn(x: Doubles, y: Doubles) -> Doubles:
-    """Return the angle of (x, y) as a fraction of a turn in [0, 1)."""
+    """Return the angle of (x, y) divided by 2π, in [0, 1)."""
     turn = np.arctan2(y, x) / (2 * np.pi)
     turn[turn < 0] += 1
     return np.minimum(turn, np.nextafter(1.0, 0.0))
@@ -30,7 +30,7 @@ def _turn(x: Doubles, y: Doubles) -> Doubles:
 def _sphere_to_square(w: Floats) -> Doubles:
     x, y, z = w.astype(np.float64)
     r2 = x * x + y * y
-    # Near the poles 1 − cosθ is known from x and y far better than from z.
+    # Near the poles 1 − cosθ is more accurate from x and y than from z.
     cos = np.where(r2 < 0.5, np.copysign(np.sqrt(np.maximum(1 - r2, 0)), z), z)
     return np.stack([np.clip((cos + 1) / 2, 0, 1), _turn(x, y)])
 

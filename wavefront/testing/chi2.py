@@ -14,7 +14,7 @@ from .report import Report
 
 
 def gamma_q(a: float, x: float) -> float:
-    """Regularised upper incomplete gamma function Q(a, x).
+    """Return the regularized upper incomplete gamma function Q(a, x).
 
     Source: NIST DLMF 8.11.4 (series, for x < a + 1) and 8.9.2 (continued fraction, by Lentz's rule).
     """
@@ -44,11 +44,11 @@ def gamma_q(a: float, x: float) -> float:
 
 
 def chi_square(observed: Ints, expected: Doubles) -> tuple[float, int, float]:
-    """χ² statistic, degrees of freedom and p-value; cells below 5 expected are pooled.
+    """Return χ², degrees of freedom and p-value; cells with less than 5 expected samples are pooled.
 
-    The cells must cover every outcome, so that both sums are the number of samples. If even the
-    pool expects less than 5, its count is compared with the Poisson distribution instead; there
-    10⁻⁵ of all samples are allowed for, as rounding puts some just beyond the edge of a density.
+    The cells must cover every outcome, so that both sums are the number of samples. If the pool expects
+    less than 5 samples, its count is compared with the Poisson distribution instead, with a tolerance of
+    10⁻⁵ of all samples, because rounding moves some just beyond the edge of a density.
     """
     rare = expected < 5
     pool, pooled = float(expected[rare].sum()), int(observed[rare].sum())
@@ -66,7 +66,7 @@ def chi_square(observed: Ints, expected: Doubles) -> tuple[float, int, float]:
 
 
 def _chi_square_p(observed: Ints, expected: Doubles, missing: int, lost: float) -> float:
-    """p-value of χ² over all cells, over rows and over columns: sums show a slope that cells hide."""
+    """Return the p-value of χ² over cells, row sums and column sums; sums reveal a slope that cells hide."""
     counts, means = observed.reshape(ROWS, COLUMNS), expected.reshape(ROWS, COLUMNS)
     views = [(counts.ravel(), means.ravel()), (counts.sum(1), means.sum(1)), (counts.sum(0), means.sum(0))]
     p = [chi_square(np.append(o, missing), np.append(e, lost))[2] for o, e in views]
@@ -74,7 +74,7 @@ def _chi_square_p(observed: Ints, expected: Doubles, missing: int, lost: float) 
 
 
 def binomial_p(count: int, trials: int, probability: float) -> float:
-    """Two-sided exact binomial p-value: twice the smaller tail, at most 1."""
+    """Return the two-sided exact binomial p-value: twice the smaller tail, at most 1."""
     if not 0 < probability < 1:
         return float(count == (trials if probability >= 1 else 0))
     k = np.arange(1, trials + 1)
@@ -95,10 +95,10 @@ def check_density(
     alpha: float,
     singular: float = 0.0,
 ) -> None:
-    """χ² of sampled points (d, m ≤ total) against a density, and the density's integral.
+    """Check sampled points (d, m ≤ total) against a density by χ², and the density's integral.
 
-    `total − m` of the samples gave no point, or one of a delta lobe; the probability of the
-    latter is `singular`.
+    `total − m` of the samples have no point or belong to a delta lobe; the probability of delta lobes is
+    `singular`.
     """
     cells = Cells.around(chart.to_square(pilot), chart.seams)
     on_square = chart.to_square(points)

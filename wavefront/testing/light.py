@@ -47,7 +47,7 @@ def check_light(
     Raises
     ------
     AssertionError
-        Naming each failed check, the point, the value measured and the one expected.
+        With each failed check, its point, and the measured and expected values.
     """
     record = light if isinstance(light, LightRecord) else light.record(np.zeros(3))
     compiled = None
@@ -134,7 +134,7 @@ def _check_light_samples(
         report.holds("delta pdf", where, drawn.pdf[some] != 1, "1")
         report.holds("delta pdf_li, le", where, (pdf != 0) | (le != 0).any(0), "0")
         return
-    # A sample on the very edge may just miss the light again, so a few lanes may differ.
+    # Rays to samples on the edge of a light may miss it, so a few lanes may differ.
     ratio = np.abs(pdf - drawn.pdf[some]) > 1e-3 * drawn.pdf[some]
     report.at_most("sample pdf ≠ pdf_li", where, float(ratio.mean()), 1e-3)
     differs = (np.abs(le - drawn.radiance[:, some]) > 1e-4 * np.maximum(le, 1e-20)).any(0)

@@ -23,9 +23,9 @@ class Cells:
 
     @classmethod
     def around(cls, pilot: Doubles, seams: Sequence[float]) -> Cells:
-        """Lay cells by the quantiles of half a uniform density and half the pilot (2, m).
+        """Return cells by the quantiles of an equal mixture of a uniform density and the pilot (2, m).
 
-        Smooth densities get nearly uniform cells; of a sharp lobe every part gets its share.
+        Smooth densities get nearly uniform cells; sharp lobes get small ones.
         """
         per_band = ROWS // (len(seams) - 1)
         bands = [
@@ -51,16 +51,15 @@ class Cells:
 
 
 def _quantiles(x: Doubles, low: float, high: float, parts: int) -> Doubles:
-    """Split [low, high] by the quantiles of half a uniform density and half the values x."""
+    """Split [low, high] by the quantiles of an equal mixture of a uniform density and the values x."""
     x = np.unique(np.clip(x, low, high))
     x = np.concatenate([[low], x[(x > low) & (x < high)], [high]])
     cdf = 0.5 * (x - low) / (high - low) + 0.5 * np.linspace(0, 1, len(x))
     return np.interp(np.linspace(0, 1, parts + 1), cdf, x)
 
 
-# Five points near those of Gauss and Lobatto, the outer ones just within the ends: boxes of which
-# an edge cuts off only a corner are noticed, and no point lies on the horizon. Weights: exact for
-# polynomials of degree 5.
+# Five points near those of Gauss and Lobatto, the outer ones just inside the ends: they detect an edge that
+# crosses only a corner of a box, and no point lies on the horizon. Weights are exact for degree 5.
 NODES = np.array([0.003, 0.175, 0.5, 0.825, 0.997])
 WEIGHTS = np.linalg.solve(NODES ** np.arange(5)[:, None], 1 / np.arange(1, 6))
 
@@ -69,8 +68,8 @@ WEIGHTS = np.linalg.solve(NODES ** np.arange(5)[:, None], 1 / np.arange(1, 6))
 class _Integrator:
     """Adaptive integrals of a density over boxes of the unit square.
 
-    Samples guide it: where one finds a density far above all nodes of its box, the nodes have
-    missed something sharp, and the box is split. Their number plays no part in the integral.
+    Samples guide the refinement: if the density at a sample is far above that at all nodes of its box, the
+    nodes have missed a peak, and the box is split. The integral does not depend on their number.
     """
 
     density: Callable[[Floats], Floats]
@@ -95,7 +94,7 @@ class _Integrator:
             area = np.maximum((boxes[1] - boxes[0]) * (boxes[3] - boxes[2]) * self.chart.area, 1e-300)
             highest = self._highest(home, len(fine))
             missed = highest > 3 * peak
-            # Two coarse integrals agree by chance on a lobe that fills a small part of a box.
+            # Two coarse integrals may agree by chance if a lobe fills a small part of a box.
             split = missed | (highest > 9 * fine / area) | ~keep | ~_least(edge, tolerance)
             if level == 59 or np.count_nonzero(split) > 30_000:
                 unresolved, split = float((error + edge)[split].sum()), np.zeros_like(split)
@@ -104,7 +103,7 @@ class _Integrator:
                 break
             home = self._descend(home, boxes, across, split)
             both = np.tile(split, 2)
-            turned = np.where(np.tile(missed, 2), level % 2 == 0, turned)  # their values tell nothing
+            turned = np.where(np.tile(missed, 2), level % 2 == 0, turned)  # all nodes missed the peak
             boxes, across = halves[:, both], turned[both]
             coarse = parts[:, split].ravel()
             owner = np.tile(owner[split], 2)
@@ -114,8 +113,8 @@ class _Integrator:
         """Integrate over boxes (4, m) by 5×5 points.
 
         Returns the integrals, the largest values, whether the density varies more along the first
-        coordinate than along the second, and an error for boxes that the density's edge goes
-        through, which two coarse integrals may well agree on; each (m,).
+        coordinate than along the second, and an error for boxes that an edge of the density
+        crosses, where two coarse integrals may agree by chance; each (m,).
         """
         a0, a1, b0, b1 = boxes
         out, peak = np.empty(boxes.shape[1]), np.empty(boxes.shape[1])
@@ -142,7 +141,7 @@ class _Integrator:
         return highest
 
     def _descend(self, home: Ints, boxes: Doubles, across: Bools, split: Bools) -> Ints:
-        """Follow the samples into the halves of the split boxes; −1 in boxes that are done."""
+        """Return the box of each sample after the split; −1 in boxes that are finished."""
         back_facing = (home >= 0) & split[home]
         rank = np.cumsum(split) - 1
         box = home[back_facing]
@@ -154,7 +153,7 @@ class _Integrator:
         return below
 
     def _around_samples(self, boxes: Doubles, cell: Ints) -> tuple[Doubles, Ints]:
-        """Cut cells of which the samples fill only a part, so that no nodes miss that part.
+        """Split cells of which the samples fill only a part, so that nodes do not miss that part.
 
         Returns boxes (4, m), and the cell that each belongs to, (m,).
         """
@@ -176,7 +175,7 @@ class _Integrator:
         return np.concatenate([boxes[:, rest], *pieces], axis=1), np.concatenate([rest, np.tile(cut, 9)])
 
     def _locate(self, boxes: Doubles, owner: Ints, cell: Ints) -> Ints:
-        """Return the box of each sample: of its cell's boxes the one that its samples fill."""
+        """Return the box of each sample, among those of its cell."""
         middle = np.empty(ROWS * COLUMNS, np.intp)
         count = np.bincount(owner, minlength=ROWS * COLUMNS)
         first = np.flatnonzero(count[owner] == 1)
@@ -188,7 +187,7 @@ class _Integrator:
 
 
 def _least(error: Doubles, tolerance: float) -> Bools:
-    """Mark the least errors, as many as add up to less than the tolerance."""
+    """Return a mask of the least errors whose sum is less than the tolerance."""
     order = np.argsort(error)
     keep = np.empty(len(error), np.bool_)
     keep[order] = np.cumsum(error[order]) < tolerance

@@ -1,11 +1,11 @@
-"""Checks that prove a material, a light or a warp correct: one call for your own class.
+"""Reports of the checks of BSDFs, lights and warps, which take one call for a class of your own.
 
 >>> import wavefront as wf
 >>> print(wf.testing.check_bsdf(MyMaterial(0.5)))          # doctest: +SKIP
 
-All rest on one harness. Samples are counted in 20×40 cells and compared by a χ² test with the
-integrals of the pdf over those cells. χ² is blind to some errors, so the properties that it
-cannot see are tested beside it. Every check is deterministic for a given seed.
+All checks have one method: samples are counted in 20×40 cells, and compared by a χ² test with the integrals
+of the pdf over these cells. Properties that a χ² test does not detect are tested separately. Every check is
+deterministic for a given seed.
 """
 
 from __future__ import annotations
@@ -37,20 +37,20 @@ class Check:
         return self.badness <= 1
 
     def __str__(self) -> str:
-        """One line: verdict, name, worst value, what was expected, where."""
+        """Return one line: verdict, name, worst value, expected value, position."""
         verdict = "ok  " if self.passed else "FAIL"
         return f"{verdict} {self.name:<22} {self.measured:>12.6g}   {self.expected:<28} {self.where}"
 
 
 @dataclass(slots=True)
 class Report:
-    """What was checked, and how close each check was."""
+    """The results of checks."""
 
     subject: str
     checks: dict[str, Check] = field(default_factory=dict)
 
     def add(self, name: str, where: str, measured: float, expected: str, badness: float) -> None:
-        """Keep this result if it is the worst so far under its name."""
+        """Record a result if it is the worst one of its check so far."""
         known = self.checks.get(name)
         if known is None or not badness <= known.badness:
             self.checks[name] = Check(name, where, float(measured), expected, float(badness))
@@ -71,7 +71,7 @@ class Report:
         self.add(name, where, p, f"p at least {alpha:.2g}", badness)
 
     def holds(self, name: str, where: str, bad: Bools, expected: str) -> None:
-        """Check that no lane is bad; the value is how many are."""
+        """Check that no lane is bad; the measured value is the number of bad lanes."""
         count = int(np.count_nonzero(bad))
         self.add(name, where, count, expected, math.inf if count else 0.0)
 
@@ -87,5 +87,5 @@ class Report:
         return self
 
     def __str__(self) -> str:
-        """One line per check."""
+        """Return one line per check."""
         return "\n".join([self.subject, *(f"  {c}" for c in self.checks.values())])

@@ -24,7 +24,7 @@ def check_warp(
     seed: int = 0,
     tolerance: float = 1e-4,
 ) -> Report:
-    """Prove that a warp's sample, pdf and inverse belong together.
+    """Check that a warp's sample, pdf and inverse are consistent.
 
     Parameters
     ----------
@@ -44,14 +44,14 @@ def check_warp(
     Raises
     ------
     AssertionError
-        Naming each failed check, the value measured and the one expected.
+        With each failed check, and the measured and expected values.
     """
     report = Report(f"check_warp({getattr(sample, '__name__', 'sample')})")
     rng = np.random.default_rng(seed)
     points = np.concatenate([sample(rng.random((2, size), f4)) for size in chunk_sizes(samples)], axis=1)
     report.holds("finite", domain, ~np.isfinite(points), "finite numbers")
     density = pdf(points[:, : 1 << 16])
-    edge = float(np.mean(~(density > 0)))  # rounding may put a few on the very border
+    edge = float(np.mean(~(density > 0)))  # rounding may move a few points beyond the border
     report.at_most("pdf 0 at samples", domain, edge, 1e-3)
     chart = CHARTS[domain]
     if domain == "sphere":
