@@ -319,8 +319,10 @@ def test_mistakes_of_a_shape_are_named():
     refused([floor(), panel], [light, light], "GradientLight: its shape shines already")
     panel.emission = 1.0
     refused([floor(), panel], [light], "GradientLight: its shape shines already")
+    panel.emission, panel.material = None, wf.Material(wf.Diffuse(0.5), alpha=0.5)
+    refused([floor(), panel], [light], "must be opaque; its material has an alpha")
     placed = wf.Instance(gradient()[0], np.eye(4))
     refused([floor(), placed], [replace(light, shape=placed)], "must be a wf.Mesh or a wf.Sphere")
     many = replace(light, radiance=np.ones((3, 3), np.float32), corner=np.ones((3, 3), np.float32))
-    panel.emission = None
+    panel.material = None
     refused([floor(), panel], [many], "record has 3 columns; it must have 1, or 2, one for each face")
