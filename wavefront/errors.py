@@ -27,7 +27,15 @@ class SaveError(SceneError, OSError):
     """A file that cannot be written. The old file, if there was one, is intact."""
 
 
-class RenderError(RuntimeError):
+class _WithImage(BaseException):
+    """An error that may hold the picture so far."""
+
+    def __init__(self, message: str, image: Any = None) -> None:
+        super().__init__(message)
+        self.image = image
+
+
+class RenderError(_WithImage, RuntimeError):
     """A render that failed after it had begun.
 
     Attributes
@@ -36,12 +44,8 @@ class RenderError(RuntimeError):
         The picture so far, an `Image`; None if there is none.
     """
 
-    def __init__(self, message: str, image: Any = None) -> None:
-        super().__init__(message)
-        self.image = image
 
-
-class Interrupted(KeyboardInterrupt):
+class Interrupted(_WithImage, KeyboardInterrupt):
     """A render that Ctrl-C stopped.
 
     It is a KeyboardInterrupt, so a script stops unless it catches it.
@@ -51,10 +55,6 @@ class Interrupted(KeyboardInterrupt):
     image
         The picture so far, an `Image`; None if there is none.
     """
-
-    def __init__(self, message: str, image: Any = None) -> None:
-        super().__init__(message)
-        self.image = image
 
     def _render_traceback_(self) -> list[str]:
         """Show the picture in a notebook: IPython calls this in place of printing a traceback."""
