@@ -537,7 +537,7 @@ def test_a_small_png_that_claims_much_costs_little(tmp_path):
 
 def test_no_more_of_a_png_is_inflated_than_it_needs():
     pieces = [memoryview(zlib.compress(bytes(30_000_000)))]
-    assert 1000 <= claims._inflated(pieces, 1000) <= claims.PIECE
+    assert 1000 <= claims._inflated(pieces, 1000) <= claims.CHUNK
 
 
 def _jpg(height, width=40):

@@ -70,7 +70,7 @@ class Conductor(JointBsdf):
         self.derive()
 
     def derive(self) -> None:
-        """Return whether the roughness is 0."""
+        """Set `specular` from the roughness."""
         self.specular = is_smooth(self.roughness)
 
     @classmethod

@@ -68,7 +68,7 @@ class Dielectric(JointBsdf):
         self.derive()
 
     def derive(self) -> None:
-        """Update what follows from the parameters: whether the roughness is 0, and the index as seen from outside."""
+        """Set `specular`, and the relative index as seen from outside, from the parameters."""
         straight = not isinstance(self.ior, BaseTexture) and abs(self.ior[0] - 1) < LEAST_BEND
         self.specular = is_smooth(self.roughness) or bool(straight)
         self.eta = self.ior  # (n,) or (1,) index beyond / before; unbound, wo is outside

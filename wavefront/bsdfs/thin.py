@@ -61,7 +61,7 @@ class ThinDielectric(JointBsdf):
         self.derive()
 
     def derive(self) -> None:
-        """Return whether the roughness is 0."""
+        """Set `specular` from the roughness."""
         self.specular = is_smooth(self.roughness)
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
