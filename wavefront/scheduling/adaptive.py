@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from ..film import Film
+from ..record import record
 from ..state import Words
 from ..vec import Ints
 
@@ -18,7 +18,7 @@ TILE = 8  # pixels; decisions are made for squares of this side
 GRACE = 1.1  # times the seconds that were given: when waves under way are discarded
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Pass:
     """Samples to take before the next decision."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 from ..camera import Camera
 from ..record import record
@@ -12,7 +11,7 @@ from ..state import Words
 from ..vec import Floats, Ints
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class View:
     """What all jobs of one picture have in common.
 
@@ -23,7 +22,7 @@ class View:
     deadline: float = math.inf  # when jobs under way are discarded, by `time.perf_counter`
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Job:
     """A block of samples: some pixels × consecutive samples."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from ..accel.base import Accelerator, Intersections
 from ..compile.scene import CompiledScene
 from ..filters import Filter
 from ..integrators import Integrator
+from ..record import record
 from ..sampling.sampler import Sampler
 from ..stages.generate import generate
 from ..state import Words
@@ -22,12 +23,19 @@ from .shared import SharedInt, Stopped
 FIRST_SAMPLE_TIMEOUT = 3.0  # seconds that a wave of first samples may take even if the time is up
 
 
-@dataclass(frozen=True)
 class WaveMonitor:
-    """What all workers share: the stop flag, and how long the paths under way are."""
+    """What all workers share.
 
-    stop: SharedInt = field(default_factory=SharedInt)
-    surfaces: SharedInt = field(default_factory=SharedInt)  # along the longest path under way
+    Attributes
+    ----------
+    stop
+        The stop flag.
+    surfaces
+        How many surfaces the longest path under way has met.
+    """
+
+    def __init__(self) -> None:
+        self.stop, self.surfaces = SharedInt(), SharedInt()
 
     def check(self, surfaces: int, deadline: float) -> None:
         """Record that a wave has come to another surface of its paths.
@@ -42,7 +50,7 @@ class WaveMonitor:
             raise Stopped
 
 
-@dataclass(frozen=True)
+@record
 class Tracer:
     """How jobs are traced: what all views of a session have in common."""
 
