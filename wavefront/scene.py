@@ -116,7 +116,7 @@ class Scene:
         Raises
         ------
         SceneError
-            If there is no shape, more than one `Environment`, or a face has an index that no vertex has.
+            If there is no shape, more than one `Environment`, or a face with an invalid index.
         """
         if not self.shapes:
             raise SceneError("the scene has no shapes")

@@ -18,19 +18,19 @@ class Checked:
     Parameters
     ----------
     convert
-        Called with the name for messages, such as "bunny: vertices", and the value; returns what is
-        kept, or raises a SceneError.
+        Called with the name for messages, such as "bunny: vertices", and the value; returns the value to
+        store, or raises a SceneError.
     """
 
     def __init__(self, convert: Callable[[str, Any], Any]) -> None:
         self._convert, self._name = convert, ""
 
     def __set_name__(self, owner: type, name: str) -> None:
-        """Learn the name under which the class has it."""
+        """Record the name of the attribute."""
         self._name = name
 
     def __set__(self, shape: Any, value: Any) -> None:
-        """Keep the value as it is converted, in the shape's own namespace."""
+        """Store the converted value in the shape's own namespace."""
         vars(shape)[self._name] = self._convert(f"{shape.name}: {self._name}", value)
 
     if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class Checked:
 
 
 class Shape(ABC):
-    """Something that a scene is made of: a `Mesh`, a `Sphere` or an `Instance`.
+    """Base class of shapes: a `Mesh`, a `Sphere` or an `Instance`.
 
     Attributes
     ----------
@@ -61,13 +61,13 @@ class Shape(ABC):
 
     @property
     def has_material(self) -> bool:
-        """Whether the shape was given a material."""
+        """True if the shape was given a material."""
         return self._material is not None
 
     @property
     @abstractmethod
     def default_material(self) -> Material:
-        """The material of a shape that was given none."""
+        """The material of a shape without a given material."""
 
     @property
     @abstractmethod

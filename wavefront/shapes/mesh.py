@@ -19,7 +19,7 @@ from ..textures.vertex_colors import VertexColors
 from ..vec import FLOAT32_MAX, f4
 from .base import Checked, Shape
 
-MOST_DOUBLINGS = 60  # from 1 to the lengths of vectors that stay as given
+MOST_DOUBLINGS = 60  # log2 of the length, or its inverse, of vectors that are stored unchanged
 FLOAT32_MIN = float(np.finfo(np.float32).tiny)
 
 
@@ -43,9 +43,9 @@ def _positions(name: str, values: ArrayLike) -> NDArray[np.float64]:
 
 
 def _vectors(name: str, values: ArrayLike | None, width: int = 3) -> NDArray[np.float64] | None:
-    """Return vectors (n, width) of which only directions count, none of them too long or short to square.
+    """Return vectors (n, width) whose lengths have no meaning, scaled so that float32 can square them.
 
-    By powers of two, so that directions stay what they are.
+    They are scaled by powers of two, so their directions do not change.
     """
     if values is None:
         return None
@@ -68,7 +68,7 @@ def _coordinates(name: str, values: ArrayLike | None) -> NDArray[np.float64] | N
 
 
 def _colors(name: str, values: ArrayLike | None) -> NDArray[np.float64] | None:
-    """Return (n, 4) linear colors in [0, 1]; without an opacity they are opaque."""
+    """Return (n, 4) linear colors in [0, 1]; colors without an opacity are opaque."""
     if values is None:
         return None
     array = finite_array(name, values, (None, None))
@@ -111,13 +111,13 @@ class Mesh(Shape):
     uvs, uvs1
         (n, 2) texture coordinates, and a second set of them.
     tangents
-        (n, 4) what red means in normal maps: unit vectors at right angles to the normals, and 1 or -1 as
-        green is normal × tangent or its opposite, as in glTF. Without them both follow from the texture
-        coordinates, as they do for bump maps. They need normals.
+        (n, 4) axes of red in normal maps: unit vectors perpendicular to the normals, and 1 or -1 if green is
+        normal × tangent or its opposite, as in glTF. By default both axes follow from the texture
+        coordinates, as for bump maps. Tangents need normals.
     colors
         (n, 3) RGB, or (n, 4) with opacity. Floats are linear, in [0, 1]; uint8 and uint16, as trimesh
-        gives them, are decoded from sRGB, but for the opacity. A material that is given shows them by a
-        parameter `VertexColors`.
+        gives them, are decoded from sRGB, except the opacity. A given material shows them by a parameter
+        `VertexColors`.
     material
         What the surface is made of: a `Material` or a `Bsdf`. By default a `Diffuse` that shows the
         `colors`, or is gray.
@@ -168,12 +168,12 @@ class Mesh(Shape):
         self.colors = colors
         self.check()
         self.material = material
-        self._default: tuple[bool, Material] | None = None  # whether it shows colors, and the material
+        self._default: tuple[bool, Material] | None = None  # whether it shows colors; the material
         self.emission = emission
         self.two_sided = two_sided
 
     def __repr__(self) -> str:
-        """Name the mesh and its size."""
+        """Return the name and the size of the mesh."""
         return f"<Mesh {self.name!r}: {len(self.vertices)} vertices, {len(self.faces)} faces>"
 
     @property
@@ -198,13 +198,13 @@ class Mesh(Shape):
         return material.emission if self._emission is None else self._emission
 
     def check(self) -> None:
-        """Check what must hold between arrays, which may have been assigned one after the other.
+        """Check the arrays against each other; they may have been assigned one by one.
 
         Raises
         ------
         SceneError
-            If a face has an index that no vertex has, an array has not one row for each vertex, or there
-            are tangents without normals.
+            If a face has an invalid index, an array does not have one row for each vertex, or there are
+            tangents without normals.
         """
         count = len(self.vertices)
         if self.faces.max() >= count or self.faces.min() < 0:

@@ -76,7 +76,7 @@ class Sphere(Shape):
         self.emission = emission
 
     def __repr__(self) -> str:
-        """Name the sphere, its place and size."""
+        """Return the name, center and radius of the sphere."""
         return f"<Sphere {self.name!r}: center {self.center.tolist()}, radius {self.radius:g}>"
 
     @property
