@@ -13,7 +13,7 @@ import argparse
 import numpy as np
 
 import wavefront as wf
-from wavefront.frame import Frame
+from wavefront.elementary import exp, log, sin_cos_turns
 
 
 class RetroReflector(wf.Bsdf):
@@ -27,14 +27,15 @@ class RetroReflector(wf.Bsdf):
         return self.reflectance * self.pdf(wo, wi)
 
     def pdf(self, wo, wi):
-        cos = np.maximum((wo * wi).sum(0), 0)
-        lobe = (self.exponent + 1) / np.float32(2 * np.pi) * cos**self.exponent
+        cos = np.maximum(wf.vec.dot(wo, wi), np.float32(1e-6))
+        lobe = (self.exponent + 1) / np.float32(2 * np.pi) * exp(self.exponent * log(cos))
         return np.where(wi[2] > 0, lobe, np.float32(0))
 
     def sample_f(self, wo, u):
-        cos = (1 - u[0]) ** (1 / (self.exponent + 1))
-        sin, phi = np.sqrt(np.maximum(1 - cos * cos, 0)), np.float32(2 * np.pi) * u[1]
-        wi = Frame.from_normal(wo).to_world(np.stack([sin * np.cos(phi), sin * np.sin(phi), cos]))
+        cos = exp(log(1 - u[0]) / (self.exponent + 1))
+        radius = np.sqrt(np.maximum(1 - cos * cos, 0))
+        sin_phi, cos_phi = sin_cos_turns(u[1])
+        wi = wf.Frame.from_normal(wo).to_world(np.stack([radius * cos_phi, radius * sin_phi, cos]))
         pdf = self.pdf(wo, wi)
         weight = self.reflectance * np.where(pdf > 0, wi[2], np.float32(0))  # f · cosθ / pdf
         return wf.BsdfSample(wi, weight, pdf, np.zeros(len(pdf), bool))
