@@ -164,9 +164,14 @@ def test_primitives_know_their_material_and_light() -> None:
 
 def test_positions_are_relative_to_the_center() -> None:
     """Subtracted before anything becomes float32."""
-    near, far = wf.Mesh(**TRIANGLE), wf.Mesh(np.array(TRIANGLE["vertices"]) + 2.0**40, TRIANGLE["faces"])
-    a, b = compiled(near, lights=[wf.Environment()]), compiled(far, lights=[wf.Environment()])
-    assert a.radius == b.radius
+    near = wf.Mesh(**TRIANGLE), wf.Sphere((0.25, 0.5, 0), 0.125)
+    far = (
+        wf.Mesh(np.array(TRIANGLE["vertices"]) + 2.0**40, TRIANGLE["faces"]),
+        wf.Sphere(near[1].center + 2.0**40, 0.125),
+    )
+    a, b = compiled(*near, lights=[wf.Environment()]), compiled(*far, lights=[wf.Environment()])
+    assert a.sphere_centers.any()
+    assert (a.sphere_centers == b.sphere_centers).all()
     assert (a.center + 2.0**40 == b.center).all()
 
 
