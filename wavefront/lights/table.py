@@ -127,10 +127,11 @@ class LightTable:
         if self.varies is None:
             return self._le(light, wi, None)
         varies = self.varies.take(light)
-        lanes, even = np.flatnonzero(varies), np.flatnonzero(~varies)
         radiance = np.empty_like(wi)
+        even = np.flatnonzero(~varies)
         if even.size:
             put(radiance, even, self._le(light.take(even), take(wi, even), None))
+        lanes = np.flatnonzero(varies)
         if lanes.size:
             assert surface_at is not None
             put(radiance, lanes, self._le(light.take(lanes), take(wi, lanes), surface_at(lanes)))

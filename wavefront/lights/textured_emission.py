@@ -54,9 +54,10 @@ class TexturedTriangleLights(TriangleLights):
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
         """Pick a point uniformly by area, and say where on the triangle it is."""
-        sample = TriangleLights.sample_li(self, point, u)
+        b = self.weights(u)
+        sample = self._sample_at(point, b)
         sample.prim = np.broadcast_to(self.prim, point.shape[1:])
-        sample.b1, sample.b2 = self.weights(u)
+        sample.b1, sample.b2 = b
         return sample
 
     def le(self, wi: Floats, surface: SurfaceInteraction | None = None) -> Floats:
@@ -68,7 +69,7 @@ class TexturedTriangleLights(TriangleLights):
         for number, emission in enumerate(self.emissions):
             lanes = np.flatnonzero(source == number)
             if lanes.size:
-                at = surface.take(lanes)
+                at = surface if lanes.size == source.size else surface.take(lanes)
                 value = emission_at(emission, at)
                 radiance[:, lanes] = value if self.sides == 2 else value * ~at.back_facing
         return radiance

@@ -29,7 +29,10 @@ class TriangleLights(PlanarLights):
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
         """Pick a point uniformly by area; its density in solid angle is d²/(A·cosθ)."""
-        b = self.weights(u)
+        return self._sample_at(point, self.weights(u))
+
+    def _sample_at(self, point: Floats, b: Floats) -> LightSample:
+        """Sample the points with barycentric weights b1, b2 (2, n)."""
         wi = self.edge_u * b[0]
         wi += self.edge_v * b[1]
         wi += self.corner
