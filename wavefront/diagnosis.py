@@ -105,7 +105,7 @@ class Sight:
     def why_white(self, darkest: float) -> str:
         """Return the likely cause of a white picture."""
         fix = f"save(..., exposure={-int(np.ceil(np.log2(darkest)))}) shows what is below"
-        shines = self._compiled.shines.take(self._hits.prim)
+        shines = self._compiled.emissive.take(self._hits.prim)
         if not len(self._seen):
             return f"the camera sees no shape, only light from all around that is above 1; {fix}"
         if shines.all():

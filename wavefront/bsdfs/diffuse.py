@@ -36,7 +36,7 @@ class Diffuse(Bsdf):
 
     @property
     def view_independent(self) -> bool:
-        """True, but not for subclasses, which may see to it themselves."""
+        """True for `Diffuse` itself; a subclass may define it."""
         return type(self) is Diffuse
 
     @property

@@ -37,11 +37,11 @@ from .scale import check_distance, check_lights, length_factor, scaled_shapes
 class CompiledScene:
     """A scene as flat arrays, relative to its center. Triangles come first, then spheres.
 
-    A mesh that is placed several times stands in the arrays once, in its own frame. Where the scene is
-    extremely large or small, all lengths here and in what is traced are in another unit (see scale.py).
+    An instanced mesh is in the arrays once, in its own coordinates. If the scene is extremely large or small,
+    all lengths here and in the accelerator are in another unit (see scale.py).
     """
 
-    scale: float  # a power of two by which lengths of the scene are multiplied; 1 for most scenes
+    scale: float  # power of two that lengths of the scene are multiplied by; 1 for most scenes
     center: NDArray[np.float64]  # (3,)
     accelerator: Accelerator
     triangles: int  # number of triangles
@@ -54,7 +54,7 @@ class CompiledScene:
     sphere_radii: Floats  # (k,)
     material_of: Ints  # (m + k,) material of each primitive
     light_of: Ints  # (m + k + 1,) light of each primitive, and at the end that of a miss; -1 for none
-    shines: Bools  # (m + k + 1,) whether there is one
+    emissive: Bools  # (m + k + 1,) whether `light_of` names a light
     materials: MaterialTable
     absorption: Floats | None  # (3, materials) per unit of length; None when nothing absorbs
     opacities: Opacities | None  # None when every surface is opaque
@@ -62,7 +62,7 @@ class CompiledScene:
     nonscattering_lights: (
         Bools | None
     )  # (lights,) those whose surface scatters nothing; None when there are none
-    instances: InstanceTable | None = None  # None when every mesh is placed once
+    instances: InstanceTable | None = None  # None when no mesh is instanced
 
     @property
     def interpolates(self) -> bool:
@@ -97,7 +97,7 @@ def compile_scene(
     make_accelerator
         Called with the `Geometry`; returns the `Accelerator`.
     light_sampler
-        How one light of many is chosen: see `LIGHT_SAMPLERS`.
+        How a light is chosen for each point: see `LIGHT_SAMPLERS`.
     most_copies
         Up to this total of instanced triangles, each instance becomes a mesh of its own.
     mis
@@ -106,7 +106,7 @@ def compile_scene(
     Raises
     ------
     SceneError
-        If an emitting shape has no area, an emitting sphere has an alpha or shines by a texture, a light
+        If an emitting shape has no area, an emitting sphere has an alpha or a textured emission, a light
         is malformed, too far away or too strong for the scene's size, or the choice is unknown.
     """
     scene.check()
@@ -162,7 +162,7 @@ def compile_scene(
         sphere_radii=geometry.radii,
         material_of=material_of,
         light_of=light_of,
-        shines=light_of >= 0,
+        emissive=light_of >= 0,
         materials=group_materials(user_materials),
         absorption=absorption_table(user_materials),
         opacities=opacity_table(user_materials, has_alpha),

@@ -1,4 +1,4 @@
-"""What emitting triangles and rectangles share: a plane, an area, and sides that shine."""
+"""The common base of emitting triangles and rectangles."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class PlanarLights(LightRecord):
     edge_v: Floats  # (3, k) from the corner
     normal: Floats  # (3, k) unit normal of the front side
     area: Floats  # (k,) squared scene units
-    radiance: Floats  # (3, k) W·sr⁻¹·m⁻²; of one that does not shine evenly, its mean
+    radiance: Floats  # (3, k) W·sr⁻¹·m⁻²; the mean, where the emission varies
 
-    sides: ClassVar[int] = 1  # that shine
+    sides: ClassVar[int] = 1  # number of emitting sides
     parallelograms: ClassVar[float]  # area, in parallelograms of the edges
     middle: ClassVar[int]  # the middle is corner + (edge_u + edge_v)/middle
 
@@ -47,7 +47,7 @@ class PlanarLights(LightRecord):
         return cls(p, u, v, n, (cls.parallelograms * size).astype(f4), each)
 
     def le(self, wi: Floats, surface: SurfaceInteraction | None = None) -> Floats:
-        """Return the radiance on rays that come upon a side that shines, (3, n)."""
+        """Return the radiance of rays that meet an emitting side, (3, n), else 0."""
         return self.radiance * (self._facing(-dot(self.normal, wi)) > 0)
 
     def power(self, scene_radius: float) -> NDArray[np.float64]:
@@ -68,7 +68,7 @@ class PlanarLights(LightRecord):
         return strength * np.minimum(height / distance, 1) / distance**2
 
     def _facing(self, rise: Floats) -> Floats:
-        """Turn heights, or cosines, over the front (n,) into those over a side that shines."""
+        """Return heights, or cosines, above an emitting side (n,), given those above the front."""
         return rise
 
 

@@ -17,7 +17,7 @@ from .base import DeltaLight, Light, LightSample, position
 
 @record
 class PointLights(DeltaLight):
-    """k points that shine equally in all directions."""
+    """k points that emit equally in all directions."""
 
     position: Floats  # (3, k) scene units
     intensity: Floats  # (3, k) W/sr
@@ -56,7 +56,7 @@ def intensity_of(name: str, value: ArrayLike) -> NDArray[np.float64]:
 
 
 class PointLight(Parametrized, Light):
-    """A point that shines equally in all directions.
+    """A point that emits equally in all directions.
 
     Parameters
     ----------

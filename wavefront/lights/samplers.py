@@ -1,4 +1,4 @@
-"""How one light of many is chosen at a point."""
+"""Light samplers, which choose one light for each point."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..vec import Doubles, Floats, Ints, broadcast, f4
 
 MOST_CELLS = 32**3
 MOST_ENTRIES = 2**21  # cells times lights
-BY_POWER = 0.05  # part of the choice that stays with the power, so that no light is ever left out
+BY_POWER = 0.05  # part of the probability that is proportional to power, so that no light is left out
 
 
 class LightSampler(Protocol):
@@ -42,7 +42,7 @@ LightSamplerMaker: TypeAlias = Callable[[Doubles, Doubles, Irradiance], LightSam
 
 
 class SingleLightSampler:
-    """The only light, of which there is no choice."""
+    """The sampler of a scene with one light."""
 
     def sample(self, point: Floats, u: Floats) -> tuple[Ints, Floats]:
         """Return light 0."""
@@ -71,7 +71,7 @@ class WeightedLightSampler:
 
 
 class SubsetLightSampler:
-    """A choice of some lights only; the others are never chosen, and cost nothing.
+    """A sampler of some of the lights; the others are never chosen.
 
     Parameters
     ----------
@@ -100,10 +100,10 @@ class SubsetLightSampler:
 
 
 class SpatialLightSampler:
-    """Probabilities by place: a grid whose cells each weigh all lights by what they bring there.
+    """Probabilities by position: each cell of a grid weights all lights by their irradiance there.
 
     Lights that are near, and lights that face the cell, are chosen more often. A small part of the
-    choice stays with the power.
+    probability is proportional to power.
 
     Parameters
     ----------
@@ -159,17 +159,17 @@ class SpatialLightSampler:
 
 
 def spatial(power: Doubles, half_size: Doubles, irradiance: Irradiance) -> LightSampler:
-    """Weigh lights by what they bring to a point's surroundings."""
+    """Return a sampler by the lights' irradiance around a point."""
     return SpatialLightSampler(-half_size, half_size, irradiance, power)
 
 
 def by_power(power: Doubles, half_size: Doubles, irradiance: Irradiance) -> LightSampler:
-    """Weigh lights by their power, everywhere alike."""
+    """Return a sampler by power, the same at every point."""
     return WeightedLightSampler(power)
 
 
 def uniform(power: Doubles, half_size: Doubles, irradiance: Irradiance) -> LightSampler:
-    """Choose every light equally often."""
+    """Return a sampler with equal probabilities."""
     return WeightedLightSampler(np.ones_like(power))
 
 

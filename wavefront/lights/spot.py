@@ -1,4 +1,4 @@
-"""Spot lights: points that shine into a cone."""
+"""Spot lights: points that emit into a cone."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from .point import intensity_of, scaled_intensity
 
 @record
 class SpotLights(DeltaLight):
-    """k points that shine into a cone each."""
+    """k points that each emit into a cone."""
 
     position: Floats  # (3, k) scene units
-    axis: Floats  # (3, k) unit direction in which the light shines
+    axis: Floats  # (3, k) unit direction of the emission
     outer: Floats  # (k,) 1 − cos of the angle at which the light ends
     slope: Floats  # (k,) 1/(cos of the angle at which it begins to fall − cos of where it ends)
     intensity: Floats  # (3, k) W/sr on the axis
@@ -79,7 +79,7 @@ def _blend(name: str, value: float) -> float:
 
 
 class SpotLight(Parametrized, Light):
-    """A point that shines into a cone.
+    """A point that emits into a cone.
 
     Parameters
     ----------

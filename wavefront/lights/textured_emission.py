@@ -29,8 +29,8 @@ class TexturedTriangleLights(TriangleLights):
     Those are sampled by area as all triangles are; their radiance is looked up at the sampled point.
     """
 
-    prim: Ints  # (k,) triangle of the scene, -1 for one that shines evenly
-    source: Ints  # (k,) number of its emission, -1 for one that shines evenly
+    prim: Ints  # (k,) triangle of the scene, -1 for uniform emission
+    source: Ints  # (k,) number of its emission, -1 for uniform emission
     emissions: tuple[Floats | BaseTexture, ...]  # (3, 1), or colors, W·sr⁻¹·m⁻²
 
     @classmethod
@@ -49,7 +49,7 @@ class TexturedTriangleLights(TriangleLights):
 
     @property
     def varies(self) -> Bools:  # type: ignore[override]
-        """Which of the triangles do not shine evenly, (k,)."""
+        """A mask (k,) of the triangles whose emission is not uniform."""
         return self.source >= 0
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
@@ -86,19 +86,19 @@ def emission_at(emission: Floats | BaseTexture, surface: SurfaceInteraction) -> 
 
 
 def has_textured_emission(mesh: Mesh) -> bool:
-    """Return True for a mesh that shines whose points differ in what they send."""
+    """Return whether the emission of an emitting mesh varies over it."""
     return isinstance(mesh.emission, BaseTexture) or mesh.material.opacity is not None
 
 
 def mean_radiance(mesh: Mesh, triangles: NDArray[np.float64]) -> Floats:
-    """Estimate what the faces of a mesh that shines send on average, (3, m).
+    """Estimate the mean radiance of each face of an emitting mesh, (3, m).
 
-    A face is cut into 16 to 1024 congruent triangles, and looked up in the middle of each.
+    The emission of a face is evaluated at the centers of 16 to 1024 congruent triangles.
 
     Parameters
     ----------
     mesh
-        What shines.
+        The emitting mesh.
     triangles
         (m, 3, 3) corners of its faces, relative to the scene's center.
     """

@@ -1,4 +1,4 @@
-"""Opacity: leaves cut out of a rectangle, veils, grids."""
+"""Opacity of surfaces (alpha), such as leaves cut out of a rectangle."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ class Shading:
 
 def emitted(scene: CompiledScene, paths: Paths, hits: Hits) -> Contribution:
     """Return the light that the paths' rays meet: emitting surfaces, and the environment on a miss."""
-    lanes = np.flatnonzero(scene.shines.take(hits.prim))  # a miss, -1, takes the last entry
+    lanes = np.flatnonzero(scene.emissive.take(hits.prim))  # a miss, -1, takes the last entry
     light = scene.light_of.take(hits.prim.take(lanes))
 
     def surface_at(some: Ints) -> SurfaceInteraction:
