@@ -80,7 +80,7 @@ class Dielectric(JointBsdf):
         return bound
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
-        """Return `f` and `pdf` (Walter et al. 2007, eqs. 20 and 21)."""
+        """Return `f`, for radiance, and `pdf` (Walter et al. 2007, eqs. 20 and 21); 0 if smooth."""
         if self.specular:
             return np.zeros_like(wi), np.zeros_like(wi[2])
         alpha = alpha_of(self.roughness)

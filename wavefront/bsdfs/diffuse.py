@@ -14,7 +14,7 @@ from .base import Bsdf, BsdfSample
 
 
 class Diffuse(Bsdf):
-    """A matte surface that looks equally bright from everywhere: f = reflectance/π.
+    """A diffuse surface, equally bright from all directions: f = reflectance/π.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Diffuse(Bsdf):
 
     @property
     def black(self) -> bool:
-        """Whether the reflectance is 0, as it often is of lights."""
+        """True if the reflectance is 0, as it often is of lights."""
         return (
             self.view_independent
             and not isinstance(self.reflectance, BaseTexture)

@@ -41,7 +41,7 @@ class Principled(JointBsdf):
     the glTF 2.0 specification, appendix B: mix(dielectric, metal, metallic) with Schlick's Fresnel,
     GGX with α = roughness², height-correlated Smith shadowing and a Lambertian base. The others
     follow glTF's extensions KHR_materials_ior, _specular, _transmission, _clearcoat and _sheen, except that
-    - the matte base gets the light that the gloss leaves over by the albedo of the gloss, so that a
+    - the diffuse base gets the light that the gloss does not reflect, by the albedo of the gloss, so that a
       white surface reflects all light and no more; the appendix's mix by Fresnel in the half vector,
       which reflects up to 1.9 times the light at grazing angles, comes with `conserve_energy=False`;
     - where light is transmitted, Fresnel's equations replace Schlick's approximation, which knows
@@ -59,19 +59,19 @@ class Principled(JointBsdf):
     ior
         Refractive index, from 1e-6 to 1e6; where light is transmitted at least 0.001 away from 1.
     transmission
-        Part of the base that is clear instead of matte, in [0, 1].
+        Part of the base that transmits light instead of scattering it diffusely, in [0, 1].
     thin
         The surface is a sheet of its own, which does not bend light (glTF without a volume).
     clearcoat, clearcoat_roughness
         Strength of a clear varnish of index 1.5, and its roughness, in [0, 1].
     sheen, sheen_color, sheen_roughness
-        Strength, color and roughness of cloth fibres, in [0, 1].
+        Strength, color and roughness of cloth fibers, in [0, 1].
     specular, specular_color
         Strength, in [0, 1], and tint, at least 0, of the dielectric's reflection along the normal, which
         the tint raises to at most 1.
     conserve_energy
-        Lay the gloss over the matte base so that no light is gained; False follows glTF's appendix
-        to the letter.
+        Layer the gloss over the diffuse base without a gain of energy. False follows glTF's appendix
+        exactly.
 
     Raises
     ------
@@ -145,7 +145,7 @@ class Principled(JointBsdf):
         return bound
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
-        """Return `f` and `pdf`: the base, then sheen and coat laid over it."""
+        """Return `f` and `pdf` of all lobes: the base, then sheen and coat layered over it."""
         chances = self._chances(wo)
         f, pdf = self._base(wo, wi, chances)
         if self._cloth:
@@ -181,7 +181,7 @@ class Principled(JointBsdf):
         return BsdfSample(wi, weigh(f, wi, pdf), pdf, broadcast(np.False_, len(pdf)), eta)
 
     def _base(self, wo: Floats, wi: Floats, chances: Chances) -> tuple[Floats, Floats]:
-        """Metal, matte, gloss and glass: value (3, n) and their part of the density (n,)."""
+        """Metal, diffuse base, gloss and glass: value (3, n) and their part of the density (n,)."""
         alpha = alpha_of(self.roughness)
         value, density, cos = mirror_lobe(wo, wi, alpha)
         opaque = (f4(1) - self.metallic) * (f4(1) - self.transmission)
@@ -233,7 +233,7 @@ class Principled(JointBsdf):
         return bent if self.back_facing is None else np.where(self.back_facing, f4(1) / bent, bent)
 
     def _under_gloss(self, wo: Floats, wi: Floats) -> Floats:
-        """Part of the light that reaches the matte base and leaves it again, (n,).
+        """Part of the light that reaches the diffuse base and leaves it again, (n,).
 
         Source: C. Kulla and A. Conty 2017, "Revisiting Physically Based Shading at Imageworks":
         (1 − E(wo))·(1 − E(wi))/(1 − mean E), with E the albedo of the gloss.
@@ -257,7 +257,7 @@ class Principled(JointBsdf):
         return self.sheen_color * (self.sheen * sheen_lobe(wo, wi, self.sheen_roughness))
 
     def _under_sheen(self, wo: Floats, wi: Floats) -> Floats:
-        """Part of the light that passes the fibres, (n,), the lesser of both directions (reciprocal)."""
+        """Part of the light that passes the fibers, (n,), the lesser of both directions (reciprocal)."""
         strength = self.sheen * self.sheen_color.max(0)
         seen = np.maximum(
             sheen_albedo(wo[2], self.sheen_roughness), sheen_albedo(np.abs(wi[2]), self.sheen_roughness)

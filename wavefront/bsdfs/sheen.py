@@ -1,4 +1,4 @@
-"""The shine of cloth at grazing angles, from fibres that stand on the surface.
+"""The shine of cloth at grazing angles, from fibers that stand on the surface.
 
 Source: A. Conty Estevez and C. Kulla 2017, "Production Friendly Microfacet Sheen BRDF", as glTF's
 KHR_materials_sheen uses it.
@@ -23,7 +23,7 @@ FIT = np.array(
 
 
 def sheen_lobe(wo: Floats, wi: Floats, roughness: Floats) -> Floats:
-    """D·G/(4·cosθo·cosθi) of the fibres above the surface, (n,), without color (eqs. 2 and 3)."""
+    """D·G/(4·cosθo·cosθi) of the fibers above the surface, (n,), without color (eqs. 2 and 3)."""
     alpha = np.maximum(roughness, LEAST_ROUGHNESS)
     h = wo + wi
     sin2 = np.clip((h[0] * h[0] + h[1] * h[1]) / np.maximum(dot(h, h), f4(1e-20)), f4(0), f4(1))
@@ -39,7 +39,7 @@ def fiber_density(sin2: Floats, alpha: Floats) -> Floats:
 
 
 def sheen_albedo(cos: Floats, roughness: Floats) -> Floats:
-    """Part of the light from cos (n,) that the fibres reflect, (n,), by bilinear lookup."""
+    """Part of the light from cos (n,) that the fibers reflect, (n,), by bilinear lookup."""
     return lookup(_albedo_table(), roughness, cos)
 
 

@@ -65,7 +65,7 @@ class ThinDielectric(JointBsdf):
         self.specular = is_smooth(self.roughness)
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
-        """Return `f` and `pdf`: below the sheet the lobe above it, mirrored."""
+        """Return `f` and `pdf`: below the sheet the lobe above it, mirrored; 0 for a smooth sheet."""
         if self.specular:
             return np.zeros_like(wi), np.zeros_like(wi[2])
         upper = wi.copy()

@@ -219,16 +219,19 @@ def number_materials(
 
     The number of an instance with its mesh's material is -1; the last result is None if all have that.
     """
-    numbers: dict[tuple[int, ...], int] = {}
+    numbers: dict[int, int] = {}
+    of_parts: dict[tuple[int, ...], int] = {}
     materials: list[Material] = []
     of_shape: list[int] = []
     shapes: list[Shape] = [*meshes, *spheres, *instances]
     for shape in shapes:
-        key = _identity(shape.material)
-        if key not in numbers:
-            numbers[key] = len(materials)
-            materials.append(shape.material)
-        of_shape.append(numbers[key])
+        material = shape.material
+        if id(material) not in numbers:
+            number = of_parts.setdefault(_identity(material), len(materials))
+            numbers[id(material)] = number
+            if number == len(materials):
+                materials.append(material)
+        of_shape.append(numbers[id(material)])
     rows = len(meshes) + len(spheres)
     counts = [len(mesh.faces) for mesh in meshes] + [1] * len(spheres)
     of_row = np.repeat(np.array(of_shape[:rows], np.intp), counts)

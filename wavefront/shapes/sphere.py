@@ -72,7 +72,7 @@ class Sphere(Shape):
         self.center = center
         self.radius = radius
         self.material = material
-        self._default = Material(Diffuse(0.5))
+        self._default: Material | None = None
         self.emission = emission
 
     def __repr__(self) -> str:
@@ -82,6 +82,8 @@ class Sphere(Shape):
     @property
     def default_material(self) -> Material:
         """A gray `Diffuse`."""
+        if self._default is None:
+            self._default = Material(Diffuse(0.5))
         return self._default
 
     @property

@@ -1,4 +1,4 @@
-"""What is lost on the way through absorbing matter."""
+"""Absorption along rays through media."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from ..vec import Floats
 
 
 def absorb(scene: CompiledScene, throughput: Floats, hits: Hits, surface: SurfaceInteraction) -> None:
-    """Weaken, in place, what came through the matter behind the surface it hit.
+    """Attenuate, in place, the throughput of rays that crossed the medium behind the surface that they hit.
 
-    A ray that meets a surface from its back side has traveled inside it: over a length t the
+    A ray that meets a surface from its back side has crossed its medium: over a length t the
     throughput (3, n) falls by exp(−absorption·t) (Beer and Lambert).
     """
     if scene.absorption is None:
