@@ -1,5 +1,8 @@
 """Settings of the whole suite."""
 
+from collections.abc import Iterator
+
+import pytest
 from hypothesis import HealthCheck, settings
 
 settings.register_profile(
@@ -10,3 +13,23 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("deterministic")
+
+
+@pytest.fixture
+def tables_restored() -> Iterator[None]:
+    """Take what a test registers out of the tables again, so that no other test finds it there."""
+    from wavefront.accel.registry import ACCELERATORS
+    from wavefront.codecs.images import IMAGE_READERS, IMAGE_WRITERS
+    from wavefront.filters import FILTERS
+    from wavefront.integrators import INTEGRATORS
+    from wavefront.io.readers import READERS
+    from wavefront.lights.samplers import LIGHT_SAMPLERS
+    from wavefront.sampling.sampler import SAMPLERS
+    from wavefront.scheduling.executors import EXECUTORS
+
+    tables = [ACCELERATORS, EXECUTORS, FILTERS, IMAGE_READERS, IMAGE_WRITERS, INTEGRATORS, LIGHT_SAMPLERS]
+    tables += [READERS, SAMPLERS]
+    before = [dict(table._entries) for table in tables]
+    yield
+    for table, entries in zip(tables, before, strict=True):
+        table._entries = entries

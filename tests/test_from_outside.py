@@ -15,6 +15,7 @@ import wavefront as wf
 
 PAGE = (Path(__file__).parents[1] / "docs" / "extending.md").read_text("utf-8")
 SIZE = (32, 24)
+pytestmark = pytest.mark.usefixtures("tables_restored")
 everywhere = pytest.mark.parametrize("integrator", ["naive", "direct_simple", "direct_mis", "full"])
 
 
