@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 import wavefront as wf
-from wavefront import cli
-from wavefront.cli import main
+from wavefront.cli import main, render_command
 from wavefront.codecs.images import read_image
 
 SQUARE = """
@@ -70,7 +69,7 @@ def no_render(monkeypatch):
     def refuse(*args, **kwargs):
         pytest.fail("rendered before the mistake was reported")
 
-    monkeypatch.setattr(cli, "render", refuse)
+    monkeypatch.setattr(render_command, "render", refuse)
 
 
 def error_of(capsys, arguments):
@@ -99,7 +98,7 @@ def test_render_writes_the_picture_and_says_so(obj, fast, capsys):
 
 def test_module_runs_as_a_program(obj, fast):
     output, options = fast
-    command = [sys.executable, "-m", "wavefront.cli", "render", obj, *options, "--integrator", "direct_mis"]
+    command = [sys.executable, "-m", "wavefront", "render", obj, *options, "--integrator", "direct_mis"]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
     assert (done.returncode, done.stderr) == (0, "")
     assert output.exists()
@@ -315,7 +314,7 @@ def test_ctrl_c_while_loading_gives_130(obj, fast, monkeypatch):
         assert progress is False  # as --quiet asks
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cli, "load", interrupt)
+    monkeypatch.setattr(render_command, "load", interrupt)
     assert main(["render", obj, *fast[1]]) == 130
 
 
@@ -327,12 +326,12 @@ def test_ctrl_c_while_loading_gives_130(obj, fast, monkeypatch):
 def test_a_render_that_stops_is_saved(obj, fast, monkeypatch, capsys, error, status, message, begun):
     """As far as it got; the exit status tells."""
     output, options = fast
-    render = cli.render
+    render = render_command.render
 
     def stopped(*args, **kwargs):
         raise error("stopped", render(*args, **kwargs) if begun else None)
 
-    monkeypatch.setattr(cli, "render", stopped)
+    monkeypatch.setattr(render_command, "render", stopped)
     assert main(["render", obj, *options]) == status
     assert message in capsys.readouterr().err
     assert output.exists() == begun
@@ -352,14 +351,14 @@ def saved_instead(capsys):
 
 def broken_after_the_render(monkeypatch, act):
     """Let something happen between the render and saving."""
-    render = cli.render
+    render = render_command.render
 
     def render_then_act(*args, **kwargs):
         image = render(*args, **kwargs)
         act()
         return image
 
-    monkeypatch.setattr(cli, "render", render_then_act)
+    monkeypatch.setattr(render_command, "render", render_then_act)
 
 
 def test_a_picture_whose_folder_has_gone_is_saved_in_the_current_one(obj, tmp_path, capsys, monkeypatch):

@@ -196,8 +196,9 @@ def test_the_command_saves_the_picture_so_far(tmp_path: Path) -> None:
     scene.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     body = f"""
 import wavefront.cli
-render = wavefront.cli.render
-wavefront.cli.render = lambda *given, **options: render(*given, **(options | {{"progress": telling}}))
+from wavefront.cli import render_command
+render = render_command.render
+render_command.render = lambda *given, **options: render(*given, **(options | {{"progress": telling}}))
 options = ["--size", "64x64", "--spp", "100000", "--output", {str(output)!r}]
 sys.exit(wavefront.cli.main(["render", {str(scene)!r}, *options]))
 """

@@ -1,0 +1,104 @@
+"""Arguments of the command line as values."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..camera import image_size, upward
+from ..codecs.encoding import check_exposure, check_gamma
+from ..errors import SceneError
+from ..lighting import check_lighting
+
+VECTOR_OPTIONS = ("--origin", "--target", "--up", "--direction")
+
+
+def joined(arguments: Sequence[str]) -> list[str]:
+    """Join a vector to its option, since argparse takes "-1,2,3" for an option of its own."""
+    joined: list[str] = []
+    for argument in arguments:
+        negative = argument[:1] == "-" and ("," in argument or argument.lower() in ("-x", "-y", "-z"))
+        if joined and joined[-1] in VECTOR_OPTIONS and negative:
+            joined[-1] += "=" + argument
+        else:
+            joined.append(argument)
+    return joined
+
+
+def size(text: str) -> tuple[int, int]:
+    """Return WIDTHxHEIGHT as two ints."""
+    try:
+        width, height = (int(part) for part in text.lower().split("x"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not WIDTHxHEIGHT, such as 640x480") from None
+    try:
+        return image_size((width, height))
+    except SceneError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def fov(text: str) -> float:
+    """Return an angle between 0 and 180 degrees."""
+    fov = _finite(text)
+    if not 0 < fov < 180:
+        raise argparse.ArgumentTypeError(f"{text!r} is not above 0 and below 180 degrees")
+    return fov
+
+
+def lighting(text: str) -> str | None:
+    """Return the name of a preset; None for "none"."""
+    lighting = None if text == "none" else text
+    try:
+        check_lighting(lighting)
+    except SceneError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return lighting
+
+
+def vector(text: str) -> tuple[float, float, float]:
+    """Return X,Y,Z as three floats."""
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not X,Y,Z, such as 0,1.5,4") from None
+    return x, y, z
+
+
+def up(text: str) -> tuple[float, float, float]:
+    """Return X,Y,Z, or the name of an axis, as three floats."""
+    if "," in text:
+        return vector(text)
+    try:
+        x, y, z = upward("--up", text).tolist()
+    except SceneError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return x, y, z
+
+
+def gamma(text: str) -> float | str:
+    """Return a gamma or "srgb"."""
+    if text == "srgb":
+        return text
+    try:
+        return check_gamma(_finite(text))
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f'{text!r} is neither a number from 0.01 to 100 nor "srgb"'
+        ) from None
+
+
+def exposure(text: str) -> float:
+    """Return stops."""
+    try:
+        return check_exposure(_finite(text))
+    except SceneError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not np.isfinite(number):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number")
+    return number

@@ -1,0 +1,11 @@
+"""Exit statuses."""
+
+from __future__ import annotations
+
+ERROR = 2  # as argparse has it
+
+
+INTERRUPTED = 130  # 128 + SIGINT, as shells report it
+
+
+TERMINATED = 143  # 128 + SIGTERM
