@@ -9,7 +9,7 @@ import scenes
 from significance import Mean, assert_same_images, render, repeat
 
 import wavefront as wf
-from wavefront import settings
+from wavefront import integrators, settings
 from wavefront.sampling.sampler import Dimension, Sampler, make_sampler
 from wavefront.stages import compact as compact_stage
 
@@ -142,3 +142,24 @@ def test_no_number_is_used_twice(integrator: str, branches: int, monkeypatch: py
     assert {dimension for _, dimension in given[-1].given} == decisions - left_out.get(
         integrator, {Dimension.ROULETTE}
     )
+
+
+@pytest.mark.parametrize("integrator", ["direct_simple", "direct_mis", "full"])
+def test_contributions_keep_the_number_of_their_light(monkeypatch, integrator: str) -> None:
+    """What is added to a picture, summed by light, is what each light brings alone."""
+    lamp = wf.Rectangle((-1, 3, -1), (2, 0, 0), (0, 0, 2), material=wf.Diffuse(0), emission=(2, 0, 0))
+    points = [wf.PointLight((0, 2, 1), (0, 5, 0)), wf.PointLight((1, 2, 0), (0, 0, 4))]
+    camera = wf.Camera.look_at((0, 2, 4), (0, 1.5, 0), fov=70, size=(8, 6))
+    floor = wf.Rectangle((-4, 0, 4), (8, 0, 0), (0, 0, -8), material=wf.Diffuse(0.5))
+    sums = np.zeros(3)
+    accumulate = integrators.accumulate
+
+    def recorded(L, paths, contribution):
+        carried = (paths.throughput[:, contribution.lanes] * contribution.radiance).sum(0)
+        sums[:] += np.bincount(contribution.light, carried, 3)
+        accumulate(L, paths, contribution)
+
+    monkeypatch.setattr(integrators, "accumulate", recorded)
+    image = render(wf.Scene([floor, lamp], points, camera), 16, integrator=integrator, executor="threads")
+    found = sums / (16 * 8 * 6)
+    assert found == pytest.approx(image.rgb.mean((0, 1)), rel=1e-4)  # each light has a channel of its own
