@@ -94,7 +94,7 @@ class Conductor(JointBsdf):
         return fresnel_conductor(cos, self.eta, self.k) * value, pdf
 
     def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
-        """Reflect in the normal, or in a visible microfacet; black where that leads below."""
+        """Return reflections at the normal or at visible microfacets; no sample below the surface."""
         n = wo.shape[1]
         if self.specular:
             weight = fresnel_conductor(wo[2], self.eta, self.k)

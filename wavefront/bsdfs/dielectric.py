@@ -74,7 +74,7 @@ class Dielectric(JointBsdf):
         self.eta = self.ior  # (n,) or (1,) index beyond / before; unbound, wo is outside
 
     def bind(self, surface: SurfaceInteraction) -> Self:
-        """Look the parameters up, and turn `eta` round where `wo` is inside."""
+        """Return the BSDF bound to `surface`, with `eta` inverted where `wo` is inside."""
         bound = copy(super().bind(surface))
         bound.eta = np.where(surface.back_facing, f4(1) / bound.ior, bound.ior)
         return bound

@@ -1,4 +1,4 @@
-"""The GGX microfacet surface: its normals, its shadows, and how to draw visible normals.
+"""The GGX microfacet model: distribution of normals, shadowing, and sampling of visible normals.
 
 Isotropic, with roughness parameter α. All formulas use the stretched length
 σ(w) = √(z² + α²(x² + y²)) of a direction, in which the Smith terms of GGX read

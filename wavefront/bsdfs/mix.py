@@ -54,7 +54,7 @@ class Mix(JointBsdf):
         self.derive()
 
     def derive(self) -> None:
-        """Set the flags from those of both."""
+        """Set the flags from those of both BSDFs."""
         self.transmissive = self.first.transmissive or self.second.transmissive
         self.specular = self.first.specular and self.second.specular
 
@@ -71,7 +71,7 @@ class Mix(JointBsdf):
         return self._blend(f1, f2), self._blend(pdf1, pdf2)
 
     def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
-        """Choose a BSDF by u[2], use the rest of u[2] again, and weigh by both.
+        """Select a BSDF by u[2], reuse the rest of u[2], and weight by both densities.
 
         A sample of a delta lobe keeps its weight: the other BSDF has no value there.
         """

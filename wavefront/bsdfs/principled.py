@@ -131,13 +131,13 @@ class Principled(JointBsdf):
         self.derive()
 
     def derive(self) -> None:
-        """Set which lobes there are."""
+        """Set which lobes exist."""
         self.transmissive = _used(self.transmission)
         self._coated = _used(self.clearcoat)
         self._cloth = _used(self.sheen)
 
     def bind(self, surface: SurfaceInteraction) -> Self:
-        """Look the parameters up, and remember on which side `wo` is."""
+        """Return the BSDF bound to `surface`, with the side of `wo`."""
         bound = super().bind(surface)
         if self.transmissive and not self.thin:
             bound = copy(bound)
@@ -158,7 +158,7 @@ class Principled(JointBsdf):
         return f, pdf
 
     def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
-        """Choose a lobe by u[2], draw from it, and weigh by the density of all."""
+        """Select a lobe by u[2], sample it, and weight by the density of all lobes."""
         gloss, glass, coat, _ = self._chances(wo)
         facet = gloss + glass
         coated = (u[2] >= facet) & (u[2] < facet + coat)

@@ -15,7 +15,7 @@ from .shade import Shading
 
 
 def branch(paths: Paths, shade: Shading, sampler: Sampler, bounce: int, ways: int) -> Paths:
-    """Let each path go on in several ways, each with its part of the throughput.
+    """Continue each path in several ways, each with an equal part of the throughput.
 
     What comes before is shared by all. Sample s becomes the samples s·ways to s·ways + ways − 1 from
     here on, so that the ways of all samples of a pixel are spread together.
@@ -45,11 +45,11 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         direction[:, turned], cos_g[turned] = _turn(shade, turned, direction, cos_g, sample.wi[2])
         cos[turned] = LIFT
         specular = specular.copy()
-        specular[turned] = True  # no light sample finds these directions
+        specular[turned] = True  # light sampling cannot find these directions
     throughput = paths.throughput * sample.weight
     if not (cos > 0).all():
         lost = np.flatnonzero(~(cos > 0))
-        throughput[:, lost] *= f4(0) * cos.take(lost)  # NaN stays, to be counted
+        throughput[:, lost] *= f4(0) * cos.take(lost)  # NaN stays, so that it reaches the picture
     return Paths(
         slot=paths.slot,
         pixel=paths.pixel,
@@ -95,7 +95,7 @@ def _turn(shade: Shading, lanes: Ints, direction: Floats, cos_g: Floats, z: Floa
 
 
 def _sample(shade: Shading, u: Floats) -> BsdfSample:
-    """Sample each group's material for its lanes."""
+    """Return BSDF samples of all lanes, drawn by group."""
     if len(shade.groups) == 1:
         return sampled(shade.groups[0][1], shade.wo, u)
     n = u.shape[1]
@@ -113,7 +113,7 @@ def _sample(shade: Shading, u: Floats) -> BsdfSample:
 
 
 def _numbers(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -> Floats:
-    """Draw as many numbers as the materials present read: 2 for the direction, a third for the lobe."""
+    """Return two numbers per lane for the direction, and a third for the lobe if any BSDF reads it."""
     address = paths.pixel, paths.sample, bounce
     rows = max((bsdf.dimensions for _, bsdf in shade.groups), default=0)
     if rows == 0:

@@ -1,4 +1,4 @@
-"""Light at a hit: what the surface emits, and what one light sends there directly."""
+"""Emission at hits, and direct light from one sampled light."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ UP = column((0, 0, 1))
 
 @record
 class Shading:
-    """Surfaces ready for their materials: local frames, and the lanes grouped by material."""
+    """Surfaces prepared for shading: local frames, and the lanes of each group of materials."""
 
     surface: SurfaceInteraction
     frame: Frame
-    wo: Floats  # (3, n) local frame; straight up where all materials are matte
+    wo: Floats  # (3, n) local frame; +z if all BSDFs are view-independent
     start: Floats  # (3, n) origins of rays that leave to the side of wo, scene units
     groups: list[tuple[slice, Bsdf]]  # lanes of each group, in order, and its material bound to them
 
     def lit(self) -> Shading:
-        """Return the first lanes, those that light sampling serves: the rest has only delta lobes."""
+        """Return the lanes that need light sampling; the groups after them have only delta lobes."""
         groups = [(lanes, bsdf) for lanes, bsdf in self.groups if not bsdf.specular]
         if len(groups) == len(self.groups):
             return self
@@ -68,7 +68,7 @@ def emitted(scene: CompiledScene, paths: Paths, hits: Hits) -> Contribution:
 
 
 def mis_weighted(scene: CompiledScene, paths: Paths, emission: Contribution) -> Contribution:
-    """Return the emission weighted against light sampling; in full where that could not have found it."""
+    """Return emission with its MIS weight; 1 where light sampling could not have found it."""
     sampled = np.flatnonzero(
         ~take(paths.specular, emission.lanes) & scene.lights.chosen_from.take(emission.light)
     )
@@ -83,7 +83,7 @@ def mis_weighted(scene: CompiledScene, paths: Paths, emission: Contribution) -> 
 
 
 def shading(scene: CompiledScene, surface: SurfaceInteraction) -> Shading:
-    """Set up local frames, and tell the groups of materials apart; `compact` has put them in order."""
+    """Return local frames and groups of surfaces; `compact` has ordered the lanes by group."""
     frame = surface.frame()
     groups = list(_groups(scene.materials, surface))
     if all(bsdf.view_independent for _, bsdf in groups):
@@ -94,7 +94,7 @@ def shading(scene: CompiledScene, surface: SurfaceInteraction) -> Shading:
 
 
 def _groups(materials: MaterialTable, surface: SurfaceInteraction) -> Iterator[tuple[slice, Bsdf]]:
-    """Yield the lanes of each group of materials that is met, and its material bound to them."""
+    """Yield the lanes of each group that occurs, and its BSDF bound to them."""
     if len(materials.groups) == 1:
         yield slice(0, len(surface)), materials.groups[0].bind(surface)
         return
@@ -119,7 +119,7 @@ def direct(
         return Contribution(nothing, np.zeros((3, 0), f4), nothing)
     n = len(shade.surface)
     address = paths.pixel[:n], paths.sample[:n], bounce
-    # with one light there is nothing to choose
+    # with one light, the choice needs no random number
     alone = np.count_nonzero(scene.lights.chosen_from) == 1
     u_choice = broadcast(f4(0), n) if alone else sampler.draw_1d(*address, Dimension.LIGHT)
     u_point = sampler.draw_2d(*address, Dimension.LIGHT_POINT)
@@ -128,7 +128,7 @@ def direct(
     wi = shade.frame.to_local(light.wi)
     cos, cos_g = shade.cosines(wi, light.wi)
     f, pdf = evaluate(shade, wi)
-    arriving = (light.pdf > 0) & (highest(f) * cos != 0)  # NaN stays, to be counted
+    arriving = (light.pdf > 0) & (highest(f) * cos != 0)  # NaN stays, so that it reaches the picture
     lanes = np.flatnonzero(arriving)
     through = (arriving & (cos_g < 0)).any()
     origin = offset_origin(shade.surface, cos_g) if through else shade.start
