@@ -25,9 +25,7 @@ from .stages.intersect import intersect, shadow_rays, visible
 from .state import Hits, Rays, SurfaceInteraction
 from .vec import Bools, Ints, dot, f4
 
-FEWEST_PIXELS = 256  # smaller pictures are measurements and are not checked
 BLACK = (0.5 / 255) ** 2.2  # radiance below which the code in a PNG is 0
-DIM = 1e-3  # radiance below which a picture looks black
 GRID = 16  # rays across the picture and down
 SAMPLES = 16  # light samples at each visible point
 
@@ -35,7 +33,7 @@ SAMPLES = 16  # light samples at each visible point
 def warn_of_black_or_white(
     image: Image, scene: Scene, compiled: CompiledScene, view: Camera, integrator: str, max_bounces: int
 ) -> None:
-    """Warn of a picture that is black or white all over, with the likely cause.
+    """Warn of a picture that `is_black_or_white`, with the likely cause.
 
     Parameters
     ----------
@@ -48,11 +46,7 @@ def warn_of_black_or_white(
     integrator, max_bounces
         Settings of the render.
     """
-    if image.rgb.shape[0] * image.rgb.shape[1] < FEWEST_PIXELS:
-        return
     brightest, darkest = float(image.rgb.max()), float(image.rgb.min())
-    if brightest >= DIM and darkest <= 1:
-        return
     sight = Sight(scene, compiled, view, integrator, max_bounces)
     if darkest > 1:
         warn_caller(f"the picture is white: {sight.why_white(darkest)}")

@@ -10,7 +10,6 @@ from __future__ import annotations
 import warnings
 from contextlib import suppress
 from copy import copy
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +20,7 @@ from .elementary import sin_cos_turns
 from .errors import SceneError
 from .lights import Environment
 from .materials import Material
+from .record import record
 from .scene import FRAMING_VIEW, Scene, turned_up
 from .shapes import Disk, Mesh
 from .textures.image import Texture
@@ -34,7 +34,7 @@ GROUND_GAP = 1e-4  # distance of the ground from the scene, relative to the scen
 OWN_LIGHT_GROUND = 0.4  # albedo of the ground where no preset is used
 
 
-@dataclass(frozen=True)
+@record
 class SoftBox:
     """A bright rectangle with soft edges, infinitely far away."""
 
@@ -61,7 +61,7 @@ class SoftBox:
         return part[:, :, None] * np.array(self.radiance)
 
 
-@dataclass(frozen=True)
+@record
 class Preset:
     """A gradient from bottom to top, and soft boxes."""
 

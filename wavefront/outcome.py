@@ -13,6 +13,8 @@ from .integrators import Integrator
 from .scene import Scene
 
 LONG_PATH = 1000  # surfaces along a path, after which it will hardly end by itself
+FEWEST_PIXELS = 256  # smaller pictures are measurements and are not checked for being black or white
+DIM = 1e-3  # radiance below which a picture looks black
 
 
 @contextmanager
@@ -34,6 +36,13 @@ def interrupted(image: Image, spp: int | None) -> Interrupted:
     return Interrupted(
         f"interrupted: the picture so far has {image.metadata['spp']:.4g}{of} samples per pixel", image
     )
+
+
+def is_black_or_white(image: Image) -> bool:
+    """Return whether every pixel is black or almost, or every pixel is above 1."""
+    if image.rgb.shape[0] * image.rgb.shape[1] < FEWEST_PIXELS:
+        return False
+    return bool(image.rgb.max() < DIM or image.rgb.min() > 1)
 
 
 def render_error(failure: Exception, image: Image) -> RenderError:

@@ -15,7 +15,6 @@ from .accel import most_copies
 from .accel.registry import AcceleratorMaker
 from .camera import Camera, image_size
 from .compile.scene import compile_scene
-from .diagnosis import warn_of_black_or_white
 from .errors import RenderError
 from .filters import FILTERS, Filter
 from .image import Image
@@ -27,6 +26,7 @@ from .outcome import (
     LONG_PATH,
     check_first_samples,
     interrupted,
+    is_black_or_white,
     render_error,
     setup_errors,
     warn_of_long_paths,
@@ -373,14 +373,17 @@ class Session:
         if time_up:
             check_first_samples(image, settings.seconds, self._monitor.surfaces.value)
         loop.accumulator.bad.report(image)
-        warn_of_black_or_white(
-            image,
-            self._lighted,
-            self._compiled,
-            loop.view.camera,
-            INTEGRATORS.label(settings.integrator),
-            settings.max_bounces,
-        )
+        if is_black_or_white(image):
+            from .diagnosis import warn_of_black_or_white  # here, as most pictures do without
+
+            warn_of_black_or_white(
+                image,
+                self._lighted,
+                self._compiled,
+                loop.view.camera,
+                INTEGRATORS.label(settings.integrator),
+                settings.max_bounces,
+            )
         if settings.noise is not None and (time_up or loop.accumulator.film.count.max() == settings.max_spp):
             warn_of_noise(image, settings.noise)
 
