@@ -71,7 +71,7 @@ def blended() -> list[wf.Bsdf]:
 
 
 def textured() -> list[wf.Bsdf]:
-    """Return materials that vary over the ball: by textures, by reliefs, and by holes."""
+    """Return materials that vary over the ball: by textures, by normal and bump maps, and by holes."""
     u, v = np.meshgrid((np.arange(512) + 0.5) / 512, (np.arange(256) + 0.5) / 256)
     checks = ((u * 16).astype(int) + (v * 8).astype(int)) % 2
     colors = np.where(checks[:, :, None], (0.85, 0.8, 0.7), (0.1, 0.25, 0.3))

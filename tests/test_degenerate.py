@@ -49,7 +49,7 @@ def test_texture_coordinates_that_span_hardly_any_area(material, normals, axes):
 
 
 @pytest.mark.parametrize("normal_map", [NORMALS, BUMPS], ids=["normals", "heights"])
-def test_a_relief_without_tangents_tilts_nothing(normal_map):
+def test_a_normal_map_without_tangents_tilts_nothing(normal_map):
     """Bit by bit: where coordinates span too little to say what is along them, there is no tilt."""
     matte = wf.Diffuse(0.5)
     camera = wf.Camera.look_at((0.6, 0.7, 2), (0.5, 0.5, 0), size=(12, 12))

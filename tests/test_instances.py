@@ -428,7 +428,7 @@ def test_an_alpha_may_be_that_of_some_instances(of_mesh):
 
 
 @pytest.mark.parametrize("smooth", [False, True])
-def test_reliefs_lie_as_on_meshes_of_their_own(smooth):
+def test_normal_maps_lie_as_on_meshes_of_their_own(smooth):
     """Bumps follow the stretch of an instance, normal maps its tangents, mirrored or not."""
     x, y = np.meshgrid(np.arange(16), np.arange(16))
     height = np.sin(x * np.pi / 4) * np.cos(y * np.pi / 4) * 0.5 + 0.5

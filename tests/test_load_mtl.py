@@ -208,7 +208,7 @@ def test_a_bump_map_that_looks_like_normals_is_one(one, tmp_path):
         ("bump -bm nan t.png", r"s\.mtl line 2: bump: BumpMap height is nan"),
     ],
 )
-def test_defects_of_reliefs(one, line, message):
+def test_defects_of_normal_maps(one, line, message):
     with pytest.raises(SceneError, match=message):
         one(line)
 

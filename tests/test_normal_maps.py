@@ -35,7 +35,7 @@ def lean(code):
 
 
 def normals(shape, normal_map, origin=(0.3, 0.4, 5), direction=(0, 0, -1), n=1):
-    """The geometric and the shading normals, (3,) each, where a ray meets a shape with a relief."""
+    """The geometric and the shading normals, (3,) each, where a ray meets a shape with a normal map."""
     shape.material = wf.Material(wf.Diffuse(0.5), normal_map=normal_map)
     scene = wf.Scene(shape, lights=[wf.Environment(1.0)])
     compiled = compile_scene(scene, lambda geometry: make_accelerator(geometry, "numpy"))
@@ -117,7 +117,7 @@ def test_bumps_lie_by_the_texture_coordinates_whatever_the_tangents():
 )
 @pytest.mark.parametrize("shared", [False, True])
 def test_tangents_move_with_their_mesh(matrix, shared):
-    """A mirrored mesh shows the mirrored relief, shared or as a mesh of its own."""
+    """A mirrored mesh shows the mirrored normal map, shared or as a mesh of its own."""
     along, across = np.array([0.6, 0.8, 0]), np.array([0.8, -0.6, 0])
     mesh = square(normals=[[0, 0, 1]] * 4, tangents=[[*along, -1]] * 4)
     mesh.material = wf.Material(wf.Diffuse(0.5), normal_map=wf.NormalMap(texel(TILT)))
@@ -140,7 +140,7 @@ def test_tangents_move_with_their_mesh(matrix, shared):
     red = moved[0] / np.linalg.norm(moved[0])
     green = np.cross([0, 0, 1], red)
     green *= np.sign(green @ moved[1])
-    front = np.sign(matrix[2][2])  # seen from behind, a relief is turned round
+    front = np.sign(matrix[2][2])  # seen from behind, a normal map is turned round
     expected = front * (lean(TILT) @ np.array([red, green, [0, 0, front]]))
     assert surface.ns[:, 0] == pytest.approx(expected, abs=1e-5)
 
@@ -152,7 +152,7 @@ def test_bad_tangents():
         square(normals=[[0, 0, 1]] * 4, tangents=[[1, 0, 0]] * 4)
 
 
-def test_from_behind_the_relief_is_turned_round():
+def test_from_behind_the_normal_map_is_turned_round():
     ng, ns = normals(square(), wf.NormalMap(texel(TILT)), origin=(0.3, 0.4, -5), direction=(0, 0, 1))
     assert ng.tolist() == [0, 0, -1]
     assert ns == pytest.approx(-lean(TILT), abs=1e-6)
@@ -257,7 +257,7 @@ def test_the_gradient_is_the_slope_of_the_lookup(seed, wrap):
     assert found[:, inner] == pytest.approx(expected[:, inner], abs=2e-4 * size)
 
 
-# ---- a flat relief is none ----------------------------------------------------------------------
+# ---- a flat normal map is none ----------------------------------------------------------------------
 
 
 def hall(normal_map=None, seen=(2.0, 1.4, 3.0)):
@@ -290,7 +290,7 @@ def hall(normal_map=None, seen=(2.0, 1.4, 3.0)):
     ],
     ids=["normals", "strength 0", "heights", "height 0"],
 )
-def test_a_flat_relief_changes_no_bit(normal_map):
+def test_a_flat_normal_map_changes_no_bit(normal_map):
     plain = render(hall(), 4).rgb
     assert np.array_equal(render(hall(normal_map), 4).rgb, plain)
 
@@ -428,8 +428,8 @@ def test_upright_normals_mirror_to_above_the_surface():
     assert ((mirrored * ng).sum(0) >= np.minimum(0.9 * cos, 0.01) * 0.9)[clear].all()
 
 
-def test_a_faint_relief_changes_little_where_normals_are_smooth():
-    """Interpolated normals may mirror to below their facet; a relief is not to blame for that."""
+def test_a_faint_normal_map_changes_little_where_normals_are_smooth():
+    """Interpolated normals may mirror to below their facet; a normal map is not to blame for that."""
     n = 10_000
     ng = directions(n, 0)
     smooth = ng + 0.5 * directions(n, 1)
@@ -444,7 +444,7 @@ def test_a_faint_relief_changes_little_where_normals_are_smooth():
     assert np.abs(ns - smooth)[:, seen].max() < 0.03
 
 
-def test_every_integrator_sees_the_same_relief():
+def test_every_integrator_sees_the_same_normal_map():
     scene = hall(wf.NormalMap(texel(TILT)), seen=(1, 3, 2))
     scene = wf.Scene(scene.shapes[2], [wf.Environment((0.5, 1.0, 2.0))], scene.camera)
     means = [

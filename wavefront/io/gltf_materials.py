@@ -148,7 +148,7 @@ class _Reader:
     def spec(self) -> MaterialSpec:
         """Return the appearance of the material."""
         extensions = self._item.get("extensions", {})
-        normal_map = self._relief()
+        normal_map = self._normal_map()
         if "KHR_materials_pbrSpecularGlossiness" in extensions:
             self._specular_glossiness(extensions["KHR_materials_pbrSpecularGlossiness"])
             self._lost += [
@@ -261,7 +261,7 @@ class _Reader:
         if mode == "MASK" and "alpha" in self._wanted:
             self._wanted["alpha_cutoff"] = self._cutoff
 
-    def _relief(self) -> NormalMap | None:
+    def _normal_map(self) -> NormalMap | None:
         if "occlusionTexture" in self._item:
             self._lost.append("occlusionTexture")
         texture = self._texture(self._item, "normalTexture", srgb=False)

@@ -69,14 +69,14 @@ def _primitive(document: Document, part: dict[str, Any], mode: int, name: str) -
         wide(vertices),
         _triangles(where, indices, mode, len(vertices)),
         normals=read("NORMAL", 3),
-        uvs=_upright(read("TEXCOORD_0", 2)),
-        uvs1=_upright(read("TEXCOORD_1", 2)),
+        uvs=_flip_v(read("TEXCOORD_0", 2)),
+        uvs1=_flip_v(read("TEXCOORD_1", 2)),
         tangents=read("TANGENT", 4),
         colors=read("COLOR_0", (3, 4)),
     )
 
 
-def _upright(coordinates: Table | None) -> Table | None:
+def _flip_v(coordinates: Table | None) -> Table | None:
     """Return texture coordinates (n, 2) with v upwards, rounded to float32; glTF counts v downwards."""
     if coordinates is None:
         return None

@@ -77,9 +77,9 @@ PBR = (
 OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-mm": 2}
 OPTIONS |= {"-texres": 1, "-type": 1, "-bm": 1}
 READ = frozenset(("-s", "-o", "-mm", "-clamp", "-imfchan"))
-RELIEFS = ("norm", "map_bump", "bump")  # keywords whose maps have a multiplier, -bm
+BUMP_MAPS = ("norm", "map_bump", "bump")  # keywords whose maps have a multiplier, -bm
 WHOLE = ("map_kd", "map_ke", "map_ks", "norm")  # keywords whose maps are not one channel of an image
-MAPS = {*WHOLE, *RELIEFS, "map_d", *(image for _, image, _ in PBR)}  # keywords whose images are read
+MAPS = {*WHOLE, *BUMP_MAPS, "map_d", *(image for _, image, _ in PBR)}  # keywords whose images are read
 CHANNELS: dict[str, Any] = {"r": 0, "g": 1, "b": 2, "m": 3, "l": "luminance"}
 
 
@@ -272,7 +272,7 @@ def spec(entry: Entry) -> MaterialSpec:
     texture = entry.texture("map_ke", factor)
     radiance = texture if texture is not None else factor if factor.any() else None
     material, lost = _material(entry)
-    material.normal_map = _relief(entry)
+    material.normal_map = _normal_or_bump_map(entry)
     return MaterialSpec(material, radiance, lost=lost)
 
 
@@ -363,7 +363,7 @@ def _alpha(entry: Entry) -> Any:
     return factor if texture is None else texture
 
 
-def _relief(entry: Entry) -> BaseNormalMap | None:
+def _normal_or_bump_map(entry: Entry) -> BaseNormalMap | None:
     """Return the normal map or bump map. If there are both, only `norm` is read."""
     if "norm" in entry.lines:
         return _made(entry, "norm", _normal_map)
@@ -445,7 +445,7 @@ def _map(entry: Entry, key: str) -> tuple[dict[str, list[str]], str]:
                 raise SceneError(f"{entry.where(key)} has the option {option!r}, which is not known")
         options[option] = words[:count]
         rest = (rest.split(None, count) + [""] * (count + 1))[count].strip()
-    read = READ | {"-bm"} if key in RELIEFS else READ
+    read = READ | {"-bm"} if key in BUMP_MAPS else READ
     read = read - {"-imfchan"} if key in WHOLE else read
     for option in options.keys() - read:
         entry.idle_options.add(f"{option} of {entry.lines[key][0]}")

@@ -187,4 +187,4 @@ def _simple(material: Any, where: str, bare: bool) -> MaterialSpec:
 
 
 def _is_map(key: str) -> bool:
-    return key.startswith("map_") or key in mtl.RELIEFS
+    return key.startswith("map_") or key in mtl.BUMP_MAPS

@@ -123,7 +123,7 @@ class BumpMap(BaseNormalMap):
     image
         A file, an array, or a `Texture` of one channel; not decoded from sRGB.
     height
-        Displacement of texel 1 relative to texel 0, scene units; negative to invert the relief.
+        Displacement of texel 1 relative to texel 0, scene units; negative to invert the bumps.
 
     Raises
     ------
