@@ -902,6 +902,17 @@ def test_a_volume_is_glass_that_absorbs(build, path):
     assert mesh.material.interior.absorption.ravel() == pytest.approx([np.log(2) / 2, 0, 0])
 
 
+def test_a_volume_over_a_distance_below_float32_is_no_division_by_zero(build, path):
+    """What absorbs lets nothing through; what does not absorb stays clear."""
+    volume = VOLUME | {"attenuationDistance": 1e-320}
+    extensions = {**GLASS["extensions"], "KHR_materials_volume": volume}
+    build.material(**GLASS | {"extensions": extensions}).gltf(path)
+    (mesh,) = load_meshes(path)
+    red, green, blue = mesh.material.interior.absorption.ravel().tolist()
+    assert 1e37 < red < np.inf
+    assert (green, blue) == (0, 0)
+
+
 def test_everything_else_is_principled(build, path):
     group = {"metallicFactor": 0.25, "roughnessFactor": 0.75, "baseColorFactor": [1, 0.5, 0, 1]}
     (mesh,) = load_meshes(build.material(pbrMetallicRoughness=group).gltf(path))

@@ -337,6 +337,7 @@ class _Reader:
             distance = self._number(group, "attenuationDistance", 1.0, high=np.inf)
             if distance == 0:
                 raise SceneError(f"{self._file}: {self._where}.attenuationDistance is 0; it must be above 0")
+            distance = max(distance, float(np.finfo(np.float32).tiny))  # what float32 can divide by
             with np.errstate(over="ignore"):
                 self._wanted["absorption"] = -log(np.maximum(color, 1e-6).astype(np.float32)) / distance
 
