@@ -15,7 +15,7 @@ BATCHES = 8  # at most
 WHOLE_BATCH = 4  # samples; batches are at least this long if a pixel has two of them
 EPSILON = 1e-2  # relative to the squared mean of a picture; added to the squares by which errors are divided
 OUTLIERS = 1e-3  # fraction of the pixels whose error is limited to that of the worst other pixel
-CHUNK = 16384  # pixels, or samples, that are added together: few enough for the cache
+CHUNK = 8192  # pixels, or samples, that are added together: few enough for the cache
 
 
 class Film:
