@@ -80,11 +80,14 @@ class ExactSums:
         largest = np.abs(terms).max(1) if terms.shape[1] > 1 or terms.min() < 0 else terms[:, 0]
         bins = self.bins[:, lanes]
         rounder = _ROUNDERS.take(bins, mode="wrap")
-        if (largest * _LIMIT_TO_ROUNDER > rounder).any():
-            needed = np.maximum(bins, np.searchsorted(_LIMITS, largest).astype(np.int8))
-            high, low = _raised(self.high[:, lanes], self.low[:, lanes], needed - bins)
-            self.high[:, lanes], self.low[:, lanes], self.bins[:, lanes] = high, low, needed
-            rounder = _ROUNDERS.take(needed, mode="wrap")
+        beyond = largest * _LIMIT_TO_ROUNDER > rounder
+        if beyond.any():
+            channel, column = np.nonzero(beyond)
+            sums = channel, column + (lanes.start or 0) if isinstance(lanes, slice) else lanes[column]
+            needed = np.searchsorted(_LIMITS, largest[beyond]).astype(np.int8)
+            self.high[sums], self.low[sums] = _raised(self.high[sums], self.low[sums], needed - bins[beyond])
+            self.bins[sums] = needed
+            rounder[beyond] = _ROUNDERS.take(needed)
         return rounder
 
 
