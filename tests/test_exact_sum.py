@@ -28,7 +28,7 @@ def column(values: list[float]) -> np.ndarray:
 
 
 def bits(sums: ExactSums) -> tuple[bytes, ...]:
-    return sums.value().tobytes(), sums.bins.tobytes()
+    return sums._high.tobytes(), sums._low.tobytes()
 
 
 @given(lists, st.randoms(use_true_random=False))

@@ -152,7 +152,7 @@ BAD = [
         ({"spp": v}, r"spp is .*; it must be a whole number from 1 to 134217728")
         for v in (0, -1, 1.5, "9", True)
     ),
-    *(({"spp": v}, r"spp is ") for v in (np.nan, 2**27 + 1)),
+    *(({"spp": v}, r"spp is ") for v in (np.nan, 2**26 + 1)),
     ({"max_bounces": -1}, r"max_bounces is -1; it must be a whole number from 0"),
     ({"max_bounces": 2.0}, r"max_bounces is 2.0; it must be a whole number from 0"),
     ({"wave_size": 0}, r"wave_size is 0; it must be a whole number from 1"),

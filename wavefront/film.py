@@ -31,7 +31,7 @@ class Film:
     within a batch. It does not include the gain between batches: for Sobol points the error is
     over-estimated, by 7 to 15 % at 16 and 64 samples, by less later. Independent samples have no such bias.
 
-    Memory is 179 bytes per pixel, whatever the number of samples.
+    Memory is 176 bytes per pixel, whatever the number of samples.
     """
 
     def __init__(self, width: int, height: int) -> None:

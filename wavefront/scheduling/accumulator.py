@@ -13,7 +13,7 @@ from ..memory import check_memory
 from .jobs import Job, JobResult
 
 MAX_BAD_SAMPLES = 1e-4  # part of all samples that may be lost to NaN before it is an error
-FILM_BYTES = 179  # of a pixel of the film
+FILM_BYTES = 176  # of a pixel of the film
 PICTURE_BYTES = 64  # of a pixel of the picture, and of what is needed to make it
 SPARE_BYTES = 16 << 20
 
