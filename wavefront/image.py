@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from .codecs.encoding import exposed, to_8bit
 from .codecs.images import encode_png, read_linear, write_image
 from .codecs.png_jpeg import Gamma
 from .errors import SceneError
+from .layers import LAYERS
 
 
 class Image:
@@ -35,6 +37,14 @@ class Image:
     standard_error
         (H, W, 3) float32 estimated standard error of `rgb`, from the scatter of 2 to 8 batches of samples. It
         includes most of the gain of stratified sampling. NaN where there are fewer than two samples.
+    layers
+        The other layers by name, (H, W) or (H, W, channels): see `layers.LAYERS`. Each is an attribute as
+        well: `image.depth` is `image.layers["depth"]`.
+    errors
+        Estimated standard error of each sampled layer, of its shape.
+    names
+        For "shape", "instance" and "material" the name of each id of the layers `shape_id`, `instance_id`
+        and `material_id`.
 
     `counts`, `variance` and `standard_error` are None in an image that was not rendered.
     """
@@ -48,6 +58,9 @@ class Image:
         counts: NDArray[np.int64] | None = None,
         variance: NDArray[np.float32] | None = None,
         standard_error: NDArray[np.float32] | None = None,
+        layers: Mapping[str, NDArray[Any]] | None = None,
+        errors: Mapping[str, NDArray[np.float32]] | None = None,
+        names: Mapping[str, Mapping[int, str]] | None = None,
     ) -> None:
         self.rgb = rgb
         self.spp = spp
@@ -55,6 +68,17 @@ class Image:
         self.counts = counts
         self.variance = variance
         self.standard_error = standard_error
+        self.layers = dict(layers or {})
+        self.errors = dict(errors or {})
+        self.names = {kind: dict(table) for kind, table in (names or {}).items()}
+
+    def __getattr__(self, name: str) -> NDArray[Any]:
+        """Return a layer by its name."""
+        if name in LAYERS:
+            if name in self.__dict__.get("layers", ()):
+                return self.layers[name]
+            raise AttributeError(f"the image has no layer {name!r}; render it with aovs=({name!r},)")
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     def __repr__(self) -> str:
         """Return the size and the sample count."""
