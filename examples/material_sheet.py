@@ -34,7 +34,7 @@ def diffuse() -> list[wf.Bsdf]:
 
 def metal() -> list[wf.Bsdf]:
     """Return three metals, each as a mirror, brushed and rough."""
-    names = ("gold", "copper", "aluminium")
+    names = ("gold", "copper", "aluminum")
     return [wf.Conductor.named(name, roughness) for name in names for roughness in (0.0, 0.3, 0.6)]
 
 
@@ -83,7 +83,7 @@ def textured() -> list[wf.Bsdf]:
         wf.Conductor.named("copper", number(0.1 + 0.5 * checks)),
         wf.Mix(wf.Diffuse((0.12, 0.12, 0.14)), wf.Conductor.named("gold", 0.2), number(bands > 0.5)),
         wf.Material(wf.OrenNayar((0.7, 0.68, 0.6), 0.4), normal_map=wf.BumpMap(waves, 0.12)),
-        wf.Material(wf.Conductor.named("aluminium", 0.15), normal_map=wf.BumpMap(waves, 0.04)),
+        wf.Material(wf.Conductor.named("aluminum", 0.15), normal_map=wf.BumpMap(waves, 0.04)),
         wf.Material(wf.Principled(WINE, 0, 0.35), normal_map=wf.NormalMap(normals(quilt, 0.06))),
         wf.Material(wf.Diffuse((0.8, 0.35, 0.1)), alpha=0.45),
         wf.Material(wf.Diffuse((0.2, 0.45, 0.4)), alpha=number(bands)),

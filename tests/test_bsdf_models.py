@@ -216,7 +216,7 @@ def test_thin_sheet_reflects_the_series_of_its_faces():
         ("gold", (0.97, 0.75, 0.37)),
         ("silver", (0.99, 0.98, 0.98)),
         ("copper", (0.92, 0.62, 0.52)),
-        ("aluminium", (0.91, 0.92, 0.92)),
+        ("aluminum", (0.91, 0.92, 0.92)),
         ("iron", (0.53, 0.51, 0.49)),
         ("chromium", (0.55, 0.56, 0.56)),
         ("titanium", (0.61, 0.58, 0.54)),

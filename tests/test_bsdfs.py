@@ -252,7 +252,7 @@ def test_mirror_reflects_in_the_normal():
         (lambda: ThinDielectric(1e20), r"ThinDielectric ior is 1e\+20; it must be .* from 1e-06 to 1e\+06"),
         (lambda: Principled(ior=1e20), r"Principled ior is 1e\+20; it must be .* from 1e-06 to 1e\+06"),
         (lambda: Conductor(1, 1, 1.1), r"Conductor roughness is 1.1; it must be in \[0, 1\]"),
-        (lambda: Conductor.named("oak"), "Conductor name is 'oak'; it must be one of aluminium, .*gold"),
+        (lambda: Conductor.named("oak"), "Conductor name is 'oak'; it must be one of aluminum, .*gold"),
         (lambda: Dielectric(1.5, -0.1), r"Dielectric roughness is -0.1; it must be in \[0, 1\]"),
         (lambda: ThinDielectric(0), "ThinDielectric ior is 0; it must be more than 0"),
         (lambda: ThinDielectric(1.5, 2), r"ThinDielectric roughness is 2; it must be in \[0, 1\]"),

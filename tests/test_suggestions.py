@@ -158,9 +158,9 @@ def test_metals_in_any_case(name: str) -> None:
 
 
 def test_metals() -> None:
-    """Both spellings of aluminium; a misspelled one is answered, and all are listed."""
+    """Both spellings of aluminum; a misspelled name is answered, and all are listed."""
     assert np.array_equal(wf.Conductor.named("Aluminum").k, wf.Conductor.named("aluminium").k)
-    with pytest.raises(wf.SceneError, match=r"must be one of aluminium, .*titanium; did you mean 'silver'\?"):
+    with pytest.raises(wf.SceneError, match=r"must be one of aluminum, .*titanium; did you mean 'silver'\?"):
         wf.Conductor.named("Silvr")
     with pytest.raises(wf.SceneError, match=r"Conductor name is 5; it must be one of"):
         wf.Conductor.named(5)

@@ -131,7 +131,7 @@ def suggests_keywords(function: Callable[P, R]) -> Callable[P, R]:
     """
     code = function.__code__
     known = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
-    title = function.__qualname__.removesuffix(".__init__")
+    makes = function.__name__ == "__init__"
 
     @wraps(function)
     def checked(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -139,6 +139,7 @@ def suggests_keywords(function: Callable[P, R]) -> Callable[P, R]:
             if name not in known:
                 elsewhere = getattr(args[0], "given_elsewhere", {}) if args else {}
                 hint = f"; write {elsewhere[name]}" if name in elsewhere else did_you_mean(name, known)
+                title = type(args[0]).__name__ if makes else function.__qualname__
                 raise TypeError(f"{title}() got an unexpected keyword argument {name!r}{hint}")
         return function(*args, **kwargs)
 

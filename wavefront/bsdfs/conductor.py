@@ -21,9 +21,9 @@ from .mirror import mirrored
 # functions of the three primaries (CIE 1931 2° by the fit of C. Wyman et al. 2013, JCGT 2(2), to
 # equal-energy white). Measurements: gold, silver, copper: P. Johnson and R. Christy 1972, Phys.
 # Rev. B 6, 4370; chromium, iron, nickel, titanium: the same authors 1974, Phys. Rev. B 9, 5056;
-# aluminium: A. Rakić 1995, Appl. Opt. 34, 4755; platinum: A. Rakić et al. 1998, Appl. Opt. 37, 5271.
+# aluminum: A. Rakić 1995, Appl. Opt. 34, 4755; platinum: A. Rakić et al. 1998, Appl. Opt. 37, 5271.
 METALS = {
-    "aluminium": ((1.4411, 0.9884, 0.5853), (7.5577, 6.5663, 5.3061)),
+    "aluminum": ((1.4411, 0.9884, 0.5853), (7.5577, 6.5663, 5.3061)),
     "chromium": ((3.2238, 3.1180, 2.2560), (3.2913, 3.3387, 3.1137)),
     "copper": ((0.2371, 1.0373, 1.2982), (3.2440, 2.6010, 2.3527)),
     "gold": ((0.1078, 0.4885, 1.4778), (3.5084, 2.3376, 1.8090)),
@@ -33,7 +33,7 @@ METALS = {
     "silver": ((0.0554, 0.0547, 0.0427), (4.2931, 3.5430, 2.5346)),
     "titanium": ((2.7159, 2.5119, 2.2270), (3.7912, 3.4042, 2.9994)),
 }
-SPELLINGS = {"aluminum": "aluminium", "chrome": "chromium"}
+SPELLINGS = {"aluminium": "aluminum", "chrome": "chromium"}
 
 
 class Conductor(JointBsdf):

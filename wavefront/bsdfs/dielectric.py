@@ -7,21 +7,19 @@ from typing import Self
 
 import numpy as np
 
-from ..parameter import Parameter
 from ..state import SurfaceInteraction
-from ..suggestions import suggests_keywords
 from ..textures.base import BaseTexture
-from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
 from ..vec import Floats, broadcast, dot, f4
-from .base import BsdfSample, JointBsdf, weigh
+from .base import BsdfSample, weigh
 from .fresnel import fresnel_dielectric
 from .microfacet import alpha_of, is_smooth, mirror_lobe, reflect, refract, refraction_lobe, visible_normals
+from .refractive import RefractiveBsdf
 
 # Closer to 1 than this, refraction bends light by less than half vectors resolve: the boundary is smooth.
 LEAST_BEND = 1e-3
 
 
-class Dielectric(JointBsdf):
+class Dielectric(RefractiveBsdf):
     """A clear boundary that reflects and refracts; the shape's inside has index `ior`.
 
     Parameters
@@ -43,29 +41,6 @@ class Dielectric(JointBsdf):
     SceneError
         If a parameter is out of its range or not finite.
     """
-
-    transmissive = True
-    dimensions = 3
-
-    ior = Parameter(refractive_index)
-    roughness = Parameter(scalar)
-    reflectance = Parameter(color)
-    transmittance = Parameter(color)
-
-    @suggests_keywords
-    def __init__(
-        self,
-        ior: Scalar = 1.5,
-        roughness: Scalar = 0.0,
-        *,
-        reflectance: Color = 1.0,
-        transmittance: Color = 1.0,
-    ) -> None:
-        self.ior = ior
-        self.roughness = roughness
-        self.reflectance = reflectance
-        self.transmittance = transmittance
-        self.derive()
 
     def derive(self) -> None:
         """Set `specular`, and the relative index as seen from outside, from the parameters."""

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..parameter import Parameter
-from ..suggestions import suggests_keywords
-from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
 from ..vec import Floats, dot, f4
-from .base import BsdfSample, JointBsdf, weigh
+from .base import BsdfSample, weigh
 from .fresnel import fresnel_dielectric
 from .microfacet import alpha_of, is_smooth, mirror_lobe, reflect, visible_normals
 from .mirror import mirrored
+from .refractive import RefractiveBsdf
 
 
-class ThinDielectric(JointBsdf):
+class ThinDielectric(RefractiveBsdf):
     """A sheet of clear material without thickness: it reflects, and lets light straight through.
 
     All reflections between its two faces are summed: with R of one face it reflects 2R/(1 + R)
@@ -36,29 +34,6 @@ class ThinDielectric(JointBsdf):
     SceneError
         If a parameter is out of its range or not finite.
     """
-
-    transmissive = True
-    dimensions = 3
-
-    ior = Parameter(refractive_index)
-    roughness = Parameter(scalar)
-    reflectance = Parameter(color)
-    transmittance = Parameter(color)
-
-    @suggests_keywords
-    def __init__(
-        self,
-        ior: Scalar = 1.5,
-        roughness: Scalar = 0.0,
-        *,
-        reflectance: Color = 1.0,
-        transmittance: Color = 1.0,
-    ) -> None:
-        self.ior = ior
-        self.roughness = roughness
-        self.reflectance = reflectance
-        self.transmittance = transmittance
-        self.derive()
 
     def derive(self) -> None:
         """Set `specular` from the roughness."""

@@ -1,0 +1,35 @@
+"""The parameters that clear materials have in common."""
+
+from __future__ import annotations
+
+from ..parameter import Parameter
+from ..suggestions import suggests_keywords
+from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
+from .base import JointBsdf
+
+
+class RefractiveBsdf(JointBsdf):
+    """A BSDF of a refractive index, a roughness, and tints of the reflected and the transmitted light."""
+
+    transmissive = True
+    dimensions = 3
+
+    ior = Parameter(refractive_index)
+    roughness = Parameter(scalar)
+    reflectance = Parameter(color)
+    transmittance = Parameter(color)
+
+    @suggests_keywords
+    def __init__(
+        self,
+        ior: Scalar = 1.5,
+        roughness: Scalar = 0.0,
+        *,
+        reflectance: Color = 1.0,
+        transmittance: Color = 1.0,
+    ) -> None:
+        self.ior = ior
+        self.roughness = roughness
+        self.reflectance = reflectance
+        self.transmittance = transmittance
+        self.derive()
