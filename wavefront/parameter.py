@@ -26,17 +26,18 @@ class Parameter:
 
     def __init__(self, convert: Callable[[str, Any], Any], argument: str | None = None) -> None:
         self._convert, self._argument = convert, argument
-        self._name = self._title = ""
+        self._name = ""
 
     def __set_name__(self, owner: type, name: str) -> None:
         """Record the name of the attribute."""
-        self._name, self._title = name, f"{owner.__name__} {self._argument or name}"
+        self._name = name
 
     def __set__(self, instance: Any, value: Any) -> None:
         """Store the converted value. After the constructor, recompute the values that follow from it."""
         values = vars(instance)
         known, before = self._name in values, values.get(self._name)
-        values[self._name] = self._convert(self._title, value)
+        title = f"{type(instance).__name__} {self._argument or self._name}"
+        values[self._name] = self._convert(title, value)
         if known:
             try:
                 instance.derive()
