@@ -12,6 +12,7 @@ import pytest
 
 import wavefront as wf
 from wavefront import cli
+from wavefront.layers import LAYERS
 from wavefront.settings import Settings
 
 DECLARED = {each.name: each for each in fields(Settings) if each.metadata}
@@ -59,7 +60,8 @@ def test_options_follow_the_declaration() -> None:
         assert found[name].help == each.metadata["option"]
         assert found[name].default == each.default
         assert found[name].choices is each.metadata["choices"]
-        assert found[name].option_strings == ["--" + name.replace("_", "-")]
+        flag = each.metadata["flag"] or name
+        assert found[name].option_strings == ["--" + flag.replace("_", "-")]
 
 
 @pytest.mark.parametrize("name", [name for name, each in DECLARED.items() if each.metadata["choices"]])
@@ -85,3 +87,32 @@ def test_settings_are_kept_as_they_are_checked() -> None:
     assert Settings(noise=0.1).max_spp == 2**16
     assert Settings(noise=0.1).target_spp is None
     assert Settings(seconds=1).max_spp > 2**16
+
+
+def test_layers_are_chosen_by_name() -> None:
+    """One name or several, each once, in the order of the table; "all" is all without keys."""
+    assert Settings().aovs == ()
+    assert Settings(aovs="depth").aovs == ("depth",)
+    assert Settings(aovs=["coverage", "albedo", "depth", "albedo"]).aovs == ("depth", "albedo", "coverage")
+    assert Settings(aovs="all").aovs == tuple(LAYERS)
+    assert Settings(aovs=("all", "light_groups")).aovs == (*LAYERS, "light_groups")
+
+
+def test_unknown_layers_are_an_error_that_lists_what_there_is() -> None:
+    """With a suggestion."""
+    with pytest.raises(
+        wf.SceneError, match=r"aovs has 'dept'; there are position, depth, .*coverage, and"
+    ) as e:
+        wf.render("no such file", aovs=("normal", "dept"))
+    assert "did you mean 'depth'" in str(e.value)
+    with pytest.raises(wf.SceneError, match="aovs has 3; there are"):
+        Settings(aovs=[3])  # type: ignore[list-item]
+    with pytest.raises(wf.SceneError, match="aovs is 3; it must be the name of a layer, or several names"):
+        Settings(aovs=3)  # type: ignore[arg-type]
+
+
+def test_the_option_of_layers_can_be_given_several_times() -> None:
+    """Each time with one name."""
+    read = cli.parser().parse_args(["render", "scene.obj", "--aov", "depth", "--aov", "albedo"])
+    assert read.aovs == ("depth", "albedo")
+    assert cli.parser().parse_args(["render", "scene.obj"]).aovs == ()

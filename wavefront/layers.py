@@ -7,7 +7,12 @@ filtered mean over the samples of the pixel, as `rgb` is, and has a standard err
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import Any
+
+from .errors import SceneError
 from .record import record
+from .suggestions import did_you_mean
 
 
 @record
@@ -44,3 +49,38 @@ LAYERS: dict[str, Layer] = {
     "denoising_albedo": _sampled(3, "albedo of the first surfaces that are not specular"),
     "denoising_normal": _sampled(3, "shading normal there, world"),
 }
+
+KEYED_LAYERS: dict[str, Layer] = {  # one layer for each key, named "light_groups.KEY" and "coverage.KEY"
+    "light_groups": _sampled(3, "radiance by the group of the light that it comes from"),
+    "coverage": _sampled(1, "part of the pixel that each shape covers, by the name of the shape"),
+}
+ALL_LAYERS = "all"  # stands for all of `LAYERS`, but for none of `KEYED_LAYERS`
+
+
+def chosen_layers(name: str, value: Any) -> tuple[str, ...]:
+    """Return the names of the layers that were asked for, each once, in the order of the tables.
+
+    Parameters
+    ----------
+    name
+        What the value is called in errors.
+    value
+        A name, or several: of `LAYERS`, of `KEYED_LAYERS`, or "all".
+
+    Raises
+    ------
+    SceneError
+        If one is unknown. The message lists all of them.
+    """
+    known = (*LAYERS, *KEYED_LAYERS)
+    chosen = [value] if isinstance(value, str) else list(value) if isinstance(value, Iterable) else None
+    if chosen is None:
+        raise SceneError(f"{name} is {value!r}; it must be the name of a layer, or several names")
+    for each in chosen:
+        if not isinstance(each, str) or each not in (*known, ALL_LAYERS):
+            raise SceneError(
+                f"{name} has {each!r}; there are {', '.join(known)}, "
+                f"and {ALL_LAYERS!r} for all but {' and '.join(KEYED_LAYERS)}{did_you_mean(each, known)}"
+            )
+    wanted = {*chosen, *(LAYERS if ALL_LAYERS in chosen else ())}
+    return tuple(each for each in known if each in wanted)

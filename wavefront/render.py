@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -45,6 +46,7 @@ def render(
     light_sampler: str | LightSamplerMaker = "spatial",
     branches: int = 1,
     wave_size: int | None = None,
+    aovs: str | Sequence[str] = (),
     progress: Progress = None,
 ) -> Image:
     """Render a picture.
@@ -113,6 +115,11 @@ def render(
     wave_size
         The most paths that are traced together by one worker; by default what suits their number and
         speed, at most 131 072. The picture does not depend on it.
+    aovs
+        Layers beside the picture, by name: "position", "depth", "distance", "normal", "normal_geometric",
+        "uv", "shape_id", "instance_id", "material_id", "alpha", "albedo", "direct", "indirect",
+        "denoising_albedo", "denoising_normal", "light_groups", "coverage", or "all" for all but the last
+        two. docs/layers.md says what each holds, and what it costs.
     progress
         By default a bar appears when a render takes over two seconds. False shows none; a
         function is called with how much is done and how much there is at most: samples, or
@@ -156,6 +163,7 @@ def render(
         light_sampler=light_sampler,
         branches=branches,
         wave_size=wave_size,
+        aovs=aovs,
         progress=progress,
     )
     with session.interrupt_handler as ctrl_c:  # until the last worker has ended

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from functools import lru_cache, partial
 from types import TracebackType
 from typing import Any, Self
@@ -72,7 +72,7 @@ class Session:
         As for `render`.
     integrator, max_bounces, seed, sampler, accel, filter, light_sampler, branches
         As for `render`.
-    workers, executor, noise, seconds, wave_size, progress
+    workers, executor, noise, seconds, wave_size, aovs, progress
         As for `render`.
 
     Raises
@@ -110,6 +110,7 @@ class Session:
         light_sampler: str | LightSamplerMaker = "spatial",
         branches: int = 1,
         wave_size: int | None = None,
+        aovs: str | Sequence[str] = (),
         progress: Progress = None,
     ) -> None:
         begin = time.perf_counter()
@@ -135,6 +136,7 @@ class Session:
             light_sampler=light_sampler,
             branches=branches,
             wave_size=wave_size,
+            aovs=aovs,
             progress=progress,
         )
         with setup_errors():

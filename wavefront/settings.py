@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import field, fields
 from functools import partial
 from typing import Any, TypeAlias
@@ -19,6 +19,7 @@ from .errors import SceneError, number
 from .exact_sum import MAX_TERMS
 from .filters import FILTERS, Filter
 from .integrators import INTEGRATORS, Integrator, li_full
+from .layers import chosen_layers
 from .lighting import DEFAULT, LIGHTINGS, check_lighting
 from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
 from .materials import MaterialLike
@@ -46,6 +47,7 @@ def setting(
     option: str | None = None,
     check: SettingCheck | None = None,
     choices: Registry[Any] | None = None,
+    flag: str | None = None,
 ) -> Any:
     """Declare a setting.
 
@@ -61,12 +63,15 @@ def setting(
         Checks a value that was given, and returns it as it is kept.
     choices
         The table of its names.
+    flag
+        The name of its option, which is given once for each of several values; None for that of the setting.
     """
     if choices is not None:
         check = partial(_check_choice, choices)
         check = optional(check) if default is None else check
     return field(
-        default=default, metadata={"text": text, "option": option, "check": check, "choices": choices}
+        default=default,
+        metadata={"text": text, "option": option, "check": check, "choices": choices, "flag": flag},
     )
 
 
@@ -249,6 +254,16 @@ class Settings:
         "The most paths that are traced together by one worker; by default what suits their number "
         "and speed, at most 131 072. The picture does not depend on it.",
         check=optional(whole_number(1, 2**24)),
+    )
+    aovs: str | Sequence[str] = setting(
+        (),
+        'Layers beside the picture, by name: "position", "depth", "distance", "normal", '
+        '"normal_geometric", "uv", "shape_id", "instance_id", "material_id", "alpha", "albedo", '
+        '"direct", "indirect", "denoising_albedo", "denoising_normal", "light_groups", "coverage", or '
+        '"all" for all but the last two. docs/layers.md says what each holds, and what it costs.',
+        option="layer to render beside the picture, or all; can be given several times",
+        flag="aov",
+        check=chosen_layers,
     )
     progress: Progress = setting(
         None,

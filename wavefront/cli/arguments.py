@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,16 @@ from ..errors import SceneError
 from ..lighting import check_lighting
 
 VECTOR_OPTIONS = ("--origin", "--target", "--up", "--direction")
+
+
+class Several(argparse.Action):
+    """An option that can be given several times: its values become a tuple, after those of the default."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option: Any = None
+    ) -> None:
+        """Add a value."""
+        setattr(namespace, self.dest, (*getattr(namespace, self.dest), values))
 
 
 def joined(arguments: Sequence[str]) -> list[str]:

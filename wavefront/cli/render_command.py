@@ -41,7 +41,7 @@ class _Help(argparse.ArgumentDefaultsHelpFormatter):
     """Names defaults where there are any."""
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
-        return action.help if action.default is None else super()._get_help_string(action)
+        return action.help if action.default in (None, ()) else super()._get_help_string(action)
 
 
 def add_render_command(commands: Any) -> None:
@@ -76,13 +76,16 @@ def add_render_command(commands: Any) -> None:
 def _add_setting(command: argparse.ArgumentParser, setting: Field[Any]) -> None:
     """Add the option of a setting that has one."""
     how: dict[str, Any] = {"help": setting.metadata["option"], "default": setting.default}
+    flag = setting.metadata["flag"] or setting.name
     if setting.type == "bool":
         how["action"] = "store_true"
+    elif setting.metadata["flag"]:
+        how.update(action=arguments.Several, dest=setting.name, metavar="NAME")
     else:
         how["type"] = PARSERS.get(setting.name) or TYPES[str(setting.type).split(" ")[0]]
         how["choices"] = setting.metadata["choices"]
         how["metavar"] = METAVARS.get(setting.name)
-    command.add_argument("--" + setting.name.replace("_", "-"), **how)
+    command.add_argument("--" + flag.replace("_", "-"), **how)
 
 
 def _render(options: argparse.Namespace) -> int:
