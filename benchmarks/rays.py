@@ -167,7 +167,7 @@ def against_prototype(path: Path, triangles: Array, origin: Array, direction: Ar
     nodes = prototype.build(
         triangles, 32 if len(triangles) < 10_000 else 64 if len(triangles) < 1e5 else 128, 8
     )
-    geometry = Geometry(triangles, np.zeros((3, 0), f4), np.zeros(0, f4), weights=False)
+    geometry = Geometry(triangles, weights=False)
     accelerator, none = make_accelerator(geometry, "numpy"), np.full(origin.shape[1], -1)
     best = [np.inf, np.inf]
     for _ in range(4):
@@ -198,7 +198,7 @@ def main() -> None:
     )
     for size in map(int, options.sizes.split(",")):
         triangles = mesh(size)
-        geometry = Geometry(triangles, np.zeros((3, 0), f4), np.zeros(0, f4))
+        geometry = Geometry(triangles)
         sides = [make_accelerator(geometry, name) for name in ("numpy", "embree")]
         for kind in ("coherent", "incoherent", "shadow"):
             origin, direction = rays(kind, size == 36, options.rays)

@@ -6,6 +6,7 @@ import numpy as np
 import trimesh
 
 from wavefront.accel import Accelerator, Geometry
+from wavefront.accel.sphere import SpherePrimitives
 
 f4 = np.float32
 
@@ -20,11 +21,10 @@ PLACES = [
 
 
 def geometry(triangles: object = (), centers: object = (), radii: object = ()) -> Geometry:
-    return Geometry(
-        np.asarray(triangles, f4).reshape(-1, 3, 3),
-        np.ascontiguousarray(np.asarray(centers, f4).reshape(-1, 3).T),
-        np.asarray(radii, f4).reshape(-1),
+    spheres = SpherePrimitives(
+        np.ascontiguousarray(np.asarray(centers, f4).reshape(-1, 3).T), np.asarray(radii, f4).reshape(-1)
     )
+    return Geometry(np.asarray(triangles, f4).reshape(-1, 3, 3), (spheres,))
 
 
 def sphere_mesh(subdivisions: int) -> np.ndarray:

@@ -170,8 +170,8 @@ def test_positions_are_relative_to_the_center() -> None:
         wf.Sphere(near[1].center + 2.0**40, 0.125),
     )
     a, b = compiled(*near, lights=[wf.Environment()]), compiled(*far, lights=[wf.Environment()])
-    assert a.sphere_centers.any()
-    assert (a.sphere_centers == b.sphere_centers).all()
+    assert a.curved.kinds[0].centers.any()
+    assert (a.curved.kinds[0].centers == b.curved.kinds[0].centers).all()
     assert (a.center + 2.0**40 == b.center).all()
 
 

@@ -7,22 +7,27 @@ from typing import Protocol
 
 from ..record import record
 from ..vec import Bools, Floats, Ints
+from .primitives import CurvedPrimitives
 
 
 @record
 class Geometry:
     """What rays can hit, in float32 relative to the scene's center.
 
-    Primitive ids count the triangles first, then the spheres.
+    Primitive ids count the triangles first, then the curved primitives of each kind.
     """
 
     triangles: Floats  # (m, 3, 3) vertices: triangle, corner, xyz
-    centers: Floats  # (3, k) sphere centers
-    radii: Floats  # (k,) sphere radii
+    curved: tuple[CurvedPrimitives, ...] = ()  # spheres and others, one element per kind
     weights: bool = True  # whether barycentric weights are needed; without them b1 and b2 are 0
     # (m,) whether a triangle and the next one have the same material, light and attributes everywhere, so
     # that either id may be reported for a hit of the flat quadrilateral that they form; None: no triangles
     interchangeable: Bools | None = None
+
+    @property
+    def count(self) -> int:
+        """Number of primitives."""
+        return len(self.triangles) + sum(map(len, self.curved))
 
 
 @record
@@ -31,8 +36,8 @@ class Intersections:
 
     t: Floats  # (n,) distance along the direction, inf on a miss
     prim: Ints  # (n,) primitive id, -1 on a miss
-    b1: Floats  # (n,) barycentric weight of the second vertex; 0 on spheres
-    b2: Floats  # (n,) barycentric weight of the third vertex; 0 on spheres
+    b1: Floats  # (n,) barycentric weight of the second vertex; 0 on curved primitives
+    b2: Floats  # (n,) barycentric weight of the third vertex; 0 on curved primitives
 
 
 class Accelerator(Protocol):
@@ -45,8 +50,8 @@ class Accelerator(Protocol):
         """Return the nearest hits with t > 0 of rays (3, n); of equal distances, the lowest primitive id.
 
         `exclude_prim` (n,) is the primitive that each ray starts on, -1 for none. A ray does not hit the
-        triangle that it starts on, and hits a sphere that it starts on only on the far side. Two triangles
-        that form one flat quadrilateral may be excluded together.
+        triangle that it starts on, and hits a sphere or another curved primitive that it starts on only on
+        the far side. Two triangles that form one flat quadrilateral may be excluded together.
         """
 
     @abstractmethod

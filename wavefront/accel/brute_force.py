@@ -59,7 +59,7 @@ class BruteForceTriangles:
     def __init__(self, table: TriangleTable, geometry: Geometry, ids: Ints, ball: Ball) -> None:
         self._table = table
         triangles = geometry.triangles
-        primitives = len(triangles) + geometry.radii.size
+        primitives = geometry.count
         first = find_quads(triangles)
         first = first[np.isin(first, ids) & np.isin(first + 1, ids)]
         single = ids[~np.isin(ids, [first, first + 1])]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import fields
+from typing import Any
 
 import numpy as np
 
@@ -52,5 +53,14 @@ class AcceleratorCache:
         return make
 
 
-def _same(a: Geometry, b: Geometry) -> bool:
-    return all(np.array_equal(getattr(a, each.name), getattr(b, each.name)) for each in fields(Geometry))
+def _same(a: Any, b: Any) -> bool:
+    """Return whether two records of arrays, such as geometries, are of one class and equal."""
+    return type(a) is type(b) and all(
+        _equal(getattr(a, each.name), getattr(b, each.name)) for each in fields(a)
+    )
+
+
+def _equal(a: Any, b: Any) -> bool:
+    if isinstance(a, tuple) and isinstance(b, tuple):
+        return len(a) == len(b) and all(map(_same, a, b))
+    return np.array_equal(a, b)

@@ -1,4 +1,4 @@
-"""Ray queries by Embree (package embreex); spheres are traced by NumPy."""
+"""Ray queries by Embree (package embreex); curved primitives are traced by NumPy."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def installed() -> bool:
 
 
 class EmbreeAccelerator:
-    """Triangles by Embree, spheres by NumPy; see base.Accelerator."""
+    """Triangles by Embree, curved primitives by NumPy; see base.Accelerator."""
 
     name = "embree"
 
@@ -46,32 +46,31 @@ class EmbreeAccelerator:
             rays = np.zeros((1, 3), f4)
             self._scene.run(rays, rays + f4(1))  # build now, not in the first of many threads
         self._planes = TrianglePlanes(triangles)
-        self._spheres: NumpyAccelerator | None = None
-        if geometry.radii.size:
-            none = np.zeros((0, 3, 3), f4)
-            self._first_sphere = len(triangles)
-            self._spheres = NumpyAccelerator(Geometry(none, geometry.centers, geometry.radii))
+        self._curved: NumpyAccelerator | None = None
+        if any(map(len, geometry.curved)):
+            self._first_curved = len(triangles)
+            self._curved = NumpyAccelerator(Geometry(np.zeros((0, 3, 3), f4), geometry.curved))
 
     def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
         """Return the nearest hits with t > 0 of rays (3, n)."""
         hits = self._closest_triangle(origin, direction, exclude_prim)
-        if self._spheres is not None:
-            on_sphere = self._spheres.closest(origin, direction, self._exclude_sphere(exclude_prim))
-            nearer = np.flatnonzero(on_sphere.t < hits.t)
-            hits.t[nearer] = on_sphere.t.take(nearer)
-            hits.prim[nearer] = on_sphere.prim.take(nearer) + self._first_sphere
+        if self._curved is not None:
+            on_curved = self._curved.closest(origin, direction, self._exclude_curved(exclude_prim))
+            nearer = np.flatnonzero(on_curved.t < hits.t)
+            hits.t[nearer] = on_curved.t.take(nearer)
+            hits.prim[nearer] = on_curved.prim.take(nearer) + self._first_curved
             hits.b1[nearer] = hits.b2[nearer] = 0
         return hits
 
     def occluded(self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints) -> Bools:
         """Return a mask (n,) of the rays that hit anything with 0 < t < `distance` (n,)."""
         blocked = self._occluded_by_triangle(origin, direction, distance, exclude_prim)
-        if self._spheres is not None:
-            blocked |= self._spheres.occluded(origin, direction, distance, self._exclude_sphere(exclude_prim))
+        if self._curved is not None:
+            blocked |= self._curved.occluded(origin, direction, distance, self._exclude_curved(exclude_prim))
         return blocked
 
-    def _exclude_sphere(self, exclude_prim: Ints) -> Ints:
-        return np.where(exclude_prim >= self._first_sphere, exclude_prim - self._first_sphere, -1)
+    def _exclude_curved(self, exclude_prim: Ints) -> Ints:
+        return np.where(exclude_prim >= self._first_curved, exclude_prim - self._first_curved, -1)
 
     def _closest_triangle(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
         """Return the nearest hits of triangles; rays that hit their excluded triangle are traced again."""

@@ -1,4 +1,4 @@
-"""Exact ray-triangle tests in float64, for the pairs that the float32 filters have not ruled out."""
+"""Triangles as primitives, with exact tests in float64 for the pairs that the filters have not ruled out."""
 
 from __future__ import annotations
 
@@ -6,11 +6,52 @@ from functools import partial
 
 import numpy as np
 
+from ..record import record
 from ..vec import Floats, Ints
 from . import triangle
-from .bvh import RayBatch
+from .bvh import Ball, RayBatch
 from .hits import Candidates, HitAccumulator
+from .primitives import Primitives
 from .triangle import TriangleTable
+
+
+@record
+class TrianglePrimitives(Primitives):
+    """m triangles."""
+
+    rows = 3
+
+    corners: Floats  # (m, 3, 3) vertices: triangle, corner, xyz
+    table: TriangleTable
+
+    def __len__(self) -> int:
+        """Return the number of triangles."""
+        return len(self.corners)
+
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Lower and upper corners, (3, m) each."""
+        return self.corners.min(1).T, self.corners.max(1).T
+
+    def hull(self) -> Floats:
+        """Return the vertices, (3, 3, m)."""
+        return np.ascontiguousarray(self.corners.transpose(1, 2, 0))
+
+    def filter_rows(self, ball: Ball) -> Floats:
+        """Return the Plücker rows of the edges, (3, m, 6)."""
+        return triangle.edge_rows(self.corners.transpose(1, 0, 2), ball.center, ball.radius)
+
+    def features(self, line: Floats, ball: Ball) -> Floats:
+        """Return the lines' Plücker coordinates (6, n), as they are."""
+        return line
+
+    def values(self, products: Floats, out: Floats) -> Floats:
+        """Return the least products of two edge functions: above 1 where a line certainly hits."""
+        return triangle.least_adjacent_product(products, out)
+
+    def tests(self, batch: RayBatch, found: HitAccumulator, first: int) -> TriangleTests:
+        """Return the exact tests of a batch; triangles have the first ids of a scene."""
+        return TriangleTests(self.table, batch, found)
 
 
 class TriangleTests:
@@ -37,8 +78,10 @@ class TriangleTests:
     def add(self, prim: Ints, lane: Ints, value: Floats) -> None:
         """Add candidates: triangles (k,), lanes (k,) and the filter's values (k,).
 
-        A value above 1 is certainly a hit. No candidate may be the triangle that its ray starts on.
+        A value above 1 is certainly a hit, but for the triangle that a ray starts on.
         """
+        others = np.flatnonzero(prim != self.batch.exclude_prim.take(lane))
+        prim, lane, value = prim.take(others), lane.take(others), value.take(others)
         uncertain = np.flatnonzero(value <= 1)
         if uncertain.size:
             self.add_uncertain(prim.take(uncertain), lane.take(uncertain))
@@ -48,7 +91,7 @@ class TriangleTests:
         self.found.add(lane, prim, triangle.plane_distance(self.table.plane, prim, origin, direction))
 
     def add_uncertain(self, prim: Ints, lane: Ints) -> None:
-        """Add candidates for the exact test: triangles (k,) and lanes (k,).
+        """Add candidates for the exact test: triangles (k,) and lanes (k,), none that its ray starts on.
 
         The first triangle of a quadrilateral stands for both.
         """

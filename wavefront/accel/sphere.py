@@ -1,11 +1,75 @@
-"""Ray-sphere tests: a float32 filter by matrix products, and the exact roots in float64."""
+"""Spheres as primitives: a float32 filter by matrix products, and the exact roots in float64."""
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
+from typing import Any
 
-from ..vec import Bools, Doubles, Floats, Ints, f4
+import numpy as np
+from numpy.typing import NDArray
+
+from ..record import record
+from ..shapes import Sphere
+from ..shapes.attributes import sphere_dpduv, sphere_uv
+from ..vec import Bools, Doubles, Floats, Ints, f4, normalize
+from .bvh import Ball
+from .primitives import CurvedPrimitives
 from .triangle import ROUNDOFF
+
+
+@record
+class SpherePrimitives(CurvedPrimitives):
+    """k spheres."""
+
+    shapes = (Sphere,)
+
+    centers: Floats  # (3, k)
+    radii: Floats  # (k,)
+
+    def __len__(self) -> int:
+        """Return the number of spheres."""
+        return self.radii.size
+
+    @classmethod
+    def from_shapes(cls, shapes: Sequence[Any], center: NDArray[np.float64]) -> SpherePrimitives:
+        """Return the spheres of shapes relative to `center` (3,)."""
+        centers = np.concatenate([shape.centers - center for shape in shapes])
+        radii = np.concatenate([shape.radii for shape in shapes])
+        return cls(np.ascontiguousarray(centers.T, f4), radii.astype(f4))
+
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Lower and upper corners, (3, k) each."""
+        return self.centers - self.radii, self.centers + self.radii
+
+    def filter_rows(self, ball: Ball) -> Floats:
+        """Return the rows (1, k, 11) of `sphere_rows`."""
+        centers, radii = self.centers.astype(np.float64), self.radii.astype(np.float64)
+        return sphere_rows(centers, radii, ball.center, ball.radius)[None]
+
+    def features(self, line: Floats, ball: Ball) -> Floats:
+        """Return the numbers (11, n) that the rows are multiplied by."""
+        return line_features(line[:3], line[3:])
+
+    def distance(self, prim: Ints, origin: Doubles, direction: Doubles, leaves: Bools) -> Doubles:
+        """Return the least t > 0 (n,) at which rays (3, n) hit spheres, inf on a miss."""
+        center = self.centers.take(prim, 1).astype(np.float64)
+        return sphere_distance(center, self.radii.take(prim).astype(np.float64), origin, direction, leaves)
+
+    def surface(self, prim: Ints, point: Floats, error: Floats) -> Floats:
+        """Return the outward normals (3, n), and move the points onto the spheres; their errors hold."""
+        center = self.centers.take(prim, 1)
+        normal = normalize(point - center)
+        np.add(center, normal * self.radii.take(prim), out=point)
+        return normal
+
+    def uv(self, prim: Ints, point: Floats) -> Floats:
+        """Return longitude and latitude, (2, n)."""
+        return sphere_uv(normalize(point - self.centers.take(prim, 1)))
+
+    def dpduv(self, prim: Ints, point: Floats) -> Floats:
+        """Return the derivatives of the point by longitude and latitude, (6, n)."""
+        return sphere_dpduv(normalize(point - self.centers.take(prim, 1)), self.radii.take(prim))
 
 
 def sphere_rows(centers: Doubles, radii: Doubles, center: Floats, radius: float) -> Floats:
@@ -50,9 +114,22 @@ def sphere_distance(
 ) -> Doubles:
     """Return the least t > 0 (k,) at which rays (3, k) hit spheres, inf on a miss.
 
+    A ray that starts on its sphere (`leaves`) has one root at exactly 0; the other one is returned.
+    """
+    first, second, nearest = sphere_roots(center, radius, origin, direction)
+    t = np.where(first > 0, first, second)
+    t = np.where(leaves, 2 * nearest, t)
+    return np.where(t > 0, t, np.inf)
+
+
+def sphere_roots(
+    center: Doubles, radius: Doubles, origin: Doubles, direction: Doubles
+) -> tuple[Doubles, Doubles, Doubles]:
+    """Return where lines (3, k) enter and leave spheres, NaN on a miss, and are nearest to their centers.
+
     Haines et al., "Precision improvements for ray/sphere intersection", Ray Tracing Gems, chapter 7:
     the discriminant from the distance between line and center, and the smaller root from the product of
-    the two. A ray that starts on its sphere (`leaves`) has one root at exactly 0; the other one is returned.
+    the two.
     """
     fx, fy, fz = origin - center
     dx, dy, dz = direction
@@ -64,12 +141,4 @@ def sphere_distance(
     c = fx * fx + fy * fy + fz * fz - radius * radius
     q = b + np.copysign(np.sqrt(a * discriminant), b)  # NaN on a miss
     near, far = c / q, q / a
-    first, second = np.minimum(near, far), np.maximum(near, far)
-    t = np.where(first > 0, first, second)
-    t = np.where(leaves, 2 * nearest, t)
-    return np.where(t > 0, t, np.inf)
-
-
-def spheres_of(centers: Doubles, radii: Doubles, prim: Ints) -> tuple[Doubles, Doubles]:
-    """Gather centers (3, k) and radii (k,) of spheres `prim` (k,)."""
-    return centers.take(prim, 1), radii.take(prim)
+    return np.minimum(near, far), np.maximum(near, far), nearest

@@ -10,10 +10,11 @@ import numpy as np
 from ..accel import Placements
 from ..errors import SceneError
 from ..record import record
-from ..shapes import Instance, Mesh, Shape, Sphere
+from ..shapes import CurvedShape, Instance, Mesh, Shape
 from ..shapes.instance import instance_bounds
 from ..state import SoA
 from ..vec import Doubles, Floats, Ints, f4
+from .curved import by_kind
 
 SKEW = 1e3  # instances whose scales along two axes have a larger ratio become meshes of their own
 BOX_ROOM = 2.0**-20  # margin of boxes on all sides, relative to their size and distance from the center
@@ -23,8 +24,8 @@ BOX_ROOM = 2.0**-20  # margin of boxes on all sides, relative to their size and 
 class InstanceTable(SoA):
     """Data of instances for shading.
 
-    The first two columns, with identity transforms, are for the triangles and the spheres that are not
-    instanced; then there is a column for each instance. Triangles of instances have distinct primitive
+    The first two columns, with identity transforms, are for the triangles and the curved primitives that are
+    not instanced; then there is a column for each instance. Triangles of instances have distinct primitive
     ids, but those of one mesh share the rows of the scene's tables.
     """
 
@@ -55,7 +56,9 @@ def _times(m: Floats, vectors: Floats) -> Floats:
     return np.stack([m[i] * x + m[i + 1] * y + m[i + 2] * z for i in (0, 3, 6)])
 
 
-def sort_shapes(shapes: Sequence[Shape], most_copies: int) -> tuple[list[Mesh], list[Sphere], list[Instance]]:
+def sort_shapes(
+    shapes: Sequence[Shape], most_copies: int
+) -> tuple[list[Mesh], list[CurvedShape], list[Instance]]:
     """Sort shapes by kind, and convert instances to meshes where sharing has no advantage.
 
     These are all instances, if they have no more than `most_copies` triangles together; instances of
@@ -65,21 +68,21 @@ def sort_shapes(shapes: Sequence[Shape], most_copies: int) -> tuple[list[Mesh], 
     total = sum(len(shape.mesh.faces) for shape in shapes if isinstance(shape, Instance))
     copies = Counter(id(shape.mesh) for shape in shapes if isinstance(shape, Instance))
     meshes: list[Mesh] = []
-    spheres: list[Sphere] = []
+    curved: list[CurvedShape] = []
     instances: list[Instance] = []
     shareable = _shareable([shape for shape in shapes if isinstance(shape, Instance)])
     for shape in shapes:
         if isinstance(shape, Mesh):
             meshes.append(shape)
-        elif isinstance(shape, Sphere):
-            spheres.append(shape)
+        elif isinstance(shape, CurvedShape):
+            curved.append(shape)
         elif not isinstance(shape, Instance):
             raise SceneError(f"{shape.name}: cannot trace a {type(shape).__name__}")
         elif total > most_copies and copies[id(shape.mesh)] > 1 and id(shape) in shareable:
             instances.append(shape)
         else:
             meshes.append(shape.to_mesh())
-    return meshes, spheres, instances
+    return meshes, by_kind(curved), instances
 
 
 def _shareable(instances: Sequence[Instance]) -> set[int]:
@@ -103,7 +106,7 @@ def place_instances(
     shared: Sequence[Mesh],
     center: Doubles,
     triangles: int,
-    spheres: int,
+    curved: int,
     material: Ints | None,
 ) -> tuple[Placements, InstanceTable]:
     """Return the data of instances for tracing and for shading.
@@ -114,10 +117,10 @@ def place_instances(
         k of them.
     shared
         The distinct meshes of the instances. Their table rows follow one another, after those of
-        triangles that are not instanced and before those of spheres.
+        triangles that are not instanced and before those of curved primitives.
     center
         (3,) of the scene.
-    triangles, spheres
+    triangles, curved
         The numbers of those that are not instanced.
     material
         (k,) the material of each instance that replaces the mesh's, -1 for none.
@@ -126,7 +129,7 @@ def place_instances(
     mesh_of = np.array([numbers[id(instance.mesh)] for instance in instances], np.intp)
     sizes = np.array([len(mesh.faces) for mesh in shared])
     rows = triangles + np.cumsum(sizes) - sizes
-    ends = triangles + spheres + np.cumsum(sizes.take(mesh_of))
+    ends = triangles + curved + np.cumsum(sizes.take(mesh_of))
     first = ends - sizes.take(mesh_of)
     boxes = instance_bounds(instances) - center
     middles = np.stack([mesh.bounds.mean(0) for mesh in shared]).take(mesh_of, 0)

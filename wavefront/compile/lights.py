@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from ..lights import (
 from ..lights.samplers import LightSamplerMaker
 from ..lights.textured_emission import has_textured_emission, mean_radiance
 from ..scene import Scene
-from ..shapes import Mesh, Shape, Sphere
+from ..shapes import CurvedShape, Mesh, Shape, Sphere
 from ..shapes.attributes import ATTRIBUTES
 from ..textures.base import BaseTexture
 from ..vec import Floats, Ints, f4
@@ -41,7 +41,7 @@ def gather_lights(
     scaled: Sequence[Shape],
     scale: float,
     meshes: Sequence[Mesh],
-    spheres: Sequence[Sphere],
+    curved: Sequence[CurvedShape],
     corners: Sequence[NDArray[np.float64]],
     center: NDArray[np.float64],
     half_size: NDArray[np.float64],
@@ -56,7 +56,7 @@ def gather_lights(
         What is rendered.
     scaled, scale
         Its shapes with all lengths multiplied by `scale`, in the same order.
-    meshes, spheres, corners
+    meshes, curved, corners
         What is traced, and the corners (m, 3, 3) of the meshes' triangles, relative to `center` (3,).
     half_size
         Half of the scene's extent, (3,).
@@ -71,8 +71,9 @@ def gather_lights(
     triangles = sum(len(part) for part in corners)
     starts = np.cumsum([0, *(len(part) for part in corners)])
     first_row = {id(mesh): int(start) for mesh, start in zip(meshes, starts, strict=False)}
-    first_row.update((id(sphere), triangles + number) for number, sphere in enumerate(spheres))
-    parts: list[Part] = [*_area_lights(meshes, corners), *_sphere_lights(spheres, triangles, center)]
+    ends = triangles + np.cumsum([shape.count for shape in curved], dtype=np.intp)
+    first_row.update((id(shape), int(end) - shape.count) for shape, end in zip(curved, ends, strict=True))
+    parts: list[Part] = [*_area_lights(meshes, corners), *_sphere_lights(curved, first_row, center)]
     groups: dict[object, list[LightRecord]] = {}
     infinite: list[InfiniteLight] = []
     surfaces: list[Part] = []
@@ -93,7 +94,7 @@ def gather_lights(
             groups.setdefault((type(record), *map(id, record.shared())), []).append(record)
     parts += [(type(records[0]).concatenate(records), None) for records in groups.values()]
     parts += surfaces
-    light_of = np.full(triangles + len(spheres), -1, np.intp)
+    light_of = np.full(int(ends[-1]) if curved else triangles, -1, np.intp)
     count = 0
     for record, rows in parts:
         if rows is not None:
@@ -122,9 +123,10 @@ def _rows_of(
         raise SceneError(f"{name}: its shape {shape.name!r} is not in the scene; add it to the shapes")
     if id(same[0]) not in first_row:
         raise SceneError(f"{name}: its shape {shape.name!r} must be a wf.Mesh or a wf.Sphere")
+    assert isinstance(shape, Mesh | CurvedShape)
     if shape.material.opacity is not None:
         raise SceneError(f"{name}: its shape {shape.name!r} must be opaque; its material has an alpha")
-    faces = len(shape.faces) if isinstance(shape, Mesh) else 1
+    faces = len(shape.faces) if isinstance(shape, Mesh) else shape.count
     if len(record) not in (1, faces):
         raise SceneError(
             f"{name}: record has {len(record)} columns; it must have 1, or {faces}, one for each face"
@@ -132,29 +134,34 @@ def _rows_of(
     return first_row[id(same[0])] + np.arange(faces)
 
 
-def _sphere_lights(spheres: Sequence[Sphere], first_row: int, center: NDArray[np.float64]) -> list[Part]:
+def _sphere_lights(
+    curved: Sequence[CurvedShape], first_row: dict[int, int], center: NDArray[np.float64]
+) -> list[Part]:
     """Return the lights of emitting spheres, if there are any."""
-    emitting = [number for number, sphere in enumerate(spheres) if sphere.emission is not None]
-    for number in emitting:
-        sphere = spheres[number]
-        if isinstance(sphere.emission, BaseTexture):
+    emitting = [shape for shape in curved if shape.emission is not None]
+    for shape in emitting:
+        if not isinstance(shape, Sphere):
             raise SceneError(
-                f"{sphere.name}: a sphere shines evenly; a mesh can shine by {sphere.emission!r}"
+                f"{shape.name}: a {type(shape).__name__} cannot shine; a wf.Sphere or a wf.Mesh can"
             )
-        if sphere.material.opacity is not None:
+        if isinstance(shape.emission, BaseTexture):
+            raise SceneError(f"{shape.name}: a sphere shines evenly; a mesh can shine by {shape.emission!r}")
+        if shape.material.opacity is not None:
             raise SceneError(
-                f"{sphere.name}: a sphere that shines must be all there; its material has an alpha"
+                f"{shape.name}: a sphere that shines must be all there; its material has an alpha"
             )
     if not emitting:
         return []
-    lights = [_sphere_light(spheres[number], center) for number in emitting]
-    return [(SphereLights.concatenate(lights), first_row + np.array(emitting))]
+    rows = [first_row[id(shape)] + np.arange(shape.count) for shape in emitting]
+    lights = [_lights_of_spheres(shape, center) for shape in emitting]
+    return [(SphereLights.concatenate(lights), np.concatenate(rows))]
 
 
-def _sphere_light(sphere: Sphere, center: NDArray[np.float64]) -> SphereLights:
-    """Return the light of an emitting sphere, relative to `center` (3,)."""
-    middle = (sphere.center - center).astype(f4).reshape(3, 1)
-    return SphereLights(middle, np.array([sphere.radius], f4), sphere.emission)
+def _lights_of_spheres(shape: Any, center: NDArray[np.float64]) -> SphereLights:
+    """Return the lights of a shape of emitting spheres, relative to `center` (3,)."""
+    middles = np.ascontiguousarray((shape.centers - center).T, f4)
+    radiance = np.repeat(shape.emission, shape.count, 1)
+    return SphereLights(middles, shape.radii.astype(f4), radiance)
 
 
 def _area_lights(meshes: Sequence[Mesh], corners: Sequence[NDArray[np.float64]]) -> list[Part]:

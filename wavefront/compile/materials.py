@@ -12,7 +12,7 @@ from ..bsdfs import Bsdf
 from ..errors import SceneError
 from ..materials import Material, Opacity
 from ..record import record
-from ..shapes import Instance, Mesh, Shape, Sphere
+from ..shapes import CurvedShape, Instance, Mesh, Shape
 from ..shapes.attributes import ATTRIBUTES
 from ..state import SurfaceInteraction
 from ..textures.base import BaseTexture
@@ -213,7 +213,7 @@ def _parameters_read(thing: Bsdf | Opacity) -> set[str]:
 
 
 def number_materials(
-    meshes: Sequence[Mesh], spheres: Sequence[Sphere], instances: Sequence[Instance]
+    meshes: Sequence[Mesh], curved: Sequence[CurvedShape], instances: Sequence[Instance]
 ) -> tuple[list[Material], Ints, Ints | None]:
     """Return the distinct materials, and their numbers for each table row and for each instance.
 
@@ -223,7 +223,7 @@ def number_materials(
     of_parts: dict[tuple[int, ...], int] = {}
     materials: list[Material] = []
     of_shape: list[int] = []
-    shapes: list[Shape] = [*meshes, *spheres, *instances]
+    shapes: list[Shape] = [*meshes, *curved, *instances]
     for shape in shapes:
         material = shape.material
         if id(material) not in numbers:
@@ -232,8 +232,8 @@ def number_materials(
             if number == len(materials):
                 materials.append(material)
         of_shape.append(numbers[id(material)])
-    rows = len(meshes) + len(spheres)
-    counts = [len(mesh.faces) for mesh in meshes] + [1] * len(spheres)
+    rows = len(meshes) + len(curved)
+    counts = [len(mesh.faces) for mesh in meshes] + [shape.count for shape in curved]
     of_row = np.repeat(np.array(of_shape[:rows], np.intp), counts)
     own = [instance.material is not instance.mesh.material for instance in instances]
     replaced = np.where(own, np.array(of_shape[rows:], np.intp), -1) if any(own) else None

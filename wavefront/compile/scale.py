@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..lights import Light
 from ..materials import Material
-from ..shapes import Instance, Mesh, Shape, Sphere
+from ..shapes import CurvedShape, Instance, Mesh, Shape
 
 # Radii of scenes that are not scaled. The upper limit is nearer: no part of a scene is larger than it.
 MIN_RADIUS, MAX_RADIUS = 2.0**-20, 2.0**24
@@ -56,7 +56,7 @@ def scaled_shapes(shapes: Sequence[Shape], factor: float) -> list[Shape]:
     for shape in shapes:
         if isinstance(shape, Instance):
             part: Shape = shape.scaled(factor, meshes[id(shape.mesh)], own[id(shape.mesh)])
-        elif isinstance(shape, Mesh | Sphere):
+        elif isinstance(shape, Mesh | CurvedShape):
             part = shape.scaled(factor)
         else:
             raise SceneError(f"{shape.name}: cannot scale a {type(shape).__name__}")

@@ -16,6 +16,7 @@ from ..scene import Scene
 from ..shapes import Shape
 from ..shapes.attributes import Corners, corner_values
 from ..vec import Bools, Floats, Ints, f4
+from .curved import CurvedTable
 from .geometry import compute_corner_normals, compute_face_normals, same_as_next
 from .instances import InstanceTable, own_frame, place_instances, sort_shapes
 from .lights import gather_lights
@@ -35,7 +36,7 @@ from .scale import check_distance, check_lights, length_factor, scaled_shapes
 
 @record
 class CompiledScene:
-    """A scene as flat arrays, relative to its center. Triangles come first, then spheres.
+    """A scene as flat arrays, relative to its center. Triangles come first, then curved primitives.
 
     An instanced mesh is in the arrays once, in its own coordinates. If the scene is extremely large or small,
     all lengths here and in the accelerator are in another unit (see scale.py).
@@ -50,8 +51,7 @@ class CompiledScene:
     attributes: dict[
         str, Corners
     ]  # by field of `SurfaceInteraction`, those that a material reads; 3 × (width, m)
-    sphere_centers: Floats  # (3, k)
-    sphere_radii: Floats  # (k,)
+    curved: CurvedTable  # k of them
     material_of: Ints  # (m + k,) material of each primitive
     light_of: Ints  # (m + k + 1,) light of each primitive, and at the end that of a miss; -1 for none
     emissive: Bools  # (m + k + 1,) whether `light_of` names a light
@@ -106,8 +106,9 @@ def compile_scene(
     Raises
     ------
     SceneError
-        If an emitting shape has no area, an emitting sphere has an alpha or a textured emission, a light
-        is malformed, too far away or too strong for the scene's size, or the choice is unknown.
+        If an emitting shape has no area, an emitting sphere has an alpha or a textured emission, a shape
+        cannot shine, a light is malformed, too far away or too strong for the scene's size, or the choice
+        is unknown.
     """
     scene.check()
     low, high = scene.bounds
@@ -117,22 +118,21 @@ def compile_scene(
     low, high = low * scale, high * scale
     center = (low + high) / 2
     scaled = scaled_shapes(scene.shapes, scale)
-    meshes, spheres, instances = sort_shapes(scaled, most_copies)
-    placed: list[Shape] = [*meshes, *spheres, *instances]
+    meshes, curved, instances = sort_shapes(scaled, most_copies)
+    placed: list[Shape] = [*meshes, *curved, *instances]
     shared = list({id(instance.mesh): instance.mesh for instance in instances}.values())
     once = sum(len(mesh.faces) for mesh in meshes)
     corners = [(mesh.vertices - center).take(mesh.faces, 0) for mesh in meshes]
     corners += [own_frame(mesh).take(mesh.faces, 0) for mesh in shared]
     meshes += shared
     triangles = np.concatenate(corners) if corners else np.zeros((0, 3, 3))
-    user_materials, material_of, replaced = number_materials(meshes, spheres, instances)
+    user_materials, material_of, replaced = number_materials(meshes, curved, instances)
     lights, light_of, environment = gather_lights(
-        scene, scaled, scale, meshes, spheres, corners, center, (high - low) / 2, light_sampler, mis
+        scene, scaled, scale, meshes, curved, corners, center, (high - low) / 2, light_sampler, mis
     )
     read = sorted({*attributes_read(placed), *lights.reads})
     attributes = {name: corner_values(name, meshes) for name in read}
-    centers = np.array([s.center - center for s in spheres]).reshape(-1, 3).T.astype(f4)
-    radii = np.array([s.radius for s in spheres]).astype(f4)
+    table_of_curved = CurvedTable.of(curved, center)
     smooth = any(mesh.normals is not None for mesh in meshes)
     triangles32 = np.ascontiguousarray(triangles, f4)
     has_alpha = find_alpha(user_materials, material_of, meshes, instances)
@@ -141,14 +141,13 @@ def compile_scene(
     weights = bool(attributes) or smooth
     normals = compute_face_normals(triangles)
     interchangeable = None if weights else same_as_next(material_of[:once], light_of[:once])
-    geometry = Geometry(triangles32[:once], np.ascontiguousarray(centers), radii, weights, interchangeable)
+    geometry = Geometry(triangles32[:once], table_of_curved.kinds, weights, interchangeable)
     accelerator, table = make_accelerator(geometry), None
     if shared:
-        placements, table = place_instances(instances, shared, center, once, len(spheres), replaced)
-        none = np.zeros((3, 0), f4), np.zeros(0, f4)
+        placements, table = place_instances(instances, shared, center, once, len(table_of_curved), replaced)
         ends = np.cumsum([len(mesh.faces) for mesh in shared])
         parts = np.split(triangles32[once:], ends[:-1])
-        built = [make_accelerator(Geometry(part, *none, weights)) for part in parts]
+        built = [make_accelerator(Geometry(part, (), weights)) for part in parts]
         accelerator = InstanceAccelerator(accelerator, built, placements)
     return CompiledScene(
         scale=scale,
@@ -158,8 +157,7 @@ def compile_scene(
         normals=normals,
         corner_normals=compute_corner_normals(meshes, normals),
         attributes=attributes,
-        sphere_centers=geometry.centers,
-        sphere_radii=geometry.radii,
+        curved=table_of_curved,
         material_of=material_of,
         light_of=light_of,
         emissive=light_of >= 0,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +39,7 @@ class Checked:
 
 
 class Shape(ABC):
-    """Base class of shapes: a `Mesh`, a `Sphere` or an `Instance`.
+    """Base class of shapes: a `Mesh`, an `Instance`, or one of curved primitives, such as a `Sphere`.
 
     Attributes
     ----------
@@ -78,3 +78,18 @@ class Shape(ABC):
     @abstractmethod
     def bounds(self) -> NDArray[np.float64]:
         """Lower and upper corner, (2, 3), scene units."""
+
+
+class CurvedShape(Shape):
+    """Base class of shapes whose primitives are not triangles: one `Sphere`, or many of one kind."""
+
+    colors: NDArray[np.float64] | None = None  # (count, 4) linear colors, or None if all are white
+
+    @property
+    @abstractmethod
+    def count(self) -> int:
+        """Number of primitives."""
+
+    @abstractmethod
+    def scaled(self, factor: float) -> Self:
+        """Return the shape with all lengths multiplied by `factor`, and the same material."""

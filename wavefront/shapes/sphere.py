@@ -14,7 +14,7 @@ from ..materials import Material, MaterialLike
 from ..suggestions import suggests_keywords
 from ..textures.base import BaseTexture
 from ..vec import FLOAT32_MAX
-from .base import Checked, Shape
+from .base import Checked, CurvedShape
 from .mesh import FLOAT32_MIN
 
 
@@ -32,7 +32,7 @@ def _radius(name: str, value: float) -> float:
     return number(name, value, lambda x: FLOAT32_MIN <= x <= FLOAT32_MAX, limit)
 
 
-class Sphere(Shape):
+class Sphere(CurvedShape):
     """A sphere, intersected exactly.
 
     Parameters
@@ -96,6 +96,21 @@ class Sphere(Shape):
         if isinstance(emission, BaseTexture):
             raise SceneError(f"{self.name}: a sphere shines evenly; a mesh can shine by {emission!r}")
         self._emission = None if emission is None else rgb(f"{self.name}: emission", emission)
+
+    @property
+    def count(self) -> int:
+        """Number of spheres."""
+        return 1
+
+    @property
+    def centers(self) -> NDArray[np.float64]:
+        """The center as one row, (1, 3)."""
+        return self.center[None]
+
+    @property
+    def radii(self) -> NDArray[np.float64]:
+        """The radius as an array, (1,)."""
+        return np.array([self.radius])
 
     def scaled(self, factor: float) -> Sphere:
         """Return the sphere with all lengths multiplied by `factor`, and the same material."""

@@ -22,7 +22,7 @@ def interaction(scene: CompiledScene, rays: Rays, hits: Hits) -> SurfaceInteract
     instances = _instances_of(scene, hits)
     error: Floats = POINT_ERROR * (highest(np.abs(point)) + hits.t)
     wo = -rays.direction
-    ng = normals(scene, hits.prim, point)
+    ng = normals(scene, hits.prim, point, error)
     if instances is not None:
         ng, error = _normals_to_scene(instances, hits, ng, error)
     ns = _shading_normals(scene, hits, instances, ng)
@@ -71,21 +71,21 @@ def material_rows(scene: CompiledScene, hits: Hits, lanes: Lanes) -> Ints:
     return np.where(replaced >= 0, replaced, material)
 
 
-def normals(scene: CompiledScene, prim: Ints, point: Floats) -> Floats:
+def normals(scene: CompiledScene, prim: Ints, point: Floats, error: Floats) -> Floats:
     """Return the unit geometric normals (3, n) of the front side at points on primitives.
 
-    Points of spheres are projected onto the sphere, in place.
+    Points of curved primitives are moved onto the surface, and their error bounds (n,) corrected, in place.
     """
-    if not len(scene.sphere_radii):
+    if not scene.curved.kinds:
         return scene.normals.take(prim, 1)
     if not scene.triangles:
-        return _onto_sphere(scene, prim, point)
+        return scene.curved.surface(prim, point, error)
     ng = scene.normals.take(np.minimum(prim, scene.triangles - 1), 1)
     round_ = np.flatnonzero(prim >= scene.triangles)
     if round_.size:
-        on = point.take(round_, 1)
-        ng[:, round_] = _onto_sphere(scene, prim.take(round_) - scene.triangles, on)
-        point[:, round_] = on
+        on, bound = point.take(round_, 1), error.take(round_)
+        ng[:, round_] = scene.curved.surface(prim.take(round_) - scene.triangles, on, bound)
+        point[:, round_], error[round_] = on, bound
     return ng
 
 
@@ -113,13 +113,6 @@ def face_viewer(wo: Floats, ns: Floats) -> Floats:
     return ns
 
 
-def _onto_sphere(scene: CompiledScene, sphere: Ints, point: Floats) -> Floats:
-    center = scene.sphere_centers.take(sphere, 1)
-    normal = normalize(point - center)
-    np.add(center, normal * scene.sphere_radii.take(sphere), out=point)
-    return normal
-
-
 def _shading_normals(
     scene: CompiledScene, hits: Hits, instances: InstanceTable | None, ng: Floats
 ) -> Floats | None:
@@ -137,21 +130,20 @@ def _shading_normals(
 
 
 def _attribute(scene: CompiledScene, name: str, corners: Corners, hits: Hits, point: Floats) -> Floats:
-    """Return an attribute at hits, (c, n): interpolated on triangles, computed on spheres."""
+    """Return an attribute at hits, (c, n): interpolated on triangles, computed on curved primitives."""
     if scene.triangles:
         values = _interpolate(_at_corners(corners, hits, scene.triangles), hits)
     else:
         values = np.empty((len(corners[0]), len(hits.prim)), f4)
     round_ = np.flatnonzero(hits.prim >= scene.triangles)
     if round_.size:
-        sphere = hits.prim.take(round_) - scene.triangles
-        normal = normalize(point.take(round_, 1) - scene.sphere_centers.take(sphere, 1))
-        values[:, round_] = ATTRIBUTES[name].on_spheres(normal, scene.sphere_radii.take(sphere))
+        prim = hits.prim.take(round_) - scene.triangles
+        values[:, round_] = ATTRIBUTES[name].on_curved(scene.curved, prim, point.take(round_, 1))
     return values
 
 
 def _at_corners(table: Corners, hits: Hits, triangles: int) -> list[Floats]:
-    """Return the values at the corners of hit triangles, 3 × (c, n); those of any triangle for spheres."""
+    """Return the values at the corners of hit triangles, 3 × (c, n); those of any triangle for others."""
     prim = np.minimum(hits.prim, triangles - 1)
     return [corner.take(prim, 1) for corner in table]
 

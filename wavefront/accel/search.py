@@ -1,0 +1,108 @@
+"""The search for hits among the primitives of one kind: behind the filter alone, or behind a tree, too."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from ..vec import Floats, Ints, f4
+from .bvh import BLOCK, BLOCK_SHIFT, CHUNK, Ball, RayBatch, blocks, build_bvh, flat_true, scratch, trace
+from .hits import AnyHit, Candidates, HitAccumulator
+from .primitives import Primitives, PrimitiveTests
+
+WIDTH = 32  # children of a node
+
+
+class PrimitiveList:
+    """Few primitives: all lines are filtered by all of them. Their ids start at `first`."""
+
+    tree = None
+
+    def __init__(self, primitives: Primitives, ball: Ball, first: int) -> None:
+        self._primitives, self._ball, self._first = primitives, ball, first
+        rows = primitives.filter_rows(ball)
+        self._rows = rows.reshape(-1, rows.shape[-1])
+
+    def find_hits(self, batch: RayBatch, found: HitAccumulator) -> None:
+        """Add all hits to `found`."""
+        count = len(self._primitives)
+        if not count:
+            return
+        tests = self._primitives.tests(batch, found, self._first)
+        features = self._primitives.features(batch.line[:, :-1], self._ball)
+        n = batch.count
+        step = max(64, CHUNK // len(self._rows))
+        for at in range(0, n, step):
+            products = self._rows @ features[:, at : at + step]
+            shape = 1, self._primitives.rows, count, products.shape[1]
+            value = self._primitives.values(products.reshape(shape), np.empty((1, *shape[2:]), f4))
+            hit = flat_true(value >= -1)
+            slot, lane = np.divmod(hit, shape[3])
+            tests.add(slot, lane + at, value.reshape(-1).take(hit))
+        tests.finish()
+
+
+class PrimitiveTree:
+    """A tree over primitives `ids` (m,) of all `primitives`, whose ids in the scene start at `first`."""
+
+    def __init__(self, primitives: Primitives, ids: Ints, ball: Ball, first: int, leaf_size: int) -> None:
+        self._primitives, self._ball, self._first = primitives, ball, first
+        hull, rows = primitives.hull(), primitives.filter_rows(ball)
+        if ids.size < hull.shape[2]:
+            hull = hull.take(ids, 2)
+        self.tree = build_bvh(hull, leaf_size, WIDTH, ball)
+        self._slots = ids.take(self.tree.prim)
+        empty = self.tree.prim < 0
+        leaves = rows.take(self._slots.reshape(-1, leaf_size), 1)  # (rows, leaves, leaf_size, columns)
+        leaves[:, empty.reshape(-1, leaf_size)] = np.nan
+        count, columns = leaves.shape[1], leaves.shape[3]
+        self.tree.leaves = np.ascontiguousarray(leaves.transpose(1, 0, 2, 3)).reshape(count, -1, columns)
+
+    def find_hits(self, batch: RayBatch, found: HitAccumulator) -> None:
+        """Add all hits to `found`."""
+        tests = self._primitives.tests(batch, found, self._first)
+        features = self._primitives.features(batch.line, self._ball)
+        trace(self.tree, batch, found.t_far, partial(self._visit, batch.count, features, tests))
+        tests.finish()
+
+    def find_blocked(self, batch: RayBatch, found: AnyHit) -> None:
+        """Mark the blocked lanes in `found`."""
+        self.find_hits(batch, found)
+
+    def resolve_quads(self, prim: Ints, batch: RayBatch, t: Floats) -> Ints:
+        """Return the primitives (n,) unchanged: the tree tests no quadrilaterals."""
+        return prim
+
+    def _visit(self, n: int, features: Floats, tests: PrimitiveTests, leaf: Ints, lane: Ints) -> None:
+        """Test pairs of leaf and lane, and pass the candidates to `tests`."""
+        size, rows, columns = self.tree.leaf_size, self._primitives.rows, len(features)
+        leaves, block_lanes = blocks(leaf, lane, n)
+
+        def add_candidates(at: Ints, value: Floats) -> None:
+            """Pass on candidates at flat indices `at` (k,) of the product (blocks, leaf size, BLOCK)."""
+            pair = at >> BLOCK_SHIFT
+            block = pair // size
+            slot = leaves.take(block) * size + (pair & (size - 1))
+            lane = block_lanes.take((block << BLOCK_SHIFT) + (at & (BLOCK - 1)))
+            tests.add(self._slots.take(slot), lane, value)
+
+        step = max(1, CHUNK // (rows * size * BLOCK))
+        candidates = Candidates(add_candidates)
+        for start in range(0, leaves.size, step):
+            chosen = leaves[start : start + step]
+            shape = (chosen.size, rows * size, BLOCK)
+            matrices = np.take(self.tree.leaves, chosen, 0, scratch("leaves", (*shape[:2], columns)), "clip")
+            some = block_lanes[start * BLOCK : (start + chosen.size) * BLOCK]
+            rays = scratch("rays", (chosen.size, columns, BLOCK))
+            for row in range(columns):
+                rays[:, row] = features[row].take(some).reshape(-1, BLOCK)
+            products = np.matmul(matrices, rays, out=scratch("product", shape))
+            value = self._primitives.values(
+                products.reshape(-1, rows, size, BLOCK), scratch("value", (chosen.size, size, BLOCK))
+            )
+            at = flat_true(np.greater_equal(value, -1, out=scratch("mask", value.shape, np.bool_)))
+            value = value.reshape(-1).take(at)
+            at += start * (size * BLOCK)
+            candidates.add(at, value)
+        candidates.flush()

@@ -1,0 +1,88 @@
+"""The curved primitives of a scene: spheres and others, kind by kind."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..accel import KINDS, CurvedPrimitives, kind_of
+from ..record import record
+from ..shapes import CurvedShape
+from ..vec import ALL, Floats, Ints, Lanes, f4, put, take
+
+
+def by_kind(shapes: Sequence[CurvedShape]) -> list[CurvedShape]:
+    """Return shapes in the order of the table of kinds, and of one kind in their own order."""
+    return sorted(shapes, key=lambda shape: KINDS.index(kind_of(shape)))
+
+
+@record
+class CurvedTable:
+    """All curved primitives, numbered from 0 on."""
+
+    kinds: tuple[CurvedPrimitives, ...]
+    first: tuple[int, ...]  # number of the first primitive of each kind
+    colors: Floats | None  # (4, k) linear RGB and opacity; None if all are opaque white
+
+    @classmethod
+    def of(cls, shapes: Sequence[CurvedShape], center: NDArray[np.float64]) -> CurvedTable:
+        """Return the primitives of shapes, which `by_kind` has ordered, relative to `center` (3,)."""
+        members: dict[type[CurvedPrimitives], list[CurvedShape]] = {}
+        for shape in shapes:
+            members.setdefault(kind_of(shape), []).append(shape)
+        kinds = tuple(kind.from_shapes(some, center) for kind, some in members.items())
+        ends = np.cumsum([len(kind) for kind in kinds], dtype=np.intp)
+        colors = None
+        if any(shape.colors is not None for shape in shapes):
+            rows = [np.ones((s.count, 4)) if s.colors is None else s.colors for s in shapes]
+            colors = np.ascontiguousarray(np.concatenate(rows).T, f4)
+        return cls(kinds, tuple(ends - [len(kind) for kind in kinds]), colors)
+
+    def __len__(self) -> int:
+        """Return the number of primitives."""
+        return sum(map(len, self.kinds))
+
+    def surface(self, prim: Ints, point: Floats, error: Floats) -> Floats:
+        """Return the outward unit normals (3, n) at hit points (3, n) of primitives (n,).
+
+        Points are moved onto the surface, and their error bounds (n,) corrected, in place.
+        """
+        if len(self.kinds) == 1:
+            return self.kinds[0].surface(prim, point, error)
+        normal = np.empty_like(point)
+        for kind, lanes, own in self._by_kind(prim):
+            some, bound = take(point, lanes), take(error, lanes)
+            put(normal, lanes, kind.surface(own, some, bound))
+            put(point, lanes, some)
+            error[lanes] = bound
+        return normal
+
+    def uv(self, prim: Ints, point: Floats) -> Floats:
+        """Return texture coordinates, (2, n)."""
+        values = np.empty((2, prim.size), f4)
+        for kind, lanes, own in self._by_kind(prim):
+            values[:, lanes] = kind.uv(own, take(point, lanes))
+        return values
+
+    def dpduv(self, prim: Ints, point: Floats) -> Floats:
+        """Return the derivatives of the point by `uv`, (6, n)."""
+        values = np.empty((6, prim.size), f4)
+        for kind, lanes, own in self._by_kind(prim):
+            values[:, lanes] = kind.dpduv(own, take(point, lanes))
+        return values
+
+    def color(self, prim: Ints, point: Floats) -> Floats:
+        """Return linear RGB and opacity, (4, n)."""
+        return np.ones((4, prim.size), f4) if self.colors is None else self.colors.take(prim, 1)
+
+    def _by_kind(self, prim: Ints) -> Iterator[tuple[CurvedPrimitives, Lanes, Ints]]:
+        """Yield the kinds, with their lanes and numbers within the kind."""
+        for kind, first in zip(self.kinds, self.first, strict=True):
+            if len(self.kinds) == 1:
+                yield kind, ALL, prim
+                continue
+            lanes = np.flatnonzero((prim >= first) & (prim < first + len(kind)))
+            if lanes.size:
+                yield kind, lanes, prim.take(lanes) - first
