@@ -46,6 +46,7 @@ def render(
     light_sampler: str | LightSamplerMaker = "spatial",
     branches: int = 1,
     wave_size: int | None = None,
+    max_memory: int | str | None = None,
     aovs: str | Sequence[str] = (),
     progress: Progress = None,
 ) -> Image:
@@ -115,6 +116,11 @@ def render(
     wave_size
         The most paths that are traced together by one worker; by default what suits their number and
         speed, at most 131 072. The picture does not depend on it.
+    max_memory
+        The most memory that this program and its workers may use together, with what it uses
+        already: a number of bytes, or a size such as "2GB" or "800MiB". It sizes waves, and the
+        number of workers where not all of them fit. The picture does not depend on it. A render that
+        needs more is refused before it begins.
     aovs
         Layers beside the picture, by name: "position", "depth", "distance", "normal", "normal_geometric",
         "uv", "shape_id", "instance_id", "material_id", "alpha", "albedo", "direct", "indirect",
@@ -163,6 +169,7 @@ def render(
         light_sampler=light_sampler,
         branches=branches,
         wave_size=wave_size,
+        max_memory=max_memory,
         aovs=aovs,
         progress=progress,
     )

@@ -72,7 +72,7 @@ class Session:
         As for `render`.
     integrator, max_bounces, seed, sampler, accel, filter, light_sampler, branches
         As for `render`.
-    workers, executor, noise, seconds, wave_size, aovs, progress
+    workers, executor, noise, seconds, wave_size, max_memory, aovs, progress
         As for `render`.
 
     Raises
@@ -110,6 +110,7 @@ class Session:
         light_sampler: str | LightSamplerMaker = "spatial",
         branches: int = 1,
         wave_size: int | None = None,
+        max_memory: int | str | None = None,
         aovs: str | Sequence[str] = (),
         progress: Progress = None,
     ) -> None:
@@ -136,6 +137,7 @@ class Session:
             light_sampler=light_sampler,
             branches=branches,
             wave_size=wave_size,
+            max_memory=max_memory,
             aovs=aovs,
             progress=progress,
         )
@@ -148,6 +150,7 @@ class Session:
         reserve_buffers(1)
         self._scene = as_scene(subject, settings.material, settings.progress)
         camera = choose_camera(self._scene, settings.camera, settings.size, settings.up_vector)
+        settings.budget(camera.size)  # refuses a picture that cannot fit before work
         accumulator = Accumulator(*camera.size)
         self._preset = choose_preset(self._scene, settings.lighting)
         self._lighted = lighted(self._scene, self._preset, ground=settings.ground, up=settings.up_vector)
@@ -167,6 +170,7 @@ class Session:
             settings.estimator(),
             settings.max_bounces,
         )
+        self._budget = settings.budget(camera.size)
         self._make_pool(settings.executor_for(camera.size))
         self._begin_picture(camera, accumulator, begin)
 
@@ -176,9 +180,7 @@ class Session:
         self._monitor = WaveMonitor()
         self.interrupt_handler = InterruptHandler(self._monitor.stop)
         work = partial(trace_job, self._tracer, self._monitor)
-        self._pool = WorkerPool[Job, JobResult](
-            work, self._settings.worker_count, executor, self._monitor.stop
-        )
+        self._pool = WorkerPool[Job, JobResult](work, self._budget.workers, executor, self._monitor.stop)
         if self._in_block:
             self._pool.__enter__()
 
@@ -186,7 +188,7 @@ class Session:
         """Get ready for a picture of a view; `begin` is when it was asked for, by `time.perf_counter`."""
         settings = self._settings
         scheduler = Scheduler(
-            begin, settings.seconds, settings.wave_size, settings.worker_count, settings.branches
+            begin, settings.seconds, self._budget.wave_size, self._budget.workers, settings.branches
         )
         self._loop = RenderLoop(
             View(self._compiled.view(camera), scheduler.deadline),
@@ -295,13 +297,17 @@ class Session:
         size = None if size is None else image_size(size)
         camera = choose_camera(self._scene, camera, size, self._settings.up_vector)
         self._compiled.view(camera)  # checks its distance
+        budget = self._settings.budget(camera.size)
         accumulator = Accumulator(*camera.size)
         executor = self._settings.executor_for(camera.size)
         with self.interrupt_handler:
             self._discard_sweeps()
             if not self._pool.closed:
                 self._pool.cancel()
-            if self._monitor.stop.value or (executor, self._executor) == ("processes", "threads"):
+            others = (executor, self._executor) == ("processes", "threads")
+            others |= budget.workers != self._budget.workers
+            self._budget = budget
+            if self._monitor.stop.value or others:
                 self._pool.close()
                 self._make_pool(executor)
         self._begin_picture(camera, accumulator, begin)
@@ -402,7 +408,7 @@ class Session:
                 "filter": FILTERS.label(settings.filter),
                 "branches": settings.branches,
                 "accelerator": self._compiled.accelerator.name,
-                "workers": settings.worker_count,
+                "workers": self._budget.workers,
                 "executor": EXECUTORS.label(self._executor),
                 "seconds": self._loop.scheduler.elapsed,
                 "interrupted": cut_short,

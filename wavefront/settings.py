@@ -23,10 +23,12 @@ from .layers import chosen_layers
 from .lighting import DEFAULT, LIGHTINGS, check_lighting
 from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
 from .materials import MaterialLike
+from .memory import memory_size
 from .progress import Progress
 from .record import record
 from .registry import Registry
 from .sampling.sampler import SAMPLERS, Sampler, SamplerMaker, make_sampler
+from .scheduling.budget import Budget, plan
 from .scheduling.executors import EXECUTORS, choose_executor, worker_count
 from .scheduling.workers import ExecutorMaker
 
@@ -255,6 +257,15 @@ class Settings:
         "and speed, at most 131 072. The picture does not depend on it.",
         check=optional(whole_number(1, 2**24)),
     )
+    max_memory: int | str | None = setting(
+        None,
+        "The most memory that this program and its workers may use together, with what it uses already: "
+        'a number of bytes, or a size such as "2GB" or "800MiB". It sizes waves, and the number of workers '
+        "where not all of them fit. The picture does not depend on it. A render that needs more is refused "
+        "before it begins.",
+        option="memory to use at most, such as 2GB",
+        check=optional(memory_size),
+    )
     aovs: str | Sequence[str] = setting(
         (),
         'Layers beside the picture, by name: "position", "depth", "distance", "normal", '
@@ -273,6 +284,7 @@ class Settings:
     )
     max_spp: int = field(init=False)  # the most samples that a pixel may get
     worker_count: int = field(init=False)
+    memory_limit: int | None = field(init=False)  # bytes
     up_vector: NDArray[np.float64] = field(init=False)  # (3,)
 
     def __post_init__(self) -> None:
@@ -281,6 +293,7 @@ class Settings:
             if check is not None:
                 setattr(self, each.name, check(each.name, getattr(self, each.name)))
         self.max_spp = self._most_samples()
+        self.memory_limit = None if self.max_memory is None else int(self.max_memory)
         self.worker_count = worker_count(self.workers)
         self.up_vector = upward("up", "y" if self.up is None else self.up)
         self.estimator()
@@ -310,6 +323,11 @@ class Settings:
         """Return the executor for a picture of a size (width, height)."""
         paths = size[0] * size[1] * self.max_spp * self.branches
         return choose_executor(self.executor, self.worker_count, paths)
+
+    def budget(self, size: tuple[int, int]) -> Budget:
+        """Return the workers, and the largest wave, for a picture of a size (width, height)."""
+        processes = self.executor_for(size) != "threads"
+        return plan(self.memory_limit, size, self.worker_count, self.wave_size, processes)
 
     def _most_samples(self) -> int:
         most = min(MAX_TERMS, MAX_BRANCH_SAMPLES // self.branches)

@@ -18,6 +18,11 @@ PICTURE_BYTES = 64  # of a pixel of the picture, and of what is needed to make i
 SPARE_BYTES = 16 << 20
 
 
+def picture_memory(width: int, height: int) -> int:
+    """Return how many bytes a film, and the picture that is made of it, need."""
+    return (FILM_BYTES + PICTURE_BYTES) * width * height + SPARE_BYTES
+
+
 class Accumulator:
     """Sums over all jobs that are done.
 
@@ -38,10 +43,11 @@ class Accumulator:
 
     def __init__(self, width: int, height: int) -> None:
         pixels = width * height
-        picture = PICTURE_BYTES * pixels + SPARE_BYTES
-        check_memory(f"a picture of {width}x{height} pixels", FILM_BYTES * pixels + picture)
+        check_memory(f"a picture of {width}x{height} pixels", picture_memory(width, height))
         self.film, self.bad, self.rays = Film(width, height), BadSamples(), 0
-        self._reserve: Any = np.empty(picture, np.uint8)  # for the picture so far when memory has run out
+        self._reserve: Any = np.empty(
+            PICTURE_BYTES * pixels + SPARE_BYTES, np.uint8
+        )  # for the picture so far when memory has run out
 
     @property
     def samples(self) -> int:

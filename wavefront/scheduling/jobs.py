@@ -41,6 +41,12 @@ class Job:
         """One past the index of the last sample."""
         return self.first_sample + self.samples
 
+    def halves(self) -> tuple[Job, ...]:
+        """Return jobs for the first and the second half of the pixels; of one pixel, the job itself."""
+        half = self.pixels.size // 2
+        parts = (self.pixels[:half], self.pixels[half:]) if half else (self.pixels,)
+        return tuple(Job(self.view, pixels, self.first_sample, self.samples) for pixels in parts)
+
     def __str__(self) -> str:
         """Name the block in an error message."""
         last = self.end - 1

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
+from itertools import chain
 from typing import TypeAlias
 
 from ..errors import RenderError
@@ -97,7 +99,8 @@ class RenderLoop:
                     if step.first:
                         yield True
                     parts = list(split(step))
-                    for job, result in pool.run(self.scheduler.in_time(self._jobs(parts)), waiting):
+                    jobs = self.scheduler.in_time(self._jobs(parts))
+                    for job, result in self._results(pool, jobs, waiting):
                         self.accumulator.add(job, result)
                         self.scheduler.job_done(job, result.seconds)
                         wave_done()
@@ -113,6 +116,42 @@ class RenderLoop:
                 self.interrupted = True
             except (MemoryError, RenderError) as error:
                 self.failure = error
+
+    def _results(
+        self, pool: WorkerPool[Job, JobResult], jobs: Iterator[Job], waiting: Callable[[], None]
+    ) -> Iterator[tuple[Job, JobResult]]:
+        """Yield jobs with their results, in order; those for which there was no memory are halved.
+
+        Raises
+        ------
+        MemoryError
+            If there is none for a few paths either.
+        """
+        given: deque[Job] = deque()  # to the pool; their results have not come yet
+
+        def remember(jobs: Iterator[Job]) -> Iterator[Job]:
+            while True:
+                try:
+                    given.append(next(jobs))
+                except StopIteration:
+                    return
+                except MemoryError as error:  # no further jobs would come
+                    raise RenderError(f"out of memory: {error}") from error
+                yield given[-1]
+
+        while True:
+            try:
+                for job, result in pool.run(remember(jobs), waiting):
+                    given.popleft()
+                    yield job, result
+                return
+            except MemoryError:
+                pool.discard()
+                if not given or not self.scheduler.halve(max(job.lanes for job in given)):
+                    raise
+            halves = [half for job in given for half in job.halves()]
+            given.clear()
+            jobs = chain(halves, jobs)
 
     def _jobs(self, parts: Iterable[Pass]) -> Iterator[Job]:
         for part in parts:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections import deque
@@ -133,6 +134,15 @@ class WorkerPool(Generic[Job, Result]):
             self._end_workers(futures)
         if self._stop.value < AT_ONCE:
             self._stop.reset()
+
+    def discard(self) -> None:
+        """Wait for the jobs under way, but for those that have not begun, and discard their results."""
+        with self._lock:
+            futures = [future for _, future in self._running]
+            self._running.clear()
+        for future in futures:
+            future.cancel()
+        all_done(futures, math.inf, self._stop)
 
     def _first(self, waiting: Callable[[], object]) -> tuple[Job, Result]:
         """Wait for the first of the jobs under way; if workers died, give all jobs to new ones."""

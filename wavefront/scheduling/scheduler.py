@@ -13,12 +13,18 @@ FIRST_WAVE = 4096  # lanes, while the speed is unknown and there is a time to ke
 SMALL_WAVE = 1 << 16  # lanes; in smaller waves a path costs more
 LARGE_WAVE = 1 << 17  # lanes; in larger waves it costs hardly less
 LANES_AT_ONCE = 1 << 19  # lanes of all workers together where that is a wave for each: 400 MB
+SMALLEST_WAVE = 64  # paths; without memory for as few there is an error
 SHARE = 1 / 4  # part of what is left for each worker that a wave may be
 MAX_WAVE_SECONDS = 1.0  # seconds that a large wave may take, for progress waits for it
 
 
 SHORT, LONG = 1 / 60, 1 / 20  # parts of the time there is that a wave should take
 SMOOTHING = 0.3  # weight of the latest wave in what a path is expected to cost
+
+
+def default_wave_size(workers: int) -> int:
+    """Return the lanes of the largest wave that suits so many workers."""
+    return min(max(LANES_AT_ONCE // workers, SMALL_WAVE), LARGE_WAVE)
 
 
 class Scheduler:
@@ -43,8 +49,7 @@ class Scheduler:
     ) -> None:
         self.time_up = False  # jobs were not admitted any more
         self._begin, self._seconds, self._workers = begin, seconds, workers
-        if wave_size is None:
-            wave_size = min(max(LANES_AT_ONCE // workers, SMALL_WAVE), LARGE_WAVE)
+        wave_size = default_wave_size(workers) if wave_size is None else wave_size
         self._largest = max(1, wave_size // branches)
         self._least = min(self._largest, max(1, SMALL_WAVE // branches))
         self._size = min(FIRST_WAVE, self._largest)  # where there is a time to keep
@@ -71,6 +76,14 @@ class Scheduler:
         if self._seconds is not None:
             return min(short, self._size)
         return min(self._largest, short, max(self._least, int(left * SHARE / self._workers)))
+
+    def halve(self, paths: int) -> bool:
+        """Have no more waves of so many paths, for which there was no memory; False if they are small."""
+        if paths <= SMALLEST_WAVE:
+            return False
+        self._largest = max(1, min(self._largest, paths // 2))
+        self._least, self._size = (min(size, self._largest) for size in (self._least, self._size))
+        return True
 
     def in_time(self, jobs: Iterator[Job]) -> Iterator[Job]:
         """Yield the jobs for as long as they will be done in time.
