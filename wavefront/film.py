@@ -41,6 +41,7 @@ class Film:
         self.sums = ExactSums((3, pixels))  # of samples
         self.squares = np.zeros((3, pixels))  # sum of squared samples
         self.batches = np.zeros((BATCHES, 3, pixels), np.float32)  # sums of full batches
+        self.batches.fill(0)  # takes the memory now, so that a render that lacks it does not fail late
 
     def add(self, pixels: Words, radiance: Floats) -> None:
         """Add samples.
