@@ -7,13 +7,14 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .codecs.encoding import exposed, to_8bit
 from .codecs.images import encode_png, read_linear, write_image
 from .codecs.png_jpeg import Gamma
 from .errors import SceneError
-from .layers import LAYERS
+from .layers import LAYERS, is_radiance
+from .samples import shared_samples
 
 
 class Image:
@@ -92,6 +93,65 @@ class Image:
     def __getitem__(self, key: Any) -> NDArray[np.float32]:
         """Return `rgb[key]`: image[y, x] is one pixel, (3,)."""
         return self.rgb[key]
+
+    def __sub__(self, other: Image) -> Image:
+        """Return the difference of two pictures of one size: `rgb` and its standard error, no layers.
+
+        The error is that of independent pictures. It is None if one of them has none, or if they share
+        samples, since their errors then depend on each other.
+
+        Raises
+        ------
+        SceneError
+            If the sizes differ.
+        """
+        if not isinstance(other, Image):
+            return NotImplemented
+        if self.shape != other.shape:
+            sizes = " and ".join(f"{x.shape[1]}x{x.shape[0]}" for x in (self, other))
+            raise SceneError(f"pictures of different sizes cannot be subtracted: {sizes}")
+        error = None
+        if (
+            self.standard_error is not None
+            and other.standard_error is not None
+            and shared_samples(self.metadata, other.metadata) is None
+        ):
+            error = np.hypot(self.standard_error, other.standard_error)
+        return Image(self.rgb - other.rgb, min(self.spp, other.spp), standard_error=error)
+
+    def __mul__(self, factor: ArrayLike) -> Image:
+        """Return the picture times a number or an rgb triple, with its errors and its layers.
+
+        Layers of radiance are multiplied too: `direct`, `indirect` and light groups. The others stay.
+
+        Raises
+        ------
+        SceneError
+            If the factor is neither a finite number nor three of them.
+        """
+        if isinstance(factor, Image) or np.asarray(factor).dtype.kind not in "fiu":
+            return NotImplemented
+        scale = np.asarray(factor, np.float32)
+        if scale.shape not in ((), (3,)) or not np.isfinite(scale).all():
+            raise SceneError(f"a picture can be multiplied by a number or an rgb triple, not by {factor!r}")
+        size = np.abs(scale)
+
+        def scaled(arrays: Mapping[str, NDArray[Any]], by: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
+            return {name: array * by if is_radiance(name) else array for name, array in arrays.items()}
+
+        return Image(
+            self.rgb * scale,
+            self.spp,
+            self.metadata,
+            counts=self.counts,
+            variance=None if self.variance is None else self.variance * size**2,
+            standard_error=None if self.standard_error is None else self.standard_error * size,
+            layers=scaled(self.layers, scale),
+            errors=scaled(self.errors, size),
+            names=self.names,
+        )
+
+    __rmul__ = __mul__
 
     @property
     def shape(self) -> tuple[int, ...]:

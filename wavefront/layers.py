@@ -84,3 +84,11 @@ def chosen_layers(name: str, value: Any) -> tuple[str, ...]:
             )
     wanted = {*chosen, *(LAYERS if ALL_LAYERS in chosen else ())}
     return tuple(each for each in known if each in wanted)
+
+
+RADIANCE = ("direct", "indirect", "light_groups.")  # what the names of layers that hold radiance begin with
+
+
+def is_radiance(name: str) -> bool:
+    """Return whether a layer holds radiance, as `rgb` does."""
+    return name.startswith(RADIANCE)

@@ -13,9 +13,11 @@ from numpy.typing import ArrayLike
 from .codecs.encoding import codes_to_linear
 from .codecs.png_jpeg import EXTENSIONS
 from .errors import SceneError
-from .film import EPSILON
+from .film import EPSILON, batch_size
 from .image import Image, three_channels
-from .vec import Doubles
+from .samples import shared_samples
+from .significance import Estimate, estimate, significance
+from .vec import Doubles, Ints
 
 Picture: TypeAlias = Image | ArrayLike | str | os.PathLike[str]
 
@@ -34,6 +36,11 @@ class Comparison:
     mean_b: Doubles  # (3,)
     flip: float | None  # mean FLIP error, 0 to 1; None where it could not be computed
     flip_absent: str  # the reason why it is None
+    p_pixels: float | None  # p-value of the pixels: the chance that noise alone makes one differ as much
+    p_blocks: float | None  # p-value of blocks of 8 × 8 and 32 × 32 pixels
+    p_mean: float | None  # p-value of the mean of the picture
+    p_value: float | None  # p-value of all three
+    p_absent: str  # the reason why they are None
     difference: Image = field(repr=False)  # |a − b|
 
     def __str__(self) -> str:
@@ -45,8 +52,15 @@ class Comparison:
             ("mean of a", "  ".join(f"{x:.6g}" for x in self.mean_a)),
             ("mean of b", "  ".join(f"{x:.6g}" for x in self.mean_b)),
             ("FLIP", self.flip_absent if self.flip is None else f"{self.flip:.6g}"),
+            *self._p_rows(),
         ]
         return "\n".join(f"{name:<13} {value}" for name, value in rows)
+
+    def _p_rows(self) -> list[tuple[str, str]]:
+        names = ("p_value", "p_pixels", "p_blocks", "p_mean")
+        if self.p_value is None:
+            return [("p_value", self.p_absent)]
+        return [(name, f"{getattr(self, name):.3g}") for name in names]
 
 
 def compare(a: Picture, b: Picture) -> Comparison:
@@ -56,6 +70,13 @@ def compare(a: Picture, b: Picture) -> Comparison:
     black pixels. Its root is the error that `render(noise=...)` limits. Source: F.
     Rousselle, C. Knaus and M. Zwicker, Adaptive Sampling and Reconstruction using Greedy Error
     Minimization, 2011, there with a fixed ε for pictures in [0, 1].
+
+    The p-values say whether two noisy pictures are the same up to noise. Each is the chance that two pictures
+    that differ by noise alone differ as much as these two do, in the pixel, the block or the channel of the
+    mean that is the least likely one; it is corrected for their number, so a picture of any size has one
+    in a hundred below 0.01. They need two rendered pictures with at least two samples per pixel and their
+    standard errors, that share no samples: with the same seed and sampler the samples must not overlap.
+    Otherwise they are None, and `p_absent` says why. Sources are in `wavefront/significance.py`.
 
     FLIP needs `pip install flip-evaluator`. For two pictures of 8 bits it is LDR-FLIP, else
     HDR-FLIP (P. Andersson et al., FLIP, 2020, and Visualizing Errors in Rendered High Dynamic Range
@@ -72,13 +93,18 @@ def compare(a: Picture, b: Picture) -> Comparison:
     SceneError
         If a file cannot be read, the sizes differ, or a value is not finite.
     """
-    left, right = _pixels("a", a), _pixels("b", b)
+    coded = _is_coded(a) and _is_coded(b)
+    names = _named("a", a), _named("b", b)
+    a, b = _loaded(a), _loaded(b)
+    left, right = _pixels(names[0], a), _pixels(names[1], b)
     if left.shape != right.shape:
         sizes = " and ".join(f"{x.shape[1]}x{x.shape[0]}" for x in (left, right))
         raise SceneError(f"pictures of different sizes cannot be compared: {sizes}")
     squared = np.square(left - right)
     rmse = float(np.sqrt(squared.mean()))
-    flip, reason = _flip(left, right, coded=_is_coded(a) and _is_coded(b))
+    flip, flip_absent = _flip(left, right, coded)
+    p_absent = _untestable("a", a) or _untestable("b", b) or _dependent(a, b)
+    p = None if p_absent else significance(_estimate(a, left), _estimate(b, right))
     return Comparison(
         relative_mse=float((squared / (np.square(right) + (EPSILON * right.mean() ** 2 or 1.0))).mean()),
         rmse=rmse,
@@ -86,7 +112,12 @@ def compare(a: Picture, b: Picture) -> Comparison:
         mean_a=left.mean((0, 1)),
         mean_b=right.mean((0, 1)),
         flip=flip,
-        flip_absent=reason,
+        flip_absent=flip_absent,
+        p_pixels=None if p is None else p.pixels,
+        p_blocks=None if p is None else p.blocks,
+        p_mean=None if p is None else p.mean,
+        p_value=None if p is None else p.all_levels,
+        p_absent=p_absent,
         difference=Image(np.abs(left - right).astype(np.float32)),
     )
 
@@ -97,6 +128,16 @@ def _decibels(peak: float, rmse: float) -> float:
     return 20 * float(np.log10(peak / rmse)) if peak > 0 else -np.inf
 
 
+def _named(name: str, picture: Picture) -> str:
+    """Return the name of a picture for messages: its path if it has one."""
+    return os.fspath(picture) if isinstance(picture, str | os.PathLike) else name
+
+
+def _loaded(picture: Picture) -> Image | ArrayLike:
+    """Return a picture, read if it is a path."""
+    return Image.load(picture) if isinstance(picture, str | os.PathLike) else picture
+
+
 def _is_coded(picture: Picture) -> bool:
     """Return whether a picture is made of 8- or 16-bit codes."""
     if isinstance(picture, str | os.PathLike):
@@ -104,13 +145,9 @@ def _is_coded(picture: Picture) -> bool:
     return getattr(picture, "dtype", None) in (np.uint8, np.uint16)
 
 
-def _pixels(name: str, picture: Picture) -> Doubles:
+def _pixels(name: str, picture: Image | ArrayLike) -> Doubles:
     """Return linear values, (H, W, 3)."""
-    values: Any = picture
-    if isinstance(picture, str | os.PathLike):
-        name, values = os.fspath(picture), Image.load(picture).rgb
-    elif isinstance(picture, Image):
-        values = picture.rgb
+    values: Any = picture.rgb if isinstance(picture, Image) else picture
     try:
         pixels = np.asarray(values)
         pixels = pixels if _is_coded(pixels) else pixels.astype(np.float64)
@@ -126,6 +163,44 @@ def _pixels(name: str, picture: Picture) -> Doubles:
         y, x, _ = bad[0]
         raise SceneError(f"{name} has {len(bad)} values that are not finite, the first at x={x}, y={y}")
     return colors
+
+
+def _untestable(name: str, picture: Image | ArrayLike) -> str:
+    """Return the reason why no p-value can be computed with a picture, or nothing."""
+    if not isinstance(picture, Image) or picture.standard_error is None or picture.counts is None:
+        return f"not computed: {name} has no standard error and number of samples of each pixel"
+    if picture.counts.min() < 2 or not np.isfinite(picture.standard_error).all():
+        return f"not computed: {name} has pixels with fewer than two samples"
+    return ""
+
+
+def _dependent(a: Image | ArrayLike, b: Image | ArrayLike) -> str:
+    """Return the reason why the errors of two pictures depend on each other, or nothing."""
+    assert isinstance(a, Image)
+    assert isinstance(b, Image)
+    shared = shared_samples(a.metadata, b.metadata)
+    if shared is None:
+        return ""
+    return (
+        f"not computed: the pictures share samples {shared[0]} to {shared[1] - 1} of seed "
+        f"{a.metadata['seed']}; render one with another seed"
+    )
+
+
+def _estimate(picture: Image | ArrayLike, mean: Doubles) -> Estimate:
+    """Return what a testable picture, of linear values (H, W, 3), says of its mean and its error."""
+    assert isinstance(picture, Image)
+    assert picture.counts is not None
+    assert picture.standard_error is not None
+    squared_error = np.square(picture.standard_error, dtype=np.float64)
+    variance = None if picture.variance is None else picture.variance.astype(np.float64)
+    return estimate(mean, squared_error, variance, _batches(picture.counts), picture.counts)
+
+
+def _batches(counts: Ints) -> Ints:
+    """Return how many batches the error of each pixel is estimated from, for its number of samples."""
+    distinct, which = np.unique(counts, return_inverse=True)
+    return np.array([count // batch_size(count) for count in distinct.tolist()])[which].reshape(counts.shape)
 
 
 def _flip(left: Doubles, right: Doubles, coded: bool) -> tuple[float | None, str]:
