@@ -13,7 +13,7 @@ import numpy as np
 import wavefront as wf
 from wavefront.accel import registry as choose
 from wavefront.accel.embree import installed
-from wavefront.codecs.encoding import srgb_to_linear, to_8bit
+from wavefront.codecs.encoding import srgb_to_linear, to_codes
 
 warnings.simplefilter("ignore")
 choose.COPIES = 0  # instances are traced as such
@@ -98,5 +98,5 @@ moved = transform + np.array([[0, 0, 0, -0.9], [0, 0, 0, 0.2], [0, 0, 0, 0], [0,
 add("instances", [wf.Instance(mesh, matrix) for mesh in [net(GREY)] for matrix in (transform, moved)], [SKY])
 codes = np.concatenate([np.arange(n, dtype=np.float32) / np.float32(n - 1) for n in (256, 65_536)])
 hashes["sRGB"] = hashlib.sha256(srgb_to_linear(codes).tobytes()).hexdigest()
-hashes["8 bits"] = hashlib.sha256(to_8bit(codes).tobytes() + to_8bit(codes, "srgb").tobytes()).hexdigest()
+hashes["8 bits"] = hashlib.sha256(to_codes(codes).tobytes() + to_codes(codes, "srgb").tobytes()).hexdigest()
 print(json.dumps(hashes))

@@ -9,6 +9,7 @@ from significance import SIDE, assert_mean, assert_same_images, measure, render,
 
 import wavefront as wf
 from wavefront import testing
+from wavefront.codecs.display import Display
 from wavefront.codecs.encoding import srgb_to_linear
 from wavefront.codecs.images import write_image
 from wavefront.lights import ConstantEnvironment, EnvironmentSum
@@ -273,7 +274,7 @@ def test_a_dark_part_of_a_sky() -> None:
 def test_files(tmp_path, name: str) -> None:
     """exr, hdr and npy hold radiance; png holds sRGB."""
     picture = noise(4, 8).astype(f4)
-    write_image(tmp_path / name, picture, gamma="srgb")
+    write_image(tmp_path / name, picture, Display(gamma="srgb"))
     tolerance = {"sky.hdr": 0.01, "sky.png": 0.01}.get(name, 1e-6)
     seen = wf.Environment(tmp_path / name).radiance
     assert seen == pytest.approx(wf.Environment(picture).radiance, rel=tolerance)

@@ -16,7 +16,9 @@ import pytest
 import trimesh
 from gltf_builder import Builder
 
-from wavefront.codecs.images import read_image, write_image
+from wavefront.codecs.display import Display
+from wavefront.codecs.image_data import ImageData
+from wavefront.codecs.images import read_image, read_picture, write_image
 from wavefront.errors import SceneError
 from wavefront.io.load import load
 
@@ -49,6 +51,13 @@ def make_seeds(folder):
     build.glb(folder / "m.glb")
     for extension in ("png", "jpg", "exr", "hdr", "npy"):
         write_image(folder / f"t.{extension}", np.random.default_rng(0).random((9, 11, 3)))
+    rgb = np.random.default_rng(1).random((9, 11, 3), np.float32)
+    arrays = {"alpha": rgb[..., 0], "shape_id": np.arange(99, dtype=np.int32).reshape(9, 11)}
+    metadata = {"background": "transparent", "noise": 0.1}
+    layered = ImageData(rgb, arrays, {"spp": 4, "metadata": metadata, "names": {"shape": {0: "a"}}})
+    for extension in ("exr", "npz"):
+        write_image(folder / f"p.{extension}", layered)
+    write_image(folder / "p.png", layered, Display(), bits=16)
 
 
 def damage(data, rng):
@@ -76,6 +85,8 @@ def attempt(folder, name):
     try:
         if name.startswith("t."):
             assert read_image(folder / name).ndim == 3
+        elif name.startswith("p."):
+            assert read_picture(folder / name).rgb.ndim == 3
         else:
             assert load(folder / ("m.obj" if name == "s.mtl" else name)).shapes
     except SceneError as error:

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .codecs.encoding import exposed, to_8bit
-from .codecs.images import encode_png, read_linear, write_image
+from .codecs import png_jpeg
+from .codecs.display import Display
+from .codecs.image_data import ERROR, ImageData
+from .codecs.images import read_picture, write_image
 from .codecs.png_jpeg import Gamma
-from .errors import SceneError
+from .codecs.white_balance import WhiteBalance
+from .errors import SceneError, one_of
 from .layers import LAYERS, is_radiance
 from .samples import shared_samples
+from .vec import luminance
+
+FIELDS = ("counts", "variance", "standard_error")  # arrays (H, W, ...) besides rgb, layers and errors
 
 
 class Image:
@@ -162,26 +169,38 @@ class Image:
     def load(cls, path: str | os.PathLike[str]) -> Image:
         """Read a picture by its extension, as linear values.
 
-        png and jpg files are decoded by the gamma that they record, as files of `save` do, and by the sRGB
-        curve if they record none. exr, hdr and npy are linear. Alpha is ignored; one channel becomes three.
+        exr and npz files of `save` give the same image again: rgb, layers, errors, names and metadata, bit
+        for bit. png and jpg files are decoded by the gamma that they record, as files of `save` do, and by
+        the sRGB curve if they record none. exr, hdr, npy and npz are linear. The last of two or four channels
+        becomes the layer "alpha"; colors of a png are multiplied by it. One channel of color becomes three.
 
         Parameters
         ----------
         path
-            A png, jpg, exr, hdr or npy file.
+            A png, jpg, exr, hdr, npy or npz file.
 
         Raises
         ------
         SceneError
             If the file is missing, of another kind, corrupt, truncated, or too large. The message names it.
         """
-        pixels = read_linear(path)
-        if not 1 <= pixels.shape[2] <= 4:
-            raise SceneError(f"{os.fspath(path)}: has {pixels.shape[2]} channels; a picture has 1 to 4")
-        return cls(three_channels(pixels))
+        found = read_picture(path)
+        errors = {name.removeprefix(ERROR): a for name, a in found.arrays.items() if name.startswith(ERROR)}
+        fields = {name: found.arrays[name] for name in FIELDS if name in found.arrays}
+        layers = {
+            name: a for name, a in found.arrays.items() if name not in FIELDS and not name.startswith(ERROR)
+        }
+        spp, names = found.info.get("spp", 0), found.info.get("names")
+        return cls(found.rgb, spp, dict(found.metadata), **fields, layers=layers, errors=errors, names=names)
 
-    def to_uint8(self, gamma: Gamma = 2.2, exposure: float = 0.0) -> NDArray[np.uint8]:
-        """Return the picture as (H, W, 3) codes for display, the same that `save` writes into a png.
+    def to_uint8(
+        self,
+        gamma: Gamma = 2.2,
+        exposure: float = 0.0,
+        tone: str = "none",
+        white_balance: WhiteBalance | None = None,
+    ) -> NDArray[np.uint8]:
+        """Return the picture as codes for display, the same that `save` writes into a png.
 
         Parameters
         ----------
@@ -189,16 +208,82 @@ class Image:
             Values are clipped to [0, 1] and raised to 1/gamma; "srgb" is the exact sRGB curve.
         exposure
             Stops (factors of 2) by which the picture is brightened first.
+        tone
+            The curve that maps radiance above 1 into the range of a display: "none", "reinhard", "aces" or
+            "agx" (`codecs/tone.py` names their sources).
+        white_balance
+            Color temperature of the light, 1667 to 25000 K, or the linear RGB of something gray in the
+            picture. It is made neutral after the exposure. 6504 K changes nothing.
+
+        Returns
+        -------
+        NDArray[np.uint8]
+            (H, W, 3); with a transparent background (H, W, 4), colors not multiplied by alpha.
 
         Raises
         ------
         SceneError
-            If gamma or exposure is out of range.
+            If a value is out of range.
         """
-        return to_8bit(exposed(self.rgb, exposure), gamma)
+        return self._codes(Display(gamma, exposure, tone, white_balance), bits=8)
 
-    def save(self, path: str | os.PathLike[str], gamma: Gamma = 2.2, exposure: float = 0.0) -> None:
-        """Write the picture by its extension: png or jpg for display; exr, hdr and npy linear.
+    def to_uint16(
+        self,
+        gamma: Gamma = 2.2,
+        exposure: float = 0.0,
+        tone: str = "none",
+        white_balance: WhiteBalance | None = None,
+    ) -> NDArray[np.uint16]:
+        """Return the picture as codes of 16 bits; parameters and shape are those of `to_uint8`."""
+        return self._codes(Display(gamma, exposure, tone, white_balance), bits=16)
+
+    def to_pil(
+        self,
+        gamma: Gamma = 2.2,
+        exposure: float = 0.0,
+        tone: str = "none",
+        white_balance: WhiteBalance | None = None,
+    ) -> Any:
+        """Return the picture as a `PIL.Image.Image`, RGB or RGBA; the parameters are those of `to_uint8`."""
+        from PIL.Image import fromarray
+
+        return fromarray(self.to_uint8(gamma, exposure, tone, white_balance))
+
+    def show(
+        self,
+        gamma: Gamma = 2.2,
+        exposure: float = 0.0,
+        tone: str = "none",
+        white_balance: WhiteBalance | None = None,
+    ) -> None:
+        """Show the picture: in a notebook below the cell, else in the system's viewer.
+
+        The parameters are those of `to_uint8`.
+        """
+        picture = self.to_pil(gamma, exposure, tone, white_balance)
+        if "IPython" in sys.modules and sys.modules["IPython"].get_ipython() is not None:
+            from IPython.display import display
+
+            display(picture)
+        else:
+            picture.show()
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        gamma: Gamma = 2.2,
+        exposure: float = 0.0,
+        tone: str = "none",
+        white_balance: WhiteBalance | None = None,
+        *,
+        bits: int = 8,
+    ) -> None:
+        """Write the picture by its extension: png or jpg for display; exr, hdr, npy and npz linear.
+
+        exr and npz hold everything: layers, errors, counts, names and metadata. Where exposure or white
+        balance change rgb, they hold only rgb and the alpha of a transparent background, since the rest
+        belongs to the picture before. A transparent background gives a png an alpha channel; hdr, npy and
+        jpg have none, so it is black there. `docs/formats.md` has the names of all channels.
 
         The file holds its old content or all of the new content, never a part. It keeps its permissions, and
         symbolic links are followed.
@@ -211,22 +296,64 @@ class Image:
             png and jpg hold value^(1/gamma), and record gamma; "srgb" is the exact sRGB curve.
         exposure
             Stops (factors of 2) by which the picture is brightened first, in every format.
+        tone
+            A tone curve for png and jpg, as in `to_uint8`.
+        white_balance
+            The color that becomes neutral, in every format, as in `to_uint8`.
+        bits
+            Bits of each channel of a png, 8 or 16.
 
         Raises
         ------
         SaveError
-            If the file cannot be written: an unknown extension, a folder that is missing, no space. It
-            is a SceneError and an OSError.
+            If the file cannot be written: an unknown extension, a folder that is missing, no space, or a
+            tone or bits that the format cannot hold. It is a SceneError and an OSError.
         SceneError
-            If gamma or exposure is out of range.
+            If gamma, exposure, tone or white balance is out of range.
         """
-        write_image(path, self.rgb, gamma=gamma, exposure=exposure)
+        write_image(path, self._data(), Display(gamma, exposure, tone, white_balance), bits)
+
+    def plot(self, name: str = "rgb", axes: Any = None) -> Any:
+        """Plot the picture or a layer with matplotlib.
+
+        Layers of one number per pixel are shown in false color with a color bar, ids in distinct colors with
+        a legend of their names, colors as `to_uint8` shows them, normals and positions as colors.
+
+        Parameters
+        ----------
+        name
+            "rgb", "luminance" (of rgb), a layer, or "counts", "variance" or "standard_error".
+        axes
+            Axes of matplotlib to draw into; by default those of a new figure.
+
+        Returns
+        -------
+        Any
+            The axes.
+
+        Raises
+        ------
+        SceneError
+            If there is no such layer.
+        ImportError
+            If matplotlib is not installed. The message says how to install it.
+        """
+        from . import plot
+
+        arrays = {**self._data().named(), "luminance": luminance(np.moveaxis(self.rgb, -1, 0))}
+        values = arrays[one_of("layer", name, arrays)]
+        table = self.names.get(name.removesuffix("_id"), {}) if name.endswith("_id") else None
+        return plot.draw(name, self.to_uint8()[..., :3] if name == "rgb" else values, table, axes)
+
+    def _data(self) -> ImageData:
+        """Return all of the image as files hold it."""
+        arrays = {name: getattr(self, name) for name in FIELDS if getattr(self, name) is not None}
+        arrays |= self.layers | {ERROR + name: values for name, values in self.errors.items()}
+        return ImageData(self.rgb, arrays, {"spp": self.spp, "metadata": self.metadata, "names": self.names})
+
+    def _codes(self, display: Display, bits: int) -> NDArray[Any]:
+        return display.codes(display.adjusted(self._data()), bits)
 
     def _repr_png_(self) -> bytes:
         """Show the picture in a notebook."""
-        return encode_png(self.rgb)
-
-
-def three_channels(pixels: NDArray[Any]) -> NDArray[Any]:
-    """Return the colors (H, W, 3) of pixels (H, W, 1 to 4), without alpha."""
-    return pixels[..., :3] if pixels.shape[2] > 2 else np.repeat(pixels[..., :1], 3, axis=2)
+        return png_jpeg.encode(self.to_uint8(), ".png", 2.2)

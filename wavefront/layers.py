@@ -92,3 +92,14 @@ RADIANCE = ("direct", "indirect", "light_groups.")  # what the names of layers t
 def is_radiance(name: str) -> bool:
     """Return whether a layer holds radiance, as `rgb` does."""
     return name.startswith(RADIANCE)
+
+
+_AXES = dict.fromkeys(("position", "normal", "normal_geometric", "denoising_normal"), "XYZ")
+_KNOWN = {**_AXES, "uv": "UV", "depth": "Z", "distance": "Z", "alpha": "A"}
+_BY_COUNT = {1: "X", 2: "XY", 3: "RGB"}
+
+
+def components(name: str, count: int) -> list[str]:
+    """Return the letters of the `count` components of an array of a picture: X, Y, Z or R, G, B and so on."""
+    known = _KNOWN.get(name, "")
+    return list(known) if len(known) == count else list(_BY_COUNT.get(count, map(str, range(count))))

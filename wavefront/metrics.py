@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .codecs.encoding import codes_to_linear
+from .codecs.images import three_channels
 from .codecs.png_jpeg import EXTENSIONS
 from .errors import SceneError
 from .film import EPSILON, batch_size
-from .image import Image, three_channels
+from .image import Image
 from .samples import shared_samples
 from .significance import Estimate, estimate, significance
 from .vec import Doubles, Ints

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..camera import image_size, upward
+from ..codecs.display import Display
 from ..codecs.encoding import check_exposure, check_gamma
 from ..errors import SceneError
 from ..lighting import check_lighting
@@ -106,6 +107,16 @@ def exposure(text: str) -> float:
         return check_exposure(_finite(text))
     except SceneError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def white_balance(text: str) -> float | tuple[float, float, float]:
+    """Return kelvin, or R,G,B as three floats."""
+    try:
+        white = vector(text) if "," in text else _finite(text)
+        Display(white_balance=white)
+    except SceneError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return white
 
 
 def _finite(text: str) -> float:

@@ -67,7 +67,7 @@ def parser() -> argparse.ArgumentParser:
     info.add_argument("scene", help="obj, ply, stl, glb or gltf file")
     info.set_defaults(run=describe_scene)
     measure = commands.add_parser("compare", help="say how far a picture is from a reference")
-    measure.add_argument("picture", help="png, jpg, exr, hdr or npy file")
+    measure.add_argument("picture", help="png, jpg, exr, hdr, npy or npz file")
     measure.add_argument("reference", help="the same, of the same size")
     measure.add_argument("-o", "--output", help="where to write the absolute difference")
     measure.set_defaults(run=compare_pictures)

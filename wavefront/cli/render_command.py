@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 
 from ..camera import Camera
-from ..codecs.images import check_writable
+from ..codecs.display import Display
+from ..codecs.images import check_display, check_writable
+from ..codecs.tone import TONES
 from ..errors import Interrupted, RenderError, SaveError, SceneError
 from ..image import Image
 from ..io.load import load
@@ -48,7 +50,9 @@ def add_render_command(commands: Any) -> None:
     """Add the command and its options to a parser's commands."""
     command = commands.add_parser("render", help="render a scene file", formatter_class=_Help)
     command.add_argument("scene", help="obj, ply, stl, glb or gltf file")
-    command.add_argument("-o", "--output", default="out.png", help="png, jpg, exr, hdr or npy file to write")
+    command.add_argument(
+        "-o", "--output", default="out.png", help="png, jpg, exr, hdr, npy or npz file to write"
+    )
     for each in fields(Settings):
         if each.metadata.get("option"):
             _add_setting(command, each)
@@ -69,6 +73,14 @@ def add_render_command(commands: Any) -> None:
     command.add_argument(
         "--exposure", type=arguments.exposure, default=0.0, help="stops, applied when saving"
     )
+    command.add_argument("--tone", choices=TONES, default="none", help="tone curve, for png and jpg")
+    command.add_argument(
+        "--white-balance",
+        type=arguments.white_balance,
+        metavar="KELVIN|R,G,B",
+        help="color temperature of the light, or a gray color of the picture, that becomes neutral",
+    )
+    command.add_argument("--bits", type=int, choices=(8, 16), default=8, help="of each channel of a png")
     command.add_argument("--quiet", action="store_true", help="no progress bar")
     command.set_defaults(run=_render)
 
@@ -90,6 +102,8 @@ def _add_setting(command: argparse.ArgumentParser, setting: Field[Any]) -> None:
 
 def _render(options: argparse.Namespace) -> int:
     check_writable(options.output)
+    display = Display(options.gamma, options.exposure, options.tone, options.white_balance)
+    check_display(options.output, display, options.bits)
     progress = False if options.quiet else None
     scene = load(options.scene, progress=progress)
     scene.camera = _camera(scene, options)
@@ -114,7 +128,17 @@ def _save(image: Image, options: argparse.Namespace) -> int:
     """Save a picture, if not where it was meant to go then elsewhere; return the exit status."""
 
     def save(path: str | Path) -> None:
-        image.save(path, gamma=options.gamma, exposure=options.exposure)
+        if Path(path).suffix.lower() != Path(options.output).suffix.lower():
+            image.save(path)  # it may not be able to hold what the options ask for
+            return
+        image.save(
+            path,
+            options.gamma,
+            options.exposure,
+            options.tone,
+            options.white_balance,
+            bits=options.bits,
+        )
 
     try:
         save(options.output)

@@ -46,7 +46,8 @@ def _check_png(data: bytes) -> None:
     check_size(height, width)
     bits, interlaced = header[8] * PNG_CHANNELS[header[9]], header[12] == 1
     need = sum(rows * (1 + (columns * bits + 7) // 8) for columns, rows in _passes(width, height, interlaced))
-    there = _inflated(_png_data(data), need)
+    pixels = (content for name, content, _ in png_chunks(data) if name == b"IDAT")
+    there = _inflated(pixels, need)
     if there < need:
         raise SceneError(f"ends early: {width} × {height} pixels take {need} bytes; {there} are there")
 
@@ -59,14 +60,14 @@ def _passes(width: int, height: int, interlaced: bool) -> Iterator[tuple[int, in
             yield columns, rows
 
 
-def _png_data(data: bytes) -> Iterator[memoryview]:
-    """Yield the compressed pixel data."""
+def png_chunks(data: bytes) -> Iterator[tuple[bytes, memoryview, int]]:
+    """Yield the name, the content and the checksum of each chunk of a png."""
     view, at = memoryview(data), len(PNG)
     while at + 8 <= len(data):
-        length, kind = int.from_bytes(view[at : at + 4], "big"), view[at + 4 : at + 8]
-        if kind == b"IDAT":
-            yield view[at + 8 : at + 8 + length]
-        at += 12 + length
+        length, name = int.from_bytes(view[at : at + 4], "big"), bytes(view[at + 4 : at + 8])
+        end = at + 8 + length
+        yield name, view[at + 8 : end], int.from_bytes(view[end : end + 4], "big")
+        at = end + 4
 
 
 def _inflated(pieces: Iterable[memoryview], need: int) -> int:

@@ -74,8 +74,8 @@ def check_gamma(gamma: Gamma) -> Gamma:
     return number("gamma", gamma, lambda x: low <= x <= high, f"from {low:g} to {high:g}")
 
 
-def to_8bit(rgb: ArrayLike, gamma: Gamma = 2.2) -> NDArray[np.uint8]:
-    """Return linear values as display values 0 to 255, any shape; NaN becomes 0.
+def to_codes(values: ArrayLike, gamma: Gamma = 2.2, bits: int = 8) -> NDArray[Any]:
+    """Return linear values as codes for display of 8 or 16 bits, any shape; NaN becomes 0.
 
     Raises
     ------
@@ -83,6 +83,7 @@ def to_8bit(rgb: ArrayLike, gamma: Gamma = 2.2) -> NDArray[np.uint8]:
         If gamma is neither a number from 0.01 to 100 nor "srgb".
     """
     curve = check_gamma(gamma)
-    unit = np.clip(np.nan_to_num(np.asarray(rgb, np.float32), nan=0.0, posinf=1.0, neginf=0.0), 0, 1)
+    unit = np.clip(np.nan_to_num(np.asarray(values, np.float32), nan=0.0, posinf=1.0, neginf=0.0), 0, 1)
     encoded = linear_to_srgb(unit) if isinstance(curve, str) else unit.astype(np.float64) ** (1 / curve)
-    return np.round(encoded * 255).astype(np.uint8)
+    kind = np.uint8 if bits == 8 else np.uint16
+    return np.round(encoded * np.iinfo(kind).max).astype(kind)

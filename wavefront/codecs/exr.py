@@ -2,31 +2,76 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable
+from functools import partial
 from io import BytesIO
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SceneError
+from ..errors import SaveError, SceneError
 from ..files import check_size
+from ..layers import components
 from ..vec import Floats
+from .image_data import ERROR, ImageData, from_json, from_named, to_json
 
-HeaderValue = str | int | float
+ATTRIBUTE = "wavefront"  # the attribute that describes all arrays
+TYPES = ("f4", "u4", "i4", "f8", "i8", "u8")  # of arrays, as NumPy writes them
 
 MAX_VALUES = 2**27  # of all channels of all parts: 512 MB as float32
 VALUES_PER_BYTE = 16  # for larger files, the limit is this number of values per byte of the file
 
 
-def encode(channels: Mapping[str, NDArray[Any]], attributes: Mapping[str, HeaderValue]) -> bytes:
-    """Return an exr file of channels (H, W) or (H, W, 3), float32 or uint32, by name."""
+def encode(picture: ImageData) -> bytes:
+    """Return an exr file of all arrays of a picture, its metadata and names.
+
+    The channels of rgb are R, G and B, those of a transparent picture's alpha A, and all others NAME.X with a
+    letter for each component. Arrays other than float32 and uint32 are stored as words of uint32, so -1 of
+    int32 is 0xFFFFFFFF. The attribute "wavefront" is JSON: spp, metadata, names, and the channels of each
+    array. Numbers and texts of the metadata are attributes "wavefront.NAME" as well.
+    """
     import OpenEXR  # imported here to keep `import wavefront` quick
 
-    header = {**attributes, "compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    channels: dict[str, NDArray[Any]] = {}
+    layout = {}
+    for name, values in picture.named().items():
+        words = _words(name, values)
+        plain = name == "rgb" or values is picture.alpha
+        labels = _labels(name, words.shape[2], plain)
+        channels |= {label: np.ascontiguousarray(words[..., k]) for k, label in enumerate(labels)}
+        layout[name] = {"channels": labels, "type": values.dtype.str[1:], "shape": values.shape[2:]}
+    header = {f"{ATTRIBUTE}.{key}": value for key, value in picture.metadata.items() if _fits(value)}
+    header |= {ATTRIBUTE: to_json({**picture.info, "arrays": layout})}
+    header |= {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     buffer = BytesIO()
-    OpenEXR.File(header, {k: np.ascontiguousarray(v) for k, v in channels.items()}).write(buffer)
+    OpenEXR.File(header, channels).write(buffer)
     return buffer.getvalue()
+
+
+def _words(name: str, values: NDArray[Any]) -> NDArray[Any]:
+    """Return an array (H, W, ...) as (H, W, k) float32 or uint32."""
+    kind = values.dtype.str[1:]
+    if kind not in TYPES:
+        raise SaveError(f"the array {name!r} is {values.dtype}; an exr holds {', '.join(TYPES)}")
+    flat = values.reshape(*values.shape[:2], -1)
+    if kind == "i8" and flat.size and flat.min() >= 0 and flat.max() < 2**32:  # as counts are
+        return flat.astype(np.uint32)
+    return np.ascontiguousarray(flat).view(np.float32 if kind == "f4" else np.uint32)
+
+
+def _labels(name: str, count: int, plain: bool) -> list[str]:
+    """Return the names of the `count` channels of an array: NAME.X, or X alone with `plain`."""
+    letters = components(name.removeprefix(ERROR), count)
+    return letters if plain else [f"{name}.{letter}" for letter in letters]
+
+
+def _fits(value: Any) -> bool:
+    """Return whether an attribute can hold a value of the metadata."""
+    if isinstance(value, bool) or (isinstance(value, int) and abs(value) >= 2**31):
+        return False
+    return isinstance(value, int | float) or (isinstance(value, str) and "\0" not in value)
 
 
 def decode(data: bytes) -> Floats:
@@ -39,28 +84,69 @@ def decode(data: bytes) -> Floats:
     SceneError
         If the file claims too much, holds deep pixels, or a part of it cannot be decoded.
     """
+    channels = _channels(data)
+    names = [n for n in ("R", "G", "B", "A") if n in channels] or sorted(channels)[:1]
+    return np.stack([channels[name]().astype(np.float32, copy=False) for name in names], axis=-1)
+
+
+def decode_all(data: bytes) -> ImageData | None:
+    """Return the picture that `encode` wrote; None for an exr file of another origin.
+
+    Raises
+    ------
+    SceneError
+        As `decode`, or if the attributes do not fit the channels.
+    """
+    import OpenEXR
+
+    text = OpenEXR.File(BytesIO(data), header_only=True).header().get(ATTRIBUTE)
+    if not isinstance(text, str):
+        return None
+    info, channels = from_json(text), _channels(data)
+    layout = info.pop("arrays", {})
+    try:
+        arrays = {
+            name: _array([channels[label]() for label in part["channels"]], part)
+            for name, part in layout.items()
+        }
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise SceneError(f"its attribute {ATTRIBUTE!r} does not fit its channels: {error!r}") from error
+    return from_named(arrays, info)
+
+
+def _array(words: list[NDArray[Any]], part: dict[str, Any]) -> NDArray[Any]:
+    """Return the array of some channels (H, W) as the layout in the attributes describes it."""
+    if part["type"] not in TYPES:
+        raise ValueError(f"type {part['type']!r}")
+    kind, stacked = np.dtype(part["type"]), np.stack(words, axis=-1)
+    whole = math.prod(part["shape"]) == len(words)
+    values = stacked.astype(kind) if whole and kind.itemsize == 8 else stacked.view(kind)
+    return values.reshape(*stacked.shape[:2], *part["shape"])
+
+
+def _channels(data: bytes) -> dict[str, Callable[[], NDArray[Any]]]:
+    """Return functions for the channels (H, W) of the first part of an exr file, by name."""
     import OpenEXR
 
     claimed = OpenEXR.File(BytesIO(data), header_only=True).parts
-    height, width = _check_claims(claimed, len(data))
+    size = _check_claims(claimed, len(data))
     # OpenEXR decodes all parts, and leaves out those that it cannot decode.
     parts = OpenEXR.File(BytesIO(data), separate_channels=True).parts
     read = {(part.part_index, part.name()) for part in parts}
     for part in claimed:
         if (part.part_index, part.name()) not in read:
             raise SceneError(f"part {part.part_index} ({part.name()!r}) of {len(claimed)} is damaged")
-    channels = parts[0].channels
-    names = [n for n in ("R", "G", "B", "A") if n in channels] or sorted(channels)[:1]
-    pixels = np.empty((height, width, len(names)), np.float32)
-    for k, name in enumerate(names):
-        values = channels[name].pixels
-        if values.shape != (height, width):
-            raise SceneError(
-                f"channel {name!r} has {values.shape[1]} × {values.shape[0]} values; "
-                f"the picture has {width} × {height} pixels"
-            )
-        pixels[..., k] = values
-    return pixels
+    return {name: partial(_pixels, name, each.pixels, size) for name, each in parts[0].channels.items()}
+
+
+def _pixels(name: str, values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
+    """Return the values of a channel if it has those of every pixel; some have fewer."""
+    if values.shape != size:
+        raise SceneError(
+            f"channel {name!r} has {values.shape[1]} × {values.shape[0]} values; "
+            f"the picture has {size[1]} × {size[0]} pixels"
+        )
+    return values
 
 
 def _check_claims(parts: list[Any], size: int) -> tuple[int, int]:

@@ -1,6 +1,6 @@
-"""Reading and writing of image files by extension: png, jpg, exr, hdr, npy.
+"""Reading and writing of image files by extension: png, jpg, exr, hdr, npy, npz.
 
-Values in the package are linear. `write_image` encodes them for display, and `read_linear` decodes them. The
+Values in the package are linear. `write_image` encodes them for display, and `read_picture` decodes them. The
 other readers do not decode: a texture may hold colors or data, which only the caller knows.
 """
 
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
@@ -20,21 +20,20 @@ from ..errors import SaveError, SceneError
 from ..files import check_size, check_target, path_name, read_bytes, write_bytes
 from ..registry import Registry
 from ..vec import Floats
-from . import exr
+from . import exr, npz
 from . import hdr as rgbe
 from . import png_jpeg as coded
-from .encoding import check_gamma, codes_to_linear, exposed, to_8bit
-from .exr import HeaderValue
-from .png_jpeg import Gamma
+from .display import Display
+from .encoding import codes_to_linear
+from .image_data import TRANSPARENT, ImageData
 
 T = TypeVar("T")
 
-Attributes: TypeAlias = Mapping[str, HeaderValue]
 Decoder: TypeAlias = Callable[
     [bytes], NDArray[Any]
 ]  # returns uint8 or uint16 codes, or linear float32, (H, W, C)
-# called with linear values (H, W, 3), the gamma and the attributes; returns the file
-Encoder: TypeAlias = Callable[[Floats, Gamma, Attributes], bytes]
+# called with an adjusted picture, how it is shown, and the bits of a code; returns the file
+Encoder: TypeAlias = Callable[[ImageData, Display, int], bytes]
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
@@ -50,70 +49,66 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     check_target(path)
 
 
+def check_display(path: str | os.PathLike[str], display: Display, bits: int = 8) -> None:
+    """Check that the format of `path` can hold a tone curve and this number of bits.
+
+    Raises
+    ------
+    SaveError
+        If the format is for linear values and there is a tone curve, or it has no codes of 16 bits.
+    """
+    extension = Path(path).suffix.lower()
+    if display.tone != "none" and extension not in coded.EXTENSIONS:
+        names = ", ".join(coded.EXTENSIONS)
+        raise SaveError(f"{path}: tone={display.tone!r} is for {names}; {extension} holds linear values")
+    if bits not in (8, 16):
+        raise SaveError(f"{path}: bits is {bits!r}; it must be 8 or 16")
+    if bits == 16 and extension != ".png":
+        raise SaveError(f"{path}: bits=16 is for .png; {extension} has another precision")
+
+
 def write_image(
     path: str | os.PathLike[str],
-    rgb: ArrayLike,
-    *,
-    gamma: Gamma = 2.2,
-    exposure: float = 0.0,
-    attributes: Mapping[str, HeaderValue] | None = None,
+    picture: ImageData | ArrayLike,
+    display: Display | None = None,
+    bits: int = 8,
 ) -> None:
     """Write a picture in the format of the extension of `path`.
 
     Parameters
     ----------
     path
-        Ends in .png, .jpg, .jpeg (8 bits, encoded for display), .exr, .hdr or .npy (linear).
-    rgb
-        (H, W, 3) linear values.
-    gamma
-        Values are raised to 1/gamma in png and jpg; "srgb" applies the exact sRGB curve. The file
-        says which.
-    exposure
-        Values are multiplied by 2**exposure first, in every format.
-    attributes
-        Text and numbers for the header of an exr.
+        Ends in .png, .jpg, .jpeg (encoded for display), .exr, .npz (all arrays), .hdr or .npy (rgb, linear).
+    picture
+        The picture, or its linear values (H, W, 3).
+    display
+        How the picture is shown; by default with gamma 2.2 and nothing else. Exposure and white balance
+        apply to every format, tone and gamma to png and jpg.
+    bits
+        8, or 16 for png.
 
     Raises
     ------
     SaveError
         If the file cannot be written. The old file stays intact.
     SceneError
-        If an argument is malformed.
+        If the pixels are malformed.
     """
     encode = _find(IMAGE_WRITERS, path, SaveError)
-    pixels = exposed(_picture(rgb), exposure)
-    check_gamma(gamma)
+    shown = Display() if display is None else display
+    check_display(path, shown, bits)
+    data = picture if isinstance(picture, ImageData) else ImageData(np.asarray(picture, np.float32))
+    adjusted = shown.adjusted(_checked(data))
     if Path(path).suffix.lower() in FINITE:
-        pixels = _finite(path, pixels)
-    write_bytes(path, _encoded(path, lambda: encode(pixels, gamma, attributes or {})))
-
-
-def write_channels(
-    path: str | os.PathLike[str],
-    channels: Mapping[str, ArrayLike],
-    attributes: Mapping[str, HeaderValue] | None = None,
-) -> None:
-    """Write named (H, W) or (H, W, 3) arrays into one exr; float32 and uint32 are kept exactly.
-
-    Raises
-    ------
-    SaveError
-        If the extension is not .exr, or the file cannot be written.
-    """
-    _find(EXR_ONLY, path, SaveError)
-    arrays = {}
-    for name, values in channels.items():
-        array = np.asarray(values)
-        arrays[name] = np.ascontiguousarray(array, np.uint32 if array.dtype.kind in "ui" else np.float32)
-    write_bytes(path, _encoded(path, lambda: exr.encode(arrays, attributes or {})))
+        adjusted = _finite(path, adjusted)
+    write_bytes(path, _encoded(path, lambda: encode(adjusted, shown, bits)))
 
 
 def read_image(path: str | os.PathLike[str]) -> Floats:
     """Return the pixels of an image file, (H, W, C) float32, top row first.
 
-    8- and 16-bit values are scaled to [0, 1] and not decoded from sRGB (pngs with 16 bits per
-    color channel are read at 8). exr, hdr and npy values are returned unchanged.
+    8- and 16-bit values are scaled to [0, 1] and not decoded from sRGB (interlaced pngs with 16 bits per
+    color channel are read at 8). exr, hdr, npy and npz values are returned unchanged.
 
     Raises
     ------
@@ -129,24 +124,44 @@ def read_image(path: str | os.PathLike[str]) -> Floats:
 
 def read_codes(path: str | os.PathLike[str]) -> NDArray[Any]:
     """Return the pixels of an image file as stored, uint8, uint16 or float32, (H, W, C)."""
-    return _read(path)[0]
+    decode = _find(IMAGE_READERS, path)
+    return _decode(os.fspath(path), decode, read_bytes(path), Path(path).suffix.lower()[1:])
 
 
-def read_linear(path: str | os.PathLike[str]) -> Floats:
-    """Return the linear values of an image file, (H, W, C) float32, top row first.
+def read_picture(path: str | os.PathLike[str]) -> ImageData:
+    """Return all that an image file holds, as linear values.
 
     png and jpg are decoded by the gamma in the file (gAMA or sRGB of a png, Exif of a jpg), or by the
-    sRGB curve if it has none. Alpha, the last of two or four channels, is linear.
+    sRGB curve if it has none. The last of two or four channels is alpha. The colors of a png with alpha are
+    multiplied by it; other formats hold them so.
 
     Raises
     ------
     SceneError
         As `read_image`.
     """
-    codes, data = _read(path)
-    if codes.dtype == np.float32:
-        return codes
-    return codes_to_linear(codes, coded.gamma_of(data))
+    decode = _find(IMAGE_READERS, path)
+    data, name, extension = read_bytes(path), os.fspath(path), Path(path).suffix.lower()
+    whole = ALL_OF_IT.get(extension)
+    found = None if whole is None else _decode(name, whole, data, extension[1:])
+    if found is not None:
+        return found
+    pixels = _decode(name, decode, data, extension[1:])
+    if not 1 <= pixels.shape[2] <= 4:
+        raise SceneError(f"{name}: has {pixels.shape[2]} channels; a picture has 1 to 4")
+    is_coded = pixels.dtype != np.float32
+    values = codes_to_linear(pixels, coded.gamma_of(data)) if is_coded else pixels
+    rgb = np.ascontiguousarray(three_channels(values))
+    if values.shape[2] in (1, 3):
+        return ImageData(rgb)
+    alpha = np.ascontiguousarray(values[..., -1])
+    colors = rgb * alpha[..., None] if is_coded else rgb
+    return ImageData(colors, {"alpha": alpha}, {"metadata": {"background": TRANSPARENT}})
+
+
+def three_channels(pixels: NDArray[Any]) -> NDArray[Any]:
+    """Return the colors (H, W, 3) of pixels (H, W, 1 to 4), without alpha."""
+    return pixels[..., :3] if pixels.shape[2] > 2 else np.repeat(pixels[..., :1], 3, axis=2)
 
 
 def decode_codes(data: bytes, name: str) -> NDArray[Any]:
@@ -154,14 +169,8 @@ def decode_codes(data: bytes, name: str) -> NDArray[Any]:
     return _decode(name, coded.decode, data, "png")
 
 
-def _read(path: str | os.PathLike[str]) -> tuple[NDArray[Any], bytes]:
-    """Return the stored values of an image file, and its bytes."""
-    decode = _find(IMAGE_READERS, path)
-    data = read_bytes(path)
-    return _decode(os.fspath(path), decode, data, Path(path).suffix.lower()[1:]), data
-
-
-def _decode(name: str, decode: Decoder, data: bytes, kind: str) -> NDArray[Any]:
+def _decode(name: str, decode: Callable[[bytes], T], data: bytes, kind: str) -> T:
+    """Return the result of `decode`; its errors name the file."""
     try:
         return decode(data)
     except SceneError as error:
@@ -171,11 +180,6 @@ def _decode(name: str, decode: Decoder, data: bytes, kind: str) -> NDArray[Any]:
     # decoders raise exceptions of any type on damaged data
     except Exception as error:
         raise SceneError(f"{name}: not a readable {kind} image: {error}") from error
-
-
-def encode_png(rgb: ArrayLike, gamma: Gamma = 2.2) -> bytes:
-    """Return a png file of linear values (H, W, 3)."""
-    return coded.encode(to_8bit(rgb, gamma), ".png", gamma)
 
 
 def _find(table: Registry[T], path: str | os.PathLike[str], error: type[SceneError] = SceneError) -> T:
@@ -195,20 +199,20 @@ def _encoded(path: str | os.PathLike[str], encode: Callable[[], bytes]) -> bytes
         raise SaveError(f"{os.fspath(path)}: cannot be encoded: {error or type(error).__name__}") from error
 
 
-def _picture(rgb: ArrayLike) -> Floats:
-    pixels = np.asarray(rgb, np.float32)
-    if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.size == 0:
-        raise SceneError(f"an image must have shape (height, width, 3), got {pixels.shape}")
-    return pixels
+def _checked(picture: ImageData) -> ImageData:
+    shape = picture.rgb.shape
+    if len(shape) != 3 or shape[2] != 3 or not picture.rgb.size:
+        raise SceneError(f"an image must have shape (height, width, 3), got {shape}")
+    return picture
 
 
-def _finite(path: str | os.PathLike[str], pixels: Floats) -> Floats:
+def _finite(path: str | os.PathLike[str], picture: ImageData) -> ImageData:
     """Replace NaN and infinities, with a warning, for a format that cannot hold them."""
-    bad = int(np.count_nonzero(~np.isfinite(pixels).all(axis=2)))
+    bad = int(np.count_nonzero(~np.isfinite(picture.rgb).all(axis=2)))
     if not bad:
-        return pixels
+        return picture
     warnings.warn(f"{os.fspath(path)}: {bad} pixels are not finite; NaN is written as 0", stacklevel=3)
-    return np.nan_to_num(pixels, nan=0.0)
+    return picture.with_rgb(np.nan_to_num(picture.rgb, nan=0.0))
 
 
 def _encode_npy(pixels: Floats) -> bytes:
@@ -225,13 +229,23 @@ def _decode_npy(data: bytes) -> Floats:
     return np.atleast_3d(pixels).astype(np.float32)
 
 
-def _encode_8bit(extension: str) -> Encoder:
-    return lambda pixels, gamma, attributes: coded.encode(to_8bit(pixels, gamma), extension, gamma)
+def _encode_png(picture: ImageData, display: Display, bits: int) -> bytes:
+    return coded.encode(display.codes(picture, bits), ".png", display.gamma)
 
 
-def _without_metadata(encode: Callable[[Floats], bytes]) -> Encoder:
-    """Return an encoder that keeps linear values, and neither a gamma nor attributes."""
-    return lambda pixels, gamma, attributes: encode(pixels)
+def _encode_jpg(picture: ImageData, display: Display, bits: int) -> bytes:
+    """Return a jpg; it has no alpha, so a transparent background is black."""
+    return coded.encode(display.codes(ImageData(picture.rgb)), ".jpg", display.gamma)
+
+
+def _colors(encode: Callable[[Floats], bytes]) -> Encoder:
+    """Return an encoder that keeps linear colors, and nothing else of the picture."""
+    return lambda picture, display, bits: encode(picture.rgb)
+
+
+def _whole(encode: Callable[[ImageData], bytes]) -> Encoder:
+    """Return an encoder that keeps all of the picture."""
+    return lambda picture, display, bits: encode(picture)
 
 
 def _checked_pixels(decode: Callable[[bytes], Any]) -> Decoder:
@@ -246,10 +260,6 @@ def _checked_pixels(decode: Callable[[bytes], Any]) -> Decoder:
     return checked
 
 
-def _exr(pixels: Floats, gamma: Gamma, attributes: Attributes) -> bytes:
-    return exr.encode({"RGB": pixels}, attributes)
-
-
 IMAGE_READERS: Registry[Decoder] = Registry(
     "extension",
     "a function of bytes that returns pixels (H, W, C)",
@@ -258,6 +268,7 @@ IMAGE_READERS: Registry[Decoder] = Registry(
         ".exr": exr.decode,
         ".hdr": rgbe.decode,
         ".npy": _decode_npy,
+        ".npz": lambda data: npz.decode(data).rgb,
     },
     adapt=_checked_pixels,
 )
@@ -265,12 +276,17 @@ IMAGE_WRITERS: Registry[Encoder] = Registry(
     "extension",
     "a function of linear pixels (H, W, 3) that returns bytes",
     {
-        **{extension: _encode_8bit(extension) for extension in coded.EXTENSIONS},
-        ".exr": _exr,
-        ".hdr": _without_metadata(rgbe.encode),
-        ".npy": _without_metadata(_encode_npy),
+        **dict.fromkeys(coded.EXTENSIONS, _encode_jpg),
+        ".png": _encode_png,
+        ".exr": _whole(exr.encode),
+        ".hdr": _colors(rgbe.encode),
+        ".npy": _colors(_encode_npy),
+        ".npz": _whole(npz.encode),
     },
-    adapt=_without_metadata,
+    adapt=_colors,
 )
-EXR_ONLY = Registry("extension", "an encoder", {".exr": _exr})  # what holds named channels
+ALL_OF_IT: dict[str, Callable[[bytes], ImageData | None]] = {  # formats that hold all of a picture
+    ".exr": exr.decode_all,
+    ".npz": npz.decode,
+}
 FINITE = (*coded.EXTENSIONS, ".hdr")  # formats that hold neither NaN nor infinities

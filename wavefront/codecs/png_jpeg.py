@@ -1,4 +1,4 @@
-"""Pictures of 8 and 16 bits in memory: png and jpg, written and read by imageio."""
+"""Pictures of 8 and 16 bits in memory: png and jpg, written and read by imageio but for what `png16` does."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SaveError, SceneError
+from . import png16
 from .claims import JPG, check_claims
 
 Gamma = float | str  # an exponent, or "srgb" for the exact sRGB curve
@@ -28,13 +29,16 @@ GREY = 128  # libjpeg's pixel value where data ends early
 ROUNDING = 2  # largest error of a gray after color interpolation, in codes
 
 
-def encode(codes: NDArray[np.uint8], extension: str, gamma: Gamma) -> bytes:
+def encode(codes: NDArray[Any], extension: str, gamma: Gamma) -> bytes:
     """Return a png or jpg file of codes (H, W, 3), with metadata of their encoding.
 
-    A png gets the chunk gAMA, or sRGB as well; a jpg gets the Exif tags ColorSpace and Gamma.
+    A png gets the chunk gAMA, or sRGB as well; a jpg gets the Exif tags ColorSpace and Gamma. A png may
+    have alpha (H, W, 4), and codes of uint16.
     """
     import imageio.v3 as iio  # imported here to keep `import wavefront` quick
 
+    if extension == ".png" and codes.dtype == np.uint16:
+        return png16.encode(codes, _png_chunks(gamma))
     if extension == ".png":
         options: dict[str, Any] = {"compress_type": PNG_DEFLATE, "pnginfo": _png_info(gamma)}
         return bytes(iio.imwrite("<bytes>", codes, extension=".png", plugin="pillow", **options))
@@ -94,14 +98,19 @@ def _exponent(data: bytes) -> float | None:
     return float(tags[EXIF_GAMMA]) if named else None
 
 
+def _png_chunks(gamma: Gamma) -> list[tuple[bytes, bytes]]:
+    """Return the chunks (name, content) that say how a png is encoded."""
+    gama = SRGB_GAMA if gamma == "srgb" else round(100000 / float(gamma))
+    chunks = [(b"gAMA", gama.to_bytes(4, "big"))]
+    return [(b"sRGB", b"\0"), *chunks] if gamma == "srgb" else chunks  # rendering intent: perceptual
+
+
 def _png_info(gamma: Gamma) -> Any:
     from PIL.PngImagePlugin import PngInfo
 
     info = PngInfo()
-    if gamma == "srgb":
-        info.add(b"sRGB", b"\0")  # rendering intent: perceptual
-    gama = SRGB_GAMA if gamma == "srgb" else round(100000 / float(gamma))
-    info.add(b"gAMA", gama.to_bytes(4, "big"))
+    for name, content in _png_chunks(gamma):
+        info.add(name, content)
     return info
 
 
@@ -120,6 +129,8 @@ def _exif(gamma: Gamma) -> bytes:
 def _decode(data: bytes) -> NDArray[Any]:
     import imageio.v3 as iio
 
+    if png16.reads(data):
+        return png16.decode(data)
     with _quiet():
         return np.asarray(iio.imread(data, plugin="pillow", index=0))
 

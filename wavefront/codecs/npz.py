@@ -1,0 +1,75 @@
+"""Pictures as archives of NumPy: every array under its name, metadata as JSON text, nothing pickled."""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from .image_data import ImageData, from_json, from_named, to_json
+
+METADATA = "metadata"  # the array of text
+LEVEL = 1  # of deflate: noise hardly shrinks more at higher levels
+MAX_BYTES = 2**31  # of all arrays
+EXPANSION = 64  # for larger archives, the limit is this number of bytes per byte of the file
+KINDS = "fiubU"  # of NumPy types that are read
+
+
+def encode(picture: ImageData) -> bytes:
+    """Return an npz file of all arrays of a picture."""
+    buffer = BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive:
+        for name, values in {**picture.named(), METADATA: np.array(to_json(picture.info))}.items():
+            member = zipfile.ZipInfo(
+                f"{name}.npy"
+            )  # with a fixed date: the same picture gives the same bytes
+            member.compress_type = zipfile.ZIP_DEFLATED
+            with archive.open(member, "w", force_zip64=True) as file:
+                np.lib.format.write_array(file, np.asanyarray(values), allow_pickle=False)
+    return buffer.getvalue()
+
+
+def decode(data: bytes) -> ImageData:
+    """Return the picture of an npz file.
+
+    Raises
+    ------
+    SceneError
+        If the file is not an archive of numeric arrays, claims more than it can hold, or has no rgb.
+    """
+    with zipfile.ZipFile(BytesIO(data)) as archive:
+        members = archive.infolist()
+        claimed, most = sum(member.file_size for member in members), max(MAX_BYTES, EXPANSION * len(data))
+        if claimed > most:
+            raise SceneError(
+                f"claims {claimed} bytes in {len(members)} arrays; the limit is {most} "
+                f"for a file of {len(data)} bytes"
+            )
+        arrays = {member.filename.removesuffix(".npy"): _read(archive, member) for member in members}
+    text = arrays.pop(METADATA, np.array("{}"))
+    if text.dtype.kind != "U" or text.ndim:
+        raise SceneError(f"the array {METADATA!r} is {text.dtype} of shape {text.shape}; it must be one text")
+    return from_named(arrays, from_json(str(text)))
+
+
+def _read(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
+    """Return an array of an archive, after checking that its header claims what the archive holds."""
+    with archive.open(member) as file:
+        major, _ = np.lib.format.read_magic(file)
+        header = {1: np.lib.format.read_array_header_1_0, 2: np.lib.format.read_array_header_2_0}.get(major)
+        if header is None:
+            raise SceneError(f"the array {member.filename!r} is of version {major} of npy; 1 and 2 are read")
+        shape, _, kind = header(file)
+        size = math.prod(shape) * kind.itemsize
+        if kind.kind not in KINDS or kind.hasobject or size != member.file_size - file.tell():
+            raise SceneError(
+                f"the array {member.filename!r} is {kind} of shape {shape}, in {member.file_size} bytes; "
+                "only numbers and text of their own size are read"
+            )
+    with archive.open(member) as file:
+        return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
