@@ -50,7 +50,19 @@ from .sampling import warp
 from .sampling.sampler import Sampler
 from .scene import Scene
 from .session import Session
-from .shapes import Disk, Instance, Mesh, Rectangle, Shape, Sphere
+from .shapes import (
+    Capsules,
+    Cylinders,
+    Disk,
+    Edges,
+    Instance,
+    Mesh,
+    Points,
+    Rectangle,
+    Shape,
+    Sphere,
+    Spheres,
+)
 from .suggestions import did_you_mean
 from .textures.base import BaseTexture
 from .textures.image import Texture
@@ -80,13 +92,16 @@ __all__ = [
     "BsdfSample",
     "BumpMap",
     "Camera",
+    "Capsules",
     "Comparison",
     "Conductor",
+    "Cylinders",
     "DeltaLight",
     "Dielectric",
     "Diffuse",
     "DirectionalLight",
     "Disk",
+    "Edges",
     "Environment",
     "Frame",
     "Geometry",
@@ -107,6 +122,7 @@ __all__ = [
     "NormalMap",
     "OrenNayar",
     "PointLight",
+    "Points",
     "Principled",
     "Rectangle",
     "RenderError",
@@ -117,6 +133,7 @@ __all__ = [
     "Session",
     "Shape",
     "Sphere",
+    "Spheres",
     "SpotLight",
     "Texture",
     "ThinDielectric",

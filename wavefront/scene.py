@@ -14,7 +14,7 @@ from .camera import Camera, field_of_view, image_size, upward
 from .elementary import arctan2, sin_cos
 from .errors import SceneError, finite_array
 from .lights import Environment, Light
-from .shapes import Instance, Mesh, Shape
+from .shapes import Instance, Mesh, PrimitiveArray, Shape
 from .shapes.instance import instance_bounds
 from .suggestions import suggests_keywords
 
@@ -27,8 +27,8 @@ class Scene:
     Parameters
     ----------
     shapes
-        `Mesh`, `Sphere` and `Instance` objects, and what `Rectangle` and `Disk` return; shapes with
-        an emission are lights. Objects of trimesh are converted.
+        `Mesh`, `Sphere`, `Spheres`, `Cylinders`, `Capsules` and `Instance` objects, and what functions such
+        as `Rectangle` return; shapes with an emission are lights. Objects of trimesh are converted.
     lights
         `PointLight`, `SpotLight`, `DirectionalLight` and `Environment` objects, or any `Light`; at most one
         `Environment`. A scene without any light is rendered in the light of a studio: see `render`.
@@ -122,7 +122,7 @@ class Scene:
             raise SceneError("the scene has no shapes")
         _check_environments(self.lights)
         for shape in self.shapes:
-            if isinstance(shape, Mesh):
+            if isinstance(shape, Mesh | PrimitiveArray):
                 shape.check()
 
     @property
@@ -276,7 +276,10 @@ class Shapes(CheckedList[Shape]):
     """The shapes of a scene."""
 
     name = "shapes"
-    allowed = "wf.Mesh, wf.Rectangle, wf.Disk, wf.Sphere, wf.Instance, or a mesh or scene of trimesh"
+    allowed = (
+        "wf.Mesh, wf.Rectangle, wf.Disk, wf.Sphere, wf.Spheres, wf.Cylinders, wf.Capsules, wf.Instance, "
+        "or a mesh or scene of trimesh"
+    )
 
     def converted(self, item: Any) -> list[Shape] | None:
         """Return a shape, or those of an object of another package."""

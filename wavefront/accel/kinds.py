@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from ..errors import SceneError
 from ..shapes import CurvedShape
+from .capsule import CapsulePrimitives
+from .cylinder import CylinderPrimitives
 from .primitives import CurvedPrimitives
 from .sphere import SpherePrimitives
 
-KINDS: tuple[type[CurvedPrimitives], ...] = (SpherePrimitives,)
+KINDS: tuple[type[CurvedPrimitives], ...] = (SpherePrimitives, CylinderPrimitives, CapsulePrimitives)
 
 
 def kind_of(shape: CurvedShape) -> type[CurvedPrimitives]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..record import record
-from ..shapes import Sphere
+from ..shapes import Sphere, Spheres
 from ..shapes.attributes import sphere_dpduv, sphere_uv
 from ..vec import Bools, Doubles, Floats, Ints, f4, normalize
 from .bvh import Ball
@@ -21,7 +21,7 @@ from .triangle import ROUNDOFF
 class SpherePrimitives(CurvedPrimitives):
     """k spheres."""
 
-    shapes = (Sphere,)
+    shapes = (Sphere, Spheres)
 
     centers: Floats  # (3, k)
     radii: Floats  # (k,)
@@ -34,7 +34,7 @@ class SpherePrimitives(CurvedPrimitives):
     def from_shapes(cls, shapes: Sequence[Any], center: NDArray[np.float64]) -> SpherePrimitives:
         """Return the spheres of shapes relative to `center` (3,)."""
         centers = np.concatenate([shape.centers - center for shape in shapes])
-        radii = np.concatenate([shape.radii for shape in shapes])
+        radii = np.concatenate([np.broadcast_to(shape.radii, shape.count) for shape in shapes])
         return cls(np.ascontiguousarray(centers.T, f4), radii.astype(f4))
 
     @property

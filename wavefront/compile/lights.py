@@ -27,7 +27,7 @@ from ..lights import (
 from ..lights.samplers import LightSamplerMaker
 from ..lights.textured_emission import has_textured_emission, mean_radiance
 from ..scene import Scene
-from ..shapes import CurvedShape, Mesh, Shape, Sphere
+from ..shapes import CurvedShape, Mesh, Shape, Sphere, Spheres
 from ..shapes.attributes import ATTRIBUTES
 from ..textures.base import BaseTexture
 from ..vec import Floats, Ints, f4
@@ -140,7 +140,7 @@ def _sphere_lights(
     """Return the lights of emitting spheres, if there are any."""
     emitting = [shape for shape in curved if shape.emission is not None]
     for shape in emitting:
-        if not isinstance(shape, Sphere):
+        if not isinstance(shape, Sphere | Spheres):
             raise SceneError(
                 f"{shape.name}: a {type(shape).__name__} cannot shine; a wf.Sphere or a wf.Mesh can"
             )
@@ -161,7 +161,8 @@ def _lights_of_spheres(shape: Any, center: NDArray[np.float64]) -> SphereLights:
     """Return the lights of a shape of emitting spheres, relative to `center` (3,)."""
     middles = np.ascontiguousarray((shape.centers - center).T, f4)
     radiance = np.repeat(shape.emission, shape.count, 1)
-    return SphereLights(middles, shape.radii.astype(f4), radiance)
+    radii = np.broadcast_to(shape.radii, shape.count).astype(f4)
+    return SphereLights(middles, radii, radiance)
 
 
 def _area_lights(meshes: Sequence[Mesh], corners: Sequence[NDArray[np.float64]]) -> list[Part]:

@@ -35,7 +35,7 @@ def _faces(name: str, faces: ArrayLike) -> NDArray[np.intp]:
     return array.astype(np.intp)
 
 
-def _positions(name: str, values: ArrayLike) -> NDArray[np.float64]:
+def positions(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """Return positions (n, 3) that float32 can hold."""
     array = finite_array(name, values, (None, 3))
     _check_float32(name, array)
@@ -67,7 +67,7 @@ def _coordinates(name: str, values: ArrayLike | None) -> NDArray[np.float64] | N
     return array
 
 
-def _colors(name: str, values: ArrayLike | None) -> NDArray[np.float64] | None:
+def linear_colors(name: str, values: ArrayLike | None) -> NDArray[np.float64] | None:
     """Return (n, 4) linear colors in [0, 1]; colors without an opacity are opaque."""
     if values is None:
         return None
@@ -136,12 +136,12 @@ class Mesh(Shape):
         beyond float32, an index is out of range, there is no face, or there are tangents without normals.
     """
 
-    vertices = Checked(_positions)
+    vertices = Checked(positions)
     faces = Checked(_faces)
     normals = Checked(_vectors)
     uvs, uvs1 = Checked(_coordinates), Checked(_coordinates)
     tangents = Checked(partial(_vectors, width=4))
-    colors = Checked(_colors)
+    colors = Checked(linear_colors)
 
     @suggests_keywords
     def __init__(

@@ -13,9 +13,10 @@ from .parameter import Color, color, scalar
 
 
 class VertexColors(BaseTexture):
-    """The interpolated `colors` of the mesh, for any material parameter that is a color or a number.
+    """The `colors` of the shape, for any material parameter that is a color or a number.
 
-    A mesh without colors, and a sphere, is opaque white.
+    Those of a mesh are interpolated; `Spheres`, `Cylinders` and `Capsules` have one for each primitive. A
+    shape without colors, and a `Sphere`, is opaque white.
 
     Parameters
     ----------

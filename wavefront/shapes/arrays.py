@@ -1,0 +1,89 @@
+"""The base class of shapes of many curved primitives, given by arrays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..bsdfs import Diffuse
+from ..errors import SceneError, finite_array
+from ..materials import Material, MaterialLike
+from ..textures.vertex_colors import VertexColors
+from ..vec import FLOAT32_MAX
+from .base import Checked, CurvedShape
+from .mesh import FLOAT32_MIN, linear_colors
+
+
+def _radii(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """Return radii (n,), or (1,) for a single number."""
+    radii = finite_array(name, value, () if np.ndim(value) == 0 else (None,)).reshape(-1)
+    bad = np.flatnonzero(~((radii >= FLOAT32_MIN) & (radii <= FLOAT32_MAX)))
+    if len(bad):
+        where = f"[{bad[0]}]" if np.ndim(value) else ""
+        limit = f"above 0, from {FLOAT32_MIN:.3g} to {FLOAT32_MAX:.3g}"
+        raise SceneError(f"{name}{where} is {radii[bad[0]]:g}; it must be {limit}")
+    return radii
+
+
+class PrimitiveArray(CurvedShape):
+    """Base class of `Spheres`, `Cylinders` and `Capsules`: n primitives with one material.
+
+    Attributes
+    ----------
+    radii
+        (n,) scene units, or (1,) if all have one.
+    colors
+        (n, 4) linear RGB and opacity; None if all are white.
+    """
+
+    radii = Checked(_radii)
+    colors = Checked(linear_colors)
+
+    def __init__(
+        self, radii: ArrayLike, colors: ArrayLike | None, material: MaterialLike | None, name: str
+    ) -> None:
+        self.name = name
+        self.radii = radii
+        self.colors = colors
+        self.material = material
+        self._default: tuple[bool, Material] | None = None  # whether it shows colors; the material
+        self.check()
+
+    def __repr__(self) -> str:
+        """Return the name and the number of primitives."""
+        return f"<{type(self).__name__} {self.name!r}: {self.count}>"
+
+    @property
+    def default_material(self) -> Material:
+        """A `Diffuse` that shows the colors, or is gray where there are none."""
+        shown = self.colors is not None
+        if self._default is None or self._default[0] != shown:
+            self._default = shown, Material(Diffuse(VertexColors() if shown else 0.5))
+        return self._default[1]
+
+    @property
+    def emission(self) -> Any:
+        """Radiance that leaves the surface: that of the material; None if dark."""
+        return self.material.emission
+
+    def check(self) -> None:
+        """Check the arrays against each other; they may have been assigned one by one.
+
+        Raises
+        ------
+        SceneError
+            If there is no primitive, or an array does not have one row for each.
+        """
+        count = self.count
+        if not count:
+            raise SceneError(f"{self.name}: is empty; it must have at least one primitive")
+        if len(self.radii) not in (1, count):
+            raise SceneError(
+                f"{self.name}: radii must be one number, or one for each of {count}, got {len(self.radii)}"
+            )
+        if self.colors is not None and len(self.colors) != count:
+            raise SceneError(
+                f"{self.name}: colors must have a row for each of {count}, got {len(self.colors)}"
+            )

@@ -1,0 +1,172 @@
+"""Many cylinders or capsules as one shape: bonds, sticks, streamlines, wireframes."""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import SceneError
+from ..materials import MaterialLike
+from ..suggestions import suggests_keywords
+from .arrays import PrimitiveArray
+from .base import Checked
+from .mesh import positions
+
+
+class SegmentArray(PrimitiveArray):
+    """Base class of `Cylinders` and `Capsules`, which have a radius about a segment each.
+
+    Attributes
+    ----------
+    starts, ends
+        (n, 3) the ends of the segments, scene units.
+    caps
+        Whether the surface is closed at the ends.
+    """
+
+    starts, ends = Checked(positions), Checked(positions)
+    caps = True
+
+    @property
+    def count(self) -> int:
+        """Number of primitives."""
+        return len(self.starts)
+
+    def check(self) -> None:
+        """Check the arrays against each other; they may have been assigned one by one.
+
+        Raises
+        ------
+        SceneError
+            If there is no primitive, or an array does not have one row for each.
+        """
+        if len(self.starts) != len(self.ends):
+            raise SceneError(f"{self.name}: has {len(self.starts)} starts and {len(self.ends)} ends")
+        super().check()
+
+    def scaled(self, factor: float) -> Self:
+        """Return the shape with all lengths multiplied by `factor`, and the same material."""
+        shape = copy(self)
+        shape.starts, shape.ends = self.starts * factor, self.ends * factor
+        shape.radii = self.radii * factor
+        return shape
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Lower and upper corner, (2, 3), of spheres about all ends; cylinders may end a little inside."""
+        radii = self.radii[:, None]
+        low = np.minimum(self.starts, self.ends) - radii
+        return np.stack([low.min(0), (np.maximum(self.starts, self.ends) + radii).max(0)])
+
+
+class Cylinders(SegmentArray):
+    """Cylinders, given by arrays of the centers of their ends.
+
+    Parameters
+    ----------
+    starts, ends
+        (n, 3) centers of both ends, scene units.
+    radii
+        (n,) or one number, scene units, above 0.
+    colors
+        (n, 3) RGB, or (n, 4) with opacity, one row per cylinder, as of `Spheres`.
+    caps
+        Whether the ends are closed. An open cylinder is a tube without thickness.
+    material
+        What all surfaces are made of: a `Material` or a `Bsdf`. By default a `Diffuse` that shows the
+        `colors`, or is gray. The outside is the front. Cylinders cannot shine.
+    name
+        Used in messages.
+
+    Raises
+    ------
+    SceneError
+        If an argument is malformed or out of range, lengths differ, there is no cylinder, or one has no
+        length.
+
+    Notes
+    -----
+    Texture coordinates: u turns once about the axis, and v rises from 0 at the start to 1 at the end.
+    """
+
+    @suggests_keywords
+    def __init__(
+        self,
+        starts: ArrayLike,
+        ends: ArrayLike,
+        radii: ArrayLike,
+        colors: ArrayLike | None = None,
+        *,
+        caps: bool = True,
+        material: MaterialLike | None = None,
+        name: str = "cylinders",
+    ) -> None:
+        self.name = name
+        self.starts, self.ends = starts, ends
+        self.caps = bool(caps)
+        super().__init__(radii, colors, material, name)
+
+    def check(self) -> None:
+        """Check the arrays against each other; they may have been assigned one by one.
+
+        Raises
+        ------
+        SceneError
+            If there is no cylinder, an array does not have one row for each, or one has no length.
+        """
+        super().check()
+        bad = np.flatnonzero((self.starts == self.ends).all(1))
+        if len(bad):
+            raise SceneError(
+                f"{self.name}: starts[{bad[0]}] and ends[{bad[0]}] are both {self.starts[bad[0]].tolist()}; "
+                "a cylinder must have a length"
+            )
+
+
+class Capsules(SegmentArray):
+    """Cylinders with half spheres at their ends, given by arrays of the ends of their axes.
+
+    Capsules that share an end make a smooth joint there.
+
+    Parameters
+    ----------
+    starts, ends
+        (n, 3) ends of the axes, scene units; the surface is everywhere one radius away from the axis. If
+        both are equal, the capsule is a sphere.
+    radii
+        (n,) or one number, scene units, above 0.
+    colors
+        (n, 3) RGB, or (n, 4) with opacity, one row per capsule, as of `Spheres`.
+    material
+        What all surfaces are made of: a `Material` or a `Bsdf`. By default a `Diffuse` that shows the
+        `colors`, or is gray. The outside is the front. Capsules cannot shine.
+    name
+        Used in messages.
+
+    Raises
+    ------
+    SceneError
+        If an argument is malformed or out of range, lengths differ, or there is no capsule.
+
+    Notes
+    -----
+    Texture coordinates: u turns once about the axis, and v rises along the axis from 0 to 1, tip to tip.
+    """
+
+    @suggests_keywords
+    def __init__(
+        self,
+        starts: ArrayLike,
+        ends: ArrayLike,
+        radii: ArrayLike,
+        colors: ArrayLike | None = None,
+        *,
+        material: MaterialLike | None = None,
+        name: str = "capsules",
+    ) -> None:
+        self.name = name
+        self.starts, self.ends = starts, ends
+        super().__init__(radii, colors, material, name)

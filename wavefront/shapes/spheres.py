@@ -1,0 +1,91 @@
+"""Many spheres as one shape."""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import SceneError, rgb
+from ..materials import MaterialLike
+from ..suggestions import suggests_keywords
+from ..textures.base import BaseTexture
+from .arrays import PrimitiveArray
+from .base import Checked
+from .mesh import positions
+
+
+class Spheres(PrimitiveArray):
+    """Spheres, given by arrays: atoms, particles, points.
+
+    Parameters
+    ----------
+    centers
+        (n, 3) scene units.
+    radii
+        (n,) or one number, scene units, above 0.
+    colors
+        (n, 3) RGB, or (n, 4) with opacity, one row per sphere. Floats are linear, in [0, 1]; uint8 and uint16
+        are decoded from sRGB. A given material shows them by a parameter `VertexColors`.
+    material
+        What all surfaces are made of: a `Material` or a `Bsdf`. By default a `Diffuse` that shows the
+        `colors`, or is gray. The outside is the front.
+    emission
+        Radiance W·sr⁻¹·m⁻² of all spheres, one number or three; it leaves the surfaces on both sides. By
+        default that of the material, if it has one.
+    name
+        Used in messages.
+
+    Raises
+    ------
+    SceneError
+        If an argument is malformed or out of range, lengths differ, or there is no sphere.
+    """
+
+    centers = Checked(positions)
+
+    @suggests_keywords
+    def __init__(
+        self,
+        centers: ArrayLike,
+        radii: ArrayLike,
+        colors: ArrayLike | None = None,
+        *,
+        material: MaterialLike | None = None,
+        emission: ArrayLike | None = None,
+        name: str = "spheres",
+    ) -> None:
+        self.name = name
+        self.centers = centers
+        super().__init__(radii, colors, material, name)
+        self.emission = emission
+
+    @property
+    def count(self) -> int:
+        """Number of spheres."""
+        return len(self.centers)
+
+    @property
+    def emission(self) -> Any:
+        """Radiance that leaves the surface: the spheres' own, or else their material's; None if dark."""
+        return self.material.emission if self._emission is None else self._emission
+
+    @emission.setter
+    def emission(self, emission: Any) -> None:
+        if isinstance(emission, BaseTexture):
+            raise SceneError(f"{self.name}: spheres shine evenly; a mesh can shine by {emission!r}")
+        self._emission = None if emission is None else rgb(f"{self.name}: emission", emission)
+
+    def scaled(self, factor: float) -> Self:
+        """Return the spheres with all lengths multiplied by `factor`, and the same material."""
+        spheres = copy(self)
+        spheres.centers, spheres.radii = self.centers * factor, self.radii * factor
+        return spheres
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Lower and upper corner, (2, 3)."""
+        radii = self.radii[:, None]
+        return np.stack([(self.centers - radii).min(0), (self.centers + radii).max(0)])
