@@ -75,7 +75,7 @@ BAD = [
     (wf.Environment, {}, {"radiance": INF}, r"Environment radiance is inf"),
     (wf.Environment, {}, {"radiance": (1, 2, 3, 4)}, r"Environment radiance must have shape \(3,\), got \(4,\)"),
     (wf.Scene, {}, {"shapes": []}, r"the scene has no shapes"),
-    (wf.Scene, {}, {"shapes": [wf.Sphere((0, 0, 0), 1), "ball"]}, r"shapes\[1\] is 'ball'; it must be one of wf.Mesh, wf.Rectangle, wf.Disk, wf.Sphere, wf.Instance"),
+    (wf.Scene, {}, {"shapes": [wf.Sphere((0, 0, 0), 1), "ball"]}, r"shapes\[1\] is 'ball'; it must be one of wf.Mesh, wf.Rectangle, wf.Disk, wf.Sphere, wf.Spheres, wf.Cylinders, wf.Capsules, wf.Instance"),
     (wf.Scene, {}, {"shapes": 5}, r"shapes must be a list of wf.Mesh, wf.Rectangle, wf.Disk, wf.Sphere, .*, got 5"),
     (wf.Scene, {}, {"shapes": None}, r"shapes must be a list of wf.Mesh, .*, got None"),
     (wf.Scene, {"shapes": wf.Sphere((0, 0, 0), 1)}, {"lights": 3}, r"lights must be a list of wf.PointLight, .*, got 3"),
