@@ -80,11 +80,11 @@ def test_concatenate_undoes_cutting(kind: type, n: int, data) -> None:
 def test_what_is_alike_in_all_records_stays_so() -> None:
     """One value for all lanes, which costs nothing to gather; two values are written out."""
     first, second = record(Paths, 3), record(Paths, 2)
-    first.eta_scale, second.eta_scale = broadcast(f4(1), 3), broadcast(f4(1), 2)
+    first.roulette_scale, second.roulette_scale = broadcast(f4(1), 3), broadcast(f4(1), 2)
     first.pdf, second.pdf = broadcast(f4(1), 3), broadcast(f4(2), 2)
     joined = Paths.concatenate([first, second])
-    assert joined.eta_scale.strides == (0,)
-    assert (joined.eta_scale.tolist(), joined.pdf.tolist()) == ([1] * 5, [1, 1, 1, 2, 2])
+    assert joined.roulette_scale.strides == (0,)
+    assert (joined.roulette_scale.tolist(), joined.pdf.tolist()) == ([1] * 5, [1, 1, 1, 2, 2])
 
 
 MIRROR, GREY, GLASS, GOLD = (
@@ -175,12 +175,15 @@ def test_directions_are_local_unless_no_material_reads_them() -> None:
 def test_what_is_alike_stays_so() -> None:
     """One number for all columns is gathered without being written down, however many are asked for."""
     paths = record(Paths, 3)
-    paths.eta_scale, paths.throughput = broadcast(f4(2), 3), np.broadcast_to(paths.throughput[:, :1], (3, 3))
+    paths.roulette_scale, paths.throughput = (
+        broadcast(f4(2), 3),
+        np.broadcast_to(paths.throughput[:, :1], (3, 3)),
+    )
     for index in ([1], [0, 1, 2], [2, 2, 1, 0], slice(1, 3)):
         part = paths.take(index if isinstance(index, slice) else np.array(index))
-        assert part.eta_scale.tolist() == [2] * len(part)
+        assert part.roulette_scale.tolist() == [2] * len(part)
         assert (part.throughput == paths.throughput[:, :1]).all()
-        assert part.eta_scale.strides == (0,)
+        assert part.roulette_scale.strides == (0,)
         assert part.slot.tolist() == paths.slot[index].tolist()
 
 
@@ -199,11 +202,11 @@ def test_found_are_the_lanes_that_hit() -> None:
     assert hits.found.tolist() == [0, 2]
 
 
-def carrying(throughput: float, eta_scale: float, n: int) -> Paths:
+def carrying(throughput: float, roulette_scale: float, n: int) -> Paths:
     """Paths of n different addresses, all alike."""
     paths = record(Paths, n)
     paths.pixel, paths.sample = np.arange(n, dtype=np.uint32), np.zeros(n, np.uint32)
-    paths.throughput, paths.eta_scale = np.full((3, n), throughput, f4), np.full(n, eta_scale, f4)
+    paths.throughput, paths.roulette_scale = np.full((3, n), throughput, f4), np.full(n, roulette_scale, f4)
     return paths
 
 
@@ -260,7 +263,7 @@ def test_paths_remember_by_how_much_glass_compresses(monkeypatch: pytest.MonkeyP
     seen = []
 
     def note(paths: Paths, sampler, bounce: int, branches: int):
-        seen.append(np.unique(paths.eta_scale.round(4)).tolist())
+        seen.append(np.unique(paths.roulette_scale.round(4)).tolist())
         return np.arange(len(paths))
 
     monkeypatch.setattr(integrators, "roulette", note)

@@ -112,7 +112,7 @@ def test_rays_start_on_the_side_that_their_lobe_leads_to(lean, roughness, back_f
     surface = interaction(compiled, paths, hits)
     assert surface.back_facing.all() == back_facing
     out = bounce_sample(paths, shading(compiled, surface), sampler, 0)
-    crossed = out.eta_scale != 1
+    crossed = out.roulette_scale != 1
     cos = (out.direction * surface.ng).sum(0)
     start = ((out.origin - surface.point) * surface.ng).sum(0)
     sampled = out.throughput[0] > 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .record import record
-from .vec import Floats, column, f4, signs
+from .vec import Floats, Lanes, column, f4, signs, take
 
 
 @record
@@ -33,9 +33,9 @@ class Frame:
         sign = signs(z[2])
         return cls(z, sign, f4(-1) / (sign + z[2]), sign * z[0])
 
-    def take(self, lanes: slice) -> Frame:
-        """Return the frames of a slice of columns."""
-        return Frame(self.z[:, lanes], self.sign[lanes], self.a[lanes], self.z0[lanes])
+    def take(self, lanes: Lanes) -> Frame:
+        """Return the frames of some columns."""
+        return Frame(*(take(each, lanes) for each in (self.z, self.sign, self.a, self.z0)))
 
     @property
     def x(self) -> Floats:

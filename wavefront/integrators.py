@@ -13,11 +13,13 @@ from typing import TypeAlias
 import numpy as np
 
 from .compile.scene import CompiledScene
+from .guiding import GuideTable
 from .registry import Registry
 from .sampling.sampler import Sampler
 from .stages.alpha import alpha_pass_through
 from .stages.bounce import bounce_sample, branch
 from .stages.compact import alive, compact, roulette, scattering_lanes, select, specular_lanes
+from .stages.guidance import guide
 from .stages.interaction import interaction
 from .stages.intersect import intersect
 from .stages.medium import absorb
@@ -74,18 +76,23 @@ def li_direct_mis(scene: CompiledScene, paths: Paths, sampler: Sampler, max_boun
 
 
 def li_full(
-    scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: int, branches: int = 1
+    scene: CompiledScene,
+    paths: Paths,
+    sampler: Sampler,
+    max_bounces: int,
+    branches: int = 1,
+    table: GuideTable | None = None,
 ) -> Floats:
     """Direct light by two samples at every bounce, and with it all indirect light.
 
-    From its first surface each path goes on in so many `branches`.
+    From its first surface each path goes on in so many `branches`. A `table` guides directions.
     """
     L = np.zeros((3, len(paths)), f4)
     for bounce in range(max_bounces + 1):
         paths, hits = intersect_and_compact(scene, paths, sampler, bounce, L, mis=True)
         if bounce == max_bounces or not len(paths):
             break
-        shade = prepare_shading(scene, paths, hits)
+        shade = guide(prepare_shading(scene, paths, hits), table)
         accumulate(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
         paths = branch(paths, shade, sampler, bounce, ways=branches if bounce == 0 else 1)
         paths = select(paths, roulette(paths, sampler, bounce, branches))

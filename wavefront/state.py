@@ -100,7 +100,7 @@ class Paths(Rays):
     throughput: Floats  # (3, n) product of BSDF weights since the camera
     pdf: Floats  # (n,) density of the last BSDF sample, 1/sr; unused where specular
     specular: Bools  # (n,) the last direction is of a delta lobe or the camera: light sampling cannot find it
-    eta_scale: Floats  # (n,) square of the relative refractive index crossed so far
+    roulette_scale: Floats  # (n,) throughput times this decides about roulette: see `stages.compact.roulette`
     prev_vertex: Floats | None = None  # (3, n) where the paths last scattered; None where that is `origin`
 
 

@@ -49,6 +49,8 @@ class Dimension(IntEnum):
     DIRECTION = 5  # 2-D: direction within the lobe
     ROULETTE = 6  # 1-D: whether the path survives Russian roulette
     OPACITY = 7  # 1-D: whether the path hits a surface with alpha; repeats along the ray, up to 2²⁰
+    GUIDE = 2**20  # 1-D: whether the direction comes from the guide's table
+    GUIDE_DIRECTION = 2**20 + 1  # 2-D: direction from the table
 
 
 REPEATED = {Dimension.OPACITY: 2**20}  # decisions that repeat, and one past the last of their numbers

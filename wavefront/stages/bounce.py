@@ -10,6 +10,7 @@ from ..bsdfs import BsdfSample, sampled
 from ..sampling.sampler import Dimension, Sampler
 from ..state import Paths
 from ..vec import Floats, Ints, f4, normalize, signs, take
+from .guidance import mix_with_guide
 from .interaction import LIFT, offset_origin
 from .shade import Shading
 
@@ -38,6 +39,10 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
     surface = shade.surface
     sample = _sample(shade, _numbers(paths, shade, sampler, bounce))
     direction = shade.frame.to_world(sample.wi)
+    roulette_scale = paths.roulette_scale if sample.eta is None else paths.roulette_scale * sample.eta**2
+    if shade.guidance is not None:
+        sample, direction, gain = mix_with_guide(shade, paths, sample, direction, sampler, bounce)
+        roulette_scale = roulette_scale * gain
     cos, cos_g = shade.cosines(sample.wi, direction)
     specular = sample.specular
     turned = _strayed(shade, sample.wi, cos)
@@ -60,7 +65,7 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         throughput=throughput,
         pdf=sample.pdf,
         specular=specular,
-        eta_scale=paths.eta_scale if sample.eta is None else paths.eta_scale * sample.eta**2,
+        roulette_scale=roulette_scale,
     )
 
 

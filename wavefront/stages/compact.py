@@ -73,16 +73,16 @@ def roulette(paths: Paths, sampler: Sampler, bounce: int, branches: int = 1) -> 
     """Return the lanes of paths that survive, and divide their throughput by the probability of that.
 
     The probability is the ratio of the path's throughput and `ROULETTE_THRESHOLD`, at most 1. The throughput
-    counts by its largest channel, without the scaling of radiance by refraction (`eta_scale`), and relative
-    to 1 / `branches`, with which the paths of a branched path begin. During the first `ROULETTE_AFTER`
-    events only paths without throughput end.
+    counts by its largest channel, times `roulette_scale`, which undoes the scaling of radiance by refraction
+    and the effect of a guide, and relative to 1 / `branches`, with which the paths of a branched path begin.
+    During the first `ROULETTE_AFTER` events only paths without throughput end.
 
     Sources: E. Veach, thesis 1997, §10.4.1; pbrt-v4, §13.2.1.
     """
     if bounce < ROULETTE_AFTER or not len(paths):
         return np.flatnonzero(alive(paths))
     chance = np.clip(
-        highest(paths.throughput) * paths.eta_scale * (branches / ROULETTE_THRESHOLD), TINY, f4(1)
+        highest(paths.throughput) * paths.roulette_scale * (branches / ROULETTE_THRESHOLD), TINY, f4(1)
     )
     u = sampler.draw_1d(paths.pixel, paths.sample, bounce, Dimension.ROULETTE)
     paths.throughput /= chance

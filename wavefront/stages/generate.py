@@ -42,5 +42,5 @@ def generate(
         throughput=np.ones((3, n), f4),
         pdf=broadcast(f4(1), n),
         specular=broadcast(np.True_, n),
-        eta_scale=broadcast(f4(1), n),
+        roulette_scale=broadcast(f4(1), n),
     )

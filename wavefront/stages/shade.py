@@ -10,17 +10,32 @@ from ..bsdfs import Bsdf, evaluated
 from ..compile.materials import MaterialTable
 from ..compile.scene import CompiledScene
 from ..frame import Frame
+from ..guiding import GuideTable
 from ..lights import LightSample
 from ..record import record
 from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
 from ..state import Contribution, Hits, Paths, SurfaceInteraction
-from ..vec import Floats, Ints, broadcast, column, dot, f4, highest, take
+from ..vec import Floats, Ints, Lanes, broadcast, column, dot, f4, highest, take
 from .alpha import transmittance_along
 from .interaction import interaction, offset_origin, origin_above
 from .intersect import ShadowRays, shadow_rays, visible
 
 UP = column((0, 0, 1))
+
+
+@record
+class Guidance:
+    """The table that guides the lanes which light samples reach, and its part in each direction."""
+
+    table: GuideTable
+    row: Ints  # (n,) row of the table
+    share: Floats  # (n,) probability with which a direction is drawn from the table; 0 where it never is
+
+    def mixed(self, lanes: Lanes, direction: Floats, pdf: Floats) -> Floats:
+        """Return the densities (k,) of directions (3, k) of some lanes, given those of the BSDF."""
+        share = take(self.share, lanes)
+        return pdf + share * (self.table.pdf(take(self.row, lanes), direction) - pdf)
 
 
 @record
@@ -32,6 +47,7 @@ class Shading:
     wo: Floats  # (3, n) local frame; +z if all BSDFs are view-independent
     start: Floats  # (3, n) origins of rays that leave to the side of wo, scene units
     groups: list[tuple[slice, Bsdf]]  # lanes of each group, in order, and its material bound to them
+    guidance: Guidance | None = None  # of the lanes of `lit`; None where BSDFs alone choose directions
 
     def lit(self) -> Shading:
         """Return the lanes that need light sampling; the groups after them have only delta lobes."""
@@ -40,7 +56,7 @@ class Shading:
             return self
         first = slice(groups[-1][0].stop if groups else 0)
         parts = self.surface.take(first), self.frame.take(first), self.wo[:, first], self.start[:, first]
-        return Shading(*parts, groups)
+        return Shading(*parts, groups, self.guidance)
 
     def cosines(self, local: Floats, world: Floats) -> tuple[Floats, Floats]:
         """Return |cosθ| (n,) of directions, known in both frames, and their cosine against `ng`, (n,).
@@ -140,10 +156,12 @@ def direct(
     else:
         seen = np.flatnonzero(visible(scene, rays))
         lanes, radiance, number = lanes.take(seen), take(radiance, seen), take(number, seen)
-    pdf_light = take(light.pdf, lanes)
+    pdf_light, pdf = take(light.pdf, lanes), take(pdf, lanes)
     scale = cos.take(lanes) / pdf_light
     if mis:
-        scale *= scene.lights.mis_weight(number, pdf_light, take(pdf, lanes))
+        if shade.guidance is not None:
+            pdf = shade.guidance.mixed(lanes, take(light.wi, lanes), pdf)
+        scale *= scene.lights.mis_weight(number, pdf_light, pdf)
     return Contribution(lanes, f.take(lanes, 1) * radiance * scale, number)
 
 

@@ -1,0 +1,89 @@
+"""Path guiding: directions drawn from a mixture of tables and BSDFs.
+
+Each lane draws from its table with a probability, else from the BSDF, and counts with the density of the
+mixture (one-sample MIS with the balance heuristic), so the estimate stays unbiased whatever the tables hold.
+
+Sources: E. Veach and L. Guibas, "Optimally Combining Sampling Techniques", SIGGRAPH 1995, section 5.3;
+T. Müller, M. Gross and J. Novák, "Practical Path Guiding", Computer Graphics Forum 36(4), 2017.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..bsdfs import BsdfSample
+from ..guiding import GuideTable
+from ..sampling.sampler import Dimension, Sampler
+from ..state import Paths
+from ..vec import Floats, Ints, f4, take
+from .shade import Guidance, Shading, evaluate
+
+FEWEST = f4(1e-3)  # density of the BSDF, relative to the mixture, below which roulette takes it for this
+
+
+def guide(shade: Shading, table: GuideTable | None) -> Shading:
+    """Let the table choose directions at the surfaces where it may; None leaves them as they are.
+
+    Surfaces that only have delta lobes cannot be guided, and transmissive ones are not: their light comes
+    from two sides.
+    """
+    lit = shade.lit()
+    if table is None or not lit.groups:
+        return shade
+    row = table.rows(lit.surface.point, lit.surface.ns)
+    share = table.share.take(row)
+    for lanes, bsdf in lit.groups:
+        if bsdf.transmissive:
+            share[lanes] = 0
+    shade.guidance = Guidance(table, row, share)
+    return shade
+
+
+def mix_with_guide(
+    shade: Shading, paths: Paths, sample: BsdfSample, direction: Floats, sampler: Sampler, bounce: int
+) -> tuple[BsdfSample, Floats, Floats]:
+    """Replace some directions by such of the tables, and weigh all by the density of the mixture.
+
+    Parameters
+    ----------
+    sample, direction
+        BSDF samples of all lanes, and their directions (3, n) in the world frame.
+
+    Returns
+    -------
+    sample, direction
+        Those of the mixture.
+    gain
+        (n,) density of the mixture over that of the BSDF: throughput times this is what the path would have
+        without a guide. Russian roulette goes by that, since a direction that is drawn often because much
+        light comes from there gives a small throughput, and yet is worth following.
+    """
+    assert shade.guidance is not None
+    table, row, share = shade.guidance.table, shade.guidance.row, shade.guidance.share
+    n = row.size
+    u = sampler.draw_1d(paths.pixel[:n], paths.sample[:n], bounce, Dimension.GUIDE)
+    chosen = np.flatnonzero(u < share)
+    direction = direction.copy()
+    direction[:, chosen] = _from_table(table, row, chosen, paths, sampler, bounce)
+    wi, specular, valid = sample.wi.copy(), np.array(sample.specular), sample.pdf > 0
+    wi[:, chosen] = shade.frame.take(chosen).to_local(take(direction, chosen))
+    specular[chosen], valid[chosen] = False, True
+    f, pdf_bsdf = evaluate(shade.lit(), wi[:, :n])
+    pdf = shade.guidance.mixed(slice(0, n), direction[:, :n], pdf_bsdf)
+    weight, density, gain = sample.weight.copy(), sample.pdf.copy(), np.ones(len(paths), f4)
+    good = valid[:n] & (pdf > 0)
+    scale = np.where(good, np.abs(wi[2, :n]) / np.where(good, pdf, f4(1)), f4(0))
+    # delta lobes are drawn by the BSDF alone
+    delta = specular[:n]
+    weight[:, :n] = np.where(delta, weight[:, :n] / (f4(1) - share), f * scale)
+    density[:n] = np.where(delta, density[:n], pdf)
+    gain[:n] = np.where(delta | ~good, f4(1), pdf / np.maximum(pdf_bsdf, FEWEST * pdf))
+    return BsdfSample(wi, weight, density, specular, sample.eta), direction, gain
+
+
+def _from_table(
+    table: GuideTable, row: Ints, lanes: Ints, paths: Paths, sampler: Sampler, bounce: int
+) -> Floats:
+    """Return directions (3, k) for some lanes."""
+    address = take(paths.pixel, lanes), take(paths.sample, lanes), bounce
+    return table.sample(row.take(lanes), sampler.draw_2d(*address, Dimension.GUIDE_DIRECTION))
