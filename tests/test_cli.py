@@ -256,9 +256,27 @@ def test_gamma_and_exposure_reach_the_file(obj, tmp_path):
     np.testing.assert_allclose(np.clip(brighter / 2, 0, 1), linear, rtol=1e-6)
 
 
+def test_tone_white_balance_and_bits_reach_the_file(obj, tmp_path):
+    common = ["--spp", "4", "--size", "8x6", "--quiet", "--origin", "0,1,3"]
+    assert main(["render", obj, "-o", str(tmp_path / "a.npz"), *common]) == 0
+    image = wf.Image.load(tmp_path / "a.npz")
+    assert image.variance is not None
+    for white, value in (("3200", 3200), ("0.5,.6,0.7", (0.5, 0.6, 0.7))):
+        options = ["--tone", "agx", "--white-balance", white, "--bits", "16", "--exposure", "1"]
+        assert main(["render", obj, "-o", str(tmp_path / "a.png"), *common, *options]) == 0
+        image.save(tmp_path / "b.png", exposure=1, tone="agx", white_balance=value, bits=16)
+        assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
+        (["--tone", "filmic"], "invalid choice: 'filmic'"),
+        (["--white-balance", "100"], "white_balance is 100.0; it must be 1667 to 25000 kelvin"),
+        (["--white-balance", "1,0,1"], "each component must be above 0"),
+        (["--bits", "12"], "invalid choice: 12"),
+        (["--tone", "agx", "-o", "a.exr"], r"a.exr: tone='agx' is for .png, .jpg, .jpeg"),
+        (["--bits", "16", "-o", "a.npy"], "a.npy: bits=16 is for .png"),
         (["--size", "640"], "is not WIDTHxHEIGHT"),
         (["--size", "4x3x2"], "is not WIDTHxHEIGHT"),
         (["--size", "ax3"], "is not WIDTHxHEIGHT"),
@@ -394,10 +412,11 @@ def test_a_picture_that_its_format_cannot_hold_is_saved_in_another(obj, tmp_path
 
     monkeypatch.setattr("wavefront.codecs.png_jpeg.encode", refuse)
     options = ["-o", str(tmp_path / "p.jpg"), "--spp", "1", "--size", "8x6", "--quiet", "--origin", "0,1,4"]
-    assert main(["render", obj, *options]) == 2
+    assert main(["render", obj, *options, "--tone", "agx"]) == 2
     error, note = saved_instead(capsys)
     assert "p.jpg: cannot be encoded: encoder error -2" in error
-    assert note == f"wavefront: the picture was saved as {tmp_path / 'p-saved.npy'}"
+    assert note == f"wavefront: the picture was saved as {tmp_path / 'p-saved.npz'}"
+    assert wf.Image.load(tmp_path / "p-saved.npz").variance is not None
 
 
 def test_a_picture_that_can_be_saved_nowhere_is_said_to_be_lost(obj, fast, capsys, monkeypatch):

@@ -10,7 +10,7 @@ from pathlib import Path
 from ..errors import SaveError
 
 MAX_STEM = 40  # characters of the name that are kept
-ALWAYS = ".npy"  # can store any picture
+ALWAYS = ".npz"  # can hold any picture, with all that belongs to it
 
 
 def save_elsewhere(save: Callable[[Path], None], path: str) -> Path | None:
@@ -27,7 +27,7 @@ def save_elsewhere(save: Callable[[Path], None], path: str) -> Path | None:
     -------
     Path
         The new path: in the folder of `path`, in the current folder or in the system's folder for temporary
-        files, in the format of `path`, else as npy. No file is replaced. None if none of these can be
+        files, in the format of `path`, else as npz. No file is replaced. None if none of these can be
         written.
     """
     extension = Path(path).suffix.lower()

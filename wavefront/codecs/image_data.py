@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -75,6 +74,8 @@ def from_named(arrays: Mapping[str, NDArray[Any]], info: Mapping[str, Any]) -> I
 
 def to_json(info: Mapping[str, Any]) -> str:
     """Return values as JSON text, with NaN as Python's `json` writes it, and other objects as their text."""
+    import json  # imported here to keep `import wavefront` quick
+
     return json.dumps(info, ensure_ascii=False, default=_plain)
 
 
@@ -91,6 +92,8 @@ def from_json(text: str) -> dict[str, Any]:
     SceneError
         If the text is not JSON, or holds values of other types.
     """
+    import json
+
     try:
         info = json.loads(text)
         if not isinstance(info, dict) or not isinstance(info.get("metadata", {}), dict):

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-import zipfile
 from io import BytesIO
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
 from .image_data import ImageData, from_json, from_named, to_json
+
+if TYPE_CHECKING:
+    import zipfile
 
 METADATA = "metadata"  # the array of text
 LEVEL = 1  # of deflate: noise hardly shrinks more at higher levels
@@ -22,6 +24,8 @@ KINDS = "fiubU"  # of NumPy types that are read
 
 def encode(picture: ImageData) -> bytes:
     """Return an npz file of all arrays of a picture."""
+    import zipfile  # imported here to keep `import wavefront` quick
+
     buffer = BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive:
         for name, values in {**picture.named(), METADATA: np.array(to_json(picture.info))}.items():
@@ -42,6 +46,8 @@ def decode(data: bytes) -> ImageData:
     SceneError
         If the file is not an archive of numeric arrays, claims more than it can hold, or has no rgb.
     """
+    import zipfile
+
     with zipfile.ZipFile(BytesIO(data)) as archive:
         members = archive.infolist()
         claimed, most = sum(member.file_size for member in members), max(MAX_BYTES, EXPANSION * len(data))
