@@ -12,7 +12,7 @@ import numpy as np
 
 from .camera import Camera
 from .compile.scene import CompiledScene
-from .guiding import Cells, GuideTable
+from .guiding import GuideCells, GuideTable
 from .guiding.octahedral import bins_of
 from .guiding.training import LEVELS, SIDE, Records, build_table, learn_shares
 from .integrators import accumulate, intersect_and_compact, prepare_shading
@@ -26,7 +26,6 @@ from .stages.shade import Shading, direct, evaluate
 from .state import Paths, SoA, Words
 from .vec import Floats, Ints, highest, take
 
-SEED_CHANGE = 0x5EED_0F_9417D  # the seed of the pilot is that of the picture XOR this
 PATHS = 1 << 18
 ROUNDS = (1 / 7, 2 / 7, 4 / 7)  # parts of the paths; each round is guided by those before it
 WAVE = 1 << 16
@@ -63,7 +62,7 @@ def train(
     """
     rounds: list[Records] = []
     table: GuideTable | None = None
-    cells: Cells | None = None
+    cells: GuideCells | None = None
     done = 0
     for part in ROUNDS:
         count = int(paths * part)
@@ -78,7 +77,7 @@ def train(
         )
         if not len(vertices):
             return table
-        cells = cells or Cells.around(vertices.point, LEVELS)
+        cells = cells or GuideCells.around(vertices.point, LEVELS)
         rounds.append(_records(vertices, light, cells))
         table = build_table(Records.concatenate(rounds), cells)
     assert table is not None
@@ -151,7 +150,7 @@ def _vertices(L: Floats, paths: Paths, left: Paths, shade: Shading) -> Vertices:
     )
 
 
-def _records(vertices: Vertices, light: Floats, cells: Cells) -> Records:
+def _records(vertices: Vertices, light: Floats, cells: GuideCells) -> Records:
     """Return the records of vertices whose paths found so much light (k,) afterwards."""
     return Records(
         cell=cells.of(vertices.point, vertices.normal),

@@ -45,6 +45,7 @@ def render(
     filter: str | Filter = "box",
     light_sampler: str | LightSamplerMaker = "spatial",
     branches: int = 1,
+    guide: bool = False,
     wave_size: int | None = None,
     max_memory: int | str | None = None,
     aovs: str | Sequence[str] = (),
@@ -113,6 +114,11 @@ def render(
         In how many ways the path of a sample goes on from the first surface, at most 64; only "full"
         has any. Two to four make a sample dearer, but less noisy by more where most of the noise is in
         indirect light, as in a room.
+    guide
+        Learn from a pilot of 262144 paths where light comes from, and choose directions by that; only
+        "full" can be guided. It takes a second or two, and pays where light comes through narrow openings
+        or several reflections: docs/guiding.md has figures. The pilot depends on the scene, the camera
+        and the seed alone.
     wave_size
         The most paths that are traced together by one worker; by default what suits their number and
         speed, at most 131 072. The picture does not depend on it.
@@ -168,6 +174,7 @@ def render(
         filter=filter,
         light_sampler=light_sampler,
         branches=branches,
+        guide=guide,
         wave_size=wave_size,
         max_memory=max_memory,
         aovs=aovs,

@@ -33,6 +33,7 @@ from .outcome import (
     warn_of_noise,
     warn_of_unseen_lights,
 )
+from .pilot import train
 from .progress import Progress, phase
 from .renderable import as_scene, choose_camera
 from .sampling.sampler import SAMPLERS, SamplerMaker
@@ -70,7 +71,7 @@ class Session:
     ----------
     scene, spp, camera, size, material, up, lighting, ground
         As for `render`.
-    integrator, max_bounces, seed, sampler, accel, filter, light_sampler, branches
+    integrator, max_bounces, seed, sampler, accel, filter, light_sampler, branches, guide
         As for `render`.
     workers, executor, noise, seconds, wave_size, max_memory, aovs, progress
         As for `render`.
@@ -109,6 +110,7 @@ class Session:
         filter: str | Filter = "box",
         light_sampler: str | LightSamplerMaker = "spatial",
         branches: int = 1,
+        guide: bool = False,
         wave_size: int | None = None,
         max_memory: int | str | None = None,
         aovs: str | Sequence[str] = (),
@@ -136,6 +138,7 @@ class Session:
             filter=filter,
             light_sampler=light_sampler,
             branches=branches,
+            guide=guide,
             wave_size=wave_size,
             max_memory=max_memory,
             aovs=aovs,
@@ -167,12 +170,22 @@ class Session:
             self._compiled,
             lru_cache(settings.sampler_for),
             FILTERS.find(settings.filter),
-            settings.estimator(),
+            self._estimator(camera),
             settings.max_bounces,
         )
         self._budget = settings.budget(camera.size)
         self._make_pool(settings.executor_for(camera.size))
         self._begin_picture(camera, accumulator, begin)
+
+    def _estimator(self, camera: Camera) -> Integrator:
+        """Return the integrator; a guide is trained for the camera."""
+        settings = self._settings
+        if not settings.guide:
+            return settings.estimator()
+        with phase("learning where light comes from", settings.progress):
+            sampler = settings.pilot_sampler(camera.film[0])
+            table = train(self._compiled, self._compiled.view(camera), sampler, settings.max_bounces)
+        return settings.estimator(table)
 
     def _make_pool(self, executor: str | ExecutorMaker) -> None:
         """Make a pool of workers, which start with the first job."""
@@ -290,16 +303,16 @@ class Session:
         SceneError
             If one of them is malformed. The picture that was begun is not changed.
         """
-        begin = time.perf_counter()
+        begin, settings = time.perf_counter(), self._settings
         if self._closed:
             raise RenderError("the session is closed")
         check_camera("camera", camera)
         size = None if size is None else image_size(size)
-        camera = choose_camera(self._scene, camera, size, self._settings.up_vector)
+        camera = choose_camera(self._scene, camera, size, settings.up_vector)
         self._compiled.view(camera)  # checks its distance
         budget = self._settings.budget(camera.size)
         accumulator = Accumulator(*camera.size)
-        executor = self._settings.executor_for(camera.size)
+        executor = settings.executor_for(camera.size)
         with self.interrupt_handler:
             self._discard_sweeps()
             if not self._pool.closed:
@@ -307,8 +320,9 @@ class Session:
             others = (executor, self._executor) == ("processes", "threads")
             others |= budget.workers != self._budget.workers
             self._budget = budget
-            if self._monitor.stop.value or others:
+            if self._monitor.stop.value or others or settings.guide:
                 self._pool.close()
+                self._tracer.integrator = self._estimator(camera)
                 self._make_pool(executor)
         self._begin_picture(camera, accumulator, begin)
 
@@ -407,6 +421,7 @@ class Session:
                 "sampler": SAMPLERS.label(settings.sampler),
                 "filter": FILTERS.label(settings.filter),
                 "branches": settings.branches,
+                "guide": settings.guide,
                 "accelerator": self._compiled.accelerator.name,
                 "workers": self._budget.workers,
                 "executor": EXECUTORS.label(self._executor),

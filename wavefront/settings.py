@@ -18,6 +18,7 @@ from .camera import Camera, image_size, upward
 from .errors import SceneError, number
 from .exact_sum import MAX_TERMS
 from .filters import FILTERS, Filter
+from .guiding import GuideTable
 from .integrators import INTEGRATORS, Integrator, li_full
 from .layers import chosen_layers
 from .lighting import DEFAULT, LIGHTINGS, check_lighting
@@ -35,6 +36,7 @@ from .scheduling.workers import ExecutorMaker
 DEFAULT_SPP = 100
 MAX_BRANCH_SAMPLES = 2**32  # a sample's index is 32 bits of its address, and each branch has one
 MAX_BRANCHES = 64
+PILOT = 0x5EED_0F_9417D  # the seed of the pilot is that of the picture XOR this
 MAX_SPP_FOR_NOISE = 2**16  # where only `noise` was given
 
 SettingCheck: TypeAlias = Callable[
@@ -251,6 +253,14 @@ class Settings:
         option="ways a path goes on from its first surface",
         check=whole_number(1, MAX_BRANCHES),
     )
+    guide: bool = setting(
+        False,
+        "Learn from a pilot of 262144 paths where light comes from, and choose directions by that; only "
+        '"full" can be guided. It takes a second or two, and pays where light comes through narrow openings '
+        "or several reflections: docs/guiding.md has figures. The pilot depends on the scene, the camera and "
+        "the seed alone.",
+        option="learn where light comes from, for scenes with much indirect light",
+    )
     wave_size: int | None = setting(
         None,
         "The most paths that are traced together by one worker; by default what suits their number "
@@ -305,19 +315,25 @@ class Settings:
         """Samples that every pixel gets; None where noise or time decides."""
         return self.max_spp if self.noise is None and self.seconds is None else None
 
-    def estimator(self) -> Integrator:
-        """Return the integrator for paths with so many branches."""
+    def estimator(self, table: GuideTable | None = None) -> Integrator:
+        """Return the integrator for paths with so many branches, guided by a table."""
         integrator = INTEGRATORS.find(self.integrator)
-        if self.branches == 1:
+        if self.branches == 1 and not self.guide:
             return integrator
         if integrator is not li_full:
             label = INTEGRATORS.label(self.integrator)
+            if self.guide:
+                raise SceneError(f"guide is {self.guide}; with integrator={label!r} it must be False")
             raise SceneError(f"branches is {self.branches}; with integrator={label!r} it must be 1")
-        return partial(li_full, branches=self.branches)
+        return partial(li_full, branches=self.branches, table=table)
 
     def sampler_for(self, width: int) -> Sampler:
         """Return the sampler of a picture that is `width` pixels wide."""
         return make_sampler(self.sampler, self.seed, width)
+
+    def pilot_sampler(self, width: int) -> Sampler:
+        """Return the sampler of the pilot of path guiding, whose numbers the picture does not use."""
+        return make_sampler(self.sampler, self.seed ^ PILOT, width)
 
     def executor_for(self, size: tuple[int, int]) -> str | ExecutorMaker:
         """Return the executor for a picture of a size (width, height)."""

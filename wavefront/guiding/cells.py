@@ -12,7 +12,7 @@ MARGIN = 0.01  # of the grid's extent, on each side
 
 
 @record
-class Cells:
+class GuideCells:
     """A cubic grid times the six axes, of which a normal belongs to the nearest.
 
     Points outside the grid belong to the nearest cell.
@@ -23,7 +23,7 @@ class Cells:
     levels: int  # the grid has 2^levels cells along each axis
 
     @classmethod
-    def around(cls, points: Floats, levels: int) -> Cells:
+    def around(cls, points: Floats, levels: int) -> GuideCells:
         """Return a grid over most of some points (3, n)."""
         low, high = np.quantile(points, (OUTLYING, 1 - OUTLYING), axis=1)
         extent = max(float((high - low).max()), 1e-20)

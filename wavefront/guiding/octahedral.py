@@ -11,6 +11,8 @@ import numpy as np
 
 from ..vec import Doubles, Floats, Ints, dot, f4
 
+PARTS = 8  # along each side of a bin, for its solid angle
+
 
 def bins_of(w: Floats, side: int) -> tuple[Ints, Floats]:
     """Return the bins of unit directions.
@@ -54,12 +56,14 @@ def directions_at(x: Floats, y: Floats) -> Floats:
 
 
 def solid_angles(side: int) -> Doubles:
-    """Return the solid angle of each bin, (side²,), sr, from the density at its center."""
-    x, y = np.meshgrid(*[(np.arange(side) + 0.5) / side * 2 - 1] * 2)
+    """Return the solid angle of each bin, (side²,), sr, by the midpoint rule over `PARTS`² parts of it."""
+    parts = side * PARTS
+    x, y = np.meshgrid(*[(np.arange(parts) + 0.5) / parts * 2 - 1] * 2)
     z = 1 - np.abs(x) - np.abs(y)
     fold = np.maximum(-z, 0)
     squared = (np.abs(x) - fold) ** 2 + (np.abs(y) - fold) ** 2 + z**2
     area = (squared * np.sqrt(squared)) ** -1.0
+    area = area.reshape(side, PARTS, side, PARTS).sum((1, 3))
     return np.asarray((area * (4 * np.pi / area.sum())).ravel())
 
 

@@ -14,9 +14,9 @@ import numpy as np
 from ..record import record
 from ..state import SoA
 from ..vec import Doubles, Floats, Ints
-from .cells import Cells
+from .cells import GuideCells
+from .guide_table import GuideTable
 from .octahedral import neighbors, solid_angles
-from .table import GuideTable
 
 SIDE = 32  # bins along each side of the square of directions
 LEVELS = 6  # the finest grid has 64³ cells
@@ -42,7 +42,7 @@ class Records(SoA):
     pdf_bsdf: Floats  # (m,) that of the BSDF alone
 
 
-def build_table(records: Records, cells: Cells) -> GuideTable:
+def build_table(records: Records, cells: GuideCells) -> GuideTable:
     """Return the table of the mean incident light, times the cosine, in each cell.
 
     From the largest cell to the smallest ones, each that has `ENOUGH` records gets a density of its
@@ -101,7 +101,7 @@ def _best_shares(table: GuideTable, records: Records) -> Doubles:
     return np.asarray(SHARES)[blended.argmin(0)]
 
 
-def _limited(records: Records, cells: Cells) -> Doubles:
+def _limited(records: Records, cells: GuideCells) -> Doubles:
     """Return incident light over density, (m,), where no record is far above its surroundings."""
     value = records.incident.astype(np.float64) / records.pdf
     coarse = cells.coarser(records.cell, min(CLAMP_LEVEL, cells.levels))

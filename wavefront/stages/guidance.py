@@ -72,12 +72,13 @@ def mix_with_guide(
     pdf = shade.guidance.mixed(slice(0, n), direction[:, :n], pdf_bsdf)
     weight, density, gain = sample.weight.copy(), sample.pdf.copy(), np.ones(len(paths), f4)
     good = valid[:n] & (pdf > 0)
-    scale = np.where(good, np.abs(wi[2, :n]) / np.where(good, pdf, f4(1)), f4(0))
+    divisor = np.where(good, pdf, f4(1))
+    scale = np.where(good, np.abs(wi[2, :n]) / divisor, f4(0))
     # delta lobes are drawn by the BSDF alone
     delta = specular[:n]
     weight[:, :n] = np.where(delta, weight[:, :n] / (f4(1) - share), f * scale)
-    density[:n] = np.where(delta, density[:n], pdf)
-    gain[:n] = np.where(delta | ~good, f4(1), pdf / np.maximum(pdf_bsdf, FEWEST * pdf))
+    density[:n] = np.where(delta, density[:n], np.where(good, pdf, f4(0)))
+    gain[:n] = np.where(delta | ~good, f4(1), divisor / np.maximum(pdf_bsdf, FEWEST * divisor))
     return BsdfSample(wi, weight, density, specular, sample.eta), direction, gain
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..record import record
 from ..vec import Doubles, Floats, Ints, f4
-from .cells import Cells
+from .cells import GuideCells
 from .octahedral import bins_of, directions_at
 
 INSIDE = f4(1e-5)  # the least distance of a sampled direction from the edges of its bin, of the bin's side
@@ -19,7 +19,7 @@ class GuideTable:
     A row is one density. Each cell has a row; cells with few records share that of a larger cell.
     """
 
-    cells: Cells
+    cells: GuideCells
     side: int  # bins along each side of the square, a power of two
     row_of: Ints  # (cells,) row of each cell
     density: Floats  # (rows · side²,) over the square [0, 1]²
@@ -28,7 +28,7 @@ class GuideTable:
     share: Floats  # (rows,) probability with which a direction is drawn from the table, not from the BSDF
 
     @classmethod
-    def of_bins(cls, cells: Cells, row_of: Ints, contents: Doubles, share: Floats) -> GuideTable:
+    def of_bins(cls, cells: GuideCells, row_of: Ints, contents: Doubles, share: Floats) -> GuideTable:
         """Return tables of rows of probabilities of bins, (rows, side²), each with the sum 1."""
         side = int(np.sqrt(contents.shape[1]))
         bins = contents.reshape(-1, side, side)
