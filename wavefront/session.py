@@ -37,7 +37,7 @@ from .pilot import train
 from .progress import Progress, phase
 from .renderable import as_scene, choose_camera
 from .sampling.sampler import SAMPLERS, SamplerMaker
-from .scheduling.accumulator import Accumulator
+from .scheduling.accumulator import Accumulator, check_picture_memory
 from .scheduling.blas import reserve_buffers
 from .scheduling.executors import EXECUTORS
 from .scheduling.interrupt import InterruptHandler
@@ -153,8 +153,8 @@ class Session:
         reserve_buffers(1)
         self._scene = as_scene(subject, settings.material, settings.progress)
         camera = choose_camera(self._scene, settings.camera, settings.size, settings.up_vector)
-        settings.budget(camera.size)  # refuses a picture that cannot fit before work
-        accumulator = Accumulator(*camera.size)
+        check_picture_memory(*camera.size)
+        settings.budget(camera.size)  # before work; again when the memory of the scene is known
         self._preset = choose_preset(self._scene, settings.lighting)
         self._lighted = lighted(self._scene, self._preset, ground=settings.ground, up=settings.up_vector)
         warn_of_unseen_lights(self._lighted, settings.integrator)
@@ -175,7 +175,7 @@ class Session:
         )
         self._budget = settings.budget(camera.size)
         self._make_pool(settings.executor_for(camera.size))
-        self._begin_picture(camera, accumulator, begin)
+        self._begin_picture(camera, Accumulator(*camera.size), begin)
 
     def _estimator(self, camera: Camera) -> Integrator:
         """Return the integrator; a guide is trained for the camera."""

@@ -23,6 +23,11 @@ def picture_memory(width: int, height: int) -> int:
     return (FILM_BYTES + PICTURE_BYTES) * width * height + SPARE_BYTES
 
 
+def check_picture_memory(width: int, height: int) -> None:
+    """Check that there is memory for a film and the picture, or raise a SceneError."""
+    check_memory(f"a picture of {width}x{height} pixels", picture_memory(width, height))
+
+
 class Accumulator:
     """Sums over all jobs that are done.
 
@@ -43,7 +48,7 @@ class Accumulator:
 
     def __init__(self, width: int, height: int) -> None:
         pixels = width * height
-        check_memory(f"a picture of {width}x{height} pixels", picture_memory(width, height))
+        check_picture_memory(width, height)
         self.film, self.bad, self.rays = Film(width, height), BadSamples(), 0
         self._reserve: Any = np.empty(
             PICTURE_BYTES * pixels + SPARE_BYTES, np.uint8
