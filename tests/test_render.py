@@ -345,7 +345,9 @@ FAULTS = [
 def test_a_few_bad_samples_are_counted(integrator: str, method: str, value: float) -> None:
     """Dropped with a warning that names the first; the picture is finite."""
     with pytest.warns(
-        UserWarning, match=r"\d+ of 262144 samples were not finite .* first: pixel \d+, sample \d+"
+        UserWarning,
+        match=r"\d+ of 262144 samples were not finite .* first: pixel \d+, sample \d+, bounce 0, "
+        r"(BSDF sample of|light sample at) material Faulty of 'floor'",
     ):
         image = render(faulty(2e-5, value, method), 4096, integrator=integrator)
     assert 1 <= image.metadata["bad_samples"] <= 26

@@ -14,12 +14,13 @@ import numpy as np
 
 from .bsdfs import Bsdf
 from .camera import Camera
+from .compile.instances import sort_shapes
 from .compile.scene import CompiledScene
 from .errors import warn_caller
 from .image import Image
 from .lights import LightSample
 from .scene import Scene
-from .shapes import Instance, Mesh, Shape
+from .shapes import Instance, Shape
 from .stages.interaction import interaction, origin_above
 from .stages.intersect import intersect, shadow_rays, visible
 from .state import Hits, Rays, SurfaceInteraction
@@ -153,14 +154,7 @@ class Sight:
         return "it looks past the scene"
 
     def _name(self, prims: Ints) -> str:
-        """Return the name of the shape that most of the primitives (n,) belong to."""
-        shapes = list(self._scene.shapes)
-        if any(isinstance(shape, Instance) for shape in shapes):
-            return "a shape"
-        ordered: list[Shape] = sorted(shapes, key=lambda shape: not isinstance(shape, Mesh))  # as compiled
-        ends = np.cumsum([len(shape.faces) if isinstance(shape, Mesh) else 1 for shape in ordered])
-        numbers = np.searchsorted(ends, prims, "right")
-        return repr(ordered[int(np.bincount(numbers).argmax())].name)
+        return shape_name(self._scene, prims)
 
     # --- Light at surfaces ----------------------------------------------------------------------------
 
@@ -238,3 +232,14 @@ class Sight:
                 "sees; integrator='full' shows all light"
             )
         return "no light reaches what the camera sees"
+
+
+def shape_name(scene: Scene, prims: Ints) -> str:
+    """Return the name of the shape that most of the primitives (n,) belong to."""
+    if any(isinstance(shape, Instance) for shape in scene.shapes):
+        return "a shape"
+    meshes, curved, _ = sort_shapes(list(scene.shapes), 0)
+    counts = [len(mesh.faces) for mesh in meshes] + [shape.count for shape in curved]
+    shapes: list[Shape] = [*meshes, *curved]
+    numbers = np.searchsorted(np.cumsum(counts), prims, "right")
+    return repr(shapes[int(np.bincount(numbers).argmax())].name)

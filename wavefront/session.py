@@ -18,7 +18,7 @@ from .compile.scene import compile_scene
 from .errors import RenderError
 from .filters import FILTERS, Filter
 from .image import Image
-from .integrators import INTEGRATORS, WITH_MIS, Integrator
+from .integrators import INTEGRATORS, WITH_MIS, Integrator, li_naive
 from .lighting import choose_preset, lighted
 from .lights.samplers import LightSamplerMaker
 from .materials import MaterialLike
@@ -394,7 +394,7 @@ class Session:
         time_up = loop.stopped or loop.scheduler.time_up
         if time_up:
             check_first_samples(image, settings.seconds, self._monitor.surfaces.value)
-        loop.accumulator.bad.report(image)
+        loop.accumulator.bad.report(image, self._cause_of_bad_sample)
         if is_black_or_white(image):
             from .diagnosis import warn_of_black_or_white  # here, as most pictures do without
 
@@ -408,6 +408,25 @@ class Session:
             )
         if settings.noise is not None and (time_up or loop.accumulator.film.count.max() == settings.max_spp):
             warn_of_noise(image, settings.noise)
+
+    def _cause_of_bad_sample(self, pixel: int, sample: int) -> str:
+        """Return in which bounce, and at which material, a sample that is not finite became so."""
+        from .faults import PathChecker  # here, as most pictures do without
+
+        settings, tracer, camera = self._settings, self._tracer, self._loop.view.camera
+        integrator = INTEGRATORS.find(settings.integrator)
+        checker = PathChecker(
+            self._lighted,
+            tracer.scene,
+            camera,
+            tracer.sampler(camera.film[0]),
+            tracer.filter,
+            tracer.max_bounces,
+            settings.branches,
+            light_samples=integrator is not li_naive,
+            mis=integrator in WITH_MIS,
+        )
+        return checker.first_fault(pixel, sample)
 
     def _image(self, cut_short: bool = False) -> Image:
         """Return the picture so far."""

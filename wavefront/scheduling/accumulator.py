@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -101,17 +102,17 @@ class BadSamples:
 
     def __init__(self) -> None:
         self.count = 0
-        self.first = ""
+        self.first = 0, 0  # pixel and sample, if there is any
 
     def count_in(self, job: Job, result: JobResult) -> None:
         """Count the bad lanes of a result and remember the first of all."""
         if result.bad.size and not self.count:
             sample, pixel = divmod(int(result.bad[0]), job.pixels.size)
-            self.first = f"pixel {job.pixels[pixel]}, sample {job.first_sample + sample}"
+            self.first = int(job.pixels[pixel]), job.first_sample + sample
         self.count += result.bad.size
 
-    def report(self, image: Image) -> None:
-        """Warn of bad samples in a picture.
+    def report(self, image: Image, cause_of: Callable[[int, int], str]) -> None:
+        """Warn of bad samples in a picture; `cause_of` a pixel and a sample returns where the value is from.
 
         Raises
         ------
@@ -121,7 +122,10 @@ class BadSamples:
         if not self.count:
             return
         samples = image.metadata["samples"]
-        message = f"{self.count} of {samples} samples were not finite and count as black; first: {self.first}"
+        pixel, sample = self.first
+        cause = cause_of(pixel, sample)
+        first = f"pixel {pixel}, sample {sample}" + (f", {cause}" if cause else "")
+        message = f"{self.count} of {samples} samples were not finite and count as black; first: {first}"
         if self.count > MAX_BAD_SAMPLES * samples:
             raise RenderError(message, image)
         warn_caller(message)

@@ -1,0 +1,126 @@
+"""Samples that are not finite: dropped, counted, and the first one named by bounce and material."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+import scenes
+from significance import render
+
+import wavefront as wf
+from wavefront.bsdfs import BsdfSample
+from wavefront.vec import column, f4
+
+
+class Spoiled(wf.Diffuse):
+    """A material that spoils a part of its samples."""
+
+    part = 1.0
+
+    def sample_f(self, wo: Any, u: Any) -> BsdfSample:
+        """Draw as Diffuse does, and spoil some weights."""
+        sample = super().sample_f(wo, u)
+        sample.weight = np.where(u[0] < self.part, f4(np.nan), sample.weight).astype(f4)
+        return sample
+
+
+class SpoiledValue(wf.Diffuse):
+    """A material whose values are not finite."""
+
+    def f(self, wo: Any, wi: Any) -> Any:
+        """Return infinities."""
+        return np.full_like(wi, np.inf)
+
+
+@dataclass(eq=False)
+class SpoiledLight(wf.DeltaLight):
+    """Parallel light from above, without a finite radiance."""
+
+    toward: np.ndarray  # (3, k) unit direction to the light
+
+    def record(self, center: Any) -> Any:
+        """Return itself."""
+        return self
+
+    def sample_li(self, point: Any, u: Any) -> wf.LightSample:
+        """Spoil the radiance."""
+        one = np.ones(point.shape[1], f4)
+        toward = np.broadcast_to(self.toward, point.shape)
+        return wf.LightSample(toward, toward * f4(np.nan), pdf=one, distance=one * f4(np.inf), cos_light=one)
+
+    def power(self, scene_radius: Any) -> Any:
+        """Return any power."""
+        return np.ones(1, f4)
+
+
+def room(material: Any, mirror: Any = None, light: Any = None) -> wf.Scene:
+    """Return a mirror that the camera sees, in which it sees a wall of the material."""
+    mirror = wf.Rectangle(
+        (-5, 0, -5), (0, 0, 10), (10, 0, 0), material=mirror or wf.Mirror(0.9), name="mirror"
+    )
+    wall = wf.Rectangle((-5, 0, -4), (10, 0, 0), (0, 10, 0), material=material, name="wall")
+    ball = wf.Sphere((9, 9, 9), 0.1, material=wf.Diffuse(0.1), name="far")
+    camera = scenes.probe((0, 0, -1), (0, 1, 1))
+    return wf.Scene([ball, wall, mirror], light or [wf.Environment(1.0)], camera)
+
+
+def first_fault(scene: wf.Scene, **options: Any) -> str:
+    """Return what the error says of the first bad sample."""
+    with pytest.raises(wf.RenderError, match="samples were not finite and count as black; first: ") as caught:
+        render(scene, 16, **options)
+    assert np.isfinite(caught.value.image.rgb).all()
+    return str(caught.value).partition("first: ")[2]
+
+
+@pytest.mark.parametrize("integrator", ["full", "naive"])
+@pytest.mark.parametrize("branches", [1, 3])
+def test_a_bsdf_sample_is_named(integrator: str, branches: int) -> None:
+    """At the second surface of the path: the mirror in front of it is not blamed."""
+    if integrator == "naive" and branches > 1:
+        branches = 1  # it has none
+    found = first_fault(room(Spoiled(0.5)), integrator=integrator, branches=branches)
+    assert found == "pixel 0, sample 0, bounce 1, BSDF sample of material Spoiled of 'wall'"
+
+
+@pytest.mark.parametrize("integrator", ["full", "direct_mis", "direct_simple"])
+def test_a_light_sample_is_named(integrator: str) -> None:
+    """By the material at which it was taken."""
+    found = first_fault(room(SpoiledValue(0.5), light=[wf.PointLight((0, 3, 0), 10)]), integrator=integrator)
+    assert found == "pixel 0, sample 0, bounce 1, light sample at material SpoiledValue of 'wall'"
+
+
+def test_a_fault_of_a_light_is_named_by_where_it_shines() -> None:
+    """The material is sound, but the place is right."""
+    scene = room(wf.Diffuse(0.5), light=[SpoiledLight(column((0, 0.6, 0.8)))])
+    assert first_fault(scene) == "pixel 0, sample 0, bounce 1, light sample at material Diffuse of 'wall'"
+
+
+def test_the_first_surface_is_bounce_0() -> None:
+    """And instances have no name of their own."""
+    scene = room(wf.Diffuse(0.5), mirror=Spoiled(0.5))
+    assert first_fault(scene) == "pixel 0, sample 0, bounce 0, BSDF sample of material Spoiled of 'mirror'"
+    box = wf.Mesh([[9, 9, 0], [9, 9, 1], [9, 8, 0]], [[0, 1, 2]])
+    scene.shapes += [wf.Instance(box, np.eye(4)), wf.Instance(box, np.diag([2.0, 2, 2, 1]))]
+    assert first_fault(scene) == "pixel 0, sample 0, bounce 0, BSDF sample of material Spoiled of a shape"
+
+
+def test_a_few_are_a_warning_with_the_picture() -> None:
+    """And the samples are dropped and counted."""
+    material = Spoiled(0.5)
+    material.part = 3e-5
+    with pytest.warns(UserWarning, match=r"first: pixel \d+, sample \d+, bounce 1, BSDF sample of .* 'wall'"):
+        image = render(room(material), 2048)
+    assert 0 < image.metadata["bad_samples"] <= 1e-4 * image.metadata["samples"]
+    assert np.isfinite(image.rgb).all()
+
+
+def test_an_integrator_of_the_users_own_is_named_by_pixel_and_sample() -> None:
+    """Its steps are unknown; a sound path of the built-in steps blames nobody."""
+
+    def spoiled(scene: Any, paths: Any, sampler: Any, max_bounces: int) -> Any:
+        return np.full((3, len(paths)), np.nan, f4)
+
+    assert first_fault(room(wf.Diffuse(0.5)), integrator=spoiled) == "pixel 0, sample 0"
