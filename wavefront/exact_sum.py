@@ -10,6 +10,8 @@ Source: J. Demmel and H. D. Nguyen, "Parallel Reproducible Summation", IEEE Tran
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from .vec import Doubles, Lanes
@@ -65,6 +67,14 @@ class ExactSums:
             rounded -= before
             rest -= rounded
             sums[:, lanes] += _total(rounded)  # exact in any order: all are multiples of one unit
+
+    def arrays(self) -> dict[str, Doubles]:
+        """Return the two levels of the sums, (c, n) each, by name."""
+        return {"high": self._high, "low": self._low}
+
+    def restore(self, arrays: Mapping[str, Doubles]) -> None:
+        """Set the sums to those of which `arrays` returned these."""
+        self._high, self._low = arrays["high"], arrays["low"]
 
     def merge(self, other: ExactSums) -> None:
         """Add the sums of other terms; the result is as if those terms had been added here."""

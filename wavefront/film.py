@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .exact_sum import ExactSums
 from .record import record
@@ -42,6 +44,7 @@ class Film:
         self.squares = np.zeros((3, pixels))  # sum of squared samples
         self.batches = np.zeros((BATCHES, 3, pixels), np.float32)  # sums of full batches
         self.batches.fill(0)  # takes the memory now, so that a render that lacks it does not fail late
+        self.lengths: Ints | None = None  # samples of each batch; None: `batch_size` of them in all
 
     def add(self, pixels: Words, radiance: Floats) -> None:
         """Add samples.
@@ -95,6 +98,55 @@ class Film:
             pair = self.batches[2 * half : 2 * half + 2, :, lanes]
             self.batches[half][:, lanes] = pair[0] + pair[1]
 
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return all that the film holds, as arrays by name."""
+        lengths = np.zeros(0, np.int64) if self.lengths is None else self.lengths
+        return {
+            "count": self.count,
+            **self.sums.arrays(),
+            "squares": self.squares,
+            "batches": self.batches,
+            "lengths": lengths,
+        }
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Become the film of which `arrays` returned these; they are not copied."""
+        self.count, self.squares, self.batches = arrays["count"], arrays["squares"], arrays["batches"]
+        self.sums.restore(arrays)
+        self.lengths = arrays["lengths"] if arrays["lengths"].size else None
+
+    def merge(self, other: Film) -> None:
+        """Add the samples of another film.
+
+        On each of the films all pixels have equally many samples. The sums, and so the picture, are those of
+        one film with all samples, bit for bit. `squares` are rounded in another order. Batches are
+        joined, in order, until they are as long as those of one film; where they do not end at the same
+        samples, they have different lengths, which the error estimate allows for.
+        """
+        count = int(self.count[0] + other.count[0])
+        size = batch_size(count)
+        joined = _joined([*self._all_batches(), *other._all_batches()], size)
+        self.count = self.count + other.count
+        self.sums.merge(other.sums)
+        self.squares = self.squares + other.squares
+        self.batches = np.zeros_like(self.batches)
+        for number, (batch, _) in enumerate(joined):
+            self.batches[number] = batch
+        lengths = [length for _, length in joined]
+        self.lengths = None if lengths == [size] * (count // size) else np.array(lengths)
+
+    def _all_batches(self) -> Iterator[tuple[Doubles, int]]:
+        """Yield the sums (3, pixels) and lengths of consecutive batches, which hold all samples."""
+        count = int(self.count[0])
+        size = batch_size(count)
+        lengths = [size] * (count // size) if self.lengths is None else self.lengths.tolist()
+        rest = self.sums.value()
+        for batch, length in zip(self.batches, lengths, strict=False):
+            rest -= batch
+            yield batch.astype(np.float64), length
+        if sum(lengths) < count:
+            yield rest, count - sum(lengths)
+
     def mean(self, span: slice = slice(None)) -> Doubles:
         """Return the means of the samples of pixels, (3, k); 0 for pixels without samples."""
         return self.sums.value(span) / np.maximum(self.count[span], 1)
@@ -107,6 +159,8 @@ class Film:
 
     def squared_error(self, span: slice = slice(None)) -> Doubles:
         """Estimate the variance of `mean` from batches, (3, k); NaN for fewer than two samples."""
+        if self.lengths is not None:
+            return _unequal_error(self.batches[: self.lengths.size, :, span], self.lengths, self.count[0])
         counts = self.count[span]
         error = np.full((3, counts.size), np.nan)
         for count in _distinct(counts[counts > 1]):
@@ -185,6 +239,31 @@ def _distinct(values: Ints) -> list[int]:
     """Return the distinct values in rising order, like np.unique, which would import numpy.ma."""
     ordered = np.sort(values)
     return ordered[np.diff(ordered, prepend=-1) > 0].tolist()
+
+
+def _joined(batches: list[tuple[Doubles, int]], size: int) -> list[tuple[Doubles, int]]:
+    """Add up neighbors until each batch has `size` samples or more; a last one with fewer is dropped."""
+    joined: list[tuple[Doubles, int]] = []
+    for batch, length in batches:
+        if joined and joined[-1][1] < size:
+            before, samples = joined.pop()
+            joined.append((before + batch, samples + length))
+        else:
+            joined.append((batch, length))
+    return joined[:-1] if len(joined) > 2 and joined[-1][1] < size else joined
+
+
+def _unequal_error(batches: Floats, lengths: Ints, count: int) -> Doubles:
+    """Estimate the variance of the mean of `count` samples, (3, k), from batches (b, 3, k) of `lengths` (b,).
+
+    The mean of a batch of n samples is taken to have 1/n of the variance of a sample. With equal lengths
+    this is the estimate from the scatter of the batches' means.
+    """
+    samples = lengths.astype(np.float64)[:, None, None]
+    means = batches / samples
+    mean = (means * samples).sum(0) / samples.sum()
+    scatter = (samples * np.square(means - mean)).sum(0) / (lengths.size - 1)
+    return np.asarray(scatter / count)
 
 
 def batch_size(count: int) -> int:

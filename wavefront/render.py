@@ -36,6 +36,7 @@ def render(
     integrator: str | Integrator = "full",
     max_bounces: int = 12,
     seed: int = 0,
+    samples: range | None = None,
     sampler: str | SamplerMaker = "sobol",
     accel: str | AcceleratorMaker = "auto",
     workers: int | None = None,
@@ -86,6 +87,10 @@ def render(
         Scattering events along a path: 0 shows only light seen directly, 1 direct light.
     seed
         The same seed gives the same picture, bit for bit, unless `seconds` is given.
+    samples
+        The samples to render, as a range of their numbers, in place of `spp`: range(0, 64) on one machine
+        and range(64, 128) on another. `Image.merge` makes one picture of them, which is that of all 128,
+        bit for bit. Not with `noise` or `seconds`.
     sampler
         "sobol"; "bluenoise", whose error at few samples is even to the eye; or "independent".
     accel
@@ -165,6 +170,7 @@ def render(
         integrator=integrator,
         max_bounces=max_bounces,
         seed=seed,
+        samples=samples,
         sampler=sampler,
         accel=accel,
         workers=workers,

@@ -71,7 +71,7 @@ class Session:
     ----------
     scene, spp, camera, size, material, up, lighting, ground
         As for `render`.
-    integrator, max_bounces, seed, sampler, accel, filter, light_sampler, branches, guide
+    integrator, max_bounces, seed, samples, sampler, accel, filter, light_sampler, branches, guide
         As for `render`.
     workers, executor, noise, seconds, wave_size, max_memory, aovs, progress
         As for `render`.
@@ -101,6 +101,7 @@ class Session:
         integrator: str | Integrator = "full",
         max_bounces: int = 12,
         seed: int = 0,
+        samples: range | None = None,
         sampler: str | SamplerMaker = "sobol",
         accel: str | AcceleratorMaker = "auto",
         workers: int | None = None,
@@ -129,6 +130,7 @@ class Session:
             integrator=integrator,
             max_bounces=max_bounces,
             seed=seed,
+            samples=samples,
             sampler=sampler,
             accel=accel,
             workers=workers,
@@ -204,7 +206,7 @@ class Session:
             begin, settings.seconds, self._budget.wave_size, self._budget.workers, settings.branches
         )
         self._loop = RenderLoop(
-            View(self._compiled.view(camera), scheduler.deadline),
+            View(self._compiled.view(camera), scheduler.deadline, settings.first_sample),
             accumulator,
             scheduler,
             spp=settings.max_spp,
@@ -431,6 +433,8 @@ class Session:
     def _image(self, cut_short: bool = False) -> Image:
         """Return the picture so far."""
         settings = self._settings
+        first = settings.first_sample
+        most = int(self._loop.accumulator.film.count.max())
         return self._loop.accumulator.image(
             {
                 "lighting": self._preset,
@@ -438,6 +442,7 @@ class Session:
                 "max_bounces": settings.max_bounces,
                 "seed": settings.seed,
                 "sampler": SAMPLERS.label(settings.sampler),
+                "sample_ranges": [[first, first + most]],
                 "filter": FILTERS.label(settings.filter),
                 "branches": settings.branches,
                 "guide": settings.guide,

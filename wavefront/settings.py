@@ -106,6 +106,17 @@ def above_zero(name: str, value: Any) -> float:
     return number(name, value, lambda x: x > 0, "above 0")
 
 
+def check_samples(name: str, value: Any) -> range | None:
+    """Check that something is a range of consecutive numbers from 0 on, or None."""
+    if value is None:
+        return None
+    if not isinstance(value, range) or value.step != 1 or not value or value.start < 0:
+        raise SceneError(
+            f"{name} is {value!r}; it must be a range of consecutive samples, such as range(64, 128)"
+        )
+    return value
+
+
 def check_camera(name: str, value: Any) -> Camera | None:
     """Check that something is a camera, or None."""
     if value is not None and not isinstance(value, Camera):
@@ -190,6 +201,15 @@ class Settings:
         0,
         "The same seed gives the same picture, bit for bit, unless `seconds` is given.",
         option="same seed, same picture",
+    )
+    samples: range | None = setting(
+        None,
+        "The samples to render, as a range of their numbers, in place of `spp`: range(0, 64) on one machine "
+        "and range(64, 128) on another. `Image.merge` makes one picture of them, which is that of all 128, "
+        "bit for bit. Not with `noise` or `seconds`.",
+        option="FIRST:END, samples to render in place of --spp, such as 64:128; "
+        "`wavefront merge` joins the pictures",
+        check=lambda name, value: check_samples(name, value),
     )
     sampler: str | SamplerMaker = setting(
         "sobol",
@@ -311,6 +331,11 @@ class Settings:
         self.executor_for((0, 0))
 
     @property
+    def first_sample(self) -> int:
+        """Index of the first sample of every pixel."""
+        return 0 if self.samples is None else self.samples.start
+
+    @property
     def target_spp(self) -> int | None:
         """Samples that every pixel gets; None where noise or time decides."""
         return self.max_spp if self.noise is None and self.seconds is None else None
@@ -347,8 +372,18 @@ class Settings:
 
     def _most_samples(self) -> int:
         most = min(MAX_TERMS, MAX_BRANCH_SAMPLES // self.branches)
+        if self.samples is not None:
+            return self._chosen_samples(self.samples, most)
         if self.spp is not None:
             return int(whole_number(1, most)("spp", self.spp))
         if self.seconds is not None:
             return most
         return DEFAULT_SPP if self.noise is None else MAX_SPP_FOR_NOISE
+
+    def _chosen_samples(self, samples: range, most: int) -> int:
+        for name in ("spp", "noise", "seconds"):
+            if getattr(self, name) is not None:
+                raise SceneError(f"samples is {samples!r}; then {name} must not be given")
+        if samples.stop > most:
+            raise SceneError(f"samples is {samples!r}; it must end at {most} at most")
+        return len(samples)

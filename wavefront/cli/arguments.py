@@ -51,6 +51,17 @@ def size(text: str) -> tuple[int, int]:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
+def samples(text: str) -> range:
+    """Return FIRST:END as a range."""
+    try:
+        first, end = (int(part) for part in text.split(":"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not FIRST:END, such as 64:128") from None
+    if not 0 <= first < end:
+        raise argparse.ArgumentTypeError(f"{text!r} has no samples; it is FIRST:END, such as 64:128")
+    return range(first, end)
+
+
 def fov(text: str) -> float:
     """Return an angle between 0 and 180 degrees."""
     fov = _finite(text)

@@ -31,8 +31,9 @@ PARSERS: dict[str, Callable[[str], Any]] = {
     "size": arguments.size,
     "lighting": arguments.lighting,
     "up": arguments.up,
+    "samples": arguments.samples,
 }
-METAVARS = {"lighting": "PRESET", "up": "X,Y,Z"}
+METAVARS = {"lighting": "PRESET", "up": "X,Y,Z", "samples": "FIRST:END"}
 CAMERA_OPTIONS = ("size",)  # settings that the command line uses for its own camera
 RENDER_OPTIONS = [
     each.name for each in fields(Settings) if each.metadata.get("option") and each.name not in CAMERA_OPTIONS

@@ -108,7 +108,8 @@ class BadSamples:
         """Count the bad lanes of a result and remember the first of all."""
         if result.bad.size and not self.count:
             sample, pixel = divmod(int(result.bad[0]), job.pixels.size)
-            self.first = int(job.pixels[pixel]), job.first_sample + sample
+            sample += job.view.first_sample + job.first_sample
+            self.first = int(job.pixels[pixel]), sample
         self.count += result.bad.size
 
     def report(self, image: Image, cause_of: Callable[[int, int], str]) -> None:

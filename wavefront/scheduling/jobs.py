@@ -20,6 +20,7 @@ class View:
 
     camera: Camera  # in the unit of the compiled scene
     deadline: float = math.inf  # when jobs under way are discarded, by `time.perf_counter`
+    first_sample: int = 0  # index of the first sample of every pixel
 
 
 @record
@@ -28,7 +29,7 @@ class Job:
 
     view: View
     pixels: Words  # (k,) row-major indices, rising
-    first_sample: int
+    first_sample: int  # counted from that of the view
     samples: int
 
     @property
@@ -38,7 +39,7 @@ class Job:
 
     @property
     def end(self) -> int:
-        """One past the index of the last sample."""
+        """One past the last sample, counted from the first of the view."""
         return self.first_sample + self.samples
 
     def halves(self) -> tuple[Job, ...]:
@@ -49,8 +50,8 @@ class Job:
 
     def __str__(self) -> str:
         """Name the block in an error message."""
-        last = self.end - 1
-        return f"samples {self.first_sample} to {last} of {self.pixels.size} pixels from {self.pixels[0]} on"
+        first, last = (self.view.first_sample + each for each in (self.first_sample, self.end - 1))
+        return f"samples {first} to {last} of {self.pixels.size} pixels from {self.pixels[0]} on"
 
 
 @record

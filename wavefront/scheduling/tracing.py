@@ -86,9 +86,10 @@ def trace_job(tracer: Tracer, monitor: WaveMonitor, job: Job) -> JobResult:
 
 def _samples(job: Job) -> Words:
     """Index of the sample of each path of a job, (lanes,)."""
+    first = job.view.first_sample + job.first_sample
     if job.samples == 1:
-        return broadcast(np.uint32(job.first_sample), job.pixels.size)
-    samples = np.arange(job.first_sample, job.end, dtype=np.uint32)
+        return broadcast(np.uint32(first), job.pixels.size)
+    samples = np.arange(first, first + job.samples, dtype=np.uint32)
     return np.repeat(samples, job.pixels.size)
 
 
