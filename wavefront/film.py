@@ -58,7 +58,7 @@ class Film:
         """
         for start in range(0, pixels.size, CHUNK):
             part = slice(start, start + CHUNK)
-            self._add(_span(pixels[part]), radiance[:, :, part])
+            self._add(pixel_span(pixels[part]), radiance[:, :, part])
 
     def _add(self, lanes: Lanes, radiance: Floats) -> None:
         """Add samples (3, samples, k) of at most `CHUNK` pixels."""
@@ -72,7 +72,7 @@ class Film:
                 self._pair_batches(lanes)
             stop = min(samples, start + at_once, start + size - count % size)
             rows = radiance[:, start:stop].astype(np.float64)
-            _add_in_order(squares, np.square(rows))
+            add_in_order(squares, np.square(rows))
             self.sums.add(lanes, rows)
             count += stop - start
             start = stop
@@ -181,7 +181,7 @@ class Film:
         """
         floor = self._floor()
         out = np.empty(self.count.size)
-        for span in self._chunks():
+        for span in chunks(self.count.size):
             out[span] = self._relative(self.squared_error(span), span, floor)
         return _without_outliers(out)
 
@@ -197,19 +197,14 @@ class Film:
         return EPSILON * (self._overall_mean() ** 2) or 1.0
 
     def _overall_mean(self) -> float:
-        return float(sum(self.mean(span).sum() for span in self._chunks()) / (3 * self.count.size))
-
-    def _chunks(self) -> Iterator[slice]:
-        """Yield spans of pixels, so that temporary arrays stay small."""
-        for start in range(0, self.count.size, CHUNK):
-            yield slice(start, min(start + CHUNK, self.count.size))
+        return float(sum(self.mean(span).sum() for span in chunks(self.count.size)) / (3 * self.count.size))
 
     def estimates(self) -> Estimates:
         """Estimate the picture and its errors; a pixel without samples is black."""
         pixels = self.count.size
         mean, variance, error = (np.empty((pixels, 3), np.float32) for _ in range(3))
         relative, floor = np.empty(pixels), self._floor()
-        for span in self._chunks():
+        for span in chunks(self.count.size):
             squared_error = self.squared_error(span)
             with np.errstate(over="ignore"):  # values beyond float32 become infinite
                 mean[span] = self.mean(span).T
@@ -272,14 +267,20 @@ def batch_size(count: int) -> int:
     return max(1, min(WHOLE_BATCH, power // 4), power // BATCHES)
 
 
-def _span(pixels: Words) -> Lanes:
+def chunks(pixels: int) -> Iterator[slice]:
+    """Yield spans of so many pixels, so that temporary arrays stay small."""
+    for start in range(0, pixels, CHUNK):
+        yield slice(start, min(start + CHUNK, pixels))
+
+
+def pixel_span(pixels: Words) -> Lanes:
     """Return rising indices as a slice if they have no gaps, which is much faster to add to."""
     first, last = int(pixels[0]), int(pixels[-1])
     return slice(first, last + 1) if last - first + 1 == pixels.size else pixels.astype(np.intp)
 
 
-def _add_in_order(sums: Doubles, rows: Doubles) -> None:
-    """Add rows (3, n, k) to sums (3, k), strictly in order.
+def add_in_order(sums: Floats, rows: Floats) -> None:
+    """Add rows (c, n, k) to sums (c, k), strictly in order.
 
     `sum` along the axis would group terms by the layout of the array, and so round differently.
     """

@@ -15,6 +15,7 @@ import numpy as np
 from .compile.scene import CompiledScene
 from .guiding import GuideTable
 from .registry import Registry
+from .sample_recorder import add_to_slots
 from .sampling.sampler import Sampler
 from .stages.alpha import alpha_pass_through
 from .stages.bounce import bounce_sample, branch
@@ -125,7 +126,11 @@ def intersect_and_compact(
     paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce)
     emission = emitted(scene, paths, hits)
     accumulate(L, paths, mis_weighted(scene, paths, emission) if mis else emission)
-    return compact(scene, paths, hits, keep(scene, paths, hits, emission))
+    lanes = keep(scene, paths, hits, emission)
+    kept = compact(scene, paths, hits, lanes)
+    if paths.recorder is not None:
+        paths.recorder.record_hits(scene, paths, hits, lanes, *kept)
+    return kept
 
 
 def prepare_shading(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
@@ -133,13 +138,16 @@ def prepare_shading(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
     surface = interaction(scene, paths, hits)
     perturb_normals(scene, surface)
     absorb(scene, paths.throughput, hits, surface)
-    return shading(scene, surface)
+    shade = shading(scene, surface)
+    if paths.recorder is not None:
+        paths.recorder.record_surfaces(scene, paths, shade)
+    return shade
 
 
 def accumulate(L: Floats, paths: Paths, contribution: Contribution) -> None:
     """Add a contribution, times the throughput of its paths, to the slots of L."""
-    if contribution.lanes.size:
-        slot = take(paths.slot, contribution.lanes)
-        arriving = take(paths.throughput, contribution.lanes) * contribution.radiance
-        for row, channel in zip(L, arriving, strict=True):  # a row at a time: much faster
-            np.add.at(row, slot, channel)
+    slot = take(paths.slot, contribution.lanes)
+    arriving = take(paths.throughput, contribution.lanes) * contribution.radiance
+    add_to_slots(L, slot, arriving)
+    if paths.recorder is not None:
+        paths.recorder.record_light(L, paths, contribution, slot, arriving)

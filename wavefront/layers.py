@@ -56,6 +56,26 @@ KEYED_LAYERS: dict[str, Layer] = {  # one layer for each key, named "light_group
 }
 ALL_LAYERS = "all"  # stands for all of `LAYERS`, but for none of `KEYED_LAYERS`
 
+DEFAULT_GROUP = "default"  # of lights and emitting materials
+
+
+def group_name(name: str, value: Any) -> str:
+    """Return the name of a group of lights.
+
+    Raises
+    ------
+    SceneError
+        If the value, called `name`, is no text or an empty one.
+    """
+    if not isinstance(value, str) or not value:
+        raise SceneError(f"{name} is {value!r}; it must be a name, such as 'sun'")
+    return value
+
+
+def layer_of(name: str) -> Layer:
+    """Return a layer by its name, that of a layer with a key such as "light_groups.sun"."""
+    return LAYERS[name] if name in LAYERS else KEYED_LAYERS[name.partition(".")[0]]
+
 
 def chosen_layers(name: str, value: Any) -> tuple[str, ...]:
     """Return the names of the layers that were asked for, each once, in the order of the tables.

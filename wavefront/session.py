@@ -19,6 +19,7 @@ from .errors import RenderError
 from .filters import FILTERS, Filter
 from .image import Image
 from .integrators import INTEGRATORS, WITH_MIS, Integrator, li_naive
+from .layers import layer_of
 from .lighting import choose_preset, lighted
 from .lights.samplers import LightSamplerMaker
 from .materials import MaterialLike
@@ -174,10 +175,11 @@ class Session:
             FILTERS.find(settings.filter),
             self._estimator(camera),
             settings.max_bounces,
+            tuple(name for name in settings.aovs if layer_of(name).sampled),
         )
         self._budget = settings.budget(camera.size)
         self._make_pool(settings.executor_for(camera.size))
-        self._begin_picture(camera, Accumulator(*camera.size), begin)
+        self._begin_picture(camera, self._new_accumulator(camera), begin)
 
     def _estimator(self, camera: Camera) -> Integrator:
         """Return the integrator; a guide is trained for the camera."""
@@ -198,6 +200,12 @@ class Session:
         self._pool = WorkerPool[Job, JobResult](work, self._budget.workers, executor, self._monitor.stop)
         if self._in_block:
             self._pool.__enter__()
+
+    def _new_accumulator(self, camera: Camera) -> Accumulator:
+        """Return sums for a picture and its layers."""
+        accumulator = Accumulator(*camera.size)
+        accumulator.add_layers(self._tracer.recorded_layers)
+        return accumulator
 
     def _begin_picture(self, camera: Camera, accumulator: Accumulator, begin: float) -> None:
         """Get ready for a picture of a view; `begin` is when it was asked for, by `time.perf_counter`."""
@@ -313,7 +321,7 @@ class Session:
         camera = choose_camera(self._scene, camera, size, settings.up_vector)
         self._compiled.view(camera)  # checks its distance
         budget = self._settings.budget(camera.size)
-        accumulator = Accumulator(*camera.size)
+        accumulator = self._new_accumulator(camera)
         executor = settings.executor_for(camera.size)
         with self.interrupt_handler:
             self._discard_sweeps()

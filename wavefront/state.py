@@ -15,9 +15,14 @@ from numpy.typing import NDArray
 
 from .frame import Frame
 from .record import record
-from .vec import Bools, Floats, Ints, Lanes, take
+from .vec import Bools, Bytes, Floats, Ints, Lanes, take
 
 Words = NDArray[np.uint32]
+
+# Scattering that is not specular, along a path:
+NOT_YET = 0  # none so far
+JUST_ONCE = 1  # the last scattering, and none before
+BEFORE = 2  # one that is not the last, or several
 
 
 @cache
@@ -102,6 +107,12 @@ class Paths(Rays):
     specular: Bools  # (n,) the last direction is of a delta lobe or the camera: light sampling cannot find it
     roulette_scale: Floats  # (n,) throughput times this decides about roulette: see `stages.compact.roulette`
     prev_vertex: Floats | None = None  # (3, n) where the paths last scattered; None where that is `origin`
+    # for layers (sample_recorder.py); None unless they are asked for
+    scattered: Bytes | None = (
+        None  # (n,) NOT_YET, JUST_ONCE or BEFORE: when the path scattered non-specularly
+    )
+    met_rough: Bools | None = None  # (n,) the path has met a surface that is not specular
+    recorder: Any = None  # the `SampleRecorder` of the wave
 
 
 @record
@@ -157,3 +168,5 @@ class Contribution(SoA):
     lanes: Ints  # (k,) columns of the paths
     radiance: Floats  # (3, k) that reaches the last vertex of each path, W·sr⁻¹·m⁻²
     light: Ints  # (k,) number of the light, as in the scene's `LightTable`
+    sampled: bool = False  # found by light samples; else the paths' rays met the lights
+    wi: Floats | None = None  # (3, k) directions of light samples; None unless a recorder asks for them

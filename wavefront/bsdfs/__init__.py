@@ -1,6 +1,6 @@
 """Scattering models. Adding one is a file here and a line below; the parametrized tests find it there."""
 
-from .base import Bsdf, BsdfSample, evaluated, sampled
+from .base import Bsdf, BsdfSample, albedo_of, evaluated, sampled
 from .conductor import Conductor
 from .dielectric import Dielectric
 from .diffuse import Diffuse
@@ -24,6 +24,7 @@ __all__ = [
     "OrenNayar",
     "Principled",
     "ThinDielectric",
+    "albedo_of",
     "evaluated",
     "sampled",
 ]

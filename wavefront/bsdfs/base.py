@@ -22,6 +22,11 @@ from ..suggestions import MATERIAL_ARGUMENTS
 from ..textures.base import BaseTexture
 from ..vec import Bools, Floats, broadcast
 
+# (16, 3), evenly spread (M. Roberts 2018, "The Unreasonable Effectiveness of Quasirandom Sequences", d = 3)
+ALBEDO_NUMBERS = ((0.5 + np.arange(16)[:, None] * 1.2207440846057596 ** -np.arange(1.0, 4.0)) % 1).astype(
+    np.float32
+)
+
 
 @record
 class BsdfSample:
@@ -74,6 +79,19 @@ class Bsdf(Parametrized, ABC):
         for name, value in varying.items():
             vars(bound)[name] = value.at(surface)  # not by assignment, which would check it
         return bound
+
+    def albedo(self, wo: Floats) -> Floats:
+        """Part of the light from `wo` that is scattered, per channel: (3, n), or (3, 1) for all alike.
+
+        Light that is refracted counts without the change of its radiance by the index. The layers `albedo`
+        and `denoising_albedo` show the albedo. Here it is the mean weight of 16 samples.
+        """
+        total = np.zeros_like(wo)
+        for u in ALBEDO_NUMBERS:
+            numbers = np.broadcast_to(u[: self.dimensions, None], (self.dimensions, wo.shape[1]))
+            sample = self.sample_f(wo, numbers)
+            total += sample.weight if sample.eta is None else sample.weight * sample.eta**2
+        return total / np.float32(len(ALBEDO_NUMBERS))
 
     @abstractmethod
     def f(self, wo: Floats, wi: Floats) -> Floats:
@@ -145,6 +163,23 @@ def sampled(bsdf: Bsdf, wo: Floats, u: Floats) -> BsdfSample:
         found = {"wi": (out.wi, 3), "weight": (out.weight, 3), "pdf": (out.pdf, None)}
         _check_shapes(bsdf, n, {f"sample_f's {name}": value for name, value in found.items()})
     return out
+
+
+def albedo_of(bsdf: Bsdf, wo: Floats) -> Floats:
+    """Return the albedo of a BSDF (3, n), limited to [0, 1].
+
+    Raises
+    ------
+    SceneError
+        If the BSDF returns an array of another shape, or values that are not finite.
+    """
+    albedo, n = bsdf.albedo(wo), wo.shape[1]
+    if np.shape(albedo) not in ((3, n), (3, 1)):
+        _check_shapes(bsdf, n, {"albedo": (albedo, 3)})
+    if not np.isfinite(albedo).all():
+        bad = albedo[~np.isfinite(albedo)][0]
+        raise SceneError(f"{type(bsdf).__name__}: albedo has the value {bad}; it must be finite")
+    return np.broadcast_to(np.clip(albedo, np.float32(0), np.float32(1)), (3, n))
 
 
 def _check_shapes(bsdf: Bsdf, n: int, found: dict[str, tuple[Any, int | None]]) -> None:

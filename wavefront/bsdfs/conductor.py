@@ -86,6 +86,10 @@ class Conductor(JointBsdf):
         key = name.lower() if isinstance(name, str) else name
         return cls(*METALS[one_of("Conductor name", SPELLINGS.get(key, key), METALS)], roughness)
 
+    def albedo(self, wo: Floats) -> Floats:
+        """Return the reflectance along the mirrored direction, also of rough metals."""
+        return fresnel_conductor(wo[2], self.eta, self.k)
+
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
         """Return F·D·G/(4·cosθo·cosθi) and the density of reflections in visible normals; 0 for a mirror."""
         if self.specular:

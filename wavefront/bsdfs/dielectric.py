@@ -54,6 +54,11 @@ class Dielectric(RefractiveBsdf):
         bound.eta = np.where(surface.back_facing, f4(1) / bound.ior, bound.ior)
         return bound
 
+    def albedo(self, wo: Floats) -> Floats:
+        """Return the tints of reflection and refraction, weighed by the reflectance of a smooth surface."""
+        reflected, _ = fresnel_dielectric(wo[2], self.eta)
+        return self.transmittance + (self.reflectance - self.transmittance) * reflected
+
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
         """Return `f`, for radiance, and `pdf` (Walter et al. 2007, eqs. 20 and 21); 0 if smooth."""
         if self.specular:

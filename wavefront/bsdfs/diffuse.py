@@ -48,6 +48,10 @@ class Diffuse(Bsdf):
             and not self.reflectance.any()
         )
 
+    def albedo(self, wo: Floats) -> Floats:
+        """Return the reflectance."""
+        return self.reflectance
+
     def f(self, wo: Floats, wi: Floats) -> Floats:
         """Return reflectance/π above the surface, (3, n)."""
         return self.reflectance * ((wi[2] > 0) * INV_PI)

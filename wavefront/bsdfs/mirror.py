@@ -34,6 +34,10 @@ class Mirror(Bsdf):
     def __init__(self, reflectance: Color = 1.0) -> None:
         self.reflectance = reflectance
 
+    def albedo(self, wo: Floats) -> Floats:
+        """Return the reflectance."""
+        return self.reflectance
+
     def f(self, wo: Floats, wi: Floats) -> Floats:
         """Return 0, (3, n): no two given directions mirror each other."""
         return np.zeros_like(wi)

@@ -64,6 +64,10 @@ class Mix(JointBsdf):
         vars(bound).update(first=self.first.bind(surface), second=self.second.bind(surface))
         return bound
 
+    def albedo(self, wo: Floats) -> Floats:
+        """Return the albedos of both BSDFs, blended."""
+        return self._blend(self.first.albedo(wo), self.second.albedo(wo))
+
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
         """Return `f` and `pdf` of both BSDFs, blended."""
         f1, pdf1 = self.first.evaluate(wo, wi)

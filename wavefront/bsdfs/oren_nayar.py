@@ -64,6 +64,10 @@ class OrenNayar(Bsdf):
             found = brief(self.sigma)
             raise SceneError(f"OrenNayar sigma is {found}; it must be in [0, 1] to preserve energy")
 
+    def albedo(self, wo: Floats) -> Floats:
+        """Return the reflectance, about which the part of the scattered light varies with `wo`."""
+        return self.reflectance
+
     def f(self, wo: Floats, wi: Floats) -> Floats:
         """Return the BRDF above the surface, (3, n)."""
         zo, zi = wo[2], np.maximum(wi[2], f4(0))

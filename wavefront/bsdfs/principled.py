@@ -144,6 +144,26 @@ class Principled(JointBsdf):
             bound.back_facing = surface.back_facing
         return bound
 
+    def albedo(self, wo: Floats) -> Floats:
+        """Return about the albedo of all lobes, layered as in `evaluate`."""
+        low, high, _, _ = gloss_tables()
+        at_f0, at_f90 = (lookup(table, self.roughness, wo[2]) for table in (low, high))
+        gloss = self._dielectric(np.zeros(1, f4)) * at_f0 + self.specular_weight * at_f90
+        metal = self.base_color * at_f0 + at_f90
+        opaque = gloss + self.base_color * (f4(1) - gloss.max(0))
+        albedo = opaque + (metal - opaque) * self.metallic
+        if self.transmissive:
+            reflected, _ = self._fresnel(wo[2])
+            clear = self.base_color + (f4(1) - self.base_color) * reflected
+            albedo = albedo + (clear - albedo) * ((f4(1) - self.metallic) * self.transmission)
+        if self._cloth:
+            fibers = self.sheen * sheen_albedo(wo[2], self.sheen_roughness)
+            albedo = albedo * (f4(1) - fibers * self.sheen_color.max(0)) + self.sheen_color * fibers
+        if self._coated:
+            through = self._through_coat(wo[2])
+            albedo = albedo * (through * through) + self.clearcoat * _schlick(COAT_F0, wo[2])
+        return albedo
+
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
         """Return `f` and `pdf` of all lobes: the base, then sheen and coat layered over it."""
         chances = self._chances(wo)

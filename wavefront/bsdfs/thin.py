@@ -39,6 +39,10 @@ class ThinDielectric(RefractiveBsdf):
         """Set `specular` from the roughness."""
         self.specular = is_smooth(self.roughness)
 
+    def albedo(self, wo: Floats) -> Floats:
+        """Return the tints of both sides, weighed by the reflectance of a smooth sheet."""
+        return self.transmittance + (self.reflectance - self.transmittance) * self._reflected(wo[2])
+
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
         """Return `f` and `pdf`: below the sheet the lobe above it, mirrored; 0 for a smooth sheet."""
         if self.specular:

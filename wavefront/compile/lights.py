@@ -31,6 +31,7 @@ from ..shapes import CurvedShape, Mesh, Shape, Sphere, Spheres
 from ..shapes.attributes import ATTRIBUTES
 from ..textures.base import BaseTexture
 from ..vec import Floats, Ints, f4
+from .light_groups import GroupNumbers, LightGroups
 
 # A record, and the primitives of its lights: (..., k) a column per light, or (..., m) of one light, or none.
 Part: TypeAlias = tuple[LightRecord, Ints | None]
@@ -47,8 +48,8 @@ def gather_lights(
     half_size: NDArray[np.float64],
     choice: str | LightSamplerMaker,
     mis: bool,
-) -> tuple[LightTable, Ints, int]:
-    """Return the table of lights, the light of each primitive, and that of rays that hit nothing.
+) -> tuple[LightTable, LightGroups, Ints, int]:
+    """Return the table of lights, their groups, and the light of each primitive and of rays that miss.
 
     Parameters
     ----------
@@ -74,9 +75,14 @@ def gather_lights(
     ends = triangles + np.cumsum([shape.count for shape in curved], dtype=np.intp)
     first_row.update((id(shape), int(end) - shape.count) for shape, end in zip(curved, ends, strict=True))
     parts: list[Part] = [*_area_lights(meshes, corners), *_sphere_lights(curved, first_row, center)]
-    groups: dict[object, list[LightRecord]] = {}
+    groups = GroupNumbers()
+    of_row = groups.of_shapes(meshes, [len(part) for part in corners], curved)
+    for _, rows in parts:
+        assert rows is not None
+        groups.add(of_row[np.atleast_2d(rows)[0]])
+    kinds_of_light: dict[object, list[tuple[LightRecord, int]]] = {}
     infinite: list[InfiniteLight] = []
-    surfaces: list[Part] = []
+    surfaces: list[tuple[Part, int]] = []
     for light in scene.lights:
         record = (light if scale == 1 else light.scaled(scale)).record(center)
         if not isinstance(record, LightRecord):
@@ -88,12 +94,20 @@ def gather_lights(
             )
         if isinstance(record, InfiniteLight):
             infinite.append(record.compensated() if mis else record)
+            groups.add_to_environment(light, infinite[-1])
         elif light.shape is not None:
-            surfaces.append((record, _rows_of(light, record, scene.shapes, scaled, first_row)))
+            part: Part = record, _rows_of(light, record, scene.shapes, scaled, first_row)
+            surfaces.append((part, groups.number(light)))
         else:
-            groups.setdefault((type(record), *map(id, record.shared())), []).append(record)
-    parts += [(type(records[0]).concatenate(records), None) for records in groups.values()]
-    parts += surfaces
+            key = type(record), *map(id, record.shared())
+            kinds_of_light.setdefault(key, []).append((record, groups.number(light)))
+    for of_kind in kinds_of_light.values():
+        records, numbers = zip(*of_kind, strict=True)
+        parts.append((type(records[0]).concatenate(records), None))
+        groups.add(np.repeat(numbers, [len(record) for record in records]))
+    for part, number in surfaces:
+        parts.append(part)
+        groups.add(np.full(len(part[0]), number))
     light_of = np.full(int(ends[-1]) if curved else triangles, -1, np.intp)
     count = 0
     for record, rows in parts:
@@ -105,7 +119,7 @@ def gather_lights(
     kinds = [record for record, _ in parts]
     if infinite:
         kinds.append(EnvironmentSum.of(infinite))
-    return LightTable(kinds, half_size, choice), light_of, count if infinite else -1
+    return LightTable(kinds, half_size, choice), groups.groups(), light_of, count if infinite else -1
 
 
 def _rows_of(

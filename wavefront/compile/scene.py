@@ -19,6 +19,7 @@ from ..vec import Bools, Floats, Ints, f4
 from .curved import CurvedTable
 from .geometry import compute_corner_normals, compute_face_normals, same_as_next
 from .instances import InstanceTable, own_frame, place_instances, sort_shapes
+from .light_groups import LightGroups
 from .lights import gather_lights
 from .materials import (
     MaterialTable,
@@ -59,6 +60,7 @@ class CompiledScene:
     absorption: Floats | None  # (3, materials) per unit of length; None when nothing absorbs
     opacities: Opacities | None  # None when every surface is opaque
     lights: LightTable
+    light_groups: LightGroups
     nonscattering_lights: (
         Bools | None
     )  # (lights,) those whose surface scatters nothing; None when there are none
@@ -127,7 +129,7 @@ def compile_scene(
     meshes += shared
     triangles = np.concatenate(corners) if corners else np.zeros((0, 3, 3))
     user_materials, material_of, replaced = number_materials(meshes, curved, instances)
-    lights, light_of, environment = gather_lights(
+    lights, groups, light_of, environment = gather_lights(
         scene, scaled, scale, meshes, curved, corners, center, (high - low) / 2, light_sampler, mis
     )
     read = sorted({*attributes_read(placed), *lights.reads})
@@ -165,6 +167,7 @@ def compile_scene(
         absorption=absorption_table(user_materials),
         opacities=opacity_table(user_materials, has_alpha),
         lights=lights,
+        light_groups=groups,
         nonscattering_lights=nonscattering_lights,
         instances=table,
     )

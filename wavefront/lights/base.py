@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError, finite_array
+from ..layers import DEFAULT_GROUP
 from ..record import record
 from ..shapes import Shape
 from ..state import SoA, SurfaceInteraction
@@ -41,6 +42,7 @@ class Light(ABC):
 
     __slots__ = ()
     shape: Shape | None = None  # the mesh or sphere of the scene whose surface shines; None for no surface
+    group: str = DEFAULT_GROUP  # for which layer of radiance the light counts
     hint: ClassVar[str | None] = None  # how to turn the light to what it misses, for messages
 
     @abstractmethod

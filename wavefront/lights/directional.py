@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..elementary import sin_cos
 from ..errors import SceneError, finite_array, number, rgb
 from ..frame import Frame
+from ..layers import DEFAULT_GROUP, group_name
 from ..parameter import Parameter, Parametrized
 from ..record import record
 from ..sampling.warp import uniform_cone
@@ -119,6 +120,8 @@ class DirectionalLight(Parametrized, Light):
         Angular diameter in degrees, the sun's is 0.53. With 0 the rays are parallel, shadows are
         sharp and the light itself is never seen, not even in a mirror. With more it is a disk of
         the sky of radiance irradiance/(π·sin²(angle/2)), which is seen where rays leave the scene.
+    group
+        Name of the layer of radiance that the light counts for, with `aovs="light_groups"`.
 
     Raises
     ------
@@ -130,12 +133,16 @@ class DirectionalLight(Parametrized, Light):
     direction = Parameter(unit)
     irradiance = Parameter(rgb)
     angle = Parameter(_angle)
+    group = Parameter(group_name)
 
     @suggests_keywords
-    def __init__(self, direction: ArrayLike, irradiance: ArrayLike, *, angle: float = 0.0) -> None:
+    def __init__(
+        self, direction: ArrayLike, irradiance: ArrayLike, *, angle: float = 0.0, group: str = DEFAULT_GROUP
+    ) -> None:
         self.direction = direction
         self.irradiance = irradiance
         self.angle = angle
+        self.group = group
 
     def scaled(self, factor: float) -> Self:
         """Return the light: it has no length."""

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import one_of, rgb, rotation_matrix
-from ..parameter import Parametrized
+from ..layers import DEFAULT_GROUP, group_name
+from ..parameter import Parameter, Parametrized
 from ..record import record
 from ..sampling.warp import uniform_sphere
 from ..state import SurfaceInteraction
@@ -64,6 +65,8 @@ class Environment(Parametrized, Light):
         (3, 3) rotation to world space from the environment's.
     filter
         "bilinear" between the centers of the image's pixels, or "nearest".
+    group
+        Name of the layer of radiance that the light counts for, with `aovs="light_groups"`.
 
     Attributes
     ----------
@@ -87,6 +90,8 @@ class Environment(Parametrized, Light):
         a rotation.
     """
 
+    group = Parameter(group_name)
+
     @suggests_keywords
     def __init__(
         self,
@@ -94,12 +99,14 @@ class Environment(Parametrized, Light):
         *,
         transform: ArrayLike | None = None,
         filter: Literal["bilinear", "nearest"] = "bilinear",
+        group: str = DEFAULT_GROUP,
     ) -> None:
         self._filter = one_of("filter", filter, ("bilinear", "nearest"))
         self._transform = None if transform is None else rotation_matrix("Environment transform", transform)
         self._image: ImageEnvironment | None = None
         self._radiance: Floats
         self.radiance = radiance
+        self.group = group
 
     @property
     def radiance(self) -> Floats:

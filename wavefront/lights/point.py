@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError, rgb
+from ..layers import DEFAULT_GROUP, group_name
 from ..parameter import Parameter, Parametrized
 from ..record import record
 from ..suggestions import suggests_keywords
@@ -64,6 +65,8 @@ class PointLight(Parametrized, Light):
         (3,) scene units.
     intensity
         W/sr, one number or three; at distance d it gives irradiance I·cosθ/d².
+    group
+        Name of the layer of radiance that the light counts for, with `aovs="light_groups"`.
 
     Raises
     ------
@@ -74,11 +77,13 @@ class PointLight(Parametrized, Light):
     delta = True
     position = Parameter(position)
     intensity = Parameter(intensity_of)
+    group = Parameter(group_name)
 
     @suggests_keywords
-    def __init__(self, position: ArrayLike, intensity: ArrayLike) -> None:
+    def __init__(self, position: ArrayLike, intensity: ArrayLike, *, group: str = DEFAULT_GROUP) -> None:
         self.position = position
         self.intensity = intensity
+        self.group = group
 
     @property
     def bounds(self) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..elementary import arccos, arcsin, sin_cos, sin_cos_turns
 from ..errors import SceneError, finite_array, number
+from ..layers import DEFAULT_GROUP, group_name
 from ..parameter import Parameter, Parametrized
 from ..record import record
 from ..suggestions import suggests_keywords
@@ -94,6 +95,8 @@ class SpotLight(Parametrized, Light):
     blend
         Part of the cone's angle, from the edge inwards, in which the light falls off: 0 is a hard
         edge, with 1 it falls off from the axis on.
+    group
+        Name of the layer of radiance that the light counts for, with `aovs="light_groups"`.
 
     Notes
     -----
@@ -113,6 +116,7 @@ class SpotLight(Parametrized, Light):
     direction = Parameter(unit)
     angle = Parameter(_angle)
     blend = Parameter(_blend)
+    group = Parameter(group_name)
 
     @suggests_keywords
     def __init__(
@@ -124,6 +128,7 @@ class SpotLight(Parametrized, Light):
         direction: ArrayLike | None = None,
         angle: float = 45.0,
         blend: float = 0.15,
+        group: str = DEFAULT_GROUP,
     ) -> None:
         self.position = position
         self.intensity = intensity
@@ -138,6 +143,7 @@ class SpotLight(Parametrized, Light):
             self.direction = direction
         self.angle = angle
         self.blend = blend
+        self.group = group
 
     @property
     def bounds(self) -> NDArray[np.float64]:

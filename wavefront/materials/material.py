@@ -9,6 +9,7 @@ import numpy as np
 
 from ..bsdfs import Bsdf
 from ..errors import SceneError, number
+from ..layers import DEFAULT_GROUP, group_name
 from ..media import Medium
 from ..parameter import Parameter, Parametrized
 from ..suggestions import suggests_keywords
@@ -68,6 +69,8 @@ class Material(Parametrized):
     emission
         Radiance that shapes of this material send, W·sr⁻¹·m⁻², at least 0: a number, three numbers, or
         a texture. The emission of a shape goes before it.
+    group
+        Name of the layer of radiance that the emission counts for, with `aovs="light_groups"`.
     interior
         The `Medium` behind the surface. A ray that meets the surface from its back side has crossed it.
 
@@ -88,6 +91,7 @@ class Material(Parametrized):
     normal_map = Parameter(_normal_map)
     emission = Parameter(_emission)
     interior = Parameter(_interior)
+    group = Parameter(group_name)
     opacity: Opacity | None
 
     @suggests_keywords
@@ -100,6 +104,7 @@ class Material(Parametrized):
         normal_map: BaseNormalMap | None = None,
         emission: Color | None = None,
         interior: Medium | None = None,
+        group: str = DEFAULT_GROUP,
     ) -> None:
         self.bsdf = bsdf
         self.alpha = alpha
@@ -107,6 +112,7 @@ class Material(Parametrized):
         self.normal_map = normal_map
         self.emission = emission
         self.interior = interior
+        self.group = group
         self.derive()
 
     def derive(self) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,9 @@ import numpy as np
 from ..errors import RenderError, warn_caller
 from ..film import Film
 from ..image import Image
+from ..layer_sums import LayerSums, layer_bytes
 from ..memory import check_memory
+from ..vec import Floats
 from .jobs import Job, JobResult
 
 MAX_BAD_SAMPLES = 1e-4  # part of all samples that may be lost to NaN before it is an error
@@ -41,6 +43,8 @@ class Accumulator:
     ----------
     film
         The sums of their samples.
+    layers
+        Those of the sampled layers; None where none is asked for.
     bad
         Those of them that were not finite.
     rays
@@ -51,9 +55,25 @@ class Accumulator:
         pixels = width * height
         check_picture_memory(width, height)
         self.film, self.bad, self.rays = Film(width, height), BadSamples(), 0
+        self.layers: LayerSums | None = None
         self._reserve: Any = np.empty(
             PICTURE_BYTES * pixels + SPARE_BYTES, np.uint8
         )  # for the picture so far when memory has run out
+
+    def add_layers(self, names: Sequence[str]) -> None:
+        """Sum up sampled layers, those with a key by it, such as "light_groups.sun".
+
+        Raises
+        ------
+        SceneError
+            If there is not enough memory for them.
+        """
+        if not names:
+            return
+        width, height = self.film.size
+        memory = sum(map(layer_bytes, names)) * width * height
+        check_memory(f"{len(names)} layers of {width}x{height} pixels", memory)
+        self.layers = LayerSums(names, width * height)
 
     @property
     def samples(self) -> int:
@@ -63,6 +83,9 @@ class Accumulator:
     def add(self, job: Job, result: JobResult) -> None:
         """Add the result of a job, the next of its pixels."""
         self.film.add(job.pixels, result.radiance)
+        if self.layers is not None:
+            assert result.layers is not None
+            self.layers.add(job.pixels, result.layers, result.radiance, most=job.end)
         self.bad.count_in(job, result)
         self.rays += result.rays
 
@@ -79,15 +102,18 @@ class Accumulator:
             "rays": self.rays,
             "bad_samples": self.bad.count,
         }
-        return film_image(self.film, {**metadata, **counts})
+        return film_image(self.film, {**metadata, **counts}, self.layers)
 
 
-def film_image(film: Film, metadata: dict[str, Any]) -> Image:
-    """Return the picture on a film; a pixel without samples is black. Its noise joins the metadata."""
+def film_image(film: Film, metadata: dict[str, Any], layers: LayerSums | None = None) -> Image:
+    """Return the picture on a film and its layers; a pixel without samples is black.
+
+    Its noise joins the metadata.
+    """
     width, height = film.size
     shape = height, width, 3
     estimates = film.estimates()
-    return Image(
+    image = Image(
         estimates.mean.reshape(shape),
         round(float(film.count.mean())),
         {**metadata, "noise": estimates.noise},
@@ -95,6 +121,17 @@ def film_image(film: Film, metadata: dict[str, Any]) -> Image:
         variance=estimates.variance.reshape(shape),
         standard_error=estimates.standard_error.reshape(shape),
     )
+    if layers is not None:
+        for name in layers.names:
+            found = layers.estimate(name, film.sums, film.count)
+            image.layers[name] = _of_shape(found.mean, width, height)
+            image.errors[name] = _of_shape(found.standard_error, width, height)
+    return image
+
+
+def _of_shape(values: Floats, width: int, height: int) -> Floats:
+    """Return a layer (pixels, c) as (height, width, c), or (height, width) if it has one channel."""
+    return values.reshape((height, width, -1) if values.shape[1] > 1 else (height, width))
 
 
 class BadSamples:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 
 from ..camera import Camera
+from ..layer_samples import LayerSamples
 from ..record import record
 from ..state import Words
 from ..vec import Floats, Ints
@@ -62,6 +63,7 @@ class JobResult:
     bad: Ints  # lanes whose radiance was not finite; it is 0 there
     rays: int  # queries of the accelerator
     seconds: float  # that it took its worker
+    layers: LayerSamples | None = None  # None where no sampled layer is asked for
 
 
 def split_jobs(

@@ -13,6 +13,7 @@ from ..compile.scene import CompiledScene
 from ..filters import Filter
 from ..integrators import Integrator
 from ..record import record
+from ..sample_recorder import SampleRecorder, recorded_layers
 from ..sampling.sampler import Sampler
 from ..stages.generate import generate
 from ..state import Words
@@ -59,6 +60,12 @@ class Tracer:
     filter: Filter
     integrator: Integrator
     max_bounces: int
+    layers: tuple[str, ...] = ()  # sampled ones that are asked for
+
+    @property
+    def recorded_layers(self) -> tuple[str, ...]:
+        """The layers that jobs return, those with a key by it."""
+        return recorded_layers(self.layers, self.scene)
 
 
 def trace_job(tracer: Tracer, monitor: WaveMonitor, job: Job) -> JobResult:
@@ -78,10 +85,14 @@ def trace_job(tracer: Tracer, monitor: WaveMonitor, job: Job) -> JobResult:
     scene = replace(tracer.scene, accelerator=accelerator)
     sampler = tracer.sampler(camera.film[0])
     paths = generate(scene, camera, sampler, np.tile(job.pixels, n), _samples(job), tracer.filter)
+    recorder = SampleRecorder(tracer.layers, scene, k * n) if tracer.layers else None
+    if recorder is not None:
+        recorder.prepare(paths)
     radiance = tracer.integrator(scene, paths, sampler, tracer.max_bounces)
     bad = np.flatnonzero(~np.isfinite(radiance).all(0))
+    layers = None if recorder is None else recorder.result(tracer.integrator, radiance, n, bad)
     radiance[:, bad] = 0
-    return JobResult(radiance.reshape(3, n, k), bad, accelerator.rays, time.perf_counter() - begin)
+    return JobResult(radiance.reshape(3, n, k), bad, accelerator.rays, time.perf_counter() - begin, layers)
 
 
 def _samples(job: Job) -> Words:

@@ -8,8 +8,8 @@ import numpy as np
 
 from ..bsdfs import BsdfSample, sampled
 from ..sampling.sampler import Dimension, Sampler
-from ..state import Paths
-from ..vec import Floats, Ints, f4, normalize, signs, take
+from ..state import BEFORE, JUST_ONCE, NOT_YET, Paths
+from ..vec import Bools, Bytes, Floats, Ints, f4, normalize, signs, take
 from .guidance import mix_with_guide
 from .interaction import LIFT, offset_origin
 from .shade import Shading
@@ -27,6 +27,8 @@ def branch(paths: Paths, shade: Shading, sampler: Sampler, bounce: int, ways: in
     parts = [bounce_sample(replace(paths, sample=sample), shade, sampler, bounce) for sample in numbers]
     paths = Paths.concatenate(parts)
     paths.throughput *= f4(1 / ways)
+    if paths.recorder is not None:
+        paths.recorder.branched(ways)
     return paths
 
 
@@ -66,7 +68,15 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         pdf=sample.pdf,
         specular=specular,
         roulette_scale=roulette_scale,
+        scattered=None if paths.scattered is None else _after(paths.scattered, specular),
+        met_rough=paths.met_rough,
+        recorder=paths.recorder,
     )
+
+
+def _after(scattered: Bytes, specular: Bools) -> Bytes:
+    """Return `Paths.scattered` (n,) after another scattering, which is specular (n,) or not."""
+    return np.where(scattered == NOT_YET, np.where(specular, NOT_YET, JUST_ONCE), BEFORE).astype(np.uint8)
 
 
 def _strayed(shade: Shading, wi: Floats, cos: Floats) -> Ints:

@@ -132,7 +132,7 @@ def direct(
     shade = shade.lit()
     if scene.lights.choice is None or not shade.groups:
         nothing = np.zeros(0, np.intp)
-        return Contribution(nothing, np.zeros((3, 0), f4), nothing)
+        return Contribution(nothing, np.zeros((3, 0), f4), nothing, sampled=True)
     n = len(shade.surface)
     address = paths.pixel[:n], paths.sample[:n], bounce
     # with one light, the choice needs no random number
@@ -144,9 +144,9 @@ def direct(
     wi = shade.frame.to_local(light.wi)
     cos, cos_g = shade.cosines(wi, light.wi)
     f, pdf = evaluate(shade, wi)
-    arriving = (light.pdf > 0) & (highest(f) * cos != 0)  # NaN stays, so that it reaches the picture
-    lanes = np.flatnonzero(arriving)
-    through = (arriving & (cos_g < 0)).any()
+    lit = (light.pdf > 0) & (highest(f) * cos != 0)  # NaN stays, so that it reaches the picture
+    lanes = np.flatnonzero(lit)
+    through = (lit & (cos_g < 0)).any()
     origin = offset_origin(shade.surface, cos_g) if through else shade.start
     rays = shadow_rays(shade.surface, origin, light, lanes)
     number = take(number, lanes)
@@ -162,7 +162,9 @@ def direct(
         if shade.guidance is not None:
             pdf = shade.guidance.mixed(lanes, take(light.wi, lanes), pdf)
         scale *= scene.lights.mis_weight(number, pdf_light, pdf)
-    return Contribution(lanes, f.take(lanes, 1) * radiance * scale, number)
+    arriving = f.take(lanes, 1) * radiance * scale
+    toward = None if paths.recorder is None else take(light.wi, lanes)
+    return Contribution(lanes, arriving, number, sampled=True, wi=toward)
 
 
 def radiance_at_samples(

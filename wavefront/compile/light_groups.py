@@ -1,0 +1,81 @@
+"""The groups of lights: for which layer of radiance each light counts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ..layers import group_name
+from ..lights import EnvironmentSum, InfiniteLight, Light
+from ..record import record
+from ..shapes import CurvedShape, Mesh
+from ..vec import Floats, Ints
+
+
+@record
+class LightGroups:
+    """The group of each light of a scene, and of the parts of its environment."""
+
+    names: tuple[str, ...]
+    of_light: Ints  # (lights,) number of the group; -1 of an environment of several groups
+    environment: tuple[tuple[str, InfiniteLight], ...]  # the groups of the environment, and what they send
+
+    def parts_of_environment(self, wi: Floats) -> Iterator[tuple[str, Floats]]:
+        """Yield each group of the environment, and its part (3, n) of the radiance from wi (3, n)."""
+        radiances = [light.le(wi) for _, light in self.environment]
+        total = np.zeros_like(wi)
+        for radiance in radiances:
+            total += radiance
+        total[total == 0] = 1
+        for (name, _), radiance in zip(self.environment, radiances, strict=True):
+            yield name, radiance / total
+
+
+class GroupNumbers:
+    """Numbers the groups of the lights of a scene, while its table of lights is built."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[str, int] = {}
+        self._of_light: list[Ints] = []
+        self._environment: dict[str, list[InfiniteLight]] = {}
+
+    def number(self, light: Light) -> int:
+        """Return the number of the group of a light.
+
+        Raises
+        ------
+        SceneError
+            If the group of a light is no name.
+        """
+        return self._number(group_name(f"{type(light).__name__} group", light.group))
+
+    def of_shapes(self, meshes: Sequence[Mesh], sizes: Sequence[int], curved: Sequence[CurvedShape]) -> Ints:
+        """Return the group of each triangle of meshes of so many, and of each other primitive.
+
+        It is -1 of those that are dark.
+        """
+        shapes: list[Mesh | CurvedShape] = [*meshes, *curved]
+        numbers = [-1 if shape.emission is None else self._number(shape.material.group) for shape in shapes]
+        return np.repeat(np.array(numbers, np.intp), [*sizes, *(shape.count for shape in curved)])
+
+    def add(self, numbers: Ints) -> None:
+        """Add the next lights of the table by the numbers (k,) of their groups."""
+        self._of_light.append(numbers)
+
+    def add_to_environment(self, light: Light, record: InfiniteLight) -> None:
+        """Add a part of the environment."""
+        self.number(light)
+        self._environment.setdefault(light.group, []).append(record)
+
+    def _number(self, name: str) -> int:
+        return self._numbers.setdefault(name, len(self._numbers))
+
+    def groups(self) -> LightGroups:
+        """Return the groups; the environment is the last light."""
+        parts = tuple((name, EnvironmentSum.of(lights)) for name, lights in self._environment.items())
+        if parts:
+            self.add(np.array([self._number(parts[0][0]) if len(parts) == 1 else -1]))
+        return LightGroups(
+            tuple(self._numbers), np.concatenate([np.zeros(0, np.intp), *self._of_light]), parts
+        )

@@ -1,0 +1,254 @@
+"""The recorder of a wave: takes from the stages what the sampled layers of its samples need.
+
+A recorder travels with the paths (`Paths.recorder`), so integrators need not know which layers are asked for,
+and integrators of a user's own give the same layers if they are made of the same stages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .bsdfs import albedo_of
+from .compile.scene import CompiledScene
+from .errors import SceneError
+from .layer_samples import BOUNDED, LayerSamples, fixed_point
+from .layers import KEYED_LAYERS, LAYERS
+from .record import record
+from .stages.compact import compact
+from .stages.interaction import interaction
+from .stages.normal_mapping import perturb_normals
+from .stages.shade import Shading, shading
+from .state import JUST_ONCE, NOT_YET, Contribution, Hits, Paths
+from .vec import Floats, Ints, f4, take
+
+FEATURES = ("denoising_albedo", "denoising_normal")
+OF_LIGHT = ("direct", "indirect", "light_groups")
+
+
+@record
+class AwaitedSurfaces:
+    """Surfaces that paths have met, and that nobody has shaded yet."""
+
+    scene: CompiledScene
+    paths: Paths
+    hits: Hits
+    first: bool  # of their paths
+
+
+class SampleRecorder:
+    """Records the sampled layers of one wave.
+
+    Parameters
+    ----------
+    wanted
+        The layers that are asked for.
+    scene
+        What is rendered.
+    n
+        Samples of the wave: slots of its paths.
+    """
+
+    def __init__(self, wanted: Sequence[str], scene: CompiledScene, n: int) -> None:
+        self._wanted = tuple(wanted)
+        self._values = {name: np.zeros((LAYERS[name].channels, n), f4) for name in BOUNDED if name in wanted}
+        self._covered = np.zeros(n, np.bool_) if "alpha" in wanted else None
+        self._light: dict[str, Floats] = {}
+        if "direct" in wanted or "indirect" in wanted:
+            self._light["direct"] = np.zeros((3, n), f4)
+        self._groups = scene.light_groups if "light_groups" in wanted else None
+        if self._groups is not None:
+            self._light.update((f"light_groups.{name}", np.zeros((3, n), f4)) for name in self._groups.names)
+        self._awaited: AwaitedSurfaces | None = None
+        self._begun = False
+        self._picture: Floats | None = None  # to which all light has been added
+        self._share = 1.0  # part of a sample that each path is
+
+    def prepare(self, paths: Paths) -> None:
+        """Have paths that start at the camera carry the recorder."""
+        paths.recorder = self
+        if "direct" in self._light:
+            paths.scattered = np.full(len(paths), NOT_YET, np.uint8)
+        if any(name in self._values for name in FEATURES):
+            paths.met_rough = np.zeros(len(paths), np.bool_)
+
+    def branched(self, ways: int) -> None:
+        """Note that each path goes on in several ways."""
+        self._share /= ways
+
+    # --- Surfaces -------------------------------------------------------------------------------------
+
+    def record_hits(
+        self, scene: CompiledScene, paths: Paths, hits: Hits, kept: Ints, kept_paths: Paths, kept_hits: Hits
+    ) -> None:
+        """Record what paths meet next.
+
+        Parameters
+        ----------
+        paths, hits
+            All paths.
+        kept
+            (k,) those that go on.
+        kept_paths, kept_hits
+            The same as records, as they will be shaded.
+        """
+        self._shade_awaited()
+        first, self._begun = not self._begun, True
+        if first and self._covered is not None:
+            self._covered[paths.slot] = hits.prim >= 0
+        if not self._needs_surfaces(paths, first):
+            return
+        ends = hits.prim >= 0
+        ends[kept] = False
+        if ends.any():
+            self._awaited = AwaitedSurfaces(
+                scene, *compact(scene, paths, hits, np.flatnonzero(ends)), first=first
+            )
+            self._shade_awaited()
+        if len(kept_paths):
+            self._awaited = AwaitedSurfaces(scene, kept_paths, kept_hits, first)
+
+    def record_surfaces(self, scene: CompiledScene, paths: Paths, shade: Shading) -> None:
+        """Record the surfaces that paths have met, which are ready to shade."""
+        awaited, self._awaited = self._awaited, None
+        if awaited is None:
+            return
+        albedo = None
+        if awaited.first and "albedo" in self._values:
+            albedo = _albedo(shade)
+            self._values["albedo"][:, paths.slot] = albedo
+        if paths.met_rough is None:
+            return
+        lanes = np.flatnonzero(~paths.met_rough)
+        if lanes.size < len(paths):  # so not the first surface
+            shade, albedo = shading(scene, shade.surface.take(lanes)), None
+        self._record_features(paths, lanes, shade, _albedo(shade) if albedo is None else albedo)
+
+    def _needs_surfaces(self, paths: Paths, first: bool) -> bool:
+        """Return whether a layer needs the next surfaces of the paths."""
+        if first and "albedo" in self._values:
+            return True
+        return paths.met_rough is not None and not paths.met_rough.all()
+
+    def _shade_awaited(self) -> None:
+        """Record surfaces that no integrator has shaded."""
+        if self._awaited is None:
+            return
+        scene, paths, hits = self._awaited.scene, self._awaited.paths, self._awaited.hits
+        surface = interaction(scene, paths, hits)
+        perturb_normals(scene, surface)
+        self.record_surfaces(scene, paths, shading(scene, surface))
+
+    def _record_features(self, paths: Paths, lanes: Ints, shade: Shading, albedo: Floats) -> None:
+        """Record the features for a denoiser for lanes (k,), those of `shade`, that meet a rough surface."""
+        assert paths.met_rough is not None
+        end = sum(part.stop - part.start for part, bsdf in shade.groups if not bsdf.specular)
+        rough = slice(0, end)  # groups that are specular come last
+        slot = take(paths.slot, lanes[rough])
+        for name, values in zip(FEATURES, (albedo, shade.surface.ns), strict=True):
+            if name in self._values:
+                add_to_slots(self._values[name], slot, values[:, rough] * f4(self._share))
+        paths.met_rough[lanes[rough]] = True
+
+    # --- Light ----------------------------------------------------------------------------------------
+
+    def record_light(
+        self, picture: Floats, paths: Paths, contribution: Contribution, slot: Ints, arriving: Floats
+    ) -> None:
+        """Record light `arriving` (3, k) that has been added to slots (k,) of the `picture` (3, n)."""
+        if self._picture is None:
+            self._picture = picture
+        if self._picture is not picture:
+            self._picture = np.empty(0, f4)  # no integrator returns this
+        if paths.scattered is not None:
+            scattered = take(paths.scattered, contribution.lanes)
+            direct = scattered == NOT_YET if contribution.sampled else scattered <= JUST_ONCE
+            self._add("direct", np.flatnonzero(direct), slot, arriving)
+        if self._groups is not None:
+            toward = take(paths.direction, contribution.lanes) if contribution.wi is None else contribution.wi
+            group = self._groups.of_light.take(contribution.light)
+            for number, name in enumerate(self._groups.names):
+                lanes = np.flatnonzero(group == number)
+                self._add(f"light_groups.{name}", lanes, slot, arriving)
+            mixed = np.flatnonzero(group < 0)
+            if mixed.size:
+                for name, part in self._groups.parts_of_environment(take(toward, mixed)):
+                    light = take(arriving, mixed) * part
+                    add_to_slots(self._light[f"light_groups.{name}"], slot.take(mixed), light)
+
+    def _add(self, name: str, lanes: Ints, slot: Ints, arriving: Floats) -> None:
+        if lanes.size == slot.size:
+            add_to_slots(self._light[name], slot, arriving)
+        elif lanes.size:
+            add_to_slots(self._light[name], slot.take(lanes), take(arriving, lanes))
+
+    # --- The result -----------------------------------------------------------------------------------
+
+    def result(self, integrator: object, radiance: Floats, samples: int, dropped: Ints) -> LayerSamples:
+        """Return the layers.
+
+        Parameters
+        ----------
+        integrator
+            What has traced the paths.
+        radiance
+            (3, n) that it returned.
+        samples
+            Of each pixel.
+        dropped
+            Slots that are black because they were not finite.
+
+        Raises
+        ------
+        SceneError
+            If the integrator is not made of the stages that tell of the layers.
+        """
+        self._check(integrator, radiance)
+        self._shade_awaited()
+        light = {name: values.reshape(3, samples, -1) for name, values in self._light.items()}
+        for values in self._light.values():
+            values[:, dropped] = 0
+        counts = {}
+        if self._covered is not None:
+            self._covered[dropped] = False
+            counts["alpha"] = self._covered.reshape(samples, -1).sum(0, dtype=np.int32)
+        bounded = {name: fixed_point(values, samples, dropped) for name, values in self._values.items()}
+        return LayerSamples(counts, bounded, light)
+
+    def _check(self, integrator: object, radiance: Floats) -> None:
+        label = getattr(integrator, "__name__", repr(integrator))
+        for name in self._wanted:
+            if name in OF_LIGHT and self._picture is not radiance:
+                raise SceneError(
+                    f"the integrator {label} cannot give the layer {name!r}: all light must be added by "
+                    "wavefront.integrators.accumulate to the array that it returns"
+                )
+            if name not in OF_LIGHT and not self._begun:
+                raise SceneError(
+                    f"the integrator {label} cannot give the layer {name!r}: its paths must find their "
+                    "surfaces by wavefront.integrators.intersect_and_compact"
+                )
+
+
+def recorded_layers(wanted: Sequence[str], scene: CompiledScene) -> tuple[str, ...]:
+    """Return the layers that recorders of a scene return, those with a key by it."""
+    names: list[str] = []
+    for name in wanted:
+        keys = scene.light_groups.names if name == "light_groups" else ()
+        names += [f"{name}.{key}" for key in keys] if name in KEYED_LAYERS else [name]
+    return tuple(names)
+
+
+def _albedo(shade: Shading) -> Floats:
+    """Return the albedo of surfaces, (3, n)."""
+    albedo = np.empty_like(shade.surface.ns)
+    for lanes, bsdf in shade.groups:
+        albedo[:, lanes] = albedo_of(bsdf, take(shade.wo, lanes))
+    return albedo
+
+
+def add_to_slots(rows: Floats, slot: Ints, values: Floats) -> None:
+    """Add values (3, k) to the slots (k,), in which numbers may repeat, of rows (3, n)."""
+    for row, channel in zip(rows, values, strict=True):  # a row at a time: much faster
+        np.add.at(row, slot, channel)
