@@ -16,23 +16,21 @@ if TYPE_CHECKING:
     import zipfile
 
 METADATA = "metadata"  # the array of text
-LEVEL = 1  # of deflate: noise hardly shrinks more at higher levels
 MAX_BYTES = 2**31  # of all arrays
 EXPANSION = 64  # for larger archives, the limit is this number of bytes per byte of the file
 KINDS = "fiubU"  # of NumPy types that are read
 
 
 def encode(picture: ImageData) -> bytes:
-    """Return an npz file of all arrays of a picture."""
+    """Return an npz file of all arrays of a picture, not compressed: noise hardly shrinks, and takes long."""
     import zipfile  # imported here to keep `import wavefront` quick
 
     buffer = BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive:
+    with zipfile.ZipFile(buffer, "w") as archive:
         for name, values in {**picture.named(), METADATA: np.array(to_json(picture.info))}.items():
             member = zipfile.ZipInfo(
                 f"{name}.npy"
             )  # with a fixed date: the same picture gives the same bytes
-            member.compress_type = zipfile.ZIP_DEFLATED
             with archive.open(member, "w", force_zip64=True) as file:
                 np.lib.format.write_array(file, np.asanyarray(values), allow_pickle=False)
     return buffer.getvalue()
