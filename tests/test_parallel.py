@@ -19,7 +19,7 @@ import scenes
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import wavefront as wf
-from wavefront.scheduling.executors import MIN_PATHS, choose_executor, worker_count
+from wavefront.scheduling.executors import MIN_PATHS, MIN_PATHS_TO_SPAWN, choose_executor, worker_count
 from wavefront.scheduling.pool import WorkerPool
 from wavefront.scheduling.shared import STOP, SharedInt, Stopped
 
@@ -262,14 +262,12 @@ def test_without_a_global_lock_threads_are_as_fast(monkeypatch: pytest.MonkeyPat
     assert choose_executor(None, 2, MIN_PATHS) == "threads"
 
 
-def test_where_nothing_can_be_forked_workers_are_threads(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And asking for processes is an error that says why."""
+def test_where_processes_are_not_forked_they_need_more_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For spawned ones begin with imports."""
     monkeypatch.setattr(sys, "platform", "darwin")
     assert choose_executor(None, 2, MIN_PATHS) == "threads"
-    with pytest.raises(
-        wf.SceneError, match=r"executor is 'processes', but .* not safe on darwin; use 'threads'"
-    ):
-        choose_executor("processes", 2, MIN_PATHS)
+    assert choose_executor(None, 2, MIN_PATHS_TO_SPAWN) == "processes"
+    assert choose_executor("processes", 2, 1) == "processes"
 
 
 @processes
@@ -279,15 +277,18 @@ def test_a_daemon_has_threads() -> None:
     daemon._config["daemon"] = True  # type: ignore[attr-defined]
     try:
         assert choose_executor(None, 2, MIN_PATHS) == "threads"
-        with pytest.raises(wf.SceneError, match=r"daemon of multiprocessing.*use 'threads'"):
-            choose_executor("processes", 2, MIN_PATHS)
+        for name in ("processes", "spawn", "forkserver"):
+            with pytest.raises(wf.SceneError, match=rf"'{name}'.*daemon of multiprocessing.*use 'threads'"):
+                choose_executor(name, 2, MIN_PATHS)
     finally:
         del daemon._config["daemon"]  # type: ignore[attr-defined]
 
 
 def test_unknown_executors_are_named() -> None:
     """With what there is."""
-    with pytest.raises(wf.SceneError, match="executor is 'dask'; it must be one of processes, threads"):
+    with pytest.raises(
+        wf.SceneError, match="executor is 'dask'; it must be one of processes, threads, spawn"
+    ):
         wf.render(scenes.everything(), 1, executor="dask")
 
 
@@ -326,7 +327,7 @@ def test_ctrl_c_stops_processes() -> None:
 @processes
 def test_a_queue_of_results_is_closed_by_two_threads_at_once() -> None:
     """As when stopped workers are killed while the pool shuts down: no file is closed twice."""
-    from wavefront.scheduling.processes import _Fork
+    from wavefront.scheduling.processes import _Context
 
     interval = sys.getswitchinterval()
     failures: list[OSError] = []
@@ -340,7 +341,7 @@ def test_a_queue_of_results_is_closed_by_two_threads_at_once() -> None:
     sys.setswitchinterval(1e-6)
     try:
         for _ in range(300):
-            queue = _Fork().SimpleQueue()
+            queue = _Context("fork").SimpleQueue()
             threads = [
                 threading.Thread(target=attempt, args=(close,)) for close in (queue.close, queue.close_writer)
             ]

@@ -19,8 +19,7 @@ from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
 from .registry import Registry
 from .sampling.sampler import SAMPLERS, SamplerMaker
 from .scene import Scene
-from .scheduling.executors import EXECUTORS
-from .scheduling.workers import ExecutorMaker
+from .scheduling.executors import EXECUTORS, ExecutorLike
 from .vec import Floats
 
 
@@ -120,7 +119,7 @@ def register_accelerator(name: str, accelerator: AcceleratorMaker) -> None:
     ACCELERATORS.register(name, accelerator)
 
 
-def register_executor(name: str, executor: ExecutorMaker) -> None:
+def register_executor(name: str, executor: ExecutorLike) -> None:
     """Let `render(executor=name)` use workers of another kind.
 
     Parameters
@@ -128,13 +127,13 @@ def register_executor(name: str, executor: ExecutorMaker) -> None:
     name
         A name that is not taken.
     executor
-        Called with the number of workers; returns a `concurrent.futures.Executor` whose workers share the
-        memory of this process, as those of `ThreadPoolExecutor` do.
+        Called with the number of workers; returns a `concurrent.futures.Executor`, which is shut down at
+        the end of the render. An executor itself, or a `dask.distributed.Client`, is not shut down.
 
     Raises
     ------
     SceneError
-        If the name is taken, or the executor cannot be called.
+        If the name is taken, or it is not an executor.
     """
     EXECUTORS.register(name, executor)
 

@@ -17,7 +17,7 @@ from .materials import MaterialLike
 from .outcome import interrupted
 from .progress import Progress
 from .sampling.sampler import SamplerMaker
-from .scheduling.workers import ExecutorMaker
+from .scheduling.executors import ExecutorLike
 from .session import Session
 from .suggestions import suggests_keywords
 
@@ -40,7 +40,7 @@ def render(
     sampler: str | SamplerMaker = "sobol",
     accel: str | AcceleratorMaker = "auto",
     workers: int | None = None,
-    executor: str | ExecutorMaker | None = None,
+    executor: str | ExecutorLike | None = None,
     noise: float | None = None,
     seconds: float | None = None,
     filter: str | Filter = "box",
@@ -49,6 +49,7 @@ def render(
     guide: bool = False,
     wave_size: int | None = None,
     max_memory: int | str | None = None,
+    strict: bool = False,
     aovs: str | Sequence[str] = (),
     progress: Progress = None,
 ) -> Image:
@@ -96,10 +97,13 @@ def render(
     accel
         Ray queries by "numpy", by "embree" (`pip install embreex`), or "auto".
     workers
-        How many waves are traced at once; by default one per core.
+        How many waves are traced at once; by default one per core, or per worker of an executor or
+        cluster that is given.
     executor
-        What workers are: "processes" or "threads". By default processes, which are faster, on Linux
-        when there is work for more than a moment, and threads otherwise. The picture is the same.
+        What workers are: "processes", "threads", "spawn" or "forkserver", which are processes that
+        share no memory with this one; or a `concurrent.futures.Executor`, a function that returns one,
+        or a `dask.distributed.Client`. By default processes, which are faster, when there is work for
+        more than a moment, and threads otherwise. The picture is the same. docs/scale.md tells more.
     noise
         Go on until the estimated relative error of the picture is no more than this: 0.02 means
         2 %. It is the root of the relative MSE that `compare` would find against a converged
@@ -132,6 +136,9 @@ def render(
         already: a number of bytes, or a size such as "2GB" or "800MiB". It sizes waves, and the
         number of workers where not all of them fit. The picture does not depend on it. A render that
         needs more is refused before it begins.
+    strict
+        True makes it an error, not a warning, when workers on other machines may compute other bits:
+        because of another version of NumPy or of this package, or another processor.
     aovs
         Layers beside the picture, by name: "position", "depth", "distance", "normal", "normal_geometric",
         "uv", "shape_id", "instance_id", "material_id", "alpha", "albedo", "direct", "indirect",
@@ -183,6 +190,7 @@ def render(
         guide=guide,
         wave_size=wave_size,
         max_memory=max_memory,
+        strict=strict,
         aovs=aovs,
         progress=progress,
     )

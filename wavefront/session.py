@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Generator, Sequence
-from functools import lru_cache, partial
+from functools import partial
 from types import TracebackType
 from typing import Any, Self
 
@@ -40,7 +40,8 @@ from .renderable import as_scene, choose_camera
 from .sampling.sampler import SAMPLERS, SamplerMaker
 from .scheduling.accumulator import Accumulator, check_picture_memory
 from .scheduling.blas import reserve_buffers
-from .scheduling.executors import EXECUTORS
+from .scheduling.delivery import can_be_sent
+from .scheduling.executors import EXECUTORS, ExecutorLike, needs_pickling
 from .scheduling.interrupt import InterruptHandler
 from .scheduling.jobs import Job, JobResult, View
 from .scheduling.loop import PassSplitter, RenderLoop, doubling, undivided
@@ -48,7 +49,6 @@ from .scheduling.pool import WorkerPool
 from .scheduling.scheduler import Scheduler
 from .scheduling.shared import STOP
 from .scheduling.tracing import Tracer, WaveMonitor, trace_job
-from .scheduling.workers import ExecutorMaker
 from .settings import Settings, check_camera
 from .suggestions import suggests_keywords
 from .version import VERSION
@@ -74,7 +74,7 @@ class Session:
         As for `render`.
     integrator, max_bounces, seed, samples, sampler, accel, filter, light_sampler, branches, guide
         As for `render`.
-    workers, executor, noise, seconds, wave_size, max_memory, aovs, progress
+    workers, executor, noise, seconds, wave_size, max_memory, strict, aovs, progress
         As for `render`.
 
     Raises
@@ -106,7 +106,7 @@ class Session:
         sampler: str | SamplerMaker = "sobol",
         accel: str | AcceleratorMaker = "auto",
         workers: int | None = None,
-        executor: str | ExecutorMaker | None = None,
+        executor: str | ExecutorLike | None = None,
         noise: float | None = None,
         seconds: float | None = None,
         filter: str | Filter = "box",
@@ -115,6 +115,7 @@ class Session:
         guide: bool = False,
         wave_size: int | None = None,
         max_memory: int | str | None = None,
+        strict: bool = False,
         aovs: str | Sequence[str] = (),
         progress: Progress = None,
     ) -> None:
@@ -144,6 +145,7 @@ class Session:
             guide=guide,
             wave_size=wave_size,
             max_memory=max_memory,
+            strict=strict,
             aovs=aovs,
             progress=progress,
         )
@@ -171,7 +173,7 @@ class Session:
             )
         self._tracer = Tracer(
             self._compiled,
-            lru_cache(settings.sampler_for),
+            settings.sampler_maker(),
             FILTERS.find(settings.filter),
             self._estimator(camera),
             settings.max_bounces,
@@ -191,13 +193,17 @@ class Session:
             table = train(self._compiled, self._compiled.view(camera), sampler, settings.max_bounces)
         return settings.estimator(table)
 
-    def _make_pool(self, executor: str | ExecutorMaker) -> None:
+    def _make_pool(self, executor: str | ExecutorLike) -> None:
         """Make a pool of workers, which start with the first job."""
+        if self._settings.executor is None and needs_pickling(executor) and not can_be_sent(self._tracer):
+            executor = "threads"
         self._executor = executor
         self._monitor = WaveMonitor()
         self.interrupt_handler = InterruptHandler(self._monitor.stop)
         work = partial(trace_job, self._tracer, self._monitor)
-        self._pool = WorkerPool[Job, JobResult](work, self._budget.workers, executor, self._monitor.stop)
+        self._pool = WorkerPool[Job, JobResult](
+            work, self._budget.workers, executor, self._monitor.stop, self._settings.strict
+        )
         if self._in_block:
             self._pool.__enter__()
 

@@ -30,8 +30,7 @@ from .record import record
 from .registry import Registry
 from .sampling.sampler import SAMPLERS, Sampler, SamplerMaker, make_sampler
 from .scheduling.budget import Budget, plan
-from .scheduling.executors import EXECUTORS, choose_executor, worker_count
-from .scheduling.workers import ExecutorMaker
+from .scheduling.executors import EXECUTORS, ExecutorLike, choose_executor, worker_count
 
 DEFAULT_SPP = 100
 MAX_BRANCH_SAMPLES = 2**32  # a sample's index is 32 bits of its address, and each branch has one
@@ -225,13 +224,16 @@ class Settings:
     )
     workers: int | None = setting(
         None,
-        "How many waves are traced at once; by default one per core.",
+        "How many waves are traced at once; by default one per core, or per worker of an executor or "
+        "cluster that is given.",
         option="waves traced at once (default: one per core)",
     )
-    executor: str | ExecutorMaker | None = setting(
+    executor: str | ExecutorLike | None = setting(
         None,
-        'What workers are: "processes" or "threads". By default processes, which are faster, on Linux '
-        "when there is work for more than a moment, and threads otherwise. The picture is the same.",
+        'What workers are: "processes", "threads", "spawn" or "forkserver", which are processes that '
+        "share no memory with this one; or a `concurrent.futures.Executor`, a function that returns one, "
+        "or a `dask.distributed.Client`. By default processes, which are faster, when there is work for "
+        "more than a moment, and threads otherwise. The picture is the same. docs/scale.md tells more.",
         option="what workers are (default: the faster here)",
         choices=EXECUTORS,
     )
@@ -296,6 +298,11 @@ class Settings:
         option="memory to use at most, such as 2GB",
         check=optional(memory_size),
     )
+    strict: bool = setting(
+        False,
+        "True makes it an error, not a warning, when workers on other machines may compute other bits: "
+        "because of another version of NumPy or of this package, or another processor.",
+    )
     aovs: str | Sequence[str] = setting(
         (),
         'Layers beside the picture, by name: "position", "depth", "distance", "normal", '
@@ -324,10 +331,10 @@ class Settings:
                 setattr(self, each.name, check(each.name, getattr(self, each.name)))
         self.max_spp = self._most_samples()
         self.memory_limit = None if self.max_memory is None else int(self.max_memory)
-        self.worker_count = worker_count(self.workers)
+        self.worker_count = worker_count(self.workers, self.executor)
         self.up_vector = upward("up", "y" if self.up is None else self.up)
         self.estimator()
-        self.sampler_for(1)
+        self.sampler_maker()(1)
         self.executor_for((0, 0))
 
     @property
@@ -352,15 +359,15 @@ class Settings:
             raise SceneError(f"branches is {self.branches}; with integrator={label!r} it must be 1")
         return partial(li_full, branches=self.branches, table=table)
 
-    def sampler_for(self, width: int) -> Sampler:
-        """Return the sampler of a picture that is `width` pixels wide."""
-        return make_sampler(self.sampler, self.seed, width)
+    def sampler_maker(self) -> Callable[[int], Sampler]:
+        """Return what makes the sampler of a picture so many pixels wide."""
+        return partial(make_sampler, SAMPLERS.find(self.sampler), self.seed)
 
     def pilot_sampler(self, width: int) -> Sampler:
         """Return the sampler of the pilot of path guiding, whose numbers the picture does not use."""
         return make_sampler(self.sampler, self.seed ^ PILOT, width)
 
-    def executor_for(self, size: tuple[int, int]) -> str | ExecutorMaker:
+    def executor_for(self, size: tuple[int, int]) -> str | ExecutorLike:
         """Return the executor for a picture of a size (width, height)."""
         paths = size[0] * size[1] * self.max_spp * self.branches
         return choose_executor(self.executor, self.worker_count, paths)

@@ -35,6 +35,7 @@ class EmbreeAccelerator:
             raise SceneError(
                 'accel="embree" needs embreex, which is not installed: pip install embreex'
             ) from error
+        self._geometry = geometry
         triangles = np.ascontiguousarray(geometry.triangles, f4)
         with np.errstate(all="ignore"):
             ids = np.flatnonzero(triangle.has_area(triangles))
@@ -50,6 +51,10 @@ class EmbreeAccelerator:
         if any(map(len, geometry.curved)):
             self._first_curved = len(triangles)
             self._curved = NumpyAccelerator(Geometry(np.zeros((0, 3, 3), f4), geometry.curved))
+
+    def __reduce__(self) -> tuple[type[EmbreeAccelerator], tuple[Geometry]]:
+        """Pickle what it was built from: Embree's own memory cannot be pickled."""
+        return EmbreeAccelerator, (self._geometry,)
 
     def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
         """Return the nearest hits with t > 0 of rays (3, n)."""

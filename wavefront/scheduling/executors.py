@@ -3,7 +3,8 @@
 NumPy lets go of Python's global lock inside its loops, but between two of them every thread must take
 it again, and waiting for it costs more than the loops win: two threads trace 1.4 times as fast as one,
 two processes 1.9 times (docs/performance.md). So where the system can fork, workers are processes.
-They share the scene's memory, which nobody writes, and cost some milliseconds to start.
+They share the scene's memory, which nobody writes, and cost some milliseconds to start. Elsewhere processes
+are spawned, and take about a second until they have imported NumPy and this package and read the scene.
 """
 
 from __future__ import annotations
@@ -11,37 +12,112 @@ from __future__ import annotations
 import multiprocessing
 import os
 import sys
+from concurrent.futures import Executor, ThreadPoolExecutor
+from functools import partial
+from typing import Any, TypeAlias
 
 from ..errors import SceneError
 from ..registry import Registry
 from .blas import reserve_buffers
-from .shared import SharedInt
-from .workers import ExecutorMaker, StoppableWork, Workers, WorkersMaker, start_threads, workers_of
+from .dask import DaskClient, dask_workers
+from .remote import RemoteWorkers
+from .workers import (
+    ExecutorMaker,
+    LocalWorkers,
+    OwnExecutor,
+    StoppableWork,
+    TaskPool,
+    UsersExecutor,
+    Workers,
+    WorkersMaker,
+    shares_memory,
+)
 
-MIN_PATHS = 1 << 18  # fewer are traced sooner than processes are started
+MIN_PATHS = 1 << 18  # fewer are traced sooner than processes are forked
+MIN_PATHS_TO_SPAWN = 1 << 22  # fewer are traced sooner than processes are spawned
+
+PROCESSES = ("processes", "spawn", "forkserver")  # names of executors whose workers are our own processes
+
+ExecutorLike: TypeAlias = Executor | ExecutorMaker | DaskClient
 
 
-def _processes(work: StoppableWork, count: int, stop: SharedInt) -> Workers:
-    from .processes import ForkedWorkers  # here, because not every system can fork
+def _forks() -> bool:
+    """Return whether processes are forked here; elsewhere that is not safe, or not possible."""
+    return sys.platform.startswith("linux")
 
-    return ForkedWorkers(work, count, stop)
+
+def _processes(work: StoppableWork, count: int, strict: bool) -> Workers:
+    from .processes import forked_workers  # here, as not every render needs it
+
+    return forked_workers(work, count, strict) if _forks() else _spawn("spawn", work, count, strict)
 
 
-def _threads(work: StoppableWork, count: int, stop: SharedInt) -> Workers:
+def _spawn(method: str, work: StoppableWork, count: int, strict: bool) -> Workers:
+    from .processes import spawned_workers
+
+    return spawned_workers(method, work, count, strict)
+
+
+def _threads(work: StoppableWork, count: int, strict: bool) -> Workers:
     reserve_buffers(count)
-    return start_threads(work, count, stop)
+    executor = ThreadPoolExecutor(count, thread_name_prefix="wavefront")
+    return LocalWorkers(OwnExecutor(executor, work.stop), work)
+
+
+def _made(make: ExecutorMaker, work: StoppableWork, count: int, strict: bool) -> Workers:
+    """Start the workers of an executor that is made for them."""
+    executor = make(count)
+    pool = OwnExecutor(executor, work.stop)
+    try:
+        return _workers_of(executor, pool, work, strict)
+    except BaseException:
+        pool.shutdown([])
+        raise
+
+
+def _users(executor: Executor, work: StoppableWork, count: int, strict: bool) -> Workers:
+    """Use the workers of an executor that belongs to the caller."""
+    return _workers_of(executor, UsersExecutor(executor, work.stop), work, strict)
+
+
+def _workers_of(executor: Executor, pool: TaskPool, work: StoppableWork, strict: bool) -> Workers:
+    if shares_memory(executor, work.stop):
+        return LocalWorkers(pool, work)
+    return RemoteWorkers(pool, work, strict)
+
+
+def _workers_maker(executor: ExecutorLike) -> WorkersMaker:
+    """Return what starts the workers of an executor that a user gives."""
+    if isinstance(executor, DaskClient):
+        return partial(dask_workers, executor)
+    if isinstance(executor, Executor):
+        return partial(_users, executor)
+    return partial(_made, executor)
+
+
+def _is_executor(thing: Any) -> bool:
+    return isinstance(thing, Executor | DaskClient) or callable(thing)
 
 
 EXECUTORS: Registry[WorkersMaker] = Registry(
     "executor",
-    "a function that returns a concurrent.futures.Executor",
-    {"processes": _processes, "threads": _threads},
-    adapt=workers_of,
+    "a concurrent.futures.Executor, a function that returns one, or a dask.distributed.Client",
+    {
+        "processes": _processes,
+        "threads": _threads,
+        "spawn": partial(_spawn, "spawn"),
+        "forkserver": partial(_spawn, "forkserver"),
+    },
+    accepts=_is_executor,
+    adapt=_workers_maker,
 )
 
 
-def worker_count(workers: int | None) -> int:
-    """Return the number of workers to use; None means one per core that this process may use.
+def worker_count(workers: int | None, executor: str | ExecutorLike | None = None) -> int:
+    """Return the number of workers to use.
+
+    None means all workers of an executor that the user has made, and otherwise one per core that this process
+    may use.
 
     Raises
     ------
@@ -49,13 +125,25 @@ def worker_count(workers: int | None) -> int:
         If it is not a whole number of at least 1.
     """
     if workers is None:
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        return _workers_in(executor) or _cores()
     if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
         raise SceneError(f"workers is {workers!r}; it must be a whole number of at least 1")
     return workers
 
 
-def choose_executor(executor: str | ExecutorMaker | None, workers: int, paths: int) -> str | ExecutorMaker:
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _workers_in(executor: str | ExecutorLike | None) -> int | None:
+    """Return how many workers an executor has; None if it does not say."""
+    if isinstance(executor, DaskClient):
+        return sum(executor.nthreads().values())
+    size = getattr(executor, "_max_workers", None) if isinstance(executor, Executor) else None
+    return size if isinstance(size, int) else None
+
+
+def choose_executor(executor: str | ExecutorLike | None, workers: int, paths: int) -> str | ExecutorLike:
     """Return what was asked for, else "threads" or "processes", whichever is faster for so many paths.
 
     Raises
@@ -66,19 +154,24 @@ def choose_executor(executor: str | ExecutorMaker | None, workers: int, paths: i
     if executor is not None:
         EXECUTORS.find(executor)
     obstacle = _obstacle_to_processes()
-    if executor == "processes" and obstacle:
-        raise SceneError(f"executor is 'processes', but {obstacle}; use 'threads'")
+    if executor in PROCESSES and obstacle:
+        raise SceneError(f"executor is {executor!r}, but {obstacle}; use 'threads'")
+    if executor == "forkserver" and executor not in multiprocessing.get_all_start_methods():
+        raise SceneError(f"executor is 'forkserver', which {sys.platform} does not have; use 'spawn'")
     if executor is not None:
         return executor
     without_lock = not getattr(sys, "_is_gil_enabled", lambda: True)()
-    few = workers == 1 or paths < MIN_PATHS
+    few = workers == 1 or paths < (MIN_PATHS if _forks() else MIN_PATHS_TO_SPAWN)
     return "threads" if few or without_lock or obstacle else "processes"
+
+
+def needs_pickling(executor: str | ExecutorLike) -> bool:
+    """Return whether workers of a name can be started only with a scene that can be pickled."""
+    return executor in ("spawn", "forkserver") or (executor == "processes" and not _forks())
 
 
 def _obstacle_to_processes() -> str | None:
     """Return why workers cannot be processes; None if they can."""
-    if not sys.platform.startswith("linux"):
-        return f"they are forked, which is not safe on {sys.platform}"
     if multiprocessing.current_process().daemon:
         return "this process is a daemon of multiprocessing, which may have no children"
     return None

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import math
+import platform
+import time
 from collections.abc import Callable, Iterator
+from dataclasses import fields
+from typing import Any
 
 from ..camera import Camera
 from ..layer_samples import LayerSamples
@@ -22,6 +26,18 @@ class View:
     camera: Camera  # in the unit of the compiled scene
     deadline: float = math.inf  # when jobs under way are discarded, by `time.perf_counter`
     first_sample: int = 0  # index of the first sample of every pixel
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the time that is left as well: the clocks of two machines differ."""
+        values = [getattr(self, each.name) for each in fields(self)]
+        return _received_view, (values, self.deadline - time.perf_counter(), platform.node())
+
+
+def _received_view(values: list[Any], left: float, machine: str) -> View:
+    view = View(*values)
+    if machine != platform.node():
+        view.deadline = time.perf_counter() + left
+    return view
 
 
 @record

@@ -7,25 +7,35 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future
+from concurrent.futures import BrokenExecutor, Future
 from concurrent.futures import wait as wait_for_futures
-from concurrent.futures.process import BrokenProcessPool
 from types import TracebackType
-from typing import Generic, Self, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 from ..errors import RenderError
+from ..record import record
 from .blas import single_threaded_blas
-from .executors import EXECUTORS
+from .executors import EXECUTORS, ExecutorLike
 from .shared import AT_ONCE, STOP, SharedInt, Stopped
-from .workers import ExecutorMaker, StoppableWork, Workers, all_done
+from .workers import JobFailed, StoppableWork, Workers, all_done
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
-RETRIES = 2  # times that lost processes are replaced
+RETRIES = 2  # times that lost processes are replaced, or that a job is given to another worker
 POLL_INTERVAL = 0.1  # seconds between two checks whether work is to stop
 CANCEL_TIMEOUT = 1.0  # seconds that jobs have to end when they are canceled
 IDLE_TIMEOUT = 10.0  # seconds after which idle workers end where no context keeps them
+
+
+@record
+class _Submitted(Generic[Job, Result]):
+    """A job that was given to workers."""
+
+    job: Job
+    future: Future[Any]
+    workers: Workers
+    attempt: int  # how often it had failed before
 
 
 class WorkerPool(Generic[Job, Result]):
@@ -39,28 +49,32 @@ class WorkerPool(Generic[Job, Result]):
     ----------
     work
         Turns a job into its result. Processes have a copy of all that it refers to, as it was when
-        they started; jobs and results are pickled.
+        they started; jobs and results are pickled. If the processes are not forked, it is pickled, too.
     count
         Number of workers.
     executor
-        A name in `EXECUTORS`, or a function that returns an executor for a number of workers.
+        A name in `EXECUTORS`, or what that table takes in place of one.
     stop
         The stop flag. At STOP no job is begun any more, and work that checks the flag may raise `Stopped`;
         at AT_ONCE nobody waits for jobs under way. `close` sets it to STOP.
+    strict
+        Whether workers that may compute other bits than this machine are an error, not a warning.
     """
 
     def __init__(
         self,
         work: Callable[[Job], Result],
         count: int,
-        executor: str | ExecutorMaker,
+        executor: str | ExecutorLike,
         stop: SharedInt | None = None,
+        strict: bool = False,
     ) -> None:
         self._stop = SharedInt() if stop is None else stop
         self._work, self._count = StoppableWork(work, self._stop), count
         self._make = EXECUTORS.find(executor)
         self._workers: Workers | None = None
-        self._running: deque[tuple[Job, Future[Result]]] = deque()
+        self._strict = strict
+        self._running: deque[_Submitted[Job, Result]] = deque()
         self._retries = RETRIES
         self._kept = False  # by a context
         self._last_use = 0.0
@@ -107,7 +121,7 @@ class WorkerPool(Generic[Job, Result]):
         Stopped
             If the stop flag is set, or a job raised it.
         RenderError
-            If worker processes die again and again.
+            If worker processes die again and again, or a job fails wherever it is done.
         """
         for job in jobs:
             self._submit(job)
@@ -127,7 +141,7 @@ class WorkerPool(Generic[Job, Result]):
         The stop flag is 0 afterwards, unless it is AT_ONCE.
         """
         with self._lock:
-            futures = [future for _, future in self._running]
+            futures = [each.future for each in self._running]
             self._running.clear()
         self._stop.rise_to(STOP)
         if not all_done(futures, CANCEL_TIMEOUT, self._stop):
@@ -138,51 +152,70 @@ class WorkerPool(Generic[Job, Result]):
     def discard(self) -> None:
         """Wait for the jobs under way, but for those that have not begun, and discard their results."""
         with self._lock:
-            futures = [future for _, future in self._running]
+            futures = [each.future for each in self._running]
             self._running.clear()
-        for future in futures:
-            future.cancel()
         all_done(futures, math.inf, self._stop)
 
     def _first(self, waiting: Callable[[], object]) -> tuple[Job, Result]:
-        """Wait for the first of the jobs under way; if workers died, give all jobs to new ones."""
+        """Wait for the first of the jobs under way; what lost workers had is given to others."""
         while True:
-            job, future = self._running[0]
-            while not wait_for_futures([future], POLL_INTERVAL).done:
+            first = self._running[0]
+            while not wait_for_futures([first.future], POLL_INTERVAL).done:
                 waiting()
                 if self._stop.value:
                     raise Stopped
             try:
-                result = future.result()
-            except BrokenProcessPool:
-                self._replace(job)
+                result = first.workers.result(first.future)
+            except BrokenExecutor as error:
+                self._replace(first, error)
+                continue
+            except JobFailed as failure:
+                self._repeat(first, failure)
                 continue
             with self._lock:
                 self._running.popleft()
                 self._last_use = time.monotonic()
-            return job, result
+            return first.job, result
 
-    def _replace(self, job: Job) -> None:
-        """Give all jobs under way to new processes."""
+    def _replace(self, first: _Submitted[Job, Result], error: BrokenExecutor) -> None:
+        """Give all jobs under way to new workers."""
+        if self._stop.value:
+            raise Stopped
+        if not first.workers.replaceable:
+            raise RenderError(
+                f"the executor lost a worker with {first.job} under way, and is broken: {error} It belongs "
+                "to the caller and is not replaced; a function that makes executors would be called again"
+            ) from error
         if not self._retries:
             raise RenderError(
-                f"worker processes died {RETRIES + 1} times, at last with {job} under way; were they "
+                f"worker processes died {RETRIES + 1} times, at last with {first.job} under way; were they "
                 "killed for lack of memory? Use fewer workers or a smaller wave_size"
             ) from None
         self._retries -= 1
         with self._lock:
-            again = [each for each, _ in self._running]
+            again = list(self._running)
             self._end_workers()
             for each in again:
-                self._submit(each)
+                self._submit(each.job, each.attempt)
 
-    def _submit(self, job: Job) -> None:
+    def _repeat(self, first: _Submitted[Job, Result], failure: JobFailed) -> None:
+        """Give the first job to another worker; it stays the first."""
+        if self._stop.value:
+            raise Stopped
+        if first.attempt == RETRIES:
+            raise RenderError(f"{first.job} failed {RETRIES + 1} times, at last by: {failure}") from failure
+        with self._lock:
+            self._submit(first.job, first.attempt + 1)
+            self._running[0] = self._running.pop()
+
+    def _submit(self, job: Job, attempt: int = 0) -> None:
         try:
             with self._lock:
                 if self._workers is None:
                     self._start_workers()
                 assert self._workers is not None
-                self._running.append((job, self._workers.submit(job)))
+                future = self._workers.submit(job, attempt)
+                self._running.append(_Submitted(job, future, self._workers, attempt))
                 self._last_use = time.monotonic()
         except (RuntimeError, OSError) as error:  # a limit of threads, processes or memory
             raise RenderError(f"a worker cannot be started: {error}; use fewer workers") from error
@@ -190,7 +223,7 @@ class WorkerPool(Generic[Job, Result]):
     def _start_workers(self) -> None:
         single_threaded_blas.acquire()
         try:
-            self._workers = self._make(self._work, self._count, self._stop)
+            self._workers = self._make(self._work, self._count, self._strict)
         except BaseException:
             single_threaded_blas.release()
             raise
@@ -198,11 +231,11 @@ class WorkerPool(Generic[Job, Result]):
             self._idle_timer = threading.Thread(target=self._end_idle_workers, daemon=True)
             self._idle_timer.start()
 
-    def _end_workers(self, running: list[Future[Result]] | None = None) -> None:
+    def _end_workers(self, running: list[Future[Any]] | None = None) -> None:
         """End all workers; `running` are the futures that may not be done, by default those under way."""
         with self._lock:
             workers, self._workers = self._workers, None
-            futures = [future for _, future in self._running] if running is None else running
+            futures = [each.future for each in self._running] if running is None else running
             self._running.clear()
         if workers is None:
             return
@@ -219,7 +252,7 @@ class WorkerPool(Generic[Job, Result]):
         left = IDLE_TIMEOUT
         while not self._closed.wait(left):
             with self._lock:
-                if self._kept or not all(future.done() for _, future in self._running):
+                if self._kept or not all(each.future.done() for each in self._running):
                     self._last_use = time.monotonic()
                 left = self._last_use + IDLE_TIMEOUT - time.monotonic()
                 if left > 0 and self._workers is not None:

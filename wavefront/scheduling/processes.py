@@ -1,8 +1,9 @@
-"""Workers that are forked processes.
+"""Workers that are processes of this machine: forked, spawned, or forked by a server process.
 
-They share the memory of the process that forked them, which nobody writes. Ending them is the difficult
-part: nobody may wait for a process that is suspended or busy, and a process that is killed while it reads or
-writes leaves a pipe behind on which `concurrent.futures` would wait forever.
+Forked ones share the memory of the process that forked them, which nobody writes; the others are sent the
+scene. Ending them is the difficult part: nobody may wait for a process that is suspended or busy, and a
+process that is killed while it reads or writes leaves a pipe behind on which `concurrent.futures` would wait
+forever.
 """
 
 from __future__ import annotations
@@ -10,47 +11,75 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import time
 import warnings
 from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import wait
-from multiprocessing.context import ForkContext, ForkProcess
 from multiprocessing.process import BaseProcess
 from multiprocessing.queues import SimpleQueue
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
+from .remote import RemoteWorkers
 from .shared import AT_ONCE, SharedInt
-from .workers import POLL_INTERVAL, StoppableWork, all_done
+from .workers import POLL_INTERVAL, LocalWorkers, StoppableWork, all_done
 
 END_TIMEOUT = 1.0  # seconds that processes have to end by themselves
 TERM_TIMEOUT = 0.2  # seconds from SIGTERM to SIGKILL
 LARGEST_BLOCK = 31 << 20  # bytes; larger ones do not move glibc's limits
+MOST_ON_WINDOWS = 61  # processes of a pool, which waits for all of them at once
 
 
-class ForkedWorkers:
-    """A pool of forked processes."""
+def forked_workers(work: StoppableWork, count: int, strict: bool) -> LocalWorkers:
+    """Start workers that share the memory of this process."""
+    pool = ProcessPool("fork", count, work.stop, work)
+    pool.submit(int)  # the first task starts all processes, before there is more to copy
+    return LocalWorkers(pool, _call_work)
 
-    def __init__(self, work: StoppableWork, count: int, stop: SharedInt) -> None:
-        self._stop = stop
-        self._context = _Fork()
-        self._pool = ProcessPoolExecutor(count, self._context, _initialize_worker, (work,))
-        with _forking():
-            self._pool.submit(int)  # the first task starts all processes
 
-    def submit(self, job: Any) -> Future[Any]:
-        """Give a job to the first process that is free; if one has died, the future says so."""
-        try:
-            return self._pool.submit(_run, job)
-        except BrokenProcessPool as error:
-            failed: Future[Any] = Future()
-            failed.set_exception(error)
-            return failed
+def spawned_workers(method: str, work: StoppableWork, count: int, strict: bool) -> RemoteWorkers:
+    """Start workers that know nothing of this process, by "spawn" or "forkserver"."""
+    return RemoteWorkers(ProcessPool(method, count, work.stop), work, strict)
+
+
+class ProcessPool:
+    """A pool of processes.
+
+    Parameters
+    ----------
+    method
+        How they are started: "fork", "spawn" or "forkserver".
+    count
+        How many.
+    stop
+        The stop flag.
+    work
+        What forked processes have from the beginning.
+    """
+
+    replaceable = True
+
+    def __init__(
+        self, method: str, count: int, stop: SharedInt, work: Callable[[Any], Any] | None = None
+    ) -> None:
+        self._stop, self._forks = stop, method == "fork"
+        self._context = _Context(method)
+        self._count = min(count, MOST_ON_WINDOWS) if sys.platform == "win32" else count
+        context: Any = self._context
+        self._pool = ProcessPoolExecutor(self._count, context, _initialize_worker, (work,))
+
+    def submit(self, function: Callable[..., Any], /, *args: Any) -> Future[Any]:
+        """Have the first process that is free call a function; processes start with the first tasks."""
+        if len(self._context.processes) == self._count:
+            return self._pool.submit(function, *args)
+        with _blocking_ctrl_c(), _forking() if self._forks else _without_main():
+            return self._pool.submit(function, *args)
 
     def shutdown(self, running: Collection[Future[Any]]) -> None:
         """Let the processes end when their jobs are done or stopped, or else kill them.
@@ -88,23 +117,33 @@ class _ResultQueue(SimpleQueue):
             self._writer.close()  # type: ignore[attr-defined]
 
 
-class _Fork(ForkContext):
-    """A context that records the processes and queues of a pool, so that they can be ended from outside."""
+class _Context:
+    """A context of multiprocessing that records processes and queues, so that they can be ended from outside.
 
-    def __init__(self) -> None:
-        super().__init__()
-        self._processes: list[BaseProcess] = []
+    Attributes
+    ----------
+    processes
+        Those that were made.
+    """
+
+    def __init__(self, method: str) -> None:
+        self.processes: list[BaseProcess] = []
+        self._context: Any = multiprocessing.get_context(method)
         self._results: list[Any] = []
 
-    def Process(self, *args: Any, **options: Any) -> ForkProcess:  # type: ignore[override]
+    def __getattr__(self, name: str) -> Any:
+        """Return everything else of the context of multiprocessing."""
+        return getattr(self._context, name)
+
+    def Process(self, *args: Any, **options: Any) -> BaseProcess:
         """Make a process."""
-        process = ForkProcess(*args, **options)
-        self._processes.append(process)
+        process: BaseProcess = self._context.Process(*args, **options)
+        self.processes.append(process)
         return process
 
     def SimpleQueue(self) -> Any:
         """Make the queue of results."""
-        queue = _ResultQueue(ctx=self.get_context())
+        queue = _ResultQueue(ctx=self._context)
         self._results.append(queue)
         return queue
 
@@ -134,7 +173,7 @@ class _Fork(ForkContext):
 
     def _alive(self, timeout: float) -> list[BaseProcess]:
         """Return the processes that have not ended; if there are any, wait so long for one to end."""
-        alive = [process for process in self._processes if process.pid is not None]
+        alive = [process for process in self.processes if process.pid is not None]
         for patience in (0, timeout):
             ended = wait([process.sentinel for process in alive], patience) if alive else ()
             alive = [process for process in alive if process.sentinel not in ended]
@@ -143,29 +182,54 @@ class _Fork(ForkContext):
 
 @contextmanager
 def _forking() -> Iterator[None]:
-    """Fork children that ignore Ctrl-C, which the parent handles.
+    """Leave out Python's warning of forking beside other threads.
 
-    Forking beside other threads is what Python warns of: a lock that one of them holds stays held in
-    the child. Ours take none but their own and those that Python and the C library renew.
+    A lock that one of them holds stays held in the child. Ours take none but their own and those that Python
+    and the C library renew.
     """
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", ".*fork.*", DeprecationWarning)
+        yield
+
+
+@contextmanager
+def _without_main() -> Iterator[None]:
+    """Hide the user's script, which multiprocessing would run again in every process that is not forked.
+
+    It would render again there if it does not guard itself by `if __name__ == "__main__"`. What it defines
+    is pickled with its code.
+    """
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
+
+
+@contextmanager
+def _blocking_ctrl_c() -> Iterator[None]:
+    """Start children that ignore Ctrl-C, which the parent handles."""
+    if sys.platform == "win32":
+        yield
+        return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", ".*fork.*", DeprecationWarning)
-            yield
+        yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-_work: Callable[[Any], Any]  # in a worker process
+_work: Callable[[Any], Any] | None  # in a forked process
 
 
-def _initialize_worker(work: Callable[[Any], Any]) -> None:
+def _initialize_worker(work: Callable[[Any], Any] | None) -> None:
     """Prepare a worker process, which ends with its parent."""
     global _work
     _work = work
     _prepare_heap()
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
@@ -189,5 +253,6 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
-def _run(job: Any) -> Any:
+def _call_work(job: Any) -> Any:
+    assert _work is not None
     return _work(job)

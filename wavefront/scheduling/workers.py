@@ -1,82 +1,180 @@
-"""The contract of workers that have been started, and the workers of an executor of `concurrent.futures`."""
+"""The contract of workers that have been started, and those of executors of `concurrent.futures`."""
 
 from __future__ import annotations
 
 import math
+import os
+import platform
 import time
 from collections.abc import Callable, Collection
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures import wait as wait_for_futures
-from functools import partial
 from typing import Any, Protocol, TypeAlias
 
 from .shared import AT_ONCE, SharedInt, Stopped
 
 POLL_INTERVAL = 0.02  # seconds between two checks whether workers have ended
+END_TIMEOUT = 1.0  # seconds that jobs in the user's own executor have to end
+
+
+class JobFailed(Exception):
+    """A worker has no result for a job; another one may have."""
 
 
 class Workers(Protocol):
-    """Workers that have been started."""
+    """Workers that have been started for one kind of work.
 
-    def submit(self, job: Any) -> Future[Any]:
-        """Give a job to the first worker that is free."""
+    Attributes
+    ----------
+    replaceable
+        Whether other workers can be started when these are lost.
+    """
+
+    replaceable: bool
+
+    def submit(self, job: Any, attempt: int = 0) -> Future[Any]:
+        """Give a job, which has failed so many times, to the first worker that is free."""
+
+    def result(self, future: Future[Any]) -> Any:
+        """Return the result of a job that is done, or raise JobFailed."""
 
     def shutdown(self, running: Collection[Future[Any]]) -> None:
         """End all workers; `running` are the futures that may not be done. Their stop flag is set, if any."""
+
+
+class TaskPool(Protocol):
+    """Runs functions in workers.
+
+    Attributes
+    ----------
+    replaceable
+        Whether another pool can be made when its workers are lost.
+    """
+
+    replaceable: bool
+
+    def submit(self, function: Callable[..., Any], /, *args: Any) -> Future[Any]:
+        """Have the first worker that is free call a function."""
+
+    def shutdown(self, running: Collection[Future[Any]]) -> None:
+        """End all workers that are ours."""
 
 
 class StoppableWork:
     """A function of a job that is called only while the stop flag is not set."""
 
     def __init__(self, work: Callable[[Any], Any], stop: SharedInt) -> None:
-        self._work, self._stop = work, stop
+        self._work, self.stop = work, stop
 
     def __call__(self, job: Any) -> Any:
-        if self._stop.value:
+        if self.stop.value:
             raise Stopped
         return self._work(job)
 
 
-WorkersMaker: TypeAlias = Callable[[StoppableWork, int, SharedInt], Workers]  # called with their number
+WorkersMaker: TypeAlias = Callable[[StoppableWork, int, bool], Workers]  # with their number, and `strict`
 ExecutorMaker: TypeAlias = Callable[[int], Executor]  # called with the number of workers
 
 
-class ExecutorWorkers:
-    """The workers of an executor that `make` returns, such as a `ThreadPoolExecutor`."""
+class LocalWorkers:
+    """Workers that share the memory of this process, so that they need not be sent anything but jobs."""
 
-    def __init__(self, make: ExecutorMaker, work: StoppableWork, count: int, stop: SharedInt) -> None:
-        self._work, self._stop = work, stop
-        self._executor = make(count)
+    def __init__(self, pool: TaskPool, work: Callable[[Any], Any]) -> None:
+        self.replaceable = pool.replaceable
+        self._pool, self._work = pool, work
 
-    def submit(self, job: Any) -> Future[Any]:
+    def submit(self, job: Any, attempt: int = 0) -> Future[Any]:
         """Give a job to the first worker that is free."""
-        return self._executor.submit(self._work, job)
+        return submit_to(self._pool, self._work, job)
+
+    def result(self, future: Future[Any]) -> Any:
+        """Return the result of a job that is done; an error is raised as it is."""
+        return future.result()
+
+    def shutdown(self, running: Collection[Future[Any]]) -> None:
+        """End the workers if they are ours."""
+        self._pool.shutdown(running)
+
+
+class OwnExecutor:
+    """An executor that was made for a render, and ends with it."""
+
+    replaceable = True
+
+    def __init__(self, executor: Executor, stop: SharedInt) -> None:
+        self._executor, self._stop = executor, stop
+
+    def submit(self, function: Callable[..., Any], /, *args: Any) -> Future[Any]:
+        """Have the first worker that is free call a function."""
+        return self._executor.submit(function, *args)
 
     def shutdown(self, running: Collection[Future[Any]]) -> None:
         """Wait for the workers, which check the stop flag; after a second Ctrl-C do not wait."""
-        self._executor.shutdown(wait=False)
-        if all_done(running, math.inf, self._stop):
-            self._executor.shutdown(wait=True)
+        self._executor.shutdown(wait=all_done(running, math.inf, self._stop))
 
 
-def workers_of(make: ExecutorMaker) -> WorkersMaker:
-    """Return what starts the workers of executors that `make` returns."""
-    return partial(ExecutorWorkers, make)
+class UsersExecutor:
+    """An executor that belongs to the caller, and goes on after the render."""
+
+    replaceable = False
+
+    def __init__(self, executor: Executor, stop: SharedInt) -> None:
+        self._executor, self._stop = executor, stop
+
+    def submit(self, function: Callable[..., Any], /, *args: Any) -> Future[Any]:
+        """Have the first worker that is free call a function."""
+        return self._executor.submit(function, *args)
+
+    def shutdown(self, running: Collection[Future[Any]]) -> None:
+        """Withdraw jobs that have not begun, and wait a moment for the others."""
+        all_done(running, END_TIMEOUT, self._stop)
 
 
-start_threads = workers_of(partial(ThreadPoolExecutor, thread_name_prefix="wavefront"))
+def submit_to(pool: TaskPool, function: Callable[..., Any], *args: Any) -> Future[Any]:
+    """Have a worker call a function; if the pool has lost its workers, the future says so."""
+    try:
+        return pool.submit(function, *args)
+    except BrokenExecutor as error:
+        failed: Future[Any] = Future()
+        failed.set_exception(error)
+        return failed
+
+
+def shares_memory(executor: Executor, stop: SharedInt) -> bool:
+    """Return whether the workers of an executor are in this process, as those that it has say themselves.
+
+    Raises
+    ------
+    Stopped
+        If the stop flag is set while an answer is waited for.
+    """
+    if isinstance(executor, ThreadPoolExecutor | ProcessPoolExecutor):
+        return isinstance(executor, ThreadPoolExecutor)
+    answer = executor.submit(_process)
+    while wait_for_futures([answer], POLL_INTERVAL).not_done:
+        if stop.value:
+            answer.cancel()
+            raise Stopped
+    return bool(answer.result() == _process())
+
+
+def _process() -> tuple[str, int]:
+    return platform.node(), os.getpid()
 
 
 def all_done(futures: Collection[Future[Any]], timeout: float, stop: SharedInt) -> bool:
-    """Wait until all futures are done, at most `timeout` seconds and not past a second Ctrl-C.
+    """Cancel the futures that have not begun, and wait for the others.
+
+    Waits at most `timeout` seconds and not past a second Ctrl-C.
 
     Returns
     -------
     bool
         True if all are done.
     """
+    running = [future for future in futures if not future.cancel()]
     end = time.monotonic() + timeout
-    while wait_for_futures(futures, POLL_INTERVAL).not_done:
+    while wait_for_futures(running, POLL_INTERVAL).not_done:
         if stop.value >= AT_ONCE or time.monotonic() > end:
             return False
     return True
