@@ -16,8 +16,9 @@ from .codecs.image_data import ERROR, ImageData
 from .codecs.images import read_picture, write_image
 from .codecs.png_jpeg import Gamma
 from .codecs.white_balance import WhiteBalance
-from .errors import SceneError, one_of
+from .errors import SceneError, number, one_of, rgb
 from .layers import LAYERS, is_radiance
+from .outlines import outline_coverage
 from .samples import shared_samples
 from .vec import luminance
 
@@ -193,6 +194,59 @@ class Image:
         }
         spp, names = found.info.get("spp", 0), found.info.get("names")
         return cls(found.rgb, spp, dict(found.metadata), **fields, layers=layers, errors=errors, names=names)
+
+    def outlined(
+        self, color: ArrayLike = 0.0, width: float = 2.0, *, crease: float = 40.0, jump: float = 0.01
+    ) -> Image:
+        """Return the picture with lines where one thing ends in front of another, and along sharp edges.
+
+        The picture must have the layers `shape_id`, `normal` and `depth`: render it with
+        aovs=("shape_id", "normal", "depth"). Its layers stay as they are, except that the lines cover a
+        transparent background.
+
+        Parameters
+        ----------
+        color
+            Linear RGB of the lines, or one number.
+        width
+            Of the lines, pixels, above 0 and at most 100.
+        crease
+            Degrees, above 0 and at most 180: there is a line where the normal turns by more from one pixel to
+            the next.
+        jump
+            Above 0: there is a line where the depth changes by more than this part of itself from one pixel
+            to the next, and not as evenly as on a slanting surface.
+
+        Raises
+        ------
+        SceneError
+            If a layer is missing, or an argument is out of range.
+        """
+        wanted = "shape_id", "normal", "depth"
+        missing = [name for name in wanted if name not in self.layers]
+        if missing:
+            raise SceneError(f"outlines: the image has no layer {missing[0]!r}; render it with aovs={wanted}")
+        ink = rgb("outlines: color", color)[:, 0]
+        width = number("outlines: width", width, lambda x: 0 < x <= 100, "above 0 and at most 100")
+        crease = number("outlines: crease", crease, lambda x: 0 < x <= 180, "above 0 and at most 180")
+        jump = number("outlines: jump", jump, lambda x: x > 0, "above 0")
+        ids, normal, depth = (self.layers[name] for name in wanted)
+        covered = outline_coverage(ids, normal, depth, width, crease, jump)
+        left: NDArray[np.float32] = 1 - covered[..., None]
+        layers = dict(self.layers)
+        if "alpha" in layers:
+            layers["alpha"] = layers["alpha"] * (1 - covered) + covered
+        return Image(
+            np.asarray(self.rgb * left + ink * covered[..., None], np.float32),
+            self.spp,
+            self.metadata,
+            counts=self.counts,
+            variance=None if self.variance is None else self.variance * left**2,
+            standard_error=None if self.standard_error is None else self.standard_error * left,
+            layers=layers,
+            errors=self.errors,
+            names=self.names,
+        )
 
     def to_uint8(
         self,
