@@ -238,7 +238,7 @@ def shape_name(scene: Scene, prims: Ints) -> str:
     """Return the name of the shape that most of the primitives (n,) belong to."""
     if any(isinstance(shape, Instance) for shape in scene.shapes):
         return "a shape"
-    meshes, curved, _ = sort_shapes(list(scene.shapes), 0)
+    meshes, curved, _, _ = sort_shapes(list(scene.shapes), 0)
     counts = [len(mesh.faces) for mesh in meshes] + [shape.count for shape in curved]
     shapes: list[Shape] = [*meshes, *curved]
     numbers = np.searchsorted(np.cumsum(counts), prims, "right")

@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .accel import most_copies
 from .accel.registry import AcceleratorMaker
@@ -17,6 +17,7 @@ from .camera import Camera, image_size
 from .compile.scene import compile_scene
 from .errors import RenderError
 from .filters import FILTERS, Filter
+from .geometric_layers import IDS, ShapeTable, geometric_layers
 from .image import Image
 from .integrators import INTEGRATORS, WITH_MIS, Integrator, li_naive
 from .layers import layer_of
@@ -171,6 +172,7 @@ class Session:
                 most_copies(settings.accel),
                 mis=INTEGRATORS.find(settings.integrator) in WITH_MIS,
             )
+        self._shape_table = ShapeTable(self._lighted.shapes)
         self._tracer = Tracer(
             self._compiled,
             settings.sampler_maker(),
@@ -228,6 +230,8 @@ class Session:
             seconds=settings.seconds,
             progress=settings.progress,
         )
+        self._camera = camera
+        self._geometric: dict[str, NDArray[Any]] = {}
         self._sweeps: Generator[bool] | None = None
         self._last_snapshot = begin
         self._stopped = self._ended = self._warned = False
@@ -362,8 +366,23 @@ class Session:
     def _sweeps_of(self, split: PassSplitter) -> Generator[bool]:
         """Return the loop that was begun, or begin it."""
         if self._sweeps is None:
+            self._make_geometric_layers()
             self._sweeps = self._loop.sweeps(self._pool, self._monitor.surfaces, self._watch_paths, split)
         return self._sweeps
+
+    def _make_geometric_layers(self) -> None:
+        """Trace the geometric layers that are asked for."""
+        names = [name for name in self._settings.aovs if not layer_of(name).sampled]
+        if names:
+            shapes = self._shape_table
+            self._geometric = geometric_layers(self._compiled, self._camera, shapes, names)
+
+    def _add_geometric_layers(self, image: Image) -> None:
+        """Give a picture its geometric layers; all pictures but the last get copies."""
+        for name, layer in self._geometric.items():
+            image.layers[name] = layer if self._ended else layer.copy()
+            if name in IDS:
+                image.names[IDS[name]] = self._shape_table.names(IDS[name])
 
     def _discard_sweeps(self) -> None:
         if self._sweeps is not None:
@@ -449,7 +468,7 @@ class Session:
         settings = self._settings
         first = settings.first_sample
         most = int(self._loop.accumulator.film.count.max())
-        return self._loop.accumulator.image(
+        image = self._loop.accumulator.image(
             {
                 "lighting": self._preset,
                 "integrator": INTEGRATORS.label(settings.integrator),
@@ -469,3 +488,5 @@ class Session:
                 "numpy": np.__version__,
             }
         )
+        self._add_geometric_layers(image)
+        return image

@@ -13,9 +13,10 @@ from ..shapes import CurvedShape
 from ..vec import ALL, Floats, Ints, Lanes, f4, put, take
 
 
-def by_kind(shapes: Sequence[CurvedShape]) -> list[CurvedShape]:
-    """Return shapes in the order of the table of kinds, and of one kind in their own order."""
-    return sorted(shapes, key=lambda shape: KINDS.index(kind_of(shape)))
+def order_by_kind(shapes: Sequence[CurvedShape]) -> list[int]:
+    """Return the indices of shapes in the order of the table of kinds, and of one kind in their own order."""
+    kinds = [KINDS.index(kind_of(shape)) for shape in shapes]
+    return sorted(range(len(shapes)), key=kinds.__getitem__)
 
 
 @record
@@ -28,7 +29,7 @@ class CurvedTable:
 
     @classmethod
     def of(cls, shapes: Sequence[CurvedShape], center: NDArray[np.float64]) -> CurvedTable:
-        """Return the primitives of shapes, which `by_kind` has ordered, relative to `center` (3,)."""
+        """Return the primitives of shapes, which `order_by_kind` has ordered, relative to `center` (3,)."""
         members: dict[type[CurvedPrimitives], list[CurvedShape]] = {}
         for shape in shapes:
             members.setdefault(kind_of(shape), []).append(shape)

@@ -11,10 +11,10 @@ from ..shapes import Mesh
 from ..vec import Bools, Floats, Ints, cross, f4, length
 
 
-def same_as_next(material_of: Ints, light_of: Ints) -> Bools:
-    """Return a mask (m,) of the triangles that have the material and light of the next one."""
-    same = np.zeros(material_of.size, np.bool_)
-    same[:-1] = (np.diff(material_of) == 0) & (np.diff(light_of) == 0)
+def same_as_next(*of_triangles: Ints) -> Bools:
+    """Return a mask (m,) of the triangles that have the same numbers (m,) as the next one."""
+    same = np.zeros(of_triangles[0].size, np.bool_)
+    same[:-1] = np.logical_and.reduce([np.diff(numbers) == 0 for numbers in of_triangles])
     return same
 
 

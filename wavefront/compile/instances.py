@@ -14,7 +14,7 @@ from ..shapes import CurvedShape, Instance, Mesh, Shape
 from ..shapes.instance import instance_bounds
 from ..state import SoA
 from ..vec import Doubles, Floats, Ints, f4
-from .curved import by_kind
+from .curved import order_by_kind
 
 SKEW = 1e3  # instances whose scales along two axes have a larger ratio become meshes of their own
 BOX_ROOM = 2.0**-20  # margin of boxes on all sides, relative to their size and distance from the center
@@ -58,8 +58,10 @@ def _times(m: Floats, vectors: Floats) -> Floats:
 
 def sort_shapes(
     shapes: Sequence[Shape], most_copies: int
-) -> tuple[list[Mesh], list[CurvedShape], list[Instance]]:
+) -> tuple[list[Mesh], list[CurvedShape], list[Instance], Ints]:
     """Sort shapes by kind, and convert instances to meshes where sharing has no advantage.
+
+    The last result has the positions in `shapes` of all these meshes, curved shapes and instances.
 
     These are all instances, if they have no more than `most_copies` triangles together; instances of
     emitting meshes, because each triangle is a light; the only instance of a mesh; and very skewed
@@ -70,19 +72,26 @@ def sort_shapes(
     meshes: list[Mesh] = []
     curved: list[CurvedShape] = []
     instances: list[Instance] = []
+    numbers: tuple[list[int], list[int], list[int]] = [], [], []
     shareable = _shareable([shape for shape in shapes if isinstance(shape, Instance)])
-    for shape in shapes:
+    for number, shape in enumerate(shapes):
         if isinstance(shape, Mesh):
             meshes.append(shape)
+            numbers[0].append(number)
         elif isinstance(shape, CurvedShape):
             curved.append(shape)
+            numbers[1].append(number)
         elif not isinstance(shape, Instance):
             raise SceneError(f"{shape.name}: cannot trace a {type(shape).__name__}")
         elif total > most_copies and copies[id(shape.mesh)] > 1 and id(shape) in shareable:
             instances.append(shape)
+            numbers[2].append(number)
         else:
             meshes.append(shape.to_mesh())
-    return meshes, by_kind(curved), instances
+            numbers[0].append(number)
+    order = order_by_kind(curved)
+    positions = [*numbers[0], *(numbers[1][at] for at in order), *numbers[2]]
+    return meshes, [curved[at] for at in order], instances, np.array(positions, np.intp)
 
 
 def _shareable(instances: Sequence[Instance]) -> set[int]:

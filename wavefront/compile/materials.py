@@ -227,7 +227,7 @@ def number_materials(
     for shape in shapes:
         material = shape.material
         if id(material) not in numbers:
-            number = of_parts.setdefault(_identity(material), len(materials))
+            number = of_parts.setdefault(material_parts(material), len(materials))
             numbers[id(material)] = number
             if number == len(materials):
                 materials.append(material)
@@ -240,6 +240,6 @@ def number_materials(
     return materials, of_row, replaced
 
 
-def _identity(material: Material) -> tuple[int, ...]:
+def material_parts(material: Material) -> tuple[int, ...]:
     """Return equal keys for materials of the same parts, such as two that hold one BSDF and nothing else."""
-    return tuple(map(id, vars(material).values()))
+    return tuple(id(part) for name, part in vars(material).items() if name != "name")

@@ -33,6 +33,7 @@ from .materials import (
     opacity_table,
 )
 from .scale import check_distance, check_lights, length_factor, scaled_shapes
+from .shape_numbers import ShapeNumbers, number_shapes
 
 
 @record
@@ -53,6 +54,7 @@ class CompiledScene:
         str, Corners
     ]  # by field of `SurfaceInteraction`, those that a material reads; 3 × (width, m)
     curved: CurvedTable  # k of them
+    shape_numbers: ShapeNumbers  # which shapes of the user's scene the primitives belong to
     material_of: Ints  # (m + k,) material of each primitive
     light_of: Ints  # (m + k + 1,) light of each primitive, and at the end that of a miss; -1 for none
     emissive: Bools  # (m + k + 1,) whether `light_of` names a light
@@ -120,10 +122,11 @@ def compile_scene(
     low, high = low * scale, high * scale
     center = (low + high) / 2
     scaled = scaled_shapes(scene.shapes, scale)
-    meshes, curved, instances = sort_shapes(scaled, most_copies)
+    meshes, curved, instances, numbers = sort_shapes(scaled, most_copies)
     placed: list[Shape] = [*meshes, *curved, *instances]
     shared = list({id(instance.mesh): instance.mesh for instance in instances}.values())
-    once = sum(len(mesh.faces) for mesh in meshes)
+    sizes = np.array([len(mesh.faces) for mesh in meshes], np.intp)
+    shape_of, once = np.repeat(numbers[: sizes.size], sizes), int(sizes.sum())
     corners = [(mesh.vertices - center).take(mesh.faces, 0) for mesh in meshes]
     corners += [own_frame(mesh).take(mesh.faces, 0) for mesh in shared]
     meshes += shared
@@ -142,7 +145,8 @@ def compile_scene(
     light_of = np.append(light_of, environment)
     weights = bool(attributes) or smooth
     normals = compute_face_normals(triangles)
-    interchangeable = None if weights else same_as_next(material_of[:once], light_of[:once])
+    shape_numbers = number_shapes(meshes, curved, instances, numbers)
+    interchangeable = None if weights else same_as_next(material_of[:once], light_of[:once], shape_of)
     geometry = Geometry(triangles32[:once], table_of_curved.kinds, weights, interchangeable)
     accelerator, table = make_accelerator(geometry), None
     if shared:
@@ -160,6 +164,7 @@ def compile_scene(
         corner_normals=compute_corner_normals(meshes, normals),
         attributes=attributes,
         curved=table_of_curved,
+        shape_numbers=shape_numbers,
         material_of=material_of,
         light_of=light_of,
         emissive=light_of >= 0,

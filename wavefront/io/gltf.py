@@ -53,6 +53,7 @@ def contents(document: Document, max_instances: int) -> GltfContents:
     numbers: dict[int, list[int]] = {}  # by mesh of the file: the indices of its parts among `out.raws`
     of: list[int] = []  # index among `out.raws` of each placed mesh
     where: list[Matrix] = []
+    names: list[str] = []
     for node in walk(document):
         json = node.json
         if "mesh" in json:
@@ -65,6 +66,7 @@ def contents(document: Document, max_instances: int) -> GltfContents:
                         f"its nodes place {total} meshes so far; the limit is max_instances={max_instances}"
                     )
                 of += parts * count
+                names += _names_of_parts(node, len(parts)) * count
                 where.append(placements(document, node, count).repeat(len(parts), 0))
         if len(json.keys() & {"camera", "skin", "extensions"}):
             with document.inside(f"nodes[{node.index}]"):
@@ -75,8 +77,14 @@ def contents(document: Document, max_instances: int) -> GltfContents:
         document.lose("animations", "the file")
     # the walk meets the last node first, as trimesh does
     if of:
-        out.places = Places(np.array(of[::-1], np.intp), np.concatenate(where)[::-1])
+        out.places = Places(np.array(of[::-1], np.intp), np.concatenate(where)[::-1], names[::-1])
     return out
+
+
+def _names_of_parts(node: Node, parts: int) -> list[str]:
+    """Return the names of the shapes of a node; "" if it has none."""
+    name = str(node.json.get("name") or "")
+    return [f"{name}_{part}" if name and parts > 1 else name for part in range(parts)]
 
 
 def _parts(document: Document, out: GltfContents, numbers: dict[int, list[int]], mesh: Any) -> list[int]:

@@ -161,6 +161,7 @@ class _Reader:
             self._extended(extensions)
         radiance = self._emission(extensions.get("KHR_materials_emissive_strength", {}))
         material, lost = build_material(self._wanted, normal_map)
+        material.name = str(self._item["name"]) if self._item.get("name") else None
         both = bool(self._item.get("doubleSided"))
         return MaterialSpec(material, radiance, both, self._lost + lost, self._alpha_given, self._cutoff)
 

@@ -254,6 +254,7 @@ def specs(entries: dict[str, Entry], strict: bool = False) -> dict[str, Material
     unread: dict[str, str] = {}
     for name, entry in entries.items():
         out[name] = spec(entry)
+        out[name].material.name = name
         for keyword in (*entry.unread(), *sorted(entry.idle_options), *out[name].lost):
             unread.setdefault(keyword, name)
     if unread:

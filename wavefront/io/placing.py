@@ -25,6 +25,9 @@ class Places:
 
     raw: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))  # (n,) index of the mesh
     matrix: Matrix = field(default_factory=lambda: np.zeros((0, 4, 4)))  # (n, 4, 4) to the scene
+    names: list[str] | None = (
+        None  # (n,) of the placed shapes, "" for that of the mesh; None for all of these
+    )
 
     @classmethod
     def once(cls, count: int) -> Places:
@@ -74,6 +77,9 @@ def place_shapes(name: str, raws: list[RawMesh], places: Places, strict: bool) -
             )
         for i in at[~fit].tolist():
             shapes[i] = build(name, moved_raw(raw, places.matrix[i]), strict)
+    for shape, own in zip(shapes, places.names or (), strict=False):
+        if shape is not None and own:
+            shape.name = own
     return [shape for shape in shapes if shape is not None]
 
 

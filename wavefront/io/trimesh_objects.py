@@ -27,7 +27,7 @@ def read(geometry: Any, source: str, strict: bool) -> Contents:
     numbers: dict[int, int] = {}
     raws: list[RawMesh] = []
     nodes = _nodes(geometry, trimesh)
-    for mesh, name, _ in nodes:
+    for mesh, name, _, _ in nodes:
         if id(mesh) not in numbers:
             numbers[id(mesh)] = len(raws)
             raws.append(_raw(mesh, name, source))
@@ -35,14 +35,17 @@ def read(geometry: Any, source: str, strict: bool) -> Contents:
     if specs.lost:
         listed = ", ".join(f"{what} (mesh {where!r})" for what, where in specs.lost.items())
         warn(f"{source}: not honored: {listed}", strict)
-    of = np.array([numbers[id(mesh)] for mesh, _, _ in nodes], np.intp)
-    return Contents(raws, Places(of, np.array([matrix for *_, matrix in nodes]).reshape(-1, 4, 4)))
+    of = np.array([numbers[id(mesh)] for mesh, *_ in nodes], np.intp)
+    matrices = np.array([matrix for *_, matrix, _ in nodes]).reshape(-1, 4, 4)
+    several = np.bincount(of, minlength=len(raws)).take(of) > 1
+    names = [node if placed else "" for (*_, node), placed in zip(nodes, several, strict=True)]
+    return Contents(raws, Places(of, matrices, names))
 
 
-def _nodes(geometry: Any, trimesh: Any) -> list[tuple[Any, str, np.ndarray]]:
-    """Return every mesh with its name and its matrix to world space."""
+def _nodes(geometry: Any, trimesh: Any) -> list[tuple[Any, str, np.ndarray, str]]:
+    """Return every mesh with its name, its matrix to world space, and the name of its node."""
     if isinstance(geometry, trimesh.Trimesh):
-        return [(geometry, str(geometry.metadata.get("name") or ""), np.eye(4))]
+        return [(geometry, str(geometry.metadata.get("name") or ""), np.eye(4), "")]
     if not isinstance(geometry, trimesh.Scene):
         raise SceneError(f"expected a trimesh.Trimesh or trimesh.Scene, got {type(geometry).__name__}")
     out = []
@@ -50,7 +53,7 @@ def _nodes(geometry: Any, trimesh: Any) -> list[tuple[Any, str, np.ndarray]]:
         matrix, key = geometry.graph[node]
         mesh = geometry.geometry[key]
         if isinstance(mesh, trimesh.Trimesh):
-            out.append((mesh, str(key), np.asarray(matrix, np.float64)))
+            out.append((mesh, str(key), np.asarray(matrix, np.float64), str(node)))
     # trimesh lists the meshes of these files in reverse order
     if geometry.source is not None and geometry.source.file_type in ("obj", "glb", "gltf"):
         out.reverse()

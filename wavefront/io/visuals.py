@@ -26,10 +26,14 @@ def spec(material: Any, where: str, bare: bool) -> MaterialSpec:
     or `Ns`. Otherwise those that trimesh would write into a file count.
     """
     if hasattr(material, "baseColorFactor"):
-        return _pbr(material)
-    if hasattr(material, "diffuse"):
-        return _simple(material, where, bare)
-    return MaterialSpec(Material(Diffuse(MATTE)), lost=[type(material).__name__])
+        found = _pbr(material)
+    elif hasattr(material, "diffuse"):
+        found = _simple(material, where, bare)
+    else:
+        found = MaterialSpec(Material(Diffuse(MATTE)), lost=[type(material).__name__])
+    name = getattr(material, "name", None)
+    found.material.name = str(name) if name else None
+    return found
 
 
 def vertex_colors(mesh: Any) -> Table | None:

@@ -50,6 +50,12 @@ def _interior(name: str, value: Any) -> Medium | None:
     return value
 
 
+def _name(name: str, value: Any) -> str | None:
+    if value is not None and not isinstance(value, str):
+        raise SceneError(f"{name} must be text, got {value!r}")
+    return value
+
+
 class Material(Parametrized):
     """A BSDF, and everything else that a surface is made of.
 
@@ -73,6 +79,8 @@ class Material(Parametrized):
         Name of the layer of radiance that the emission counts for, with `aovs="light_groups"`.
     interior
         The `Medium` behind the surface. A ray that meets the surface from its back side has crossed it.
+    name
+        What `Image.names` calls the material; readers of files give that of the file.
 
     Attributes
     ----------
@@ -92,6 +100,7 @@ class Material(Parametrized):
     emission = Parameter(_emission)
     interior = Parameter(_interior)
     group = Parameter(group_name)
+    name = Parameter(_name)
     opacity: Opacity | None
 
     @suggests_keywords
@@ -105,6 +114,7 @@ class Material(Parametrized):
         emission: Color | None = None,
         interior: Medium | None = None,
         group: str = DEFAULT_GROUP,
+        name: str | None = None,
     ) -> None:
         self.bsdf = bsdf
         self.alpha = alpha
@@ -113,6 +123,7 @@ class Material(Parametrized):
         self.emission = emission
         self.interior = interior
         self.group = group
+        self.name = name
         self.derive()
 
     def derive(self) -> None:

@@ -22,6 +22,8 @@ from .interaction import interaction, offset_origin
 from .intersect import ShadowRays, intersect, shadow_ray_length, visible
 from .medium import absorb
 
+COVERING = f4(0.5)  # opacity from which on a surface hides what is behind it, where nothing is random
+
 AnyRays = TypeVar("AnyRays", bound=Rays)
 
 
@@ -59,12 +61,34 @@ def alpha_pass_through(
         passing = np.flatnonzero(u >= scene.opacities.at(surface))
         lanes, here, surface = lanes.take(passing), here.take(passing), surface.take(passing)
         absorb(scene, here.throughput, at.take(passing), surface)
-        here = _continue_behind(here, surface)
+        here = continue_behind(here, surface)
         paths.origin[:, lanes], paths.exclude_prim[lanes] = here.origin, here.exclude_prim
         paths.throughput[:, lanes] = here.throughput
         hits.put(lanes, intersect(scene, here))
         lanes = lanes.compress(has_alpha.take(hits.prim.take(lanes)))
     return paths, hits
+
+
+def covering_hits(scene: CompiledScene, rays: Rays) -> tuple[Rays, Hits]:
+    """Return the nearest hits of rays on surfaces whose opacity is at least `COVERING`.
+
+    Nothing is random here. The rays that are returned start behind the last surface that they have passed.
+    """
+    hits = intersect(scene, rays)
+    if scene.opacities is None:
+        return rays, hits
+    has_alpha = scene.opacities.has_alpha
+    lanes = np.flatnonzero(has_alpha.take(hits.prim))
+    rays = replace(rays, origin=rays.origin.copy(), exclude_prim=rays.exclude_prim.copy())
+    while lanes.size:
+        here, at = rays.take(lanes), hits.take(lanes)
+        surface = interaction(scene, here, at)
+        passing = np.flatnonzero(scene.opacities.at(surface) < COVERING)
+        lanes, here = lanes.take(passing), continue_behind(here.take(passing), surface.take(passing))
+        rays.put(lanes, here)
+        hits.put(lanes, intersect(scene, here))
+        lanes = lanes.compress(has_alpha.take(hits.prim.take(lanes)))
+    return rays, hits
 
 
 def transmittance_along(scene: CompiledScene, rays: ShadowRays) -> Floats:
@@ -88,14 +112,14 @@ def transmittance_along(scene: CompiledScene, rays: ShadowRays) -> Floats:
         absorb(scene, left, hits, surface)
         part[:, lanes] = left
         rays = replace(
-            _continue_behind(rays, surface), error=rays.error + surface.error, distance=rays.distance - hits.t
+            continue_behind(rays, surface), error=rays.error + surface.error, distance=rays.distance - hits.t
         )
         on = np.flatnonzero(left.max(0) != 0)
         lanes, rays = lanes.take(on), rays.take(on)
     return part
 
 
-def _continue_behind(rays: AnyRays, surface: SurfaceInteraction) -> AnyRays:
+def continue_behind(rays: AnyRays, surface: SurfaceInteraction) -> AnyRays:
     """Return rays that continue from just behind the surfaces."""
     origin = offset_origin(surface, dot(surface.ng, rays.direction))
     return replace(rays, origin=origin, exclude_prim=surface.prim)

@@ -8,8 +8,10 @@ from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..filters import Filter, box
 from ..sampling.sampler import Dimension, Sampler
-from ..state import Paths, Words
-from ..vec import broadcast, f4
+from ..state import Paths, Rays, Words
+from ..vec import Floats, broadcast, f4
+
+HALF = f4(0.5)
 
 
 def generate(
@@ -24,12 +26,11 @@ def generate(
     filter
         Distributes the samples of a pixel in and around it.
     """
-    width, n = camera.film[0], len(pixel)
+    n = len(pixel)
     pixel = camera.address(pixel)
     jitter = filter(sampler.draw_2d(pixel, sample, 0, Dimension.PIXEL))
-    row = pixel // np.uint32(width)
-    x = (pixel - row * np.uint32(width)).astype(f4) + jitter[0]
-    y = row.astype(f4) + jitter[1]
+    column, row = _corners(camera, pixel)
+    x, y = column + jitter[0], row + jitter[1]
     lens = sampler.draw_2d(pixel, sample, 0, Dimension.LENS) if camera.uses_lens else None
     origin, direction = camera.rays(x, y, scene.center, lens)
     return Paths(
@@ -44,3 +45,17 @@ def generate(
         specular=broadcast(np.True_, n),
         roulette_scale=broadcast(f4(1), n),
     )
+
+
+def center_rays(scene: CompiledScene, camera: Camera, pixel: Words) -> Rays:
+    """Return the rays through the centers of pixels (n,) and the center of the lens."""
+    column, row = _corners(camera, camera.address(pixel))
+    origin, direction = camera.rays(column + HALF, row + HALF, scene.center)
+    return Rays(origin, direction, np.full(len(pixel), -1, np.intp))
+
+
+def _corners(camera: Camera, address: Words) -> tuple[Floats, Floats]:
+    """Return the film points (n,), (n,) of the upper left corners of pixels (n,) of the whole picture."""
+    width = np.uint32(camera.film[0])
+    row = address // width
+    return (address - row * width).astype(f4), row.astype(f4)
