@@ -99,6 +99,18 @@ def test_a_gray_thing_becomes_gray_of_the_same_luminance():
     assert np.ptp(shown) < 1e-6
 
 
+def test_the_bradford_matrix_of_illuminant_a():
+    """From A to D65, as B. Lindbloom's page on chromatic adaptation lists it."""
+    published = [
+        [0.8446965, -0.1179225, 0.3948108],
+        [-0.1366303, 1.1041226, 0.1291718],
+        [0.0798489, -0.1348999, 3.1924009],
+    ]
+    color = np.linalg.inv(XYZ_OF_RGB) @ [1.09850, 1, 0.35585]
+    found = XYZ_OF_RGB @ white_balance_matrix(color) @ np.linalg.inv(XYZ_OF_RGB)
+    assert found == pytest.approx(np.array(published), abs=2e-4)
+
+
 def test_kelvin():
     """6504 changes nothing. Light of a lamp becomes white, so a picture gets bluer."""
     assert white_balance_matrix(NEUTRAL) == pytest.approx(np.eye(3), abs=1e-12)
