@@ -426,6 +426,19 @@ def test_attributes_that_do_not_fit_an_exr_are_named(tmp_path, attribute):
     assert wf.Image.load(tmp_path / "a.exr").shape == (3, 4, 3)
 
 
+@pytest.mark.parametrize("extension", ["exr", "npz"])
+def test_names_of_any_characters(tmp_path, extension):
+    """Those of shapes and the metadata come from files. Those of layers must be printable."""
+    rgb, path = np.ones((2, 2, 3), np.float32), tmp_path / f"a.{extension}"
+    names = {"shape": {0: "\udcff", 1: "a\0b", 2: "\n", 3: "図", 4: ""}}
+    image = wf.Image(rgb, metadata={"lighting": "a\0b", "sampler": "\udcff\n"}, names=names)
+    image.save(path)
+    assert_same(wf.Image.load(path), image)
+    for name in ("", "light_groups.a\0b", "\n"):
+        with pytest.raises(wf.SaveError, match=rf"a\.{extension}: an array is called"):
+            wf.Image(rgb, layers={name: rgb}).save(path)
+
+
 def test_arrays_that_an_exr_cannot_hold_are_errors(tmp_path):
     rgb = np.ones((2, 2, 3), np.float32)
     similar = {"a": rgb, "a.R": rgb[..., 0], "a.R.X": rgb[..., 1], "R": rgb[..., 2]}

@@ -71,7 +71,7 @@ def _fits(value: Any) -> bool:
     """Return whether an attribute can hold a value of the metadata."""
     if isinstance(value, bool) or (isinstance(value, int) and abs(value) >= 2**31):
         return False
-    return isinstance(value, int | float) or (isinstance(value, str) and "\0" not in value)
+    return isinstance(value, int | float) or (isinstance(value, str) and value.isprintable())
 
 
 def decode(data: bytes) -> Floats:

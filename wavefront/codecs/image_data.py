@@ -76,7 +76,7 @@ def to_json(info: Mapping[str, Any]) -> str:
     """Return values as JSON text, with NaN as Python's `json` writes it, and other objects as their text."""
     import json  # imported here to keep `import wavefront` quick
 
-    return json.dumps(info, ensure_ascii=False, default=_plain)
+    return json.dumps(info, default=_plain)
 
 
 def _plain(value: Any) -> Any:

@@ -98,7 +98,7 @@ def write_image(
     shown = Display() if display is None else display
     check_display(path, shown, bits)
     data = picture if isinstance(picture, ImageData) else ImageData(np.asarray(picture, np.float32))
-    adjusted = shown.adjusted(_checked(data))
+    adjusted = shown.adjusted(_checked(path, data))
     if Path(path).suffix.lower() in FINITE:
         adjusted = _finite(path, adjusted)
     write_bytes(path, _encoded(path, lambda: encode(adjusted, shown, bits)))
@@ -199,10 +199,13 @@ def _encoded(path: str | os.PathLike[str], encode: Callable[[], bytes]) -> bytes
         raise SaveError(f"{os.fspath(path)}: cannot be encoded: {error or type(error).__name__}") from error
 
 
-def _checked(picture: ImageData) -> ImageData:
+def _checked(path: str | os.PathLike[str], picture: ImageData) -> ImageData:
     shape = picture.rgb.shape
     if len(shape) != 3 or shape[2] != 3 or not picture.rgb.size:
         raise SceneError(f"an image must have shape (height, width, 3), got {shape}")
+    for name in picture.arrays:
+        if not name or not name.isprintable():
+            raise SaveError(f"{path}: an array is called {name!r}; a name must have printable characters only")
     return picture
 
 
