@@ -17,7 +17,7 @@ from .codecs.images import read_picture, write_image
 from .codecs.png_jpeg import Gamma
 from .codecs.white_balance import WhiteBalance
 from .errors import SceneError, number, one_of, rgb
-from .layers import LAYERS, is_radiance
+from .layers import LAYERS, NOISY, is_radiance
 from .outlines import outline_coverage
 from .samples import shared_samples
 from .vec import luminance
@@ -38,8 +38,8 @@ class Image:
         Settings and results of the render: lighting (the preset that was added, or None), integrator,
         max_bounces, seed, sampler, sample_ranges (the half-open ranges [first, end] of the samples that some
         pixel has), filter, accelerator, workers, executor, seconds (wall time), spp (mean
-        over pixels), samples, rays, bad_samples, interrupted, version (of this package), numpy, and noise
-        (estimated relative error of the picture).
+        over pixels), samples, rays, bad_samples, interrupted, version (of this package), numpy, noise
+        (estimated relative error of the picture before denoising), and of a denoised picture denoiser.
     counts
         (H, W) int64 samples of each pixel.
     variance
@@ -56,7 +56,8 @@ class Image:
         For "shape", "instance" and "material" the name of each id of the layers `shape_id`, `instance_id`
         and `material_id`.
 
-    `counts`, `variance` and `standard_error` are None in an image that was not rendered.
+    `counts`, `variance` and `standard_error` are None in an image that was not rendered, `standard_error`
+    also in one that was denoised.
     """
 
     def __init__(
@@ -161,6 +162,60 @@ class Image:
         )
 
     __rmul__ = __mul__
+
+    def denoise(self, denoiser: str = "auto") -> Image:
+        """Return the picture without most of its noise.
+
+        Only `rgb` is denoised; all layers stay as they are, and `noisy` is the picture before. The layers
+        `denoising_albedo` and `denoising_normal`, which `render(denoise=True)` adds, guide the denoiser
+        along edges and textures. Pixels that are not finite are filled. The standard error of the result is
+        not known. A picture that was denoised is denoised anew from the noisy one.
+
+        Parameters
+        ----------
+        denoiser
+            "oidn": Intel Open Image Denoise, through pyoidn (`pip install pyoidn`). "nonlocal_means": a
+            filter of this package, slower and less good; it needs nothing. "auto": "oidn" if it is
+            installed. `metadata["denoiser"]` says which it was.
+
+        Raises
+        ------
+        SceneError
+            If there is no such denoiser, or it is not installed.
+        """
+        from .denoising import denoise, noisy_picture
+
+        source = self.noisy or self
+        picture = noisy_picture(source.rgb, source.standard_error, source.layers, source.errors)
+        rgb, used = denoise(picture, denoiser)
+        error = {} if source.standard_error is None else {NOISY: source.standard_error}
+        return Image(
+            rgb,
+            source.spp,
+            {**source.metadata, "denoiser": used},
+            counts=source.counts,
+            variance=source.variance,
+            layers={**source.layers, NOISY: source.rgb},
+            errors={**source.errors, **error},
+            names=source.names,
+        )
+
+    @property
+    def noisy(self) -> Image | None:
+        """The picture before denoising; None if this one was not denoised."""
+        if NOISY not in self.layers:
+            return None
+        return Image(
+            self.layers[NOISY],
+            self.spp,
+            {name: value for name, value in self.metadata.items() if name != "denoiser"},
+            counts=self.counts,
+            variance=self.variance,
+            standard_error=self.errors.get(NOISY),
+            layers={name: layer for name, layer in self.layers.items() if name != NOISY},
+            errors={name: error for name, error in self.errors.items() if name != NOISY},
+            names=self.names,
+        )
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -106,7 +106,13 @@ def chosen_layers(name: str, value: Any) -> tuple[str, ...]:
     return tuple(each for each in known if each in wanted)
 
 
-RADIANCE = ("direct", "indirect", "light_groups.")  # what the names of layers that hold radiance begin with
+NOISY = "noisy"  # the layer that holds `rgb` as it was before denoising
+RADIANCE = (
+    NOISY,
+    "direct",
+    "indirect",
+    "light_groups.",
+)  # what the names of layers that hold radiance begin with
 
 
 def is_radiance(name: str) -> bool:

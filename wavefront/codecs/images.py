@@ -205,7 +205,9 @@ def _checked(path: str | os.PathLike[str], picture: ImageData) -> ImageData:
         raise SceneError(f"an image must have shape (height, width, 3), got {shape}")
     for name in picture.arrays:
         if not name or not name.isprintable():
-            raise SaveError(f"{path}: an array is called {name!r}; a name must have printable characters only")
+            raise SaveError(
+                f"{path}: an array is called {name!r}; a name must have printable characters only"
+            )
     return picture
 
 

@@ -1,0 +1,6 @@
+"""Denoising of pictures: by Open Image Denoise where it is installed, else by non-local means."""
+
+from .denoisers import DENOISERS, denoise
+from .noisy import GUIDES, NoisyPicture, noisy_picture
+
+__all__ = ["DENOISERS", "GUIDES", "NoisyPicture", "denoise", "noisy_picture"]

@@ -1,0 +1,106 @@
+"""What denoisers are given: a noisy picture and its guides."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..record import record
+from ..vec import Doubles, Floats
+
+ALBEDO, NORMAL = GUIDES = "denoising_albedo", "denoising_normal"  # layers that guide denoisers
+
+
+@record
+class Guide:
+    """A layer that shows the edges of the picture, with less noise."""
+
+    values: Floats  # (H, W, 3), finite
+    squared_error: Floats  # (H, W, 3)
+
+
+@record
+class NoisyPicture:
+    """A picture and its guides."""
+
+    rgb: Floats  # (H, W, 3), finite
+    squared_error: Floats  # (H, W, 3) estimated variance of `rgb`
+    albedo: Guide | None
+    normal: Guide | None
+
+
+def noisy_picture(
+    rgb: Floats,
+    standard_error: Floats | None,
+    layers: Mapping[str, NDArray[Any]],
+    errors: Mapping[str, Floats],
+) -> NoisyPicture:
+    """Return what denoisers are given for a picture (H, W, 3), its error, its layers and their errors.
+
+    Values that are not finite are replaced by those of pixels about them. An error that is not known is
+    estimated from the picture itself.
+    """
+    rgb = without_holes(rgb)
+    albedo, normal = (
+        _guide(layers[name], errors.get(name)) if name in layers else None for name in (ALBEDO, NORMAL)
+    )
+    return NoisyPicture(rgb, _squared_error(rgb, standard_error), albedo, normal)
+
+
+def _guide(values: Floats, error: Floats | None) -> Guide:
+    values = without_holes(values)
+    return Guide(values, _squared_error(values, error))
+
+
+def _squared_error(values: Floats, error: Floats | None) -> Floats:
+    """Return squared errors of values (H, W, 3), finite ones."""
+    if error is not None and np.isfinite(error).all():
+        return np.square(error)
+    scatter = scatter_of_neighbors(values)
+    return scatter if error is None else np.where(np.isfinite(error), np.square(error), scatter)
+
+
+def without_holes(values: Floats) -> Floats:
+    """Return values (H, W, c) with the mean of the nearest finite pixels where one is not finite.
+
+    It is that of a square about the pixel that doubles until it has a finite one; 0 if there is none.
+    """
+    good = np.asarray(np.isfinite(values).all(2))
+    if good.all():
+        return values
+    filled = np.where(good[..., None], values, 0).astype(np.float64)
+    reach = 1
+    while good.any() and not good.all():
+        near = _square_sums(good[..., None].astype(np.float64), reach)
+        mean = _square_sums(filled, reach) / np.maximum(near, 1)
+        filled = np.where(good[..., None], filled, mean)
+        good = near[..., 0] > 0.5
+        reach *= 2
+    return filled.astype(np.float32)
+
+
+def _square_sums(values: Doubles, reach: int) -> Doubles:
+    """Return sums of values (H, W, c) over the squares that reach so far from each pixel."""
+    for axis in (0, 1):
+        n = values.shape[axis]
+        sums = np.concatenate([np.zeros_like(values.take([0], axis)), np.cumsum(values, axis)], axis)
+        at = np.arange(n)
+        values = sums.take(np.minimum(at + reach + 1, n), axis) - sums.take(np.maximum(at - reach, 0), axis)
+    return values
+
+
+def scatter_of_neighbors(values: Floats) -> Floats:
+    """Estimate the variance of each pixel of (H, W, c) from the scatter of pixels about each.
+
+    It is taken to be proportional to the square of the mean of 3 × 3 pixels. The factor is the median over
+    the picture, since most pixels are not at an edge.
+    """
+    rows = np.pad(values.astype(np.float64), ((1, 1), (1, 1), (0, 0)), mode="symmetric")
+    windows = np.lib.stride_tricks.sliding_window_view(rows, (3, 3), (0, 1))
+    square = np.square(windows.mean((-1, -2)))
+    lit = square > 0
+    factor = np.median(windows.var((-1, -2), ddof=1)[lit] / square[lit]) if lit.any() else 0.0
+    return (factor * square).astype(np.float32)
