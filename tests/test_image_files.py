@@ -301,6 +301,10 @@ def test_damaged_pngs_of_16_bits_are_named(tmp_path):
     path.write_bytes(data[: at + 9] + bytes([data[at + 9] ^ 1]) + data[at + 10 :])
     with pytest.raises(wf.SceneError, match=r"a\.png: "):
         wf.Image.load(path)
+    end = data.index(b"IEND") - 8  # the checksum of the pixels
+    path.write_bytes(data[:end] + bytes([data[end] ^ 1]) + data[end + 1 :])
+    with pytest.raises(wf.SceneError, match=r"a\.png: the checksum of a chunk b'IDAT' is wrong"):
+        wf.Image.load(path)
     path.write_bytes(data[: at + 60])
     with pytest.raises(wf.SceneError, match=r"a\.png: ends early"):
         wf.Image.load(path)
