@@ -30,6 +30,7 @@ def assert_same(found, expected):
     """The arrays are the same bit for bit, and metadata and names are equal."""
     a, b = arrays_of(found), arrays_of(expected)
     assert a.keys() == b.keys()
+    assert found.layers.keys() == expected.layers.keys()
     for name in a:
         assert (a[name].dtype, a[name].shape) == (b[name].dtype, b[name].shape), name
         assert a[name].tobytes() == b[name].tobytes(), name
@@ -71,7 +72,8 @@ def test_arrays_of_other_types_come_back(tmp_path, extension, kind, shape):
     values = np.random.default_rng(0).integers(0, 2**63, (4, 5, *shape)).astype(kind)
     values[0, 0] = np.iinfo(kind).min if values.dtype.kind in "iu" else -np.inf
     values[1, 1] = np.iinfo(kind).max if values.dtype.kind in "iu" else np.nan
-    image = wf.Image(np.ones((4, 5, 3), np.float32), layers={"sums": values})
+    small = np.full((4, 5, *shape), -1).astype(kind)
+    image = wf.Image(np.ones((4, 5, 3), np.float32), layers={"sums": values, "small": small})
     image.save(tmp_path / f"a.{extension}")
     assert_same(wf.Image.load(tmp_path / f"a.{extension}"), image)
 
