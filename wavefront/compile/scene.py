@@ -32,8 +32,11 @@ from .materials import (
     number_materials,
     opacity_table,
 )
+from .morton import MortonGrid
 from .scale import check_distance, check_lights, length_factor, scaled_shapes
 from .shape_numbers import ShapeNumbers, number_shapes
+
+LARGE = 20_000  # triangles; from here on the order of rays matters more than sorting them costs
 
 
 @record
@@ -67,6 +70,7 @@ class CompiledScene:
         Bools | None
     )  # (lights,) those whose surface scatters nothing; None when there are none
     instances: InstanceTable | None = None  # None when no mesh is instanced
+    places: MortonGrid | None = None  # orders the paths of large scenes; None in small ones
 
     @property
     def interpolates(self) -> bool:
@@ -175,4 +179,5 @@ def compile_scene(
         light_groups=groups,
         nonscattering_lights=nonscattering_lights,
         instances=table,
+        places=MortonGrid.over((high - low) / 2) if len(triangles) >= LARGE else None,
     )

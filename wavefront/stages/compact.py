@@ -20,16 +20,25 @@ TINY = np.finfo(f4).tiny  # least probability of survival: keeps the division fi
 def compact(scene: CompiledScene, paths: Paths, hits: Hits, lanes: Ints) -> tuple[Paths, Hits]:
     """Return the given lanes of paths and hits, ordered by material group; all must have hit a surface.
 
-    Each group is then a slice, so that shading needs no gather. Fields of the paths that are needed only
-    before the hit (`exclude_prim`, `pdf`, `prev_vertex`) are not kept.
+    Each group is then a slice, so that shading needs no gather. In large scenes each group is ordered by
+    place, so that rays that start near each other are traced together. Fields of the paths that are needed
+    only before the hit (`exclude_prim`, `pdf`, `prev_vertex`) are not kept.
     """
-    ordered, n = by_group(scene, hits, lanes), len(paths)
+    ordered, n = by_group(scene, hits, by_place(scene, paths, hits, lanes)), len(paths)
     if ordered is lanes and lanes.size == n:
         return paths, hits
     arrived = replace(
         paths, exclude_prim=broadcast(np.intp(-1), n), pdf=broadcast(f4(0), n), prev_vertex=None
     )
     return arrived.take(ordered), hits.take(ordered)
+
+
+def by_place(scene: CompiledScene, paths: Paths, hits: Hits, lanes: Ints) -> Ints:
+    """Return lanes (k,) ordered by where they hit, on a Morton curve; the same array in small scenes."""
+    if scene.places is None:
+        return lanes
+    points = take(paths.origin, lanes) + take(paths.direction, lanes) * take(hits.t, lanes)
+    return lanes.take(np.argsort(scene.places.codes(points), kind="stable"))
 
 
 def by_group(scene: CompiledScene, hits: Hits, lanes: Ints) -> Ints:

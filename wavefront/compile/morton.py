@@ -1,0 +1,41 @@
+"""Morton codes: cells of a grid in an order that keeps near cells together.
+
+Source: G. M. Morton, "A Computer Oriented Geodetic Data Base and a New Technique in File Sequencing", IBM
+report, 1966.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..record import record
+from ..vec import Floats, f4
+
+BITS = 5  # along each axis: codes have 15 bits, and NumPy sorts integers of 16 bits by radix
+
+_SPREAD = np.array(
+    [sum((i >> bit & 1) << 3 * bit for bit in range(BITS)) for i in range(1 << BITS)], np.uint16
+)
+
+
+@record
+class MortonGrid:
+    """A cubic grid of 2^BITS cells along each axis."""
+
+    low: Floats  # (3,) its corner
+    per_unit: np.float32  # cells per unit of length
+
+    @classmethod
+    def over(cls, half: NDArray[np.float64]) -> MortonGrid:
+        """Return a grid over a box around 0 with these half sides (3,)."""
+        return cls((-half).astype(f4), f4((1 << BITS) / max(2 * float(half.max()), 1e-30)))
+
+    def codes(self, points: Floats) -> NDArray[np.uint16]:
+        """Return the codes (n,) of points (3, n)."""
+        code = np.zeros(points.shape[1], np.uint16)
+        last = f4((1 << BITS) - 0.5)
+        for axis in range(3):
+            cell = ((points[axis] - self.low[axis]) * self.per_unit).clip(f4(0), last).astype(np.uint8)
+            code |= _SPREAD.take(cell) << np.uint16(axis)
+        return code
