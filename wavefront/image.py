@@ -35,7 +35,8 @@ class Image:
     spp
         Samples per pixel; the rounded mean where pixels differ.
     metadata
-        Settings and results of the render: lighting (the preset that was added, or None), integrator,
+        Settings and results of the render: lighting (the preset that was added, or None), background
+        ("transparent", a color, or None for the environment), integrator,
         max_bounces, seed, sampler, sample_ranges (the half-open ranges [first, end] of the samples that some
         pixel has), filter, accelerator, workers, executor, seconds (wall time), spp (mean
         over pixels), samples, rays, bad_samples, interrupted, version (of this package), numpy, noise

@@ -18,6 +18,7 @@ from .registry import Registry
 from .sample_recorder import add_to_slots
 from .sampling.sampler import Sampler
 from .stages.alpha import alpha_pass_through
+from .stages.background import show_background
 from .stages.bounce import bounce_sample, branch
 from .stages.compact import alive, compact, roulette, scattering_lanes, select, specular_lanes
 from .stages.guidance import guide
@@ -125,6 +126,8 @@ def intersect_and_compact(
     hits = intersect(scene, paths)
     paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce)
     emission = emitted(scene, paths, hits)
+    if bounce == 0:
+        emission = show_background(scene, L, paths, hits, emission)
     accumulate(L, paths, mis_weighted(scene, paths, emission) if mis else emission)
     lanes = keep(scene, paths, hits, emission)
     kept = compact(scene, paths, hits, lanes)

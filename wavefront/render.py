@@ -33,6 +33,7 @@ def render(
     up: ArrayLike | None = None,
     lighting: str | None = "auto",
     ground: bool = False,
+    background: str | ArrayLike | None = None,
     integrator: str | Integrator = "full",
     max_bounces: int = 12,
     seed: int = 0,
@@ -81,6 +82,10 @@ def render(
     ground
         Adds a level ground under the scene that catches its shadow and fades into the background. It
         belongs to the picture alone: the scene, its bounds and the numbers of its shapes stay.
+    background
+        "transparent" or a color: replaces what the camera sees directly of the environment; its light
+        stays, and so do its reflections. Either gives the layer `alpha`. Colors of a transparent picture
+        are premultiplied by alpha.
     integrator
         "full", "direct_mis", "direct_simple" or "naive". This and the other settings that take names also
         take a thing of your own, such as a function; docs/extending.md has an example of each.
@@ -174,6 +179,7 @@ def render(
         up=up,
         lighting=lighting,
         ground=ground,
+        background=background,
         integrator=integrator,
         max_bounces=max_bounces,
         seed=seed,

@@ -177,6 +177,11 @@ class SampleRecorder:
                     light = take(arriving, mixed) * part
                     add_to_slots(self._light[f"light_groups.{name}"], slot.take(mixed), light)
 
+    def record_background(self, slot: Ints, color: Floats) -> None:
+        """Record a background (3, 1) that has been added to slots (k,)."""
+        if "direct" in self._light:
+            self._light["direct"][:, slot] += color
+
     def _add(self, name: str, lanes: Ints, slot: Ints, arriving: Floats) -> None:
         if lanes.size == slot.size:
             add_to_slots(self._light[name], slot, arriving)

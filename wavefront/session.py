@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Generator, Sequence
+from dataclasses import replace
 from functools import partial
 from types import TracebackType
 from typing import Any, Self
@@ -71,7 +72,7 @@ class Session:
 
     Parameters
     ----------
-    scene, spp, camera, size, material, up, lighting, ground
+    scene, spp, camera, size, material, up, lighting, ground, background
         As for `render`.
     integrator, max_bounces, seed, samples, sampler, accel, filter, light_sampler, branches, guide
         As for `render`.
@@ -100,6 +101,7 @@ class Session:
         up: ArrayLike | None = None,
         lighting: str | None = "auto",
         ground: bool = False,
+        background: str | ArrayLike | None = None,
         integrator: str | Integrator = "full",
         max_bounces: int = 12,
         seed: int = 0,
@@ -130,6 +132,7 @@ class Session:
             up=up,
             lighting=lighting,
             ground=ground,
+            background=background,
             integrator=integrator,
             max_bounces=max_bounces,
             seed=seed,
@@ -165,13 +168,14 @@ class Session:
         self._lighted = lighted(self._scene, self._preset, ground=settings.ground, up=settings.up_vector)
         warn_of_unseen_lights(self._lighted, settings.integrator)
         with phase("building the scene", settings.progress):
-            self._compiled = compile_scene(
+            compiled = compile_scene(
                 self._lighted,
                 self._scene.accelerators.maker(settings.accel),
                 settings.light_sampler,
                 most_copies(settings.accel),
                 mis=INTEGRATORS.find(settings.integrator) in WITH_MIS,
             )
+            self._compiled = replace(compiled, background=settings.background_color)
         self._shape_table = ShapeTable(self._lighted.shapes)
         self._tracer = Tracer(
             self._compiled,
@@ -179,7 +183,7 @@ class Session:
             FILTERS.find(settings.filter),
             self._estimator(camera),
             settings.max_bounces,
-            tuple(name for name in settings.aovs if layer_of(name).sampled),
+            settings.sampled_layers,
         )
         self._budget = settings.budget(camera.size)
         self._make_pool(settings.executor_for(camera.size))
@@ -471,6 +475,7 @@ class Session:
         image = self._loop.accumulator.image(
             {
                 "lighting": self._preset,
+                "background": _background_label(settings.background),
                 "integrator": INTEGRATORS.label(settings.integrator),
                 "max_bounces": settings.max_bounces,
                 "seed": settings.seed,
@@ -490,3 +495,8 @@ class Session:
         )
         self._add_geometric_layers(image)
         return image
+
+
+def _background_label(background: Any) -> Any:
+    """Return the background as metadata have it."""
+    return np.ravel(background).tolist() if isinstance(background, np.ndarray) else background

@@ -15,12 +15,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from .accel.registry import ACCELERATORS, AcceleratorMaker
 from .camera import Camera, image_size, upward
-from .errors import SceneError, number
+from .codecs.image_data import TRANSPARENT
+from .errors import SceneError, number, rgb
 from .exact_sum import MAX_TERMS
 from .filters import FILTERS, Filter
 from .guiding import GuideTable
 from .integrators import INTEGRATORS, Integrator, li_full
-from .layers import chosen_layers
+from .layers import chosen_layers, layer_of
 from .lighting import DEFAULT, LIGHTINGS, check_lighting
 from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
 from .materials import MaterialLike
@@ -31,6 +32,7 @@ from .registry import Registry
 from .sampling.sampler import SAMPLERS, Sampler, SamplerMaker, make_sampler
 from .scheduling.budget import Budget, plan
 from .scheduling.executors import EXECUTORS, ExecutorLike, choose_executor, worker_count
+from .vec import Floats, f4
 
 DEFAULT_SPP = 100
 MAX_BRANCH_SAMPLES = 2**32  # a sample's index is 32 bits of its address, and each branch has one
@@ -123,6 +125,13 @@ def check_camera(name: str, value: Any) -> Camera | None:
     return value
 
 
+def check_background(name: str, value: Any) -> Any:
+    """Check a background: "transparent", or a color, which becomes (3, 1)."""
+    if isinstance(value, str) and value != TRANSPARENT:
+        raise SceneError(f"{name} is {value!r}; it must be {TRANSPARENT!r}, a color or None")
+    return value if value is None or isinstance(value, str) else rgb(name, value)
+
+
 def check_preset(name: str, value: Any) -> str | None:
     """Check the name of a preset."""
     check_lighting(value)
@@ -182,6 +191,14 @@ class Settings:
         "Adds a level ground under the scene that catches its shadow and fades into the background. "
         "It belongs to the picture alone: the scene, its bounds and the numbers of its shapes stay.",
         option="add a ground that catches the shadow",
+    )
+    background: str | ArrayLike | None = setting(
+        None,
+        '"transparent" or a color: replaces what the camera sees directly of the environment; its light '
+        "stays, and so do its reflections. Either gives the layer `alpha`. Colors of a transparent picture "
+        "are premultiplied by alpha.",
+        option="transparent, or a color R,G,B in place of the visible environment",
+        check=check_background,
     )
     integrator: str | Integrator = setting(
         "full",
@@ -341,6 +358,19 @@ class Settings:
     def first_sample(self) -> int:
         """Index of the first sample of every pixel."""
         return 0 if self.samples is None else self.samples.start
+
+    @property
+    def background_color(self) -> Floats | None:
+        """What camera rays that miss show, (3, 1), black where it is transparent; None: the environment."""
+        if self.background is None:
+            return None
+        return np.zeros((3, 1), f4) if isinstance(self.background, str) else np.asarray(self.background, f4)
+
+    @property
+    def sampled_layers(self) -> tuple[str, ...]:
+        """The sampled layers that are asked for; a background gives alpha."""
+        wanted = self.aovs if self.background is None else chosen_layers("aovs", [*self.aovs, "alpha"])
+        return tuple(name for name in wanted if layer_of(name).sampled)
 
     @property
     def target_spp(self) -> int | None:

@@ -11,6 +11,7 @@ import numpy as np
 from ..camera import image_size, upward
 from ..codecs.display import Display
 from ..codecs.encoding import check_exposure, check_gamma
+from ..codecs.image_data import TRANSPARENT
 from ..errors import SceneError
 from ..lighting import check_lighting
 
@@ -98,6 +99,16 @@ def up(text: str) -> tuple[float, float, float]:
     except SceneError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
     return x, y, z
+
+
+def background(text: str) -> str | tuple[float, float, float]:
+    """Return "transparent", or R,G,B as three floats."""
+    if text == TRANSPARENT:
+        return text
+    try:
+        return vector(text)
+    except argparse.ArgumentTypeError:
+        raise argparse.ArgumentTypeError(f"{text!r} is neither {TRANSPARENT!r} nor R,G,B") from None
 
 
 def gamma(text: str) -> float | str:

@@ -30,10 +30,11 @@ TYPES: dict[str, Callable[[str], Any]] = {"int": int, "float": float, "str": str
 PARSERS: dict[str, Callable[[str], Any]] = {
     "size": arguments.size,
     "lighting": arguments.lighting,
+    "background": arguments.background,
     "up": arguments.up,
     "samples": arguments.samples,
 }
-METAVARS = {"lighting": "PRESET", "up": "X,Y,Z", "samples": "FIRST:END"}
+METAVARS = {"lighting": "PRESET", "background": "COLOR", "up": "X,Y,Z", "samples": "FIRST:END"}
 CAMERA_OPTIONS = ("size",)  # settings that the command line uses for its own camera
 RENDER_OPTIONS = [
     each.name for each in fields(Settings) if each.metadata.get("option") and each.name not in CAMERA_OPTIONS

@@ -71,6 +71,7 @@ class CompiledScene:
     )  # (lights,) those whose surface scatters nothing; None when there are none
     instances: InstanceTable | None = None  # None when no mesh is instanced
     places: MortonGrid | None = None  # orders the paths of large scenes; None in small ones
+    background: Floats | None = None  # (3, 1) what camera rays that miss show; None for the environment
 
     @property
     def interpolates(self) -> bool:
