@@ -20,8 +20,8 @@ from .stages.compact import compact
 from .stages.interaction import interaction
 from .stages.normal_mapping import perturb_normals
 from .stages.shade import Shading, shading
-from .state import JUST_ONCE, NOT_YET, Contribution, Hits, Paths
-from .vec import Floats, Ints, f4, take
+from .state import BEFORE, JUST_ONCE, NOT_YET, Contribution, Hits, Paths
+from .vec import Floats, Ints, f4, put, take
 
 FEATURES = ("denoising_albedo", "denoising_normal")
 OF_LIGHT = ("direct", "indirect", "light_groups")
@@ -117,12 +117,14 @@ class SampleRecorder:
         albedo = None
         if awaited.first and "albedo" in self._values:
             albedo = _albedo(shade)
-            self._values["albedo"][:, paths.slot] = albedo
+            put(self._values["albedo"], paths.slot, albedo)
         if paths.met_rough is None:
             return
         lanes = np.flatnonzero(~paths.met_rough)
-        if lanes.size < len(paths):  # so not the first surface
-            shade, albedo = shading(scene, shade.surface.take(lanes)), None
+        if not lanes.size:
+            return
+        if lanes.size < len(paths):  # so these are not the first surfaces
+            shade = shading(scene, shade.surface.take(lanes))
         self._record_features(paths, lanes, shade, _albedo(shade) if albedo is None else albedo)
 
     def _needs_surfaces(self, paths: Paths, first: bool) -> bool:
@@ -148,7 +150,10 @@ class SampleRecorder:
         slot = take(paths.slot, lanes[rough])
         for name, values in zip(FEATURES, (albedo, shade.surface.ns), strict=True):
             if name in self._values:
-                add_to_slots(self._values[name], slot, values[:, rough] * f4(self._share))
+                if self._share == 1:  # a slot has one path
+                    put(self._values[name], slot, values[:, rough])
+                else:
+                    add_to_slots(self._values[name], slot, values[:, rough] * f4(self._share))
         paths.met_rough[lanes[rough]] = True
 
     # --- Light ----------------------------------------------------------------------------------------
@@ -161,7 +166,7 @@ class SampleRecorder:
             self._picture = picture
         if self._picture is not picture:
             self._picture = np.empty(0, f4)  # no integrator returns this
-        if paths.scattered is not None:
+        if paths.scattered is not None and (paths.scattered != BEFORE).any():
             scattered = take(paths.scattered, contribution.lanes)
             direct = scattered == NOT_YET if contribution.sampled else scattered <= JUST_ONCE
             self._add("direct", np.flatnonzero(direct), slot, arriving)
