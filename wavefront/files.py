@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import stat
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from .errors import SaveError, SceneError
 
@@ -24,21 +26,34 @@ def read_bytes(path: str | os.PathLike[str], limit: int = MAX_BYTES) -> bytes:
         If the file is missing, unreadable, not a regular file, or larger than `limit` bytes.
     """
     name = path_name(path)
+    check_regular(name, limit)
+    try:
+        return Path(name).read_bytes()
+    except OSError as error:
+        raise SceneError(f"{name}: cannot be read: {error}") from error
+
+
+def check_regular(path: str | os.PathLike[str], limit: float = math.inf) -> None:
+    """Check that there is a regular file of at most `limit` bytes.
+
+    Raises
+    ------
+    SceneError
+        If there is not.
+    """
+    name = path_name(path)
     try:
         info = os.stat(name)
-        if stat.S_ISDIR(info.st_mode):
-            raise SceneError(f"{name}: is a folder, not a file")
-        if not stat.S_ISREG(info.st_mode):
-            raise SceneError(f"{name}: is a device or pipe; only regular files are read")
-        if info.st_size > limit:
-            raise SceneError(f"{name}: has {info.st_size} bytes; the limit is {limit}")
-        return Path(name).read_bytes()
     except FileNotFoundError as error:
         raise SceneError(f"{name}: there is no such file") from error
     except (OSError, ValueError) as error:
-        if isinstance(error, SceneError):
-            raise
         raise SceneError(f"{name}: cannot be read: {error}") from error
+    if stat.S_ISDIR(info.st_mode):
+        raise SceneError(f"{name}: is a folder, not a file")
+    if not stat.S_ISREG(info.st_mode):
+        raise SceneError(f"{name}: is a device or pipe; only regular files are read")
+    if info.st_size > limit:
+        raise SceneError(f"{name}: has {info.st_size} bytes; the limit is {limit}")
 
 
 def decode_text(data: bytes) -> str:
@@ -141,7 +156,26 @@ def _mode(target: Path) -> int | None:
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
     """Write a file so that it always holds either its old content or all of the new content.
 
+    Raises
+    ------
+    SaveError
+        If it cannot be written, as for `write_chunks`.
+    """
+    write_chunks(path, lambda: [data])
+
+
+def write_chunks(path: str | os.PathLike[str], chunks: Callable[[], Iterable[Any]]) -> None:
+    """Write a file so that it always holds either its old content or all of the new content.
+
     A file that is replaced keeps its permissions. Symbolic links are followed.
+
+    Parameters
+    ----------
+    path
+        Where to write.
+    chunks
+        Returns the content, bytes or buffers one after the other. It is called again if the file has to be
+        begun anew.
 
     Raises
     ------
@@ -151,7 +185,7 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
     target = check_target(path)
     scratch = target.with_name(f".wavefront-{os.urandom(6).hex()}.tmp")
     try:
-        _write_new(scratch, data, _mode(target))
+        _write_new(scratch, chunks, _mode(target))
         os.replace(scratch, target)
     except SaveError:
         raise
@@ -163,7 +197,7 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
     _sync_folder(target.parent)
 
 
-def _write_new(path: Path, data: bytes, mode: int | None) -> None:
+def _write_new(path: Path, chunks: Callable[[], Iterable[Any]], mode: int | None) -> None:
     """Write a new file with these permissions, or those of the umask.
 
     Where the system supports it, the file has no name until it is complete: no partial file remains,
@@ -172,20 +206,21 @@ def _write_new(path: Path, data: bytes, mode: int | None) -> None:
     nameless = _open_nameless(path.parent)
     if nameless is not None:
         with contextlib.suppress(OSError), open(nameless, "wb") as file:
-            _fill(file, data, mode)
+            _fill(file, chunks, mode)
             # src_dir_fd makes Python follow the link, as it is documented to do without
             os.link(f"{OPEN_FILES}/{nameless}", path, src_dir_fd=nameless)
             return
     named = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
     with open(named, "wb") as file:
-        _fill(file, data, mode)
+        _fill(file, chunks, mode)
 
 
-def _fill(file: IO[bytes], data: bytes, mode: int | None) -> None:
-    """Set the permissions, write all data and flush it to the disk."""
+def _fill(file: IO[bytes], chunks: Callable[[], Iterable[Any]], mode: int | None) -> None:
+    """Set the permissions, write all chunks and flush it to the disk."""
     if mode is not None and hasattr(os, "fchmod"):
         os.fchmod(file.fileno(), mode)
-    file.write(data)
+    for chunk in chunks():
+        file.write(chunk)
     file.flush()
     os.fsync(file.fileno())
 

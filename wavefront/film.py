@@ -163,7 +163,7 @@ class Film:
             return _unequal_error(self.batches[: self.lengths.size, :, span], self.lengths, self.count[0])
         counts = self.count[span]
         error = np.full((3, counts.size), np.nan)
-        for count in _distinct(counts[counts > 1]):
+        for count in distinct(counts[counts > 1]):
             same = counts == count
             lanes = ALL if same.all() else np.flatnonzero(same)
             size = batch_size(count)
@@ -230,7 +230,7 @@ def _without_outliers(relative: Doubles) -> Doubles:
     return np.minimum(relative, np.partition(relative, worst)[worst])
 
 
-def _distinct(values: Ints) -> list[int]:
+def distinct(values: Ints) -> list[int]:
     """Return the distinct values in rising order, like np.unique, which would import numpy.ma."""
     ordered = np.sort(values)
     return ordered[np.diff(ordered, prepend=-1) > 0].tolist()

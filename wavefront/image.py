@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .checkpoint import read_checkpoint
+from .checkpoint_file import is_checkpoint
 from .codecs import png_jpeg
 from .codecs.display import Display
 from .codecs.image_data import ERROR, ImageData
@@ -19,8 +21,9 @@ from .codecs.white_balance import WhiteBalance
 from .errors import SceneError, number, one_of, rgb
 from .layers import LAYERS, NOISY, is_radiance
 from .outlines import outline_coverage
+from .picture_sums import PictureSums, merged_metadata, merged_sums, restored_sums
 from .samples import shared_samples
-from .vec import luminance
+from .vec import Floats, luminance
 
 FIELDS = ("counts", "variance", "standard_error")  # arrays (H, W, ...) besides rgb, layers and errors
 
@@ -56,6 +59,9 @@ class Image:
     names
         For "shape", "instance" and "material" the name of each id of the layers `shape_id`, `instance_id`
         and `material_id`.
+    sums
+        The sums of the samples, for `merge`. Only pictures of `render(samples=...)`, of checkpoints and of
+        npz files of these have them.
 
     `counts`, `variance` and `standard_error` are None in an image that was not rendered, `standard_error`
     also in one that was denoised.
@@ -73,6 +79,7 @@ class Image:
         layers: Mapping[str, NDArray[Any]] | None = None,
         errors: Mapping[str, NDArray[np.float32]] | None = None,
         names: Mapping[str, Mapping[int, str]] | None = None,
+        sums: PictureSums | None = None,
     ) -> None:
         self.rgb = rgb
         self.spp = spp
@@ -83,6 +90,7 @@ class Image:
         self.layers = dict(layers or {})
         self.errors = dict(errors or {})
         self.names = {kind: dict(table) for kind, table in (names or {}).items()}
+        self.sums = sums
 
     def __getattr__(self, name: str) -> NDArray[Any]:
         """Return a layer by its name."""
@@ -218,6 +226,34 @@ class Image:
             names=self.names,
         )
 
+    def merge(self, other: Image) -> Image:
+        """Return the picture of the samples of two pictures of one scene, which share none.
+
+        It is that of one render of all these samples, bit for bit; so are sampled layers. `variance` and
+        `standard_error` may differ from those of one render in how their sums are rounded; where the
+        samples of a part do not fill whole batches (of `film.batch_size`), the error is estimated from
+        batches of other lengths. Layers that are not sampled are those of this picture. In the metadata
+        counts and seconds are added, and `sample_ranges` are joined; the rest is that of this picture.
+
+        Parameters
+        ----------
+        other
+            A picture of other samples: of `render(samples=...)`, or of a checkpoint.
+
+        Raises
+        ------
+        SceneError
+            If one of the pictures was not rendered with `samples=` (or read from a checkpoint), its
+            pixels have different numbers of samples, scenes or settings differ, or samples are in both.
+        """
+        if not isinstance(other, Image):
+            raise SceneError(f"a picture is merged with another one, got {type(other).__name__}")
+        sums = merged_sums(self.sums, other.sums)
+        image = film_image(sums, merged_metadata(self.metadata, other.metadata), keep_sums=True)
+        image.layers = {**self.layers, **image.layers}
+        image.names = self.names
+        return image
+
     @property
     def shape(self) -> tuple[int, ...]:
         """(H, W, 3), of `rgb`."""
@@ -231,25 +267,38 @@ class Image:
         for bit. png and jpg files are decoded by the gamma that they record, as files of `save` do, and by
         the sRGB curve if they record none. exr, hdr, npy and npz are linear. The last of two or four channels
         becomes the layer "alpha"; colors of a png are multiplied by it. One channel of color becomes three.
+        A checkpoint gives the picture so far.
 
         Parameters
         ----------
         path
-            A png, jpg, exr, hdr, npy or npz file.
+            A png, jpg, exr, hdr, npy or npz file, or a checkpoint with any extension.
 
         Raises
         ------
         SceneError
             If the file is missing, of another kind, corrupt, truncated, or too large. The message names it.
         """
+        if is_checkpoint(path):
+            checkpoint = read_checkpoint(path)
+            return film_image(checkpoint.sums, checkpoint.metadata, keep_sums=True)
         found = read_picture(path)
         errors = {name.removeprefix(ERROR): a for name, a in found.arrays.items() if name.startswith(ERROR)}
-        fields = {name: found.arrays[name] for name in FIELDS if name in found.arrays}
         layers = {
             name: a for name, a in found.arrays.items() if name not in FIELDS and not name.startswith(ERROR)
         }
-        spp, names = found.info.get("spp", 0), found.info.get("names")
-        return cls(found.rgb, spp, dict(found.metadata), **fields, layers=layers, errors=errors, names=names)
+        return cls(
+            found.rgb,
+            found.info.get("spp", 0),
+            dict(found.metadata),
+            counts=found.arrays.get("counts"),
+            variance=found.arrays.get("variance"),
+            standard_error=found.arrays.get("standard_error"),
+            layers=layers,
+            errors=errors,
+            names=found.info.get("names"),
+            sums=restored_sums(os.fspath(path), found.rgb.shape, found.info.get("sums"), found.sums),
+        )
 
     def outlined(
         self, color: ArrayLike = 0.0, width: float = 2.0, *, crease: float = 40.0, jump: float = 0.01
@@ -460,7 +509,10 @@ class Image:
         """Return all of the image as files hold it."""
         arrays = {name: getattr(self, name) for name in FIELDS if getattr(self, name) is not None}
         arrays |= self.layers | {ERROR + name: values for name, values in self.errors.items()}
-        return ImageData(self.rgb, arrays, {"spp": self.spp, "metadata": self.metadata, "names": self.names})
+        info: dict[str, Any] = {"spp": self.spp, "metadata": self.metadata, "names": self.names}
+        if self.sums is None:
+            return ImageData(self.rgb, arrays, info)
+        return ImageData(self.rgb, arrays, {**info, "sums": self.sums.info}, self.sums.arrays())
 
     def _codes(self, display: Display, bits: int) -> NDArray[Any]:
         return display.codes(display.adjusted(self._data()), bits)
@@ -468,3 +520,34 @@ class Image:
     def _repr_png_(self) -> bytes:
         """Show the picture in a notebook."""
         return png_jpeg.encode(self.to_uint8(), ".png", 2.2)
+
+
+def film_image(sums: PictureSums, metadata: Mapping[str, Any], keep_sums: bool) -> Image:
+    """Return the picture on a film and its layers; a pixel without samples is black.
+
+    Its noise joins the metadata. With `keep_sums` the picture refers to the sums, which must not change then.
+    """
+    film, layers = sums.film, sums.layers
+    width, height = film.size
+    shape = height, width, 3
+    estimates = film.estimates()
+    image = Image(
+        estimates.mean.reshape(shape),
+        round(float(film.count.mean())),
+        {**metadata, "noise": estimates.noise},
+        counts=film.count.reshape(height, width).copy(),
+        variance=estimates.variance.reshape(shape),
+        standard_error=estimates.standard_error.reshape(shape),
+        sums=sums if keep_sums else None,
+    )
+    if layers is not None:
+        for name in layers.names:
+            found = layers.estimate(name, film.sums, film.count)
+            image.layers[name] = _of_shape(found.mean, width, height)
+            image.errors[name] = _of_shape(found.standard_error, width, height)
+    return image
+
+
+def _of_shape(values: Floats, width: int, height: int) -> Floats:
+    """Return a layer (pixels, c) as (height, width, c), or (height, width) if it has one channel."""
+    return values.reshape((height, width, -1) if values.shape[1] > 1 else (height, width))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from typing import Any
 
@@ -49,6 +50,8 @@ def render(
     branches: int = 1,
     guide: bool = False,
     wave_size: int | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
+    checkpoint_interval: float = 60,
     max_memory: int | str | None = None,
     strict: bool = False,
     aovs: str | Sequence[str] = (),
@@ -136,6 +139,12 @@ def render(
     wave_size
         The most paths that are traced together by one worker; by default what suits their number and
         speed, at most 131 072. The picture does not depend on it.
+    checkpoint
+        A file that keeps the render: it is written every `checkpoint_interval` seconds, at Ctrl-C and at
+        the end. The same call goes on from it, with the same bits as without a break; with more `spp` it
+        goes on further. The file of another scene or of other settings is refused.
+    checkpoint_interval
+        Seconds between two writes of the checkpoint. Writing takes a twentieth of the time at most.
     max_memory
         The most memory that this program and its workers may use together, with what it uses
         already: a number of bytes, or a size such as "2GB" or "800MiB". It sizes waves, and the
@@ -195,11 +204,18 @@ def render(
         branches=branches,
         guide=guide,
         wave_size=wave_size,
+        checkpoint=checkpoint,
+        checkpoint_interval=checkpoint_interval,
         max_memory=max_memory,
         strict=strict,
         aovs=aovs,
         progress=progress,
     )
+    return finish(session)
+
+
+def finish(session: Session) -> Image:
+    """Render a session to the end, close it and return the picture, as `render` does."""
     with session.interrupt_handler as ctrl_c:  # until the last worker has ended
         with session:
             image = session.run()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Generator, Sequence
 from dataclasses import replace
@@ -12,11 +13,12 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .accel import most_copies
+from .accel import Accelerator, Geometry, most_copies
 from .accel.registry import AcceleratorMaker
 from .camera import Camera, image_size
+from .checkpoint import Checkpoint
 from .compile.scene import compile_scene
-from .errors import RenderError
+from .errors import RenderError, SceneError, warn_caller
 from .filters import FILTERS, Filter
 from .geometric_layers import IDS, ShapeTable, geometric_layers
 from .image import Image
@@ -39,8 +41,10 @@ from .outcome import (
 from .pilot import train
 from .progress import Progress, phase
 from .renderable import as_scene, choose_camera
+from .resuming import CheckpointFile, render_identity, scene_fingerprint
 from .sampling.sampler import SAMPLERS, SamplerMaker
 from .scheduling.accumulator import Accumulator, check_picture_memory
+from .scheduling.adaptive import Pass
 from .scheduling.blas import reserve_buffers
 from .scheduling.delivery import can_be_sent
 from .scheduling.executors import EXECUTORS, ExecutorLike, needs_pickling
@@ -77,6 +81,8 @@ class Session:
     integrator, max_bounces, seed, samples, sampler, accel, filter, light_sampler, branches, guide
         As for `render`.
     workers, executor, noise, seconds, wave_size, max_memory, strict, aovs, progress
+        As for `render`.
+    checkpoint, checkpoint_interval
         As for `render`.
 
     Raises
@@ -117,6 +123,8 @@ class Session:
         branches: int = 1,
         guide: bool = False,
         wave_size: int | None = None,
+        checkpoint: str | os.PathLike[str] | None = None,
+        checkpoint_interval: float = 60,
         max_memory: int | str | None = None,
         strict: bool = False,
         aovs: str | Sequence[str] = (),
@@ -124,6 +132,7 @@ class Session:
     ) -> None:
         begin = time.perf_counter()
         self._in_block = self._closed = False
+        self.command: dict[str, Any] | None = None
         self._settings = Settings(
             spp=spp,
             camera=camera,
@@ -148,6 +157,8 @@ class Session:
             branches=branches,
             guide=guide,
             wave_size=wave_size,
+            checkpoint=checkpoint,
+            checkpoint_interval=checkpoint_interval,
             max_memory=max_memory,
             strict=strict,
             aovs=aovs,
@@ -168,9 +179,17 @@ class Session:
         self._lighted = lighted(self._scene, self._preset, ground=settings.ground, up=settings.up_vector)
         warn_of_unseen_lights(self._lighted, settings.integrator)
         with phase("building the scene", settings.progress):
+            make_accelerator = self._scene.accelerators.maker(settings.accel)
+
+            def make(geometry: Geometry) -> Accelerator:
+                self._geometries.append(geometry)
+                return make_accelerator(geometry)
+
+            self._geometries: list[Geometry] = []
+            self._fingerprint: str | None = None
             compiled = compile_scene(
                 self._lighted,
-                self._scene.accelerators.maker(settings.accel),
+                make,
                 settings.light_sampler,
                 most_copies(settings.accel),
                 mis=INTEGRATORS.find(settings.integrator) in WITH_MIS,
@@ -222,17 +241,30 @@ class Session:
     def _begin_picture(self, camera: Camera, accumulator: Accumulator, begin: float) -> None:
         """Get ready for a picture of a view; `begin` is when it was asked for, by `time.perf_counter`."""
         settings = self._settings
+        view = self._compiled.view(camera)
+        if settings.samples is not None or settings.checkpoint is not None:
+            accumulator.sums.identity = self._identity(view)
+        self._checkpoint, earlier = None, None
+        if settings.checkpoint is not None:
+            self._checkpoint = CheckpointFile(settings.checkpoint, settings.checkpoint_interval)
+            earlier = self._checkpoint.resume(accumulator, settings)
+        begun = None
+        if earlier is not None:
+            begin -= earlier.state["seconds"]
+            if earlier.pixels is not None:
+                begun = Pass(earlier.pixels, earlier.state["first"], settings.max_spp)
         scheduler = Scheduler(
             begin, settings.seconds, self._budget.wave_size, self._budget.workers, settings.branches
         )
         self._loop = RenderLoop(
-            View(self._compiled.view(camera), scheduler.deadline, settings.first_sample),
+            View(view, scheduler.deadline, settings.first_sample),
             accumulator,
             scheduler,
             spp=settings.max_spp,
             noise=settings.noise,
             seconds=settings.seconds,
             progress=settings.progress,
+            begun=begun,
         )
         self._camera = camera
         self._geometric: dict[str, NDArray[Any]] = {}
@@ -330,6 +362,10 @@ class Session:
         begin, settings = time.perf_counter(), self._settings
         if self._closed:
             raise RenderError("the session is closed")
+        if self._checkpoint is not None:
+            raise SceneError(
+                "a session with a checkpoint renders one view; begin another session for this one"
+            )
         check_camera("camera", camera)
         size = None if size is None else image_size(size)
         camera = choose_camera(self._scene, camera, size, settings.up_vector)
@@ -358,6 +394,22 @@ class Session:
         self._stopped = True
         self._monitor.stop.rise_to(STOP)
 
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a checkpoint of the picture so far, from which `render(checkpoint=path)` goes on.
+
+        `Image.load` reads the file as a picture.
+
+        Raises
+        ------
+        SaveError
+            If it cannot be written. The old file is intact.
+        SceneError
+            If a part of the scene cannot be compared with that of the next render. The message names it.
+        """
+        sums = self._loop.accumulator.sums
+        sums.identity = sums.identity or self._identity(self._loop.view.camera)
+        self._make_checkpoint().write(path)
+
     def close(self) -> None:
         """End the render and all workers; the session cannot be used again."""
         with self.interrupt_handler:
@@ -371,7 +423,7 @@ class Session:
         """Return the loop that was begun, or begin it."""
         if self._sweeps is None:
             self._make_geometric_layers()
-            self._sweeps = self._loop.sweeps(self._pool, self._monitor.surfaces, self._watch_paths, split)
+            self._sweeps = self._loop.sweeps(self._pool, self._monitor.surfaces, self._wave_done, split)
         return self._sweeps
 
     def _make_geometric_layers(self) -> None:
@@ -392,8 +444,10 @@ class Session:
         if self._sweeps is not None:
             self._sweeps.close()
 
-    def _watch_paths(self) -> None:
-        """Warn once of paths that do not end."""
+    def _wave_done(self) -> None:
+        """Write the checkpoint when it is due, and warn once of paths that do not end."""
+        if self._checkpoint is not None:
+            self._checkpoint.write_if_due(self._make_checkpoint)
         long = self._settings.max_bounces > LONG_PATH and self._monitor.surfaces.value > LONG_PATH
         if long and not self._warned:
             self._warned = True
@@ -408,13 +462,20 @@ class Session:
         else:
             self._pool.cancel()
         loop.accumulator.release_reserve()
-        image = self._image(cut_short=self._interrupted or self._stopped)
+        not_written = None
+        if self._checkpoint is not None:
+            not_written = self._checkpoint.write(self._make_checkpoint)
+        image = self._image(cut_short=self._interrupted or self._stopped, last=True)
+        if not_written is not None and (loop.failure is not None or self._interrupted):
+            warn_caller(f"the checkpoint was not written: {not_written}")
         if loop.failure is not None:
             raise render_error(loop.failure, image) from loop.failure
         if not self._interrupted and not self._stopped:
             self._report(image)
         if self._interrupted:
             raise interrupted(image, settings.target_spp)
+        if not_written is not None:
+            raise RenderError(f"the checkpoint was not written: {not_written}", image) from not_written
         return image if loop.accumulator.samples else None
 
     @property
@@ -467,34 +528,62 @@ class Session:
         )
         return checker.first_fault(pixel, sample)
 
-    def _image(self, cut_short: bool = False) -> Image:
-        """Return the picture so far."""
+    def _identity(self, camera: Camera) -> dict[str, Any]:
+        """Return what another render must have in common with this one, whose camera is in scene units."""
+        if self._fingerprint is None:
+            self._fingerprint = scene_fingerprint(self._compiled, self._geometries)
+        return render_identity(
+            self._settings,
+            self._fingerprint,
+            self._compiled.accelerator.name,
+            camera,
+            self._tracer.recorded_layers,
+        )
+
+    def _make_checkpoint(self) -> Checkpoint:
+        """Return the render so far."""
+        loop, accumulator = self._loop, self._loop.accumulator
+        step = loop.step if self._settings.noise is not None else None
+        state = {
+            **accumulator.state(),
+            "seconds": loop.scheduler.elapsed,
+            "first": 0 if step is None else step.first,
+        }
+        metadata = {**self._metadata(cut_short=True), **accumulator.counts()}
+        pixels = None if step is None else step.pixels
+        return Checkpoint(accumulator.sums, metadata, state, pixels, self.command)
+
+    def _image(self, cut_short: bool = False, last: bool = False) -> Image:
+        """Return the picture so far; the last one can be merged with others if `samples` were given."""
+        keep_sums = last and self._settings.samples is not None
+        image = self._loop.accumulator.image(self._metadata(cut_short), keep_sums)
+        self._add_geometric_layers(image)
+        return image
+
+    def _metadata(self, cut_short: bool) -> dict[str, Any]:
+        """Return the settings and results of the picture so far."""
         settings = self._settings
         first = settings.first_sample
         most = int(self._loop.accumulator.film.count.max())
-        image = self._loop.accumulator.image(
-            {
-                "lighting": self._preset,
-                "background": _background_label(settings.background),
-                "integrator": INTEGRATORS.label(settings.integrator),
-                "max_bounces": settings.max_bounces,
-                "seed": settings.seed,
-                "sampler": SAMPLERS.label(settings.sampler),
-                "sample_ranges": [[first, first + most]],
-                "filter": FILTERS.label(settings.filter),
-                "branches": settings.branches,
-                "guide": settings.guide,
-                "accelerator": self._compiled.accelerator.name,
-                "workers": self._budget.workers,
-                "executor": EXECUTORS.label(self._executor),
-                "seconds": self._loop.scheduler.elapsed,
-                "interrupted": cut_short,
-                "version": VERSION,
-                "numpy": np.__version__,
-            }
-        )
-        self._add_geometric_layers(image)
-        return image
+        return {
+            "lighting": self._preset,
+            "background": _background_label(settings.background),
+            "integrator": INTEGRATORS.label(settings.integrator),
+            "max_bounces": settings.max_bounces,
+            "seed": settings.seed,
+            "sampler": SAMPLERS.label(settings.sampler),
+            "sample_ranges": [[first, first + most]],
+            "filter": FILTERS.label(settings.filter),
+            "branches": settings.branches,
+            "guide": settings.guide,
+            "accelerator": self._compiled.accelerator.name,
+            "workers": self._budget.workers,
+            "executor": EXECUTORS.label(self._executor),
+            "seconds": self._loop.scheduler.elapsed,
+            "interrupted": cut_short,
+            "version": VERSION,
+            "numpy": np.__version__,
+        }
 
 
 def _background_label(background: Any) -> Any:

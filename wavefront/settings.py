@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import field, fields
 from functools import partial
@@ -18,6 +19,7 @@ from .camera import Camera, image_size, upward
 from .codecs.image_data import TRANSPARENT
 from .errors import SceneError, number, rgb
 from .exact_sum import MAX_TERMS
+from .files import check_target
 from .filters import FILTERS, Filter
 from .guiding import GuideTable
 from .integrators import INTEGRATORS, Integrator, li_full
@@ -130,6 +132,15 @@ def check_background(name: str, value: Any) -> Any:
     if isinstance(value, str) and value != TRANSPARENT:
         raise SceneError(f"{name} is {value!r}; it must be {TRANSPARENT!r}, a color or None")
     return value if value is None or isinstance(value, str) else rgb(name, value)
+
+
+def check_checkpoint(name: str, value: Any) -> str | None:
+    """Check that a checkpoint can be written to a path, or that there is none."""
+    if value is None:
+        return None
+    if not isinstance(value, str | os.PathLike):
+        raise SceneError(f"{name} is {value!r}; it must be a path, such as 'out.wfck'")
+    return str(check_target(value))
 
 
 def check_preset(name: str, value: Any) -> str | None:
@@ -305,6 +316,20 @@ class Settings:
         "The most paths that are traced together by one worker; by default what suits their number "
         "and speed, at most 131 072. The picture does not depend on it.",
         check=optional(whole_number(1, 2**24)),
+    )
+    checkpoint: str | os.PathLike[str] | None = setting(
+        None,
+        "A file that keeps the render: it is written every `checkpoint_interval` seconds, at Ctrl-C and at "
+        "the end. The same call goes on from it, with the same bits as without a break; with more `spp` it "
+        "goes on further. The file of another scene or of other settings is refused.",
+        option="file that keeps the render, from which the same command goes on",
+        check=check_checkpoint,
+    )
+    checkpoint_interval: float = setting(
+        60,
+        "Seconds between two writes of the checkpoint. Writing takes a twentieth of the time at most.",
+        option="seconds between two writes of the checkpoint",
+        check=above_zero,
     )
     max_memory: int | str | None = setting(
         None,

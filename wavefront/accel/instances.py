@@ -52,7 +52,7 @@ class InstanceAccelerator:
 
     def __init__(self, single: Accelerator, meshes: Sequence[Accelerator], placements: Placements) -> None:
         self.name = single.name
-        self._single, self._meshes, self._placements = single, meshes, placements
+        self._single, self._meshes, self.placements = single, meshes, placements
         self._first = int(placements.first[0])
         tree = build_tree(placements.low, placements.high, 1, WIDTH)
         self._low, self._high = (
@@ -70,7 +70,7 @@ class InstanceAccelerator:
                 lanes, some = lane.take(at), instance.take(at)
                 rays = self._local(origin, direction, excluded, lanes, some)
                 found = self._meshes[number].closest(*rays)
-                found.prim += np.where(found.prim >= 0, self._placements.first.take(some), 0)
+                found.prim += np.where(found.prim >= 0, self.placements.first.take(some), 0)
                 _update_closest(hits, lanes, found)
         return hits
 
@@ -95,14 +95,14 @@ class InstanceAccelerator:
 
     def _exclude_instanced(self, exclude_prim: Ints) -> tuple[Ints, Ints]:
         """Return the instances (n,) of excluded primitives, -1 for none, and their triangles in the mesh."""
-        instance = np.searchsorted(self._placements.first, exclude_prim, "right") - 1
-        return instance, exclude_prim - self._placements.first.take(instance)
+        instance = np.searchsorted(self.placements.first, exclude_prim, "right") - 1
+        return instance, exclude_prim - self.placements.first.take(instance)
 
     def _local(
         self, origin: Floats, direction: Floats, excluded: tuple[Ints, Ints], lane: Ints, instance: Ints
     ) -> tuple[Floats, Floats, Ints]:
         """Return rays `lane` (p,) in mesh coordinates of `instance` (p,): origin, direction, exclude_prim."""
-        m = self._placements.to_local.take(instance, 1).reshape(3, 4, -1)
+        m = self.placements.to_local.take(instance, 1).reshape(3, 4, -1)
         x, y, z = origin.take(lane, 1)
         dx, dy, dz = direction.take(lane, 1)
         start, along = np.empty((3, lane.size), f4), np.empty((3, lane.size), f4)
@@ -115,7 +115,7 @@ class InstanceAccelerator:
 
     def _by_mesh(self, instance: Ints) -> Iterator[tuple[int, Ints]]:
         """Yield each distinct mesh of `instance` (p,), and the indices of its instances there."""
-        mesh = self._placements.mesh.take(instance)
+        mesh = self.placements.mesh.take(instance)
         order = np.argsort(mesh, kind="stable")
         numbers, begins = np.unique(mesh.take(order), return_index=True)
         yield from zip(numbers.tolist(), np.split(order, begins[1:]), strict=True)
@@ -140,7 +140,7 @@ class InstanceAccelerator:
 
     @property
     def _instance_bits(self) -> int:
-        return max(1, (self._placements.mesh.size - 1).bit_length())
+        return max(1, (self.placements.mesh.size - 1).bit_length())
 
     def _pairs(self, origin: Floats, direction: Floats, t_far: Floats) -> NDArray[np.int64] | None:
         """Return the packed pairs of ray and instance that may meet, sorted; None if more than PAIRS."""

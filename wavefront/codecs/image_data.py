@@ -24,6 +24,7 @@ class ImageData:
     rgb: Floats  # (H, W, 3) linear, premultiplied by alpha
     arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)  # (H, W, ...) all others, by name
     info: Mapping[str, Any] = field(default_factory=dict)  # spp, metadata, names: values of JSON
+    sums: Mapping[str, NDArray[Any]] = field(default_factory=dict)  # of the samples, by name, for merging
 
     @property
     def metadata(self) -> Mapping[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     import zipfile
 
 METADATA = "metadata"  # the array of text
+SUMS = "sums."  # before the names of arrays that only merging reads
 MAX_BYTES = 2**31  # of all arrays
 EXPANSION = 64  # for larger archives, the limit is this number of bytes per byte of the file
 KINDS = "fiubU"  # of NumPy types that are read
@@ -26,8 +28,9 @@ def encode(picture: ImageData) -> bytes:
     import zipfile  # imported here to keep `import wavefront` quick
 
     buffer = BytesIO()
+    arrays = {**picture.named(), **{SUMS + name: values for name, values in picture.sums.items()}}
     with zipfile.ZipFile(buffer, "w") as archive:
-        for name, values in {**picture.named(), METADATA: np.array(to_json(picture.info))}.items():
+        for name, values in {**arrays, METADATA: np.array(to_json(picture.info))}.items():
             member = zipfile.ZipInfo(
                 f"{name}.npy"
             )  # with a fixed date: the same picture gives the same bytes
@@ -58,7 +61,9 @@ def decode(data: bytes) -> ImageData:
     text = arrays.pop(METADATA, np.array("{}"))
     if text.dtype.kind != "U" or text.ndim:
         raise SceneError(f"the array {METADATA!r} is {text.dtype} of shape {text.shape}; it must be one text")
-    return from_named(arrays, from_json(str(text)))
+    sums = {name: arrays.pop(name) for name in list(arrays) if name.startswith(SUMS)}
+    picture = from_named(arrays, from_json(str(text)))
+    return replace(picture, sums={name.removeprefix(SUMS): values for name, values in sums.items()})
 
 
 def _read(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:

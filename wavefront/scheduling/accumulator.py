@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..errors import RenderError, warn_caller
 from ..film import Film
-from ..image import Image
+from ..image import Image, film_image
 from ..layer_sums import LayerSums, layer_bytes
 from ..memory import check_memory
-from ..vec import Floats
+from ..picture_sums import PictureSums
 from .jobs import Job, JobResult
 
 MAX_BAD_SAMPLES = 1e-4  # part of all samples that may be lost to NaN before it is an error
@@ -41,10 +41,8 @@ class Accumulator:
 
     Attributes
     ----------
-    film
-        The sums of their samples.
-    layers
-        Those of the sampled layers; None where none is asked for.
+    sums
+        The sums of their samples, and of their sampled layers.
     bad
         Those of them that were not finite.
     rays
@@ -54,8 +52,8 @@ class Accumulator:
     def __init__(self, width: int, height: int) -> None:
         pixels = width * height
         check_picture_memory(width, height)
-        self.film, self.bad, self.rays = Film(width, height), BadSamples(), 0
-        self.layers: LayerSums | None = None
+        self.sums = PictureSums(Film(width, height), None, {})
+        self.bad, self.rays = BadSamples(), 0
         self._reserve: Any = np.empty(
             PICTURE_BYTES * pixels + SPARE_BYTES, np.uint8
         )  # for the picture so far when memory has run out
@@ -73,7 +71,12 @@ class Accumulator:
         width, height = self.film.size
         memory = sum(map(layer_bytes, names)) * width * height
         check_memory(f"{len(names)} layers of {width}x{height} pixels", memory)
-        self.layers = LayerSums(names, width * height)
+        self.sums.layers = LayerSums(names, width * height)
+
+    @property
+    def film(self) -> Film:
+        """The film."""
+        return self.sums.film
 
     @property
     def samples(self) -> int:
@@ -83,9 +86,9 @@ class Accumulator:
     def add(self, job: Job, result: JobResult) -> None:
         """Add the result of a job, the next of its pixels."""
         self.film.add(job.pixels, result.radiance)
-        if self.layers is not None:
+        if self.sums.layers is not None:
             assert result.layers is not None
-            self.layers.add(job.pixels, result.layers, result.radiance, most=job.end)
+            self.sums.layers.add(job.pixels, result.layers, result.radiance, most=job.end)
         self.bad.count_in(job, result)
         self.rays += result.rays
 
@@ -93,45 +96,30 @@ class Accumulator:
         """Free the memory that is kept for the last picture."""
         self._reserve = None
 
-    def image(self, metadata: dict[str, Any]) -> Image:
-        """Return the picture so far; numbers of samples, rays and noise join the metadata."""
-        samples = self.samples
-        counts = {
-            "spp": samples / self.film.count.size,
-            "samples": samples,
+    def image(self, metadata: dict[str, Any], keep_sums: bool = False) -> Image:
+        """Return the picture so far; numbers of samples, rays and noise join the metadata.
+
+        With `keep_sums` it can be merged; then no more samples must be added.
+        """
+        return film_image(self.sums, {**metadata, **self.counts()}, keep_sums)
+
+    def counts(self) -> dict[str, Any]:
+        """Return numbers of samples and rays, for the metadata of the picture."""
+        return {
+            "spp": self.samples / self.film.count.size,
+            "samples": self.samples,
             "rays": self.rays,
             "bad_samples": self.bad.count,
         }
-        return film_image(self.film, {**metadata, **counts}, self.layers)
 
+    def state(self) -> dict[str, Any]:
+        """Return what is counted beside the sums, for a checkpoint."""
+        return {"rays": self.rays, "bad": self.bad.count, "first_bad": list(self.bad.first)}
 
-def film_image(film: Film, metadata: dict[str, Any], layers: LayerSums | None = None) -> Image:
-    """Return the picture on a film and its layers; a pixel without samples is black.
-
-    Its noise joins the metadata.
-    """
-    width, height = film.size
-    shape = height, width, 3
-    estimates = film.estimates()
-    image = Image(
-        estimates.mean.reshape(shape),
-        round(float(film.count.mean())),
-        {**metadata, "noise": estimates.noise},
-        counts=film.count.reshape(height, width).copy(),
-        variance=estimates.variance.reshape(shape),
-        standard_error=estimates.standard_error.reshape(shape),
-    )
-    if layers is not None:
-        for name in layers.names:
-            found = layers.estimate(name, film.sums, film.count)
-            image.layers[name] = _of_shape(found.mean, width, height)
-            image.errors[name] = _of_shape(found.standard_error, width, height)
-    return image
-
-
-def _of_shape(values: Floats, width: int, height: int) -> Floats:
-    """Return a layer (pixels, c) as (height, width, c), or (height, width) if it has one channel."""
-    return values.reshape((height, width, -1) if values.shape[1] > 1 else (height, width))
+    def count_earlier(self, state: Mapping[str, Any]) -> None:
+        """Take over what `state` returned in an earlier part of the render."""
+        self.rays, self.bad.count = state["rays"], state["bad"]
+        self.bad.first = state["first_bad"][0], state["first_bad"][1]
 
 
 class BadSamples:

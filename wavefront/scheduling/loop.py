@@ -10,7 +10,7 @@ from typing import TypeAlias
 from ..errors import RenderError
 from ..progress import Bar, Progress
 from .accumulator import Accumulator
-from .adaptive import Pass, passes
+from .adaptive import Pass, passes, unfinished
 from .jobs import Job, JobResult, View, split_jobs
 from .pool import WorkerPool
 from .scheduler import Scheduler
@@ -32,6 +32,8 @@ class RenderLoop:
         Sizes the jobs and keeps the time.
     spp, noise, seconds, progress
         As for `render`; `spp` is the most samples that a pixel may get.
+    begun
+        The pass under way, if the accumulator has samples of an earlier part of the render.
 
     Attributes
     ----------
@@ -41,6 +43,8 @@ class RenderLoop:
         Whether the user's function or signal handler raised KeyboardInterrupt.
     failure
         The error that ended the loop, if one did.
+    step
+        The pass under way; None before the first one.
     """
 
     def __init__(
@@ -53,9 +57,10 @@ class RenderLoop:
         noise: float | None,
         seconds: float | None,
         progress: Progress,
+        begun: Pass | None = None,
     ) -> None:
         self.view, self.accumulator, self.scheduler = view, accumulator, scheduler
-        self.spp = spp
+        self.spp, self.step = spp, begun
         self._noise, self._seconds, self._progress = noise, seconds, progress
         self.stopped = self.interrupted = False
         self.failure: Exception | None = None
@@ -95,10 +100,13 @@ class RenderLoop:
                 wave_done()
 
             try:
-                for step in passes(self.accumulator.film, self.spp, self._noise):
+                film = self.accumulator.film
+                bar.advance(self.accumulator.samples, self.scheduler.elapsed)
+                for step in passes(film, self.spp, self._noise, self.step):
+                    self.step = step
                     if step.first:
                         yield True
-                    parts = list(split(step))
+                    parts = [part for rest in unfinished(film, step) for part in split(rest)]
                     jobs = self.scheduler.in_time(self._jobs(parts))
                     for job, result in self._results(pool, jobs, waiting):
                         self.accumulator.add(job, result)
