@@ -24,6 +24,7 @@ SHAPES = {  # the picture of --size 24, (height, width)
     "estimators": (24, 96),
     "furnace": (24, 120),
     "gltf_scene": (15, 24),
+    "layers": (62, 108),
     "material_sheet": (16, 24),
     "own_material": (15, 24),
 }

@@ -17,6 +17,7 @@ from PIL import Image as PillowImage
 import wavefront as wf
 from wavefront.codecs import png16, png_jpeg
 from wavefront.codecs.image_data import from_named
+from wavefront.layers import LAYERS
 
 
 def arrays_of(image):
@@ -57,11 +58,21 @@ def test_all_of_an_image_comes_back(tmp_path, extension, background):
 
 
 @pytest.mark.parametrize("extension", ["exr", "npz"])
-def test_a_rendered_image_comes_back(tmp_path, extension):
-    scene = [wf.Sphere((0, 0, 0), 1), wf.Environment(1)]
-    image = wf.render(scene, 4, size=(9, 6), seconds=100, noise=0.5, progress=False)
+@pytest.mark.parametrize("background", ["transparent", (0.1, 0.2, 0.3), None])
+def test_a_rendered_image_comes_back(tmp_path, extension, background):
+    ball = wf.Sphere((0, 0, 0), 1, name="ball")
+    scene = wf.Scene([ball], [wf.Environment(1, group="sky"), wf.PointLight((2, 2, 2), 1)])
+    image = wf.render(
+        scene, 4, size=(9, 6), noise=0.5, aovs=("all", "light_groups"), background=background, progress=False
+    )
+    assert {*LAYERS, "light_groups.sky"} <= image.layers.keys()
     image.save(tmp_path / f"a.{extension}")
     assert_same(wf.Image.load(tmp_path / f"a.{extension}"), image)
+    image.save(tmp_path / "a.png")
+    with PillowImage.open(tmp_path / "a.png") as file:
+        assert file.mode == ("RGBA" if background == "transparent" else "RGB")
+    if background == "transparent":
+        assert (wf.Image.load(tmp_path / "a.png").alpha[0] == image.alpha[0]).all()
 
 
 @pytest.mark.parametrize("kind", [np.float64, np.int64, np.uint64, np.uint32])
