@@ -440,10 +440,11 @@ class Image:
     ) -> None:
         """Write the picture by its extension: png or jpg for display; exr, hdr, npy and npz linear.
 
-        exr and npz hold everything: layers, errors, counts, names and metadata. Where exposure or white
-        balance change rgb, they hold only rgb and the alpha of a transparent background, since the rest
-        belongs to the picture before. A transparent background gives a png an alpha channel; hdr, npy and
-        jpg have none, so it is black there. `docs/formats.md` has the names of all channels.
+        exr and npz hold everything: layers, errors, counts, names and metadata, and npz the sums for `merge`.
+        Where exposure or white balance change rgb, they hold only rgb and the alpha of a transparent
+        background, since the rest belongs to the picture before. A transparent background gives a png an
+        alpha channel; hdr, npy and jpg have none, so it is black there. `docs/formats.md` has the names of
+        all channels.
 
         The file holds its old content or all of the new content, never a part. It keeps its permissions, and
         symbolic links are followed.
