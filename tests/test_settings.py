@@ -101,7 +101,7 @@ def test_layers_are_chosen_by_name() -> None:
 def test_unknown_layers_are_an_error_that_lists_what_there_is() -> None:
     """With a suggestion."""
     with pytest.raises(
-        wf.SceneError, match=r"aovs has 'dept'; there are position, depth, .*coverage, and"
+        wf.SceneError, match=r"aovs has 'dept'; there are position, depth, .*coverage, boxes, and"
     ) as e:
         wf.render("no such file", aovs=("normal", "dept"))
     assert "did you mean 'depth'" in str(e.value)

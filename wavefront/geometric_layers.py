@@ -99,7 +99,7 @@ def geometric_layers(
     layers = {name: _empty(name, width * height) for name in names}
     view = scene.view(camera)
     corners = _Corners(shapes.shapes) if "uv" in names else None
-    for span, pixel in _spans(width * height):
+    for span, pixel in pixel_spans(width * height):
         center = center_rays(scene, view, pixel)
         moved, hits = covering_hits(scene, center)
         met = hits.found
@@ -123,7 +123,8 @@ def _empty(name: str, pixels: int) -> NDArray[Any]:
     return np.full(pixels if channels == 1 else (pixels, channels), np.nan, f4)
 
 
-def _spans(pixels: int) -> Iterator[tuple[slice, Words]]:
+def pixel_spans(pixels: int) -> Iterator[tuple[slice, Words]]:
+    """Yield spans of so many pixels, and their numbers."""
     for start in range(0, pixels, RAYS_AT_ONCE):
         end = min(start + RAYS_AT_ONCE, pixels)
         yield slice(start, end), np.arange(start, end, dtype=np.uint32)

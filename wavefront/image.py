@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .camera import Camera
 from .checkpoint import read_checkpoint
 from .checkpoint_file import is_checkpoint
 from .codecs import png_jpeg
@@ -19,7 +20,7 @@ from .codecs.images import read_picture, write_image
 from .codecs.png_jpeg import Gamma
 from .codecs.white_balance import WhiteBalance
 from .errors import SceneError, number, one_of, rgb
-from .layers import LAYERS, NOISY, is_radiance
+from .layers import BOXES, LAYERS, NOISY, is_radiance
 from .outlines import outline_coverage
 from .picture_sums import PictureSums, merged_metadata, merged_sums, restored_sums
 from .samples import shared_samples
@@ -99,6 +100,68 @@ class Image:
                 return self.layers[name]
             raise AttributeError(f"the image has no layer {name!r}; render it with aovs=({name!r},)")
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+
+    @property
+    def boxes(self) -> list[dict[str, Any]]:
+        """Boxes of objects, from `aovs="boxes"`: see docs/layers.md. They are part of the metadata."""
+        if BOXES not in self.metadata:
+            raise AttributeError(f"the image has no boxes; render it with aovs=({BOXES!r},)")
+        found: list[dict[str, Any]] = self.metadata[BOXES]
+        return found
+
+    def mask(self, which: int | str, kind: str = "shape") -> NDArray[np.bool_]:
+        """Return the pixels (H, W) whose center ray meets something, by the layer of its ids.
+
+        Parameters
+        ----------
+        which
+            An id, or a name: of several things of that name, the pixels of all.
+        kind
+            "shape", "instance" or "material".
+
+        Raises
+        ------
+        SceneError
+            If there is no such thing, or the layer `shape_id`, `instance_id` or `material_id` is missing.
+        """
+        names = self.names.get(one_of("kind", kind, ("shape", "instance", "material")))
+        ids = self.layers.get(f"{kind}_id")
+        if names is None or ids is None:
+            raise SceneError(f"mask: the image has no layer '{kind}_id'; render it with aovs=('{kind}_id',)")
+        chosen = [which] if which in names else [at for at, name in names.items() if name == which]
+        if not chosen:
+            raise SceneError(
+                f"mask: there is no {kind} {which!r}; names are {', '.join(map(repr, names.values()))[:200]}"
+            )
+        return np.isin(ids, chosen)
+
+    def motion(self, camera: Camera) -> NDArray[np.float32]:
+        """Return the optical flow to a picture of the same scene by another camera, (H, W, 2) in pixels.
+
+        What is seen in the middle of pixel [y, x] is seen by the other camera at (x + dx, y + dy), in
+        columns and rows of the picture that it renders. It may be hidden there, or outside. NaN where this
+        picture shows nothing, or the point is behind the other camera.
+
+        Parameters
+        ----------
+        camera
+            The other camera. This picture must have the layer `position`.
+
+        Raises
+        ------
+        SceneError
+            If the layer is missing.
+        """
+        position = self.layers.get("position")
+        if position is None:
+            raise SceneError("motion: the image has no layer 'position'; render it with aovs=('position',)")
+        height, width = position.shape[:2]
+        flow = np.full((height, width, 2), np.nan, np.float32)
+        row, column = np.nonzero(np.isfinite(position).all(2))
+        pixels, _ = camera.project(position[row, column])
+        here = np.stack([column, row], 1) + 0.5
+        flow[row, column] = pixels - camera.window[:2] - here
+        return flow
 
     def __repr__(self) -> str:
         """Return the size and the sample count."""

@@ -54,7 +54,8 @@ KEYED_LAYERS: dict[str, Layer] = {  # one layer for each key, named "light_group
     "light_groups": _sampled(3, "radiance by the group of the light that it comes from"),
     "coverage": _sampled(1, "part of the pixel that each shape covers, by the name of the shape"),
 }
-ALL_LAYERS = "all"  # stands for all of `LAYERS`, but for none of `KEYED_LAYERS`
+BOXES = "boxes"  # of objects: no array, but `Image.boxes`
+ALL_LAYERS = "all"  # stands for all of `LAYERS`, and for nothing else
 
 DEFAULT_GROUP = "default"  # of lights and emitting materials
 
@@ -72,6 +73,16 @@ def group_name(name: str, value: Any) -> str:
     return value
 
 
+def sampled_names(chosen: Iterable[str]) -> tuple[str, ...]:
+    """Return the names of the sampled layers among those that were chosen."""
+    return tuple(name for name in chosen if name != BOXES and layer_of(name).sampled)
+
+
+def geometric_names(chosen: Iterable[str]) -> tuple[str, ...]:
+    """Return the names of the geometric layers among those that were chosen."""
+    return tuple(name for name in chosen if name != BOXES and not layer_of(name).sampled)
+
+
 def layer_of(name: str) -> Layer:
     """Return a layer by its name, that of a layer with a key such as "light_groups.sun"."""
     return LAYERS[name] if name in LAYERS else KEYED_LAYERS[name.partition(".")[0]]
@@ -85,22 +96,22 @@ def chosen_layers(name: str, value: Any) -> tuple[str, ...]:
     name
         What the value is called in errors.
     value
-        A name, or several: of `LAYERS`, of `KEYED_LAYERS`, or "all".
+        A name, or several: of `LAYERS`, of `KEYED_LAYERS`, "boxes" or "all".
 
     Raises
     ------
     SceneError
         If one is unknown. The message lists all of them.
     """
-    known = (*LAYERS, *KEYED_LAYERS)
+    known = (*LAYERS, *KEYED_LAYERS, BOXES)
     chosen = [value] if isinstance(value, str) else list(value) if isinstance(value, Iterable) else None
     if chosen is None:
         raise SceneError(f"{name} is {value!r}; it must be the name of a layer, or several names")
     for each in chosen:
         if not isinstance(each, str) or each not in (*known, ALL_LAYERS):
             raise SceneError(
-                f"{name} has {each!r}; there are {', '.join(known)}, "
-                f"and {ALL_LAYERS!r} for all but {' and '.join(KEYED_LAYERS)}{did_you_mean(each, known)}"
+                f"{name} has {each!r}; there are {', '.join(known)}, and {ALL_LAYERS!r} for all but "
+                f"{', '.join((*KEYED_LAYERS, BOXES))}{did_you_mean(each, known)}"
             )
     wanted = {*chosen, *(LAYERS if ALL_LAYERS in chosen else ())}
     return tuple(each for each in known if each in wanted)

@@ -156,8 +156,8 @@ def render(
     aovs
         Layers beside the picture, by name: "position", "depth", "distance", "normal", "normal_geometric",
         "uv", "shape_id", "instance_id", "material_id", "alpha", "albedo", "direct", "indirect",
-        "denoising_albedo", "denoising_normal", "light_groups", "coverage", or "all" for all but the last
-        two. docs/layers.md says what each holds, and what it costs.
+        "denoising_albedo", "denoising_normal", "light_groups", "coverage", "boxes", or "all" for all
+        but the last three. docs/layers.md says what each holds, and what it costs.
     progress
         By default a bar appears when a render takes over two seconds. False shows none; a
         function is called with how much is done and how much there is at most: samples, or

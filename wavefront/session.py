@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Generator, Sequence
+from copy import deepcopy
 from dataclasses import replace
 from functools import partial
 from types import TracebackType
@@ -23,10 +24,11 @@ from .filters import FILTERS, Filter
 from .geometric_layers import IDS, ShapeTable, geometric_layers
 from .image import Image
 from .integrators import INTEGRATORS, WITH_MIS, Integrator, li_naive
-from .layers import layer_of
+from .layers import BOXES, geometric_names
 from .lighting import choose_preset, lighted
 from .lights.samplers import LightSamplerMaker
 from .materials import MaterialLike
+from .object_boxes import object_boxes
 from .outcome import (
     LONG_PATH,
     check_first_samples,
@@ -268,6 +270,7 @@ class Session:
         )
         self._camera = camera
         self._geometric: dict[str, NDArray[Any]] = {}
+        self._boxes: list[dict[str, Any]] | None = None
         self._sweeps: Generator[bool] | None = None
         self._last_snapshot = begin
         self._stopped = self._ended = self._warned = False
@@ -427,11 +430,13 @@ class Session:
         return self._sweeps
 
     def _make_geometric_layers(self) -> None:
-        """Trace the geometric layers that are asked for."""
-        names = [name for name in self._settings.aovs if not layer_of(name).sampled]
+        """Trace the geometric layers and the boxes that are asked for."""
+        names = geometric_names(self._settings.aovs)
+        given = self._compiled, self._camera, self._shape_table
         if names:
-            shapes = self._shape_table
-            self._geometric = geometric_layers(self._compiled, self._camera, shapes, names)
+            self._geometric = geometric_layers(*given, names)
+        if BOXES in self._settings.aovs:
+            self._boxes = object_boxes(*given)
 
     def _add_geometric_layers(self, image: Image) -> None:
         """Give a picture its geometric layers; all pictures but the last get copies."""
@@ -439,6 +444,8 @@ class Session:
             image.layers[name] = layer if self._ended else layer.copy()
             if name in IDS:
                 image.names[IDS[name]] = self._shape_table.names(IDS[name])
+        if self._boxes is not None:
+            image.metadata[BOXES] = deepcopy(self._boxes)
 
     def _discard_sweeps(self) -> None:
         if self._sweeps is not None:

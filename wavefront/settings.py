@@ -23,7 +23,7 @@ from .files import check_target
 from .filters import FILTERS, Filter
 from .guiding import GuideTable
 from .integrators import INTEGRATORS, Integrator, li_full
-from .layers import chosen_layers, layer_of
+from .layers import chosen_layers, sampled_names
 from .lighting import DEFAULT, LIGHTINGS, check_lighting
 from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
 from .materials import MaterialLike
@@ -349,8 +349,9 @@ class Settings:
         (),
         'Layers beside the picture, by name: "position", "depth", "distance", "normal", '
         '"normal_geometric", "uv", "shape_id", "instance_id", "material_id", "alpha", "albedo", '
-        '"direct", "indirect", "denoising_albedo", "denoising_normal", "light_groups", "coverage", or '
-        '"all" for all but the last two. docs/layers.md says what each holds, and what it costs.',
+        '"direct", "indirect", "denoising_albedo", "denoising_normal", "light_groups", "coverage", '
+        '"boxes", or "all" for all but the last three. docs/layers.md says what each holds, and what it '
+        "costs.",
         option="layer to render beside the picture, or all; can be given several times",
         flag="aov",
         check=chosen_layers,
@@ -395,7 +396,7 @@ class Settings:
     def sampled_layers(self) -> tuple[str, ...]:
         """The sampled layers that are asked for; a background gives alpha."""
         wanted = self.aovs if self.background is None else chosen_layers("aovs", [*self.aovs, "alpha"])
-        return tuple(name for name in wanted if layer_of(name).sampled)
+        return sampled_names(wanted)
 
     @property
     def target_spp(self) -> int | None:
