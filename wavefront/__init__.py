@@ -71,8 +71,11 @@ from .textures.vertex_colors import VertexColors
 from .version import VERSION
 
 if TYPE_CHECKING:
+    from .animation import save_animation
+    from .camera.moves import interpolate_cameras, orbit
     from .io.load import from_trimesh, load, load_mesh
     from .metrics import Comparison, compare
+    from .views import render_many, turntable
 
 __version__ = VERSION
 
@@ -80,9 +83,14 @@ _LATER = {  # what many programs do without is imported when they ask for it
     "Comparison": ".metrics",
     "compare": ".metrics",
     "from_trimesh": ".io.load",
+    "interpolate_cameras": ".camera.moves",
     "load": ".io.load",
     "load_mesh": ".io.load",
+    "orbit": ".camera.moves",
+    "render_many": ".views",
+    "save_animation": ".animation",
     "testing": ".testing",
+    "turntable": ".views",
 }
 
 __all__ = [
@@ -142,8 +150,10 @@ __all__ = [
     "elementary",
     "from_trimesh",
     "integrators",
+    "interpolate_cameras",
     "load",
     "load_mesh",
+    "orbit",
     "register_accelerator",
     "register_executor",
     "register_filter",
@@ -152,8 +162,11 @@ __all__ = [
     "register_light_sampler",
     "register_sampler",
     "render",
+    "render_many",
+    "save_animation",
     "studio",
     "testing",
+    "turntable",
     "vec",
     "warp",
 ]

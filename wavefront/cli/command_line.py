@@ -19,6 +19,7 @@ from .compare_command import compare_pictures
 from .info_command import describe_scene
 from .render_command import add_render_command
 from .status import ERROR, INTERRUPTED, TERMINATED
+from .turntable_command import add_turntable_command
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -63,6 +64,7 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument("--version", action="version", version=VERSION)
     commands = top.add_subparsers(required=True, metavar="command")
     add_render_command(commands)
+    add_turntable_command(commands)
     info = commands.add_parser("info", help="say what a scene file holds")
     info.add_argument("scene", help="obj, ply, stl, glb or gltf file")
     info.set_defaults(run=describe_scene)

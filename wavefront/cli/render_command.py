@@ -4,60 +4,34 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
-from dataclasses import Field, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..camera import Camera
-from ..codecs.display import Display
 from ..codecs.images import check_display, check_writable
-from ..codecs.tone import TONES
 from ..errors import Interrupted, RenderError, SaveError, SceneError
 from ..image import Image
 from ..io.load import load
 from ..render import render
 from ..scene import Scene
-from ..settings import Settings
 from . import arguments
+from .options import Help, add_display, add_settings, display_of, setting_values
 from .rescue import save_elsewhere
 from .status import ERROR, INTERRUPTED
 
 FOV = 40.0  # degrees
-TYPES: dict[str, Callable[[str], Any]] = {"int": int, "float": float, "str": str}
-PARSERS: dict[str, Callable[[str], Any]] = {
-    "size": arguments.size,
-    "lighting": arguments.lighting,
-    "background": arguments.background,
-    "up": arguments.up,
-    "samples": arguments.samples,
-}
-METAVARS = {"lighting": "PRESET", "background": "COLOR", "up": "X,Y,Z", "samples": "FIRST:END"}
-CAMERA_OPTIONS = ("size",)  # settings that the command line uses for its own camera
-RENDER_OPTIONS = [
-    each.name for each in fields(Settings) if each.metadata.get("option") and each.name not in CAMERA_OPTIONS
-]
-
-
-class _Help(argparse.ArgumentDefaultsHelpFormatter):
-    """Names defaults where there are any."""
-
-    def _get_help_string(self, action: argparse.Action) -> str | None:
-        return action.help if action.default in (None, ()) else super()._get_help_string(action)
 
 
 def add_render_command(commands: Any) -> None:
     """Add the command and its options to a parser's commands."""
-    command = commands.add_parser("render", help="render a scene file", formatter_class=_Help)
+    command = commands.add_parser("render", help="render a scene file", formatter_class=Help)
     command.add_argument("scene", help="obj, ply, stl, glb or gltf file")
     command.add_argument(
         "-o", "--output", default="out.png", help="png, jpg, exr, hdr, npy or npz file to write"
     )
-    for each in fields(Settings):
-        if each.metadata.get("option"):
-            _add_setting(command, each)
+    add_settings(command)
     where = {"type": arguments.vector, "metavar": "X,Y,Z"}
     command.add_argument("--origin", **where, help="camera position; replaces the file's camera")
     command.add_argument(
@@ -69,42 +43,15 @@ def add_render_command(commands: Any) -> None:
     command.add_argument(
         "--fov", type=arguments.fov, help=f"vertical field of view, degrees (default: {FOV:g})"
     )
-    command.add_argument(
-        "--gamma", type=arguments.gamma, default=2.2, help='for png and jpg: a number or "srgb"'
-    )
-    command.add_argument(
-        "--exposure", type=arguments.exposure, default=0.0, help="stops, applied when saving"
-    )
-    command.add_argument("--tone", choices=TONES, default="none", help="tone curve, for png and jpg")
-    command.add_argument(
-        "--white-balance",
-        type=arguments.white_balance,
-        metavar="KELVIN|R,G,B",
-        help="color temperature of the light, or a gray color of the picture, that becomes neutral",
-    )
+    add_display(command)
     command.add_argument("--bits", type=int, choices=(8, 16), default=8, help="of each channel of a png")
     command.add_argument("--quiet", action="store_true", help="no progress bar")
     command.set_defaults(run=_render)
 
 
-def _add_setting(command: argparse.ArgumentParser, setting: Field[Any]) -> None:
-    """Add the option of a setting that has one."""
-    how: dict[str, Any] = {"help": setting.metadata["option"], "default": setting.default}
-    flag = setting.metadata["flag"] or setting.name
-    if setting.type == "bool":
-        how["action"] = "store_true"
-    elif setting.metadata["flag"]:
-        how.update(action=arguments.Several, dest=setting.name, metavar="NAME")
-    else:
-        how["type"] = PARSERS.get(setting.name) or TYPES[str(setting.type).split(" ")[0]]
-        how["choices"] = setting.metadata["choices"]
-        how["metavar"] = METAVARS.get(setting.name)
-    command.add_argument("--" + flag.replace("_", "-"), **how)
-
-
 def _render(options: argparse.Namespace) -> int:
     check_writable(options.output)
-    display = Display(options.gamma, options.exposure, options.tone, options.white_balance)
+    display = display_of(options)
     check_display(options.output, display, options.bits)
     progress = False if options.quiet else None
     scene = load(options.scene, progress=progress)
@@ -114,7 +61,7 @@ def _render(options: argparse.Namespace) -> int:
     try:
         image = render(
             scene,
-            **{name: getattr(options, name) for name in RENDER_OPTIONS},
+            **setting_values(options),
             progress=progress,
         )
     except Interrupted as stop:

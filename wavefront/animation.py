@@ -1,0 +1,146 @@
+"""Images as numbered files, or as one animation."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from importlib.util import find_spec
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .codecs.display import Display
+from .codecs.images import check_writable
+from .codecs.white_balance import WhiteBalance
+from .errors import SaveError, SceneError, number
+from .files import check_target, path_name, write_bytes
+from .image import Image
+
+ANIMATIONS = (".gif", ".png", ".mp4")
+
+
+def save_animation(
+    path: str | os.PathLike[str],
+    images: Iterable[Image],
+    *,
+    fps: float = 24,
+    gamma: float | str = 2.2,
+    exposure: float = 0.0,
+    tone: str = "none",
+    white_balance: WhiteBalance | None = None,
+) -> int:
+    """Save images as an animation, or as numbered files.
+
+    Parameters
+    ----------
+    path
+        Ends in .gif, .png (animated) or .mp4, which needs `pip install av`. With a number in
+        braces, such as "frame_{:03d}.png", each image is saved by itself, in any format of `Image.save`,
+        from 0 on, when it is there.
+    images
+        Of one size; from `render_many`, for example.
+    fps
+        Images per second.
+    gamma, exposure, tone, white_balance
+        As for `Image.save`.
+
+    Returns
+    -------
+    int
+        The number of images.
+
+    Raises
+    ------
+    SceneError
+        If there is no image, sizes differ, or an argument is out of range.
+    SaveError
+        If the file cannot be written.
+    """
+    name = path_name(path, SaveError)
+    display = Display(gamma, exposure, tone, white_balance)
+    fps = number("fps", fps, lambda x: x > 0, "above 0")
+    check_animation(name)
+    if "{" in name:
+        return _save_numbered(name, images, display)
+    frames = _frames(name, images, display)
+    write_bytes(name, _encoded(Path(name).suffix.lower(), frames, fps))
+    return len(frames)
+
+
+def check_animation(path: str | os.PathLike[str]) -> None:
+    """Check that an animation can be written to `path`, before a long render.
+
+    Raises
+    ------
+    SaveError
+        If the extension is unknown, the folder is missing or not writable, or a package is not installed.
+    """
+    name = path_name(path, SaveError)
+    if "{" in name:
+        check_writable(numbered(name, 0))
+        return
+    extension = Path(name).suffix.lower()
+    if extension not in ANIMATIONS:
+        raise SaveError(f"{name}: extension is {extension!r}; it must be one of {', '.join(ANIMATIONS)}")
+    if extension == ".mp4" and find_spec("av") is None:
+        raise SaveError(f"{name}: mp4 needs pip install av")
+    check_target(name)
+
+
+def numbered(pattern: str, number: int) -> str:
+    """Return the name of a numbered file.
+
+    Raises
+    ------
+    SaveError
+        If the pattern does not make names that differ.
+    """
+    try:
+        name, other = pattern.format(number), pattern.format(number + 1)
+    except (ValueError, IndexError, KeyError) as error:
+        raise SaveError(f"{pattern}: no pattern for numbers, such as frame_{{:03d}}.png: {error}") from error
+    if name == other:
+        raise SaveError(f"{pattern}: has no place for a number, such as frame_{{:03d}}.png")
+    return name
+
+
+def _save_numbered(pattern: str, images: Iterable[Image], display: Display) -> int:
+    count = 0
+    for image in images:
+        image.save(
+            numbered(pattern, count), display.gamma, display.exposure, display.tone, display.white_balance
+        )
+        count += 1
+    if not count:
+        raise SceneError(f"{pattern}: there are no images to save")
+    return count
+
+
+def _frames(name: str, images: Iterable[Image], display: Display) -> list[NDArray[np.uint8]]:
+    """Return the codes (H, W, 3) of all images; a transparent background becomes black."""
+    frames: list[NDArray[np.uint8]] = []
+    for image in images:
+        codes = image.to_uint8(display.gamma, display.exposure, display.tone, display.white_balance)
+        if frames and codes.shape[:2] != frames[0].shape[:2]:
+            sizes = " and ".join(f"{c.shape[1]}x{c.shape[0]}" for c in (frames[0], codes))
+            raise SceneError(f"{name}: images of an animation must have one size, got {sizes}")
+        frames.append(codes[..., :3])
+    if not frames:
+        raise SceneError(f"{name}: there are no images to save")
+    return frames
+
+
+def _encoded(extension: str, frames: list[NDArray[np.uint8]], fps: float) -> bytes:
+    import imageio.v3 as iio
+
+    buffer = BytesIO()
+    stack = np.stack(frames)
+    if extension == ".mp4":
+        height, width = stack.shape[1:3]
+        even = stack[:, : height // 2 * 2, : width // 2 * 2]  # the codec halves the resolution of color
+        iio.imwrite(buffer, even, extension=".mp4", plugin="pyav", codec="libx264", fps=fps)
+    else:
+        iio.imwrite(buffer, stack, extension=extension, plugin="pillow", duration=1000 / fps, loop=0)
+    return buffer.getvalue()

@@ -1,0 +1,83 @@
+"""The options that several commands share: settings of a render, and of display."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import Field, fields
+from typing import Any
+
+from ..codecs.display import Display
+from ..codecs.tone import TONES
+from ..settings import Settings
+from . import arguments
+
+TYPES: dict[str, Callable[[str], Any]] = {"int": int, "float": float, "str": str}
+PARSERS: dict[str, Callable[[str], Any]] = {
+    "size": arguments.size,
+    "lighting": arguments.lighting,
+    "background": arguments.background,
+    "up": arguments.up,
+    "samples": arguments.samples,
+}
+METAVARS = {"lighting": "PRESET", "background": "COLOR", "up": "X,Y,Z", "samples": "FIRST:END"}
+CAMERA_OPTIONS = ("size",)  # settings that the command line uses for its own camera
+RENDER_OPTIONS = [
+    each.name for each in fields(Settings) if each.metadata.get("option") and each.name not in CAMERA_OPTIONS
+]
+
+
+class Help(argparse.ArgumentDefaultsHelpFormatter):
+    """Names defaults where there are any."""
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        return action.help if action.default in (None, ()) else super()._get_help_string(action)
+
+
+def add_settings(command: argparse.ArgumentParser) -> None:
+    """Add an option for each setting that has one."""
+    for each in fields(Settings):
+        if each.metadata.get("option"):
+            _add_setting(command, each)
+
+
+def setting_values(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the settings that were given, but for those of the command line's own camera."""
+    return {name: getattr(options, name) for name in RENDER_OPTIONS}
+
+
+def add_display(command: argparse.ArgumentParser) -> None:
+    """Add the options of display."""
+    command.add_argument(
+        "--gamma", type=arguments.gamma, default=2.2, help='for png and jpg: a number or "srgb"'
+    )
+    command.add_argument(
+        "--exposure", type=arguments.exposure, default=0.0, help="stops, applied when saving"
+    )
+    command.add_argument("--tone", choices=TONES, default="none", help="tone curve, for png and jpg")
+    command.add_argument(
+        "--white-balance",
+        type=arguments.white_balance,
+        metavar="KELVIN|R,G,B",
+        help="color temperature of the light, or a gray color of the picture, that becomes neutral",
+    )
+
+
+def display_of(options: argparse.Namespace) -> Display:
+    """Return how pictures are shown."""
+    return Display(options.gamma, options.exposure, options.tone, options.white_balance)
+
+
+def _add_setting(command: argparse.ArgumentParser, setting: Field[Any]) -> None:
+    """Add the option of a setting that has one."""
+    how: dict[str, Any] = {"help": setting.metadata["option"], "default": setting.default}
+    flag = setting.metadata["flag"] or setting.name
+    if setting.type == "bool":
+        how["action"] = "store_true"
+    elif setting.metadata["flag"]:
+        how.update(action=arguments.Several, dest=setting.name, metavar="NAME")
+    else:
+        how["type"] = PARSERS.get(setting.name) or TYPES[str(setting.type).split(" ")[0]]
+        how["choices"] = setting.metadata["choices"]
+        how["metavar"] = METAVARS.get(setting.name)
+    command.add_argument("--" + flag.replace("_", "-"), **how)

@@ -1,0 +1,53 @@
+"""`wavefront turntable`."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from ..animation import check_animation, save_animation
+from ..io.load import load
+from ..views import render_many, turntable
+from .options import Help, add_display, add_settings, display_of, setting_values
+
+
+def add_turntable_command(commands: Any) -> None:
+    """Add the command and its options to a parser's commands."""
+    command = commands.add_parser(
+        "turntable", help="render an animation around a scene", formatter_class=Help
+    )
+    command.add_argument("scene", help="obj, ply, stl, glb or gltf file")
+    command.add_argument(
+        "-o",
+        "--output",
+        default="turntable.gif",
+        help="gif, png (animated) or mp4 file to write, or numbered files such as frame_{:03d}.png",
+    )
+    command.add_argument("--frames", type=int, default=60, help="pictures of a whole turn")
+    command.add_argument("--fps", type=float, default=24.0, help="pictures per second")
+    add_settings(command)
+    add_display(command)
+    command.add_argument("--quiet", action="store_true", help="no progress bar")
+    command.set_defaults(run=_turntable)
+
+
+def _turntable(options: argparse.Namespace) -> int:
+    check_animation(options.output)
+    display = display_of(options)
+    progress = False if options.quiet else None
+    scene = load(options.scene, progress=progress)
+    cameras = turntable(
+        scene, options.frames, size=options.size, up="y" if options.up is None else options.up
+    )
+    images = render_many(scene, cameras, progress=progress, **setting_values(options))
+    count = save_animation(
+        options.output,
+        images,
+        fps=options.fps,
+        gamma=display.gamma,
+        exposure=display.exposure,
+        tone=display.tone,
+        white_balance=display.white_balance,
+    )
+    print(f"{options.output}: {count} pictures")
+    return 0

@@ -1,0 +1,86 @@
+"""Many views of one scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from .camera import Camera, upward
+from .camera.moves import orbit
+from .errors import SceneError
+from .image import Image
+from .renderable import as_scene, choose_camera
+from .session import Session
+
+
+def render_many(
+    scene: Any, cameras: Iterable[Camera], spp: int | None = None, **settings: Any
+) -> Iterator[Image]:
+    """Render a scene from several cameras, one after the other.
+
+    The scene is compiled once, and the workers are kept. Each image is that of `render` with its camera,
+    bit for bit.
+
+    Parameters
+    ----------
+    scene, spp
+        As for `render`.
+    cameras
+        What sees the scene.
+    **settings
+        The other settings of `render`; an unknown one is an error.
+
+    Yields
+    ------
+    Image
+        When it is done.
+
+    Raises
+    ------
+    SceneError
+        If a setting or the scene is malformed, or there is no camera.
+    Interrupted
+        After Ctrl-C; its `image` is the picture so far.
+    """
+    views = iter(cameras)
+    first = next(views, None)
+    if first is None:
+        raise SceneError("cameras is empty; render_many needs at least one")
+    with Session(scene, spp, camera=first, **settings) as session:
+        yield session.run()
+        for camera in views:
+            session.set_camera(camera, settings.get("size"))
+            yield session.run()
+
+
+def turntable(
+    scene: Any, n: int = 60, *, size: tuple[int, int] | None = None, up: ArrayLike = "y"
+) -> list[Camera]:
+    """Return n cameras on a circle around the middle of a scene, at equal angles.
+
+    The first is the scene's camera, or one that frames it.
+
+    Parameters
+    ----------
+    scene
+        What `render` takes.
+    n
+        At least 1.
+    size
+        (width, height) in pixels, in place of the camera's.
+    up
+        What is up in the scene: (3,), or the name of an axis.
+
+    Raises
+    ------
+    SceneError
+        If an argument is malformed.
+    """
+    if n < 1:
+        raise SceneError(f"n is {n}; it must be at least 1")
+    subject = as_scene(scene, None, False)
+    axis = upward("up", up)
+    camera = choose_camera(subject, None, size, axis)
+    return [orbit(camera, subject.bounds.mean(0), 360 * k / n, axis) for k in range(n)]
