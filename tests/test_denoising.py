@@ -1,12 +1,20 @@
 """Denoisers: they lower the error, keep the mean and edges, and survive odd pictures."""
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+from significance import render
 
 import wavefront as wf
+from wavefront.cli import main
 from wavefront.denoising.noisy import without_holes
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
+import gltf_scene
+import material_sheet
+from cornell_box import cornell_box
 
 DENOISERS = ("oidn", "nonlocal_means")
 
@@ -160,3 +168,78 @@ def test_without_pyoidn(monkeypatch) -> None:
         image.denoise("oidn")
     with pytest.raises(wf.SceneError, match="denoiser"):
         image.denoise("median")
+
+
+def test_render(denoiser, monkeypatch) -> None:
+    """Adds the guides, leaves the noisy picture as it would be, and lowers the error."""
+    if denoiser != "oidn":
+        monkeypatch.setattr("wavefront.denoising.denoisers.find_spec", lambda name: None)
+    scene = cornell_box(48)
+    plain = render(scene, 16, aovs="depth", max_bounces=5)
+    found = render(scene, 16, aovs="depth", max_bounces=5, denoise=True)
+    assert found.metadata["denoiser"] == denoiser
+    assert (found.noisy.rgb == plain.rgb).all()
+    assert (found.noisy.standard_error == plain.standard_error).all()
+    assert set(found.noisy.layers) == {"depth", "denoising_albedo", "denoising_normal"}
+    assert np.array_equal(found.depth, plain.depth, equal_nan=True)
+    exact = render(scene, 512, seed=7, max_bounces=5)
+    assert relative_mse(found, exact) < 0.4 * relative_mse(plain, exact)
+    assert found.rgb.mean() == pytest.approx(plain.rgb.mean(), rel=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["cornell box", "material sheet", "gltf scene"])
+def test_error_at_16_samples(name, tmp_path) -> None:
+    """A quarter of the error by Open Image Denoise, half of it by the own filter, against 4096 samples."""
+    scene, smooth = {
+        "cornell box": lambda: (cornell_box(128), "box"),
+        "material sheet": lambda: (material_sheet.scene(192), "gaussian"),
+        "gltf scene": lambda: (gltf_scene.scene(tmp_path / "scene.glb", 240), "box"),
+    }[name]()
+    settings = {"filter": smooth, "lighting": None, "progress": False}
+    noisy = wf.render(scene, 16, aovs=("denoising_albedo", "denoising_normal"), **settings)
+    exact = wf.render(scene, 4096, seed=1, **settings)
+    assert wf.compare(noisy, exact).p_value > 1e-3
+    for denoiser, most in (("oidn", 0.25), ("nonlocal_means", 0.5)):
+        found = noisy.denoise(denoiser)
+        ratio = relative_mse(found, exact) / relative_mse(noisy, exact)
+        print(f"{name}, {denoiser}: {ratio:.3f}")
+        assert ratio < most
+        assert found.rgb.mean() == pytest.approx(noisy.rgb.mean(), rel=0.01)
+
+
+def test_session() -> None:
+    """Its last picture is that of render; those before are noisy."""
+    settings = {"size": (16, 12), "lighting": "even", "progress": False, "denoise": True}
+    with wf.Session(wf.Sphere((0, 0, 0), 1), 4, **settings) as session:
+        images = list(session)
+    assert [image.noisy is None for image in images] == [True] * (len(images) - 1) + [False]
+    assert (images[-1].rgb == wf.render(wf.Sphere((0, 0, 0), 1), 4, **settings).rgb).all()
+
+
+def test_command(tmp_path, capsys) -> None:
+    """--denoise writes both pictures into an exr."""
+    path = tmp_path / "ball.ply"
+    path.write_text(
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    )
+    out = tmp_path / "out.exr"
+    options = ["--spp", "4", "--size", "16x12", "--lighting", "even", "--quiet", "--denoise", "-o", str(out)]
+    assert main(["render", str(path), *options]) == 0
+    assert "before denoising" in capsys.readouterr().out
+    image = wf.Image.load(out)
+    assert image.metadata["denoiser"] in DENOISERS
+    assert image.noisy.standard_error is not None
+
+
+def test_merging_denoised_pictures() -> None:
+    """Merges the noisy ones."""
+    settings = {"size": (8, 6), "lighting": "even", "progress": False}
+    ball = wf.Sphere((0, 0, 0), 1)
+    one, other = (wf.render(ball, samples=part, denoise=True, **settings) for part in (range(4), range(4, 8)))
+    merged = one.merge(other)
+    assert (merged.rgb == wf.render(ball, 8, **settings).rgb).all()
+    assert merged.noisy is None
+    assert "denoiser" not in merged.metadata
+    assert merged.denoise().noisy is not None

@@ -270,6 +270,7 @@ class Image:
             layers={**source.layers, NOISY: source.rgb},
             errors={**source.errors, **error},
             names=source.names,
+            sums=source.sums,
         )
 
     @property
@@ -287,6 +288,7 @@ class Image:
             layers={name: layer for name, layer in self.layers.items() if name != NOISY},
             errors={name: error for name, error in self.errors.items() if name != NOISY},
             names=self.names,
+            sums=self.sums,
         )
 
     def merge(self, other: Image) -> Image:
@@ -297,6 +299,7 @@ class Image:
         samples of a part do not fill whole batches (of `film.batch_size`), the error is estimated from
         batches of other lengths. Layers that are not sampled are those of this picture. In the metadata
         counts and seconds are added, and `sample_ranges` are joined; the rest is that of this picture.
+        Of denoised pictures the noisy ones are merged.
 
         Parameters
         ----------
@@ -311,9 +314,10 @@ class Image:
         """
         if not isinstance(other, Image):
             raise SceneError(f"a picture is merged with another one, got {type(other).__name__}")
+        source = self.noisy or self
         sums = merged_sums(self.sums, other.sums)
-        image = film_image(sums, merged_metadata(self.metadata, other.metadata), keep_sums=True)
-        image.layers = {**self.layers, **image.layers}
+        image = film_image(sums, merged_metadata(source.metadata, other.metadata), keep_sums=True)
+        image.layers = {**source.layers, **image.layers}
         image.names = self.names
         return image
 

@@ -117,6 +117,7 @@ def chosen_layers(name: str, value: Any) -> tuple[str, ...]:
     return tuple(each for each in known if each in wanted)
 
 
+GUIDES = "denoising_albedo", "denoising_normal"  # the layers that guide denoisers
 NOISY = "noisy"  # the layer that holds `rgb` as it was before denoising
 RADIANCE = (
     NOISY,

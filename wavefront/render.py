@@ -55,6 +55,7 @@ def render(
     max_memory: int | str | None = None,
     strict: bool = False,
     aovs: str | Sequence[str] = (),
+    denoise: bool = False,
     progress: Progress = None,
 ) -> Image:
     """Render a picture.
@@ -158,6 +159,10 @@ def render(
         "uv", "shape_id", "instance_id", "material_id", "alpha", "albedo", "direct", "indirect",
         "denoising_albedo", "denoising_normal", "light_groups", "coverage", "boxes", or "all" for all
         but the last three. docs/layers.md says what each holds, and what it costs.
+    denoise
+        Removes most of the noise of the last picture, as `Image.denoise` does, along edges and textures
+        that the layers "denoising_albedo" and "denoising_normal" show, which it adds. `image.noisy` is the
+        picture before.
     progress
         By default a bar appears when a render takes over two seconds. False shows none; a
         function is called with how much is done and how much there is at most: samples, or
@@ -209,6 +214,7 @@ def render(
         max_memory=max_memory,
         strict=strict,
         aovs=aovs,
+        denoise=denoise,
         progress=progress,
     )
     return finish(session)

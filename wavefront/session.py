@@ -82,7 +82,7 @@ class Session:
         As for `render`.
     integrator, max_bounces, seed, samples, sampler, accel, filter, light_sampler, branches, guide
         As for `render`.
-    workers, executor, noise, seconds, wave_size, max_memory, strict, aovs, progress
+    workers, executor, noise, seconds, wave_size, max_memory, strict, aovs, denoise, progress
         As for `render`.
     checkpoint, checkpoint_interval
         As for `render`.
@@ -130,6 +130,7 @@ class Session:
         max_memory: int | str | None = None,
         strict: bool = False,
         aovs: str | Sequence[str] = (),
+        denoise: bool = False,
         progress: Progress = None,
     ) -> None:
         begin = time.perf_counter()
@@ -164,6 +165,7 @@ class Session:
             max_memory=max_memory,
             strict=strict,
             aovs=aovs,
+            denoise=denoise,
             progress=progress,
         )
         with setup_errors():
@@ -483,7 +485,9 @@ class Session:
             raise interrupted(image, settings.target_spp)
         if not_written is not None:
             raise RenderError(f"the checkpoint was not written: {not_written}", image) from not_written
-        return image if loop.accumulator.samples else None
+        if not loop.accumulator.samples:
+            return None
+        return image.denoise() if settings.denoise else image
 
     @property
     def _interrupted(self) -> bool:

@@ -23,7 +23,7 @@ from .files import check_target
 from .filters import FILTERS, Filter
 from .guiding import GuideTable
 from .integrators import INTEGRATORS, Integrator, li_full
-from .layers import chosen_layers, sampled_names
+from .layers import GUIDES, chosen_layers, sampled_names
 from .lighting import DEFAULT, LIGHTINGS, check_lighting
 from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
 from .materials import MaterialLike
@@ -356,6 +356,13 @@ class Settings:
         flag="aov",
         check=chosen_layers,
     )
+    denoise: bool = setting(
+        False,
+        "Removes most of the noise of the last picture, as `Image.denoise` does, along edges and textures "
+        'that the layers "denoising_albedo" and "denoising_normal" show, which it adds. `image.noisy` is the '
+        "picture before.",
+        option="remove noise from the picture",
+    )
     progress: Progress = setting(
         None,
         "By default a bar appears when a render takes over two seconds. False shows none; a function "
@@ -372,6 +379,8 @@ class Settings:
             check = each.metadata.get("check")
             if check is not None:
                 setattr(self, each.name, check(each.name, getattr(self, each.name)))
+        if self.denoise:
+            self.aovs = chosen_layers("aovs", (*self.aovs, *GUIDES))
         self.max_spp = self._most_samples()
         self.memory_limit = None if self.max_memory is None else int(self.max_memory)
         self.worker_count = worker_count(self.workers, self.executor)

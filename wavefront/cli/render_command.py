@@ -127,4 +127,5 @@ def _summary(image: Image, path: str) -> str:
     return (
         f"{path}: {width}x{height}, {image.spp} spp in {seconds:.1f} s ({rate:.2f} million samples/s), "
         f"estimated error {'unknown' if np.isnan(noise) else f'{noise:.2%}'}"
+        f"{' before denoising' if 'denoiser' in image.metadata else ''}"
     )

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..layers import GUIDES
 from ..record import record
 from ..vec import Doubles, Floats
-
-ALBEDO, NORMAL = GUIDES = "denoising_albedo", "denoising_normal"  # layers that guide denoisers
 
 
 @record
@@ -44,9 +43,7 @@ def noisy_picture(
     estimated from the picture itself.
     """
     rgb = without_holes(rgb)
-    albedo, normal = (
-        _guide(layers[name], errors.get(name)) if name in layers else None for name in (ALBEDO, NORMAL)
-    )
+    albedo, normal = (_guide(layers[name], errors.get(name)) if name in layers else None for name in GUIDES)
     return NoisyPicture(rgb, _squared_error(rgb, standard_error), albedo, normal)
 
 
