@@ -23,7 +23,7 @@ from typing import Any
 from ..errors import SceneError
 from ..record import record
 from .blas import single_threaded_blas
-from .machine import differences
+from .machine import machine_differences
 from .shared import SharedInt, Stopped
 
 KEEP = 10.0  # seconds from the last job until a process forgets the work
@@ -58,7 +58,7 @@ def do_job(payload: Payload, job: Any) -> Reply:
     except FileNotFoundError:
         return Reply(missing=True)
     except Exception:  # of a class that this worker does not have, or in another version
-        return Reply(failure=traceback.format_exc(), differences=differences(payload.machine))
+        return Reply(failure=traceback.format_exc(), differences=machine_differences(payload.machine))
 
 
 def _reply(work: Callable[[Any], Any], job: Any, differing: tuple[str, ...]) -> Reply:
@@ -137,7 +137,7 @@ def _load(payload: Payload) -> _Entry:
     if data is None:
         with open(payload.path, "rb") as file:
             data = file.read()
-    return _Entry(pickle.loads(data), differences(payload.machine))
+    return _Entry(pickle.loads(data), machine_differences(payload.machine))
 
 
 def pack(work: Any, folder: str) -> bytes:

@@ -25,7 +25,7 @@ def describe_machine() -> dict[str, str]:
     return described
 
 
-def differences(here: dict[str, str]) -> tuple[str, ...]:
+def machine_differences(here: dict[str, str]) -> tuple[str, ...]:
     """Return in what this process differs from the machine that was described, in words."""
     there = describe_machine()
     if "embreex" in here and "embreex" not in there:
