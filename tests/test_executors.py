@@ -410,8 +410,8 @@ def test_this_machine_does_not_differ_from_itself() -> None:
     """A description names the versions."""
     here = machine.describe_machine()
     assert here["wavefront"] == wf.__version__
-    assert machine.differences(here) == ()
-    assert machine.differences({**here, "wavefront": "0"}) == (f"wavefront {wf.__version__} in place of 0",)
+    assert machine.machine_differences(here) == ()
+    assert machine.machine_differences({**here, "wavefront": "0"}) == (f"wavefront {wf.__version__} in place of 0",)
 
 
 @pytest.mark.slow
