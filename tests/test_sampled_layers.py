@@ -20,7 +20,7 @@ from wavefront.stages.intersect import intersect
 from wavefront.stages.shade import emitted
 
 SAMPLED = tuple(name for name, layer in LAYERS.items() if layer.sampled)
-EVERYTHING = (*SAMPLED, "light_groups")
+EVERYTHING = (*SAMPLED, "light_groups", "coverage")
 INTEGRATORS = ("naive", "direct_simple", "direct_mis", "full")
 
 
@@ -207,6 +207,31 @@ def test_alpha_is_filtered_like_the_picture() -> None:
     for name in ("box", "tent", "gaussian"):
         image = render(wf.Scene([disk], [], camera), 16, aovs="alpha", filter=name)
         np.testing.assert_array_equal(image.alpha, image.rgb[..., 0])
+
+
+def test_coverage_tells_shapes_apart_by_their_names() -> None:
+    """The parts of a pixel that shapes cover sum to alpha, and one behind another counts for nothing."""
+    leaf = wf.Rectangle((0, 0, 0), (0.5, 0, 0), (0, 0.5, 0), name="leaf")
+    shapes = [
+        wf.Rectangle(
+            (-1, -1, 0), (1, 0, 0), (0, 2, 0), material=wf.Material(wf.Diffuse(0.5), alpha=0.4), name="left"
+        ),
+        wf.Rectangle((0, -1, 0), (0.5, 0, 0), (0, 2, 0), name="right"),
+        wf.Rectangle((0, -1, -1), (0.5, 0, 0), (0, 2, 0), name="hidden"),
+        *(
+            wf.Instance(leaf, [[1, 0, 0, 0.5], [0, 1, 0, y], [0, 0, 1, 0], [0, 0, 0, 1]], name="leaf")
+            for y in (-1, 0.5)
+        ),
+    ]
+    camera = wf.Camera.look_at((0, 0, 5), (0, 0, 0), fov=2 * np.degrees(np.arctan(1 / 5)), size=(16, 16))
+    image = render(wf.Scene(shapes, [wf.Environment(1)], camera), 64, aovs=("alpha", "coverage"))
+    parts = {name: layer for name, layer in image.layers.items() if name.startswith("coverage.")}
+    assert list(parts) == ["coverage.left", "coverage.right", "coverage.hidden", "coverage.leaf"]
+    np.testing.assert_allclose(sum(parts.values()), image.alpha, atol=1e-6)
+    assert parts["coverage.left"].mean() == pytest.approx(0.4 / 2, abs=0.01)
+    assert parts["coverage.right"].mean() == pytest.approx(0.25, abs=0.001)
+    assert parts["coverage.leaf"].mean() == pytest.approx(2 * 0.25 / 4, abs=0.001)
+    assert not parts["coverage.hidden"].any()
 
 
 def test_errors_are_those_of_the_samples() -> None:

@@ -6,7 +6,7 @@ and integrators of a user's own give the same layers if they are made of the sam
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -54,6 +54,7 @@ class SampleRecorder:
         self._wanted = tuple(wanted)
         self._values = {name: np.zeros((LAYERS[name].channels, n), f4) for name in BOUNDED if name in wanted}
         self._covered = np.zeros(n, np.bool_) if "alpha" in wanted else None
+        self._coverage = Coverage(scene, n) if "coverage" in wanted else None
         self._light: dict[str, Floats] = {}
         if "direct" in wanted or "indirect" in wanted:
             self._light["direct"] = np.zeros((3, n), f4)
@@ -97,6 +98,8 @@ class SampleRecorder:
         first, self._begun = not self._begun, True
         if first and self._covered is not None:
             self._covered[paths.slot] = hits.prim >= 0
+        if first and self._coverage is not None:
+            self._coverage.record(scene, paths, hits)
         if not self._needs_surfaces(paths, first):
             return
         ends = hits.prim >= 0
@@ -223,6 +226,8 @@ class SampleRecorder:
         if self._covered is not None:
             self._covered[dropped] = False
             counts["alpha"] = self._covered.reshape(samples, -1).sum(0, dtype=np.int32)
+        if self._coverage is not None:
+            counts.update(self._coverage.counts(samples, dropped))
         bounded = {name: fixed_point(values, samples, dropped) for name, values in self._values.items()}
         return LayerSamples(counts, bounded, light)
 
@@ -241,11 +246,41 @@ class SampleRecorder:
                 )
 
 
+class Coverage:
+    """Which of the names of a scene's shapes each sample of a wave sees first.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    n
+        Samples of the wave.
+    """
+
+    def __init__(self, scene: CompiledScene, n: int) -> None:
+        self._names = tuple(dict.fromkeys(scene.shape_names))
+        numbers = {name: number for number, name in enumerate(self._names)}
+        self._of_shape = np.array([numbers[name] for name in scene.shape_names], np.intp)
+        self._seen = np.full(n, -1, np.intp)
+
+    def record(self, scene: CompiledScene, paths: Paths, hits: Hits) -> None:
+        """Record the first surfaces of paths."""
+        found = hits.found
+        self._seen[take(paths.slot, found)] = self._of_shape.take(scene.shape_numbers.of(hits.take(found)))
+
+    def counts(self, samples: int, dropped: Ints) -> Iterator[tuple[str, Ints]]:
+        """Yield each layer, and how many samples of each pixel (k,) see a shape of that name."""
+        self._seen[dropped] = -1
+        seen = self._seen.reshape(samples, -1)
+        for number, name in enumerate(self._names):
+            yield f"coverage.{name}", (seen == number).sum(0, dtype=np.int32)
+
+
 def recorded_layers(wanted: Sequence[str], scene: CompiledScene) -> tuple[str, ...]:
     """Return the layers that recorders of a scene return, those with a key by it."""
     names: list[str] = []
     for name in wanted:
-        keys = scene.light_groups.names if name == "light_groups" else ()
+        keys = scene.light_groups.names if name == "light_groups" else dict.fromkeys(scene.shape_names)
         names += [f"{name}.{key}" for key in keys] if name in KEYED_LAYERS else [name]
     return tuple(names)
 

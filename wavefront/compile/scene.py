@@ -58,6 +58,7 @@ class CompiledScene:
     ]  # by field of `SurfaceInteraction`, those that a material reads; 3 × (width, m)
     curved: CurvedTable  # k of them
     shape_numbers: ShapeNumbers  # which shapes of the user's scene the primitives belong to
+    shape_names: tuple[str, ...]  # of those shapes
     material_of: Ints  # (m + k,) material of each primitive
     light_of: Ints  # (m + k + 1,) light of each primitive, and at the end that of a miss; -1 for none
     emissive: Bools  # (m + k + 1,) whether `light_of` names a light
@@ -170,6 +171,7 @@ def compile_scene(
         attributes=attributes,
         curved=table_of_curved,
         shape_numbers=shape_numbers,
+        shape_names=tuple(shape.name for shape in scene.shapes),
         material_of=material_of,
         light_of=light_of,
         emissive=light_of >= 0,
