@@ -74,9 +74,9 @@ def test_parts_sum_to_the_picture(integrator: str) -> None:
     np.testing.assert_array_equal(image.rgb, plain.rgb)
     np.testing.assert_array_equal(image.standard_error, plain.standard_error)
     assert ulps(image.rgb, image.direct, image.indirect) <= 1
-    groups = {name: layer for name, layer in image.layers.items() if name.startswith("light_groups.")}
+    groups = image.light_groups
     names = ("lamp", "sky", "sun") if integrator == "naive" else ("lamp", "sky", "sun", "default")
-    assert set(groups) == {f"light_groups.{name}" for name in names}
+    assert set(groups) == set(names)
     assert all(layer.max() > 0 for layer in groups.values())
     assert ulps(image.rgb, *groups.values()) <= 1
     if integrator.startswith("direct"):
@@ -85,7 +85,8 @@ def test_parts_sum_to_the_picture(integrator: str) -> None:
 
 def test_layers_that_are_not_asked_for_are_not_made() -> None:
     """Only those that are, with their errors."""
-    assert render(room(8), 2).layers == {}
+    plain = render(room(8), 2)
+    assert plain.layers == plain.light_groups == plain.coverage == {}
     image = render(room(8), 2, aovs="indirect")
     assert list(image.layers) == list(image.errors) == ["indirect"]
     with pytest.raises(AttributeError, match="render it with aovs="):
@@ -225,13 +226,13 @@ def test_coverage_tells_shapes_apart_by_their_names() -> None:
     ]
     camera = wf.Camera.look_at((0, 0, 5), (0, 0, 0), fov=2 * np.degrees(np.arctan(1 / 5)), size=(16, 16))
     image = render(wf.Scene(shapes, [wf.Environment(1)], camera), 64, aovs=("alpha", "coverage"))
-    parts = {name: layer for name, layer in image.layers.items() if name.startswith("coverage.")}
-    assert list(parts) == ["coverage.left", "coverage.right", "coverage.hidden", "coverage.leaf"]
+    parts = image.coverage
+    assert list(parts) == ["left", "right", "hidden", "leaf"]
     np.testing.assert_allclose(sum(parts.values()), image.alpha, atol=1e-6)
-    assert parts["coverage.left"].mean() == pytest.approx(0.4 / 2, abs=0.01)
-    assert parts["coverage.right"].mean() == pytest.approx(0.25, abs=0.001)
-    assert parts["coverage.leaf"].mean() == pytest.approx(2 * 0.25 / 4, abs=0.001)
-    assert not parts["coverage.hidden"].any()
+    assert parts["left"].mean() == pytest.approx(0.4 / 2, abs=0.01)
+    assert parts["right"].mean() == pytest.approx(0.25, abs=0.001)
+    assert parts["leaf"].mean() == pytest.approx(2 * 0.25 / 4, abs=0.001)
+    assert not parts["hidden"].any()
 
 
 def test_errors_are_those_of_the_samples() -> None:

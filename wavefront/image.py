@@ -93,6 +93,22 @@ class Image:
         self.names = {kind: dict(table) for kind, table in (names or {}).items()}
         self.sums = sums
 
+    @property
+    def light_groups(self) -> dict[str, NDArray[np.float32]]:
+        """The radiance (H, W, 3) of each group of lights, by its name; empty if it was not asked for."""
+        return self._keyed("light_groups")
+
+    @property
+    def coverage(self) -> dict[str, NDArray[np.float32]]:
+        """The part (H, W) of each pixel that shapes cover, by their name; empty if it was not asked for."""
+        return self._keyed("coverage")
+
+    def _keyed(self, kind: str) -> dict[str, NDArray[np.float32]]:
+        prefix = kind + "."
+        return {
+            name.removeprefix(prefix): layer for name, layer in self.layers.items() if name.startswith(prefix)
+        }
+
     def __getattr__(self, name: str) -> NDArray[Any]:
         """Return a layer by its name."""
         if name in LAYERS:
