@@ -12,6 +12,8 @@ from __future__ import annotations
 import multiprocessing
 import os
 import sys
+import threading
+import time
 from concurrent.futures import Executor, ThreadPoolExecutor
 from functools import partial
 from typing import Any, TypeAlias
@@ -35,6 +37,9 @@ from .workers import (
 
 MIN_PATHS = 1 << 18  # fewer are traced sooner than processes are forked
 MIN_PATHS_TO_SPAWN = 1 << 22  # fewer are traced sooner than processes are spawned
+
+NAP = 0.02  # seconds for which other threads are watched
+BUSY = 0.25  # part of a core
 
 PROCESSES = ("processes", "spawn", "forkserver")  # names of executors whose workers are our own processes
 
@@ -162,7 +167,20 @@ def choose_executor(executor: str | ExecutorLike | None, workers: int, paths: in
         return executor
     without_lock = not getattr(sys, "_is_gil_enabled", lambda: True)()
     few = workers == 1 or paths < (MIN_PATHS if _forks() else MIN_PATHS_TO_SPAWN)
-    return "threads" if few or without_lock or obstacle else "processes"
+    threads = few or without_lock or obstacle or (_forks() and _other_threads_compute())
+    return "threads" if threads else "processes"
+
+
+def _other_threads_compute() -> bool:
+    """Return whether other threads of this process are busy.
+
+    Before a fork OpenBLAS waits for its own threads, forever if another thread uses them: `os.fork` hangs.
+    """
+    if threading.active_count() == 1:
+        return False
+    begin = time.process_time()
+    time.sleep(NAP)
+    return time.process_time() - begin > BUSY * NAP
 
 
 def needs_pickling(executor: str | ExecutorLike) -> bool:

@@ -1,0 +1,157 @@
+"""Renders on a cluster of Dask: the same bits, also when workers are lost. Skipped where Dask is missing."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+import scenes
+
+import wavefront as wf
+from wavefront.scheduling import delivery
+from wavefront.scheduling.pool import WorkerPool
+from wavefront.scheduling.shared import STOP, SharedInt, Stopped
+
+distributed = pytest.importorskip("distributed")
+QUIET = {"progress": False, "wave_size": 500}
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[Any]:
+    """A cluster of two processes of one thread each."""
+    settings = {"threads_per_worker": 1, "dashboard_address": None}
+    with distributed.LocalCluster(n_workers=2, **settings) as cluster, distributed.Client(cluster) as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def expected() -> bytes:
+    """The bits of one worker."""
+    return wf.render(scenes.everything(), 8, workers=1, executor="threads", **QUIET).rgb.tobytes()
+
+
+def tokens(client: Any) -> dict[str, list[str]]:
+    """Return what each worker keeps."""
+    return client.run(lambda: list(delivery._kept._entries))
+
+
+def test_a_cluster_gives_the_same_bits(client: Any, expected: bytes) -> None:
+    """The scene goes once to each worker; the cluster goes on to work for others."""
+    before = {name for names in tokens(client).values() for name in names}
+    image = wf.render(scenes.everything(), 8, executor=client, **QUIET)
+    assert image.rgb.tobytes() == expected
+    assert (image.metadata["executor"], image.metadata["workers"]) == ("Client", 2)
+    sent = [set(names) - before for names in tokens(client).values()]
+    assert len(set.union(*sent)) == 1
+    assert client.submit(abs, -1).result() == 1
+
+
+def test_pictures_come_while_a_cluster_renders(client: Any) -> None:
+    """After each pass."""
+    with wf.Session(scenes.everything(), 8, executor=client, **QUIET) as session:
+        images = list(session)
+    assert [image.spp for image in images if image.spp in (1, 2, 4, 8)] == [1, 2, 4, 8]
+
+
+def test_nothing_stays_on_the_cluster(client: Any) -> None:
+    """But the scene, for ten seconds, in the processes that had jobs."""
+    wf.render(scenes.everything(), 1, executor=client, **QUIET)
+    end = time.monotonic() + 30
+    while any(client.who_has().values()) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert not any(client.who_has().values())
+
+
+def wait_for_stop(stop: SharedInt, job: int) -> int:
+    end = time.monotonic() + 60
+    while job and not stop.value and time.monotonic() < end:
+        time.sleep(0.01)
+    if stop.value:
+        raise Stopped
+    return job
+
+
+def test_a_stop_ends_jobs_on_the_cluster(client: Any) -> None:
+    """Those under way, on this machine, and those that have not begun."""
+    stop = SharedInt()
+    begin = time.monotonic()
+    with WorkerPool(partial(wait_for_stop, stop), 2, client, stop) as pool:
+        results = pool.run(range(20))
+        assert next(results) == (0, 0)
+        stop.rise_to(STOP)
+        with pytest.raises(Stopped):
+            list(results)
+        pool.cancel()
+    assert time.monotonic() - begin < 20
+    assert client.submit(abs, -1).result() == 1
+
+
+def kill_once(path: str, job: int) -> int:
+    if job == 5 and not os.path.exists(path):
+        Path(path).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return job
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")  # of Dask, about the worker
+def test_a_worker_that_is_killed_in_the_middle_costs_its_jobs_alone(client: Any) -> None:
+    """The same bits come out."""
+    room = scenes.everything()
+    alone = wf.render(room, 64, workers=1, executor="threads", **QUIET)
+    (pid, *_), killed = list(client.run(os.getpid).values()), []
+
+    def kill(done: int, total: int) -> None:
+        if not killed and done > total / 3:
+            os.kill(pid, signal.SIGKILL)
+            killed.append(done)
+
+    image = wf.render(room, 64, executor=client, progress=kill, wave_size=500)
+    assert killed
+    assert image.rgb.tobytes() == alone.rgb.tobytes()
+    client.wait_for_workers(2, timeout=60)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")
+def test_all_workers_may_be_lost(client: Any, tmp_path: Path) -> None:
+    """With all copies of the work, as long as others come."""
+    pids, killed = client.run(os.getpid).values(), []
+
+    def jobs() -> Iterator[int]:
+        for job in range(40):
+            if job == 20:
+                for pid in pids:
+                    os.kill(pid, signal.SIGKILL)
+                killed.append(job)
+            yield job
+
+    with WorkerPool(partial(kill_once, str(tmp_path / "dead")), 2, client) as pool:
+        assert list(pool.run(jobs())) == [(job, job) for job in range(40)]
+    assert killed
+    client.wait_for_workers(2, timeout=60)
+
+
+@pytest.mark.slow
+def test_two_threads_of_a_worker_share_the_scene(expected: bytes) -> None:
+    """And a cluster in this process needs none but its own."""
+    settings = {"processes": False, "dashboard_address": None}
+    with (
+        distributed.LocalCluster(n_workers=1, threads_per_worker=2, **settings) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        assert wf.render(scenes.everything(), 8, executor=client, **QUIET).rgb.tobytes() == expected
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, 2, 3, 8])
+def test_any_number_of_jobs_at_once_gives_the_same_bits(client: Any, expected: bytes, workers: int) -> None:
+    """More than the cluster has threads, or fewer."""
+    image = wf.render(scenes.everything(), 8, workers=workers, executor=client, **QUIET)
+    assert image.rgb.tobytes() == expected

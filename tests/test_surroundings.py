@@ -1,0 +1,160 @@
+"""Renders beside other things: threads, worker processes, asyncio, notebooks and other libraries.
+
+Warnings are errors in all tests.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import multiprocessing
+import subprocess
+import sys
+import threading
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scenes
+from threadpoolctl import threadpool_info
+
+import wavefront as wf
+from wavefront.scheduling import executors
+
+QUIET = {"progress": False, "wave_size": 500}
+LINUX = sys.platform.startswith("linux")
+needs_fork = pytest.mark.skipif(not LINUX, reason="needs fork")
+NAMES = [
+    "threads",
+    pytest.param("processes", marks=needs_fork),
+    pytest.param("spawn", marks=pytest.mark.slow),
+]
+
+
+def bits(executor: str = "threads", workers: int = 2) -> bytes:
+    """Render, and return the bits of the picture."""
+    return wf.render(scenes.everything(), 8, workers=workers, executor=executor, **QUIET).rgb.tobytes()
+
+
+@pytest.fixture(scope="module")
+def expected() -> bytes:
+    """The bits of one worker."""
+    return bits(workers=1)
+
+
+@pytest.mark.parametrize("executor", NAMES)
+def test_two_renders_at_once(executor: str, expected: bytes) -> None:
+    """In two threads; BLAS has as many threads as before when both are over."""
+    before = threadpool_info()
+    threads_before = threading.active_count()
+    with ThreadPoolExecutor(2) as pool:
+        assert list(pool.map(bits, [executor] * 4)) == [expected] * 4
+    assert threadpool_info() == before
+    assert threading.active_count() == threads_before
+    assert not multiprocessing.active_children()
+
+
+@pytest.mark.parametrize(
+    "method", [pytest.param("fork", marks=needs_fork), pytest.param("spawn", marks=pytest.mark.slow)]
+)
+@pytest.mark.parametrize("executor", NAMES)
+def test_a_render_in_a_worker_process(method: str, executor: str, expected: bytes) -> None:
+    """Which has workers of its own."""
+    with ProcessPoolExecutor(1, multiprocessing.get_context(method)) as pool:
+        assert pool.submit(bits, executor).result() == expected
+
+
+@pytest.mark.parametrize("executor", NAMES)
+def test_a_render_in_asyncio(executor: str, expected: bytes) -> None:
+    """In a thread, while the loop goes on, and in the loop itself."""
+
+    async def both() -> tuple[bytes, int, bytes]:
+        render = asyncio.create_task(asyncio.to_thread(bits, executor))
+        turns = 0
+        while not render.done():
+            await asyncio.sleep(0.001)
+            turns += 1
+        return await render, turns, bits(executor)
+
+    aside, turns, within = asyncio.run(both())
+    assert (aside, within) == (expected, expected)
+    assert turns > 1
+
+
+@pytest.mark.parametrize("executor", [None, "threads", pytest.param("spawn", marks=pytest.mark.slow)])
+def test_beside_threads_of_blas(
+    executor: str | None, expected: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """That multiply all the while: a fork would wait for them forever, so by default there is none."""
+    monkeypatch.setattr(executors, "MIN_PATHS", 1)
+    over = threading.Event()
+    matrix = np.ones((300, 300))
+
+    def multiply() -> None:
+        while not over.is_set():
+            matrix @ matrix
+
+    others = [threading.Thread(target=multiply, daemon=True) for _ in range(2)]
+    for each in others:
+        each.start()
+    try:
+        image = wf.render(scenes.everything(), 8, workers=2, executor=executor, **QUIET)
+    finally:
+        over.set()
+        for each in others:
+            each.join(60)
+    assert image.rgb.tobytes() == expected
+    assert image.metadata["executor"] == (executor or "threads")
+
+
+@pytest.mark.parametrize("executor", NAMES)
+def test_beside_threads_that_python_warns_of(executor: str) -> None:
+    """A script with threads and a pool of its own ends, with nothing on stderr."""
+    script = f"""
+import threading
+import numpy as np
+import wavefront as wf
+from concurrent.futures import ThreadPoolExecutor
+pool = ThreadPoolExecutor(2)
+list(pool.map(np.linalg.inv, np.stack([np.eye(200)] * 8)))
+ball = [wf.Sphere((0, 0, 0), 1), wf.Environment(1)]
+for _ in range(2):
+    print(wf.render(ball, 4, size=(16, 16), workers=2, executor={executor!r}).rgb.sum())
+"""
+    command = [sys.executable, "-W", "error", "-c", script]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.stderr == ""
+    assert len(done.stdout.split()) == 2
+    assert len(set(done.stdout.split())) == 1
+
+
+NOTEBOOK = """
+import warnings
+warnings.simplefilter("error")
+import numpy as np
+import wavefront as wf
+class Gray(wf.Bsdf):
+    def f(self, wo, wi):
+        return (wi[2] > 0) * np.full_like(wi, 0.1)
+ball = [wf.Sphere((0, 0, 0), 1, material=Gray()), wf.Environment(1)]
+sums = {str(wf.render(ball, 8, size=(32, 32), workers=2, executor=executor).rgb.sum())
+        for executor in ("threads", "processes", "spawn", None)}
+print(len(sums), end="")
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")  # of the client that runs the notebook
+@needs_fork
+def test_a_render_in_a_notebook(tmp_path: Path) -> None:
+    """With classes of the notebook, in every kind of worker; a second cell renders again."""
+    nbformat = pytest.importorskip("nbformat")
+    nbclient = pytest.importorskip("nbclient")
+    pytest.importorskip("ipykernel")
+    cells = [nbformat.v4.new_code_cell(NOTEBOOK) for _ in range(2)]
+    notebook = nbformat.v4.new_notebook(cells=cells)
+    nbclient.NotebookClient(
+        notebook, timeout=120, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}
+    ).execute()
+    for cell in notebook.cells:
+        assert [output.get("text") for output in cell.outputs] == ["1"], cell.outputs
