@@ -11,6 +11,7 @@ from PIL import Image
 from wavefront.errors import SceneError
 from wavefront.io import markup, threemf
 from wavefront.io.load import from_trimesh, load, load_mesh, load_meshes
+from wavefront.io.sources import LoadLimits
 
 OFF = "OFF # a comment\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n\n0 1 0\n3 0 1 2\n3 0 2 3\n"
 
@@ -360,9 +361,8 @@ def test_members_of_3mf_are_limited(write, monkeypatch):
     pytest.importorskip("networkx")
     bomb = package(**{"zeros": bytes(2**22)})
     assert len(bomb) < 2**14
-    monkeypatch.setattr(threemf, "MAX_UNPACKED", 2**22)
     with pytest.raises(SceneError, match=r"a\.3mf: unpacks to \d+ bytes; the limit is 4194304"):
-        load_meshes(write(bomb, "a.3mf"))
+        load_meshes(write(bomb, "a.3mf"), limits=LoadLimits(unpacked_bytes=2**22))
     monkeypatch.setattr(threemf, "MAX_MEMBERS", 3)
     with pytest.raises(SceneError, match=r"a\.3mf: has 6 members; the limit is 3"):
         load_meshes(write(package(**{str(i): b"" for i in range(5)}), "a.3mf"))

@@ -17,8 +17,9 @@ from wavefront import Camera, Scene, render
 from wavefront.bsdfs import Dielectric, Diffuse, Principled, ThinDielectric
 from wavefront.codecs.encoding import srgb_to_linear
 from wavefront.errors import SceneError
-from wavefront.io import appearance, gltf_document, gltf_materials, placing
+from wavefront.io import appearance, gltf_document, placing
 from wavefront.io.load import from_trimesh, load, load_mesh, load_meshes
+from wavefront.io.sources import LoadLimits
 from wavefront.lights import DirectionalLight, SpotLight
 from wavefront.materials import Material
 from wavefront.shapes import Instance, Mesh
@@ -230,7 +231,7 @@ def test_what_instances_have_besides_is_named(build, path):
         ),
         (
             {"TRANSLATION": np.zeros((2**20 + 1, 3), np.int8)},
-            r"a\.gltf: nodes\[0\]: its nodes place 1048577 meshes so far; the limit is max_instances=1048576",
+            r"a\.gltf: nodes\[0\]: its nodes place 1048577 meshes so far; the limit is 1048576",
         ),
     ],
 )
@@ -284,18 +285,16 @@ def test_what_a_file_may_multiply_to_is_limited(build, path):
     build.json["nodes"] *= 1000
     build.json["scenes"][0]["nodes"] = list(range(1000))
     build.gltf(path)
-    message = (
-        r"a\.gltf: nodes\[998\]: its nodes place 2097152 meshes so far; the limit is max_instances=1048576"
-    )
+    message = r"a\.gltf: nodes\[998\]: its nodes place 2097152 meshes so far; the limit is 1048576"
     with pytest.raises(SceneError, match=message):
         load(path)
     build.json["nodes"] = build.json["nodes"][:1]
     build.json["scenes"][0]["nodes"] = [0]
     build.json["accessors"][0]["count"] = 5
     build.gltf(path)
-    assert len(load(path, max_instances=5).shapes) == 5
-    with pytest.raises(SceneError, match="place 5 meshes so far; the limit is max_instances=4"):
-        load(path, max_instances=4)
+    assert len(load(path, limits=LoadLimits(instances=5)).shapes) == 5
+    with pytest.raises(SceneError, match="place 5 meshes so far; the limit is 4 "):
+        load(path, limits=LoadLimits(instances=4))
 
 
 def test_how_many_triangles_are_copied_is_limited(build, path, monkeypatch):
@@ -1369,22 +1368,23 @@ def test_a_missing_buffer_names_both_files(build, path):
         load(path)
 
 
-def test_how_many_pixels_the_images_have_is_limited(build, path, monkeypatch):
+def test_how_many_pixels_the_images_have_is_limited(build, path):
     """A view of the buffer may serve any number of images."""
     info = build.image(np.zeros((4, 4, 3), np.uint8))
-    build.json["images"] *= 3
-    build.json["textures"] = [{"source": i} for i in range(3)]
+    build.json["images"] *= 5
+    build.json["textures"] = [{"source": i} for i in range(5)]
     build.material(
         normalTexture=info, emissiveFactor=[1, 1, 1], emissiveTexture={"index": 1},
-        pbrMetallicRoughness={"baseColorTexture": {"index": 2}},
+        pbrMetallicRoughness={"baseColorTexture": {"index": 2}, "metallicRoughnessTexture": {"index": 3}},
+        extensions={"KHR_materials_clearcoat": {"clearcoatFactor": 1, "clearcoatTexture": {"index": 4}}},
     ).gltf(path)  # fmt: skip
-    monkeypatch.setattr(gltf_materials, "MAX_ALL_PIXELS", 48)
-    load(path)
-    monkeypatch.setattr(gltf_materials, "MAX_ALL_PIXELS", 47)
+    load(path, limits=LoadLimits(pixels=20))
     with pytest.raises(
-        SceneError, match=r"images\[\d\] brings the images to 48 pixels in all; the limit is 47"
+        SceneError, match=r"images\[\d\] brings the images to 80 pixels in all; the limit is 76"
     ):
-        load(path)
+        load(path, limits=LoadLimits(pixels=19))
+    with pytest.raises(SceneError, match=r"images\[\d\]: image has 4 × 4 pixels; the limit is 15"):
+        load(path, limits=LoadLimits(pixels=15))
 
 
 @pytest.mark.parametrize("part", [0.1, 0.3, 0.6, 0.95, 0.999])

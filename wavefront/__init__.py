@@ -74,6 +74,7 @@ if TYPE_CHECKING:
     from .animation import save_animation
     from .camera.moves import interpolate_cameras, orbit
     from .io.load import from_trimesh, load, load_mesh
+    from .io.sources import LoadLimits
     from .metrics import Comparison, compare
     from .views import render_many, turntable
 
@@ -84,6 +85,7 @@ _LATER = {  # what many programs do without is imported when they ask for it
     "compare": ".metrics",
     "from_trimesh": ".io.load",
     "interpolate_cameras": ".camera.moves",
+    "LoadLimits": ".io.sources",
     "load": ".io.load",
     "load_mesh": ".io.load",
     "orbit": ".camera.moves",
@@ -122,6 +124,7 @@ __all__ = [
     "LightRecord",
     "LightSample",
     "LightSampler",
+    "LoadLimits",
     "Material",
     "Medium",
     "Mesh",

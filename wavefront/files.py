@@ -1,4 +1,4 @@
-"""Reading and writing of files: regular files only, whole files only, nothing outside a scene's folder."""
+"""Reading and writing of files: regular files only, whole files only."""
 
 from __future__ import annotations
 
@@ -68,38 +68,12 @@ def decode_text(data: bytes) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def beside(scene: str | os.PathLike[str], reference: str) -> Path:
-    """Return the path of a file that `scene` refers to by a relative name.
-
-    A scene file from elsewhere must not make the program read arbitrary files. So the target must be inside
-    the scene's folder, also after symbolic links are followed.
-
-    Raises
-    ------
-    SceneError
-        If the name is a URI, absolute, or leads out of the folder.
-    """
-    folder = Path(os.fspath(scene)).resolve().parent
-    name = reference.replace("\\", "/")
-    if "://" in name or name.lower().startswith(("http:", "https:", "file:", "ftp:")):
-        raise SceneError(f"{scene}: refers to {reference!r}; only files in its own folder are read")
-    if name.startswith("/") or name[1:2] == ":":
-        raise SceneError(f"{scene}: refers to {reference!r}; an absolute path is not followed")
-    try:
-        target = (folder / name).resolve()
-    except (OSError, RuntimeError, ValueError) as error:
-        raise SceneError(f"{scene}: refers to {reference!r}: {error}") from error
-    if not target.is_relative_to(folder):
-        raise SceneError(f"{scene}: refers to {reference!r}, which is outside its folder")
-    return folder / name
-
-
-def check_size(height: int, width: int) -> None:
-    """Refuse images that are empty or have more than `MAX_PIXELS` pixels, with a SceneError."""
+def check_size(height: int, width: int, most: float = MAX_PIXELS) -> None:
+    """Refuse images that are empty or have more than `most` pixels, with a SceneError."""
     if height < 1 or width < 1:
         raise SceneError(f"image has {width} × {height} pixels; it must have at least one")
-    if height * width > MAX_PIXELS:
-        raise SceneError(f"image has {width} × {height} pixels; the limit is {MAX_PIXELS}")
+    if height * width > most:
+        raise SceneError(f"image has {width} × {height} pixels; the limit is {most}")
 
 
 def path_name(path: str | os.PathLike[str], error: type[SceneError] = SceneError) -> str:

@@ -10,6 +10,7 @@ from ..errors import SceneError
 from ..vec import Bools, Floats, Ints, cross, dot, f4, length
 from . import triangle
 from .base import Geometry, Intersections
+from .duplicates import first_of_equals
 from .numpy_accel import NumpyAccelerator
 
 
@@ -38,7 +39,8 @@ class EmbreeAccelerator:
         self._geometry = geometry
         triangles = np.ascontiguousarray(geometry.triangles, f4)
         with np.errstate(all="ignore"):
-            ids = np.flatnonzero(triangle.has_area(triangles))
+            # Embree returns any of several triangles at the same distance
+            ids = np.flatnonzero(triangle.has_area(triangles) & first_of_equals(triangles))
         self._ids = np.append(ids, -1)  # (k + 1,) ids by Embree's primitive; the last one is for misses
         self._scene: Any = None
         if ids.size:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SaveError, SceneError
-from ..files import check_size
+from ..files import MAX_PIXELS, check_size
 from ..layers import components
 from ..vec import Floats
 from .image_data import ERROR, ImageData, from_json, from_named, to_json
@@ -74,7 +74,7 @@ def _fits(value: Any) -> bool:
     return isinstance(value, int | float) or (isinstance(value, str) and value.isprintable())
 
 
-def decode(data: bytes) -> Floats:
+def decode(data: bytes, max_pixels: int = MAX_PIXELS) -> Floats:
     """Return the pixels of the first part of an exr file, (H, W, C) float32, top row first.
 
     The channels C are R, G, B and A if they exist, else the first channel by name.
@@ -84,7 +84,7 @@ def decode(data: bytes) -> Floats:
     SceneError
         If the file claims too much, holds deep pixels, or a part of it cannot be decoded.
     """
-    channels = _channels(data)
+    channels = _channels(data, max_pixels)
     names = [n for n in ("R", "G", "B", "A") if n in channels] or sorted(channels)[:1]
     return np.stack([channels[name]().astype(np.float32, copy=False) for name in names], axis=-1)
 
@@ -124,12 +124,12 @@ def _array(words: list[NDArray[Any]], part: dict[str, Any]) -> NDArray[Any]:
     return values.reshape(*stacked.shape[:2], *part["shape"])
 
 
-def _channels(data: bytes) -> dict[str, Callable[[], NDArray[Any]]]:
+def _channels(data: bytes, max_pixels: int = MAX_PIXELS) -> dict[str, Callable[[], NDArray[Any]]]:
     """Return functions for the channels (H, W) of the first part of an exr file, by name."""
     import OpenEXR
 
     claimed = OpenEXR.File(BytesIO(data), header_only=True).parts
-    size = _check_claims(claimed, len(data))
+    size = _check_claims(claimed, len(data), max_pixels)
     # OpenEXR decodes all parts, and leaves out those that it cannot decode.
     parts = OpenEXR.File(BytesIO(data), separate_channels=True).parts
     read = {(part.part_index, part.name()) for part in parts}
@@ -149,18 +149,18 @@ def _pixels(name: str, values: NDArray[Any], size: tuple[int, int]) -> NDArray[A
     return values
 
 
-def _check_claims(parts: list[Any], size: int) -> tuple[int, int]:
+def _check_claims(parts: list[Any], size: int, max_pixels: int) -> tuple[int, int]:
     """Check the headers of all parts, and return (height, width) of the first one."""
     import OpenEXR
 
     if not parts:
         raise SceneError("has no picture: its header is damaged")
-    values, most = 0, max(MAX_VALUES, VALUES_PER_BYTE * size)
+    values, most = 0, max(MAX_VALUES * max(1, max_pixels // MAX_PIXELS), VALUES_PER_BYTE * size)
     for part in parts:
         if part.type() in (OpenEXR.deepscanline, OpenEXR.deeptile):
             raise SceneError(f"part {part.part_index} holds deep pixels; only flat pictures are read")
         height, width = _window(part)
-        check_size(height, width)
+        check_size(height, width, max_pixels)
         values += height * width * len(part.header["channels"])
     if values > most:
         raise SceneError(

@@ -10,7 +10,7 @@ import re
 import numpy as np
 
 from ..errors import SceneError
-from ..files import check_size
+from ..files import MAX_PIXELS, check_size
 from ..vec import Bytes, Floats
 
 SIGNATURES = (b"#?RADIANCE", b"#?RGBE")
@@ -29,7 +29,7 @@ def encode(pixels: Floats) -> bytes:
     return header + b"".join(rows)
 
 
-def decode(data: bytes) -> Floats:
+def decode(data: bytes, max_pixels: int = MAX_PIXELS) -> Floats:
     """Return the pixels (H, W, 3) of a .hdr file, top row first.
 
     Raises
@@ -45,7 +45,7 @@ def decode(data: bytes) -> Floats:
     if (head[2], head[4]) != (b"-Y", b"+X"):
         raise SceneError(f"rows run {(head[2] + b' ' + head[4]).decode()}; only -Y +X is read")
     height, width = int(head[3]), int(head[5])
-    check_size(height, width)
+    check_size(height, width, max_pixels)
     return from_rgbe(_scanlines(np.frombuffer(data, np.uint8, offset=head.end()), height, width))
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SaveError, SceneError
-from ..files import check_size, check_target, path_name, read_bytes, write_bytes
+from ..files import MAX_PIXELS, check_size, check_target, path_name, read_bytes, write_bytes
 from ..registry import Registry
 from ..vec import Floats
 from . import exr, npz
@@ -29,9 +29,8 @@ from .image_data import TRANSPARENT, ImageData
 
 T = TypeVar("T")
 
-Decoder: TypeAlias = Callable[
-    [bytes], NDArray[Any]
-]  # returns uint8 or uint16 codes, or linear float32, (H, W, C)
+# called with a file and the most pixels; returns uint8 or uint16 codes, or linear float32, (H, W, C)
+Decoder: TypeAlias = Callable[[bytes, int], NDArray[Any]]
 # called with an adjusted picture, how it is shown, and the bits of a code; returns the file
 Encoder: TypeAlias = Callable[[ImageData, Display, int], bytes]
 
@@ -122,9 +121,9 @@ def read_image(path: str | os.PathLike[str]) -> Floats:
     return codes.astype(np.float32) / np.float32(np.iinfo(codes.dtype).max)
 
 
-def read_codes(path: str | os.PathLike[str]) -> NDArray[Any]:
+def read_codes(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> NDArray[Any]:
     """Return the pixels of an image file as stored, uint8, uint16 or float32, (H, W, C)."""
-    decode = _find(IMAGE_READERS, path)
+    decode = _at_most(max_pixels, _find(IMAGE_READERS, path))
     return _decode(os.fspath(path), decode, read_bytes(path), Path(path).suffix.lower()[1:])
 
 
@@ -146,7 +145,7 @@ def read_picture(path: str | os.PathLike[str]) -> ImageData:
     found = None if whole is None else _decode(name, whole, data, extension[1:])
     if found is not None:
         return found
-    pixels = _decode(name, decode, data, extension[1:])
+    pixels = _decode(name, _at_most(MAX_PIXELS, decode), data, extension[1:])
     if not 1 <= pixels.shape[2] <= 4:
         raise SceneError(f"{name}: has {pixels.shape[2]} channels; a picture has 1 to 4")
     is_coded = pixels.dtype != np.float32
@@ -164,9 +163,14 @@ def three_channels(pixels: NDArray[Any]) -> NDArray[Any]:
     return pixels[..., :3] if pixels.shape[2] > 2 else np.repeat(pixels[..., :1], 3, axis=2)
 
 
-def decode_codes(data: bytes, name: str) -> NDArray[Any]:
+def decode_codes(data: bytes, name: str, max_pixels: int = MAX_PIXELS) -> NDArray[Any]:
     """Return the stored values (H, W, C) of a png or jpg in memory; `name` is for messages."""
-    return _decode(name, coded.decode, data, "png")
+    return _decode(name, _at_most(max_pixels, coded.decode), data, "png")
+
+
+def _at_most(max_pixels: int, decode: Decoder) -> Callable[[bytes], NDArray[Any]]:
+    """Return a decoder of pictures of so many pixels."""
+    return lambda data: decode(data, max_pixels)
 
 
 def _decode(name: str, decode: Callable[[bytes], T], data: bytes, kind: str) -> T:
@@ -226,11 +230,11 @@ def _encode_npy(pixels: Floats) -> bytes:
     return buffer.getvalue()
 
 
-def _decode_npy(data: bytes) -> Floats:
+def _decode_npy(data: bytes, max_pixels: int) -> Floats:
     pixels = np.load(BytesIO(data), allow_pickle=False)
     if pixels.ndim not in (2, 3) or pixels.dtype.kind not in "fiub":
         raise SceneError(f"array is {pixels.dtype} of shape {pixels.shape}; an image is (H, W) or (H, W, C)")
-    check_size(pixels.shape[0], pixels.shape[1])
+    check_size(pixels.shape[0], pixels.shape[1], max_pixels)
     return np.atleast_3d(pixels).astype(np.float32)
 
 
@@ -256,10 +260,11 @@ def _whole(encode: Callable[[ImageData], bytes]) -> Encoder:
 def _checked_pixels(decode: Callable[[bytes], Any]) -> Decoder:
     """Return a decoder that checks what `decode`, a user's own function, returns."""
 
-    def checked(data: bytes) -> NDArray[Any]:
+    def checked(data: bytes, max_pixels: int) -> NDArray[Any]:
         pixels = np.asarray(decode(data))
         if pixels.ndim != 3 or not 1 <= pixels.shape[2] <= 4 or not pixels.size:
             raise SceneError(f"the reader returned the shape {pixels.shape}; an image is (H, W, 1 to 4)")
+        check_size(pixels.shape[0], pixels.shape[1], max_pixels)
         return pixels if pixels.dtype in (np.uint8, np.uint16) else pixels.astype(np.float32)
 
     return checked
@@ -273,7 +278,7 @@ IMAGE_READERS: Registry[Decoder] = Registry(
         ".exr": exr.decode,
         ".hdr": rgbe.decode,
         ".npy": _decode_npy,
-        ".npz": lambda data: npz.decode(data).rgb,
+        ".npz": lambda data, max_pixels: npz.decode(data).rgb,
     },
     adapt=_checked_pixels,
 )

@@ -13,6 +13,7 @@ from typing import Any
 from ..errors import SceneError
 from .markup import check_expanded, look_through, need, total
 from .repair import warn
+from .sources import SceneFiles
 from .trimesh_loading import Images, by_trimesh
 
 LOST = ("instance_controller", "instance_light", "instance_camera", "lines", "linestrips", "animation")
@@ -20,7 +21,7 @@ PRIMITIVES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
 PLACES = ("node", "visual_scene", "scene")  # elements that hold nodes, or refer to them
 
 
-def parse(path: str | os.PathLike[str], data: bytes, strict: bool, materials: bool) -> Any:
+def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> Any:
     """Return the trimesh scene of a COLLADA file.
 
     Raises
@@ -28,13 +29,13 @@ def parse(path: str | os.PathLike[str], data: bytes, strict: bool, materials: bo
     SceneError
         If pycollada is missing, or the file is malformed; the message names the file and the error.
     """
-    name = os.fspath(path)
+    name = os.fspath(files.scene)
     need(name, ".dae", ("collada", "pycollada"))
     if zipfile.is_zipfile(BytesIO(data)):  # an archive may begin after other bytes
         raise SceneError(f"{name}: is an archive; unpack it first")
     document = _Document(name, data)
     check_expanded(name, document.children, document.sizes, "scene")
-    images = Images(path)
+    images = Images(files)
     found = by_trimesh(name, data, "dae", images)
     lost = [f"{tag} (line {line})" for tag, line in document.lost.items()]
     if any(map(_is_clear, found.geometry.values())):

@@ -34,20 +34,18 @@ class GltfContents:
     camera: Camera | None = None
 
 
-def contents(document: Document, max_instances: int) -> GltfContents:
+def contents(document: Document) -> GltfContents:
     """Read the default scene.
 
     Parameters
     ----------
     document
         The file.
-    max_instances
-        Number of meshes at most that all its nodes place.
 
     Raises
     ------
     SceneError
-        If an element is missing or malformed, or the nodes place more meshes.
+        If an element is missing or malformed, or the nodes place more meshes than its limits allow.
     """
     out = GltfContents()
     numbers: dict[int, list[int]] = {}  # by mesh of the file: the indices of its parts among `out.raws`
@@ -61,9 +59,10 @@ def contents(document: Document, max_instances: int) -> GltfContents:
                 parts = _parts(document, out, numbers, json["mesh"])
                 count = count_placements(document, node)
                 total = len(of) + count * len(parts)
-                if total > max_instances:
+                if total > document.files.limits.instances:
                     raise SceneError(
-                        f"its nodes place {total} meshes so far; the limit is max_instances={max_instances}"
+                        f"its nodes place {total} meshes so far; the limit is "
+                        f"{document.files.limits.instances} (LoadLimits.instances)"
                     )
                 of += parts * count
                 names += _names_of_parts(node, len(parts)) * count

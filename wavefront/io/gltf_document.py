@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
-from ..files import beside, read_bytes
 from ..shapes.transform import Matrix
+from .sources import MAX_TRIANGLES, SceneFiles
 
 COMPONENTS: dict[int, type[np.generic]] = {
     5120: np.int8,
@@ -44,9 +44,9 @@ MALFORMED = (TypeError, KeyError, AttributeError, IndexError, ValueError, Overfl
 class Document:
     """The JSON of a file and the bytes that it refers to. Errors name the file and the element."""
 
-    def __init__(self, path: str | os.PathLike[str], data: bytes) -> None:
-        self.path = path
-        self.name = os.fspath(path)
+    def __init__(self, files: SceneFiles, data: bytes) -> None:
+        self.files = files
+        self.name = os.fspath(files.scene)
         text, self._binary = _chunks(self.name, data) if data[:4] == b"glTF" else (data, None)
         try:
             self.json = json.loads(text)
@@ -116,7 +116,7 @@ class Document:
         if not uri.startswith("data:"):
             if uri not in self._files:
                 with self.inside(where):
-                    self._files[uri] = read_bytes(beside(self.path, unquote(uri)))
+                    self._files[uri] = self.files.read(self.files.find(unquote(uri)))
             return self._files[uri]
         try:
             return base64.b64decode(uri.partition(",")[2], validate=True)
@@ -125,7 +125,7 @@ class Document:
 
     def is_missing(self, uri: str) -> bool:
         """Return whether a URI names a file that does not exist."""
-        return not uri.startswith("data:") and not beside(self.path, unquote(uri)).exists()
+        return not uri.startswith("data:") and not self.files.find(unquote(uri)).exists()
 
     def buffer(self, index: Any) -> bytes:
         """Return the bytes of a buffer."""
@@ -173,15 +173,16 @@ class Document:
                 f"{self.name}: {where} is {shown(item.get('type'))} of {shown(item.get('componentType'))}, "
                 "which glTF does not have"
             )
-        if count * width > MAX_ELEMENTS:
+        scale = max(1, self.files.limits.triangles // MAX_TRIANGLES)  # where the user allows larger meshes
+        if count * width > MAX_ELEMENTS * scale:
             raise SceneError(
-                f"{self.name}: {where} has {count} elements; the limit is {MAX_ELEMENTS // width}"
+                f"{self.name}: {where} has {count} elements; the limit is {MAX_ELEMENTS * scale // width}"
             )
         self._numbers += count * width
-        if self._numbers > MAX_NUMBERS:
+        if self._numbers > MAX_NUMBERS * scale:
             raise SceneError(
                 f"{self.name}: {where}: the accessors that its meshes read have {self._numbers} numbers "
-                f"so far; the limit is {MAX_NUMBERS}"
+                f"so far; the limit is {MAX_NUMBERS * scale}"
             )
         if "bufferView" in item:
             values = self._strided(item, count, width, kind, where)

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from ..codecs.images import decode_codes
 from ..elementary import log, sin_cos_turns
 from ..errors import SceneError
-from ..files import MAX_PIXELS
 from ..textures.image import Texture
 from ..textures.normal_map import NormalMap
 from ..textures.parameter import MAX_INDEX
@@ -41,7 +40,7 @@ KNOWN = frozenset(
         "texture_transform",
     )
 ) | {"EXT_mesh_gpu_instancing"}
-MAX_ALL_PIXELS = 4 * MAX_PIXELS  # of all images of a file, decoded
+IMAGES = 4  # all images of a file may have so many times the pixels of the largest
 BESIDE = frozenset(  # extensions that may occur with specular-glossiness; the others exclude it
     ("KHR_materials_pbrSpecularGlossiness", "KHR_materials_emissive_strength", "KHR_texture_transform")
 )
@@ -125,11 +124,13 @@ class GltfMaterials:
             name = name if uri.startswith("data:") else f"{name} ({uri})"
         else:
             raise SceneError(f"{name} has neither a uri nor a bufferView")
-        codes = decode_codes(content, name)
+        limits = document.files.limits
+        codes = decode_codes(content, name, limits.pixels)
         self._pixels += codes.shape[0] * codes.shape[1]
-        if self._pixels > MAX_ALL_PIXELS:
+        if self._pixels > IMAGES * limits.pixels:
             raise SceneError(
-                f"{name} brings the images to {self._pixels} pixels in all; the limit is {MAX_ALL_PIXELS}"
+                f"{name} brings the images to {self._pixels} pixels in all; "
+                f"the limit is {IMAGES * limits.pixels}"
             )
         return codes
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -16,8 +17,9 @@ from ..scene import Scene
 from ..shapes import Instance, Mesh, Shape
 from . import trimesh_objects, trimesh_view
 from .joining import join
-from .placing import MAX_INSTANCES, place_meshes, place_shapes
-from .readers import PathLike, Wish, read
+from .placing import place_meshes, place_shapes
+from .readers import Wish, read
+from .sources import LoadLimits, PathLike, checked_limits, folders
 
 T = TypeVar("T")
 
@@ -27,7 +29,8 @@ def load(
     *,
     strict: bool = False,
     progress: Progress = None,
-    max_instances: int = MAX_INSTANCES,
+    limits: LoadLimits | None = None,
+    search_paths: PathLike | Sequence[PathLike] = (),
 ) -> Scene:
     """Read a scene: .obj (with its .mtl), .ply, .stl, .glb, .gltf, .off, .dae, .3mf.
 
@@ -38,13 +41,15 @@ def load(
     Parameters
     ----------
     path
-        The file. Files that it refers to are read only from its own folder.
+        The file. Files that it refers to are read only from its own folder, and folders below it.
     strict
         Raise an error in place of each warning of a repair or of an unsupported property.
     progress
         If reading takes more than 2 s, True or None shows a line with the file's name; False shows nothing.
-    max_instances
-        Number of meshes at most that a glTF file places: a file of a few bytes may place millions.
+    limits
+        How large the file, its images and its meshes may be; None for the defaults of `LoadLimits`.
+    search_paths
+        A folder, or several, where files that it refers to may be, too.
 
     Raises
     ------
@@ -52,7 +57,8 @@ def load(
         If the file cannot be read. The message names the file, the line or element, the value and the limit.
     """
     with _phase(path, progress):
-        name, contents = os.fspath(path), read(path, Wish(strict, max_instances=max_instances))
+        wish = Wish(strict, limits=checked_limits(limits), search_paths=folders(search_paths))
+        name, contents = os.fspath(path), read(path, wish)
         placed = place_shapes(name, contents.raws, contents.places, strict)
         return Scene(_some(name, [*placed, *contents.shapes]), contents.lights, contents.camera)
 
@@ -64,6 +70,8 @@ def load_mesh(
     *,
     strict: bool = False,
     progress: Progress = None,
+    limits: LoadLimits | None = None,
+    search_paths: PathLike | Sequence[PathLike] = (),
 ) -> Mesh:
     """Read all geometry of a file as one mesh.
 
@@ -76,7 +84,7 @@ def load_mesh(
         one.
     transform
         (4, 4) matrix applied to the vertices.
-    strict, progress
+    strict, progress, limits, search_paths
         As for `load`.
 
     Raises
@@ -85,13 +93,23 @@ def load_mesh(
         As for `load`.
     """
     with _phase(path, progress):
-        meshes = load_meshes(path, strict=strict, materials=material is None)
+        meshes = load_meshes(
+            path, strict=strict, materials=material is None, limits=limits, search_paths=search_paths
+        )
         return join(meshes, Path(path).stem, material, transform)
 
 
-def load_meshes(path: PathLike, *, strict: bool = False, materials: bool = True) -> list[Mesh]:
+def load_meshes(
+    path: PathLike,
+    *,
+    strict: bool = False,
+    materials: bool = True,
+    limits: LoadLimits | None = None,
+    search_paths: PathLike | Sequence[PathLike] = (),
+) -> list[Mesh]:
     """Read the meshes of a file, one for each material and node; arguments as for `load`."""
-    name, contents = os.fspath(path), read(path, Wish(strict, materials))
+    wish = Wish(strict, materials, checked_limits(limits), folders(search_paths))
+    name, contents = os.fspath(path), read(path, wish)
     placed = place_meshes(name, contents.raws, contents.places, strict)
     return _some(name, [*placed, *(_as_mesh(name, shape) for shape in contents.shapes)])
 

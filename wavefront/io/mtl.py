@@ -43,7 +43,6 @@ from numpy.typing import NDArray
 
 from ..bsdfs import Dielectric, Diffuse, Mirror
 from ..errors import SceneError
-from ..files import beside
 from ..materials import Material
 from ..textures.image import Texture
 from ..textures.normal_map import BaseNormalMap, BumpMap, NormalMap
@@ -51,6 +50,7 @@ from ..textures.parameter import MAX_INDEX
 from ..vec import Doubles
 from .appearance import MaterialSpec, build_material
 from .repair import warn
+from .sources import LoadLimits, SceneFiles
 
 GLASS = (4, 6, 7, 9)
 MIRROR = (3, 5, 8)
@@ -93,6 +93,7 @@ class Entry:
     read: set[str] = field(default_factory=set)  # keywords that the material uses
     idle_options: set[str] = field(default_factory=set)  # options of maps that are not honored
     images: dict[str, NDArray[np.uint8]] = field(default_factory=dict)  # maps that were read already
+    files: SceneFiles | None = None  # None where all maps were read already
     strict: bool = False
 
     def where(self, key: str) -> str:
@@ -148,7 +149,7 @@ class Entry:
             raise SceneError(f"{self.where(key)} names no file")
         self.read.add(key)
         base, gain = self._option(options, "-mm", [0.0, 1.0])
-        source = self.images[key] if key in self.images else self.beside(key, name)
+        source = self.images[key] if key in self.images else self.find(key, name)
         try:
             return Texture(
                 source,
@@ -158,14 +159,15 @@ class Entry:
                 channel=self._channel(options) if kind == "scalar" else None,
                 scale=np.asarray(scale) * gain,
                 offset=np.asarray(scale) * base,
+                max_pixels=LoadLimits().pixels if self.files is None else self.files.limits.pixels,
             )
         except SceneError as error:
             raise SceneError(f"{self.where(key)}: {error}") from error
 
-    def beside(self, key: str, name: str) -> Path:
+    def find(self, key: str, name: str) -> Path:
         """Return the path of the file in a line."""
         try:
-            return beside(self.file, name)
+            return (self.files or SceneFiles(self.file)).find(name, self.file)
         except SceneError as error:
             raise SceneError(f"{self.where(key)}: {error}") from error
 
@@ -211,8 +213,10 @@ def _spellings(value: float) -> set[str]:
     return {f"{value:.{digits}f}" for digits in range(10)} | {f"{value:g}"}
 
 
-def parse(path: str | os.PathLike[str], text: str, strict: bool = False) -> dict[str, Entry]:
-    """Split MTL text into materials; a name may contain spaces.
+def parse(
+    path: str | os.PathLike[str], text: str, strict: bool = False, files: SceneFiles | None = None
+) -> dict[str, Entry]:
+    """Split MTL text into materials; a name may contain spaces. Their maps are among `files`.
 
     Raises
     ------
@@ -227,7 +231,7 @@ def parse(path: str | os.PathLike[str], text: str, strict: bool = False) -> dict
         if not keyword:
             continue
         if key == "newmtl":
-            current = entries[rest] = Entry(file, rest, strict=strict)
+            current = entries[rest] = Entry(file, rest, strict=strict, files=files)
         elif current is None:
             raise SceneError(f"{file} line {number}: {keyword} stands before the first newmtl")
         else:
@@ -281,7 +285,7 @@ def _leave_out_missing(entry: Entry) -> None:
     """Warn of maps whose files are missing; the material is read without them."""
     for key in [key for key in entry.lines if key in MAPS and key not in entry.images]:
         name = _map(entry, key)[1]
-        if name and not os.path.exists(entry.beside(key, name)):
+        if name and not os.path.exists(entry.find(key, name)):
             warn(f"{entry.where(key)}: texture {name!r} is missing", entry.strict)
             del entry.lines[key]
 

@@ -13,7 +13,6 @@ from ..shapes.instance import can_place
 from ..shapes.transform import Matrix, moved, moved_tangents
 from .repair import RawMesh, build
 
-MAX_INSTANCES = 2**20  # meshes that the nodes of a file may place by default
 MAX_ELEMENT = 1e100  # of a matrix: the squares of larger elements overflow
 MAX_COPIES = 2**14  # meshes that cannot be instances, because their matrices are singular
 MAX_COPIED_FACES = 2**25  # triangles in copies of meshes, where each placement becomes a mesh

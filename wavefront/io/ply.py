@@ -18,13 +18,14 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from .headers import SIZES, TYPES, Element, check_ply, ply_textures, unread
 from .repair import warn
+from .sources import SceneFiles
 from .trimesh_loading import Images, by_trimesh
 
 FACES = ("face", "tristrips")
 ORDERS: dict[str, Literal["little", "big"]] = {"<": "little", ">": "big"}
 
 
-def parse(path: str | os.PathLike[str], data: bytes, strict: bool, materials: bool) -> tuple[Any, int]:
+def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> tuple[Any, int]:
     """Return the trimesh object of a PLY file, and the number of its faces by the header.
 
     Raises
@@ -32,7 +33,7 @@ def parse(path: str | os.PathLike[str], data: bytes, strict: bool, materials: bo
     SceneError
         If the file is malformed. The message names the file, and the line of a text.
     """
-    name = os.fspath(path)
+    name = os.fspath(files.scene)
     elements = check_ply(name, data)
     lost = unread(elements)
     data, faces = _with_triangles(name, data, elements)
@@ -44,7 +45,7 @@ def parse(path: str | os.PathLike[str], data: bytes, strict: bool, materials: bo
     textures = ply_textures(data)
     if len(textures) > 1 and materials:
         warn(f"{name}: not honored: several textures; {textures[-1]!r} is taken for all faces", strict)
-    images = Images(path)
+    images = Images(files)
     found = by_trimesh(name, data, "ply", images, skip_materials=not (textures and materials))
     images.report(strict)
     return found, sum(element.count for element in elements if element.name == "face")

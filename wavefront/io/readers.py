@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
 
 from ..errors import SceneError
-from ..files import beside, decode_text, read_bytes
+from ..files import decode_text
 from ..registry import Registry
 from ..scene import Scene
 from . import dae, gltf, mtl, obj, off, ply, stl, threemf, trimesh_objects, visuals
 from .appearance import MaterialSpec, assign_material
 from .contents import Contents
 from .gltf_materials import GltfMaterials
-from .placing import MAX_INSTANCES, Places
+from .placing import Places
 from .repair import warn
-
-PathLike = str | os.PathLike[str]
+from .sources import LoadLimits, PathLike, SceneFiles
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,8 @@ class Wish:
 
     strict: bool = False  # refuse files that need a repair or have unsupported properties
     materials: bool = True  # read materials
-    max_instances: int = MAX_INSTANCES  # number of meshes at most that the nodes of a file place
+    limits: LoadLimits = field(default_factory=LoadLimits)
+    search_paths: tuple[Path, ...] = ()  # folders whose files the file may refer to, beside its own
 
 
 def read(path: PathLike, wish: Wish) -> Contents:
@@ -42,13 +42,16 @@ def read(path: PathLike, wish: Wish) -> Contents:
     name = os.fspath(path)
     extension = Path(name).suffix.lower()
     parse = READERS.find(extension, f"{name}: extension")
-    data = read_bytes(path)
+    files = SceneFiles(path, wish.search_paths, wish.limits)
+    data = files.read(path)
     if extension in PLAIN:
         _refuse(name, data)
     try:
-        return parse(path, data, wish)
+        contents = parse(files, data, wish)
     except MemoryError as error:
         raise SceneError(f"{name}: does not fit in memory") from error
+    wish.limits.check_triangles(name, sum(len(raw.faces) for raw in contents.raws))
+    return contents
 
 
 def _refuse(name: str, data: bytes) -> None:
@@ -59,10 +62,10 @@ def _refuse(name: str, data: bytes) -> None:
         raise SceneError(f"{name}: is an archive; unpack it first")
 
 
-def _read_gltf(path: PathLike, data: bytes, wish: Wish) -> Contents:
-    document = gltf.Document(path, data)
+def _read_gltf(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
+    document = gltf.Document(files, data)
     with document.inside("the file"):
-        found = gltf.contents(document, wish.max_instances)
+        found = gltf.contents(document)
         specs = GltfMaterials(document)
         for raw, number in found.raws:
             # without a material, the mesh gets the default material, as in memory
@@ -74,13 +77,13 @@ def _read_gltf(path: PathLike, data: bytes, wish: Wish) -> Contents:
     return Contents([raw for raw, _ in found.raws], found.places, found.lights, found.camera)
 
 
-def _read_obj(path: PathLike, data: bytes, wish: Wish) -> Contents:
-    name, strict, materials = os.fspath(path), wish.strict, wish.materials
+def _read_obj(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
+    name, strict, materials = os.fspath(files.scene), wish.strict, wish.materials
     parsed = obj.parse(name, decode_text(data), strict)
     if parsed.ignored:
         listed = ", ".join(f"{keyword} (line {line})" for keyword, line in parsed.ignored.items())
         warn(f"{name}: not honored: {listed}", strict)
-    specs = _libraries(path, parsed.libraries, strict) if materials else {}
+    specs = _libraries(files, parsed.libraries, strict) if materials else {}
     for raw in parsed.raws:
         raw.colors = None if raw.colors is None else visuals.from_srgb(raw.colors)
         if materials and not assign_material(raw, specs.get(raw.name)):
@@ -93,21 +96,22 @@ def _read_obj(path: PathLike, data: bytes, wish: Wish) -> Contents:
     return Contents.once(parsed.raws)
 
 
-def _libraries(path: PathLike, libraries: list[str], strict: bool) -> dict[str, MaterialSpec]:
+def _libraries(files: SceneFiles, libraries: list[str], strict: bool) -> dict[str, MaterialSpec]:
     """Read the material files; warn of missing ones."""
     specs: dict[str, MaterialSpec] = {}
     for library in dict.fromkeys(libraries):
-        file = beside(path, library)
+        file = files.find(library)
         if not os.path.exists(file):  # also False for invalid names
-            warn(f"{os.fspath(path)}: material file {library!r} is missing", strict)
+            warn(f"{os.fspath(files.scene)}: material file {library!r} is missing", strict)
             continue
-        specs.update(mtl.specs(mtl.parse(file, decode_text(read_bytes(file)), strict), strict))
+        entries = mtl.parse(file, decode_text(files.read(file)), strict, files)
+        specs.update(mtl.specs(entries, strict))
     return specs
 
 
-def _read_ply(path: PathLike, data: bytes, wish: Wish) -> Contents:
-    name = os.fspath(path)
-    found, claimed = ply.parse(path, data, wish.strict, wish.materials)
+def _read_ply(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
+    name = os.fspath(files.scene)
+    found, claimed = ply.parse(files, data, wish.strict, wish.materials)
     contents = trimesh_objects.read(found, name, wish.strict)
     faces = sum(len(raw.faces) for raw in contents.raws)
     if faces < claimed:
@@ -115,30 +119,30 @@ def _read_ply(path: PathLike, data: bytes, wish: Wish) -> Contents:
     return contents
 
 
-def _read_stl(path: PathLike, data: bytes, wish: Wish) -> Contents:
-    return Contents.once(stl.parse(os.fspath(path), data, wish.strict))
+def _read_stl(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
+    return Contents.once(stl.parse(os.fspath(files.scene), data, wish.strict))
 
 
-def _read_off(path: PathLike, data: bytes, wish: Wish) -> Contents:
-    name = os.fspath(path)
+def _read_off(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
+    name = os.fspath(files.scene)
     return trimesh_objects.read(off.parse(name, data, wish.strict, wish.materials), name, wish.strict)
 
 
-def _read_dae(path: PathLike, data: bytes, wish: Wish) -> Contents:
-    found = dae.parse(path, data, wish.strict, wish.materials)
-    return trimesh_objects.read(found, os.fspath(path), wish.strict)
+def _read_dae(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
+    found = dae.parse(files, data, wish.strict, wish.materials)
+    return trimesh_objects.read(found, os.fspath(files.scene), wish.strict)
 
 
-def _read_3mf(path: PathLike, data: bytes, wish: Wish) -> Contents:
-    name = os.fspath(path)
-    return trimesh_objects.read(threemf.parse(name, data, wish.strict, wish.materials), name, wish.strict)
+def _read_3mf(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
+    name = os.fspath(files.scene)
+    return trimesh_objects.read(threemf.parse(files, data, wish.strict, wish.materials), name, wish.strict)
 
 
 def _from_scene(load: Callable[[str, bytes], Scene]) -> Reader:
     """Return a reader that gives what `load`, a user's own function, makes of a file."""
 
-    def read_scene(path: PathLike, data: bytes, wish: Wish) -> Contents:
-        name = os.fspath(path)
+    def read_scene(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
+        name = os.fspath(files.scene)
         scene = load(name, data)
         if not isinstance(scene, Scene):
             raise SceneError(f"{name}: its reader returned {type(scene).__name__}; it must return a wf.Scene")
@@ -147,7 +151,7 @@ def _from_scene(load: Callable[[str, bytes], Scene]) -> Reader:
     return read_scene
 
 
-Reader: TypeAlias = Callable[[PathLike, bytes, Wish], Contents]
+Reader: TypeAlias = Callable[[SceneFiles, bytes, Wish], Contents]
 READERS: Registry[Reader] = Registry(
     "extension",
     "a function of (path, data) that returns a wf.Scene",

@@ -5,6 +5,7 @@ Positions are those of the file, mostly in millimeters with z up. Colors and mat
 
 from __future__ import annotations
 
+import os
 import zipfile
 from io import BytesIO
 from typing import Any
@@ -12,10 +13,10 @@ from typing import Any
 from ..errors import SceneError
 from .markup import check_expanded, look_through, need
 from .repair import warn
+from .sources import SceneFiles
 from .trimesh_loading import by_trimesh
 
 MAX_MEMBERS = 2**12
-MAX_UNPACKED = 2**30  # bytes
 LOST = (
     "basematerials",
     "colorgroup",
@@ -26,7 +27,7 @@ LOST = (
 )
 
 
-def parse(name: str, data: bytes, strict: bool, materials: bool) -> Any:
+def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> Any:
     """Return the trimesh scene of a 3MF file.
 
     Raises
@@ -34,15 +35,16 @@ def parse(name: str, data: bytes, strict: bool, materials: bool) -> Any:
     SceneError
         If lxml or networkx is missing, or the file is malformed; the message names the file and the error.
     """
+    name = os.fspath(files.scene)
     need(name, ".3mf", ("lxml", "lxml"), ("networkx", "networkx"))
-    package = _Package(name, _models(name, data))
+    package = _Package(name, _models(name, data, files.limits.unpacked_bytes))
     check_expanded(name, package.children, {}, "build")
     if package.lost and materials:
         warn(f"{name}: not honored: {', '.join(package.lost)}", strict)
     return by_trimesh(name, data, "3mf")
 
 
-def _models(name: str, data: bytes) -> dict[str, bytes]:
+def _models(name: str, data: bytes, most: int) -> dict[str, bytes]:
     """Return the members of the archive that contain geometry."""
     try:
         with zipfile.ZipFile(BytesIO(data)) as archive:
@@ -50,8 +52,10 @@ def _models(name: str, data: bytes) -> dict[str, bytes]:
             size = sum(member.file_size for member in members)
             if len(members) > MAX_MEMBERS:
                 raise SceneError(f"{name}: has {len(members)} members; the limit is {MAX_MEMBERS}")
-            if size > MAX_UNPACKED:
-                raise SceneError(f"{name}: unpacks to {size} bytes; the limit is {MAX_UNPACKED}")
+            if size > most:
+                raise SceneError(
+                    f"{name}: unpacks to {size} bytes; the limit is {most} (LoadLimits.unpacked_bytes)"
+                )
             models = [member for member in members if member.filename.lower().endswith(".model")]
             return {member.filename: archive.read(member) for member in models}
     except (MemoryError, SceneError):

@@ -13,27 +13,28 @@ import numpy as np
 
 from ..codecs.images import decode_codes
 from ..errors import SceneError
-from ..files import beside, read_bytes
 from .repair import warn
+from .sources import SceneFiles
 
 
 class Images:
     """The images in a file's folder, for trimesh, which itself ignores missing and damaged images."""
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.path = path
+    def __init__(self, files: SceneFiles) -> None:
+        self.files = files
         self.missing: list[str] = []
         self.error: SceneError | None = None
 
     def get(self, reference: str) -> bytes:
         """Return the content of an image, after checking that it can be decoded."""
         try:
-            file = beside(self.path, reference)
+            file = self.files.find(reference)
             if not os.path.exists(file):
-                file = beside(self.path, unquote(reference))
+                file = self.files.find(unquote(reference))
             if os.path.exists(file):
-                content = read_bytes(file)
-                decode_codes(content, f"{os.fspath(self.path)}: texture {reference!r}")
+                content = self.files.read(file)
+                name = f"{os.fspath(self.files.scene)}: texture {reference!r}"
+                decode_codes(content, name, self.files.limits.pixels)
                 return content
         except SceneError as error:
             self.error = self.error or error
@@ -46,7 +47,7 @@ class Images:
         if self.error is not None:
             raise self.error
         for name in dict.fromkeys(self.missing):
-            warn(f"{os.fspath(self.path)}: texture {name!r} is missing", strict)
+            warn(f"{os.fspath(self.files.scene)}: texture {name!r} is missing", strict)
 
 
 def by_trimesh(name: str, data: bytes, kind: str, images: Any = None, skip_materials: bool = False) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
@@ -12,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..codecs.encoding import srgb_to_linear
 from ..codecs.images import read_codes
 from ..errors import SceneError, finite_array, one_of
-from ..files import check_size
+from ..files import MAX_PIXELS, check_size
 from ..state import SurfaceInteraction
 from ..suggestions import suggests_keywords
 from ..vec import Floats, Ints, f4, luminance
@@ -52,6 +53,8 @@ class Texture(BaseTexture):
         One number, or three for a color.
     uv_set
         Which texture coordinates of the mesh to use: 0 for its `uvs`, 1 for its `uvs1`.
+    max_pixels
+        A file with more pixels is refused before it is decoded.
 
     Raises
     ------
@@ -72,8 +75,9 @@ class Texture(BaseTexture):
         scale: ArrayLike = 1.0,
         offset: ArrayLike = 0.0,
         uv_set: Literal[0, 1] = 0,
+        max_pixels: int = MAX_PIXELS,
     ) -> None:
-        codes, self.name = _codes(source)
+        codes, self.name = _codes(source, max_pixels)
         self.size = (codes.shape[1], codes.shape[0])  # (width, height)
         self.channels = self._stride = codes.shape[2]  # of the image
         self._texels = codes.reshape(-1)  # not as float32: 8-bit images take a quarter of the memory
@@ -189,10 +193,10 @@ class Texture(BaseTexture):
         return codes if table is None else table.take(codes)
 
 
-def _codes(source: Any) -> tuple[NDArray[Any], str]:
+def _codes(source: Any, max_pixels: int) -> tuple[NDArray[Any], str]:
     """Return texels (H, W, C) as uint8 or float32, and a name for messages."""
     if isinstance(source, str | os.PathLike):
-        codes, name = read_codes(source), Path(source).name
+        codes, name = read_codes(source, max_pixels), Path(source).name
     else:
         codes, name = np.asarray(source), "array"
     if codes.ndim == 2:
@@ -201,7 +205,7 @@ def _codes(source: Any) -> tuple[NDArray[Any], str]:
         raise SceneError(
             f"texture {name!r} is {codes.dtype} of shape {codes.shape}; it must be (H, W, 1 to 4)"
         )
-    check_size(codes.shape[0], codes.shape[1])
+    check_size(codes.shape[0], codes.shape[1], math.inf)  # an array may have any size
     if codes.dtype in (np.uint8, np.uint16):
         return np.ascontiguousarray(codes), name
     if codes.dtype.kind in "ui":

@@ -1,0 +1,151 @@
+"""The files that a scene file may read: where they may be, and how large."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import SceneError
+from ..files import MAX_BYTES, MAX_PIXELS, check_regular, path_name, read_bytes
+
+PathLike = str | os.PathLike[str]
+
+MAX_TRIANGLES = 2**26  # of all meshes of a file by default
+ARCHIVES = (".npz", ".zip", ".gz", ".tar", ".7z", ".bz2", ".xz", ".zst")
+SCHEMES = ("http:", "https:", "file:", "ftp:")
+
+
+@dataclass(frozen=True)
+class LoadLimits:
+    """How much a scene file may ask for. A file of a few bytes can claim any size.
+
+    Each is a whole number of at least 1. A larger one lets larger files load, a smaller one protects better.
+
+    Parameters
+    ----------
+    file_bytes
+        Size of the file, and of each file that it refers to.
+    pixels
+        Pixels of one image. All images of a glTF file together may have four times as many.
+    triangles
+        Triangles of all meshes of a file, before they are placed.
+    instances
+        Meshes that the nodes of a glTF file place.
+    unpacked_bytes
+        Size of the unpacked members of a 3mf file, the only archive that is read.
+
+    Raises
+    ------
+    SceneError
+        If one is not a whole number of at least 1.
+    """
+
+    file_bytes: int = MAX_BYTES
+    pixels: int = MAX_PIXELS
+    triangles: int = MAX_TRIANGLES
+    instances: int = 2**20
+    unpacked_bytes: int = 2**30
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < 1:
+                raise SceneError(
+                    f"LoadLimits {each.name} is {value!r}; it must be a whole number of at least 1"
+                )
+
+    def check_triangles(self, name: str, count: int) -> None:
+        """Refuse a file of more triangles with a SceneError."""
+        if count > self.triangles:
+            raise SceneError(
+                f"{name}: has {count} triangles; the limit is {self.triangles} (LoadLimits.triangles)"
+            )
+
+
+def checked_limits(limits: LoadLimits | None) -> LoadLimits:
+    """Return the limits, by default those of `LoadLimits`, or raise a SceneError if they are none."""
+    if limits is not None and not isinstance(limits, LoadLimits):
+        raise SceneError(f"limits is {limits!r}; it must be a wf.LoadLimits")
+    return limits or LoadLimits()
+
+
+@dataclass(frozen=True)
+class SceneFiles:
+    """The files that a scene file may read: those in its own folder and in the search paths, and below them.
+
+    A scene file from elsewhere must not make the program read arbitrary files. So the target of each
+    reference must be inside one of these folders, also after symbolic links are followed.
+    """
+
+    scene: PathLike
+    search_paths: tuple[Path, ...] = ()
+    limits: LoadLimits = field(default_factory=LoadLimits)
+
+    def find(self, reference: str, base: PathLike | None = None) -> Path:
+        """Return the path of a file that the scene refers to by a relative name.
+
+        It is looked for in the folder of `base`, by default the scene file, and then in the search paths; the
+        path is that of the first place where it exists, or else the first allowed one.
+
+        Raises
+        ------
+        SceneError
+            If the name is a URI, absolute, or leads out of all folders, or the file is too large, or no regular file.
+        """
+        source = self.scene if base is None else base
+        name = reference.replace("\\", "/")
+        if "://" in name or name.lower().startswith(SCHEMES):
+            raise SceneError(f"{source}: refers to {reference!r}; only files in its own folder are read")
+        if name.lower().endswith(ARCHIVES):
+            raise SceneError(f"{source}: refers to {reference!r}; archives are not read")
+        if name.startswith("/") or name[1:2] == ":":
+            raise SceneError(f"{source}: refers to {reference!r}; an absolute path is not followed")
+        folder = _folder(source)
+        roots = [_folder(self.scene), *(each.resolve() for each in self.search_paths)]
+        allowed = [
+            place / name
+            for place in (folder, *roots[1:])
+            if any(self._target(place, name, reference).is_relative_to(root) for root in roots)
+        ]
+        if not allowed:
+            raise SceneError(f"{source}: refers to {reference!r}, which is outside its folder")
+        found = next((path for path in allowed if os.path.exists(path)), None)
+        if found is not None:
+            check_regular(found, self.limits.file_bytes)
+        return found or allowed[0]
+
+    def read(self, path: PathLike) -> bytes:
+        """Return the content of a regular file of at most `limits.file_bytes`."""
+        return read_bytes(path, self.limits.file_bytes)
+
+    def _target(self, folder: Path, name: str, reference: str) -> Path:
+        """Return where a name in a folder leads to."""
+        try:
+            return (folder / name).resolve()
+        except (OSError, RuntimeError, ValueError) as error:
+            raise SceneError(f"{self.scene}: refers to {reference!r}: {error}") from error
+
+
+def _folder(path: PathLike) -> Path:
+    return Path(os.fspath(path)).resolve().parent
+
+
+def folders(search_paths: PathLike | Iterable[PathLike]) -> tuple[Path, ...]:
+    """Return search paths as a tuple, after checking that each is a folder.
+
+    Raises
+    ------
+    SceneError
+        If one is not.
+    """
+    if isinstance(search_paths, str | os.PathLike):
+        search_paths = (search_paths,)
+    found = tuple(Path(path_name(each)) for each in search_paths)
+    for each in found:
+        if not each.is_dir():
+            raise SceneError(f"search_paths: {each} is not a folder")
+    return found
