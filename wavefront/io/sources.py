@@ -94,8 +94,8 @@ class SceneFiles:
         Raises
         ------
         SceneError
-            If the name is a URI, absolute, or leads out of all folders, or the file is too large or not a
-        regular one.
+            If the name is a URI, absolute, or leads out of all folders, or the file is too large or
+            not a regular one.
         """
         source = self.scene if base is None else base
         name = reference.replace("\\", "/")
