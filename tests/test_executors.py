@@ -411,7 +411,9 @@ def test_this_machine_does_not_differ_from_itself() -> None:
     here = machine.describe_machine()
     assert here["wavefront"] == wf.__version__
     assert machine.machine_differences(here) == ()
-    assert machine.machine_differences({**here, "wavefront": "0"}) == (f"wavefront {wf.__version__} in place of 0",)
+    assert machine.machine_differences({**here, "wavefront": "0"}) == (
+        f"wavefront {wf.__version__} in place of 0",
+    )
 
 
 @pytest.mark.slow

@@ -61,7 +61,7 @@ def first(shapes: list[wf.Shape]) -> wf.Material:
 
 BAD = {
     'wf.render("x.obj", spp="4")': "arg-type",
-    'wf.render("x.obj", samples=4)': "call-arg",
+    'wf.render("x.obj", sample_count=4)': "call-arg",
     "wf.Diffuse(albedo=0.5)": "call-arg",
     "wf.Scene([wf.Sphere((0, 0, 0), 1)], camera=(0, 0, 5))": "arg-type",
     'wf.Camera.look_at((0, 0, 5), (0, 0, 0), fov="wide")': "arg-type",

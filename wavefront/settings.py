@@ -115,7 +115,8 @@ def check_samples(name: str, value: Any) -> range | None:
         return None
     if not isinstance(value, range) or value.step != 1 or not value or value.start < 0:
         raise SceneError(
-            f"{name} is {value!r}; it must be a range of consecutive samples, such as range(64, 128)"
+            f"{name} is {value!r}; it must be a range of consecutive samples, such as range(64, 128); "
+            "spp is their number"
         )
     return value
 
