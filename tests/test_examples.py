@@ -18,6 +18,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 SHAPES = {  # the picture of --size 24, (height, width)
     "cornell_box": (24, 24),
     "course_spheres": (24, 24),
+    "cuboids": (24, 24),
     "default_look": (20, 24),
     "depth_of_field": (13, 24),
     "environment": (13, 24),
@@ -26,7 +27,9 @@ SHAPES = {  # the picture of --size 24, (height, width)
     "gltf_scene": (15, 24),
     "layers": (62, 108),
     "material_sheet": (16, 24),
+    "molecule": (24, 24),
     "own_material": (15, 24),
+    "spheres": (24, 24),
 }
 
 
@@ -73,6 +76,13 @@ def test_example_names_its_defaults(name):
     spp = re.search(r'"--spp", type=int, default=(\d+)', text)[1]
     size = re.search(r'"--size", type=int, default=(\d+)', text)[1]
     assert f"python examples/{name}.py [out.png] [--spp {spp}] [--size {size}]" in text
+
+
+@pytest.mark.parametrize("name", ["spheres", "cuboids", "molecule"])
+def test_scenes_of_scientists_are_short(name):
+    """At most 20 lines, from the numbers to the picture."""
+    code = (EXAMPLES / f"{name}.py").read_text().partition("parse_args()")[2]
+    assert len([line for line in code.splitlines() if line.strip()]) <= 20
 
 
 def test_furnace_prints_numbers_within_their_errors(tmp_path):

@@ -110,3 +110,14 @@ def test_arguments_are_checked(options: dict, message: str) -> None:
 def test_a_missing_layer_is_named() -> None:
     with pytest.raises(wf.SceneError, match=r"no layer 'shape_id'; render it with aovs=\('shape_id', "):
         Image(np.ones((3, 3, 3), f4)).outlined()
+
+
+def test_a_rendered_picture_of_two_balls_is_outlined() -> None:
+    balls = wf.Spheres([(-0.4, 0, 0), (0.4, 0, -1)], 0.6, material=wf.Diffuse(1.0))
+    camera = wf.Camera.look_at((0, 0, 6), (0, 0, 0), fov=20, size=(64, 64))
+    scene = wf.Scene(balls, [wf.Environment(1)], camera)
+    image = wf.render(scene, 4, aovs=("shape_id", "normal", "depth"))
+    dark = image.outlined(width=2).rgb[..., 0] < 0.5 * image.rgb[..., 0]
+    assert 200 < dark.sum() < 600
+    assert dark[32, 28:40].any()  # where one ball ends in front of the other, which is of the same shape
+    assert not dark[28:36, 14:24].any()

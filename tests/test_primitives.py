@@ -258,6 +258,7 @@ def test_points_lie_on_the_surface_and_normals_stand_on_it(shape: object) -> Non
         axis_point = span / size * np.clip(along, 0, size)
         away = np.linalg.norm(relative - axis_point, axis=0)
         np.testing.assert_allclose(away, radius, atol=2e-7)
+        assert (np.abs(away - radius) <= surface.error).all()
         np.testing.assert_allclose(normal * radius, relative - axis_point, atol=1e-6)
     else:
         on_cap = ~on_side
@@ -265,6 +266,9 @@ def test_points_lie_on_the_surface_and_normals_stand_on_it(shape: object) -> Non
         height = np.minimum(np.abs(along), np.abs(along - size))
         assert (height[on_cap] < 2e-7).all()
         assert on_cap.any() == (shape is wf.Cylinders)
+        assert (np.abs(away - radius)[on_side] <= surface.error[on_side]).all()
+        from_middle = (relative - span / 2)[:, on_cap]
+        assert ((normal[:, on_cap] * from_middle).sum(0) > 0).all()
     assert (surface.error < 1e-5).all()
     assert len(primitives) == 40
 
