@@ -21,7 +21,7 @@ from .stages.interaction import interaction
 from .stages.normal_mapping import perturb_normals
 from .stages.shade import Shading, shading
 from .state import BEFORE, JUST_ONCE, NOT_YET, Contribution, Hits, Paths
-from .vec import Floats, Ints, f4, put, take
+from .vec import Floats, Ints, broadcast, f4, put, take
 
 FEATURES = ("denoising_albedo", "denoising_normal")
 OF_LIGHT = ("direct", "indirect", "light_groups")
@@ -73,6 +73,11 @@ class SampleRecorder:
             paths.scattered = np.full(len(paths), NOT_YET, np.uint8)
         if any(name in self._values for name in FEATURES):
             paths.met_rough = np.zeros(len(paths), np.bool_)
+
+    @property
+    def needs_directions(self) -> bool:
+        """Whether contributions of light samples must have their directions: to divide an environment."""
+        return self._groups is not None and len(self._groups.environment) > 1
 
     def branched(self, ways: int) -> None:
         """Note that each path goes on in several ways."""
@@ -157,7 +162,10 @@ class SampleRecorder:
                     put(self._values[name], slot, values[:, rough])
                 else:
                     add_to_slots(self._values[name], slot, values[:, rough] * f4(self._share))
-        paths.met_rough[lanes[rough]] = True
+        if end == len(paths):
+            paths.met_rough = broadcast(np.True_, end)
+        else:
+            paths.met_rough[lanes[rough]] = True
 
     # --- Light ----------------------------------------------------------------------------------------
 
@@ -174,13 +182,15 @@ class SampleRecorder:
             direct = scattered == NOT_YET if contribution.sampled else scattered <= JUST_ONCE
             self._add("direct", np.flatnonzero(direct), slot, arriving)
         if self._groups is not None:
-            toward = take(paths.direction, contribution.lanes) if contribution.wi is None else contribution.wi
             group = self._groups.of_light.take(contribution.light)
             for number, name in enumerate(self._groups.names):
                 lanes = np.flatnonzero(group == number)
                 self._add(f"light_groups.{name}", lanes, slot, arriving)
             mixed = np.flatnonzero(group < 0)
             if mixed.size:
+                toward = contribution.wi
+                if toward is None:
+                    toward = take(paths.direction, contribution.lanes)
                 for name, part in self._groups.parts_of_environment(take(toward, mixed)):
                     light = take(arriving, mixed) * part
                     add_to_slots(self._light[f"light_groups.{name}"], slot.take(mixed), light)

@@ -163,7 +163,8 @@ def direct(
             pdf = shade.guidance.mixed(lanes, take(light.wi, lanes), pdf)
         scale *= scene.lights.mis_weight(number, pdf_light, pdf)
     arriving = f.take(lanes, 1) * radiance * scale
-    toward = None if paths.recorder is None else take(light.wi, lanes)
+    directed = paths.recorder is not None and paths.recorder.needs_directions
+    toward = take(light.wi, lanes) if directed else None
     return Contribution(lanes, arriving, number, sampled=True, wi=toward)
 
 
