@@ -384,7 +384,7 @@ def test_files(row: str, outcomes: dict[str, list[str]]) -> None:
             assert (strict, lenient) == ("", ""), case
             continue
         assert re.search(expected, strict), f"{case}: {strict}"
-        assert lenient == "" and row in REPAIRED or re.search(expected, lenient), f"{case}: {lenient}"
+        assert (lenient == "" and row in REPAIRED) or re.search(expected, lenient), f"{case}: {lenient}"
 
 
 def test_repairs_are_counted(tmp_path: Path) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import reduce
+from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import wavefront as wf
+from wavefront.cli import main
 from wavefront.film import Film
 from wavefront.vec import f4
 
@@ -120,3 +124,120 @@ def test_ranges_that_make_no_picture_are_errors(options: dict[str, Any], message
     """Before any work."""
     with pytest.raises(wf.SceneError, match=message):
         wf.render("no such file", **options)
+
+
+# --- Pictures -----------------------------------------------------------------------------------------
+
+LAYERS = ("alpha", "albedo", "direct", "indirect", "light_groups", "coverage", "depth")
+
+
+@pytest.mark.parametrize("cuts", [(8,), (1,), (5, 11), (3, 4, 13), (2, 4, 6, 8, 10, 12, 14)])
+def test_pictures_of_any_parts_merge_to_one_render(cuts: tuple[int, ...]) -> None:
+    """Bit for bit, sampled layers too; in any order of merging."""
+    whole = wf.render(SCENE, 16, aovs=LAYERS)
+    parts = [
+        wf.render(SCENE, samples=range(first, end), aovs=LAYERS, wave_size=70 + first)
+        for first, end in pairwise((0, *cuts, 16))
+    ]
+    merged = reduce(wf.Image.merge, parts)
+    backward = reduce(wf.Image.merge, parts[::-1])
+    for image in (merged, backward):
+        assert image.rgb.tobytes() == whole.rgb.tobytes()
+        assert set(image.layers) == set(whole.layers)
+        for name, layer in whole.layers.items():
+            assert image.layers[name].tobytes() == layer.tobytes(), name
+        assert image.metadata["sample_ranges"] == [[0, 16]]
+        assert (image.spp, image.metadata["spp"]) == (16, 16)
+        assert image.metadata["samples"] == whole.metadata["samples"]
+        assert image.metadata["rays"] == whole.metadata["rays"]
+        assert image.variance is not None
+        np.testing.assert_allclose(image.variance, whole.variance, rtol=1e-5)
+    assert merged.metadata["seconds"] == pytest.approx(sum(part.metadata["seconds"] for part in parts))
+
+
+def test_merging_changes_neither_picture() -> None:
+    """They can be merged again with others."""
+    a, b, c = (wf.render(SCENE, samples=range(first, first + 4)) for first in (0, 4, 8))
+    before = a.rgb.copy(), a.sums.film.count.copy()  # type: ignore[union-attr]
+    once = a.merge(b).merge(c)
+    twice = a.merge(c).merge(b)
+    assert once.rgb.tobytes() == twice.rgb.tobytes()
+    assert a.merge(c).metadata["sample_ranges"] == [[0, 4], [8, 12]]
+    assert (a.rgb == before[0]).all()
+    assert (a.sums.film.count == before[1]).all()  # type: ignore[union-attr]
+
+
+def test_npz_files_carry_the_sums(tmp_path: Path) -> None:
+    """Of the picture and of its layers, also of merged ones."""
+    paths = [tmp_path / f"{number}.npz" for number in range(3)]
+    for first, path in zip((0, 3, 6), paths, strict=True):
+        wf.render(SCENE, samples=range(first, first + 3), aovs=LAYERS).save(path)
+    wf.Image.load(paths[0]).merge(wf.Image.load(paths[2])).save(paths[0])
+    merged = wf.Image.load(paths[0]).merge(wf.Image.load(paths[1]))
+    whole = wf.render(SCENE, 9, aovs=LAYERS)
+    assert merged.rgb.tobytes() == whole.rgb.tobytes()
+    assert all(merged.layers[name].tobytes() == layer.tobytes() for name, layer in whole.layers.items())
+
+
+def test_what_cannot_be_merged_is_an_error() -> None:
+    """The message says why."""
+    part, later = wf.render(SCENE, samples=range(4)), range(4, 8)
+    for other, message in [
+        (wf.render(SCENE, 8), r"pictures without the sums .*render with samples=range\(...\)"),
+        (wf.render(SCENE, samples=range(3, 8)), "pictures that share samples .*: 3 to 3 are in both"),
+        (wf.render(SCENE, samples=later, seed=1), "different renders .*: seed was 0 and is 1"),
+        (wf.render(SCENE, samples=later, size=(8, 8)), r"size was \[16, 12\] and is \[8, 8\]"),
+        (wf.render(SCENE, samples=later, aovs="alpha"), r"aovs was \[\] and is \['alpha'\]"),
+        (wf.render(wf.Scene(SCENE.shapes, [wf.Environment(1)], CAMERA), samples=later), "the scene differs"),
+        (part.rgb, "a picture is merged with another one, got ndarray"),
+    ]:
+        with pytest.raises(wf.SceneError, match=message):
+            part.merge(other)
+
+
+def test_a_part_that_was_stopped_cannot_be_merged() -> None:
+    """Its pixels have different numbers of samples."""
+
+    def stop(done: float, total: float) -> None:
+        if done > 200:
+            raise KeyboardInterrupt
+
+    with pytest.raises(wf.Interrupted) as stopped:
+        wf.render(SCENE, samples=range(4, 8), wave_size=150, progress=stop, workers=1)
+    with pytest.raises(wf.SceneError, match="whose pixels have 1 to 2 samples cannot be merged"):
+        wf.render(SCENE, samples=range(4)).merge(stopped.value.image)
+
+
+def test_sums_that_were_damaged_are_an_error(tmp_path: Path) -> None:
+    """As those of a file that somebody else has written."""
+    wf.render(SCENE, samples=range(4)).save(tmp_path / "a.npz")
+    with np.load(tmp_path / "a.npz") as archive:
+        arrays = dict(archive)
+    for name, value in [
+        ("sums.film.count", arrays["sums.film.count"][:-1]),
+        ("sums.film.high", arrays["sums.film.high"].astype(np.float32)),
+        ("metadata", np.array("{}")),
+    ]:
+        np.savez(tmp_path / "b.npz", **{**arrays, name: value})
+        with pytest.raises(wf.SceneError, match=r"b\.npz: the sums of its samples are damaged"):
+            wf.Image.load(tmp_path / "b.npz")
+
+
+def test_the_command_line_renders_parts_and_merges_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    """Equal to one render of all samples."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "t.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    options = ["--size", "12x8", "--lighting", "studio", "--quiet"]
+    for samples, output in (("0:4", "a.npz"), ("4:9", "b.npz")):
+        assert main(["render", "t.obj", *options, "--samples", samples, "-o", output]) == 0
+    assert main(["render", "t.obj", *options, "--spp", "9", "-o", "whole.npy"]) == 0
+    capsys.readouterr()
+    assert main(["merge", "b.npz", "a.npz", "-o", "merged.npy"]) == 0
+    assert capsys.readouterr().out == "merged.npy: 9 spp, samples 0:9\n"
+    assert np.load("merged.npy").tobytes() == np.load("whole.npy").tobytes()
+    assert main(["merge", "a.npz", "whole.npy", "-o", "merged.npy"]) == 2
+    assert "whole.npy: pictures without the sums of their samples cannot be merged" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["render", "t.obj", "--samples", "4:4"])

@@ -60,7 +60,7 @@ def write(
 
 def _chunks(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Iterator[Any]:
     listed = [[name, _type(array), list(array.shape)] for name, array in arrays.items()]
-    text = json.dumps({**header, "arrays": listed}, ensure_ascii=False).encode()
+    text = json.dumps({**header, "arrays": listed}).encode()
     start = PRELUDE.pack(MAGIC, VERSION, len(text)) + text
     yield start + hashlib.sha256(start).digest()
     for (_, kind, _), array in zip(listed, arrays.values(), strict=True):

@@ -97,7 +97,7 @@ class CheckpointFile:
     def __init__(self, path: str | os.PathLike[str], interval: float) -> None:
         self.path = path
         self._interval, self._last, self._warned = interval, time.perf_counter(), False
-        self._samples = -1  # in the file, if this render has written it or gone on from it
+        self._samples = 0  # in the file, if this render has written it or gone on from it
 
     def resume(self, accumulator: Accumulator, settings: Settings) -> Checkpoint | None:
         """Put the samples of the file into the accumulator, if there is a file.

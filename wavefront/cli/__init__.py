@@ -1,4 +1,4 @@
-"""`wavefront render`, `wavefront info` and `wavefront compare`."""
+"""`wavefront render`, `resume`, `merge`, `info` and `compare`."""
 
 from .command_line import main, parser
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import argparse
 import io
+import os
 import signal
 import sys
 import threading
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, NoReturn
+from typing import Any
 
 from ..errors import SceneError
 from ..version import VERSION
@@ -18,6 +19,7 @@ from .arguments import joined
 from .compare_command import compare_pictures
 from .info_command import describe_scene
 from .render_command import add_render_command
+from .resume_command import add_resume_commands
 from .status import ERROR, INTERRUPTED, TERMINATED
 from .turntable_command import add_turntable_command
 
@@ -26,8 +28,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
     if isinstance(sys.stdout, io.TextIOWrapper):  # names of files may be in no encoding
         sys.stdout.reconfigure(errors="backslashreplace")
-    options = parser().parse_args(joined(sys.argv[1:] if arguments is None else arguments))
-    with _sigterm_exits(), warnings.catch_warnings():
+    words = joined(sys.argv[1:] if arguments is None else arguments)
+    options = parser().parse_args(words, argparse.Namespace(arguments=words, folder=os.getcwd()))
+    with _sigterm_as_ctrl_c() as sigterm, warnings.catch_warnings():
         warnings.simplefilter("always", UserWarning)
         warnings.showwarning = lambda message, *_: _show_warning(message)
         try:
@@ -36,24 +39,34 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"wavefront: error: {error}", file=sys.stderr)
             return ERROR
         except KeyboardInterrupt:
-            return INTERRUPTED
-    return status
+            status = INTERRUPTED
+    return TERMINATED if sigterm.came and status == INTERRUPTED else status
+
+
+class _Sigterm:
+    """What to do at SIGTERM: the same as at Ctrl-C, which keeps the picture; a second one ends at once."""
+
+    came = False
+
+    def handle(self, signal_number: int, frame: Any) -> None:
+        """Handle the signal."""
+        self.came = True
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        if not callable(signal.getsignal(signal.SIGINT)):  # ignored, as in the background
+            raise SystemExit(TERMINATED)
+        signal.raise_signal(signal.SIGINT)
 
 
 @contextmanager
-def _sigterm_exits() -> Iterator[None]:
-    """Let SIGTERM end the program as an error does, which tidies up; a second one ends it at once."""
-
-    def leave(signal_number: int, frame: Any) -> NoReturn:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        raise SystemExit(TERMINATED)
-
+def _sigterm_as_ctrl_c() -> Iterator[_Sigterm]:
+    """Handle SIGTERM as Ctrl-C."""
+    sigterm = _Sigterm()
     if threading.current_thread() is not threading.main_thread():  # only that one may set handlers
-        yield
+        yield sigterm
         return
-    before = signal.signal(signal.SIGTERM, leave)
+    before = signal.signal(signal.SIGTERM, sigterm.handle)
     try:
-        yield
+        yield sigterm
     finally:
         signal.signal(signal.SIGTERM, before)
 
@@ -65,6 +78,7 @@ def parser() -> argparse.ArgumentParser:
     commands = top.add_subparsers(required=True, metavar="command")
     add_render_command(commands)
     add_turntable_command(commands)
+    add_resume_commands(commands, top)
     info = commands.add_parser("info", help="say what a scene file holds")
     info.add_argument("scene", help="obj, ply, stl, glb or gltf file")
     info.set_defaults(run=describe_scene)

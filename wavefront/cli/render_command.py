@@ -14,8 +14,9 @@ from ..codecs.images import check_display, check_writable
 from ..errors import Interrupted, RenderError, SaveError, SceneError
 from ..image import Image
 from ..io.load import load
-from ..render import render
+from ..render import finish
 from ..scene import Scene
+from ..session import Session
 from . import arguments
 from .options import Help, add_display, add_settings, display_of, setting_values
 from .rescue import save_elsewhere
@@ -61,6 +62,7 @@ def _render(options: argparse.Namespace) -> int:
     try:
         image = render(
             scene,
+            {"arguments": options.arguments, "folder": options.folder},
             **setting_values(options),
             progress=progress,
         )
@@ -71,6 +73,13 @@ def _render(options: argparse.Namespace) -> int:
         image, status = error.image, ERROR
         print(f"wavefront: error: {error}", file=sys.stderr)
     return (image is not None and _save(image, options)) or status
+
+
+def render(scene: Scene, command: dict[str, Any], **settings: Any) -> Image:
+    """Render a scene with settings of `Session`; a checkpoint keeps the command for `wavefront resume`."""
+    session = Session(scene, **settings)
+    session.command = command
+    return finish(session)
 
 
 def _save(image: Image, options: argparse.Namespace) -> int:
