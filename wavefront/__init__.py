@@ -15,6 +15,7 @@ from .bsdfs import (
     Mix,
     OrenNayar,
     Principled,
+    ShadowCatcher,
     ThinDielectric,
 )
 from .camera import Camera
@@ -142,6 +143,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "Session",
+    "ShadowCatcher",
     "Shape",
     "Sphere",
     "Spheres",

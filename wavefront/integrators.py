@@ -20,6 +20,7 @@ from .sampling.sampler import Sampler
 from .stages.alpha import alpha_pass_through
 from .stages.background import show_background
 from .stages.bounce import bounce_sample, branch
+from .stages.caught_shadow import off_catchers
 from .stages.compact import alive, compact, roulette, scattering_lanes, select, specular_lanes
 from .stages.guidance import guide
 from .stages.interaction import interaction
@@ -130,6 +131,8 @@ def intersect_and_compact(
         emission = show_background(scene, L, paths, hits, emission)
     accumulate(L, paths, mis_weighted(scene, paths, emission) if mis else emission)
     lanes = keep(scene, paths, hits, emission)
+    if bounce == 0:
+        lanes = off_catchers(scene, hits, lanes)
     kept = compact(scene, paths, hits, lanes)
     if paths.recorder is not None:
         paths.recorder.record_hits(scene, paths, hits, lanes, *kept)

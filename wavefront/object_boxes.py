@@ -13,9 +13,10 @@ import numpy as np
 from .camera import Camera
 from .compile.scene import CompiledScene
 from .geometric_layers import ShapeTable, pixel_spans
-from .stages.alpha import continue_behind, covering_hits
+from .stages.alpha import covering_hits
 from .stages.generate import center_rays
 from .stages.interaction import interaction
+from .stages.transmittance import continue_behind
 from .vec import Ints
 
 

@@ -506,7 +506,7 @@ class Session:
         if time_up:
             check_first_samples(image, settings.seconds, self._monitor.surfaces.value)
         loop.accumulator.bad.report(image, self._cause_of_bad_sample)
-        if is_black_or_white(image):
+        if settings.background is None and is_black_or_white(image):
             from .diagnosis import warn_of_black_or_white  # here, as most pictures do without
 
             warn_of_black_or_white(

@@ -8,6 +8,7 @@ from .mirror import Mirror
 from .mix import Mix
 from .oren_nayar import OrenNayar
 from .principled import Principled
+from .shadow_catcher import ShadowCatcher
 from .thin import ThinDielectric
 
 ALL = (Diffuse, Mirror, Dielectric, Conductor, OrenNayar, ThinDielectric, Principled, Mix)
@@ -23,6 +24,7 @@ __all__ = [
     "Mix",
     "OrenNayar",
     "Principled",
+    "ShadowCatcher",
     "ThinDielectric",
     "albedo_of",
     "evaluated",

@@ -48,6 +48,7 @@ class Bsdf(Parametrized, ABC):
     """
 
     transmissive: bool = False  # light can cross the surface
+    catches_shadows: bool = False  # the camera sees only shadows on it
     dimensions: int = 2  # rows of u that sample_f reads
     given_elsewhere: ClassVar[dict[str, str]] = MATERIAL_ARGUMENTS  # for messages
     specular: bool = False  # every lobe is a delta: f and pdf are 0, light sampling is skipped

@@ -119,6 +119,12 @@ def find_alpha(
     return found
 
 
+def find_shadow_catchers(materials: Sequence[Material]) -> Bools | None:
+    """Return a mask (materials,) of those that catch shadows; None if none does."""
+    found = np.array([material.bsdf.catches_shadows for material in materials], np.bool_)
+    return found if found.any() else None
+
+
 def find_nonscattering_lights(
     materials: Sequence[Material], material_of: Ints, light_of: Ints, lights: int
 ) -> Bools | None:

@@ -28,6 +28,7 @@ from .materials import (
     attributes_read,
     find_alpha,
     find_nonscattering_lights,
+    find_shadow_catchers,
     group_materials,
     number_materials,
     opacity_table,
@@ -72,6 +73,7 @@ class CompiledScene:
     )  # (lights,) those whose surface scatters nothing; None when there are none
     instances: InstanceTable | None = None  # None when no mesh is instanced
     places: MortonGrid | None = None  # orders the paths of large scenes; None in small ones
+    shadow_catchers: Bools | None = None  # (materials,) those that catch shadows; None when none does
     background: Floats | None = None  # (3, 1) what camera rays that miss show; None for the environment
 
     @property
@@ -182,5 +184,6 @@ def compile_scene(
         light_groups=groups,
         nonscattering_lights=nonscattering_lights,
         instances=table,
+        shadow_catchers=find_shadow_catchers(user_materials),
         places=MortonGrid.over((high - low) / 2) if len(triangles) >= LARGE else None,
     )

@@ -9,7 +9,6 @@ surface behind, so both loops end.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 
@@ -17,14 +16,14 @@ from ..compile.scene import CompiledScene
 from ..errors import RenderError
 from ..sampling.sampler import Dimension, Sampler, numbers_of
 from ..state import Hits, Paths, Rays, SurfaceInteraction
-from ..vec import Floats, dot, f4
-from .interaction import interaction, offset_origin
-from .intersect import ShadowRays, intersect, shadow_ray_length, visible
+from ..vec import Floats, Ints, f4
+from .caught_shadow import catcher_lanes, shadow_opacity
+from .interaction import interaction
+from .intersect import intersect
 from .medium import absorb
+from .transmittance import continue_behind
 
 COVERING = f4(0.5)  # opacity from which on a surface hides what is behind it, where nothing is random
-
-AnyRays = TypeVar("AnyRays", bound=Rays)
 
 
 def alpha_pass_through(
@@ -40,10 +39,10 @@ def alpha_pass_through(
     RenderError
         If a ray meets more surfaces than there are random numbers for.
     """
-    if scene.opacities is None:
+    catches = bounce == 0 and scene.shadow_catchers is not None
+    if scene.opacities is None and not catches:
         return paths, hits
-    has_alpha = scene.opacities.has_alpha
-    lanes = np.flatnonzero(has_alpha.take(hits.prim))  # a miss, -1, takes the last entry
+    lanes = _passable(scene, hits, np.arange(len(paths)), catches)
     if not lanes.size:
         return paths, hits
     paths = replace(
@@ -58,15 +57,42 @@ def alpha_pass_through(
         here, at = paths.take(lanes), hits.take(lanes)
         surface = interaction(scene, here, at)
         u = sampler.draw_1d(here.pixel, here.sample, bounce, dimension)
-        passing = np.flatnonzero(u >= scene.opacities.at(surface))
+        passing = np.flatnonzero(u >= _opacities(scene, here, at, surface, sampler, catches))
         lanes, here, surface = lanes.take(passing), here.take(passing), surface.take(passing)
         absorb(scene, here.throughput, at.take(passing), surface)
         here = continue_behind(here, surface)
         paths.origin[:, lanes], paths.exclude_prim[lanes] = here.origin, here.exclude_prim
         paths.throughput[:, lanes] = here.throughput
         hits.put(lanes, intersect(scene, here))
-        lanes = lanes.compress(has_alpha.take(hits.prim.take(lanes)))
+        lanes = _passable(scene, hits, lanes, catches)
     return paths, hits
+
+
+def _passable(scene: CompiledScene, hits: Hits, lanes: Ints, catches: bool) -> Ints:
+    """Return those of some lanes (k,) that hit a surface that they may pass; with `catches`, catchers too."""
+    passable = np.zeros(lanes.size, np.bool_)
+    if scene.opacities is not None:
+        passable = scene.opacities.has_alpha.take(hits.prim.take(lanes))  # a miss, -1, takes the last entry
+    if catches:
+        passable[np.searchsorted(lanes, catcher_lanes(scene, hits, lanes))] = True
+    return lanes.compress(passable)
+
+
+def _opacities(
+    scene: CompiledScene,
+    paths: Paths,
+    hits: Hits,
+    surface: SurfaceInteraction,
+    sampler: Sampler,
+    catches: bool,
+) -> Floats:
+    """Return the opacities (n,) of surfaces, with `catches` those of shadows on catchers."""
+    everything = np.arange(len(surface))
+    opacity: Floats = np.ones(everything.size, f4) if scene.opacities is None else scene.opacities.at(surface)
+    lanes = catcher_lanes(scene, hits, everything) if catches else everything[:0]
+    if lanes.size:
+        opacity[lanes] *= shadow_opacity(scene, paths.take(lanes), surface.take(lanes), sampler)
+    return opacity
 
 
 def covering_hits(scene: CompiledScene, rays: Rays) -> tuple[Rays, Hits]:
@@ -89,37 +115,3 @@ def covering_hits(scene: CompiledScene, rays: Rays) -> tuple[Rays, Hits]:
         hits.put(lanes, intersect(scene, here))
         lanes = lanes.compress(has_alpha.take(hits.prim.take(lanes)))
     return rays, hits
-
-
-def transmittance_along(scene: CompiledScene, rays: ShadowRays) -> Floats:
-    """Return the transmittance of shadow rays, (3, k).
-
-    Only rays that hit anything are traced on from surface to surface.
-    """
-    assert scene.opacities is not None
-    part = np.ones_like(rays.direction)
-    lanes = np.flatnonzero(~visible(scene, rays))
-    rays = rays.take(lanes)
-    while lanes.size:
-        hits = intersect(scene, rays)
-        between = hits.t < shadow_ray_length(rays)
-        has_alpha = scene.opacities.has_alpha.take(hits.prim)
-        part[:, lanes.compress(between & ~has_alpha)] = 0
-        met = np.flatnonzero(between & has_alpha)
-        lanes, rays, hits = lanes.take(met), rays.take(met), hits.take(met)
-        surface = interaction(scene, rays, hits)
-        left = part.take(lanes, 1) * (f4(1) - scene.opacities.at(surface))
-        absorb(scene, left, hits, surface)
-        part[:, lanes] = left
-        rays = replace(
-            continue_behind(rays, surface), error=rays.error + surface.error, distance=rays.distance - hits.t
-        )
-        on = np.flatnonzero(left.max(0) != 0)
-        lanes, rays = lanes.take(on), rays.take(on)
-    return part
-
-
-def continue_behind(rays: AnyRays, surface: SurfaceInteraction) -> AnyRays:
-    """Return rays that continue from just behind the surfaces."""
-    origin = offset_origin(surface, dot(surface.ng, rays.direction))
-    return replace(rays, origin=origin, exclude_prim=surface.prim)

@@ -17,9 +17,9 @@ from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
 from ..state import Contribution, Hits, Paths, SurfaceInteraction
 from ..vec import Floats, Ints, Lanes, broadcast, column, dot, f4, highest, take
-from .alpha import transmittance_along
 from .interaction import interaction, offset_origin, origin_above
 from .intersect import ShadowRays, shadow_rays, visible
+from .transmittance import transmittance_along
 
 UP = column((0, 0, 1))
 

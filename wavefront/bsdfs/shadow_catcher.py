@@ -1,0 +1,30 @@
+"""Surfaces that show only the shadows on them."""
+
+from __future__ import annotations
+
+from .diffuse import Diffuse
+
+
+class ShadowCatcher(Diffuse):
+    """A surface that the camera sees only where shadows fall on it, for objects composed onto photographs.
+
+    Where it is in full light, the camera looks through it at the background; where all light is blocked it is
+    black and opaque. Its opacity is 1 − the ratio of the light that arrives to the light that would arrive if
+    nothing were in the way, as in the shadow matte of Arnold and the shadow catcher of Blender's Cycles.
+    Only direct light counts, by its luminance, so the shadow has no color. To rays that have been scattered,
+    such as those of mirrors and of the indirect light on objects, it is a `Diffuse` surface.
+
+    Parameters
+    ----------
+    reflectance
+        As of `Diffuse`, for the light that it sends onto objects.
+
+    Notes
+    -----
+    For each sample of the camera one of 16 candidates of arriving light is chosen by its part of their sum
+    (resampled importance sampling, J. Talbot et al. 2005), and one shadow ray is traced to it. With one
+    point or directional light the opacity has no bias; in other light its bias falls with the number of
+    candidates.
+    """
+
+    catches_shadows = True
