@@ -31,7 +31,8 @@ def test_block_runs(document, line, code, tmp_path, monkeypatch):
     render = wf.render
 
     def quick(scene, spp=MOST_SPP, **options):
-        return render(scene, min(spp, MOST_SPP), progress=False, **options)
+        few = {} if "samples" in options else {"spp": min(spp, MOST_SPP)}
+        return render(scene, **few, progress=False, **options)
 
     monkeypatch.setattr(wf, "render", quick)
     monkeypatch.chdir(tmp_path)
