@@ -24,6 +24,7 @@ import numpy as np
 from mitsuba_scene import to_mitsuba
 
 import wavefront as wf
+from wavefront.scheduling.executors import worker_count
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
 from cornell_box import cornell_box
@@ -50,7 +51,7 @@ def mitsuba(spp: int, variant: str) -> Callable[[], np.ndarray]:
 class Cycles:
     """A Cycles process that renders once per call."""
 
-    def __init__(self, python: str, spp: int, threads: int) -> None:
+    def __init__(self, python: str, spp: int, threads: int, size: int = SIZE, denoise: bool = False) -> None:
         script = Path(__file__).with_name("cycles_cornell.py")
         self.process = subprocess.Popen(
             [python, str(script)],
@@ -67,19 +68,30 @@ class Cycles:
                 "color": shape.material.bsdf.reflectance.ravel().tolist(),
                 "emission": None if shape.emission is None else shape.emission.ravel().tolist(),
             }
-            for i, shape in enumerate(cornell_box(SIZE).shapes)
+            for i, shape in enumerate(cornell_box(size).shapes)
         ]
-        job = {"shapes": shapes, "size": SIZE, "spp": spp, "threads": threads, "max_bounces": MAX_BOUNCES}
-        self._say(json.dumps(job))
+        job = {"shapes": shapes, "size": size, "spp": spp, "threads": threads, "max_bounces": MAX_BOUNCES}
+        self._say(json.dumps({**job, "denoise": denoise}))
         self.seconds()
 
     def seconds(self) -> float:
         """Render, and return the seconds that Cycles took."""
-        self._say("again")
+        return float(self._answers("again")["SECONDS"])
+
+    def picture(self) -> np.ndarray:
+        """Render with another seed, and return the picture (H, W, 3)."""
+        return wf.Image.load(self._answers("write")["PICTURE"]).rgb
+
+    def _answers(self, line: str) -> dict[str, str]:
+        """Return what Cycles says, by its first word."""
+        self._say(line)
         assert self.process.stdout is not None
-        for line in self.process.stdout:
-            if line.startswith("SECONDS"):
-                return float(line.split()[1])
+        found = {}
+        for answer in self.process.stdout:
+            word, _, rest = answer.strip().partition(" ")
+            found[word] = rest
+            if word == "SECONDS":
+                return found
         raise RuntimeError("Cycles stopped without an answer")
 
     def _say(self, line: str) -> None:
@@ -130,7 +142,7 @@ if __name__ == "__main__":
         "mitsuba scalar_rgb": clock(mitsuba(options.spp, "scalar_rgb")),
     }
     if options.bpy_python:
-        sides["cycles"] = Cycles(options.bpy_python, options.spp, wf.parallel.worker_count(None)).seconds
+        sides["cycles"] = Cycles(options.bpy_python, options.spp, worker_count(None)).seconds
     if options.prototype:
         sides["prototype"] = clock(prototype(options.prototype, options.spp))
     times: dict[str, list[float]] = {name: [] for name in sides}

@@ -27,7 +27,7 @@ def material(name: str, color: list[float], emission: list[float] | None) -> bpy
     return made
 
 
-def build(shapes: list[dict], size: int, spp: int, threads: int, max_bounces: int) -> None:
+def build(shapes: list[dict], size: int, spp: int, threads: int, max_bounces: int, denoise: bool) -> None:
     """Put the shapes, a camera and the settings into Blender's scene."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
@@ -47,19 +47,25 @@ def build(shapes: list[dict], size: int, spp: int, threads: int, max_bounces: in
     scene.render.threads_mode, scene.render.threads = "FIXED", threads
     scene.cycles.device = "CPU"
     scene.cycles.samples = spp
-    scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
+    scene.cycles.use_adaptive_sampling = False
+    scene.cycles.use_denoising, scene.cycles.denoiser = denoise, "OPENIMAGEDENOISE"
+    scene.cycles.pixel_filter_type = "BOX"
+    scene.cycles.filter_width = 1.0
     scene.cycles.max_bounces = scene.cycles.diffuse_bounces = max_bounces
     scene.render.image_settings.file_format = "OPEN_EXR"
+    scene.render.image_settings.color_depth = "32"
     scene.render.filepath = tempfile.mkdtemp() + "/out.exr"
 
 
 def main() -> None:
     """Read the job from standard input, then print the seconds of one render per further line."""
     job = json.loads(sys.stdin.readline())
-    build(job["shapes"], job["size"], job["spp"], job["threads"], job["max_bounces"])
-    for _ in sys.stdin:
+    build(job["shapes"], job["size"], job["spp"], job["threads"], job["max_bounces"], job["denoise"])
+    for seed, line in enumerate(sys.stdin):
+        bpy.context.scene.cycles.seed = seed
         begin = time.perf_counter()
-        bpy.ops.render.render(write_still=False)
+        bpy.ops.render.render(write_still="write" in line)
+        print(f"PICTURE {bpy.context.scene.render.filepath}")
         print(f"SECONDS {time.perf_counter() - begin}", flush=True)
 
 

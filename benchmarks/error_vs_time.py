@@ -2,8 +2,10 @@
 
 python benchmarks/error_vs_time.py [--scene cornell|mesh|lights|all] [--data DATA] [--out plot.png]
 
-Sides: wavefront with each sampler and, "sobol/4", with four branches, numpy and embree; Mitsuba
-`llvm_ad_rgb` and `scalar_rgb`, each with `independent` and `multijitter`. All draw the same shapes with
+Sides: wavefront with each sampler, "sobol/4" with four branches and "denoised" with `denoise=True`, numpy
+and embree; Mitsuba `llvm_ad_rgb` and `scalar_rgb`, each with `independent` and `multijitter`; with
+`--bpy-python`, on the box, Cycles with Open Image Denoise, whose error is that against its own converged
+picture, since its edges lie a part of a pixel elsewhere. All draw the same shapes with
 as many bounces, a box filter and a worker per core. The reference is the mean of two converged
 renders, one of each side, whose means are compared first. Printed are, for each side:
 
@@ -37,17 +39,20 @@ from statistics import median
 from typing import Any
 
 import numpy as np
+from cornell_peers import Cycles
 from many_lights import lit
 from mitsuba_scene import to_mitsuba
 
 import wavefront as wf
 from wavefront.sampling.sampler import SAMPLERS
+from wavefront.scheduling.executors import worker_count
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
 from cornell_box import cornell_box
 
 BOUNCES = {"cornell": 7, "mesh": 7, "lights": 3}
 SPP = (4, 16, 64)
+DENOISED = "denoised"  # in place of a sampler
 IMPORT = """
 import time
 import numpy
@@ -102,7 +107,13 @@ def ball(subdivisions: int) -> tuple[np.ndarray, np.ndarray]:
 
 def ours(scene: wf.Scene, bounces: int, sampler: str, accel: str, branches: int = 1) -> Render:
     """Return a renderer of this project."""
-    options: dict[str, Any] = {"sampler": sampler, "accel": accel, "branches": branches}
+    denoise = sampler == DENOISED
+    options: dict[str, Any] = {
+        "sampler": "sobol" if denoise else sampler,
+        "accel": accel,
+        "branches": branches,
+        "denoise": denoise,
+    }
 
     def render(spp: int, seed: int) -> np.ndarray:
         return wf.render(scene, spp, seed=seed, max_bounces=bounces, progress=False, **options).rgb
@@ -127,9 +138,17 @@ def mitsuba(
     return render
 
 
+def cycles(python: str, size: int, counts: tuple[int, ...], denoise: bool = True) -> Render:
+    """Return a renderer of Cycles, a process of a Python for each of some sample counts."""
+    made = {spp: Cycles(python, spp, worker_count(None), size, denoise) for spp in counts}
+    return lambda spp, seed: made[spp].picture()
+
+
 def renderer(side: str, scene: wf.Scene, bounces: int, counts: tuple[int, ...] = SPP) -> Render:
     """Return the renderer of a side, called "wavefront embree sobol" or "scalar_rgb multijitter"."""
     *_, engine, sampler = side.split()
+    if engine == "cycles":
+        return cycles(chosen.bpy_python, scene.camera.size[0], counts)
     if side.startswith("wavefront"):
         sampler, _, branches = sampler.partition("/")
         return ours(scene, bounces, sampler, engine, int(branches or 1))
@@ -204,13 +223,21 @@ def measure(name: str, scene: wf.Scene, options: argparse.Namespace) -> dict[str
     print(f"\n## {name}: {scene.camera.size[0]}x{scene.camera.size[1]}, max_bounces {bounces}", flush=True)
     exact = reference(scene, bounces, options.reference_spp, variants[0])
     names = [
-        f"wavefront {accel} {sampler}" for accel in ("numpy", "embree") for sampler in (*SAMPLERS, "sobol/4")
+        f"wavefront {accel} {sampler}"
+        for accel in ("numpy", "embree")
+        for sampler in (*SAMPLERS, "sobol/4", DENOISED)
     ]
     names += [f"{variant} {sampler}" for variant in variants for sampler in ("independent", "multijitter")]
+    names += [f"cycles {DENOISED}"] if options.bpy_python and name == "cornell" else []
     sides = {side: renderer(side, scene, bounces) for side in names}
     for side, render in sides.items():  # warm up; Mitsuba may compile anew for each sample count
         for spp in SPP[:1] if side.startswith("wavefront") else SPP:
             render(spp, 0)
+    converged = dict.fromkeys(sides, exact)
+    for side in sides:
+        if side.startswith("cycles"):
+            counts = (options.reference_spp,)
+            converged[side] = cycles(options.bpy_python, options.size, counts, denoise=False)(counts[0], 0)
     times: dict[str, Any] = {side: {spp: [] for spp in SPP} for side in sides}
     errors: dict[str, Any] = {side: {spp: [] for spp in SPP} for side in sides}
     for spp in SPP:
@@ -219,12 +246,14 @@ def measure(name: str, scene: wf.Scene, options: argparse.Namespace) -> dict[str
                 begin = time.perf_counter()
                 picture = render(spp, seed)
                 times[side][spp].append(time.perf_counter() - begin)
-                errors[side][spp].append(relative_mse(picture, exact))
+                errors[side][spp].append(relative_mse(picture, converged[side]))
     found = {
         side: {
             "errors": [median(errors[side][spp]) for spp in SPP],
             "seconds": [median(times[side][spp]) for spp in SPP],
-            "once": max(0.0, first(side, options, name) - median(times[side][SPP[0]])),
+            "once": 0.0
+            if side.startswith("cycles")  # its scene is loaded beforehand, and not measured
+            else max(0.0, first(side, options, name) - median(times[side][SPP[0]])),
         }
         for side in sides
     }
@@ -254,8 +283,21 @@ def report(found: dict[str, Any]) -> None:
         )
 
 
-COLORS = {"wavefront numpy": "C3", "wavefront embree": "C1", "llvm_ad_rgb": "C0", "scalar_rgb": "C2"}
-LINES = {"independent": ":", "sobol": "-", "bluenoise": "--", "multijitter": "-", "sobol/4": "-."}
+COLORS = {
+    "wavefront numpy": "C3",
+    "wavefront embree": "C1",
+    "llvm_ad_rgb": "C0",
+    "scalar_rgb": "C2",
+    "cycles": "C4",
+}
+LINES = {
+    "independent": ":",
+    "sobol": "-",
+    "bluenoise": "--",
+    "multijitter": "-",
+    "sobol/4": "-.",
+    DENOISED: (0, (1, 1)),
+}
 
 
 def plot(results: dict[str, Any], path: Path) -> None:
@@ -303,6 +345,7 @@ if __name__ == "__main__":
     parser.add_argument("--size", type=int, default=256)
     parser.add_argument("--repeat", type=int, default=3)
     parser.add_argument("--reference-spp", type=int, default=4096)
+    parser.add_argument("--bpy-python", help="a Python that has bpy, for Cycles")
     parser.add_argument("--variants", default="llvm_ad_rgb,scalar_rgb")
     parser.add_argument("--out", type=Path, default=Path("error_vs_time.png"))
     parser.add_argument("--keep", type=Path, help="JSON file of results to add to")
