@@ -390,7 +390,7 @@ def test_files(row: str, outcomes: dict[str, list[str]]) -> None:
 def test_repairs_are_counted(tmp_path: Path) -> None:
     """A warning in place of the error of `strict`."""
     path = text(FACE + "f 1 1 2\nv nan 0 0\nf 1 2 4\n")(tmp_path)
-    with pytest.warns(UserWarning) as found:
+    with pytest.warns(UserWarning, match="faces") as found:
         (shape,) = wf.load(path).shapes
     assert isinstance(shape, wf.Mesh)
     assert len(shape.faces) == 1
@@ -414,7 +414,7 @@ def test_faces_without_area_are_in_no_table_of_lights(tmp_path: Path) -> None:
 @pytest.mark.parametrize("make", [lambda: wf.Scene([]), lambda: wf.Mesh(np.zeros((0, 3)), [])])
 def test_an_empty_scene(make: Callable[[], Any]) -> None:
     """There is nothing to render."""
-    with pytest.raises(wf.SceneError, match="no shapes|no faces|must have shape|nothing|empty"):
+    with pytest.raises(wf.SceneError, match=r"no shapes|no faces|must have shape|nothing|empty"):
         render(make(), 1)
 
 
@@ -571,7 +571,7 @@ def test_an_ior_of_1_or_less() -> None:
 )
 def test_a_light_without_area(make: Callable[[], Any]) -> None:
     """It cannot shine."""
-    with pytest.raises(wf.SceneError, match="area|radius|parallel"):
+    with pytest.raises(wf.SceneError, match=r"area|radius|parallel"):
         render(wf.Scene(make(), camera=wf.Camera.look_at((0, 0, 4), (0, 0, 0), size=(8, 8))), 1)
 
 

@@ -356,6 +356,16 @@ def test_damaged_3mf(write, data, message):
         load_meshes(write(data, "a.3mf"))
 
 
+@pytest.mark.parametrize("element", ["inf", "nan", "1e300"])
+def test_matrices_of_3mf_that_are_not_finite_are_named(write, element):
+    """Found by damaged files: a matrix that is not finite gave a warning of NumPy."""
+    pytest.importorskip("lxml")
+    pytest.importorskip("networkx")
+    build = f'<item objectid="1" transform="{element} 0 0 0 1 0 0 0 1 5 0 0"/>'
+    with pytest.raises(SceneError, match=r"a\.3mf: .*(matrix|not a readable 3mf)"):
+        load_meshes(write(package(model(build=build)), "a.3mf"))
+
+
 def test_members_of_3mf_are_limited(write, monkeypatch):
     pytest.importorskip("lxml")
     pytest.importorskip("networkx")

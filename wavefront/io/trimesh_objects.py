@@ -50,7 +50,8 @@ def _nodes(geometry: Any, trimesh: Any) -> list[tuple[Any, str, np.ndarray, str]
         raise SceneError(f"expected a trimesh.Trimesh or trimesh.Scene, got {type(geometry).__name__}")
     out = []
     for node in geometry.graph.nodes_geometry:
-        matrix, key = geometry.graph[node]
+        with np.errstate(all="ignore"):  # a matrix that is not finite is reported where it is used
+            matrix, key = geometry.graph[node]
         mesh = geometry.geometry[key]
         if isinstance(mesh, trimesh.Trimesh):
             out.append((mesh, str(key), np.asarray(matrix, np.float64), str(node)))
