@@ -9,7 +9,7 @@ import scenes
 from significance import Mean, assert_same_images, render, repeat
 
 import wavefront as wf
-from wavefront import integrators, settings
+from wavefront import integrators, pilot, settings
 from wavefront.sampling.sampler import Dimension, Sampler, make_sampler
 from wavefront.stages import compact as compact_stage
 
@@ -117,9 +117,12 @@ class Once(Sampler):
 
 
 @pytest.mark.parametrize(
-    ("integrator", "branches"), [*((integrator, 1) for integrator in scenes.ALL), ("full", 3)]
+    ("integrator", "branches", "guide"),
+    [*((integrator, 1, False) for integrator in scenes.ALL), ("full", 3, False), ("full", 3, True)],
 )
-def test_no_number_is_used_twice(integrator: str, branches: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_number_is_used_twice(
+    integrator: str, branches: int, guide: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Not by two decisions, bounces or branches: the means of many scenes would not show it."""
     given: list[Once] = []
 
@@ -128,6 +131,7 @@ def test_no_number_is_used_twice(integrator: str, branches: int, monkeypatch: py
         return given[-1]
 
     monkeypatch.setattr(settings, "make_sampler", record)
+    monkeypatch.setattr(pilot, "PATHS", 1 << 13)
     scene = scenes.everything((12, 9))
     veils = [
         wf.Rectangle((-2, -2, z), (4, 0, 0), (0, 4, 0), material=wf.Material(wf.Diffuse(0.5), alpha=0.3))
@@ -136,12 +140,12 @@ def test_no_number_is_used_twice(integrator: str, branches: int, monkeypatch: py
     blend = wf.Sphere((0.2, 0.3, 0.2), 0.2, material=wf.Mix(wf.Diffuse(0.7), wf.Dielectric(1.5, 0.3)))
     camera = wf.Camera.look_at((0, 0, 3.9), (0, 0, 0), size=(12, 9), aperture=0.1, focus=3.9)
     scene = wf.Scene([*scene.shapes, *veils, blend], [wf.Environment((0.2, 0.3, 0.5))], camera)
-    render(scene, 16, integrator=integrator, max_bounces=5, branches=branches)
+    render(scene, 16, integrator=integrator, max_bounces=5, branches=branches, guide=guide)
     left_out = {"naive": {Dimension.LIGHT, Dimension.LIGHT_POINT}, "full": set()}
     decisions = {*Dimension, Dimension.OPACITY + 1, Dimension.OPACITY + 2}  # three veils
     assert {dimension for _, dimension in given[-1].given} == decisions - left_out.get(
         integrator, {Dimension.ROULETTE}
-    )
+    ) - (set() if guide else {Dimension.GUIDE, Dimension.GUIDE_DIRECTION})
 
 
 @pytest.mark.parametrize("integrator", ["direct_simple", "direct_mis", "full"])

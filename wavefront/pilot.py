@@ -48,9 +48,7 @@ class Vertices(SoA):
     found: Floats  # (k,) sum of the channels of the radiance that was found before this vertex
 
 
-def train(
-    scene: CompiledScene, camera: Camera, sampler: Sampler, max_bounces: int, paths: int = PATHS
-) -> GuideTable | None:
+def train(scene: CompiledScene, camera: Camera, sampler: Sampler, max_bounces: int) -> GuideTable | None:
     """Trace the pilot and return the table; None if its paths met nothing that can be guided.
 
     Parameters
@@ -65,7 +63,7 @@ def train(
     cells: GuideCells | None = None
     done = 0
     for part in ROUNDS:
-        count = int(paths * part)
+        count = int(PATHS * part)
         found = [
             _trace(scene, camera, sampler, max_bounces, table, first, min(WAVE, done + count - first))
             for first in range(done, done + count, WAVE)
