@@ -21,6 +21,7 @@ import pytest
 import wavefront as wf
 from wavefront import cli, files
 from wavefront.checkpoint_file import read_header
+from wavefront.sampling.sampler import IndependentSampler
 
 SIZE = (24, 18)
 BLOBS = [(-1.2, 0.3, 0), (1.1, -0.2, 0.4), (0, 0.9, -0.5)]
@@ -162,6 +163,19 @@ def test_a_session_iterates_from_where_the_checkpoint_is(tmp_path: Path) -> None
             session.set_camera(None)
 
 
+@pytest.mark.parametrize("how", ["break", "stop"])
+def test_a_session_that_is_left_keeps_its_render(tmp_path: Path, how: str) -> None:
+    """Whether its loop is left or it is stopped."""
+    with wf.Session(scene(), 16, checkpoint=tmp_path / "a") as session:
+        for image in session:
+            if image.spp == 2 and how == "break":
+                break
+            if image.spp == 2:
+                session.stop()
+    assert wf.Image.load(tmp_path / "a").spp >= 2
+    assert digest(wf.render(scene(), 16, checkpoint=tmp_path / "a")) == digest(wf.render(scene(), 16))
+
+
 def test_parts_of_the_samples_have_checkpoints_that_merge(tmp_path: Path) -> None:
     """As pictures do."""
     for number, samples in enumerate((range(5), range(5, 11))):
@@ -241,6 +255,29 @@ def test_another_scene_is_refused(tmp_path: Path) -> None:
         with pytest.raises(wf.SceneError, match="another render: the scene differs"):
             wf.render(other, 2, checkpoint=tmp_path / "a")
     wf.render(scene(ground=wf.Diffuse(Checks(8))), 4, checkpoint=tmp_path / "a")
+
+
+@pytest.mark.parametrize("name", ["filter", "integrator", "sampler"])
+def test_other_code_of_the_users_is_refused(tmp_path: Path, name: str) -> None:
+    """Also where its name is the same."""
+
+    def make(factor: float) -> Any:
+        def own_filter(u: Any) -> Any:
+            return u * np.float32(factor)
+
+        def own_integrator(scene: Any, paths: Any, sampler: Any, max_bounces: int) -> Any:
+            return np.full((3, len(paths)), np.float32(factor))
+
+        class OwnSampler(IndependentSampler):
+            def draw_1d(self, *address: Any) -> Any:
+                return super().draw_1d(*address) * np.float32(factor)
+
+        return {"filter": own_filter, "integrator": own_integrator, "sampler": OwnSampler}[name]
+
+    wf.render(scene(), 2, **{name: make(0.5)}, checkpoint=tmp_path / "a")
+    wf.render(scene(), 3, **{name: make(0.5)}, checkpoint=tmp_path / "a")
+    with pytest.raises(wf.SceneError, match=f"the code of the {name} differs"):
+        wf.render(scene(), 4, **{name: make(0.25)}, checkpoint=tmp_path / "a")
 
 
 def test_what_cannot_be_recognized_again_is_refused(tmp_path: Path) -> None:

@@ -312,6 +312,7 @@ class Session:
             raise StopIteration
         with self.interrupt_handler:
             if self._stopped:  # since the last picture
+                self._keep_render()
                 self._ended = True
                 self._pool.cancel()
                 raise StopIteration
@@ -418,6 +419,8 @@ class Session:
     def close(self) -> None:
         """End the render and all workers; the session cannot be used again."""
         with self.interrupt_handler:
+            if not self._ended:
+                self._keep_render()
             self._closed = self._ended = True
             self._discard_sweeps()
             self._pool.close()
@@ -550,6 +553,12 @@ class Session:
             camera,
             self._tracer.recorded_layers,
         )
+
+    def _keep_render(self) -> None:
+        """Write the checkpoint of a render that is left before its end; warn if that is not possible."""
+        error = None if self._checkpoint is None else self._checkpoint.write(self._make_checkpoint)
+        if error is not None:
+            warn_caller(f"the checkpoint was not written: {error}")
 
     def _make_checkpoint(self) -> Checkpoint:
         """Return the render so far."""
