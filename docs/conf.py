@@ -1,0 +1,99 @@
+"""Settings of the documentation site.
+
+Build it with `sphinx-build -W -c docs . build/site`: the source folder is that of the repository, so links
+between the documents, README.md and CONTRIBUTING.md are the same there and on the site.
+"""
+
+import re
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "docs")]
+
+from wavefront.version import VERSION  # noqa: E402
+
+project = "wavefront"
+author = "the wavefront developers"
+copyright = "the wavefront developers, MIT license"
+version = release = VERSION
+
+extensions = [
+    "myst_parser",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "sphinx_gallery.gen_gallery",
+    "sphinxcontrib.mermaid",
+]
+root_doc = "docs/index"
+include_patterns = ["docs/**", "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "benchmarks/README.md"]
+exclude_patterns = [".*", ".*/**", "build/**", "docs/tutorial/**", "docs/_templates/**"]
+exclude_patterns += [f"docs/generated/**/*.{ending}" for ending in ("py", "ipynb", "zip")]
+templates_path = ["_templates"]
+default_role = "py:obj"
+suppress_warnings = ["config.cache"]  # sphinx-gallery's settings hold functions
+
+html_theme = "furo"
+html_title = f"wavefront {VERSION}"
+html_additional_pages = {"index": "to_the_index.html"}
+html_show_sphinx = False
+html_copy_source = False
+
+myst_enable_extensions = ["dollarmath", "amsmath"]
+myst_fence_as_directive = ["mermaid"]
+myst_heading_anchors = 4
+
+autosummary_generate = True
+autodoc_typehints = "none"  # numpydoc's sections say what an argument is
+autodoc_member_order = "bysource"
+numpydoc_show_class_members = False
+numpydoc_class_members_toctree = False
+
+sphinx_gallery_conf = {
+    "examples_dirs": "docs/tutorial",
+    "gallery_dirs": "docs/generated/tutorial",
+    "filename_pattern": r"/\d\d_",
+    "within_subsection_order": "FileNameSortKey",
+    "image_scrapers": ("saved_pictures.scraper",),
+    "reset_modules": (),
+    "capture_repr": (),
+    "min_reported_time": 1e9,
+    "download_all_examples": False,
+    "show_memory": False,
+    "show_signature": False,
+    "abort_on_example_error": True,
+    "remove_config_comments": True,
+    "write_computation_times": False,
+    "plot_gallery": "True",
+}
+
+LINKED = re.compile(r"^- \[.*?\]\((\S+?)(?:#\S*)?\)", re.MULTILINE)
+TOCTREE = "\n```{{toctree}}\n:hidden:\n:caption: {caption}\n\n{pages}\n```\n"
+
+
+def page_of(link: str) -> str:
+    """Return the name of the page, from the root of the site, to which a link of the index leads."""
+    if link == "tutorial/README.rst":
+        return "/docs/generated/tutorial/index"
+    path = (ROOT / "docs" / link).resolve().relative_to(ROOT)
+    return f"/{path.with_suffix('').as_posix()}"
+
+
+def contents_from_lists(app, docname, source):
+    """Give each section of the index a table of contents: the pages that its list links to."""
+    if docname != root_doc:
+        return
+    text = source[0].replace("(tutorial/README.rst)", "(generated/tutorial/index.rst)")
+    sections = re.split(r"^## ", source[0], flags=re.MULTILINE)[1:]
+    for section in sections:
+        caption = section.partition("\n")[0]
+        pages = "\n".join(dict.fromkeys(page_of(link) for link in LINKED.findall(section)))
+        text += TOCTREE.format(caption=caption, pages=pages)
+    source[0] = text
+
+
+def setup(app):
+    """Connect what this file adds to Sphinx."""
+    app.connect("source-read", contents_from_lists)
