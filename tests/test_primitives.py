@@ -414,6 +414,28 @@ def test_what_is_wrong_is_named(make: object, message: str) -> None:
         make()
 
 
+@pytest.mark.parametrize("shape", [wf.Cylinders, wf.Capsules])
+def test_bounds_hold_the_shape_and_touch_it(shape: object) -> None:
+    """Those of one tilted body, against points of its surface."""
+    axis, radius = np.array([0.6, 0, 0.8]), 0.5
+    body = shape([(0, 0, 0)], [2 * axis], radius)
+    turn = np.linspace(0, 2 * np.pi, 721)[:, None]
+    around = radius * (np.cos(turn) * (0.8, 0, -0.6) + np.sin(turn) * (0, 1, 0))
+    if shape is wf.Capsules:
+        tilt = np.linspace(-np.pi / 2, np.pi / 2, 721)[:, None, None]
+        around = (np.cos(tilt) * around + radius * np.sin(tilt) * axis).reshape(-1, 3)
+    points = np.concatenate([around, around + 2 * axis])
+    np.testing.assert_allclose(body.bounds, [points.min(0), points.max(0)], atol=1e-4)
+
+
+@pytest.mark.parametrize(("cloud", "maker"), [(True, "Points"), (False, "Edges")])
+def test_clouds_and_paths_in_place_of_shapes_get_a_hint(cloud: bool, maker: str) -> None:
+    points = np.eye(3)
+    given = trimesh.PointCloud(points) if cloud else trimesh.load_path(points)
+    with pytest.raises(wf.SceneError, match=rf"; wf\.{maker}\(it, radius\) is a shape"):
+        wf.Scene([given])
+
+
 def test_cylinders_cannot_shine() -> None:
     glow = wf.Material(wf.Diffuse(0), emission=1)
     shape = wf.Cylinders([(0, 0, 0)], [(0, 1, 0)], 0.1, material=glow, name="rod")

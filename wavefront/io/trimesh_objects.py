@@ -16,6 +16,8 @@ from .repair import RawMesh, warn, with_face_colors
 if TYPE_CHECKING:
     import trimesh
 
+# objects of trimesh without faces, and what makes shapes of them
+WITHOUT_FACES = {"PointCloud": "Points", "Path2D": "Edges", "Path3D": "Edges"}
 BARE = ("obj", "ply")  # formats whose materials may lack a color; trimesh then invents a gray one
 
 
@@ -47,7 +49,9 @@ def _nodes(geometry: Any, trimesh: Any) -> list[tuple[Any, str, np.ndarray, str]
     if isinstance(geometry, trimesh.Trimesh):
         return [(geometry, str(geometry.metadata.get("name") or ""), np.eye(4), "")]
     if not isinstance(geometry, trimesh.Scene):
-        raise SceneError(f"expected a trimesh.Trimesh or trimesh.Scene, got {type(geometry).__name__}")
+        kind = type(geometry).__name__
+        hint = f"; wf.{WITHOUT_FACES[kind]}(it, radius) is a shape" if kind in WITHOUT_FACES else ""
+        raise SceneError(f"expected a trimesh.Trimesh or trimesh.Scene, got {kind}{hint}")
     out = []
     for node in geometry.graph.nodes_geometry:
         with np.errstate(all="ignore"):  # a matrix that is not finite is reported where it is used

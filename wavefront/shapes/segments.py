@@ -56,10 +56,14 @@ class SegmentArray(PrimitiveArray):
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """Lower and upper corner, (2, 3), of spheres about all ends; cylinders may end a little inside."""
-        radii = self.radii[:, None]
-        low = np.minimum(self.starts, self.ends) - radii
-        return np.stack([low.min(0), (np.maximum(self.starts, self.ends) + radii).max(0)])
+        """Lower and upper corner, (2, 3)."""
+        reach = self._reach()
+        low = np.minimum(self.starts, self.ends) - reach
+        return np.stack([low.min(0), (np.maximum(self.starts, self.ends) + reach).max(0)])
+
+    def _reach(self) -> NDArray[np.float64]:
+        """Return how far the surfaces reach beyond the ends of the segments, (n, 3) or (n, 1)."""
+        return self.radii[:, None]
 
 
 class Cylinders(SegmentArray):
@@ -108,6 +112,12 @@ class Cylinders(SegmentArray):
         self.starts, self.ends = starts, ends
         self.caps = bool(caps)
         super().__init__(radii, colors, material, name)
+
+    def _reach(self) -> NDArray[np.float64]:
+        """Return how far flat ends reach, (n, 3): the radius, times the sine of axis and coordinate axis."""
+        span = self.ends - self.starts
+        axis = span / np.linalg.norm(span, axis=1, keepdims=True)
+        return self.radii[:, None] * np.sqrt(np.maximum(1 - axis**2, 0))
 
     def check(self) -> None:
         """Check the arrays against each other; they may have been assigned one by one.
