@@ -46,6 +46,10 @@ class Film:
         self.batches.fill(0)  # takes the memory now, so that a render that lacks it does not fail late
         self.lengths: Ints | None = None  # samples of each batch; None: `batch_size` of them in all
 
+    def release_errors(self) -> None:
+        """Free the sums of variances and errors, 120 bytes per pixel; nothing can be added after that."""
+        self.squares, self.batches = np.zeros((3, 0)), np.zeros((BATCHES, 3, 0), np.float32)
+
     def add(self, pixels: Words, radiance: Floats) -> None:
         """Add samples.
 

@@ -20,6 +20,7 @@ from .codecs.images import read_picture, write_image
 from .codecs.png_jpeg import Gamma
 from .codecs.white_balance import WhiteBalance
 from .errors import SceneError, number, one_of, rgb
+from .film import Film
 from .layers import BOXES, LAYERS, NOISY, is_radiance
 from .outlines import outline_coverage
 from .picture_sums import PictureSums, merged_metadata, merged_sums, restored_sums
@@ -611,25 +612,44 @@ def film_image(sums: PictureSums, metadata: Mapping[str, Any], keep_sums: bool) 
 
     Its noise joins the metadata. With `keep_sums` the picture refers to the sums, which must not change then.
     """
-    film, layers = sums.film, sums.layers
+    image = _film_rgb(sums.film, metadata)
+    image.sums = sums if keep_sums else None
+    _add_layers(image, sums)
+    return image
+
+
+def last_film_image(sums: PictureSums, metadata: Mapping[str, Any]) -> Image:
+    """Return the picture as `film_image` does; the film is left without what its errors were made of."""
+    image = _film_rgb(sums.film, metadata)
+    sums.film.release_errors()
+    _add_layers(image, sums)
+    return image
+
+
+def _film_rgb(film: Film, metadata: Mapping[str, Any]) -> Image:
+    """Return the picture on a film, without layers."""
     width, height = film.size
     shape = height, width, 3
     estimates = film.estimates()
-    image = Image(
+    return Image(
         estimates.mean.reshape(shape),
         round(float(film.count.mean())),
         {**metadata, "noise": estimates.noise},
         counts=film.count.reshape(height, width).copy(),
         variance=estimates.variance.reshape(shape),
         standard_error=estimates.standard_error.reshape(shape),
-        sums=sums if keep_sums else None,
     )
-    if layers is not None:
-        for name in layers.names:
-            found = layers.estimate(name, film.sums, film.count)
-            image.layers[name] = _of_shape(found.mean, width, height)
-            image.errors[name] = _of_shape(found.standard_error, width, height)
-    return image
+
+
+def _add_layers(image: Image, sums: PictureSums) -> None:
+    """Add the sampled layers to a picture."""
+    if sums.layers is None:
+        return
+    width, height = sums.film.size
+    for name in sums.layers.names:
+        found = sums.layers.estimate(name, sums.film.sums, sums.film.count)
+        image.layers[name] = _of_shape(found.mean, width, height)
+        image.errors[name] = _of_shape(found.standard_error, width, height)
 
 
 def _of_shape(values: Floats, width: int, height: int) -> Floats:

@@ -224,7 +224,7 @@ def finish(session: Session) -> Image:
     """Render a session to the end, close it and return the picture, as `render` does."""
     with session.interrupt_handler as ctrl_c:  # until the last worker has ended
         with session:
-            image = session.run()
+            image = session.run_once()
         if ctrl_c.pressed:
             raise interrupted(image, None)
     return image

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import RenderError, warn_caller
 from ..film import Film
-from ..image import Image, film_image
+from ..image import Image, film_image, last_film_image
 from ..layer_sums import LayerSums, layer_bytes
 from ..memory import check_memory
 from ..picture_sums import PictureSums
@@ -102,6 +102,10 @@ class Accumulator:
         With `keep_sums` it can be merged; then no more samples must be added.
         """
         return film_image(self.sums, {**metadata, **self.counts()}, keep_sums)
+
+    def last_image(self, metadata: dict[str, Any]) -> Image:
+        """Return the picture, as `image` does, and free the sums that it is made from on the way."""
+        return last_film_image(self.sums, {**metadata, **self.counts()})
 
     def counts(self) -> dict[str, Any]:
         """Return numbers of samples and rays, for the metadata of the picture."""
