@@ -101,7 +101,8 @@ class RenderLoop:
 
             try:
                 film = self.accumulator.film
-                bar.advance(self.accumulator.samples, self.scheduler.elapsed)
+                if film.count.any():  # those of an earlier part of the render
+                    bar.advance(self.accumulator.samples, self.scheduler.elapsed)
                 for step in passes(film, self.spp, self._noise, self.step):
                     self.step = step
                     if step.first:
