@@ -220,6 +220,19 @@ def test_a_published_integer_is_the_same_in_all_places(tmp_path: Path) -> None:
     assert SharedInt.attach(path).value == 0
 
 
+def test_a_stop_stays_for_work_that_begins_late(tmp_path: Path) -> None:
+    """Though the flag is used again for other workers."""
+    shared = SharedInt()
+    shared.publish(str(tmp_path / "shared"))
+    other = SharedInt.attach(str(tmp_path / "shared"))
+    shared.leave_stopped()
+    assert (shared.value, other.value) == (0, STOP)
+    shared.rise_to(STOP)
+    shared.leave_stopped()
+    shared.reset()
+    assert (shared.value, other.value) == (0, STOP)
+
+
 def test_the_deadline_is_that_of_the_clock_of_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two machines count from different moments."""
     view = jobs.View(None, time.perf_counter() + 100)  # type: ignore[arg-type]

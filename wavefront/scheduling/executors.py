@@ -38,8 +38,8 @@ from .workers import (
 MIN_PATHS = 1 << 18  # fewer are traced sooner than processes are forked
 MIN_PATHS_TO_SPAWN = 1 << 22  # fewer are traced sooner than processes are spawned
 
-NAP = 0.02  # seconds for which other threads are watched
-BUSY = 0.25  # part of a core
+NAP = 0.05  # seconds for which other threads are watched
+BUSY = 0.01  # part of a core; busy threads may get little of one on a busy machine
 
 PROCESSES = ("processes", "spawn", "forkserver")  # names of executors whose workers are our own processes
 

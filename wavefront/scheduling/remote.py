@@ -69,7 +69,7 @@ class RemoteWorkers:
         self, pool: TaskPool, work: StoppableWork, strict: bool, delivery: Delivery | None = None
     ) -> None:
         self.replaceable = pool.replaceable
-        self._pool, self._strict = pool, strict
+        self._pool, self._strict, self._stop = pool, strict, work.stop
         self._warned: set[tuple[str, ...]] = set()
         self._folder = tempfile.mkdtemp(prefix="wavefront-")
         try:
@@ -118,6 +118,7 @@ class RemoteWorkers:
         try:
             self._pool.shutdown(running)
         finally:
+            self._stop.leave_stopped()
             self._remove_folder()
 
     def _report(self, differences: tuple[str, ...]) -> None:

@@ -51,6 +51,16 @@ class SharedInt:
         before, self._value = self._value, _mapped(path)
         self.rise_to(before[0])
 
+    def leave_stopped(self) -> None:
+        """Leave STOP for those that have attached the integer, and go on in memory of its own.
+
+        Work that begins late, such as a task that a cluster could not withdraw in time, finds it there.
+        """
+        before, value = self._value, self.value
+        self._value = SharedInt()._value
+        self.rise_to(value)
+        before[0] = max(STOP, value)
+
     @classmethod
     def attach(cls, path: str) -> SharedInt:
         """Return the integer that was published in a file.
