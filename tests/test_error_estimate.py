@@ -9,7 +9,8 @@ from significance import render
 
 import wavefront as wf
 from wavefront.film import OUTLIERS, Film, batch_size
-from wavefront.scheduling.accumulator import film_image
+from wavefront.image import film_image
+from wavefront.picture_sums import PictureSums
 from wavefront.vec import f4
 
 
@@ -72,7 +73,7 @@ def test_no_scatter_is_no_error() -> None:
     assert not film.squared_error().any()
     assert film.noise() == 0
     lone = filled(np.ones((3, 1, 4)))
-    image = film_image(lone, {})
+    image = film_image(PictureSums(lone, None, {}), {}, keep_sums=False)
     assert np.isnan(image.variance).all()
     assert np.isnan(image.standard_error).all()
     assert np.isnan(lone.noise())
@@ -85,7 +86,7 @@ def test_pixels_have_their_own_counts() -> None:
     film = Film(2, 2)
     film.add(pixels(0, 1, 2), samples[:, :16, :3])
     film.add(pixels(0, 2), samples[:, 16:, [0, 2]])
-    image = film_image(film, {})
+    image = film_image(PictureSums(film, None, {}), {}, keep_sums=False)
     assert image.counts.tolist() == [[64, 16], [64, 0]]
     assert image.spp == 36
     assert image.rgb[1, 1].tolist() == [0, 0, 0]

@@ -86,6 +86,18 @@ def test_what_cannot_fit_is_refused_with_the_figures() -> None:
         wf.render(scene, 1, max_memory="1GB")
 
 
+def test_layers_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They leave less memory for waves."""
+    monkeypatch.setattr(budget, "resident_memory", lambda: 100 * MEGABYTE)
+    limit = 400 * MEGABYTE
+    plain, layered = (
+        plan(limit, (640, 480), 1, None, True, layers) for layers in ((), ("direct", "indirect"))
+    )
+    assert layered.wave_size < plain.wave_size
+    with pytest.raises(wf.SceneError, match="are needed"):
+        wf.render(scenes.everything(), 1, size=(2000, 1500), max_memory="1.1GB", aovs="all", progress=False)
+
+
 def test_the_least_memory_that_is_named_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     """And one byte less is not."""
     monkeypatch.setattr(budget, "resident_memory", lambda: 0)

@@ -208,7 +208,7 @@ class Session:
             settings.max_bounces,
             settings.sampled_layers,
         )
-        self._budget = settings.budget(camera.size)
+        self._budget = settings.budget(camera.size, self._tracer.recorded_layers)
         self._make_pool(settings.executor_for(camera.size))
         self._begin_picture(camera, self._new_accumulator(camera), begin)
 
@@ -392,7 +392,7 @@ class Session:
         size = None if size is None else image_size(size)
         camera = choose_camera(self._scene, camera, size, settings.up_vector)
         self._compiled.view(camera)  # checks its distance
-        budget = self._settings.budget(camera.size)
+        budget = settings.budget(camera.size, self._tracer.recorded_layers)
         accumulator = self._new_accumulator(camera)
         executor = settings.executor_for(camera.size)
         with self.interrupt_handler:

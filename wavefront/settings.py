@@ -438,10 +438,10 @@ class Settings:
         paths = size[0] * size[1] * self.max_spp * self.branches
         return choose_executor(self.executor, self.worker_count, paths)
 
-    def budget(self, size: tuple[int, int]) -> Budget:
-        """Return the workers, and the largest wave, for a picture of a size (width, height)."""
+    def budget(self, size: tuple[int, int], layers: Sequence[str] = ()) -> Budget:
+        """Return the workers, and the largest wave, for a picture of a size (width, height) with layers."""
         processes = self.executor_for(size) != "threads"
-        return plan(self.memory_limit, size, self.worker_count, self.wave_size, processes)
+        return plan(self.memory_limit, size, self.worker_count, self.wave_size, processes, layers)
 
     def _most_samples(self) -> int:
         most = min(MAX_TERMS, MAX_BRANCH_SAMPLES // self.branches)

@@ -21,9 +21,9 @@ PICTURE_BYTES = 64  # of a pixel of the picture, and of what is needed to make i
 SPARE_BYTES = 16 << 20
 
 
-def picture_memory(width: int, height: int) -> int:
-    """Return how many bytes a film, and the picture that is made of it, need."""
-    return (FILM_BYTES + PICTURE_BYTES) * width * height + SPARE_BYTES
+def picture_memory(width: int, height: int, layers: Sequence[str] = ()) -> int:
+    """Return how many bytes a film, sampled layers, and the picture that is made of them need."""
+    return (FILM_BYTES + PICTURE_BYTES + sum(map(layer_bytes, layers))) * width * height + SPARE_BYTES
 
 
 def check_picture_memory(width: int, height: int) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ..errors import SceneError
 from ..memory import megabytes, resident_memory
 from ..record import record
@@ -24,7 +26,12 @@ class Budget:
 
 
 def plan(
-    max_memory: int | None, size: tuple[int, int], workers: int, wave_size: int | None, processes: bool
+    max_memory: int | None,
+    size: tuple[int, int],
+    workers: int,
+    wave_size: int | None,
+    processes: bool,
+    layers: Sequence[str] = (),
 ) -> Budget:
     """Return how many workers trace waves of how many lanes.
 
@@ -38,6 +45,8 @@ def plan(
         The most of each; a `wave_size` of None stands for what suits so many workers.
     processes
         Whether workers are processes.
+    layers
+        The sampled layers of the picture.
 
     Raises
     ------
@@ -47,7 +56,7 @@ def plan(
     if max_memory is None:
         return Budget(workers, wave_size or default_wave_size(workers))
     fixed = PROCESS_BYTES if processes else THREAD_BYTES
-    in_use, picture = resident_memory(), picture_memory(*size)
+    in_use, picture = resident_memory(), picture_memory(*size, layers)
     worker = fixed + min(LEAST_WAVE, wave_size or LEAST_WAVE) * LANE_BYTES
     left = max_memory - in_use - picture
     if left < worker:
