@@ -92,7 +92,7 @@ def test_pixels_have_their_own_counts() -> None:
     assert image.rgb[1, 1].tolist() == [0, 0, 0]
     assert np.isnan(image.standard_error[1, 1]).all()
     for k, count in ((0, 64), (1, 16), (2, 64)):
-        alone = film_image(filled(samples[:, :count, k : k + 1]), {})
+        alone = film_image(PictureSums(filled(samples[:, :count, k : k + 1]), None, {}), {}, keep_sums=False)
         assert (image.standard_error.reshape(-1, 3)[k] == alone.standard_error).all()
         assert (image.variance.reshape(-1, 3)[k] == alone.variance).all()
 

@@ -15,7 +15,7 @@ from wavefront.memory import memory_size, resident_memory
 from wavefront.scheduling import budget
 from wavefront.scheduling.accumulator import picture_memory
 from wavefront.scheduling.budget import LANE_BYTES, LEAST_WAVE, PROCESS_BYTES, THREAD_BYTES, plan
-from wavefront.scheduling.scheduler import LARGE_WAVE
+from wavefront.scheduling.scheduler import LARGE_WAVE, SMALL_WAVE
 
 MEGABYTE = 10**6
 
@@ -53,12 +53,12 @@ def test_other_sizes_are_refused_before_work(value: Any) -> None:
 
 
 def test_memory_sizes_waves_first_and_then_workers(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With much memory nothing changes; with little there are fewer workers, and then small waves."""
+    """With much memory waves are as large as pays; with little there are fewer workers, then small waves."""
     monkeypatch.setattr(budget, "resident_memory", lambda: 100 * MEGABYTE)
     free = plan(None, (640, 480), 4, None, processes=True)
     assert (free.workers, free.wave_size) == (4, LARGE_WAVE)
     ample = plan(10**12, (640, 480), 4, None, processes=True)
-    assert (ample.workers, ample.wave_size) == (4, LARGE_WAVE)
+    assert (ample.workers, ample.wave_size) == (4, SMALL_WAVE)
     assert plan(10**12, (640, 480), 4, 500, processes=True).wave_size == 500
     before = free
     for megabytes in range(2000, 300, -20):
@@ -89,7 +89,7 @@ def test_what_cannot_fit_is_refused_with_the_figures() -> None:
 def test_layers_count(monkeypatch: pytest.MonkeyPatch) -> None:
     """They leave less memory for waves."""
     monkeypatch.setattr(budget, "resident_memory", lambda: 100 * MEGABYTE)
-    limit = 400 * MEGABYTE
+    limit = 100 * MEGABYTE + picture_memory(640, 480) + PROCESS_BYTES + 40 * MEGABYTE
     plain, layered = (
         plan(limit, (640, 480), 1, None, True, layers) for layers in ((), ("direct", "indirect"))
     )

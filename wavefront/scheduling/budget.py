@@ -8,7 +8,7 @@ from ..errors import SceneError
 from ..memory import megabytes, resident_memory
 from ..record import record
 from .accumulator import picture_memory
-from .scheduler import default_wave_size
+from .scheduler import SMALL_WAVE, default_wave_size
 
 LANE_BYTES = 1000  # of a lane of a wave, with its share of results that wait to be added
 PROCESS_BYTES = 70 << 20  # of a worker process beside its wave: pages it does not share, and what glibc keeps
@@ -67,5 +67,5 @@ def plan(
         )
     good = min(GOOD_WAVE, wave_size or GOOD_WAVE)
     workers = max(1, min(workers, left // (fixed + good * LANE_BYTES)))
-    largest = wave_size or default_wave_size(workers)
+    largest = wave_size or SMALL_WAVE  # at any speed, so that the peak does not depend on it
     return Budget(workers, min(largest, (left // workers - fixed) // LANE_BYTES))
