@@ -149,14 +149,11 @@ class Camera:
         SceneError
             If the matrix scales, shears or mirrors, or an argument is out of range.
         """
-        if convention not in ("opengl", "opencv"):
-            raise SceneError(f"convention is {convention!r}; it must be 'opengl' or 'opencv'")
+        signs = _axes_of(convention)
         axes, eye = _rigid("cam_to_world", cam_to_world)
-        if convention == "opencv":
-            axes = axes * (1, -1, -1)
         return cls(
             eye,
-            axes,
+            axes * signs,
             Perspective(field_of_view(fov), shift=shift, aperture=aperture, focus=focus),
             size,
             crop,
@@ -297,6 +294,81 @@ class Camera:
         camera.origin, camera.projection = self.origin * factor, self.projection.scaled(factor)
         return camera
 
+    # --- Matrices -------------------------------------------------------------------------------
+
+    def intrinsics(self) -> NDArray[np.float64]:
+        """Return the matrix K (3, 3) of `from_intrinsics`: pixels of the whole picture, with centers at .5.
+
+        OpenCV counts the centers of pixels from 0: subtract 0.5 from cx and cy. Lens distortion is no part
+        of K.
+
+        Raises
+        ------
+        SceneError
+            If the camera is no perspective one.
+        """
+        return self._perspective().matrix(self.film)
+
+    def extrinsics(self) -> NDArray[np.float64]:
+        """Return the matrix (4, 4) from the world to OpenCV's camera space: x right, y down, z forward."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = (self.rotation * (1, -1, -1)).T
+        matrix[:3, 3] = -matrix[:3, :3] @ self.origin
+        return matrix
+
+    def to_matrix(self, convention: Literal["opengl", "opencv"] = "opengl") -> NDArray[np.float64]:
+        """Return the matrix (4, 4) from camera space to the world, as `from_matrix` takes it.
+
+        Parameters
+        ----------
+        convention
+            "opengl": x right, y up, looking along -z; "opencv": x right, y down, looking along +z.
+
+        Raises
+        ------
+        SceneError
+            If the convention is unknown.
+        """
+        matrix = np.eye(4)
+        matrix[:3, :3] = self.rotation * _axes_of(convention)
+        matrix[:3, 3] = self.origin
+        return matrix
+
+    def projection_matrix(self, near: float = 0.01, far: float = 1000) -> NDArray[np.float64]:
+        """Return OpenGL's projection matrix (4, 4), from camera space ("opengl") to clip coordinates.
+
+        Divided by their fourth component, x from -1 to 1 is the picture from left to right, y from bottom to
+        top, and z the range from `near` to `far`. Lens distortion is no part of it.
+
+        Parameters
+        ----------
+        near, far
+            Depths of the clipping planes, scene units, 0 < near < far. Pixels do not depend on them.
+
+        Raises
+        ------
+        SceneError
+            If the camera is no perspective one, or the depths are out of range.
+        """
+        near = number("near", near, lambda x: x > 0, "above 0")
+        far = number("far", far, lambda x: x > near, f"above near, which is {near:g}")
+        (fx, skew, cx), (_, fy, cy), _ = self.intrinsics().tolist()
+        width, height = self.film
+        return np.array(
+            [
+                [2 * fx / width, -2 * skew / width, 1 - 2 * cx / width, 0],
+                [0, 2 * fy / height, 2 * cy / height - 1, 0],
+                [0, 0, (far + near) / (near - far), 2 * far * near / (near - far)],
+                [0, 0, -1, 0],
+            ]
+        )
+
+    def _perspective(self) -> Perspective:
+        if not isinstance(self.projection, Perspective):
+            kind = type(self.projection).__name__
+            raise SceneError(f"a camera with {kind} rays has no intrinsic matrix; a perspective one has")
+        return self.projection
+
     # --- What a render asks ---------------------------------------------------------------------
 
     @property
@@ -398,6 +470,13 @@ def _axes(backward: NDArray[np.float64], up: ArrayLike) -> NDArray[np.float64]:
         raise SceneError(f"Camera up {vertical.tolist()} must not be zero or parallel to the view")
     right = right / np.linalg.norm(right)
     return np.stack([right, np.cross(backward, right), backward], 1)
+
+
+def _axes_of(convention: str) -> tuple[int, int, int]:
+    """Return the signs of right, up and backward in the axes x, y and z of a convention."""
+    if convention not in ("opengl", "opencv"):
+        raise SceneError(f"convention is {convention!r}; it must be 'opengl' or 'opencv'")
+    return (1, -1, -1) if convention == "opencv" else (1, 1, 1)
 
 
 def _rigid(name: str, value: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

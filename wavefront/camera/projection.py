@@ -171,6 +171,11 @@ class Perspective(Projection):
         middle, focal = self._intrinsics(film)
         return np.stack([(x + self.skew * y) * focal[0] + middle[0], y * focal[1] + middle[1]]), depth
 
+    def matrix(self, film: Size) -> Doubles:
+        """Return the intrinsic matrix (3, 3), in pixels with centers at .5; distortion is no part of it."""
+        (cx, cy), (fx, fy) = self._intrinsics(film)
+        return np.array([[fx, self.skew * fx, cx], [0, fy, cy], [0, 0, 1]])
+
     def check(self, film: Size) -> None:
         """Check that the distortion is invertible at a grid of film points."""
         if self.distortion is None:
