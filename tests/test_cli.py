@@ -69,7 +69,7 @@ def no_render(monkeypatch):
     def refuse(*args, **kwargs):
         pytest.fail("rendered before the mistake was reported")
 
-    monkeypatch.setattr(render_command, "render", refuse)
+    monkeypatch.setattr(render_command, "render_by_command", refuse)
 
 
 def error_of(capsys, arguments):
@@ -344,12 +344,12 @@ def test_ctrl_c_while_loading_gives_130(obj, fast, monkeypatch):
 def test_a_render_that_stops_is_saved(obj, fast, monkeypatch, capsys, error, status, message, begun):
     """As far as it got; the exit status tells."""
     output, options = fast
-    render = render_command.render
+    render = render_command.render_by_command
 
     def stopped(*args, **kwargs):
         raise error("stopped", render(*args, **kwargs) if begun else None)
 
-    monkeypatch.setattr(render_command, "render", stopped)
+    monkeypatch.setattr(render_command, "render_by_command", stopped)
     assert main(["render", obj, *options]) == status
     assert message in capsys.readouterr().err
     assert output.exists() == begun
@@ -369,14 +369,14 @@ def saved_instead(capsys):
 
 def broken_after_the_render(monkeypatch, act):
     """Let something happen between the render and saving."""
-    render = render_command.render
+    render = render_command.render_by_command
 
     def render_then_act(*args, **kwargs):
         image = render(*args, **kwargs)
         act()
         return image
 
-    monkeypatch.setattr(render_command, "render", render_then_act)
+    monkeypatch.setattr(render_command, "render_by_command", render_then_act)
 
 
 def test_a_picture_whose_folder_has_gone_is_saved_in_the_current_one(obj, tmp_path, capsys, monkeypatch):

@@ -60,7 +60,7 @@ def _render(options: argparse.Namespace) -> int:
     image: Image | None
     status = 0
     try:
-        image = render(
+        image = render_by_command(
             scene,
             {"arguments": options.arguments, "folder": options.folder},
             **setting_values(options),
@@ -75,7 +75,7 @@ def _render(options: argparse.Namespace) -> int:
     return (image is not None and _save(image, options)) or status
 
 
-def render(scene: Scene, command: dict[str, Any], **settings: Any) -> Image:
+def render_by_command(scene: Scene, command: dict[str, Any], **settings: Any) -> Image:
     """Render a scene with settings of `Session`; a checkpoint keeps the command for `wavefront resume`."""
     session = Session(scene, **settings)
     session.command = command
