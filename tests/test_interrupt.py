@@ -198,7 +198,7 @@ def test_the_command_saves_the_picture_so_far(tmp_path: Path) -> None:
 import wavefront.cli
 from wavefront.cli import render_command
 render = render_command.render_by_command
-render_command.render_by_command = lambda *given, **options: render(*given, **(options | {{"progress": telling}}))
+render_command.render_by_command = lambda *given, **named: render(*given, **named | {{"progress": telling}})
 options = ["--size", "64x64", "--spp", "100000", "--output", {str(output)!r}]
 sys.exit(wavefront.cli.main(["render", {str(scene)!r}, *options]))
 """
