@@ -23,7 +23,6 @@ extensions = [
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
-    "sphinx.ext.mathjax",
     "sphinx_gallery.gen_gallery",
     "sphinxcontrib.mermaid",
 ]
@@ -31,7 +30,7 @@ root_doc = "docs/index"
 include_patterns = ["docs/**", "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "benchmarks/README.md"]
 exclude_patterns = [".*", ".*/**", "build/**", "docs/tutorial/**", "docs/_templates/**"]
 exclude_patterns += [f"docs/generated/**/*.{ending}" for ending in ("py", "ipynb", "zip")]
-templates_path = ["_templates"]
+templates_path = [str(ROOT / "docs" / "_templates")]
 default_role = "py:obj"
 suppress_warnings = ["config.cache"]  # sphinx-gallery's settings hold functions
 
@@ -41,7 +40,6 @@ html_additional_pages = {"index": "to_the_index.html"}
 html_show_sphinx = False
 html_copy_source = False
 
-myst_enable_extensions = ["dollarmath", "amsmath"]
 myst_fence_as_directive = ["mermaid"]
 myst_heading_anchors = 4
 

@@ -57,6 +57,12 @@ def save_animation(
         If there is no image, sizes differ, or an argument is out of range.
     SaveError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> images = [wf.Image(np.full((8, 8, 3), value, np.float32)) for value in (0.0, 0.5, 1.0)]
+    >>> wf.save_animation("flash.gif", images, fps=8)
+    3
     """
     name = path_name(path, SaveError)
     display = Display(gamma, exposure, tone, white_balance)

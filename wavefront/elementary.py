@@ -4,6 +4,11 @@ NumPy computes sin, exp, arctan2 and others by code that differs between AVX-512
 C library; the results differ in the last bit. The functions here consist of operations that IEEE 754 rounds
 in one way only: sums, products, quotients, square roots and comparisons. All code that affects a picture
 uses them, in float32 or float64.
+
+Examples
+--------
+>>> wf.elementary.exp(np.float32([0, 1]))
+array([1.       , 2.7182817], dtype=float32)
 """
 
 from __future__ import annotations
@@ -25,8 +30,8 @@ F4, F8 = np.dtype(np.float32), np.dtype(np.float64)
 def sin_cos_turns(turns: Reals) -> tuple[Reals, Reals]:
     """Return sine and cosine of 2π·turns, with an error of at most two ulps of 1.
 
-    With v the difference to the nearest integer, they are the cosine and the sine of ¼ − |v| turns, an angle
-    in [−¼, ¼], so that no range reduction by cases is needed.
+    With v the difference to the nearest integer, they are the cosine and the sine of ``¼ − |v|`` turns, an
+    angle in [−¼, ¼], so that no range reduction by cases is needed.
     """
     t: Any = turns
     v = t - np.rint(t)
@@ -87,7 +92,7 @@ def _sine_of_cosine(x: Any) -> Any:
 def exp(x: Floats) -> Floats:
     """Return e to the power x, float32; 0 for x below −87, and exp(88) for x above 88.
 
-    x = n·ln 2 + r with |r| ≤ ln 2/2; 2ⁿ is made from its bits.
+    x = n·ln 2 + r with ``|r| ≤ ln 2/2``; 2ⁿ is made from its bits.
     """
     inside = x.clip(_LEAST_EXPONENT, _GREATEST_EXPONENT)
     n = np.rint(inside * _INVERSE_LN_2)

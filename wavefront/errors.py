@@ -20,11 +20,29 @@ class SceneError(ValueError):
     """A scene, file or argument that cannot be rendered.
 
     The message names what is wrong, where it is, the value found and the limit.
+
+    Examples
+    --------
+    >>> try:
+    ...     wf.Diffuse((0.2, 1.5, 0.1))
+    ... except wf.SceneError as error:
+    ...     print(error)
+    Diffuse reflectance[1] is 1.5; it must be in [0, 1]
     """
 
 
 class SaveError(SceneError, OSError):
-    """A file that cannot be written. The old file, if there was one, is intact."""
+    """A file that cannot be written. The old file, if there was one, is intact.
+
+    Examples
+    --------
+    >>> image = wf.Image(np.zeros((4, 4, 3), np.float32))
+    >>> try:
+    ...     image.save("no_such_folder/picture.png")
+    ... except wf.SaveError as error:
+    ...     print("the picture is not saved")
+    the picture is not saved
+    """
 
 
 class _WithImage(BaseException):
@@ -42,6 +60,17 @@ class RenderError(_WithImage, RuntimeError):
     ----------
     image
         The picture so far, an `Image`; None if there is none.
+
+    Examples
+    --------
+    >>> class Broken(wf.Bsdf):
+    ...     def f(self, wo, wi):
+    ...         return np.full_like(wo, np.nan)
+    >>> try:
+    ...     wf.render([wf.Sphere((0, 0, 0), 1, material=Broken()), wf.Environment(1)], 1, size=(8, 8))
+    ... except wf.RenderError as error:
+    ...     print(error.image.shape)
+    (8, 8, 3)
     """
 
 
@@ -54,6 +83,15 @@ class Interrupted(_WithImage, KeyboardInterrupt):
     ----------
     image
         The picture so far, an `Image`; None if there is none.
+
+    Examples
+    --------
+    >>> def press_ctrl_c(done, total):
+    ...     raise KeyboardInterrupt
+    >>> try:
+    ...     wf.render([wf.Sphere((0, 0, 0), 1), wf.Environment(1)], 4, size=(8, 8), progress=press_ctrl_c)
+    ... except wf.Interrupted as stop:
+    ...     image = stop.image
     """
 
     def _render_traceback_(self) -> list[str]:

@@ -39,6 +39,13 @@ def register_integrator(name: str, integrator: Integrator) -> None:
     ------
     SceneError
         If the name is taken, or the integrator is not a function.
+
+    Examples
+    --------
+    >>> wf.register_integrator("naive twin", wf.integrators.li_naive)
+    >>> scene = [wf.Sphere((0, 0, 0), 1), wf.Environment(1)]
+    >>> wf.render(scene, spp=1, size=(8, 8), integrator="naive twin").metadata["integrator"]
+    'naive twin'
     """
     INTEGRATORS.register(name, integrator)
 
@@ -57,6 +64,18 @@ def register_sampler(name: str, sampler: SamplerMaker) -> None:
     ------
     SceneError
         If the name is taken, or the sampler cannot be called.
+
+    Examples
+    --------
+    >>> class Middle(wf.Sampler):
+    ...     def draw_1d(self, pixel, sample, bounce, dimension):
+    ...         return np.full(len(pixel), 0.5, np.float32)
+    ...     def draw_2d(self, pixel, sample, bounce, dimension):
+    ...         return np.full((2, len(pixel)), 0.5, np.float32)
+    >>> wf.register_sampler("middle", Middle)
+    >>> scene = [wf.Sphere((0, 0, 0), 1), wf.PointLight((0, 3, 3), 20)]
+    >>> wf.render(scene, spp=1, size=(8, 8), sampler="middle").metadata["sampler"]
+    'middle'
     """
     SAMPLERS.register(name, sampler)
 
@@ -76,6 +95,15 @@ def register_filter(name: str, filter: Filter) -> None:
     ------
     SceneError
         If the name is taken, or the filter is not a function.
+
+    Examples
+    --------
+    >>> def center(u):
+    ...     return np.full_like(u, 0.5)
+    >>> wf.register_filter("center", center)
+    >>> scene = [wf.Sphere((0, 0, 0), 1), wf.Environment(1)]
+    >>> wf.render(scene, spp=1, size=(8, 8), filter="center").metadata["filter"]
+    'center'
     """
     FILTERS.register(name, filter)
 
@@ -97,6 +125,20 @@ def register_light_sampler(name: str, light_sampler: LightSamplerMaker) -> None:
     ------
     SceneError
         If the name is taken, or the light sampler cannot be called.
+
+    Examples
+    --------
+    >>> class First(wf.LightSampler):
+    ...     def __init__(self, power, half_size, irradiance):
+    ...         pass
+    ...     def sample(self, point, u):
+    ...         return np.zeros(len(u), np.intp), np.ones(len(u), np.float32)
+    ...     def pmf(self, light, point):
+    ...         return (light == 0).astype(np.float32)
+    >>> wf.register_light_sampler("first", First)
+    >>> scene = [wf.Sphere((0, 0, 0), 1), wf.PointLight((0, 3, 3), 20)]
+    >>> wf.render(scene, spp=1, size=(8, 8), light_sampler="first").shape
+    (8, 8, 3)
     """
     LIGHT_SAMPLERS.register(name, light_sampler)
 
@@ -115,6 +157,16 @@ def register_accelerator(name: str, accelerator: AcceleratorMaker) -> None:
     ------
     SceneError
         If the name is taken, or the accelerator cannot be called.
+
+    Examples
+    --------
+    >>> from wavefront.accel.numpy_accel import NumpyAccelerator
+    >>> class Mine(NumpyAccelerator):
+    ...     name = "mine"
+    >>> wf.register_accelerator("mine", Mine)
+    >>> scene = [wf.Sphere((0, 0, 0), 1), wf.Environment(1)]
+    >>> wf.render(scene, spp=1, size=(8, 8), accel="mine").metadata["accelerator"]
+    'mine'
     """
     ACCELERATORS.register(name, accelerator)
 
@@ -134,6 +186,14 @@ def register_executor(name: str, executor: ExecutorLike) -> None:
     ------
     SceneError
         If the name is taken, or it is not an executor.
+
+    Examples
+    --------
+    >>> from concurrent.futures import ThreadPoolExecutor
+    >>> wf.register_executor("pool", ThreadPoolExecutor)
+    >>> scene = [wf.Sphere((0, 0, 0), 1), wf.Environment(1)]
+    >>> wf.render(scene, spp=1, size=(8, 8), executor="pool").shape
+    (8, 8, 3)
     """
     EXECUTORS.register(name, executor)
 
@@ -164,6 +224,17 @@ def register_format(
     ------
     SceneError
         If the extension does not begin with a dot or is taken, or no function is given.
+
+    Examples
+    --------
+    >>> def load_balls(path, data):
+    ...     rows = [[float(word) for word in line.split()] for line in data.decode("ascii").splitlines()]
+    ...     return wf.Scene([wf.Sphere(row[:3], row[3]) for row in rows])
+    >>> wf.register_format(".balls", load=load_balls)
+    >>> with open("three.balls", "w") as file:
+    ...     _ = file.write("0 0 0 1\\n2 0 0 1\\n4 0 0 1\\n")
+    >>> len(wf.load("three.balls").shapes)
+    3
     """
     if not isinstance(extension, str) or not extension.startswith(".") or len(extension) < 2:
         raise SceneError(f"extension is {extension!r}; it must begin with a dot, as '.xyz' does")

@@ -20,6 +20,13 @@ class Frame:
     stored.
 
     Source: Duff et al. 2017, "Building an Orthonormal Basis, Revisited", JCGT 6(1), listing 3.
+
+    Examples
+    --------
+    >>> normal = np.array([[0], [1], [0]], np.float32)
+    >>> frame = wf.Frame.from_normal(normal)
+    >>> frame.to_local(normal)[2]
+    array([1.], dtype=float32)
     """
 
     z: Floats  # (3, n) normal

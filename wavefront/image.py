@@ -67,6 +67,15 @@ class Image:
 
     `counts`, `variance` and `standard_error` are None in an image that was not rendered, `standard_error`
     also in one that was denoised.
+
+    Examples
+    --------
+    >>> image = wf.render([wf.Sphere((0, 0, 0), 1), wf.Environment(1)], spp=4, size=(32, 24), aovs="depth")
+    >>> image.save("ball.exr")
+    >>> wf.Image.load("ball.exr").depth.shape
+    (24, 32)
+    >>> image.to_uint8(tone="agx").dtype
+    dtype('uint8')
     """
 
     def __init__(

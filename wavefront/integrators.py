@@ -3,6 +3,12 @@
 Each takes a wave of paths through the loop intersect → compact → shade → bounce-sample and returns the
 radiance of every path's slot, (3, n). `max_bounces` counts scattering events: with 0 only light seen
 directly is found, with 1 direct light as well.
+
+Examples
+--------
+>>> from wavefront.integrators import INTEGRATORS
+>>> list(INTEGRATORS)
+['naive', 'direct_simple', 'direct_mis', 'full']
 """
 
 from __future__ import annotations

@@ -166,6 +166,12 @@ def studio(preset: str = DEFAULT, *, up: ArrayLike = "y", camera: Camera | None 
     ------
     SceneError
         If there is no such preset, or `up` is malformed or zero.
+
+    Examples
+    --------
+    >>> scene = wf.Scene(wf.Sphere((0, 0, 0), 1), lights=wf.studio("softbox"))
+    >>> wf.render(scene, spp=1, size=(16, 16)).shape
+    (16, 16, 3)
     """
     if preset not in LIGHTINGS:
         raise SceneError(f"preset is {preset!r}; it must be one of {', '.join(LIGHTINGS)}")

@@ -28,6 +28,15 @@ class Comparison:
     """Difference of picture a from the reference b, over linear values of all pixels and channels.
 
     `print` shows it as a table.
+
+    Examples
+    --------
+    >>> gray = np.full((32, 32, 3), 0.5, np.float32)
+    >>> comparison = wf.compare(1.1 * gray, gray)
+    >>> isinstance(comparison, wf.Comparison)
+    True
+    >>> round(comparison.rmse, 6)
+    0.05
     """
 
     relative_mse: float  # mean of (a − b)²/(b² + ε), ε = 0.01 · mean(b)²
@@ -93,6 +102,12 @@ def compare(a: Picture, b: Picture) -> Comparison:
     ------
     SceneError
         If a file cannot be read, the sizes differ, or a value is not finite.
+
+    Examples
+    --------
+    >>> gray = np.full((32, 32, 3), 0.5, np.float32)
+    >>> round(wf.compare(1.1 * gray, gray).rmse, 4)
+    0.05
     """
     coded = _is_coded(a) and _is_coded(b)
     names = _named("a", a), _named("b", b)

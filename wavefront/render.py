@@ -183,6 +183,13 @@ def render(
         If the render cannot go on: memory runs out, worker processes die again and again, more than
         1e-4 of the samples are not finite, or `seconds` are over before there is one sample. Its
         `image` is the picture so far.
+
+    Examples
+    --------
+    >>> ball = wf.Sphere((0, 0, 0), 1, material=wf.Diffuse(0.5))
+    >>> image = wf.render([ball, wf.Environment(1)], spp=4, size=(32, 24))
+    >>> image.rgb.shape
+    (24, 32, 3)
     """
     session = Session(
         scene,

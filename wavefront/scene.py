@@ -45,6 +45,14 @@ class Scene:
     ------
     SceneError
         If there is no shape, or an element is of the wrong type.
+
+    Examples
+    --------
+    >>> floor = wf.Rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2))
+    >>> scene = wf.Scene([floor], lights=[wf.PointLight((0, 2, 0), 10)])
+    >>> scene.add(wf.Sphere((0, 0.5, 0), 0.5)).bounds
+    array([[-1.,  0., -1.],
+           [ 1.,  1.,  1.]])
     """
 
     @suggests_keywords

@@ -95,6 +95,16 @@ class Session:
         After Ctrl-C while a picture is waited for.
     RenderError
         If the render cannot go on.
+
+    Examples
+    --------
+    >>> scene = [wf.Sphere((0, 0, 0), 1), wf.Environment(1)]
+    >>> with wf.Session(scene, spp=4, size=(16, 16), progress=False) as session:
+    ...     for image in session:
+    ...         print(image.spp)
+    1
+    2
+    4
     """
 
     @suggests_keywords

@@ -1,6 +1,12 @@
 """Operations on (3, n) float32 vectors.
 
 Every sum is written out by component, so that the bits of a column do not depend on the number of columns.
+
+Examples
+--------
+>>> a, b = np.float32([[1], [2], [3]]), np.float32([[0], [1], [0]])
+>>> wf.vec.dot(a, b)
+array([2.], dtype=float32)
 """
 
 from __future__ import annotations

@@ -43,6 +43,13 @@ def render_many(
         If a setting or the scene is malformed, or there is no camera.
     Interrupted
         After Ctrl-C; its `image` is the picture so far.
+
+    Examples
+    --------
+    >>> scene = wf.Scene([wf.Sphere((0, 0, 0), 1)], wf.Environment(1))
+    >>> cameras = wf.turntable(scene, 3, size=(16, 16))
+    >>> [image.shape for image in wf.render_many(scene, cameras, spp=1)]
+    [(16, 16, 3), (16, 16, 3), (16, 16, 3)]
     """
     views = iter(cameras)
     first = next(views, None)
@@ -77,6 +84,12 @@ def turntable(
     ------
     SceneError
         If an argument is malformed.
+
+    Examples
+    --------
+    >>> cameras = wf.turntable(wf.Sphere((0, 0, 0), 1), 4, size=(16, 16))
+    >>> len(cameras)
+    4
     """
     if n < 1:
         raise SceneError(f"n is {n}; it must be at least 1")

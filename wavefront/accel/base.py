@@ -15,6 +15,12 @@ class Geometry:
     """What rays can hit, in float32 relative to the scene's center.
 
     Primitive ids count the triangles first, then the curved primitives of each kind.
+
+    Examples
+    --------
+    >>> triangle = np.array([[(0, 0, 0), (1, 0, 0), (0, 1, 0)]], np.float32)
+    >>> wf.Geometry(triangle).count
+    1
     """
 
     triangles: Floats  # (m, 3, 3) vertices: triangle, corner, xyz
@@ -32,7 +38,15 @@ class Geometry:
 
 @record
 class Intersections:
-    """The nearest hit of each ray."""
+    """The nearest hit of each ray.
+
+    Examples
+    --------
+    >>> f4 = np.float32
+    >>> miss = wf.Intersections(np.full(2, np.inf, f4), np.full(2, -1), np.zeros(2, f4), np.zeros(2, f4))
+    >>> miss.prim
+    array([-1, -1])
+    """
 
     t: Floats  # (n,) distance along the direction, inf on a miss
     prim: Ints  # (n,) primitive id, -1 on a miss
@@ -41,7 +55,17 @@ class Intersections:
 
 
 class Accelerator(Protocol):
-    """Answers ray queries. Results do not depend on the size of a batch or the order of its rays."""
+    """Answers ray queries. Results do not depend on the size of a batch or the order of its rays.
+
+    Examples
+    --------
+    >>> from wavefront.accel.numpy_accel import NumpyAccelerator
+    >>> triangle = np.array([[(-1, -1, 0), (1, -1, 0), (0, 1, 0)]], np.float32)
+    >>> accelerator = NumpyAccelerator(wf.Geometry(triangle))
+    >>> origin, direction = np.float32([[0], [0], [3]]), np.float32([[0], [0], [-1]])
+    >>> accelerator.closest(origin, direction, np.array([-1])).t
+    array([3.], dtype=float32)
+    """
 
     name: str  # what the metadata of pictures calls it
 

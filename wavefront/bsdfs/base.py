@@ -30,7 +30,16 @@ ALBEDO_NUMBERS = ((0.5 + np.arange(16)[:, None] * 1.2207440846057596 ** -np.aran
 
 @record
 class BsdfSample:
-    """One sampled direction per column. A zero weight means that there is no sample."""
+    """One sampled direction per column. A zero weight means that there is no sample.
+
+    Examples
+    --------
+    >>> wi = wf.warp.cosine_hemisphere(np.full((2, 5), 0.5, np.float32))
+    >>> pdf = wf.warp.cosine_hemisphere_pdf(wi)
+    >>> sample = wf.BsdfSample(wi, np.full((3, 5), 0.8, np.float32), pdf, np.zeros(5, bool))
+    >>> sample.wi.shape
+    (3, 5)
+    """
 
     wi: Floats  # (3, n) sampled direction, local frame
     weight: Floats  # (3, n) f(wo, wi)·|cosθi| / pdf
@@ -45,6 +54,15 @@ class Bsdf(Parametrized, ABC):
     A subclass gives `f`; it may give a `sample_f` and its `pdf` that follow `f` more closely than
     the cosine-weighted ones here. Parameters are attributes: constants of shape (3, 1) or (1,),
     or `BaseTexture` ones, which `bind` replaces by their values at the hit points.
+
+    Examples
+    --------
+    >>> class Lambert(wf.Bsdf):
+    ...     def f(self, wo, wi):
+    ...         return np.where(wi[2] > 0, np.float32(0.5 / np.pi), np.float32(0)) * np.ones_like(wi)
+    >>> ball = wf.Sphere((0, 0, 0), 1, material=Lambert())
+    >>> wf.render([ball, wf.Environment(1)], spp=1, size=(8, 8)).shape
+    (8, 8, 3)
     """
 
     transmissive: bool = False  # light can cross the surface

@@ -56,6 +56,11 @@ class Conductor(JointBsdf):
     ------
     SceneError
         If a parameter is out of its range or not finite.
+
+    Examples
+    --------
+    >>> gold = wf.Conductor.named("gold", roughness=0.3)
+    >>> metal = wf.Conductor(eta=(1.5, 1.0, 0.6), k=(7.6, 6.6, 5.4))
     """
 
     eta = Parameter(partial(color, high=MAX_INDEX, above_zero=True))

@@ -40,6 +40,11 @@ class Dielectric(RefractiveBsdf):
     ------
     SceneError
         If a parameter is out of its range or not finite.
+
+    Examples
+    --------
+    >>> glass = wf.Dielectric(1.5)
+    >>> frosted = wf.Dielectric(1.5, roughness=0.3)
     """
 
     def derive(self) -> None:

@@ -26,6 +26,11 @@ class Diffuse(Bsdf):
     ------
     SceneError
         If the reflectance is outside [0, 1] or not finite.
+
+    Examples
+    --------
+    >>> clay = wf.Diffuse((0.7, 0.3, 0.2))
+    >>> checks = wf.Diffuse(wf.Texture([[0.1, 0.8], [0.8, 0.1]], filter="nearest"))
     """
 
     reflectance = Parameter(color)

@@ -24,6 +24,10 @@ class Mirror(Bsdf):
     ------
     SceneError
         If the reflectance is outside [0, 1] or not finite.
+
+    Examples
+    --------
+    >>> mirror = wf.Sphere((0, 0, 0), 1, material=wf.Mirror(0.95))
     """
 
     specular = True

@@ -39,6 +39,10 @@ class Mix(JointBsdf):
     ------
     SceneError
         If the weight is outside [0, 1], or something else than a `Bsdf` is given.
+
+    Examples
+    --------
+    >>> rusty = wf.Mix(wf.Conductor.named("iron", roughness=0.4), wf.Diffuse((0.4, 0.15, 0.05)), 0.6)
     """
 
     dimensions = 3

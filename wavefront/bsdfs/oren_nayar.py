@@ -44,6 +44,10 @@ class OrenNayar(Bsdf):
     ------
     SceneError
         If a parameter is out of its range or not finite.
+
+    Examples
+    --------
+    >>> plaster = wf.OrenNayar(0.7, sigma=0.5)
     """
 
     reflectance = Parameter(color)

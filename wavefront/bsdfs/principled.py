@@ -41,6 +41,7 @@ class Principled(JointBsdf):
     the glTF 2.0 specification, appendix B: mix(dielectric, metal, metallic) with Schlick's Fresnel,
     GGX with α = roughness², height-correlated Smith shadowing and a Lambertian base. The others
     follow glTF's extensions KHR_materials_ior, _specular, _transmission, _clearcoat and _sheen, except that
+
     - the diffuse base gets the light that the gloss does not reflect, by the albedo of the gloss, so that a
       white surface reflects all light and no more; the appendix's mix by Fresnel in the half vector,
       which reflects up to 1.9 times the light at grazing angles, comes with `conserve_energy=False`;
@@ -77,6 +78,11 @@ class Principled(JointBsdf):
     ------
     SceneError
         If a parameter is out of its range or not finite.
+
+    Examples
+    --------
+    >>> plastic = wf.Principled((0.1, 0.3, 0.8), roughness=0.3)
+    >>> varnished_metal = wf.Principled((0.9, 0.5, 0.3), metallic=1, roughness=0.5, clearcoat=1)
     """
 
     dimensions = 3

@@ -25,6 +25,14 @@ class ShadowCatcher(Diffuse):
     (resampled importance sampling, J. Talbot et al. 2005), and one shadow ray is traced to it. With one
     point or directional light the opacity has no bias; in other light its bias falls with the number of
     candidates.
+
+    Examples
+    --------
+    >>> ground = wf.Rectangle((-4, 0, 4), (8, 0, 0), (0, 0, -8), material=wf.ShadowCatcher())
+    >>> ball, sun = wf.Sphere((0, 1, 0), 1), wf.DirectionalLight((1, -2, -1), 3)
+    >>> image = wf.render([ground, ball, sun], spp=1, size=(16, 16), background="transparent")
+    >>> image.alpha.shape
+    (16, 16)
     """
 
     catches_shadows = True

@@ -33,6 +33,10 @@ class ThinDielectric(RefractiveBsdf):
     ------
     SceneError
         If a parameter is out of its range or not finite.
+
+    Examples
+    --------
+    >>> pane = wf.Rectangle((-1, 0, 0), (2, 0, 0), (0, 2, 0), material=wf.ThinDielectric(1.5))
     """
 
     def derive(self) -> None:

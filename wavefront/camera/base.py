@@ -39,6 +39,13 @@ class Camera:
     window
         (x0, y0, x1, y1) in pixels of the whole picture: the part that is rendered, without column
         x1 and row y1.
+
+    Examples
+    --------
+    >>> camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), fov=40, size=(64, 48))
+    >>> pixels, depth = camera.project([(0, 0, 0)])
+    >>> pixels[0], depth[0]
+    (array([32., 24.]), np.float64(4.0))
     """
 
     def __init__(

@@ -32,6 +32,12 @@ def orbit(camera: Camera, center: ArrayLike, degrees: float, up: ArrayLike = "y"
     ------
     SceneError
         If an argument is malformed.
+
+    Examples
+    --------
+    >>> camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0))
+    >>> wf.orbit(camera, (0, 0, 0), 90).origin.round(6) + 0.0
+    array([4., 0., 0.])
     """
     middle = finite_array("center", center, (3,))
     turn = _rotation(upward("up", up), np.radians(number("degrees", degrees)))
@@ -60,6 +66,13 @@ def interpolate_cameras(cameras: Sequence[Camera], n: int) -> list[Camera]:
     -----
     Sources: E. Catmull and R. Rom, "A Class of Local Interpolating Splines", 1974; K. Shoemake, "Animating
     Rotation with Quaternion Curves", SIGGRAPH 1985.
+
+    Examples
+    --------
+    >>> ends = [wf.Camera.look_at((x, 0, 4), (x, 0, 0)) for x in (0, 1)]
+    >>> path = wf.interpolate_cameras(ends, 5)
+    >>> path[2].origin
+    array([0.5, 0. , 4. ])
     """
     if len(cameras) < 2 or n < 2:
         raise SceneError(f"{n} cameras between {len(cameras)}; both numbers must be at least 2")

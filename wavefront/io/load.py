@@ -55,6 +55,14 @@ def load(
     ------
     SceneError
         If the file cannot be read. The message names the file, the line or element, the value and the limit.
+
+    Examples
+    --------
+    >>> with open("triangle.obj", "w") as file:
+    ...     _ = file.write("v 0 0 0\\nv 1 0 0\\nv 0 1 0\\nf 1 2 3\\n")
+    >>> scene = wf.load("triangle.obj")
+    >>> len(scene.shapes[0].faces)
+    1
     """
     with _phase(path, progress):
         wish = Wish(strict, limits=checked_limits(limits), search_paths=folders(search_paths))
@@ -91,6 +99,14 @@ def load_mesh(
     ------
     SceneError
         As for `load`.
+
+    Examples
+    --------
+    >>> with open("triangle.off", "w") as file:
+    ...     _ = file.write("OFF\\n3 1 0\\n0 0 0\\n1 0 0\\n0 1 0\\n3 0 1 2\\n")
+    >>> mesh = wf.load_mesh("triangle.off", material=wf.Diffuse(0.8))
+    >>> mesh.vertices.shape
+    (3, 3)
     """
     with _phase(path, progress):
         meshes = load_meshes(
@@ -145,6 +161,14 @@ def from_trimesh(geometry: Any) -> Scene:
     ------
     SceneError
         If it is something else, or has no faces.
+
+    Examples
+    --------
+    >>> import trimesh
+    >>> scene = wf.from_trimesh(trimesh.creation.box())
+    >>> scene.add(wf.Environment(1)).bounds
+    array([[-0.5, -0.5, -0.5],
+           [ 0.5,  0.5,  0.5]])
     """
     source = "trimesh object"
     contents = trimesh_objects.read(geometry, source, strict=False)

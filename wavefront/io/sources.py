@@ -42,6 +42,16 @@ class LoadLimits:
     ------
     SceneError
         If one is not a whole number of at least 1.
+
+    Examples
+    --------
+    >>> small = wf.LoadLimits(file_bytes=100)
+    >>> with open("big.off", "w") as file:
+    ...     _ = file.write("OFF\\n" + "0 0 0\\n" * 100)
+    >>> wf.load("big.off", limits=small)
+    Traceback (most recent call last):
+        ...
+    wavefront.errors.SceneError: ...
     """
 
     file_bytes: int = MAX_BYTES

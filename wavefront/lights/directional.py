@@ -128,6 +128,10 @@ class DirectionalLight(Parametrized, Light):
     SceneError
         If an argument is malformed, the direction is zero, or the angle is neither 0 nor from
         0.01 to 180.
+
+    Examples
+    --------
+    >>> sun = wf.DirectionalLight((-1, -2, -1), irradiance=3, angle=0.53)
     """
 
     direction = Parameter(unit)

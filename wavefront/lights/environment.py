@@ -88,6 +88,12 @@ class Environment(Parametrized, Light):
     SceneError
         If the radiance is malformed or not finite, an image is all black, or the transform is not
         a rotation.
+
+    Examples
+    --------
+    >>> even = wf.Environment(1)
+    >>> rows = np.linspace(1, 0, 32)[:, None, None]
+    >>> sky = wf.Environment(rows * np.ones((32, 64, 3)) * (0.4, 0.6, 1.0))
     """
 
     group = Parameter(group_name)

@@ -17,7 +17,13 @@ from .base import LightRecord, LightSample
 
 
 class InfiniteLight(LightRecord):
-    """A light that rays meet where they leave the scene. A record holds one, shared by all lanes."""
+    """A light that rays meet where they leave the scene. A record holds one, shared by all lanes.
+
+    Examples
+    --------
+    >>> isinstance(wf.Environment(1).record(np.zeros(3)), wf.InfiniteLight)
+    True
+    """
 
     __slots__ = ()
 

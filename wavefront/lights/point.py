@@ -72,6 +72,10 @@ class PointLight(Parametrized, Light):
     ------
     SceneError
         If an argument is malformed.
+
+    Examples
+    --------
+    >>> lamp = wf.PointLight((0, 3, 0), intensity=(40, 35, 30))
     """
 
     delta = True

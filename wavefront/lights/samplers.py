@@ -18,7 +18,21 @@ BY_POWER = 0.05  # part of the probability that is proportional to power, so tha
 
 
 class LightSampler(Protocol):
-    """Chooses a light for each point."""
+    """Chooses a light for each point.
+
+    Examples
+    --------
+    >>> class First(wf.LightSampler):
+    ...     def __init__(self, power, half_size, irradiance):
+    ...         pass
+    ...     def sample(self, point, u):
+    ...         return np.zeros(len(u), np.intp), np.ones(len(u), np.float32)
+    ...     def pmf(self, light, point):
+    ...         return (light == 0).astype(np.float32)
+    >>> scene = [wf.Sphere((0, 0, 0), 1), wf.PointLight((0, 3, 3), 20)]
+    >>> wf.render(scene, spp=1, size=(8, 8), light_sampler=First).shape
+    (8, 8, 3)
+    """
 
     @abstractmethod
     def sample(self, point: Floats, u: Floats) -> tuple[Ints, Floats]:

@@ -107,6 +107,10 @@ class SpotLight(Parametrized, Light):
     ------
     SceneError
         If an argument is malformed or out of range.
+
+    Examples
+    --------
+    >>> spot = wf.SpotLight((0, 4, 2), 100, target=(0, 0, 0), angle=30)
     """
 
     hint = "direct the SpotLight, or widen its cone"

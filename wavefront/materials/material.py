@@ -91,6 +91,11 @@ class Material(Parametrized):
     ------
     SceneError
         If a parameter is of the wrong type or out of its range.
+
+    Examples
+    --------
+    >>> leaf = wf.Material(wf.Diffuse((0.1, 0.5, 0.1)), alpha=0.5, name="leaf")
+    >>> green_glass = wf.Material(wf.Dielectric(1.5), interior=wf.Medium(absorption=(2, 0.2, 1)))
     """
 
     bsdf = Parameter(_bsdf)

@@ -35,6 +35,11 @@ class Medium(Parametrized):
     ------
     SceneError
         If a parameter is out of its range, not finite, or a texture.
+
+    Examples
+    --------
+    >>> tea = wf.Medium(absorption=(0.5, 1.5, 4.0))
+    >>> cup = wf.Sphere((0, 0, 0), 1, material=wf.Material(wf.Dielectric(1.33), interior=tea))
     """
 
     absorption = Parameter(_coefficient)

@@ -78,6 +78,17 @@ class Sampler(ABC):
     ------
     SceneError
         If the seed is out of range or not an integer.
+
+    Examples
+    --------
+    >>> class Middle(wf.Sampler):
+    ...     def draw_1d(self, pixel, sample, bounce, dimension):
+    ...         return np.full(len(pixel), 0.5, np.float32)
+    ...     def draw_2d(self, pixel, sample, bounce, dimension):
+    ...         return np.full((2, len(pixel)), 0.5, np.float32)
+    >>> scene = [wf.Sphere((0, 0, 0), 1), wf.PointLight((0, 3, 3), 20)]
+    >>> wf.render(scene, spp=1, size=(8, 8), sampler=Middle).shape
+    (8, 8, 3)
     """
 
     def __init__(self, seed: int = 0, width: int = 1) -> None:

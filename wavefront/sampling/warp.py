@@ -1,4 +1,12 @@
-"""Warps of the unit square: for each a map `name`, its density `name_pdf` and `name_inverse`."""
+"""Warps of the unit square: for each a map `name`, its density `name_pdf` and `name_inverse`.
+
+Examples
+--------
+>>> u = np.random.default_rng(1).random((2, 1000), np.float32)
+>>> directions = wf.warp.cosine_hemisphere(u)
+>>> bool((directions[2] >= 0).all())
+True
+"""
 
 from __future__ import annotations
 
@@ -193,7 +201,7 @@ def tent(u: Floats, radius: float = 1.0) -> Floats:
 
 
 def tent_pdf(x: Floats, radius: float = 1.0) -> Floats:
-    """Return the density of `tent` at x (n,), per unit length: (1 − |x|/radius)/radius."""
+    """Return the density of `tent` at x (n,), per unit length: ``(1 − |x|/radius)/radius``."""
     return np.maximum(f4(1) - np.abs(x) / f4(radius), f4(0)) / f4(radius)
 
 

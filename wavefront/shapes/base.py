@@ -45,6 +45,12 @@ class Shape(ABC):
     ----------
     name
         Used in messages.
+
+    Examples
+    --------
+    >>> ball = wf.Sphere((0, 0, 0), 1, name="ball")
+    >>> isinstance(ball, wf.Shape), ball.name
+    (True, 'ball')
     """
 
     name: str

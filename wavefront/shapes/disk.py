@@ -45,6 +45,12 @@ def Disk(
     ------
     SceneError
         If an argument is malformed or out of range.
+
+    Examples
+    --------
+    >>> table = wf.Disk((0, 0, 0), (0, 1, 0), 2, material=wf.Diffuse(0.4))
+    >>> len(table.faces)
+    64
     """
     middle = finite_array(f"{name}: center", center, (3,))
     axis = finite_array(f"{name}: normal", normal, (3,))

@@ -57,6 +57,13 @@ class Instance(Shape):
     ------
     SceneError
         If the transform is malformed, singular, or takes a vertex beyond the range of float32.
+
+    Examples
+    --------
+    >>> leaf = wf.Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)])
+    >>> moved = np.eye(4)
+    >>> moved[:3, 3] = (2, 0, 0)
+    >>> scene = wf.Scene([wf.Instance(leaf, np.eye(4)), wf.Instance(leaf, moved)])
     """
 
     transform = Checked(_invertible)

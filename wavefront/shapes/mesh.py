@@ -134,6 +134,13 @@ class Mesh(Shape):
     SceneError
         If an array has a wrong shape, a value is not finite, a position or a texture coordinate is
         beyond float32, an index is out of range, there is no face, or there are tangents without normals.
+
+    Examples
+    --------
+    >>> vertices = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
+    >>> triangle = wf.Mesh(vertices, [(0, 1, 2)], material=wf.Diffuse((0.8, 0.2, 0.1)))
+    >>> triangle.faces.shape
+    (1, 3)
     """
 
     vertices = Checked(positions)
@@ -260,6 +267,11 @@ def Rectangle(
     ------
     SceneError
         If an argument is malformed, or the edges are parallel.
+
+    Examples
+    --------
+    >>> floor = wf.Rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2))
+    >>> lamp = wf.Rectangle((-0.5, 2, -0.5), (1, 0, 0), (0, 0, 1), emission=5)
     """
     origin = finite_array(f"{name}: corner", corner, (3,))
     u = finite_array(f"{name}: edge_u", edge_u, (3,))

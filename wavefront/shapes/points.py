@@ -42,6 +42,10 @@ def Points(
     ------
     SceneError
         If an argument is malformed or out of range.
+
+    Examples
+    --------
+    >>> cloud = wf.Points(np.random.default_rng(1).random((100, 3)), radius=0.01)
     """
     if hasattr(points, "vertices"):
         given = getattr(points, "colors", None)
@@ -71,6 +75,11 @@ def Edges(
     ------
     SceneError
         If an argument is malformed or out of range, or there is no edge.
+
+    Examples
+    --------
+    >>> triangle = wf.Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)])
+    >>> wires = wf.Edges(triangle, radius=0.02, material=wf.Conductor.named("copper", roughness=0.2))
     """
     starts, ends = _ends_of_mesh(lines) if hasattr(lines, "faces") else _ends_of_lines(name, lines)
     if not len(starts):

@@ -94,6 +94,12 @@ class Cylinders(SegmentArray):
     Notes
     -----
     Texture coordinates: u turns once about the axis, and v rises from 0 at the start to 1 at the end.
+
+    Examples
+    --------
+    >>> bonds = wf.Cylinders([(0, 0, 0), (1, 0, 0)], [(1, 0, 0), (1, 1, 0)], 0.1)
+    >>> wf.render(bonds, spp=1, size=(16, 16), lighting="cloudy").shape
+    (16, 16, 3)
     """
 
     @suggests_keywords
@@ -164,6 +170,11 @@ class Capsules(SegmentArray):
     Notes
     -----
     Texture coordinates: u turns once about the axis, and v rises along the axis from 0 to 1, tip to tip.
+
+    Examples
+    --------
+    >>> line = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (2, 1, 1)])
+    >>> tube = wf.Capsules(line[:-1], line[1:], 0.05)
     """
 
     @suggests_keywords

@@ -53,6 +53,11 @@ class Sphere(CurvedShape):
     ------
     SceneError
         If an argument is malformed, or the emission is a texture.
+
+    Examples
+    --------
+    >>> ball = wf.Sphere((0, 1, 0), 1, material=wf.Mirror(0.9))
+    >>> lamp = wf.Sphere((0, 3, 0), 0.2, emission=(20, 18, 15))
     """
 
     center = Checked(_center)

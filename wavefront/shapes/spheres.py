@@ -42,6 +42,13 @@ class Spheres(PrimitiveArray):
     ------
     SceneError
         If an argument is malformed or out of range, lengths differ, or there is no sphere.
+
+    Examples
+    --------
+    >>> centers = np.random.default_rng(1).random((1000, 3))
+    >>> particles = wf.Spheres(centers, 0.02, colors=centers)
+    >>> wf.render(particles, spp=1, size=(16, 16), lighting="cloudy").shape
+    (16, 16, 3)
     """
 
     centers = Checked(positions)

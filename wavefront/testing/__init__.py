@@ -1,4 +1,11 @@
-"""Checks of BSDFs, lights and warps, for users and for the tests."""
+"""Checks of BSDFs, lights and warps, for users and for the tests.
+
+Examples
+--------
+>>> report = wf.testing.check_bsdf(wf.Diffuse(0.5), samples=20_000)
+>>> all(check.passed for check in report.checks.values())
+True
+"""
 
 from .bsdf import check_bsdf
 from .light import check_light

@@ -56,7 +56,7 @@ class Report:
             self.checks[name] = Check(name, where, float(measured), expected, float(badness))
 
     def near(self, name: str, where: str, measured: float, expected: float, tolerance: float) -> None:
-        """Check that |measured − expected| ≤ tolerance."""
+        """Check that ``|measured − expected| ≤ tolerance``."""
         text = f"{expected:.6g} ± {tolerance:.2g}"
         self.add(name, where, measured, text, abs(measured - expected) / tolerance)
 

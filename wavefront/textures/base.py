@@ -9,7 +9,19 @@ from ..vec import Floats
 
 
 class BaseTexture(ABC):
-    """A parameter of materials and lights that varies over surfaces, such as an image."""
+    """A parameter of materials and lights that varies over surfaces, such as an image.
+
+    Examples
+    --------
+    >>> class Stripes(wf.BaseTexture):
+    ...     reads = ("uv",)
+    ...     scalar = True
+    ...     def at(self, surface):
+    ...         return np.float32(0.5) + np.float32(0.4) * np.sign(surface.uv[0] - np.float32(0.5))
+    >>> board = wf.Rectangle((-1, -1, 0), (2, 0, 0), (0, 2, 0), material=wf.Diffuse(Stripes()))
+    >>> wf.render([board, wf.Environment(1)], spp=1, size=(8, 8)).shape
+    (8, 8, 3)
+    """
 
     reads: tuple[str, ...] = ("uv",)  # fields of `SurfaceInteraction` that `at` needs: "uv", "uv1", "color"
     scalar: bool | None = (

@@ -60,6 +60,12 @@ class Texture(BaseTexture):
     ------
     SceneError
         If the file cannot be read, or an argument is malformed.
+
+    Examples
+    --------
+    >>> checks = wf.Texture([[0.1, 0.8], [0.8, 0.1]], filter="nearest")
+    >>> roughness = wf.Texture(np.linspace(0, 1, 64).reshape(8, 8), srgb=False, channel=0)
+    >>> material = wf.Principled(checks, roughness=roughness)
     """
 
     @suggests_keywords

@@ -67,6 +67,11 @@ class NormalMap(BaseNormalMap):
     SceneError
         If the texture gives numbers, is decoded from sRGB or has a singular transform, or the
         strength is not finite or of a size above 1e9.
+
+    Examples
+    --------
+    >>> flat = np.full((4, 4, 3), (128, 128, 255), np.uint8)
+    >>> material = wf.Material(wf.Diffuse(0.5), normal_map=wf.NormalMap(wf.Texture(flat, srgb=False)))
     """
 
     @suggests_keywords
@@ -130,6 +135,12 @@ class BumpMap(BaseNormalMap):
     SceneError
         If the texture gives colors or is decoded from sRGB, or the height is not finite or of a
         size beyond float32.
+
+    Examples
+    --------
+    >>> heights = np.random.default_rng(1).random((64, 64))
+    >>> bumps = wf.BumpMap(wf.Texture(heights, srgb=False, channel=0), height=0.01)
+    >>> material = wf.Material(wf.Diffuse(0.5), normal_map=bumps)
     """
 
     @suggests_keywords

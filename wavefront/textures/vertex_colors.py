@@ -30,6 +30,11 @@ class VertexColors(BaseTexture):
     ------
     SceneError
         If `times` is out of range, or the channel is invalid.
+
+    Examples
+    --------
+    >>> corners, colors = [(0, 0, 0), (1, 0, 0), (0, 1, 0)], np.eye(3)
+    >>> mesh = wf.Mesh(corners, [(0, 1, 2)], colors=colors, material=wf.Diffuse(wf.VertexColors()))
     """
 
     @suggests_keywords
