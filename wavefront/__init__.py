@@ -30,6 +30,7 @@ from .extensions import (
     register_sampler,
 )
 from .frame import Frame
+from .html import register_preview
 from .image import Image
 from .lighting import studio
 from .lights import (
@@ -44,6 +45,7 @@ from .lights import (
     SpotLight,
 )
 from .lights.samplers import LightSampler
+from .material_ball import ball_png
 from .materials import Material
 from .media import Medium
 from .render import render
@@ -80,6 +82,7 @@ if TYPE_CHECKING:
     from .views import render_many, turntable
 
 __version__ = VERSION
+register_preview(ball_png)
 
 _LATER = {  # what many programs do without is imported when they ask for it
     "Comparison": ".metrics",

@@ -94,11 +94,17 @@ class Interrupted(_WithImage, KeyboardInterrupt):
     ...     image = stop.image
     """
 
+    _displayed = False
+
     def _render_traceback_(self) -> list[str]:
-        """Show the picture in a notebook: IPython calls this in place of printing a traceback."""
-        if self.image is not None:
+        """Show the picture in a notebook: IPython calls this in place of printing a traceback.
+
+        Kernels call it once for the notebook and once more for their reply.
+        """
+        if self.image is not None and not self._displayed:
             from IPython.display import display  # IPython is installed: it called this method
 
+            self._displayed = True
             display(self.image)
         return [f"{type(self).__name__}: {self}"]
 

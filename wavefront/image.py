@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from .codecs.png_jpeg import Gamma
 from .codecs.white_balance import WhiteBalance
 from .errors import SceneError, number, one_of, rgb
 from .film import Film
+from .html import picture_html
 from .layers import BOXES, LAYERS, NOISY, is_radiance
 from .outlines import outline_coverage
 from .picture_sums import PictureSums, merged_metadata, merged_sums, restored_sums
@@ -614,6 +616,20 @@ class Image:
     def _repr_png_(self) -> bytes:
         """Show the picture in a notebook."""
         return png_jpeg.encode(self.to_uint8(), ".png", 2.2)
+
+    def _repr_html_(self) -> str:
+        """Show the picture in a notebook, with its size, samples, error, time and layers."""
+        height, width = self.rgb.shape[:2]
+        facts = [f"{width} × {height}", f"{self.spp} spp"]
+        noise = self.metadata.get("noise", np.nan)
+        if np.isfinite(noise):
+            facts.append(f"error {noise:.2%}{' before denoising' if 'denoiser' in self.metadata else ''}")
+        if "seconds" in self.metadata:
+            facts.append(f"{self.metadata['seconds']:.1f} s")
+        if self.layers:
+            facts.append(f"layers: {', '.join(self.layers)}")
+        caption = escape(" · ".join(facts))
+        return f"<div>{picture_html(self._repr_png_())}<div><small>{caption}</small></div></div>"
 
 
 def film_image(sums: PictureSums, metadata: Mapping[str, Any], keep_sums: bool) -> Image:

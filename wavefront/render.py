@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -15,6 +15,7 @@ from .image import Image
 from .integrators import Integrator
 from .lights.samplers import LightSamplerMaker
 from .materials import MaterialLike
+from .notebook import run_shown, shows_pictures
 from .outcome import interrupted
 from .progress import Progress
 from .sampling.sampler import SamplerMaker
@@ -164,9 +165,10 @@ def render(
         that the layers "denoising_albedo" and "denoising_normal" show, which it adds. `image.noisy` is the
         picture before.
     progress
-        By default a bar appears when a render takes over two seconds. False shows none; a
-        function is called with how much is done and how much there is at most: samples, or
-        seconds where `seconds` is given. While a wave takes long it is called every second.
+        By default a bar appears when a render takes over two seconds; in a notebook the picture appears in
+        its place, and refines. False shows neither; a function is called with how much is done and how much
+        there is at most: samples, or seconds where `seconds` is given. While a wave takes long it is called
+        every second.
 
     Returns
     -------
@@ -191,6 +193,7 @@ def render(
     >>> image.rgb.shape
     (24, 32, 3)
     """
+    shown = shows_pictures(progress)
     session = Session(
         scene,
         spp=spp,
@@ -222,16 +225,16 @@ def render(
         strict=strict,
         aovs=aovs,
         denoise=denoise,
-        progress=progress,
+        progress=False if shown else progress,
     )
-    return finish(session)
+    return finish(session, run_shown if shown else Session.run_once)
 
 
-def finish(session: Session) -> Image:
-    """Render a session to the end, close it and return the picture, as `render` does."""
+def finish(session: Session, run: Callable[[Session], Image] = Session.run_once) -> Image:
+    """Have a function render a session to the end, close it and return the picture, as `render` does."""
     with session.interrupt_handler as ctrl_c:  # until the last worker has ended
         with session:
-            image = session.run_once()
+            image = run(session)
         if ctrl_c.pressed:
             raise interrupted(image, None)
     return image

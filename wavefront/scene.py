@@ -14,6 +14,7 @@ from .camera import Camera, field_of_view, image_size, upward
 from .elementary import arctan2, sin_cos
 from .errors import SceneError, finite_array
 from .lights import Environment, Light
+from .scene_html import scene_html
 from .shapes import Instance, Mesh, PrimitiveArray, Shape
 from .shapes.instance import instance_bounds
 from .suggestions import suggests_keywords
@@ -73,6 +74,10 @@ class Scene:
         return (
             f"<Scene: {len(self.shapes)} shapes, {len(self.lights)} lights, camera={self.camera is not None}>"
         )
+
+    def _repr_html_(self) -> str:
+        """Show counts, bounds, materials and lights in a notebook."""
+        return scene_html(self.shapes, self.lights, self.camera, self.bounds if self.shapes else None)
 
     @property
     def shapes(self) -> list[Shape]:

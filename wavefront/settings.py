@@ -366,9 +366,10 @@ class Settings:
     )
     progress: Progress = setting(
         None,
-        "By default a bar appears when a render takes over two seconds. False shows none; a function "
-        "is called with how much is done and how much there is at most: samples, or seconds where "
-        "`seconds` is given. While a wave takes long it is called every second.",
+        "By default a bar appears when a render takes over two seconds; in a notebook the picture appears "
+        "in its place, and refines. False shows neither; a function is called with how much is done and "
+        "how much there is at most: samples, or seconds where `seconds` is given. While a wave takes long "
+        "it is called every second.",
     )
     max_spp: int = field(init=False)  # the most samples that a pixel may get
     worker_count: int = field(init=False)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from ..errors import SceneError
+from ..html import preview_html
 from ..parameter import Parametrized
 from ..record import record
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
@@ -78,6 +79,10 @@ class Bsdf(Parametrized, ABC):
             hint = f"; write {self.given_elsewhere[name]}" if name in self.given_elsewhere else ""
             text = f"{type(self).__name__!r} object has no attribute {name!r}{hint}"
             raise AttributeError(text, name=name, obj=self)
+
+    def _repr_html_(self) -> str:
+        """Show a ball in a notebook."""
+        return preview_html(self)
 
     @property
     def view_independent(self) -> bool:

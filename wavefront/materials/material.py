@@ -9,6 +9,7 @@ import numpy as np
 
 from ..bsdfs import Bsdf
 from ..errors import SceneError, number
+from ..html import preview_html
 from ..layers import DEFAULT_GROUP, group_name
 from ..media import Medium
 from ..parameter import Parameter, Parametrized
@@ -130,6 +131,10 @@ class Material(Parametrized):
         self.group = group
         self.name = name
         self.derive()
+
+    def _repr_html_(self) -> str:
+        """Show a ball in a notebook."""
+        return preview_html(self)
 
     def derive(self) -> None:
         """Set the opacity."""
