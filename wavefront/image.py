@@ -23,7 +23,7 @@ from .codecs.white_balance import WhiteBalance
 from .errors import SceneError, number, one_of, rgb
 from .film import Film
 from .html import picture_html
-from .layers import BOXES, LAYERS, NOISY, is_radiance
+from .layers import BOXES, CLAMPED, GIVEN_LAYERS, LAYERS, NOISY, is_radiance
 from .outlines import outline_coverage
 from .picture_sums import PictureSums, merged_metadata, merged_sums, restored_sums
 from .samples import shared_samples
@@ -47,7 +47,8 @@ class Image:
         max_bounces, seed, sampler, sample_ranges (the half-open ranges [first, end] of the samples that some
         pixel has), filter, accelerator, workers, executor, seconds (wall time), spp (mean
         over pixels), samples, rays, bad_samples, interrupted, version (of this package), numpy, noise
-        (estimated relative error of the picture before denoising), and of a denoised picture denoiser.
+        (estimated relative error of the picture before denoising), clamp and clamped (the part of the light
+        that it removed), and of a denoised picture denoiser.
     counts
         (H, W) int64 samples of each pixel.
     variance
@@ -123,10 +124,11 @@ class Image:
 
     def __getattr__(self, name: str) -> NDArray[Any]:
         """Return a layer by its name."""
-        if name in LAYERS:
+        if name in LAYERS or name in GIVEN_LAYERS:
             if name in self.__dict__.get("layers", ()):
                 return self.layers[name]
-            raise AttributeError(f"the image has no layer {name!r}; render it with aovs=({name!r},)")
+            setting = "clamp=" if name == CLAMPED else f"aovs=({name!r},)"
+            raise AttributeError(f"the image has no layer {name!r}; render it with {setting}")
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     @property
@@ -675,6 +677,14 @@ def _add_layers(image: Image, sums: PictureSums) -> None:
         found = sums.layers.estimate(name, sums.film.sums, sums.film.count)
         image.layers[name] = _of_shape(found.mean, width, height)
         image.errors[name] = _of_shape(found.standard_error, width, height)
+    if CLAMPED in image.layers:
+        image.metadata[CLAMPED] = _removed_part(image.rgb, image.layers[CLAMPED])
+
+
+def _removed_part(rgb: Floats, removed: Floats) -> float:
+    """Return the part of the light that is not in a picture (H, W, 3) because it was `removed`, as it is."""
+    left, lost = (float(values.mean(dtype=np.float64)) for values in (rgb, removed))
+    return lost / (left + lost) if lost else 0.0
 
 
 def _of_shape(values: Floats, width: int, height: int) -> Floats:

@@ -54,6 +54,10 @@ KEYED_LAYERS: dict[str, Layer] = {  # one layer for each key, named "light_group
     "light_groups": _sampled(3, "radiance by the group of the light that it comes from"),
     "coverage": _sampled(1, "part of the pixel that each shape covers, by the name of the shape"),
 }
+CLAMPED = "clamped"
+GIVEN_LAYERS: dict[str, Layer] = {  # layers that a setting gives, beside those that are asked for
+    CLAMPED: _sampled(3, "radiance that the setting `clamp` removed"),
+}
 BOXES = "boxes"  # of objects: no array, but `Image.boxes`
 ALL_LAYERS = "all"  # stands for all of `LAYERS`, and for nothing else
 
@@ -85,7 +89,7 @@ def geometric_names(chosen: Iterable[str]) -> tuple[str, ...]:
 
 def layer_of(name: str) -> Layer:
     """Return a layer by its name, that of a layer with a key such as "light_groups.sun"."""
-    return LAYERS[name] if name in LAYERS else KEYED_LAYERS[name.partition(".")[0]]
+    return {**LAYERS, **KEYED_LAYERS, **GIVEN_LAYERS}[name.partition(".")[0]]
 
 
 def chosen_layers(name: str, value: Any) -> tuple[str, ...]:
@@ -124,6 +128,7 @@ RADIANCE = (
     "direct",
     "indirect",
     "light_groups.",
+    CLAMPED,
 )  # what the names of layers that hold radiance begin with
 
 

@@ -14,6 +14,7 @@ from .scene import Scene
 
 LONG_PATH = 1000  # surfaces along a path, after which it will hardly end by itself
 FEWEST_PIXELS = 256  # smaller pictures are measurements and are not checked for being black or white
+MUCH_LIGHT = 0.02  # part of the picture's light
 DIM = 1e-3  # radiance below which a picture looks black
 
 
@@ -72,6 +73,16 @@ def check_first_samples(image: Image, seconds: float | None, surfaces: int) -> N
         raise RenderError(f"there is no picture: {why}")
     if without:
         warn_caller(f"{without} pixels of {image.counts.size} have no sample and are black: {why}")
+
+
+def warn_of_clamped_light(image: Image, clamp: float) -> None:
+    """Warn where a clamp has darkened the picture by more than `MUCH_LIGHT`."""
+    part = image.metadata["clamped"]
+    if part > MUCH_LIGHT:
+        warn_caller(
+            f"clamp={clamp:g} removed {100 * part:.1f} % of the light, so the picture is too dark: "
+            'raise it; the layer "clamped" shows where'
+        )
 
 
 def warn_of_noise(image: Image, asked: float) -> None:

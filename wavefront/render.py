@@ -50,6 +50,7 @@ def render(
     light_sampler: str | LightSamplerMaker = "spatial",
     branches: int = 1,
     guide: bool = False,
+    clamp: float | None = None,
     wave_size: int | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
     checkpoint_interval: float = 60,
@@ -138,6 +139,12 @@ def render(
         "full" can be guided. It takes a second or two, and pays where light comes through narrow openings
         or several reflections: docs/guiding.md has figures. The pilot depends on the scene, the camera
         and the seed alone.
+    clamp
+        The most that a path may find as indirect light at once, as radiance, the mean of its channels; what
+        is brighter is scaled down. It removes fireflies, and with them light: the picture gets too dark. The
+        layer "clamped" holds what was removed, `metadata["clamped"]` says how much of all light that is, and
+        a warning does above 2 %. Light seen directly, and that of lights on the first rough surface, is not
+        clamped.
     wave_size
         The most paths that are traced together by one worker; by default what suits their number and
         speed, at most 131 072. The picture does not depend on it.
@@ -218,6 +225,7 @@ def render(
         light_sampler=light_sampler,
         branches=branches,
         guide=guide,
+        clamp=clamp,
         wave_size=wave_size,
         checkpoint=checkpoint,
         checkpoint_interval=checkpoint_interval,

@@ -14,17 +14,17 @@ from .bsdfs import albedo_of
 from .compile.scene import CompiledScene
 from .errors import SceneError
 from .layer_samples import BOUNDED, LayerSamples, fixed_point
-from .layers import KEYED_LAYERS, LAYERS
+from .layers import CLAMPED, KEYED_LAYERS, LAYERS
 from .record import record
 from .stages.compact import compact
 from .stages.interaction import interaction
 from .stages.normal_mapping import perturb_normals
 from .stages.shade import Shading, shading
 from .state import BEFORE, JUST_ONCE, NOT_YET, Contribution, Hits, Paths
-from .vec import Floats, Ints, broadcast, f4, put, take
+from .vec import Bools, Bytes, Floats, Ints, broadcast, f4, put, take
 
 FEATURES = ("denoising_albedo", "denoising_normal")
-OF_LIGHT = ("direct", "indirect", "light_groups")
+OF_LIGHT = ("direct", "indirect", "light_groups", CLAMPED)
 
 
 @record
@@ -48,9 +48,13 @@ class SampleRecorder:
         What is rendered.
     n
         Samples of the wave: slots of its paths.
+    clamp
+        The most indirect light that a path may find at once, as radiance, the mean of its channels.
     """
 
-    def __init__(self, wanted: Sequence[str], scene: CompiledScene, n: int) -> None:
+    def __init__(
+        self, wanted: Sequence[str], scene: CompiledScene, n: int, clamp: float | None = None
+    ) -> None:
         self._wanted = tuple(wanted)
         self._values = {name: np.zeros((LAYERS[name].channels, n), f4) for name in BOUNDED if name in wanted}
         self._covered = np.zeros(n, np.bool_) if "alpha" in wanted else None
@@ -58,6 +62,9 @@ class SampleRecorder:
         self._light: dict[str, Floats] = {}
         if "direct" in wanted or "indirect" in wanted:
             self._light["direct"] = np.zeros((3, n), f4)
+        self._clamp = clamp
+        if CLAMPED in wanted:
+            self._light[CLAMPED] = np.zeros((3, n), f4)
         self._groups = scene.light_groups if "light_groups" in wanted else None
         if self._groups is not None:
             self._light.update((f"light_groups.{name}", np.zeros((3, n), f4)) for name in self._groups.names)
@@ -69,7 +76,7 @@ class SampleRecorder:
     def prepare(self, paths: Paths) -> None:
         """Have paths that start at the camera carry the recorder."""
         paths.recorder = self
-        if "direct" in self._light:
+        if "direct" in self._light or CLAMPED in self._light:
             paths.scattered = np.full(len(paths), NOT_YET, np.uint8)
         if any(name in self._values for name in FEATURES):
             paths.met_rough = np.zeros(len(paths), np.bool_)
@@ -169,6 +176,25 @@ class SampleRecorder:
 
     # --- Light ----------------------------------------------------------------------------------------
 
+    def clamped(self, paths: Paths, contribution: Contribution, slot: Ints, arriving: Floats) -> Floats:
+        """Return light `arriving` (3, k) at slots (k,), its indirect part scaled down to the clamp.
+
+        A path of several branches is clamped like one of a sample of its own. What is not finite stays so.
+        """
+        if self._clamp is None or paths.scattered is None:
+            return arriving
+        limit, (x, y, z) = f4(self._clamp * self._share), arriving * f4(1 / 3)
+        mean = x + y + z
+        bright = (mean > limit) & (mean < np.inf) & ~_is_direct(paths.scattered, contribution)
+        lanes = np.flatnonzero(bright)
+        if not lanes.size:
+            return arriving
+        left = arriving.copy()
+        left[:, lanes] *= limit / mean.take(lanes)
+        removed = arriving.take(lanes, 1) - left.take(lanes, 1)
+        add_to_slots(self._light[CLAMPED], slot.take(lanes), removed)
+        return left
+
     def record_light(
         self, picture: Floats, paths: Paths, contribution: Contribution, slot: Ints, arriving: Floats
     ) -> None:
@@ -177,10 +203,8 @@ class SampleRecorder:
             self._picture = picture
         if self._picture is not picture:
             self._picture = np.empty(0, f4)  # no integrator returns this
-        if paths.scattered is not None and (paths.scattered != BEFORE).any():
-            scattered = take(paths.scattered, contribution.lanes)
-            direct = scattered == NOT_YET if contribution.sampled else scattered <= JUST_ONCE
-            self._add("direct", np.flatnonzero(direct), slot, arriving)
+        if "direct" in self._light and paths.scattered is not None and (paths.scattered != BEFORE).any():
+            self._add("direct", np.flatnonzero(_is_direct(paths.scattered, contribution)), slot, arriving)
         if self._groups is not None:
             group = self._groups.of_light.take(contribution.light)
             for number, name in enumerate(self._groups.names):
@@ -293,6 +317,12 @@ def recorded_layers(wanted: Sequence[str], scene: CompiledScene) -> tuple[str, .
         keys = scene.light_groups.names if name == "light_groups" else dict.fromkeys(scene.shape_names)
         names += [f"{name}.{key}" for key in keys] if name in KEYED_LAYERS else [name]
     return tuple(names)
+
+
+def _is_direct(scattered: Bytes, contribution: Contribution) -> Bools:
+    """Return a mask (k,) of the contributions that count for the layer "direct"."""
+    at = take(scattered, contribution.lanes)
+    return at == NOT_YET if contribution.sampled else at <= JUST_ONCE
 
 
 def _albedo(shade: Shading) -> Floats:

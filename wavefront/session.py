@@ -36,6 +36,7 @@ from .outcome import (
     is_black_or_white,
     render_error,
     setup_errors,
+    warn_of_clamped_light,
     warn_of_long_paths,
     warn_of_noise,
     warn_of_unseen_lights,
@@ -82,7 +83,7 @@ class Session:
         As for `render`.
     integrator, max_bounces, seed, samples, sampler, accel, filter, light_sampler, branches, guide
         As for `render`.
-    workers, executor, noise, seconds, wave_size, max_memory, strict, aovs, denoise, progress
+    workers, executor, noise, seconds, clamp, wave_size, max_memory, strict, aovs, denoise, progress
         As for `render`.
     checkpoint, checkpoint_interval
         As for `render`.
@@ -134,6 +135,7 @@ class Session:
         light_sampler: str | LightSamplerMaker = "spatial",
         branches: int = 1,
         guide: bool = False,
+        clamp: float | None = None,
         wave_size: int | None = None,
         checkpoint: str | os.PathLike[str] | None = None,
         checkpoint_interval: float = 60,
@@ -169,6 +171,7 @@ class Session:
             light_sampler=light_sampler,
             branches=branches,
             guide=guide,
+            clamp=clamp,
             wave_size=wave_size,
             checkpoint=checkpoint,
             checkpoint_interval=checkpoint_interval,
@@ -217,6 +220,7 @@ class Session:
             self._estimator(camera),
             settings.max_bounces,
             settings.sampled_layers,
+            settings.clamp,
         )
         self._budget = settings.budget(camera.size, self._tracer.recorded_layers)
         self._make_pool(settings.executor_for(camera.size))
@@ -535,6 +539,8 @@ class Session:
         if time_up:
             check_first_samples(image, settings.seconds, self._monitor.surfaces.value)
         loop.accumulator.bad.report(image, self._cause_of_bad_sample)
+        if settings.clamp is not None:
+            warn_of_clamped_light(image, settings.clamp)
         if settings.background is None and is_black_or_white(image):
             from .diagnosis import warn_of_black_or_white  # here, as most pictures do without
 
@@ -625,6 +631,7 @@ class Session:
             "filter": FILTERS.label(settings.filter),
             "branches": settings.branches,
             "guide": settings.guide,
+            "clamp": settings.clamp,
             "accelerator": self._compiled.accelerator.name,
             "workers": self._budget.workers,
             "executor": EXECUTORS.label(self._executor),

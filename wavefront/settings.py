@@ -23,7 +23,7 @@ from .files import check_target
 from .filters import FILTERS, Filter
 from .guiding import GuideTable
 from .integrators import INTEGRATORS, Integrator, li_full
-from .layers import GUIDES, chosen_layers, sampled_names
+from .layers import CLAMPED, GUIDES, chosen_layers, sampled_names
 from .lighting import DEFAULT, LIGHTINGS, check_lighting
 from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
 from .materials import MaterialLike
@@ -312,6 +312,16 @@ class Settings:
         "the seed alone.",
         option="learn where light comes from, for scenes with much indirect light",
     )
+    clamp: float | None = setting(
+        None,
+        "The most that a path may find as indirect light at once, as radiance, the mean of its channels; "
+        "what is brighter is scaled down. It removes fireflies, and with them light: the picture gets too "
+        'dark. The layer "clamped" holds what was removed, `metadata["clamped"]` says how much of all light '
+        "that is, and a warning does above 2 %. Light seen directly, and that of lights on the first rough "
+        "surface, is not clamped.",
+        option="most indirect light that a path finds at once; removes fireflies, and some light",
+        check=optional(above_zero),
+    )
     wave_size: int | None = setting(
         None,
         "The most paths that are traced together by one worker; by default what suits their number "
@@ -405,9 +415,9 @@ class Settings:
 
     @property
     def sampled_layers(self) -> tuple[str, ...]:
-        """The sampled layers that are asked for; a background gives alpha."""
+        """The sampled layers that are asked for; a background gives alpha, a clamp what it removes."""
         wanted = self.aovs if self.background is None else chosen_layers("aovs", [*self.aovs, "alpha"])
-        return sampled_names(wanted)
+        return (*sampled_names(wanted), *(() if self.clamp is None else (CLAMPED,)))
 
     @property
     def target_spp(self) -> int | None:

@@ -61,6 +61,7 @@ class Tracer:
     integrator: Integrator
     max_bounces: int
     layers: tuple[str, ...] = ()  # sampled ones that are asked for
+    clamp: float | None = None  # the limit of indirect light that a path finds at once
 
     @property
     def recorded_layers(self) -> tuple[str, ...]:
@@ -85,7 +86,7 @@ def trace_job(tracer: Tracer, monitor: WaveMonitor, job: Job) -> JobResult:
     scene = replace(tracer.scene, accelerator=accelerator)
     sampler = tracer.sampler(camera.film[0])
     paths = generate(scene, camera, sampler, np.tile(job.pixels, n), _samples(job), tracer.filter)
-    recorder = SampleRecorder(tracer.layers, scene, k * n) if tracer.layers else None
+    recorder = SampleRecorder(tracer.layers, scene, k * n, tracer.clamp) if tracer.layers else None
     if recorder is not None:
         recorder.prepare(paths)
     radiance = tracer.integrator(scene, paths, sampler, tracer.max_bounces)
