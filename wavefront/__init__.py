@@ -76,6 +76,7 @@ from .version import VERSION
 if TYPE_CHECKING:
     from .animation import save_animation
     from .camera.moves import interpolate_cameras, orbit
+    from .datasets import write_dataset
     from .io.load import from_trimesh, load, load_mesh
     from .io.sources import LoadLimits
     from .metrics import Comparison, compare
@@ -97,6 +98,7 @@ _LATER = {  # what many programs do without is imported when they ask for it
     "save_animation": ".animation",
     "testing": ".testing",
     "turntable": ".views",
+    "write_dataset": ".datasets",
 }
 
 __all__ = [
@@ -177,6 +179,7 @@ __all__ = [
     "turntable",
     "vec",
     "warp",
+    "write_dataset",
 ]
 
 

@@ -127,6 +127,45 @@ def _mode(target: Path) -> int | None:
     return mode & 0o777
 
 
+def make_folder(path: str | os.PathLike[str]) -> None:
+    """Make a folder and those above it, unless it exists.
+
+    Raises
+    ------
+    SaveError
+        If it cannot be made.
+    """
+    try:
+        os.makedirs(path, exist_ok=True)
+    except (OSError, ValueError) as error:
+        raise SaveError(f"{os.fspath(path)}: the folder cannot be made: {error}") from error
+
+
+def write_json(path: str | os.PathLike[str], value: Any) -> None:
+    """Write values as a file of JSON, as `write_bytes` does."""
+    import json  # imported here to keep `import wavefront` quick
+
+    write_bytes(path, json.dumps(value, allow_nan=False).encode())
+
+
+def read_json(path: str | os.PathLike[str]) -> Any:
+    """Return the values of a file of JSON.
+
+    Raises
+    ------
+    SceneError
+        As `read_bytes`, and if the file holds something else.
+    """
+    import json
+
+    try:
+        return json.loads(read_bytes(path))
+    except (ValueError, RecursionError) as error:
+        if isinstance(error, SceneError):
+            raise
+        raise SceneError(f"{os.fspath(path)}: is no JSON: {error}") from error
+
+
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
     """Write a file so that it always holds either its old content or all of the new content.
 

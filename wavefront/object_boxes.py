@@ -1,4 +1,4 @@
-"""Boxes of objects in a picture: of what is seen of each shape, and of the whole shape, as if it were alone.
+"""Objects in a picture: boxes of what is seen of each shape and of the whole shape, and its silhouette.
 
 The rays of the geometric layers go on behind each surface, so one pass finds all shapes that each pixel's
 center covers, whatever hides them.
@@ -6,9 +6,11 @@ center covers, whatever hides them.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .camera import Camera
 from .compile.scene import CompiledScene
@@ -51,6 +53,28 @@ def object_boxes(scene: CompiledScene, camera: Camera, shapes: ShapeTable) -> li
         }
         for number in np.flatnonzero(amodal.count).tolist()
     ]
+
+
+def silhouettes(scene: CompiledScene, camera: Camera) -> Iterator[tuple[int, NDArray[np.bool_]]]:
+    """Yield the id of each shape and the pixels (height, width) that it would cover if it were alone.
+
+    Shapes that would cover none are left out.
+
+    Parameters
+    ----------
+    scene, camera
+        As for `geometric_layers`.
+    """
+    width, height = camera.size
+    view = scene.view(camera)
+    spans = [_shapes_met(scene, view, pixel.astype(np.int64))[1] for _, pixel in pixel_spans(width * height)]
+    shape, at = (np.concatenate(each) for each in zip(*spans, strict=True))
+    order = np.argsort(shape, kind="stable")
+    numbers, first = np.unique(shape.take(order), return_index=True)
+    for number, pixels in zip(numbers.tolist(), np.split(at.take(order), first[1:]), strict=False):
+        mask = np.zeros(width * height, bool)
+        mask[pixels] = True
+        yield number, mask.reshape(height, width)
 
 
 def _shapes_met(

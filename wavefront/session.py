@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from functools import partial
@@ -28,7 +28,7 @@ from .layers import BOXES, geometric_names
 from .lighting import choose_preset, lighted
 from .lights.samplers import LightSamplerMaker
 from .materials import MaterialLike
-from .object_boxes import object_boxes
+from .object_boxes import object_boxes, silhouettes
 from .outcome import (
     LONG_PATH,
     check_first_samples,
@@ -445,6 +445,31 @@ class Session:
         sums = self._loop.accumulator.sums
         sums.identity = sums.identity or self._identity(self._loop.view.camera)
         self._make_checkpoint().write(path)
+
+    def identity(self) -> dict[str, Any]:
+        """Return what another render must have in common with this one so that its samples are the same.
+
+        These are settings, and fingerprints of the scene, the camera and functions of your own. `spp` and
+        `seconds` are no part of it.
+
+        Raises
+        ------
+        SceneError
+            If a part of the scene, such as an attribute of a BSDF of your own, cannot be compared.
+        """
+        return self._identity(self._loop.view.camera)
+
+    def silhouettes(self, camera: Camera | None = None) -> Iterator[tuple[int, NDArray[np.bool_]]]:
+        """Yield the id of each shape and the pixels (height, width) that it would cover if it were alone.
+
+        Ids and rays are those of the layer `shape_id`. Shapes that would cover no pixel are left out.
+
+        Parameters
+        ----------
+        camera
+            What sees the scene; None for the camera of the picture.
+        """
+        return silhouettes(self._compiled, self._camera if camera is None else camera)
 
     def close(self) -> None:
         """End the render and all workers; the session cannot be used again."""

@@ -1,0 +1,74 @@
+"""What a data set says of the shapes of a scene: their names, categories, models and poses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from ..errors import SceneError
+from ..record import record
+from ..shapes import Instance, Shape
+from ..suggestions import did_you_mean
+from ..vec import Doubles
+
+RIGID = 1e-6  # largest element of MᵀM − 1 of a matrix that neither scales nor shears
+
+
+@record
+class AnnotatedObject:
+    """One shape that is annotated."""
+
+    shape: int  # number of the shape in the scene, as in the layer `shape_id`
+    name: str
+    category: int  # the same for shapes of one name, from 1 on
+    model: int  # the same for instances of one mesh, from 1 on
+    pose: Doubles  # (4, 4) from the model to the world, a rotation and a translation
+
+
+def annotated_objects(shapes: Sequence[Shape], names: Iterable[str] | None) -> dict[int, AnnotatedObject]:
+    """Return the shapes that are annotated, by their numbers.
+
+    An instance that is moved and rotated is a model of its own coordinates. Any other shape is a model in
+    world coordinates.
+
+    Parameters
+    ----------
+    shapes
+        Those of the scene.
+    names
+        Of the shapes to annotate; None for all.
+
+    Raises
+    ------
+    SceneError
+        If there is no shape of a name.
+    """
+    known = dict.fromkeys(shape.name for shape in shapes)
+    wanted = list(known) if names is None else [names] if isinstance(names, str) else list(names)
+    for name in wanted:
+        if name not in known:
+            there = ", ".join(map(repr, known))[:200]
+            raise SceneError(
+                f"objects has {name!r}; shapes of the scene are {there}{did_you_mean(name, known)}"
+            )
+    categories = {name: number for number, name in enumerate(dict.fromkeys(wanted), 1)}
+    models: dict[int, int] = {}
+    found = {}
+    for number, shape in enumerate(shapes):
+        if shape.name in categories:
+            pose = _rigid_pose(shape)
+            kind = id(shape if pose is None or not isinstance(shape, Instance) else shape.mesh)
+            model = models.setdefault(kind, len(models) + 1)
+            placed = np.eye(4) if pose is None else pose
+            found[number] = AnnotatedObject(number, shape.name, categories[shape.name], model, placed)
+    return found
+
+
+def _rigid_pose(shape: Shape) -> Doubles | None:
+    """Return the transform of an instance if it is a rotation and a translation."""
+    if not isinstance(shape, Instance):
+        return None
+    turn = shape.transform[:3, :3]
+    rigid = np.abs(turn.T @ turn - np.eye(3)).max() <= RIGID and np.linalg.det(turn) > 0
+    return np.asarray(shape.transform, np.float64) if rigid else None

@@ -1,0 +1,98 @@
+"""One view of a data set: what formats are told of it, and its camera's matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from ..camera import Camera, Perspective
+from ..codecs.display import Display
+from ..image import Image
+from ..record import record
+from ..vec import Doubles
+from .annotated import AnnotatedObject
+from .masks import Mask
+
+# called with a camera, yields the ids and silhouettes of shapes; None is the view's own camera
+Silhouettes: TypeAlias = Callable[[Camera | None], Iterator[tuple[int, Mask]]]
+NEAREST = 1e-5  # of the near clipping plane, in depths of the far one
+
+
+@record
+class DatasetView:
+    """A rendered view."""
+
+    number: int
+    camera: Camera
+    image: Image  # with the layers depth, normal and shape_id
+    objects: dict[int, AnnotatedObject]  # by the number of the shape
+    display: Display
+    silhouettes: Silhouettes
+
+    @property
+    def name(self) -> str:
+        """The name of its files, without extension."""
+        return view_name(self.number)
+
+    def write_colors(self, path: str) -> None:
+        """Write the colors as they are shown."""
+        how = self.display
+        self.image.save(path, how.gamma, how.exposure, how.tone, how.white_balance)
+
+
+def view_name(number: int) -> str:
+    """Return the name of the files of a view, without extension."""
+    return f"{number:06d}"
+
+
+def pinhole(camera: Camera) -> Camera:
+    """Return a camera without lens or distortion, whose whole picture is the window of `camera`.
+
+    Raises
+    ------
+    SceneError
+        If the camera is no perspective one.
+    """
+    k = camera.intrinsics()
+    k[:2, 2] -= camera.window[:2]
+    return Camera.from_intrinsics(k, camera.extrinsics(), size=camera.size)
+
+
+def opencv_intrinsics(camera: Camera) -> Doubles:
+    """Return K (3, 3) of the rendered window, where pixels have their centers at whole numbers."""
+    k = pinhole(camera).intrinsics()
+    k[:2, 2] -= 0.5
+    return k
+
+
+def camera_matrices(camera: Camera, farthest: float) -> dict[str, Any]:
+    """Return the matrices of a view as values of JSON, row by row.
+
+    Parameters
+    ----------
+    camera
+        What saw the scene.
+    farthest
+        A depth that is greater than that of all points, scene units.
+    """
+    whole = pinhole(camera)
+    near = farthest * NEAREST
+    lens = camera.projection.distortion if isinstance(camera.projection, Perspective) else None
+    return {
+        "size": list(camera.size),
+        "opencv": {
+            "K": opencv_intrinsics(camera).tolist(),
+            "world_to_camera": camera.extrinsics().tolist(),
+            "camera_to_world": camera.to_matrix("opencv").tolist(),
+            "distortion": [0.0] * 8 if lens is None else np.asarray(lens.coefficients).tolist(),
+        },
+        "opengl": {
+            "camera_to_world": camera.to_matrix("opengl").tolist(),
+            "world_to_camera": np.linalg.inv(camera.to_matrix("opengl")).tolist(),
+            "projection": whole.projection_matrix(near, farthest).tolist(),
+            "near": near,
+            "far": farthest,
+        },
+    }
