@@ -111,11 +111,13 @@ def test_loading_is_a_phase(load, progress, tmp_path, monkeypatch, capsys) -> No
     monkeypatch.setattr(module, "DELAY", 0.001)
     (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
 
-    def slow(path: object) -> bytes:
-        time.sleep(0.3)
-        return (tmp_path / "a.obj").read_bytes()
+    read = readers.SceneFiles.read
 
-    monkeypatch.setattr(readers, "read_bytes", slow)
+    def slow(files: readers.SceneFiles, path: object) -> bytes:
+        time.sleep(0.3)
+        return read(files, path)
+
+    monkeypatch.setattr(readers.SceneFiles, "read", slow)
     load(tmp_path / "a.obj", progress=progress)
     shown = capsys.readouterr().err
     assert ("loading a.obj: 00:00" in shown) == (progress is None)

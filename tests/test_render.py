@@ -149,7 +149,7 @@ def test_scale_and_place_change_nothing(scale: float, shift: float, integrator: 
 
 BAD = [
     *(
-        ({"spp": v}, r"spp is .*; it must be a whole number from 1 to 134217728")
+        ({"spp": v}, r"spp is .*; it must be a whole number from 1 to 67108864")
         for v in (0, -1, 1.5, "9", True)
     ),
     *(({"spp": v}, r"spp is ") for v in (np.nan, 2**26 + 1)),
