@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import sys
+import tracemalloc
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -25,10 +26,10 @@ from rays import (
     sphere_mesh,
 )
 
-from wavefront.accel import Accelerator, make_accelerator
+from wavefront.accel import Accelerator, Geometry, make_accelerator
 from wavefront.accel.build import build_tree, stable_order
 from wavefront.accel.embree import installed
-from wavefront.accel.numpy_accel import leaf_size_for
+from wavefront.accel.numpy_accel import NumpyAccelerator, leaf_size_for
 from wavefront.errors import SceneError
 
 f4 = np.float32
@@ -397,7 +398,7 @@ def test_from_inside_outside_and_on_a_sphere(name: str) -> None:
 # --- build, and the choice of accelerator ---------------------------------------------------------
 
 
-@pytest.mark.parametrize("count", [1, 65, 1000, 20_000])
+@pytest.mark.parametrize("count", [1, 65, 1000, 20_000, 200_000])
 def test_the_tree_holds_each_primitive_once_inside_its_boxes(count: int) -> None:
     rng = np.random.default_rng(17)
     low = rng.uniform(-1, 1, (3, count)).astype(f4)
@@ -411,6 +412,36 @@ def test_the_tree_holds_each_primitive_once_inside_its_boxes(count: int) -> None
         members = members[members >= 0]
         assert (low[:, members].min(1) >= tree.low[n, s]).all()
         assert (high[:, members].max(1) <= tree.high[n, s]).all()
+
+
+def test_large_segments_are_split_as_well_as_small_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a sample decides, the tree is as good, and finds the same hits."""
+    mesh = sphere_mesh(5)
+    low, high = (np.ascontiguousarray(each.T, f4) for each in (mesh.min(1), mesh.max(1)))
+    whole, rays = build_tree(low, high, 32, 32), random_rays(2000, 5)
+    hits = make_accelerator(geometry(mesh), "numpy").closest(*rays, nothing(2000))
+    monkeypatch.setattr("wavefront.accel.build.AT_ONCE", 2000)
+    monkeypatch.setattr("wavefront.accel.build.SAMPLE", 500)
+    assert build_tree(low, high, 32, 32).cost < 1.03 * whole.cost
+    sampled = make_accelerator(geometry(mesh), "numpy").closest(*rays, nothing(2000))
+    np.testing.assert_array_equal(sampled.t, hits.t)
+    np.testing.assert_array_equal(sampled.prim, hits.prim)
+
+
+def test_building_takes_little_memory() -> None:
+    """Per triangle, beyond what is kept; float64 copies of all corners would take more."""
+    count = 300
+    x, y = np.meshgrid(*[np.linspace(0, 1, count + 1)] * 2, indexing="ij")
+    points = np.stack([x, y, np.sin(9 * x)], -1).astype(f4)
+    a, b, c, d = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
+    triangles = np.concatenate([np.stack(t, 2).reshape(-1, 3, 3) for t in ((a, b, c), (a, c, d))])
+    tracemalloc.start()
+    accelerator = NumpyAccelerator(Geometry(triangles, weights=False))
+    kept, most = (size / len(triangles) for size in tracemalloc.get_traced_memory())
+    tracemalloc.stop()
+    assert accelerator.name == "numpy"
+    assert kept < 150
+    assert most < 350
 
 
 def test_leaves_are_as_large_as_measurements_say() -> None:

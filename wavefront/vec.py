@@ -11,7 +11,7 @@ array([2.], dtype=float32)
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
@@ -114,6 +114,12 @@ def signs(x: Floats) -> Floats:
     bits = x.view(np.uint32) & np.uint32(0x80000000)
     bits |= np.uint32(0x3F800000)
     return bits.view(f4)
+
+
+def spans(total: int, size: int) -> Iterator[slice]:
+    """Yield slices of at most `size` that cover `total` columns, so that temporary arrays stay small."""
+    for start in range(0, total, size):
+        yield slice(start, min(start + size, total))
 
 
 def column(value: object) -> Floats:

@@ -14,20 +14,21 @@ import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
-from typing import Any
+from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..record import record
-from ..vec import TINY, Bools, Doubles, Floats, Ints, f4
+from ..vec import TINY, Bools, Doubles, Floats, Ints, f4, spans
 from .build import build_tree, stable_order
 from .triangle import ROUNDOFF
 
 BLOCK = 32  # rays that share one copy of a node's matrix
 BLOCK_SHIFT = 5
 CHUNK = 1 << 18  # elements of one product
+AT_ONCE = 1 << 15  # primitives whose bounds are found together, so that they fit the cache
 NEAR_ROUNDS = 3  # rounds in which each ray visits its nearest child of the root; then it visits all others
 TOP = 128  # most children of the root: inner children are replaced by their own while these fit
 
@@ -174,14 +175,33 @@ class Bvh:
     scale: np.float32  # 1 / the ball's radius
 
 
-def build_bvh(points: Floats, leaf_size: int, width: int, ball: Ball) -> Bvh:
-    """Build the tree and its quadrics over primitives within points (corners, 3, m).
+class Bounded(Protocol):
+    """Primitives within the convex hulls of points."""
+
+    def take(self, index: Ints) -> Bounded:
+        """Return some of the primitives."""
+
+    def hull(self) -> Floats:
+        """Return the points of m primitives, (corners, 3, m)."""
+
+
+def build_bvh(primitives: Bounded, ids: Ints, leaf_size: int, width: int, ball: Ball) -> Bvh:
+    """Build the tree and its quadrics over primitives `ids` (m,).
 
     The caller fills in `leaves`.
     """
-    low, high = points.min(0), points.max(0)
-    local = ((points - ball.center[:, None].astype(np.float64)) / ball.radius).astype(f4)
-    tree = build_tree(low, high, leaf_size, width, partial(fit_ellipsoids, local))
+    low, high = np.empty((3, ids.size), f4), np.empty((3, ids.size), f4)
+    for part in spans(ids.size, AT_ONCE):
+        points = primitives.take(ids[part]).hull()
+        low[:, part], high[:, part] = points.min(0), points.max(0)
+
+    def fit(order: Ints, start: Ints) -> Doubles:
+        points = primitives.take(ids.take(order)).hull()
+        local = ((points - ball.center[:, None].astype(np.float64)) / ball.radius).astype(f4)
+        return fit_ellipsoids(local, start)
+
+    tree = build_tree(low, high, leaf_size, width, fit)
+    del low, high
     assert tree.shape is not None
     absent = tree.low[..., 0] > tree.high[..., 0]
     nodes = len(absent)
@@ -191,7 +211,9 @@ def build_bvh(points: Floats, leaf_size: int, width: int, ball: Ball) -> Bvh:
     center[tree.child.ravel()[inner]] = shapes[inner, :3]
     radius = np.ones(nodes)
     radius[tree.child.ravel()[inner]] = np.linalg.norm(shapes[inner, 3:], axis=1)
-    quadrics = quadric_rows(tree.shape, center, radius)
+    quadrics = np.empty((nodes, width, len(PAIRS)), f4)
+    for part in spans(nodes, AT_ONCE // width):
+        quadrics[part] = quadric_rows(tree.shape[part], center[part], radius[part])
     quadrics[absent] = 0
     for axis in range(3):
         quadrics[absent, PAIRS.index((axis, axis))] = -1
@@ -226,15 +248,17 @@ def build_bvh(points: Floats, leaf_size: int, width: int, ball: Ball) -> Bvh:
     )
 
 
-def fit_ellipsoids(points: Floats, order: Ints, start: Ints) -> Doubles:
-    """Fit a bounding ellipsoid to each segment of primitives with points (corners, 3, m).
+def fit_ellipsoids(points: Floats, start: Ints) -> Doubles:
+    """Fit a bounding ellipsoid to each segment of primitives with points (corners, 3, m), overwriting them.
+
+    `start` is where segments begin.
 
     Returns (segments, 12): the center, then the three half axes as columns of a matrix. These are the
     principal axes of the points, scaled to the extent along each, and then until all points are inside.
     """
-    count = np.diff(start, append=order.size)
+    count = np.diff(start, append=points.shape[2])
     owner = np.repeat(np.arange(start.size), count)
-    chosen = points.take(order, 2)
+    chosen = points
     weight = 1 / (count * len(points))
     mean = np.add.reduceat(chosen.sum(0, dtype=np.float64), start, 1) * weight
     chosen -= mean.astype(f4).take(owner, 1)

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from ..record import record
-from ..vec import Floats, Ints
+from ..vec import Floats, Ints, Lanes
 from . import triangle
 from .bvh import Ball, RayBatch
 from .hits import Candidates, HitAccumulator
@@ -28,10 +28,16 @@ class TrianglePrimitives(Primitives):
         """Return the number of triangles."""
         return len(self.corners)
 
+    def take(self, index: Lanes) -> TrianglePrimitives:
+        """Return some of the triangles."""
+        chosen = self.corners[index] if isinstance(index, slice) else self.corners.take(index, 0)
+        return TrianglePrimitives(chosen, self.table)
+
     @property
     def bounds(self) -> tuple[Floats, Floats]:
         """Lower and upper corners, (3, m) each."""
-        return self.corners.min(1).T, self.corners.max(1).T
+        a, b, c = self.corners.transpose(1, 2, 0)
+        return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
     def hull(self) -> Floats:
         """Return the vertices, (3, 3, m)."""

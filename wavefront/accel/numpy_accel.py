@@ -31,6 +31,16 @@ def _batch_size(leaves: int) -> int:
     return 1 << 15 if leaves < 256 else 1 << 16 if leaves < 2048 else 1 << 18
 
 
+def _ball_of(geometry: Geometry) -> Ball:
+    """Return a bounding ball of all primitives."""
+    corners = [corner.T for kind in geometry.curved if len(kind) for corner in kind.bounds]
+    corners += [geometry.triangles.reshape(-1, 3)] if len(geometry.triangles) else []
+    if not corners:
+        return Ball(np.zeros(3, f4), 1.0)
+    low, high = np.stack([part.min(0) for part in corners], 1), np.stack([part.max(0) for part in corners], 1)
+    return bounding_ball(low, high)
+
+
 class NumpyAccelerator:
     """Ray queries in NumPy alone; see base.Accelerator."""
 
@@ -40,11 +50,9 @@ class NumpyAccelerator:
         triangles = geometry.triangles
         self._first_curved = len(triangles)
         self._weights = geometry.weights
-        boxes = [corner for kind in geometry.curved for corner in kind.bounds]
-        corners = np.concatenate([triangles.reshape(-1, 3).T, *boxes], 1)
-        self._ball = bounding_ball(corners, corners) if corners.size else Ball(np.zeros(3, f4), 1.0)
+        self._ball = _ball_of(geometry)
         with np.errstate(all="ignore"):
-            self._table = triangle.triangle_table(triangles)
+            self._table = triangle.triangle_table(triangles, self._weights)
             self._triangles = self._search_triangles(geometry, leaf_size)
             first, self._curved = self._first_curved, []
             for kind in geometry.curved:

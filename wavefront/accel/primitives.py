@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..shapes import CurvedShape
+from ..state import SoA
 from ..vec import Bools, Doubles, Floats, Ints
 from .bvh import Ball, RayBatch
 from .hits import HitAccumulator
@@ -30,7 +31,7 @@ class PrimitiveTests(Protocol):
         """Test what is left."""
 
 
-class Primitives(ABC):
+class Primitives(SoA, ABC):
     """k primitives of one kind, in float32 relative to the scene's center."""
 
     rows: ClassVar[int] = 1  # rows of the filter for each primitive

@@ -6,12 +6,13 @@ from functools import partial
 
 import numpy as np
 
-from ..vec import Floats, Ints, f4
+from ..vec import Floats, Ints, f4, spans
 from .bvh import BLOCK, BLOCK_SHIFT, CHUNK, Ball, RayBatch, blocks, build_bvh, flat_true, scratch, trace
 from .hits import AnyHit, Candidates, HitAccumulator
 from .primitives import Primitives, PrimitiveTests
 
 WIDTH = 32  # children of a node
+AT_ONCE = 1 << 14  # primitives whose rows are made together, so that they fit the cache
 
 
 class PrimitiveList:
@@ -48,16 +49,23 @@ class PrimitiveTree:
 
     def __init__(self, primitives: Primitives, ids: Ints, ball: Ball, first: int, leaf_size: int) -> None:
         self._primitives, self._ball, self._first = primitives, ball, first
-        hull, rows = primitives.hull(), primitives.filter_rows(ball)
-        if ids.size < hull.shape[2]:
-            hull = hull.take(ids, 2)
-        self.tree = build_bvh(hull, leaf_size, WIDTH, ball)
+        self.tree = build_bvh(primitives, ids, leaf_size, WIDTH, ball)
         self._slots = ids.take(self.tree.prim)
-        empty = self.tree.prim < 0
-        leaves = rows.take(self._slots.reshape(-1, leaf_size), 1)  # (rows, leaves, leaf_size, columns)
-        leaves[:, empty.reshape(-1, leaf_size)] = np.nan
-        count, columns = leaves.shape[1], leaves.shape[3]
-        self.tree.leaves = np.ascontiguousarray(leaves.transpose(1, 0, 2, 3)).reshape(count, -1, columns)
+        self.tree.leaves = self._leaf_matrices(leaf_size)
+
+    def _leaf_matrices(self, leaf_size: int) -> Floats:
+        """Return the rows of the filter, (leaves, rows * leaf_size, columns); NaN where a leaf has none."""
+        empty = (self.tree.prim < 0).reshape(-1, leaf_size)
+        leaves = np.empty((0, 0, 0), f4)
+        for part in spans(len(empty), max(1, AT_ONCE // leaf_size)):
+            slots = self._slots.reshape(-1, leaf_size)[part]
+            rows = self._primitives.take(slots.reshape(-1)).filter_rows(self._ball)
+            rows = rows.reshape(len(rows), *slots.shape, -1)  # (rows, leaves, leaf_size, columns)
+            rows[:, empty[part]] = np.nan
+            if not leaves.size:
+                leaves = np.empty((len(empty), len(rows) * leaf_size, rows.shape[3]), f4)
+            leaves[part] = rows.transpose(1, 0, 2, 3).reshape(slots.shape[0], -1, rows.shape[3])
+        return leaves
 
     def find_hits(self, batch: RayBatch, found: HitAccumulator) -> None:
         """Add all hits to `found`."""

@@ -14,9 +14,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..record import record
-from ..vec import Bools, Doubles, Floats, Ints, cross, f4
+from ..vec import Bools, Doubles, Floats, Ints, cross, f4, spans
 
 ROUNDOFF = 2.0**-24  # half an ulp of float32
+AT_ONCE = 1 << 14  # triangles whose float64 data are made together, so that they fit the cache
 LEAST_EXTENT = 1e-30  # added to the extent of points, so that no row is infinite
 # Column i: the axes that become x, y and z for rays whose largest component is along axis i.
 AXES = np.array([[1, 2, 0], [2, 0, 1], [0, 1, 2]])
@@ -26,36 +27,54 @@ AXES = np.array([[1, 2, 0], [2, 0, 1], [0, 1, 2]])
 class TriangleTable:
     """Float64 data of the exact tests, one column per triangle (m)."""
 
-    corners: Doubles  # (9, m) x, y, z of the first, second and third vertex
+    corners: Floats  # (m, 3, 3) vertices: triangle, corner, xyz
     plane: Doubles  # (4, m) normal n = (b - a) × (c - a), and n·a
-    second: Doubles  # (4, m) weight of the second vertex at p is second[:3]·p + second[3]
-    third: Doubles  # (4, m) the same for the third vertex
+    # None where no barycentric weights are needed:
+    second: Doubles | None  # (4, m) weight of the second vertex at p is second[:3]·p + second[3]
+    third: Doubles | None  # (4, m) the same for the third vertex
 
 
-def triangle_table(triangles: Floats) -> TriangleTable:
-    """Precompute planes and barycentric gradients of triangles (m, 3, 3)."""
-    corners = np.ascontiguousarray(triangles.reshape(-1, 9).T, np.float64)
-    a, b, c = corners[:3], corners[3:6], corners[6:]
-    normal = cross(b - a, c - a)
-    with np.errstate(all="ignore"):
-        size2 = (normal * normal).sum(0)
-        second = cross(c - a, normal) / size2
-        third = cross(normal, b - a) / size2
-    return TriangleTable(
-        corners,
-        np.concatenate([normal, (normal * a).sum(0)[None]]),
-        np.concatenate([second, -(second * a).sum(0)[None]]),
-        np.concatenate([third, -(third * a).sum(0)[None]]),
-    )
+def triangle_table(triangles: Floats, weights: bool) -> TriangleTable:
+    """Precompute planes, and with `weights` barycentric gradients, of triangles (m, 3, 3)."""
+    m = len(triangles)
+    plane = np.empty((4, m))
+    second, third = (np.empty((4, m)) if weights else None for _ in range(2))
+    for part in spans(m, AT_ONCE):
+        a, b, c = vertices(triangles[part])
+        normal = cross(b - a, c - a)
+        _write_plane(plane[:, part], normal, a)
+        if second is None or third is None:
+            continue
+        with np.errstate(all="ignore"):
+            size2 = (normal * normal).sum(0)
+            gradients = cross(c - a, normal) / size2, cross(normal, b - a) / size2
+        for rows, gradient in zip((second, third), gradients, strict=True):
+            _write_plane(rows[:, part], gradient, a)
+            rows[3, part] *= -1
+    return TriangleTable(triangles, plane, second, third)
+
+
+def _write_plane(rows: Doubles, normal: Floats | Doubles, point: Doubles) -> None:
+    """Write normals (3, k), and their products with points (3, k), to rows (4, k)."""
+    rows[:3] = normal
+    rows[3] = (normal * point).sum(0)
+
+
+def vertices(triangles: Floats) -> Doubles:
+    """Return the vertices of triangles (k, 3, 3) as (corner, axis, k) float64."""
+    return np.ascontiguousarray(triangles.transpose(1, 2, 0), np.float64)
 
 
 def has_area(triangles: Floats) -> Bools:
     """Return a mask of the triangles (m, 3, 3) that are not degenerate; a degenerate one is never hit."""
-    a, b, c = np.ascontiguousarray(triangles.transpose(1, 2, 0), np.float64)
-    normal = cross(b - a, c - a)
-    with np.errstate(all="ignore"):
-        size2 = (normal * normal).sum(0)
-    return (size2 > 0) & np.isfinite(size2)
+    found = np.empty(len(triangles), np.bool_)
+    for part in spans(found.size, AT_ONCE):
+        a, b, c = vertices(triangles[part])
+        normal = cross(b - a, c - a)
+        with np.errstate(all="ignore"):
+            size2 = (normal * normal).sum(0)
+        found[part] = (size2 > 0) & np.isfinite(size2)
+    return found
 
 
 def edge_rows(corners: Floats, center: Floats, radius: float) -> Floats:
@@ -195,7 +214,7 @@ def least_opposite_product(edges: Floats, out: Floats) -> Floats:
 
 def vertices_from(table: TriangleTable, prim: Ints, origin: Doubles) -> Doubles:
     """Return the vertices of triangles `prim` (k,) relative to points (3, k): (corner, axis, k)."""
-    return table.corners.take(prim, 1).reshape(3, 3, -1) - origin
+    return vertices(table.corners.take(prim, 0)) - origin
 
 
 def hits_watertight(vertices: Doubles, direction: Doubles) -> Bools:
@@ -248,6 +267,7 @@ def barycentrics(
     z = origin[2] + t * direction[2]
     weights = []
     for gradient in (table.second, table.third):
+        assert gradient is not None
         gx, gy, gz, constant = (row.take(prim) for row in gradient)
         weight = (gx * x + gy * y + gz * z + constant).astype(f4)
         weights.append(np.minimum(np.maximum(weight, f4(0), out=weight), f4(1), out=weight))

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..shapes import Mesh
-from ..vec import Bools, Floats, Ints, cross, f4, length
+from ..vec import Bools, Floats, Ints, cross, f4, length, spans
+
+AT_ONCE = 1 << 14  # triangles that are made in float64 together, so that they fit the cache
 
 
 def same_as_next(*of_triangles: Ints) -> Bools:
@@ -16,6 +18,25 @@ def same_as_next(*of_triangles: Ints) -> Bools:
     same = np.zeros(of_triangles[0].size, np.bool_)
     same[:-1] = np.logical_and.reduce([np.diff(numbers) == 0 for numbers in of_triangles])
     return same
+
+
+def gather_triangles(
+    meshes: Sequence[Mesh], vertices: Sequence[NDArray[np.float64]]
+) -> tuple[Floats, Floats]:
+    """Return the triangles (m, 3, 3) of meshes in float32, and their unit normals (3, m).
+
+    `vertices` (n, 3) of each mesh are relative to where its triangles are traced.
+    """
+    count = sum(len(mesh.faces) for mesh in meshes)
+    triangles, normals = np.empty((count, 3, 3), f4), np.empty((3, count), f4)
+    end = 0
+    for mesh, points in zip(meshes, vertices, strict=True):
+        for part in spans(len(mesh.faces), AT_ONCE):
+            corners = points.take(mesh.faces[part], 0)
+            start, end = end, end + len(corners)
+            triangles[start:end] = corners
+            normals[:, start:end] = compute_face_normals(corners)
+    return triangles, normals
 
 
 def compute_face_normals(triangles: NDArray[np.float64]) -> Floats:

@@ -43,7 +43,7 @@ def gather_lights(
     scale: float,
     meshes: Sequence[Mesh],
     curved: Sequence[CurvedShape],
-    corners: Sequence[NDArray[np.float64]],
+    vertices: Sequence[NDArray[np.float64]],
     center: NDArray[np.float64],
     half_size: NDArray[np.float64],
     choice: str | LightSamplerMaker,
@@ -57,8 +57,8 @@ def gather_lights(
         What is rendered.
     scaled, scale
         Its shapes with all lengths multiplied by `scale`, in the same order.
-    meshes, curved, corners
-        What is traced, and the corners (m, 3, 3) of the meshes' triangles, relative to `center` (3,).
+    meshes, curved, vertices
+        What is traced, and the vertices (n, 3) of each mesh, relative to `center` (3,).
     half_size
         Half of the scene's extent, (3,).
     choice, mis
@@ -69,14 +69,15 @@ def gather_lights(
     SceneError
         If a light is malformed, or a shape cannot shine as it should.
     """
-    triangles = sum(len(part) for part in corners)
-    starts = np.cumsum([0, *(len(part) for part in corners)])
+    sizes = [len(mesh.faces) for mesh in meshes]
+    triangles = sum(sizes)
+    starts = np.cumsum([0, *sizes])
     first_row = {id(mesh): int(start) for mesh, start in zip(meshes, starts, strict=False)}
     ends = triangles + np.cumsum([shape.count for shape in curved], dtype=np.intp)
     first_row.update((id(shape), int(end) - shape.count) for shape, end in zip(curved, ends, strict=True))
-    parts: list[Part] = [*_area_lights(meshes, corners), *_sphere_lights(curved, first_row, center)]
+    parts: list[Part] = [*_area_lights(meshes, vertices), *_sphere_lights(curved, first_row, center)]
     groups = GroupNumbers()
-    of_row = groups.of_shapes(meshes, [len(part) for part in corners], curved)
+    of_row = groups.of_shapes(meshes, sizes, curved)
     for _, rows in parts:
         assert rows is not None
         groups.add(of_row[np.atleast_2d(rows)[0]])
@@ -179,7 +180,7 @@ def _lights_of_spheres(shape: Any, center: NDArray[np.float64]) -> SphereLights:
     return SphereLights(middles, radii, radiance)
 
 
-def _area_lights(meshes: Sequence[Mesh], corners: Sequence[NDArray[np.float64]]) -> list[Part]:
+def _area_lights(meshes: Sequence[Mesh], vertices: Sequence[NDArray[np.float64]]) -> list[Part]:
     """Return the emitting rectangles and triangles of all meshes, a record for each kind.
 
     Only what shines evenly is taken for rectangles, as their points have no barycentric weights.
@@ -188,11 +189,12 @@ def _area_lights(meshes: Sequence[Mesh], corners: Sequence[NDArray[np.float64]])
     emitting = [number for number, mesh in enumerate(meshes) if mesh.emission is not None]
     if not emitting:
         return []
-    sizes = [len(part) for part in corners]
+    sizes = [len(mesh.faces) for mesh in meshes]
     starts = np.cumsum([0, *sizes])
+    corners = {number: vertices[number].take(meshes[number].faces, 0) for number in emitting}
     mesh_of = np.repeat(emitting, [sizes[number] for number in emitting])
     face = np.concatenate([np.arange(starts[number], starts[number + 1]) for number in emitting])
-    triangles = np.concatenate([corners[number] for number in emitting])
+    triangles = np.concatenate(list(corners.values()))
     radiance = np.concatenate([_radiance(meshes[number], corners[number]) for number in emitting], 1)
     emissions, source_of = _textured_emissions(meshes)
     source = source_of[mesh_of]

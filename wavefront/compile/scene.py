@@ -15,9 +15,9 @@ from ..record import record
 from ..scene import Scene
 from ..shapes import Shape
 from ..shapes.attributes import Corners, corner_values
-from ..vec import Bools, Floats, Ints, f4
+from ..vec import Bools, Floats, Ints
 from .curved import CurvedTable
-from .geometry import compute_corner_normals, compute_face_normals, same_as_next
+from .geometry import compute_corner_normals, gather_triangles, same_as_next
 from .instances import InstanceTable, own_frame, place_instances, sort_shapes
 from .light_groups import LightGroups
 from .lights import gather_lights
@@ -135,32 +135,30 @@ def compile_scene(
     shared = list({id(instance.mesh): instance.mesh for instance in instances}.values())
     sizes = np.array([len(mesh.faces) for mesh in meshes], np.intp)
     shape_of, once = np.repeat(numbers[: sizes.size], sizes), int(sizes.sum())
-    corners = [(mesh.vertices - center).take(mesh.faces, 0) for mesh in meshes]
-    corners += [own_frame(mesh).take(mesh.faces, 0) for mesh in shared]
+    vertices = [mesh.vertices - center for mesh in meshes] + [own_frame(mesh) for mesh in shared]
     meshes += shared
-    triangles = np.concatenate(corners) if corners else np.zeros((0, 3, 3))
+    triangles, normals = gather_triangles(meshes, vertices)
     user_materials, material_of, replaced = number_materials(meshes, curved, instances)
     lights, groups, light_of, environment = gather_lights(
-        scene, scaled, scale, meshes, curved, corners, center, (high - low) / 2, light_sampler, mis
+        scene, scaled, scale, meshes, curved, vertices, center, (high - low) / 2, light_sampler, mis
     )
     read = sorted({*attributes_read(placed), *lights.reads})
     attributes = {name: corner_values(name, meshes) for name in read}
     table_of_curved = CurvedTable.of(curved, center)
     smooth = any(mesh.normals is not None for mesh in meshes)
-    triangles32 = np.ascontiguousarray(triangles, f4)
+    del vertices
     has_alpha = find_alpha(user_materials, material_of, meshes, instances)
     nonscattering_lights = find_nonscattering_lights(user_materials, material_of, light_of, len(lights))
     light_of = np.append(light_of, environment)
     weights = bool(attributes) or smooth
-    normals = compute_face_normals(triangles)
     shape_numbers = number_shapes(meshes, curved, instances, numbers)
     interchangeable = None if weights else same_as_next(material_of[:once], light_of[:once], shape_of)
-    geometry = Geometry(triangles32[:once], table_of_curved.kinds, weights, interchangeable)
+    geometry = Geometry(triangles[:once], table_of_curved.kinds, weights, interchangeable)
     accelerator, table = make_accelerator(geometry), None
     if shared:
         placements, table = place_instances(instances, shared, center, once, len(table_of_curved), replaced)
         ends = np.cumsum([len(mesh.faces) for mesh in shared])
-        parts = np.split(triangles32[once:], ends[:-1])
+        parts = np.split(triangles[once:], ends[:-1])
         built = [make_accelerator(Geometry(part, (), weights)) for part in parts]
         accelerator = InstanceAccelerator(accelerator, built, placements)
     return CompiledScene(
