@@ -4,14 +4,16 @@ import numpy as np
 import pytest
 
 import wavefront as wf
-from wavefront.lights import LightTable, PointLights, TriangleLights
+from wavefront.lights import LightTable, PointLightRecord, TriangleLights
 from wavefront.lights.samplers import BY_POWER, SpatialLightSampler
 from wavefront.vec import f4
 
 
 def two_points() -> LightTable:
     """A light near each end of a long scene."""
-    return LightTable([PointLights(np.array([[-9, 9], [1, 1], [0, 0]], f4), np.ones((3, 2), f4))], (10, 1, 1))
+    return LightTable(
+        [PointLightRecord(np.array([[-9, 9], [1, 1], [0, 0]], f4), np.ones((3, 2), f4))], (10, 1, 1)
+    )
 
 
 @pytest.mark.parametrize(("x", "near"), [(-9.0, 0), (9.0, 1)])
@@ -65,7 +67,9 @@ def test_points_outside_the_grid_belong_to_its_border() -> None:
 @pytest.mark.parametrize("extent", [(0, 0, 0), (1, 0, 1), (1e-6, 1e6, 1)], ids=str)
 def test_flat_and_empty_extents(extent: tuple[float, float, float]) -> None:
     """A scene without height or depth still has a grid of at least one cell."""
-    lights = LightTable([PointLights(np.array([[-1, 1], [1, 1], [0, 0]], f4), np.ones((3, 2), f4))], extent)
+    lights = LightTable(
+        [PointLightRecord(np.array([[-1, 1], [1, 1], [0, 0]], f4), np.ones((3, 2), f4))], extent
+    )
     _, chance = lights.choice.sample(np.zeros((3, 4), f4), np.linspace(0, 0.99, 4, dtype=f4))
     assert (chance > 0).all()
 

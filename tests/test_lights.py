@@ -8,7 +8,7 @@ from significance import assert_mean, measure, render
 import wavefront as wf
 from wavefront.accel import make_accelerator
 from wavefront.compile.scene import compile_scene
-from wavefront.lights import ConstantEnvironment, LightTable, PointLights, SphereLights, TriangleLights
+from wavefront.lights import ConstantEnvironment, LightTable, PointLightRecord, SphereLights, TriangleLights
 from wavefront.vec import f4
 
 RNG = np.random.default_rng(1)
@@ -39,7 +39,7 @@ LIGHTS = {
         lambda: SphereLights(column(0, 0, 0), np.array([5], f4), column(1, 1, 1)),
         [[0, 0, 0], [4.5, 0, 0], [1, -2, 2]],
     ),
-    "points": (lambda: PointLights(column(1, 2, 3), column(4, 5, 6)), [[0, 0, 0], [1, 2, 2.99]]),
+    "points": (lambda: PointLightRecord(column(1, 2, 3), column(4, 5, 6)), [[0, 0, 0], [1, 2, 2.99]]),
     "environment": (lambda: ConstantEnvironment(column(1, 2, 3)), [[0, 0, 0]]),
     "cosine environment": (lambda: scenes.CosineEnvironment(2.0).record(np.zeros(3)), [[0, 0, 0]]),
 }
@@ -73,7 +73,7 @@ def table(choice: str = "spatial") -> LightTable:
     kinds = [
         triangles(),
         spheres(),
-        PointLights(column(1, 2, 3), column(4, 5, 6)),
+        PointLightRecord(column(1, 2, 3), column(4, 5, 6)),
         ConstantEnvironment(column(1, 2, 3)),
     ]
     return LightTable(kinds, 2.0 / np.sqrt(3), choice)
@@ -114,7 +114,7 @@ def test_samples_of_a_table_are_those_of_the_chosen_light(choice: str) -> None:
 
 def test_a_dark_light_is_never_chosen() -> None:
     """Its power is 0."""
-    lights = LightTable([PointLights(np.zeros((3, 2), f4), np.array([[0, 1]] * 3, f4))], 1.0)
+    lights = LightTable([PointLightRecord(np.zeros((3, 2), f4), np.array([[0, 1]] * 3, f4))], 1.0)
     chosen, chance = lights.choice.sample(RNG.random((3, 1000), f4), RNG.random(1000, f4))
     assert (chosen == 1).all()
     assert (chance == 1).all()

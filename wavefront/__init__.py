@@ -42,6 +42,7 @@ from .lights import (
     LightRecord,
     LightSample,
     PointLight,
+    PointLights,
     SpotLight,
 )
 from .lights.samplers import LightSampler
@@ -139,6 +140,7 @@ __all__ = [
     "NormalMap",
     "OrenNayar",
     "PointLight",
+    "PointLights",
     "Points",
     "Principled",
     "Rectangle",

@@ -306,7 +306,10 @@ class Lights(CheckedList[Light]):
     """The lights of a scene."""
 
     name = "lights"
-    allowed = "wf.PointLight, wf.SpotLight, wf.DirectionalLight, wf.Environment, or a wf.Light of your own"
+    allowed = (
+        "wf.PointLight, wf.PointLights, wf.SpotLight, wf.DirectionalLight, wf.Environment, or a wf.Light of "
+        "your own"
+    )
 
     def converted(self, item: Any) -> list[Light] | None:
         """Return a light."""

@@ -5,7 +5,7 @@ from .directional import DirectionalLight, DirectionalLights, SunLight
 from .environment import ConstantEnvironment, Environment
 from .image import ImageEnvironment
 from .infinite import EnvironmentSum, InfiniteLight
-from .point import PointLight, PointLights
+from .point import PointLight, PointLightRecord, PointLights
 from .rectangle import RectangleLights, TwoSidedRectangleLights, first_of_pairs
 from .sphere import SphereLights
 from .spot import SpotLight, SpotLights
@@ -27,6 +27,7 @@ __all__ = [
     "LightSample",
     "LightTable",
     "PointLight",
+    "PointLightRecord",
     "PointLights",
     "RectangleLights",
     "SphereLights",

@@ -7,7 +7,7 @@ from copy import copy
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SceneError, rgb
+from ..errors import SceneError, finite_array, rgb
 from ..layers import DEFAULT_GROUP, group_name
 from ..parameter import Parameter, Parametrized
 from ..record import record
@@ -17,7 +17,7 @@ from .base import DeltaLight, Light, LightSample, position
 
 
 @record
-class PointLights(DeltaLight):
+class PointLightRecord(DeltaLight):
     """k points that emit equally in all directions."""
 
     position: Floats  # (3, k) scene units
@@ -107,13 +107,117 @@ class PointLight(Parametrized, Light):
         light.intensity = scaled_intensity("PointLight intensity", self.intensity, factor)
         return light
 
-    def record(self, center: NDArray[np.float64]) -> PointLights:
+    def record(self, center: NDArray[np.float64]) -> PointLightRecord:
         """Return the light as a record of one column, relative to `center` (3,)."""
-        return PointLights((self.position - center).astype(f4).reshape(3, 1), self.intensity.astype(f4))
+        return PointLightRecord((self.position - center).astype(f4).reshape(3, 1), self.intensity.astype(f4))
+
+
+def checked_positions(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """Return where lights stand, (n, 3) scene units.
+
+    Raises
+    ------
+    SceneError
+        If the array has another shape, no row, or an element that is not finite.
+    """
+    array = finite_array(name, value, (None, 3))
+    if not len(array):
+        raise SceneError(f"{name} must have one row at least, got {array.shape}")
+    return array
+
+
+def intensities_of(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """Return intensities as float64: in a very large scene they may be beyond float32.
+
+    Raises
+    ------
+    SceneError
+        If an element is negative or not finite.
+    """
+    array = finite_array(name, value, (None,) * np.ndim(value))
+    bad = np.argwhere(array < 0)
+    if len(bad):
+        where = "".join(f"[{i}]" for i in bad[0])
+        raise SceneError(f"{name}{where} is {array[tuple(bad[0])]:g}; it must be at least 0")
+    return array
+
+
+class PointLights(Parametrized, Light):
+    """Many points that emit equally in all directions, as one light.
+
+    A million of them are set up in a second. They count as lights of their own where one is chosen.
+
+    Parameters
+    ----------
+    positions
+        (n, 3) scene units.
+    intensities
+        W/sr: one number, a color (3,), a number for each point (n, 1), or a color for each (n, 3).
+    group
+        Name of the layer of radiance that the lights count for, with `aovs="light_groups"`.
+
+    Raises
+    ------
+    SceneError
+        If an argument is malformed.
+
+    Examples
+    --------
+    >>> stars = np.random.default_rng(0).normal(size=(1000, 3)) * (5, 1, 5) + (0, 4, 0)
+    >>> floor = wf.Rectangle((-3, 0, -3), (0, 0, 6), (6, 0, 0))
+    >>> wf.render(wf.Scene([floor], wf.PointLights(stars, 0.02)), spp=1, size=(8, 8)).shape
+    (8, 8, 3)
+    """
+
+    delta = True
+    positions = Parameter(checked_positions)
+    intensities = Parameter(intensities_of)
+    group = Parameter(group_name)
+
+    @suggests_keywords
+    def __init__(self, positions: ArrayLike, intensities: ArrayLike, *, group: str = DEFAULT_GROUP) -> None:
+        self.positions = positions
+        self.intensities = intensities
+        self.group = group
+        self.derive()
+
+    def derive(self) -> None:
+        """Check that there is an intensity for each position."""
+        shape, n = self.intensities.shape, len(self.positions)
+        if shape not in ((), (3,), (n, 1), (n, 3)):
+            raise SceneError(
+                f"PointLights intensities must have shape (), (3,), ({n}, 1) or ({n}, 3) for {n} positions, "
+                f"got {shape}"
+            )
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Lower and upper corner (2, 3) of the positions."""
+        return np.stack([self.positions.min(0), self.positions.max(0)])
+
+    def scaled(self, factor: float) -> PointLights:
+        """Return the lights for a scene whose lengths were multiplied by `factor`: the same irradiance there.
+
+        Raises
+        ------
+        SceneError
+            If an intensity is then beyond float32.
+        """
+        lights = copy(self)
+        lights.positions = self.positions * factor
+        lights.intensities = scaled_intensity("PointLights intensities", self.intensities, factor)
+        return lights
+
+    def record(self, center: NDArray[np.float64]) -> PointLightRecord:
+        """Return the lights as a record of n columns, relative to `center` (3,)."""
+        intensities = np.broadcast_to(self.intensities, self.positions.shape)
+        return PointLightRecord(
+            np.ascontiguousarray((self.positions - center).T, f4), np.ascontiguousarray(intensities.T, f4)
+        )
 
 
 def scaled_intensity(name: str, intensity: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
-    """Return an intensity (3, 1) in a scene whose lengths were multiplied by `factor`.
+    """Return intensities in a scene whose lengths were multiplied by `factor`.
 
     Raises
     ------
