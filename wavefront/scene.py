@@ -307,7 +307,7 @@ class Lights(CheckedList[Light]):
 
     name = "lights"
     allowed = (
-        "wf.PointLight, wf.PointLights, wf.SpotLight, wf.DirectionalLight, wf.Environment, or a wf.Light of "
+        "wf.PointLight, wf.SpotLight, wf.DirectionalLight, wf.Environment, wf.PointLights, or a wf.Light of "
         "your own"
     )
 
