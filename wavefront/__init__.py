@@ -81,6 +81,7 @@ if TYPE_CHECKING:
     from .io.load import from_trimesh, load, load_mesh
     from .io.sources import LoadLimits
     from .metrics import Comparison, compare
+    from .viewer import Viewer, view
     from .views import render_many, turntable
 
 __version__ = VERSION
@@ -100,6 +101,8 @@ _LATER = {  # what many programs do without is imported when they ask for it
     "testing": ".testing",
     "turntable": ".views",
     "write_dataset": ".datasets",
+    "view": ".viewer",
+    "Viewer": ".viewer",
 }
 
 __all__ = [
@@ -158,6 +161,7 @@ __all__ = [
     "Texture",
     "ThinDielectric",
     "VertexColors",
+    "Viewer",
     "compare",
     "elementary",
     "from_trimesh",
@@ -180,6 +184,7 @@ __all__ = [
     "testing",
     "turntable",
     "vec",
+    "view",
     "warp",
     "write_dataset",
 ]

@@ -42,7 +42,7 @@ def draw(name: str, values: NDArray[Any], names: Mapping[int, str] | None, axes:
         picture = axes.imshow(values, cmap="viridis", interpolation="nearest")
         axes.figure.colorbar(picture, ax=axes)
     else:
-        axes.imshow(_colors(name, values), interpolation="nearest")
+        axes.imshow(layer_colors(name, values), interpolation="nearest")
     return axes
 
 
@@ -54,7 +54,7 @@ def _pyplot() -> Any:
     return pyplot
 
 
-def _colors(name: str, values: NDArray[Any]) -> NDArray[Any]:
+def layer_colors(name: str, values: NDArray[Any]) -> NDArray[Any]:
     """Return the components (H, W, c) of a layer as colors (H, W, 3), uint8 or in [0, 1]."""
     if values.dtype == np.uint8:
         return values

@@ -22,6 +22,7 @@ from .render_command import add_render_command
 from .resume_command import add_resume_commands
 from .status import ERROR, INTERRUPTED, TERMINATED
 from .turntable_command import add_turntable_command
+from .view_command import add_view_command
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -78,6 +79,7 @@ def parser() -> argparse.ArgumentParser:
     commands = top.add_subparsers(required=True, metavar="command")
     add_render_command(commands)
     add_turntable_command(commands)
+    add_view_command(commands)
     add_resume_commands(commands, top)
     info = commands.add_parser("info", help="say what a scene file holds")
     info.add_argument("scene", help="obj, ply, stl, glb or gltf file")

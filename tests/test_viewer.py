@@ -1,0 +1,540 @@
+"""The viewer without a browser: its loop, what pages may say, what is served, and what is left."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+import wavefront as wf
+from wavefront.viewer import refiner as module
+from wavefront.viewer.guard import is_value, may_connect
+from wavefront.viewer.refiner import Refiner, ViewerFrame
+from wavefront.viewer.shown import CHOICES, VIEWER_LAYERS, shown_codes
+from wavefront.viewer.viewpoint import Viewpoint
+
+viser = pytest.importorskip("viser")
+msgspec = pytest.importorskip("msgspec")  # comes with viser, as the next one
+websockets = pytest.importorskip("websockets.sync.client")
+exceptions = pytest.importorskip("websockets.exceptions")
+
+BALL = wf.Scene([wf.Sphere((0, 0, 0), 1, material=wf.Diffuse((0.7, 0.3, 0.1)))], wf.Environment(1))
+CAMERA = wf.Camera.look_at((0, 0, 5), (0, 0, 0), size=(64, 48))
+SOON = 30.0  # seconds; far less is usual
+
+
+# --- The loop -------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def steady(monkeypatch: pytest.MonkeyPatch) -> None:
+    """First pictures of one size, however long they take."""
+    monkeypatch.setattr(module, "TOO_LONG", float("inf"))
+    monkeypatch.setattr(module, "SHORT", 0.0)
+
+
+class Scripted:
+    """Stands for a session: each picture waits for `go`, so that the order of events is known."""
+
+    def __init__(self, pictures: int = 3) -> None:
+        self.pictures = pictures
+        self.views: list[tuple[wf.Camera, tuple[int, int]]] = []
+        self.stops = 0
+        self.closed = False
+        self.go = threading.Semaphore(0)
+        self.entered = threading.Semaphore(0)  # released when a picture is waited for
+        self._left = 0
+        self._stopped = False
+
+    def set_camera(self, camera: wf.Camera, size: tuple[int, int] | None = None) -> None:
+        self.views.append((camera, size or camera.film))
+        self._left, self._stopped = self.pictures, False
+
+    def __iter__(self) -> Scripted:
+        return self
+
+    def __next__(self) -> wf.Image:
+        if not self._left or self._stopped:
+            raise StopIteration
+        self.entered.release()
+        assert self.go.acquire(timeout=SOON)
+        self._left -= 1
+        width, height = self.views[-1][1]
+        return wf.Image(np.zeros((height, width, 3), np.float32), self.pictures - self._left)
+
+    def stop(self) -> None:
+        self.stops += 1
+        self._stopped = True
+        self.go.release()
+
+    def close(self) -> None:
+        self.closed = True
+
+
+class Watched:
+    """A refiner over a scripted session, and what it shows."""
+
+    def __init__(self, session: Any) -> None:
+        self.frames: list[ViewerFrame] = []
+        self.errors: list[Exception] = []
+        self.refiner = Refiner(cast(wf.Session, session), self.frames.append, self.errors.append)
+        self.refiner.start()
+
+
+def eventually(condition: Callable[[], object], seconds: float = SOON) -> bool:
+    """Wait until a condition holds, at most so long."""
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.005)
+    return bool(condition())
+
+
+def entered(session: Scripted) -> None:
+    """Wait until the loop waits for a picture."""
+    assert session.entered.acquire(timeout=SOON)
+
+
+@pytest.mark.usefixtures("steady")
+def test_a_view_begins_small_and_refines() -> None:
+    """One picture of lower resolution, then all of the whole one, of which the last is marked."""
+    session = Scripted()
+    watched = Watched(session)
+    watched.refiner.look(CAMERA)
+    session.go.release(10)
+    assert eventually(lambda: watched.frames and watched.frames[-1].final)
+    watched.refiner.close()
+    assert session.closed
+    assert [size for _, size in session.views] == [(21, 16), (64, 48)]
+    assert [(frame.image.spp, frame.final) for frame in watched.frames] == [
+        (1, False),
+        (1, False),
+        (2, False),
+        (3, False),
+        (3, True),
+    ]
+    assert session.stops == 1  # at the end
+
+
+@pytest.mark.usefixtures("steady")
+def test_a_movement_stops_a_picture_that_refines() -> None:
+    """And the next view begins small again."""
+    session = Scripted(pictures=1000)
+    watched = Watched(session)
+    watched.refiner.look(CAMERA)
+    entered(session)
+    session.go.release()
+    entered(session)  # in full resolution
+    other = wf.Camera.look_at((0, 0, 6), (0, 0, 0), size=(64, 48))
+    watched.refiner.look(other)
+    assert session.stops == 1
+    assert eventually(lambda: len(session.views) == 3)
+    assert session.views[2] == (other, (21, 16))
+    watched.refiner.close()
+    assert not any(frame.final for frame in watched.frames)
+
+
+@pytest.mark.usefixtures("steady")
+def test_a_first_picture_is_finished_and_shown_while_the_view_moves() -> None:
+    """Otherwise nothing would be seen of a movement; views that were left meanwhile are skipped."""
+    session = Scripted()
+    watched = Watched(session)
+    cameras = [wf.Camera.look_at((0, 0, z), (0, 0, 0), size=(64, 48)) for z in (3, 4, 5)]
+    watched.refiner.look(cameras[0])
+    entered(session)
+    watched.refiner.look(cameras[1])
+    watched.refiner.look(cameras[2])
+    assert session.stops == 0
+    session.go.release(10)
+    assert eventually(lambda: watched.frames and watched.frames[-1].final)
+    watched.refiner.close()
+    assert [camera for camera, _ in session.views] == [cameras[0], cameras[2], cameras[2]]
+    assert watched.frames[0].camera is cameras[0]
+
+
+def test_first_pictures_become_smaller_where_they_take_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And larger again, up to the whole picture, where they are quick; never less than there is to see."""
+    session = Scripted(pictures=1)
+    session.go.release(1000)
+    camera = wf.Camera.look_at((0, 0, 5), (0, 0, 0), size=(640, 480))
+    watched = Watched(session)
+
+    def sizes(too_long: float, short: float) -> list[tuple[int, int]]:
+        monkeypatch.setattr(module, "TOO_LONG", too_long)
+        monkeypatch.setattr(module, "SHORT", short)
+        session.views.clear()
+        for _ in range(5):
+            done = len(watched.frames)
+            watched.refiner.look(camera)
+            assert eventually(lambda done=done: len(watched.frames) > done and watched.frames[-1].final)
+        return [size for _, size in session.views if size != (640, 480)]
+
+    assert sizes(0, -1) == [(160, 120)] + 4 * [(80, 60)]
+    assert sizes(SOON, SOON) == [(80, 60), (160, 120), (320, 240)]
+    watched.refiner.close()
+
+
+@pytest.mark.usefixtures("steady")
+def test_an_error_ends_a_view_and_not_the_viewer() -> None:
+    """The next view is rendered."""
+    session = Scripted()
+    watched = Watched(session)
+    error = wf.SceneError("too far away")
+    real = session.set_camera
+
+    def set_camera(camera: wf.Camera, size: tuple[int, int] | None = None) -> None:
+        if camera is not CAMERA:
+            raise error
+        real(camera, size)
+
+    session.set_camera = set_camera  # type: ignore[method-assign]
+    watched.refiner.look(wf.Camera.look_at((0, 0, 6), (0, 0, 0), size=(64, 48)))
+    assert eventually(lambda: watched.errors == [error])
+    watched.refiner.look(CAMERA)
+    session.go.release(10)
+    assert eventually(lambda: watched.frames and watched.frames[-1].final)
+    watched.refiner.close()
+
+
+def test_the_last_picture_is_that_of_render() -> None:
+    """Bit for bit, also after other views that were left early, and with the layers of a page."""
+    session = wf.Session(BALL, 16, camera=CAMERA, workers=2, aovs=VIEWER_LAYERS, progress=False)
+    watched = Watched(session)
+    for z in (3, 4, 5):
+        watched.refiner.look(wf.Camera.look_at((0, 1, z), (0, 0, 0), size=(64, 48)))
+        time.sleep(0.03)
+    assert eventually(lambda: watched.frames and watched.frames[-1].final)
+    watched.refiner.close()
+    last = watched.frames[-1]
+    assert last.camera.origin[2] == 5
+    expected = wf.render(BALL, 16, camera=last.camera, progress=False)
+    assert last.image.rgb.tobytes() == expected.rgb.tobytes()
+    assert watched.errors == []
+
+
+# --- Viewpoints -------------------------------------------------------------------------------------
+
+
+def viewpoint(camera: wf.Camera = CAMERA) -> Viewpoint:
+    return Viewpoint.of(camera, BALL.bounds, np.array([0.0, 1, 0]))
+
+
+def test_code_of_a_camera_makes_it_again() -> None:
+    """With all of its bits, and with few digits."""
+    view = viewpoint(wf.Camera.look_at((1.23456789, 2, 3), (0.1, 0, 0), fov=33, size=(64, 48)))
+    for each in (view, view.with_lens(aperture=0.125, focus=2.5)):
+        copied = eval(each.code, {"wf": wf})
+        for part in ("origin", "rotation"):
+            assert (getattr(copied, part) == getattr(each.camera, part)).all()
+        for part in ("fov", "aperture", "focus"):
+            assert (
+                getattr(copied.projection, part) == getattr(each.camera.projection, part) or part == "focus"
+            )
+        assert copied.film == (64, 48)
+    assert "1.23457" in view.code
+    assert "aperture" not in view.code
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1, 1e6])
+def test_a_viewpoint_is_that_of_the_scenes_camera(scale: float) -> None:
+    """To six digits, in scenes of any size; on the page the scene has the radius 1."""
+    scene = wf.Scene([wf.Sphere((5 * scale, 0, 0), scale)], wf.Environment(1))
+    camera = scene.framing_camera(fov=30, size=(64, 48))
+    view = Viewpoint.of(camera, scene.bounds, np.array([0.0, 1, 0]))
+    assert np.abs(view.camera.origin - camera.origin).max() < 1e-5 * scale
+    assert np.abs(view.camera.rotation - camera.rotation).max() < 1e-5
+    assert np.abs(view.surroundings.to_page(view.target)).max() < 1e-5
+    origin, target = map(view.surroundings.to_page, (view.origin, view.target))
+    assert view.moved(origin, target, view.up).origin == pytest.approx(view.origin, abs=1e-5 * scale)
+
+
+def test_a_rolled_camera_keeps_its_roll() -> None:
+    """Up is what the camera has for up then; a panorama becomes a perspective view."""
+    rolled = wf.Camera.look_at((0, 0, 5), (0, 0, 0), up=(1, 1, 0), size=(64, 48))
+    assert np.abs(viewpoint(rolled).camera.rotation - rolled.rotation).max() < 1e-5
+    assert viewpoint(wf.Camera.panorama((0, 0, 5), (0, 0, 0), size=(64, 32))).fov == 40
+
+
+def test_a_picture_has_the_shape_of_the_page_and_not_more_pixels_than_allowed() -> None:
+    """Small pages get small pictures."""
+    view = viewpoint(CAMERA.resized((400, 300)))
+    assert view.resized(1600, 900).size == (462, 260)
+    assert view.resized(200, 100).size == (200, 100)
+
+
+NAN, INF = float("nan"), float("inf")
+
+
+@pytest.mark.parametrize(
+    ("origin", "target", "up"),
+    [
+        ((NAN, 0, 0), (0, 0, 0), (0, 1, 0)),
+        ((0, 0, 5), (0, INF, 0), (0, 1, 0)),
+        ((0, 0, 1e9), (0, 0, 0), (0, 1, 0)),
+        ((0, 0, 5), (0, 0, 5), (0, 1, 0)),
+        ((0, 0, 5), (0, 0, 0), (0, 0, 1)),
+        ((0, 0, 5), (0, 0, 0), (0, 0, 0)),
+        ((0, 0), (0, 0, 0), (0, 1, 0)),
+        ("far", (0, 0, 0), (0, 1, 0)),
+        (None, (0, 0, 0), (0, 1, 0)),
+    ],
+)
+def test_places_that_are_none_are_refused(origin: Any, target: Any, up: Any) -> None:
+    """Not finite, too far away, coinciding, parallel, or no numbers."""
+    with pytest.raises(wf.SceneError):
+        viewpoint().moved(origin, target, up)
+
+
+@pytest.mark.parametrize("size", [(0, 10), (10, 10**9), (NAN, 10), ("wide", 10), (None, 10), (-5, 10)])
+def test_sizes_that_are_none_are_refused(size: Any) -> None:
+    """They come from the page."""
+    with pytest.raises(wf.SceneError, match=r"^page (width|height)"):
+        viewpoint().resized(*size)
+
+
+@pytest.mark.parametrize(
+    "lens", [{"fov": 179}, {"fov": NAN}, {"aperture": -1}, {"aperture": 1e9}, {"focus": 0}, {"focus": "near"}]
+)
+def test_lenses_that_are_none_are_refused(lens: Any) -> None:
+    """With the limits."""
+    with pytest.raises(wf.SceneError, match=r"must be (from|a number)"):
+        viewpoint().with_lens(**lens)
+
+
+# --- Layers -----------------------------------------------------------------------------------------
+
+
+def test_layers_are_shown_as_colors() -> None:
+    """Each choice; exposure changes radiance alone."""
+    image = wf.render(BALL, 4, camera=CAMERA, aovs=VIEWER_LAYERS, progress=False)
+    shown = {choice: shown_codes(image, choice, 0) for choice in CHOICES}
+    for codes in shown.values():
+        assert codes.shape == (48, 64, 3)
+        assert codes.dtype == np.uint8
+    assert (shown["rgb"] == image.to_uint8()).all()
+    assert (shown["denoised"] == image.denoise().to_uint8()).all()
+    middle, corner = (24, 32), (0, 0)
+    assert shown["depth"][middle].tolist() == [255, 255, 255]  # the nearest
+    assert shown["normal"][middle][2] > 250  # towards the camera
+    assert shown["depth"][corner].tolist() == shown["normal"][corner].tolist() == [217, 217, 217]
+    assert (shown["ids"][middle] != shown["ids"][corner]).any()
+    for choice in ("albedo", "normal", "depth", "ids"):
+        assert (shown_codes(image, choice, 3) == shown[choice]).all()
+    assert shown_codes(image, "rgb", 1).mean() > shown["rgb"].mean()
+
+
+def test_a_transparent_background_is_gray() -> None:
+    """Pages have no alpha."""
+    image = wf.render(BALL, 4, camera=CAMERA, aovs=VIEWER_LAYERS, background="transparent", progress=False)
+    assert shown_codes(image, "rgb", 0)[0, 0].tolist() == [217, 217, 217]
+
+
+# --- What pages may do ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("origin", "host", "own", "may"),
+    [
+        ("http://127.0.0.1:8080", "127.0.0.1:8080", "127.0.0.1", True),
+        ("http://localhost:8080", "localhost:8080", "127.0.0.1", True),
+        ("http://[::1]:8080", "[::1]:8080", "::1", True),
+        (None, "127.0.0.1:8080", "127.0.0.1", True),  # not a browser
+        ("http://evil.example", "127.0.0.1:8080", "127.0.0.1", False),
+        ("http://127.0.0.1:8888", "127.0.0.1:8080", "127.0.0.1", False),  # another server of this machine
+        ("null", "127.0.0.1:8080", "127.0.0.1", False),
+        ("http://evil.example:8080", "evil.example:8080", "127.0.0.1", False),  # a name that leads here
+        ("http://desk.example:8080", "desk.example:8080", "0.0.0.0", True),
+        ("http://evil.example", "desk.example:8080", "0.0.0.0", False),
+    ],
+)
+def test_pages_of_other_sites_may_not_connect(origin: str | None, host: str, own: str, may: bool) -> None:
+    """Browsers let them try."""
+    assert may_connect(origin, host, own) == may
+
+
+def test_only_values_may_be_set() -> None:
+    """Not limits, names or callbacks of elements."""
+    assert is_value({"value": 1.5})
+    assert is_value({"value": "rgb"})
+    for updates in (
+        {"max": 1e9},
+        {"value": 1, "max": 2},
+        {"update_cb": []},
+        {"value": [1]},
+        {},
+        None,
+        "value",
+    ):
+        assert not is_value(updates)
+
+
+@pytest.fixture
+def viewer() -> Iterator[wf.Viewer]:
+    """A viewer of a ball, closed at the end, when nothing must be left."""
+    before = set(threading.enumerate())
+    with wf.view(BALL, 4, camera=CAMERA, port=0, open_browser=False, block=False) as viewer:
+        yield viewer
+    assert eventually(lambda: set(threading.enumerate()) <= before)
+    assert multiprocessing.active_children() == []
+    with pytest.raises(OSError):  # nobody listens
+        urllib.request.urlopen(viewer.url, timeout=5)
+
+
+class Client:
+    """Speaks to a viewer as its page does."""
+
+    def __init__(self, viewer: wf.Viewer, **options: Any) -> None:
+        address = viewer.url.replace("http", "ws")
+        protocol: Any = f"viser-v{viser.__version__}"
+        self.socket = websockets.connect(
+            address, subprotocols=[protocol], compression=None, max_size=None, **options
+        )
+
+    def send(self, kind: str, **values: Any) -> None:
+        """Send a message."""
+        self.socket.send(msgspec.msgpack.encode({"type": kind, **values}))
+
+    def look(self, **values: Any) -> None:
+        """Send a camera."""
+        camera: dict[str, Any] = {
+            "wxyz": (1.0, 0, 0, 0),
+            "position": (0, 0, 3.0),
+            "fov": 1.0,
+            "near": 0.1,
+            "far": 100.0,
+            "image_height": 48,
+            "image_width": 64,
+            "look_at": (0.0, 0, 0),
+            "up_direction": (0.0, 1, 0),
+        }
+        self.send("ViewerCameraMessage", **(camera | values))
+
+
+def test_a_page_moves_the_camera(viewer: wf.Viewer) -> None:
+    """And gets the picture of `render` with it."""
+    assert "127.0.0.1" in viewer.url
+    client = Client(viewer)
+    client.look(position=(1.0, 0.5, 3.0), image_width=48)
+    assert eventually(lambda: viewer.camera.film == (48, 48))
+    image = viewer.wait_for_picture(SOON)
+    assert viewer.image is image
+    expected = wf.render(BALL, 4, camera=viewer.camera, progress=False)
+    assert image.rgb.tobytes() == expected.rgb.tobytes()
+    radius = np.sqrt(3)
+    assert viewer.camera.origin.tolist() == pytest.approx([radius, radius / 2, 3 * radius], abs=1e-4)
+    client.socket.close()
+
+
+def test_what_a_page_says_is_checked(viewer: wf.Viewer) -> None:
+    """Cameras that are none change nothing, and other messages do nothing; the viewer goes on."""
+    client = Client(viewer)
+    client.look()
+    assert eventually(lambda: viewer.camera.origin[2] < 5.2 and viewer.camera.origin[2] != 5)
+    before = viewer.camera
+    client.look(position=(NAN, 0, 0))
+    client.look(position=(0.0, 0, 0))
+    client.look(image_width=10**9)
+    client.look(up_direction=(0.0, 0, 0))
+    client.send("ShareUrlRequest")
+    client.send("FileTransferStartUpload", source_component_uuid="x", transfer_uuid="y", filename="f",
+                mime_type="text/plain", part_count=1, size_bytes=1)  # fmt: skip
+    client.send("GuiUpdateMessage", uuid="nothing", updates={"value": 3})
+    time.sleep(0.2)
+    assert viewer.camera is before
+    client.look(image_width=48)
+    assert eventually(lambda: viewer.camera.film == (48, 48))
+    client.socket.close()
+
+
+def test_a_page_of_another_site_is_refused(viewer: wf.Viewer) -> None:
+    """Before it is sent anything."""
+    client = Client(viewer, origin="http://evil.example")
+    with pytest.raises(exceptions.ConnectionClosed) as refused:
+        client.socket.recv(timeout=SOON)
+    assert refused.value.rcvd.code == 1008
+
+
+def test_nothing_but_the_page_is_served(viewer: wf.Viewer) -> None:
+    """No file of the machine, however it is named."""
+
+    def status(path: str) -> int:
+        try:
+            with urllib.request.urlopen(viewer.url + path, timeout=SOON) as answer:
+                return answer.status
+        except urllib.error.HTTPError as error:
+            return error.code
+
+    assert status("/") == 200
+    for path in (
+        "/../page.py",
+        "/%2e%2e/%2e%2e/_viser.py",
+        "//etc/passwd",
+        "/..%5c..%5c_viser.py",
+        "/index.php",
+    ):
+        assert status(path) == 404
+
+
+def test_a_viewer_refuses_what_it_cannot_do() -> None:
+    """Before any work."""
+    refused = [
+        ({"checkpoint": "file"}, "view: checkpoint is 'file'"),
+        ({"samples": range(3)}, "view: samples is"),
+        ({"port": 70000}, "port is 70000; it must be a whole number from 0 to 65535"),
+        ({"spp": 0}, "spp is 0"),
+        ({"host": "no such host."}, "cannot listen at host 'no such host.'"),
+        ({"host": "203.0.113.1"}, "cannot listen at host '203.0.113.1'"),
+    ]
+    before = set(threading.enumerate())
+    for settings, text in refused:
+        with pytest.raises(wf.SceneError, match=text):
+            wf.view(BALL, **{"open_browser": False, "block": False, "size": (16, 16), **settings})  # type: ignore[arg-type]
+    assert set(threading.enumerate()) <= before
+
+
+def test_a_viewer_that_is_closed_says_so() -> None:
+    """It can be closed twice."""
+    viewer = wf.view(BALL, 4, size=(16, 16), port=0, open_browser=False, block=False)
+    assert repr(viewer) == f"<Viewer at {viewer.url}>"
+    viewer.close()
+    viewer.close()
+    viewer.wait()
+    assert repr(viewer) == f"<Viewer at {viewer.url}, closed>"
+
+
+@pytest.mark.slow
+def test_the_command_ends_at_ctrl_c(tmp_path: Path) -> None:
+    """With 0, and nothing left; the page is there until then."""
+    mesh = tmp_path / "triangle.obj"
+    mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    command = [sys.executable, "-m", "wavefront", "view", str(mesh), "--no-browser", "--port", "0"]
+    process = subprocess.Popen(
+        [*command, "--size", "64x48", "--spp", "4"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        process_group=0,
+    )
+    try:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        assert line.startswith("wavefront: http://127.0.0.1:"), line
+        assert urllib.request.urlopen(line.split()[1], timeout=SOON).status == 200
+        os.killpg(process.pid, signal.SIGINT)
+        output, errors = process.communicate(timeout=SOON)
+    finally:
+        process.kill()
+        process.communicate()
+    assert process.returncode == 0, output + errors
+    assert "Traceback" not in errors

@@ -1,0 +1,224 @@
+"""The viewer in a browser: headless Chromium loads the page, drags the picture and presses buttons."""
+
+from __future__ import annotations
+
+import io
+import multiprocessing
+import shutil
+import threading
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+
+import wavefront as wf
+
+viser = pytest.importorskip("viser")
+playwright = pytest.importorskip("playwright.sync_api")
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium"),
+    pytest.mark.filterwarnings("default"),  # of the driver of the browser
+]
+SOFTWARE_GL = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+SIZE = {"width": 800, "height": 600}
+SOON = 60.0  # seconds
+
+SCENE = wf.Scene(
+    [
+        wf.Sphere((0, 0, 0), 1, material=wf.Diffuse((0.8, 0.2, 0.1))),
+        wf.Sphere((2, 0, 0), 1, material=wf.Diffuse((0.1, 0.3, 0.8))),
+        wf.Rectangle((-5, -1, -5), (0, 0, 10), (10, 0, 0)),
+    ],
+    wf.Environment(0.8),
+)
+CAMERA = wf.Camera.look_at((1, 2, 7), (1, 0, 0), size=(320, 240))
+SPP = 16
+
+
+def eventually(condition: Callable[[], object], seconds: float = SOON) -> bool:
+    """Wait until a condition holds, at most so long."""
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.02)
+    return bool(condition())
+
+
+@pytest.fixture
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as driver:
+        chromium = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", *SOFTWARE_GL])
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def viewer() -> Iterator[wf.Viewer]:
+    before = set(threading.enumerate())
+    with wf.view(SCENE, SPP, camera=CAMERA, port=0, open_browser=False, block=False) as viewer:
+        yield viewer
+    assert eventually(lambda: set(threading.enumerate()) <= before)
+    assert multiprocessing.active_children() == []
+
+
+@pytest.fixture
+def page(viewer: wf.Viewer, browser: Any) -> Any:
+    """The page of the viewer, when it shows the last picture of its first view."""
+    page = browser.new_context(viewport=SIZE, permissions=["clipboard-read", "clipboard-write"]).new_page()
+    page.goto(viewer.url)
+    page.get_by_text("spp").wait_for(timeout=1000 * SOON)
+    assert eventually(lambda: viewer.camera.film == (320, 240))
+    viewer.wait_for_picture(SOON)
+    page.get_by_text(f"{SPP} of {SPP} spp").wait_for(timeout=1000 * SOON)
+    return page
+
+
+def shot(page: Any) -> np.ndarray:
+    """Return what the page shows, without the panel, as floats."""
+    page.wait_for_timeout(500)
+    return iio.imread(io.BytesIO(page.screenshot()))[300:, :, :3].astype(float)
+
+
+def drag(page: Any, dx: int, dy: int) -> None:
+    page.mouse.move(300, 450)
+    page.mouse.down()
+    for k in range(1, 11):
+        page.mouse.move(300 + dx * k // 10, 450 + dy * k // 10)
+    page.mouse.up()
+
+
+EXPOSURE, FIELD_OF_VIEW, FOCUS, APERTURE = range(4)  # the sliders, from the top
+
+
+def enter(page: Any, slider: int, text: str) -> None:
+    """Type a value into the field beside a slider."""
+    page.get_by_role("textbox").nth(slider).fill(text)
+    page.keyboard.press("Enter")
+
+
+def expected(viewer: wf.Viewer, **options: Any) -> wf.Image:
+    return wf.render(SCENE, SPP, camera=viewer.camera, progress=False, **options)
+
+
+def test_a_page_shows_the_picture_of_render(page: Any, viewer: wf.Viewer) -> None:
+    """The last picture has its bits, and the page shows that, scaled."""
+    last = viewer.wait_for_picture(SOON)
+    reference = expected(viewer)
+    assert last.rgb.tobytes() == reference.rgb.tobytes()
+    codes = reference.to_uint8().astype(float)
+    seen = shot(page)
+    rows = np.arange(300, 600) * codes.shape[0] // 600
+    columns = np.arange(800) * codes.shape[1] // 800
+    assert np.abs(seen - codes[rows][:, columns]).mean() < 6  # the browser interpolates
+
+
+def test_a_drag_changes_the_view_and_the_picture_restarts(page: Any, viewer: wf.Viewer) -> None:
+    """And refines again, to the picture of `render` with the new camera."""
+    before, camera = shot(page), viewer.camera
+    spp: list[int] = []
+    show = viewer._page.show  # type: ignore[union-attr]
+    viewer._page.show = lambda frame: (spp.append(frame.image.spp), show(frame))  # type: ignore[union-attr, method-assign, assignment]
+    drag(page, 150, 40)
+    assert eventually(lambda: not np.allclose(viewer.camera.origin, camera.origin))
+    assert np.linalg.norm(viewer.camera.origin - (1, 0, 0)) == pytest.approx(
+        np.sqrt(53), rel=0.05
+    )  # an orbit
+    page.wait_for_timeout(1000)  # the page's camera comes to rest
+    last = viewer.wait_for_picture(SOON)
+    assert spp[0] == 1
+    assert spp[-1] == SPP
+    assert last.rgb.tobytes() == expected(viewer).rgb.tobytes()
+    page.get_by_text(f"{SPP} of {SPP} spp").wait_for(timeout=1000 * SOON)
+    assert np.abs(shot(page) - before).mean() > 5
+
+
+def test_the_wheel_zooms_and_the_right_button_pans(page: Any, viewer: wf.Viewer) -> None:
+    """The distance changes; the target moves."""
+    distance = np.linalg.norm(viewer.camera.origin - (1, 0, 0))
+    page.mouse.move(300, 450)
+    page.mouse.wheel(0, -400)
+    assert eventually(lambda: np.linalg.norm(viewer.camera.origin - (1, 0, 0)) < 0.95 * distance)
+    page.wait_for_timeout(1000)
+    camera = viewer.camera
+    page.mouse.down(button="right")
+    page.mouse.move(400, 450, steps=5)
+    page.mouse.up(button="right")
+    assert eventually(lambda: np.abs(viewer.camera.origin - camera.origin).max() > 0.1)
+    page.wait_for_timeout(1000)
+    assert np.abs(viewer.camera.rotation - camera.rotation).max() < 1e-3
+
+
+def test_controls_change_the_lens_and_what_is_shown(page: Any, viewer: wf.Viewer) -> None:
+    """The field of view restarts the picture; exposure and layers do not."""
+    bright, picture = shot(page), viewer.image
+    enter(page, EXPOSURE, "-2")
+    page.wait_for_timeout(500)
+    dark = shot(page)
+    assert dark.mean() < 0.8 * bright.mean()
+    page.get_by_role("combobox").last.click()
+    page.get_by_role("option", name="normal").click()
+    assert eventually(lambda: np.abs(shot(page) - dark).mean() > 10)
+    assert viewer.image is picture
+    enter(page, FIELD_OF_VIEW, "20")
+    assert eventually(lambda: viewer.camera.projection.fov == 20)  # type: ignore[attr-defined]
+    enter(page, APERTURE, "0.5")
+    assert eventually(lambda: viewer.camera.projection.aperture == 0.5)  # type: ignore[attr-defined]
+    assert viewer.wait_for_picture(SOON).rgb.tobytes() == expected(viewer).rgb.tobytes()
+
+
+def test_buttons_save_the_picture_and_copy_the_camera(page: Any, viewer: wf.Viewer) -> None:
+    """As a png with the codes of `to_uint8`, and as Python that makes the same camera."""
+    with page.expect_download(timeout=1000 * SOON) as started:
+        page.get_by_text("save picture").click()
+    saved = iio.imread(started.value.path())
+    assert (saved == viewer.wait_for_picture(SOON).to_uint8()).all()
+    page.get_by_text("copy camera as code").click()
+    page.get_by_text("copied").wait_for(timeout=1000 * SOON)
+    camera = eval(page.evaluate("navigator.clipboard.readText()"), {"wf": wf})
+    assert camera.film == viewer.camera.film
+    for part in ("origin", "rotation"):
+        assert (getattr(camera, part) == getattr(viewer.camera, part)).all()
+
+
+def test_a_page_that_is_left_does_not_end_the_viewer(page: Any, viewer: wf.Viewer, browser: Any) -> None:
+    """Another one can be opened."""
+    page.close()
+    again = browser.new_page(viewport=SIZE)
+    again.goto(viewer.url)
+    again.get_by_text("spp").wait_for(timeout=1000 * SOON)
+
+
+CONNECT = """
+([url, protocol]) => new Promise(done => {
+    const socket = new WebSocket(url, protocol);
+    let messages = 0;
+    socket.onmessage = () => { messages += 1; socket.close(4000); };
+    socket.onclose = event => done([event.code, messages > 0]);
+})
+"""
+
+
+def test_pages_of_other_sites_see_nothing(page: Any, viewer: wf.Viewer, browser: Any, tmp_path: Path) -> None:
+    """Not even those of another server of this machine."""
+    (tmp_path / "index.html").write_text("<p>elsewhere</p>")
+    (tmp_path / "favicon.ico").write_bytes(b"")
+    handler = partial(SimpleHTTPRequestHandler, directory=str(tmp_path))
+    where = [viewer.url.replace("http", "ws"), f"viser-v{viser.__version__}"]
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        elsewhere = browser.new_page()
+        elsewhere.goto(f"http://127.0.0.1:{server.server_port}/")
+        refused = elsewhere.evaluate(CONNECT, where)
+        elsewhere.close()
+        server.shutdown()
+        thread.join()
+    assert refused == [1008, False]
+    assert page.evaluate(CONNECT, where) == [4000, True]

@@ -1,0 +1,38 @@
+"""`wavefront view`."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from ..io.load import load
+from ..viewer import view
+from .options import Help, add_settings, setting_values
+
+
+def add_view_command(commands: Any) -> None:
+    """Add the command and its options to a parser's commands."""
+    command = commands.add_parser(
+        "view", help="show a scene in the browser, rendered while one moves around", formatter_class=Help
+    )
+    command.add_argument("scene", help="obj, ply, stl, glb or gltf file")
+    command.add_argument(
+        "--host", default="127.0.0.1", help="address to listen at; 0.0.0.0 lets the whole network in"
+    )
+    command.add_argument("--port", type=int, default=8080, help="port to listen at, or one of the next")
+    command.add_argument("--no-browser", action="store_true", help="do not open the page")
+    add_settings(command)
+    command.set_defaults(run=_view)
+
+
+def _view(options: argparse.Namespace) -> int:
+    view(
+        load(options.scene),
+        host=options.host,
+        port=options.port,
+        open_browser=not options.no_browser,
+        block=True,
+        size=options.size,
+        **setting_values(options),
+    )
+    return 0

@@ -1,0 +1,248 @@
+"""The page of a viewer: a picture behind an orbit camera, with controls, served by viser."""
+
+from __future__ import annotations
+
+import io
+import socket
+import threading
+from collections.abc import Callable
+from contextlib import redirect_stdout, suppress
+from functools import partial
+from html import escape
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..codecs import png_jpeg
+from ..errors import SceneError, one_of
+from .guard import guard
+from .refiner import ViewerFrame
+from .shown import CHOICES, shown_codes
+from .viewpoint import FOV, Viewpoint, within
+
+QUALITY = 85  # of pictures while they refine, sent as jpg; the last one is a png
+STOPS = 6.0  # exposure, up and down
+STEPS = 200  # of a slider
+COPY = (
+    "const c=this.dataset.code;(navigator.clipboard?navigator.clipboard.writeText(c):Promise.reject())"
+    ".then(()=>{this.textContent='copied'},()=>prompt('Copy the camera:',c))"
+)
+BUTTON = (
+    "width:100%;padding:0.5em;border:0;border-radius:0.3em;cursor:pointer;"
+    "background:#2b6cb0;color:#fff;font:inherit;font-size:0.85em"
+)
+
+
+class Page:
+    """The page of a viewer.
+
+    Parameters
+    ----------
+    host, port
+        Where it listens; if the port is taken, at one of the next ones.
+    viewpoint
+        The first view.
+    most_spp
+        Samples per pixel of the last picture of a view; None where they are not known before.
+    look
+        Called with the viewpoint when it has changed; it must return at once.
+
+    Raises
+    ------
+    SceneError
+        If the page cannot listen there.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        viewpoint: Viewpoint,
+        most_spp: int | None,
+        look: Callable[[Viewpoint], object],
+    ) -> None:
+        self._look, self._most_spp = look, most_spp
+        self._lock = threading.Condition()
+        self._viewpoint = viewpoint
+        self._exposure, self._choice = 0.0, "rgb"
+        self._frame: ViewerFrame | None = None
+        self._fresh = self._closed = False
+        self._codes: NDArray[np.uint8] | None = None  # of the picture that is shown
+        self._server = _serve(host, port)
+        guard(self._server, host)
+        self.url = f"http://{_address(host)}:{self._server.get_port()}"
+        self._add_camera()
+        self._add_controls()
+        self._server.on_client_connect(self._connected)
+        self._presenter = threading.Thread(target=self._present, name="wavefront-page", daemon=True)
+        self._presenter.start()
+
+    @property
+    def viewpoint(self) -> Viewpoint:
+        """What the page shows."""
+        with self._lock:
+            return self._viewpoint
+
+    def show(self, frame: ViewerFrame) -> None:
+        """Show a picture; it returns at once, and of several the newest is shown."""
+        with self._lock:
+            self._frame = frame
+            self._refresh()
+
+    def say(self, text: str) -> None:
+        """Show a line of text in place of the state of the picture."""
+        self._state.content = escape(text)
+
+    def close(self) -> None:
+        """End the server and all threads."""
+        with self._lock:
+            self._closed = True
+            self._refresh()
+        self._presenter.join()
+        with redirect_stdout(io.StringIO()):  # viser prints lines of its own
+            self._server.stop()
+        self._server._thread_executor.shutdown(wait=True)
+
+    # --- What the page has ----------------------------------------------------------------------------
+
+    def _add_camera(self) -> None:
+        view, around = self._viewpoint, self._viewpoint.surroundings
+        self._server.scene.set_up_direction(view.up)
+        camera = self._server.initial_camera
+        camera.up = np.array(view.up)
+        camera.position = around.to_page(view.origin)
+        camera.look_at = around.to_page(view.target)
+        camera.fov = float(np.radians(view.fov))
+
+    def _add_controls(self) -> None:
+        gui, view = self._server.gui, self._viewpoint
+        gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
+        gui.set_panel_label("wavefront")
+        self._state = gui.add_markdown("")
+        layer = gui.add_dropdown("layer", tuple(CHOICES), initial_value="rgb")
+        layer.on_update(self._on(lambda event: self._show_as(choice=event.target.value)))
+        exposure = gui.add_slider("exposure", -STOPS, STOPS, 0.1, 0.0, hint="stops")
+        exposure.on_update(self._on(lambda event: self._show_as(exposure=event.target.value)))
+        hints = {"fov": "degrees", "focus": "distance, scene units", "aperture": "diameter, scene units"}
+        titles = {"fov": "field of view", "focus": "focus", "aperture": "aperture"}
+        for name, title in titles.items():
+            low, high = FOV if name == "fov" else view.ranges[name]
+            step = 0.5 if name == "fov" else float(f"{(high - low) / STEPS:.1g}")
+            slider = gui.add_slider(title, low, high, step, getattr(view, name), hint=hints[name])
+            slider.on_update(self._on(partial(self._set_lens, name)))
+        save = gui.add_button("save picture")
+        save.on_click(self._on(self._save))
+        self._copy = gui.add_html(self._copy_button())
+
+    def _copy_button(self) -> str:
+        code = escape(self._viewpoint.code, quote=True)
+        button = f'<button style="{BUTTON}" data-code="{code}" onclick="{COPY}">copy camera as code</button>'
+        return f'<div style="padding:0 0.6em 0.6em">{button}</div>'
+
+    # --- What the page says ---------------------------------------------------------------------------
+
+    def _on(self, act: Callable[[Any], object]) -> Callable[[Any], Any]:
+        """Return what viser calls in its event loop, in the order of the messages; bad values are ignored."""
+
+        async def react(event: Any) -> None:
+            with suppress(SceneError):
+                act(event)
+
+        return react
+
+    async def _connected(self, client: Any) -> None:
+        client.camera.on_update(self._on(self._move))
+        await self._on(self._move)(client.camera)
+
+    def _move(self, camera: Any) -> None:
+        view = self.viewpoint.moved(camera.position, camera.look_at, camera.up_direction)
+        self._change(view.resized(camera.image_width, camera.image_height))
+
+    def _set_lens(self, name: str, event: Any) -> None:
+        self._change(self.viewpoint.with_lens(**{name: event.target.value}))
+        if name == "fov":
+            for client in self._server.get_clients().values():
+                client.camera.fov = float(np.radians(self.viewpoint.fov))
+
+    def _change(self, viewpoint: Viewpoint) -> None:
+        with self._lock:
+            if viewpoint == self._viewpoint:
+                return
+            self._viewpoint = viewpoint
+        self._copy.content = self._copy_button()
+        self._look(viewpoint)
+
+    def _show_as(self, choice: str | None = None, exposure: Any = None) -> None:
+        if choice is not None:
+            one_of("layer", choice, CHOICES)
+        if exposure is not None:
+            exposure = within("exposure", exposure, -STOPS, STOPS)
+        with self._lock:
+            self._choice = self._choice if choice is None else choice
+            self._exposure = self._exposure if exposure is None else exposure
+            self._refresh()
+
+    def _save(self, event: Any) -> None:
+        with self._lock:
+            codes = self._codes
+        if codes is not None:
+            png = png_jpeg.encode(codes, ".png", 2.2)
+            event.client.send_file_download("wavefront.png", png, save_immediately=True)
+
+    # --- What the page shows --------------------------------------------------------------------------
+
+    def _refresh(self) -> None:
+        """Wake the presenter; the lock is held."""
+        self._fresh = True
+        self._lock.notify()
+
+    def _present(self) -> None:
+        """Send the newest picture whenever there is one. Runs in a thread of its own."""
+        while True:
+            with self._lock:
+                self._lock.wait_for(lambda: self._fresh)
+                if self._closed:
+                    return
+                self._fresh = False
+                frame, choice, exposure = self._frame, self._choice, self._exposure
+            if frame is None:
+                continue
+            try:
+                codes = shown_codes(frame.image, choice, exposure)
+            except SceneError as error:
+                self.say(str(error))
+                continue
+            with self._lock:
+                self._codes = codes
+            self._send(codes, frame)
+
+    def _send(self, codes: NDArray[np.uint8], frame: ViewerFrame) -> None:
+        kind = {"format": "png"} if frame.final else {"format": "jpeg", "jpeg_quality": QUALITY}
+        self._server.scene.set_background_image(np.ascontiguousarray(codes), **kind)
+        height, width = codes.shape[:2]
+        of = "" if self._most_spp is None else f" of {self._most_spp}"
+        noise = frame.image.metadata["noise"]
+        error = f" · error {noise:.2%}" if np.isfinite(noise) else ""
+        self._state.content = f"{width} × {height} · {frame.image.spp}{of} spp{error}"
+
+
+def _serve(host: str, port: int) -> Any:
+    """Start a server of viser."""
+    import viser
+
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, kind, protocol) as free:  # viser would look for a port forever
+            free.bind(address)
+    except (OSError, UnicodeError) as error:
+        raise SceneError(f"the viewer cannot listen at host {host!r}: {error}") from error
+    with redirect_stdout(io.StringIO()):
+        return viser.ViserServer(host, port, verbose=False)
+
+
+def _address(host: str) -> str:
+    """Return what a browser on this machine calls a host."""
+    if host in ("0.0.0.0", "::", ""):
+        return "127.0.0.1"
+    return f"[{host}]" if ":" in host else host

@@ -1,0 +1,272 @@
+"""`view()`: a page in the browser that shows a scene, rendered while one looks."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import webbrowser
+from types import TracebackType
+from typing import Any, Self
+
+from ..camera import Camera, upward
+from ..errors import RenderError, SceneError
+from ..image import Image
+from ..notebook import in_kernel
+from ..renderable import as_scene, choose_camera
+from ..scene import Scene
+from ..session import Session
+from .refiner import Refiner, ViewerFrame
+from .shown import VIEWER_LAYERS
+from .viewpoint import Viewpoint
+
+SPP = 256
+FIRST = 2.0  # seconds that the page waits for its first picture
+POLL = 0.5  # seconds
+FRAME = "100%", 600  # width and height of the page in a notebook
+REFUSED = ("checkpoint", "samples", "progress")  # settings that make no sense for views that change
+
+
+class Viewer:
+    """A page that shows a scene. `view` makes it.
+
+    As a context manager it is closed at the end of the block.
+
+    Parameters
+    ----------
+    session
+        Renders the pictures; the viewer closes it.
+    viewpoint
+        The first view.
+    host, port
+        Where the page listens.
+    spp
+        Samples per pixel of the last picture of a view; None where they are not known before.
+
+    Attributes
+    ----------
+    url
+        Where the page is.
+
+    Examples
+    --------
+    >>> import wavefront as wf
+    >>> ball = wf.Sphere((0, 0, 0), 1)
+    >>> with wf.view(ball, spp=4, size=(32, 32), open_browser=False, block=False) as viewer:
+    ...     same = wf.render(ball, spp=4, camera=viewer.camera)
+    """
+
+    def __init__(self, session: Session, viewpoint: Viewpoint, host: str, port: int, spp: int | None) -> None:
+        from .page import Page  # here, as it needs viser
+
+        self._wanted: Camera | None = None
+        self._latest: ViewerFrame | None = None
+        self._error: Exception | None = None  # that ended the newest view
+        self._page: Page | None = None
+        self._news = threading.Condition()
+        self._closed = threading.Event()
+        self._refiner = Refiner(session, self._show, self._fail)
+        try:
+            self._refiner.start()
+            self._look(viewpoint)
+            with self._news:  # workers start before the threads of the server
+                self._news.wait_for(self._has_news, FIRST)
+            self._page = Page(host, port, viewpoint, spp, self._look)
+        except BaseException:
+            self._refiner.close()
+            raise
+        self.url = self._page.url
+        if self._latest is not None:
+            self._page.show(self._latest)
+
+    def __repr__(self) -> str:
+        """Say where the page is."""
+        return f"<Viewer at {self.url}{', closed' if self._closed.is_set() else ''}>"
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the viewer."""
+        self.close()
+
+    @property
+    def camera(self) -> Camera:
+        """The camera of the view that the page shows: `render` with it gives the same picture."""
+        assert self._wanted is not None
+        return self._wanted
+
+    @property
+    def image(self) -> Image | None:
+        """The newest picture; None if there is none yet."""
+        return None if self._latest is None else self._latest.image
+
+    def wait_for_picture(self, timeout: float | None = None) -> Image:
+        """Wait until the picture of the view is done, and return it.
+
+        Parameters
+        ----------
+        timeout
+            Seconds; None waits as long as it takes.
+
+        Raises
+        ------
+        RenderError
+            If the time is over, or the viewer was closed. Its `image` is the newest picture.
+        """
+        with self._news:
+            self._news.wait_for(lambda: self._done() or self._closed.is_set(), timeout)
+            if self._latest is not None and self._latest.final and self._done():
+                return self._latest.image
+        if self._error is not None:
+            raise RenderError(f"the view was not rendered: {self._error}", self.image) from self._error
+        why = "was closed" if self._closed.is_set() else f"has no last picture after {timeout} s"
+        raise RenderError(f"the viewer {why}", self.image)
+
+    def wait(self) -> None:
+        """Wait until the viewer is closed, or for Ctrl-C, which closes it."""
+        try:
+            while not self._closed.wait(POLL):
+                pass
+        except KeyboardInterrupt:
+            self.close()
+
+    def close(self) -> None:
+        """End the render and the server; no process, thread or socket is left."""
+        if self._closed.is_set():
+            return
+        self._closed.set()
+        with self._news:
+            self._news.notify_all()
+        self._refiner.close()
+        if self._page is not None:
+            self._page.close()
+
+    def _look(self, viewpoint: Viewpoint) -> None:
+        """Begin pictures of a view; called in the page's event loop."""
+        camera = viewpoint.camera
+        with self._news:
+            self._wanted, self._error = camera, None
+        self._refiner.look(camera)
+
+    def _has_news(self) -> bool:
+        return self._latest is not None or self._error is not None
+
+    def _done(self) -> bool:
+        """Return whether no better picture of the newest view follows."""
+        latest = self._latest
+        final = latest is not None and latest.final and latest.camera is self._wanted
+        return final or self._error is not None
+
+    def _show(self, frame: ViewerFrame) -> None:
+        with self._news:
+            self._latest = frame
+            self._news.notify_all()
+        if self._page is not None:
+            self._page.show(frame)
+
+    def _fail(self, error: Exception) -> None:
+        with self._news:
+            self._error = error
+            self._news.notify_all()
+        if self._page is not None:
+            self._page.say(f"stopped: {error}")
+
+
+def view(
+    scene: Any,
+    spp: int | None = None,
+    *,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    open_browser: bool = True,
+    block: bool | None = None,
+    **settings: Any,
+) -> Viewer:
+    """Show a scene on a page in the browser, where one can move around while the picture refines.
+
+    It needs viser: `pip install viser`, the extra `viewer`.
+
+    Parameters
+    ----------
+    scene
+        As for `render`.
+    spp
+        Samples per pixel of the last picture of a view; by default 256, or as for `render` where `noise`
+        or `seconds` are given.
+    host
+        The address to listen at. By default only this machine can connect; "0.0.0.0" lets all machines of
+        the network see and move the picture, without a password.
+    port
+        Where to listen; if it is taken, one of the next.
+    open_browser
+        Whether to open the page. In a notebook it is shown in a frame below the cell in any case.
+    block
+        True waits for Ctrl-C, and closes the viewer then. None does so in scripts, whose end would close the
+        viewer, and returns at once in notebooks and at a prompt.
+    **settings
+        The other settings of `render`, but for `checkpoint`, `samples` and `progress`. The page has the shape
+        of its window; pictures have about as many pixels as `size`, or the camera, has.
+
+    Returns
+    -------
+    Viewer
+
+    Raises
+    ------
+    SceneError
+        If an argument or the scene is malformed, or nothing can listen there.
+    ImportError
+        If viser is not installed.
+
+    Examples
+    --------
+    >>> import wavefront as wf
+    >>> ball = wf.Sphere((0, 0, 0), 1)
+    >>> with wf.view(ball, spp=4, size=(32, 32), open_browser=False, block=False) as viewer:
+    ...     image = viewer.wait_for_picture()
+    """
+    _check_viser()
+    given = [name for name in REFUSED if settings.get(name) is not None]
+    if given:
+        raise SceneError(f"view: {given[0]} is {settings[given[0]]!r}; it is for a picture of one view")
+    if not isinstance(port, int) or not 0 <= port < 2**16:
+        raise SceneError(f"port is {port!r}; it must be a whole number from 0 to 65535")
+    if spp is None and settings.get("noise") is None and settings.get("seconds") is None:
+        spp = SPP
+    viewer = _opened(as_scene(scene, settings.pop("material", None)), spp, host, port, settings)
+    in_notebook = in_kernel()
+    if in_notebook:
+        _show_frame(viewer.url)
+    elif open_browser:
+        webbrowser.open(viewer.url)
+    if block or (block is None and not in_notebook and not hasattr(sys, "ps1")):
+        print(f"wavefront: {viewer.url} shows the scene; Ctrl-C ends", flush=True)
+        viewer.wait()
+    return viewer
+
+
+def _opened(scene: Scene, spp: int | None, host: str, port: int, settings: dict[str, Any]) -> Viewer:
+    """Return a viewer of a scene with settings of `Session`."""
+    up = upward("up", settings.get("up") or "y")
+    camera = choose_camera(scene, settings.get("camera"), settings.get("size"), up)
+    viewpoint = Viewpoint.of(camera, scene.bounds, up)
+    aovs = settings.pop("aovs", ())
+    wanted = (*((aovs,) if isinstance(aovs, str) else aovs), *VIEWER_LAYERS)
+    settings = {**settings, "camera": viewpoint.camera, "size": None, "aovs": wanted, "progress": False}
+    return Viewer(Session(scene, spp, **settings), viewpoint, host, port, spp)
+
+
+def _check_viser() -> None:
+    try:
+        import viser  # noqa: F401
+    except ImportError as error:
+        raise ImportError("the viewer needs viser: pip install viser") from error
+
+
+def _show_frame(url: str) -> None:
+    from IPython.display import IFrame, display
+
+    width, height = FRAME
+    display(IFrame(url, width, height, extras=['allow="clipboard-write"']))
