@@ -324,7 +324,7 @@ def test_wrong_files(tmp_path, capsys, no_render, command):
 
 
 def test_no_command_is_an_error(capsys):
-    assert "usage" in error_of(capsys, [])
+    assert "arguments are required: command; see wavefront --help" in error_of(capsys, [])
 
 
 def test_ctrl_c_while_loading_gives_130(obj, fast, monkeypatch):

@@ -294,6 +294,7 @@ class Settings:
         "spatial",
         'How one light of many is chosen at a point: "spatial" weighs what each brings there, "power" '
         'its power alone, "uniform" nothing.',
+        option="how one light of many is chosen",
         choices=LIGHT_SAMPLERS,
     )
     branches: int = setting(

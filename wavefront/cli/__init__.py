@@ -1,4 +1,4 @@
-"""`wavefront render`, `resume`, `merge`, `info` and `compare`."""
+"""The program `wavefront`: a file for each command, and what they share."""
 
 from .command_line import main, parser
 

@@ -13,11 +13,16 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from ..errors import SceneError
+from ..errors import RenderError, SceneError
 from ..version import VERSION
 from .arguments import joined
-from .compare_command import compare_pictures
-from .info_command import describe_scene
+from .command import Parser
+from .compare_command import add_compare_command
+from .completion_command import add_completion_command
+from .dataset_command import add_dataset_command
+from .doctor_command import add_doctor_command
+from .info_command import add_info_command
+from .messages import print_error, print_note, print_warning
 from .render_command import add_render_command
 from .resume_command import add_resume_commands
 from .status import ERROR, INTERRUPTED, TERMINATED
@@ -33,13 +38,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(words, argparse.Namespace(arguments=words, folder=os.getcwd()))
     with _sigterm_as_ctrl_c() as sigterm, warnings.catch_warnings():
         warnings.simplefilter("always", UserWarning)
-        warnings.showwarning = lambda message, *_: _show_warning(message)
+        warnings.showwarning = lambda message, *_: print_warning(message)
         try:
             status: int = options.run(options)
-        except (SceneError, OSError) as error:
-            print(f"wavefront: error: {error}", file=sys.stderr)
+        except (SceneError, RenderError, ImportError, OSError, MemoryError) as error:
+            print_error(error)
             return ERROR
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as stop:
+            if str(stop):
+                print_note(stop)
             status = INTERRUPTED
     return TERMINATED if sigterm.came and status == INTERRUPTED else status
 
@@ -74,23 +81,21 @@ def _sigterm_as_ctrl_c() -> Iterator[_Sigterm]:
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    top = argparse.ArgumentParser(prog="wavefront", description="A path tracer in whole-array NumPy.")
+    top = Parser(
+        prog="wavefront",
+        description="A path tracer in whole-array NumPy.",
+        epilog="wavefront COMMAND --help has the options of a command, and examples. Exit status: 0 done, "
+        "1 doctor found a fault, 2 error, 130 stopped by Ctrl-C, 143 by SIGTERM.",
+    )
     top.add_argument("--version", action="version", version=VERSION)
     commands = top.add_subparsers(required=True, metavar="command")
     add_render_command(commands)
     add_turntable_command(commands)
     add_view_command(commands)
+    add_dataset_command(commands)
     add_resume_commands(commands, top)
-    info = commands.add_parser("info", help="say what a scene file holds")
-    info.add_argument("scene", help="obj, ply, stl, glb or gltf file")
-    info.set_defaults(run=describe_scene)
-    measure = commands.add_parser("compare", help="say how far a picture is from a reference")
-    measure.add_argument("picture", help="png, jpg, exr, hdr, npy or npz file")
-    measure.add_argument("reference", help="the same, of the same size")
-    measure.add_argument("-o", "--output", help="where to write the absolute difference")
-    measure.set_defaults(run=compare_pictures)
+    add_info_command(commands)
+    add_compare_command(commands)
+    add_doctor_command(commands)
+    add_completion_command(commands, top)
     return top
-
-
-def _show_warning(message: Warning | str) -> None:
-    print(f"wavefront: warning: {message}", file=sys.stderr)

@@ -3,26 +3,124 @@
 from __future__ import annotations
 
 import argparse
+import os
+import warnings
+from collections.abc import Iterable, Iterator
+from typing import Any
 
 import numpy as np
 
 from ..io.load import load
-from ..shapes import Instance, Mesh
+from ..materials import Material
+from ..parameter import brief
+from ..scene import Scene
+from ..shapes import Instance, Mesh, Shape
+from ..textures.base import BaseTexture
+from ..textures.image import Texture
+from .command import add_command, add_scene
 
 
-def describe_scene(options: argparse.Namespace) -> int:
+def add_info_command(commands: Any) -> None:
+    """Add the command to a parser's commands."""
+    command = add_command(
+        commands,
+        "info",
+        "say what a scene file holds: shapes, sizes, materials, textures, lights, and what is wrong with it",
+        ["wavefront info scene.glb"],
+    )
+    add_scene(command)
+    command.add_argument("--quiet", action="store_true", help="do not say that a large file is being read")
+    command.set_defaults(run=_info)
+
+
+def _info(options: argparse.Namespace) -> int:
     """Say what a scene file holds; return the exit status."""
-    scene = load(options.scene)
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always", UserWarning)
+        scene = load(options.scene, progress=False if options.quiet else None)
+    for line in _lines(options.scene, scene, [str(each.message) for each in found]):
+        print(line)
+    return 0
+
+
+def _lines(path: str, scene: Scene, messages: list[str]) -> Iterator[str]:
+    """Yield the lines about a scene."""
+    meshes = _distinct(shape.mesh if isinstance(shape, Instance) else shape for shape in scene.shapes)
     low, high = scene.bounds
-    meshes = [shape.mesh if isinstance(shape, Instance) else shape for shape in scene.shapes]
-    faces = sum(len(mesh.faces) for mesh in meshes if isinstance(mesh, Mesh))
-    print(f"{options.scene}: {len(scene.shapes)} shapes, {faces} triangles, {len(scene.lights)} lights")
-    print(f"bounds: {_triple(low)} to {_triple(high)}")
-    print(f"camera: {'in the file' if scene.camera else 'none; the scene will be framed'}")
+    yield (
+        f"{path}: {len(scene.shapes)} shapes, {_triangles(scene.shapes)} triangles, "
+        f"{len(scene.lights)} lights"
+    )
+    yield f"size: file {_bytes(os.path.getsize(path))}, meshes {_bytes(_mesh_bytes(meshes))} in memory"
+    yield f"bounds: {_triple(low)} to {_triple(high)}, {_triple(high - low)} across"
+    yield f"camera: {'in the file' if scene.camera else 'none; the scene will be framed'}"
+    yield "shapes:"
     for shape in scene.shapes:
         glow = "" if shape.emission is None else ", emits"
-        print(f"  {shape!r} {type(shape.material.bsdf).__name__}{glow}")
-    return 0
+        yield f"  {shape!r} {_label(shape.material)}{glow}"
+    if scene.lights:
+        yield "lights:"
+        yield from (f"  {light!r}" for light in scene.lights)
+    yield "materials:"
+    materials = _distinct(shape.material for shape in scene.shapes)
+    for material in materials:
+        name = f"{material.name!r} " if material.name else ""
+        yield f"  {name}{brief(material.bsdf)}"
+    textures = _distinct(texture for material in materials for texture in _textures(material, set()))
+    yield "textures:" if textures else "textures: none"
+    for texture in textures:
+        yield f"  {texture!r}, {texture.channels} channels, {'sRGB' if texture.srgb else 'linear'}"
+    yield f"warnings: {len(messages)}" if messages else "warnings: none"
+    yield from (f"  {message}" for message in messages)
+
+
+def _textures(thing: Any, seen: set[int]) -> Iterator[Texture]:
+    """Yield the images that a material, or a part of one, reads."""
+    if id(thing) in seen:
+        return
+    seen.add(id(thing))
+    if isinstance(thing, Texture):
+        yield thing
+    elif isinstance(thing, list | tuple):
+        for part in thing:
+            yield from _textures(part, seen)
+    elif type(thing).__module__.startswith(_PACKAGE) and hasattr(thing, "__dict__"):
+        for part in vars(thing).values():
+            yield from _textures(part, seen)
+
+
+_PACKAGE = BaseTexture.__module__.partition(".")[0] + "."
+
+
+def _distinct(things: Iterable[Any]) -> list[Any]:
+    """Return things, each once."""
+    return list({id(thing): thing for thing in things}.values())
+
+
+def _triangles(shapes: Iterable[Shape]) -> int:
+    meshes = (shape.mesh if isinstance(shape, Instance) else shape for shape in shapes)
+    return sum(len(mesh.faces) for mesh in meshes if isinstance(mesh, Mesh))
+
+
+def _mesh_bytes(meshes: Iterable[Shape]) -> int:
+    """Return the bytes of the arrays of meshes."""
+    return sum(
+        value.nbytes for mesh in meshes for value in vars(mesh).values() if isinstance(value, np.ndarray)
+    )
+
+
+def _bytes(count: int) -> str:
+    """Return a number of bytes with a unit."""
+    size, unit = float(count), "bytes"
+    for unit in ("bytes", "kB", "MB", "GB"):
+        if size < 1000 or unit == "GB":
+            break
+        size /= 1000
+    return f"{size:.4g} {unit}"
+
+
+def _label(material: Material) -> str:
+    return type(material.bsdf).__name__
 
 
 def _triple(values: np.ndarray) -> str:

@@ -27,13 +27,6 @@ RENDER_OPTIONS = [
 ]
 
 
-class Help(argparse.ArgumentDefaultsHelpFormatter):
-    """Names defaults where there are any."""
-
-    def _get_help_string(self, action: argparse.Action) -> str | None:
-        return action.help if action.default in (None, ()) else super()._get_help_string(action)
-
-
 def add_settings(command: argparse.ArgumentParser) -> None:
     """Add an option for each setting that has one."""
     for each in fields(Settings):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,10 @@ from ..render import finish
 from ..scene import Scene
 from ..session import Session
 from . import arguments
-from .options import Help, add_display, add_settings, display_of, setting_values
+from .command import PICTURE_FILE, SCENE_FILE, add_command
+from .messages import print_error, print_note
+from .options import add_display, add_settings, display_of, setting_values
+from .outputs import output_paths
 from .rescue import save_elsewhere
 from .status import ERROR, INTERRUPTED
 
@@ -27,13 +29,28 @@ FOV = 40.0  # degrees
 
 def add_render_command(commands: Any) -> None:
     """Add the command and its options to a parser's commands."""
-    command = commands.add_parser("render", help="render a scene file", formatter_class=Help)
-    command.add_argument("scene", help="obj, ply, stl, glb or gltf file")
+    command = add_command(
+        commands,
+        "render",
+        "render scene files",
+        [
+            "wavefront render scene.glb -o out.png --spp 256",
+            "wavefront render part.stl --up z --lighting softbox --ground --size 800x600 --noise 0.02",
+            "wavefront render a.obj b.ply -o pictures/",
+            "wavefront render a.obj b.ply -o 'layers/{}.exr' --aov depth --aov normal --denoise",
+            "wavefront render room.gltf --spp 4096 --guide --checkpoint room.wfck -o room.exr",
+        ],
+    )
+    command.add_argument("scenes", nargs="+", metavar="scene", help=SCENE_FILE)
     command.add_argument(
-        "-o", "--output", default="out.png", help="png, jpg, exr, hdr, npy or npz file to write"
+        "-o",
+        "--output",
+        default="out.png",
+        help=f"{PICTURE_FILE} to write; a folder, for pngs with the names of the scenes; "
+        "or a path with {} in the place of that name",
     )
     add_settings(command)
-    where = {"type": arguments.vector, "metavar": "X,Y,Z"}
+    where: dict[str, Any] = {"type": arguments.vector, "metavar": "X,Y,Z"}
     command.add_argument("--origin", **where, help="camera position; replaces the file's camera")
     command.add_argument(
         "--target", **where, help="point that the camera looks at (default: the scene's middle)"
@@ -51,12 +68,33 @@ def add_render_command(commands: Any) -> None:
 
 
 def _render(options: argparse.Namespace) -> int:
-    check_writable(options.output)
-    display = display_of(options)
-    check_display(options.output, display, options.bits)
+    """Render all scenes; return the worst exit status."""
+    paths = output_paths(options.scenes, options.output)
+    if len(paths) > 1 and options.checkpoint is not None:
+        raise SceneError(f"--checkpoint is for one scene; there are {len(paths)}")
+    for path in paths:
+        check_writable(path)
+        check_display(path, display_of(options), options.bits)
+    worst = 0
+    for scene, path in zip(options.scenes, paths, strict=True):
+        try:
+            status = _render_scene(scene, path, options)
+        except (SceneError, OSError) as error:
+            if len(paths) == 1:
+                raise
+            print_error(error)
+            status = ERROR
+        if status == INTERRUPTED:
+            return status
+        worst = max(worst, status)
+    return worst
+
+
+def _render_scene(path: str, output: str, options: argparse.Namespace) -> int:
+    """Render a scene and save the picture; return the exit status."""
     progress = False if options.quiet else None
-    scene = load(options.scene, progress=progress)
-    scene.camera = _camera(scene, options)
+    scene = load(path, progress=progress)
+    scene.camera = _camera(path, scene, options)
     image: Image | None
     status = 0
     try:
@@ -68,11 +106,11 @@ def _render(options: argparse.Namespace) -> int:
         )
     except Interrupted as stop:
         image, status = stop.image, INTERRUPTED
-        print(f"wavefront: {stop}", file=sys.stderr)
+        print_note(stop)
     except RenderError as error:
         image, status = error.image, ERROR
-        print(f"wavefront: error: {error}", file=sys.stderr)
-    return (image is not None and _save(image, options)) or status
+        print_error(error)
+    return (image is not None and _save(image, output, options)) or status
 
 
 def render_by_command(scene: Scene, command: dict[str, Any], **settings: Any) -> Image:
@@ -82,11 +120,11 @@ def render_by_command(scene: Scene, command: dict[str, Any], **settings: Any) ->
     return finish(session)
 
 
-def _save(image: Image, options: argparse.Namespace) -> int:
+def _save(image: Image, output: str, options: argparse.Namespace) -> int:
     """Save a picture, if not where it was meant to go then elsewhere; return the exit status."""
 
     def save(path: str | Path) -> None:
-        if Path(path).suffix.lower() != Path(options.output).suffix.lower():
+        if Path(path).suffix.lower() != Path(output).suffix.lower():
             image.save(path)  # it may not be able to hold what the options ask for
             return
         image.save(
@@ -99,17 +137,17 @@ def _save(image: Image, options: argparse.Namespace) -> int:
         )
 
     try:
-        save(options.output)
+        save(output)
     except (SaveError, MemoryError) as error:
-        print(f"wavefront: error: {error or 'out of memory'}", file=sys.stderr)
-        place = save_elsewhere(save, options.output)
-        print(f"wavefront: the picture {f'was saved as {place}' if place else 'is lost'}", file=sys.stderr)
+        print_error(error)
+        place = save_elsewhere(save, output)
+        print_note(f"the picture {f'was saved as {place}' if place else 'is lost'}")
         return ERROR
-    print(_summary(image, options.output))
+    print(_summary(image, output))
     return 0
 
 
-def _camera(scene: Scene, options: argparse.Namespace) -> Camera:
+def _camera(path: str, scene: Scene, options: argparse.Namespace) -> Camera:
     """Return the camera that the options describe, else the file's, else one that frames the scene."""
     size = options.size or (scene.camera.size if scene.camera else (512, 512))
     fov = FOV if options.fov is None else options.fov
@@ -125,7 +163,7 @@ def _camera(scene: Scene, options: argparse.Namespace) -> Camera:
         return scene.framing_camera(fov, size, up=up, direction=options.direction)
     for name in ("fov", "up", "direction"):
         if getattr(options, name) is not None:
-            raise SceneError(f"--{name} needs --origin: {options.scene} has a camera of its own")
+            raise SceneError(f"--{name} needs --origin: {path} has a camera of its own")
     return scene.camera.resized(size)
 
 

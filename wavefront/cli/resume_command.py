@@ -10,18 +10,27 @@ from ..checkpoint_file import read_header
 from ..codecs.images import check_writable
 from ..errors import SceneError
 from ..image import Image
+from .command import PICTURE_FILE, add_command
 
 
 def add_resume_commands(commands: Any, parser: argparse.ArgumentParser) -> None:
     """Add the commands to those of a parser."""
-    resume = commands.add_parser(
-        "resume", help="go on with a render that wavefront render --checkpoint began"
+    resume = add_command(
+        commands,
+        "resume",
+        "go on with a render that wavefront render --checkpoint began",
+        ["wavefront resume out.wfck"],
     )
     resume.add_argument("checkpoint", help="the file that --checkpoint named")
     resume.set_defaults(run=lambda options: _resume(options.checkpoint, parser))
-    merge = commands.add_parser("merge", help="join pictures of different samples of one scene")
+    merge = add_command(
+        commands,
+        "merge",
+        "join pictures of different samples of one scene",
+        ["wavefront merge part0.npz part1.npz -o out.exr"],
+    )
     merge.add_argument("pictures", nargs="+", help="npz files of render --samples, or checkpoints")
-    merge.add_argument("-o", "--output", required=True, help="png, jpg, exr, hdr, npy or npz file to write")
+    merge.add_argument("-o", "--output", required=True, help=f"{PICTURE_FILE} to write")
     merge.set_defaults(run=_merge)
 
 
@@ -32,9 +41,8 @@ def _resume(path: str, parser: argparse.ArgumentParser) -> int:
         raise SceneError(f"{path}: was not begun by wavefront render; call render(checkpoint=...) again")
     options = parser.parse_args(command["arguments"])
     options.arguments, options.folder = command["arguments"], command["folder"]
-    options.scene, options.output = (
-        os.path.join(options.folder, each) for each in (options.scene, options.output)
-    )
+    options.scenes = [os.path.join(options.folder, each) for each in options.scenes]
+    options.output = os.path.join(options.folder, options.output)
     options.checkpoint = path
     status: int = options.run(options)
     return status

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+FAULT = 1  # `doctor` found one
+
+
 ERROR = 2  # as argparse has it
 
 

@@ -8,15 +8,22 @@ from typing import Any
 from ..animation import check_animation, save_animation
 from ..io.load import load
 from ..views import render_many, turntable
-from .options import Help, add_display, add_settings, display_of, setting_values
+from .command import add_command, add_scene
+from .options import add_display, add_settings, display_of, setting_values
 
 
 def add_turntable_command(commands: Any) -> None:
     """Add the command and its options to a parser's commands."""
-    command = commands.add_parser(
-        "turntable", help="render an animation around a scene", formatter_class=Help
+    command = add_command(
+        commands,
+        "turntable",
+        "render an animation around a scene",
+        [
+            "wavefront turntable mesh.obj -o spin.mp4 --frames 90 --fps 30 --spp 64 --size 640x480",
+            "wavefront turntable part.stl --up z -o 'frame_{:03d}.png'",
+        ],
     )
-    command.add_argument("scene", help="obj, ply, stl, glb or gltf file")
+    add_scene(command)
     command.add_argument(
         "-o",
         "--output",

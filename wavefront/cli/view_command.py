@@ -7,15 +7,19 @@ from typing import Any
 
 from ..io.load import load
 from ..viewer import view
-from .options import Help, add_settings, setting_values
+from .command import add_command, add_scene
+from .options import add_settings, setting_values
 
 
 def add_view_command(commands: Any) -> None:
     """Add the command and its options to a parser's commands."""
-    command = commands.add_parser(
-        "view", help="show a scene in the browser, rendered while one moves around", formatter_class=Help
+    command = add_command(
+        commands,
+        "view",
+        "show a scene in the browser, rendered while one moves around",
+        ["wavefront view scene.glb", "wavefront view part.stl --up z --no-browser --port 9000"],
     )
-    command.add_argument("scene", help="obj, ply, stl, glb or gltf file")
+    add_scene(command)
     command.add_argument(
         "--host", default="127.0.0.1", help="address to listen at; 0.0.0.0 lets the whole network in"
     )

@@ -1,0 +1,57 @@
+"""Commands of the command line: their help with examples, and their errors on one line."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any, NoReturn
+
+from .status import ERROR
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong, and end the program."""
+        self.exit(ERROR, f"{self.prog}: error: {message}; see {self.prog} --help\n")
+
+
+class Help(argparse.ArgumentDefaultsHelpFormatter, argparse.RawDescriptionHelpFormatter):
+    """Names defaults where there are any, and keeps the lines of examples."""
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        return action.help if action.default in (None, ()) else super()._get_help_string(action)
+
+
+def add_command(commands: Any, name: str, what: str, examples: list[str]) -> argparse.ArgumentParser:
+    """Add a command to those of a parser.
+
+    Parameters
+    ----------
+    commands
+        The parser's commands.
+    name
+        Of the command.
+    what
+        What it does, for the help of the program and of the command.
+    examples
+        Command lines, which end its help.
+    """
+    lines = "\n".join(f"  {example}" for example in examples)
+    command: argparse.ArgumentParser = commands.add_parser(
+        name,
+        help=what,
+        description=what[0].upper() + what[1:] + ".",
+        epilog=f"examples:\n{lines}",
+        formatter_class=Help,
+    )
+    return command
+
+
+def add_scene(command: argparse.ArgumentParser) -> None:
+    """Add the argument for one scene file."""
+    command.add_argument("scene", help=SCENE_FILE)
+
+
+SCENE_FILE = "obj, ply, stl, off, glb, gltf, dae or 3mf file"
+PICTURE_FILE = "png, jpg, exr, hdr, npy or npz file"

@@ -1,0 +1,112 @@
+"""Tests of an installation that take seconds: right pictures, and how fast they are."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..accel.embree import installed
+from ..bsdfs import Dielectric, Diffuse
+from ..camera import Camera
+from ..image import Image
+from ..lights import Environment
+from ..record import record
+from ..render import render
+from ..scene import Scene
+from ..shapes import Mesh, Rectangle, Sphere
+from ..vec import Doubles, Ints
+
+SIZE = (128, 128)
+FURNACE_SPP = 64
+STANDARD_ERRORS = 5  # by which the mean of a right picture differs in one of two million tests
+ROUNDING = 1e-5  # relative, of sums of float32 along a path
+RINGS, SIDES = 32, 64  # of the mesh that rays are timed with
+
+
+@record
+class CheckResult:
+    """What a test found."""
+
+    name: str
+    passed: bool
+    text: str
+
+
+def check_furnace() -> CheckResult:
+    """Render a white sphere in white light, which must not be seen: its radiance is that of the light."""
+    scene = Scene(
+        [Sphere((0, 0, 0), 1, material=Diffuse(1.0))],
+        [Environment(1.0)],
+        Camera.look_at((0, 0, 4), (0, 0, 0), fov=20, size=(64, 64)),
+    )
+    image = render(scene, FURNACE_SPP, seed=1, progress=False)
+    assert image.standard_error is not None
+    mean = float(image.rgb.mean(dtype=np.float64))
+    # the channels of a gray picture have the same samples
+    error = float(np.sqrt(np.square(image.standard_error[..., 0], dtype=np.float64).sum()))
+    error /= image.standard_error[..., 0].size
+    passed = abs(mean - 1) <= STANDARD_ERRORS * error + ROUNDING
+    return CheckResult(
+        "furnace", passed, f"a white sphere in light of radiance 1 has {mean:.6f} ± {error:.6f}"
+    )
+
+
+def check_workers() -> CheckResult:
+    """Render one picture with one worker and with two, which must have the same bits."""
+    scene = timed_room()
+    one, two = (render(scene, 4, size=(64, 64), workers=n, progress=False) for n in (1, 2))
+    return CheckResult(
+        "workers", bool(np.array_equal(one.rgb, two.rgb)), "one worker and two give the same bits"
+    )
+
+
+def measure_speeds(seconds: float, workers: int) -> list[CheckResult]:
+    """Measure rays per second with each accelerator that is installed, for some seconds in all."""
+    accelerators = ["numpy", *(["embree"] if installed() else [])]
+    results = []
+    for name in accelerators:
+        image = render(
+            timed_room(), seconds=seconds / len(accelerators), size=SIZE, accel=name, progress=False
+        )
+        finite = bool(np.isfinite(image.rgb).all())
+        results.append(CheckResult(f"speed, {name}", finite, _speed_text(image, workers)))
+    return results
+
+
+def _speed_text(image: Image, workers: int) -> str:
+    seconds = image.metadata["seconds"]
+    return (
+        f"{image.metadata['rays'] / seconds / 1e6:.2f} million rays per second, "
+        f"{image.metadata['samples'] / seconds / 1e6:.2f} million samples per second "
+        f"({workers} workers, {seconds:.1f} s with set-up)"
+    )
+
+
+def timed_room() -> Scene:
+    """Return a room with a ball of triangles and one of glass."""
+    vertices, faces = _ball(RINGS, SIDES)
+    white, red = Diffuse(0.75), Diffuse((0.7, 0.2, 0.1))
+    walls = [
+        Rectangle((-2, -1, -2), (0, 0, 4), (4, 0, 0), material=white),
+        Rectangle((-2, -1, -2), (4, 0, 0), (0, 3, 0), material=white),
+        Rectangle((-2, -1, -2), (0, 3, 0), (0, 0, 4), material=red),
+    ]
+    light = Rectangle((-0.5, 1.9, -0.5), (1, 0, 0), (0, 0, 1), emission=12.0)
+    balls = [
+        Mesh(vertices - (0.8, 0, 0), faces, material=white),
+        Sphere((0.9, -0.3, 0.4), 0.7, material=Dielectric(1.5)),
+    ]
+    return Scene(
+        [*walls, light, *balls], camera=Camera.look_at((1, 0.6, 5.5), (0, 0.1, 0), fov=40, size=SIZE)
+    )
+
+
+def _ball(rings: int, sides: int) -> tuple[Doubles, Ints]:
+    """Return the vertices (n, 3) and faces (m, 3) of a unit ball of latitudes and longitudes."""
+    latitude = np.linspace(0.01, np.pi - 0.01, rings + 1)[:, None]
+    longitude = np.linspace(0, 2 * np.pi, sides, endpoint=False)[None]
+    x, y, z = np.sin(latitude) * np.cos(longitude), np.cos(latitude), np.sin(latitude) * np.sin(longitude)
+    vertices = np.stack([x, np.broadcast_to(y, x.shape), z], -1).reshape(-1, 3)
+    row, column = (each.ravel() for each in np.mgrid[:rings, :sides])
+    a, b = row * sides + column, row * sides + (column + 1) % sides
+    faces = np.concatenate([np.stack([a, b, a + sides], 1), np.stack([b, b + sides, a + sides], 1)])
+    return vertices, faces
