@@ -11,8 +11,6 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
-import json
-import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -21,10 +19,10 @@ from statistics import median
 from typing import Any
 
 import numpy as np
+from cycles_peer import Cycles
 from mitsuba_scene import to_mitsuba
 
 import wavefront as wf
-from wavefront.scheduling.executors import worker_count
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
 from cornell_box import cornell_box
@@ -46,58 +44,6 @@ def mitsuba(spp: int, variant: str) -> Callable[[], np.ndarray]:
     scene = to_mitsuba(mi, cornell_box(SIZE), MAX_BOUNCES)
     np.array(mi.render(scene, spp=1))
     return lambda: np.array(mi.render(scene, spp=spp))
-
-
-class Cycles:
-    """A Cycles process that renders once per call."""
-
-    def __init__(self, python: str, spp: int, threads: int, size: int = SIZE, denoise: bool = False) -> None:
-        script = Path(__file__).with_name("cycles_cornell.py")
-        self.process = subprocess.Popen(
-            [python, str(script)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
-        shapes = [
-            {
-                "name": f"{shape.name}{i}",
-                "vertices": shape.vertices.tolist(),
-                "faces": shape.faces.tolist(),
-                "color": shape.material.bsdf.reflectance.ravel().tolist(),
-                "emission": None if shape.emission is None else shape.emission.ravel().tolist(),
-            }
-            for i, shape in enumerate(cornell_box(size).shapes)
-        ]
-        job = {"shapes": shapes, "size": size, "spp": spp, "threads": threads, "max_bounces": MAX_BOUNCES}
-        self._say(json.dumps({**job, "denoise": denoise}))
-        self.seconds()
-
-    def seconds(self) -> float:
-        """Render, and return the seconds that Cycles took."""
-        return float(self._answers("again")["SECONDS"])
-
-    def picture(self) -> np.ndarray:
-        """Render with another seed, and return the picture (H, W, 3)."""
-        return wf.Image.load(self._answers("write")["PICTURE"]).rgb
-
-    def _answers(self, line: str) -> dict[str, str]:
-        """Return what Cycles says, by its first word."""
-        self._say(line)
-        assert self.process.stdout is not None
-        found = {}
-        for answer in self.process.stdout:
-            word, _, rest = answer.strip().partition(" ")
-            found[word] = rest
-            if word == "SECONDS":
-                return found
-        raise RuntimeError("Cycles stopped without an answer")
-
-    def _say(self, line: str) -> None:
-        assert self.process.stdin is not None
-        self.process.stdin.write(line + "\n")
-        self.process.stdin.flush()
 
 
 def prototype(path: str, spp: int) -> Callable[[], np.ndarray]:
@@ -142,7 +88,9 @@ if __name__ == "__main__":
         "mitsuba scalar_rgb": clock(mitsuba(options.spp, "scalar_rgb")),
     }
     if options.bpy_python:
-        sides["cycles"] = Cycles(options.bpy_python, options.spp, worker_count(None)).seconds
+        peer = Cycles(options.bpy_python, cornell_box(SIZE), options.spp, MAX_BOUNCES)
+        peer.seconds()  # warm up
+        sides["cycles"] = peer.seconds
     if options.prototype:
         sides["prototype"] = clock(prototype(options.prototype, options.spp))
     times: dict[str, list[float]] = {name: [] for name in sides}

@@ -1,27 +1,33 @@
-"""Relative MSE over time: this project beside Mitsuba 3, on three scenes.
+"""Relative MSE over time: this project beside Mitsuba 3 and Cycles, on three scenes and four hard ones.
 
-python benchmarks/error_vs_time.py [--scene cornell|mesh|lights|all] [--data DATA] [--out plot.png]
+python benchmarks/error_vs_time.py [--scene NAME] [--bpy-python PATH] [--data DATA] [--out plot.png]
 
-Sides: wavefront with each sampler, "sobol/4" with four branches and "denoised" with `denoise=True`, numpy
-and embree; Mitsuba `llvm_ad_rgb` and `scalar_rgb`, each with `independent` and `multijitter`; with
-`--bpy-python`, on the box, Cycles with Open Image Denoise, whose error is that against its own converged
-picture, since its edges lie a part of a pixel elsewhere. All draw the same shapes with
-as many bounces, a box filter and a worker per core. The reference is the mean of two converged
-renders, one of each side, whose means are compared first. Printed are, for each side:
+Scenes: "cornell", "mesh" and "lights"; those of hard_scenes.py, which are "ceiling", "ajar", "window" and
+"corridor"; "hard" for these four, "all" for all. Sides: wavefront with each sampler or one of the other
+METHODS below, numpy and embree; Mitsuba `llvm_ad_rgb` and `scalar_rgb`, each with `independent` and
+`multijitter`; with `--bpy-python`, Cycles with Open Image Denoise on the box, and with its own path guiding
+on the hard scenes. All draw the same shapes with as many bounces, a box filter and a worker per core;
+Cycles has a sphere of 20 480 triangles in place of each ball. The reference is the mean of two converged
+renders, one of wavefront and one of Mitsuba, weighted by their noise, whose means are compared first.
+A denoised picture of Cycles is compared with its own converged picture. Printed are, for each side:
 
-- error and wall time at each sample count, warm: medians over the repeats, the sides in turn. Mitsuba's
-  scene is loaded once, beforehand; a render of wavefront includes setting up its scene, but what rays are
-  traced with, which stays with the scene, has been built by the render before;
+- error and wall time at each sample count, warm: medians over the repeats, the sides in turn. The scene of
+  Mitsuba and Cycles is loaded once, beforehand; a render of wavefront includes setting up its scene and
+  training a guide, but what rays are traced with, which stays with the scene, has been built by the render
+  before;
+- the mean of the pictures of most samples over that of the reference;
 - what a fresh process takes besides, once: importing the renderer, loading the scene, compiling. It is
   the time of a process of its own, with an empty cache of compiled kernels, less that of a warm render;
 - time to the error that `llvm_ad_rgb independent` has at its largest sample count, by straight lines
   between the measured points on logarithmic axes, and beyond the last by the last two (marked *); a side
-  whose fewest samples have less error than that is given their time;
+  whose fewest samples have less error than that is given their time (marked <);
 - speed at that error relative to `llvm_ad_rgb independent`, warm, and cold with what comes once added.
 
-With `--keep FILE` results join those of earlier runs in that file, and the plot shows all of them, so
-that the scenes can be measured one at a time. Needs `pip install -e '.[bench]'`, and for
-`llvm_ad_rgb` an LLVM library (DRJIT_LIBLLVM_PATH).
+With `--blur 1.5` a second table has the errors of the same pictures after a Gaussian blur of 1.5 pixels,
+of the picture and of the reference: noise that neighbors share does not vanish there. With `--keep FILE`
+results join those of earlier runs in that file, and the plot shows all of them, so that the scenes can be
+measured one at a time. Needs `pip install -e '.[bench]'`, and for `llvm_ad_rgb` an LLVM library
+(DRJIT_LIBLLVM_PATH; version 15 cannot compile scenes with spheres for AVX-512, version 19 can).
 """
 
 from __future__ import annotations
@@ -34,25 +40,35 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 import numpy as np
-from cornell_peers import Cycles
+from cycles_peer import Cycles
+from hard_scenes import HARD_SCENES
 from many_lights import lit
 from mitsuba_scene import to_mitsuba
+from scipy.ndimage import gaussian_filter
 
 import wavefront as wf
 from wavefront.sampling.sampler import SAMPLERS
-from wavefront.scheduling.executors import worker_count
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
 from cornell_box import cornell_box
 
-BOUNCES = {"cornell": 7, "mesh": 7, "lights": 3}
-SPP = (4, 16, 64)
-DENOISED = "denoised"  # in place of a sampler
+DENOISED = "denoised"
+GUIDED = "guided"
+METHODS: dict[str, dict[str, Any]] = {  # settings of `wf.render` by what a side is called
+    **{sampler: {"sampler": sampler} for sampler in SAMPLERS},
+    "sobol/4": {"branches": 4},
+    GUIDED: {"guide": True},
+    "guided/4": {"guide": True, "branches": 4},
+    DENOISED: {"denoise": True},
+}
+CYCLES = {DENOISED: {"denoise": True}, GUIDED: {"guide": True}}
 IMPORT = """
 import time
 import numpy
@@ -61,6 +77,18 @@ import wavefront
 print(time.perf_counter() - begin)
 """
 Render = Callable[[int, int], np.ndarray]  # spp, seed -> picture
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A scene, and how it is measured."""
+
+    build: Callable[[], wf.Scene]
+    max_bounces: int
+    spp: tuple[int, ...]
+    methods: tuple[str, ...]  # of wavefront
+    exact: str  # the method of the converged picture of wavefront
+    cycles: str | None = None  # the method of Cycles
 
 
 def mesh_scene(data: Path | None, size: int) -> wf.Scene:
@@ -105,30 +133,18 @@ def ball(subdivisions: int) -> tuple[np.ndarray, np.ndarray]:
     return np.asarray(mesh.vertices), np.asarray(mesh.faces)
 
 
-def ours(scene: wf.Scene, bounces: int, sampler: str, accel: str, branches: int = 1) -> Render:
+def ours(scene: wf.Scene, max_bounces: int, method: str, accel: str) -> Render:
     """Return a renderer of this project."""
-    denoise = sampler == DENOISED
-    options: dict[str, Any] = {
-        "sampler": "sobol" if denoise else sampler,
-        "accel": accel,
-        "branches": branches,
-        "denoise": denoise,
-    }
-
-    def render(spp: int, seed: int) -> np.ndarray:
-        return wf.render(scene, spp, seed=seed, max_bounces=bounces, progress=False, **options).rgb
-
-    return render
+    options = {"accel": accel, "max_bounces": max_bounces, "progress": False, **METHODS[method]}
+    return lambda spp, seed: wf.render(scene, spp, seed=seed, **options).rgb
 
 
-def mitsuba(
-    scene: wf.Scene, bounces: int, sampler: str, variant: str, counts: tuple[int, ...] = SPP
-) -> Render:
+def mitsuba(scene: wf.Scene, max_bounces: int, sampler: str, variant: str, counts: tuple[int, ...]) -> Render:
     """Return a renderer of Mitsuba, with the scene loaded for each of some sample counts."""
     import mitsuba as mi
 
     mi.set_variant(variant)
-    loaded = {spp: to_mitsuba(mi, scene, bounces, sampler, spp) for spp in counts}
+    loaded = {spp: to_mitsuba(mi, scene, max_bounces, sampler, spp) for spp in counts}
 
     def render(spp: int, seed: int) -> np.ndarray:
         mi.set_variant(variant)
@@ -138,21 +154,21 @@ def mitsuba(
     return render
 
 
-def cycles(python: str, size: int, counts: tuple[int, ...], denoise: bool = True) -> Render:
+def cycles(scene: wf.Scene, max_bounces: int, method: str, counts: tuple[int, ...]) -> Render:
     """Return a renderer of Cycles, a process of a Python for each of some sample counts."""
-    made = {spp: Cycles(python, spp, worker_count(None), size, denoise) for spp in counts}
+    options = CYCLES.get(method, {})
+    made = {spp: Cycles(chosen.bpy_python, scene, spp, max_bounces, **options) for spp in counts}
     return lambda spp, seed: made[spp].picture()
 
 
-def renderer(side: str, scene: wf.Scene, bounces: int, counts: tuple[int, ...] = SPP) -> Render:
+def renderer(side: str, scene: wf.Scene, subject: Subject) -> Render:
     """Return the renderer of a side, called "wavefront embree sobol" or "scalar_rgb multijitter"."""
-    *_, engine, sampler = side.split()
+    *_, engine, method = side.split()
     if engine == "cycles":
-        return cycles(chosen.bpy_python, scene.camera.size[0], counts)
+        return cycles(scene, subject.max_bounces, method, subject.spp)
     if side.startswith("wavefront"):
-        sampler, _, branches = sampler.partition("/")
-        return ours(scene, bounces, sampler, engine, int(branches or 1))
-    return mitsuba(scene, bounces, sampler, engine, counts)
+        return ours(scene, subject.max_bounces, method, engine)
+    return mitsuba(scene, subject.max_bounces, method, engine, subject.spp)
 
 
 def first(side: str, options: argparse.Namespace, name: str) -> float:
@@ -161,16 +177,17 @@ def first(side: str, options: argparse.Namespace, name: str) -> float:
     if options.data:
         command += ["--data", str(options.data)]
     seconds = []
-    for _ in range(3):
+    for _ in range(options.repeat):
         with tempfile.TemporaryDirectory() as home:  # without Mitsuba's cache of compiled kernels
             seconds.append(printed_by(command, HOME=home))
     return median(seconds)
 
 
-def print_first(side: str, scene: wf.Scene, bounces: int) -> None:
+def print_first(side: str, subject: Subject) -> None:
     """Print how long a first render takes in this process, the scene's arrays being there already."""
+    scene, fewest = subject.build(), subject.spp[:1]
     begin = time.perf_counter()
-    renderer(side, scene, bounces, SPP[:1])(SPP[0], 0)
+    renderer(side, scene, replace(subject, spp=fewest))(fewest[0], 0)
     seconds = time.perf_counter() - begin
     if side.startswith("wavefront"):  # which this script has imported
         seconds += printed_by([sys.executable, "-c", IMPORT])
@@ -183,12 +200,13 @@ def printed_by(command: list[str], **environment: str) -> float:
     return float(done.stdout.split()[-1])
 
 
-def reference(scene: wf.Scene, bounces: int, spp: int, variant: str) -> np.ndarray:
+def reference(scene: wf.Scene, subject: Subject, spp: int, variant: str) -> np.ndarray:
     """Return the mean of a converged picture of each side, after printing how they compare."""
-    mine = ours(scene, bounces, "sobol", "auto")(spp, 1000).astype(float)
-    render = mitsuba(scene, bounces, "independent", variant)
-    passes = [render(min(spp, 256), 2000 + i) for i in range(max(1, spp // 256))]
-    other = np.mean(passes, 0, dtype=float)
+    render = ours(scene, subject.max_bounces, subject.exact, "auto")
+    mine, noise = averaged([render(spp // 2, 1000 + i) for i in range(2)])
+    render = mitsuba(scene, subject.max_bounces, "independent", variant, (min(spp // 2, 256),))
+    passes = [render(min(spp // 2, 256), 2000 + i) for i in range(max(2, spp // 256))]
+    other, other_noise = averaged(passes)
     ratio = mine.mean((0, 1)) / other.mean((0, 1))
     chance = (mine - other).std((0, 1)) / other.mean((0, 1)) / np.sqrt(mine[..., 0].size)
     print(
@@ -196,9 +214,15 @@ def reference(scene: wf.Scene, bounces: int, spp: int, variant: str) -> np.ndarr
     )
     if (np.abs(ratio - 1) > 4 * chance + 0.001).any():
         print("the means differ by more than chance and 0.1 %: the figures below are not comparable")
-    exact = (mine + other) / 2
-    print(f"relative MSE of the reference itself, their mean: {relative_mse(mine, exact):.2g}")
-    return exact
+    print(f"relative MSE of the reference itself: {1 / (1 / noise + 1 / other_noise):.2g}")
+    return np.average([mine, other], axis=0, weights=[1 / noise, 1 / other_noise])
+
+
+def averaged(passes: list[np.ndarray]) -> tuple[np.ndarray, float]:
+    """Return the mean of independent pictures, and its relative MSE, from how they differ."""
+    mean = np.mean(passes, 0, dtype=float)
+    single = float(np.mean([relative_mse(picture, mean) for picture in passes]))
+    return mean, single / (len(passes) - 1)
 
 
 def relative_mse(picture: np.ndarray, exact: np.ndarray) -> float:
@@ -216,70 +240,87 @@ def time_to(error: float, errors: list[float], times: list[float]) -> tuple[floa
     return float(np.exp(y[end] + slope * (np.log(error) - x[end]))), error < errors[-1]
 
 
-def measure(name: str, scene: wf.Scene, options: argparse.Namespace) -> dict[str, Any]:
-    """Measure all sides on one scene and print the table."""
-    bounces = BOUNCES[name]
-    variants = [v for v in ("llvm_ad_rgb", "scalar_rgb") if v in options.variants]
-    print(f"\n## {name}: {scene.camera.size[0]}x{scene.camera.size[1]}, max_bounces {bounces}", flush=True)
-    exact = reference(scene, bounces, options.reference_spp, variants[0])
-    names = [
-        f"wavefront {accel} {sampler}"
-        for accel in ("numpy", "embree")
-        for sampler in (*SAMPLERS, "sobol/4", DENOISED)
+def blurred(picture: np.ndarray, pixels: float) -> np.ndarray:
+    """Return a picture after a Gaussian blur."""
+    return gaussian_filter(picture, (pixels, pixels, 0))
+
+
+def sides_of(subject: Subject, options: argparse.Namespace) -> list[str]:
+    """Return the names of all sides that draw a scene."""
+    methods = options.methods.split(",") if options.methods else subject.methods
+    names = [f"wavefront {accel} {method}" for accel in ("numpy", "embree") for method in methods]
+    names += [
+        f"{variant} {sampler}"
+        for variant in ("llvm_ad_rgb", "scalar_rgb")
+        if variant in options.variants
+        for sampler in ("independent", "multijitter")
     ]
-    names += [f"{variant} {sampler}" for variant in variants for sampler in ("independent", "multijitter")]
-    names += [f"cycles {DENOISED}"] if options.bpy_python and name == "cornell" else []
-    sides = {side: renderer(side, scene, bounces) for side in names}
+    return names + ([f"cycles {subject.cycles}"] if options.bpy_python and subject.cycles else [])
+
+
+def measure(name: str, subject: Subject, options: argparse.Namespace) -> dict[str, Any]:
+    """Measure all sides on one scene and print the tables."""
+    scene = subject.build()
+    width, height = scene.camera.size
+    print(f"\n## {name}: {width}x{height}, max_bounces {subject.max_bounces}", flush=True)
+    names = sides_of(subject, options)
+    base = next(side for side in names if side.endswith("independent") and "rgb" in side)
+    exact = reference(scene, subject, options.reference_spp, base.split()[0])
+    sides = {side: renderer(side, scene, subject) for side in names}
     for side, render in sides.items():  # warm up; Mitsuba may compile anew for each sample count
-        for spp in SPP[:1] if side.startswith("wavefront") else SPP:
+        for spp in subject.spp[:1] if side.startswith("wavefront") else subject.spp:
             render(spp, 0)
     converged = dict.fromkeys(sides, exact)
-    for side in sides:
-        if side.startswith("cycles"):
-            counts = (options.reference_spp,)
-            converged[side] = cycles(options.bpy_python, options.size, counts, denoise=False)(counts[0], 0)
-    times: dict[str, Any] = {side: {spp: [] for spp in SPP} for side in sides}
-    errors: dict[str, Any] = {side: {spp: [] for spp in SPP} for side in sides}
-    for spp in SPP:
+    denoised = f"cycles {DENOISED}"
+    if denoised in sides:
+        counts = (options.reference_spp,)
+        converged[denoised] = cycles(scene, subject.max_bounces, "plain", counts)(counts[0], 0)
+    found: dict[str, Any] = {side: {"errors": [], "blurred": [], "seconds": []} for side in sides}
+    for spp in subject.spp:
+        rows: dict[str, list[tuple[float, ...]]] = {side: [] for side in sides}
         for seed in range(options.repeat):
             for side, render in sides.items():
                 begin = time.perf_counter()
                 picture = render(spp, seed)
-                times[side][spp].append(time.perf_counter() - begin)
-                errors[side][spp].append(relative_mse(picture, converged[side]))
-    found = {
-        side: {
-            "errors": [median(errors[side][spp]) for spp in SPP],
-            "seconds": [median(times[side][spp]) for spp in SPP],
-            "once": 0.0
-            if side.startswith("cycles")  # its scene is loaded beforehand, and not measured
-            else max(0.0, first(side, options, name) - median(times[side][SPP[0]])),
-        }
-        for side in sides
-    }
-    report(found)
+                seconds = time.perf_counter() - begin
+                soft = relative_mse(*(blurred(p, options.blur) for p in (picture, converged[side])))
+                ratio = picture.mean(dtype=float) / exact.mean()
+                rows[side].append((relative_mse(picture, converged[side]), soft, seconds, ratio))
+        for side, measured in rows.items():
+            columns = [list(column) for column in zip(*measured, strict=True)]
+            for key, column in zip(("errors", "blurred", "seconds"), columns, strict=False):
+                found[side][key].append(median(column))
+            found[side]["mean"] = sum(columns[-1]) / options.repeat
+    for side, of in found.items():
+        # the scene of Cycles is loaded beforehand, and not measured
+        of["once"] = (
+            0.0 if side.startswith("cycles") else max(0.0, first(side, options, name) - of["seconds"][0])
+        )
+    report(found, subject.spp, base, "errors")
+    if options.blur:
+        print(f"after a blur of {options.blur} pixels")
+        report(found, subject.spp, base, "blurred")
     return found
 
 
-def report(found: dict[str, Any]) -> None:
+def report(found: dict[str, Any], counts: tuple[int, ...], base: str, key: str) -> None:
     """Print error and time per sample count, and the time to equal error."""
-    base = "llvm_ad_rgb independent"
-    base = base if base in found else next(side for side in found if "rgb" in side)
-    target = found[base]["errors"][-1]
-    head = "".join(f"{f'{spp} spp':>19}" for spp in SPP)
+    target = found[base][key][-1]
+    head = "".join(f"{f'{spp} spp':>19}" for spp in counts)
     print(
-        f"{'relMSE in seconds':29}{head}{'once':>7}{'to ' + format(target, '.2g'):>11}{'warm':>8}{'cold':>7}"
+        f"{'relMSE in seconds':29}{head}{'mean':>8}{'once':>7}{'to ' + format(target, '.2g'):>11}"
+        f"{'warm':>8}{'cold':>7}"
     )
     base_time = found[base]["seconds"][-1]
     for side, of in found.items():
-        cells = "".join(
-            f"{f'{e:.5f} in {s:.2f}':>19}" for e, s in zip(of["errors"], of["seconds"], strict=True)
-        )
-        reached, beyond = time_to(target, of["errors"], of["seconds"])
+        errors = of[key]
+        cells = "".join(f"{f'{e:.5f} in {s:.2f}':>19}" for e, s in zip(errors, of["seconds"], strict=True))
+        reached, beyond = time_to(target, errors, of["seconds"])
         cold = (base_time + found[base]["once"]) / (reached + of["once"])
-        mark = "*" if beyond else " "
+        mark = "*" if beyond else "<" if target > errors[0] else " "
         print(
-            f"{side:29}{cells}{of['once']:7.2f}{reached:10.2f}{mark}{base_time / reached:7.2f}x{cold:6.2f}x"
+            f"{side:29}{cells}{of['mean']:8.4f}{of['once']:7.2f}{reached:10.2f}{mark}"
+            f"{base_time / reached:7.2f}x{cold:6.2f}x"
         )
 
 
@@ -296,6 +337,8 @@ LINES = {
     "bluenoise": "--",
     "multijitter": "-",
     "sobol/4": "-.",
+    GUIDED: (0, (5, 1)),
+    "guided/4": (0, (5, 1, 1, 1)),
     DENOISED: (0, (1, 1)),
 }
 
@@ -336,13 +379,35 @@ def joined(found: dict[str, Any], kept: Path | None) -> dict[str, Any]:
     return everything
 
 
+def subjects(options: argparse.Namespace) -> dict[str, Subject]:
+    """Return all scenes by name."""
+    size, spp = options.size, (4, 16, 64)
+    methods = (*SAMPLERS, "sobol/4", DENOISED)
+    box = (*SAMPLERS, "sobol/4", GUIDED, "guided/4", DENOISED)
+    found = {
+        "cornell": Subject(lambda: cornell_box(size), 7, spp, box, "sobol", DENOISED),
+        "mesh": Subject(lambda: mesh_scene(options.data, size), 7, spp, methods, "sobol"),
+        "lights": Subject(lambda: lit("panels", 1000, size), 3, spp, methods, "sobol"),
+    }
+    hard = ("sobol", "sobol/4", GUIDED, "guided/4")
+    for name, build in HARD_SCENES.items():
+        found[name] = Subject(partial(build, size), 12, (16, 64, 256), hard, "guided/4", GUIDED)
+    if options.spp:
+        counts = tuple(int(count) for count in options.spp.split(","))
+        found = {name: replace(subject, spp=counts) for name, subject in found.items()}
+    return found
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--scene", choices=("cornell", "mesh", "lights", "all"), default="all")
+    parser.add_argument("--scene", default="all", help="a scene, hard or all")
     parser.add_argument("--data", type=Path, help="folder that holds rocker-arm.obj")
     parser.add_argument("--size", type=int, default=256)
+    parser.add_argument("--spp", help="sample counts, such as 4,16,64")
+    parser.add_argument("--methods", help=f"of wavefront, some of {','.join(METHODS)}")
+    parser.add_argument("--blur", type=float, default=0.0, help="pixels; prints a second table")
     parser.add_argument("--repeat", type=int, default=3)
     parser.add_argument("--reference-spp", type=int, default=4096)
     parser.add_argument("--bpy-python", help="a Python that has bpy, for Cycles")
@@ -351,13 +416,14 @@ if __name__ == "__main__":
     parser.add_argument("--keep", type=Path, help="JSON file of results to add to")
     parser.add_argument("--first", help=argparse.SUPPRESS)  # a side: print what its first render takes
     chosen = parser.parse_args()
-    subjects = {
-        "cornell": lambda: cornell_box(chosen.size),
-        "mesh": lambda: mesh_scene(chosen.data, chosen.size),
-        "lights": lambda: lit("panels", 1000, chosen.size),
-    }
+    known = subjects(chosen)
+    names = {"all": list(known), "hard": list(HARD_SCENES)}.get(chosen.scene, [chosen.scene])
+    if not set(names) <= set(known):
+        parser.error(f"--scene is one of {', '.join(known)}, hard, all")
     if chosen.first:
-        print_first(chosen.first, subjects[chosen.scene](), BOUNCES[chosen.scene])
+        print_first(chosen.first, known[names[0]])
         sys.exit()
-    names = list(subjects) if chosen.scene == "all" else [chosen.scene]
-    plot(joined({name: measure(name, subjects[name](), chosen) for name in names}, chosen.keep), chosen.out)
+    results: dict[str, Any] = {}
+    for name in names:
+        results = joined({**results, name: measure(name, known[name], chosen)}, chosen.keep)
+    plot(results, chosen.out)

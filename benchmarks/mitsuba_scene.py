@@ -8,6 +8,8 @@ import numpy as np
 
 import wavefront as wf
 
+FAR = 1e5  # distance of a sun, in units of the scene
+
 
 def to_mitsuba(
     mi: Any, scene: wf.Scene, max_bounces: int, sampler: str = "independent", spp: int = 16
@@ -43,7 +45,7 @@ def to_mitsuba(
     for i, shape in enumerate(_joined(scene.shapes)):
         description[f"shape{i}"] = _sphere(shape) if isinstance(shape, wf.Sphere) else _mesh(mi, shape, i)
     for i, light in enumerate(scene.lights):
-        description[f"light{i}"] = _light(light)
+        description[f"light{i}"] = _light(mi, light)
     return mi.load_dict(description)
 
 
@@ -72,20 +74,28 @@ def _rgb(values: np.ndarray) -> dict[str, Any]:
 
 
 def _bsdf(material: wf.Bsdf) -> dict[str, Any]:
-    if isinstance(material, wf.Diffuse):
-        inner: dict[str, Any] = {"type": "diffuse", "reflectance": _rgb(material.reflectance)}
-    elif isinstance(material, wf.Mirror):
-        inner = {"type": "conductor", "specular_reflectance": _rgb(material.reflectance)}
-    elif isinstance(material, wf.Conductor):
-        inner = {"type": "conductor", "eta": _rgb(material.eta), "k": _rgb(material.k)}
-        if not material.specular:
-            alpha = float(material.roughness[0]) ** 2
-            inner |= {"type": "roughconductor", "alpha": alpha, "distribution": "ggx"}
-    elif isinstance(material, wf.Dielectric) and material.specular:
+    if isinstance(material, wf.Dielectric) and material.specular:
         return {"type": "dielectric", "int_ior": float(material.ior[0]), "ext_ior": 1.0}
-    else:
-        raise ValueError(f"no twin in Mitsuba for {material!r}")
-    return {"type": "twosided", "bsdf": inner}
+    return {"type": "twosided", "bsdf": _reflection(material)}
+
+
+def _reflection(material: wf.Bsdf) -> dict[str, Any]:
+    """Return the twin of a material that reflects on its front side."""
+    if isinstance(material, wf.Diffuse):
+        return {"type": "diffuse", "reflectance": _rgb(material.reflectance)}
+    if isinstance(material, wf.Mirror):
+        return {"type": "conductor", "specular_reflectance": _rgb(material.reflectance)}
+    if isinstance(material, wf.Conductor):
+        metal = {"type": "conductor", "eta": _rgb(material.eta), "k": _rgb(material.k)}
+        if material.specular:
+            return metal
+        alpha = float(material.roughness[0]) ** 2
+        return {**metal, "type": "roughconductor", "alpha": alpha, "distribution": "ggx"}
+    if isinstance(material, wf.Mix):
+        first, second = _reflection(material.first), _reflection(material.second)
+        weight = float(np.ravel(material.weight)[0])
+        return {"type": "blendbsdf", "weight": weight, "bsdf_0": first, "bsdf_1": second}
+    raise ValueError(f"no twin in Mitsuba for {material!r}")
 
 
 def _mesh(mi: Any, shape: wf.Mesh, number: int) -> Any:
@@ -119,9 +129,24 @@ def _sphere(shape: wf.Sphere) -> dict[str, Any]:
     return made
 
 
-def _light(light: Any) -> dict[str, Any]:
+def _light(mi: Any, light: Any) -> dict[str, Any]:
     if isinstance(light, wf.PointLight):
         return {"type": "point", "position": light.position.tolist(), "intensity": _rgb(light.intensity)}
     if isinstance(light, wf.Environment):
         return {"type": "constant", "radiance": _rgb(light.radiance)}
+    if isinstance(light, wf.DirectionalLight) and light.angle > 0:
+        return _sun(mi, light)
     raise ValueError(f"no twin in Mitsuba for {light!r}")
+
+
+def _sun(mi: Any, light: wf.DirectionalLight) -> dict[str, Any]:
+    """Return a far disk that shines: Mitsuba's own directional light has no size."""
+    half = np.radians(light.angle) / 2
+    origin = (-FAR * np.asarray(light.direction)).tolist()
+    place = mi.ScalarTransform4f().look_at(origin=origin, target=[0, 0, 0], up=[0, 1, 0])
+    return {
+        "type": "disk",
+        "to_world": place @ mi.ScalarTransform4f().scale(FAR * float(np.tan(half))),
+        "bsdf": {"type": "diffuse", "reflectance": 0.0},
+        "emitter": {"type": "area", "radiance": _rgb(light.irradiance / (np.pi * np.sin(half) ** 2))},
+    }

@@ -5,11 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scenes import room
+from threadpoolctl import threadpool_info
 
 import wavefront as wf
+from wavefront import session
 from wavefront.frame import Frame
 from wavefront.guiding import GuideCells, GuideTable
 from wavefront.guiding.octahedral import bins_of, directions_at, neighbors, solid_angles
+from wavefront.pilot import train
 from wavefront.sampling.sampler import Dimension
 from wavefront.stages.guidance import mix_with_guide
 from wavefront.stages.shade import Guidance, Shading
@@ -235,6 +238,19 @@ def test_branches_can_be_guided() -> None:
         *(np.sqrt((i.standard_error.astype(float) ** 2).sum()) / i.rgb.size for i in (plain, guided))
     )
     assert abs(plain.rgb.mean(dtype=float) - guided.rgb.mean(dtype=float)) < 4 * error
+
+
+def test_the_pilot_holds_blas_to_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With more they wait for each other: on a busy machine the pilot took five times as long."""
+    threads = []
+
+    def spy(*arguments: object) -> GuideTable | None:
+        threads.extend(library["num_threads"] for library in threadpool_info())
+        return train(*arguments)
+
+    monkeypatch.setattr(session, "train", spy)
+    wf.render([wf.Sphere((0, 0, 0), 1), wf.Environment(1)], 1, size=(8, 8), guide=True, progress=False)
+    assert set(threads) == {1}
 
 
 def test_nothing_to_guide() -> None:

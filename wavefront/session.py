@@ -48,7 +48,7 @@ from .resuming import CheckpointFile, render_identity, scene_fingerprint
 from .sampling.sampler import SAMPLERS, SamplerMaker
 from .scheduling.accumulator import Accumulator, check_picture_memory
 from .scheduling.adaptive import Pass
-from .scheduling.blas import reserve_buffers
+from .scheduling.blas import reserve_buffers, single_threaded_blas
 from .scheduling.delivery import can_be_sent
 from .scheduling.executors import EXECUTORS, ExecutorLike, needs_pickling
 from .scheduling.interrupt import InterruptHandler
@@ -231,7 +231,7 @@ class Session:
         settings = self._settings
         if not settings.guide:
             return settings.estimator()
-        with phase("learning where light comes from", settings.progress):
+        with phase("learning where light comes from", settings.progress), single_threaded_blas:
             sampler = settings.pilot_sampler(camera.film[0])
             table = train(self._compiled, self._compiled.view(camera), sampler, settings.max_bounces)
         return settings.estimator(table)

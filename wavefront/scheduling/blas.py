@@ -43,6 +43,14 @@ class _SingleThreadedBlas:
             if not self._users:
                 self._limits.restore_original_limits()
 
+    def __enter__(self) -> None:
+        """Hold BLAS to one thread."""
+        self.acquire()
+
+    def __exit__(self, *raised: object) -> None:
+        """Let BLAS have as many threads as before."""
+        self.release()
+
 
 single_threaded_blas = _SingleThreadedBlas()
 
