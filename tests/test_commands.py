@@ -14,7 +14,14 @@ import pytest
 
 import wavefront as wf
 from wavefront import cli
-from wavefront.cli import command_line, completion_command, doctor_command, self_test, turntable_command
+from wavefront.cli import (
+    command_line,
+    completion_command,
+    doctor_command,
+    render_command,
+    self_test,
+    turntable_command,
+)
 from wavefront.cli.doctor_command import EXTRAS
 
 ROOT = Path(__file__).parents[1]
@@ -177,6 +184,27 @@ def test_where_several_pictures_cannot_go(scenes, options, message, tmp_path, mo
     monkeypatch.chdir(tmp_path)
     assert cli.main(["render", *scenes, *options]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_a_scene_is_shown_with_the_options_of_a_render(mesh: Path, monkeypatch, capsys) -> None:
+    """In place of a picture; what the viewer does not take is refused."""
+    shown = []
+    monkeypatch.setattr(
+        render_command, "view", lambda scene, **settings: shown.append((scene.camera, settings))
+    )
+    monkeypatch.chdir(mesh.parent)
+    words = ["render", mesh.name, "--view", "--origin", "3,3,3", "--seed", "7", *FAST]
+    assert cli.main(words) == 0
+    ((camera, settings),) = shown
+    assert camera.origin.tolist() == [3, 3, 3]
+    assert camera.size == (16, 12)
+    assert (settings["seed"], settings["lighting"], settings["block"]) == (7, "even", True)
+    assert [path.name for path in mesh.parent.iterdir()] == ["mesh.obj"]
+    assert cli.main(["render", "other.obj", *words[1:]]) == 2
+    monkeypatch.undo()
+    assert cli.main([*words[:1], str(mesh), *words[2:], "--checkpoint", str(mesh.with_name("a.wfck"))]) == 2
+    assert "--view is for one scene" in (err := capsys.readouterr().err)
+    assert "checkpoint" in err
 
 
 # --- Other commands -------------------------------------------------------------------------------

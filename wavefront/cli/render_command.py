@@ -16,6 +16,7 @@ from ..io.load import load
 from ..render import finish
 from ..scene import Scene
 from ..session import Session
+from ..viewer import view
 from . import arguments
 from .command import PICTURE_FILE, SCENE_FILE, add_command
 from .messages import print_error, print_note
@@ -64,11 +65,18 @@ def add_render_command(commands: Any) -> None:
     add_display(command)
     command.add_argument("--bits", type=int, choices=(8, 16), default=8, help="of each channel of a png")
     command.add_argument("--quiet", action="store_true", help="no progress bar")
+    command.add_argument(
+        "--view",
+        action="store_true",
+        help="show the scene with these options in the browser, in place of writing a picture",
+    )
     command.set_defaults(run=_render)
 
 
 def _render(options: argparse.Namespace) -> int:
     """Render all scenes; return the worst exit status."""
+    if options.view:
+        return _show(options)
     paths = output_paths(options.scenes, options.output)
     if len(paths) > 1 and options.checkpoint is not None:
         raise SceneError(f"--checkpoint is for one scene; there are {len(paths)}")
@@ -88,6 +96,17 @@ def _render(options: argparse.Namespace) -> int:
             return status
         worst = max(worst, status)
     return worst
+
+
+def _show(options: argparse.Namespace) -> int:
+    """Show the scene in the browser until Ctrl-C; return the exit status."""
+    if len(options.scenes) > 1:
+        raise SceneError(f"--view is for one scene; there are {len(options.scenes)}")
+    (path,) = options.scenes
+    scene = load(path, progress=False if options.quiet else None)
+    scene.camera = _camera(path, scene, options)
+    view(scene, block=True, **setting_values(options))
+    return 0
 
 
 def _render_scene(path: str, output: str, options: argparse.Namespace) -> int:
