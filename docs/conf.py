@@ -68,30 +68,34 @@ sphinx_gallery_conf = {
 }
 
 LINKED = re.compile(r"^- \[.*?\]\((\S+?)(?:#\S*)?\)", re.MULTILINE)
+TUTORIAL = re.compile(r"\]\((docs/|)tutorial/README\.rst\)")
 TOCTREE = "\n```{{toctree}}\n:hidden:\n:caption: {caption}\n\n{pages}\n```\n"
 
 
-def page_of(link: str) -> str:
-    """Return the name of the page, from the root of the site, to which a link of the index leads."""
-    if link == "tutorial/README.rst":
-        return "/docs/generated/tutorial/index"
-    path = (ROOT / "docs" / link).resolve().relative_to(ROOT)
-    return f"/{path.with_suffix('').as_posix()}"
+def links_to_the_tutorial(app, docname, source):
+    """Point links to the tutorial's scripts to the pages that sphinx-gallery makes of them."""
+    source[0] = TUTORIAL.sub(r"](\1generated/tutorial/index.rst)", source[0])
 
 
 def contents_from_lists(app, docname, source):
     """Give each section of the index a table of contents: the pages that its list links to."""
     if docname != root_doc:
         return
-    text = source[0].replace("(tutorial/README.rst)", "(generated/tutorial/index.rst)")
-    sections = re.split(r"^## ", source[0], flags=re.MULTILINE)[1:]
-    for section in sections:
+    text = source[0]
+    for section in re.split(r"^## ", text, flags=re.MULTILINE)[1:]:
         caption = section.partition("\n")[0]
-        pages = "\n".join(dict.fromkeys(page_of(link) for link in LINKED.findall(section)))
+        pages = "\n".join(dict.fromkeys(_page_of(link) for link in LINKED.findall(section)))
         text += TOCTREE.format(caption=caption, pages=pages)
     source[0] = text
 
 
+def _page_of(link: str) -> str:
+    """Return the name of the page, from the root of the site, to which a link of the index leads."""
+    path = (ROOT / "docs" / link).resolve().relative_to(ROOT)
+    return f"/{path.with_suffix('').as_posix()}"
+
+
 def setup(app):
     """Connect what this file adds to Sphinx."""
+    app.connect("source-read", links_to_the_tutorial, priority=400)
     app.connect("source-read", contents_from_lists)

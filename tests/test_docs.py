@@ -11,7 +11,9 @@ import pytest
 import wavefront as wf
 
 ROOT = Path(__file__).parents[1]
-DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = sorted([*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "how_to").glob("*.md")])
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES]
+TUTORIAL = sorted((ROOT / "docs" / "tutorial").glob("*.py"))
 BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)#]*)(?:#([^)]*))?\)")
 HEADING = re.compile(r"^#+ (.*)$", re.MULTILINE)
@@ -26,19 +28,32 @@ def blocks():
             yield pytest.param(document, line, match[1], id=name)
 
 
-@pytest.mark.parametrize(("document", "line", "code"), list(blocks()))
-def test_block_runs(document, line, code, tmp_path, monkeypatch):
+@pytest.fixture
+def few_samples(tmp_path, monkeypatch):
+    """Let `wf.render` take one sample per pixel, in an empty folder."""
     render = wf.render
 
-    def quick(scene, spp=MOST_SPP, **options):
+    def quick(scene, spp=MOST_SPP, noise=None, **options):
         few = {} if "samples" in options else {"spp": min(spp, MOST_SPP)}
         return render(scene, **few, progress=False, **options)
 
     monkeypatch.setattr(wf, "render", quick)
     monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.usefixtures("few_samples")
+@pytest.mark.parametrize(("document", "line", "code"), list(blocks()))
+def test_block_runs(document, line, code, tmp_path):
     exec(compile("\n" * (line - 1) + code, str(document), "exec"), {"__name__": "__main__"})
     for picture in tmp_path.iterdir():
         assert picture.stat().st_size > 100
+
+
+@pytest.mark.usefixtures("few_samples")
+@pytest.mark.parametrize("script", TUTORIAL, ids=lambda path: path.stem)
+def test_step_of_the_tutorial_runs(script, tmp_path):
+    exec(compile(script.read_text("utf-8"), str(script), "exec"), {"__name__": "__main__"})
+    assert list(tmp_path.glob("*.png"))
 
 
 def test_there_are_blocks_to_run():
@@ -79,7 +94,7 @@ def test_files_named_in_the_documents_exist():
 
 def test_the_index_lists_every_document():
     pages = {path for path, _ in LINK.findall((ROOT / "docs" / "index.md").read_text("utf-8"))}
-    documents = {path.name for path in (ROOT / "docs").glob("*.md")}
+    documents = {path.relative_to(ROOT / "docs").as_posix() for path in PAGES}
     assert documents - pages == {"index.md"}
 
 

@@ -30,6 +30,7 @@ SHAPES = {  # the picture of --size 24, (height, width)
     "molecule": (24, 24),
     "own_material": (15, 24),
     "spheres": (24, 24),
+    "terrace": (13, 24),
 }
 
 
@@ -55,10 +56,10 @@ def test_all_examples_are_here():
     assert {path.stem for path in EXAMPLES.glob("*.py")} == set(SHAPES)
 
 
-def test_readme_lists_all_examples():
-    text = (EXAMPLES.parent / "README.md").read_text("utf-8")
+def test_the_overview_lists_all_examples():
+    text = (EXAMPLES.parent / "docs" / "overview.md").read_text("utf-8")
     table = text.partition("## Examples")[2].partition("\n## ")[0]
-    listed = re.findall(r"^\| \[(\w+)\.py\]\(examples/\1\.py\) \|", table, re.MULTILINE)
+    listed = re.findall(r"^\| \[(\w+)\.py\]\(\.\./examples/\1\.py\) \|", table, re.MULTILINE)
     assert sorted(listed) == sorted(SHAPES)
 
 
