@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 from pycocotools.coco import COCO
+from pycocotools.mask import toBbox
 from trimesh.transformations import rotation_matrix, translation_matrix
 
 import wavefront as wf
@@ -148,14 +149,18 @@ def test_coco_is_read_by_its_own_reader(folder: Path, coco: COCO) -> None:
             mask = image.shape_id == shape
             assert np.array_equal(coco.annToMask(each), mask)
             assert each["area"] == mask.sum()
-            assert each["bbox"] == mask_box(mask)
+            assert each["bbox"] == mask_box(mask) == toBbox(coco.annToRLE(each)).tolist()
             assert each["iscrowd"] == 0
             assert coco.cats[each["category_id"]]["name"] == image.names["shape"][shape]
     assert min(coco.anns) == 1
 
 
-def test_run_lengths_begin_outside() -> None:
+def test_boxes_and_run_lengths_of_a_mask() -> None:
+    """Run lengths go down the columns, and begin outside."""
     mask = np.array([[1, 0], [1, 0], [0, 1]], bool)
+    assert mask_box(mask) == [0, 0, 2, 3]
+    assert mask_box(mask[2:]) == [1, 0, 1, 1]
+    assert mask_box(~mask[:, :0]) is None
     assert run_lengths(mask) == [0, 2, 3, 1]
     assert run_lengths(~mask) == [2, 3, 1]
     assert run_lengths(np.zeros((2, 2), bool)) == [4]
@@ -179,6 +184,9 @@ def test_bop_has_its_published_layout(folder: Path) -> None:
     root = folder / "train" / "000000"
     cameras, poses, infos = (loaded(root / f"scene_{key}.json") for key in ("camera", "gt", "gt_info"))
     assert list(cameras) == list(poses) == list(infos) == ["0", "1", "2"]
+    k = cameras["0"]["cam_K"]
+    about = {"fx": k[0], "fy": k[4], "cx": k[2], "cy": k[5], "width": 60, "height": 40, "depth_scale": 0.1}
+    assert loaded(folder / "camera.json") == about
     masks = set()
     for number in range(3):
         camera = cameras[str(number)]

@@ -30,7 +30,7 @@ NO_BOX = [-1, -1, -1, -1]
 
 
 class BopLayout:
-    """`train/000000/` with pictures, depth, masks, and `scene_camera`, `scene_gt` and `scene_gt_info`.
+    """`camera.json`, and `train/000000/` with pictures, depth, masks, cameras, poses and what is seen.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class BopLayout:
     """
 
     def __init__(self, folder: Path, millimeters: float, depth_scale: float | None) -> None:
-        self._folder = folder / SCENE
+        self._root, self._folder = folder, folder / SCENE
         self._millimeters = millimeters
         self._depth_scale = depth_scale
 
@@ -84,10 +84,21 @@ class BopLayout:
             for number, mask in _wide_silhouettes(view):
                 if number in cut:
                     _widen(infos[number], mask, view.camera)
-        return {"camera": self._camera(view.camera, scale), "gt": poses, "gt_info": list(infos.values())}
+        return {
+            "size": list(view.camera.size),
+            "camera": self._camera(view.camera, scale),
+            "gt": poses,
+            "gt_info": list(infos.values()),
+        }
 
     def write_index(self, views: Mapping[int, Any]) -> None:
-        """Write the cameras and annotations of all views."""
+        """Write the cameras and annotations of all views; `camera.json` has that of the first view."""
+        first = views[min(views)]
+        width, height = first["size"]
+        fx, _, cx, _, fy, cy, *_ = first["camera"]["cam_K"]
+        scale = first["camera"]["depth_scale"]
+        about = {"width": width, "height": height, "fx": fx, "fy": fy, "cx": cx, "cy": cy}
+        write_json(self._root / "camera.json", {**about, "depth_scale": scale})
         for key in ("camera", "gt", "gt_info"):
             write_json(
                 self._folder / f"scene_{key}.json", {str(number): view[key] for number, view in views.items()}

@@ -195,7 +195,7 @@ class _Writer:
         if not isinstance(record, dict) or not {"identity", "camera", "layouts"} <= record.keys():
             raise SceneError(f"{path}: is no record of a view; remove it")
         before = record["identity"]
-        if before is None or identity is None:
+        if not isinstance(before, dict) or identity is None:
             return None
         other = differences(before, identity)
         if other:
