@@ -309,3 +309,29 @@ def test_a_result_of_a_notebook_is_shown_once(tmp_path: Path) -> None:
     assert "<img" in material[0]["data"]["text/html"]
     assert [output["output_type"] for output in quiet] == ["execute_result"]
     assert updates[4] == []
+
+
+VIEW = """
+import wavefront as wf
+viewer = wf.view(wf.Sphere((0, 0, 0), 1), 4, lighting="studio", size=(32, 32), port=0)
+"""
+CLOSE = """
+import multiprocessing, threading
+viewer.wait_for_picture()
+viewer.close()
+names = [each.name for each in threading.enumerate()]
+print([name for name in names if "wavefront" in name], multiprocessing.active_children())
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")
+def test_a_viewer_of_a_notebook_is_shown_in_a_frame(tmp_path: Path) -> None:
+    """It does not wait; the kernel goes on, and nothing is left when it is closed."""
+    pytest.importorskip("viser")
+    (shown, closed), _ = executed([VIEW, CLOSE], tmp_path)
+    assert len(shown) == 1, shown
+    (frame,) = shown
+    assert "<iframe" in frame["data"]["text/html"]
+    assert 'src="http://127.0.0.1:' in frame["data"]["text/html"].replace("\n", "")
+    assert [output["text"] for output in closed] == ["[] []\n"]

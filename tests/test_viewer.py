@@ -26,7 +26,8 @@ from wavefront.viewer.shown import CHOICES, VIEWER_LAYERS, shown_codes
 from wavefront.viewer.viewpoint import Viewpoint
 
 viser = pytest.importorskip("viser")
-msgspec = pytest.importorskip("msgspec")  # comes with viser, as the next one
+msgspec = pytest.importorskip("msgspec")  # comes with viser, as the next ones
+zstandard = pytest.importorskip("zstandard")
 websockets = pytest.importorskip("websockets.sync.client")
 exceptions = pytest.importorskip("websockets.exceptions")
 
@@ -436,6 +437,19 @@ def test_a_page_moves_the_camera(viewer: wf.Viewer) -> None:
     client.socket.close()
 
 
+def test_a_page_gets_a_picture_at_once(viewer: wf.Viewer) -> None:
+    """It is there before the page has said how large it is."""
+    client = Client(viewer)
+    assert any(b"BackgroundImageMessage" in kinds(client.socket.recv(timeout=SOON)) for _ in range(10))
+    client.socket.close()
+
+
+def kinds(data: bytes) -> bytes:
+    """Return the messages of a window as they are before they are compressed."""
+    size = int.from_bytes(data[8:16], "little")
+    return zstandard.ZstdDecompressor().decompress(data[16 : 16 + size])
+
+
 def test_what_a_page_says_is_checked(viewer: wf.Viewer) -> None:
     """Cameras that are none change nothing, and other messages do nothing; the viewer goes on."""
     client = Client(viewer)
@@ -511,6 +525,22 @@ def test_a_viewer_that_is_closed_says_so() -> None:
     viewer.close()
     viewer.wait()
     assert repr(viewer) == f"<Viewer at {viewer.url}, closed>"
+
+
+SCRIPT = """
+import wavefront as wf
+viewer = wf.view(wf.Sphere((0, 0, 0), 1), 100_000, lighting="studio", port=0, open_browser=False, block=False)
+print("shown", flush=True)
+"""
+
+
+@pytest.mark.slow
+def test_a_script_that_ends_ends_its_viewer() -> None:
+    """Without a word, while the picture refines."""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", SCRIPT], capture_output=True, text=True, timeout=120
+    )
+    assert (done.stdout, done.stderr, done.returncode) == ("shown\n", "", 0)
 
 
 @pytest.mark.slow

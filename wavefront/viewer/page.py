@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import io
 import socket
 import threading
-from collections.abc import Callable
-from contextlib import redirect_stdout, suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import partial
 from html import escape
 from typing import Any
@@ -100,7 +99,7 @@ class Page:
             self._closed = True
             self._refresh()
         self._presenter.join()
-        with redirect_stdout(io.StringIO()):  # viser prints lines of its own
+        with _silence():
             self._server.stop()
         self._server._thread_executor.shutdown(wait=True)
 
@@ -237,8 +236,21 @@ def _serve(host: str, port: int) -> Any:
             free.bind(address)
     except (OSError, UnicodeError) as error:
         raise SceneError(f"the viewer cannot listen at host {host!r}: {error}") from error
-    with redirect_stdout(io.StringIO()):
+    with _silence():
         return viser.ViserServer(host, port, verbose=False)
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """Keep viser from printing lines of its own, by rich."""
+    import rich
+
+    console = rich.get_console()
+    before, console.quiet = console.quiet, True
+    try:
+        yield
+    finally:
+        console.quiet = before
 
 
 def _address(host: str) -> str:

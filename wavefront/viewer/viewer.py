@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import sys
 import threading
 import webbrowser
@@ -75,6 +76,7 @@ class Viewer:
             self._refiner.close()
             raise
         self.url = self._page.url
+        atexit.register(self.close)
         if self._latest is not None:
             self._page.show(self._latest)
 
@@ -137,6 +139,7 @@ class Viewer:
         if self._closed.is_set():
             return
         self._closed.set()
+        atexit.unregister(self.close)
         with self._news:
             self._news.notify_all()
         self._refiner.close()
@@ -249,7 +252,8 @@ def view(
 
 def _opened(scene: Scene, spp: int | None, host: str, port: int, settings: dict[str, Any]) -> Viewer:
     """Return a viewer of a scene with settings of `Session`."""
-    up = upward("up", settings.get("up") or "y")
+    up = settings.get("up")
+    up = upward("up", "y" if up is None else up)
     camera = choose_camera(scene, settings.get("camera"), settings.get("size"), up)
     viewpoint = Viewpoint.of(camera, scene.bounds, up)
     aovs = settings.pop("aovs", ())
