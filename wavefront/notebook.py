@@ -72,13 +72,14 @@ class LivePicture:
         """Show the last picture, if there was one before."""
         if self._handle is None or image is None:
             return
-        self._put(image)
-        self._last = image
+        if image is not self._last:
+            self._put(image)
         _shell().events.register("post_run_cell", self._cell_ended)
 
     def _put(self, image: Image) -> None:
         from IPython.display import display  # it is there: this program runs in its kernel
 
+        self._last = image
         if self._handle is None:
             self._handle = display(image, display_id=True)
         else:
@@ -89,10 +90,8 @@ class LivePicture:
         from IPython.display import HTML
 
         _shell().events.unregister("post_run_cell", self._cell_ended)
-        failed = result.error_in_exec
-        if result.result is self._last or (
-            failed is not None and getattr(failed, "image", None) is self._last
-        ):
+        shown = result.result, getattr(result.error_in_exec, "image", None)
+        if any(each is self._last for each in shown):
             self._handle.update(HTML(""))
 
 
