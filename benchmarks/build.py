@@ -15,7 +15,8 @@ import numpy as np
 import trimesh
 
 from wavefront.accel.build import build_tree
-from wavefront.accel.numpy_accel import WIDTH, leaf_size_for
+from wavefront.accel.numpy_accel import leaf_size_for
+from wavefront.accel.search import WIDTH
 
 f4 = np.float32
 

@@ -154,18 +154,18 @@ def mitsuba(scene: wf.Scene, max_bounces: int, sampler: str, variant: str, count
     return render
 
 
-def cycles(scene: wf.Scene, max_bounces: int, method: str, counts: tuple[int, ...]) -> Render:
+def cycles(scene: wf.Scene, max_bounces: int, method: str, python: str, counts: tuple[int, ...]) -> Render:
     """Return a renderer of Cycles, a process of a Python for each of some sample counts."""
     options = CYCLES.get(method, {})
-    made = {spp: Cycles(chosen.bpy_python, scene, spp, max_bounces, **options) for spp in counts}
+    made = {spp: Cycles(python, scene, spp, max_bounces, **options) for spp in counts}
     return lambda spp, seed: made[spp].picture()
 
 
-def renderer(side: str, scene: wf.Scene, subject: Subject) -> Render:
+def renderer(side: str, scene: wf.Scene, subject: Subject, bpy_python: str) -> Render:
     """Return the renderer of a side, called "wavefront embree sobol" or "scalar_rgb multijitter"."""
     *_, engine, method = side.split()
     if engine == "cycles":
-        return cycles(scene, subject.max_bounces, method, subject.spp)
+        return cycles(scene, subject.max_bounces, method, bpy_python, subject.spp)
     if side.startswith("wavefront"):
         return ours(scene, subject.max_bounces, method, engine)
     return mitsuba(scene, subject.max_bounces, method, engine, subject.spp)
@@ -187,7 +187,7 @@ def print_first(side: str, subject: Subject) -> None:
     """Print how long a first render takes in this process, the scene's arrays being there already."""
     scene, fewest = subject.build(), subject.spp[:1]
     begin = time.perf_counter()
-    renderer(side, scene, replace(subject, spp=fewest))(fewest[0], 0)
+    renderer(side, scene, replace(subject, spp=fewest), "")(fewest[0], 0)
     seconds = time.perf_counter() - begin
     if side.startswith("wavefront"):  # which this script has imported
         seconds += printed_by([sys.executable, "-c", IMPORT])
@@ -266,7 +266,7 @@ def measure(name: str, subject: Subject, options: argparse.Namespace) -> dict[st
     names = sides_of(subject, options)
     base = next(side for side in names if side.endswith("independent") and "rgb" in side)
     exact = reference(scene, subject, options.reference_spp, base.split()[0])
-    sides = {side: renderer(side, scene, subject) for side in names}
+    sides = {side: renderer(side, scene, subject, options.bpy_python) for side in names}
     for side, render in sides.items():  # warm up; Mitsuba may compile anew for each sample count
         for spp in subject.spp[:1] if side.startswith("wavefront") else subject.spp:
             render(spp, 0)
@@ -274,7 +274,8 @@ def measure(name: str, subject: Subject, options: argparse.Namespace) -> dict[st
     denoised = f"cycles {DENOISED}"
     if denoised in sides:
         counts = (options.reference_spp,)
-        converged[denoised] = cycles(scene, subject.max_bounces, "plain", counts)(counts[0], 0)
+        render = cycles(scene, subject.max_bounces, "plain", options.bpy_python, counts)
+        converged[denoised] = render(counts[0], 0)
     found: dict[str, Any] = {side: {"errors": [], "blurred": [], "seconds": []} for side in sides}
     for spp in subject.spp:
         rows: dict[str, list[tuple[float, ...]]] = {side: [] for side in sides}

@@ -42,17 +42,17 @@ class Counted:
 
     def __init__(self) -> None:
         self.built = self.started = 0
-        self._build, self._start = cache.make_accelerator, processes.ForkedWorkers
+        self._build, self._start = cache.make_accelerator, processes.forked_workers
         cache.make_accelerator = self._count_build
-        processes.ForkedWorkers = self._count_start  # type: ignore[assignment,misc]
+        processes.forked_workers = self._count_start
 
     def _count_build(self, *given: Any) -> Any:
         self.built += 1
         return self._build(*given)
 
-    def _count_start(self, work: Any, count: int, stop: Any) -> Any:
+    def _count_start(self, work: Any, count: int, strict: bool) -> Any:
         self.started += count
-        return self._start(work, count, stop)
+        return self._start(work, count, strict)
 
 
 def main() -> None:
