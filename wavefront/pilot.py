@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .camera import Camera
 from .compile.scene import CompiledScene
@@ -164,8 +165,13 @@ def _addresses(camera: Camera, first: int, count: int) -> tuple[Words, Words]:
     """Return pixels and samples (count,): all pixels in turn, or few that are spread over the picture."""
     pixels = np.uint64(camera.size[0] * camera.size[1])
     number = np.arange(first, first + count, dtype=np.uint64)
-    pixel = number % pixels if pixels <= PATHS else number * GOLDEN % pixels
-    return pixel.astype(np.uint32), (number // pixels).astype(np.uint32)
+    pixel = (number % pixels).astype(np.uint32) if pixels <= PATHS else spread_pixels(camera, number)
+    return pixel, (number // pixels).astype(np.uint32)
+
+
+def spread_pixels(camera: Camera, number: NDArray[np.uint64]) -> Words:
+    """Return pixels (k,) for numbers (k,), so that consecutive numbers are spread over the picture."""
+    return (number * GOLDEN % np.uint64(camera.size[0] * camera.size[1])).astype(np.uint32)
 
 
 def _none() -> Vertices:

@@ -48,8 +48,8 @@ def render(
     seconds: float | None = None,
     filter: str | Filter = "box",
     light_sampler: str | LightSamplerMaker = "spatial",
-    branches: int = 1,
-    guide: bool = False,
+    branches: int | str = 1,
+    guide: bool | str = False,
     clamp: float | None = None,
     wave_size: int | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
@@ -131,14 +131,15 @@ def render(
         How one light of many is chosen at a point: "spatial" weighs what each brings there, "power"
         its power alone, "uniform" nothing.
     branches
-        In how many ways the path of a sample goes on from the first surface, at most 64; only "full"
-        has any. Two to four make a sample dearer, but less noisy by more where most of the noise is in
-        indirect light, as in a room.
+        In how many ways the path of a sample goes on from the first surface, at most 64; only "full" has any.
+        Two to four make a sample dearer, but less noisy by more where most of the noise is in indirect light,
+        as in a room. "auto" finds out by a trial of 65536 paths whether two to four pay.
     guide
-        Learn from a pilot of 262144 paths where light comes from, and choose directions by that; only
-        "full" can be guided. It takes a second or two, and pays where light comes through narrow openings
-        or several reflections: docs/guiding.md has figures. The pilot depends on the scene, the camera
-        and the seed alone.
+        Learn from a pilot of 262144 paths where light comes from, and choose directions by that; only "full"
+        can be guided. It takes a second or two, and pays where light comes through narrow openings or several
+        reflections: docs/guiding.md has figures. The pilot depends on the scene, the camera and the seed
+        alone. "auto" guides only where a trial of 131072 paths says that it pays; `metadata["guided"]` says
+        what it found.
     clamp
         The most that a path may find as indirect light at once, as radiance, the mean of its channels; what
         is brighter is scaled down. It removes fireflies, and with them light: the picture gets too dark. The

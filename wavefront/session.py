@@ -22,6 +22,7 @@ from .compile.scene import compile_scene
 from .errors import RenderError, SceneError, warn_caller
 from .filters import FILTERS, Filter
 from .geometric_layers import IDS, ShapeTable, geometric_layers
+from .guiding import GuideTable
 from .image import Image
 from .integrators import INTEGRATORS, WITH_MIS, Integrator, li_naive
 from .layers import BOXES, geometric_names
@@ -58,8 +59,9 @@ from .scheduling.pool import WorkerPool
 from .scheduling.scheduler import Scheduler
 from .scheduling.shared import STOP
 from .scheduling.tracing import Tracer, WaveMonitor, trace_job
-from .settings import Settings, check_camera
+from .settings import AUTO, Settings, check_camera
 from .suggestions import suggests_keywords
+from .trial import Trial, is_worth_it, run_trial
 from .version import VERSION
 
 SNAPSHOT_INTERVAL = 1.0  # seconds between two pictures of a long pass
@@ -133,8 +135,8 @@ class Session:
         seconds: float | None = None,
         filter: str | Filter = "box",
         light_sampler: str | LightSamplerMaker = "spatial",
-        branches: int = 1,
-        guide: bool = False,
+        branches: int | str = 1,
+        guide: bool | str = False,
         clamp: float | None = None,
         wave_size: int | None = None,
         checkpoint: str | os.PathLike[str] | None = None,
@@ -227,14 +229,41 @@ class Session:
         self._begin_picture(camera, self._new_accumulator(camera), begin)
 
     def _estimator(self, camera: Camera) -> Integrator:
-        """Return the integrator; a guide is trained for the camera."""
+        """Return the integrator; what is to be learned or decided is, for the camera."""
         settings = self._settings
-        if not settings.guide:
-            return settings.estimator()
+        self._branches, self._guided = 1 if settings.branches == AUTO else int(settings.branches), False
+        if not settings.decides:
+            return settings.estimator(None, self._branches)
         with phase("learning where light comes from", settings.progress), single_threaded_blas:
-            sampler = settings.pilot_sampler(camera.film[0])
-            table = train(self._compiled, self._compiled.view(camera), sampler, settings.max_bounces)
-        return settings.estimator(table)
+            view, width = self._compiled.view(camera), camera.film[0]
+            table = None
+            if settings.guide:
+                sampler = settings.pilot_sampler(width)
+                table = train(self._compiled, view, sampler, settings.max_bounces)
+            table = self._decide(view, width, table)
+        self._guided = table is not None
+        return settings.estimator(table, self._branches)
+
+    def _decide(self, view: Camera, width: int, table: GuideTable | None) -> GuideTable | None:
+        """Decide about what is "auto": the number of branches, and whether a table is used."""
+        settings = self._settings
+        samplers = settings.pilot_sampler(width, 1), settings.pilot_sampler(width, 2)
+
+        def trial(guided_by: GuideTable | None) -> Trial:
+            return run_trial(self._compiled, view, samplers, settings.max_bounces, guided_by)
+
+        fixed = None if settings.branches == AUTO else self._branches
+        if settings.guide == AUTO and table is not None:
+            guided, plain = trial(table), trial(None)
+            pays = is_worth_it(guided, plain, fixed)
+            found, table = (guided, table) if pays else (plain, None)
+        elif fixed is None:
+            found = trial(table)
+        else:
+            return table
+        if fixed is None:
+            self._branches = found.best_ways()
+        return table
 
     def _make_pool(self, executor: str | ExecutorLike) -> None:
         """Make a pool of workers, which start with the first job."""
@@ -272,7 +301,7 @@ class Session:
             if earlier.pixels is not None:
                 begun = Pass(earlier.pixels, earlier.state["first"], settings.max_spp)
         scheduler = Scheduler(
-            begin, settings.seconds, self._budget.wave_size, self._budget.workers, settings.branches
+            begin, settings.seconds, self._budget.wave_size, self._budget.workers, self._branches
         )
         self._loop = RenderLoop(
             View(view, scheduler.deadline, settings.first_sample),
@@ -416,7 +445,7 @@ class Session:
             others = (executor, self._executor) == ("processes", "threads")
             others |= budget.workers != self._budget.workers
             self._budget = budget
-            if self._monitor.stop.value or others or settings.guide:
+            if self._monitor.stop.value or others or settings.decides:
                 self._pool.close()
                 self._tracer.integrator = self._estimator(camera)
                 self._make_pool(executor)
@@ -593,7 +622,7 @@ class Session:
             tracer.sampler(camera.film[0]),
             tracer.filter,
             tracer.max_bounces,
-            settings.branches,
+            self._branches,
             light_samples=integrator is not li_naive,
             mis=integrator in WITH_MIS,
         )
@@ -654,8 +683,9 @@ class Session:
             "sampler": SAMPLERS.label(settings.sampler),
             "sample_ranges": [[first, first + most]],
             "filter": FILTERS.label(settings.filter),
-            "branches": settings.branches,
+            "branches": self._branches,
             "guide": settings.guide,
+            "guided": self._guided,
             "clamp": settings.clamp,
             "accelerator": self._compiled.accelerator.name,
             "workers": self._budget.workers,

@@ -39,6 +39,8 @@ from .vec import Floats, f4
 DEFAULT_SPP = 100
 MAX_BRANCH_SAMPLES = 2**32  # a sample's index is 32 bits of its address, and each branch has one
 MAX_BRANCHES = 64
+AUTO = "auto"
+MOST_AUTO = 4  # branches that "auto" may choose
 PILOT = 0x5EED_0F_9417D  # the seed of the pilot is that of the picture XOR this
 MAX_SPP_FOR_NOISE = 2**16  # where only `noise` was given
 
@@ -102,6 +104,25 @@ def whole_number(low: int, high: int) -> SettingCheck:
         return int(value)
 
     return check
+
+
+def auto_or(check: SettingCheck) -> SettingCheck:
+    """Return a check that lets "auto" pass."""
+
+    def check_other(name: str, value: Any) -> Any:
+        try:
+            return value if isinstance(value, str) and value == AUTO else check(name, value)
+        except SceneError as error:
+            raise SceneError(f"{error}, or {AUTO!r}") from None
+
+    return check_other
+
+
+def check_flag(name: str, value: Any) -> bool:
+    """Check that something is True or False."""
+    if not isinstance(value, bool | np.bool_):
+        raise SceneError(f"{name} is {value!r}; it must be True or False")
+    return bool(value)
 
 
 def above_zero(name: str, value: Any) -> float:
@@ -297,21 +318,24 @@ class Settings:
         option="how one light of many is chosen",
         choices=LIGHT_SAMPLERS,
     )
-    branches: int = setting(
+    branches: int | str = setting(
         1,
         "In how many ways the path of a sample goes on from the first surface, at most 64; only "
         '"full" has any. Two to four make a sample dearer, but less noisy by more where most of the '
-        "noise is in indirect light, as in a room.",
-        option="ways a path goes on from its first surface",
-        check=whole_number(1, MAX_BRANCHES),
+        'noise is in indirect light, as in a room. "auto" finds out by a trial of 65536 paths whether two to '
+        "four pay.",
+        option="ways a path goes on from its first surface, or auto",
+        check=auto_or(whole_number(1, MAX_BRANCHES)),
     )
-    guide: bool = setting(
+    guide: bool | str = setting(
         False,
         "Learn from a pilot of 262144 paths where light comes from, and choose directions by that; only "
         '"full" can be guided. It takes a second or two, and pays where light comes through narrow openings '
         "or several reflections: docs/guiding.md has figures. The pilot depends on the scene, the camera and "
-        "the seed alone.",
+        'the seed alone. "auto" guides only where a trial of 131072 paths says that it pays; '
+        '`metadata["guided"]` says what it found.',
         option="learn where light comes from, for scenes with much indirect light",
+        check=auto_or(check_flag),
     )
     clamp: float | None = setting(
         None,
@@ -425,29 +449,42 @@ class Settings:
         """Samples that every pixel gets; None where noise or time decides."""
         return self.max_spp if self.noise is None and self.seconds is None else None
 
-    def estimator(self, table: GuideTable | None = None) -> Integrator:
+    def estimator(self, table: GuideTable | None = None, branches: int = 1) -> Integrator:
         """Return the integrator for paths with so many branches, guided by a table."""
         integrator = INTEGRATORS.find(self.integrator)
-        if self.branches == 1 and not self.guide:
-            return integrator
         if integrator is not li_full:
             label = INTEGRATORS.label(self.integrator)
-            if self.guide:
+            if self.guide is True:
                 raise SceneError(f"guide is {self.guide}; with integrator={label!r} it must be False")
-            raise SceneError(f"branches is {self.branches}; with integrator={label!r} it must be 1")
-        return partial(li_full, branches=self.branches, table=table)
+            if self.branches not in (1, AUTO):
+                raise SceneError(f"branches is {self.branches}; with integrator={label!r} it must be 1")
+            return integrator
+        if branches == 1 and table is None:
+            return integrator
+        return partial(li_full, branches=branches, table=table)
+
+    @property
+    def most_branches(self) -> int:
+        """Branches that a path may have."""
+        return MOST_AUTO if isinstance(self.branches, str) else self.branches
+
+    @property
+    def decides(self) -> bool:
+        """Whether a trial or a pilot comes before each picture."""
+        full = INTEGRATORS.find(self.integrator) is li_full
+        return full and (bool(self.guide) or self.branches == AUTO)
 
     def sampler_maker(self) -> Callable[[int], Sampler]:
         """Return what makes the sampler of a picture so many pixels wide."""
         return partial(make_sampler, SAMPLERS.find(self.sampler), self.seed)
 
-    def pilot_sampler(self, width: int) -> Sampler:
-        """Return the sampler of the pilot of path guiding, whose numbers the picture does not use."""
-        return make_sampler(self.sampler, self.seed ^ PILOT, width)
+    def pilot_sampler(self, width: int, number: int = 0) -> Sampler:
+        """Return the sampler of the pilot or of a block of the trial, with numbers of their own."""
+        return make_sampler(self.sampler, (self.seed ^ PILOT) + number, width)
 
     def executor_for(self, size: tuple[int, int]) -> str | ExecutorLike:
         """Return the executor for a picture of a size (width, height)."""
-        paths = size[0] * size[1] * self.max_spp * self.branches
+        paths = size[0] * size[1] * self.max_spp * self.most_branches
         return choose_executor(self.executor, self.worker_count, paths)
 
     def budget(self, size: tuple[int, int], layers: Sequence[str] = ()) -> Budget:
@@ -456,7 +493,7 @@ class Settings:
         return plan(self.memory_limit, size, self.worker_count, self.wave_size, processes, layers)
 
     def _most_samples(self) -> int:
-        most = min(MAX_TERMS, MAX_BRANCH_SAMPLES // self.branches)
+        most = min(MAX_TERMS, MAX_BRANCH_SAMPLES // self.most_branches)
         if self.samples is not None:
             return self._chosen_samples(self.samples, most)
         if self.spp is not None:

@@ -146,3 +146,8 @@ def _finite(text: str) -> float:
     if not np.isfinite(number):
         raise argparse.ArgumentTypeError(f"{text!r} is not a finite number")
     return number
+
+
+def branches(text: str) -> int | str:
+    """Return a number of branches, or "auto"."""
+    return text if text == "auto" else int(text)
