@@ -4,11 +4,13 @@ Build it with `sphinx-build -W -c docs . build/site`: the source folder is that 
 between the documents, README.md and CONTRIBUTING.md are the same there and on the site.
 """
 
+import os
 import re
 import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+os.environ["TQDM_DISABLE"] = "1"  # no progress bars in what the tutorial prints
 sys.path[:0] = [str(ROOT), str(ROOT / "docs")]
 
 from wavefront.version import VERSION  # noqa: E402
@@ -28,7 +30,7 @@ extensions = [
 ]
 root_doc = "docs/index"
 include_patterns = ["docs/**", "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "benchmarks/README.md"]
-exclude_patterns = [".*", ".*/**", "build/**", "docs/tutorial/**", "docs/_templates/**"]
+exclude_patterns = [".[!.]*", ".[!.]*/**", "build/**", "docs/tutorial/**", "docs/_templates/**"]
 exclude_patterns += [f"docs/generated/**/*.{ending}" for ending in ("py", "ipynb", "zip")]
 templates_path = [str(ROOT / "docs" / "_templates")]
 default_role = "py:obj"
