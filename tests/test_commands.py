@@ -291,6 +291,15 @@ def test_doctor_says_what_is_there_and_tests_it() -> None:
     assert re.search(r"speed, numpy: \d+\.\d\d million rays per second", done.stdout)
 
 
+def test_the_room_is_as_described() -> None:
+    scene = self_test.timed_room()
+    (mesh,) = (shape for shape in scene.shapes if shape.name == "mesh")
+    assert f" {len(mesh.faces)} triangles" in self_test.ROOM
+    width, height = scene.camera.size
+    assert f" {width}x{height} pixels" in self_test.ROOM
+    assert sum(shape.emission is not None for shape in scene.shapes) == 1
+
+
 def test_doctor_gives_1_when_a_test_fails(monkeypatch, capsys) -> None:
     gray = wf.Diffuse(0.99)
     monkeypatch.setattr(self_test, "Diffuse", lambda reflectance: gray)

@@ -63,7 +63,7 @@ def _doctor(options: argparse.Namespace) -> int:
         print(line, flush=True)
     if not options.seconds > 0:
         return 0
-    from .self_test import check_furnace, check_workers, measure_speeds
+    from .self_test import ROOM, check_furnace, check_workers, measure_speeds
 
     print("Test", flush=True)
     workers = worker_count(None)
@@ -71,9 +71,7 @@ def _doctor(options: argparse.Namespace) -> int:
     results += measure_speeds(max(1.0, options.seconds - CHECKS_TAKE), workers)
     for result in results:
         print(f"  {'passed' if result.passed else 'FAILED'}  {result.name}: {result.text}")
-    print(
-        "  Speeds are of a room with 16 384 triangles, one sphere of glass and one light, in 256x256 pixels."
-    )
+    print(f"  Speeds are of {ROOM}.")
     print("  Rays to surfaces and to lights count alike. Other scenes have other speeds.")
     return 0 if all(result.passed for result in results) else FAULT
 
