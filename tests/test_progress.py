@@ -2,9 +2,11 @@
 
 import threading
 import time
+from functools import partial
 
 import pytest
 import scenes
+from tqdm import tqdm
 
 import wavefront as wf
 from wavefront import progress as module
@@ -35,6 +37,19 @@ def test_a_bar_of_time_counts_seconds(capsys) -> None:
         assert "4/10 s" in capsys.readouterr().err
         bar.advance(100, 11)
     assert "10/10 s" in capsys.readouterr().err
+
+
+def test_a_bar_may_be_disabled_by_the_environment(monkeypatch, capsys) -> None:
+    """TQDM_DISABLE, which tqdm reads when it is imported, stands for an argument."""
+    monkeypatch.setattr("tqdm.tqdm", partial(tqdm, disable=True))
+    monkeypatch.setattr(module, "DELAY", 0.0)
+    monkeypatch.setattr(threading, "excepthook", lambda failure: pytest.fail(str(failure)))
+    with Bar(None, 1000, None) as bar:
+        bar.advance(100, DELAY + 1)
+        bar.wait(3, DELAY + 10)
+    with phase("loading"):
+        time.sleep(0.2)
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize("seconds", [None, 20.0])

@@ -74,7 +74,8 @@ class Bar:
         if self._timed:
             style = {"bar_format": "{l_bar}{bar}| {n:.0f}/{total:.0f} s{postfix}"}
         bar = tqdm(total=self._total, initial=self._done, unit="sample", **style)
-        bar.start_t -= elapsed
+        if not bar.disable:  # by the environment variable TQDM_DISABLE
+            bar.start_t -= elapsed
         return bar
 
 
@@ -114,6 +115,7 @@ def _show(title: str, ended: threading.Event) -> None:
     from tqdm import tqdm  # as above
 
     with tqdm(desc=title, bar_format="{desc}: {elapsed}") as line:
-        line.start_t -= time.monotonic() - start
+        if not line.disable:
+            line.start_t -= time.monotonic() - start
         while not ended.wait(TICK):
             line.refresh()
