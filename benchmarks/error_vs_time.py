@@ -11,10 +11,10 @@ Cycles has a sphere of 20 480 triangles in place of each ball. The reference is 
 renders, one of wavefront and one of Mitsuba, weighted by their noise, whose means are compared first.
 A denoised picture of Cycles is compared with its own converged picture. Printed are, for each side:
 
-- error and wall time at each sample count, warm: medians over the repeats, the sides in turn. The scene of
-  Mitsuba and Cycles is loaded once, beforehand; a render of wavefront includes setting up its scene and
-  training a guide, but what rays are traced with, which stays with the scene, has been built by the render
-  before;
+- error and wall time at each sample count (with four branches a fourth of it), warm: medians over the
+  repeats, the sides in turn. The scene of Mitsuba and Cycles is loaded once, beforehand; a render of
+  wavefront includes setting up its scene and training a guide, but what rays are traced with, which stays
+  with the scene, has been built by the render before;
 - the mean of the pictures of most samples over that of the reference;
 - what a fresh process takes besides, once: importing the renderer, loading the scene, compiling. It is
   the time of a process of its own, with an empty cache of compiled kernels, less that of a warm render;
@@ -134,9 +134,10 @@ def ball(subdivisions: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def ours(scene: wf.Scene, max_bounces: int, method: str, accel: str) -> Render:
-    """Return a renderer of this project."""
+    """Return a renderer of this project; four branches of a path count as four samples."""
     options = {"accel": accel, "max_bounces": max_bounces, "progress": False, **METHODS[method]}
-    return lambda spp, seed: wf.render(scene, spp, seed=seed, **options).rgb
+    branches = options.get("branches", 1)
+    return lambda spp, seed: wf.render(scene, max(1, spp // branches), seed=seed, **options).rgb
 
 
 def mitsuba(scene: wf.Scene, max_bounces: int, sampler: str, variant: str, counts: tuple[int, ...]) -> Render:

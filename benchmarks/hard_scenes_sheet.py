@@ -1,10 +1,11 @@
 """A sheet of the hard scenes at equal time: plain, guided with four branches, Mitsuba and Cycles.
 
-python benchmarks/hard_scenes_sheet.py --bpy-python PATH [--seconds 4] [--size 256] [--out sheet.png]
+python benchmarks/hard_scenes_sheet.py --bpy-python PATH [--seconds 4] [--size 128] [--out sheet.png]
 
-The sample counts follow from the times of renders of 2 and 16 samples per pixel; the time of training a
-guide counts. A picture is the second one that its side draws, so that Mitsuba has compiled its kernels.
-`--spp 93,10,200,50` gives the counts of the four sides instead, for a machine too busy to measure times.
+The sample counts follow from the times of renders of 4 and 16 paths per pixel, branches counted; the time of
+training a guide counts. A picture is the second one that its side draws, so that Mitsuba has compiled
+its kernels.
+`--spp 93,40,196,50` gives the counts of the four sides instead, for a machine too busy to measure times.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+import PIL.Image
 from error_vs_time import Render, Subject, renderer
 from hard_scenes import HARD_SCENES
 
@@ -37,7 +39,7 @@ TITLES = {
     "window": "sky through a window",
     "corridor": "corridor, glossy floor",
 }
-PROBES = (2, 16)  # samples per pixel
+PROBES = (4, 16)  # paths per pixel
 BRIGHTNESS = 0.2  # mean of a picture as it is shown
 
 
@@ -63,28 +65,30 @@ def at_equal_time(of: Callable[..., Render], seconds: float) -> tuple[np.ndarray
     per_sample = max(many - few, 1e-3) / (PROBES[1] - PROBES[0])
     spp = max(1, PROBES[0] + round((seconds - few) / per_sample))
     taken, picture = timed(of(spp), spp)
-    return picture, f"{spp} spp, {taken:.1f} s"
+    return picture, f"{spp} paths, {taken:.1f} s"
 
 
 def main(options: argparse.Namespace) -> None:
     """Render all pictures and draw the sheet."""
     counts = [int(count) for count in options.spp.split(",")] if options.spp else [0] * len(SIDES)
     figure, axes = plt.subplots(
-        len(HARD_SCENES), len(SIDES), figsize=(2.6 * len(SIDES), 2.8 * len(HARD_SCENES)), squeeze=False
+        len(HARD_SCENES), len(SIDES), figsize=(1.7 * len(SIDES), 1.8 * len(HARD_SCENES)), squeeze=False
     )
     for row, name in zip(axes, HARD_SCENES, strict=True):
         scale = None
         for axis, (title, side), spp in zip(row, SIDES.items(), counts, strict=True):
             of = drawer(name, side, options)
-            picture, line = (of(spp)(spp, 1), f"{spp} spp") if spp else at_equal_time(of, options.seconds)
+            picture, line = (of(spp)(spp, 1), f"{spp} paths") if spp else at_equal_time(of, options.seconds)
             scale = scale or BRIGHTNESS / picture.mean()  # one exposure for a scene
             axis.imshow(wf.Image(picture * scale, 1).to_uint8())
-            axis.set_title(f"{title}\n{line}", fontsize=8)
+            axis.set_title(f"{title}\n{line}", fontsize=6.5)
             axis.set(xticks=[], yticks=[])
             print(f"{name:10}{title:24}{line}", flush=True)
-        row[0].set_ylabel(TITLES[name], fontsize=9)
+        row[0].set_ylabel(TITLES[name], fontsize=7)
     figure.tight_layout()
     figure.savefig(options.out, dpi=100)
+    with PIL.Image.open(options.out) as drawn:  # noise compresses badly: 128 colors make a fourth of the size
+        drawn.convert("RGB").quantize(128).save(options.out, optimize=True)
     print(f"wrote {options.out}")
 
 
@@ -95,6 +99,6 @@ if __name__ == "__main__":
     parser.add_argument("--bpy-python", required=True, help="a Python that has bpy, for Cycles")
     parser.add_argument("--seconds", type=float, default=4.0, help="of each picture")
     parser.add_argument("--spp", help="sample counts of the four sides, in place of --seconds")
-    parser.add_argument("--size", type=int, default=256)
+    parser.add_argument("--size", type=int, default=128)
     parser.add_argument("--out", type=Path, default=Path("hard_scenes.png"))
     main(parser.parse_args())
