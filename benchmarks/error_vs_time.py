@@ -66,6 +66,7 @@ METHODS: dict[str, dict[str, Any]] = {  # settings of `wf.render` by what a side
     "sobol/4": {"branches": 4},
     GUIDED: {"guide": True},
     "guided/4": {"guide": True, "branches": 4},
+    "auto": {"guide": "auto", "branches": "auto"},
     DENOISED: {"denoise": True},
 }
 CYCLES = {DENOISED: {"denoise": True}, GUIDED: {"guide": True}}
@@ -136,7 +137,7 @@ def ball(subdivisions: int) -> tuple[np.ndarray, np.ndarray]:
 def ours(scene: wf.Scene, max_bounces: int, method: str, accel: str) -> Render:
     """Return a renderer of this project; four branches of a path count as four samples."""
     options = {"accel": accel, "max_bounces": max_bounces, "progress": False, **METHODS[method]}
-    branches = options.get("branches", 1)
+    branches = 4 if method.endswith("/4") else 1
     return lambda spp, seed: wf.render(scene, max(1, spp // branches), seed=seed, **options).rgb
 
 
@@ -341,6 +342,7 @@ LINES = {
     "sobol/4": "-.",
     GUIDED: (0, (5, 1)),
     "guided/4": (0, (5, 1, 1, 1)),
+    "auto": (0, (3, 1)),
     DENOISED: (0, (1, 1)),
 }
 
@@ -391,7 +393,7 @@ def subjects(options: argparse.Namespace) -> dict[str, Subject]:
         "mesh": Subject(lambda: mesh_scene(options.data, size), 7, spp, methods, "sobol"),
         "lights": Subject(lambda: lit("panels", 1000, size), 3, spp, methods, "sobol"),
     }
-    hard = ("sobol", "sobol/4", GUIDED, "guided/4")
+    hard = ("sobol", GUIDED, "guided/4")
     for name, build in HARD_SCENES.items():
         found[name] = Subject(partial(build, size), 12, (16, 64, 256), hard, "guided/4", GUIDED)
     if options.spp:
