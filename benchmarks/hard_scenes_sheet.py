@@ -40,7 +40,7 @@ TITLES = {
     "corridor": "corridor, glossy floor",
 }
 PROBES = (4, 16)  # paths per pixel
-BRIGHTNESS = 0.2  # mean of a picture as it is shown
+BRIGHTNESS = 0.4  # mean of a picture as it is shown
 
 
 def timed(render: Render, spp: int) -> tuple[float, np.ndarray]:
