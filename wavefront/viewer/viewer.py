@@ -15,6 +15,7 @@ from ..image import Image
 from ..notebook import in_kernel
 from ..renderable import as_scene, choose_camera
 from ..scene import Scene
+from ..scheduling.executors import choose_executor, needs_pickling, worker_count
 from ..session import Session
 from .refiner import Refiner, ViewerFrame
 from .shown import VIEWER_LAYERS
@@ -259,7 +260,18 @@ def _opened(scene: Scene, spp: int | None, host: str, port: int, settings: dict[
     aovs = settings.pop("aovs", ())
     wanted = (*((aovs,) if isinstance(aovs, str) else aovs), *VIEWER_LAYERS)
     settings = {**settings, "camera": viewpoint.camera, "size": None, "aovs": wanted, "progress": False}
+    if settings.get("executor") is None:
+        settings["executor"] = _executor(settings.get("workers"), (spp or SPP) * viewpoint.pixels)
     return Viewer(Session(scene, spp, **settings), viewpoint, host, port, spp)
+
+
+def _executor(workers: int | None, paths: int) -> str | None:
+    """Choose an executor before there are other threads, so that it need not be chosen anew for each view.
+
+    None leaves the choice to the session, where it depends on whether the scene can be pickled.
+    """
+    chosen = choose_executor(None, worker_count(workers), paths)
+    return chosen if isinstance(chosen, str) and not needs_pickling(chosen) else None
 
 
 def _check_viser() -> None:
