@@ -20,6 +20,7 @@ import numpy as np
 
 from .compile.scene import CompiledScene
 from .guiding import GuideTable
+from .pixel_tiles import WaveTiles
 from .registry import Registry
 from .sample_recorder import add_to_slots
 from .sampling.sampler import Sampler
@@ -33,6 +34,7 @@ from .stages.interaction import interaction
 from .stages.intersect import intersect
 from .stages.medium import absorb
 from .stages.normal_mapping import perturb_normals
+from .stages.reuse import add_shared, as_shared, can_reuse, shared_points
 from .stages.shade import Shading, direct, emitted, mis_weighted, shading
 from .state import Contribution, Hits, Paths
 from .vec import Floats, Ints, f4, take
@@ -106,6 +108,62 @@ def li_full(
         paths = branch(paths, shade, sampler, bounce, ways=branches if bounce == 0 else 1)
         paths = select(paths, roulette(paths, sampler, bounce, branches))
     return L
+
+
+def li_reuse(
+    scene: CompiledScene,
+    paths: Paths,
+    sampler: Sampler,
+    max_bounces: int,
+    branches: int = 1,
+    table: GuideTable | None = None,
+) -> Floats:
+    """Estimate what `li_full` does; pixels share what their paths find after their second points.
+
+    Direct light at the first points, and emission that paths meet at their second ones, stay each path's own.
+    """
+    if not can_reuse(scene):
+        return li_full(scene, paths, sampler, max_bounces, branches, table)
+    L = np.zeros((3, len(paths)), f4)
+    tiles = WaveTiles.of(paths.pixel, paths.sample, sampler.width)
+    first, hits = intersect_and_compact(scene, paths, sampler, 0, L, mis=True)
+    if max_bounces == 0 or not len(first):
+        return L
+    shade = guide(prepare_shading(scene, first, hits), table)
+    accumulate(L, first, direct(scene, first, shade, sampler, 0, mis=True))
+    paths = branch(first, shade, sampler, 0, ways=branches)
+    paths = select(paths, roulette(paths, sampler, 0, branches))
+    paths, hits = intersect_and_compact(scene, paths, sampler, 1, L, mis=True)
+    if max_bounces == 1 or not len(paths):
+        return L
+    lanes, points = shared_points(scene, paths, hits, branches)
+    own = np.setdiff1d(np.arange(len(paths)), lanes, assume_unique=True)
+    shared, light = as_shared(paths.take(lanes)), np.zeros((3, lanes.size), f4)
+    _follow(scene, paths.take(own), hits.take(own), sampler, max_bounces, L, branches, table)
+    _follow(scene, shared, hits.take(lanes), sampler, max_bounces, light, branches, table)
+    add_shared(scene, L, first, shade, points, light, tiles, branches)
+    return L
+
+
+def _follow(
+    scene: CompiledScene,
+    paths: Paths,
+    hits: Hits,
+    sampler: Sampler,
+    max_bounces: int,
+    L: Floats,
+    branches: int,
+    table: GuideTable | None,
+) -> None:
+    """Add to L what paths find that have come to their second surfaces, and not been shaded there."""
+    for bounce in range(1, max_bounces):
+        if not len(paths):
+            return
+        shade = guide(prepare_shading(scene, paths, hits), table)
+        accumulate(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
+        paths = bounce_sample(paths, shade, sampler, bounce)
+        paths = select(paths, roulette(paths, sampler, bounce, branches))
+        paths, hits = intersect_and_compact(scene, paths, sampler, bounce + 1, L, mis=True)
 
 
 WITH_MIS: tuple[Integrator, ...] = (li_direct_mis, li_full)  # weigh light samples against BSDF samples

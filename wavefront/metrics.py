@@ -16,6 +16,7 @@ from .codecs.png_jpeg import EXTENSIONS
 from .errors import SceneError
 from .film import EPSILON, batch_size
 from .image import Image
+from .pixel_tiles import MEMBERS
 from .samples import shared_samples
 from .significance import Estimate, estimate, significance
 from .vec import Doubles, Ints
@@ -86,7 +87,9 @@ def compare(a: Picture, b: Picture) -> Comparison:
     mean that is the least likely one; it is corrected for their number, so a picture of any size has one
     in a hundred below 0.01. They need two rendered pictures with at least two samples per pixel and their
     standard errors, that share no samples: with the same seed and sampler the samples must not overlap.
-    Otherwise they are None, and `p_absent` says why. Sources are in `wavefront/significance.py`.
+    Otherwise they are None, and `p_absent` says why. Of pictures with `reuse=True`, whose pixels share noise,
+    those of blocks and of the mean allow for that, and so find less. Sources are in
+    `wavefront/significance.py`.
 
     FLIP needs `pip install flip-evaluator`. For two pictures of 8 bits it is LDR-FLIP, else
     HDR-FLIP (P. Andersson et al., FLIP, 2020, and Visualizing Errors in Rendered High Dynamic Range
@@ -210,7 +213,8 @@ def _estimate(picture: Image | ArrayLike, mean: Doubles) -> Estimate:
     assert picture.standard_error is not None
     squared_error = np.square(picture.standard_error, dtype=np.float64)
     variance = None if picture.variance is None else picture.variance.astype(np.float64)
-    return estimate(mean, squared_error, variance, _batches(picture.counts), picture.counts)
+    sharing = MEMBERS if picture.metadata.get("reuse") else 1
+    return estimate(mean, squared_error, variance, _batches(picture.counts), picture.counts, sharing)
 
 
 def _batches(counts: Ints) -> Ints:

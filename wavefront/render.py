@@ -50,6 +50,7 @@ def render(
     light_sampler: str | LightSamplerMaker = "spatial",
     branches: int | str = 1,
     guide: bool | str = False,
+    reuse: bool = False,
     clamp: float | None = None,
     wave_size: int | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
@@ -140,6 +141,10 @@ def render(
         reflections: docs/guiding.md has figures. The pilot depends on the scene, the camera and the seed
         alone. "auto" guides only where a trial of 131072 paths says that it pays; `metadata["guided"]` says
         what it found.
+    reuse
+        Share paths among pixels: what a path finds from its second surface on counts for sixteen pixels that
+        lie a little apart; only "full" does so. It pays where most of the noise is in indirect light between
+        matte surfaces. The errors of these pixels depend on each other then: docs/reuse.md has figures.
     clamp
         The most that a path may find as indirect light at once, as radiance, the mean of its channels; what
         is brighter is scaled down. It removes fireflies, and with them light: the picture gets too dark. The
@@ -226,6 +231,7 @@ def render(
         light_sampler=light_sampler,
         branches=branches,
         guide=guide,
+        reuse=reuse,
         clamp=clamp,
         wave_size=wave_size,
         checkpoint=checkpoint,

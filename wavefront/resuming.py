@@ -30,7 +30,7 @@ NAMED: dict[str, Registry[Any]] = {
     "filter": FILTERS,
     "light_sampler": LIGHT_SAMPLERS,
 }
-PLAIN = ("max_bounces", "seed", "branches", "guide", "clamp", "noise")
+PLAIN = ("max_bounces", "seed", "branches", "guide", "reuse", "clamp", "noise")
 WRITING_SHARE = 0.05  # of the time that writing may take, on a slow disk; the interval is then longer
 
 

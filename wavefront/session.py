@@ -83,7 +83,7 @@ class Session:
     ----------
     scene, spp, camera, size, material, up, lighting, ground, background
         As for `render`.
-    integrator, max_bounces, seed, samples, sampler, accel, filter, light_sampler, branches, guide
+    integrator, max_bounces, seed, samples, sampler, accel, filter, light_sampler, branches, guide, reuse
         As for `render`.
     workers, executor, noise, seconds, clamp, wave_size, max_memory, strict, aovs, denoise, progress
         As for `render`.
@@ -137,6 +137,7 @@ class Session:
         light_sampler: str | LightSamplerMaker = "spatial",
         branches: int | str = 1,
         guide: bool | str = False,
+        reuse: bool = False,
         clamp: float | None = None,
         wave_size: int | None = None,
         checkpoint: str | os.PathLike[str] | None = None,
@@ -173,6 +174,7 @@ class Session:
             light_sampler=light_sampler,
             branches=branches,
             guide=guide,
+            reuse=reuse,
             clamp=clamp,
             wave_size=wave_size,
             checkpoint=checkpoint,
@@ -304,7 +306,7 @@ class Session:
             begin, settings.seconds, self._budget.wave_size, self._budget.workers, self._branches
         )
         self._loop = RenderLoop(
-            View(view, scheduler.deadline, settings.first_sample),
+            View(view, scheduler.deadline, settings.first_sample, settings.reuse),
             accumulator,
             scheduler,
             spp=settings.max_spp,
@@ -686,6 +688,7 @@ class Session:
             "branches": self._branches,
             "guide": settings.guide,
             "guided": self._guided,
+            "reuse": settings.reuse,
             "clamp": settings.clamp,
             "accelerator": self._compiled.accelerator.name,
             "workers": self._budget.workers,

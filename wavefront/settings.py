@@ -22,7 +22,7 @@ from .exact_sum import MAX_TERMS
 from .files import check_target
 from .filters import FILTERS, Filter
 from .guiding import GuideTable
-from .integrators import INTEGRATORS, Integrator, li_full
+from .integrators import INTEGRATORS, Integrator, li_full, li_reuse
 from .layers import CLAMPED, GUIDES, chosen_layers, sampled_names
 from .lighting import DEFAULT, LIGHTINGS, check_lighting
 from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
@@ -337,6 +337,15 @@ class Settings:
         option="learn where light comes from, for scenes with much indirect light",
         check=auto_or(check_flag),
     )
+    reuse: bool = setting(
+        False,
+        "Share paths among pixels: what a path finds from its second surface on counts for sixteen pixels "
+        'that lie a little apart; only "full" does so. It pays where most of the noise is in indirect light '
+        "between matte surfaces. The errors of these pixels depend on each other then: docs/reuse.md has "
+        "figures.",
+        check=check_flag,
+        option="share paths among pixels, for matte scenes with much indirect light",
+    )
     clamp: float | None = setting(
         None,
         "The most that a path may find as indirect light at once, as radiance, the mean of its channels; "
@@ -423,8 +432,16 @@ class Settings:
         self.worker_count = worker_count(self.workers, self.executor)
         self.up_vector = upward("up", "y" if self.up is None else self.up)
         self.estimator()
+        self._check_reuse()
         self.sampler_maker()(1)
         self.executor_for((0, 0))
+
+    def _check_reuse(self) -> None:
+        """Check that shared paths have no light that must be told apart by the path that found it."""
+        if self.reuse and "light_groups" in self.aovs:
+            raise SceneError("reuse is True; then aovs must not have 'light_groups'")
+        if self.reuse and self.clamp is not None:
+            raise SceneError(f"clamp is {self.clamp:g}; with reuse=True it must be None")
 
     @property
     def first_sample(self) -> int:
@@ -450,15 +467,19 @@ class Settings:
         return self.max_spp if self.noise is None and self.seconds is None else None
 
     def estimator(self, table: GuideTable | None = None, branches: int = 1) -> Integrator:
-        """Return the integrator for paths with so many branches, guided by a table."""
+        """Return the integrator for paths with so many branches, guided by a table and shared or not."""
         integrator = INTEGRATORS.find(self.integrator)
         if integrator is not li_full:
             label = INTEGRATORS.label(self.integrator)
             if self.guide is True:
                 raise SceneError(f"guide is {self.guide}; with integrator={label!r} it must be False")
+            if self.reuse:
+                raise SceneError(f"reuse is {self.reuse}; with integrator={label!r} it must be False")
             if self.branches not in (1, AUTO):
                 raise SceneError(f"branches is {self.branches}; with integrator={label!r} it must be 1")
             return integrator
+        if self.reuse:
+            return partial(li_reuse, branches=branches, table=table)
         if branches == 1 and table is None:
             return integrator
         return partial(li_full, branches=branches, table=table)

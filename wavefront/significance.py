@@ -31,6 +31,7 @@ class Estimate:
     freedom: Doubles  # (..., 3) degrees of freedom of `squared_error`
     samples: Doubles  # (..., 1) number of samples
     variance: Doubles  # (..., 3) estimated variance of one sample; 0 where it is not known
+    sharing: int = 1  # pixels in a group whose errors may depend on each other; those of groups do not
 
 
 @record
@@ -128,13 +129,15 @@ def _combinations(m: Doubles, n: Doubles) -> Doubles:
 def _averaged(picture: Estimate, side: int) -> Estimate:
     """Return the means over blocks of pixels; those at the right and lower edge may be smaller.
 
-    The errors of pixels are independent. The degrees of freedom are those of Satterthwaite's approximation
-    (F. E. Satterthwaite, An Approximate Distribution of Estimates of Variance Components, 1946).
+    The errors of pixels are independent, or in groups of `sharing` pixels: then they are taken to be all the
+    same in a group, which is the worst case (by the inequality of Cauchy and Schwarz). The degrees of freedom
+    are those of Satterthwaite's approximation (F. E. Satterthwaite, An Approximate Distribution of Estimates
+    of Variance Components, 1946).
     """
     pixels = _block_sums(np.ones((*picture.mean.shape[:2], 1)), side)
-    variance = _block_sums(picture.squared_error, side)
-    spread = _block_sums(picture.squared_error**2 / picture.freedom, side)
-    freedom = _block_sums(picture.freedom, side)
+    variance = picture.sharing * _block_sums(picture.squared_error, side)
+    spread = picture.sharing**3 * _block_sums(picture.squared_error**2 / picture.freedom, side)
+    freedom = _block_sums(picture.freedom, side) / picture.sharing
     return Estimate(
         _block_sums(picture.mean, side) / pixels,
         variance / pixels**2,
@@ -152,7 +155,12 @@ def _block_sums(values: Doubles, side: int) -> Doubles:
 
 
 def estimate(
-    mean: Doubles, squared_error: Doubles, variance: Doubles | None, batches: Ints, samples: Ints
+    mean: Doubles,
+    squared_error: Doubles,
+    variance: Doubles | None,
+    batches: Ints,
+    samples: Ints,
+    sharing: int = 1,
 ) -> Estimate:
     """Return the estimate of a picture.
 
@@ -164,7 +172,9 @@ def estimate(
         (H, W, 3) of one sample; None if it is not known.
     batches, samples
         (H, W) numbers of each pixel, at least 2.
+    sharing
+        Pixels in a group whose errors may depend on each other.
     """
     freedom = np.broadcast_to((batches - 1.0)[..., None], mean.shape)
     variance = np.zeros_like(mean) if variance is None else variance
-    return Estimate(mean, squared_error, freedom, samples[..., None].astype(np.float64), variance)
+    return Estimate(mean, squared_error, freedom, samples[..., None].astype(np.float64), variance, sharing)

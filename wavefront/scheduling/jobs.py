@@ -9,8 +9,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import fields
 from typing import Any
 
+import numpy as np
+
 from ..camera import Camera
 from ..layer_samples import LayerSamples
+from ..pixel_tiles import whole_tiles
 from ..record import record
 from ..state import Words
 from ..vec import Floats, Ints
@@ -26,6 +29,23 @@ class View:
     camera: Camera  # in the unit of the compiled scene
     deadline: float = math.inf  # when jobs under way are discarded, by `time.perf_counter`
     first_sample: int = 0  # index of the first sample of every pixel
+    whole_tiles: bool = False  # the pixels of a tile (pixel_tiles.py) belong in one job
+
+    def parts(self, pixels: Words, width: int) -> Iterator[Words]:
+        """Split pixels (k,) into parts of at most `width`, or of one tile where tiles stay whole."""
+        if not self.whole_tiles:
+            for start in range(0, pixels.size, width):
+                yield pixels[start : start + width]
+            return
+        order, cuts = whole_tiles(self.camera.address(pixels), self.camera.film[0])
+        start = 0
+        while start < pixels.size:
+            fitting = int(np.searchsorted(cuts, start + width, side="right"))
+            end = int(cuts[max(fitting - 1, 0)])
+            if end <= start:
+                end = int(cuts[fitting])
+            yield pixels.take(np.sort(order[start:end]))
+            start = end
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the time that is left as well: the clocks of two machines differ."""
@@ -60,9 +80,8 @@ class Job:
         return self.first_sample + self.samples
 
     def halves(self) -> tuple[Job, ...]:
-        """Return jobs for the first and the second half of the pixels; of one pixel, the job itself."""
-        half = self.pixels.size // 2
-        parts = (self.pixels[:half], self.pixels[half:]) if half else (self.pixels,)
+        """Return jobs for parts of at most half the pixels; of one pixel or tile, the job itself."""
+        parts = self.view.parts(self.pixels, max(1, -(-self.pixels.size // 2)))
         return tuple(Job(self.view, pixels, self.first_sample, self.samples) for pixels in parts)
 
     def __str__(self) -> str:
@@ -88,13 +107,14 @@ def split_jobs(
     """Split samples `first` to `last` of some pixels into jobs.
 
     Every pixel's samples come in order. No job has more paths than `wave_size` returns, which is given the
-    number of paths left, when a sweep over the pixels begins.
+    number of paths left, when a sweep over the pixels begins; but jobs of one tile may, where tiles stay
+    whole. The last pixel is in the last job of a sweep.
     """
     while first < last:
         lanes = wave_size((last - first) * pixels.size)
         parts = -(-pixels.size // lanes)
         width = -(-pixels.size // parts)  # equal parts: a small wave costs almost as much as a large one
         depth = min(max(1, lanes // width), last - first)
-        for start in range(0, pixels.size, width):
-            yield Job(view, pixels[start : start + width], first, depth)
+        for part in view.parts(pixels, width):
+            yield Job(view, part, first, depth)
         first += depth

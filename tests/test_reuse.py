@@ -1,0 +1,315 @@
+"""Paths shared among pixels: the same means, less noise, the same bits however a render is cut."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import scenes
+from scenes import Case
+from significance import Mean, assert_mean, assert_same_images, render, repeat
+
+import wavefront as wf
+from wavefront import pilot, pixel_tiles
+from wavefront.pixel_tiles import WaveTiles, place_in_tiles, whole_tiles
+from wavefront.scheduling.jobs import View, split_jobs
+
+
+@pytest.fixture
+def close(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pixels of a tile next to each other, so that small pictures have whole tiles."""
+    monkeypatch.setattr(pixel_tiles, "STRIDE", 1)
+
+
+# --- Tiles ----------------------------------------------------------------------------------------
+
+
+def test_tiles_divide_a_picture() -> None:
+    """Each tile has sixteen different members, seven pixels apart, but for the edges of the picture."""
+    width, height = 59, 57
+    tile, member = place_in_tiles(np.arange(width * height, dtype=np.uint32), width)
+    pairs = set(zip(tile.tolist(), member.tolist(), strict=True))
+    assert len(pairs) == width * height
+    inside = tile.reshape(height, width)[:56, :56]
+    assert (np.bincount(inside.ravel())[np.unique(inside)] == 16).all()
+    rows, columns = np.nonzero(inside == inside[8, 10])
+    assert (np.unique(rows).tolist(), np.unique(columns).tolist()) == ([1, 8, 15, 22], [3, 10, 17, 24])
+    assert np.bincount(tile).max() == 16
+
+
+def test_samples_are_of_different_tiles() -> None:
+    pixel, sample = np.array([0, 7, 1, 0], np.uint32), np.array([3, 3, 3, 4], np.uint32)
+    tiles = WaveTiles.of(pixel, sample, 100)
+    assert tiles.count == 3
+    assert tiles.tile[0] == tiles.tile[1] != tiles.tile[2]
+    assert tiles.tile[3] not in tiles.tile[:3]
+    assert tiles.member.tolist() == [0, 1, 0, 0]
+
+
+@pytest.mark.parametrize("wave", [1, 16, 100, 1000, 5000])
+@pytest.mark.parametrize("window", [None, (5, 3, 38, 32)])
+def test_jobs_have_whole_tiles(wave: int, window: tuple[int, int, int, int] | None) -> None:
+    """Every sample once; the last pixel in the last job; no more paths than a wave or a tile has."""
+    camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), size=(47, 44))
+    camera = camera if window is None else camera.cropped(window)
+    pixels = np.random.default_rng(0).permutation(camera.size[0] * camera.size[1])[:700]
+    pixels = np.sort(pixels).astype(np.uint32)
+    tile, _ = place_in_tiles(camera.address(pixels), 47)
+    jobs = list(split_jobs(View(camera, whole_tiles=True), pixels, 2, 7, lambda left: wave))
+    seen = np.zeros(700, int)
+    for job in jobs:
+        at = np.searchsorted(pixels, job.pixels)
+        assert (np.diff(job.pixels.astype(int)) > 0).all()
+        assert np.isin(tile, tile[at]).sum() == at.size
+        assert (seen[at] == job.first_sample - 2).all()
+        seen[at] += job.samples
+        assert job.lanes <= max(wave, 16)
+        parts = job.halves()
+        assert np.array_equal(np.sort(np.concatenate([part.pixels for part in parts])), job.pixels)
+        assert all(
+            np.isin(tile, tile[np.isin(pixels, part.pixels)]).sum() == part.pixels.size for part in parts
+        )
+    assert (seen == 5).all()
+    ends = [job.end for job in jobs if job.pixels[-1] == pixels[-1]]
+    assert [job.end for job in jobs][-1] == ends[-1] == 7
+    assert ends == sorted(set(ends))
+
+
+def test_whole_rows_of_blocks_lie_side_by_side() -> None:
+    pixels = np.arange(56 * 56, dtype=np.uint32)
+    order, cuts = whole_tiles(pixels, 56)
+    assert np.array_equal(np.sort(order[: 28 * 56]), pixels[: 28 * 56])
+    assert 28 * 56 in cuts
+
+
+# --- Means ----------------------------------------------------------------------------------------
+
+
+def matte_corner() -> wf.Scene:
+    """Walls of pure colors: what one cannot reflect counts for the other."""
+    red, blue = wf.Diffuse((0.9, 0, 0)), wf.Diffuse((0, 0.1, 0.9))
+    shapes = [
+        scenes.floor(wf.Diffuse(0.7), half=2),
+        wf.Rectangle((-2, 0, -2), (4, 0, 0), (0, 3, 0), material=blue),
+        wf.Rectangle((-2, 0, -2), (0, 3, 0), (0, 0, 4), material=red),
+    ]
+    camera = wf.Camera.look_at((2, 2, 3), (-1, 0.5, -1), fov=40, size=(16, 16))
+    return wf.Scene(shapes, [wf.PointLight((0, 2, 0), 5)], camera)
+
+
+def smooth() -> wf.Scene:
+    """Balls with interpolated normals, beside each other and far from the camera's plane."""
+    scene = scenes.cornell_box((16, 16))
+    theta = np.linspace(0, np.pi, 7)
+    phi = np.arange(8) * np.pi / 4
+    points = np.array([[np.sin(t) * np.cos(p), np.cos(t), np.sin(t) * np.sin(p)] for t in theta for p in phi])
+    faces = [
+        face
+        for i in range(6)
+        for j in range(8)
+        for face in (
+            (8 * i + j, 8 * i + (j + 1) % 8, 8 * i + 8 + j),
+            (8 * i + (j + 1) % 8, 8 * i + 8 + (j + 1) % 8, 8 * i + 8 + j),
+        )
+    ]
+    balls = [
+        wf.Mesh(
+            points * 0.4 + (x, -0.5, 0.2),
+            faces,
+            normals=points,
+            material=wf.Principled((0.8, 0.5, 0.2), roughness=0.3) if x > 0 else wf.Diffuse((0.2, 0.8, 0.6)),
+        )
+        for x in (-0.45, 0.45)
+    ]
+    return wf.Scene([*scene.shapes[:6], *balls], camera=scene.camera)
+
+
+def veiled() -> wf.Scene:
+    """Half-transparent panes, a texture, and glass that absorbs nothing."""
+    scene = scenes.cornell_box((16, 16))
+    checks = wf.Texture(np.array([[[0.9, 0.2, 0.1], [0.1, 0.3, 0.8]], [[0.2, 0.7, 0.2], [0.9, 0.9, 0.9]]]))
+    pane = wf.Material(wf.Diffuse(0.6), alpha=0.4)
+    uv = [[0, 0], [4, 0], [4, 4], [0, 4]]
+    back = wf.Mesh(
+        [[-1, -1, -0.9], [1, -1, -0.9], [1, 1, -0.9], [-1, 1, -0.9]],
+        [[0, 1, 2], [0, 2, 3]],
+        uvs=uv,
+        material=wf.Diffuse(checks),
+    )
+    shapes = [
+        wf.Rectangle((-0.2, -1, -0.9), (0, 1.5, 0), (0, 0, 1.5), material=pane),
+        wf.Rectangle((-0.9, -0.4, -0.5), (0.8, 0, 0), (0, 0, 0.8), material=pane),
+        wf.Sphere((0.5, -0.6, 0.2), 0.35, material=wf.Dielectric(1.5)),
+    ]
+    return wf.Scene([*scene.shapes[:6], back, *shapes], camera=scene.camera)
+
+
+def blended() -> wf.Scene:
+    """Rough and delta lobes together, rough glass, an absorbing medium, instances and an environment."""
+    scene = scenes.cornell_box((16, 16))
+    plates = wf.Mix(wf.Diffuse(0.7), wf.Mirror(0.9), 0.4)
+    amber = wf.Material(wf.Dielectric(1.4, roughness=0.4), interior=wf.Medium((0.3, 1, 2)))
+    ball = scenes.box((-0.2, -0.2, -0.2), (0.2, 0.2, 0.2), wf.Diffuse(0.5))
+    shapes = [
+        wf.Rectangle((-0.9, -0.95, 0.9), (1.8, 0, 0), (0, 0, -1.8), material=plates),
+        wf.Sphere((0.4, -0.55, 0.2), 0.35, material=amber),
+        wf.Instance(ball, [[1, 0, 0, -0.5], [0, 1, 0, -0.6], [0, 0, 2, 0], [0, 0, 0, 1]]),
+    ]
+    return wf.Scene([*scene.shapes[:6], *shapes], [wf.Environment(0.3)], scene.camera)
+
+
+SCENES = [matte_corner, smooth, veiled, blended]
+
+
+@pytest.mark.parametrize("build", SCENES)
+@pytest.mark.parametrize(
+    ("spp", "error"), [(16, 0.015), pytest.param(1024, 0.001, marks=pytest.mark.slow)], ids=["quick", "slow"]
+)
+def test_sharing_keeps_the_mean(build: Callable[[], wf.Scene], spp: int, error: float, close: None) -> None:
+    """Pure colors, smooth shading, alpha, textures, mixed lobes, media and instances."""
+    options = {"max_bounces": 5}
+    plain = repeat(build(), spp, **options)
+    shared = repeat(build(), spp, reuse=True, first_seed=100, **options)
+    assert_same_images(plain, shared, error)
+
+
+@pytest.mark.parametrize("options", [{"branches": 3}, {"guide": True}], ids=str)
+def test_branches_and_guides_go_with_it(options: dict, close: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pilot, "PATHS", 1 << 13)
+    plain = repeat(scenes.room(), 32)
+    shared = repeat(scenes.room(), 8, reuse=True, first_seed=100, **options)
+    assert_same_images(plain, shared, 0.01)
+
+
+def test_no_light_is_lost_or_won(close: None) -> None:
+    """In a closed white room of radiance 1 each sample is 1, whichever pixels it comes from."""
+    inside = scenes.box((-1, -1, -1), (1, 1, 1), wf.Diffuse(0.5), emission=0.5, inward=True)
+    scene = wf.Scene([inside], camera=wf.Camera.look_at((0, 0, 0), (1, 0.3, 0.2), fov=70, size=(16, 16)))
+    runs = repeat(scene, 32, max_bounces=40, reuse=True)
+    assert_mean(Mean.of(runs.mean((1, 2, 3))), 1.0, 0.003)
+
+
+def test_noise_falls() -> None:
+    """By more than a third of the variance, where light is indirect."""
+    scene = scenes.cornell_box((56, 56))
+    plain, shared = (render(scene, 16, reuse=reuse) for reuse in (False, True))
+    assert shared.metadata["noise"] < 0.8 * plain.metadata["noise"]
+    assert shared.metadata["reuse"] is True
+
+
+CASES = [*scenes.DIRECT_CASES, *scenes.TRIANGLE_CASES, *scenes.INDIRECT_CASES, *scenes.SPECULAR_CASES]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", [case for case in CASES if "full" in case.integrators], ids=str)
+def test_every_case(case: Case, close: None) -> None:
+    """Pictures of several seeds are the batches, since pixels depend on each other."""
+    spp = max(16, case.spp // 8)
+    runs = repeat(case.build(), spp, reuse=True, **{"max_bounces": 4, **case.options})
+    unseen = 10 / (64 * 16 * spp * case.expected)
+    measured = Mean.of(runs.mean((1, 2, 3)))
+    assert_mean(measured, case.expected, 3 * case.max_error, rounding=1e-5 + unseen)
+
+
+# --- Bits -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "cut",
+    [{"wave_size": 20}, {"wave_size": 500, "workers": 3}, {"workers": 2, "executor": "processes"}],
+    ids=str,
+)
+def test_waves_and_workers_change_no_bit(cut: dict) -> None:
+    scene = scenes.everything((31, 25))
+    options = {"reuse": True, "branches": 2}
+    whole = render(scene, 2, **options)
+    assert render(scene, 2, **options, **cut).rgb.tobytes() == whole.rgb.tobytes()
+
+
+def test_pixels_that_need_more_samples_share_them_in_any_wave() -> None:
+    """Adaptive passes leave gaps in the tiles."""
+    scene = scenes.room((33, 25))
+    options = {"reuse": True, "noise": 0.12, "max_bounces": 3}
+    whole = render(scene, 64, **options)
+    again = render(scene, 64, **options, wave_size=3000, workers=2)
+    assert np.unique(whole.counts).size > 1
+    assert again.rgb.tobytes() == whole.rgb.tobytes()
+    assert np.array_equal(again.counts, whole.counts)
+
+
+def test_parts_of_the_samples_make_the_whole() -> None:
+    scene = scenes.everything((25, 9))
+    parts = [render(scene, None, reuse=True, samples=part) for part in (range(0, 3), range(3, 8))]
+    whole = render(scene, None, reuse=True, samples=range(0, 8))
+    assert wf.Image.merge(*parts).rgb.tobytes() == whole.rgb.tobytes()
+
+
+@pytest.mark.parametrize("noise", [None, 0.122])
+def test_sessions_go_on_with_the_same_bits(noise: float | None, tmp_path) -> None:
+    """From a checkpoint that was written in the middle of a pass."""
+    scene, path = scenes.room((33, 25)), tmp_path / "render.wfck"
+    options = {"reuse": True, "wave_size": 2000, "noise": noise, "max_bounces": 3}
+    whole = render(scene, 64, **options)
+    done = 0
+
+    def stop(now: float, most: float) -> None:
+        nonlocal done
+        done = now
+        if now > 0.52 * most:
+            session.stop()
+
+    session = wf.Session(
+        scene, 64, checkpoint=path, workers=1, accel="numpy", **{**options, "progress": stop}
+    )
+    with session:
+        session.run()
+    assert 0 < done < whole.metadata["samples"]
+    assert render(scene, 64, checkpoint=path, **options).rgb.tobytes() == whole.rgb.tobytes()
+
+
+def test_a_part_of_a_picture_has_the_same_tiles() -> None:
+    """Blocks that lie in a window whole have the bits of the whole picture."""
+    scene = scenes.everything((56, 56))
+    whole = render(scene, 2, reuse=True).rgb
+    part = render(scene, 2, reuse=True, camera=scene.camera.cropped((28, 0, 56, 56))).rgb
+    assert part.tobytes() == np.ascontiguousarray(whole[:, 28:]).tobytes()
+
+
+# --- With other settings --------------------------------------------------------------------------
+
+
+def test_layers_of_light() -> None:
+    """Direct light is that of a plain render, and what is left is indirect."""
+    scene = scenes.room((21, 21))
+    plain, shared = (render(scene, 4, reuse=reuse, aovs=["direct", "indirect"]) for reuse in (False, True))
+    assert np.allclose(shared.direct, plain.direct, atol=1e-5)
+    assert np.allclose(shared.direct + shared.indirect, shared.rgb, atol=1e-5)
+
+
+def test_nothing_to_share() -> None:
+    """Pictures of one bounce, and of scenes without matte surfaces, are the plain ones."""
+    for scene, bounces in ((scenes.room((21, 21)), 1), (scenes.glass_ball(), 4)):
+        one, other = (render(scene, 4, reuse=reuse, max_bounces=bounces) for reuse in (True, False))
+        assert one.rgb.tobytes() == other.rgb.tobytes()
+
+
+def test_only_full_can_share() -> None:
+    with pytest.raises(wf.SceneError, match="reuse is True; with integrator='naive' it must be False"):
+        wf.render(scenes.room(), 1, reuse=True, integrator="naive")
+    with pytest.raises(wf.SceneError, match="reuse is True; then aovs must not have 'light_groups'"):
+        wf.render(scenes.room(), 1, reuse=True, aovs="light_groups")
+    with pytest.raises(wf.SceneError, match="clamp is 2; with reuse=True it must be None"):
+        wf.render(scenes.room(), 1, reuse=True, clamp=2)
+
+
+def test_comparisons_allow_for_shared_noise(close: None) -> None:
+    """Blocks of pixels that share noise differ by more than their standard errors say."""
+    scene = scenes.cornell_box((32, 32))
+    p, blind = [], []
+    for seed in range(12):
+        a, b = (render(scene, 16, reuse=True, seed=2 * seed + k) for k in (0, 1))
+        p.append(wf.compare(a, b).p_value)
+        for image in (a, b):
+            image.metadata["reuse"] = False
+        blind.append(wf.compare(a, b).p_blocks)
+    assert min(p) > 0.01
+    assert min(blind) < 1e-4
