@@ -8,8 +8,9 @@ from significance import render
 import wavefront as wf
 from wavefront import metrics
 from wavefront.film import Film
+from wavefront.image import film_image
+from wavefront.picture_sums import PictureSums
 from wavefront.samples import shared_samples
-from wavefront.scheduling.accumulator import film_image
 from wavefront.significance import sidak
 from wavefront.student_t import log_gamma, t_tail
 
@@ -20,7 +21,7 @@ def noisy(rng, draw, spp=16, size=SIZE):
     """A picture of which each sample is drawn by draw(rng, (3, spp, pixels))."""
     film = Film(size, size)
     film.add(np.arange(size * size, dtype=np.uint32), draw(rng, (3, spp, size * size)).astype(np.float32))
-    return film_image(film, {})
+    return film_image(PictureSums(film, None, {}), {}, keep_sums=False)
 
 
 def gaussian(rng, shape):
