@@ -157,7 +157,14 @@ def blended() -> wf.Scene:
     return wf.Scene([*scene.shapes[:6], *shapes], [wf.Environment(0.3)], scene.camera)
 
 
-SCENES = [matte_corner, smooth, veiled, blended]
+def divided() -> wf.Scene:
+    """A lit and a dark half with a screen between them: pixels of one tile do not see the same."""
+    sides = [wf.Rectangle((x, 0, -1), (0, 0, 2), (0, 1.5, 0), material=wf.Diffuse(0.8)) for x in (-1, 0, 1)]
+    camera = wf.Camera.look_at((0.22, 4, 0.01), (0.22, 0, 0), fov=25, size=(16, 16))
+    return wf.Scene([scenes.floor(half=1), *sides], [wf.PointLight((-0.5, 1, 0), 3)], camera)
+
+
+SCENES = [matte_corner, smooth, veiled, blended, divided]
 
 
 @pytest.mark.parametrize("build", SCENES)
