@@ -14,6 +14,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..elementary import exp
 from ..record import record
 from ..vec import Doubles, Floats
 from .noisy import Guide, NoisyPicture
@@ -109,7 +110,7 @@ def _weighted_mean(
                 there = guide.window(top + down + patch, right + patch, rows, width)
                 found = _squared_difference(here, there, 1.0, scale)
                 distance = np.maximum(distance, found.max(0))
-            weight = np.exp(-np.maximum(distance, 0))
+            weight = exp(-np.maximum(distance, 0).astype(np.float32))
             near = padded.window(top + down + patch, right + patch, rows, width)
             total += weight
             value += weight * near.mean
