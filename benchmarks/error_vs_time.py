@@ -27,7 +27,7 @@ With `--blur 1.5` a second table has the errors of the same pictures after a Gau
 of the picture and of the reference: noise that neighbors share does not vanish there. With `--keep FILE`
 results join those of earlier runs in that file, and the plot shows all of them, so that the scenes can be
 measured one at a time. Needs `pip install -e '.[bench]'`, and for `llvm_ad_rgb` an LLVM library
-(DRJIT_LIBLLVM_PATH; version 15 cannot compile scenes with spheres for AVX-512, version 19 can).
+(DRJIT_LIBLLVM_PATH; Mitsuba 3.9 ends with an error of version 15 on processors with AVX-512, not of 19).
 """
 
 from __future__ import annotations
@@ -323,7 +323,8 @@ def report(found: dict[str, Any], counts: tuple[int, ...], base: str, key: str) 
         mark = "*" if beyond else "<" if target > errors[0] else " "
         print(
             f"{side:29}{cells}{of['mean']:8.4f}{of['once']:7.2f}{reached:10.2f}{mark}"
-            f"{base_time / reached:7.2f}x{cold:6.2f}x"
+            f"{base_time / reached:7.2f}x{cold:6.2f}x",
+            flush=True,
         )
 
 
