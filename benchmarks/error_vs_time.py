@@ -66,6 +66,8 @@ METHODS: dict[str, dict[str, Any]] = {  # settings of `wf.render` by what a side
     "sobol/4": {"branches": 4},
     GUIDED: {"guide": True},
     "guided/4": {"guide": True, "branches": 4},
+    "reused": {"reuse": True},
+    "reused/4": {"reuse": True, "branches": 4},
     "auto": {"guide": "auto", "branches": "auto"},
     DENOISED: {"denoise": True},
 }
@@ -344,6 +346,8 @@ LINES = {
     GUIDED: (0, (5, 1)),
     "guided/4": (0, (5, 1, 1, 1)),
     "auto": (0, (3, 1)),
+    "reused": (0, (7, 2)),
+    "reused/4": (0, (7, 2, 1, 2)),
     DENOISED: (0, (1, 1)),
 }
 
@@ -388,7 +392,7 @@ def subjects(options: argparse.Namespace) -> dict[str, Subject]:
     """Return all scenes by name."""
     size, spp = options.size, (4, 16, 64)
     methods = (*SAMPLERS, "sobol/4", DENOISED)
-    box = (*SAMPLERS, "sobol/4", GUIDED, "guided/4", DENOISED)
+    box = (*SAMPLERS, "sobol/4", GUIDED, "guided/4", "reused", "reused/4", DENOISED)
     found = {
         "cornell": Subject(lambda: cornell_box(size), 7, spp, box, "sobol", DENOISED),
         "mesh": Subject(lambda: mesh_scene(options.data, size), 7, spp, methods, "sobol"),
