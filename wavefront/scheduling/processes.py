@@ -17,22 +17,20 @@ import time
 import warnings
 from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
 from multiprocessing.queues import SimpleQueue
 from types import ModuleType
 from typing import Any
 
-import numpy as np
-
+from .heap import prepare_heap
 from .remote import RemoteWorkers
 from .shared import AT_ONCE, SharedInt
 from .workers import POLL_INTERVAL, LocalWorkers, StoppableWork, all_done
 
 END_TIMEOUT = 1.0  # seconds that processes have to end by themselves
 TERM_TIMEOUT = 0.2  # seconds from SIGTERM to SIGKILL
-LARGEST_BLOCK = 31 << 20  # bytes; larger ones do not move glibc's limits
 MOST_ON_WINDOWS = 61  # processes of a pool, which waits for all of them at once
 
 
@@ -227,23 +225,10 @@ def _initialize_worker(work: Callable[[Any], Any] | None) -> None:
     """Prepare a worker process, which ends with its parent."""
     global _work
     _work = work
-    _prepare_heap()
+    prepare_heap()
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _prepare_heap() -> None:
-    """Have glibc keep what is freed, in large pages; with another C library, do nothing of use.
-
-    All memory of a young process is new, and the system hands it out page by page: 11 600 page faults
-    in the first wave. After glibc has freed a block, it takes smaller ones from its heap, and keeps
-    twice as much there before it gives any back; and NumPy asks for large pages under large arrays.
-    """
-    with suppress(MemoryError):
-        np.empty(LARGEST_BLOCK, np.uint8)
-        nearly_twice = [np.empty(9 * LARGEST_BLOCK // 10, np.uint8) for _ in range(2)]
-        del nearly_twice
 
 
 def _end_with_parent() -> None:
