@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -56,7 +57,34 @@ def intensity_of(name: str, value: ArrayLike) -> NDArray[np.float64]:
     return rgb(name, value, dtype=np.float64)
 
 
-class PointLight(Parametrized, Light):
+class LightAtPoint(Parametrized, Light):
+    """Base of lights at one position, with an intensity."""
+
+    delta = True
+    position = Parameter(position)
+    intensity = Parameter(intensity_of)
+    group = Parameter(group_name)
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """The position, twice, (2, 3)."""
+        return np.stack([self.position, self.position])
+
+    def scaled(self, factor: float) -> Self:
+        """Return the light for a scene whose lengths were multiplied by `factor`: the same irradiance there.
+
+        Raises
+        ------
+        SceneError
+            If its intensity is then beyond float32.
+        """
+        light = copy(self)
+        light.position = self.position * factor
+        light.intensity = scaled_intensity(f"{type(self).__name__} intensity", self.intensity, factor)
+        return light
+
+
+class PointLight(LightAtPoint):
     """A point that emits equally in all directions.
 
     Parameters
@@ -78,34 +106,11 @@ class PointLight(Parametrized, Light):
     >>> lamp = wf.PointLight((0, 3, 0), intensity=(40, 35, 30))
     """
 
-    delta = True
-    position = Parameter(position)
-    intensity = Parameter(intensity_of)
-    group = Parameter(group_name)
-
     @suggests_keywords
     def __init__(self, position: ArrayLike, intensity: ArrayLike, *, group: str = DEFAULT_GROUP) -> None:
         self.position = position
         self.intensity = intensity
         self.group = group
-
-    @property
-    def bounds(self) -> NDArray[np.float64]:
-        """The position, twice, (2, 3)."""
-        return np.stack([self.position, self.position])
-
-    def scaled(self, factor: float) -> PointLight:
-        """Return the light for a scene whose lengths were multiplied by `factor`: the same irradiance there.
-
-        Raises
-        ------
-        SceneError
-            If its intensity is then beyond float32.
-        """
-        light = copy(self)
-        light.position = self.position * factor
-        light.intensity = scaled_intensity("PointLight intensity", self.intensity, factor)
-        return light
 
     def record(self, center: NDArray[np.float64]) -> PointLightRecord:
         """Return the light as a record of one column, relative to `center` (3,)."""

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from copy import copy
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..elementary import arccos, arcsin, sin_cos, sin_cos_turns
 from ..errors import SceneError, finite_array, number
-from ..layers import DEFAULT_GROUP, group_name
-from ..parameter import Parameter, Parametrized
+from ..layers import DEFAULT_GROUP
+from ..parameter import Parameter
 from ..record import record
 from ..suggestions import suggests_keywords
 from ..vec import Floats, dot, f4
-from .base import DeltaLight, Light, LightSample, position
+from .base import DeltaLight, LightSample
 from .directional import unit
-from .point import intensity_of, scaled_intensity
+from .point import LightAtPoint
 
 
 @record
@@ -79,7 +77,7 @@ def _blend(name: str, value: float) -> float:
     return number(name, value, lambda x: 0 <= x <= 1, "in [0, 1]")
 
 
-class SpotLight(Parametrized, Light):
+class SpotLight(LightAtPoint):
     """A point that emits into a cone.
 
     Parameters
@@ -114,13 +112,9 @@ class SpotLight(Parametrized, Light):
     """
 
     hint = "direct the SpotLight, or widen its cone"
-    delta = True
-    position = Parameter(position)
-    intensity = Parameter(intensity_of)
     direction = Parameter(unit)
     angle = Parameter(_angle)
     blend = Parameter(_blend)
-    group = Parameter(group_name)
 
     @suggests_keywords
     def __init__(
@@ -148,24 +142,6 @@ class SpotLight(Parametrized, Light):
         self.angle = angle
         self.blend = blend
         self.group = group
-
-    @property
-    def bounds(self) -> NDArray[np.float64]:
-        """The position, twice, (2, 3)."""
-        return np.stack([self.position, self.position])
-
-    def scaled(self, factor: float) -> SpotLight:
-        """Return the light for a scene whose lengths were multiplied by `factor`: the same irradiance there.
-
-        Raises
-        ------
-        SceneError
-            If its intensity is then beyond float32.
-        """
-        light = copy(self)
-        light.position = self.position * factor
-        light.intensity = scaled_intensity("SpotLight intensity", self.intensity, factor)
-        return light
 
     def record(self, center: NDArray[np.float64]) -> SpotLights:
         """Return the light as a record of one column, relative to `center` (3,)."""
