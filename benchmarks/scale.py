@@ -87,7 +87,7 @@ def measured_costs(client: Client, repeat: int) -> Costs:
     size = sum(array.nbytes for array in film.arrays().values()) / WAVE
     with tempfile.TemporaryDirectory() as folder:
         session = wf.Session(scene, 1, **options)
-        data = pack(session._tracer, folder)
+        data = pack(session._plan.tracer, folder)
         scene_seconds = seconds(lambda: pickle.loads(data), repeat)
     result = JobResult(radiance, np.zeros(0, np.intp), 0, 0.0)
     with WorkerPool(partial(constant, result), 2, client) as pool:

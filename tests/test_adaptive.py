@@ -8,12 +8,13 @@ import scenes
 from significance import render
 
 import wavefront as wf
-from wavefront import outcome, session
+from wavefront import outcome
 from wavefront.film import Film
 from wavefront.scheduling import adaptive, scheduler, tracing
 from wavefront.scheduling.adaptive import MIN_SPP, next_stop, passes
 from wavefront.scheduling.jobs import Job, JobResult, View, split_jobs
 from wavefront.scheduling.scheduler import Scheduler
+from wavefront.session import session
 from wavefront.vec import f4
 
 

@@ -10,19 +10,19 @@ import pytest
 import scenes
 
 import wavefront as wf
-from wavefront import session
 from wavefront.film import Film
 from wavefront.image import film_image
 from wavefront.memory import available_memory, check_memory
 from wavefront.picture_sums import PictureSums
 from wavefront.scheduling.accumulator import FILM_BYTES, PICTURE_BYTES, Accumulator
+from wavefront.session import prepared_scene
 
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of Linux")
 
 LIMITED = """
 import resource, sys
 import wavefront as wf
-from wavefront import session
+from wavefront.session import session
 import wavefront.scheduling.processes
 mesh = wf.Mesh(*{mesh})
 camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), size=(96, 96))
@@ -97,7 +97,7 @@ def test_the_picture_so_far_is_kept_when_memory_runs_out(monkeypatch: pytest.Mon
 
 def test_no_memory_for_the_scene_is_an_error_without_a_picture(monkeypatch: pytest.MonkeyPatch) -> None:
     """It has a type, too."""
-    monkeypatch.setattr(session, "compile_scene", fail_after(abs, 0))
+    monkeypatch.setattr(prepared_scene, "compile_scene", fail_after(abs, 0))
     with pytest.raises(wf.RenderError, match="out of memory while the scene was set up: no room") as caught:
         wf.render(scenes.everything(), 1, progress=False)
     assert caught.value.image is None

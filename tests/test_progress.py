@@ -10,10 +10,10 @@ from tqdm import tqdm
 
 import wavefront as wf
 from wavefront import progress as module
-from wavefront import session
 from wavefront.io import readers
 from wavefront.io.load import load, load_mesh
 from wavefront.progress import DELAY, Bar, phase
+from wavefront.session import prepared_scene
 
 
 @pytest.mark.parametrize("progress", [None, True])
@@ -141,13 +141,13 @@ def test_loading_is_a_phase(load, progress, tmp_path, monkeypatch, capsys) -> No
 
 def test_building_a_scene_shows_a_line(monkeypatch, capsys) -> None:
     """Where it takes long, and is not asked to be quiet."""
-    compile_scene = session.compile_scene
+    compile_scene = prepared_scene.compile_scene
 
     def slowly(*given, **options):
         time.sleep(0.3)
         return compile_scene(*given, **options)
 
-    monkeypatch.setattr(session, "compile_scene", slowly)
+    monkeypatch.setattr(prepared_scene, "compile_scene", slowly)
     monkeypatch.setattr(module, "DELAY", 0.05)
     for quiet in (False, True):
         wf.render(scenes.everything(), 1, progress=False if quiet else None)

@@ -10,9 +10,9 @@ import trimesh
 from significance import render
 
 import wavefront as wf
-from wavefront import session
 from wavefront.bsdfs import BsdfSample
 from wavefront.sampling.sampler import SAMPLERS
+from wavefront.session import prepared_scene, session
 from wavefront.vec import f4
 
 BALL = wf.Sphere((0, 0, 0), 1)
@@ -197,8 +197,8 @@ def test_bad_arguments_are_named_before_any_work(change: dict, message: str, mon
     def work(*_):
         raise AssertionError("work began before the arguments were checked")
 
-    for name in ("as_scene", "compile_scene", "trace_job"):
-        monkeypatch.setattr(session, name, work)
+    for module, name in ((session, "as_scene"), (prepared_scene, "compile_scene"), (session, "trace_job")):
+        monkeypatch.setattr(module, name, work)
     with pytest.raises(wf.SceneError, match=message):
         wf.render(small(), **{"progress": False, **change})
 

@@ -16,8 +16,9 @@ import scenes
 from test_interrupt import children, end_of, runs, script, wait_for
 
 import wavefront as wf
-from wavefront import session as module
 from wavefront.scheduling import pool
+from wavefront.session import prepared_scene
+from wavefront.session import session as module
 
 LINUX = sys.platform.startswith("linux")
 needs_fork = pytest.mark.skipif(not LINUX, reason="needs fork")
@@ -136,8 +137,10 @@ def test_another_camera_compiles_nothing_and_starts_no_worker(
     options = {"sampler": sampler, "workers": 2, "executor": executor, "wave_size": 300, **QUIET}
     plain = [wf.render(everything(), 6, camera=view(x, size), **options) for x, size in VIEWS]
     compiled = []
-    compile_scene = module.compile_scene
-    monkeypatch.setattr(module, "compile_scene", lambda *a, **k: compiled.append(1) or compile_scene(*a, **k))
+    compile_scene = prepared_scene.compile_scene
+    monkeypatch.setattr(
+        prepared_scene, "compile_scene", lambda *a, **k: compiled.append(1) or compile_scene(*a, **k)
+    )
     with wf.Session(everything(), 6, camera=view(0), **options) as session:
         next(session)
         workers = {each.pid for each in multiprocessing.active_children()}

@@ -118,11 +118,13 @@ def test_each_view_is_what_render_gives() -> None:
 
 
 def test_the_scene_is_compiled_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    from wavefront import session
+    from wavefront.session import prepared_scene
 
     calls = []
-    compile_scene = session.compile_scene
-    monkeypatch.setattr(session, "compile_scene", lambda *a, **k: calls.append(1) or compile_scene(*a, **k))
+    compile_scene = prepared_scene.compile_scene
+    monkeypatch.setattr(
+        prepared_scene, "compile_scene", lambda *a, **k: calls.append(1) or compile_scene(*a, **k)
+    )
     assert len(list(wf.render_many(SCENE, wf.turntable(SCENE, 5, size=(8, 8)), 1, progress=False))) == 5
     assert len(calls) == 1
 

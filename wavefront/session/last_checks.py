@@ -1,0 +1,68 @@
+"""Checks of the last picture of a render: warnings of what is wrong with it, and errors."""
+
+from __future__ import annotations
+
+from ..image import Image
+from ..integrators import INTEGRATORS, WITH_MIS, li_naive
+from ..outcome import check_first_samples, is_black_or_white, warn_of_clamped_light, warn_of_noise
+from ..scheduling.loop import RenderLoop
+from .plan import Plan
+
+
+def check_last_image(image: Image, plan: Plan, loop: RenderLoop, surfaces: int) -> None:
+    """Warn of what is wrong with the last picture.
+
+    Parameters
+    ----------
+    image
+        The picture.
+    plan, loop
+        How it was rendered.
+    surfaces
+        How many surfaces the longest path under way has met.
+
+    Raises
+    ------
+    RenderError
+        If there is no picture, or too many samples are not finite.
+    """
+    settings, accumulator = plan.settings, loop.accumulator
+    time_up = loop.stopped or loop.scheduler.time_up
+    if time_up:
+        check_first_samples(image, settings.seconds, surfaces)
+    accumulator.bad.report(image, lambda pixel, sample: _cause_of_bad_sample(plan, loop, pixel, sample))
+    if settings.clamp is not None:
+        warn_of_clamped_light(image, settings.clamp)
+    if settings.background is None and is_black_or_white(image):
+        from ..diagnosis import warn_of_black_or_white  # here, as most pictures do without
+
+        warn_of_black_or_white(
+            image,
+            plan.scene.lighted,
+            plan.scene.compiled,
+            loop.view.camera,
+            INTEGRATORS.label(settings.integrator),
+            settings.max_bounces,
+        )
+    if settings.noise is not None and (time_up or accumulator.film.count.max() == settings.max_spp):
+        warn_of_noise(image, settings.noise)
+
+
+def _cause_of_bad_sample(plan: Plan, loop: RenderLoop, pixel: int, sample: int) -> str:
+    """Return in which bounce, and at which material, a sample that is not finite became so."""
+    from ..faults import PathChecker  # here, as most pictures do without
+
+    tracer, camera = plan.tracer, loop.view.camera
+    integrator = INTEGRATORS.find(plan.settings.integrator)
+    checker = PathChecker(
+        plan.scene.lighted,
+        tracer.scene,
+        camera,
+        tracer.sampler(camera.film[0]),
+        tracer.filter,
+        tracer.max_bounces,
+        plan.estimator.branches,
+        light_samples=integrator is not li_naive,
+        mis=integrator in WITH_MIS,
+    )
+    return checker.first_fault(pixel, sample)

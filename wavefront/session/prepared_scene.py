@@ -1,0 +1,77 @@
+"""A scene that is ready to be rendered from any view."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..accel import Accelerator, Geometry, most_copies
+from ..compile.scene import compile_scene
+from ..geometric_layers import ShapeTable
+from ..integrators import INTEGRATORS, WITH_MIS
+from ..lighting import choose_preset, lighted
+from ..outcome import warn_of_unseen_lights
+from ..progress import phase
+from ..resuming import scene_fingerprint
+from ..scene import Scene
+from ..settings import Settings
+
+
+class PreparedScene:
+    """A user's scene with the light and ground that settings add to it, compiled.
+
+    Parameters
+    ----------
+    scene
+        The user's.
+    settings
+        Of the render.
+
+    Attributes
+    ----------
+    scene
+        The user's.
+    preset
+        Name of the light that was added; None if there is none.
+    lighted
+        The scene with it.
+    compiled
+        That one, compiled.
+    shapes
+        Names and ids of its shapes.
+    """
+
+    def __init__(self, scene: Scene, settings: Settings) -> None:
+        self.scene = scene
+        self.preset = choose_preset(scene, settings.lighting)
+        self.lighted = lighted(scene, self.preset, ground=settings.ground, up=settings.up_vector)
+        warn_of_unseen_lights(self.lighted, settings.integrator)
+        self._geometries: list[Geometry] = []
+        self._fingerprint: str | None = None
+        with phase("building the scene", settings.progress):
+            make_accelerator = scene.accelerators.maker(settings.accel)
+
+            def make(geometry: Geometry) -> Accelerator:
+                self._geometries.append(geometry)
+                return make_accelerator(geometry)
+
+            compiled = compile_scene(
+                self.lighted,
+                make,
+                settings.light_sampler,
+                most_copies(settings.accel),
+                mis=INTEGRATORS.find(settings.integrator) in WITH_MIS,
+            )
+        self.compiled = replace(compiled, background=settings.background_color)
+        self.shapes = ShapeTable(self.lighted.shapes)
+
+    def fingerprint(self) -> str:
+        """Return the fingerprint of all that rays can meet.
+
+        Raises
+        ------
+        SceneError
+            If a part of it, such as an attribute of a BSDF of a user, cannot be compared.
+        """
+        if self._fingerprint is None:
+            self._fingerprint = scene_fingerprint(self.compiled, self._geometries)
+        return self._fingerprint

@@ -1,0 +1,450 @@
+"""The session: what drives a render, picture by picture."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Generator, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..accel.registry import AcceleratorMaker
+from ..camera import Camera, image_size
+from ..checkpoint import Checkpoint
+from ..errors import RenderError, SaveError, SceneError, warn_caller
+from ..filters import Filter
+from ..image import Image
+from ..integrators import Integrator
+from ..lights.samplers import LightSamplerMaker
+from ..materials import MaterialLike
+from ..object_boxes import silhouettes
+from ..outcome import LONG_PATH, interrupted, render_error, setup_errors, warn_of_long_paths
+from ..progress import Progress
+from ..renderable import as_scene, choose_camera
+from ..sampling.sampler import SamplerMaker
+from ..scheduling.accumulator import Accumulator, check_picture_memory
+from ..scheduling.blas import reserve_buffers
+from ..scheduling.executors import ExecutorLike
+from ..scheduling.interrupt import InterruptHandler
+from ..scheduling.jobs import Job, JobResult
+from ..scheduling.loop import PassSplitter, doubling, undivided
+from ..scheduling.pool import WorkerPool
+from ..scheduling.shared import STOP
+from ..scheduling.tracing import WaveMonitor, trace_job
+from ..settings import Settings, check_camera
+from ..suggestions import suggests_keywords
+from .last_checks import check_last_image
+from .plan import make_plan
+from .prepared_scene import PreparedScene
+from .view_render import ViewRender, new_accumulator
+
+SNAPSHOT_INTERVAL = 1.0  # seconds between two pictures of a long pass
+
+
+class Session:
+    """A render that can be watched, stopped and pointed at another view.
+
+    Iteration goes on with the render and yields the picture so far after each pass: at 1, 2, 4, 8 ... samples
+    per pixel, or where `noise` decides anew, and at least about once a second where the passes over all
+    pixels take no longer. The last picture is that of `render`, bit for bit. While the caller looks at a
+    picture, workers go on with the next few waves.
+
+    As a context manager the session keeps its workers until the end of the block, and leaves no
+    process, thread or shared memory behind it, also after an error or Ctrl-C. Outside of a block, workers
+    that were idle for 10 seconds end, and start again when they are needed.
+
+    Parameters
+    ----------
+    scene, spp, camera, size, material, up, lighting, ground, background
+        As for `render`.
+    integrator, max_bounces, seed, samples, sampler, accel, filter, light_sampler, branches, guide, reuse
+        As for `render`.
+    workers, executor, noise, seconds, clamp, wave_size, max_memory, strict, aovs, denoise, progress
+        As for `render`.
+    checkpoint, checkpoint_interval
+        As for `render`.
+
+    Raises
+    ------
+    SceneError
+        If an argument or the scene is malformed.
+    Interrupted
+        After Ctrl-C while a picture is waited for.
+    RenderError
+        If the render cannot go on.
+
+    Examples
+    --------
+    >>> scene = [wf.Sphere((0, 0, 0), 1), wf.Environment(1)]
+    >>> with wf.Session(scene, spp=4, size=(16, 16), progress=False) as session:
+    ...     for image in session:
+    ...         print(image.spp)
+    1
+    2
+    4
+    """
+
+    @suggests_keywords
+    def __init__(
+        self,
+        scene: Any,
+        spp: int | None = None,
+        *,
+        camera: Camera | None = None,
+        size: tuple[int, int] | None = None,
+        material: MaterialLike | None = None,
+        up: ArrayLike | None = None,
+        lighting: str | None = "auto",
+        ground: bool = False,
+        background: str | ArrayLike | None = None,
+        integrator: str | Integrator = "full",
+        max_bounces: int = 12,
+        seed: int = 0,
+        samples: range | None = None,
+        sampler: str | SamplerMaker = "sobol",
+        accel: str | AcceleratorMaker = "auto",
+        workers: int | None = None,
+        executor: str | ExecutorLike | None = None,
+        noise: float | None = None,
+        seconds: float | None = None,
+        filter: str | Filter = "box",
+        light_sampler: str | LightSamplerMaker = "spatial",
+        branches: int | str = 1,
+        guide: bool | str = False,
+        reuse: bool = False,
+        clamp: float | None = None,
+        wave_size: int | None = None,
+        checkpoint: str | os.PathLike[str] | None = None,
+        checkpoint_interval: float = 60,
+        max_memory: int | str | None = None,
+        strict: bool = False,
+        aovs: str | Sequence[str] = (),
+        denoise: bool = False,
+        progress: Progress = None,
+    ) -> None:
+        begin = time.perf_counter()
+        self._in_block = self._closed = self._once = False
+        self.command: dict[str, Any] | None = None
+        self._settings = Settings(
+            spp=spp,
+            camera=camera,
+            size=size,
+            material=material,
+            up=up,
+            lighting=lighting,
+            ground=ground,
+            background=background,
+            integrator=integrator,
+            max_bounces=max_bounces,
+            seed=seed,
+            samples=samples,
+            sampler=sampler,
+            accel=accel,
+            workers=workers,
+            executor=executor,
+            noise=noise,
+            seconds=seconds,
+            filter=filter,
+            light_sampler=light_sampler,
+            branches=branches,
+            guide=guide,
+            reuse=reuse,
+            clamp=clamp,
+            wave_size=wave_size,
+            checkpoint=checkpoint,
+            checkpoint_interval=checkpoint_interval,
+            max_memory=max_memory,
+            strict=strict,
+            aovs=aovs,
+            denoise=denoise,
+            progress=progress,
+        )
+        with setup_errors():
+            self._set_up(scene, begin)
+
+    def _set_up(self, subject: Any, begin: float) -> None:
+        """Compile the scene and begin the first picture."""
+        settings = self._settings
+        reserve_buffers(1)
+        scene = as_scene(subject, settings.material, settings.progress)
+        camera = choose_camera(scene, settings.camera, settings.size, settings.up_vector)
+        check_picture_memory(*camera.size)
+        settings.budget(camera.size)  # before work; again when the memory of the scene is known
+        self._scene = PreparedScene(scene, settings)
+        self._plan = make_plan(settings, self._scene, camera)
+        self._make_pool()
+        self._begin_picture(camera, new_accumulator(camera, self._plan.tracer.recorded_layers), begin)
+
+    def _make_pool(self) -> None:
+        """Make a pool of workers, which start with the first job."""
+        self._monitor = WaveMonitor()
+        self.interrupt_handler = InterruptHandler(self._monitor.stop)
+        self._pool = WorkerPool[Job, JobResult](
+            partial(trace_job, self._plan.tracer, self._monitor),
+            self._plan.budget.workers,
+            self._plan.executor,
+            self._monitor.stop,
+            self._settings.strict,
+        )
+        if self._in_block:
+            self._pool.__enter__()
+
+    def _begin_picture(self, camera: Camera, accumulator: Accumulator, begin: float) -> None:
+        """Get ready for a picture of a view; `begin` is when it was asked for, by `time.perf_counter`."""
+        self._render = ViewRender(self._plan, camera, accumulator, begin)
+        self._last_snapshot = begin
+        self._stopped = self._ended = self._warned = False
+
+    # --- Use ------------------------------------------------------------------------------------------
+
+    def __enter__(self) -> Self:
+        """Keep the workers until the end of the block."""
+        self._in_block = True
+        self._pool.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the session."""
+        self._in_block = False
+        self.close()
+
+    def __iter__(self) -> Self:
+        """Go on with the render; a second loop goes on where the first one was left."""
+        return self
+
+    def __next__(self) -> Image:
+        """Render until there is another picture, and return it.
+
+        Raises
+        ------
+        StopIteration
+            If the last picture was returned, or the session was stopped or closed.
+        Interrupted
+            After Ctrl-C; its `image` is the picture so far.
+        RenderError
+            If the render cannot go on; its `image` is the picture so far.
+        """
+        if self._ended:
+            raise StopIteration
+        with self.interrupt_handler:
+            if self._stopped:  # since the last picture
+                self._keep_render()
+                self._ended = True
+                self._pool.cancel()
+                raise StopIteration
+            for pass_ended in self._sweeps_of(doubling):
+                if pass_ended or time.perf_counter() - self._last_snapshot >= SNAPSHOT_INTERVAL:
+                    snapshot = self._render.image()
+                    self._last_snapshot = time.perf_counter()
+                    if not self.interrupt_handler.pressed:
+                        return snapshot
+            image = self._end()
+        if image is None:
+            raise StopIteration
+        return image
+
+    def run(self) -> Image:
+        """Render to the end and return the picture.
+
+        Raises
+        ------
+        Interrupted
+            After Ctrl-C; its `image` is the picture so far.
+        RenderError
+            If the render cannot go on, or is over already.
+        """
+        return self._run()
+
+    def run_once(self) -> Image:
+        """Render to the end and return the picture; after that the session can only be closed.
+
+        It takes less memory than `run`: sums are freed while the picture is made from them.
+
+        Raises
+        ------
+        Interrupted, RenderError
+            As `run`.
+        """
+        self._once = True
+        return self._run()
+
+    def _run(self) -> Image:
+        if self._ended:
+            raise RenderError("the render is over; set_camera begins another picture")
+        with self.interrupt_handler:
+            for _ in () if self._stopped else self._sweeps_of(undivided):
+                pass
+            image = self._end()
+        if image is None:
+            raise RenderError("the render was stopped before there was a picture")
+        return image
+
+    def set_camera(self, camera: Camera | None, size: tuple[int, int] | None = None) -> None:
+        """Begin another picture of the same scene, without compiling it again.
+
+        What was rendered so far is dropped. Workers that have been started go on with the new picture, and
+        `seconds` count from now on.
+
+        Parameters
+        ----------
+        camera
+            What sees the scene; None for the scene's own camera, or one that frames it.
+        size
+            (width, height) in pixels, in place of the camera's.
+
+        Raises
+        ------
+        SceneError
+            If one of them is malformed. The picture that was begun is not changed.
+        """
+        begin, settings = time.perf_counter(), self._settings
+        if self._closed:
+            raise RenderError("the session is closed")
+        if self._render.file is not None:
+            raise SceneError(
+                "a session with a checkpoint renders one view; begin another session for this one"
+            )
+        check_camera("camera", camera)
+        size = None if size is None else image_size(size)
+        camera = choose_camera(self._scene.scene, camera, size, settings.up_vector)
+        self._scene.compiled.view(camera)  # checks its distance
+        budget = settings.budget(camera.size, self._plan.tracer.recorded_layers)
+        accumulator = new_accumulator(camera, self._plan.tracer.recorded_layers)
+        executor = settings.executor_for(camera.size)
+        with self.interrupt_handler:
+            self._render.discard_sweeps()
+            if not self._pool.closed:
+                self._pool.cancel()
+            others = (executor, self._plan.executor) == ("processes", "threads")
+            others |= budget.workers != self._plan.budget.workers
+            if self._monitor.stop.value or others or settings.decides:
+                self._pool.close()
+                self._plan = make_plan(settings, self._scene, camera)
+                self._make_pool()
+            else:
+                self._plan = replace(self._plan, budget=budget)
+        self._begin_picture(camera, accumulator, begin)
+
+    def stop(self) -> None:
+        """End the render: the loop ends, with the picture so far where one is waited for.
+
+        It can be called from another thread, and from a function that is given as `progress`.
+        """
+        self._stopped = True
+        self._monitor.stop.rise_to(STOP)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a checkpoint of the picture so far, from which `render(checkpoint=path)` goes on.
+
+        `Image.load` reads the file as a picture.
+
+        Raises
+        ------
+        SaveError
+            If it cannot be written. The old file is intact.
+        SceneError
+            If a part of the scene cannot be compared with that of the next render. The message names it.
+        """
+        sums = self._render.accumulator.sums
+        sums.identity = sums.identity or self._render.identity()
+        self._make_checkpoint().write(path)
+
+    def identity(self) -> dict[str, Any]:
+        """Return what another render must have in common with this one so that its samples are the same.
+
+        These are settings, and fingerprints of the scene, the camera and functions of your own. `spp` and
+        `seconds` are no part of it.
+
+        Raises
+        ------
+        SceneError
+            If a part of the scene, such as an attribute of a BSDF of your own, cannot be compared.
+        """
+        return self._render.identity()
+
+    def silhouettes(self, camera: Camera | None = None) -> Iterator[tuple[int, NDArray[np.bool_]]]:
+        """Yield the id of each shape and the pixels (height, width) that it would cover if it were alone.
+
+        Ids and rays are those of the layer `shape_id`. Shapes that would cover no pixel are left out.
+
+        Parameters
+        ----------
+        camera
+            What sees the scene; None for the camera of the picture.
+        """
+        return silhouettes(self._scene.compiled, self._render.camera if camera is None else camera)
+
+    def close(self) -> None:
+        """End the render and all workers; the session cannot be used again."""
+        with self.interrupt_handler:
+            if not self._ended:
+                self._keep_render()
+            self._closed = self._ended = True
+            self._render.discard_sweeps()
+            self._pool.close()
+
+    # --- The picture ----------------------------------------------------------------------------------
+
+    def _sweeps_of(self, split: PassSplitter) -> Generator[bool]:
+        """Return the loop that was begun, or begin it."""
+        return self._render.sweeps(self._pool, self._monitor.surfaces, self._wave_done, split)
+
+    def _wave_done(self) -> None:
+        """Write the checkpoint when it is due, and warn once of paths that do not end."""
+        if self._render.file is not None:
+            self._render.file.write_if_due(self._make_checkpoint)
+        long = self._settings.max_bounces > LONG_PATH and self._monitor.surfaces.value > LONG_PATH
+        if long and not self._warned:
+            self._warned = True
+            warn_of_long_paths(self._settings.max_bounces)
+
+    def _end(self) -> Image | None:
+        """Return the last picture when the loop is over, or raise what ended it; None if there is none."""
+        render, settings = self._render, self._settings
+        failure = render.loop.failure
+        self._ended = True
+        if failure is not None or self._interrupted:
+            self._pool.close()
+        else:
+            self._pool.cancel()
+        render.accumulator.release_reserve()
+        not_written = self._write_checkpoint()
+        image = render.last_image(self._interrupted or self._stopped, free_sums=self._once)
+        if not_written is not None and (failure is not None or self._interrupted):
+            warn_caller(f"the checkpoint was not written: {not_written}")
+        if failure is not None:
+            raise render_error(failure, image) from failure
+        if not self._interrupted and not self._stopped:
+            check_last_image(image, self._plan, render.loop, self._monitor.surfaces.value)
+        if self._interrupted:
+            raise interrupted(image, settings.target_spp)
+        if not_written is not None:
+            raise RenderError(f"the checkpoint was not written: {not_written}", image) from not_written
+        if not render.accumulator.samples:
+            return None
+        return image.denoise() if settings.denoise else image
+
+    @property
+    def _interrupted(self) -> bool:
+        return self._render.loop.interrupted or self.interrupt_handler.pressed
+
+    def _make_checkpoint(self) -> Checkpoint:
+        """Return the render so far."""
+        return self._render.checkpoint(self.command)
+
+    def _write_checkpoint(self) -> SaveError | MemoryError | None:
+        """Write the checkpoint, where one is kept; return why it cannot be written, if it cannot."""
+        return None if self._render.file is None else self._render.file.write(self._make_checkpoint)
+
+    def _keep_render(self) -> None:
+        """Write the checkpoint of a render that is left before its end; warn if that is not possible."""
+        error = self._write_checkpoint()
+        if error is not None:
+            warn_caller(f"the checkpoint was not written: {error}")

@@ -1,0 +1,230 @@
+"""The render of one view of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Sequence
+from copy import deepcopy
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Camera
+from ..checkpoint import Checkpoint
+from ..filters import FILTERS
+from ..geometric_layers import IDS, geometric_layers
+from ..image import Image
+from ..integrators import INTEGRATORS
+from ..layers import BOXES, geometric_names
+from ..object_boxes import object_boxes
+from ..resuming import CheckpointFile, render_identity
+from ..sampling.sampler import SAMPLERS
+from ..scheduling.accumulator import Accumulator
+from ..scheduling.adaptive import Pass
+from ..scheduling.executors import EXECUTORS
+from ..scheduling.jobs import Job, JobResult, View
+from ..scheduling.loop import PassSplitter, RenderLoop
+from ..scheduling.pool import WorkerPool
+from ..scheduling.scheduler import Scheduler
+from ..scheduling.shared import SharedInt
+from ..version import VERSION
+from .plan import Plan
+
+
+class ViewRender:
+    """The render of one view: its loop, its picture so far, its layers and its checkpoint.
+
+    Parameters
+    ----------
+    plan
+        How it is rendered.
+    camera
+        What sees the scene.
+    accumulator
+        Sums for the picture and its layers.
+    begin
+        When it was asked for, by `time.perf_counter`.
+
+    Attributes
+    ----------
+    camera, accumulator
+        As given.
+    loop
+        Renders it.
+    file
+        Where its checkpoint is kept; None if that was not asked for.
+    """
+
+    def __init__(self, plan: Plan, camera: Camera, accumulator: Accumulator, begin: float) -> None:
+        settings, view = plan.settings, plan.scene.compiled.view(camera)
+        self.camera, self.accumulator = camera, accumulator
+        self._plan, self._view = plan, view
+        self._geometric: dict[str, NDArray[Any]] = {}
+        self._boxes: list[dict[str, Any]] | None = None
+        self._sweeps: Generator[bool] | None = None
+        self.file: CheckpointFile | None = None
+        if settings.samples is not None or settings.checkpoint is not None:
+            accumulator.sums.identity = self.identity()
+        begun = None
+        if settings.checkpoint is not None:
+            self.file = CheckpointFile(settings.checkpoint, settings.checkpoint_interval)
+            earlier = self.file.resume(accumulator, settings)
+            if earlier is not None:
+                begin -= earlier.state["seconds"]
+                if earlier.pixels is not None:
+                    begun = Pass(earlier.pixels, earlier.state["first"], settings.max_spp)
+        scheduler = Scheduler(
+            begin,
+            settings.seconds,
+            plan.budget.wave_size,
+            plan.budget.workers,
+            plan.estimator.branches,
+        )
+        self.loop = RenderLoop(
+            View(view, scheduler.deadline, settings.first_sample, settings.reuse),
+            accumulator,
+            scheduler,
+            spp=settings.max_spp,
+            noise=settings.noise,
+            seconds=settings.seconds,
+            progress=settings.progress,
+            begun=begun,
+        )
+
+    def sweeps(
+        self,
+        pool: WorkerPool[Job, JobResult],
+        surfaces: SharedInt,
+        wave_done: Callable[[], object],
+        split: PassSplitter,
+    ) -> Generator[bool]:
+        """Return the sweeps of the loop that was begun, or begin it, after the geometric layers."""
+        if self._sweeps is None:
+            self._make_geometric_layers()
+            self._sweeps = self.loop.sweeps(pool, surfaces, wave_done, split)
+        return self._sweeps
+
+    def discard_sweeps(self) -> None:
+        """End the loop."""
+        if self._sweeps is not None:
+            self._sweeps.close()
+
+    def image(self, cut_short: bool = False) -> Image:
+        """Return the picture so far.
+
+        Parameters
+        ----------
+        cut_short
+            Whether the render ends before its time.
+        """
+        image = self.accumulator.image(self.metadata(cut_short))
+        self._add_layers(image, {name: layer.copy() for name, layer in self._geometric.items()})
+        return image
+
+    def last_image(self, cut_short: bool, free_sums: bool) -> Image:
+        """Return the last picture; it can be merged with others if `samples` were given.
+
+        Parameters
+        ----------
+        cut_short
+            As for `image`.
+        free_sums
+            Whether sums that are not merged may be freed while the picture is made from them, as nothing
+            else needs them.
+        """
+        keep_sums, metadata = self._plan.settings.samples is not None, self.metadata(cut_short)
+        if free_sums and not keep_sums:
+            image = self.accumulator.last_image(metadata)
+        else:
+            image = self.accumulator.image(metadata, keep_sums)
+        self._add_layers(image, self._geometric)
+        return image
+
+    def identity(self) -> dict[str, Any]:
+        """Return what another render must have in common with this one so that its samples are the same.
+
+        Raises
+        ------
+        SceneError
+            If a part of the scene cannot be compared.
+        """
+        scene, layers = self._plan.scene, self._plan.tracer.recorded_layers
+        accelerator = scene.compiled.accelerator.name
+        return render_identity(self._plan.settings, scene.fingerprint(), accelerator, self._view, layers)
+
+    def checkpoint(self, command: dict[str, Any] | None) -> Checkpoint:
+        """Return the render so far, with the command that goes on with it."""
+        loop, accumulator = self.loop, self.accumulator
+        step = loop.step if self._plan.settings.noise is not None else None
+        state = {
+            **accumulator.state(),
+            "seconds": loop.scheduler.elapsed,
+            "first": 0 if step is None else step.first,
+        }
+        metadata = {**self.metadata(cut_short=True), **accumulator.counts()}
+        pixels = None if step is None else step.pixels
+        return Checkpoint(accumulator.sums, metadata, state, pixels, command)
+
+    def metadata(self, cut_short: bool) -> dict[str, Any]:
+        """Return the settings and results of the picture so far."""
+        plan, settings = self._plan, self._plan.settings
+        first = settings.first_sample
+        most = int(self.accumulator.film.count.max())
+        return {
+            "lighting": plan.scene.preset,
+            "background": _background_label(settings.background),
+            "integrator": INTEGRATORS.label(settings.integrator),
+            "max_bounces": settings.max_bounces,
+            "seed": settings.seed,
+            "sampler": SAMPLERS.label(settings.sampler),
+            "sample_ranges": [[first, first + most]],
+            "filter": FILTERS.label(settings.filter),
+            "branches": plan.estimator.branches,
+            "guide": settings.guide,
+            "guided": plan.estimator.guided,
+            "reuse": settings.reuse,
+            "clamp": settings.clamp,
+            "accelerator": plan.scene.compiled.accelerator.name,
+            "workers": plan.budget.workers,
+            "executor": EXECUTORS.label(plan.executor),
+            "seconds": self.loop.scheduler.elapsed,
+            "interrupted": cut_short,
+            "version": VERSION,
+            "numpy": np.__version__,
+        }
+
+    def _make_geometric_layers(self) -> None:
+        """Trace the geometric layers and the boxes that are asked for."""
+        aovs, scene = self._plan.settings.aovs, self._plan.scene
+        names = geometric_names(aovs)
+        if names:
+            self._geometric = geometric_layers(scene.compiled, self.camera, scene.shapes, names)
+        if BOXES in aovs:
+            self._boxes = object_boxes(scene.compiled, self.camera, scene.shapes)
+
+    def _add_layers(self, image: Image, geometric: dict[str, NDArray[Any]]) -> None:
+        """Give a picture its geometric layers and boxes."""
+        for name, layer in geometric.items():
+            image.layers[name] = layer
+            if name in IDS:
+                image.names[IDS[name]] = self._plan.scene.shapes.names(IDS[name])
+        if self._boxes is not None:
+            image.metadata[BOXES] = deepcopy(self._boxes)
+
+
+def new_accumulator(camera: Camera, layers: Sequence[str]) -> Accumulator:
+    """Return sums for the picture of a camera and its sampled layers.
+
+    Raises
+    ------
+    SceneError
+        If there is not enough memory for them.
+    """
+    accumulator = Accumulator(*camera.size)
+    accumulator.add_layers(layers)
+    return accumulator
+
+
+def _background_label(background: Any) -> Any:
+    """Return the background as metadata have it."""
+    return np.ravel(background).tolist() if isinstance(background, np.ndarray) else background
