@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from .camera import Camera
 from .compile.materials import material_parts
 from .compile.scene import CompiledScene
+from .film import distinct
 from .layers import LAYERS
 from .materials import Material
 from .shapes import Instance, Mesh, Shape
@@ -197,7 +198,7 @@ class _Corners:
         """Return texture coordinates (n, 2) at points (n, 3) on faces of meshes, NaN where there are none."""
         out = np.full((len(shape), 2), np.nan)
         number = self._of_shape.take(shape)
-        for mesh in np.unique(number).tolist():
+        for mesh in distinct(number):
             lanes = np.flatnonzero(number == mesh)
             out[lanes] = self._uv(self._meshes[mesh], shape.take(lanes), face.take(lanes), point[lanes])
         return out
@@ -214,10 +215,11 @@ class _Corners:
 
     def _placed(self, number: Ints, vertex: Doubles) -> Doubles:
         """Return vertices (3, n) of the meshes of shapes (n,) in the scene."""
-        distinct, lane = np.unique(number, return_inverse=True)
-        if not isinstance(self._shapes[distinct[0]], Instance):
+        if not isinstance(self._shapes[number[0]], Instance):
             return vertex
-        placed = [self._shapes[each] for each in distinct.tolist()]
+        used = distinct(number)
+        lane = np.searchsorted(used, number)
+        placed = [self._shapes[each] for each in used]
         m = np.stack([shape.transform for shape in placed if isinstance(shape, Instance)])
         m = m.take(lane, 0).transpose(1, 2, 0)
         x, y, z = vertex

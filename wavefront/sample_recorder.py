@@ -13,7 +13,7 @@ import numpy as np
 from .bsdfs import albedo_of
 from .compile.scene import CompiledScene
 from .errors import SceneError
-from .layer_samples import BOUNDED, LayerSamples, fixed_point
+from .layer_samples import BOUNDED, FixedPointSamples, LayerSamples, fixed_point
 from .layers import CLAMPED, KEYED_LAYERS, LAYERS
 from .record import record
 from .stages.compact import compact
@@ -70,6 +70,7 @@ class SampleRecorder:
             self._light.update((f"light_groups.{name}", np.zeros((3, n), f4)) for name in self._groups.names)
         self._awaited: AwaitedSurfaces | None = None
         self._begun = False
+        self._all_rough = True  # no first surface is specular
         self._picture: Floats | None = None  # to which all light has been added
         self._share = 1.0  # part of a sample that each path is
 
@@ -77,7 +78,7 @@ class SampleRecorder:
         """Have paths that start at the camera carry the recorder."""
         paths.recorder = self
         if "direct" in self._light or CLAMPED in self._light:
-            paths.scattered = np.full(len(paths), NOT_YET, np.uint8)
+            paths.scattered = broadcast(np.uint8(NOT_YET), len(paths))
         if any(name in self._values for name in FEATURES):
             paths.met_rough = np.zeros(len(paths), np.bool_)
 
@@ -162,6 +163,7 @@ class SampleRecorder:
         assert paths.met_rough is not None
         end = sum(part.stop - part.start for part, bsdf in shade.groups if not bsdf.specular)
         rough = slice(0, end)  # groups that are specular come last
+        self._all_rough &= end == lanes.size
         slot = take(paths.slot, lanes[rough])
         for name, values in zip(FEATURES, (albedo, shade.surface.ns), strict=True):
             if name in self._values:
@@ -262,8 +264,17 @@ class SampleRecorder:
             counts["alpha"] = self._covered.reshape(samples, -1).sum(0, dtype=np.int32)
         if self._coverage is not None:
             counts.update(self._coverage.counts(samples, dropped))
-        bounded = {name: fixed_point(values, samples, dropped) for name, values in self._values.items()}
-        return LayerSamples(counts, bounded, light)
+        return LayerSamples(counts, self._bounded(samples, dropped), light)
+
+    def _bounded(self, samples: int, dropped: Ints) -> dict[str, FixedPointSamples]:
+        """Return the layers with values in [-1, 1]."""
+        bounded: dict[str, FixedPointSamples] = {}
+        for name, values in self._values.items():
+            if name == "denoising_albedo" and self._all_rough and "albedo" in bounded:
+                bounded[name] = bounded["albedo"]  # the same values: sent once
+            else:
+                bounded[name] = fixed_point(values, samples, dropped)
+        return bounded
 
     def _check(self, integrator: object, radiance: Floats) -> None:
         label = getattr(integrator, "__name__", repr(integrator))

@@ -18,6 +18,10 @@ from ..record import record
 from ..state import Words
 from ..vec import Floats, Ints
 
+DEEPEST = 8  # samples of a pixel that a job should have: the more, the less it costs to send and add sums
+DEPTH_SHARE = 1 / 2  # of the samples so far, so that the pixels of a render that is ended differ by no more,
+# and of those left, so that all workers end at about the same time
+
 
 @record
 class View:
@@ -112,7 +116,8 @@ def split_jobs(
     """
     while first < last:
         lanes = wave_size((last - first) * pixels.size)
-        parts = -(-pixels.size // lanes)
+        depth = min(max(1, int(min(first, last - first) * DEPTH_SHARE)), DEEPEST, lanes)
+        parts = -(-pixels.size * depth // lanes)
         width = -(-pixels.size // parts)  # equal parts: a small wave costs almost as much as a large one
         depth = min(max(1, lanes // width), last - first)
         for part in view.parts(pixels, width):

@@ -9,7 +9,7 @@ import numpy as np
 from ..bsdfs import BsdfSample, sampled
 from ..sampling.sampler import Dimension, Sampler
 from ..state import BEFORE, JUST_ONCE, NOT_YET, Paths
-from ..vec import Bools, Bytes, Floats, Ints, f4, normalize, signs, take
+from ..vec import Bools, Bytes, Floats, Ints, broadcast, f4, normalize, signs, take
 from .guidance import mix_with_guide
 from .interaction import LIFT, offset_origin
 from .shade import Shading
@@ -76,7 +76,12 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
 
 def _after(scattered: Bytes, specular: Bools) -> Bytes:
     """Return `Paths.scattered` (n,) after another scattering, which is specular (n,) or not."""
-    return np.where(scattered == NOT_YET, np.where(specular, NOT_YET, JUST_ONCE), BEFORE).astype(np.uint8)
+    n = scattered.size
+    if n and not (scattered.strides[0] or specular.strides[0]):  # alike on all lanes
+        return broadcast(_after(scattered[:1].copy(), specular[:1].copy())[0], n)
+    after = np.multiply(scattered != NOT_YET, BEFORE, dtype=np.uint8)
+    after |= np.multiply((scattered == NOT_YET) & ~specular, JUST_ONCE, dtype=np.uint8)
+    return after
 
 
 def _strayed(shade: Shading, wi: Floats, cos: Floats) -> Ints:
