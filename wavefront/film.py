@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .exact_sum import ExactSums
 from .record import record
 from .state import Words
-from .vec import ALL, Doubles, Floats, Ints, Lanes, take
+from .vec import ALL, Doubles, Floats, Ints, Lanes, distinct, take
 
 BATCHES = 8  # at most
 WHOLE_BATCH = 4  # samples; batches are at least this long if a pixel has two of them
@@ -232,12 +232,6 @@ def _without_outliers(relative: Doubles) -> Doubles:
     """Limit the worst `OUTLIERS` of the pixels to the worst of the others."""
     worst = relative.size - 1 - int(OUTLIERS * relative.size)
     return np.minimum(relative, np.partition(relative, worst)[worst])
-
-
-def distinct(values: Ints) -> list[int]:
-    """Return the distinct values in rising order, like np.unique, which would import numpy.ma."""
-    ordered = np.sort(values)
-    return ordered[np.diff(ordered, prepend=-1) > 0].tolist()
 
 
 def _joined(batches: list[tuple[Doubles, int]], size: int) -> list[tuple[Doubles, int]]:

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from .camera import Camera
 from .compile.materials import material_parts
 from .compile.scene import CompiledScene
-from .film import distinct
 from .layers import LAYERS
 from .materials import Material
 from .shapes import Instance, Mesh, Shape
@@ -23,7 +22,7 @@ from .stages.generate import center_rays
 from .stages.interaction import interaction
 from .stages.normal_mapping import perturb_normals
 from .state import Hits, Rays, Words
-from .vec import Doubles, Ints, dot, f4, length
+from .vec import Doubles, Ints, distinct, dot, f4, length
 
 RAYS_AT_ONCE = 1 << 16
 IDS = {"shape_id": "shape", "instance_id": "instance", "material_id": "material"}

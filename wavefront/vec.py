@@ -125,3 +125,9 @@ def spans(total: int, size: int) -> Iterator[slice]:
 def column(value: object) -> Floats:
     """Return three numbers as a (3, 1) float32 column."""
     return np.asarray(value, f4).reshape(3, 1)
+
+
+def distinct(values: Ints) -> list[int]:
+    """Return the distinct values in rising order, like np.unique, which would import numpy.ma."""
+    ordered = np.sort(values)
+    return ordered[np.diff(ordered, prepend=-1) > 0].tolist()

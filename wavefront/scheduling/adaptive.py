@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..film import Film, distinct
+from ..film import Film
 from ..record import record
 from ..state import Words
-from ..vec import Ints
+from ..vec import Ints, distinct
 
 MIN_SPP = 32  # before anything is decided by an error estimate
 TILE = 8  # pixels; decisions are made for squares of this side

@@ -59,7 +59,7 @@ class ViewRender:
         settings, view = plan.settings, plan.scene.compiled.view(camera)
         self.camera, self.accumulator = camera, accumulator
         self._plan, self._view = plan, view
-        self._geometric: dict[str, NDArray[Any]] = {}
+        self._geometric: dict[str, NDArray[Any]] | None = None  # not made yet
         self._boxes: list[dict[str, Any]] | None = None
         self._sweeps: Generator[bool] | None = None
         self.file: CheckpointFile | None = None
@@ -98,10 +98,17 @@ class ViewRender:
         wave_done: Callable[[], object],
         split: PassSplitter,
     ) -> Generator[bool]:
-        """Return the sweeps of the loop that was begun, or begin it, after the geometric layers."""
+        """Return the sweeps of the loop that was begun, or begin it.
+
+        The geometric layers are made while workers trace the first jobs.
+        """
+
+        def done() -> None:
+            self._geometric_layers()
+            wave_done()
+
         if self._sweeps is None:
-            self._make_geometric_layers()
-            self._sweeps = self.loop.sweeps(pool, surfaces, wave_done, split)
+            self._sweeps = self.loop.sweeps(pool, surfaces, done, split)
         return self._sweeps
 
     def discard_sweeps(self) -> None:
@@ -118,7 +125,7 @@ class ViewRender:
             Whether the render ends before its time.
         """
         image = self.accumulator.image(self.metadata(cut_short))
-        self._add_layers(image, {name: layer.copy() for name, layer in self._geometric.items()})
+        self._add_layers(image, {name: layer.copy() for name, layer in self._geometric_layers().items()})
         return image
 
     def last_image(self, cut_short: bool, free_sums: bool) -> Image:
@@ -137,7 +144,7 @@ class ViewRender:
             image = self.accumulator.last_image(metadata)
         else:
             image = self.accumulator.image(metadata, keep_sums)
-        self._add_layers(image, self._geometric)
+        self._add_layers(image, self._geometric_layers())
         return image
 
     def identity(self) -> dict[str, Any]:
@@ -193,14 +200,16 @@ class ViewRender:
             "numpy": np.__version__,
         }
 
-    def _make_geometric_layers(self) -> None:
-        """Trace the geometric layers and the boxes that are asked for."""
-        aovs, scene = self._plan.settings.aovs, self._plan.scene
-        names = geometric_names(aovs)
-        if names:
-            self._geometric = geometric_layers(scene.compiled, self.camera, scene.shapes, names)
-        if BOXES in aovs:
-            self._boxes = object_boxes(scene.compiled, self.camera, scene.shapes)
+    def _geometric_layers(self) -> dict[str, NDArray[Any]]:
+        """Return the geometric layers that are asked for; the first time, trace them and the boxes."""
+        if self._geometric is None:
+            aovs, scene = self._plan.settings.aovs, self._plan.scene
+            given = scene.compiled, self.camera, scene.shapes
+            if BOXES in aovs:
+                self._boxes = object_boxes(*given)
+            names = geometric_names(aovs)
+            self._geometric = geometric_layers(*given, names) if names else {}
+        return self._geometric
 
     def _add_layers(self, image: Image, geometric: dict[str, NDArray[Any]]) -> None:
         """Give a picture its geometric layers and boxes."""
