@@ -36,7 +36,7 @@ from distributed import Client, LocalCluster
 import wavefront as wf
 from wavefront.film import Film
 from wavefront.scheduling.delivery import pack
-from wavefront.scheduling.jobs import JobResult
+from wavefront.scheduling.jobs import WaveResult
 from wavefront.scheduling.pool import WorkerPool
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "examples"))
@@ -44,7 +44,8 @@ from cornell_box import cornell_box
 
 PIXELS, SPP = 3840 * 2160, 4096
 WORKERS = (10, 100, 1_000, 10_000)
-WAVE = 1 << 16  # paths of a job
+WAVE = 1 << 16  # paths that are traced, or added to a film, to measure what one costs
+JOB = 1 << 19  # paths of a job: four waves
 NETWORK = 1.25e9  # bytes per second, assumed: 10 Gbit/s
 CORES = 16  # workers of a machine, assumed
 SLOW, FACTOR = 0.01, 5.0  # part of the jobs that take so many times as long, assumed
@@ -59,7 +60,8 @@ class Costs:
     add: float  # of the process that adds, per sample
     merge: float  # of two films, per pixel
     film: float  # bytes per pixel
-    job: float  # of the process that hands out jobs, for each, with its result of 12 bytes per path
+    job: float  # of the process that hands out jobs, for each
+    send: float  # of the same, per path of its result
     scene: float  # until a worker has the scene
 
 
@@ -89,13 +91,20 @@ def measured_costs(client: Client, repeat: int) -> Costs:
         session = wf.Session(scene, 1, **options)
         data = pack(session._plan.tracer, folder)
         scene_seconds = seconds(lambda: pickle.loads(data), repeat)
-    result = JobResult(radiance, np.zeros(0, np.intp), 0, 0.0)
-    with WorkerPool(partial(constant, result), 2, client) as pool:
+    job = job_cost(client, 1)
+    send = max(0.0, job_cost(client, JOB) - job) / JOB
+    return Costs(path, add, merge, size, job, send, scene_seconds)
+
+
+def job_cost(client: Client, paths: int) -> float:
+    """CPU seconds of this process for a job with a result of so many paths. The scheduler is in it, too."""
+    result = WaveResult(np.ones((3, 1, paths), np.float32), np.zeros(0, np.intp), 0, 0.0)
+    pixels = np.arange(WAVE, dtype=np.uint32)
+    with WorkerPool(partial(constant, [result]), 2, client) as pool:
         list(pool.run([pixels] * 4))
-        begin, jobs = time.process_time(), 100  # the scheduler is in this process, too
+        begin, jobs = time.process_time(), 100
         assert len(list(pool.run([pixels] * jobs))) == jobs
-        job = (time.process_time() - begin) / jobs
-    return Costs(path, add, merge, size, job, scene_seconds)
+        return (time.process_time() - begin) / jobs
 
 
 def constant(result: Any, job: Any) -> Any:
@@ -116,7 +125,7 @@ def measured_speedup(options: argparse.Namespace) -> None:
     for _ in range(options.repeat):
         times["one process"].append(render(workers=1, executor="threads"))
         for count, name in enumerate(list(times)[1:], 1):
-            with cluster(count) as local, Client(local) as client:
+            with cluster(count) as local, Client(local, direct_to_workers=True) as client:
                 wf.render(scene, 1, executor=client, progress=False)  # imports
                 times[name].append(render(executor=client))
     alone = median(times["one process"])
@@ -134,13 +143,18 @@ def simulated_samples(costs: Costs, workers: int, paths: int) -> float:
     """Seconds of a render whose samples all go to one process, which takes them one job after the other."""
     rng = np.random.default_rng(workers)
     times = job_seconds(rng, math.ceil(PIXELS * SPP / paths), paths * costs.path)
-    one = costs.job * max(1.0, paths / WAVE) + paths * (costs.add + 12 / NETWORK)
+    one = result_seconds(costs, paths)
     busy = [costs.scene] * workers  # when each worker is done
     now = 0.0
     for needed in times.tolist():
         now = max(now, heapq.heappop(busy)) + one
         heapq.heappush(busy, now + needed)
     return max(busy)
+
+
+def result_seconds(costs: Costs, paths: int) -> float:
+    """Seconds of the process that hands out jobs of so many paths, for each."""
+    return costs.job + paths * (costs.send + costs.add + 12 / NETWORK)
 
 
 def simulated_films(costs: Costs, workers: int, spp: int) -> tuple[float, float]:
@@ -173,15 +187,14 @@ def print_simulation(costs: Costs) -> None:
     for workers in WORKERS:
         best = min((simulated_films(costs, workers, spp), spp) for spp in (1, 2, 4, 8, 16, 32, 64, 128))
         (films, merge), spp = best
-        samples = simulated_samples(costs, workers, WAVE)
+        samples = simulated_samples(costs, workers, JOB)
         print(
             f"  {workers:7,} {samples / 3600:12.2f} h {ideal / workers / samples:5.0%}"
             f" {films / 3600:12.3f} h {spp:4} spp {merge:16.1f} s {ideal / workers / films:10.0%}"
         )
     print("\n  most workers that one process keeps busy, by paths of a job:", end="")
-    for paths in (1 << 10, 1 << 13, 1 << 16, 1 << 19):
-        one = costs.job * max(1.0, paths / WAVE) + paths * (costs.add + 12 / NETWORK)
-        print(f"  {paths:,}: {paths * costs.path / one:.1f}", end="")
+    for paths in (1 << 13, 1 << 16, 1 << 19, 1 << 21):
+        print(f"  {paths:,}: {paths * costs.path / result_seconds(costs, paths):.1f}", end="")
     print()
 
 
@@ -194,12 +207,12 @@ def main() -> None:
     parser.add_argument("--spp", type=int, default=256)
     parser.add_argument("--size", type=int, default=512)
     options = parser.parse_args()
-    with cluster(2) as local, Client(local) as client:
+    with cluster(2) as local, Client(local, direct_to_workers=True) as client:
         costs = measured_costs(client, options.repeat)
     print(f"Measured: {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
     print(f"  a path {costs.path * 1e6:.3f} µs, adding a sample {costs.add * 1e9:.1f} ns")
     print(f"  merging two films {costs.merge * 1e9:.0f} ns and {costs.film:.0f} bytes per pixel")
-    print(f"  a job of {WAVE} paths costs Dask {costs.job * 1e3:.2f} ms")
+    print(f"  a job costs Dask {costs.job * 1e3:.2f} ms, and {costs.send * 1e9:.1f} ns per path")
     print(f"  loading the scene {costs.scene * 1e3:.2f} ms")
     print(f"Assumed: {NETWORK * 8e-9:.0f} Gbit/s, {CORES} cores per machine, {SLOW:.0%} of jobs take")
     print(f"  {FACTOR:.0f} times as long, a worker is lost every {1 / LOSSES / 3600:,.0f} hours")

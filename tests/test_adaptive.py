@@ -169,7 +169,7 @@ class Machine:
             counts[job.pixels] += job.samples
             clock.job_done(job, spent)
 
-        for job in clock.in_time(split_jobs(VIEW, everything, 0, 10**9, clock.wave_size)):
+        for job in clock.in_time(split_jobs(VIEW, everything, 0, 10**9, clock.job_size)):
             spent = self.per_wave + self.per_path * job.lanes
             spent *= slower if self.now > seconds / 2 else 1
             worker = int(np.argmin(free))
@@ -180,7 +180,7 @@ class Machine:
         while queue:
             finish()
         assert clock.time_up
-        self.last_wave_size = clock.wave_size(10**9)
+        self.last_wave_size = clock.job_size(10**9)
         return counts
 
 
@@ -214,7 +214,7 @@ def test_waves_are_sized_to_the_time(monkeypatch) -> None:
 def wave_sizes(per_path: float, wave_size: int | None, workers: int, branches: int = 1) -> np.ndarray:
     """Lanes of all waves of 100 000 pixels and 60 samples, each path of which takes a known time."""
     clock, lanes = Scheduler(0.0, None, wave_size, workers, branches), []
-    for job in split_jobs(VIEW, np.arange(100_000, dtype=np.uint32), 0, 60, clock.wave_size):
+    for job in split_jobs(VIEW, np.arange(100_000, dtype=np.uint32), 0, 60, clock.job_size):
         clock.job_done(job, per_path * job.lanes)
         lanes.append(job.lanes)
     assert sum(lanes) == 6_000_000
@@ -241,7 +241,7 @@ def test_waves_are_large_where_that_pays() -> None:
 def test_jobs_are_deep_where_that_does_no_harm() -> None:
     """Few pixels with many samples each, but no pixel is far ahead of others; the last jobs are small."""
     clock, every = Scheduler(0.0, None, None, 2), np.arange(500_000, dtype=np.uint32)
-    jobs = list(split_jobs(VIEW, every, 0, 64, clock.wave_size))
+    jobs = list(split_jobs(VIEW, every, 0, 64, clock.job_size))
     assert max(job.samples for job in jobs) == jobs_module.DEEPEST
     assert sum(job.lanes for job in jobs if job.samples >= 3) > 0.75 * 64 * every.size
     assert all(job.samples <= max(1, min(job.first_sample, 64 - job.first_sample) / 2) for job in jobs)
@@ -253,10 +253,42 @@ def test_jobs_are_deep_where_that_does_no_harm() -> None:
     assert (got == 64).all()
 
 
+def test_jobs_of_a_cluster_have_several_waves() -> None:
+    """Fewer at the end, and where paths are slow."""
+    jobs: dict[float, list[Job]] = {1e-6: [], 1e-5: []}
+    for per_path, done in jobs.items():
+        clock = Scheduler(0.0, None, None, 2, waves_per_job=4)
+        pixels = np.arange(100_000, dtype=np.uint32)
+        for job in split_jobs(VIEW, pixels, 0, 60, clock.job_size, clock.wave_size):
+            clock.job_done(job, per_path * job.lanes)
+            done.append(job)
+            assert max(wave.lanes for wave in job.waves()) <= scheduler.LARGE_WAVE
+    assert max(len(list(job.waves())) for job in jobs[1e-6]) >= 4
+    assert jobs[1e-6][-1].lanes <= scheduler.SMALL_WAVE
+    assert max(job.lanes for job in jobs[1e-5]) * 1e-5 <= scheduler.MAX_JOB_SECONDS
+
+
+@pytest.mark.parametrize("wave_size", [1, 3, 50, 100, 299, 300, 900])
+@pytest.mark.parametrize("whole_tiles", [False, True])
+def test_waves_of_a_job_are_its_samples_in_order(wave_size: int, whole_tiles: bool) -> None:
+    """Each pixel's samples come one after the other, and every one of them once."""
+    camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), size=(20, 5))
+    job = Job(View(camera, whole_tiles=whole_tiles), np.arange(100, dtype=np.uint32), 7, 3, wave_size)
+    samples = np.full(100, 7)
+    for wave in job.waves():
+        assert wave.lanes <= wave_size or whole_tiles
+        assert (samples[wave.pixels] == wave.first_sample).all()
+        samples[wave.pixels] = wave.end
+    assert (samples == 10).all()
+    halves = job.halves()
+    assert sum(half.lanes for half in halves) == job.lanes
+    assert all(half.lanes_at_once <= max(1, job.lanes_at_once // 2) for half in halves)
+
+
 def test_nobody_waits_for_a_large_wave() -> None:
     """Where paths are slow waves take about a second, or are small."""
-    assert wave_sizes(1e-6, None, 2).max() * 1.2e-5 > scheduler.MAX_WAVE_SECONDS
-    assert wave_sizes(1.2e-5, None, 2).max() * 1.2e-5 <= scheduler.MAX_WAVE_SECONDS
+    assert wave_sizes(1e-6, None, 2).max() * 1.2e-5 > scheduler.MAX_JOB_SECONDS
+    assert wave_sizes(1.2e-5, None, 2).max() * 1.2e-5 <= scheduler.MAX_JOB_SECONDS
     assert wave_sizes(1e-4, None, 2).max() <= scheduler.SMALL_WAVE
 
 

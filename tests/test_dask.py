@@ -15,6 +15,7 @@ import scenes
 import wavefront as wf
 from wavefront.scheduling import delivery
 from wavefront.scheduling.pool import WorkerPool
+from wavefront.scheduling.remote import RemoteWorkers
 from wavefront.scheduling.shared import STOP, SharedInt, Stopped
 
 distributed = pytest.importorskip("distributed")
@@ -49,6 +50,18 @@ def test_a_cluster_gives_the_same_bits(client: Any, expected: bytes) -> None:
     sent = [set(names) - before for names in tokens(client).values()]
     assert len(set.union(*sent)) == 1
     assert client.submit(abs, -1).result() == 1
+
+
+def test_a_task_has_several_waves(client: Any, expected: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Since Dask spends milliseconds on each."""
+    jobs: list[Any] = []
+    submit = RemoteWorkers.submit
+    monkeypatch.setattr(RemoteWorkers, "submit", lambda *given: jobs.append(given[1]) or submit(*given))
+    image = wf.render(scenes.everything(), 8, executor=client, progress=False, wave_size=10)
+    assert image.rgb.tobytes() == expected
+    assert sum(job.lanes for job in jobs) == image.metadata["samples"]
+    assert max(len(list(job.waves())) for job in jobs) == 4
+    assert all(wave.lanes <= 10 for job in jobs for wave in job.waves())
 
 
 def test_pictures_come_while_a_cluster_renders(client: Any) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,9 @@ from significance import render
 
 import wavefront as wf
 from wavefront.bsdfs import BsdfSample
+from wavefront.film import Film
+from wavefront.integrators import li_full
+from wavefront.picture_sums import PictureSums
 from wavefront.vec import column, f4
 
 
@@ -69,7 +73,7 @@ def room(material: Any, mirror: Any = None, light: Any = None) -> wf.Scene:
 
 def first_fault(scene: wf.Scene, **options: Any) -> str:
     """Return what the error says of the first bad sample."""
-    with pytest.raises(wf.RenderError, match="samples were not finite and count as black; first: ") as caught:
+    with pytest.raises(wf.RenderError, match="samples were not finite and were dropped; first: ") as caught:
         render(scene, 16, **options)
     assert np.isfinite(caught.value.image.rgb).all()
     return str(caught.value).partition("first: ")[2]
@@ -124,3 +128,113 @@ def test_an_integrator_of_the_users_own_is_named_by_pixel_and_sample() -> None:
         return np.full((3, len(paths)), np.nan, f4)
 
     assert first_fault(room(wf.Diffuse(0.5)), integrator=spoiled) == "pixel 0, sample 0"
+
+
+RARE = 40_009  # one sample of so many is spoiled
+
+
+def with_rare_faults(scene: Any, paths: Any, sampler: Any, max_bounces: int) -> Any:
+    """Estimate as "full" does, and spoil a few samples."""
+    pixel, sample = paths.pixel.copy(), paths.sample.copy()
+    radiance = li_full(scene, paths, sampler, max_bounces)
+    radiance[:, (pixel * 64 + sample) % RARE == 3] = np.nan
+    return radiance
+
+
+def with_many_faults(scene: Any, paths: Any, sampler: Any, max_bounces: int) -> Any:
+    """Return 2 for three samples of four, and infinity for the fourth."""
+    return np.full((3, 1), 2, f4) + np.where(paths.sample % 4 == 1, f4(np.inf), f4(0))
+
+
+def small_room() -> wf.Scene:
+    """Return a room that is seen by 40 x 32 pixels."""
+    return scenes.everything(size=(40, 32))
+
+
+def test_the_mean_of_a_pixel_is_that_of_the_samples_that_are_left() -> None:
+    """A quarter is dropped, which would darken the picture by a quarter if it counted as black."""
+    with pytest.raises(
+        wf.RenderError, match="256 of 1024 samples were not finite and were dropped"
+    ) as caught:
+        render(room(wf.Diffuse(0.5)), 16, integrator=with_many_faults)
+    image = caught.value.image
+    assert (image.rgb == 2).all()
+    assert (image.counts == 12).all()
+    assert (image.variance == 0).all()
+    assert (image.standard_error == 0).all()
+    assert (image.spp, image.metadata["bad_samples"]) == (16, 256)
+
+
+def test_a_pixel_without_other_samples_is_black() -> None:
+    """And its error is not known."""
+    with pytest.raises(wf.RenderError) as caught:
+        render(room(Spoiled(0.5)), 4)
+    image = caught.value.image
+    assert not image.rgb.any()
+    assert not image.counts.any()
+    assert np.isnan(image.standard_error).all()
+
+
+def test_layers_leave_the_same_samples_out() -> None:
+    """All samples see the wall in the mirror, so what is left of them does."""
+    material = Spoiled(0.5)
+    material.part = 0.25
+    with pytest.raises(wf.RenderError) as caught:
+        render(room(material), 16, aovs=("alpha", "albedo", "coverage", "direct", "indirect"))
+    image = caught.value.image
+    assert 0 < image.counts.min() < 16
+    assert (image.alpha == 1).all()
+    assert (image.coverage["mirror"] == 1).all()
+    np.testing.assert_allclose(image.albedo, 0.9, atol=1e-6)
+    np.testing.assert_allclose(image.direct + image.indirect, image.rgb, rtol=1e-5)
+
+
+@pytest.mark.filterwarnings("ignore:.*were not finite")
+@pytest.mark.parametrize(
+    "cut", [{"wave_size": 700}, {"workers": 3, "executor": "threads", "wave_size": 1000}]
+)
+def test_dropped_samples_leave_the_bits_to_no_division(cut: dict[str, Any], tmp_path: Path) -> None:
+    """Neither waves and workers, nor merged pictures, nor a render that is resumed."""
+    options: dict[str, Any] = {
+        "integrator": with_rare_faults,
+        "max_bounces": 2,
+        "aovs": ("alpha", "albedo", "direct"),
+        "progress": False,
+        "accel": "numpy",
+    }
+    whole = wf.render(small_room(), 64, **options)
+    assert whole.metadata["bad_samples"] == 3
+    assert (whole.counts == 63).sum() == 3
+    path = tmp_path / "render.wfck"
+    wf.render(small_room(), 32, checkpoint=path, **options, **cut)
+    parts = [wf.render(small_room(), samples=range(*each), **options) for each in ((0, 20), (20, 64))]
+    others = [
+        wf.render(small_room(), 64, **options, **cut),
+        wf.render(small_room(), 64, checkpoint=path, **options),
+        wf.Image.load(path),
+        parts[0].merge(parts[1]),
+        parts[1].merge(parts[0]),
+    ]
+    for image in others:
+        assert image.rgb.tobytes() == whole.rgb.tobytes()
+        assert (image.counts == whole.counts).all()
+        assert image.metadata["bad_samples"] == 3
+        for name in options["aovs"]:
+            assert image.layers[name].tobytes() == whole.layers[name].tobytes()
+
+
+def test_a_film_takes_memory_for_dropped_samples_only_if_there_are_any() -> None:
+    """And files whose sums have them for other pixels are refused."""
+    film, pixels = Film(3, 2), np.arange(6, dtype=np.uint32)
+    film.add(pixels, np.ones((3, 4, 6), f4))
+    assert not film.dropped.size
+    samples = np.ones((3, 2, 6), f4)
+    samples[:, 1, 5] = 0
+    film.add(pixels, samples, dropped=np.array([11]))
+    assert film.dropped.tolist() == [0, 0, 0, 0, 0, 1]
+    assert film.used().tolist() == [6, 6, 6, 6, 6, 5]
+    assert (film.mean() == 1).all()
+    sums = PictureSums(film, None, {})
+    arrays = sums.arrays()
+    with pytest.raises(wf.SceneError, match=r"'film.dropped' have shape \(5,\); it must be \(6,\)"):
+        sums.restore({**arrays, "film.dropped": film.dropped[1:]})

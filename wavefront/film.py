@@ -17,6 +17,7 @@ BATCHES = 8  # at most
 WHOLE_BATCH = 4  # samples; batches are at least this long if a pixel has two of them
 EPSILON = 1e-2  # relative to the squared mean of a picture; added to the squares by which errors are divided
 OUTLIERS = 1e-3  # fraction of the pixels whose error is limited to that of the worst other pixel
+NONE = np.zeros(0, np.intp)
 CHUNK = 8192  # pixels, or samples, that are added together: few enough for the cache
 
 
@@ -33,13 +34,23 @@ class Film:
     within a batch. It does not include the gain between batches: for Sobol points the error is
     over-estimated, by 7 to 15 % at 16 and 64 samples, by less later. Independent samples have no such bias.
 
-    Memory is 176 bytes per pixel, whatever the number of samples.
+    Samples that are not finite are dropped: they are counted, and the mean is that of the others.
+
+    Memory is 176 bytes per pixel, whatever the number of samples, and 4 more when one was dropped.
+
+    Attributes
+    ----------
+    count
+        Samples of each pixel, (pixels,), with those that were dropped.
+    dropped
+        How many of them were dropped, (pixels,); empty as long as none was.
     """
 
     def __init__(self, width: int, height: int) -> None:
         pixels = width * height
         self.size = width, height
         self.count = np.zeros(pixels, np.int64)
+        self.dropped = np.zeros(0, np.int32)
         self.sums = ExactSums((3, pixels))  # of samples
         self.squares = np.zeros((3, pixels))  # sum of squared samples
         self.batches = np.zeros((BATCHES, 3, pixels), np.float32)  # sums of full batches
@@ -50,7 +61,7 @@ class Film:
         """Free the sums of variances and errors, 120 bytes per pixel; nothing can be added after that."""
         self.squares, self.batches = np.zeros((3, 0)), np.zeros((BATCHES, 3, 0), np.float32)
 
-    def add(self, pixels: Words, radiance: Floats) -> None:
+    def add(self, pixels: Words, radiance: Floats, dropped: Ints = NONE) -> None:
         """Add samples.
 
         Parameters
@@ -59,7 +70,11 @@ class Film:
             (k,) row-major indices in rising order, of pixels with equally many samples so far.
         radiance
             (3, samples, k): the next samples of each pixel.
+        dropped
+            Numbers of those, in [0, samples · k), that are dropped; they are 0 in `radiance`.
         """
+        if dropped.size:
+            self._drop(pixels[dropped % pixels.size])
         for start in range(0, pixels.size, CHUNK):
             part = slice(start, start + CHUNK)
             self._add(pixel_span(pixels[part]), radiance[:, :, part])
@@ -86,6 +101,16 @@ class Film:
             self.squares[:, lanes] = squares
         self.count[lanes] = count
 
+    def _drop(self, pixels: Words) -> None:
+        """Count dropped samples of pixels, which may repeat."""
+        if not self.dropped.size:
+            self.dropped = np.zeros(self.count.size, np.int32)
+        np.add.at(self.dropped, pixels, 1)
+
+    def used(self, span: slice = slice(None)) -> Ints:
+        """Return how many samples of each pixel were not dropped, (k,)."""
+        return self.count[span] - self.dropped[span] if self.dropped.size else self.count[span]
+
     def _close_batch(self, lanes: Lanes, number: int) -> None:
         """Store the sum of a full batch: the sums less all batches before it.
 
@@ -107,6 +132,7 @@ class Film:
         lengths = np.zeros(0, np.int64) if self.lengths is None else self.lengths
         return {
             "count": self.count,
+            "dropped": self.dropped,
             **self.sums.arrays(),
             "squares": self.squares,
             "batches": self.batches,
@@ -115,7 +141,8 @@ class Film:
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Become the film of which `arrays` returned these; they are not copied."""
-        self.count, self.squares, self.batches = arrays["count"], arrays["squares"], arrays["batches"]
+        self.count, self.dropped = arrays["count"], arrays["dropped"]
+        self.squares, self.batches = arrays["squares"], arrays["batches"]
         self.sums.restore(arrays)
         self.lengths = arrays["lengths"] if arrays["lengths"].size else None
 
@@ -131,6 +158,10 @@ class Film:
         size = batch_size(count)
         joined = _joined([*self._all_batches(), *other._all_batches()], size)
         self.count = self.count + other.count
+        if self.dropped.size and other.dropped.size:
+            self.dropped = self.dropped + other.dropped
+        elif other.dropped.size:
+            self.dropped = other.dropped.copy()
         self.sums.merge(other.sums)
         self.squares = self.squares + other.squares
         self.batches = np.zeros_like(self.batches)
@@ -153,16 +184,27 @@ class Film:
 
     def mean(self, span: slice = slice(None)) -> Doubles:
         """Return the means of the samples of pixels, (3, k); 0 for pixels without samples."""
-        return self.sums.value(span) / np.maximum(self.count[span], 1)
+        return self.sums.value(span) / np.maximum(self.used(span), 1)
 
     def variance(self, span: slice = slice(None)) -> Doubles:
         """Estimate the variance of one sample of each pixel, (3, k); NaN for fewer than two."""
-        count = self.count[span]
+        count = self.used(span)
         spread = self.squares[:, span] - count * np.square(self.mean(span))
         return np.where(count > 1, np.maximum(spread, 0), np.nan) / np.maximum(count - 1, 1)
 
     def squared_error(self, span: slice = slice(None)) -> Doubles:
-        """Estimate the variance of `mean` from batches, (3, k); NaN for fewer than two samples."""
+        """Estimate the variance of `mean` from batches, (3, k); NaN for fewer than two samples.
+
+        Where samples were dropped, which batches hold as 0, it is that of as many independent samples.
+        """
+        error = self._scatter_of_batches(span)
+        if self.dropped.size:
+            some = np.flatnonzero(self.dropped[span])
+            error[:, some] = (self.variance(span) / np.maximum(self.used(span), 1))[:, some]
+        return error
+
+    def _scatter_of_batches(self, span: slice) -> Doubles:
+        """Estimate the variance of the mean of all samples, (3, k)."""
         if self.lengths is not None:
             return _unequal_error(self.batches[: self.lengths.size, :, span], self.lengths, self.count[0])
         counts = self.count[span]

@@ -50,7 +50,7 @@ class Image:
         (estimated relative error of the picture before denoising), clamp and clamped (the part of the light
         that it removed), and of a denoised picture denoiser.
     counts
-        (H, W) int64 samples of each pixel.
+        (H, W) int64 samples of each pixel, without those that were not finite.
     variance
         (H, W, 3) float32 estimated variance of one sample; NaN where there are fewer than two.
     standard_error
@@ -662,7 +662,7 @@ def _film_rgb(film: Film, metadata: Mapping[str, Any]) -> Image:
         estimates.mean.reshape(shape),
         round(float(film.count.mean())),
         {**metadata, "noise": estimates.noise},
-        counts=film.count.reshape(height, width).copy(),
+        counts=film.used().reshape(height, width).copy(),
         variance=estimates.variance.reshape(shape),
         standard_error=estimates.standard_error.reshape(shape),
     )
@@ -674,7 +674,7 @@ def _add_layers(image: Image, sums: PictureSums) -> None:
         return
     width, height = sums.film.size
     for name in sums.layers.names:
-        found = sums.layers.estimate(name, sums.film.sums, sums.film.count)
+        found = sums.layers.estimate(name, sums.film.sums, sums.film.used())
         image.layers[name] = _of_shape(found.mean, width, height)
         image.errors[name] = _of_shape(found.standard_error, width, height)
     if CLAMPED in image.layers:

@@ -62,11 +62,17 @@ class PictureSums:
                 raise SceneError(
                     f"the sums of the samples are incomplete: {name!r} is missing or of another type"
                 )
-            if found.shape != mine.shape and name != FILM + "lengths":
+            if found.shape != mine.shape and not self._may_vary(name, found):
                 raise SceneError(f"the sums {name!r} have shape {found.shape}; it must be {mine.shape}")
         self.film.restore(_part(arrays, FILM))
         if self.layers is not None:
             self.layers.restore(_part(arrays, LAYER))
+
+    def _may_vary(self, name: str, found: NDArray[Any]) -> bool:
+        """Return whether an array may have this shape, too."""
+        return name == FILM + "lengths" or (
+            name == FILM + "dropped" and found.shape in ((0,), self.film.count.shape)
+        )
 
 
 def _part(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArray[Any]]:

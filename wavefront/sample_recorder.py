@@ -246,7 +246,7 @@ class SampleRecorder:
         samples
             Of each pixel.
         dropped
-            Slots that are black because they were not finite.
+            Slots of samples that are dropped, because they were not finite; they count as 0.
 
         Raises
         ------

@@ -13,7 +13,7 @@ from ..image import Image, film_image, last_film_image
 from ..layer_sums import LayerSums, layer_bytes
 from ..memory import check_memory
 from ..picture_sums import PictureSums
-from .jobs import Job, JobResult
+from .jobs import Job, JobResult, WaveResult
 
 MAX_BAD_SAMPLES = 1e-4  # part of all samples that may be lost to NaN before it is an error
 FILM_BYTES = 176  # of a pixel of the film
@@ -85,11 +85,15 @@ class Accumulator:
 
     def add(self, job: Job, result: JobResult) -> None:
         """Add the result of a job, the next of its pixels."""
-        self.film.add(job.pixels, result.radiance)
+        for wave, of_wave in zip(job.waves(), result, strict=True):
+            self._add_wave(wave, of_wave)
+
+    def _add_wave(self, wave: Job, result: WaveResult) -> None:
+        self.film.add(wave.pixels, result.radiance, result.bad)
         if self.sums.layers is not None:
             assert result.layers is not None
-            self.sums.layers.add(job.pixels, result.layers, result.radiance, most=job.end)
-        self.bad.count_in(job, result)
+            self.sums.layers.add(wave.pixels, result.layers, result.radiance, most=wave.end)
+        self.bad.count_in(wave, result)
         self.rays += result.rays
 
     def release_reserve(self) -> None:
@@ -133,8 +137,8 @@ class BadSamples:
         self.count = 0
         self.first = 0, 0  # pixel and sample, if there is any
 
-    def count_in(self, job: Job, result: JobResult) -> None:
-        """Count the bad lanes of a result and remember the first of all."""
+    def count_in(self, job: Job, result: WaveResult) -> None:
+        """Count the bad lanes of a wave, which is a job of its own, and remember the first of all."""
         if result.bad.size and not self.count:
             sample, pixel = divmod(int(result.bad[0]), job.pixels.size)
             sample += job.view.first_sample + job.first_sample
@@ -147,7 +151,7 @@ class BadSamples:
         Raises
         ------
         RenderError
-            If they are more than 1e-4 of all. It has the picture, where they count as black.
+            If they are more than 1e-4 of all. It has the picture, where they are left out.
         """
         if not self.count:
             return
@@ -155,7 +159,7 @@ class BadSamples:
         pixel, sample = self.first
         cause = cause_of(pixel, sample)
         first = f"pixel {pixel}, sample {sample}" + (f", {cause}" if cause else "")
-        message = f"{self.count} of {samples} samples were not finite and count as black; first: {first}"
+        message = f"{self.count} of {samples} samples were not finite and were dropped; first: {first}"
         if self.count > MAX_BAD_SAMPLES * samples:
             raise RenderError(message, image)
         warn_caller(message)

@@ -41,6 +41,8 @@ MIN_PATHS_TO_SPAWN = 1 << 22  # fewer are traced sooner than processes are spawn
 NAP = 0.05  # seconds for which other threads are watched
 BUSY = 0.01  # part of a core; busy threads may get little of one on a busy machine
 
+WAVES_PER_TASK = 4  # of a cluster, where a task costs 8 ms beside its work, and a wave takes 100 ms
+
 PROCESSES = ("processes", "spawn", "forkserver")  # names of executors whose workers are our own processes
 
 ExecutorLike: TypeAlias = Executor | ExecutorMaker | DaskClient
@@ -181,6 +183,11 @@ def _other_threads_compute() -> bool:
     begin = time.process_time()
     time.sleep(NAP)
     return time.process_time() - begin > BUSY * NAP
+
+
+def waves_per_job(executor: str | ExecutorLike) -> int:
+    """Return how many waves a job may have."""
+    return WAVES_PER_TASK if isinstance(executor, DaskClient) else 1
 
 
 def needs_pickling(executor: str | ExecutorLike) -> bool:

@@ -7,7 +7,7 @@ import platform
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import fields
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -72,6 +72,7 @@ class Job:
     pixels: Words  # (k,) row-major indices, rising
     first_sample: int  # counted from that of the view
     samples: int
+    wave_size: int | None = None  # paths that are traced at once; None for all
 
     @property
     def lanes(self) -> int:
@@ -83,10 +84,27 @@ class Job:
         """One past the last sample, counted from the first of the view."""
         return self.first_sample + self.samples
 
+    @property
+    def lanes_at_once(self) -> int:
+        """Number of paths that are traced at once."""
+        return self.lanes if self.wave_size is None else min(self.lanes, self.wave_size)
+
+    def waves(self) -> Iterator[Job]:
+        """Yield what is traced at once, a job for each wave; the samples of every pixel come in order."""
+        if self.lanes_at_once == self.lanes:
+            yield self
+            return
+        depth = min(self.samples, self.lanes_at_once)
+        parts = -(-self.pixels.size // (self.lanes_at_once // depth))
+        for pixels in self.view.parts(self.pixels, -(-self.pixels.size // parts)):
+            for first in range(self.first_sample, self.end, depth):
+                yield Job(self.view, pixels, first, min(depth, self.end - first))
+
     def halves(self) -> tuple[Job, ...]:
-        """Return jobs for parts of at most half the pixels; of one pixel or tile, the job itself."""
+        """Return jobs for parts of at most half the pixels, in smaller waves; a pixel or tile stays whole."""
         parts = self.view.parts(self.pixels, max(1, -(-self.pixels.size // 2)))
-        return tuple(Job(self.view, pixels, self.first_sample, self.samples) for pixels in parts)
+        wave_size = max(1, self.lanes_at_once // 2)
+        return tuple(Job(self.view, pixels, self.first_sample, self.samples, wave_size) for pixels in parts)
 
     def __str__(self) -> str:
         """Name the block in an error message."""
@@ -95,8 +113,8 @@ class Job:
 
 
 @record
-class JobResult:
-    """What a job returns."""
+class WaveResult:
+    """What a wave of a job returns."""
 
     radiance: Floats  # (3, samples, pixels)
     bad: Ints  # lanes whose radiance was not finite; it is 0 there
@@ -105,21 +123,29 @@ class JobResult:
     layers: LayerSamples | None = None  # None where no sampled layer is asked for
 
 
+JobResult: TypeAlias = list[WaveResult]  # of each wave
+
+
 def split_jobs(
-    view: View, pixels: Words, first: int, last: int, wave_size: Callable[[int], int]
+    view: View,
+    pixels: Words,
+    first: int,
+    last: int,
+    job_size: Callable[[int], int],
+    wave_size: int | None = None,
 ) -> Iterator[Job]:
     """Split samples `first` to `last` of some pixels into jobs.
 
-    Every pixel's samples come in order. No job has more paths than `wave_size` returns, which is given the
+    Every pixel's samples come in order. No job has more paths than `job_size` returns, which is given the
     number of paths left, when a sweep over the pixels begins; but jobs of one tile may, where tiles stay
-    whole. The last pixel is in the last job of a sweep.
+    whole. The last pixel is in the last job of a sweep. Waves of a job have at most `wave_size` paths.
     """
     while first < last:
-        lanes = wave_size((last - first) * pixels.size)
+        lanes = job_size((last - first) * pixels.size)
         depth = min(max(1, int(min(first, last - first) * DEPTH_SHARE)), DEEPEST, lanes)
         parts = -(-pixels.size * depth // lanes)
         width = -(-pixels.size // parts)  # equal parts: a small wave costs almost as much as a large one
         depth = min(max(1, lanes // width), last - first)
         for part in view.parts(pixels, width):
-            yield Job(view, part, first, depth)
+            yield Job(view, part, first, depth, wave_size)
         first += depth

@@ -111,7 +111,7 @@ class RenderLoop:
                     jobs = self.scheduler.in_time(self._jobs(parts))
                     for job, result in self._results(pool, jobs, waiting):
                         self.accumulator.add(job, result)
-                        self.scheduler.job_done(job, result.seconds)
+                        self.scheduler.job_done(job, sum(wave.seconds for wave in result))
                         wave_done()
                         surfaces.reset()
                         bar.advance(job.lanes, self.scheduler.elapsed)
@@ -156,7 +156,7 @@ class RenderLoop:
                 return
             except MemoryError:
                 pool.discard()
-                if not given or not self.scheduler.halve(max(job.lanes for job in given)):
+                if not given or not self.scheduler.halve(max(job.lanes_at_once for job in given)):
                     raise
             halves = [half for job in given for half in job.halves()]
             given.clear()
@@ -164,7 +164,10 @@ class RenderLoop:
 
     def _jobs(self, parts: Iterable[Pass]) -> Iterator[Job]:
         for part in parts:
-            yield from split_jobs(self.view, part.pixels, part.first, part.last, self.scheduler.wave_size)
+            scheduler = self.scheduler
+            yield from split_jobs(
+                self.view, part.pixels, part.first, part.last, scheduler.job_size, scheduler.wave_size
+            )
 
 
 def undivided(step: Pass) -> Iterator[Pass]:

@@ -14,8 +14,8 @@ SMALL_WAVE = 1 << 16  # lanes; in smaller waves a path costs more
 LARGE_WAVE = 1 << 17  # lanes; in larger waves it costs hardly less
 LANES_AT_ONCE = 1 << 19  # lanes of all workers together where that is a wave for each: 400 MB
 SMALLEST_WAVE = 64  # paths; without memory for as few there is an error
-SHARE = 1 / 4  # part of what is left for each worker that a wave may be
-MAX_WAVE_SECONDS = 1.0  # seconds that a large wave may take, for progress waits for it
+SHARE = 1 / 4  # part of what is left for each worker that a job may be
+MAX_JOB_SECONDS = 1.0  # seconds that a large job may take, for progress waits for it
 
 
 SHORT, LONG = 1 / 60, 1 / 20  # parts of the time there is that a wave should take
@@ -42,10 +42,18 @@ class Scheduler:
         Waves that are traced at once.
     branches
         Lanes that a path may become.
+    waves_per_job
+        How many waves of the largest size a job may have where there is no time to keep.
     """
 
     def __init__(
-        self, begin: float, seconds: float | None, wave_size: int | None, workers: int, branches: int = 1
+        self,
+        begin: float,
+        seconds: float | None,
+        wave_size: int | None,
+        workers: int,
+        branches: int = 1,
+        waves_per_job: int = 1,
     ) -> None:
         self.time_up = False  # jobs were not admitted any more
         self._begin, self._seconds, self._workers = begin, seconds, workers
@@ -53,6 +61,7 @@ class Scheduler:
         self._largest = max(1, wave_size // branches)
         self._least = min(self._largest, max(1, SMALL_WAVE // branches))
         self._size = min(FIRST_WAVE, self._largest)  # where there is a time to keep
+        self._waves_per_job = waves_per_job
         self._under_way = 0  # paths
         self._cost = 0.0  # expected seconds of a worker per path
 
@@ -66,16 +75,22 @@ class Scheduler:
         """When waves under way are discarded, by `time.perf_counter`."""
         return math.inf if self._seconds is None else self._begin + GRACE * self._seconds
 
-    def wave_size(self, left: int) -> int:
-        """Return how many paths a wave may have.
+    @property
+    def wave_size(self) -> int:
+        """How many paths a wave may have."""
+        return self._largest
 
-        Large waves cost less per path. But no worker should have much to do when the others are done
-        with all that are `left`, or when the time is up, and nobody should have to wait long for a wave.
+    def job_size(self, left: int) -> int:
+        """Return how many paths a job may have.
+
+        Large jobs cost less per path. But no worker should have much to do when the others are done
+        with all that are `left`, or when the time is up, and nobody should have to wait long for a job.
         """
-        short = max(self._least, int(MAX_WAVE_SECONDS / self._cost)) if self._cost else self._least
+        short = max(self._least, int(MAX_JOB_SECONDS / self._cost)) if self._cost else self._least
         if self._seconds is not None:
             return min(short, self._size)
-        return min(self._largest, short, max(self._least, int(left * SHARE / self._workers)))
+        largest = self._largest * self._waves_per_job
+        return min(largest, short, max(self._least, int(left * SHARE / self._workers)))
 
     def halve(self, paths: int) -> bool:
         """Have no more waves of so many paths, for which there was no memory; False if they are small."""

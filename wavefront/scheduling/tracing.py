@@ -18,7 +18,7 @@ from ..sampling.sampler import Sampler
 from ..stages.generate import generate
 from ..state import Words
 from ..vec import Bools, Floats, Ints, broadcast
-from .jobs import Job, JobResult
+from .jobs import Job, JobResult, WaveResult
 from .shared import SharedInt, Stopped
 
 FIRST_SAMPLE_TIMEOUT = 3.0  # seconds that a wave of first samples may take even if the time is up
@@ -70,13 +70,18 @@ class Tracer:
 
 
 def trace_job(tracer: Tracer, monitor: WaveMonitor, job: Job) -> JobResult:
-    """Trace one wave of paths from the camera to its radiance.
+    """Trace the waves of a job, one after the other.
 
     Raises
     ------
     Stopped
-        If `monitor` or the deadline ends the wave between two bounces.
+        If `monitor` or the deadline ends a wave between two bounces.
     """
+    return [_trace_wave(tracer, monitor, wave) for wave in job.waves()]
+
+
+def _trace_wave(tracer: Tracer, monitor: WaveMonitor, job: Job) -> WaveResult:
+    """Trace the paths of a job, all at once, from the camera to their radiance."""
     begin = time.perf_counter()
     k, n = job.pixels.size, job.samples
     camera, deadline = job.view.camera, job.view.deadline
@@ -93,7 +98,7 @@ def trace_job(tracer: Tracer, monitor: WaveMonitor, job: Job) -> JobResult:
     bad = np.flatnonzero(~np.isfinite(radiance).all(0))
     layers = None if recorder is None else recorder.result(tracer.integrator, radiance, n, bad)
     radiance[:, bad] = 0
-    return JobResult(radiance.reshape(3, n, k), bad, accelerator.rays, time.perf_counter() - begin, layers)
+    return WaveResult(radiance.reshape(3, n, k), bad, accelerator.rays, time.perf_counter() - begin, layers)
 
 
 def _samples(job: Job) -> Words:

@@ -21,7 +21,7 @@ from ..resuming import CheckpointFile, render_identity
 from ..sampling.sampler import SAMPLERS
 from ..scheduling.accumulator import Accumulator
 from ..scheduling.adaptive import Pass
-from ..scheduling.executors import EXECUTORS
+from ..scheduling.executors import EXECUTORS, waves_per_job
 from ..scheduling.jobs import Job, JobResult, View
 from ..scheduling.loop import PassSplitter, RenderLoop
 from ..scheduling.pool import WorkerPool
@@ -79,6 +79,7 @@ class ViewRender:
             plan.budget.wave_size,
             plan.budget.workers,
             plan.estimator.branches,
+            waves_per_job(plan.executor),
         )
         self.loop = RenderLoop(
             View(view, scheduler.deadline, settings.first_sample, settings.reuse),
