@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,8 +18,9 @@ from test_interrupt import children, end_of, runs, script, wait_for
 
 import wavefront as wf
 from wavefront.scheduling import pool
-from wavefront.session import prepared_scene
+from wavefront.session import prepared_scene, view_render
 from wavefront.session import session as module
+from wavefront.session.view_render import ViewRender
 
 LINUX = sys.platform.startswith("linux")
 needs_fork = pytest.mark.skipif(not LINUX, reason="needs fork")
@@ -229,6 +231,47 @@ def test_stop_before_there_is_a_picture() -> None:
         session.stop()
         with pytest.raises(wf.RenderError, match="stopped before there was a picture"):
             session.run()
+
+
+def test_drop_ends_a_render_without_a_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From another thread; another view follows."""
+    with wf.Session(everything(), 10_000_000, workers=2, wave_size=2000, **QUIET) as session:
+        images = [next(session)]
+        monkeypatch.setattr(ViewRender, "last_image", None)  # is not called
+        timer = threading.Timer(0.3, session.drop)
+        timer.start()
+        images.extend(session)
+        timer.join()
+        assert not any(image.metadata["interrupted"] for image in images)
+        session.set_camera(view(0.4))
+        assert next(session).spp == 1
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_workers_can_be_started_before_there_is_work(executor: str) -> None:
+    """They are those that render then."""
+    with wf.Session(everything(), 4, workers=2, executor=executor, **QUIET) as session:
+        session.start_workers()
+        workers = {each.pid for each in multiprocessing.active_children()}
+        assert len(workers) == (2 if executor == "processes" else 0)
+        session.start_workers()
+        assert session.run().spp == 4
+        assert {each.pid for each in multiprocessing.active_children()} == workers
+
+
+def test_geometric_layers_end_when_the_session_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before the next rays, as waves do."""
+    with wf.Session(everything(), 4, aovs="depth", **QUIET) as session:
+        layers, rays = view_render.geometric_layers, []
+
+        def stopped_layers(scene: Any, *rest: Any) -> Any:
+            session.drop()
+            rays.append(scene.accelerator)
+            return layers(scene, *rest)
+
+        monkeypatch.setattr(view_render, "geometric_layers", stopped_layers)
+        assert list(session) == []
+        assert [accelerator.rays for accelerator in rays] == [0]
 
 
 # --- Nothing is left ------------------------------------------------------------------------------

@@ -52,12 +52,19 @@ class Scripted:
     def __init__(self, pictures: int = 3) -> None:
         self.pictures = pictures
         self.views: list[tuple[wf.Camera, tuple[int, int]]] = []
-        self.stops = 0
+        self.drops = 0
+        self.started = False
         self.closed = False
         self.go = threading.Semaphore(0)
         self.entered = threading.Semaphore(0)  # released when a picture is waited for
         self._left = 0
         self._stopped = False
+
+    def __enter__(self) -> Scripted:
+        return self
+
+    def start_workers(self) -> None:
+        self.started = True
 
     def set_camera(self, camera: wf.Camera, size: tuple[int, int] | None = None) -> None:
         self.views.append((camera, size or camera.film))
@@ -75,8 +82,8 @@ class Scripted:
         width, height = self.views[-1][1]
         return wf.Image(np.zeros((height, width, 3), np.float32), self.pictures - self._left)
 
-    def stop(self) -> None:
-        self.stops += 1
+    def drop(self) -> None:
+        self.drops += 1
         self._stopped = True
         self.go.release()
 
@@ -87,11 +94,13 @@ class Scripted:
 class Watched:
     """A refiner over a scripted session, and what it shows."""
 
-    def __init__(self, session: Any) -> None:
+    def __init__(self, session: Any, seen: bool = True) -> None:
         self.frames: list[ViewerFrame] = []
         self.errors: list[Exception] = []
         self.refiner = Refiner(cast(wf.Session, session), self.frames.append, self.errors.append)
         self.refiner.start()
+        if seen:
+            self.refiner.refine()
 
 
 def eventually(condition: Callable[[], object], seconds: float = SOON) -> bool:
@@ -125,7 +134,24 @@ def test_a_view_begins_small_and_refines() -> None:
         (3, False),
         (3, True),
     ]
-    assert session.stops == 1  # at the end
+    assert session.drops == 1  # at the end
+
+
+@pytest.mark.usefixtures("steady")
+def test_the_first_view_stays_small_until_somebody_looks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Workers start at once; they do not take the processor from the browser that loads the page."""
+    monkeypatch.setattr(module, "PATIENCE", SOON)
+    session = Scripted()
+    session.go.release(10)
+    watched = Watched(session, seen=False)
+    assert session.started
+    watched.refiner.look(CAMERA)
+    assert eventually(lambda: len(watched.frames) == 1)
+    time.sleep(0.1)
+    assert [size for _, size in session.views] == [(21, 16)]
+    watched.refiner.refine()
+    assert eventually(lambda: watched.frames[-1].final)
+    watched.refiner.close()
 
 
 @pytest.mark.usefixtures("steady")
@@ -139,7 +165,7 @@ def test_a_movement_stops_a_picture_that_refines() -> None:
     entered(session)  # in full resolution
     other = wf.Camera.look_at((0, 0, 6), (0, 0, 0), size=(64, 48))
     watched.refiner.look(other)
-    assert session.stops == 1
+    assert session.drops == 1
     assert eventually(lambda: len(session.views) == 3)
     assert session.views[2] == (other, (21, 16))
     watched.refiner.close()
@@ -156,7 +182,7 @@ def test_a_first_picture_is_finished_and_shown_while_the_view_moves() -> None:
     entered(session)
     watched.refiner.look(cameras[1])
     watched.refiner.look(cameras[2])
-    assert session.stops == 0
+    assert session.drops == 0
     session.go.release(10)
     assert eventually(lambda: watched.frames and watched.frames[-1].final)
     watched.refiner.close()

@@ -222,3 +222,48 @@ def test_pages_of_other_sites_see_nothing(page: Any, viewer: wf.Viewer, browser:
         thread.join()
     assert refused == [1008, False]
     assert page.evaluate(CONNECT, where) == [4000, True]
+
+
+RECORD = """
+(() => {
+    window.moves = [];
+    window.shown = [];
+    addEventListener("pointermove", () => moves.push(Date.now()), true);
+    new MutationObserver(() => {
+        const state = document.documentElement.textContent.match(/(\\d+ × \\d+) · (\\d+) of \\d+ spp/);
+        if (state && (!shown.length || shown.at(-1)[1] !== state[0]))
+            shown.push([Date.now(), state[0], Number(state[2])]);
+    }).observe(document, {subtree: true, childList: true, characterData: true});
+    window.restart = () => {
+        const first = shown.find(([time, _, spp]) => moves.length && spp == 1 && time >= moves[0]);
+        return first ? first[0] - moves[0] : null;
+    };
+})()
+"""
+FIRST_FRAME, RESTART = 2.0, 0.2  # seconds
+
+
+def test_the_first_frame_and_a_restart_come_soon(browser: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    """Seconds from `view` and from a movement to a picture in the page; the machine must be quiet."""
+    page = browser.new_page(viewport=SIZE)
+    page.add_init_script(RECORD)
+    begin, restarts = time.time(), []
+    with wf.view(SCENE, 4096, camera=CAMERA, port=0, open_browser=False, block=False) as viewer:
+        page.goto(viewer.url)
+        page.wait_for_function("shown.length", timeout=1000 * SOON)
+        first = page.evaluate("shown[0][0]") / 1000 - begin
+        page.wait_for_function("shown.at(-1)[2] > 4", timeout=1000 * SOON)
+        page.mouse.move(300, 450)
+        page.mouse.down()
+        for k in range(1, 10):
+            page.wait_for_timeout(300)  # pictures refine
+            page.evaluate("moves.length = shown.length = 0")
+            page.mouse.move(300 + 20 * k, 450)
+            page.wait_for_function("restart() !== null", timeout=1000 * SOON)
+            restarts.append(page.evaluate("restart()") / 1000)
+        page.mouse.up()
+    with capsys.disabled():
+        each = ", ".join(f"{seconds:.2f}" for seconds in restarts)
+        print(f"\nfirst frame after {first:.2f} s, restarts after {each} s")
+    assert first < FIRST_FRAME
+    assert np.median(restarts) < RESTART

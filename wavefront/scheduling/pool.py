@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, Future
 from concurrent.futures import wait as wait_for_futures
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Generic, Self, TypeVar
 
@@ -107,6 +108,18 @@ class WorkerPool(Generic[Job, Result]):
             timer = self._idle_timer
             if timer is not None and timer is not threading.current_thread():
                 timer.join()
+
+    def start(self) -> None:
+        """Start the workers now; otherwise the first job does.
+
+        Raises
+        ------
+        RenderError
+            If one cannot be started.
+        """
+        with self._lock, _start_errors():
+            if self._workers is None:
+                self._start_workers()
 
     def run(
         self, jobs: Iterable[Job], waiting: Callable[[], object] = lambda: None
@@ -209,16 +222,13 @@ class WorkerPool(Generic[Job, Result]):
             self._running[0] = self._running.pop()
 
     def _submit(self, job: Job, attempt: int = 0) -> None:
-        try:
-            with self._lock:
-                if self._workers is None:
-                    self._start_workers()
-                assert self._workers is not None
-                future = self._workers.submit(job, attempt)
-                self._running.append(_Submitted(job, future, self._workers, attempt))
-                self._last_use = time.monotonic()
-        except (RuntimeError, OSError) as error:  # a limit of threads, processes or memory
-            raise RenderError(f"a worker cannot be started: {error}; use fewer workers") from error
+        with self._lock, _start_errors():
+            if self._workers is None:
+                self._start_workers()
+            assert self._workers is not None
+            future = self._workers.submit(job, attempt)
+            self._running.append(_Submitted(job, future, self._workers, attempt))
+            self._last_use = time.monotonic()
 
     def _start_workers(self) -> None:
         single_threaded_blas.acquire()
@@ -262,3 +272,12 @@ class WorkerPool(Generic[Job, Result]):
                     workers.shutdown([])
                     single_threaded_blas.release()
                 return
+
+
+@contextmanager
+def _start_errors() -> Iterator[None]:
+    """Turn a limit of threads, processes or memory into the error of a render."""
+    try:
+        yield
+    except (RuntimeError, OSError) as error:
+        raise RenderError(f"a worker cannot be started: {error}; use fewer workers") from error

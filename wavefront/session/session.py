@@ -198,7 +198,7 @@ class Session:
         """Get ready for a picture of a view; `begin` is when it was asked for, by `time.perf_counter`."""
         self._render = ViewRender(self._plan, camera, accumulator, begin)
         self._last_snapshot = begin
-        self._stopped = self._ended = self._warned = False
+        self._stopped = self._dropped = self._ended = self._warned = False
 
     # --- Use ------------------------------------------------------------------------------------------
 
@@ -340,6 +340,21 @@ class Session:
         self._stopped = True
         self._monitor.stop.rise_to(STOP)
 
+    def drop(self) -> None:
+        """End the render as `stop` does, but without a picture of it, as another view follows."""
+        self._dropped = True
+        self.stop()
+
+    def start_workers(self) -> None:
+        """Start the workers now; otherwise they start with the first samples.
+
+        Raises
+        ------
+        RenderError
+            If one cannot be started.
+        """
+        self._pool.start()
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a checkpoint of the picture so far, from which `render(checkpoint=path)` goes on.
 
@@ -394,7 +409,7 @@ class Session:
 
     def _sweeps_of(self, split: PassSplitter) -> Generator[bool]:
         """Return the loop that was begun, or begin it."""
-        return self._render.sweeps(self._pool, self._monitor.surfaces, self._wave_done, split)
+        return self._render.sweeps(self._pool, self._monitor, self._wave_done, split)
 
     def _wave_done(self) -> None:
         """Write the checkpoint when it is due, and warn once of paths that do not end."""
@@ -415,6 +430,8 @@ class Session:
         else:
             self._pool.cancel()
         render.accumulator.release_reserve()
+        if self._dropped and failure is None and not self._interrupted:
+            return None
         not_written = self._write_checkpoint()
         image = render.last_image(self._interrupted or self._stopped, free_sums=self._once)
         if not_written is not None and (failure is not None or self._interrupted):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Generator, Sequence
 from copy import deepcopy
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..camera import Camera
 from ..checkpoint import Checkpoint
+from ..compile.scene import CompiledScene
 from ..filters import FILTERS
 from ..geometric_layers import IDS, geometric_layers
 from ..image import Image
@@ -26,7 +29,7 @@ from ..scheduling.jobs import Job, JobResult, View
 from ..scheduling.loop import PassSplitter, RenderLoop
 from ..scheduling.pool import WorkerPool
 from ..scheduling.scheduler import Scheduler
-from ..scheduling.shared import SharedInt
+from ..scheduling.tracing import MonitoredAccelerator, WaveMonitor
 from ..version import VERSION
 from .plan import Plan
 
@@ -95,21 +98,23 @@ class ViewRender:
     def sweeps(
         self,
         pool: WorkerPool[Job, JobResult],
-        surfaces: SharedInt,
+        monitor: WaveMonitor,
         wave_done: Callable[[], object],
         split: PassSplitter,
     ) -> Generator[bool]:
         """Return the sweeps of the loop that was begun, or begin it.
 
-        The geometric layers are made while workers trace the first jobs.
+        The geometric layers are made while workers trace the first jobs, and stopped as these are.
         """
+        compiled = self._plan.scene.compiled
+        stoppable = MonitoredAccelerator(compiled.accelerator, monitor, math.inf)
 
         def done() -> None:
-            self._geometric_layers()
+            self._geometric_layers(replace(compiled, accelerator=stoppable))
             wave_done()
 
         if self._sweeps is None:
-            self._sweeps = self.loop.sweeps(pool, surfaces, done, split)
+            self._sweeps = self.loop.sweeps(pool, monitor.surfaces, done, split)
         return self._sweeps
 
     def discard_sweeps(self) -> None:
@@ -126,7 +131,8 @@ class ViewRender:
             Whether the render ends before its time.
         """
         image = self.accumulator.image(self.metadata(cut_short))
-        self._add_layers(image, {name: layer.copy() for name, layer in self._geometric_layers().items()})
+        layers = self._geometric_layers(self._plan.scene.compiled)
+        self._add_layers(image, {name: layer.copy() for name, layer in layers.items()})
         return image
 
     def last_image(self, cut_short: bool, free_sums: bool) -> Image:
@@ -145,7 +151,7 @@ class ViewRender:
             image = self.accumulator.last_image(metadata)
         else:
             image = self.accumulator.image(metadata, keep_sums)
-        self._add_layers(image, self._geometric_layers())
+        self._add_layers(image, self._geometric_layers(self._plan.scene.compiled))
         return image
 
     def identity(self) -> dict[str, Any]:
@@ -201,11 +207,10 @@ class ViewRender:
             "numpy": np.__version__,
         }
 
-    def _geometric_layers(self) -> dict[str, NDArray[Any]]:
+    def _geometric_layers(self, compiled: CompiledScene) -> dict[str, NDArray[Any]]:
         """Return the geometric layers that are asked for; the first time, trace them and the boxes."""
         if self._geometric is None:
-            aovs, scene = self._plan.settings.aovs, self._plan.scene
-            given = scene.compiled, self.camera, scene.shapes
+            aovs, given = self._plan.settings.aovs, (compiled, self.camera, self._plan.scene.shapes)
             if BOXES in aovs:
                 self._boxes = object_boxes(*given)
             names = geometric_names(aovs)

@@ -46,6 +46,8 @@ class Page:
         Samples per pixel of the last picture of a view; None where they are not known before.
     look
         Called with the viewpoint when it has changed; it must return at once.
+    connected
+        Called when a browser has loaded the page; it must return at once, too.
 
     Raises
     ------
@@ -60,8 +62,9 @@ class Page:
         viewpoint: Viewpoint,
         most_spp: int | None,
         look: Callable[[Viewpoint], object],
+        connected: Callable[[], object],
     ) -> None:
-        self._look, self._most_spp = look, most_spp
+        self._look, self._connected, self._most_spp = look, connected, most_spp
         self._lock = threading.Condition()
         self._viewpoint = viewpoint
         self._exposure, self._choice = 0.0, "rgb"
@@ -73,7 +76,7 @@ class Page:
         self.url = f"http://{_address(host)}:{self._server.get_port()}"
         self._add_camera()
         self._add_controls()
-        self._server.on_client_connect(self._connected)
+        self._server.on_client_connect(self._greet)
         self._presenter = threading.Thread(target=self._present, name="wavefront-page", daemon=True)
         self._presenter.start()
 
@@ -150,9 +153,10 @@ class Page:
 
         return react
 
-    async def _connected(self, client: Any) -> None:
+    async def _greet(self, client: Any) -> None:
         client.camera.on_update(self._on(self._move))
         await self._on(self._move)(client.camera)
+        self._connected()
 
     def _move(self, camera: Any) -> None:
         view = self.viewpoint.moved(camera.position, camera.look_at, camera.up_direction)
@@ -224,6 +228,7 @@ class Page:
         noise = frame.image.metadata["noise"]
         error = f" · error {noise:.2%}" if np.isfinite(noise) else ""
         self._state.content = f"{width} × {height} · {frame.image.spp}{of} spp{error}"
+        self._server.flush()  # viser would wait for more messages
 
 
 def _serve(host: str, port: int) -> Any:

@@ -18,6 +18,7 @@ TOO_LONG, SHORT = (
     0.03,
 )  # seconds for the first picture of a view; the next one becomes smaller, or larger
 LEAST_SIDE = 16  # pixels of the first picture of a view
+PATIENCE = 2.0  # seconds that the first view waits in lower resolution for somebody to look at it
 
 
 @record
@@ -42,10 +43,13 @@ class Refiner:
 
     The last picture of a view is that of `render` with its camera, bit for bit.
 
+    Until somebody looks the first view stays at its lower resolution, for a while: a browser that loads the
+    page needs the processor.
+
     Parameters
     ----------
     session
-        Renders the pictures. The refiner closes it.
+        Renders the pictures. The refiner keeps its workers, and closes it.
     show
         Called with each picture, in the refiner's thread.
     fail
@@ -59,12 +63,19 @@ class Refiner:
         self._changes = 0  # of the view, so far
         self._refines = False  # in full resolution; a change stops that
         self._closed = False
+        self._looked_at = threading.Event()
         self._divisor = FIRST_DIVISOR
         self._thread = threading.Thread(target=self._loop, name="wavefront-viewer", daemon=True)
 
     def start(self) -> None:
-        """Wait for views, in a thread."""
+        """Start the workers, before there are other threads, and wait for views, in a thread."""
+        self._session.__enter__()
+        self._session.start_workers()
         self._thread.start()
+
+    def refine(self) -> None:
+        """Let the pictures refine, as somebody looks. It can be called from any thread."""
+        self._looked_at.set()
 
     def look(self, camera: Camera) -> None:
         """Show what a camera sees from now on. It can be called from any thread, and returns at once."""
@@ -77,6 +88,7 @@ class Refiner:
         with self._lock:
             self._closed = True
             self._changed()
+        self.refine()
         if self._thread.is_alive():
             self._thread.join()
         self._session.close()
@@ -85,7 +97,7 @@ class Refiner:
         """Wake the loop, or stop the picture that refines; the lock is held."""
         self._changes += 1
         if self._refines or self._closed:
-            self._session.stop()
+            self._session.drop()
         self._lock.notify()
 
     def _loop(self) -> None:
@@ -108,6 +120,8 @@ class Refiner:
         size = self._small(camera.film)
         if size != camera.film:
             self._show_first(camera, size)
+        self._looked_at.wait(PATIENCE)
+        self.refine()
         if not self._begin(camera, change):
             return
         try:

@@ -6,6 +6,7 @@ import atexit
 import sys
 import threading
 import webbrowser
+from importlib.util import find_spec
 from types import TracebackType
 from typing import Any, Self
 
@@ -22,7 +23,9 @@ from .shown import VIEWER_LAYERS
 from .viewpoint import Viewpoint
 
 SPP = 256
-FIRST = 2.0  # seconds that the page waits for its first picture
+WAVE_SIZE = (
+    1 << 15
+)  # paths; a movement waits for less of a smaller wave, and one of half the size costs 10 % more
 POLL = 0.5  # seconds
 FRAME = "100%", 600  # width and height of the page in a notebook
 REFUSED = ("checkpoint", "samples", "progress")  # settings that make no sense for views that change
@@ -58,8 +61,6 @@ class Viewer:
     """
 
     def __init__(self, session: Session, viewpoint: Viewpoint, host: str, port: int, spp: int | None) -> None:
-        from .page import Page  # here, as it needs viser
-
         self._wanted: Camera | None = None
         self._latest: ViewerFrame | None = None
         self._error: Exception | None = None  # that ended the newest view
@@ -70,9 +71,9 @@ class Viewer:
         try:
             self._refiner.start()
             self._look(viewpoint)
-            with self._news:  # workers start before the threads of the server
-                self._news.wait_for(self._has_news, FIRST)
-            self._page = Page(host, port, viewpoint, spp, self._look)
+            from .page import Page  # while workers trace, as it takes long to import viser
+
+            self._page = Page(host, port, viewpoint, spp, self._look, self._refiner.refine)
         except BaseException:
             self._refiner.close()
             raise
@@ -118,6 +119,7 @@ class Viewer:
         RenderError
             If the time is over, or the viewer was closed. Its `image` is the newest picture.
         """
+        self._refiner.refine()
         with self._news:
             self._news.wait_for(lambda: self._done() or self._closed.is_set(), timeout)
             if self._latest is not None and self._latest.final and self._done():
@@ -153,9 +155,6 @@ class Viewer:
         with self._news:
             self._wanted, self._error = camera, None
         self._refiner.look(camera)
-
-    def _has_news(self) -> bool:
-        return self._latest is not None or self._error is not None
 
     def _done(self) -> bool:
         """Return whether no better picture of the newest view follows."""
@@ -260,6 +259,8 @@ def _opened(scene: Scene, spp: int | None, host: str, port: int, settings: dict[
     aovs = settings.pop("aovs", ())
     wanted = (*((aovs,) if isinstance(aovs, str) else aovs), *VIEWER_LAYERS)
     settings = {**settings, "camera": viewpoint.camera, "size": None, "aovs": wanted, "progress": False}
+    if settings.get("wave_size") is None:
+        settings["wave_size"] = WAVE_SIZE
     if settings.get("executor") is None:
         settings["executor"] = _executor(settings.get("workers"), (spp or SPP) * viewpoint.pixels)
     return Viewer(Session(scene, spp, **settings), viewpoint, host, port, spp)
@@ -275,10 +276,8 @@ def _executor(workers: int | None, paths: int) -> str | None:
 
 
 def _check_viser() -> None:
-    try:
-        import viser  # noqa: F401
-    except ImportError as error:
-        raise ImportError("the viewer needs viser: pip install viser") from error
+    if find_spec("viser") is None:
+        raise ImportError("the viewer needs viser: pip install viser")
 
 
 def _show_frame(url: str) -> None:
