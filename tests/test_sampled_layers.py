@@ -293,7 +293,7 @@ def test_bits_depend_on_neither_workers_nor_waves(branches: int) -> None:
 
 
 def test_bits_do_not_depend_on_the_search(monkeypatch) -> None:
-    """One kind of accelerator has several ways to search: all primitives, or trees with leaves of other sizes."""
+    """One kind of accelerator searches in several ways: a list, or trees with leaves of other sizes."""
     options = {"aovs": ("all", "light_groups", "coverage"), "workers": 1, "progress": False}
     listed = wf.render(room(16), 8, accel="numpy", **options)
     monkeypatch.setattr(numpy_accel, "SMALL", 0)
