@@ -190,6 +190,54 @@ except wf.Interrupted as stop:
         assert "while the scene was set up: there is no picture yet None" in end_of(process, time.monotonic())
 
 
+@pytest.mark.parametrize("module", ["xxhash", "scipy"])
+def test_ctrl_c_while_trimesh_is_imported(tmp_path: Path, module: str) -> None:
+    """It catches BaseException about imports that are optional; no half of it stays behind."""
+    scene = tmp_path / "triangle.obj"
+    scene.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    body = f"""
+import signal
+class Presses:
+    def find_spec(self, name, path=None, target=None):
+        if name == {module!r}:
+            sys.meta_path.remove(self)
+            print("pressed", flush=True)
+            signal.raise_signal(signal.SIGINT)
+sys.meta_path.insert(0, Presses())
+try:
+    wf.load({str(scene)!r})
+    print("went on")
+except KeyboardInterrupt:
+    print("interrupted", "trimesh" in sys.modules)
+print(len(wf.load({str(scene)!r}).shapes), signal.getsignal(signal.SIGINT) is signal.default_int_handler)
+"""
+    with script(body) as process:
+        output, errors = process.communicate(timeout=60)
+    assert output.split("\n")[:3] == ["pressed", "interrupted True", "1 True"], output + errors
+
+
+def test_ctrl_c_within_a_loader_of_trimesh(tmp_path: Path) -> None:
+    """That of STL goes on after any error in the text of the header."""
+    scene = tmp_path / "triangle.stl"
+    scene.write_bytes(bytes(80) + (1).to_bytes(4, "little") + bytes(50))
+    body = f"""
+import signal
+import trimesh.exchange.stl as loader
+def pressed(*given, **named):
+    print("pressed", flush=True)
+    signal.raise_signal(signal.SIGINT)
+loader.util.decode_text = pressed
+try:
+    wf.load({str(scene)!r})
+    print("went on")
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+    with script(body) as process:
+        output, errors = process.communicate(timeout=60)
+    assert output.split() == ["pressed", "interrupted"], output + errors
+
+
 def test_the_command_saves_the_picture_so_far(tmp_path: Path) -> None:
     """And ends with 130, as shells have it."""
     scene, output = tmp_path / "triangle.obj", tmp_path / "so_far.exr"

@@ -21,6 +21,7 @@ import numpy as np
 from ..errors import SceneError
 from .lines import NUMBER, check_lines, words
 from .repair import RawMesh, warn
+from .trimesh_import import import_trimesh
 from .trimesh_loading import geometries
 
 UNSEEN = ("", "o", "g")  # keywords without an effect on the look of a surface
@@ -217,10 +218,8 @@ def _fan(face: str) -> list[str]:
 
 def _raw(lines: _Lines, material: str, mesh: dict[str, Any]) -> RawMesh:
     """Return the mesh of the faces of a material."""
-    from trimesh.geometry import triangulate_quads
-
     group, uvs = lines.groups[material], mesh["visual"] and mesh["visual"].uv
-    faces = triangulate_quads(mesh["faces"])
+    faces = import_trimesh().geometry.triangulate_quads(mesh["faces"])
     raw = RawMesh(material, mesh["vertices"], faces, mesh.get("vertex_normals"), uvs)
     raw.colors = mesh.get("vertex_colors")
     numbers, triangles = np.array(group) + 1, np.array([lines.kinds[at].width - 2 for at in group])

@@ -19,6 +19,7 @@ from ..errors import SceneError
 from .headers import SIZES, TYPES, Element, check_ply, ply_textures, unread
 from .repair import warn
 from .sources import SceneFiles
+from .trimesh_import import import_trimesh
 from .trimesh_loading import Images, by_trimesh
 
 FACES = ("face", "tristrips")
@@ -126,12 +127,10 @@ def _lists(name: str, body: bytes, element: Element, order: str) -> Iterator[NDA
 
 def _split(name: str, lists: list[NDArray[np.int64]]) -> NDArray[np.int64]:
     """Return the triangles (m, 3) of polygons."""
-    from trimesh.geometry import triangulate_quads
-
     short = next((i for i, corners in enumerate(lists) if len(corners) < 3), None)
     if short is not None:
         raise SceneError(f"{name}: face {short} has {len(lists[short])} corners; it needs at least 3")
-    return np.asarray(triangulate_quads(lists), np.int64)
+    return np.asarray(import_trimesh().geometry.triangulate_quads(lists), np.int64)
 
 
 def _unrolled(strips: list[NDArray[np.int64]]) -> NDArray[np.int64]:

@@ -15,6 +15,7 @@ from ..codecs.images import decode_codes
 from ..errors import SceneError
 from .repair import warn
 from .sources import SceneFiles
+from .trimesh_import import ctrl_c_is_kept, import_trimesh
 
 
 class Images:
@@ -71,8 +72,7 @@ def by_trimesh(name: str, data: bytes, kind: str, images: Any = None, skip_mater
     SceneError
         For any error of trimesh but MemoryError.
     """
-    import trimesh
-
+    trimesh = import_trimesh()
     options: dict[str, Any] = {"skip_materials": True} if skip_materials else {}
     with typed_errors(name, kind):
         if kind == "dae":
@@ -88,8 +88,7 @@ def geometries(name: str, kind: str, data: bytes) -> list[dict[str, Any]]:
     SceneError
         For any error of the loader but MemoryError.
     """
-    from trimesh.exchange.load import mesh_loaders
-
+    mesh_loaders = import_trimesh().exchange.load.mesh_loaders
     with typed_errors(name, kind):
         found = mesh_loaders[kind](BytesIO(data))
     return list(found["geometry"].values()) if "geometry" in found else [found]
@@ -99,7 +98,7 @@ def geometries(name: str, kind: str, data: bytes) -> list[dict[str, Any]]:
 def typed_errors(name: str, kind: str) -> Iterator[None]:
     """Convert any error of a loader but MemoryError to a SceneError; silence NumPy's warnings."""
     try:
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), ctrl_c_is_kept(wait=False):
             yield
     except (MemoryError, SceneError):
         raise
@@ -109,8 +108,7 @@ def typed_errors(name: str, kind: str) -> Iterator[None]:
 
 def _unprocessed(loaded: dict[str, Any]) -> Any:
     """Build the scene that trimesh's loader of COLLADA describes; `load_scene` would merge its vertices."""
-    import trimesh
-
+    trimesh = import_trimesh()
     scene = trimesh.Scene()
     scene.geometry.update(
         {key: trimesh.Trimesh(**mesh, process=False) for key, mesh in loaded["geometry"].items()}

@@ -12,6 +12,7 @@ from .appearance import MaterialSpec, assign_material, is_faint
 from .contents import Contents
 from .placing import Places
 from .repair import RawMesh, warn, with_face_colors
+from .trimesh_import import import_trimesh
 
 if TYPE_CHECKING:
     import trimesh
@@ -23,8 +24,7 @@ BARE = ("obj", "ply")  # formats whose materials may lack a color; trimesh then 
 
 def read(geometry: Any, source: str, strict: bool) -> Contents:
     """Return the meshes of a trimesh object with their materials and placements."""
-    import trimesh
-
+    trimesh = import_trimesh()
     specs = _Visuals()
     numbers: dict[int, int] = {}
     raws: list[RawMesh] = []
