@@ -15,7 +15,9 @@ from trimesh.transformations import rotation_matrix, translation_matrix
 
 import wavefront as wf
 from wavefront.datasets import dataset
+from wavefront.datasets.annotated import annotated_objects
 from wavefront.datasets.masks import mask_box, run_lengths
+from wavefront.datasets.models import diameter, write_models
 
 SIZE = (60, 40)
 MM = 250  # millimeters of a scene unit
@@ -252,6 +254,57 @@ def test_bops_poses_and_depth_are_those_of_the_picture(folder: Path, number: int
         at = seen(local[:, :3], pose["cam_R_m2c"], pose["cam_t_m2c"])
         assert np.abs(at - np.stack([column, row], 1)).max() < 0.01
         assert pose["obj_id"] == {0: 1, 1: 2, 3: 1, 4: 3}[shape]
+
+
+def test_bop_has_the_models_of_meshes(folder: Path) -> None:
+    """Of crates in their own coordinates, of the plate in the world's; a ball is no mesh."""
+    sizes = loaded(folder / "models" / "models_info.json")
+    assert {path.name for path in (folder / "models").iterdir()} == {
+        "models_info.json",
+        "obj_000001.ply",
+        "obj_000003.ply",
+    }
+    expected = {"1": np.eye(4), "3": translation_matrix((-1.15, 0, 0.5)) @ FLAT}
+    assert sizes.keys() == expected.keys()
+    for key, matrix in expected.items():
+        model = trimesh.load(folder / "models" / f"obj_{int(key):06d}.ply", process=False)
+        points = MM * trimesh.transform_points(CRATE.vertices, matrix)
+        assert np.allclose(model.vertices, points, rtol=1e-6, atol=1e-4)
+        assert np.array_equal(model.faces, CRATE.faces)
+        info = sizes[key]
+        assert info.keys() == {"diameter", *(f"{kind}_{axis}" for kind in ("min", "size") for axis in "xyz")}
+        assert np.allclose([info[f"min_{axis}"] for axis in "xyz"], points.min(0))
+        assert np.allclose([info[f"size_{axis}"] for axis in "xyz"], np.ptp(points, 0))
+        assert info["diameter"] == pytest.approx(np.linalg.norm(np.ptp(points, 0)))
+
+
+def test_models_keep_normals_and_colors(tmp_path: Path) -> None:
+    """Colors as sRGB codes; the box is that of the vertices that faces use."""
+    vertices = [*np.eye(3), (9, 9, 9)]
+    normals, codes = np.tile([0.6, 0, 0.8], (4, 1)), np.arange(16, dtype=np.uint8).reshape(4, 4) * 16
+    mesh = wf.Mesh(vertices, [(0, 1, 2)], normals=normals, colors=codes)
+    objects = annotated_objects([mesh], None)
+    write_models(tmp_path, [mesh], objects, 1000)
+    model = trimesh.load(tmp_path / "models" / "obj_000001.ply", process=False)
+    assert np.allclose(model.vertex_normals, normals)
+    assert np.array_equal(model.visual.vertex_colors, codes)
+    info = loaded(tmp_path / "models" / "models_info.json")["1"]
+    assert info["size_x"] == 1000
+    assert info["diameter"] == pytest.approx(1000 * np.sqrt(2))
+
+
+@pytest.mark.parametrize("kind", ["cloud", "sphere", "line", "one"])
+def test_diameters_are_those_of_all_pairs(kind: str) -> None:
+    """As a search without blocks finds them."""
+    random = np.random.default_rng(3)
+    points = {
+        "cloud": random.random((700, 3)) * (1, 2, 3),
+        "sphere": trimesh.creation.icosphere(3).vertices,
+        "line": np.outer(random.random(300), (1, 2, 3)),
+        "one": np.ones((1, 3)),
+    }[kind]
+    every = np.linalg.norm(points[:, None] - points, axis=2).max()
+    assert diameter(points) == pytest.approx(every, rel=1e-12)
 
 
 def test_bops_silhouettes_are_of_the_whole_objects(folder: Path) -> None:

@@ -23,6 +23,7 @@ class AnnotatedObject:
     name: str
     category: int  # the same for shapes of one name, from 1 on
     model: int  # the same for instances of one mesh, from 1 on
+    of_mesh: bool  # whether the model is the mesh of an instance, in its own coordinates
     pose: Doubles  # (4, 4) from the model to the world, a rotation and a translation
 
 
@@ -58,10 +59,12 @@ def annotated_objects(shapes: Sequence[Shape], names: Iterable[str] | None) -> d
     for number, shape in enumerate(shapes):
         if shape.name in categories:
             pose = _rigid_pose(shape)
-            kind = id(shape if pose is None or not isinstance(shape, Instance) else shape.mesh)
-            model = models.setdefault(kind, len(models) + 1)
+            mesh = shape.mesh if isinstance(shape, Instance) and pose is not None else None
+            model = models.setdefault(id(shape if mesh is None else mesh), len(models) + 1)
             placed = np.eye(4) if pose is None else pose
-            found[number] = AnnotatedObject(number, shape.name, categories[shape.name], model, placed)
+            found[number] = AnnotatedObject(
+                number, shape.name, categories[shape.name], model, mesh is not None, placed
+            )
     return found
 
 

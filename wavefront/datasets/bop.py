@@ -6,7 +6,7 @@ millimeters, and pixels have their centers at whole numbers, as in OpenCV.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -17,9 +17,11 @@ from numpy.typing import NDArray
 from ..camera import Camera, Perspective
 from ..errors import SceneError
 from ..files import make_folder, write_bytes, write_json
+from ..shapes import Shape
 from ..vec import Doubles, Floats
 from .annotated import AnnotatedObject
 from .masks import Mask, mask_box, touches_edge
+from .models import write_models
 from .view import DatasetView, opencv_intrinsics, pinhole
 
 SCENE = "train/000000"
@@ -30,20 +32,32 @@ NO_BOX = [-1, -1, -1, -1]
 
 
 class BopLayout:
-    """`camera.json`, and `train/000000/` with pictures, depth, masks, cameras, poses and what is seen.
+    """`camera.json`, `models/`, and `train/000000/` with pictures, depth, masks, cameras and poses.
 
     Parameters
     ----------
     folder
         Of the data set.
+    shapes
+        Those of the scene.
+    objects
+        Those that are annotated, by their numbers.
     millimeters
         Of a scene unit.
     depth_scale
         Millimeters of a code of depth; None for 0.1, or in deep pictures for more.
     """
 
-    def __init__(self, folder: Path, millimeters: float, depth_scale: float | None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        shapes: Sequence[Shape],
+        objects: Mapping[int, AnnotatedObject],
+        millimeters: float,
+        depth_scale: float | None,
+    ) -> None:
         self._root, self._folder = folder, folder / SCENE
+        self._shapes, self._objects = shapes, objects
         self._millimeters = millimeters
         self._depth_scale = depth_scale
 
@@ -92,7 +106,8 @@ class BopLayout:
         }
 
     def write_index(self, views: Mapping[int, Any]) -> None:
-        """Write the cameras and annotations of all views; `camera.json` has that of the first view."""
+        """Write models, cameras and annotations; `camera.json` has the camera of the first view."""
+        write_models(self._root, self._shapes, self._objects, self._millimeters)
         first = views[min(views)]
         width, height = first["size"]
         fx, _, cx, _, fy, cy, *_ = first["camera"]["cam_K"]

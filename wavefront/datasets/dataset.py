@@ -123,7 +123,9 @@ def write_dataset(
     if "coco" in chosen:
         layouts["coco"] = CocoLayout(root, annotated)
     if "bop" in chosen:
-        layouts["bop"] = BopLayout(root, _length("millimeters", millimeters), _scale(depth_scale))
+        layouts["bop"] = BopLayout(
+            root, subject.shapes, annotated, _length("millimeters", millimeters), _scale(depth_scale)
+        )
     views = _checked_cameras(cameras, settings.pop("size", None), layouts)
     display = Display(gamma, exposure, tone, white_balance)
     settings["aovs"] = (*chosen_layers("aovs", settings.get("aovs", ())), *LAYERS_NEEDED)

@@ -13,7 +13,7 @@ from ..materials import Material, MaterialLike, as_material
 from ..suggestions import suggests_keywords
 from ..textures.base import BaseTexture
 from ..vec import FLOAT32_MAX
-from .base import Checked, Shape
+from .base import Checked, CurvedShape, Shape
 from .mesh import Mesh, check_range
 from .transform import moved, moved_tangents
 
@@ -78,7 +78,8 @@ class Instance(Shape):
         name: str | None = None,
     ) -> None:
         if not isinstance(mesh, Mesh):
-            raise SceneError(f"{name or 'instance'}: mesh must be a wf.Mesh, got {mesh!r}")
+            hint = "; give all copies as one array of primitives" if isinstance(mesh, CurvedShape) else ""
+            raise SceneError(f"{name or 'instance'}: mesh must be a wf.Mesh, got {mesh!r}{hint}")
         self.name = mesh.name if name is None else name
         self.mesh = mesh
         self.transform = transform
