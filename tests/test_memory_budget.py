@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
+import sys
 import threading
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +22,7 @@ from wavefront.scheduling.budget import LANE_BYTES, LEAST_WAVE, PROCESS_BYTES, T
 from wavefront.scheduling.scheduler import LARGE_WAVE, SMALL_WAVE
 
 MEGABYTE = 10**6
+PEAKS = Path(__file__).parents[1] / "benchmarks" / "memory.py"
 
 
 @pytest.mark.parametrize(
@@ -191,3 +196,18 @@ def test_a_session_sizes_each_picture() -> None:
             session.set_camera(None, size=(2000, 2000))
         image = session.run()
     assert image.metadata["samples"] == 2 * 64 * 64
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
+def test_the_peak_of_a_large_picture_does_not_grow_with_its_samples() -> None:
+    """1920x1080 at 4 and 4096 samples, to the end: within 5 %, under 1 GB. Ten minutes on two quiet cores."""
+    options = ["--scene", "sky", "--spp", "4", "4096", "--seconds", "7200"]
+    limits = ["--max-memory", "1GB", "--workers", "2"]
+    done = subprocess.run([sys.executable, PEAKS, *options, *limits], capture_output=True, text=True)
+    print(done.stdout)
+    assert done.returncode == 0, done.stdout + done.stderr[-3000:]
+    assert "4096 of 4096 samples" in done.stdout
+    few, many = [float(peak) for peak in re.findall(r"spp: peak ([\d,]+) MB", done.stdout)]
+    assert max(few, many) < 1000
+    assert max(few, many) / min(few, many) < 1.05
