@@ -6,8 +6,8 @@ Each render has a process of its own. Its memory is the sum of the proportional 
 workers, read 20 times a second from /proc, so that shared pages count once. A render that is not done after
 `--seconds` is stopped, and its picture is made of the samples so far: memory does not grow with their number,
 so the peak is that of the whole render, if the second half of the time does not raise it. The table shows it
-for each half. The scene "sky" has the shortest paths, so that all of its 8.5 billion samples are done in about
-ten minutes of two cores.
+for each half. The scene "sky" has the shortest paths, so that all of its 8.5 billion samples are done in
+about ten minutes of two cores.
 """
 
 from __future__ import annotations
