@@ -89,9 +89,13 @@ class ProcessPool:
         try:
             if not all_done(running, END_TIMEOUT, self._stop):
                 self._context.kill()
-            watchdog.start()
+            try:
+                watchdog.start()
+            except RuntimeError:  # there is no memory for a thread
+                self._context.kill()
             self._pool.shutdown(wait=True)
-            watchdog.join()
+            if watchdog.ident is not None:
+                watchdog.join()
         except BaseException:
             self._context.kill()
             raise

@@ -178,10 +178,16 @@ class Session:
         self._scene = PreparedScene(scene, settings)
         self._plan = make_plan(settings, self._scene, camera)
         self._make_pool()
-        self._begin_picture(camera, new_accumulator(camera, self._plan.tracer.recorded_layers), begin)
+        try:
+            self._pool.start()  # before there are sums, of which forked processes would keep old copies
+            accumulator = new_accumulator(camera, self._plan.tracer.recorded_layers)
+            self._begin_picture(camera, accumulator, begin)
+        except BaseException:
+            self._pool.close()
+            raise
 
     def _make_pool(self) -> None:
-        """Make a pool of workers, which start with the first job."""
+        """Make a pool of workers, which start with the first job if not before."""
         self._monitor = WaveMonitor()
         self.interrupt_handler = InterruptHandler(self._monitor.stop)
         self._pool = WorkerPool[Job, JobResult](
