@@ -113,7 +113,8 @@ def settings(job: dict) -> None:
     cycles.use_denoising, cycles.denoiser = job["denoise"], "OPENIMAGEDENOISE"
     cycles.use_guiding = job["guide"]
     cycles.pixel_filter_type, cycles.filter_width = "BOX", 1.0
-    cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = job["max_bounces"]
+    bounces = job["max_bounces"] - 1  # direct light is no bounce to Cycles
+    cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = bounces
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0
     cycles.blur_glossy = cycles.light_sampling_threshold = 0
 

@@ -3,13 +3,13 @@
 python benchmarks/error_vs_time.py [--scene NAME] [--bpy-python PATH] [--data DATA] [--out plot.png]
 
 Scenes: "cornell", "mesh" and "lights"; those of hard_scenes.py, which are "ceiling", "ajar", "window" and
-"corridor"; "hard" for these four, "all" for all. Sides: wavefront with each sampler or one of the other
-METHODS below, numpy and embree; Mitsuba `llvm_ad_rgb` and `scalar_rgb`, each with `independent` and
-`multijitter`; with `--bpy-python`, Cycles with Open Image Denoise on the box, and with its own path guiding
-on the hard scenes. All draw the same shapes with as many bounces, a box filter and a worker per core;
-Cycles has a sphere of 20 480 triangles in place of each ball. The reference is the mean of two converged
-renders, one of wavefront and one of Mitsuba, weighted by their noise, whose means are compared first.
-A denoised picture of Cycles is compared with its own converged picture. Printed are, for each side:
+"corridor"; "hard" for these four, "all" for all. Sides: wavefront by each method of the scene, or by those
+of --methods, in numpy and embree; Mitsuba `llvm_ad_rgb` and `scalar_rgb`, each with `independent` and
+`multijitter`; with `--bpy-python`, Cycles with its own path guiding on the box and the hard scenes, and with
+Open Image Denoise on the box. All draw the same shapes with as many bounces, a box filter and a worker per
+core; Cycles has a sphere of 20 480 triangles in place of each ball. The reference is the mean of two
+converged renders, one of wavefront and one of Mitsuba, weighted by their noise, whose means are compared
+first. Printed are, for each side:
 
 - error and wall time at each sample count (with four branches a fourth of it), warm: medians over the
   repeats, the sides in turn. The scene of Mitsuba and Cycles is loaded once, beforehand; a render of
@@ -26,7 +26,13 @@ A denoised picture of Cycles is compared with its own converged picture. Printed
 With `--blur 1.5` a second table has the errors of the same pictures after a Gaussian blur of 1.5 pixels,
 of the picture and of the reference: noise that neighbors share does not vanish there. With `--keep FILE`
 results join those of earlier runs in that file, and the plot shows all of them, so that the scenes can be
-measured one at a time. Needs `pip install -e '.[bench]'`, and for `llvm_ad_rgb` an LLVM library
+measured one at a time.
+
+With `--references FOLDER` converged pictures are kept there and found again. `--prepare` makes them and ends:
+it measures nothing, so it may run on a busy machine, and the measurement later on a quiet one. `--warm`
+leaves out the fresh processes, which take a large part of the time of a run.
+
+Needs `pip install -e '.[bench]'`, and for `llvm_ad_rgb` an LLVM library
 (DRJIT_LIBLLVM_PATH; Mitsuba 3.9 ends with an error of version 15 on processors with AVX-512, not of 19).
 """
 
@@ -47,31 +53,17 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from cycles_peer import Cycles
 from hard_scenes import HARD_SCENES
 from many_lights import lit
-from mitsuba_scene import to_mitsuba
+from references import References, relative_mse
+from renderers import DENOISED, GUIDED, METHODS, renderer
 from scipy.ndimage import gaussian_filter
 
 import wavefront as wf
-from wavefront.sampling.sampler import SAMPLERS
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
 from cornell_box import cornell_box
 
-DENOISED = "denoised"
-GUIDED = "guided"
-METHODS: dict[str, dict[str, Any]] = {  # settings of `wf.render` by what a side is called
-    **{sampler: {"sampler": sampler} for sampler in SAMPLERS},
-    "sobol/4": {"branches": 4},
-    GUIDED: {"guide": True},
-    "guided/4": {"guide": True, "branches": 4},
-    "reused": {"reuse": True},
-    "reused/4": {"reuse": True, "branches": 4},
-    "auto": {"guide": "auto", "branches": "auto"},
-    DENOISED: {"denoise": True},
-}
-CYCLES = {DENOISED: {"denoise": True}, GUIDED: {"guide": True}}
 IMPORT = """
 import time
 import numpy
@@ -79,7 +71,6 @@ begin = time.perf_counter()
 import wavefront
 print(time.perf_counter() - begin)
 """
-Render = Callable[[int, int], np.ndarray]  # spp, seed -> picture
 
 
 @dataclass(frozen=True)
@@ -91,7 +82,7 @@ class Subject:
     spp: tuple[int, ...]
     methods: tuple[str, ...]  # of wavefront
     exact: str  # the method of the converged picture of wavefront
-    cycles: str | None = None  # the method of Cycles
+    cycles: tuple[str, ...] = ()  # methods of Cycles
 
 
 def mesh_scene(data: Path | None, size: int) -> wf.Scene:
@@ -136,45 +127,6 @@ def ball(subdivisions: int) -> tuple[np.ndarray, np.ndarray]:
     return np.asarray(mesh.vertices), np.asarray(mesh.faces)
 
 
-def ours(scene: wf.Scene, max_bounces: int, method: str, accel: str) -> Render:
-    """Return a renderer of this project; four branches of a path count as four samples."""
-    options = {"accel": accel, "max_bounces": max_bounces, "progress": False, **METHODS[method]}
-    branches = 4 if method.endswith("/4") else 1
-    return lambda spp, seed: wf.render(scene, max(1, spp // branches), seed=seed, **options).rgb
-
-
-def mitsuba(scene: wf.Scene, max_bounces: int, sampler: str, variant: str, counts: tuple[int, ...]) -> Render:
-    """Return a renderer of Mitsuba, with the scene loaded for each of some sample counts."""
-    import mitsuba as mi
-
-    mi.set_variant(variant)
-    loaded = {spp: to_mitsuba(mi, scene, max_bounces, sampler, spp) for spp in counts}
-
-    def render(spp: int, seed: int) -> np.ndarray:
-        mi.set_variant(variant)
-        subject = loaded.get(spp, loaded[counts[-1]])
-        return np.array(mi.render(subject, spp=spp, seed=seed))
-
-    return render
-
-
-def cycles(scene: wf.Scene, max_bounces: int, method: str, python: str, counts: tuple[int, ...]) -> Render:
-    """Return a renderer of Cycles, a process of a Python for each of some sample counts."""
-    options = CYCLES.get(method, {})
-    made = {spp: Cycles(python, scene, spp, max_bounces, **options) for spp in counts}
-    return lambda spp, seed: made[spp].picture()
-
-
-def renderer(side: str, scene: wf.Scene, subject: Subject, bpy_python: str) -> Render:
-    """Return the renderer of a side, called "wavefront embree sobol" or "scalar_rgb multijitter"."""
-    *_, engine, method = side.split()
-    if engine == "cycles":
-        return cycles(scene, subject.max_bounces, method, bpy_python, subject.spp)
-    if side.startswith("wavefront"):
-        return ours(scene, subject.max_bounces, method, engine)
-    return mitsuba(scene, subject.max_bounces, method, engine, subject.spp)
-
-
 def first(side: str, options: argparse.Namespace, name: str) -> float:
     """Return the seconds of a first render in a process of its own, import and loading included."""
     command = [sys.executable, __file__, "--scene", name, "--size", str(options.size), "--first", side]
@@ -191,7 +143,7 @@ def print_first(side: str, subject: Subject) -> None:
     """Print how long a first render takes in this process, the scene's arrays being there already."""
     scene, fewest = subject.build(), subject.spp[:1]
     begin = time.perf_counter()
-    renderer(side, scene, replace(subject, spp=fewest), "")(fewest[0], 0)
+    renderer(side, scene, subject.max_bounces, fewest)(fewest[0], 0)
     seconds = time.perf_counter() - begin
     if side.startswith("wavefront"):  # which this script has imported
         seconds += printed_by([sys.executable, "-c", IMPORT])
@@ -202,36 +154,6 @@ def printed_by(command: list[str], **environment: str) -> float:
     """Run a process and return the number that it prints last."""
     done = subprocess.run(command, env={**os.environ, **environment}, check=True, stdout=subprocess.PIPE)
     return float(done.stdout.split()[-1])
-
-
-def reference(scene: wf.Scene, subject: Subject, spp: int, variant: str) -> np.ndarray:
-    """Return the mean of a converged picture of each side, after printing how they compare."""
-    render = ours(scene, subject.max_bounces, subject.exact, "auto")
-    mine, noise = averaged([render(spp // 2, 1000 + i) for i in range(2)])
-    render = mitsuba(scene, subject.max_bounces, "independent", variant, (min(spp // 2, 256),))
-    passes = [render(min(spp // 2, 256), 2000 + i) for i in range(max(2, spp // 256))]
-    other, other_noise = averaged(passes)
-    ratio = mine.mean((0, 1)) / other.mean((0, 1))
-    chance = (mine - other).std((0, 1)) / other.mean((0, 1)) / np.sqrt(mine[..., 0].size)
-    print(
-        f"converged at {spp} spp: mean of wavefront / mean of mitsuba = {ratio.round(4)} ± {chance.round(4)}"
-    )
-    if (np.abs(ratio - 1) > 4 * chance + 0.001).any():
-        print("the means differ by more than chance and 0.1 %: the figures below are not comparable")
-    print(f"relative MSE of the reference itself: {1 / (1 / noise + 1 / other_noise):.2g}")
-    return np.average([mine, other], axis=0, weights=[1 / noise, 1 / other_noise])
-
-
-def averaged(passes: list[np.ndarray]) -> tuple[np.ndarray, float]:
-    """Return the mean of independent pictures, and its relative MSE, from how they differ."""
-    mean = np.mean(passes, 0, dtype=float)
-    single = float(np.mean([relative_mse(picture, mean) for picture in passes]))
-    return mean, single / (len(passes) - 1)
-
-
-def relative_mse(picture: np.ndarray, exact: np.ndarray) -> float:
-    """Return the error that `wf.compare` reports."""
-    return wf.compare(picture.astype(np.float32), exact.astype(np.float32)).relative_mse
 
 
 def time_to(error: float, errors: list[float], times: list[float]) -> tuple[float, bool]:
@@ -252,34 +174,44 @@ def blurred(picture: np.ndarray, pixels: float) -> np.ndarray:
 def sides_of(subject: Subject, options: argparse.Namespace) -> list[str]:
     """Return the names of all sides that draw a scene."""
     methods = options.methods.split(",") if options.methods else subject.methods
-    names = [f"wavefront {accel} {method}" for accel in ("numpy", "embree") for method in methods]
+    names = [f"wavefront {accel} {method}" for accel in options.accel.split(",") for method in methods]
     names += [
         f"{variant} {sampler}"
         for variant in ("llvm_ad_rgb", "scalar_rgb")
         if variant in options.variants
         for sampler in ("independent", "multijitter")
     ]
-    return names + ([f"cycles {subject.cycles}"] if options.bpy_python and subject.cycles else [])
+    return names + ([f"cycles {method}" for method in subject.cycles] if options.bpy_python else [])
+
+
+def base_of(sides: list[str]) -> str:
+    """Return the side that the others are compared with."""
+    return next(side for side in sides if side.endswith("rgb independent"))
 
 
 def measure(name: str, subject: Subject, options: argparse.Namespace) -> dict[str, Any]:
-    """Measure all sides on one scene and print the tables."""
+    """Measure all sides on one scene and print the tables; {} where only references are made."""
     scene = subject.build()
     width, height = scene.camera.size
     print(f"\n## {name}: {width}x{height}, max_bounces {subject.max_bounces}", flush=True)
     names = sides_of(subject, options)
-    base = next(side for side in names if side.endswith("independent") and "rgb" in side)
-    exact = reference(scene, subject, options.reference_spp, base.split()[0])
-    sides = {side: renderer(side, scene, subject, options.bpy_python) for side in names}
+    base = base_of(names)
+    exact = References(options.references).mean_with_mitsuba(
+        name,
+        scene,
+        subject.max_bounces,
+        options.reference_spp,
+        method=subject.exact,
+        variant=base.split()[0],
+    )
+    if options.prepare:
+        return {}
+    sides = {
+        each: renderer(each, scene, subject.max_bounces, subject.spp, options.bpy_python) for each in names
+    }
     for side, render in sides.items():  # warm up; Mitsuba may compile anew for each sample count
         for spp in subject.spp[:1] if side.startswith("wavefront") else subject.spp:
             render(spp, 0)
-    converged = dict.fromkeys(sides, exact)
-    denoised = f"cycles {DENOISED}"
-    if denoised in sides:
-        counts = (options.reference_spp,)
-        render = cycles(scene, subject.max_bounces, "plain", options.bpy_python, counts)
-        converged[denoised] = render(counts[0], 0)
     found: dict[str, Any] = {side: {"errors": [], "blurred": [], "seconds": []} for side in sides}
     for spp in subject.spp:
         rows: dict[str, list[tuple[float, ...]]] = {side: [] for side in sides}
@@ -288,9 +220,9 @@ def measure(name: str, subject: Subject, options: argparse.Namespace) -> dict[st
                 begin = time.perf_counter()
                 picture = render(spp, seed)
                 seconds = time.perf_counter() - begin
-                soft = relative_mse(*(blurred(p, options.blur) for p in (picture, converged[side])))
+                soft = relative_mse(*(blurred(p, options.blur) for p in (picture, exact)))
                 ratio = picture.mean(dtype=float) / exact.mean()
-                rows[side].append((relative_mse(picture, converged[side]), soft, seconds, ratio))
+                rows[side].append((relative_mse(picture, exact), soft, seconds, ratio))
         for side, measured in rows.items():
             columns = [list(column) for column in zip(*measured, strict=True)]
             for key, column in zip(("errors", "blurred", "seconds"), columns, strict=False):
@@ -299,7 +231,9 @@ def measure(name: str, subject: Subject, options: argparse.Namespace) -> dict[st
     for side, of in found.items():
         # the scene of Cycles is loaded beforehand, and not measured
         of["once"] = (
-            0.0 if side.startswith("cycles") else max(0.0, first(side, options, name) - of["seconds"][0])
+            0.0
+            if options.warm or side.startswith("cycles")
+            else max(0.0, first(side, options, name) - of["seconds"][0])
         )
     report(found, subject.spp, base, "errors")
     if options.blur:
@@ -339,10 +273,11 @@ COLORS = {
 }
 LINES = {
     "independent": ":",
-    "sobol": "-",
+    "default": "-",
+    "plain": (0, (9, 1)),
     "bluenoise": "--",
     "multijitter": "-",
-    "sobol/4": "-.",
+    "plain/4": "-.",
     GUIDED: (0, (5, 1)),
     "guided/4": (0, (5, 1, 1, 1)),
     "auto": (0, (3, 1)),
@@ -391,16 +326,16 @@ def joined(found: dict[str, Any], kept: Path | None) -> dict[str, Any]:
 def subjects(options: argparse.Namespace) -> dict[str, Subject]:
     """Return all scenes by name."""
     size, spp = options.size, (4, 16, 64)
-    methods = (*SAMPLERS, "sobol/4", DENOISED)
-    box = (*SAMPLERS, "sobol/4", GUIDED, "guided/4", "reused", "reused/4", DENOISED)
+    hard = ("default", "plain", "plain/4", GUIDED, "guided/4", "reused")
+    methods = (*hard, "independent", "bluenoise", DENOISED)
+    box = (*methods, "reused/4")
     found = {
-        "cornell": Subject(lambda: cornell_box(size), 7, spp, box, "sobol", DENOISED),
-        "mesh": Subject(lambda: mesh_scene(options.data, size), 7, spp, methods, "sobol"),
-        "lights": Subject(lambda: lit("panels", 1000, size), 3, spp, methods, "sobol"),
+        "cornell": Subject(lambda: cornell_box(size), 7, spp, box, "reused", (GUIDED, DENOISED)),
+        "mesh": Subject(lambda: mesh_scene(options.data, size), 7, spp, methods, "plain"),
+        "lights": Subject(lambda: lit("panels", 1000, size), 3, spp, methods, "plain"),
     }
-    hard = ("sobol", GUIDED, "guided/4")
     for name, build in HARD_SCENES.items():
-        found[name] = Subject(partial(build, size), 12, (16, 64, 256), hard, "guided/4", GUIDED)
+        found[name] = Subject(partial(build, size), 12, (16, 64, 256), hard, "guided/4", (GUIDED,))
     if options.spp:
         counts = tuple(int(count) for count in options.spp.split(","))
         found = {name: replace(subject, spp=counts) for name, subject in found.items()}
@@ -416,9 +351,13 @@ if __name__ == "__main__":
     parser.add_argument("--size", type=int, default=256)
     parser.add_argument("--spp", help="sample counts, such as 4,16,64")
     parser.add_argument("--methods", help=f"of wavefront, some of {','.join(METHODS)}")
+    parser.add_argument("--accel", default="numpy,embree", help="accelerators of wavefront")
     parser.add_argument("--blur", type=float, default=0.0, help="pixels; prints a second table")
     parser.add_argument("--repeat", type=int, default=3)
     parser.add_argument("--reference-spp", type=int, default=4096)
+    parser.add_argument("--references", type=Path, help="folder of converged pictures, made where missing")
+    parser.add_argument("--prepare", action="store_true", help="only make the converged pictures")
+    parser.add_argument("--warm", action="store_true", help="measure no fresh processes")
     parser.add_argument("--bpy-python", help="a Python that has bpy, for Cycles")
     parser.add_argument("--variants", default="llvm_ad_rgb,scalar_rgb")
     parser.add_argument("--out", type=Path, default=Path("error_vs_time.png"))
@@ -434,5 +373,7 @@ if __name__ == "__main__":
         sys.exit()
     results: dict[str, Any] = {}
     for name in names:
-        results = joined({**results, name: measure(name, known[name], chosen)}, chosen.keep)
-    plot(results, chosen.out)
+        found = measure(name, known[name], chosen)
+        results = joined({**results, name: found}, chosen.keep) if found else results
+    if not chosen.prepare:
+        plot(results, chosen.out)

@@ -1,11 +1,13 @@
 """A sheet of the hard scenes at equal time: plain, guided with four branches, Mitsuba and Cycles.
 
-python benchmarks/hard_scenes_sheet.py --bpy-python PATH [--seconds 4] [--size 128] [--out sheet.png]
+python benchmarks/hard_scenes_sheet.py --bpy-python PATH [--references FOLDER] [--seconds 4] [--out sheet.png]
 
-The sample counts follow from the times of renders of 4 and 16 paths per pixel, branches counted; the time of
-training a guide counts. A picture is the second one that its side draws, so that Mitsuba has compiled
-its kernels.
-`--spp 93,40,196,50` gives the counts of the four sides instead, for a machine too busy to measure times.
+Each side takes as many samples per pixel as it draws in the given time, with the training of a guide. Two
+short renders say how many these are; where the picture then takes a tenth more or less time, the number is
+corrected once. A picture is the second one that its side draws, so that Mitsuba has compiled its kernels.
+Under it stand its paths per pixel (branches counted), its time, and its relative MSE to the reference of
+error_vs_time.py, which --references keeps. Run it on a quiet machine: it takes five minutes, besides the
+references.
 """
 
 from __future__ import annotations
@@ -13,14 +15,14 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 import PIL.Image
-from error_vs_time import Render, Subject, renderer
 from hard_scenes import HARD_SCENES
+from references import References, relative_mse
+from renderers import Render, renderer
 
 import wavefront as wf
 
@@ -28,7 +30,7 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 SIDES = {
-    "plain": "wavefront auto sobol",
+    "plain": "wavefront auto plain",
     "guided, four branches": "wavefront auto guided/4",
     "Mitsuba multijitter": "llvm_ad_rgb multijitter",
     "Cycles, guided": "cycles guided",
@@ -39,7 +41,9 @@ TITLES = {
     "window": "sky through a window",
     "corridor": "corridor, glossy floor",
 }
-PROBES = (4, 16)  # paths per pixel
+MAX_BOUNCES = 12
+PROBES = (8, 32)  # paths per pixel
+CLOSE = 0.1  # of the time, which is near enough
 BRIGHTNESS = 0.4  # mean of a picture as it is shown
 
 
@@ -51,40 +55,47 @@ def timed(render: Render, spp: int) -> tuple[float, np.ndarray]:
     return time.perf_counter() - begin, picture
 
 
-def drawer(name: str, side: str, options: argparse.Namespace) -> Callable[..., Render]:
-    """Return a function that makes the renderer of a side for some sample counts."""
-    build = partial(HARD_SCENES[name], options.size)
-    scene = build()
-    return lambda *spp: renderer(side, scene, Subject(build, 12, spp, (), "sobol"), options.bpy_python)
-
-
-def at_equal_time(of: Callable[..., Render], seconds: float) -> tuple[np.ndarray, str]:
-    """Return a picture that takes so many seconds, and a line that says what it took."""
+def at_equal_time(of: Callable[..., Render], seconds: float) -> tuple[int, float, np.ndarray]:
+    """Return the samples per pixel that a side draws in so many seconds, what it took, and the picture."""
     render = of(*PROBES)
     few, many = (timed(render, spp)[0] for spp in PROBES)
-    per_sample = max(many - few, 1e-3) / (PROBES[1] - PROBES[0])
-    spp = max(1, PROBES[0] + round((seconds - few) / per_sample))
+    per_sample = max(many - few, many / 10) / (PROBES[1] - PROBES[0])  # clocks are not exact
+    fixed = max(few - per_sample * PROBES[0], 0)
+    spp = max(1, round((seconds - fixed) / per_sample))
     taken, picture = timed(of(spp), spp)
-    return picture, f"{spp} paths, {taken:.1f} s"
+    if abs(taken / seconds - 1) > CLOSE and taken > fixed:
+        spp = max(1, round(spp * (seconds - fixed) / (taken - fixed)))
+        taken, picture = timed(of(spp), spp)
+    return spp, taken, picture
 
 
 def main(options: argparse.Namespace) -> None:
     """Render all pictures and draw the sheet."""
-    counts = [int(count) for count in options.spp.split(",")] if options.spp else [0] * len(SIDES)
+    kept = References(options.references)
     figure, axes = plt.subplots(
-        len(HARD_SCENES), len(SIDES), figsize=(1.7 * len(SIDES), 1.8 * len(HARD_SCENES)), squeeze=False
+        len(HARD_SCENES), len(SIDES), figsize=(1.7 * len(SIDES), 1.9 * len(HARD_SCENES)), squeeze=False
     )
     for row, name in zip(axes, HARD_SCENES, strict=True):
-        scale = None
-        for axis, (title, side), spp in zip(row, SIDES.items(), counts, strict=True):
-            of = drawer(name, side, options)
-            picture, line = (of(spp)(spp, 1), f"{spp} paths") if spp else at_equal_time(of, options.seconds)
-            scale = scale or BRIGHTNESS / picture.mean()  # one exposure for a scene
+        scene = HARD_SCENES[name](options.size)
+        exact = kept.mean_with_mitsuba(
+            name, scene, MAX_BOUNCES, options.reference_spp, method="guided/4", variant="llvm_ad_rgb"
+        )
+        scale = BRIGHTNESS / exact.mean()  # one exposure for a scene
+        for axis, (title, side) in zip(row, SIDES.items(), strict=True):
+            spp, seconds, picture = at_equal_time(
+                lambda *counts, side=side, scene=scene: renderer(
+                    side, scene, MAX_BOUNCES, counts, options.bpy_python
+                ),
+                options.seconds,
+            )
+            line = f"{spp} paths, {seconds:.1f} s, error {relative_mse(picture, exact):.3f}"
             axis.imshow(wf.Image(picture * scale, 1).to_uint8())
-            axis.set_title(f"{title}\n{line}", fontsize=6.5)
+            axis.set_xlabel(line, fontsize=6)
             axis.set(xticks=[], yticks=[])
             print(f"{name:10}{title:24}{line}", flush=True)
         row[0].set_ylabel(TITLES[name], fontsize=7)
+    for axis, title in zip(axes[0], SIDES, strict=True):
+        axis.set_title(title, fontsize=7)
     figure.tight_layout()
     figure.savefig(options.out, dpi=100)
     with PIL.Image.open(options.out) as drawn:  # noise compresses badly: 128 colors make a fourth of the size
@@ -98,7 +109,8 @@ if __name__ == "__main__":
     )
     parser.add_argument("--bpy-python", required=True, help="a Python that has bpy, for Cycles")
     parser.add_argument("--seconds", type=float, default=4.0, help="of each picture")
-    parser.add_argument("--spp", help="sample counts of the four sides, in place of --seconds")
     parser.add_argument("--size", type=int, default=128)
+    parser.add_argument("--references", type=Path, help="folder of converged pictures, made where missing")
+    parser.add_argument("--reference-spp", type=int, default=2048)
     parser.add_argument("--out", type=Path, default=Path("hard_scenes.png"))
     main(parser.parse_args())

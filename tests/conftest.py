@@ -16,6 +16,14 @@ settings.load_profile("deterministic")
 
 
 @pytest.fixture
+def close_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let pixels that share paths be next to each other, so that small pictures have whole tiles."""
+    from wavefront import pixel_tiles
+
+    monkeypatch.setattr(pixel_tiles, "STRIDE", 1)
+
+
+@pytest.fixture
 def tables_restored() -> Iterator[None]:
     """Take what a test registers out of the tables again, so that no other test finds it there."""
     from wavefront.accel.registry import ACCELERATORS

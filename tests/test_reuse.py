@@ -5,20 +5,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import scenes
-from scenes import Case
 from significance import Mean, assert_mean, assert_same_images, render, repeat
 
 import wavefront as wf
-from wavefront import pilot, pixel_tiles
+from wavefront import pilot
 from wavefront.pixel_tiles import WaveTiles, place_in_tiles, whole_tiles
 from wavefront.scheduling.jobs import View, split_jobs
-
-
-@pytest.fixture
-def close(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pixels of a tile next to each other, so that small pictures have whole tiles."""
-    monkeypatch.setattr(pixel_tiles, "STRIDE", 1)
-
 
 # --- Tiles ----------------------------------------------------------------------------------------
 
@@ -171,7 +163,9 @@ SCENES = [matte_corner, smooth, veiled, blended, divided]
 @pytest.mark.parametrize(
     ("spp", "error"), [(16, 0.015), pytest.param(1024, 0.001, marks=pytest.mark.slow)], ids=["quick", "slow"]
 )
-def test_sharing_keeps_the_mean(build: Callable[[], wf.Scene], spp: int, error: float, close: None) -> None:
+def test_sharing_keeps_the_mean(
+    build: Callable[[], wf.Scene], spp: int, error: float, close_tiles: None
+) -> None:
     """Pure colors, smooth shading, alpha, textures, mixed lobes, media and instances."""
     options = {"max_bounces": 5}
     plain = repeat(build(), spp, **options)
@@ -180,14 +174,16 @@ def test_sharing_keeps_the_mean(build: Callable[[], wf.Scene], spp: int, error: 
 
 
 @pytest.mark.parametrize("options", [{"branches": 3}, {"guide": True}], ids=str)
-def test_branches_and_guides_go_with_it(options: dict, close: None, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_branches_and_guides_go_with_it(
+    options: dict, close_tiles: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(pilot, "PATHS", 1 << 13)
     plain = repeat(scenes.room(), 32)
     shared = repeat(scenes.room(), 8, reuse=True, first_seed=100, **options)
     assert_same_images(plain, shared, 0.01)
 
 
-def test_no_light_is_lost_or_won(close: None) -> None:
+def test_no_light_is_lost_or_won(close_tiles: None) -> None:
     """In a closed white room of radiance 1 each sample is 1, whichever pixels it comes from."""
     inside = scenes.box((-1, -1, -1), (1, 1, 1), wf.Diffuse(0.5), emission=0.5, inward=True)
     scene = wf.Scene([inside], camera=wf.Camera.look_at((0, 0, 0), (1, 0.3, 0.2), fov=70, size=(16, 16)))
@@ -201,20 +197,6 @@ def test_noise_falls() -> None:
     plain, shared = (render(scene, 16, reuse=reuse) for reuse in (False, True))
     assert shared.metadata["noise"] < 0.8 * plain.metadata["noise"]
     assert shared.metadata["reuse"] is True
-
-
-CASES = [*scenes.DIRECT_CASES, *scenes.TRIANGLE_CASES, *scenes.INDIRECT_CASES, *scenes.SPECULAR_CASES]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("case", [case for case in CASES if "full" in case.integrators], ids=str)
-def test_every_case(case: Case, close: None) -> None:
-    """Pictures of several seeds are the batches, since pixels depend on each other."""
-    spp = max(16, case.spp // 8)
-    runs = repeat(case.build(), spp, reuse=True, **{"max_bounces": 4, **case.options})
-    unseen = 10 / (64 * 16 * spp * case.expected)
-    measured = Mean.of(runs.mean((1, 2, 3)))
-    assert_mean(measured, case.expected, 3 * case.max_error, rounding=1e-5 + unseen)
 
 
 # --- Bits -----------------------------------------------------------------------------------------
@@ -308,7 +290,7 @@ def test_only_full_can_share() -> None:
         wf.render(scenes.room(), 1, reuse=True, clamp=2)
 
 
-def test_comparisons_allow_for_shared_noise(close: None) -> None:
+def test_comparisons_allow_for_shared_noise(close_tiles: None) -> None:
     """Blocks of pixels that share noise differ by more than their standard errors say."""
     scene = scenes.cornell_box((32, 32))
     p, blind = [], []

@@ -1,0 +1,90 @@
+"""Guided and re-used renders have the mean of plain ones, within three standard errors of at most 0.1 %.
+
+`pytest -m slow tests/test_equal_means.py` takes half an hour on two cores.
+"""
+
+import sys
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scenes
+from scenes import Case
+from significance import ROUNDING, Mean, assert_mean, measure, repeat
+
+import wavefront as wf
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+from hard_scenes import HARD_SCENES
+
+pytestmark = pytest.mark.slow
+MAX_ERROR = 0.001
+SPP = 4096
+RUNS = 16  # pictures that share no noise, where pixels do
+SIZE = 64
+PICTURES = {
+    **{name: partial(build, SIZE) for name, build in HARD_SCENES.items()},
+    **{
+        build.__name__: partial(build, (SIZE, SIZE))
+        for build in (scenes.cornell_box, scenes.room, scenes.everything)
+    },
+    "glass ball": scenes.glass_ball,
+    "glass box": scenes.glass_box,
+}
+TECHNIQUES = {
+    "guided": {"guide": True},
+    "guided, four branches": {"guide": True, "branches": 4},
+    "re-used": {"reuse": True},
+}
+CASES = [*scenes.DIRECT_CASES, *scenes.TRIANGLE_CASES, *scenes.INDIRECT_CASES, *scenes.SPECULAR_CASES]
+techniques = pytest.mark.parametrize("options", TECHNIQUES.values(), ids=list(TECHNIQUES))
+
+
+def mean_of_picture(name: str, spp: int, **options: Any) -> Mean:
+    """Render a scene whose pixels know nothing of each other, each with a distribution of its own.
+
+    The channels count as one, as their noise is nearly the same.
+    """
+    image = wf.render(PICTURES[name](), spp, progress=False, **options)
+    error = np.sqrt(np.square(image.standard_error, dtype=float).mean(2).sum()) / image.rgb[..., 0].size
+    return Mean(float(image.rgb.mean(dtype=float)), float(error), image.rgb[..., 0].size)
+
+
+def mean_of_runs(scene: wf.Scene, spp: int, **options: Any) -> Mean:
+    """Render pictures of several seeds, which are the batches, since pixels depend on each other."""
+    return Mean.of(repeat(scene, max(1, spp // RUNS), runs=RUNS, first_seed=1, **options).mean((1, 2, 3)))
+
+
+@cache
+def plain(name: str) -> Mean:
+    """Return the mean of a scene by plain paths."""
+    return mean_of_picture(name, SPP, branches=1, guide=False, reuse=False)
+
+
+@techniques
+@pytest.mark.parametrize("name", PICTURES)
+def test_pictures(name: str, options: dict[str, Any]) -> None:
+    spp = SPP // options.get("branches", 1)
+    if "reuse" in options:
+        found = mean_of_runs(PICTURES[name](), spp, accel="auto", workers=None, **options)
+    else:
+        found = mean_of_picture(name, spp, seed=1, **options)
+    exact = plain(name)
+    print(f"{name}: {found} and plain {exact}")
+    assert max(exact.error / exact.value, found.error / found.value) <= MAX_ERROR
+    off = abs(found.value - exact.value) - ROUNDING * exact.value
+    assert off <= 3 * np.hypot(found.error, exact.error)
+
+
+@techniques
+@pytest.mark.parametrize("case", [case for case in CASES if "full" in case.integrators], ids=str)
+def test_every_case(case: Case, options: dict[str, Any], close_tiles: None) -> None:
+    """The probe of each scene measures its known light."""
+    spp = 4 * case.spp
+    unseen = 10 / (64 * spp * case.expected)  # see test_reference.py
+    chosen = {"max_bounces": 4, **case.options, **options}
+    measured = (mean_of_runs if "reuse" in options else measure)(case.build(), spp, **chosen)
+    print(f"{case}: {measured}, must be {case.expected:.6g}")
+    assert_mean(measured, case.expected, MAX_ERROR, sigmas=3, rounding=ROUNDING + unseen)
