@@ -26,6 +26,7 @@ METHODS: dict[str, dict[str, Any]] = {  # settings of `wf.render` by what a side
     "plain/4": {**PLAIN, "branches": 4},
     GUIDED: {**PLAIN, "guide": True},
     "guided/4": {**PLAIN, "guide": True, "branches": 4},
+    "guided/reused": {**PLAIN, "guide": True, "reuse": True},
     "reused": {**PLAIN, "reuse": True},
     "reused/4": {**PLAIN, "reuse": True, "branches": 4},
     "auto": {"guide": "auto", "branches": "auto"},

@@ -284,7 +284,7 @@ def test_doctor_says_what_is_there_and_tests_it() -> None:
     done = run("doctor", "--seconds", "1")
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith(f"wavefront {wf.__version__}, Python {sys.version.split()[0]}")
-    for text in (f"numpy {np.__version__}", "cores: ", "BLAS: ", "NumPy uses ", *EXTRAS):
+    for text in (f"numpy {np.__version__}", "cores: ", "BLAS: ", "NumPy uses ", "--guide: ", *EXTRAS):
         assert text in done.stdout
     assert done.stdout.count("  passed  ") >= 3
     assert "FAILED" not in done.stdout

@@ -8,12 +8,12 @@ from scenes import room
 from threadpoolctl import threadpool_info
 
 import wavefront as wf
+from wavefront import choice
 from wavefront.frame import Frame
 from wavefront.guiding import GuideCells, GuideTable
 from wavefront.guiding.octahedral import bins_of, directions_at, neighbors, solid_angles
 from wavefront.pilot import train
 from wavefront.sampling.sampler import Dimension
-from wavefront.session import plan
 from wavefront.stages.guidance import mix_with_guide
 from wavefront.stages.shade import Guidance, Shading
 from wavefront.state import Paths, SurfaceInteraction
@@ -249,7 +249,7 @@ def test_the_pilot_holds_blas_to_one_thread(monkeypatch: pytest.MonkeyPatch) -> 
         threads.extend(each["num_threads"] for each in libraries if each["user_api"] == "blas")
         return train(*arguments)
 
-    monkeypatch.setattr(plan, "train", spy)
+    monkeypatch.setattr(choice, "train", spy)
     wf.render([wf.Sphere((0, 0, 0), 1), wf.Environment(1)], 1, size=(8, 8), guide=True, progress=False)
     assert set(threads) == {1}
 

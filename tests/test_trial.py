@@ -1,16 +1,23 @@
-"""`branches="auto"` and `guide="auto"`: what the trial decides, and that decisions stay the same."""
+"""What is chosen where `branches`, `reuse` or `guide` is "auto", and that choices stay the same."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from scenes import cornell_box
+from scenes import cornell_box, everything, room
 
 import wavefront as wf
-from wavefront.trial import Trial
+from wavefront import choice, trial
+from wavefront.compile.scene import compile_scene
+from wavefront.sampling.sampler import IndependentSampler
+from wavefront.settings import Settings
+from wavefront.trial import Reused, Trial, run_trial
+
+SIZE = (192, 192)  # the smallest pictures that get a trial
 
 
 def many_lights(size: tuple[int, int] = (32, 32)) -> wf.Scene:
@@ -52,27 +59,180 @@ def render(scene: wf.Scene, spp: int = 2, **settings: Any) -> wf.Image:
     return wf.render(scene, spp, **{"workers": 1, "executor": "threads", **settings})
 
 
-@pytest.mark.parametrize(("scene", "some"), [(cornell_box((32, 32)), True), (many_lights(), False)])
-def test_branches_where_the_noise_is_in_indirect_light(scene: wf.Scene, some: bool) -> None:
+def test_branches_where_the_noise_is_in_indirect_light() -> None:
     """The picture is that of the number that was chosen."""
-    image = render(scene, branches="auto")
-    assert (image.metadata["branches"] > 1) == some
-    assert np.array_equal(image.rgb, render(scene, branches=image.metadata["branches"]).rgb)
+    assert chosen(many_lights((320, 320)), reuse=False).branches == 1
+    image = render(open_scene(SIZE), 1)
+    found = image.metadata["branches"]
+    assert found > 1
+    assert image.metadata["reuse"] is False
+    assert np.array_equal(image.rgb, render(open_scene(SIZE), 1, branches=found).rgb)
 
 
-def test_decisions_do_not_depend_on_workers_waves_or_time() -> None:
+def test_paths_are_shared_where_that_pays() -> None:
+    """In a matte room, by default; the picture is that of `reuse=True`."""
+    image = render(cornell_box(SIZE), 1)
+    assert (image.metadata["branches"], image.metadata["reuse"]) == (1, True)
+    assert np.array_equal(image.rgb, render(cornell_box(SIZE), 1, reuse=True).rgb)
+
+
+def glossy(size: tuple[int, int]) -> wf.Scene:
+    """The Cornell box with a ball of rough gold in it."""
+    box = cornell_box(size)
+    ball = wf.Sphere((0, -0.5, 0), 0.5, material=wf.Conductor.named("gold", roughness=0.3))
+    return wf.Scene([*box.shapes[:6], ball], camera=box.camera)
+
+
+@pytest.mark.parametrize("build", [room, everything, glossy, open_scene])
+@pytest.mark.parametrize("by", ["materials", "trial"])
+def test_paths_are_not_shared_where_glass_and_gloss_make_the_noise(
+    build: Callable[[tuple[int, int]], wf.Scene], by: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Their materials say so, and so would the trial."""
+    if by == "trial":
+        monkeypatch.setattr(choice, "shares_all", lambda scene: True)
+    assert not chosen(build((240, 240))).reuse
+
+
+def chosen(scene: wf.Scene, **settings: Any) -> choice.Choice:
+    """Return what is chosen for a scene."""
+    compiled = compile_scene(scene, scene.accelerators.maker("numpy"), mis=True)
+    assert scene.camera is not None
+    return choice.choose(Settings(**settings), compiled, compiled.view(scene.camera))
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"reuse": False},
+        {"clamp": 2},
+        {"noise": 0.1},
+        {"denoise": True},
+        {"aovs": "light_groups"},
+        {"branches": 1},
+        {"branches": 3},
+        {"max_bounces": 1},
+        {"integrator": "direct_mis"},
+    ],
+    ids=str,
+)
+def test_paths_are_not_shared_with_some_settings(
+    settings: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever a trial would say."""
+    pays = Trial(0, 1, 1, 1, 1, Reused(pixels=0.1, neighbors=0.1, connections=0))
+    tried: list[bool] = []
+
+    def trial(*args: Any) -> Trial:
+        tried.append(args[-1])
+        return pays
+
+    monkeypatch.setattr(choice, "_trial", trial)
+    assert chosen(cornell_box(SIZE)).reuse
+    assert tried.pop()
+    assert not chosen(cornell_box(SIZE), **settings).reuse
+    assert not any(tried)
+
+
+def test_a_guide_goes_with_what_pays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The trial is of guided paths then; without a guide there is a hint where light is hard to find."""
+    table: Any = object()
+    tables = []
+
+    def trial(*args: Any) -> Trial:
+        tables.append(args[3])
+        return Trial(0, 1, 1, 1, 1, Reused(pixels=0.1, neighbors=0.1, connections=0))
+
+    monkeypatch.setattr(choice, "train", lambda *args: table)
+    monkeypatch.setattr(choice, "_trial", trial)
+    guided, plain = (chosen(cornell_box(SIZE), guide=guide) for guide in (True, False))
+    assert (guided.reuse, guided.table, guided.hint) == (True, table, None)
+    assert (plain.reuse, plain.table, plain.hint) == (True, None, choice.GUIDE_HINT)
+    assert tables == [table, None]
+
+
+@pytest.mark.parametrize(("dim", "hint"), [(False, None), (True, choice.GUIDE_HINT)])
+def test_metadata_hint_at_a_guide(dim: bool, hint: str | None) -> None:
+    """Where a lamp shines away from what is seen, not in the Cornell box."""
+    scene = lamp_at_the_ceiling(SIZE) if dim else cornell_box(SIZE)
+    assert render(scene, 1).metadata["hint"] == hint
+
+
+@pytest.mark.parametrize(
+    ("scene", "settings"),
+    [
+        (cornell_box((191, 192)), {}),
+        (cornell_box(SIZE), {"max_bounces": 1}),
+        (cornell_box(SIZE), {"integrator": "naive"}),
+        (cornell_box(SIZE), {"branches": 2}),
+        (cornell_box(SIZE), {"reuse": True}),
+        (wf.Scene([wf.Sphere((0, 0, 0), 1)], camera=cornell_box(SIZE).camera), {}),
+        (
+            wf.Scene(
+                [wf.Sphere((0, 0, 0), 1, material=wf.Mirror())], wf.Environment(1), cornell_box(SIZE).camera
+            ),
+            {},
+        ),
+    ],
+    ids=["small", "direct light", "naive", "branches", "reuse", "dark", "mirror"],
+)
+def test_there_is_no_trial_where_it_can_bring_nothing(
+    scene: wf.Scene, settings: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Small pictures, direct light, other integrators, no light, no rough surface."""
+    monkeypatch.setattr(choice, "run_trial", None)
+    found = chosen(scene, **settings)
+    assert (found.branches, found.reuse) == (settings.get("branches", 1), settings.get("reuse", False))
+
+
+def test_a_window_is_a_part_of_the_same_picture() -> None:
+    """The whole picture decides, so its bits stay."""
+    scene = cornell_box((240, 160))
+    window = scene.camera.cropped((28, 0, 56, 28))
+    assert chosen(scene).reuse
+    assert chosen(wf.Scene(scene.shapes, camera=window)).reuse
+    whole, part = (render(scene, 1, camera=camera) for camera in (scene.camera, window))
+    assert np.array_equal(part.rgb, whole.rgb[:28, 28:56])
+
+
+def test_decisions_do_not_depend_on_workers_waves_samples_or_time() -> None:
     """Counted rays decide."""
-    images = [
-        wf.render(cornell_box((16, 16)), 3, branches="auto", **settings)
-        for settings in (
-            {"workers": 1, "executor": "threads"},
-            {"workers": 2, "executor": "threads", "wave_size": 100},
-            {"workers": 1, "seconds": 60, "executor": "threads"},
-        )
+    whole = render(cornell_box(SIZE), 2)
+    same = [
+        {"workers": 2, "wave_size": 5000},
+        {"workers": 1, "seconds": 600},
+        {"workers": 2, "executor": "processes"},
     ]
-    for image in images[1:]:
-        assert image.metadata["branches"] == images[0].metadata["branches"]
-        assert np.array_equal(image.rgb, images[0].rgb)
+    for settings in same:
+        image = render(cornell_box(SIZE), 2, **settings)
+        assert image.metadata["reuse"] is True
+        assert np.array_equal(image.rgb, whole.rgb)
+    parts = [
+        wf.render(cornell_box(SIZE), samples=part, workers=1, executor="threads")
+        for part in (range(1), range(1, 2))
+    ]
+    assert np.array_equal(wf.Image.merge(*parts).rgb, whole.rgb)
+
+
+@pytest.mark.parametrize("accel", ["numpy", "embree"])
+def test_trials_do_not_depend_on_how_they_are_cut_into_waves(
+    accel: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Means and counts are the same for any number of tiles that are traced together."""
+    if accel == "embree":
+        pytest.importorskip("embreex")
+    scene = cornell_box(SIZE)
+    compiled = compile_scene(scene, scene.accelerators.maker(accel), mis=True)
+    samplers = IndependentSampler(1), IndependentSampler(2)
+    found = []
+    for tiles in (1, 3, 64):
+        monkeypatch.setattr(trial, "WAVE", tiles)
+        found.append(run_trial(compiled, compiled.view(scene.camera), samplers, 5, tiles=7, reuse=True))
+    for other in found[1:]:
+        for name in ("shared", "separate", "before", "after"):
+            assert getattr(other, name) == getattr(found[0], name)
+        for name in ("pixels", "neighbors", "connections"):
+            assert getattr(other.reused, name) == getattr(found[0].reused, name)
 
 
 def test_a_guide_is_used_where_it_pays() -> None:
@@ -81,32 +241,38 @@ def test_a_guide_is_used_where_it_pays() -> None:
         image = render(scene, guide="auto")
         assert image.metadata["guided"] is pays
         assert image.metadata["guide"] == "auto"
-        assert np.array_equal(image.rgb, render(scene, guide=pays).rgb)
+        same = render(scene, guide=pays, branches=image.metadata["branches"])
+        assert np.array_equal(image.rgb, same.rgb)
 
 
 def test_renders_go_on_with_the_same_decision(tmp_path: Path) -> None:
-    """And a checkpoint knows that they were decided."""
+    """A checkpoint knows what was decided, and goes on where the same is asked for."""
     path = tmp_path / "box.wfck"
-    render(cornell_box((16, 16)), 2, branches="auto", checkpoint=path)
-    image = render(cornell_box((16, 16)), 5, branches="auto", checkpoint=path)
-    assert np.array_equal(image.rgb, render(cornell_box((16, 16)), 5, branches="auto").rgb)
-    with pytest.raises(wf.SceneError, match="branches was 'auto' and is 2"):
-        render(cornell_box((16, 16)), 5, branches=2, checkpoint=path)
+    render(cornell_box(SIZE), 1, checkpoint=path)
+    image = render(cornell_box(SIZE), 2, checkpoint=path)
+    assert np.array_equal(image.rgb, render(cornell_box(SIZE), 2).rgb)
+    with pytest.raises(wf.SceneError, match="reuse was True and is False"):
+        render(cornell_box(SIZE), 2, reuse=False, checkpoint=path)
+    assert np.array_equal(render(cornell_box(SIZE), 2, reuse=True, checkpoint=path).rgb, image.rgb)
 
 
 def test_each_camera_has_a_trial_of_its_own() -> None:
-    """A session decides anew."""
-    box = cornell_box((15, 15))
-    away_from_it = wf.Camera.look_at((0, 0, 30), (0, 0, 300), fov=40, size=(15, 15))
-    with wf.Session(box, 2, branches="auto", workers=1, executor="threads", lighting=None) as session:
+    """A session decides anew; its workers go on where the decision is the same."""
+    box = wf.Scene(cornell_box(SIZE).shapes, wf.Environment(0.01), cornell_box(SIZE).camera)
+    away_from_it = wf.Camera.look_at((0, 0, 30), (0, 0, 300), fov=40, size=SIZE)
+    with wf.Session(box, 1, workers=1, executor="threads", lighting=None) as session:
         first = session.run()
+        pool = session._pool
         session.set_camera(away_from_it)
         away = session.run()
+        assert session._pool is not pool
         session.set_camera(None)
+        pool = session._pool
         assert np.array_equal(session.run().rgb, first.rgb)
-    alone = render(box, 2, branches="auto", camera=away_from_it)
-    assert first.metadata["branches"] > away.metadata["branches"] == alone.metadata["branches"]
-    assert np.array_equal(away.rgb, alone.rgb)
+        session.set_camera(box.camera)
+        assert session._pool is pool
+    assert (first.metadata["reuse"], away.metadata["reuse"]) == (True, False)
+    assert np.array_equal(away.rgb, render(box, 1, camera=away_from_it).rgb)
 
 
 def test_other_integrators_have_nothing_to_decide() -> None:
@@ -119,10 +285,10 @@ def test_other_integrators_have_nothing_to_decide() -> None:
 
 def test_the_cost_is_variance_times_rays() -> None:
     """The best number is near the one of the splitting formula, √(V2/V1 · c1/c2)."""
-    trial = Trial(shared=1.0, separate=9.0, before=100, after=100.0, ray_cost=1.0)
-    assert trial.cost(1) == 10 * 200
-    assert trial.cost(3) == 4 * 400
-    assert trial.best_ways() == 3  # √9
+    found = Trial(shared=1.0, separate=9.0, before=100, after=100.0, ray_cost=1.0)
+    assert found.cost(1) == 10 * 200
+    assert found.cost(3) == 4 * 400
+    assert found.best_ways() == 3  # √9
     assert Trial(1.0, 0.9, 100, 100.0, 1.0).best_ways() == 1
     assert Trial(1.0, 1.2, 110, 100.0, 1.0).best_ways() == 1  # the gain is too small
     assert Trial(0.0, 0.0, 100, 0.0, 1.0).best_ways() == 1
@@ -134,6 +300,7 @@ def test_the_cost_is_variance_times_rays() -> None:
         ({"branches": "many"}, r"branches is 'many'; it must be a whole number from 1 to 64, or 'auto'"),
         ({"branches": 0}, r"branches is 0; it must be a whole number from 1 to 64, or 'auto'"),
         ({"guide": "yes"}, r"guide is 'yes'; it must be True or False, or 'auto'"),
+        ({"reuse": "yes"}, r"reuse is 'yes'; it must be True or False, or 'auto'"),
     ],
 )
 def test_other_values_are_refused(settings: dict[str, Any], message: str) -> None:

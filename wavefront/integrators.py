@@ -139,13 +139,13 @@ def li_reuse(
     lanes, points = shared_points(scene, paths, hits, branches)
     own = np.setdiff1d(np.arange(len(paths)), lanes, assume_unique=True)
     shared, light = as_shared(paths.take(lanes)), np.zeros((3, lanes.size), f4)
-    _follow(scene, paths.take(own), hits.take(own), sampler, max_bounces, L, branches, table)
-    _follow(scene, shared, hits.take(lanes), sampler, max_bounces, light, branches, table)
+    follow(scene, paths.take(own), hits.take(own), sampler, max_bounces, L, branches, table)
+    follow(scene, shared, hits.take(lanes), sampler, max_bounces, light, branches, table)
     add_shared(scene, L, first, shade, points, light, tiles, branches)
     return L
 
 
-def _follow(
+def follow(
     scene: CompiledScene,
     paths: Paths,
     hits: Hits,

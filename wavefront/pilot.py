@@ -165,13 +165,13 @@ def _addresses(camera: Camera, first: int, count: int) -> tuple[Words, Words]:
     """Return pixels and samples (count,): all pixels in turn, or few that are spread over the picture."""
     pixels = np.uint64(camera.size[0] * camera.size[1])
     number = np.arange(first, first + count, dtype=np.uint64)
-    pixel = (number % pixels).astype(np.uint32) if pixels <= PATHS else spread_pixels(camera, number)
-    return pixel, (number // pixels).astype(np.uint32)
+    pixel = number % pixels if pixels <= PATHS else spread(number, int(pixels))
+    return pixel.astype(np.uint32), (number // pixels).astype(np.uint32)
 
 
-def spread_pixels(camera: Camera, number: NDArray[np.uint64]) -> Words:
-    """Return pixels (k,) for numbers (k,), so that consecutive numbers are spread over the picture."""
-    return (number * GOLDEN % np.uint64(camera.size[0] * camera.size[1])).astype(np.uint32)
+def spread(number: NDArray[np.uint64], places: int) -> NDArray[np.uint64]:
+    """Return places (k,) for numbers (k,), so that consecutive numbers are spread over all of them."""
+    return number * GOLDEN % np.uint64(places)
 
 
 def _none() -> Vertices:

@@ -48,9 +48,9 @@ def render(
     seconds: float | None = None,
     filter: str | Filter = "box",
     light_sampler: str | LightSamplerMaker = "spatial",
-    branches: int | str = 1,
+    branches: int | str = "auto",
     guide: bool | str = False,
-    reuse: bool = False,
+    reuse: bool | str = "auto",
     clamp: float | None = None,
     wave_size: int | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
@@ -134,7 +134,8 @@ def render(
     branches
         In how many ways the path of a sample goes on from the first surface, at most 64; only "full" has any.
         Two to four make a sample dearer, but less noisy by more where most of the noise is in indirect light,
-        as in a room. "auto" finds out by a trial of 65536 paths whether two to four pay.
+        as in a room. "auto" finds out by a short trial whether they pay: docs/choices.md tells how. In
+        pictures of less than 192x192 pixels it is one.
     guide
         Learn from a pilot of 262144 paths where light comes from, and choose directions by that; only "full"
         can be guided. It takes a second or two, and pays where light comes through narrow openings or several
@@ -145,6 +146,8 @@ def render(
         Share paths among pixels: what a path finds from its second surface on counts for sixteen pixels that
         lie a little apart; only "full" does so. It pays where most of the noise is in indirect light between
         matte surfaces. The errors of these pixels depend on each other then: docs/reuse.md has figures.
+        "auto" shares where all surfaces are matte and the trial says that it pays, but not with `branches`,
+        `clamp`, `noise`, `denoise` or light groups.
     clamp
         The most that a path may find as indirect light at once, as radiance, the mean of its channels; what
         is brighter is scaled down. It removes fireflies, and with them light: the picture gets too dark. The

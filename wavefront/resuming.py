@@ -11,6 +11,7 @@ from typing import Any
 from .accel import Geometry, InstanceAccelerator
 from .camera import Camera
 from .checkpoint import Checkpoint, check_identity, other_versions, read_checkpoint
+from .choice import Choice
 from .compile.scene import CompiledScene
 from .errors import SaveError, SceneError, warn_caller
 from .filters import FILTERS
@@ -30,7 +31,7 @@ NAMED: dict[str, Registry[Any]] = {
     "filter": FILTERS,
     "light_sampler": LIGHT_SAMPLERS,
 }
-PLAIN = ("max_bounces", "seed", "branches", "guide", "reuse", "clamp", "noise")
+PLAIN = ("max_bounces", "seed", "guide", "clamp", "noise")
 WRITING_SHARE = 0.05  # of the time that writing may take, on a slow disk; the interval is then longer
 
 
@@ -49,7 +50,7 @@ def scene_fingerprint(compiled: CompiledScene, geometries: Sequence[Geometry]) -
 
 
 def render_identity(
-    settings: Settings, scene: str, accelerator: str, camera: Camera, layers: Sequence[str]
+    settings: Settings, choice: Choice, scene: str, accelerator: str, camera: Camera, layers: Sequence[str]
 ) -> dict[str, Any]:
     """Return what two renders must have in common so that their samples are the same.
 
@@ -57,6 +58,8 @@ def render_identity(
     ----------
     settings
         Those that the picture depends on are taken.
+    choice
+        How paths go on, whether that was asked for or decided.
     scene
         Its fingerprint.
     accelerator
@@ -74,6 +77,8 @@ def render_identity(
     return {
         "size": list(camera.size),
         **{name: getattr(settings, name) for name in PLAIN},
+        "branches": choice.branches,
+        "reuse": choice.reuse,
         **names,
         "accelerator": accelerator,
         "aovs": list(layers),

@@ -21,8 +21,7 @@ from .errors import SceneError, number, rgb
 from .exact_sum import MAX_TERMS
 from .files import check_target
 from .filters import FILTERS, Filter
-from .guiding import GuideTable
-from .integrators import INTEGRATORS, Integrator, li_full, li_reuse
+from .integrators import INTEGRATORS, Integrator, li_full
 from .layers import CLAMPED, GUIDES, chosen_layers, sampled_names
 from .lighting import DEFAULT, LIGHTINGS, check_lighting
 from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
@@ -319,12 +318,12 @@ class Settings:
         choices=LIGHT_SAMPLERS,
     )
     branches: int | str = setting(
-        1,
+        AUTO,
         "In how many ways the path of a sample goes on from the first surface, at most 64; only "
         '"full" has any. Two to four make a sample dearer, but less noisy by more where most of the '
-        'noise is in indirect light, as in a room. "auto" finds out by a trial of 65536 paths whether two to '
-        "four pay.",
-        option="ways a path goes on from its first surface, or auto",
+        'noise is in indirect light, as in a room. "auto" finds out by a short trial whether they pay: '
+        "docs/choices.md tells how. In pictures of less than 192x192 pixels it is one.",
+        option="ways a path goes on from its first surface, or auto (default), which tries what pays",
         check=auto_or(whole_number(1, MAX_BRANCHES)),
     )
     guide: bool | str = setting(
@@ -337,14 +336,15 @@ class Settings:
         option="learn where light comes from, for scenes with much indirect light",
         check=auto_or(check_flag),
     )
-    reuse: bool = setting(
-        False,
+    reuse: bool | str = setting(
+        AUTO,
         "Share paths among pixels: what a path finds from its second surface on counts for sixteen pixels "
         'that lie a little apart; only "full" does so. It pays where most of the noise is in indirect light '
         "between matte surfaces. The errors of these pixels depend on each other then: docs/reuse.md has "
-        "figures.",
-        check=check_flag,
-        option="share paths among pixels, for matte scenes with much indirect light",
+        'figures. "auto" shares where all surfaces are matte and the trial says that it pays, but not with '
+        "`branches`, `clamp`, `noise`, `denoise` or light groups.",
+        check=auto_or(check_flag),
+        option="share paths among pixels: yes, no, or auto (default), in matte scenes where it pays",
     )
     clamp: float | None = setting(
         None,
@@ -431,16 +431,27 @@ class Settings:
         self.memory_limit = None if self.max_memory is None else int(self.max_memory)
         self.worker_count = worker_count(self.workers, self.executor)
         self.up_vector = upward("up", "y" if self.up is None else self.up)
-        self.estimator()
+        self._check_integrator()
         self._check_reuse()
         self.sampler_maker()(1)
         self.executor_for((0, 0))
 
+    def _check_integrator(self) -> None:
+        """Check that the integrator can do what is asked for."""
+        if self.is_full:
+            return
+        label = INTEGRATORS.label(self.integrator)
+        for name in ("guide", "reuse"):
+            if getattr(self, name) is True:
+                raise SceneError(f"{name} is True; with integrator={label!r} it must be False")
+        if self.branches not in (1, AUTO):
+            raise SceneError(f"branches is {self.branches}; with integrator={label!r} it must be 1")
+
     def _check_reuse(self) -> None:
         """Check that shared paths have no light that must be told apart by the path that found it."""
-        if self.reuse and "light_groups" in self.aovs:
+        if self.reuse is True and "light_groups" in self.aovs:
             raise SceneError("reuse is True; then aovs must not have 'light_groups'")
-        if self.reuse and self.clamp is not None:
+        if self.reuse is True and self.clamp is not None:
             raise SceneError(f"clamp is {self.clamp:g}; with reuse=True it must be None")
 
     @property
@@ -466,34 +477,15 @@ class Settings:
         """Samples that every pixel gets; None where noise or time decides."""
         return self.max_spp if self.noise is None and self.seconds is None else None
 
-    def estimator(self, table: GuideTable | None = None, branches: int = 1) -> Integrator:
-        """Return the integrator for paths with so many branches, guided by a table and shared or not."""
-        integrator = INTEGRATORS.find(self.integrator)
-        if integrator is not li_full:
-            label = INTEGRATORS.label(self.integrator)
-            if self.guide is True:
-                raise SceneError(f"guide is {self.guide}; with integrator={label!r} it must be False")
-            if self.reuse:
-                raise SceneError(f"reuse is {self.reuse}; with integrator={label!r} it must be False")
-            if self.branches not in (1, AUTO):
-                raise SceneError(f"branches is {self.branches}; with integrator={label!r} it must be 1")
-            return integrator
-        if self.reuse:
-            return partial(li_reuse, branches=branches, table=table)
-        if branches == 1 and table is None:
-            return integrator
-        return partial(li_full, branches=branches, table=table)
+    @property
+    def is_full(self) -> bool:
+        """Whether the integrator is the one whose paths can branch, be guided and be shared."""
+        return INTEGRATORS.find(self.integrator) is li_full
 
     @property
     def most_branches(self) -> int:
         """Branches that a path may have."""
         return MOST_AUTO if isinstance(self.branches, str) else self.branches
-
-    @property
-    def decides(self) -> bool:
-        """Whether a trial or a pilot comes before each picture."""
-        full = INTEGRATORS.find(self.integrator) is li_full
-        return full and (bool(self.guide) or self.branches == AUTO)
 
     def sampler_maker(self) -> Callable[[int], Sampler]:
         """Return what makes the sampler of a picture so many pixels wide."""
@@ -505,7 +497,8 @@ class Settings:
 
     def executor_for(self, size: tuple[int, int]) -> str | ExecutorLike:
         """Return the executor for a picture of a size (width, height)."""
-        paths = size[0] * size[1] * self.max_spp * self.most_branches
+        branches = self.branches if isinstance(self.branches, int) else 1
+        paths = size[0] * size[1] * self.max_spp * branches
         return choose_executor(self.executor, self.worker_count, paths)
 
     def budget(self, size: tuple[int, int], layers: Sequence[str] = ()) -> Budget:

@@ -151,3 +151,11 @@ def _finite(text: str) -> float:
 def branches(text: str) -> int | str:
     """Return a number of branches, or "auto"."""
     return text if text == "auto" else int(text)
+
+
+def reuse(text: str) -> bool | str:
+    """Return whether pixels share paths, or "auto"."""
+    values: dict[str, bool | str] = {"yes": True, "no": False, "auto": "auto"}
+    if text not in values:
+        raise argparse.ArgumentTypeError(f"{text!r} is not yes, no or auto")
+    return values[text]

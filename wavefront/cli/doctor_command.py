@@ -59,7 +59,7 @@ def add_doctor_command(commands: Any) -> None:
 
 def _doctor(options: argparse.Namespace) -> int:
     """Describe and test the installation; return the exit status."""
-    for line in (*_about_program(), *_about_machine(), *_about_extras()):
+    for line in (*_about_program(), *_about_machine(), *_about_extras(), *_about_settings()):
         print(line, flush=True)
     if not options.seconds > 0:
         return 0
@@ -106,6 +106,12 @@ def _about_extras() -> Iterator[str]:
         missing = " ".join(package for package, found in versions.items() if not found)
         state = f"installed ({there})" if not missing else f"not installed: pip install {missing}"
         yield f"  {name}: {extra.brings}; {state}"
+
+
+def _about_settings() -> Iterator[str]:
+    yield "Settings"
+    yield "  --branches, --reuse: auto; a short trial finds out what pays, in 192x192 pixels or more"
+    yield "  --guide: off; may pay where light is hard to find, as image.metadata['hint'] says then"
 
 
 def _version(package: str) -> str | None:

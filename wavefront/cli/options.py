@@ -20,6 +20,7 @@ PARSERS: dict[str, Callable[[str], Any]] = {
     "up": arguments.up,
     "samples": arguments.samples,
     "branches": arguments.branches,
+    "reuse": arguments.reuse,
 }
 METAVARS = {"lighting": "PRESET", "background": "COLOR", "up": "X,Y,Z", "samples": "FIRST:END"}
 CAMERA_OPTIONS = ("size",)  # settings that the command line uses for its own camera
@@ -66,7 +67,7 @@ def _add_setting(command: argparse.ArgumentParser, setting: Field[Any]) -> None:
     """Add the option of a setting that has one."""
     how: dict[str, Any] = {"help": setting.metadata["option"], "default": setting.default}
     flag = setting.metadata["flag"] or setting.name
-    if str(setting.type).startswith("bool"):
+    if str(setting.type).startswith("bool") and setting.name not in PARSERS:
         how["action"] = "store_true"
     elif setting.metadata["flag"]:
         how.update(action=arguments.Several, dest=setting.name, metavar="NAME")

@@ -61,7 +61,7 @@ def _cause_of_bad_sample(plan: Plan, loop: RenderLoop, pixel: int, sample: int) 
         tracer.sampler(camera.film[0]),
         tracer.filter,
         tracer.max_bounces,
-        plan.estimator.branches,
+        plan.choice.branches,
         light_samples=integrator is not li_naive,
         mis=integrator in WITH_MIS,
     )

@@ -39,7 +39,7 @@ from ..scheduling.tracing import WaveMonitor, trace_job
 from ..settings import Settings, check_camera
 from ..suggestions import suggests_keywords
 from .last_checks import check_last_image
-from .plan import make_plan
+from .plan import choose_paths, make_plan
 from .prepared_scene import PreparedScene
 from .view_render import ViewRender, new_accumulator
 
@@ -114,9 +114,9 @@ class Session:
         seconds: float | None = None,
         filter: str | Filter = "box",
         light_sampler: str | LightSamplerMaker = "spatial",
-        branches: int | str = 1,
+        branches: int | str = "auto",
         guide: bool | str = False,
-        reuse: bool = False,
+        reuse: bool | str = "auto",
         clamp: float | None = None,
         wave_size: int | None = None,
         checkpoint: str | os.PathLike[str] | None = None,
@@ -176,7 +176,7 @@ class Session:
         check_picture_memory(*camera.size)
         settings.budget(camera.size)  # before work; again when the memory of the scene is known
         self._scene = PreparedScene(scene, settings)
-        self._plan = make_plan(settings, self._scene, camera)
+        self._plan = make_plan(settings, self._scene, camera, choose_paths(settings, self._scene, camera))
         self._make_pool()
         try:
             self._pool.start()  # before there are sums, of which forked processes would keep old copies
@@ -330,12 +330,13 @@ class Session:
                 self._pool.cancel()
             others = (executor, self._plan.executor) == ("processes", "threads")
             others |= budget.workers != self._plan.budget.workers
-            if self._monitor.stop.value or others or settings.decides:
+            choice = choose_paths(settings, self._scene, camera)
+            if self._monitor.stop.value or others or not choice.is_same(self._plan.choice):
                 self._pool.close()
-                self._plan = make_plan(settings, self._scene, camera)
+                self._plan = make_plan(settings, self._scene, camera, choice)
                 self._make_pool()
             else:
-                self._plan = replace(self._plan, budget=budget)
+                self._plan = replace(self._plan, choice=choice, budget=budget)
         self._begin_picture(camera, accumulator, begin)
 
     def stop(self) -> None:

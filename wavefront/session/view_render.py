@@ -81,11 +81,11 @@ class ViewRender:
             settings.seconds,
             plan.budget.wave_size,
             plan.budget.workers,
-            plan.estimator.branches,
+            plan.choice.branches,
             waves_per_job(plan.executor),
         )
         self.loop = RenderLoop(
-            View(view, scheduler.deadline, settings.first_sample, settings.reuse),
+            View(view, scheduler.deadline, settings.first_sample, plan.choice.reuse),
             accumulator,
             scheduler,
             spp=settings.max_spp,
@@ -162,9 +162,15 @@ class ViewRender:
         SceneError
             If a part of the scene cannot be compared.
         """
-        scene, layers = self._plan.scene, self._plan.tracer.recorded_layers
-        accelerator = scene.compiled.accelerator.name
-        return render_identity(self._plan.settings, scene.fingerprint(), accelerator, self._view, layers)
+        plan = self._plan
+        return render_identity(
+            plan.settings,
+            plan.choice,
+            plan.scene.fingerprint(),
+            plan.scene.compiled.accelerator.name,
+            self._view,
+            plan.tracer.recorded_layers,
+        )
 
     def checkpoint(self, command: dict[str, Any] | None) -> Checkpoint:
         """Return the render so far, with the command that goes on with it."""
@@ -193,10 +199,11 @@ class ViewRender:
             "sampler": SAMPLERS.label(settings.sampler),
             "sample_ranges": [[first, first + most]],
             "filter": FILTERS.label(settings.filter),
-            "branches": plan.estimator.branches,
+            "branches": plan.choice.branches,
             "guide": settings.guide,
-            "guided": plan.estimator.guided,
-            "reuse": settings.reuse,
+            "guided": plan.choice.table is not None,
+            "reuse": plan.choice.reuse,
+            "hint": plan.choice.hint,
             "clamp": settings.clamp,
             "accelerator": plan.scene.compiled.accelerator.name,
             "workers": plan.budget.workers,

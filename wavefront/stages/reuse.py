@@ -229,6 +229,11 @@ def can_reuse(scene: CompiledScene) -> bool:
     return not mixed and bool(_can_be_shared(scene).any())
 
 
+def shares_all(scene: CompiledScene) -> bool:
+    """Return whether all paths of a scene can be shared: whether all of its materials are matte."""
+    return can_reuse(scene) and bool(_can_be_shared(scene).all())
+
+
 def _can_be_shared(scene: CompiledScene) -> Bools:
     """Return which materials (materials,) can be those of shared points."""
     materials = scene.materials
