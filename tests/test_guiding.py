@@ -163,7 +163,14 @@ class Guided(wf.Bsdf):
 
 
 @pytest.mark.parametrize(
-    "bsdf", [wf.Diffuse(0.7), wf.Principled(0.5, roughness=0.3), wf.Conductor.named("gold", 0.4)], ids=repr
+    "bsdf",
+    [
+        wf.Diffuse(0.7),
+        wf.Principled(0.5, roughness=0.3),
+        wf.Conductor.named("gold", 0.4),
+        wf.Mix(wf.Diffuse(0.7), wf.Mirror(0.9), 0.4),
+    ],
+    ids=repr,
 )
 def test_the_mixture_has_its_pdf(bsdf: wf.Bsdf) -> None:
     """By the public checks of a BSDF: pdf against samples, weight = f·cos/pdf, and albedo."""

@@ -77,7 +77,7 @@ def mix_with_guide(
     # delta lobes are drawn by the BSDF alone
     delta = specular[:n]
     weight[:, :n] = np.where(delta, weight[:, :n] / (f4(1) - share), f * scale)
-    density[:n] = np.where(delta, density[:n], np.where(good, pdf, f4(0)))
+    density[:n] = np.where(delta, density[:n] * (f4(1) - share), np.where(good, pdf, f4(0)))
     gain[:n] = np.where(delta | ~good, f4(1), divisor / np.maximum(pdf_bsdf, FEWEST * divisor))
     return BsdfSample(wi, weight, density, specular, sample.eta), direction, gain
 
