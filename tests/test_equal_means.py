@@ -1,6 +1,6 @@
 """Guided and re-used renders have the mean of plain ones, within three standard errors of at most 0.1 %.
 
-`pytest -m slow tests/test_equal_means.py` takes half an hour on two cores.
+Printed are all means: `pytest -s -m slow tests/test_equal_means.py`.
 """
 
 import sys
@@ -33,10 +33,11 @@ PICTURES = {
     "glass ball": scenes.glass_ball,
     "glass box": scenes.glass_box,
 }
+PLAIN = {"branches": 1, "guide": False, "reuse": False}
 TECHNIQUES = {
-    "guided": {"guide": True},
-    "guided, four branches": {"guide": True, "branches": 4},
-    "re-used": {"reuse": True},
+    "guided": {**PLAIN, "guide": True},
+    "guided, four branches": {**PLAIN, "guide": True, "branches": 4},
+    "re-used": {**PLAIN, "reuse": True},
 }
 CASES = [*scenes.DIRECT_CASES, *scenes.TRIANGLE_CASES, *scenes.INDIRECT_CASES, *scenes.SPECULAR_CASES]
 techniques = pytest.mark.parametrize("options", TECHNIQUES.values(), ids=list(TECHNIQUES))
@@ -60,14 +61,14 @@ def mean_of_runs(scene: wf.Scene, spp: int, **options: Any) -> Mean:
 @cache
 def plain(name: str) -> Mean:
     """Return the mean of a scene by plain paths."""
-    return mean_of_picture(name, SPP, branches=1, guide=False, reuse=False)
+    return mean_of_picture(name, SPP, **PLAIN)
 
 
 @techniques
 @pytest.mark.parametrize("name", PICTURES)
 def test_pictures(name: str, options: dict[str, Any]) -> None:
-    spp = SPP // options.get("branches", 1)
-    if "reuse" in options:
+    spp = SPP // options["branches"]
+    if options["reuse"]:
         found = mean_of_runs(PICTURES[name](), spp, accel="auto", workers=None, **options)
     else:
         found = mean_of_picture(name, spp, seed=1, **options)
@@ -85,6 +86,6 @@ def test_every_case(case: Case, options: dict[str, Any], close_tiles: None) -> N
     spp = 4 * case.spp
     unseen = 10 / (64 * spp * case.expected)  # see test_reference.py
     chosen = {"max_bounces": 4, **case.options, **options}
-    measured = (mean_of_runs if "reuse" in options else measure)(case.build(), spp, **chosen)
+    measured = (mean_of_runs if options["reuse"] else measure)(case.build(), spp, **chosen)
     print(f"{case}: {measured}, must be {case.expected:.6g}")
     assert_mean(measured, case.expected, MAX_ERROR, sigmas=3, rounding=ROUNDING + unseen)
