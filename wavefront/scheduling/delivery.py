@@ -23,7 +23,7 @@ from typing import Any
 from ..errors import SceneError
 from ..record import record
 from .blas import single_threaded_blas
-from .heap import keep_freed_memory, prepare_heap
+from .heap import prepare_heap
 from .machine import machine_differences
 from .shared import SharedInt, Stopped
 
@@ -134,7 +134,6 @@ _kept = _KeptWork()
 
 
 def _load(payload: Payload) -> _Entry:
-    keep_freed_memory()
     prepare_heap()
     data = payload.data
     if data is None:

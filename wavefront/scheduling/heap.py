@@ -8,29 +8,22 @@ from contextlib import suppress
 import numpy as np
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
-LARGEST_BLOCK = 31 << 20  # bytes; larger ones do not move glibc's limits
-
-
-def keep_freed_memory() -> None:
-    """Have glibc keep what is freed also where the environment says otherwise; else do nothing.
-
-    Workers of Dask are started with MALLOC_TRIM_THRESHOLD_=65536, so every wave would get all of its memory
-    anew from the system: it took twice the time.
-    """
-    with suppress(AttributeError, OSError, TypeError):  # another C library
-        mallopt = ctypes.CDLL(None).mallopt
-        mallopt(M_TRIM_THRESHOLD, 2 * LARGEST_BLOCK)
-        mallopt(M_MMAP_THRESHOLD, LARGEST_BLOCK)
+LARGEST_BLOCK = 31 << 20  # bytes; glibc takes larger blocks from the system in any case
 
 
 def prepare_heap() -> None:
     """Have glibc keep what is freed, in large pages; with another C library, do nothing of use.
 
     All memory of a young process is new, and the system hands it out page by page: 11 600 page faults
-    in the first wave. After glibc has freed a block, it takes smaller ones from its heap, and keeps
-    twice as much there before it gives any back; and NumPy asks for large pages under large arrays.
+    in the first wave. So the heap is grown to what glibc keeps before it gives any back, and NumPy asks for
+    large pages under large arrays. The limits are set since environments may say otherwise: workers of
+    Dask are started with MALLOC_TRIM_THRESHOLD_=65536, and every wave got all of its memory anew, which took
+    twice the time.
     """
+    with suppress(AttributeError, OSError, TypeError):  # another C library
+        mallopt = ctypes.CDLL(None).mallopt
+        mallopt(M_TRIM_THRESHOLD, 2 * LARGEST_BLOCK)
+        mallopt(M_MMAP_THRESHOLD, LARGEST_BLOCK)
     with suppress(MemoryError):
-        np.empty(LARGEST_BLOCK, np.uint8)
         nearly_twice = [np.empty(9 * LARGEST_BLOCK // 10, np.uint8) for _ in range(2)]
         del nearly_twice
