@@ -2,27 +2,66 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from concurrent.futures import Executor
+from collections.abc import Callable, Collection, Mapping
+from concurrent.futures import Future, InvalidStateError
+from contextlib import suppress
 from typing import Any, Protocol, runtime_checkable
 
 from .delivery import Payload
 from .remote import RemoteWorkers
-from .workers import StoppableWork, UsersExecutor
+from .shared import SharedInt
+from .workers import END_TIMEOUT, StoppableWork, all_done
 
 
 @runtime_checkable
 class DaskClient(Protocol):
     """The part of `dask.distributed.Client` that is used."""
 
-    def get_executor(self, **options: Any) -> Executor:
-        """Return an executor of the cluster."""
+    loop: Any  # of its network thread
+
+    def submit(self, function: Callable[..., Any], *args: Any, **options: Any) -> Any:
+        """Have a worker call a function."""
+
+    def gather(self, futures: Any, **options: Any) -> Any:
+        """Return the results of tasks."""
 
     def scatter(self, data: Any, **options: Any) -> Any:
         """Send data to the memory of workers."""
 
     def nthreads(self) -> Mapping[str, int]:
         """Return the number of threads of each worker."""
+
+
+class ClusterTasks:
+    """Runs functions in the workers of a cluster, which belongs to the caller.
+
+    The executor that Dask makes of a client leaves a future open forever if the result of a task is lost
+    before it is fetched, with all that it was computed from. Here such a future has an error.
+    """
+
+    replaceable = False
+
+    def __init__(self, client: DaskClient, stop: SharedInt) -> None:
+        self._client, self._stop = client, stop
+
+    def submit(self, function: Callable[..., Any], /, *args: Any) -> Future[Any]:
+        """Have the first worker that is free call a function."""
+        task, answer = self._client.submit(function, *args, pure=False), Future[Any]()
+        answer.add_done_callback(lambda done: task.cancel() if done.cancelled() else None)
+        self._client.loop.add_callback(self._fetch, task, answer)
+        return answer
+
+    async def _fetch(self, task: Any, answer: Future[Any]) -> None:
+        """Wait for a task and pass on its result, or why there is none."""
+        with suppress(InvalidStateError):  # it was canceled meanwhile
+            try:
+                answer.set_result(await self._client.gather(task, asynchronous=True))
+            except BaseException as error:
+                answer.set_exception(error)
+
+    def shutdown(self, running: Collection[Future[Any]]) -> None:
+        """Withdraw jobs that have not begun; nobody waits for the others."""
+        all_done(running, END_TIMEOUT, self._stop)
 
 
 class ScatterDelivery:
@@ -47,5 +86,4 @@ class ScatterDelivery:
 
 def dask_workers(client: DaskClient, work: StoppableWork, count: int, strict: bool) -> RemoteWorkers:
     """Return the workers of a cluster, which belongs to the caller."""
-    executor = client.get_executor(pure=False)
-    return RemoteWorkers(UsersExecutor(executor, work.stop), work, strict, ScatterDelivery(client))
+    return RemoteWorkers(ClusterTasks(client, work.stop), work, strict, ScatterDelivery(client))
