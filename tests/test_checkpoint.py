@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import hashlib
 import os
+import pickle
 import random
 import signal
 import subprocess
@@ -385,6 +386,43 @@ def test_a_damaged_file_is_neither_used_nor_replaced(content: bytes, tmp_path: P
 # --- Faults -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="open files of Linux")
+def test_a_file_is_on_the_disk_before_it_takes_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A temporary file is written and flushed, renamed, and then the folder is flushed."""
+    steps: list[str] = []
+    flush, rename = os.fsync, os.replace
+
+    def fsync(handle: int) -> None:
+        steps.append("folder" if os.path.isdir(f"/proc/self/fd/{handle}") else "file")
+        flush(handle)
+
+    def replace(source: Any, target: Any) -> None:
+        assert (Path(source).parent, Path(target)) == (tmp_path, tmp_path / "a")
+        steps.append("replace")
+        rename(source, target)
+
+    monkeypatch.setattr(files.os, "fsync", fsync)
+    monkeypatch.setattr(files.os, "replace", replace)
+    wf.render(scene(), 1, checkpoint=tmp_path / "a")
+    assert steps == ["file", "replace", "folder"]
+
+
+def test_nothing_of_a_file_is_unpickled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither when a render goes on nor when a picture is loaded."""
+    path, settings = tmp_path / "a", {"workers": 1, "executor": "threads"}
+    wf.render(scene(), 1, checkpoint=path, **settings)
+
+    def refused(*args: Any, **named: Any) -> None:
+        raise AssertionError("something was unpickled")
+
+    for name in ("load", "loads", "Unpickler"):
+        monkeypatch.setattr(pickle, name, refused)
+    assert wf.render(scene(), 2, checkpoint=path, **settings).spp == 2
+    assert wf.Image.load(path).spp == 2
+
+
 def test_a_full_disk_leaves_the_old_file_and_the_picture(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -549,6 +587,8 @@ def test_resume_gives_the_command_again(
     assert cli.main(["resume", "moved"]) == 0
     assert (tmp_path / "out.npy").read_bytes() == picture
     assert read_header("moved")["command"]["arguments"] == command
+    assert cli.main(["resume", "moved"]) == 0  # there is nothing left to do
+    assert (tmp_path / "out.npy").read_bytes() == picture
     wf.render(scene(), 1, checkpoint="of_python")
     assert cli.main(["resume", "of_python"]) == 2
     assert "was not begun by wavefront render" in capsys.readouterr().err

@@ -104,6 +104,22 @@ def test_a_stop_ends_jobs_on_the_cluster(client: Any) -> None:
     assert client.submit(abs, -1).result() == 1
 
 
+def test_a_result_that_is_lost_before_it_is_fetched_is_an_error(
+    client: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After some trials; nobody waits forever."""
+
+    async def lost(*given: Any, **options: Any) -> None:
+        raise RuntimeError("lost with its inputs")
+
+    monkeypatch.setattr(client, "gather", lost)
+    with (
+        WorkerPool(abs, 2, client) as pool,
+        pytest.raises(wf.RenderError, match="7 failed 3 times, at last by: RuntimeError: lost with its"),
+    ):
+        list(pool.run([7]))
+
+
 @pytest.mark.slow
 @pytest.mark.filterwarnings("default")  # of Dask, about the worker
 def test_a_worker_that_is_killed_in_the_middle_costs_its_jobs_alone(client: Any) -> None:

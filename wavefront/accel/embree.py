@@ -26,8 +26,8 @@ def installed() -> bool:
 class EmbreeAccelerator:
     """Triangles by Embree, curved primitives by NumPy; see base.Accelerator.
 
-    Of triangles with the same corners the first is hit. Of others that overlap in a plane any one is hit: their
-    distances differ by Embree's rounding. It is always the same one for a ray.
+    Of triangles with the same corners the first is hit. Of others that overlap in a plane any one is hit:
+    their distances differ by Embree's rounding. It is always the same one for a ray.
     """
 
     name = "embree"
