@@ -54,8 +54,8 @@ class Film:
         self.sums = ExactSums((3, pixels))  # of samples
         self.squares = np.zeros((3, pixels))  # sum of squared samples
         self.batches = np.zeros((BATCHES, 3, pixels), np.float32)  # sums of full batches
+        self.batches.fill(0)  # takes the memory now, so that a render that lacks it does not fail late
         self.lengths: Ints | None = None  # samples of each batch; None: `batch_size` of them in all
-        self._memory_taken = False
 
     def release_errors(self) -> None:
         """Free the sums of variances and errors, 120 bytes per pixel; nothing can be added after that."""
@@ -73,11 +73,6 @@ class Film:
         dropped
             Numbers of those, in [0, samples · k), that are dropped; they are 0 in `radiance`.
         """
-        if not self._memory_taken:
-            # Now, so that a render that lacks it does not fail late; not before worker processes are forked,
-            # as they would keep a copy of what is written since.
-            self.batches.fill(0)
-            self._memory_taken = True
         if dropped.size:
             self._drop(pixels[dropped % pixels.size])
         for start in range(0, pixels.size, CHUNK):
@@ -147,7 +142,7 @@ class Film:
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Become the film of which `arrays` returned these; they are not copied."""
         self.count, self.dropped = arrays["count"], arrays["dropped"]
-        self.squares, self.batches, self._memory_taken = arrays["squares"], arrays["batches"], True
+        self.squares, self.batches = arrays["squares"], arrays["batches"]
         self.sums.restore(arrays)
         self.lengths = arrays["lengths"] if arrays["lengths"].size else None
 
