@@ -92,6 +92,7 @@ def diameter(points: Doubles) -> float:
 
     Blocks of points that cannot be farther apart than two points that have been found are not compared.
     """
+    points = points - (points.min(0) + points.max(0)) / 2  # for the precision of the squares below
     blocks = _blocks(points, max(BLOCK, len(points) // 1000))
     center = np.stack([(block.min(0) + block.max(0)) / 2 for block in blocks])
     radius = np.array(
@@ -104,8 +105,9 @@ def diameter(points: Doubles) -> float:
         if most[one, other] <= found:
             break
         if one <= other:
-            apart = np.linalg.norm(blocks[one][:, None] - blocks[other], axis=2)
-            found = max(found, float(apart.max()))
+            a, b = blocks[one], blocks[other]
+            squares = (a**2).sum(1)[:, None] + (b**2).sum(1) - 2 * (a @ b.T)
+            found = max(found, float(squares.max()) ** 0.5)
     return found
 
 
