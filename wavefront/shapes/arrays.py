@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..bsdfs import Diffuse
 from ..errors import SceneError, finite_array
-from ..materials import Material, MaterialLike
-from ..textures.vertex_colors import VertexColors
+from ..materials import MaterialLike
 from ..vec import FLOAT32_MAX
 from .base import Checked, CurvedShape
-from .mesh import FLOAT32_MIN, linear_colors
+from .colored import ColoredShape
+from .mesh import FLOAT32_MIN
 
 
 def _radii(name: str, value: ArrayLike) -> NDArray[np.float64]:
@@ -27,19 +26,16 @@ def _radii(name: str, value: ArrayLike) -> NDArray[np.float64]:
     return radii
 
 
-class PrimitiveArray(CurvedShape):
+class PrimitiveArray(ColoredShape, CurvedShape):
     """Base class of `Spheres`, `Cylinders` and `Capsules`: n primitives with one material.
 
     Attributes
     ----------
     radii
         (n,) scene units, or (1,) if all have one.
-    colors
-        (n, 4) linear RGB and opacity; None if all are white.
     """
 
     radii = Checked(_radii)
-    colors = Checked(linear_colors)
 
     def __init__(
         self, radii: ArrayLike, colors: ArrayLike | None, material: MaterialLike | None, name: str
@@ -48,20 +44,11 @@ class PrimitiveArray(CurvedShape):
         self.radii = radii
         self.colors = colors
         self.material = material
-        self._default: tuple[bool, Material] | None = None  # whether it shows colors; the material
         self.check()
 
     def __repr__(self) -> str:
         """Return the name and the number of primitives."""
         return f"<{type(self).__name__} {self.name!r}: {self.count}>"
-
-    @property
-    def default_material(self) -> Material:
-        """A `Diffuse` that shows the colors, or is gray where there are none."""
-        shown = self.colors is not None
-        if self._default is None or self._default[0] != shown:
-            self._default = shown, Material(Diffuse(VertexColors() if shown else 0.5))
-        return self._default[1]
 
     @property
     def emission(self) -> Any:

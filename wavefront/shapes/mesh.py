@@ -9,15 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..bsdfs import Diffuse
-from ..codecs.encoding import srgb_to_linear
 from ..errors import SceneError, finite_array
 from ..materials import Material, MaterialLike
 from ..suggestions import suggests_keywords
 from ..textures.parameter import Color, color
-from ..textures.vertex_colors import VertexColors
-from ..vec import FLOAT32_MAX, f4
-from .base import Checked, Shape
+from ..vec import FLOAT32_MAX
+from .base import Checked
+from .colored import ColoredShape
 
 MOST_DOUBLINGS = 60  # log2 of the length, or its inverse, of vectors that are stored unchanged
 FLOAT32_MIN = float(np.finfo(np.float32).tiny)
@@ -67,25 +65,6 @@ def _coordinates(name: str, values: ArrayLike | None) -> NDArray[np.float64] | N
     return array
 
 
-def linear_colors(name: str, values: ArrayLike | None) -> NDArray[np.float64] | None:
-    """Return (n, 4) linear colors in [0, 1]; colors without an opacity are opaque."""
-    if values is None:
-        return None
-    array = finite_array(name, values, (None, None))
-    codes = getattr(values, "dtype", None)
-    if codes in (np.uint8, np.uint16):
-        most = np.iinfo(codes).max
-        array[:, :3] = srgb_to_linear(array[:, :3].astype(f4) / f4(most))
-        array[:, 3:] /= most
-    if array.shape[1] not in (3, 4):
-        raise SceneError(f"{name} has {array.shape[1]} numbers per vertex; it must have 3 or 4")
-    bad = np.argwhere((array < 0) | (array > 1))
-    if len(bad):
-        i, j = bad[0]
-        raise SceneError(f"{name}[{i}][{j}] is {array[i, j]:g}; it must be in [0, 1], or uint8")
-    return array if array.shape[1] == 4 else np.column_stack([array, np.ones(len(array))])
-
-
 def check_range(name: str, vertices: NDArray[np.float64]) -> None:
     _check_float32(f"{name}: vertices", vertices)
 
@@ -97,7 +76,7 @@ def _check_float32(name: str, rows: NDArray[np.float64]) -> None:
         raise SceneError(f"{name}[{i}][{j}] is {rows[i, j]:g}; its size must be at most {FLOAT32_MAX:.3g}")
 
 
-class Mesh(Shape):
+class Mesh(ColoredShape):
     """Triangles that share vertices.
 
     Parameters
@@ -148,7 +127,6 @@ class Mesh(Shape):
     normals = Checked(_vectors)
     uvs, uvs1 = Checked(_coordinates), Checked(_coordinates)
     tangents = Checked(partial(_vectors, width=4))
-    colors = Checked(linear_colors)
 
     @suggests_keywords
     def __init__(
@@ -175,21 +153,12 @@ class Mesh(Shape):
         self.colors = colors
         self.check()
         self.material = material
-        self._default: tuple[bool, Material] | None = None  # whether it shows colors; the material
         self.emission = emission
         self.two_sided = two_sided
 
     def __repr__(self) -> str:
         """Return the name and the size of the mesh."""
         return f"<Mesh {self.name!r}: {len(self.vertices)} vertices, {len(self.faces)} faces>"
-
-    @property
-    def default_material(self) -> Material:
-        """A `Diffuse` that shows the vertex colors, or is gray where there are none."""
-        shown = self.colors is not None
-        if self._default is None or self._default[0] != shown:
-            self._default = shown, Material(Diffuse(VertexColors() if shown else 0.5))
-        return self._default[1]
 
     @property
     def emission(self) -> Any:

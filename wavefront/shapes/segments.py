@@ -30,6 +30,19 @@ class SegmentArray(PrimitiveArray):
     starts, ends = Checked(positions), Checked(positions)
     caps = True
 
+    def __init__(
+        self,
+        starts: ArrayLike,
+        ends: ArrayLike,
+        radii: ArrayLike,
+        colors: ArrayLike | None,
+        material: MaterialLike | None,
+        name: str,
+    ) -> None:
+        self.name = name
+        self.starts, self.ends = starts, ends
+        super().__init__(radii, colors, material, name)
+
     @property
     def count(self) -> int:
         """Number of primitives."""
@@ -114,10 +127,8 @@ class Cylinders(SegmentArray):
         material: MaterialLike | None = None,
         name: str = "cylinders",
     ) -> None:
-        self.name = name
-        self.starts, self.ends = starts, ends
         self.caps = bool(caps)
-        super().__init__(radii, colors, material, name)
+        super().__init__(starts, ends, radii, colors, material, name)
 
     def _reach(self) -> NDArray[np.float64]:
         """Return how far flat ends reach, (n, 3): the radius, times the sine of axis and coordinate axis."""
@@ -188,6 +199,4 @@ class Capsules(SegmentArray):
         material: MaterialLike | None = None,
         name: str = "capsules",
     ) -> None:
-        self.name = name
-        self.starts, self.ends = starts, ends
-        super().__init__(radii, colors, material, name)
+        super().__init__(starts, ends, radii, colors, material, name)

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..bsdfs import Diffuse
-from ..errors import SceneError, finite_array, number, rgb
+from ..errors import SceneError, finite_array, number
 from ..materials import Material, MaterialLike
 from ..suggestions import suggests_keywords
-from ..textures.base import BaseTexture
 from ..vec import FLOAT32_MAX
-from .base import Checked, CurvedShape
+from .base import Checked
+from .even_emission import EvenEmission
 from .mesh import FLOAT32_MIN
 
 
@@ -32,7 +31,7 @@ def _radius(name: str, value: float) -> float:
     return number(name, value, lambda x: FLOAT32_MIN <= x <= FLOAT32_MAX, limit)
 
 
-class Sphere(CurvedShape):
+class Sphere(EvenEmission):
     """A sphere, intersected exactly.
 
     Parameters
@@ -90,17 +89,6 @@ class Sphere(CurvedShape):
         if self._default is None:
             self._default = Material(Diffuse(0.5))
         return self._default
-
-    @property
-    def emission(self) -> Any:
-        """Radiance that leaves the surface: the sphere's own, or else its material's; None if dark."""
-        return self.material.emission if self._emission is None else self._emission
-
-    @emission.setter
-    def emission(self, emission: Any) -> None:
-        if isinstance(emission, BaseTexture):
-            raise SceneError(f"{self.name}: a sphere shines evenly; a mesh can shine by {emission!r}")
-        self._emission = None if emission is None else rgb(f"{self.name}: emission", emission)
 
     @property
     def count(self) -> int:

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SceneError, rgb
 from ..materials import MaterialLike
 from ..suggestions import suggests_keywords
-from ..textures.base import BaseTexture
 from .arrays import PrimitiveArray
 from .base import Checked
+from .even_emission import EvenEmission
 from .mesh import positions
 
 
-class Spheres(PrimitiveArray):
+class Spheres(EvenEmission, PrimitiveArray):
     """Spheres, given by arrays: atoms, particles, points.
 
     Parameters
@@ -73,17 +72,6 @@ class Spheres(PrimitiveArray):
     def count(self) -> int:
         """Number of spheres."""
         return len(self.centers)
-
-    @property
-    def emission(self) -> Any:
-        """Radiance that leaves the surface: the spheres' own, or else their material's; None if dark."""
-        return self.material.emission if self._emission is None else self._emission
-
-    @emission.setter
-    def emission(self, emission: Any) -> None:
-        if isinstance(emission, BaseTexture):
-            raise SceneError(f"{self.name}: spheres shine evenly; a mesh can shine by {emission!r}")
-        self._emission = None if emission is None else rgb(f"{self.name}: emission", emission)
 
     def scaled(self, factor: float) -> Self:
         """Return the spheres with all lengths multiplied by `factor`, and the same material."""
