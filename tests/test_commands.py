@@ -103,7 +103,7 @@ def test_errors_are_one_line_and_give_2(mesh: Path, arguments: list[str], messag
         (["rendr"], "invalid choice: 'rendr'"),
         (["render", "no.obj"], "no.obj: there is no such file"),
         (["render", "mesh.obj", "-o", "no/out.png"], "no/out.png: the folder"),
-        (["turntable", "mesh.obj", "--frames", "0", "--quiet"], "n is 0; it must be at least 1"),
+        (["turntable", "mesh.obj", "--frames", "0", "--quiet"], "'0' is not a whole number from 1 on"),
         (["dataset", "mesh.obj", "-o", "set", "--object", "x", "--quiet"], "objects has 'x'"),
         (["merge", "mesh.obj", "-o", "out.npz"], "mesh.obj: extension is '.obj'"),
         (["resume", "mesh.obj"], "mesh.obj: "),

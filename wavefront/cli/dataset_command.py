@@ -9,7 +9,7 @@ from ..datasets import write_dataset
 from ..datasets.dataset import FORMATS
 from ..io.load import load
 from ..views import turntable
-from .arguments import Several
+from .arguments import Several, count
 from .command import add_command, add_scene
 from .options import add_display, add_settings, display_of, setting_values
 
@@ -27,7 +27,7 @@ def add_dataset_command(commands: Any) -> None:
     )
     add_scene(command)
     command.add_argument("-o", "--output", required=True, help="folder to write; the same command goes on")
-    command.add_argument("--views", type=int, default=60, help="pictures of a whole turn")
+    command.add_argument("--views", type=count, default=60, help="pictures of a whole turn")
     command.add_argument(
         "--format",
         action=Several,

@@ -8,6 +8,7 @@ from typing import Any
 from ..animation import check_animation, save_animation
 from ..io.load import load
 from ..views import render_many, turntable
+from .arguments import count
 from .command import add_command, add_scene
 from .options import add_display, add_settings, display_of, setting_values
 
@@ -30,7 +31,7 @@ def add_turntable_command(commands: Any) -> None:
         default="turntable.gif",
         help="gif, png (animated) or mp4 file to write, or numbered files such as frame_{:03d}.png",
     )
-    command.add_argument("--frames", type=int, default=60, help="pictures of a whole turn")
+    command.add_argument("--frames", type=count, default=60, help="pictures of a whole turn")
     command.add_argument("--fps", type=float, default=24.0, help="pictures per second")
     add_settings(command)
     add_display(command)
