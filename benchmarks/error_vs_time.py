@@ -327,7 +327,7 @@ def joined(found: dict[str, Any], kept: Path | None) -> dict[str, Any]:
 def subjects(options: argparse.Namespace) -> dict[str, Subject]:
     """Return all scenes by name."""
     size, spp = options.size, (4, 16, 64)
-    hard = ("default", "plain", "plain/4", GUIDED, "guided/4", "reused")
+    hard = ("default", "plain", "plain/4", GUIDED, "guided/4", "guided/reused", "reused")
     methods = (*hard, "independent", "bluenoise", DENOISED)
     box = (*methods, "reused/4")
     found = {

@@ -1,4 +1,4 @@
-"""A sheet of the hard scenes at equal time: plain, guided with four branches, Mitsuba and Cycles.
+"""A sheet of the hard scenes at equal time: plain, guided with paths re-used, Mitsuba and Cycles.
 
 python benchmarks/hard_scenes_sheet.py --bpy-python PATH [--references FOLDER] [--seconds 4] [--out sheet.png]
 
@@ -31,7 +31,7 @@ import matplotlib.pyplot as plt
 
 SIDES = {
     "plain": "wavefront auto plain",
-    "guided, four branches": "wavefront auto guided/4",
+    "guided, re-used": "wavefront auto guided/reused",
     "Mitsuba multijitter": "llvm_ad_rgb multijitter",
     "Cycles, guided": "cycles guided",
 }

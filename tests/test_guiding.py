@@ -162,7 +162,7 @@ class Guided(wf.Bsdf):
         return Guidance(self.table, np.ones(n, int), np.broadcast_to(self.table.share[1], n))
 
 
-@pytest.mark.parametrize(
+mixtures = pytest.mark.parametrize(
     "bsdf",
     [
         wf.Diffuse(0.7),
@@ -172,9 +172,25 @@ class Guided(wf.Bsdf):
     ],
     ids=repr,
 )
+
+
+@mixtures
 def test_the_mixture_has_its_pdf(bsdf: wf.Bsdf) -> None:
     """By the public checks of a BSDF: pdf against samples, weight = f·cos/pdf, and albedo."""
     wf.testing.check_bsdf(Guided(bsdf, random_table(share=0.4)), samples=50_000, angles=(0, 75))
+
+
+@mixtures
+def test_the_mixture_keeps_the_albedo(bsdf: wf.Bsdf) -> None:
+    """Delta lobes, too, which the table never draws, have the weight of all their light."""
+    n = 100_000
+    wo = np.repeat(np.array([[0.6], [0], [0.8]], f4), n, 1)
+    u = np.random.default_rng(0).random((6, n)).astype(f4)
+    guided = Guided(bsdf, random_table(share=0.4)).sample_f(wo, u).weight[0]
+    plain = bsdf.sample_f(wo, u[:3]).weight[0]
+    error = np.hypot(guided.std(), plain.std()) / np.sqrt(n)
+    assert error < 0.01
+    assert abs(guided.mean(dtype=float) - plain.mean(dtype=float)) < 4 * error
 
 
 # --- Pictures -------------------------------------------------------------------------------------
