@@ -212,11 +212,18 @@ def test_stop_in_the_loop_ends_it(executor: str) -> None:
 
 def test_stop_from_another_thread_gives_the_picture_so_far() -> None:
     """It is the last one, and says that it was cut short."""
-    with wf.Session(everything(), 10_000_000, workers=2, wave_size=2000, **QUIET) as session:
-        timer = threading.Timer(0.5, session.stop)
-        timer.start()
+    begun = threading.Event()
+    options = {**QUIET, "progress": lambda done, most: begun.set() if done else None}
+    with wf.Session(everything(), 10_000_000, workers=2, wave_size=2000, **options) as session:
+
+        def stop() -> None:
+            begun.wait()
+            session.stop()
+
+        thread = threading.Thread(target=stop)
+        thread.start()
         image = session.run()
-        timer.join()
+        thread.join()
         assert image.metadata["interrupted"]
         assert image.metadata["samples"] > 0
         assert list(session) == []
