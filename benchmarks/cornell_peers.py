@@ -33,7 +33,8 @@ SIZE, MAX_BOUNCES = 256, 7
 def ours(spp: int, accel: str) -> Callable[[], np.ndarray]:
     """Return a function that renders with wavefront."""
     scene = cornell_box(SIZE)
-    return lambda: wf.render(scene, spp, max_bounces=MAX_BOUNCES, accel=accel, progress=False).rgb
+    plain = {"branches": 1, "reuse": False, "progress": False}  # samples are counted: each must be one path
+    return lambda: wf.render(scene, spp, max_bounces=MAX_BOUNCES, accel=accel, **plain).rgb
 
 
 def mitsuba(spp: int, variant: str) -> Callable[[], np.ndarray]:

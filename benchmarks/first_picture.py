@@ -25,7 +25,7 @@ import sys
 sys.path.insert(0, {examples!r})
 import wavefront as wf
 from cornell_box import cornell_box
-wf.render(cornell_box(256), 16, max_bounces=7, accel={accel!r}, progress=False).save({out!r})
+wf.render(cornell_box(256), 16, max_bounces=7, branches=1, accel={accel!r}, progress=False).save({out!r})
 """
 THEIRS = """
 import mitsuba as mi

@@ -35,7 +35,7 @@ scene = wf.load(path)
 loaded = time.perf_counter()
 scene.lights.append(wf.Environment(1))
 scene.camera = scene.framing_camera(size=(width, height))
-times = [wf.render(scene, spp, accel=accel, progress=False).metadata["seconds"] for _ in range(2)]
+times = [wf.render(scene, spp, accel=accel, branches=1, progress=False).metadata["seconds"] for _ in range(2)]
 print(f"{accel:>8} {first:9.0f} {peak():7.0f} {loaded - begin:8.2f} {times[0]:9.2f} {times[1]:8.2f}")
 """
 

@@ -85,6 +85,7 @@ def measure(scene: wf.Scene, choice: str, options: argparse.Namespace) -> tuple[
             accel=options.accel,
             max_bounces=3,
             sampler="independent",
+            branches=1,
             progress=False,
         )
         for seed in range(options.repeat)

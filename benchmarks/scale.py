@@ -80,6 +80,7 @@ def measured_costs(client: Client, repeat: int) -> Costs:
     """Measure what the simulation needs."""
     scene = cornell_box(256)
     options: dict[str, Any] = {"workers": 1, "executor": "threads", "wave_size": WAVE, "progress": False}
+    options["branches"] = 1
     path = seconds(lambda: wf.render(scene, 16, **options), repeat) / (16 * 256**2)
     pixels, radiance = np.arange(WAVE, dtype=np.uint32), np.ones((3, 1, WAVE), np.float32)
     film, other = Film(256, 256), Film(256, 256)
@@ -118,7 +119,7 @@ def measured_speedup(options: argparse.Namespace) -> None:
 
     def render(**how: Any) -> float:
         begin = time.perf_counter()
-        wf.render(scene, options.spp, progress=False, **how)
+        wf.render(scene, options.spp, branches=1, progress=False, **how)
         return time.perf_counter() - begin
 
     times: dict[str, list[float]] = {"one process": [], "Dask, 1 worker": [], "Dask, 2 workers": []}

@@ -63,7 +63,7 @@ def main() -> None:
     parser.add_argument("--repeat", type=int, default=7)
     parser.add_argument("--subdivisions", type=int, default=6)
     options = parser.parse_args()
-    settings = {"spp": 4, "accel": "numpy", "executor": "processes", "progress": False}
+    settings = {"spp": 4, "branches": 1, "accel": "numpy", "executor": "processes", "progress": False}
     counted = Counted()
     rows: dict[str, list[tuple[float, int, int]]] = {}
 

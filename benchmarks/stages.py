@@ -62,7 +62,7 @@ def profile(scene: wf.Scene, spp: int, accel: str) -> dict[str, float]:
         ),
         mock.patch.object(shade, "visible", timed(shade.visible, "visible", clock)),
     ):
-        image = wf.render(scene, spp, max_bounces=7, accel=accel, workers=1, progress=False)
+        image = wf.render(scene, spp, max_bounces=7, accel=accel, workers=1, branches=1, progress=False)
     clock["direct"] -= clock["visible"]
     clock["rest"] = image.metadata["seconds"] - sum(clock.values())
     clock["all"] = image.metadata["seconds"]

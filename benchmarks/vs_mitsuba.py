@@ -80,7 +80,7 @@ def compare(
 
     mi.set_variant(variant)
     begin = time.perf_counter()
-    ours = wf.render(our_scene(folder, size), spp, max_bounces=max_bounces, accel=accel)
+    ours = wf.render(our_scene(folder, size), spp, max_bounces=max_bounces, accel=accel, branches=1)
     middle = time.perf_counter()
     theirs = np.array(mi.render(mitsuba_scene(mi, folder, size, max_bounces + 1), spp=spp))
     end = time.perf_counter()

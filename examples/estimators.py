@@ -49,7 +49,8 @@ def compare(scene: wf.Scene, spp: int) -> dict[str, tuple[np.ndarray, float]]:
     results = {}
     for name in ESTIMATORS:
         first, second = (
-            np.asarray(wf.render(scene, spp, integrator=name, seed=seed, progress=False)) for seed in (0, 1)
+            np.asarray(wf.render(scene, spp, integrator=name, seed=seed, branches=1, progress=False))
+            for seed in (0, 1)
         )
         # half the squared difference of two estimates is an unbiased estimate of their variance
         results[name] = first, float(((first - second) ** 2).mean(dtype=np.float64)) / 2 * spp
