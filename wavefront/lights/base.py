@@ -19,7 +19,7 @@ from ..layers import DEFAULT_GROUP
 from ..record import record
 from ..shapes import Shape
 from ..state import SoA, SurfaceInteraction
-from ..vec import Bools, Floats, Ints, f4
+from ..vec import Bools, Doubles, Floats, Ints, f4
 
 
 @record
@@ -43,6 +43,15 @@ class LightSample(SoA):
     prim: Ints | None = None  # (n,) triangle of the sampled point; -1 for a sample with its own radiance
     b1: Floats | None = None  # (n,) barycentric weight of its second vertex there
     b2: Floats | None = None  # (n,) barycentric weight of its third vertex
+
+
+@record
+class Emitters(SoA):
+    """Where k lights are and where they shine to, for the choice of one; relative to the scene's center."""
+
+    middle: Doubles  # (3, k) scene units
+    facing: Doubles  # (3, k) the normal of a surface that shines on one side, or the axis of a spot; else 0
+    extent2: Doubles  # (k,) square of the size, such as the area of a surface
 
 
 class Light(ABC):
@@ -159,6 +168,13 @@ class LightRecord(SoA, Light):
         """
         broadcast = self.power(scene_radius) / (4 * np.pi * max(scene_radius, 1e-30) ** 2)
         return np.broadcast_to(broadcast, (center.shape[1], len(broadcast)))
+
+    def emitters(self) -> Emitters | None:
+        """Return where the lights are, for the choice among very many; None if they are nowhere.
+
+        Lights that are nowhere are chosen by power, with half of the samples together.
+        """
+        return None
 
 
 class DeltaLight(LightRecord):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..record import record
 from ..state import SurfaceInteraction
 from ..vec import Floats, dot, f4, positive
-from .base import LightRecord
+from .base import Emitters, LightRecord
 
 LEAST_SQUARE = f4(1e-35)  # added to squared distances before their root, so that nothing is divided by 0
 EDGE_ON = f4(1e-14)  # taken off cosines that are divided by; smaller ones count as those of a dark side
@@ -58,7 +58,7 @@ class PlanarLights(LightRecord):
         self, center: NDArray[np.float64], radius: float, scene_radius: float
     ) -> NDArray[np.float64]:
         """L·A·cosθ/d² at most, with the area at the middle; (c, k)."""
-        middle = self.corner + (self.edge_u + self.edge_v) / self.middle
+        middle = self._middle()
         size = np.sqrt(self.area)
         away = center[:, :, None] - middle[:, None, :]
         height = (away * self.normal[:, None, :]).sum(0)
@@ -66,6 +66,14 @@ class PlanarLights(LightRecord):
         distance = np.sqrt(np.maximum((away**2).sum(0), np.maximum(size, radius) ** 2))
         strength = self.area * self.radiance.mean(0, dtype=np.float64)
         return strength * np.minimum(height / distance, 1) / distance**2
+
+    def emitters(self) -> Emitters:
+        """Return the middles; lights with one side shine to the front."""
+        facing = self.normal.astype(np.float64) * (self.sides == 1)
+        return Emitters(self._middle().astype(np.float64), facing, self.area.astype(np.float64))
+
+    def _middle(self) -> Floats:
+        return self.corner + (self.edge_u + self.edge_v) / self.middle
 
     def _facing(self, rise: Floats) -> Floats:
         """Return heights, or cosines, above an emitting side (n,), given those above the front."""

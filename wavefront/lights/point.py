@@ -14,7 +14,7 @@ from ..parameter import Parameter, Parametrized
 from ..record import record
 from ..suggestions import suggests_keywords
 from ..vec import FLOAT32_MAX, Floats, dot, f4
-from .base import DeltaLight, Light, LightSample, position
+from .base import DeltaLight, Emitters, Light, LightSample, position
 
 
 @record
@@ -44,6 +44,11 @@ class PointLightRecord(DeltaLight):
         """I/d², with d at least the radius of the ball; (c, k)."""
         away = self.position[:, None, :] - center[:, :, None]
         return self.intensity.mean(0, dtype=np.float64) / np.maximum((away**2).sum(0), radius**2)
+
+    def emitters(self) -> Emitters:
+        """Return the positions; the lights shine everywhere."""
+        middle = self.position.astype(np.float64)
+        return Emitters(middle, np.zeros_like(middle), np.zeros(len(self)))
 
 
 def intensity_of(name: str, value: ArrayLike) -> NDArray[np.float64]:
@@ -150,7 +155,7 @@ def intensities_of(name: str, value: ArrayLike) -> NDArray[np.float64]:
 class PointLights(Parametrized, Light):
     """Many points that emit equally in all directions, as one light.
 
-    A million of them are set up in a second. They count as lights of their own where one is chosen.
+    A million of them are set up in two seconds. They count as lights of their own where one is chosen.
 
     Parameters
     ----------

@@ -10,10 +10,13 @@ import numpy as np
 
 from ..registry import Registry
 from ..sampling.discrete import Discrete, rounded_up
-from ..vec import Doubles, Floats, Ints, broadcast, f4
+from ..vec import Bools, Doubles, Floats, Ints, broadcast, f4
+from .base import Emitters
+from .tree import LightTreeSampler
 
 MOST_CELLS = 32**3
 MOST_ENTRIES = 2**21  # cells times lights
+MOST_IN_GRID = 2**16  # lights; a tree has less noise for more of them, as a grid has too few cells then
 BY_POWER = 0.05  # part of the probability that is proportional to power, so that no light is left out
 
 
@@ -44,7 +47,11 @@ class LightSampler(Protocol):
 
 
 class Irradiance(Protocol):
-    """What each light brings to parts of the scene."""
+    """What each light brings to parts of the scene, and where it is."""
+
+    @property
+    def emitters(self) -> Emitters:
+        """Where the lights are; NaN for those that are nowhere."""
 
     def __call__(self, center: Doubles, radius: float, /) -> Doubles:
         """Return a bound on the irradiance (c, k) by each light within `radius` of points `center` (3, c)."""
@@ -82,6 +89,26 @@ class WeightedLightSampler:
     def pmf(self, light: Ints, point: Floats) -> Floats:
         """Return the weight of each light."""
         return self.table.pmf(light)
+
+
+class HalvedLightSampler:
+    """Two samplers of different lights, each of which takes half of the samples."""
+
+    def __init__(self, first: SubsetLightSampler, second: SubsetLightSampler) -> None:
+        self.first, self.second = first, second
+
+    def sample(self, point: Floats, u: Floats) -> tuple[Ints, Floats]:
+        """Let the first choose where u is below 1/2."""
+        light, chance = np.empty(len(u), np.intp), np.empty(len(u), f4)
+        below = u < f4(0.5)
+        for choice, lanes, begin in ((self.first, below, 0), (self.second, ~below, 1)):
+            at = np.flatnonzero(lanes)
+            light[at], chance[at] = choice.sample(point.take(at, 1), f4(2) * u.take(at) - f4(begin))
+        return light, chance * f4(0.5)
+
+    def pmf(self, light: Ints, point: Floats) -> Floats:
+        """Return half of the probability; only one of the two is not 0."""
+        return f4(0.5) * (self.first.pmf(light, point) + self.second.pmf(light, point))
 
 
 class SubsetLightSampler:
@@ -173,8 +200,25 @@ class SpatialLightSampler:
 
 
 def spatial(power: Doubles, half_size: Doubles, irradiance: Irradiance) -> LightSampler:
-    """Return a sampler by the lights' irradiance around a point."""
+    """Return a sampler by the lights' irradiance around a point: a grid, or a tree of very many lights."""
+    if len(power) > MOST_IN_GRID:
+        emitters = irradiance.emitters
+        placed = np.isfinite(emitters.extent2)
+        if placed.any():
+            return _tree(power, float(np.linalg.norm(half_size)), emitters, placed)
     return SpatialLightSampler(-half_size, half_size, irradiance, power)
+
+
+def _tree(power: Doubles, scene_radius: float, emitters: Emitters, placed: Bools) -> LightSampler:
+    """Return a tree of the lights that are `placed` (k,); the others are chosen by power."""
+    if placed.all():
+        return LightTreeSampler(emitters, power, scene_radius)
+    inside, others = np.flatnonzero(placed), np.flatnonzero(~placed)
+    tree = LightTreeSampler(emitters.take(inside), power.take(inside), scene_radius)
+    return HalvedLightSampler(
+        SubsetLightSampler(tree, inside, len(power)),
+        SubsetLightSampler(WeightedLightSampler(power.take(others)), others, len(power)),
+    )
 
 
 def by_power(power: Doubles, half_size: Doubles, irradiance: Irradiance) -> LightSampler:

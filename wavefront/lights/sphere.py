@@ -10,7 +10,7 @@ from ..record import record
 from ..sampling.warp import uniform_cone, uniform_sphere
 from ..state import SurfaceInteraction
 from ..vec import INV_FOUR_PI, TWO_PI, Floats, dot, f4
-from .base import LightRecord, LightSample
+from .base import Emitters, LightRecord, LightSample
 
 
 @record
@@ -63,6 +63,11 @@ class SphereLights(LightRecord):
         size = self.radius.astype(np.float64)
         strength = np.pi * size**2 * self.radiance.mean(0, dtype=np.float64)
         return strength / np.maximum((away**2).sum(0), np.maximum(size, radius) ** 2)
+
+    def emitters(self) -> Emitters:
+        """Return the centers; spheres shine everywhere."""
+        middle = self.center.astype(np.float64)
+        return Emitters(middle, np.zeros_like(middle), self.radius.astype(np.float64) ** 2)
 
     def _towards(self, point: Floats) -> tuple[Floats, Floats]:
         """Return the unit axis (3, n) and the distance (n,) to the center."""

@@ -12,7 +12,7 @@ from ..parameter import Parameter
 from ..record import record
 from ..suggestions import suggests_keywords
 from ..vec import Floats, dot, f4
-from .base import DeltaLight, LightSample
+from .base import DeltaLight, Emitters, LightSample
 from .directional import unit
 from .point import LightAtPoint
 
@@ -57,6 +57,11 @@ class SpotLights(DeltaLight):
         nearest = np.where(distance > radius, np.maximum(nearest, 0), 0)
         ramp = np.clip((self.outer - (1 - sin_cos_turns(nearest / (2 * np.pi))[1])) * self.slope, 0, 1)
         return self.intensity.mean(0, dtype=np.float64) * ramp**2 / np.maximum(distance, radius) ** 2
+
+    def emitters(self) -> Emitters:
+        """Return the positions; the lights shine along their axes."""
+        middle = self.position.astype(np.float64)
+        return Emitters(middle, self.axis.astype(np.float64), np.zeros(len(self)))
 
     def _falloff(self, wi: Floats) -> Floats:
         """Part (n,) of the intensity that leaves against wi (3, n).

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..sampling.mis import power_heuristic
 from ..state import SurfaceInteraction
 from ..vec import ALL, Floats, Ints, Lanes, f4, put, take
-from .base import LightRecord, LightSample, sampled_li
+from .base import Emitters, LightRecord, LightSample, sampled_li
 from .samplers import (
     LIGHT_SAMPLERS,
     LightSampler,
@@ -18,6 +18,30 @@ from .samplers import (
     SingleLightSampler,
     SubsetLightSampler,
 )
+
+
+class IrradianceOf:
+    """What lights of several kinds bring to parts of a scene of radius `scene_radius`, and where they are."""
+
+    def __init__(self, kinds: Sequence[LightRecord], scene_radius: float) -> None:
+        self.kinds, self.scene_radius = kinds, scene_radius
+
+    def __call__(self, center: NDArray[np.float64], radius: float, /) -> NDArray[np.float64]:
+        """Return a bound on the irradiance (c, k) by each light within `radius` of points `center` (3, c)."""
+        return np.concatenate([kind.irradiance(center, radius, self.scene_radius) for kind in self.kinds], 1)
+
+    @property
+    def emitters(self) -> Emitters:
+        """Where the lights are; NaN for those that are nowhere."""
+        return Emitters.concatenate([_emitters(kind) for kind in self.kinds])
+
+
+def _emitters(kind: LightRecord) -> Emitters:
+    found = kind.emitters()
+    if found is not None:
+        return found
+    nowhere = np.full((3, len(kind)), np.nan)
+    return Emitters(nowhere, nowhere, nowhere[0])
 
 
 class LightTable:
@@ -77,12 +101,7 @@ class LightTable:
             return None if chosen is None else SubsetLightSampler(chosen, np.flatnonzero(power), power.size)
         if power.size == 1:
             return SingleLightSampler()
-        scene_radius = float(np.linalg.norm(half_size))
-
-        def irradiance(center: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
-            return np.concatenate([kind.irradiance(center, radius, scene_radius) for kind in self.kinds], 1)
-
-        return make(power, half_size, irradiance)
+        return make(power, half_size, IrradianceOf(self.kinds, float(np.linalg.norm(half_size))))
 
     def sample_li(self, point: Floats, u_choice: Floats, u: Floats) -> tuple[LightSample, Ints]:
         """Choose a light for each point (3, n) with u_choice (n,) and sample it with u (2, n).
