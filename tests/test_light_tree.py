@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 import wavefront as wf
-from wavefront.lights import LightTable, PointLightRecord, TriangleLights, samplers
+from wavefront.lights import (
+    LightTable,
+    PointLightRecord,
+    SphereLights,
+    TriangleLights,
+    TwoSidedTriangleLights,
+    samplers,
+)
 from wavefront.lights.base import Emitters, LightRecord, LightSample
 from wavefront.lights.samplers import HalvedLightSampler, SubsetLightSampler
 from wavefront.lights.tree import LightTreeSampler
@@ -197,3 +204,30 @@ def test_pictures_have_the_mean_of_other_samplers(monkeypatch: pytest.MonkeyPatc
     assert sigma < 0.01 * by_power.mean()
     assert abs(by_tree.mean() - by_power.mean()) < 3 * sigma
     assert by_tree.std() < by_power.std()
+
+
+def test_lights_say_where_they_are() -> None:
+    """Middle, direction and size of each kind; a sky is nowhere."""
+    up = np.array([[[0.0, 1, 0], [0, 1, 3], [3, 1, 0]]])
+    one_sided, two_sided = (
+        kind.from_triangles(up, np.ones((3, 1), f4)).emitters()
+        for kind in (TriangleLights, TwoSidedTriangleLights)
+    )
+    for found in (one_sided, two_sided):
+        assert found is not None
+        np.testing.assert_allclose(found.middle, [[1], [1], [1]], rtol=1e-6)
+        np.testing.assert_allclose(found.extent2, 4.5)
+    assert one_sided is not None
+    assert two_sided is not None
+    assert one_sided.facing.ravel().tolist() == [0, 1, 0]
+    assert not two_sided.facing.any()
+    center = np.array([1.0, 0, 0])
+    point = wf.PointLight((2, 3, 4), 1).record(center).emitters()
+    spot = wf.SpotLight((2, 3, 4), 1, direction=(0, -1, 0)).record(center).emitters()
+    sphere = SphereLights(np.array([[1], [3], [4]], f4), np.array([2], f4), np.ones((3, 1), f4)).emitters()
+    for emitters, facing, extent2 in ((point, (0, 0, 0), 0), (spot, (0, -1, 0), 0), (sphere, (0, 0, 0), 4)):
+        assert emitters is not None
+        assert emitters.middle.ravel().tolist() == [1, 3, 4]
+        assert emitters.facing.ravel().tolist() == list(facing)
+        assert emitters.extent2.tolist() == [extent2]
+    assert wf.Environment(1).record(center).emitters() is None
