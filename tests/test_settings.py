@@ -116,3 +116,12 @@ def test_the_option_of_layers_can_be_given_several_times() -> None:
     read = cli.parser().parse_args(["render", "scene.obj", "--aov", "depth", "--aov", "albedo"])
     assert read.aovs == ("depth", "albedo")
     assert cli.parser().parse_args(["render", "scene.obj"]).aovs == ()
+
+
+def test_the_option_of_reuse_takes_yes_no_and_auto(capsys: pytest.CaptureFixture[str]) -> None:
+    """Anything else is an error that names them."""
+    for text, value in (("yes", True), ("no", False), ("auto", "auto")):
+        assert cli.parser().parse_args(["render", "scene.obj", "--reuse", text]).reuse == value
+    with pytest.raises(SystemExit):
+        cli.parser().parse_args(["render", "scene.obj", "--reuse", "maybe"])
+    assert "'maybe' is not yes, no or auto" in capsys.readouterr().err

@@ -594,3 +594,20 @@ def test_the_command_ends_at_ctrl_c(tmp_path: Path) -> None:
         process.communicate()
     assert process.returncode == 0, output + errors
     assert "Traceback" not in errors
+
+
+def test_views_wait_for_no_trial(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Unless it is asked for."""
+    from wavefront.viewer import viewer
+
+    asked: list[tuple[Any, Any]] = []
+
+    def session(scene: Any, spp: int | None, **settings: Any) -> None:
+        asked.append((settings["branches"], settings["reuse"]))
+        raise KeyError
+
+    monkeypatch.setattr(viewer, "Session", session)
+    for settings in ({}, {"branches": "auto", "reuse": "auto"}):
+        with pytest.raises(KeyError):
+            wf.view(BALL, spp=1, open_browser=False, block=False, workers=1, executor="threads", **settings)
+    assert asked == [(1, False), ("auto", "auto")]
