@@ -42,7 +42,7 @@ TITLES = {
     "corridor": "corridor, glossy floor",
 }
 MAX_BOUNCES = 12
-PROBES = (8, 32)  # paths per pixel
+PROBES = (9, 36)  # paths per pixel
 CLOSE = 0.1  # of the time, which is near enough
 BRIGHTNESS = 0.4  # mean of a picture as it is shown
 
@@ -55,16 +55,22 @@ def timed(render: Render, spp: int) -> tuple[float, np.ndarray]:
     return time.perf_counter() - begin, picture
 
 
+def whole(samples: float) -> int:
+    """Return a number near to this that is a grid of strata: `multijitter` rounds others up."""
+    rows = max(1, int(max(samples, 1) ** 0.5))
+    return max(1, rows * round(samples / rows))
+
+
 def at_equal_time(of: Callable[..., Render], seconds: float) -> tuple[int, float, np.ndarray]:
     """Return the samples per pixel that a side draws in so many seconds, what it took, and the picture."""
     render = of(*PROBES)
     few, many = (timed(render, spp)[0] for spp in PROBES)
     per_sample = max(many - few, many / 10) / (PROBES[1] - PROBES[0])  # clocks are not exact
     fixed = max(few - per_sample * PROBES[0], 0)
-    spp = max(1, round((seconds - fixed) / per_sample))
+    spp = whole((seconds - fixed) / per_sample)
     taken, picture = timed(of(spp), spp)
     if abs(taken / seconds - 1) > CLOSE and taken > fixed:
-        spp = max(1, round(spp * (seconds - fixed) / (taken - fixed)))
+        spp = whole(spp * (seconds - fixed) / (taken - fixed))
         taken, picture = timed(of(spp), spp)
     return spp, taken, picture
 

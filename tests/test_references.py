@@ -9,7 +9,9 @@ from scenes import cornell_box
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 import references
-from references import Converged, References
+from references import Converged, References, hash_of
+
+import wavefront as wf
 
 SIDE = "wavefront numpy plain"
 
@@ -57,3 +59,13 @@ def test_a_picture_of_another_version_is_not(tmp_path: Path, monkeypatch: pytest
         monkeypatch.setattr(references.wf, "__version__", version)
         References(tmp_path).picture("box", cornell_box((4, 4)), SIDE, 1, 16)
     assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_scenes_have_hashes_of_what_they_show() -> None:
+    def scene(emission=1.0, gray=0.5, x=0.0, sky=1.0, fov=40.0) -> wf.Scene:
+        ball = wf.Sphere((x, 0, 0), 1, material=wf.Diffuse(gray), emission=emission)
+        camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), fov=fov, size=(4, 4))
+        return wf.Scene([ball], [wf.Environment(sky)], camera)
+
+    others = [scene(emission=2.0), scene(gray=0.6), scene(x=0.1), scene(sky=2.0), scene(fov=41.0)]
+    assert len({hash_of(each) for each in (scene(), scene(), *others)}) == 6
