@@ -80,6 +80,7 @@ def measured_costs(client: Client, repeat: int) -> Costs:
     """Measure what the simulation needs."""
     scene = cornell_box(256)
     options: dict[str, Any] = {"workers": 1, "executor": "threads", "wave_size": WAVE, "progress": False}
+    options.update(branches=1, reuse=False)  # a path is one path
     options["branches"] = 1
     path = seconds(lambda: wf.render(scene, 16, **options), repeat) / (16 * 256**2)
     pixels, radiance = np.arange(WAVE, dtype=np.uint32), np.ones((3, 1, WAVE), np.float32)

@@ -118,7 +118,7 @@ pool = ThreadPoolExecutor(2)
 list(pool.map(np.linalg.inv, np.stack([np.eye(200)] * 8)))
 ball = [wf.Sphere((0, 0, 0), 1), wf.Environment(1)]
 for _ in range(2):
-    print(wf.render(ball, 4, size=(16, 16), workers=2, executor={executor!r}).rgb.sum())
+    print(wf.render(ball, 4, size=(16, 16), workers=2, executor={executor!r}, progress=False).rgb.sum())
 """
     command = [sys.executable, "-W", "error", "-c", script]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
