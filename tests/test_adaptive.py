@@ -273,7 +273,7 @@ def test_jobs_of_a_cluster_have_several_waves() -> None:
 def test_waves_of_a_job_are_its_samples_in_order(wave_size: int, whole_tiles: bool) -> None:
     """Each pixel's samples come one after the other, and every one of them once."""
     camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), size=(20, 5))
-    job = Job(View(camera, whole_tiles=whole_tiles), np.arange(100, dtype=np.uint32), 7, 3, wave_size)
+    job = Job(View(camera, reuse=whole_tiles), np.arange(100, dtype=np.uint32), 7, 3, wave_size)
     samples = np.full(100, 7)
     for wave in job.waves():
         assert wave.lanes <= wave_size or whole_tiles

@@ -46,7 +46,7 @@ def test_jobs_have_whole_tiles(wave: int, window: tuple[int, int, int, int] | No
     pixels = np.random.default_rng(0).permutation(camera.size[0] * camera.size[1])[:700]
     pixels = np.sort(pixels).astype(np.uint32)
     tile, _ = place_in_tiles(camera.address(pixels), 47)
-    jobs = list(split_jobs(View(camera, whole_tiles=True), pixels, 2, 7, lambda left: wave))
+    jobs = list(split_jobs(View(camera, reuse=True), pixels, 2, 7, lambda left: wave))
     seen = np.zeros(700, int)
     for job in jobs:
         at = np.searchsorted(pixels, job.pixels)

@@ -257,7 +257,7 @@ def test_renders_go_on_with_the_same_decision(tmp_path: Path) -> None:
 
 
 def test_each_camera_has_a_trial_of_its_own() -> None:
-    """A session decides anew; its workers go on where the decision is the same."""
+    """A session decides anew; its workers go on, as jobs say how their paths do."""
     box = wf.Scene(cornell_box(SIZE).shapes, wf.Environment(0.01), cornell_box(SIZE).camera)
     away_from_it = wf.Camera.look_at((0, 0, 30), (0, 0, 300), fov=40, size=SIZE)
     with wf.Session(box, 1, workers=1, executor="threads", lighting=None) as session:
@@ -265,9 +265,7 @@ def test_each_camera_has_a_trial_of_its_own() -> None:
         pool = session._pool
         session.set_camera(away_from_it)
         away = session.run()
-        assert session._pool is not pool
         session.set_camera(None)
-        pool = session._pool
         assert np.array_equal(session.run().rgb, first.rgb)
         session.set_camera(box.camera)
         assert session._pool is pool

@@ -105,7 +105,7 @@ def enter(page: Any, slider: int, text: str) -> None:
 
 def expected(viewer: wf.Viewer, **options: Any) -> wf.Image:
     """Return the picture of the view as `render` makes it; viewers decide nothing by a trial."""
-    return wf.render(SCENE, SPP, camera=viewer.camera, branches=1, reuse=False, progress=False, **options)
+    return wf.render(SCENE, SPP, camera=viewer.camera, progress=False, **options)
 
 
 def test_a_page_shows_the_picture_of_render(page: Any, viewer: wf.Viewer) -> None:

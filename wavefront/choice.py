@@ -7,12 +7,9 @@ that a picture of 64 samples that gets 64 more is the one of 128.
 
 from __future__ import annotations
 
-from functools import partial
-
 from .camera import Camera
 from .compile.scene import CompiledScene
 from .guiding import GuideTable
-from .integrators import INTEGRATORS, Integrator, li_full, li_reuse
 from .pilot import train
 from .pixel_tiles import SIDE, STRIDE
 from .record import record
@@ -33,19 +30,6 @@ class Choice:
     reuse: bool = False
     table: GuideTable | None = None
     hint: str | None = None  # what may pay besides
-
-    def integrator(self, settings: Settings) -> Integrator:
-        """Return the integrator for such paths."""
-        if self.reuse:
-            return partial(li_reuse, branches=self.branches, table=self.table)
-        if self.branches == 1 and self.table is None:
-            return INTEGRATORS.find(settings.integrator)
-        return partial(li_full, branches=self.branches, table=self.table)
-
-    def is_same(self, other: Choice) -> bool:
-        """Return whether paths go on in the same way."""
-        mine, its = (self.branches, self.reuse), (other.branches, other.reuse)
-        return mine == its and self.table is None and other.table is None
 
 
 def choose(settings: Settings, scene: CompiledScene, camera: Camera) -> Choice:

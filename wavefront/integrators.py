@@ -14,6 +14,7 @@ Examples
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -164,6 +165,17 @@ def follow(
         paths = bounce_sample(paths, shade, sampler, bounce)
         paths = select(paths, roulette(paths, sampler, bounce, branches))
         paths, hits = intersect_and_compact(scene, paths, sampler, bounce + 1, L, mis=True)
+
+
+def integrator_for(
+    integrator: Integrator, branches: int, reuse: bool, table: GuideTable | None
+) -> Integrator:
+    """Return an integrator whose paths branch, are shared among pixels, and are guided, as asked for."""
+    if reuse:
+        return partial(li_reuse, branches=branches, table=table)
+    if branches == 1 and table is None:
+        return integrator
+    return partial(li_full, branches=branches, table=table)
 
 
 WITH_MIS: tuple[Integrator, ...] = (li_direct_mis, li_full)  # weigh light samples against BSDF samples

@@ -33,11 +33,12 @@ class View:
     camera: Camera  # in the unit of the compiled scene
     deadline: float = math.inf  # when jobs under way are discarded, by `time.perf_counter`
     first_sample: int = 0  # index of the first sample of every pixel
-    whole_tiles: bool = False  # the pixels of a tile (pixel_tiles.py) belong in one job
+    branches: int = 1  # ways in which a path goes on from its first surface
+    reuse: bool = False  # pixels share paths, so those of a tile (pixel_tiles.py) belong in one job
 
     def parts(self, pixels: Words, width: int) -> Iterator[Words]:
         """Split pixels (k,) into parts of at most `width`, or of one tile where tiles stay whole."""
-        if not self.whole_tiles:
+        if not self.reuse:
             for start in range(0, pixels.size, width):
                 yield pixels[start : start + width]
             return

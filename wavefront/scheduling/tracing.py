@@ -11,7 +11,8 @@ import numpy as np
 from ..accel.base import Accelerator, Intersections
 from ..compile.scene import CompiledScene
 from ..filters import Filter
-from ..integrators import Integrator
+from ..guiding import GuideTable
+from ..integrators import Integrator, integrator_for
 from ..record import record
 from ..sample_recorder import SampleRecorder, recorded_layers
 from ..sampling.sampler import Sampler
@@ -61,6 +62,7 @@ class Tracer:
     integrator: Integrator
     max_bounces: int
     layers: tuple[str, ...] = ()  # sampled ones that are asked for
+    table: GuideTable | None = None  # guides paths
     clamp: float | None = None  # the limit of indirect light that a path finds at once
 
     @property
@@ -94,9 +96,10 @@ def _trace_wave(tracer: Tracer, monitor: WaveMonitor, job: Job) -> WaveResult:
     recorder = SampleRecorder(tracer.layers, scene, k * n, tracer.clamp) if tracer.layers else None
     if recorder is not None:
         recorder.prepare(paths)
-    radiance = tracer.integrator(scene, paths, sampler, tracer.max_bounces)
+    integrator = integrator_for(tracer.integrator, job.view.branches, job.view.reuse, tracer.table)
+    radiance = integrator(scene, paths, sampler, tracer.max_bounces)
     bad = np.flatnonzero(~np.isfinite(radiance).all(0))
-    layers = None if recorder is None else recorder.result(tracer.integrator, radiance, n, bad)
+    layers = None if recorder is None else recorder.result(integrator, radiance, n, bad)
     radiance[:, bad] = 0
     return WaveResult(radiance.reshape(3, n, k), bad, accelerator.rays, time.perf_counter() - begin, layers)
 

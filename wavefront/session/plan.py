@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..camera import Camera
 from ..choice import Choice, choose
 from ..filters import FILTERS
+from ..integrators import INTEGRATORS
 from ..progress import phase
 from ..record import record
 from ..scheduling.blas import single_threaded_blas
@@ -41,9 +42,10 @@ def make_plan(settings: Settings, scene: PreparedScene, camera: Camera, choice: 
         scene.compiled,
         settings.sampler_maker(),
         FILTERS.find(settings.filter),
-        choice.integrator(settings),
+        INTEGRATORS.find(settings.integrator),
         settings.max_bounces,
         settings.sampled_layers,
+        choice.table,
         settings.clamp,
     )
     budget = settings.budget(camera.size, tracer.recorded_layers)

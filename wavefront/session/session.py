@@ -331,7 +331,8 @@ class Session:
             others = (executor, self._plan.executor) == ("processes", "threads")
             others |= budget.workers != self._plan.budget.workers
             choice = choose_paths(settings, self._scene, camera)
-            if self._monitor.stop.value or others or not choice.is_same(self._plan.choice):
+            others |= choice.table is not self._plan.choice.table
+            if self._monitor.stop.value or others:
                 self._pool.close()
                 self._plan = make_plan(settings, self._scene, camera, choice)
                 self._make_pool()

@@ -85,7 +85,7 @@ class ViewRender:
             waves_per_job(plan.executor),
         )
         self.loop = RenderLoop(
-            View(view, scheduler.deadline, settings.first_sample, plan.choice.reuse),
+            View(view, scheduler.deadline, settings.first_sample, plan.choice.branches, plan.choice.reuse),
             accumulator,
             scheduler,
             spp=settings.max_spp,

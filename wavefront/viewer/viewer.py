@@ -28,7 +28,6 @@ WAVE_SIZE = (
 )  # paths; a movement waits for less of a smaller wave, and one of half the size costs 10 % more
 POLL = 0.5  # seconds
 FRAME = "100%", 600  # width and height of the page in a notebook
-NO_TRIAL = {"branches": 1, "reuse": False}  # by default: a view that moves must not wait
 REFUSED = ("checkpoint", "samples", "progress")  # settings that make no sense for views that change
 
 
@@ -210,9 +209,8 @@ def view(
         True waits for Ctrl-C, and closes the viewer then. None does so in scripts, whose end would close the
         viewer, and returns at once in notebooks and at a prompt.
     **settings
-        The other settings of `render`, but for `checkpoint`, `samples` and `progress`; by default `branches`
-        is 1 and `reuse` False, since trying what pays would delay each view. The page has the shape of its
-        window; pictures have about as many pixels as `size`, or the camera, has.
+        The other settings of `render`, but for `checkpoint`, `samples` and `progress`. The page has
+        the shape of its window; pictures have about as many pixels as `size`, or the camera, has.
 
     Returns
     -------
@@ -261,7 +259,6 @@ def _opened(scene: Scene, spp: int | None, host: str, port: int, settings: dict[
     aovs = settings.pop("aovs", ())
     wanted = (*((aovs,) if isinstance(aovs, str) else aovs), *VIEWER_LAYERS)
     settings = {
-        **NO_TRIAL,
         **settings,
         "camera": viewpoint.camera,
         "size": None,
