@@ -17,6 +17,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from scenes import cornell_box
 
 import wavefront as wf
 from wavefront.viewer import refiner as module
@@ -596,18 +597,12 @@ def test_the_command_ends_at_ctrl_c(tmp_path: Path) -> None:
     assert "Traceback" not in errors
 
 
-def test_views_wait_for_no_trial(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Unless it is asked for."""
-    from wavefront.viewer import viewer
-
-    asked: list[tuple[Any, Any]] = []
-
-    def session(scene: Any, spp: int | None, **settings: Any) -> None:
-        asked.append((settings["branches"], settings["reuse"]))
-        raise KeyError
-
-    monkeypatch.setattr(viewer, "Session", session)
-    for settings in ({}, {"branches": "auto", "reuse": "auto"}):
-        with pytest.raises(KeyError):
-            wf.view(BALL, spp=1, open_browser=False, block=False, workers=1, executor="threads", **settings)
-    assert asked == [(1, False), ("auto", "auto")]
+def test_views_are_rendered_as_by_default() -> None:
+    """Also where a trial decides that pixels share paths."""
+    box = cornell_box((224, 224))
+    settings: dict[str, Any] = {"workers": 1, "executor": "threads"}
+    with wf.view(box, spp=1, open_browser=False, block=False, **settings) as viewer:
+        image = viewer.wait_for_picture(SOON)
+        same = wf.render(box, 1, camera=viewer.camera, progress=False, **settings)
+    assert image.metadata["reuse"] is True
+    assert image.rgb.tobytes() == same.rgb.tobytes()
