@@ -357,12 +357,12 @@ def test_a_few_bad_samples_are_counted(integrator: str, method: str, value: floa
 
 @pytest.mark.parametrize(("integrator", "method"), FAULTS)
 def test_many_bad_samples_are_an_error(integrator: str, method: str) -> None:
-    """More than 1e-4 of all."""
+    """More than 1e-4 of all; the picture is the mean of the others, which is right here."""
     with pytest.raises(wf.RenderError, match=r"samples were not finite") as caught:
         render(faulty(0.1, np.nan, method), 64, integrator=integrator)
     image = caught.value.image
-    assert np.isfinite(image.rgb).all()
-    assert 0.2 < image.rgb.mean() < 0.5  # all the other samples are there
+    assert image.rgb == pytest.approx(0.5, abs=0.05)
+    assert image.rgb.mean() == pytest.approx(0.5, abs=0.002)
     assert image.metadata["bad_samples"] > 0
 
 
