@@ -337,7 +337,7 @@ def subjects(options: argparse.Namespace) -> dict[str, Subject]:
         "lights": Subject(lambda: lit("panels", 1000, size), 3, spp, methods, "plain"),
     }
     for name, build in HARD_SCENES.items():
-        found[name] = Subject(partial(build, size), 12, (16, 64, 256), hard, "guided/4", (GUIDED,))
+        found[name] = Subject(partial(build, size), 12, (16, 64, 256), hard, "guided/reused", (GUIDED,))
     if options.spp:
         counts = tuple(int(count) for count in options.spp.split(","))
         found = {name: replace(subject, spp=counts) for name, subject in found.items()}
