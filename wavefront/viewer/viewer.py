@@ -18,7 +18,7 @@ from ..renderable import as_scene, choose_camera
 from ..scene import Scene
 from ..scheduling.executors import choose_executor, needs_pickling, worker_count
 from ..session import Session
-from .refiner import Refiner, ViewerFrame
+from .refiner import FIRST_DIVISOR, Refiner, ViewerFrame
 from .shown import VIEWER_LAYERS
 from .viewpoint import Viewpoint
 
@@ -261,7 +261,7 @@ def _opened(scene: Scene, spp: int | None, host: str, port: int, settings: dict[
     settings = {
         **settings,
         "camera": viewpoint.camera,
-        "size": None,
+        "size": tuple(max(1, side // FIRST_DIVISOR) for side in viewpoint.camera.film),
         "aovs": wanted,
         "progress": False,
     }
