@@ -104,7 +104,7 @@ def enter(page: Any, slider: int, text: str) -> None:
 
 
 def expected(viewer: wf.Viewer, **options: Any) -> wf.Image:
-    """Return the picture of the view as `render` makes it; viewers decide nothing by a trial."""
+    """Return the picture of the view as `render` makes it by default."""
     return wf.render(SCENE, SPP, camera=viewer.camera, progress=False, **options)
 
 
