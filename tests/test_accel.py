@@ -257,46 +257,6 @@ def test_ties_go_to_the_lowest_id(name: str) -> None:
     assert hits.t[0] == 1
 
 
-def overlapping(order: tuple[int, ...], turned: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return two triangles each of three squares that overlap in a plane, and which square each is of."""
-    triangles = []
-    for lowest, highest in np.array([(-1, 1), (-0.5, 0.75), (-0.875, 0.25)])[list(order)]:
-        x, y = np.meshgrid((lowest, highest), (lowest, highest))
-        corners = np.stack([x, y, np.zeros_like(x)], -1).reshape(4, 3) @ turned
-        triangles += [corners[[0, 1, 3]], corners[[0, 3, 2]]]
-    return np.array(triangles), np.repeat(order, 2)
-
-
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 0, 2)])
-@pytest.mark.parametrize("axes", [(0, 1, 2), (2, 0, 1), (1, 2, 0)])
-def test_faces_that_overlap_in_a_plane(name: str, order: tuple[int, ...], axes: tuple[int, ...]) -> None:
-    """The lowest id is hit; by Embree any of them, at the same distance, the same for a ray in any batch."""
-    turned = np.eye(3)[list(axes)]
-    triangles, square = overlapping(order, turned)
-    rng, n = np.random.default_rng(8), 3000
-    place = np.concatenate([rng.uniform(-0.99, 0.99, (2, n)), np.zeros((1, n))])
-    origin = (3 * rng.normal(size=(3, n))).astype(f4)
-    direction = (turned.T @ place - origin).astype(f4)
-    hits = make_accelerator(geometry(triangles), name).closest(origin, direction, nothing(n))
-    alone = [
-        make_accelerator(geometry(triangles[square == each]), "numpy").closest(origin, direction, nothing(n))
-        for each in range(3)
-    ]
-    np.testing.assert_allclose(hits.t, alone[0].t, rtol=2e-6)
-    hit = np.array([each.prim >= 0 for each in alone])
-    found = square.take(hits.prim)
-    assert hit[found, np.arange(n)].all()
-    if name == "numpy":
-        first = hit[list(order)].argmax(0)
-        np.testing.assert_array_equal(found, np.array(order).take(first))
-    parts = [slice(0, 1), slice(1, 1000), slice(1000, n)]
-    accelerator = make_accelerator(geometry(triangles), name)
-    again = [accelerator.closest(origin[:, part], direction[:, part], nothing(n)[part]) for part in parts]
-    np.testing.assert_array_equal(np.concatenate([each.prim for each in again]), hits.prim)
-    np.testing.assert_array_equal(np.concatenate([each.t for each in again]), hits.t)
-
-
 def test_a_tie_across_the_leaves_of_a_tree_goes_to_the_lowest_id() -> None:
     mesh = sphere_mesh(3)
     doubled = np.concatenate([mesh, mesh[::-1]])

@@ -11,7 +11,7 @@ IndexError or a silent change. Other test modules hold the same rows in more det
 | short lines, truncated file | short lines (test_load.py) |
 | zero-area face | zero area, test_faces_without_area_are_in_no_table_of_lights |
 | empty mesh, empty scene | empty, test_an_empty_scene |
-| duplicate or coplanar faces | test_ties_go_to_the_lowest_primitive (test_accel.py: faces_that_overlap) |
+| duplicate or coplanar faces | test_ties_go_to_the_lowest_primitive (test_coplanar.py) |
 | scene × 1e6, × 1e-6, 1e5 sizes away | test_size_and_place_change_rounding_only (test_scale.py) |
 | camera inside geometry or glass | test_a_camera_inside |
 | size 0, spp 0, NaN in arguments | test_bad_arguments (test_render.py) |

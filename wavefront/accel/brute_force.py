@@ -19,6 +19,7 @@ from ..vec import Bools, Bytes, Floats, Ints, f4
 from . import triangle
 from .base import Geometry
 from .bvh import Ball, RayBatch, flat_true, scratch
+from .coplanar import share_planes
 from .exact import TriangleTests
 from .hits import AnyHit, Candidates, HitAccumulator
 from .quads import are_parallelograms, corners, diagonal_planes, find_quads, planes
@@ -65,6 +66,7 @@ class BruteForceTriangles:
         single = ids[~np.isin(ids, [first, first + 1])]
         quads = corners(triangles, first)
         table.plane[:, first] = table.plane[:, first + 1] = planes(quads)
+        share_planes(table, triangles, ids, first)
         # Index -1, the last one, is for misses.
         self._partner = np.full(primitives + 1, -1)
         self._partner[first] = first + 1
@@ -88,12 +90,16 @@ class BruteForceTriangles:
         """Build the matrices of each kind of polygon, given by corners (e, m, 3) and triangle ids (m,)."""
         self._polygons, begin = [], 0
         polygon_planes, side_rows = [], []
+        away = self._table.deviation
         for number, (corner, prim) in enumerate(kinds):
             if prim.size:
+                deviation = np.zeros(prim.size) if away is None else away.take(prim)
                 rows = triangle.edge_rows(corner, ball.center, ball.radius).reshape(-1, 6)
                 self._polygons.append(Polygons(rows, slice(begin, begin + prim.size), number == 0))
-                side_rows.append(triangle.side_rows(corner, ball.center, ball.radius))
-                polygon_planes.append(triangle.polygon_planes(self._table, prim, corner, ball.center))
+                side_rows.append(triangle.side_rows(corner, ball.center, ball.radius, deviation))
+                polygon_planes.append(
+                    triangle.polygon_planes(self._table, prim, corner, ball.center, deviation)
+                )
                 begin += prim.size
         self._count = begin
         self._rows = sum(len(polygons.rows) for polygons in self._polygons)

@@ -5,26 +5,26 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..vec import Bools, Floats
+from ..vec import Bools, Floats, Ints, spans
+from .triangle import has_area
 
-FACTORS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)  # odd
+AT_ONCE = 1 << 14  # triangles whose keys are made together, so that they fit the cache
+FACTORS = tuple(map(np.uint64, (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9)))  # odd
+
+Keys = NDArray[np.uint64]
+
+
+def that_can_be_hit(triangles: Floats) -> Ints:
+    """Return the ids of triangles (m, 3, 3) with an area and not the corners of an earlier one."""
+    return np.flatnonzero(has_area(triangles) & first_of_equals(triangles))
 
 
 def first_of_equals(triangles: Floats) -> Bools:
     """Return a mask (m,), False for triangles (m, 3, 3) with the corners of an earlier one in any order."""
     keep = np.ones(len(triangles), np.bool_)
-    keys = _keys(triangles)
-    order = np.argsort(keys, kind="stable")
-    ordered = keys.take(order)
-    same = ordered[1:] == ordered[:-1]
-    if not same.any():
-        return keep
     # few: compare the corners themselves
-    doubtful = np.zeros(len(triangles), np.bool_)
-    doubtful[1:] = same
-    doubtful[:-1] |= same
     seen: set[bytes] = set()
-    for index in np.sort(order.compress(doubtful)).tolist():
+    for index in np.sort(repeated(_keys(triangles))[0]).tolist():
         corners = triangles[index] + np.float32(0)  # without negative zeros
         name = b"".join(sorted(corner.tobytes() for corner in corners))
         keep[index] = name not in seen
@@ -32,11 +32,34 @@ def first_of_equals(triangles: Floats) -> Bools:
     return keep
 
 
-def _keys(triangles: Floats) -> NDArray[np.uint64]:
+def repeated(keys: Keys) -> tuple[Ints, Ints]:
+    """Return the places (r,) of keys (k,) that are there several times, by key, and where each key begins.
+
+    Keys may differ in their lowest bits, as many as the places need.
+    """
+    bits = np.uint64(max(1, (keys.size - 1).bit_length()))
+    low = (np.uint64(1) << bits) - np.uint64(1)
+    # sorting numbers is several times as fast as finding their order
+    ordered = np.sort((keys & ~low) | np.arange(keys.size, dtype=np.uint64))
+    key = ordered >> bits
+    same = key[1:] == key[:-1]
+    several, first = np.zeros(keys.size, np.bool_), np.ones(keys.size, np.bool_)
+    several[1:] = same
+    several[:-1] |= same
+    first[1:] = ~same
+    place = (ordered.compress(several) & low).astype(np.intp)
+    return place, np.flatnonzero(first.compress(several))
+
+
+def _keys(triangles: Floats) -> Keys:
     """Return a number for each triangle that does not depend on the order of its corners."""
-    bits = (triangles + np.float32(0)).view(np.uint32).astype(np.uint64)
-    corners = (bits * FACTORS).sum(-1, dtype=np.uint64)
-    corners ^= corners >> np.uint64(29)
-    corners *= FACTORS[0]
-    corners ^= corners >> np.uint64(32)
-    return np.asarray(corners.sum(-1, dtype=np.uint64))
+    keys = np.empty(len(triangles), np.uint64)
+    for part in spans(keys.size, AT_ONCE):
+        rows = np.ascontiguousarray((triangles[part] + np.float32(0)).transpose(2, 1, 0))
+        x, y, z = rows.view(np.uint32).astype(np.uint64)
+        corners = x * FACTORS[0] + y * FACTORS[1] + z * FACTORS[2]
+        corners ^= corners >> np.uint64(29)
+        corners *= FACTORS[0]
+        corners ^= corners >> np.uint64(32)
+        keys[part] = corners[0] + corners[1] + corners[2]
+    return keys

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import SceneError
-from ..vec import Bools, Floats, Ints, cross, dot, f4, length
+from ..vec import Bools, Doubles, Floats, Ints, cross, dot, f4, length
 from . import triangle
 from .base import Geometry, Intersections
-from .duplicates import first_of_equals
+from .coplanar import Overlaps, find_overlaps
+from .duplicates import that_can_be_hit
 from .numpy_accel import NumpyAccelerator
 
 
@@ -26,8 +27,8 @@ def installed() -> bool:
 class EmbreeAccelerator:
     """Triangles by Embree, curved primitives by NumPy; see base.Accelerator.
 
-    Of triangles with the same corners the first is hit. Of others that overlap in a plane any one is hit:
-    their distances differ by Embree's rounding. It is always the same one for a ray.
+    Of triangles with the same corners Embree knows the first alone. Where others that overlap in a plane are
+    hit, Embree finds any of them, and NumPy then the first.
     """
 
     name = "embree"
@@ -44,7 +45,7 @@ class EmbreeAccelerator:
         triangles = np.ascontiguousarray(geometry.triangles, f4)
         with np.errstate(all="ignore"):
             # Embree returns any of several triangles at the same distance
-            ids = np.flatnonzero(triangle.has_area(triangles) & first_of_equals(triangles))
+            ids = that_can_be_hit(triangles)
         self._ids = np.append(ids, -1)  # (k + 1,) ids by Embree's primitive; the last one is for misses
         self._scene: Any = None
         if ids.size:
@@ -53,6 +54,8 @@ class EmbreeAccelerator:
             rays = np.zeros((1, 3), f4)
             self._scene.run(rays, rays + f4(1))  # build now, not in the first of many threads
         self._planes = TrianglePlanes(triangles)
+        overlaps = find_overlaps(triangles, ids, self._planes.plane)
+        self._overlapping = None if overlaps is None else OverlappingFaces(geometry, overlaps)
         self._curved: NumpyAccelerator | None = None
         if any(map(len, geometry.curved)):
             self._first_curved = len(triangles)
@@ -65,6 +68,8 @@ class EmbreeAccelerator:
     def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
         """Return the nearest hits with t > 0 of rays (3, n)."""
         hits = self._closest_triangle(origin, direction, exclude_prim)
+        if self._overlapping is not None:
+            self._overlapping.find_first(origin, direction, exclude_prim, hits)
         if self._curved is not None:
             on_curved = self._curved.closest(origin, direction, self._exclude_curved(exclude_prim))
             nearer = np.flatnonzero(on_curved.t < hits.t)
@@ -148,6 +153,33 @@ class EmbreeAccelerator:
         return blocked
 
 
+class OverlappingFaces:
+    """Faces of a scene that overlap in a plane: of those at the same distance the first is to be hit."""
+
+    def __init__(self, geometry: Geometry, overlaps: Overlaps) -> None:
+        self._face, self._group = overlaps.face, overlaps.group
+        self._number = np.full(geometry.count + 1, -1)  # place of each primitive in `face`; -1 is a miss, too
+        self._number[overlaps.face] = np.arange(overlaps.face.size)
+        self._open = np.zeros(geometry.count + 1, np.bool_)
+        self._open[overlaps.face] = overlaps.open
+        faces = geometry.triangles.take(overlaps.face, 0)
+        self._accelerator = NumpyAccelerator(Geometry(faces, weights=geometry.weights))
+
+    def find_first(self, origin: Floats, direction: Floats, exclude_prim: Ints, hits: Intersections) -> None:
+        """Replace hits of rays (3, n) by those of earlier faces that overlap the faces hit."""
+        lanes = np.flatnonzero(self._open.take(hits.prim))
+        if not lanes.size:
+            return
+        excluded = self._number.take(exclude_prim.take(lanes))
+        found = self._accelerator.closest(origin.take(lanes, 1), direction.take(lanes, 1), excluded)
+        group = self._group.take(self._number.take(hits.prim.take(lanes)))
+        # NumPy may miss all of them at an edge, and find something behind
+        same = np.flatnonzero((found.prim >= 0) & (self._group.take(found.prim) == group))
+        lanes = lanes.take(same)
+        hits.t[lanes], hits.prim[lanes] = found.t.take(same), self._face.take(found.prim.take(same))
+        hits.b1[lanes], hits.b2[lanes] = found.b1.take(same), found.b2.take(same)
+
+
 class TrianglePlanes:
     """The planes of triangles (m, 3, 3), to find rays that certainly miss their excluded triangle.
 
@@ -171,6 +203,11 @@ class TrianglePlanes:
     def __len__(self) -> int:
         """Return the number of triangles."""
         return self._rows.shape[1]
+
+    @property
+    def plane(self) -> Doubles:
+        """The unit normals and offsets, (4, m)."""
+        return self._rows[:4]
 
     def certainly_missed(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Bools:
         """Return a mask of the rays (3, n) whose excluded triangle (n,) is certainly behind them."""

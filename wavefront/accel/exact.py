@@ -124,5 +124,6 @@ def _test_uncertain(
     direction = batch.direction.take(lane, 1).astype(np.float64)
     vertices = triangle.vertices_from(table, prim, origin)
     t = triangle.plane_distance(table.plane, prim, origin, direction)
-    t = triangle.clamp_to_triangle(t, vertices, direction)
+    deviation = None if table.deviation is None else table.deviation.take(prim)
+    t = triangle.clamp_to_triangle(t, vertices, direction, deviation)
     found.add(lane, first, np.where(triangle.hits_watertight(vertices, direction), t, np.inf))

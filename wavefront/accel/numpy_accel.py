@@ -9,6 +9,8 @@ from . import triangle
 from .base import Geometry, Intersections
 from .brute_force import BruteForceTriangles
 from .bvh import Ball, Codes, RayBatch, bounding_ball, prepare
+from .coplanar import share_planes
+from .duplicates import that_can_be_hit
 from .exact import TrianglePrimitives
 from .hits import AnyHit, ClosestHit, unpack_prim, unpack_t
 from .primitives import CurvedPrimitives
@@ -64,9 +66,10 @@ class NumpyAccelerator:
     def _search_triangles(
         self, geometry: Geometry, leaf_size: int | None
     ) -> BruteForceTriangles | PrimitiveTree:
-        ids = np.flatnonzero(triangle.has_area(geometry.triangles))
+        ids = that_can_be_hit(geometry.triangles)
         if ids.size <= SMALL:
             return BruteForceTriangles(self._table, geometry, ids, self._ball)
+        share_planes(self._table, geometry.triangles, ids)
         primitives = TrianglePrimitives(geometry.triangles, self._table)
         return PrimitiveTree(primitives, ids, self._ball, 0, leaf_size or leaf_size_for(ids.size))
 

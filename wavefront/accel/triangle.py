@@ -32,6 +32,8 @@ class TriangleTable:
     # None where no barycentric weights are needed:
     second: Doubles | None  # (4, m) weight of the second vertex at p is second[:3]·p + second[3]
     third: Doubles | None  # (4, m) the same for the third vertex
+    # (m,) largest distance of a corner from the plane, but for rounding in float64; None: 0
+    deviation: Doubles | None = None
 
 
 def triangle_table(triangles: Floats, weights: bool) -> TriangleTable:
@@ -122,25 +124,27 @@ class PolygonPlanes(NamedTuple):
         return (self.plane / at_start).T.astype(f4), (self.plane / at_end).T.astype(f4)
 
 
-def polygon_planes(table: TriangleTable, prim: Ints, corners: Floats, center: Floats) -> PolygonPlanes:
+def polygon_planes(
+    table: TriangleTable, prim: Ints, corners: Floats, center: Floats, deviation: Doubles
+) -> PolygonPlanes:
     """Return the planes about `center` (3,) of flat polygons with corners (e, m, 3).
 
-    They are the planes of their first triangles `prim` (m,) in the table, from which t is computed.
+    They are the planes of their first triangles `prim` (m,) in the table, from which t is computed. These are
+    up to `deviation` (m,) away from the planes of the corners.
     """
     plane = table.plane.take(prim, 1)
     plane[3] = (plane[:3] * center[:, None]).sum(0) - plane[3]
     plane /= np.sqrt((plane[:3] * plane[:3]).sum(0))
-    return PolygonPlanes(
-        plane, np.zeros(prim.size) + _deviation_from_plane(corners.astype(np.float64) - center)
-    )
+    return PolygonPlanes(plane, deviation + _deviation_from_plane(corners.astype(np.float64) - center))
 
 
-def side_rows(corners: Floats, center: Floats, radius: float) -> Floats:
+def side_rows(corners: Floats, center: Floats, radius: float, deviation: Doubles) -> Floats:
     """Return rows (m, 4) that find on which side of flat polygons, corners (e, m, 3), a point lies.
 
     The product with (p - center, 1) has the sign of the edge functions of a ray from p if the ray reaches
     the polygon's plane at t > 0. Rows are scaled so that the product of this and w1 (see `edge_rows`) is
-    above -1 for every such hit, with p within five radii of the center.
+    above -1 for every such hit, with p within five radii of the center. The plane that a ray reaches may be
+    `deviation` (m,) away from that of the corners.
     """
     corner: Doubles = corners.astype(np.float64) - center
     normal = np.cross(corner[1] - corner[0], corner[2] - corner[0])
@@ -150,7 +154,7 @@ def side_rows(corners: Floats, center: Floats, radius: float) -> Floats:
     edge_error, edge_scale = _edge_error(corner, radius)
     area2 = _twice_area(corner)
     # 60 rounding errors: those of a sum of four terms, and those of p if it is a point along a ray.
-    error = ROUNDOFF * 60 * radius * size + _deviation_from_plane(corner) * size
+    error = ROUNDOFF * 60 * radius * size + (_deviation_from_plane(corner) + deviation) * size
     slack = error * (area2 + edge_error) + edge_error * (6 * radius * size + error)
     with np.errstate(all="ignore"):
         return (rows / (slack * edge_scale)[:, None]).astype(f4)
@@ -245,15 +249,20 @@ def plane_distance(
     return top / (nx * direction[0] + ny * direction[1] + nz * direction[2])
 
 
-def clamp_to_triangle(t: Doubles, vertices: Doubles, direction: Doubles) -> Doubles:
+def clamp_to_triangle(
+    t: Doubles, vertices: Doubles, direction: Doubles, deviation: Doubles | None
+) -> Doubles:
     """Clip t (k,) to the extent of triangles (3, 3, k), relative to the rays' origins, along the rays.
 
     For a ray in the triangle's plane t is 0/0. The margin is wide enough not to change t for rays that
-    cross the plane at a measurable angle.
+    cross the plane, which is up to `deviation` (k,) away from the corners (None: 0), at a measurable angle.
     """
-    depths = (vertices * direction).sum(1) / (direction * direction).sum(0)
+    square = (direction * direction).sum(0)
+    depths = (vertices * direction).sum(1) / square
     low, high = depths.min(0), depths.max(0)
     margin = 1e-6 * (high - low) + 1e-9 * np.maximum(np.abs(low), np.abs(high))
+    if deviation is not None:
+        margin += np.where(deviation > 0, high - low + 16 * deviation / np.sqrt(square), 0)
     return np.clip(t, low - margin, high + margin)
 
 

@@ -1,0 +1,347 @@
+"""Faces that overlap in a plane without being the same: which these are, and planes that they share.
+
+Their corners are rounded, so each has a plane of its own, and rounding would decide which of them is nearest.
+On a common plane they are at one distance, and the first of them is hit.
+
+Candidates are found by hashing. Numbers that change little with a plane, and are the same for both of its
+sides, are rounded to cells; each of `SHIFTS` grids of cells is shifted against the others, so that planes
+that nearly agree share a cell in at least one of them. Of the faces of a cell, those whose boxes overlap are
+found by sorting them along one axis, in strips along another. The rest is a test of two triangles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..record import record
+from ..vec import Bools, Doubles, Floats, Ints, cross, dot, f4, length, spans
+from .duplicates import FACTORS, Keys, repeated
+from .triangle import AXES, ROUNDOFF, TriangleTable
+
+SHIFTS = 4  # one more than there are numbers of a plane
+COARSEST = 1 / 8  # the greatest width of a cell
+FLATNESS = 4 * ROUNDOFF  # largest distance from a common plane, relative to the coordinates
+AT_ONCE = 1 << 15  # faces, or pairs of them, whose numbers are made together, so that they fit the cache
+FARTHEST = 16.0  # heights of a triangle beyond it, up to which its plane is known
+# Pairs that are tested, for each face and in all. The faces of cells that have more count as overlapping:
+# they get one plane, or rays that hit them are traced twice. Both do no harm where they do not overlap.
+DENSE, BUDGET = 64, 1 << 24
+# A rotation, so that no usual plane is special to the components of its normal.
+ROTATION = np.array([[0.61, 0.52, 0.5978], [-0.7923, 0.401, 0.4597], [-0.0007, -0.7541, 0.6568]])
+NONE: Ints = np.zeros(0, np.intp)
+
+HalfInts = NDArray[np.int32]  # numbers of faces, in half the memory of `Ints`
+
+
+@record
+class Overlaps:
+    """The faces that overlap others, (k,) columns in ascending order of the faces."""
+
+    face: Ints  # (k,) their ids
+    group: Ints  # (k,) faces of one group overlap each other, directly or through others of the group
+    plane: Doubles  # (4, k) normal n and n·p: the same for a group, if it is flat
+    deviation: Doubles  # (k,) largest distance of a corner of the face from that plane
+    open: Bools  # (k,) whether another face may have to be hit where this one is found
+
+
+def share_planes(table: TriangleTable, triangles: Floats, ids: Ints, joined: Ints = NONE) -> None:
+    """Give triangles of the table that overlap in a plane a common one; parameters as for `find_overlaps`."""
+    overlaps = find_overlaps(triangles, ids, table.plane, joined)
+    if overlaps is not None:
+        table.plane[:, overlaps.face] = overlaps.plane
+        table.deviation = np.zeros(len(triangles))
+        table.deviation[overlaps.face] = overlaps.deviation
+
+
+def find_overlaps(triangles: Floats, ids: Ints, plane: Doubles, joined: Ints = NONE) -> Overlaps | None:
+    """Find those of the triangles `ids` (ascending) that overlap others in a plane; None if there are none.
+
+    Parameters
+    ----------
+    triangles
+        (m, 3, 3) vertices.
+    ids
+        (k,) those that have an area, each with other corners.
+    plane
+        (4, m) normal n of any length, and n·p.
+    joined
+        (q,) triangles that have one plane with the next one anyway.
+    """
+    pairs = np.concatenate([np.zeros((2, 0), np.intp), *_overlapping(triangles, ids, plane)], 1)
+    if not pairs.size:
+        return None
+    later = np.unique(pairs.max(0))
+    halves = np.stack([joined, joined + 1])
+    pairs = np.concatenate([pairs, halves[:, np.isin(halves, pairs).any(0)]], 1)
+    face, place = np.unique(pairs, return_inverse=True)
+    group = _components(face.size, *place.reshape(2, -1))
+    common, deviation, flat = _common_planes(triangles.take(face, 0), group)
+    return Overlaps(
+        face,
+        group,
+        np.where(flat, common, plane.take(face, 1)),
+        np.where(flat, deviation, 0.0),
+        np.isin(face, later) | ~flat,
+    )
+
+
+def _overlapping(triangles: Floats, ids: Ints, plane: Doubles) -> Iterator[Ints]:
+    """Yield pairs (2, p) of faces that overlap; some may come twice."""
+    if ids.size < 2:
+        return
+    numbers = _plane_numbers(triangles, ids, plane)
+    before: list[Keys] = []
+    for shift in range(SHIFTS):
+        keys = _cells(numbers, shift / SHIFTS, ids.size)
+        member, start = repeated(keys)
+        member, start = _without_parts(member, start, before)
+        before.append(keys)
+        yield from _overlapping_in_runs(triangles, ids.take(member), plane, start)
+
+
+def _plane_numbers(triangles: Floats, ids: Ints, plane: Doubles) -> Floats:
+    """Return three numbers (3, k) of planes, in cells: the same for both sides, and continuous.
+
+    Normals of usual triangles of a mesh are certain to a quarter of a cell.
+    """
+    width = min(COARSEST, 0.5 / np.sqrt(ids.size))
+    out = np.empty((3, ids.size), f4)
+    farthest = 0.0
+    for part in spans(ids.size, AT_ONCE):
+        some = plane.take(ids[part], 1)
+        some /= length(some[:3])
+        p, q, r = (row[0] * some[0] + row[1] * some[1] + row[2] * some[2] for row in ROTATION)
+        out[0, part] = p * q / width
+        out[1, part] = (q * r - 0.7 * p * p) / width
+        out[2, part] = some[3] * (p + 0.6 * q + 0.3 * r)
+        farthest = max(farthest, float(np.abs(triangles.take(ids[part], 0)).max()))
+    out[2] *= f4(1 / (width * farthest))
+    return out
+
+
+def _cells(numbers: Floats, shift: float, count: int) -> Keys:
+    """Return keys (k,) of the cells that numbers (3, k) are in."""
+    keys = np.zeros(count, np.uint64)
+    for part in spans(count, AT_ONCE):
+        key = np.zeros(1, np.uint64)
+        for cell, factor in zip(np.floor(numbers[:, part] + f4(shift)), FACTORS, strict=True):
+            key = (key + cell.astype(np.int64).view(np.uint64)) * factor
+            key = key ^ (key >> np.uint64(29))
+        keys[part] = key * FACTORS[0]
+    return keys
+
+
+def _without_parts(member: Ints, start: Ints, before: list[Keys]) -> tuple[Ints, Ints]:
+    """Leave out runs whose members were together in one cell of an earlier grid."""
+    for keys in before:
+        if not member.size:
+            break
+        own = keys.take(member)
+        new = np.minimum.reduceat(own, start) != np.maximum.reduceat(own, start)
+        count = np.diff(start, append=member.size)
+        member, count = member.compress(np.repeat(new, count)), count.compress(new)
+        start = np.cumsum(count) - count
+    return member, start
+
+
+def _overlapping_in_runs(triangles: Floats, face: Ints, plane: Doubles, start: Ints) -> Iterator[Ints]:
+    """Yield pairs (2, p) of faces (r,) that overlap, of the runs that begin at `start`."""
+    count = np.diff(start, append=face.size)
+    two = start.compress(count == 2)
+    for part in spans(two.size, AT_ONCE):
+        yield _that_overlap(triangles, plane, face.take(two[part]), face.take(two[part] + 1))
+    more = np.repeat(count > 2, count)
+    face, count = face.compress(more), count.compress(count > 2)
+    if not count.size:
+        return
+    start = np.cumsum(count) - count
+    run: HalfInts = np.repeat(np.arange(start.size, dtype=np.int32), count)
+    low, high = np.empty((3, face.size), f4), np.empty((3, face.size), f4)
+    axes = AXES.take(_steepest(plane, face.take(start)), 1)
+    for part in spans(face.size, AT_ONCE):
+        corners = np.ascontiguousarray(triangles.take(face[part], 0).transpose(1, 2, 0))
+        turned = np.take_along_axis(corners, axes.take(run[part], 1)[None], 1)  # the last axis is across
+        low[:, part], high[:, part] = turned.min(0), turned.max(0)
+    strips = _Strips(low, high, run, start, count)
+    dense = _beyond_budget(strips.pairs_of_runs(start.size), DENSE * face.size + BUDGET)
+    some = np.flatnonzero(dense.take(run[1:]) & (run[1:] == run[:-1]))
+    yield np.stack([face.take(some), face.take(some + 1)])
+    for first, second in strips.pairs(dense):
+        meet = _boxes_meet(low, high, first, second)
+        yield _that_overlap(
+            triangles, plane, face.take(first.compress(meet)), face.take(second.compress(meet))
+        )
+
+
+def _beyond_budget(pairs: Doubles, budget: int) -> Bools:
+    """Return a mask of the runs with most pairs (runs,), without which there are no more than the budget."""
+    order = np.argsort(pairs, kind="stable")
+    dense = np.zeros(pairs.size, np.bool_)
+    dense[order] = np.cumsum(pairs.take(order)) > budget
+    return dense
+
+
+def _steepest(plane: Doubles, face: Ints) -> Ints:
+    """Return the axis (k,) along which the normals of faces (k,) are longest."""
+    return np.asarray(np.abs(plane[:3].take(face, 1)).argmax(0))
+
+
+def _that_overlap(triangles: Floats, plane: Doubles, one: Ints, other: Ints) -> Ints:
+    """Return those (2, q) of the pairs of faces (p,) that have area in common, in nearly one plane."""
+    axes = AXES.take(_steepest(plane, one), 1)[None, :2]
+    corners = [np.ascontiguousarray(triangles.take(face, 0).transpose(1, 2, 0)) for face in (one, other)]
+    flat = [np.take_along_axis(some, axes, 1).astype(np.float64) for some in corners]
+    left = np.flatnonzero(~_apart(*flat))
+    left = left.compress(_coplanar(*(some.take(left, 2) for some in corners)))
+    return np.stack([one.take(left), other.take(left)])
+
+
+class _Strips:
+    """Boxes in strips along the first axis, as high as the boxes are on average, sorted in each strip."""
+
+    def __init__(self, low: Floats, high: Floats, run: HalfInts, start: Ints, count: Ints) -> None:
+        left, bottom = np.minimum.reduceat(low[0], start), np.minimum.reduceat(low[1], start)
+        size = np.add.reduceat(high[1] - low[1], start, dtype=np.float64) / count
+        extent = np.maximum.reduceat(high[1], start) - bottom
+        height = np.maximum(size, extent / np.maximum(count // 16, 1)).astype(f4)
+        height += f4(1e-30)
+        first, last = (
+            ((edge - bottom.take(run)) / height.take(run)).astype(np.int32) for edge in (low[1], high[1])
+        )
+        strips = np.maximum.reduceat(last, start) + 1
+        strips = np.cumsum(strips) - strips
+        first += strips.take(run).astype(np.int32)
+        last += strips.take(run).astype(np.int32)
+        copies = last - first + 1
+        box = np.repeat(np.arange(run.size, dtype=np.int32), copies)
+        strip = np.arange(box.size, dtype=np.int32)
+        strip += np.repeat(first - (np.cumsum(copies) - copies).astype(np.int32), copies)
+        del copies, last
+        begin, end = (
+            (edge - left.take(run)).view(np.uint32).take(box) | strip.astype(np.uint64) << np.uint64(32)
+            for edge in (low[0], high[0])
+        )  # the bits of floats that are not negative sort like the floats
+        order = np.argsort(begin)
+        self._box, self._strip = box.take(order), strip.take(order)
+        del box, strip
+        self._first, self._run = first, run
+        begin, end = begin.take(order), end.take(order)
+        del order
+        following = np.searchsorted(begin, end)
+        following -= np.arange(1, begin.size + 1)
+        self._following = np.maximum(following, 0, out=following)
+
+    def pairs_of_runs(self, runs: int) -> Doubles:
+        """Return how many pairs of boxes of each run overlap along the first axis and share a strip."""
+        return np.asarray(np.bincount(self._run.take(self._box), self._following, runs), np.float64)
+
+    def pairs(self, skipped: Bools) -> Iterator[tuple[Ints, Ints]]:
+        """Yield these pairs once each, boxes (p,) and boxes (p,), but for those of skipped runs (runs,)."""
+        following = np.where(skipped.take(self._run.take(self._box)), 0, self._following)
+        entry = np.flatnonzero(following)
+        following = following.take(entry)
+        total = np.cumsum(following)
+        ends = np.searchsorted(total, np.arange(AT_ONCE, total[-1] + AT_ONCE, AT_ONCE)) if total.size else ()
+        at = 0
+        for end in np.unique(np.minimum(np.add(ends, 1), entry.size)).tolist():
+            some, times = entry[at:end], following[at:end]
+            first = np.repeat(some, times)
+            second = first + 1 + np.arange(first.size) - np.repeat(np.cumsum(times) - times, times)
+            strip = self._strip.take(first)
+            one, other = self._box.take(first), self._box.take(second)
+            # two boxes may share several strips: the lowest counts
+            lowest = np.maximum(self._first.take(one), self._first.take(other)) == strip
+            yield one.compress(lowest), other.compress(lowest)
+            at = end
+
+
+def _boxes_meet(low: Floats, high: Floats, one: Ints, other: Ints) -> Bools:
+    """Return a mask (p,) of pairs of boxes that overlap along the second axis and touch along the third."""
+    meet: Bools = np.ones(one.size, np.bool_)
+    for axis in (1, 2):
+        bottom = np.maximum(low[axis].take(one), low[axis].take(other))
+        top = np.minimum(high[axis].take(one), high[axis].take(other))
+        meet &= bottom < top if axis == 1 else bottom - top <= FLATNESS * (np.abs(bottom) + np.abs(top))
+    return meet
+
+
+def _apart(one: Doubles, other: Doubles) -> Bools:
+    """Return a mask of the pairs of triangles (corner, 2, p) in a plane that have no area in common.
+
+    Then all corners of one are beyond an edge of the other, which separates them.
+    """
+    apart = np.zeros(one.shape[2], np.bool_)
+    tolerance = FLATNESS * np.maximum(np.abs(one).max((0, 1)), np.abs(other).max((0, 1)))
+    left = np.arange(apart.size)
+    for edge in range(3):
+        for first, second in ((one, other), (other, one)):
+            x, y = first.take(left, 2).transpose(1, 0, 2)
+            u, v = second.take(left, 2).transpose(1, 0, 2)
+            begin, end, third = edge, (edge + 1) % 3, (edge + 2) % 3
+            dx, dy = x[end] - x[begin], y[end] - y[begin]
+            inside = np.sign(dx * (y[third] - y[begin]) - dy * (x[third] - x[begin]))
+            beyond = np.maximum.reduce(inside * (dx * (v - y[begin]) - dy * (u - x[begin])))
+            separates = beyond <= tolerance.take(left) * (np.abs(dx) + np.abs(dy))
+            apart[left.compress(separates)] = True
+            left = left.compress(~separates)
+    return apart
+
+
+def _coplanar(one: Floats, other: Floats) -> Bools:
+    """Return a mask of the pairs of triangles (corner, 3, p) whose planes agree within their rounding.
+
+    Of the two, that with the greater height over its longest edge gives the plane.
+    """
+    tolerance = FLATNESS * np.maximum(np.abs(one).max((0, 1)), np.abs(other).max((0, 1)))
+    heights, distances, sizes = [], [], []
+    for first, second in ((one, other), (other, one)):
+        a, b, c = first.astype(np.float64)
+        normal = cross(b - a, c - a)
+        area2 = length(normal)
+        heights.append(area2 / np.maximum(np.maximum(length(b - a), length(c - b)), length(a - c)))
+        away = [np.abs(dot(normal, corner - a)) for corner in second.astype(np.float64)]
+        distances.append(np.maximum.reduce(away) / area2)
+        sizes.append(np.ptp(first, axis=0).max(0))
+    higher = heights[0] >= heights[1]
+    # beyond a triangle its plane is less certain
+    reach = np.where(higher, *sizes[::-1]) / np.maximum(*heights)
+    return np.where(higher, *distances) <= tolerance * (1 + np.minimum(reach, FARTHEST))
+
+
+def _components(count: int, first: Ints, second: Ints) -> Ints:
+    """Return the lowest member of the connected part that each of `count` nodes is in, by edges (p,)."""
+    label = np.arange(count)
+    while first.size:
+        one, other = label.take(first), label.take(second)
+        differ = one != other
+        first, second, one, other = (ends.compress(differ) for ends in (first, second, one, other))
+        np.minimum.at(label, np.maximum(one, other), np.minimum(one, other))
+        while (label.take(label) != label).any():
+            label = label.take(label)
+    return label
+
+
+def _common_planes(corners: Floats, group: Ints) -> tuple[Doubles, Doubles, Bools]:
+    """Fit a plane to each group of faces (k, 3, 3).
+
+    Returns the planes (4, k), the largest distances (k,) of corners, and a mask (k,) of groups that are flat.
+    """
+    a, b, c = corners.transpose(1, 2, 0).astype(np.float64)
+    normal = cross(b - a, c - a)
+    normal *= np.sign(dot(normal, normal.take(group, 1)))
+    sums = [np.asarray(np.bincount(group, row, group.size), np.float64) for row in normal]
+    normal = np.stack(sums).take(group, 1)
+    normal /= length(normal)
+    heights = np.stack([dot(normal, corner) for corner in (a, b, c)])
+    low, high = np.full(group.size, np.inf), np.full(group.size, -np.inf)
+    np.minimum.at(low, group, heights.min(0))
+    np.maximum.at(high, group, heights.max(0))
+    size = np.zeros(group.size)
+    np.maximum.at(size, group, np.abs(corners).max((1, 2)))
+    low, high = low.take(group), high.take(group)
+    offset = (low + high) / 2
+    flat = (high - low) / 2 <= FLATNESS * size.take(group)
+    return np.concatenate([normal, offset[None]]), np.abs(heights - offset).max(0), flat
