@@ -63,6 +63,22 @@ class WaveTiles:
         number[order] = np.cumsum(np.diff(ordered, prepend=ordered[:1]) != 0)
         return cls(number, member, int(number.max(initial=-1)) + 1)
 
+    def grid(self, path: Ints, which: Ints | None = None) -> Ints:
+        """Return where members of tiles are among some paths: (MEMBERS, tiles), -1 for those that are not.
+
+        Parameters
+        ----------
+        path
+            (k,) paths of the wave, no two of them of the same tile and member unless `which` is given.
+        which
+            The columns of `path` that count; None for all.
+        """
+        numbers = np.arange(path.size) if which is None else which
+        path = path.take(numbers)
+        grid = np.full((MEMBERS, self.count), -1, np.intp)
+        grid[self.member.take(path), self.tile.take(path)] = numbers
+        return grid
+
 
 def whole_tiles(pixel: Words, width: int) -> tuple[Ints, Ints]:
     """Return an order (n,) of pixels (n,) in which the members of each tile follow each other, and its cuts.

@@ -22,15 +22,16 @@ from dataclasses import replace
 import numpy as np
 
 from ..compile.scene import CompiledScene
-from ..pixel_tiles import MEMBERS, WaveTiles
+from ..pixel_tiles import WaveTiles
 from ..record import record
 from ..state import Hits, Paths, SoA
-from ..vec import ALL, Bools, Floats, Ints, dot, f4, highest, take
+from ..vec import ALL, Bools, Floats, Ints, dot, f4, highest, spans, take
 from .interaction import interaction, material_rows, offset_origin
 from .intersect import ShadowRays, visible
 from .shade import Shading, evaluate
 from .transmittance import transmittance_along
 
+TILES_AT_ONCE = 1024
 GRAZING = f4(1 / 16)  # cosine to interpolated normals below which they may have been bent towards the viewer
 
 
@@ -116,91 +117,119 @@ def add_shared(
     lit = shade.lit()
     if not lit.groups or not len(points):
         return
-    n = len(lit.surface)
-    slot = paths.slot[:n]
-    tile, member = tiles.tile.take(slot), tiles.member.take(slot)
-    cell = member * tiles.count + tile
-    numbers = np.full((branches, MEMBERS, tiles.count), -1, np.intp)
-    numbers[points.way, tiles.member.take(points.slot), tiles.tile.take(points.slot)] = np.arange(len(points))
+    slot = paths.slot[: len(lit.surface)]
+    lane_in = tiles.grid(slot)
+    number_in = [tiles.grid(points.slot, np.flatnonzero(points.way == way)) for way in range(branches)]
     shines = highest(light) != 0  # NaN counts: it must reach the picture
-    received = np.zeros((3, n), f4)
-    for of_way in numbers:
-        for other, of_tile in enumerate(of_way):
-            number = of_tile.take(tile)
-            there = number >= 0
-            there &= shines.take(number)
-            if not there.any():
-                continue
-            target, own = points.take(number), there & (member == other)
-            connection = connect(scene, lit, target, there, own)
-            total = _sums(connection.density, cell, tiles.count).take(tile)
-            found = total > 0
-            part = connection.geometry / (np.where(found, total, f4(1)) * f4(branches))
-            received += connection.f * part * take(light, number)
-            lost = np.flatnonzero(own & ~found)  # by rounding: they stay the path's own
-            L[:, slot.take(lost)] += take(target.throughput, lost) * take(light, number.take(lost))
-    L[:, slot] += paths.throughput[:, :n] * received
+    received = np.zeros((3, slot.size), f4)
+    for some in spans(tiles.count, TILES_AT_ONCE):
+        first = FirstPoints.of(scene, lit, lane_in[:, some])
+        if first is None:
+            continue
+        arriving = np.zeros((3, *first.present.shape), f4)
+        for numbers in number_in:
+            for member, number in enumerate(numbers[:, some]):
+                there = (number >= 0) & shines.take(number)
+                if not there.any():
+                    continue
+                target = points.take(number)
+                connection = connect(scene, first, target, there, member)
+                total = _sum(connection.density)
+                found = total > 0
+                part = connection.geometry / (np.where(found, total, f4(1)) * f4(branches))
+                shared = connection.f * part
+                shared *= take(light, number)[:, None]
+                arriving += shared
+                lost = np.flatnonzero(there & ~found)  # by rounding: they stay the path's own
+                L[:, target.slot.take(lost)] += take(target.throughput, lost) * take(light, number.take(lost))
+        cells = np.flatnonzero(first.present)
+        received[:, lane_in[:, some].reshape(-1).take(cells)] = arriving.reshape(3, -1).take(cells, 1)
+    L[:, slot] += paths.throughput[:, : slot.size] * received
+
+
+@record
+class FirstPoints:
+    """First points of t tiles as a grid, so that each shared point stands beside those of its tile."""
+
+    present: Bools  # (members, t) which cells have a point; the others hold that of any other cell
+    shade: Shading  # (members * t) columns
+
+    @classmethod
+    def of(cls, scene: CompiledScene, shade: Shading, lane_in: Ints) -> FirstPoints | None:
+        """Return the points of a grid (members, t) of lanes, -1 where there is none; None if there are none."""
+        present = lane_in >= 0
+        some = lane_in[present]
+        if not some.size:
+            return None
+        lanes = np.where(present, lane_in, some[0])
+        return cls(present, shade.at(scene, lanes.reshape(-1)))
 
 
 @record
 class Connections:
-    """Connections of first points to one shared point each; all is 0 where there is none."""
+    """Connections of the first points of t tiles to one shared point each; all is 0 where there is none."""
 
-    f: Floats  # (3, n) BSDF times cosine at the first point, 1/sr
-    geometry: Floats  # (n,) cosine at the shared point / distance², 0 where something is between
-    density: Floats  # (n,) per area with which a path from the first point finds the shared one
+    f: Floats  # (3, members, t) BSDF times cosine at the first point, 1/sr
+    geometry: Floats  # (members, t) cosine at the shared point / distance², 0 where something is between
+    density: Floats  # (members, t) per area with which a path from the first point finds the shared one
 
 
 def connect(
-    scene: CompiledScene, shade: Shading, target: SharedPoints, there: Bools, own: Bools
+    scene: CompiledScene, first: FirstPoints, target: SharedPoints, there: Bools, member: int
 ) -> Connections:
     """Connect first points to shared points.
 
     Parameters
     ----------
-    shade
-        n first points.
+    first
+        Points of t tiles.
     target
-        A point for each.
+        A point for each tile.
     there
-        (n,) where there is one.
-    own
-        (n,) where the path of the first point has found it, so that nothing is between them.
+        (t,) where there is one.
+    member
+        Whose paths have found these points, so that nothing is between.
     """
-    surface = shade.surface
-    start = shade.start
+    shade, shape = first.shade, first.present.shape
+    surface, start, ng = shade.surface, shade.start.reshape(3, *shape), target.ng[:, None]
+    point = target.point[:, None]
     if any(bsdf.transmissive for _, bsdf in shade.groups):
-        start = offset_origin(surface, dot(surface.ng, target.point - surface.point))
-    way = target.point - start
-    squared = dot(way, way)
-    there = there & (squared > 0)
-    inverse = f4(1) / np.sqrt(np.where(there, squared, f4(1)))
-    direction = np.where(there, way * inverse, shade.frame.z)
-    cos_target = -dot(target.ng, direction)
-    there &= cos_target > 0
+        cos = dot(surface.ng.reshape(3, *shape), point - surface.point.reshape(3, *shape))
+        start = offset_origin(surface, cos.reshape(-1)).reshape(3, *shape)
+    direction = point - start
+    squared = dot(direction, direction)
+    possible = first.present & there & (squared > 0)
+    inverse = f4(1) / np.sqrt(np.where(possible, squared, f4(1)))
+    direction *= inverse
+    if not possible.all():
+        np.copyto(direction, shade.frame.z.reshape(3, *shape), where=~possible)
+    cos_target = -dot(ng, direction)
+    possible &= cos_target > 0
     if scene.corner_normals is not None:
-        there &= -dot(target.ns, direction) > GRAZING
-    local = shade.frame.to_local(direction)
+        possible &= -dot(target.ns[:, None], direction) > GRAZING
+    wi = direction.reshape(3, -1)
+    local = shade.frame.to_local(wi)
     f, pdf = evaluate(shade, local)
     if shade.guidance is not None:
-        pdf = shade.guidance.mixed(ALL, direction, pdf)
-    cos, _ = shade.cosines(local, direction)
+        pdf = shade.guidance.mixed(ALL, wi, pdf)
+    cos, _ = shade.cosines(local, wi)
     f = f * cos
     # paths without throughput end at their first point
-    there &= (pdf > 0) & (highest(f) != 0)
-    geometry = np.where(there, cos_target * inverse * inverse, f4(0))
-    ask = there if scene.opacities is not None else there & ~own
-    lanes = np.flatnonzero(ask)
+    possible &= ((pdf > 0) & (highest(f) != 0)).reshape(shape)
+    geometry = np.where(possible, cos_target * inverse * inverse, f4(0))
+    if scene.opacities is None:
+        possible[member] = False
+    lanes = np.flatnonzero(possible)
     rays = ShadowRays(
-        origin=take(start, lanes),
-        direction=take(direction, lanes),
+        origin=take(start.reshape(3, -1), lanes),
+        direction=take(wi, lanes),
         exclude_prim=take(surface.prim, lanes),
-        error=take(surface.error, lanes) + take(target.error, lanes),
-        distance=f4(1) / inverse.take(lanes),
-        cos_light=cos_target.take(lanes),
+        error=take(surface.error, lanes) + take(target.error, lanes % there.size),
+        distance=f4(1) / take(inverse.reshape(-1), lanes),
+        cos_light=take(cos_target.reshape(-1), lanes),
     )
-    geometry[lanes] *= _transmittance(scene, rays)
-    return Connections(f, geometry, pdf * geometry)
+    geometry.reshape(-1)[lanes] *= _transmittance(scene, rays)
+    return Connections(f.reshape(3, *shape), geometry, pdf.reshape(shape) * geometry)
 
 
 def _transmittance(scene: CompiledScene, rays: ShadowRays) -> Floats:
@@ -210,12 +239,10 @@ def _transmittance(scene: CompiledScene, rays: ShadowRays) -> Floats:
     return transmittance_along(scene, rays)[0]
 
 
-def _sums(values: Floats, cell: Ints, count: int) -> Floats:
-    """Return the sum (count,) over each tile of values (n,), given the place of each in (members, tiles)."""
-    rows = np.zeros(MEMBERS * count, f4)
-    rows[cell] = values
-    total = np.zeros(count, f4)
-    for row in rows.reshape(MEMBERS, count):  # in order, for the same bits in any wave
+def _sum(values: Floats) -> Floats:
+    """Return the sum (t,) of rows (members, t), in order, for the same bits in any wave."""
+    total = np.zeros(values.shape[1], f4)
+    for row in values:
         total += row
     return total
 

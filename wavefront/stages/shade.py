@@ -16,7 +16,7 @@ from ..record import record
 from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
 from ..state import Contribution, Hits, Paths, SurfaceInteraction
-from ..vec import Floats, Ints, Lanes, broadcast, column, dot, f4, highest, take
+from ..vec import ALL, Floats, Ints, Lanes, broadcast, column, dot, f4, highest, take
 from .interaction import interaction, offset_origin, origin_above
 from .intersect import ShadowRays, shadow_rays, visible
 from .transmittance import transmittance_along
@@ -46,7 +46,7 @@ class Shading:
     frame: Frame
     wo: Floats  # (3, n) local frame; +z if all BSDFs are view-independent
     start: Floats  # (3, n) origins of rays that leave to the side of wo, scene units
-    groups: list[tuple[slice, Bsdf]]  # lanes of each group, in order, and its material bound to them
+    groups: list[tuple[Lanes, Bsdf]]  # lanes of each group, in order, and its material bound to them
     guidance: Guidance | None = None  # of the lanes of `lit`; None where BSDFs alone choose directions
 
     def lit(self) -> Shading:
@@ -57,6 +57,17 @@ class Shading:
         first = slice(groups[-1][0].stop if groups else 0)
         parts = self.surface.take(first), self.frame.take(first), self.wo[:, first], self.start[:, first]
         return Shading(*parts, groups, self.guidance)
+
+    def at(self, scene: CompiledScene, lanes: Ints) -> Shading:
+        """Return the surfaces of some lanes (k,) of `lit`, in any order."""
+        surface = self.surface.take(lanes)
+        if self.surface.ns is self.surface.ng:
+            surface.ns = surface.ng
+        guidance = self.guidance
+        if guidance is not None:
+            guidance = Guidance(guidance.table, guidance.row.take(lanes), guidance.share.take(lanes))
+        groups = list(_groups_of_unordered(scene.materials, surface))
+        return Shading(surface, self.frame.take(lanes), take(self.wo, lanes), take(self.start, lanes), groups, guidance)
 
     def cosines(self, local: Floats, world: Floats) -> tuple[Floats, Floats]:
         """Return |cosθ| (n,) of directions, known in both frames, and their cosine against `ng`, (n,).
@@ -119,6 +130,19 @@ def _groups(materials: MaterialTable, surface: SurfaceInteraction) -> Iterator[t
     for number in np.flatnonzero(np.diff(starts)):
         lanes = slice(int(starts[number]), int(starts[number + 1]))
         yield lanes, materials.groups[number].bind(surface.take(lanes))
+
+
+def _groups_of_unordered(
+    materials: MaterialTable, surface: SurfaceInteraction
+) -> Iterator[tuple[Lanes, Bsdf]]:
+    """Yield the lanes of each group that occurs, of surfaces in any order, and its BSDF bound to them."""
+    group_of = materials.group_of.take(surface.material)
+    for number, group in enumerate(materials.groups):
+        lanes = np.flatnonzero(group_of == number)
+        if lanes.size == len(surface):
+            yield ALL, group.bind(surface)
+        elif lanes.size:
+            yield lanes, group.bind(surface.take(lanes))
 
 
 def direct(
