@@ -12,7 +12,7 @@ from .integrators import accumulate, intersect_and_compact, prepare_shading
 from .record import record
 from .sampling.sampler import Sampler
 from .scene import Scene
-from .stages.bounce import branch
+from .stages.bounce import branch, copies
 from .stages.compact import roulette, select
 from .stages.generate import generate
 from .stages.shade import direct
@@ -31,6 +31,7 @@ class PathChecker:
     filter: Filter
     max_bounces: int
     branches: int
+    copies: int  # in which a path goes on from its second surface where pixels share what it finds
     light_samples: bool  # at surfaces
     mis: bool  # light samples are weighted against BSDF samples
 
@@ -42,9 +43,14 @@ class PathChecker:
         """
         address = np.array([pixel], np.uint32), np.array([sample], np.uint32)
         with np.errstate(all="ignore"):
-            return self._first_fault(generate(self.scene, self.camera, self.sampler, *address, self.filter))
+            for of_second in sorted({1, self.copies}):
+                paths = generate(self.scene, self.camera, self.sampler, *address, self.filter)
+                fault = self._first_fault(paths, of_second)
+                if fault:
+                    return fault
+        return ""
 
-    def _first_fault(self, paths: Paths) -> str:
+    def _first_fault(self, paths: Paths, of_second: int) -> str:
         for bounce in range(self.max_bounces + 1):
             radiance = np.zeros((3, 1), f4)
             paths, hits = intersect_and_compact(
@@ -70,6 +76,8 @@ class PathChecker:
                 of_surface: Bools = np.logical_or.reduce(_bad(paths).reshape(ways, -1), 0)
                 return self._at(bounce, shade.surface, of_surface, "BSDF sample of")
             paths = select(paths, roulette(paths, self.sampler, bounce, self.branches))
+            if bounce == 0 and of_second > 1:
+                paths = Paths.concatenate(copies(paths, of_second))
         return ""
 
     def _at(self, bounce: int, surface: SurfaceInteraction, bad: Bools, what: str) -> str:

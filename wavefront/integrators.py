@@ -27,7 +27,7 @@ from .sample_recorder import add_to_slots
 from .sampling.sampler import Sampler
 from .stages.alpha import alpha_pass_through
 from .stages.background import show_background
-from .stages.bounce import bounce_sample, branch
+from .stages.bounce import bounce_sample, branch, copies
 from .stages.caught_shadow import off_catchers
 from .stages.compact import alive, compact, roulette, scattering_lanes, select, specular_lanes
 from .stages.guidance import guide
@@ -35,7 +35,7 @@ from .stages.interaction import interaction
 from .stages.intersect import intersect
 from .stages.medium import absorb
 from .stages.normal_mapping import perturb_normals
-from .stages.reuse import add_shared, as_shared, can_reuse, shared_points
+from .stages.reuse import SHARED_WAYS, add_shared, as_shared, can_reuse, shared_points
 from .stages.shade import Shading, direct, emitted, mis_weighted, shading
 from .state import Contribution, Hits, Paths
 from .vec import Floats, Ints, f4, take
@@ -139,9 +139,11 @@ def li_reuse(
         return L
     lanes, points = shared_points(scene, paths, hits, branches)
     own = np.setdiff1d(np.arange(len(paths)), lanes, assume_unique=True)
-    shared, light = as_shared(paths.take(lanes)), np.zeros((3, lanes.size), f4)
     follow(scene, paths.take(own), hits.take(own), sampler, max_bounces, L, branches, table)
-    follow(scene, shared, hits.take(lanes), sampler, max_bounces, light, branches, table)
+    shared, hits, light = as_shared(paths.take(lanes)), hits.take(lanes), np.zeros((3, lanes.size), f4)
+    for paths in copies(shared, SHARED_WAYS):
+        follow(scene, paths, hits, sampler, max_bounces, light, branches, table)
+    light *= f4(1 / SHARED_WAYS)
     add_shared(scene, L, first, shade, points, light, tiles, branches)
     return L
 

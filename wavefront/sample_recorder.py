@@ -161,7 +161,7 @@ class SampleRecorder:
     def _record_features(self, paths: Paths, lanes: Ints, shade: Shading, albedo: Floats) -> None:
         """Record the features for a denoiser for lanes (k,), those of `shade`, that meet a rough surface."""
         assert paths.met_rough is not None
-        end = sum(part.stop - part.start for part, bsdf in shade.groups if not bsdf.specular)
+        end = len(shade.lit().surface)
         rough = slice(0, end)  # groups that are specular come last
         self._all_rough &= end == lanes.size
         slot = take(paths.slot, lanes[rough])

@@ -33,6 +33,7 @@ from .registry import Registry
 from .sampling.sampler import SAMPLERS, Sampler, SamplerMaker, make_sampler
 from .scheduling.budget import Budget, plan
 from .scheduling.executors import EXECUTORS, ExecutorLike, choose_executor, worker_count
+from .stages.reuse import SHARED_WAYS
 from .vec import Floats, f4
 
 DEFAULT_SPP = 100
@@ -507,7 +508,8 @@ class Settings:
         return plan(self.memory_limit, size, self.worker_count, self.wave_size, processes, layers)
 
     def _most_samples(self) -> int:
-        most = min(MAX_TERMS, MAX_BRANCH_SAMPLES // self.most_branches)
+        ways = self.most_branches if self.reuse is False else self.most_branches * SHARED_WAYS
+        most = min(MAX_TERMS, MAX_BRANCH_SAMPLES // ways)
         if self.samples is not None:
             return self._chosen_samples(self.samples, most)
         if self.spp is not None:

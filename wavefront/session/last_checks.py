@@ -6,6 +6,7 @@ from ..image import Image
 from ..integrators import INTEGRATORS, WITH_MIS, li_naive
 from ..outcome import check_first_samples, is_black_or_white, warn_of_clamped_light, warn_of_noise
 from ..scheduling.loop import RenderLoop
+from ..stages.reuse import SHARED_WAYS
 from .plan import Plan
 
 
@@ -62,6 +63,7 @@ def _cause_of_bad_sample(plan: Plan, loop: RenderLoop, pixel: int, sample: int) 
         tracer.filter,
         tracer.max_bounces,
         plan.choice.branches,
+        SHARED_WAYS if plan.choice.reuse else 1,
         light_samples=integrator is not li_naive,
         mis=integrator in WITH_MIS,
     )

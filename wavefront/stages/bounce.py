@@ -18,18 +18,25 @@ from .shade import Shading
 def branch(paths: Paths, shade: Shading, sampler: Sampler, bounce: int, ways: int) -> Paths:
     """Continue each path in several ways, each with an equal part of the throughput.
 
-    What comes before is shared by all. Sample s becomes the samples s·ways to s·ways + ways − 1 from
-    here on, so that the ways of all samples of a pixel are spread together.
+    What comes before is shared by all.
     """
     if ways == 1:
         return bounce_sample(paths, shade, sampler, bounce)
-    numbers = [paths.sample * np.uint32(ways) + np.uint32(way) for way in range(ways)]
-    parts = [bounce_sample(replace(paths, sample=sample), shade, sampler, bounce) for sample in numbers]
-    paths = Paths.concatenate(parts)
+    paths = Paths.concatenate([bounce_sample(each, shade, sampler, bounce) for each in copies(paths, ways)])
     paths.throughput *= f4(1 / ways)
     if paths.recorder is not None:
         paths.recorder.branched(ways)
     return paths
+
+
+def copies(paths: Paths, count: int) -> list[Paths]:
+    """Return copies of paths that go on with different random numbers.
+
+    Sample s becomes the samples s·count to s·count + count − 1 from here on, so that the copies of all
+    samples of a pixel are spread together.
+    """
+    numbers = [paths.sample * np.uint32(count) + np.uint32(copy) for copy in range(count)]
+    return [replace(paths, sample=sample) for sample in numbers]
 
 
 def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -> Paths:
@@ -93,7 +100,7 @@ def _strayed(shade: Shading, wi: Floats, cos: Floats) -> Ints:
     if shade.surface.ns is shade.surface.ng:
         return np.zeros(0, np.intp)
     found = [
-        np.flatnonzero((cos[lanes] == 0) & (wi[2, lanes] != 0)) + lanes.start
+        take(np.arange(cos.size), lanes)[(cos[lanes] == 0) & (wi[2, lanes] != 0)]
         for lanes, bsdf in shade.groups
         if bsdf.transmissive
     ]

@@ -22,7 +22,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..compile.scene import CompiledScene
-from ..pixel_tiles import WaveTiles
+from ..pixel_tiles import MEMBERS, WaveTiles
 from ..record import record
 from ..state import Hits, Paths, SoA
 from ..vec import ALL, Bools, Floats, Ints, dot, f4, highest, spans, take
@@ -31,7 +31,8 @@ from .intersect import ShadowRays, visible
 from .shade import Shading, evaluate
 from .transmittance import transmittance_along
 
-TILES_AT_ONCE = 1024
+SHARED_WAYS = 2  # in which a path goes on from its shared point: many pixels use what it finds
+TILES_AT_ONCE = (1 << 14) // MEMBERS  # whose first points are connected together, so that they fit the cache
 GRAZING = f4(1 / 16)  # cosine to interpolated normals below which they may have been bent towards the viewer
 
 
@@ -156,7 +157,7 @@ class FirstPoints:
 
     @classmethod
     def of(cls, scene: CompiledScene, shade: Shading, lane_in: Ints) -> FirstPoints | None:
-        """Return the points of a grid (members, t) of lanes, -1 where there is none; None if there are none."""
+        """Return the points of a grid (members, t) of lanes, where -1 stands for none; None if all are -1."""
         present = lane_in >= 0
         some = lane_in[present]
         if not some.size:

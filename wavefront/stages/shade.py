@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -46,7 +47,9 @@ class Shading:
     frame: Frame
     wo: Floats  # (3, n) local frame; +z if all BSDFs are view-independent
     start: Floats  # (3, n) origins of rays that leave to the side of wo, scene units
-    groups: list[tuple[Lanes, Bsdf]]  # lanes of each group, in order, and its material bound to them
+    groups: list[
+        tuple[Lanes, Bsdf]
+    ]  # lanes of each group, and its material bound to them; slices but for `at`
     guidance: Guidance | None = None  # of the lanes of `lit`; None where BSDFs alone choose directions
 
     def lit(self) -> Shading:
@@ -54,20 +57,26 @@ class Shading:
         groups = [(lanes, bsdf) for lanes, bsdf in self.groups if not bsdf.specular]
         if len(groups) == len(self.groups):
             return self
-        first = slice(groups[-1][0].stop if groups else 0)
+        last = groups[-1][0] if groups else slice(0)
+        assert isinstance(last, slice)  # `compact` has ordered the lanes
+        first = slice(last.stop)
         parts = self.surface.take(first), self.frame.take(first), self.wo[:, first], self.start[:, first]
         return Shading(*parts, groups, self.guidance)
 
     def at(self, scene: CompiledScene, lanes: Ints) -> Shading:
-        """Return the surfaces of some lanes (k,) of `lit`, in any order."""
+        """Return the surfaces of some lanes (k,) of `lit`, in any order; a lane may occur again."""
         surface = self.surface.take(lanes)
         if self.surface.ns is self.surface.ng:
             surface.ns = surface.ng
-        guidance = self.guidance
-        if guidance is not None:
-            guidance = Guidance(guidance.table, guidance.row.take(lanes), guidance.share.take(lanes))
-        groups = list(_groups_of_unordered(scene.materials, surface))
-        return Shading(surface, self.frame.take(lanes), take(self.wo, lanes), take(self.start, lanes), groups, guidance)
+        parts = surface, self.frame.take(lanes), take(self.wo, lanes), take(self.start, lanes)
+        return Shading(*parts, list(_groups_anywhere(scene.materials, surface)), self._guidance_at(lanes))
+
+    def _guidance_at(self, lanes: Ints) -> Guidance | None:
+        if self.guidance is None:
+            return None
+        return replace(
+            self.guidance, row=self.guidance.row.take(lanes), share=self.guidance.share.take(lanes)
+        )
 
     def cosines(self, local: Floats, world: Floats) -> tuple[Floats, Floats]:
         """Return |cosθ| (n,) of directions, known in both frames, and their cosine against `ng`, (n,).
@@ -120,8 +129,8 @@ def shading(scene: CompiledScene, surface: SurfaceInteraction) -> Shading:
     return Shading(surface, frame, wo, origin_above(surface), groups)
 
 
-def _groups(materials: MaterialTable, surface: SurfaceInteraction) -> Iterator[tuple[slice, Bsdf]]:
-    """Yield the lanes of each group that occurs, and its BSDF bound to them."""
+def _groups(materials: MaterialTable, surface: SurfaceInteraction) -> Iterator[tuple[Lanes, Bsdf]]:
+    """Yield the lanes of each group that occurs, which follow each other, and its BSDF bound to them."""
     if len(materials.groups) == 1:
         yield slice(0, len(surface)), materials.groups[0].bind(surface)
         return
@@ -132,10 +141,8 @@ def _groups(materials: MaterialTable, surface: SurfaceInteraction) -> Iterator[t
         yield lanes, materials.groups[number].bind(surface.take(lanes))
 
 
-def _groups_of_unordered(
-    materials: MaterialTable, surface: SurfaceInteraction
-) -> Iterator[tuple[Lanes, Bsdf]]:
-    """Yield the lanes of each group that occurs, of surfaces in any order, and its BSDF bound to them."""
+def _groups_anywhere(materials: MaterialTable, surface: SurfaceInteraction) -> Iterator[tuple[Lanes, Bsdf]]:
+    """Yield the lanes of each group that occurs, in any order, and its BSDF bound to them."""
     group_of = materials.group_of.take(surface.material)
     for number, group in enumerate(materials.groups):
         lanes = np.flatnonzero(group_of == number)
