@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import multiprocessing
 import os
 import signal
@@ -15,6 +16,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, cast
 
+import imageio.v3 as iio
 import numpy as np
 import pytest
 from scenes import cornell_box
@@ -428,6 +430,7 @@ class Client:
         self.socket = websockets.connect(
             address, subprotocols=[protocol], compression=None, max_size=None, **options
         )
+        self._looked = False
 
     def send(self, kind: str, **values: Any) -> None:
         """Send a message."""
@@ -446,6 +449,9 @@ class Client:
             "look_at": (0.0, 0, 0),
             "up_direction": (0.0, 1, 0),
         }
+        if not self._looked:  # where pages are before they take the view
+            self.send("ViewerCameraMessage", **(camera | {"position": (0, 0, -5.0)}))
+        self._looked = True
         self.send("ViewerCameraMessage", **(camera | values))
 
 
@@ -525,6 +531,37 @@ def test_nothing_but_the_page_is_served(viewer: wf.Viewer) -> None:
         "/index.php",
     ):
         assert status(path) == 404
+
+
+def test_a_page_gets_a_picture_with_its_first_requests(viewer: wf.Viewer) -> None:
+    """The newest one, as a jpg that pages of other sites cannot read, not even by a name that leads here."""
+    codes = viewer.wait_for_picture(SOON).to_uint8().astype(float)
+    assert eventually(lambda: first(viewer.url).shape == codes.shape)
+    assert np.abs(first(viewer.url) - codes).mean() < 3
+    for headers in ({"Host": "evil.example"}, {"Origin": "http://evil.example"}):
+        with pytest.raises(urllib.error.HTTPError, match="404"):
+            first(viewer.url, headers)
+
+
+def first(url: str, headers: dict[str, str] | None = None) -> np.ndarray:
+    """Return the picture that a page fetches while it loads."""
+    request = urllib.request.Request(f"{url}/first.jpg", headers=headers or {})
+    with urllib.request.urlopen(request, timeout=SOON) as answer:
+        assert answer.headers["Cross-Origin-Resource-Policy"] == "same-origin"
+        assert answer.headers["Cache-Control"] == "no-store"
+        return iio.imread(answer.read())
+
+
+@pytest.mark.parametrize("encoding", ["gzip", "identity"])
+def test_the_page_is_that_of_viser_with_a_picture(viewer: wf.Viewer, encoding: str) -> None:
+    """And with our title; compressed if the browser can read that."""
+    request = urllib.request.Request(viewer.url, headers={"Accept-Encoding": encoding})
+    with urllib.request.urlopen(request, timeout=SOON) as answer:
+        page = answer.read()
+        assert answer.headers.get("Content-Encoding", "identity") == encoding
+    page = gzip.decompress(page) if encoding == "gzip" else page
+    assert page.count(b"url(/first.jpg)") == page.count(b"<title>wavefront</title>") == 1
+    assert b'<div id="root"></div>' in page
 
 
 def test_a_viewer_refuses_what_it_cannot_do() -> None:

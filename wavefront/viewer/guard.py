@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -29,10 +30,19 @@ def may_connect(origin: str | None, host: str | None, own: str) -> bool:
     return own not in LOCAL or name in LOCAL
 
 
-def guard(server: Any, own: str) -> None:
+def guard(server: Any, own: str, let_in: Callable[[], object]) -> None:
     """Refuse pages of other sites, and all messages but cameras and values, of a `viser.ViserServer`.
 
     Viser itself also takes uploads, commands, and the request to open a tunnel to the internet.
+
+    Parameters
+    ----------
+    server
+        The server.
+    own
+        The host that it listens at.
+    let_in
+        Called before anything is sent to a page that may connect.
     """
     from viser._messages import GuiUpdateMessage
 
@@ -43,6 +53,8 @@ def guard(server: Any, own: str) -> None:
         headers = socket.request.headers
         if not may_connect(headers.get("Origin"), headers.get("Host"), own):
             await socket.close(FORBIDDEN, "this page is of another site")
+        else:
+            let_in()
 
     async def update(client_id: Any, message: Any) -> None:
         if is_value(message.updates):

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..codecs import png_jpeg
 from ..errors import SceneError, one_of
+from .front import Front, asked_first
 from .guard import guard
 from .refiner import ViewerFrame
 from .shown import CHOICES, shown_codes
@@ -27,6 +28,7 @@ COPY = (
     "const c=this.dataset.code;(navigator.clipboard?navigator.clipboard.writeText(c):Promise.reject())"
     ".then(()=>{this.textContent='copied'},()=>prompt('Copy the camera:',c))"
 )
+LINE = "padding:0 0.6em 0.6em;font-size:0.9em"
 BUTTON = (
     "width:100%;padding:0.5em;border:0;border-radius:0.3em;cursor:pointer;"
     "background:#2b6cb0;color:#fff;font:inherit;font-size:0.85em"
@@ -71,8 +73,8 @@ class Page:
         self._frame: ViewerFrame | None = None
         self._fresh = self._closed = False
         self._codes: NDArray[np.uint8] | None = None  # of the picture that is shown
-        self._server = _serve(host, port)
-        guard(self._server, host)
+        self._server = _serve(host, port, Front(host, self._picture))
+        guard(self._server, host, lambda: self._begin_at(self.viewpoint))
         self.url = f"http://{_address(host)}:{self._server.get_port()}"
         self._add_camera()
         self._add_controls()
@@ -94,7 +96,8 @@ class Page:
 
     def say(self, text: str) -> None:
         """Show a line of text in place of the state of the picture."""
-        self._state.content = escape(text)
+        self._state.content = _line(text)
+        self._copy.content = self._copy_button()
 
     def close(self) -> None:
         """End the server and all threads."""
@@ -109,9 +112,15 @@ class Page:
     # --- What the page has ----------------------------------------------------------------------------
 
     def _add_camera(self) -> None:
-        view, around = self._viewpoint, self._viewpoint.surroundings
+        view = self._viewpoint
+        self._server.scene.configure_environment_map(None)  # no light, as there is nothing but a picture
+        self._server.scene.configure_default_lights(False)
         self._server.scene.set_up_direction(view.up)
-        camera = self._server.initial_camera
+        self._begin_at(view)
+
+    def _begin_at(self, view: Viewpoint) -> None:
+        """Let pages that connect begin with a view."""
+        camera, around = self._server.initial_camera, view.surroundings
         camera.up = np.array(view.up)
         camera.position = around.to_page(view.origin)
         camera.look_at = around.to_page(view.target)
@@ -121,7 +130,7 @@ class Page:
         gui, view = self._server.gui, self._viewpoint
         gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
         gui.set_panel_label("wavefront")
-        self._state = gui.add_markdown("")
+        self._state = gui.add_html(_line("…"))  # markdown would be compiled for each picture
         layer = gui.add_dropdown("layer", tuple(CHOICES), initial_value="rgb")
         layer.on_update(self._on(lambda event: self._show_as(choice=event.target.value)))
         exposure = gui.add_slider("exposure", -STOPS, STOPS, 0.1, 0.0, hint="stops")
@@ -154,13 +163,21 @@ class Page:
         return react
 
     async def _greet(self, client: Any) -> None:
-        client.camera.on_update(self._on(self._move))
-        await self._on(self._move)(client.camera)
+        """Follow the camera of a page that has connected; it does not have the view of the others yet."""
+        client.camera.on_update(self._on(partial(self._move, client.camera.position)))
+        await self._on(self._resize)(client.camera)
         self._connected()
 
-    def _move(self, camera: Any) -> None:
+    def _move(self, first: NDArray[np.float64], camera: Any) -> None:
+        """Show the view of a page, unless its camera is where it was at first, before it took the view."""
+        if np.array_equal(first, camera.position):
+            self._resize(camera)
+            return
         view = self.viewpoint.moved(camera.position, camera.look_at, camera.up_direction)
         self._change(view.resized(camera.image_width, camera.image_height))
+
+    def _resize(self, camera: Any) -> None:
+        self._change(self.viewpoint.resized(camera.image_width, camera.image_height))
 
     def _set_lens(self, name: str, event: Any) -> None:
         self._change(self.viewpoint.with_lens(**{name: event.target.value}))
@@ -173,7 +190,6 @@ class Page:
             if viewpoint == self._viewpoint:
                 return
             self._viewpoint = viewpoint
-        self._copy.content = self._copy_button()
         self._look(viewpoint)
 
     def _show_as(self, choice: str | None = None, exposure: Any = None) -> None:
@@ -194,6 +210,12 @@ class Page:
             event.client.send_file_download("wavefront.png", png, save_immediately=True)
 
     # --- What the page shows --------------------------------------------------------------------------
+
+    def _picture(self) -> bytes | None:
+        """Return what is shown, as a jpg; None if there is nothing yet."""
+        with self._lock:
+            codes = self._codes
+        return None if codes is None else png_jpeg.encode(codes, ".jpg", 2.2)
 
     def _refresh(self) -> None:
         """Wake the presenter; the lock is held."""
@@ -227,12 +249,19 @@ class Page:
         of = "" if self._most_spp is None else f" of {self._most_spp}"
         noise = frame.image.metadata["noise"]
         error = f" · error {noise:.2%}" if np.isfinite(noise) else ""
-        self._state.content = f"{width} × {height} · {frame.image.spp}{of} spp{error}"
+        self._state.content = _line(f"{width} × {height} · {frame.image.spp}{of} spp{error}")
+        if (width, height) == frame.camera.film:  # not with the first picture of a view, which is in a hurry
+            self._copy.content = self._copy_button()
         self._server.flush()  # viser would wait for more messages
 
 
-def _serve(host: str, port: int) -> Any:
-    """Start a server of viser."""
+def _line(text: str) -> str:
+    """Return a line of text for the panel."""
+    return f'<div style="{LINE}">{escape(text)}</div>'
+
+
+def _serve(host: str, port: int, front: Front) -> Any:
+    """Start a server of viser that asks `front` first."""
     import viser
 
     try:
@@ -241,7 +270,7 @@ def _serve(host: str, port: int) -> Any:
             free.bind(address)
     except (OSError, UnicodeError) as error:
         raise SceneError(f"the viewer cannot listen at host {host!r}: {error}") from error
-    with _silence():
+    with _silence(), asked_first(front):
         return viser.ViserServer(host, port, verbose=False)
 
 

@@ -13,10 +13,7 @@ from ..session import Session
 
 FIRST_DIVISOR = 4  # of the width and height of the first picture of a view
 MOST = 8  # as a divisor, so that there is something to see
-TOO_LONG, SHORT = (
-    0.12,
-    0.03,
-)  # seconds for the first picture of a view; the next one becomes smaller, or larger
+TOO_LONG, SHORT = 0.06, 0.015  # seconds for the first picture of a view; the next one is smaller, or larger
 LEAST_SIDE = 16  # pixels of the first picture of a view
 PATIENCE = 2.0  # seconds that the first view waits in lower resolution for somebody to look at it
 
