@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -21,7 +22,9 @@ from threadpoolctl import threadpool_info, threadpool_limits
 import wavefront as wf
 from wavefront.scheduling.executors import MIN_PATHS, MIN_PATHS_TO_SPAWN, choose_executor, worker_count
 from wavefront.scheduling.pool import WorkerPool
-from wavefront.scheduling.shared import STOP, SharedInt, Stopped
+from wavefront.scheduling.processes import ProcessPool
+from wavefront.scheduling.shared import AT_ONCE, STOP, SharedInt, Stopped
+from wavefront.scheduling.workers import all_done
 
 LINUX = sys.platform.startswith("linux")
 EXECUTORS = ["threads", pytest.param("processes", marks=pytest.mark.skipif(not LINUX, reason="needs fork"))]
@@ -352,3 +355,18 @@ def test_a_queue_of_results_is_closed_by_two_threads_at_once() -> None:
     finally:
         sys.setswitchinterval(interval)
     assert failures == []
+
+
+@processes
+def test_killed_processes_with_jobs_that_wait_are_collected() -> None:
+    """All futures end, the thread of the pool goes on to its end, and no process is left in any state."""
+    stop = SharedInt()
+    pool = ProcessPool("fork", 1, stop)
+    futures = [pool.submit(time.sleep, 30) for _ in range(8)]
+    pids = [process.pid for process in pool._context.processes]
+    stop.rise_to(AT_ONCE)
+    assert not all_done(futures, 0, stop)
+    pool.shutdown(futures)
+    assert all(isinstance(future.exception(2), BrokenExecutor) for future in futures)
+    assert pids
+    assert not any(Path(f"/proc/{pid}").exists() for pid in pids)

@@ -73,11 +73,17 @@ class ProcessPool:
         self._pool = ProcessPoolExecutor(self._count, context, _initialize_worker, (work,))
 
     def submit(self, function: Callable[..., Any], /, *args: Any) -> Future[Any]:
-        """Have the first process that is free call a function; processes start with the first tasks."""
+        """Have the first process that is free call a function; processes start with the first tasks.
+
+        The future cannot be canceled: set the stop flag to end jobs early.
+        """
+        answer = _Answer()
         if len(self._context.processes) == self._count:
-            return self._pool.submit(function, *args)
+            self._pool.submit(function, *args).add_done_callback(answer.follow)
+            return answer
         with _blocking_ctrl_c(), _forking() if self._forks else _without_main():
-            return self._pool.submit(function, *args)
+            self._pool.submit(function, *args).add_done_callback(answer.follow)
+            return answer
 
     def shutdown(self, running: Collection[Future[Any]]) -> None:
         """Let the processes end when their jobs are done or stopped, or else kill them.
@@ -99,6 +105,26 @@ class ProcessPool:
         except BaseException:
             self._context.kill()
             raise
+
+
+class _Answer(Future[Any]):
+    """A future that cannot be canceled.
+
+    When processes were killed, the thread of `ProcessPoolExecutor` in Python 3.11 fails at the first future
+    that was canceled before it had begun, and so leaves the other futures open and the processes unreaped.
+    """
+
+    def cancel(self) -> bool:
+        """Return False: the job goes on."""
+        return False
+
+    def follow(self, done: Future[Any]) -> None:
+        """Take the outcome of a future that is done."""
+        error = done.exception()
+        if error is None:
+            self.set_result(done.result())
+        else:
+            self.set_exception(error)
 
 
 class _ResultQueue(SimpleQueue):
