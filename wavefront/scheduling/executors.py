@@ -146,8 +146,10 @@ def _workers_in(executor: str | ExecutorLike | None) -> int | None:
     """Return how many workers an executor has; None if it does not say."""
     if isinstance(executor, DaskClient):
         return sum(executor.nthreads().values())
-    size = getattr(executor, "_max_workers", None) if isinstance(executor, Executor) else None
-    return size if isinstance(size, int) else None
+    if not isinstance(executor, Executor):
+        return None
+    sizes = getattr(executor, "_max_workers", None), getattr(executor, "num_workers", None)  # the latter: MPI
+    return next((size for size in sizes if isinstance(size, int) and size > 0), None)
 
 
 def choose_executor(executor: str | ExecutorLike | None, workers: int, paths: int) -> str | ExecutorLike:
