@@ -26,7 +26,6 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx_gallery.gen_gallery",
-    "sphinxcontrib.mermaid",
 ]
 root_doc = "docs/index"
 include_patterns = ["docs/**", "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "benchmarks/README.md"]
@@ -42,7 +41,6 @@ html_additional_pages = {"index": "to_the_index.html"}
 html_show_sphinx = False
 html_copy_source = False
 
-myst_fence_as_directive = ["mermaid"]
 myst_heading_anchors = 4
 
 autosummary_generate = True

@@ -1,6 +1,6 @@
 """The Cornell box: the classic room with two boxes.
 
-python examples/cornell_box.py [out.png] [--spp 100] [--size 512]
+python examples/cornell_box.py [out.png] [--spp 16] [--size 512]
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def cornell_box(size: int = 512) -> wf.Scene:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("output", nargs="?", default="cornell_box.png")
-    parser.add_argument("--spp", type=int, default=100)
+    parser.add_argument("--spp", type=int, default=16)
     parser.add_argument("--size", type=int, default=512)
     options = parser.parse_args()
     wf.render(cornell_box(options.size), options.spp).save(options.output)

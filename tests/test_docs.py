@@ -148,6 +148,30 @@ def test_pictures_are_small_and_are_pictures():
         assert picture.read_bytes().startswith(b"\x89PNG"), picture.name
 
 
+PICTURE = re.compile(r"!\[([^\]]+)\]\((\S+)\)")
+
+
+@pytest.mark.parametrize("page", sorted((ROOT / "docs" / "how_to").glob("*.md")), ids=lambda page: page.stem)
+def test_a_how_to_page_shows_what_its_code_makes(page):
+    """A small picture, described for those who do not see it."""
+    shown = PICTURE.findall(page.read_text("utf-8"))
+    assert shown
+    for _, path in shown:
+        picture = page.parent / path
+        assert picture.stat().st_size < 60_000, path
+        assert wf.Image.load(picture).rgb.std() > 0.02, path
+
+
+def test_pages_load_nothing_from_other_servers():
+    """No diagram that needs a script, and no extension that brings one."""
+    settings = (ROOT / "docs" / "conf.py").read_text("utf-8")
+    assert "mermaid" not in settings
+    for page in PAGES:
+        text = page.read_text("utf-8")
+        assert "```mermaid" not in text, page.name
+        assert not [path for _, path in PICTURE.findall(text) if ":" in path], page.name
+
+
 def test_the_conventions_hold_for_the_constant_environment():
     """The claim on conventions.md: a floor of reflectance 0.5 in an environment of 1 is 0.5."""
     floor = wf.Rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2), material=wf.Diffuse(0.5))
