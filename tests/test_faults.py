@@ -189,6 +189,60 @@ def test_layers_leave_the_same_samples_out() -> None:
     np.testing.assert_allclose(image.direct + image.indirect, image.rgb, rtol=1e-5)
 
 
+class SpoiledAlbedo(wf.Diffuse):
+    """A material that scatters well, and has no albedo in directions from one side."""
+
+    value = np.nan
+
+    def albedo(self, wo: Any) -> Any:
+        """Spoil some."""
+        return np.where(wo[0] > 0.1, f4(self.value), f4(0.5)) * np.ones((3, 1), f4)
+
+
+def wall_of(material: Any) -> wf.Scene:
+    """A wall that is seen from above and, where x > 0, from the right."""
+    wall = wf.Rectangle((-9, -9, 0), (18, 0, 0), (0, 18, 0), material=material, name="wall")
+    camera = wf.Camera.look_at((0, 0, 5), (0, 0, 0), fov=60, size=(16, 16))
+    return wf.Scene([wall], [wf.Environment(1)], camera)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("layer", ["albedo", "denoising_albedo"])
+def test_a_layer_that_is_not_finite_is_dropped_counted_and_named(layer: str, value: float) -> None:
+    """With its sample, in the picture, too, whose radiance is finite; the mean is that of the others."""
+    material = SpoiledAlbedo(0.5)
+    material.value = value
+    assert render(wall_of(material), 4).metadata["bad_samples"] == 0  # nobody has asked
+    with pytest.raises(wf.RenderError, match="not finite and were dropped") as caught:
+        render(wall_of(material), 16, aovs=layer)
+    text, image = str(caught.value), caught.value.image
+    assert f"bounce 0, layer {layer!r} at material SpoiledAlbedo of 'wall'" in text
+    assert int(text.split()[0]) == image.metadata["bad_samples"] == 16 * 256 - image.counts.sum()
+    assert 0 < image.counts.sum() < 16 * 256
+    there = image.counts > 0
+    assert (image.layers[layer][there] == 0.5).all()
+    assert not image.layers[layer][~there].any()
+    assert (image.rgb[there] > 0).all()
+
+
+def test_a_normal_that_is_not_finite_is_dropped() -> None:
+    """Although nothing is shaded there, so that the picture is finite."""
+    scene = wall_of(wf.Diffuse(0.5))
+
+    def spoil(surface: Any) -> None:
+        surface.ns = surface.ns.copy()
+        surface.ns[:, surface.point[0] > 1] = np.nan
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("wavefront.sample_recorder.perturb_normals", lambda scene, surface: spoil(surface))
+        with pytest.raises(wf.RenderError, match="were not finite and were dropped") as caught:
+            render(scene, 4, aovs="denoising_normal", max_bounces=0)
+    image = caught.value.image
+    assert 0 < image.metadata["bad_samples"] < 4 * 256
+    assert np.isfinite(image.denoising_normal).all()
+    assert (image.denoising_normal[image.counts > 0] == (0, 0, 1)).all()
+
+
 @pytest.mark.filterwarnings("ignore:.*were not finite")
 @pytest.mark.parametrize(
     "cut", [{"wave_size": 700}, {"workers": 3, "executor": "threads", "wave_size": 1000}]

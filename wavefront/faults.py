@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from .camera import Camera
@@ -15,9 +17,9 @@ from .scene import Scene
 from .stages.bounce import branch, copies
 from .stages.compact import roulette, select
 from .stages.generate import generate
-from .stages.shade import direct
+from .stages.shade import Shading, direct
 from .state import Paths, SurfaceInteraction
-from .vec import Bools, f4
+from .vec import Bools, Floats, f4
 
 
 @record
@@ -34,6 +36,7 @@ class PathChecker:
     copies: int  # in which a path goes on from its second surface where pixels share what it finds
     light_samples: bool  # at surfaces
     mis: bool  # light samples are weighted against BSDF samples
+    layers: tuple[str, ...] = ()  # sampled ones that are asked for
 
     def first_fault(self, pixel: int, sample: int) -> str:
         """Return the bounce and the material where a path gets a value that is not finite.
@@ -63,6 +66,10 @@ class PathChecker:
             shade = prepare_shading(self.scene, paths, hits)
             if _bad(paths).any():
                 return self._at(bounce, shade.surface, _bad(paths), "absorption in front of")
+            for name, layer in self._surface_layers(shade, bounce):
+                bad = np.asarray(np.isnan(layer).any(0))
+                if bad.any():
+                    return self._at(bounce, shade.surface, bad, f"layer {name!r} at")
             if self.light_samples:
                 lit = direct(self.scene, paths, shade, self.sampler, bounce, mis=self.mis)
                 accumulate(radiance, paths, lit)
@@ -79,6 +86,14 @@ class PathChecker:
             if bounce == 0 and of_second > 1:
                 paths = Paths.concatenate(copies(paths, of_second))
         return ""
+
+    def _surface_layers(self, shade: Shading, bounce: int) -> Iterator[tuple[str, Floats]]:
+        """Yield the layers that a surface gives a path which meets it, by name."""
+        for name in self.layers:
+            if (name == "albedo" and bounce == 0) or name == "denoising_albedo":
+                yield name, shade.albedo()
+            if name == "denoising_normal":
+                yield name, shade.surface.ns
 
     def _at(self, bounce: int, surface: SurfaceInteraction, bad: Bools, what: str) -> str:
         """Name the material of the first bad lane; of the first of all where only their sum is bad."""

@@ -10,7 +10,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from .bsdfs import albedo_of
 from .compile.scene import CompiledScene
 from .errors import SceneError
 from .layer_samples import BOUNDED, FixedPointSamples, LayerSamples, fixed_point
@@ -132,7 +131,7 @@ class SampleRecorder:
             return
         albedo = None
         if awaited.first and "albedo" in self._values:
-            albedo = _albedo(shade)
+            albedo = shade.albedo()
             put(self._values["albedo"], paths.slot, albedo)
         if paths.met_rough is None:
             return
@@ -141,7 +140,7 @@ class SampleRecorder:
             return
         if lanes.size < len(paths):  # so these are not the first surfaces
             shade = shading(scene, shade.surface.take(lanes))
-        self._record_features(paths, lanes, shade, _albedo(shade) if albedo is None else albedo)
+        self._record_features(paths, lanes, shade, shade.albedo() if albedo is None else albedo)
 
     def _needs_surfaces(self, paths: Paths, first: bool) -> bool:
         """Return whether a layer needs the next surfaces of the paths."""
@@ -234,8 +233,8 @@ class SampleRecorder:
 
     # --- The result -----------------------------------------------------------------------------------
 
-    def result(self, integrator: object, radiance: Floats, samples: int, dropped: Ints) -> LayerSamples:
-        """Return the layers.
+    def finish(self, integrator: object, radiance: Floats) -> Bools:
+        """Record what is left, and return a mask (n,) of the slots whose layers are all finite.
 
         Parameters
         ----------
@@ -243,10 +242,6 @@ class SampleRecorder:
             What has traced the paths.
         radiance
             (3, n) that it returned.
-        samples
-            Of each pixel.
-        dropped
-            Slots of samples that are dropped, because they were not finite; they count as 0.
 
         Raises
         ------
@@ -255,6 +250,22 @@ class SampleRecorder:
         """
         self._check(integrator, radiance)
         self._shade_awaited()
+        finite: Bools = np.ones(radiance.shape[1], np.bool_)
+        for values in (*self._values.values(), *self._light.values()):
+            for row in values:
+                finite &= np.isfinite(row)
+        return finite
+
+    def result(self, samples: int, dropped: Ints) -> LayerSamples:
+        """Return the layers, after `finish`.
+
+        Parameters
+        ----------
+        samples
+            Of each pixel.
+        dropped
+            Slots of samples that are dropped, because they were not finite; they count as 0.
+        """
         light = {name: values.reshape(3, samples, -1) for name, values in self._light.items()}
         for values in self._light.values():
             values[:, dropped] = 0
@@ -334,14 +345,6 @@ def _is_direct(scattered: Bytes, contribution: Contribution) -> Bools:
     """Return a mask (k,) of the contributions that count for the layer "direct"."""
     at = take(scattered, contribution.lanes)
     return at == NOT_YET if contribution.sampled else at <= JUST_ONCE
-
-
-def _albedo(shade: Shading) -> Floats:
-    """Return the albedo of surfaces, (3, n)."""
-    albedo = np.empty_like(shade.surface.ns)
-    for lanes, bsdf in shade.groups:
-        albedo[:, lanes] = albedo_of(bsdf, take(shade.wo, lanes))
-    return albedo
 
 
 def add_to_slots(rows: Floats, slot: Ints, values: Floats) -> None:

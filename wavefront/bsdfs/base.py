@@ -190,20 +190,20 @@ def sampled(bsdf: Bsdf, wo: Floats, u: Floats) -> BsdfSample:
 
 
 def albedo_of(bsdf: Bsdf, wo: Floats) -> Floats:
-    """Return the albedo of a BSDF (3, n), limited to [0, 1].
+    """Return the albedo of a BSDF (3, n), limited to [0, 1]; what is not finite is NaN.
 
     Raises
     ------
     SceneError
-        If the BSDF returns an array of another shape, or values that are not finite.
+        If the BSDF returns an array of another shape.
     """
     albedo, n = bsdf.albedo(wo), wo.shape[1]
     if np.shape(albedo) not in ((3, n), (3, 1)):
         _check_shapes(bsdf, n, {"albedo": (albedo, 3)})
+    limited = np.clip(albedo, np.float32(0), np.float32(1))
     if not np.isfinite(albedo).all():
-        bad = albedo[~np.isfinite(albedo)][0]
-        raise SceneError(f"{type(bsdf).__name__}: albedo has the value {bad}; it must be finite")
-    return np.broadcast_to(np.clip(albedo, np.float32(0), np.float32(1)), (3, n))
+        limited[~np.isfinite(albedo)] = np.nan
+    return np.broadcast_to(limited, (3, n))
 
 
 def _check_shapes(bsdf: Bsdf, n: int, found: dict[str, tuple[Any, int | None]]) -> None:

@@ -98,8 +98,11 @@ def _trace_wave(tracer: Tracer, monitor: WaveMonitor, job: Job) -> WaveResult:
         recorder.prepare(paths)
     integrator = integrator_for(tracer.integrator, job.view.branches, job.view.reuse, tracer.table)
     radiance = integrator(scene, paths, sampler, tracer.max_bounces)
-    bad = np.flatnonzero(~np.isfinite(radiance).all(0))
-    layers = None if recorder is None else recorder.result(integrator, radiance, n, bad)
+    finite = np.isfinite(radiance).all(0)
+    if recorder is not None:
+        finite &= recorder.finish(integrator, radiance)
+    bad = np.flatnonzero(~finite)
+    layers = None if recorder is None else recorder.result(n, bad)
     radiance[:, bad] = 0
     return WaveResult(radiance.reshape(3, n, k), bad, accelerator.rays, time.perf_counter() - begin, layers)
 

@@ -66,5 +66,6 @@ def _cause_of_bad_sample(plan: Plan, loop: RenderLoop, pixel: int, sample: int) 
         SHARED_WAYS if plan.choice.reuse else 1,
         light_samples=integrator is not li_naive,
         mis=integrator in WITH_MIS,
+        layers=tracer.layers,
     )
     return checker.first_fault(pixel, sample)

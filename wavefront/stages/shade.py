@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..bsdfs import Bsdf, evaluated
+from ..bsdfs import Bsdf, albedo_of, evaluated
 from ..compile.materials import MaterialTable
 from ..compile.scene import CompiledScene
 from ..frame import Frame
@@ -77,6 +77,13 @@ class Shading:
         return replace(
             self.guidance, row=self.guidance.row.take(lanes), share=self.guidance.share.take(lanes)
         )
+
+    def albedo(self) -> Floats:
+        """Return the albedo of the surfaces, (3, n)."""
+        albedo = np.empty_like(self.surface.ns)
+        for lanes, bsdf in self.groups:
+            albedo[:, lanes] = albedo_of(bsdf, take(self.wo, lanes))
+        return albedo
 
     def cosines(self, local: Floats, world: Floats) -> tuple[Floats, Floats]:
         """Return |cosθ| (n,) of directions, known in both frames, and their cosine against `ng`, (n,).
