@@ -323,6 +323,21 @@ def test_wrong_files(tmp_path, capsys, no_render, command):
     assert "bad.obj" in error_of(capsys, [command, str(tmp_path / "bad.obj")])
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["rendr"], "; did you mean 'render'?; see wavefront --help"),
+        (["render", "a.obj", "--sample-count", "4"], "; did you mean --spp?; see wavefront render --help"),
+        (["render", "a.obj", "--most-bounces=3"], "; did you mean --max-bounces?"),
+        (["turntable", "a.obj", "--frame", "4", "--tonemap", "aces"], "; did you mean --tone?"),
+        (["render", "a.obj", "--sampler", "sobel"], "; did you mean 'sobol'?"),
+        (["info", "a.obj", "b.obj"], "unrecognized arguments: b.obj; see wavefront info --help"),
+    ],
+)
+def test_what_may_have_been_meant_is_said(capsys, words, message):
+    assert message in error_of(capsys, words)
+
+
 def test_no_command_is_an_error(capsys):
     assert "arguments are required: command; see wavefront --help" in error_of(capsys, [])
 

@@ -208,3 +208,13 @@ def test_false_alarms_of_renders(spp, sampler) -> None:
     found = np.array([levels(wf.compare(a, next(images))) for a in images])
     for chance in (0.01, 0.1):
         assert ((found <= chance).sum(0) <= most(pairs, chance)).all(), (found <= chance).mean(0)
+
+
+def test_the_table_says_what_the_p_value_means():
+    """For readers who do not remember which way round it is."""
+    scene = [wf.Sphere((0, 0, 0), 1), wf.Environment(1), wf.PointLight((2, 2, 2), 20)]
+    a, b = (wf.render(scene, 16, size=(32, 32), seed=seed, progress=False) for seed in (1, 2))
+    assert "noise alone   may well explain the difference (p_value " in str(wf.compare(a, b))
+    assert "noise alone   hardly explains the difference (p_value 0, limit 0.01)" in str(
+        wf.compare(a * 1.2, b)
+    )

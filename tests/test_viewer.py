@@ -289,6 +289,13 @@ def test_a_viewpoint_is_that_of_the_scenes_camera(scale: float) -> None:
     assert view.moved(origin, target, view.up).origin == pytest.approx(view.origin, abs=1e-5 * scale)
 
 
+def test_a_focus_that_has_no_effect_has_few_digits() -> None:
+    """It is only where a slider begins; that of a lens that is open is kept."""
+    assert viewpoint(wf.Camera.look_at((0, 0, 5.123456), (0, 0, 0), size=(64, 48))).focus == 5.12
+    lens = wf.Camera.look_at((0, 0, 5.123456), (0, 0, 0), size=(64, 48), aperture=0.1, focus=4.98765)
+    assert viewpoint(lens).focus == 4.98765
+
+
 def test_a_rolled_camera_keeps_its_roll() -> None:
     """Up is what the camera has for up then; a panorama becomes a perspective view."""
     rolled = wf.Camera.look_at((0, 0, 5), (0, 0, 0), up=(1, 1, 0), size=(64, 48))

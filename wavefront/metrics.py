@@ -21,6 +21,8 @@ from .samples import shared_samples
 from .significance import Estimate, estimate, significance
 from .vec import Doubles, Ints
 
+UNLIKELY = 0.01  # p-value below which noise hardly explains a difference
+
 Picture: TypeAlias = Image | ArrayLike | str | os.PathLike[str]
 
 
@@ -71,7 +73,12 @@ class Comparison:
         names = ("p_value", "p_pixels", "p_blocks", "p_mean")
         if self.p_value is None:
             return [("p_value", self.p_absent)]
-        return [(name, f"{getattr(self, name):.3g}") for name in names]
+        rows = [(name, f"{getattr(self, name):.3g}") for name in names]
+        may = "may well explain" if self.p_value >= UNLIKELY else "hardly explains"
+        return [
+            *rows,
+            ("noise alone", f"{may} the difference (p_value {self.p_value:.3g}, limit {UNLIKELY})"),
+        ]
 
 
 def compare(a: Picture, b: Picture) -> Comparison:

@@ -5,11 +5,32 @@ from __future__ import annotations
 import argparse
 from typing import Any, NoReturn
 
+from ..suggestions import did_you_mean, meant
 from .status import ERROR
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line."""
+    """A parser whose errors are one line, with what may have been meant."""
+
+    def parse_known_args(  # type: ignore[override]
+        self, args: Any = None, namespace: Any = None
+    ) -> tuple[argparse.Namespace, list[str]]:
+        """Refuse unknown arguments here, where the options of the command are known."""
+        options, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            names = [name.lstrip("-").replace("-", "_") for name in self._option_string_actions]
+            found = meant(unknown[0].partition("=")[0].lstrip("-").replace("-", "_"), names)
+            hint = f"; did you mean --{found.replace('_', '-')}?" if found and unknown[0][0] == "-" else ""
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
+        return options, []
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Refuse a value that is none of the choices."""
+        try:
+            super()._check_value(action, value)
+        except argparse.ArgumentError as error:
+            hint = did_you_mean(value, map(str, action.choices or ()))
+            raise argparse.ArgumentError(action, error.message + hint) from None
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong, and end the program."""

@@ -48,8 +48,8 @@ def _lines(path: str, scene: Scene, messages: list[str]) -> Iterator[str]:
     meshes = _distinct(shape.mesh if isinstance(shape, Instance) else shape for shape in scene.shapes)
     low, high = scene.bounds
     yield (
-        f"{path}: {len(scene.shapes)} shapes, {_triangles(scene.shapes)} triangles, "
-        f"{len(scene.lights)} lights"
+        f"{path}: {_count(len(scene.shapes), 'shape')}, {_count(_triangles(scene.shapes), 'triangle')}, "
+        f"{_count(len(scene.lights), 'light')}"
     )
     yield f"size: file {_bytes(os.path.getsize(path))}, meshes {_bytes(_mesh_bytes(meshes))} in memory"
     yield f"bounds: {_triple(low)} to {_triple(high)}, {_triple(high - low)} across"
@@ -107,6 +107,11 @@ def _mesh_bytes(meshes: Iterable[Shape]) -> int:
     return sum(
         value.nbytes for mesh in meshes for value in vars(mesh).values() if isinstance(value, np.ndarray)
     )
+
+
+def _count(count: int, thing: str) -> str:
+    """Return a number of things."""
+    return f"{count} {thing}{'' if count == 1 else 's'}"
 
 
 def _bytes(count: int) -> str:

@@ -109,7 +109,7 @@ class Viewpoint:
             _rounded(up if upright else camera.rotation[:, 1], DIGITS),
             float(np.clip(lens.fov, *FOV)),
             lens.aperture,
-            lens.focus if lens.aperture > 0 else round(distance, around.digits),
+            lens.focus if lens.aperture > 0 else float(f"{distance:.3g}"),  # of a slider, as it has no effect
             camera.film,
             camera.film[0] * camera.film[1],
         )
