@@ -391,6 +391,29 @@ def test_missing_folder_and_other_kinds(tmp_path):
         read_image(tmp_path / "text.png")
 
 
+def test_a_png_whose_text_is_a_bomb(tmp_path):
+    """64 MB in 64 kB: refused without unpacking them, and the message says why."""
+
+    def chunk(name, content):
+        return (
+            struct.pack(">I", len(content)) + name + content + struct.pack(">I", zlib.crc32(name + content))
+        )
+
+    header = struct.pack(">IIBBBBB", 1, 1, 8, 2, 0, 0, 0)
+    bomb = chunk(b"zTXt", b"a\0\0" + zlib.compress(bytes(1 << 26)))
+    pixels = chunk(b"IDAT", zlib.compress(bytes(4))) + chunk(b"IEND", b"")
+    (tmp_path / "t.png").write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + bomb + pixels)
+    tracemalloc.start()
+    try:
+        with pytest.raises(
+            SceneError, match=r"t\.png: not a readable png image: Decompressed data too large"
+        ):
+            read_image(tmp_path / "t.png")
+        assert tracemalloc.get_traced_memory()[1] < 1 << 25
+    finally:
+        tracemalloc.stop()
+
+
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes")
 def test_a_pipe_is_refused_at_once(tmp_path):
     os.mkfifo(tmp_path / "p.png")

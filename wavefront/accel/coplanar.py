@@ -70,7 +70,8 @@ def find_overlaps(triangles: Floats, ids: Ints, plane: Doubles, joined: Ints = N
     joined
         (q,) triangles that have one plane with the next one anyway.
     """
-    pairs = np.concatenate([np.zeros((2, 0), np.intp), *_overlapping(triangles, ids, plane)], 1)
+    with np.errstate(all="ignore"):
+        pairs = np.concatenate([np.zeros((2, 0), np.intp), *_overlapping(triangles, ids, plane)], 1)
     if not pairs.size:
         return None
     later = np.unique(pairs.max(0))

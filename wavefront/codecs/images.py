@@ -183,7 +183,8 @@ def _decode(name: str, decode: Callable[[bytes], T], data: bytes, kind: str) -> 
         raise SceneError(f"{name}: does not fit in memory") from error
     # decoders raise exceptions of any type on damaged data
     except Exception as error:
-        raise SceneError(f"{name}: not a readable {kind} image: {error}") from error
+        reason = error.__cause__ or error  # imageio hides what is wrong with a file behind its own error
+        raise SceneError(f"{name}: not a readable {kind} image: {reason}") from error
 
 
 def _find(table: Registry[T], path: str | os.PathLike[str], error: type[SceneError] = SceneError) -> T:
