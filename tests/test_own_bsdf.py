@@ -61,3 +61,14 @@ def test_the_default_sampling_does_not_hide_it() -> None:
         render(
             [wf.Sphere((0, 0, 0), 1, material=Phong()), wf.Environment()], 1, integrator="naive", size=(8, 8)
         )
+
+
+def test_a_bsdf_that_is_a_part_of_itself_is_named() -> None:
+    """Not followed until Python gives up; two names for one part are no loop."""
+    loop = Paint("nothing")
+    loop.same = loop.whole
+    scene = [wf.Sphere((0, 0, 0), 1, material=loop), wf.Environment(1)]
+    assert render(scene, 1).spp == 1
+    loop.again = loop
+    with pytest.raises(wf.SceneError, match="Paint: an attribute of it is the BSDF itself"):
+        render(scene, 1)

@@ -208,13 +208,24 @@ def _reads(material: Material) -> set[str]:
     return out if material.normal_map is None else out.union(material.normal_map.reads)
 
 
-def _parameters_read(thing: Bsdf | Opacity) -> set[str]:
+def _parameters_read(thing: Bsdf | Opacity, within: tuple[Bsdf | Opacity, ...] = ()) -> set[str]:
+    """Return the names of the attributes that a BSDF, inside of others, or an opacity reads.
+
+    Raises
+    ------
+    SceneError
+        If a BSDF is a part of itself.
+    """
+    if any(thing is outer for outer in within):
+        raise SceneError(
+            f"{type(thing).__name__}: an attribute of it is the BSDF itself, or has it as a part"
+        )
     out: set[str] = set()
     for value in vars(thing).values():
         if isinstance(value, BaseTexture):
             out.update(value.reads)
         elif isinstance(value, Bsdf):
-            out |= _parameters_read(value)
+            out |= _parameters_read(value, (*within, thing))
     return out
 
 
