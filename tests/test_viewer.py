@@ -571,6 +571,26 @@ def test_the_page_is_that_of_viser_with_a_picture(viewer: wf.Viewer, encoding: s
     assert b'<div id="root"></div>' in page
 
 
+@pytest.mark.skipif(not hasattr(os, "getpriority"), reason="the system has no priorities")
+def test_workers_give_way_to_the_page() -> None:
+    """Not this process, which sends the pictures, and no other one that was there."""
+    other = multiprocessing.get_context("spawn").Process(target=time.sleep, args=(SOON,))
+    other.start()
+    own = os.getpriority(os.PRIO_PROCESS, 0)
+    try:
+        with wf.view(
+            BALL, 4, size=(16, 16), executor="processes", workers=2, port=0, open_browser=False, block=False
+        ):
+            workers = [each for each in multiprocessing.active_children() if each.pid != other.pid]
+            assert len(workers) == 2
+            assert all(os.getpriority(os.PRIO_PROCESS, each.pid or 0) >= 10 for each in workers)
+            assert os.getpriority(os.PRIO_PROCESS, 0) == own
+            assert os.getpriority(os.PRIO_PROCESS, other.pid or 0) == own
+    finally:
+        other.kill()
+        other.join()
+
+
 def test_a_viewer_refuses_what_it_cannot_do() -> None:
     """Before any work."""
     refused = [

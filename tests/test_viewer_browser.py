@@ -254,17 +254,20 @@ RECORD = """
     window.moves = [];
     window.shown = [];
     addEventListener("pointermove", () => moves.push(Date.now()), true);
+    let before = null;
     new MutationObserver(() => {
         const state = document.documentElement.textContent.match(/(\\d+ × \\d+) · (\\d+) of \\d+ spp/);
-        if (state && (!shown.length || shown.at(-1)[3] !== state[0]))
-            shown.push([Date.now(), state[1], Number(state[2]), state[0]]);
+        const camera = document.querySelector("[data-code]")?.dataset.code;
+        const last = shown.at(-1) || before;
+        if (state && (!last || last.text !== state[0] || last.camera !== camera))
+            shown.push({time: Date.now(), text: state[0], size: state[1], spp: Number(state[2]), camera});
     }).observe(document, {subtree: true, childList: true, characterData: true});
-    let before = null;
-    window.watch = () => { before = shown.at(-1); moves.length = shown.length = 0; };
-    window.restart = () => {  // milliseconds from a movement to a picture of fewer pixels or samples
-        const isNew = ([time, size, spp]) => time >= moves[0] && (size != before[1] || spp < before[2]);
+    window.watch = () => { before = shown.at(-1) || before; moves.length = shown.length = 0; };
+    window.restart = () => {  // milliseconds from a movement to a new picture
+        const isNew = picture => picture.time >= moves[0] && (picture.size !== before.size
+            || picture.spp < before.spp || picture.camera !== before.camera);
         const first = moves.length && shown.find(isNew);
-        return first ? first[0] - moves[0] : null;
+        return first ? first.time - moves[0] : null;
     };
 })()
 """
@@ -273,7 +276,7 @@ PAINTED = """
     const picture = performance.getEntriesByName(location.origin + "/first.jpg")[0];
     const paint = performance.getEntriesByName("first-contentful-paint")[0];
     const times = [paint.startTime, picture.responseEnd].map(time => performance.timeOrigin + time);
-    return [...times, shown[0][0]].map(time => time / 1000);
+    return [...times, shown[0].time].map(time => time / 1000);
 }
 """
 FIRST_FRAME, RESTART = 2.0, 0.2  # seconds
@@ -292,7 +295,7 @@ def test_the_first_frame_and_a_restart_come_soon(browser: Any, capsys: pytest.Ca
         page.goto(viewer.url)
         page.wait_for_function("shown.length", timeout=1000 * SOON)
         painted, fetched, alive = page.evaluate(PAINTED)
-        page.wait_for_function("shown.at(-1)[2] > 4", timeout=1000 * SOON)
+        page.wait_for_function("shown.at(-1).spp > 4", timeout=1000 * SOON)
         page.mouse.move(300, 450)
         page.mouse.down()
         for k in range(1, 10):

@@ -18,6 +18,7 @@ from ..renderable import as_scene, choose_camera
 from ..scene import Scene
 from ..scheduling.executors import choose_executor, needs_pickling, worker_count
 from ..session import Session
+from .priority import giving_way
 from .refiner import FIRST_DIVISOR, Refiner, ViewerFrame
 from .shown import VIEWER_LAYERS
 from .viewpoint import Viewpoint
@@ -269,7 +270,9 @@ def _opened(scene: Scene, spp: int | None, host: str, port: int, settings: dict[
         settings["wave_size"] = WAVE_SIZE
     if settings.get("executor") is None:
         settings["executor"] = _executor(settings.get("workers"), (spp or SPP) * viewpoint.pixels)
-    return Viewer(Session(scene, spp, **settings), viewpoint, host, port, spp)
+    with giving_way():
+        session = Session(scene, spp, **settings)
+    return Viewer(session, viewpoint, host, port, spp)
 
 
 def _executor(workers: int | None, paths: int) -> str | None:
