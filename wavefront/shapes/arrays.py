@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from copy import copy
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +14,7 @@ from ..vec import FLOAT32_MAX
 from .base import Checked, CurvedShape
 from .colored import ColoredShape
 from .mesh import FLOAT32_MIN
+from .transform import points_by, similarities
 
 
 def _radii(name: str, value: ArrayLike) -> NDArray[np.float64]:
@@ -36,6 +38,7 @@ class PrimitiveArray(ColoredShape, CurvedShape):
     """
 
     radii = Checked(_radii)
+    _points: ClassVar[tuple[str, ...]]  # the arrays of points
 
     def __init__(
         self, radii: ArrayLike, colors: ArrayLike | None, material: MaterialLike | None, name: str
@@ -54,6 +57,29 @@ class PrimitiveArray(ColoredShape, CurvedShape):
     def emission(self) -> Any:
         """Radiance that leaves the surface: that of the material; None if dark."""
         return self.material.emission
+
+    def placed(self, transforms: ArrayLike) -> Self:
+        """Return copies that are moved, turned, mirrored or scaled by one factor, all in one shape.
+
+        Parameters
+        ----------
+        transforms
+            (4, 4) or (n, 4, 4) affine matrices, for column vectors; a copy for each. Texture
+            coordinates are those of shapes that were made there.
+
+        Raises
+        ------
+        SceneError
+            If a transform is malformed, or does not scale alike in all directions.
+        """
+        matrices, scale = similarities(f"{self.name}: transforms", transforms)
+        shape = copy(self)
+        for name in self._points:
+            setattr(shape, name, points_by(matrices, getattr(self, name)))
+        shape.radii = (scale[:, None] * np.broadcast_to(self.radii, self.count)).ravel()
+        shape.colors = None if self.colors is None else np.tile(self.colors, (len(matrices), 1))
+        shape.check()
+        return shape
 
     def check(self) -> None:
         """Check the arrays against each other; they may have been assigned one by one.

@@ -78,7 +78,8 @@ class Instance(Shape):
         name: str | None = None,
     ) -> None:
         if not isinstance(mesh, Mesh):
-            hint = "; give all copies as one array of primitives" if isinstance(mesh, CurvedShape) else ""
+            curved = isinstance(mesh, CurvedShape)
+            hint = "; its method placed() makes copies by matrices" if curved else ""
             raise SceneError(f"{name or 'instance'}: mesh must be a wf.Mesh, got {mesh!r}{hint}")
         self.name = mesh.name if name is None else name
         self.mesh = mesh

@@ -29,6 +29,7 @@ class SegmentArray(PrimitiveArray):
 
     starts, ends = Checked(positions), Checked(positions)
     caps = True
+    _points = "starts", "ends"
 
     def __init__(
         self,

@@ -15,6 +15,7 @@ from ..vec import FLOAT32_MAX
 from .base import Checked
 from .even_emission import EvenEmission
 from .mesh import FLOAT32_MIN
+from .transform import points_by, similarities
 
 
 def _center(name: str, value: ArrayLike) -> NDArray[np.float64]:
@@ -109,6 +110,26 @@ class Sphere(EvenEmission):
         """Return the sphere with all lengths multiplied by `factor`, and the same material."""
         sphere = copy(self)
         sphere.center, sphere.radius = self.center * factor, self.radius * factor
+        return sphere
+
+    def placed(self, transform: ArrayLike) -> Sphere:
+        """Return a copy that is moved, turned, mirrored or scaled by one factor.
+
+        Parameters
+        ----------
+        transform
+            (4, 4) affine matrix, for column vectors. Texture coordinates are those of a sphere that was
+            made there.
+
+        Raises
+        ------
+        SceneError
+            If the transform is malformed, or does not scale alike in all directions.
+        """
+        given = finite_array(f"{self.name}: transform", transform, (4, 4))
+        matrices, scale = similarities(f"{self.name}: transform", given)
+        sphere = copy(self)
+        sphere.center, sphere.radius = points_by(matrices, self.centers)[0], self.radius * float(scale[0])
         return sphere
 
     @property

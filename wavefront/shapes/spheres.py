@@ -51,6 +51,7 @@ class Spheres(EvenEmission, PrimitiveArray):
     """
 
     centers = Checked(positions)
+    _points = ("centers",)
 
     @suggests_keywords
     def __init__(

@@ -3,13 +3,43 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SceneError
+from ..errors import SceneError, finite_array
 
 Matrix = NDArray[np.float64]  # (4, 4), or several
 
 IDENTITY = np.eye(4)
+EVEN = 2.0**-20  # relative difference of the scales along two axes that float32 hardly shows
+
+
+def similarities(name: str, value: ArrayLike) -> tuple[Matrix, NDArray[np.float64]]:
+    """Return matrices (n, 4, 4) that keep shapes, of one (4, 4) or of n, and the factors of lengths (n,).
+
+    Raises
+    ------
+    SceneError
+        If a matrix is malformed, or scales lengths along one direction more than along another.
+    """
+    shape = (4, 4) if np.ndim(value) == 2 else (None, 4, 4)
+    matrices = finite_array(name, value, shape).reshape(-1, 4, 4)
+    scales = np.linalg.svd(matrices[:, :3, :3], compute_uv=False)
+    bad = np.flatnonzero((matrices[:, 3] != (0, 0, 0, 1)).any(1))
+    if bad.size:
+        raise SceneError(f"{name} has the last row {matrices[bad[0], 3].tolist()}; it must be [0, 0, 0, 1]")
+    bad = np.flatnonzero(~((scales[:, 2] > 0) & (scales[:, 0] - scales[:, 2] <= EVEN * scales[:, 0])))
+    if bad.size:
+        most, _, least = scales[bad[0]]
+        raise SceneError(
+            f"{name} stretches by {least:.6g} along one axis and {most:.6g} along another; only "
+            "meshes can be placed so, others need one factor above 0"
+        )
+    return matrices, np.cbrt(scales.prod(1))
+
+
+def points_by(matrices: Matrix, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return points (k, 3), transformed by each of n matrices (n, 4, 4): (n·k, 3)."""
+    return (points @ matrices[:, :3, :3].transpose(0, 2, 1) + matrices[:, None, :3, 3]).reshape(-1, 3)
 
 
 def moved_tangents(matrix: np.ndarray, tangents: np.ndarray | None) -> np.ndarray | None:
