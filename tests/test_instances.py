@@ -260,7 +260,8 @@ def test_points_are_no_further_off_than_their_error(accel, matrix, start, aim):
         mesh = wf.Mesh(box.vertices, box.faces)
     if matrix is not VERTEX:
         matrix = matrix @ translation_matrix(-mesh.bounds.mean(0))
-    matrices = [matrix, np.diag([-1, -1, -1, 1]) @ matrix]  # so the scene's middle is the origin
+    mirrored = np.diag([*[-0.99 if start == 300 else -1] * 3, 1])  # a box in the same place is no instance
+    matrices = [matrix, mirrored @ matrix]  # so the scene's middle is the origin
     scene = compiled(placed(mesh, matrices), accel)
     assert scene.center == pytest.approx([0, 0, 0], abs=1e-9)
     origin = rng.normal(size=(3, n))
@@ -294,13 +295,51 @@ def test_only_the_triangle_of_the_instance_left_is_skipped(accel):
 
 
 @pytest.mark.parametrize("accel", NAMES)
-def test_ties_go_to_the_lowest_id(accel):
+@pytest.mark.parametrize("compared", [True, False])
+def test_ties_go_to_the_lowest_id(accel, compared, monkeypatch):
+    """Instances in the same place are meshes of their own, before all others, or compare as instances."""
     mesh = bumpy()
+    if not compared:
+        monkeypatch.setattr("wavefront.compile.overlaps.MOST_FACES", 0)
     scene = compiled([*placed(mesh, [at(0, 0, 0), at(9, 0, 0)] + [at(0, 0, 0)] * 12)], accel)
     origin, direction = rays(4000, 4)
     hits = scene.accelerator.closest(origin, direction, nothing(4000))
     first = hits.prim // len(mesh.faces)
-    assert np.unique(first[hits.prim >= 0]).tolist() == [0, 1]
+    assert np.unique(first[hits.prim >= 0]).tolist() == [0, 13 if compared else 1]
+
+
+def overlapping_squares(order):
+    """Return three instances of a square that overlap in an oblique plane, and a mesh that overlaps them."""
+    square = wf.Mesh([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    turned = at(0.3, -0.2, 0.1, 1, (0.4, 1.1, 0.2))
+    shapes = [
+        *placed(
+            square, [turned @ at(0.1 * k, -0.2 * k, 0, (1 - 0.2 * k, 1, 1 + k), (0, 0, k)) for k in range(3)]
+        ),
+        wf.Instance(square, turned @ at(0.5, 0.5, 0, 0.7)).to_mesh(),
+    ]
+    return [shapes[number] for number in order], turned
+
+
+@pytest.mark.parametrize("accel", NAMES)
+@pytest.mark.parametrize("order", [(0, 1, 2, 3), (3, 2, 1, 0), (1, 3, 0, 2)])
+def test_the_first_of_instances_and_meshes_that_overlap_in_a_plane_is_hit(accel, order):
+    """The first in the scene, in every accelerator; an instance elsewhere still shares its mesh."""
+    shapes, turned = overlapping_squares(order)
+    away = at(0, 0, -9), at(0, 1, -11)
+    shapes += placed(shapes[order.index(0)].mesh, away)
+    camera = wf.Camera.look_at((turned @ [0.4, 0.1, 3, 1])[:3], turned[:3, 3], size=(60, 60))
+
+    def seen(some):
+        scene = wf.Scene(some, [wf.Environment(1)], camera)
+        return render(scene, 1, accel=accel, aovs="shape_id", max_bounces=0).shape_id
+
+    covered = np.array([seen([shape]) == 0 for shape in shapes[:4]])
+    found = seen(shapes)
+    there = covered.any(0)
+    assert covered.sum(0).max() == 4
+    np.testing.assert_array_equal(found[there], covered.argmax(0)[there])
+    assert len(compiled(shapes, accel).accelerator.placements.mesh) == 2
 
 
 @pytest.mark.parametrize("accel", NAMES)

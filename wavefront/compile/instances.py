@@ -15,6 +15,7 @@ from ..shapes.instance import instance_bounds
 from ..state import SoA
 from ..vec import Doubles, Floats, Ints, f4
 from .curved import order_by_kind
+from .overlaps import overlapping_instances
 
 SKEW = 1e3  # instances whose scales along two axes have a larger ratio become meshes of their own
 BOX_ROOM = 2.0**-20  # margin of boxes on all sides, relative to their size and distance from the center
@@ -64,16 +65,15 @@ def sort_shapes(
     The last result has the positions in `shapes` of all these meshes, curved shapes and instances.
 
     These are all instances, if they have no more than `most_copies` triangles together; instances of
-    emitting meshes, because each triangle is a light; the only instance of a mesh; and very skewed
-    instances, because float32 is not precise enough in the mesh's coordinates.
+    emitting meshes, because each triangle is a light; the only instance of a mesh; very skewed instances,
+    because float32 is not precise enough in the mesh's coordinates; and those that overlap other shapes in a
+    plane.
     """
-    total = sum(len(shape.mesh.faces) for shape in shapes if isinstance(shape, Instance))
-    copies = Counter(id(shape.mesh) for shape in shapes if isinstance(shape, Instance))
+    kept = _kept_instances(shapes, most_copies)
     meshes: list[Mesh] = []
     curved: list[CurvedShape] = []
     instances: list[Instance] = []
     numbers: tuple[list[int], list[int], list[int]] = [], [], []
-    shareable = _shareable([shape for shape in shapes if isinstance(shape, Instance)])
     for number, shape in enumerate(shapes):
         if isinstance(shape, Mesh):
             meshes.append(shape)
@@ -83,7 +83,7 @@ def sort_shapes(
             numbers[1].append(number)
         elif not isinstance(shape, Instance):
             raise SceneError(f"{shape.name}: cannot trace a {type(shape).__name__}")
-        elif total > most_copies and copies[id(shape.mesh)] > 1 and id(shape) in shareable:
+        elif id(shape) in kept:
             instances.append(shape)
             numbers[2].append(number)
         else:
@@ -92,6 +92,20 @@ def sort_shapes(
     order = order_by_kind(curved)
     positions = [*numbers[0], *(numbers[1][at] for at in order), *numbers[2]]
     return meshes, [curved[at] for at in order], instances, np.array(positions, np.intp)
+
+
+def _kept_instances(shapes: Sequence[Shape], most_copies: int) -> set[int]:
+    """Return the identities of the instances that share a mesh: see `sort_shapes`."""
+    instances = [shape for shape in shapes if isinstance(shape, Instance)]
+    if sum(len(instance.mesh.faces) for instance in instances) <= most_copies:
+        return set()
+    copies = Counter(id(instance.mesh) for instance in instances)
+    shareable = _shareable(instances)
+    kept = [each for each in instances if copies[id(each.mesh)] > 1 and id(each) in shareable]
+    left = {id(each) for each in kept}
+    meshes = [each.to_mesh() for each in instances if id(each) not in left]
+    meshes += [shape for shape in shapes if isinstance(shape, Mesh)]
+    return left - overlapping_instances(kept, meshes)
 
 
 def _shareable(instances: Sequence[Instance]) -> set[int]:
