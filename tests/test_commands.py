@@ -218,7 +218,7 @@ def test_info_names_sizes_textures_and_warnings(mesh: Path, capsys) -> None:
     done = run("info", mesh.name, "--quiet", cwd=mesh.parent)
     assert (done.returncode, done.stderr) == (0, "")
     lines = done.stdout.splitlines()
-    assert lines[0] == "mesh.obj: 1 shapes, 5 triangles, 0 lights"
+    assert lines[0] == "mesh.obj: 1 shape, 5 triangles, 0 lights"
     assert lines[1].startswith(f"size: file {mesh.stat().st_size} bytes, meshes ")
     assert lines[2] == "bounds: (0, 0, 0) to (1, 1, 1), (1, 1, 1) across"
     assert "5 × 3>, 3 channels, sRGB" in lines[lines.index("textures:") + 1]

@@ -289,6 +289,13 @@ def test_a_viewpoint_is_that_of_the_scenes_camera(scale: float) -> None:
     assert view.moved(origin, target, view.up).origin == pytest.approx(view.origin, abs=1e-5 * scale)
 
 
+def test_a_field_of_view_has_few_digits() -> None:
+    """It is shown and copied, too; those of files have sixteen."""
+    view = viewpoint(wf.Camera.look_at((0, 0, 5), (0, 0, 0), fov=37.8491654365455, size=(64, 48)))
+    assert view.fov == 37.8492
+    assert "fov=37.8492, " in view.code
+
+
 def test_a_focus_that_has_no_effect_has_few_digits() -> None:
     """It is only where a slider begins; that of a lens that is open is kept."""
     assert viewpoint(wf.Camera.look_at((0, 0, 5.123456), (0, 0, 0), size=(64, 48))).focus == 5.12

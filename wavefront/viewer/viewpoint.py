@@ -16,6 +16,7 @@ from ..errors import SceneError, finite_array, number
 Triple = tuple[float, float, float]
 
 FOV = 5.0, 120.0  # degrees, least and greatest
+FOV_DIGITS = 4  # behind the point
 OTHER_FOV = 40.0  # degrees, in place of cameras that are not perspective
 NEAREST, FARTHEST = 0.01, 10.0  # focus, in radii of the scene
 WIDEST = 0.2  # aperture, in radii of the scene
@@ -107,7 +108,7 @@ class Viewpoint:
             around.rounded(camera.origin),
             around.rounded(camera.origin + ahead * distance),
             _rounded(up if upright else camera.rotation[:, 1], DIGITS),
-            float(np.clip(lens.fov, *FOV)),
+            round(float(np.clip(lens.fov, *FOV)), FOV_DIGITS),
             lens.aperture,
             lens.focus if lens.aperture > 0 else float(f"{distance:.3g}"),  # of a slider, as it has no effect
             camera.film,
