@@ -13,6 +13,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, cast
 
@@ -545,6 +546,25 @@ def test_nothing_but_the_page_is_served(viewer: wf.Viewer) -> None:
         "/index.php",
     ):
         assert status(path) == 404
+
+
+def test_pictures_that_refine_leave_the_page_time() -> None:
+    """Other views and the last picture are sent at once, and so is another exposure."""
+    sent: list[tuple[float, ViewerFrame]] = []
+    with wf.view(BALL, 512, camera=CAMERA, port=0, open_browser=False, block=False) as viewer:
+        page = viewer._page
+        assert page is not None
+        page._send = lambda codes, frame: sent.append((time.monotonic(), frame))  # type: ignore[method-assign]
+        viewer.wait_for_picture(SOON)
+        assert eventually(lambda: sent and sent[-1][1].final)
+        count = len(sent)
+        page._show_as(exposure=1)
+        page._show_as(exposure=2)
+        assert eventually(lambda: len(sent) > count)
+    refined = [(then, frame) for then, frame in sent if not frame.final]
+    assert len(refined) > 1
+    for (before, first), (after, second) in pairwise(refined):
+        assert second.camera is not first.camera or after - before > 0.09
 
 
 def test_a_page_gets_a_picture_with_its_first_requests(viewer: wf.Viewer) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -22,6 +23,7 @@ from .shown import CHOICES, shown_codes
 from .viewpoint import FOV, Viewpoint, within
 
 QUALITY = 85  # of pictures while they refine, sent as jpg; the last one is a png
+PAUSE = 0.1  # seconds between pictures that refine, so that the browser has time for movements
 STOPS = 6.0  # exposure, up and down
 STEPS = 200  # of a slider
 COPY = (
@@ -73,6 +75,7 @@ class Page:
         self._frame: ViewerFrame | None = None
         self._fresh = self._closed = False
         self._codes: NDArray[np.uint8] | None = None  # of the picture that is shown
+        self._sent: tuple[ViewerFrame | None, float] = None, 0.0  # the newest one that was sent, and when
         self._server = _serve(host, port, Front(host, self._picture))
         guard(self._server, host, lambda: self._begin_at(self.viewpoint))
         self.url = f"http://{_address(host)}:{self._server.get_port()}"
@@ -227,6 +230,7 @@ class Page:
         while True:
             with self._lock:
                 self._lock.wait_for(lambda: self._fresh)
+                self._lock.wait_for(self._urgent, max(0.0, self._sent[1] + PAUSE - time.monotonic()))
                 if self._closed:
                     return
                 self._fresh = False
@@ -240,7 +244,14 @@ class Page:
                 continue
             with self._lock:
                 self._codes = codes
+                self._sent = frame, time.monotonic()
             self._send(codes, frame)
+
+    def _urgent(self) -> bool:
+        """Return whether what is to be shown may not wait: all but a better picture of the same view."""
+        last, frame = self._sent[0], self._frame
+        better = last is not None and frame is not None and frame is not last and frame.camera is last.camera
+        return self._closed or not better or (frame is not None and frame.final)
 
     def _send(self, codes: NDArray[np.uint8], frame: ViewerFrame) -> None:
         kind = {"format": "png"} if frame.final else {"format": "jpeg", "jpeg_quality": QUALITY}
