@@ -162,6 +162,14 @@ def test_a_how_to_page_shows_what_its_code_makes(page):
         assert wf.Image.load(picture).rgb.std() > 0.02, path
 
 
+def test_pages_of_classes_have_what_the_classes_inherit():
+    """`Spheres.placed` is a method of a base class that is not public."""
+    template = (ROOT / "docs" / "_templates" / "autosummary" / "class.rst").read_text("utf-8")
+    assert ":inherited-members:" in template
+    assert "placed" not in vars(wf.Spheres)
+    assert callable(wf.Spheres.placed)
+
+
 def test_pages_load_nothing_from_other_servers():
     """No diagram that needs a script, and no extension that brings one."""
     settings = (ROOT / "docs" / "conf.py").read_text("utf-8")
