@@ -151,30 +151,52 @@ def _without_parts(member: Ints, start: Ints, before: list[Keys]) -> tuple[Ints,
 def _overlapping_in_runs(triangles: Floats, face: Ints, plane: Doubles, start: Ints) -> Iterator[Ints]:
     """Yield pairs (2, p) of faces (r,) that overlap, of the runs that begin at `start`."""
     count = np.diff(start, append=face.size)
+    corners, across = _flattened(triangles, face, plane, start, count)
     two = start.compress(count == 2)
     for part in spans(two.size, AT_ONCE):
-        yield _that_overlap(triangles, plane, face.take(two[part]), face.take(two[part] + 1))
-    more = np.repeat(count > 2, count)
-    face, count = face.compress(more), count.compress(count > 2)
-    if not count.size:
+        yield face.take(_that_overlap(triangles, face, corners, two[part], two[part] + 1))
+    more = np.flatnonzero(np.repeat(count > 2, count))
+    if not more.size:
         return
-    start = np.cumsum(count) - count
-    run: HalfInts = np.repeat(np.arange(start.size, dtype=np.int32), count)
-    low, high = np.empty((3, face.size), f4), np.empty((3, face.size), f4)
-    axes = AXES.take(_steepest(plane, face.take(start)), 1)
-    for part in spans(face.size, AT_ONCE):
-        corners = np.ascontiguousarray(triangles.take(face[part], 0).transpose(1, 2, 0))
-        turned = np.take_along_axis(corners, axes.take(run[part], 1)[None], 1)  # the last axis is across
-        low[:, part], high[:, part] = turned.min(0), turned.max(0)
-    strips = _Strips(low, high, run, start, count)
-    dense = _beyond_budget(strips.pairs_of_runs(start.size), DENSE * face.size + BUDGET)
+    face, corners, across = face.take(more), corners.take(more, 0), across.take(more, 1)
+    count = count.compress(count > 2)
+    low, high = _extent(*corners.transpose(1, 2, 0))
+    run: HalfInts = np.repeat(np.arange(count.size, dtype=np.int32), count)
+    strips = _Strips(low, high, run, np.cumsum(count) - count, count)
+    dense = _beyond_budget(strips.pairs_of_runs(count.size), DENSE * face.size + BUDGET)
     some = np.flatnonzero(dense.take(run[1:]) & (run[1:] == run[:-1]))
     yield np.stack([face.take(some), face.take(some + 1)])
     for first, second in strips.pairs(dense):
-        meet = _boxes_meet(low, high, first, second)
-        yield _that_overlap(
-            triangles, plane, face.take(first.compress(meet)), face.take(second.compress(meet))
-        )
+        bottom = np.maximum(low[1].take(first), low[1].take(second))
+        meet = bottom < np.minimum(high[1].take(first), high[1].take(second))
+        bottom = np.maximum(across[0].take(first), across[0].take(second))
+        top = np.minimum(across[1].take(first), across[1].take(second))
+        meet &= bottom - top <= FLATNESS * (np.abs(bottom) + np.abs(top))
+        first, second = first.compress(meet), second.compress(meet)
+        yield face.take(_that_overlap(triangles, face, corners, first, second))
+
+
+def _flattened(
+    triangles: Floats, face: Ints, plane: Doubles, start: Ints, count: Ints
+) -> tuple[Floats, Floats]:
+    """Return the corners (r, 3, 2) of faces without the axis that is most across the first of each run.
+
+    Also returns the least and the greatest coordinate of each face along that axis, (2, r).
+    """
+    axis = np.abs(plane[:3].take(face.take(start), 1)).argmax(0)
+    axes = np.repeat(AXES.T.astype(np.int8).take(axis, 0), count, 0)
+    out, across = np.empty((face.size, 3, 2), f4), np.empty((2, face.size), f4)
+    for part in spans(face.size, AT_ONCE):
+        corners = triangles.take(face[part], 0)
+        turned = np.take_along_axis(corners, axes[part, None].astype(np.intp), 2)
+        out[part] = turned[:, :, :2]
+        across[:, part] = _extent(*turned[:, :, 2].T)
+    return out, across
+
+
+def _extent(a: Floats, b: Floats, c: Floats) -> Floats:
+    """Return the least and the greatest of three arrays, (2, ...); much faster than `min` and `max`."""
+    return np.stack([np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)])
 
 
 def _beyond_budget(pairs: Doubles, budget: int) -> Bools:
@@ -185,19 +207,18 @@ def _beyond_budget(pairs: Doubles, budget: int) -> Bools:
     return dense
 
 
-def _steepest(plane: Doubles, face: Ints) -> Ints:
-    """Return the axis (k,) along which the normals of faces (k,) are longest."""
-    return np.asarray(np.abs(plane[:3].take(face, 1)).argmax(0))
+def _that_overlap(triangles: Floats, face: Ints, corners: Floats, first: Ints, second: Ints) -> Ints:
+    """Return those (2, q) of the pairs of places (p,) in `face` that overlap, in nearly one plane.
 
-
-def _that_overlap(triangles: Floats, plane: Doubles, one: Ints, other: Ints) -> Ints:
-    """Return those (2, q) of the pairs of faces (p,) that have area in common, in nearly one plane."""
-    axes = AXES.take(_steepest(plane, one), 1)[None, :2]
-    corners = [np.ascontiguousarray(triangles.take(face, 0).transpose(1, 2, 0)) for face in (one, other)]
-    flat = [np.take_along_axis(some, axes, 1).astype(np.float64) for some in corners]
-    left = np.flatnonzero(~_apart(*flat))
-    left = left.compress(_coplanar(*(some.take(left, 2) for some in corners)))
-    return np.stack([one.take(left), other.take(left)])
+    `corners` (r, 3, 2) are those of the faces in a plane that is not far from theirs.
+    """
+    pair = np.stack([first, second])
+    flat = (np.ascontiguousarray(corners.take(each, 0).transpose(1, 2, 0), np.float64) for each in pair)
+    pair = pair.compress(~_apart(*flat), 1)
+    if pair.size:
+        solid = (triangles.take(each, 0).transpose(1, 2, 0) for each in face.take(pair))
+        pair = pair.compress(_coplanar(*solid), 1)
+    return pair
 
 
 class _Strips:
@@ -257,16 +278,6 @@ class _Strips:
             lowest = np.maximum(self._first.take(one), self._first.take(other)) == strip
             yield one.compress(lowest), other.compress(lowest)
             at = end
-
-
-def _boxes_meet(low: Floats, high: Floats, one: Ints, other: Ints) -> Bools:
-    """Return a mask (p,) of pairs of boxes that overlap along the second axis and touch along the third."""
-    meet: Bools = np.ones(one.size, np.bool_)
-    for axis in (1, 2):
-        bottom = np.maximum(low[axis].take(one), low[axis].take(other))
-        top = np.minimum(high[axis].take(one), high[axis].take(other))
-        meet &= bottom < top if axis == 1 else bottom - top <= FLATNESS * (np.abs(bottom) + np.abs(top))
-    return meet
 
 
 def _apart(one: Doubles, other: Doubles) -> Bools:
