@@ -31,6 +31,12 @@ class Spoiled(wf.Diffuse):
         return sample
 
 
+class SpoiledMatte(Spoiled):
+    """The same, so that pixels share what paths find there."""
+
+    view_independent = True
+
+
 class SpoiledValue(wf.Diffuse):
     """A material whose values are not finite."""
 
@@ -89,6 +95,22 @@ def test_a_bsdf_sample_is_named(integrator: str, branches: int) -> None:
     assert found == "pixel 0, sample 0, bounce 1, BSDF sample of material Spoiled of 'wall'"
 
 
+def test_a_fault_of_a_shared_point_is_named() -> None:
+    """By the random numbers of the paths that go on from there."""
+    material = SpoiledMatte(0.5)
+    material.part = 0.005
+    scene = wf.Scene(
+        [
+            wf.Rectangle((-5, 0, -5), (0, 0, 10), (10, 0, 0), material=wf.Diffuse(0.9), name="floor"),
+            wf.Rectangle((-5, 0, -4), (10, 0, 0), (0, 10, 0), material=material, name="wall"),
+        ],
+        [wf.Environment(1.0)],
+        scenes.probe((0, 0, -3.9), (0, 3, -3.5)),
+    )
+    found = first_fault(scene, reuse=True)
+    assert found.endswith("bounce 1, BSDF sample of material SpoiledMatte of 'wall'")
+
+
 @pytest.mark.parametrize("integrator", ["full", "direct_mis", "direct_simple"])
 def test_a_light_sample_is_named(integrator: str) -> None:
     """By the material at which it was taken."""
@@ -114,7 +136,7 @@ def test_the_first_surface_is_bounce_0() -> None:
 def test_a_few_are_a_warning_with_the_picture() -> None:
     """And the samples are dropped and counted."""
     material = Spoiled(0.5)
-    material.part = 3e-5
+    material.part = 0.005
     with pytest.warns(UserWarning, match=r"first: pixel \d+, sample \d+, bounce 1, BSDF sample of .* 'wall'"):
         image = render(room(material), 2048)
     assert 0 < image.metadata["bad_samples"] <= 1e-4 * image.metadata["samples"]
@@ -178,7 +200,7 @@ def test_a_pixel_without_other_samples_is_black() -> None:
 def test_layers_leave_the_same_samples_out() -> None:
     """All samples see the wall in the mirror, so what is left of them does."""
     material = Spoiled(0.5)
-    material.part = 0.25
+    material.part = 0.005
     with pytest.raises(wf.RenderError) as caught:
         render(room(material), 16, aovs=("alpha", "albedo", "coverage", "direct", "indirect"))
     image = caught.value.image

@@ -170,6 +170,10 @@ BAD = [
     ({"seed": 0.5}, r"seed is 0.5; it must be"),
     *(({"branches": v}, rf"branches is {v}; it must be a whole number from 1 to 64") for v in (0, 65, 2.0)),
     ({"branches": 64, "spp": 2**26 + 1}, r"spp is 67108865; it must be a whole number from 1 to 67108864"),
+    (
+        {"branches": 64, "reuse": True, "spp": 2**26},
+        r"spp is 67108864; it must be a whole number from 1 to 33554432",
+    ),
     *(
         ({"branches": 2, "integrator": name}, rf"branches is 2; with integrator='{name}' it must be 1")
         for name in ("naive", "direct_simple", "direct_mis")

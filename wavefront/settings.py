@@ -508,7 +508,7 @@ class Settings:
         return plan(self.memory_limit, size, self.worker_count, self.wave_size, processes, layers)
 
     def _most_samples(self) -> int:
-        ways = self.most_branches if self.reuse is False else self.most_branches * SHARED_WAYS
+        ways = self.most_branches * (SHARED_WAYS if self.reuse is True else 1)
         most = min(MAX_TERMS, MAX_BRANCH_SAMPLES // ways)
         if self.samples is not None:
             return self._chosen_samples(self.samples, most)
