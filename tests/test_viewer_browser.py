@@ -130,6 +130,23 @@ def test_a_page_has_a_picture_before_its_scripts_run(viewer: wf.Viewer, browser:
     assert np.abs(shot(page) - codes[rows][:, columns]).mean() < 6  # the browser interpolates
 
 
+DARK = wf.Scene([wf.Sphere((0, 0, 0), 1, material=wf.Diffuse(0))], [wf.PointLight((9, 9, 9), 1)])
+
+
+def test_a_black_picture_replaces_the_first_one_when_somebody_acts(browser: Any) -> None:
+    """Otherwise black may mean that nothing has been drawn yet."""
+    is_drawn = "document.documentElement.classList.contains('drawn')"
+    with wf.view(DARK, 4, camera=CAMERA, port=0, open_browser=False, block=False) as viewer:
+        page = browser.new_page(viewport=SIZE)
+        page.goto(viewer.url)
+        page.get_by_text("spp").wait_for(timeout=1000 * SOON)
+        assert not page.evaluate(is_drawn)
+        camera = viewer.camera
+        drag(page, 60, 0)
+        assert page.evaluate(is_drawn)
+        assert eventually(lambda: viewer.camera is not camera)
+
+
 def test_a_drag_changes_the_view_and_the_picture_restarts(page: Any, viewer: wf.Viewer) -> None:
     """And refines again, to the picture of `render` with the new camera."""
     before, camera = shot(page), viewer.camera

@@ -17,35 +17,44 @@ from .guard import may_connect
 PICTURE = "/first.jpg"
 WAIT = 10.0  # seconds that a page waits for the first picture
 # The canvas of viser is clear at first, then black, then it would be faded in: the first picture stays until
-# there is another one. As nothing but a picture is drawn there, it needs no smooth edges and no alpha.
-HEAD = f"""<head>
+# there is another one, or somebody acts. As the canvas has nothing but a picture, it needs neither smooth
+# edges nor alpha.
+HEAD = """<head>
     <style>
-      html, body {{ height: 100%; margin: 0; background-color: #141414 }}
-      body {{ background: #141414 url({PICTURE}) center / auto 100% no-repeat }}
-      html:not(.drawn) #root div:has(canvas) {{ background: none !important }}
-      html:not(.drawn) canvas[data-engine] {{ visibility: hidden }}
-      canvas[data-engine] {{ opacity: 1 !important }}
+      html, body { height: 100%; margin: 0; background-color: #141414 }
+      body { background: #141414 url(/first.jpg) center / auto 100% no-repeat }
+      canvas[data-engine] { opacity: 1 !important }
+      html:not(.drawn) canvas[data-engine] { opacity: 0 !important }
+      html:not(.drawn) #root div:has(canvas) { background: none !important }
     </style>
     <script>
-      (() => {{
+      (() => {
         const context = HTMLCanvasElement.prototype.getContext;
-        HTMLCanvasElement.prototype.getContext = function (kind, options) {{
-          const plain = kind.startsWith("webgl") ? {{ antialias: false, alpha: false }} : {{}};
-          return context.call(this, kind, {{ ...options, ...plain }});
-        }};
-        const small = Object.assign(document.createElement("canvas"), {{ width: 8, height: 8 }});
-        const pixels = small.getContext("2d", {{ willReadFrequently: true }});
-        const end = performance.now() + 15000;
-        const timer = setInterval(() => {{
+        HTMLCanvasElement.prototype.getContext = function (kind, options) {
+          const plain = kind.startsWith("webgl") ? { antialias: false, alpha: false } : {};
+          return context.call(this, kind, { ...options, ...plain });
+        };
+        const side = 64, small = document.createElement("canvas");
+        small.width = small.height = side;
+        const pixels = small.getContext("2d", { willReadFrequently: true });
+        pixels.imageSmoothingQuality = "high";
+        const isColor = (code, k) => k % 4 < 3 && code;
+        let end = Infinity;  // a picture may be black
+        const look = () => {
           const canvas = document.querySelector("canvas[data-engine]");
-          if (canvas) pixels.drawImage(canvas, 0, 0, 8, 8);
-          const isColor = (code, k) => k % 4 < 3 && code;
-          const drawn = canvas && pixels.getImageData(0, 0, 8, 8).data.some(isColor);
-          if (!drawn && performance.now() < end) return;
+          if (!canvas) return;
+          end = Math.min(end, performance.now() + 5000);
+          pixels.drawImage(canvas, 0, 0, side, side);
+          const colored = pixels.getImageData(0, 0, side, side).data.filter(isColor).length;
+          if (colored > side * side / 8 || performance.now() > end) show();  // more than the axes of viser
+        };
+        const timer = setInterval(look, 100);
+        const show = () => {
           clearInterval(timer);
           document.documentElement.classList.add("drawn");
-        }}, 100);
-      }})();
+        };
+        for (const act of ["pointerdown", "wheel", "keydown"]) addEventListener(act, show, { once: true });
+      })();
     </script>"""
 
 
