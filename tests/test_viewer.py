@@ -464,8 +464,9 @@ class Client:
             "look_at": (0.0, 0, 0),
             "up_direction": (0.0, 1, 0),
         }
-        if not self._looked:  # where pages are before they take the view
-            self.send("ViewerCameraMessage", **(camera | {"position": (0, 0, -5.0)}))
+        if not self._looked:  # where pages are before they take the view, which is that of CAMERA
+            for z in (-5.0, 3.0, 5 / np.sqrt(3)):
+                self.send("ViewerCameraMessage", **(camera | {"position": (0, 0, float(z))}))
         self._looked = True
         self.send("ViewerCameraMessage", **(camera | values))
 
@@ -482,6 +483,25 @@ def test_a_page_moves_the_camera(viewer: wf.Viewer) -> None:
     assert image.rgb.tobytes() == expected.rgb.tobytes()
     radius = np.sqrt(3)
     assert viewer.camera.origin.tolist() == pytest.approx([radius, radius / 2, 3 * radius], abs=1e-4)
+    client.socket.close()
+
+
+def test_views_that_a_page_has_before_it_takes_ours_are_not_shown(
+    viewer: wf.Viewer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """But for a time only, as some cameras cannot be taken; its size counts at once."""
+    monkeypatch.setattr("wavefront.viewer.page.ARRIVAL", 1.0)
+    client = Client(viewer)
+    client._looked = True
+    for z in (-5.0, 3.0):
+        client.look(position=(0.0, 0, z), image_width=48)
+    assert eventually(lambda: viewer.camera.film == (48, 48))
+    assert viewer.camera.origin.tolist() == [0, 0, 5]
+    before = viewer.camera
+    time.sleep(1.1)
+    client.look(position=(0.0, 0, 3.0), image_width=48)
+    assert eventually(lambda: viewer.camera is not before)
+    assert viewer.camera.origin[2] == pytest.approx(3 * np.sqrt(3), abs=1e-4)
     client.socket.close()
 
 

@@ -23,6 +23,7 @@ from .shown import CHOICES, shown_codes
 from .viewpoint import FOV, Viewpoint, within
 
 QUALITY = 85  # of pictures while they refine, sent as jpg; the last one is a png
+ARRIVAL = 3.0  # seconds in which a page that connects takes the view; before, it has views of its own
 PAUSE = 0.1  # seconds between pictures that refine, so that the browser has time for movements
 STOPS = 6.0  # exposure, up and down
 STEPS = 200  # of a slider
@@ -75,6 +76,7 @@ class Page:
         self._frame: ViewerFrame | None = None
         self._fresh = self._closed = False
         self._codes: NDArray[np.uint8] | None = None  # of the picture that is shown
+        self._arrived: set[int] = set()  # pages that have taken the view
         self._sent: tuple[ViewerFrame | None, float] = None, 0.0  # the newest one that was sent, and when
         self._server = _serve(host, port, Front(host, self._picture))
         guard(self._server, host, lambda: self._begin_at(self.viewpoint))
@@ -166,17 +168,20 @@ class Page:
         return react
 
     async def _greet(self, client: Any) -> None:
-        """Follow the camera of a page that has connected; it does not have the view of the others yet."""
-        client.camera.on_update(self._on(partial(self._move, client.camera.position)))
+        """Follow the camera of a page that has connected."""
+        client.camera.on_update(self._on(partial(self._move, time.monotonic() + ARRIVAL)))
         await self._on(self._resize)(client.camera)
         self._connected()
 
-    def _move(self, first: NDArray[np.float64], camera: Any) -> None:
-        """Show the view of a page, unless its camera is where it was at first, before it took the view."""
-        if np.array_equal(first, camera.position):
-            self._resize(camera)
-            return
-        view = self.viewpoint.moved(camera.position, camera.look_at, camera.up_direction)
+    def _move(self, arrival: float, camera: Any) -> None:
+        """Show the view of a page, once it has taken that of the others, or the time for that is over."""
+        page, view = camera.client.client_id, self.viewpoint
+        if page not in self._arrived:
+            if not _is_at(camera, view) and time.monotonic() < arrival:
+                self._resize(camera)
+                return
+            self._arrived.add(page)
+        view = view.moved(camera.position, camera.look_at, camera.up_direction)
         self._change(view.resized(camera.image_width, camera.image_height))
 
     def _resize(self, camera: Any) -> None:
@@ -264,6 +269,13 @@ class Page:
         if (width, height) == frame.camera.film:  # not with the first picture of a view, which is in a hurry
             self._copy.content = self._copy_button()
         self._server.flush()  # viser would wait for more messages
+
+
+def _is_at(camera: Any, view: Viewpoint) -> bool:
+    """Return whether the camera of a page is that of a view."""
+    around = view.surroundings
+    pairs = (camera.position, around.to_page(view.origin)), (camera.look_at, around.to_page(view.target))
+    return all(np.allclose(of_page, of_view, rtol=1e-3, atol=1e-3) for of_page, of_view in pairs)
 
 
 def _line(text: str) -> str:
