@@ -120,8 +120,10 @@ def add_shared(
         return
     slot = paths.slot[: len(lit.surface)]
     lane_in = tiles.grid(slot)
-    number_in = [tiles.grid(points.slot, np.flatnonzero(points.way == way)) for way in range(branches)]
-    shines = highest(light) != 0  # NaN counts: it must reach the picture
+    shining = highest(light) != 0  # NaN counts: it must reach the picture
+    number_in = [
+        tiles.grid(points.slot, np.flatnonzero(shining & (points.way == way))) for way in range(branches)
+    ]
     received = np.zeros((3, slot.size), f4)
     for some in spans(tiles.count, TILES_AT_ONCE):
         first = FirstPoints.of(scene, lit, lane_in[:, some])
@@ -129,20 +131,20 @@ def add_shared(
             continue
         arriving = np.zeros((3, *first.present.shape), f4)
         for numbers in number_in:
-            for member, number in enumerate(numbers[:, some]):
-                there = (number >= 0) & shines.take(number)
-                if not there.any():
-                    continue
-                target = points.take(number)
-                connection = connect(scene, first, target, there, member)
-                total = _sum(connection.density)
+            rows = [(member, number) for member, number in enumerate(numbers[:, some]) if (number >= 0).any()]
+            of_rows = [
+                connect(scene, first, points.take(number), number >= 0, member) for member, number in rows
+            ]
+            find_blocked(scene, of_rows)
+            for (_, number), connections in zip(rows, of_rows, strict=True):
+                total = _sum(connections.pdf * connections.geometry)
                 found = total > 0
-                part = connection.geometry / (np.where(found, total, f4(1)) * f4(branches))
-                shared = connection.f * part
+                part = connections.geometry / (np.where(found, total, f4(1)) * f4(branches))
+                shared = connections.f * part
                 shared *= take(light, number)[:, None]
                 arriving += shared
-                lost = np.flatnonzero(there & ~found)  # by rounding: they stay the path's own
-                L[:, target.slot.take(lost)] += take(target.throughput, lost) * take(light, number.take(lost))
+                lost = number.compress((number >= 0) & ~found)  # by rounding: they stay the path's own
+                L[:, points.slot.take(lost)] += take(points.throughput, lost) * take(light, lost)
         cells = np.flatnonzero(first.present)
         received[:, lane_in[:, some].reshape(-1).take(cells)] = arriving.reshape(3, -1).take(cells, 1)
     L[:, slot] += paths.throughput[:, : slot.size] * received
@@ -171,14 +173,16 @@ class Connections:
     """Connections of the first points of t tiles to one shared point each; all is 0 where there is none."""
 
     f: Floats  # (3, members, t) BSDF times cosine at the first point, 1/sr
+    pdf: Floats  # (members, t) density with which a path from the first point takes the direction, 1/sr
     geometry: Floats  # (members, t) cosine at the shared point / distance², 0 where something is between
-    density: Floats  # (members, t) per area with which a path from the first point finds the shared one
+    lanes: Ints  # (k,) cells of which that is not known yet
+    rays: ShadowRays  # k that find it out
 
 
 def connect(
     scene: CompiledScene, first: FirstPoints, target: SharedPoints, there: Bools, member: int
 ) -> Connections:
-    """Connect first points to shared points.
+    """Connect first points to shared points, as if nothing were between them.
 
     Parameters
     ----------
@@ -229,8 +233,17 @@ def connect(
         distance=f4(1) / take(inverse.reshape(-1), lanes),
         cos_light=take(cos_target.reshape(-1), lanes),
     )
-    geometry.reshape(-1)[lanes] *= _transmittance(scene, rays)
-    return Connections(f.reshape(3, *shape), geometry, pdf.reshape(shape) * geometry)
+    return Connections(f.reshape(3, *shape), pdf.reshape(shape), geometry, lanes, rays)
+
+
+def find_blocked(scene: CompiledScene, of_rows: list[Connections]) -> None:
+    """Weaken connections, in place, by what is between their points; all of them by one query."""
+    if not of_rows:
+        return
+    through = _transmittance(scene, ShadowRays.concatenate([each.rays for each in of_rows]))
+    ends = np.cumsum([each.lanes.size for each in of_rows])
+    for each, part in zip(of_rows, np.split(through, ends[:-1]), strict=True):
+        each.geometry.reshape(-1)[each.lanes] *= part
 
 
 def _transmittance(scene: CompiledScene, rays: ShadowRays) -> Floats:
