@@ -84,14 +84,54 @@ def glossy(size: tuple[int, int]) -> wf.Scene:
 
 
 @pytest.mark.parametrize("build", [room, everything, glossy, open_scene])
-@pytest.mark.parametrize("by", ["materials", "trial"])
+@pytest.mark.parametrize("by", ["light", "trial"])
 def test_paths_are_not_shared_where_glass_and_gloss_make_the_noise(
     build: Callable[[tuple[int, int]], wf.Scene], by: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Their materials say so, and so would the trial."""
+    """Little light that is hard to find says so, and so would the trial."""
     if by == "trial":
         monkeypatch.setattr(choice, "shares_all", lambda scene: True)
     assert not chosen(build((240, 240))).reuse
+
+
+@pytest.mark.parametrize(
+    "gloss",
+    [
+        wf.Mix(wf.Diffuse((0.3, 0.25, 0.2)), wf.Conductor.named("gold", roughness=0.25), 0.15),
+        wf.Principled((0.5, 0.4, 0.3), roughness=0.3),
+    ],
+    ids=["mix", "principled"],
+)
+def test_paths_are_shared_beside_gloss_where_light_is_hard_to_find(gloss: wf.Bsdf) -> None:
+    """A glossy floor and a glass ball do not keep the matte walls of a room from it."""
+    scene = lamp_at_the_ceiling((256, 256))
+    scene.shapes[0].material = wf.Material(gloss)
+    scene.shapes.append(wf.Sphere((0.4, -0.8, 0.3), 0.2, material=wf.Dielectric(1.5)))
+    assert chosen(scene).reuse
+
+
+@pytest.mark.parametrize(
+    ("build", "rare", "tries"),
+    [(cornell_box, False, [True]), (glossy, False, [False]), (glossy, True, [False, True])],
+    ids=["matte", "glossy", "light is rare"],
+)
+def test_sharing_is_tried_where_all_is_matte_or_light_is_rare(
+    build: Callable[[tuple[int, int]], wf.Scene],
+    rare: bool,
+    tries: list[bool],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Elsewhere rare caustics may be most of the noise, and a trial may miss them."""
+    tried: list[bool] = []
+
+    def trial(*args: Any) -> Trial:
+        tried.append(args[-1])
+        reused = Reused(pixels=0.1, blurred=0.1, again=0, connections=0, evaluations=0)
+        return Trial(0, 2 if rare else 0.1, 1, 1, 1, reused)
+
+    monkeypatch.setattr(choice, "_trial", trial)
+    assert chosen(build(SIZE)).reuse is tries[-1]
+    assert tried == tries
 
 
 def chosen(scene: wf.Scene, **settings: Any) -> choice.Choice:
@@ -120,7 +160,7 @@ def test_paths_are_not_shared_with_some_settings(
     settings: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whatever a trial would say."""
-    pays = Trial(0, 1, 1, 1, 1, Reused(pixels=0.1, neighbors=0.1, connections=0))
+    pays = Trial(0, 1, 1, 1, 1, Reused(pixels=0.1, blurred=0.1, again=0, connections=0, evaluations=0))
     tried: list[bool] = []
 
     def trial(*args: Any) -> Trial:
@@ -141,7 +181,7 @@ def test_a_guide_goes_with_what_pays(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def trial(*args: Any) -> Trial:
         tables.append(args[3])
-        return Trial(0, 1, 1, 1, 1, Reused(pixels=0.1, neighbors=0.1, connections=0))
+        return Trial(0, 2, 1, 1, 1, Reused(pixels=0.1, blurred=0.1, again=0, connections=0, evaluations=0))
 
     monkeypatch.setattr(choice, "train", lambda *args: table)
     monkeypatch.setattr(choice, "_trial", trial)
@@ -231,8 +271,31 @@ def test_trials_do_not_depend_on_how_they_are_cut_into_waves(
     for other in found[1:]:
         for name in ("shared", "separate", "before", "after"):
             assert getattr(other, name) == getattr(found[0], name)
-        for name in ("pixels", "neighbors", "connections"):
+        for name in ("pixels", "blurred", "again", "connections", "evaluations"):
             assert getattr(other.reused, name) == getattr(found[0].reused, name)
+
+
+def test_a_blur_adds_up_the_noise_that_a_tile_shares() -> None:
+    """The weights are those of pixels seven apart in a picture that is blurred by a Gaussian."""
+    deviation = np.random.default_rng(0).normal(size=16)
+    picture = np.zeros((101, 101))
+    picture[40 : 40 + 4 * 7 : 7, 40 : 40 + 4 * 7 : 7] = deviation.reshape(4, 4)
+    away = np.arange(-40, 41)
+    kernel = np.exp(-(away**2) / (2 * trial.BLUR**2))
+    for axis in (0, 1):
+        picture = np.apply_along_axis(np.convolve, axis, picture, kernel, "same")
+    found = trial._after_blur(deviation[None, None, None]).sum()
+    assert found == pytest.approx(np.square(picture).sum() / np.square(kernel).sum() ** 2, rel=1e-3)
+
+
+def test_sharing_costs_rays_evaluations_and_further_paths() -> None:
+    """All of them relative to the rays of plain paths; what is gained must be more."""
+    reused = Reused(pixels=0.2, blurred=0.3, again=50, connections=100, evaluations=100)
+    found = Trial(0.0, 1.0, 50, 50, 1.0, reused)
+    assert found.costs_of_reuse() == pytest.approx((0.2 * 2.3, 0.3 * 2.3))
+    assert found.reuse_pays()
+    dear = Reused(pixels=0.2, blurred=0.3, again=350, connections=100, evaluations=100)
+    assert not Trial(0.0, 1.0, 50, 50, 1.0, dear).reuse_pays()
 
 
 def test_a_guide_is_used_where_it_pays() -> None:

@@ -14,8 +14,8 @@ from .pilot import train
 from .pixel_tiles import SIDE, STRIDE
 from .record import record
 from .settings import AUTO, Settings
-from .stages.reuse import shares_all
-from .trial import MOST_TILES, Trial, is_worth_it, run_trial, tiles_for
+from .stages.reuse import can_reuse, shares_all
+from .trial import BLOCKS, MOST_TILES, Trial, is_worth_it, run_trial, tiles_for
 
 LEAST_PIXELS = 192 * 192  # of pictures that get a trial; smaller ones take no longer than a moment
 GUIDE_HINT = "most light is hard to find here: guide=True may pay (docs/guiding.md)"
@@ -50,8 +50,14 @@ def choose(settings: Settings, scene: CompiledScene, camera: Camera) -> Choice:
     if settings.guide == AUTO and table is not None:
         return _choose_guide(settings, scene, whole, asked, table)
     if _tries_something(settings, scene, whole):
-        tries_reuse = _may_reuse(settings, whole) and shares_all(scene)
-        found = _trial(settings, scene, whole, table, tiles_for(whole.size), tries_reuse)
+        tiles, may_reuse = tiles_for(whole.size), _may_reuse(settings, whole) and can_reuse(scene)
+        tries_reuse = may_reuse and shares_all(scene)
+        found = _trial(settings, scene, whole, table, tiles, tries_reuse)
+        if (
+            may_reuse and not tries_reuse and found.light_is_rare
+        ):  # else rare caustics may be most of the noise
+            tries_reuse = True
+            found = _trial(settings, scene, whole, table, tiles, tries_reuse)
         hint = GUIDE_HINT if table is None and found.light_is_rare else None
         if tries_reuse and found.reuse_pays():
             return Choice(1, True, table, hint)
@@ -79,7 +85,7 @@ def _trial(
     reuse: bool = False,
 ) -> Trial:
     width = camera.film[0]
-    samplers = settings.pilot_sampler(width, 1), settings.pilot_sampler(width, 2)
+    samplers = tuple(settings.pilot_sampler(width, number) for number in range(1, BLOCKS + 1))
     return run_trial(scene, camera, samplers, settings.max_bounces, table, tiles, reuse)
 
 

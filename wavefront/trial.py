@@ -1,13 +1,13 @@
 """The trial before a render: what more branches, paths that pixels share, or a guide would bring.
 
-Pixels of some tiles (pixel_tiles.py) are rendered twice under seeds of their own, with two branches that are
-kept apart. The variance of a picture with N branches is shared + separate / N: the covariance of the two
-branches is what they share, and the rest lies between them. With the rays of both parts of the paths,
+Pixels of some tiles (pixel_tiles.py) are rendered several times under seeds of their own, with two branches
+that are kept apart. The variance of a picture with N branches is shared + separate / N: the covariance of the
+two branches is what they share, and the rest lies between them. With the rays of both parts of the paths,
 counted and not timed, this gives variance times rays for every N, which is least near the square root of
 (separate / shared) · (rays before / rays of a branch). What the first branches find is shared among the
-pixels of each tile, too, and compared with the same paths alone: in each pixel, and in means of four
-neighbors of a tile, whose noise is the same in part. So decisions depend on the scene, the camera and the
-settings alone.
+pixels of each tile, too, and compared with the same paths alone: in each pixel, and after a blur, which adds
+up what is the same in the noise of a tile. So decisions depend on the scene, the camera and the settings
+alone.
 
 Sources: J. Arvo and D. Kirk, Particle Transport and Image Synthesis, 1990 (splitting); E. Veach, thesis 1997,
 §10.4.2 (efficiency).
@@ -33,12 +33,13 @@ from .stages.bounce import bounce_sample
 from .stages.compact import roulette, select
 from .stages.generate import generate
 from .stages.guidance import guide
-from .stages.reuse import add_shared, as_shared, shared_points
+from .stages.reuse import SHARED_WAYS, add_shared, as_shared, shared_points
 from .stages.shade import direct
 from .state import Paths, Words
-from .vec import Bools, Doubles, Floats, Ints
+from .vec import Bools, Doubles, Floats, Ints, f4
 
-SAMPLES = 8  # of each pixel in each of two blocks; stratified, as those of a picture are
+BLOCKS = 4  # of independent samples
+SAMPLES = 4  # of each pixel in each block; stratified, as those of a picture are
 PIXELS_PER_TILE = 2048  # of the picture: an eighth of a path for each of its pixels
 MOST_TILES = 256  # 65536 paths
 BOUNCES = 6  # of the trial's paths at most: few get further, and a wave of few costs as much as one of many
@@ -50,10 +51,15 @@ ERRORS = 2  # standard errors, over tiles, by which more variance counts as shar
 GAIN = 0.9  # variance times rays must fall below this part: counted rays tell the cost to about a tenth
 NEAR_BEST = 1.1  # the fewest branches are taken that cost no more than this times the least
 GUIDED_RAY = 1.35  # cost of a ray of a guided path, relative to that of a plain one
-CONNECTION = 0.6  # cost of a ray that connects pixels, likewise
-RARE_LIGHT = 0.5  # relative variance of a pixel of SAMPLES samples, from where on light is hard to find
-REUSE_GAIN = 0.75  # what re-use must bring beyond the best number of branches, in the mean of pixels and blur
-NO_WORSE = 1.1  # and neither may cost more than this
+CONNECTION = 0.5  # cost of a ray that connects pixels, likewise
+EVALUATION = 0.3  # cost of evaluating the BSDF of a pixel for another one, relative to that of a ray
+RARE_LIGHT = 1.0  # relative variance of a pixel of SAMPLES samples, from where on light is hard to find
+REUSE_GAIN = 0.9  # what re-use must bring beyond the best number of branches, in the mean of pixels and blur
+NO_WORSE = 1.3  # and neither may cost more than this: the trial takes re-use to be dearer than it is
+BLUR = 4  # standard deviation of the blur, pixels
+BLUR_WEIGHTS = [  # of a row of a tile for each other: the convolution of the blur with itself
+    [math.exp(-(((row - other) * STRIDE / (2 * BLUR)) ** 2)) for other in range(SIDE)] for row in range(SIDE)
+]
 
 
 @record
@@ -61,8 +67,10 @@ class Reused:
     """What sharing paths among pixels brings."""
 
     pixels: float  # variance of a pixel, relative to that of the same paths alone
-    neighbors: float  # and of the mean of four neighbors in a tile
+    blurred: float  # and after a blur, which adds up noise that pixels share
+    again: float  # rays of the further paths from shared points
     connections: float  # rays that connect pixels
+    evaluations: float  # connections that were looked at, whether or not they needed a ray
 
 
 @record
@@ -98,15 +106,16 @@ class Trial:
         if self.reused is None:
             return 1.0, 1.0
         plain = self.before + self.after
-        cost = (plain + CONNECTION * self.reused.connections) / plain
-        return self.reused.pixels * cost, self.reused.neighbors * cost
+        connecting = CONNECTION * self.reused.connections + EVALUATION * self.reused.evaluations
+        cost = (plain + self.reused.again + connecting) / plain
+        return self.reused.pixels * cost, self.reused.blurred * cost
 
     def reuse_pays(self) -> bool:
         """Return whether re-use costs less than the best number of branches, by pixels and after a blur."""
-        pixels, neighbors = self.costs_of_reuse()
+        pixels, blurred = self.costs_of_reuse()
         branches = self.cost(self.best_ways()) / self.cost(1) if self.cost(1) > 0 else 1.0
-        both = math.sqrt(pixels * neighbors)
-        return both < REUSE_GAIN * branches and max(pixels, neighbors) < NO_WORSE
+        both = math.sqrt(pixels * blurred)
+        return both < REUSE_GAIN * branches and max(pixels, blurred) < NO_WORSE
 
 
 def is_worth_it(guided: Trial, plain: Trial, ways: int | None) -> bool:
@@ -123,18 +132,20 @@ def tiles_for(size: tuple[int, int]) -> int:
 def run_trial(
     scene: CompiledScene,
     camera: Camera,
-    samplers: tuple[Sampler, Sampler],
+    samplers: tuple[Sampler, ...],
     max_bounces: int,
     table: GuideTable | None = None,
     tiles: int = MOST_TILES // 2,
     reuse: bool = False,
 ) -> Trial:
-    """Render some pixels twice, with samplers whose numbers the picture does not use.
+    """Render some pixels several times, with samplers whose numbers the picture does not use.
 
     Parameters
     ----------
     camera
         In the unit of the compiled scene.
+    samplers
+        One for each block of samples, at least two.
     max_bounces
         At least 2.
     tiles
@@ -148,11 +159,11 @@ def run_trial(
         for first in range(0, pixel.size, WAVE * MEMBERS)
     ]
     ways = np.concatenate([part.ways for part in parts], -1)
-    difference, mean = ways[:, :, 0] - ways[:, :, 1], ways.mean((1, 2))
+    deviation, mean = _deviations(ways), ways.mean((1, 2))
     of_tile = mean.reshape(3, tiles, MEMBERS).mean(-1).repeat(MEMBERS, -1)
-    scale = (np.square(of_tile) + (FLOOR * mean.mean() ** 2 or 1.0))[:, None]
-    alone = (np.square(difference) / scale).mean((0, 1)) / 2  # of each pixel, with one branch
-    common = (difference[:, 0] * difference[:, 1] / scale[:, 0]).mean(0) / 2
+    scale = (np.square(of_tile) + (FLOOR * mean.mean() ** 2 or 1.0))[:, None, None]
+    alone = (np.square(deviation) / scale).mean((0, 1, 2))  # of each pixel, with one branch
+    common = (deviation[:, 0] * deviation[:, 1] / scale[:, 0]).mean((0, 1))
     kept = _calm(alone)
     total = math.fsum(alone.take(kept)) / kept.size
     shared = min(_at_most(common, kept), total)
@@ -160,10 +171,7 @@ def run_trial(
     reused = None
     if reuse:
         together = np.concatenate([part.together for part in parts], -1)
-        pair = together[:, :, 0] - together[:, :, 1], difference[:, :1]
-        of_neighbors = (_of_neighbors(each) for each in (*pair, scale))
-        connections = sum(part.connections for part in parts)
-        reused = Reused(_ratio(*pair, scale), _ratio(*of_neighbors), connections)
+        reused = _reused(parts, _deviations(together), deviation[:, :1], scale)
     return Trial(
         shared,
         total - shared,
@@ -186,10 +194,25 @@ def _spread_tiles(camera: Camera, count: int) -> Words:
     return (y % height * width + x % width).ravel().astype(np.uint32)
 
 
-def _of_neighbors(values: Doubles) -> Doubles:
-    """Return the means (3, ways, tiles · 4) of four neighbors of values (3, ways, pixels)."""
-    by_tile = values.reshape(*values.shape[:2], -1, SIDE // 2, 2, SIDE // 2, 2)
-    return by_tile.mean((-3, -1)).reshape(*values.shape[:2], -1)
+def _deviations(blocks: Doubles) -> Doubles:
+    """Return how blocks (3, ways, blocks, pixels) differ from their mean; the mean square is the variance."""
+    count = blocks.shape[2]
+    return (blocks - blocks.mean(2, keepdims=True)) * math.sqrt(count / (count - 1))
+
+
+def _after_blur(deviation: Doubles) -> Doubles:
+    """Return deviations (..., pixels) times what a blur gathers of those of their tiles; it may be negative.
+
+    The mean over pixels is the variance after the blur, but for a factor. Two pixels count by the
+    convolution of the blur with itself.
+    """
+    of_tile = deviation.reshape(*deviation.shape[:-1], -1, SIDE, SIDE)
+    gathered = of_tile
+    for axis in (-2, -1):
+        rows = np.moveaxis(gathered, axis, 0)
+        sums = [sum(w * row for w, row in zip(weights, rows, strict=True)) for weights in BLUR_WEIGHTS]
+        gathered = np.moveaxis(np.stack(sums), 0, axis)
+    return (of_tile * gathered).reshape(deviation.shape)
 
 
 def _calm(variance: Doubles) -> Ints:
@@ -208,9 +231,25 @@ def _at_most(values: Doubles, kept: Ints) -> float:
     return max(mean + ERRORS * error, 0.0)
 
 
-def _ratio(difference: Doubles, other: Doubles, scale: Doubles) -> float:
-    """Return the variance of one kind of picture over that of another, given differences of two of each."""
-    one, base = ((np.square(each) / scale).mean((0, 1)) for each in (difference, other))
+def _reused(parts: list[TrialPart], together: Doubles, alone: Doubles, scale: Doubles) -> Reused:
+    """Return what sharing brings, given deviations (3, 1, blocks, pixels) with it and without it."""
+    return Reused(
+        _ratio(*(np.square(each) / scale for each in (together, alone))),
+        _ratio(*(_by_tile(_after_blur(each) / scale) for each in (together, alone))),
+        sum(part.again for part in parts),
+        sum(part.connections for part in parts),
+        sum(part.evaluations for part in parts),
+    )
+
+
+def _by_tile(values: Doubles) -> Doubles:
+    """Return the sums (..., tiles) of values (..., pixels)."""
+    return values.reshape(*values.shape[:-1], -1, MEMBERS).sum(-1)
+
+
+def _ratio(squares: Doubles, others: Doubles) -> float:
+    """Return the mean of squares (3, ways, blocks, k) over that of others, without the greatest of each."""
+    one, base = (each.mean((0, 1, 2)) for each in (squares, others))
     least = math.fsum(base.take(_calm(base)))
     return math.fsum(one.take(_calm(one))) / least if least > 0 else 1.0
 
@@ -219,17 +258,19 @@ def _ratio(difference: Doubles, other: Doubles, scale: Doubles) -> float:
 class TrialPart:
     """What the paths of some pixels have found."""
 
-    ways: Doubles  # (3, 2, 2, pixels) radiance by each branch, as if it were the only one, in each block
-    together: Doubles  # (3, 1, 2, pixels) by the first branches, where pixels share what they find
+    ways: Doubles  # (3, 2, blocks, pixels) radiance by each branch, as if it were the only one
+    together: Doubles  # (3, 1, blocks, pixels) by the first branches, where pixels share what they find
     before: int  # rays before the branches part
     after: int  # rays of both branches
+    again: int  # rays of the further paths from shared points
     connections: int  # rays between pixels
+    evaluations: int  # of BSDFs, for these
 
 
 def _trace(
     scene: CompiledScene,
     camera: Camera,
-    samplers: tuple[Sampler, Sampler],
+    samplers: tuple[Sampler, ...],
     max_bounces: int,
     table: GuideTable | None,
     pixel: Words,
@@ -238,7 +279,7 @@ def _trace(
     """Trace samples of pixels, whole tiles in turn, with two branches of independent random numbers."""
     counter = RayCounter(scene.accelerator)
     scene, sampler = replace(scene, accelerator=counter), samplers[0]
-    paths = _both_blocks(scene, camera, samplers, pixel)
+    paths = _blocks(scene, camera, samplers, pixel)
     n = len(paths)
     L = np.zeros((3, 2 * n), np.float32)
     first, hits = intersect_and_compact(scene, paths, sampler, 0, L, mis=True)
@@ -252,8 +293,8 @@ def _trace(
     paths, hits = intersect_and_compact(scene, paths, sampler, 1, L, mis=True)
     if not reuse:
         follow(scene, paths, hits, sampler, max_bounces, L, 1, table)
-        ways = _means(L, pixel.size)
-        return TrialPart(ways, ways[:, :1], before, counter.rays - before, 0)
+        ways = _means(L, len(samplers), pixel.size)
+        return TrialPart(ways, ways[:, :1], before, counter.rays - before, 0, 0, 0)
     lanes, points = shared_points(scene, paths, hits, 1)
     found = np.concatenate([L, np.zeros((3, lanes.size), np.float32)], 1)  # of paths, then of shared points
     follow(scene, _cut(paths, lanes, 2 * n), hits, sampler, max_bounces, found, 1, table)
@@ -261,11 +302,19 @@ def _trace(
     together = L[:, :n].copy()
     L[:, points.slot] += points.throughput * light
     of_first = np.flatnonzero(points.slot < n)
+    lanes, points, light = lanes.take(of_first), points.take(of_first), light.take(of_first, 1)
+    begun, hits = as_shared(paths.take(lanes)), hits.take(lanes)
+    for way in range(1, SHARED_WAYS):
+        other = replace(begun, pixel=_elsewhere(begun.pixel, camera, 2 * len(samplers) * way))
+        follow(scene, other, hits, sampler, max_bounces, light, 1, table)
+    light *= f4(1 / SHARED_WAYS)
+    again = counter.rays - after
     tile, member = np.divmod(np.arange(n), MEMBERS)
     tiles = WaveTiles(tile, member, n // MEMBERS)
-    add_shared(scene, together, first, shade, points.take(of_first), light.take(of_first, 1), tiles, 1)
-    ways, shared = _means(L, pixel.size), _means(together, pixel.size)
-    return TrialPart(ways, shared, before, after - before, counter.rays - after)
+    add_shared(scene, together, first, shade, points, light, tiles, 1)
+    ways, shared = _means(L, len(samplers), pixel.size), _means(together, len(samplers), pixel.size)
+    connections, evaluations = counter.rays - after - again, MEMBERS * len(shade.lit().surface)
+    return TrialPart(ways, shared, before, after - before, again, connections, evaluations)
 
 
 def _cut(paths: Paths, lanes: Ints, first_slot: int) -> Paths:
@@ -283,21 +332,20 @@ def _cut(paths: Paths, lanes: Ints, first_slot: int) -> Paths:
     return cut
 
 
-def _means(L: Floats, pixels: int) -> Doubles:
-    """Return means (3, ways, 2, pixels) over samples of radiance (3, ways · blocks · samples · pixels)."""
+def _means(L: Floats, blocks: int, pixels: int) -> Doubles:
+    """Return means (3, ways, blocks, pixels) of radiance (3, ways · blocks · samples · pixels)."""
     finite = np.where(np.isfinite(L), L, 0)
-    return finite.reshape(3, -1, 2, SAMPLES, pixels).mean(3, dtype=np.float64)
+    return finite.reshape(3, -1, blocks, SAMPLES, pixels).mean(3, dtype=np.float64)
 
 
-def _both_blocks(
-    scene: CompiledScene, camera: Camera, samplers: tuple[Sampler, Sampler], pixel: Words
-) -> Paths:
-    """Return paths of two blocks of samples, whose random numbers are independent."""
-    sample = np.repeat(np.arange(SAMPLES, dtype=np.uint32), pixel.size)
-    one, other = (generate(scene, camera, each, np.tile(pixel, SAMPLES), sample) for each in samplers)
-    other.slot = other.slot + len(one)
-    other.pixel = _elsewhere(other.pixel, camera, 2)
-    return Paths.concatenate([one, other])
+def _blocks(scene: CompiledScene, camera: Camera, samplers: tuple[Sampler, ...], pixel: Words) -> Paths:
+    """Return paths of a block of samples for each sampler, whose random numbers are independent."""
+    sample, pixel = np.repeat(np.arange(SAMPLES, dtype=np.uint32), pixel.size), np.tile(pixel, SAMPLES)
+    blocks = [generate(scene, camera, sampler, pixel, sample) for sampler in samplers]
+    for number, paths in enumerate(blocks):
+        paths.slot = paths.slot + number * pixel.size
+        paths.pixel = _elsewhere(paths.pixel, camera, 2 * number)
+    return Paths.concatenate(blocks)
 
 
 def _elsewhere(pixel: Words, camera: Camera, times: int) -> Words:
