@@ -155,6 +155,57 @@ def square(build: Callable[[tuple[int, int]], wf.Scene], size: int) -> wf.Scene:
     return build((size, size))
 
 
+def changed(name: str, floor: wf.Bsdf | None = None, *things: Any) -> Callable[[int], wf.Scene]:
+    """Return what builds one of the hard scenes, or the Cornell box, with another floor and more things."""
+
+    def build(size: int) -> wf.Scene:
+        scene = HARD_SCENES[name](size) if name in HARD_SCENES else scenes.cornell_box((size, size))
+        if floor is not None:
+            scene.shapes[0].material = wf.Material(floor)
+        scene.shapes = [*scene.shapes, *things]
+        return scene
+
+    return build
+
+
+def sunny(size: int) -> wf.Scene:
+    """Return the room with a window in a sun of 8 degrees, whose light glass and gold balls gather."""
+    scene = HARD_SCENES["window"](size)
+    scene.lights = [
+        wf.Environment((0.5, 0.7, 1)),
+        wf.DirectionalLight((1, -0.9, -0.2), (20, 18, 15), angle=8),
+    ]
+    glass, gold = wf.Dielectric(1.5), wf.Conductor.named("gold", roughness=0.08)
+    balls = wf.Sphere((1.3, 1.1, 2.1), 0.25, material=glass), wf.Sphere((2.3, 0.3, 2.2), 0.3, material=gold)
+    scene.shapes = [*scene.shapes, *balls]
+    return scene
+
+
+GOLD = wf.Conductor.named("gold", roughness=0.2)
+WOOD = wf.Principled((0.5, 0.35, 0.2), roughness=0.35)
+SHINY = wf.Mix(wf.Diffuse((0.5, 0.4, 0.3)), wf.Conductor(1, 1000, roughness=0.15), 0.1)
+PLASTIC = wf.Principled((0.7, 0.5, 0.4), roughness=0.3)
+BESIDE_GLOSS: dict[str, Callable[[int], wf.Scene]] = {
+    "box, gold ball": lambda size: room_with(size, wf.Sphere((0.1, -0.6, 0.2), 0.4, material=GOLD)),
+    "box, plastic ball": lambda size: room_with(size, wf.Sphere((0.1, -0.6, 0.2), 0.4, material=PLASTIC)),
+    "box, small glass ball": lambda size: room_with(
+        size, wf.Sphere((0.4, -0.85, 0.5), 0.15, material=wf.Dielectric(1.5))
+    ),
+    "box, shiny floor": changed("Cornell box", SHINY),
+    "ceiling, shiny floor": changed("ceiling", SHINY),
+    "ceiling, gold and plastic balls": changed(
+        "ceiling",
+        None,
+        wf.Sphere((1.6, 0.4, 3.6), 0.35, material=GOLD),
+        wf.Sphere((2.6, 0.25, 3.9), 0.25, material=PLASTIC),
+    ),
+    "ajar, wooden floor": changed("ajar", WOOD),
+    "ajar, gold ball": changed("ajar", None, wf.Sphere((2.2, 0.4, 3.2), 0.4, material=GOLD)),
+    "window, wooden floor": changed("window", WOOD),
+    "window, gold floor": changed("window", GOLD),
+    "window, glass ball": changed("window", None, wf.Sphere((2, 0.4, 3.2), 0.4, material=wf.Dielectric(1.5))),
+    "window, wide sun, glass and gold": sunny,
+}
 SCENES: dict[str, Callable[[int], Any]] = {
     "Cornell box": cornell_box,
     "mirror and glass balls": partial(square, scenes.room),
@@ -169,6 +220,7 @@ SCENES: dict[str, Callable[[int], Any]] = {
     "metal and glass meshes": meshes,
     **{f"{n} {kind}": partial(lit, kind, n) for kind in ("points", "panels") for n in (10, 1000)},
     **{name: partial(example, name) for name in EXAMPLES},
+    **BESIDE_GLOSS,
 }
 
 

@@ -103,21 +103,28 @@ def test_paths_are_not_shared_where_glass_and_gloss_make_the_noise(
     ids=["mix", "principled"],
 )
 def test_paths_are_shared_beside_gloss_where_light_is_hard_to_find(gloss: wf.Bsdf) -> None:
-    """A glossy floor and a glass ball do not keep the matte walls of a room from it."""
+    """A glossy floor does not keep the matte walls of a room from it; a small ball, seldom met, does."""
     scene = lamp_at_the_ceiling((256, 256))
     scene.shapes[0].material = wf.Material(gloss)
-    scene.shapes.append(wf.Sphere((0.4, -0.8, 0.3), 0.2, material=wf.Dielectric(1.5)))
     assert chosen(scene).reuse
+    scene.shapes.append(wf.Sphere((0.4, -0.8, 0.3), 0.1, material=wf.Dielectric(1.5)))
+    assert not chosen(scene).reuse
 
 
 @pytest.mark.parametrize(
-    ("build", "rare", "tries"),
-    [(cornell_box, False, [True]), (glossy, False, [False]), (glossy, True, [False, True])],
-    ids=["matte", "glossy", "light is rare"],
+    ("build", "variance", "gloss", "tries"),
+    [
+        (cornell_box, 0.1, 1, [True]),
+        (glossy, 0.1, 0.3, [False]),
+        (glossy, 2, 0.01, [False]),
+        (glossy, 2, 0.3, [False, True]),
+    ],
+    ids=["matte", "glossy", "seldom met", "often met, and light is rare"],
 )
 def test_sharing_is_tried_where_all_is_matte_or_light_is_rare(
     build: Callable[[tuple[int, int]], wf.Scene],
-    rare: bool,
+    variance: float,
+    gloss: float,
     tries: list[bool],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -127,7 +134,7 @@ def test_sharing_is_tried_where_all_is_matte_or_light_is_rare(
     def trial(*args: Any) -> Trial:
         tried.append(args[-1])
         reused = Reused(pixels=0.1, blurred=0.1, again=0, connections=0, evaluations=0)
-        return Trial(0, 2 if rare else 0.1, 1, 1, 1, reused)
+        return Trial(0, variance, 1, 1, 1, gloss, reused)
 
     monkeypatch.setattr(choice, "_trial", trial)
     assert chosen(build(SIZE)).reuse is tries[-1]
@@ -160,7 +167,7 @@ def test_paths_are_not_shared_with_some_settings(
     settings: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whatever a trial would say."""
-    pays = Trial(0, 1, 1, 1, 1, Reused(pixels=0.1, blurred=0.1, again=0, connections=0, evaluations=0))
+    pays = Trial(0, 1, 1, 1, 1, 1, Reused(pixels=0.1, blurred=0.1, again=0, connections=0, evaluations=0))
     tried: list[bool] = []
 
     def trial(*args: Any) -> Trial:
@@ -181,7 +188,7 @@ def test_a_guide_goes_with_what_pays(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def trial(*args: Any) -> Trial:
         tables.append(args[3])
-        return Trial(0, 2, 1, 1, 1, Reused(pixels=0.1, blurred=0.1, again=0, connections=0, evaluations=0))
+        return Trial(0, 2, 1, 1, 1, 1, Reused(pixels=0.1, blurred=0.1, again=0, connections=0, evaluations=0))
 
     monkeypatch.setattr(choice, "train", lambda *args: table)
     monkeypatch.setattr(choice, "_trial", trial)
@@ -291,11 +298,11 @@ def test_a_blur_adds_up_the_noise_that_a_tile_shares() -> None:
 def test_sharing_costs_rays_evaluations_and_further_paths() -> None:
     """All of them relative to the rays of plain paths; what is gained must be more."""
     reused = Reused(pixels=0.2, blurred=0.3, again=50, connections=100, evaluations=100)
-    found = Trial(0.0, 1.0, 50, 50, 1.0, reused)
+    found = Trial(0.0, 1.0, 50, 50, 1.0, 1, reused)
     assert found.costs_of_reuse() == pytest.approx((0.2 * 2.3, 0.3 * 2.3))
     assert found.reuse_pays()
     dear = Reused(pixels=0.2, blurred=0.3, again=350, connections=100, evaluations=100)
-    assert not Trial(0.0, 1.0, 50, 50, 1.0, dear).reuse_pays()
+    assert not Trial(0.0, 1.0, 50, 50, 1.0, 1, dear).reuse_pays()
 
 
 def test_a_guide_is_used_where_it_pays() -> None:

@@ -53,9 +53,7 @@ def choose(settings: Settings, scene: CompiledScene, camera: Camera) -> Choice:
         tiles, may_reuse = tiles_for(whole.size), _may_reuse(settings, whole) and can_reuse(scene)
         tries_reuse = may_reuse and shares_all(scene)
         found = _trial(settings, scene, whole, table, tiles, tries_reuse)
-        if (
-            may_reuse and not tries_reuse and found.light_is_rare
-        ):  # else rare caustics may be most of the noise
+        if may_reuse and not tries_reuse and found.light_is_rare and found.gloss_is_common:
             tries_reuse = True
             found = _trial(settings, scene, whole, table, tiles, tries_reuse)
         hint = GUIDE_HINT if table is None and found.light_is_rare else None

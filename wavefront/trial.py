@@ -33,10 +33,11 @@ from .stages.bounce import bounce_sample
 from .stages.compact import roulette, select
 from .stages.generate import generate
 from .stages.guidance import guide
-from .stages.reuse import SHARED_WAYS, add_shared, as_shared, shared_points
+from .stages.interaction import material_rows
+from .stages.reuse import SHARED_WAYS, add_shared, as_shared, shared_materials, shared_points
 from .stages.shade import direct
 from .state import Paths, Words
-from .vec import Bools, Doubles, Floats, Ints, f4
+from .vec import ALL, Bools, Doubles, Floats, Ints, f4
 
 BLOCKS = 4  # of independent samples
 SAMPLES = 4  # of each pixel in each block; stratified, as those of a picture are
@@ -54,6 +55,7 @@ GUIDED_RAY = 1.35  # cost of a ray of a guided path, relative to that of a plain
 CONNECTION = 0.5  # cost of a ray that connects pixels, likewise
 EVALUATION = 0.3  # cost of evaluating the BSDF of a pixel for another one, relative to that of a ray
 RARE_LIGHT = 1.0  # relative variance of a pixel of SAMPLES samples, from where on light is hard to find
+COMMON_GLOSS = 0.05  # part of the second points, from where on a trial sees enough of what a material does
 REUSE_GAIN = 0.9  # what re-use must bring beyond the best number of branches, in the mean of pixels and blur
 NO_WORSE = 1.3  # and neither may cost more than this: the trial takes re-use to be dearer than it is
 BLUR = 4  # standard deviation of the blur, pixels
@@ -82,6 +84,7 @@ class Trial:
     before: float  # rays up to the first surface, and of light samples there
     after: float  # rays of one branch of all paths
     ray_cost: float
+    least_gloss: float = 1.0  # part of the second points that are of the glossy material which is met least
     reused: Reused | None = None  # None where it was not tried
 
     def cost(self, ways: int) -> float:
@@ -100,6 +103,11 @@ class Trial:
     def light_is_rare(self) -> bool:
         """Whether few paths find most of the light."""
         return self.shared + self.separate > RARE_LIGHT
+
+    @property
+    def gloss_is_common(self) -> bool:
+        """Whether paths meet all glossy materials so often that their caustics do not surprise."""
+        return self.least_gloss >= COMMON_GLOSS
 
     def costs_of_reuse(self) -> tuple[float, float]:
         """Return variance times cost of re-use over that of plain paths: of pixels, and after a blur."""
@@ -178,6 +186,7 @@ def run_trial(
         before,
         after,
         1.0 if table is None else GUIDED_RAY,
+        _least_gloss(scene, np.sum([part.met for part in parts], 0)),
         reused,
     )
 
@@ -242,6 +251,12 @@ def _reused(parts: list[TrialPart], together: Doubles, alone: Doubles, scale: Do
     )
 
 
+def _least_gloss(scene: CompiledScene, met: Ints) -> float:
+    """Return the least part of all points (materials,) that are of one material which cannot be shared."""
+    glossy = met[~shared_materials(scene)]
+    return float(glossy.min() / max(met.sum(), 1)) if glossy.size else 1.0
+
+
 def _by_tile(values: Doubles) -> Doubles:
     """Return the sums (..., tiles) of values (..., pixels)."""
     return values.reshape(*values.shape[:-1], -1, MEMBERS).sum(-1)
@@ -260,6 +275,7 @@ class TrialPart:
 
     ways: Doubles  # (3, 2, blocks, pixels) radiance by each branch, as if it were the only one
     together: Doubles  # (3, 1, blocks, pixels) by the first branches, where pixels share what they find
+    met: Ints  # (materials,) how many second points are of each material
     before: int  # rays before the branches part
     after: int  # rays of both branches
     again: int  # rays of the further paths from shared points
@@ -291,10 +307,11 @@ def _trace(
     paths = Paths.concatenate([bounce_sample(each, shade, sampler, 0) for each in (first, second)])
     paths = select(paths, roulette(paths, sampler, 0))
     paths, hits = intersect_and_compact(scene, paths, sampler, 1, L, mis=True)
+    met = np.bincount(material_rows(scene, hits, ALL), minlength=scene.materials.group_of.size)
     if not reuse:
         follow(scene, paths, hits, sampler, max_bounces, L, 1, table)
         ways = _means(L, len(samplers), pixel.size)
-        return TrialPart(ways, ways[:, :1], before, counter.rays - before, 0, 0, 0)
+        return TrialPart(ways, ways[:, :1], met, before, counter.rays - before, 0, 0, 0)
     lanes, points = shared_points(scene, paths, hits, 1)
     found = np.concatenate([L, np.zeros((3, lanes.size), np.float32)], 1)  # of paths, then of shared points
     follow(scene, _cut(paths, lanes, 2 * n), hits, sampler, max_bounces, found, 1, table)
@@ -314,7 +331,7 @@ def _trace(
     add_shared(scene, together, first, shade, points, light, tiles, 1)
     ways, shared = _means(L, len(samplers), pixel.size), _means(together, len(samplers), pixel.size)
     connections, evaluations = counter.rays - after - again, MEMBERS * len(shade.lit().surface)
-    return TrialPart(ways, shared, before, after - before, again, connections, evaluations)
+    return TrialPart(ways, shared, met, before, after - before, again, connections, evaluations)
 
 
 def _cut(paths: Paths, lanes: Ints, first_slot: int) -> Paths:

@@ -56,7 +56,7 @@ def shared_points(scene: CompiledScene, paths: Paths, hits: Hits, branches: int)
     first ones, and which were not found by a delta lobe. Interpolated normals that the viewer sees at a
     grazing angle depend on the viewer.
     """
-    shareable = _can_be_shared(scene).take(material_rows(scene, hits, ALL))
+    shareable = shared_materials(scene).take(material_rows(scene, hits, ALL))
     lanes = np.flatnonzero(~paths.specular & shareable)
     surface = interaction(scene, paths.take(lanes), hits.take(lanes))
     good = np.ones(lanes.size, np.bool_)
@@ -267,15 +267,15 @@ def can_reuse(scene: CompiledScene) -> bool:
     Where surfaces with alpha and media are mixed none is: what gets through differs between channels then.
     """
     mixed = scene.opacities is not None and scene.absorption is not None
-    return not mixed and bool(_can_be_shared(scene).any())
+    return not mixed and bool(shared_materials(scene).any())
 
 
 def shares_all(scene: CompiledScene) -> bool:
     """Return whether all paths of a scene can be shared: whether all of its materials are matte."""
-    return can_reuse(scene) and bool(_can_be_shared(scene).all())
+    return can_reuse(scene) and bool(shared_materials(scene).all())
 
 
-def _can_be_shared(scene: CompiledScene) -> Bools:
+def shared_materials(scene: CompiledScene) -> Bools:
     """Return which materials (materials,) can be those of shared points."""
     materials = scene.materials
     same = np.array([bsdf.view_independent for bsdf in materials.groups], np.bool_)
