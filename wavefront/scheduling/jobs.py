@@ -42,6 +42,9 @@ class View:
             for start in range(0, pixels.size, width):
                 yield pixels[start : start + width]
             return
+        if pixels.size <= width:
+            yield pixels
+            return
         order, cuts = whole_tiles(self.camera.address(pixels), self.camera.film[0])
         start = 0
         while start < pixels.size:
