@@ -20,6 +20,7 @@ import scenes
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import wavefront as wf
+from wavefront.scheduling import executors
 from wavefront.scheduling.executors import MIN_PATHS, MIN_PATHS_TO_SPAWN, choose_executor, worker_count
 from wavefront.scheduling.pool import WorkerPool
 from wavefront.scheduling.processes import ProcessPool
@@ -250,8 +251,9 @@ def test_overlapping_workers_share_the_limit_of_blas() -> None:
 
 
 @processes
-def test_much_work_goes_to_processes() -> None:
-    """Little, or that of one worker, to threads."""
+def test_much_work_goes_to_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Little, or that of one worker, to threads; here no other thread is busy."""
+    monkeypatch.setattr(executors, "_other_threads_compute", lambda: False)
     assert choose_executor(None, 2, MIN_PATHS) == "processes"
     assert choose_executor(None, 2, MIN_PATHS - 1) == "threads"
     assert choose_executor(None, 1, MIN_PATHS) == "threads"
