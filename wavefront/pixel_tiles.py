@@ -64,14 +64,14 @@ class WaveTiles:
         return cls(number, member, int(number.max(initial=-1)) + 1)
 
     def grid(self, path: Ints, which: Ints | None = None) -> Ints:
-        """Return where members of tiles are among some paths: (MEMBERS, tiles), -1 for those that are not.
+        """Return which of some paths belongs to each member of each tile, (MEMBERS, tiles); -1 for none.
 
         Parameters
         ----------
         path
-            (k,) paths of the wave, no two of them of the same tile and member unless `which` is given.
+            (k,) paths of the wave. The result holds indices into this array.
         which
-            The columns of `path` that count; None for all.
+            Indices of those that count, at most one for each member of a tile; None for all.
         """
         numbers = np.arange(path.size) if which is None else which
         path = path.take(numbers)

@@ -14,6 +14,7 @@ from ..accel.coplanar import find_overlaps
 from ..accel.triangle import has_area, triangle_table
 from ..shapes import Instance, Mesh
 from ..shapes.instance import instance_bounds
+from ..shapes.transform import points_by
 from ..vec import Doubles, Floats, Ints, f4
 
 MOST_FACES = 1 << 18  # of instances, and of meshes beside them, among which overlaps are searched
@@ -68,7 +69,7 @@ def _placed_corners(instances: Sequence[Instance]) -> tuple[list[Doubles], Ints]
     for numbers in members.values():
         mesh = instances[numbers[0]].mesh
         transforms = np.stack([instances[number].transform for number in numbers])
-        points = mesh.vertices.take(mesh.faces.ravel(), 0) @ transforms[:, :3, :3].transpose(0, 2, 1)
-        corners.append((points + transforms[:, None, :3, 3]).reshape(-1, 3, 3))
+        points = mesh.vertices.take(mesh.faces.ravel(), 0)
+        corners.append(points_by(transforms, points).reshape(-1, 3, 3))
         owners.append(np.repeat(numbers, len(mesh.faces)))
     return corners, np.concatenate(owners)

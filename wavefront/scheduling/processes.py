@@ -17,7 +17,7 @@ import time
 import warnings
 from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
 from multiprocessing.queues import SimpleQueue
@@ -78,12 +78,12 @@ class ProcessPool:
         The future cannot be canceled: set the stop flag to end jobs early.
         """
         answer = _Answer()
-        if len(self._context.processes) == self._count:
+        with ExitStack() as stack:
+            if len(self._context.processes) < self._count:  # this task starts some
+                stack.enter_context(_blocking_ctrl_c())
+                stack.enter_context(_forking() if self._forks else _without_main())
             self._pool.submit(function, *args).add_done_callback(answer.follow)
-            return answer
-        with _blocking_ctrl_c(), _forking() if self._forks else _without_main():
-            self._pool.submit(function, *args).add_done_callback(answer.follow)
-            return answer
+        return answer
 
     def shutdown(self, running: Collection[Future[Any]]) -> None:
         """Let the processes end when their jobs are done or stopped, or else kill them.

@@ -135,7 +135,7 @@ def add_shared(
             of_rows = [
                 connect(scene, first, points.take(number), number >= 0, member) for member, number in rows
             ]
-            find_blocked(scene, of_rows)
+            attenuate(scene, of_rows)
             for (_, number), connections in zip(rows, of_rows, strict=True):
                 total = _sum(connections.pdf * connections.geometry)
                 found = total > 0
@@ -236,8 +236,8 @@ def connect(
     return Connections(f.reshape(3, *shape), pdf.reshape(shape), geometry, lanes, rays)
 
 
-def find_blocked(scene: CompiledScene, of_rows: list[Connections]) -> None:
-    """Weaken connections, in place, by what is between their points; all of them by one query."""
+def attenuate(scene: CompiledScene, of_rows: list[Connections]) -> None:
+    """Multiply connections, in place, by the transmittance between their points: one query for all."""
     if not of_rows:
         return
     through = _transmittance(scene, ShadowRays.concatenate([each.rays for each in of_rows]))

@@ -47,9 +47,8 @@ class Shading:
     frame: Frame
     wo: Floats  # (3, n) local frame; +z if all BSDFs are view-independent
     start: Floats  # (3, n) origins of rays that leave to the side of wo, scene units
-    groups: list[
-        tuple[Lanes, Bsdf]
-    ]  # lanes of each group, and its material bound to them; slices but for `at`
+    # lanes of each group, in order and a slice but for `at`, and its material bound to them
+    groups: list[tuple[Lanes, Bsdf]]
     guidance: Guidance | None = None  # of the lanes of `lit`; None where BSDFs alone choose directions
 
     def lit(self) -> Shading:
