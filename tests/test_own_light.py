@@ -1,4 +1,4 @@
-"""Lights of a user's own, by public names alone: the examples of docs/lights.md, and one at infinity."""
+"""Lights of a user's own: the examples of docs/lights.md, and one at infinity."""
 
 import re
 from dataclasses import dataclass, replace
@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 
 import wavefront as wf
+from wavefront.lights import LightTable, samplers
+from wavefront.lights.tree import LightTreeSampler
+from wavefront.testing.chi2 import chi_square
 
 PAGE = (Path(__file__).parents[1] / "docs" / "lights.md").read_text("utf-8")
 everywhere = pytest.mark.parametrize("integrator", ["naive", "direct_simple", "direct_mis", "full"])
@@ -119,6 +122,75 @@ def test_a_class_of_its_own_for_the_scene(integrator):
     assert Tube().delta
     found = measure([floor()], [Tube()], integrator=integrator)
     assert_close(found, measure([floor()], [line()], integrator=integrator))
+
+
+def lines_under_a_ceiling(kind, k=600):
+    """Short lines, whose powers differ, all in one plane over the floor."""
+    rng = np.random.default_rng(3)
+    return [
+        line((x, 0.3, z), (0.05, 0, 0), np.full(3, strength * 0.01), kind)
+        for x, z, strength in np.stack([*rng.uniform(-4, 4, (2, k)), rng.random(k)], 1)
+    ]
+
+
+class Nowhere(example("LineLight")):
+    """The same lines, but they do not say where they are."""
+
+    emitters = wf.LightRecord.emitters
+
+
+def test_the_tree_draws_lines_by_its_probabilities(monkeypatch):
+    """Those sum to 1, near lines are preferred, and counts of draws agree with them."""
+    monkeypatch.setattr(samplers, "MOST_IN_GRID", 100)
+    lights = lines_under_a_ceiling(example("LineLight"))
+    kind = type(lights[0]).concatenate(lights)
+    choice, k, n = LightTable([kind], (4, 1, 4)).choice, len(kind), 1 << 16
+    assert isinstance(choice, LightTreeSampler)
+    at = np.array([[1.0], [0], [-2]], np.float32)
+    pmf = choice.pmf(np.arange(k), np.repeat(at, k, 1)).astype(float)
+    assert pmf.sum() == pytest.approx(1, abs=1e-5)
+    away = np.linalg.norm(kind.start - at, axis=0)
+    assert pmf[away < 1].sum() > 5 * (away < 1).mean()
+    u = (np.random.default_rng(4).integers(0, 1 << 24, n) / (1 << 24)).astype(np.float32)
+    light, chance = choice.sample(np.repeat(at, n, 1), u)
+    assert (chance == pmf[light]).all()
+    _, _, p = chi_square(np.bincount(light, minlength=k), pmf * n)
+    assert p > 1e-3
+
+
+def test_lights_that_say_where_they_are_have_less_noise(monkeypatch):
+    """In a tree; the mean is the same, beside a sky, which is nowhere."""
+    monkeypatch.setattr(samplers, "MOST_IN_GRID", 100)
+    variances, means = [], []
+    for kind in (example("LineLight"), Nowhere):
+        scene = wf.Scene([floor()], [*lines_under_a_ceiling(kind), wf.Environment(0.01)], probe((1, 0, -2)))
+        image = picture(scene, 32, sampler="independent", reuse=False, branches=1)
+        variances.append((image.standard_error**2).mean())
+        means.append(measure(scene.shapes, scene.lights, 32, (1, 0, -2), sampler="independent"))
+    assert variances[0] < 0.1 * variances[1]
+    (placed, small), (nowhere, large) = means
+    assert (np.abs(placed - nowhere) <= 4 * np.hypot(small, large)).all()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"middle": np.zeros((3, 2))}, r"middle must have shape \(3, 1\), got \(3, 2\)"),
+        ({"middle": np.full((3, 1), np.nan)}, r"middle\[0\]\[0\] is nan; it must be finite"),
+        ({"facing": column((0, 2, 0))}, r"facing\[:, 0\] has the length 2; it must be at most 1"),
+        ({"extent2": np.array([-1.0])}, r"extent2\[0\] is -1; it must be at least 0"),
+        (None, r"must return wf\.Emitters or None, got 3"),
+    ],
+)
+def test_mistakes_of_places_are_named(monkeypatch, changes, message):
+    class Wrong(example("LineLight")):
+        def emitters(self):
+            return 3 if changes is None else replace(super().emitters().take(np.array([0])), **changes)
+
+    with pytest.raises(wf.SceneError, match=f"Wrong: emitters.*{message}"):
+        wf.testing.check_light(line(kind=Wrong), samples=20_000)
+    monkeypatch.setattr(samplers, "MOST_IN_GRID", 1)
+    refused([floor()], [line(kind=Wrong), line()], f"Wrong: emitters.*{message}")
 
 
 # --- With a surface --------------------------------------------------------------------------------

@@ -36,6 +36,7 @@ from .lighting import studio
 from .lights import (
     DeltaLight,
     DirectionalLight,
+    Emitters,
     Environment,
     InfiniteLight,
     Light,
@@ -122,6 +123,7 @@ __all__ = [
     "DirectionalLight",
     "Disk",
     "Edges",
+    "Emitters",
     "Environment",
     "Frame",
     "Geometry",

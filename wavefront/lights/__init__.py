@@ -1,6 +1,6 @@
 """Lights, and how one of them is chosen."""
 
-from .base import DeltaLight, Light, LightRecord, LightSample
+from .base import DeltaLight, Emitters, Light, LightRecord, LightSample
 from .directional import DirectionalLight, DirectionalLights, SunLight
 from .environment import ConstantEnvironment, Environment
 from .image import ImageEnvironment
@@ -18,6 +18,7 @@ __all__ = [
     "DeltaLight",
     "DirectionalLight",
     "DirectionalLights",
+    "Emitters",
     "Environment",
     "EnvironmentSum",
     "ImageEnvironment",

@@ -47,10 +47,18 @@ class LightSample(SoA):
 
 @record
 class Emitters(SoA):
-    """Where k lights are and where they shine to, for the choice of one; relative to the scene's center."""
+    """Where k lights are and where they shine to, for the choice of one among very many.
 
-    middle: Doubles  # (3, k) scene units
-    facing: Doubles  # (3, k) the normal of a surface that shines on one side, or the axis of a spot; else 0
+    Examples
+    --------
+    >>> record = wf.PointLight((0, 2, 0), 8).record(np.zeros(3))
+    >>> where = record.emitters()
+    >>> isinstance(where, wf.Emitters), where.middle[:, 0].tolist(), float(where.extent2[0])
+    (True, [0.0, 2.0, 0.0], 0.0)
+    """
+
+    middle: Doubles  # (3, k) relative to the scene's center, scene units
+    facing: Doubles  # (3, k) unit normal of a surface that shines on one side, or unit axis of a spot; else 0
     extent2: Doubles  # (k,) square of the size, such as the area of a surface
 
 
@@ -170,9 +178,10 @@ class LightRecord(SoA, Light):
         return np.broadcast_to(broadcast, (center.shape[1], len(broadcast)))
 
     def emitters(self) -> Emitters | None:
-        """Return where the lights are, for the choice among very many; None if they are nowhere.
+        """Return where the lights are, for the choice among more than 65 536; None if they are nowhere.
 
-        Lights that are nowhere are chosen by power, with half of the samples together.
+        Lights that are nowhere are chosen by power, with half of the samples together. A wrong place makes
+        noise, but no error of the mean.
         """
         return None
 
@@ -232,3 +241,33 @@ def sampled_li(light: LightRecord, point: Floats, u: Floats) -> LightSample:
                     f"it must have {'(3, n)' if len(due) == 2 else '(n,)'} = {due}"
                 )
     return sample
+
+
+def emitters_of(light: LightRecord) -> Emitters:
+    """Return where the k lights of a record are; NaN for those that are nowhere.
+
+    Raises
+    ------
+    SceneError
+        If `emitters` returns something else than `Emitters` has.
+    """
+    found, k = light.emitters(), len(light)
+    if found is None:
+        nowhere = np.full((3, k), np.nan)
+        return Emitters(nowhere, nowhere, nowhere[0])
+    name = f"{type(light).__name__}: emitters"
+    if not isinstance(found, Emitters):
+        raise SceneError(f"{name} must return wf.Emitters or None, got {found!r}")
+    middle = finite_array(f"{name}' middle", found.middle, (3, k))
+    facing = finite_array(f"{name}' facing", found.facing, (3, k))
+    extent2 = finite_array(f"{name}' extent2", found.extent2, (k,))
+    if (extent2 < 0).any():
+        at = int(extent2.argmin())
+        raise SceneError(f"{name}' extent2[{at}] is {extent2[at]:g}; it must be at least 0")
+    length2 = (facing * facing).sum(0)
+    if (length2 > 1 + 1e-3).any():
+        at = int(length2.argmax())
+        raise SceneError(
+            f"{name}' facing[:, {at}] has the length {np.sqrt(length2[at]):g}; it must be at most 1"
+        )
+    return Emitters(middle, facing, extent2)

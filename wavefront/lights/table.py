@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..sampling.mis import power_heuristic
 from ..state import SurfaceInteraction
 from ..vec import ALL, Floats, Ints, Lanes, f4, put, take
-from .base import Emitters, LightRecord, LightSample, sampled_li
+from .base import Emitters, LightRecord, LightSample, emitters_of, sampled_li
 from .samplers import (
     LIGHT_SAMPLERS,
     LightSampler,
@@ -33,15 +33,7 @@ class IrradianceOf:
     @property
     def emitters(self) -> Emitters:
         """Where the lights are; NaN for those that are nowhere."""
-        return Emitters.concatenate([_emitters(kind) for kind in self.kinds])
-
-
-def _emitters(kind: LightRecord) -> Emitters:
-    found = kind.emitters()
-    if found is not None:
-        return found
-    nowhere = np.full((3, len(kind)), np.nan)
-    return Emitters(nowhere, nowhere, nowhere[0])
+        return Emitters.concatenate([emitters_of(kind) for kind in self.kinds])
 
 
 class LightTable:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..accel import make_accelerator
 from ..compile.scene import CompiledScene, compile_scene
-from ..lights.base import LightRecord, LightSample
+from ..lights.base import LightRecord, LightSample, emitters_of
 from ..scene import Scene
 from ..stages.interaction import interaction
 from ..stages.intersect import intersect
@@ -48,12 +48,15 @@ def check_light(
     ------
     AssertionError
         With each failed check, its point, and the measured and expected values.
+    SceneError
+        If `emitters` returns something else than `Emitters` has.
     """
     record = light if isinstance(light, LightRecord) else light.record(np.zeros(3))
     compiled = None
     if light.shape is not None:
         compiled = compile_scene(Scene([light.shape], [light]), partial(make_accelerator, accel="numpy"))
         record = light.record(compiled.center)
+    emitters_of(record)
     report = Report(f"check_light({type(light).__name__})")
     default = [[0, 0, 0], [2, 1, 3], [-3, 2, -1], [0.5, -4, 1], [20, 10, -30]]
     where = np.asarray(default if points is None else points, np.float64).reshape(-1, 3)
