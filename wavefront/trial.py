@@ -48,8 +48,10 @@ WAVE = 32  # tiles that are traced together: two branches of their paths are a w
 OUTLIERS = 0.01  # part of the pixels, the noisiest, that do not count
 FLOOR = 0.01  # of the squared mean of all pixels, added to that of each
 MOST_WAYS = 4  # more gain nothing
-ERRORS = 2  # standard errors, over tiles, by which more variance counts as shared than was found
-GAIN = 0.9  # variance times rays must fall below this part: counted rays tell the cost to about a tenth
+ERRORS = 1  # standard errors, over tiles, by which more variance counts as shared than was found
+GAIN = 0.85  # variance times rays must fall below this part: rays tell the cost to about a tenth, and a trial
+# may miss the few paths that find most of the light
+GUIDE_GAIN = 0.9  # variance times rays of guided paths must fall below this part
 NEAR_BEST = 1.1  # the fewest branches are taken that cost no more than this times the least
 GUIDED_RAY = 1.35  # cost of a ray of a guided path, relative to that of a plain one
 CONNECTION = 0.5  # cost of a ray that connects pixels, likewise
@@ -94,10 +96,9 @@ class Trial:
 
     def best_ways(self) -> int:
         """Return the number of branches at which variance times rays is about least; 1 if it gains little."""
-        least = min(self.cost(ways) for ways in range(1, MOST_WAYS + 1))
-        if not least < GAIN * self.cost(1):
-            return 1
-        return next(ways for ways in range(1, MOST_WAYS + 1) if self.cost(ways) <= NEAR_BEST * least)
+        costs = [self.cost(ways) for ways in range(1, MOST_WAYS + 1)]
+        ways = next(ways for ways, cost in enumerate(costs, 1) if cost <= NEAR_BEST * min(costs))
+        return ways if self.cost(ways) < GAIN * self.cost(1) else 1
 
     @property
     def light_is_rare(self) -> bool:
@@ -129,7 +130,7 @@ class Trial:
 def is_worth_it(guided: Trial, plain: Trial, ways: int | None) -> bool:
     """Return whether a guide pays, with so many branches; None: with the best number for each."""
     with_guide, without = (trial.cost(ways or trial.best_ways()) for trial in (guided, plain))
-    return with_guide < GAIN * without
+    return with_guide < GUIDE_GAIN * without
 
 
 def tiles_for(size: tuple[int, int]) -> int:
@@ -230,14 +231,14 @@ def _calm(variance: Doubles) -> Ints:
 
 
 def _at_most(values: Doubles, kept: Ints) -> float:
-    """Return the mean of the kept values (k,) of pixels (n,), plus `ERRORS` of its errors; at least 0."""
+    """Return the mean of the kept values (k,) of pixels (n,), at least 0, plus `ERRORS` of its errors."""
     which = np.zeros(values.size)
     which[kept] = 1
     of_tile = (values * which).reshape(-1, MEMBERS).sum(1)
     count, mean = of_tile.size, math.fsum(of_tile) / kept.size
     spread = math.fsum(np.square(of_tile - mean * which.reshape(-1, MEMBERS).sum(1)))
     error = math.sqrt(spread * count / max(count - 1, 1)) / kept.size
-    return max(mean + ERRORS * error, 0.0)
+    return max(mean, 0.0) + ERRORS * error
 
 
 def _reused(parts: list[TrialPart], together: Doubles, alone: Doubles, scale: Doubles) -> Reused:
