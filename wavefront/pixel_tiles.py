@@ -41,6 +41,13 @@ def place_in_tiles(pixel: Words, width: int) -> tuple[Ints, Ints]:
     return tile, member
 
 
+def others_in_tile(pixel: Words, one: int, width: int) -> Ints:
+    """Return which of pixels (n,) share the tile of pixel[one], without that one; arguments as above."""
+    tile, _ = place_in_tiles(pixel, width)
+    same = np.flatnonzero(tile == tile[one])
+    return same[same != one]
+
+
 @record
 class WaveTiles:
     """The tiles of the paths of a wave: those of one tile and one sample belong together.

@@ -36,14 +36,8 @@ class BopLayout:
 
     Parameters
     ----------
-    folder
-        Of the data set.
-    shapes
-        Those of the scene.
-    objects
-        Those that are annotated, by their numbers.
-    millimeters
-        Of a scene unit.
+    folder, shapes, objects, millimeters
+        As for `write_models`.
     depth_scale
         Millimeters of a code of depth; None for 0.1, or in deep pictures for more.
     """

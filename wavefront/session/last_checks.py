@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..camera import Camera
 from ..image import Image
 from ..integrators import INTEGRATORS, WITH_MIS, li_naive
 from ..outcome import check_first_samples, is_black_or_white, warn_of_clamped_light, warn_of_noise
-from ..pixel_tiles import place_in_tiles
+from ..pixel_tiles import others_in_tile
 from ..scheduling.loop import RenderLoop
 from ..stages.reuse import SHARED_WAYS
 from .plan import Plan
@@ -72,13 +71,8 @@ def _cause_of_bad_sample(plan: Plan, loop: RenderLoop, pixel: int, sample: int) 
         mis=integrator in WITH_MIS,
         layers=tracer.layers,
     )
-    pixels = [pixel] if not plan.choice.reuse else _sharing(camera, pixel)
+    pixels = [pixel]
+    if plan.choice.reuse:
+        every = camera.address(np.arange(camera.size[0] * camera.size[1], dtype=np.uint32))
+        pixels += others_in_tile(every, pixel, camera.film[0]).tolist()
     return next(filter(None, (checker.first_fault(each, sample) for each in pixels)), "")
-
-
-def _sharing(camera: Camera, pixel: int) -> list[int]:
-    """Return the pixels that share their paths with one, and first that one."""
-    pixels = np.arange(camera.size[0] * camera.size[1], dtype=np.uint32)
-    tile, _ = place_in_tiles(camera.address(pixels), camera.film[0])
-    others = np.flatnonzero(tile == tile[pixel]).tolist()
-    return sorted(others, key=lambda other: other != pixel)

@@ -77,14 +77,7 @@ class NormalMap(BaseNormalMap):
     @suggests_keywords
     def __init__(self, image: TextureSource, strength: float = 1.0) -> None:
         self.texture = image if isinstance(image, Texture) else Texture(image, srgb=False)
-        self.strength = f4(
-            number(
-                "NormalMap strength",
-                strength,
-                lambda x: abs(x) <= MAX_STRENGTH,
-                f"finite, and at most {MAX_STRENGTH:g}",
-            )
-        )
+        self.strength = _limited("NormalMap strength", strength, MAX_STRENGTH)
         if self.texture.scalar or self.texture.channels < 3:
             raise SceneError(f"NormalMap: {self.texture!r} gives numbers; it must give three channels")
         _check_plain("NormalMap", self.texture)
@@ -148,14 +141,7 @@ class BumpMap(BaseNormalMap):
         self.texture = (
             image if isinstance(image, Texture) else Texture(image, srgb=False, channel="luminance")
         )
-        self.height = f4(
-            number(
-                "BumpMap height",
-                height,
-                lambda x: abs(x) <= MAX_HEIGHT,
-                f"finite, and at most {MAX_HEIGHT:g}",
-            )
-        )
+        self.height = _limited("BumpMap height", height, MAX_HEIGHT)
         if not self.texture.scalar:
             raise SceneError(f"BumpMap: {self.texture!r} gives colors; choose one by channel=")
         _check_plain("BumpMap", self.texture)
@@ -191,6 +177,10 @@ def _halves(surface: SurfaceInteraction, name: str) -> tuple[Floats, Floats]:
     if both is None:
         raise SceneError("normal map: the surface has no tangents")
     return both[:3], both[3:]
+
+
+def _limited(name: str, value: float, most: float) -> np.float32:
+    return f4(number(name, value, lambda x: abs(x) <= most, f"finite, and at most {most:g}"))
 
 
 def _check_plain(kind: str, texture: Texture) -> None:
