@@ -40,7 +40,10 @@ def surface(points: np.ndarray, material: wf.Bsdf | None = None, *, round_u=Fals
     corner = (np.arange(n - 1)[:, None] * m + np.arange(m - 1)).ravel()
     right, up, across = corner + 1, corner + m, corner + m + 1
     faces = np.concatenate([np.stack([corner, up, across], 1), np.stack([corner, across, right], 1)])
-    return wf.Mesh(points.reshape(-1, 3), faces, normals=normals.reshape(-1, 3), material=material)
+    points = points.reshape(-1, 3)
+    a, b, c = points[faces.T]
+    faces = faces[np.cross(b - a, c - a).any(1)]  # at a pole every other face has no area
+    return wf.Mesh(points, faces, normals=normals.reshape(-1, 3), material=material)
 
 
 def grid(n: int, m: int, u_end: float = 2 * np.pi, v_end: float = 2 * np.pi) -> tuple[np.ndarray, np.ndarray]:

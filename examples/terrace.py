@@ -69,8 +69,11 @@ def grid(points: np.ndarray, closed: tuple[bool, bool], **options: object) -> wf
     index = np.arange(rows * columns).reshape(rows, columns)
     a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
     faces = np.concatenate([np.stack(t, -1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
+    points = points.reshape(-1, 3)
+    first, second, third = points[faces.T]
+    faces = faces[np.cross(second - first, third - first).any(1)]  # on the axis half of them have no area
     return wf.Mesh(
-        points.reshape(-1, 3),
+        points,
         faces,
         normals=normals.reshape(-1, 3),
         uvs=np.stack([u, v], -1).reshape(-1, 2),

@@ -105,7 +105,7 @@ def test_noise_that_is_not_reached_is_told(limit: dict) -> None:
         f"noise=0.0001 was not reached: it is {found['noise']:.4g} after {found['spp']:.4g} samples per "
         f"pixel in {found['seconds']:.3g} s"
     )
-    with pytest.warns(UserWarning, match="it is unknown after 1 samples"):
+    with pytest.warns(UserWarning, match="it is unknown after 1 sample per"):
         render(lit(), 1, noise=0.5)
 
 

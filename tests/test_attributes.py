@@ -157,7 +157,7 @@ def test_a_channel_of_the_colors_is_a_number():
 
 def test_what_has_no_colors_is_white():
     material = wf.Diffuse(wf.VertexColors(0.7))
-    with pytest.warns(UserWarning, match=r"1 meshes lack the vertex colors .* read, first: 'plain'"):
+    with pytest.warns(UserWarning, match=r"1 mesh lacks the vertex colors .* reads, first: 'plain'"):
         image = unlit(square(material=material, name="plain"))
     assert image == pytest.approx(0.7, rel=1e-5)
     ball = wf.Sphere((0.5, 0.5, -9), 8, material=material)
@@ -212,7 +212,7 @@ def test_a_texture_uses_the_second_set():
 
 def test_a_mesh_without_the_coordinates_that_its_texture_reads_is_named():
     white = wf.Texture(np.ones((1, 1), np.float32), uv_set=1)
-    with pytest.warns(UserWarning, match=r"lack the second texture coordinates \(uvs1\)"):
+    with pytest.warns(UserWarning, match=r"lacks the second texture coordinates \(uvs1\)"):
         unlit(square(uvs=CORNERS, material=wf.Diffuse(white)))
 
 

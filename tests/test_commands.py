@@ -226,7 +226,7 @@ def test_info_names_sizes_textures_and_warnings(mesh: Path, capsys) -> None:
     (count,) = (line for line in lines if line.startswith("warnings"))
     messages = lines[lines.index(count) + 1 :]
     assert count == f"warnings: {len(messages)}"
-    assert any("dropped 1 faces" in message for message in messages)
+    assert any("dropped 1 face" in message for message in messages)
     mesh.write_text(TETRAHEDRON)
     assert cli.main(["info", str(mesh), "--quiet"]) == 0
     assert capsys.readouterr().out.splitlines()[-1] == "warnings: none"

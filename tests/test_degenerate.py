@@ -133,3 +133,24 @@ def test_what_is_brighter_than_float32_is_infinite_without_a_warning():
     image = render(wf.Scene(area_light, camera=camera), 4)
     assert np.isfinite(image.rgb).all()
     assert image.rgb.max() == pytest.approx(1e25)
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-30, 1e-200, 1e30])
+def test_faces_of_zero_area_in_memory_are_counted(size):
+    """Once for each mesh, when it is made: a face whose corners are in a point, and one on a line."""
+    points = [*PLACES, (2, 0, 0), (3, 0, 0)]
+    with pytest.warns(UserWarning, match="zero area") as caught:
+        mesh = wf.Mesh(np.array(points) * size, [[0, 1, 2], [1, 4, 5], [0, 2, 3], [3, 3, 3]], name="strip")
+    wf.Scene(mesh).check()
+    assert [str(each.message) for each in caught] == ["strip: dropped 2 faces of zero area, first: face 1"]
+    assert caught[0].filename == __file__
+
+
+def test_a_face_of_zero_area_in_memory_is_not_hit():
+    vertices = np.concatenate([PLACES, [[2, 0, 0]]])
+    camera = wf.Camera.look_at((0.6, 0.7, 2), (0.5, 0.5, 0), size=(12, 12))
+    with pytest.warns(UserWarning, match="mesh: dropped 1 face of zero area, first: face 2"):
+        found = render([(vertices, [*FACES, [0, 1, 4]]), wf.Environment(1.0)], 4, camera=camera)
+    assert np.array_equal(
+        found.rgb, render(wf.Scene(wf.Mesh(PLACES, FACES), [wf.Environment(1.0)], camera), 4).rgb
+    )

@@ -128,8 +128,8 @@ def test_many_items():
         ([1, -2], "weights[1] is -2.0; it must be finite and at least 0"),
         ([1, float("nan")], "weights[1] is nan; it must be finite and at least 0"),
         ([float("inf")], "weights[0] is inf; it must be finite and at least 0"),
-        ([], "weights must have 1 dimension(s) and at least one item, got shape (0,)"),
-        ([[1]], "weights must have 1 dimension(s) and at least one item, got shape (1, 1)"),
+        ([], "weights must have 1 dimension and at least one item, got shape (0,)"),
+        ([[1]], "weights must have 1 dimension and at least one item, got shape (1, 1)"),
     ],
 )
 def test_bad_weights_are_refused(weights, message):
@@ -217,8 +217,8 @@ def test_an_environment_sized_grid():
         (np.zeros((2, 3)), "weights are all 0; at least one must be positive"),
         ([[1, 2], [3, -1]], "weights[1][1] is -1.0; it must be finite and at least 0"),
         ([[1, float("nan")]], "weights[0][1] is nan; it must be finite and at least 0"),
-        ([1, 2], "weights must have 2 dimension(s) and at least one item, got shape (2,)"),
-        (np.zeros((0, 4)), "weights must have 2 dimension(s) and at least one item, got shape (0, 4)"),
+        ([1, 2], "weights must have 2 dimensions and at least one item, got shape (2,)"),
+        (np.zeros((0, 4)), "weights must have 2 dimensions and at least one item, got shape (0, 4)"),
     ],
 )
 def test_bad_grids_are_refused(weights, message):

@@ -487,7 +487,7 @@ def test_complaints() -> None:
     with pytest.raises(wf.SceneError, match=r"Material emission\[1\] is -1; it must be at least 0"):
         wf.Material(wf.Principled(0.5), emission=(0, -1, 0))
     bare = wf.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], emission=texture(QUARTERS))
-    with pytest.warns(UserWarning, match=r"1 meshes lack the texture coordinates \(uvs\).*first: 'mesh'"):
+    with pytest.warns(UserWarning, match=r"1 mesh lacks the texture coordinates \(uvs\).*first: 'mesh'"):
         render(wf.Scene([bare]), 1)
 
 

@@ -313,7 +313,7 @@ def test_negative_pixels_warn() -> None:
     picture = np.ones((2, 4, 3))
     picture[1, 2, 0], picture[1, 3] = -0.5, -1
     with pytest.warns(
-        UserWarning, match=r"2 pixels are negative and count as 0, first: row 1, column 2, \[-0.5, 1.0, 1.0\]"
+        UserWarning, match=r"2 negative pixels count as 0, first: row 1, column 2, \[-0.5, 1.0, 1.0\]"
     ):
         environment = wf.Environment(picture, filter="nearest")
     assert environment.record(ORIGIN).image.mean().tolist() == pytest.approx([0.75, 0.875, 0.875])

@@ -250,7 +250,7 @@ def test_bad_faces_are_dropped_and_counted(write, case):
 
 def test_nothing_left_is_an_error(write):
     path = write(SQUARE + "f 1 1 2\n")
-    with pytest.raises(SceneError, match="has no faces"), pytest.warns(UserWarning, match="dropped 1 faces"):
+    with pytest.raises(SceneError, match="has no faces"), pytest.warns(UserWarning, match="dropped 1 face "):
         load_meshes(path)
 
 
@@ -265,19 +265,19 @@ def test_thin_and_tiny_faces_stay(write, scale, shift):
 def test_not_finite_normals_and_uvs_are_announced(write):
     path = write(SQUARE + "vt nan 0\nvt 0 0\nvn inf 0 0\nvn 0 0 1\nf 1/1/1 2/2/2 3/2/2\n")
     with (
-        pytest.warns(UserWarning, match="1 normals are not finite, first: vertex 0"),
-        pytest.warns(UserWarning, match="1 uvs are not finite, first: vertex 0"),
+        pytest.warns(UserWarning, match="1 normal is not finite, first: vertex 0"),
+        pytest.warns(UserWarning, match="1 uv is not finite, first: vertex 0"),
     ):
         (mesh,) = load_meshes(path)
     assert np.array_equal(mesh.normals, [[0, 0, 1]] * 3)
-    with pytest.raises(SceneError, match="1 normals are not finite"):
+    with pytest.raises(SceneError, match="1 normal is not finite"):
         load_meshes(path, strict=True)
 
 
 def test_uvs_beyond_all_textures_are_announced(write):
     path = write(SQUARE + "vt 1e38 0\nvt 0 0\nvt 1 -1e30\nf 1/1 2/2 3/3\n")
     with pytest.warns(
-        UserWarning, match=r"2 uvs are beyond ±16777216 and were set to 0, first: vertex 0"
+        UserWarning, match=r"2 uvs are beyond ±16777216 and set to 0, first: vertex 0"
     ) as record:
         (mesh,) = load_meshes(path)
     assert len(record) == 1
@@ -604,8 +604,8 @@ def test_obj_colors_are_srgb(write):
 def test_obj_colors_that_are_wanting_or_too_large_are_announced(write):
     some = obj_with_colors(CODES / 200)[:-1].rsplit(" ", 3)[0] + "\nf 1 2 3\nf 1 3 4\n"
     with (
-        pytest.warns(UserWarning, match="1 vertex colors are not finite, first: vertex 3"),
-        pytest.warns(UserWarning, match=r"1 vertex colors are outside \[0, 1\] and were clamped, first: ver"),
+        pytest.warns(UserWarning, match="1 vertex color is not finite, first: vertex 3"),
+        pytest.warns(UserWarning, match=r"1 vertex color is outside \[0, 1\] and clamped, first: ver"),
     ):
         (mesh,) = load_meshes(write(some))
     assert mesh.colors[0].tolist() == [1, 0, 0, 1]
@@ -759,7 +759,7 @@ def test_colors_of_faces_show_beside_vertices_that_are_all_white(write):
 
 def test_face_colors_survive_faces_that_do_not(write):
     faces = ["3 0 1 1 255 0 0", "3 0 1 2 0 255 0", "3 0 2 3 0 0 255"]
-    with pytest.warns(UserWarning, match="dropped 1 faces of zero area"):
+    with pytest.warns(UserWarning, match="dropped 1 face of zero area"):
         (mesh,) = load_meshes(write(painted_ply(PLACES, faces), "a.ply"))
     assert soup(mesh, mesh.colors)[:, :, 1:3].tolist() == [[[1, 0]] * 3, [[0, 1]] * 3]
     with pytest.raises(SceneError, match=r"a\.ply: .*face 0 uses vertex 7; it must be in \[0, 3\]"):

@@ -103,7 +103,7 @@ def test_without_flip(monkeypatch) -> None:
         (A, "picture.bmpx", "bmpx"),
         (np.zeros(3), A, r"a has shape \(3,\)"),
         (A, np.zeros((0, 2, 3)), r"b has shape \(0, 2, 3\)"),
-        (A, np.where(A == 4, np.nan, A), "b has 1 values that are not finite, the first at x=1, y=1"),
+        (A, np.where(A == 4, np.nan, A), "b has 1 value that is not finite, the first at x=1, y=1"),
         (object(), A, "a is not a picture: object"),
     ],
 )

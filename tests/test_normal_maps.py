@@ -492,7 +492,7 @@ def test_complaints(make, message):
 
 def test_a_mesh_without_coordinates_is_named():
     bare = wf.Mesh(np.column_stack([CORNERS, np.zeros(4)]), FACES, name="bare")
-    with pytest.warns(UserWarning, match=r"1 meshes lack the texture coordinates .* first: 'bare'") as found:
+    with pytest.warns(UserWarning, match=r"1 mesh lacks the texture coordinates .* first: 'bare'") as found:
         assert normals(bare, wf.NormalMap(texel(TILT)))[1].tolist() == [0, 0, 1]
     assert len(found) == 1
 

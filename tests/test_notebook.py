@@ -61,7 +61,7 @@ def test_a_scene_shows_counts_bounds_materials_and_lights() -> None:
         wf.Sphere((3, 0, 0), 0.5, emission=2, name="lamp"),
     ]
     html = wf.Scene(shapes, [wf.PointLight((0, 5, 0), 3)])._repr_html_()
-    assert "5 shapes, 1 instances, 4 triangles, 7 curved primitives, 2 lights" in html
+    assert "5 shapes, 1 instance, 4 triangles, 7 curved primitives, 2 lights" in html
     assert "bounds (-1, -1, -1) to (3.5, 1, 1)" in html
     assert html.count("&lt;red&gt;") == 1
     assert "3 shapes" in html

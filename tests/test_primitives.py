@@ -404,7 +404,7 @@ def test_a_hundred_thousand_are_set_up_in_a_second() -> None:
         (lambda: wf.Spheres([(0, 0, 0)], 1, [(2, 0, 0)]), r"colors\[0\]\[0\] is 2"),
         (lambda: wf.Spheres([(0, 0, 0)], 1, np.ones((2, 3))), r"colors must have a row for each of 1, got 2"),
         (lambda: wf.Cylinders([(0, 0, 0)], [(0, 0, 0)], 1), r"starts\[0\] and ends\[0\] are both"),
-        (lambda: wf.Capsules([(0, 0, 0)], np.zeros((2, 3)), 1), r"capsules: has 1 starts and 2 ends"),
+        (lambda: wf.Capsules([(0, 0, 0)], np.zeros((2, 3)), 1), r"capsules: has 1 start and 2 ends"),
         (lambda: wf.Edges(np.zeros((1, 3)), 1), r"edges: has no edges"),
         (lambda: wf.Edges(7, 1), r"edges: lines must be a mesh, a path, or points \(n, 3\), got 7"),
     ],

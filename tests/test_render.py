@@ -404,7 +404,7 @@ def test_ctrl_c_within_a_sample_of_all_pixels() -> None:
     def stop(done: int, total: int) -> None:
         raise KeyboardInterrupt
 
-    with pytest.raises(wf.Interrupted, match=r"0\.25 of 1 samples") as caught:
+    with pytest.raises(wf.Interrupted, match=r"0\.25 of 1 sample per") as caught:
         render(small((8, 8)), 1, wave_size=16, progress=stop)
     image = caught.value.image
     assert (image.rgb[2:] == 0).all()

@@ -9,7 +9,7 @@ from significance import Mean, assert_mean, assert_same_images, render, repeat
 
 import wavefront as wf
 from wavefront import integrators, pilot
-from wavefront.pixel_tiles import WaveTiles, place_in_tiles, whole_tiles
+from wavefront.pixel_tiles import WaveTiles, others_in_tile, place_in_tiles, whole_tiles
 from wavefront.sampling.sampler import SobolSampler
 from wavefront.scheduling.jobs import View, split_jobs
 from wavefront.stages.generate import generate
@@ -29,6 +29,12 @@ def test_tiles_divide_a_picture() -> None:
     rows, columns = np.nonzero(inside == inside[8, 10])
     assert (np.unique(rows).tolist(), np.unique(columns).tolist()) == ([1, 8, 15, 22], [3, 10, 17, 24])
     assert np.bincount(tile).max() == 16
+    with_one = np.ravel_multi_index(
+        np.meshgrid([1, 8, 15, 22], [3, 10, 17, 24], indexing="ij"), (height, width)
+    )
+    one = 8 * width + 10
+    others = others_in_tile(np.arange(width * height, dtype=np.uint32), one, width)
+    assert sorted([one, *others.tolist()]) == np.sort(with_one, None).tolist()
 
 
 def test_samples_are_of_different_tiles() -> None:
@@ -102,7 +108,7 @@ def smooth() -> wf.Scene:
         for i in range(6)
         for j in range(8)
         for face in (
-            (8 * i + j, 8 * i + (j + 1) % 8, 8 * i + 8 + j),
+            *[(8 * i + j, 8 * i + (j + 1) % 8, 8 * i + 8 + j)] * (i > 0),  # without an area at the pole
             (8 * i + (j + 1) % 8, 8 * i + 8 + (j + 1) % 8, 8 * i + 8 + j),
         )
     ]

@@ -105,10 +105,12 @@ def test_a_lone_shape_is_a_scene(make) -> None:
 
 def test_a_light_must_have_an_area() -> None:
     """A mesh whose faces are all flat to nothing cannot shine; one such face among others is left out."""
-    line = wf.Mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]], emission=1.0, name="wire")
-    with pytest.raises(wf.SceneError, match=r"wire: a light must have an area; all 1 faces have none"):
+    with pytest.warns(UserWarning, match="wire: dropped 1 face of zero area, first: face 0"):
+        line = wf.Mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]], emission=1.0, name="wire")
+    with pytest.raises(wf.SceneError, match=r"wire: a light must have an area; its 1 face has none"):
         compiled(line)
-    mixed = wf.Mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 1, 3]], emission=1.0)
+    with pytest.warns(UserWarning, match="mesh: dropped 1 face of zero area, first: face 0"):
+        mixed = wf.Mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 1, 3]], emission=1.0)
     assert len(compiled(mixed).lights) == 1
 
 
@@ -235,8 +237,8 @@ def test_shading_normals_are_normalized_and_zero_ones_replaced() -> None:
 def test_repr_counts() -> None:
     """What a user sees at the prompt."""
     text = repr(wf.Scene([wf.Sphere(**BALL)], [wf.PointLight(**POINT)]))
-    assert text == "<Scene: 1 shapes, 1 lights, camera=False>"
-    assert repr(wf.Mesh(**TRIANGLE)) == "<Mesh 'mesh': 3 vertices, 1 faces>"
+    assert text == "<Scene: 1 shape, 1 light, camera=False>"
+    assert repr(wf.Mesh(**TRIANGLE)) == "<Mesh 'mesh': 3 vertices, 1 face>"
     assert repr(wf.Sphere(**BALL)) == "<Sphere 'sphere': center [0.0, 0.0, 0.0], radius 1>"
 
 

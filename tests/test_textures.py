@@ -175,7 +175,7 @@ def test_a_material_takes_it():
         (np.zeros(3), {}, r"of shape \(3,\)"),
         (np.zeros((0, 2, 3)), {}, "at least one"),
         (np.zeros((2, 2), np.int64), {}, "is int64; it must be uint8, uint16 or float"),
-        (np.array([[0, np.nan]]), {}, "has 1 values that are not finite, first: row 0, column 1"),
+        (np.array([[0, np.nan]]), {}, "has 1 value that is not finite, first: row 0, column 1"),
         (np.array([["a"]]), {}, "it must be"),
         (np.zeros((2, 2)), {"wrap": "border"}, "wrap is 'border'; it must be one of repeat, mirror, clamp"),
         (np.zeros((2, 2)), {"wrap": ("clamp",)}, "it must be one mode"),

@@ -24,6 +24,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .counted import counted
 from .errors import SceneError
 from .files import check_regular, write_chunks
 
@@ -139,7 +140,7 @@ def _header(file: IO[bytes], name: str) -> dict[str, Any]:
     if prelude[: len(MAGIC)] != MAGIC:
         raise SceneError(f"{name}: is not a checkpoint of wavefront, or its first bytes are damaged")
     if len(prelude) < PRELUDE.size:
-        raise SceneError(f"{name}: is truncated after {len(prelude)} bytes; it {DAMAGED}")
+        raise SceneError(f"{name}: is truncated after {counted(len(prelude), 'byte')}; it {DAMAGED}")
     _, version, length = PRELUDE.unpack(prelude)
     if version != VERSION:
         raise SceneError(f"{name}: has version {version} of the format; this program reads {VERSION}")
@@ -150,7 +151,7 @@ def _header(file: IO[bytes], name: str) -> dict[str, Any]:
     size = file.tell() + sum(_size(kind, shape, name) + DIGEST for _, kind, shape in header["arrays"])
     found = os.fstat(file.fileno()).st_size
     if found != size:
-        raise SceneError(f"{name}: has {found} bytes and should have {size}; it {DAMAGED}")
+        raise SceneError(f"{name}: has {counted(found, 'byte')} and should have {size}; it {DAMAGED}")
     return header
 
 

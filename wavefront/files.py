@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import IO, Any
 
+from .counted import counted
 from .errors import SaveError, SceneError
 
 MAX_BYTES = 2**31  # larger files are refused before they are read
@@ -53,7 +54,7 @@ def check_regular(path: str | os.PathLike[str], limit: float = math.inf) -> None
     if not stat.S_ISREG(info.st_mode):
         raise SceneError(f"{name}: is a device or pipe; only regular files are read")
     if info.st_size > limit:
-        raise SceneError(f"{name}: has {info.st_size} bytes; the limit is {limit}")
+        raise SceneError(f"{name}: has {counted(info.st_size, 'byte')}; the limit is {limit}")
 
 
 def decode_text(data: bytes) -> str:

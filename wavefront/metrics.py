@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from .codecs.encoding import codes_to_linear
 from .codecs.images import three_channels
 from .codecs.png_jpeg import EXTENSIONS
+from .counted import counted
 from .errors import SceneError
 from .film import EPSILON, batch_size
 from .image import Image
@@ -187,7 +188,8 @@ def _pixels(name: str, picture: Image | ArrayLike) -> Doubles:
     bad = np.argwhere(~np.isfinite(colors))
     if len(bad):
         y, x, _ = bad[0]
-        raise SceneError(f"{name} has {len(bad)} values that are not finite, the first at x={x}, y={y}")
+        found = counted(len(bad), "value that is", "values that are")
+        raise SceneError(f"{name} has {found} not finite, the first at x={x}, y={y}")
     return colors
 
 

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from .counted import counted
 from .errors import Interrupted, RenderError, warn_caller
 from .image import Image
 from .integrators import Integrator
@@ -33,10 +34,9 @@ def interrupted(image: Image, spp: int | None) -> Interrupted:
     """Return the error that says how much of `spp` samples per pixel there is; None if that is open."""
     if not image.metadata["samples"]:
         return Interrupted("interrupted: there is no picture yet")
-    of = "" if spp is None else f" of {spp}"
-    return Interrupted(
-        f"interrupted: the picture so far has {image.metadata['spp']:.4g}{of} samples per pixel", image
-    )
+    found = image.metadata["spp"]
+    there = f"{found:.4g} of " + counted(spp, "sample") if spp else counted(found, "sample", form=".4g")
+    return Interrupted(f"interrupted: the picture so far has {there} per pixel", image)
 
 
 def is_black_or_white(image: Image) -> bool:
@@ -72,7 +72,11 @@ def check_first_samples(image: Image, seconds: float | None, surfaces: int) -> N
     if without == image.counts.size:
         raise RenderError(f"there is no picture: {why}")
     if without:
-        warn_caller(f"{without} pixels of {image.counts.size} have no sample and are black: {why}")
+        of = f"of {image.counts.size}"
+        black = counted(
+            without, f"pixel {of} has no sample and is black", f"pixels {of} have no sample and are black"
+        )
+        warn_caller(f"{black}: {why}")
 
 
 def warn_of_clamped_light(image: Image, clamp: float) -> None:
@@ -92,8 +96,8 @@ def warn_of_noise(image: Image, asked: float) -> None:
         return
     noise = "unknown" if np.isnan(found["noise"]) else f"{found['noise']:.4g}"
     warn_caller(
-        f"noise={asked:.4g} was not reached: it is {noise} after {found['spp']:.4g} samples per pixel "
-        f"in {found['seconds']:.3g} s"
+        f"noise={asked:.4g} was not reached: it is {noise} after "
+        f"{counted(found['spp'], 'sample', form='.4g')} per pixel in {found['seconds']:.3g} s"
     )
 
 

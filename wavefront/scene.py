@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .accel import AcceleratorCache
 from .camera import Camera, field_of_view, image_size, upward
+from .counted import counted
 from .elementary import arctan2, sin_cos
 from .errors import SceneError, finite_array
 from .lights import Environment, Light
@@ -72,7 +73,8 @@ class Scene:
     def __repr__(self) -> str:
         """Return the numbers of shapes and lights."""
         return (
-            f"<Scene: {len(self.shapes)} shapes, {len(self.lights)} lights, camera={self.camera is not None}>"
+            f"<Scene: {counted(len(self.shapes), 'shape')}, {counted(len(self.lights), 'light')}, "
+            f"camera={self.camera is not None}>"
         )
 
     def _repr_html_(self) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .camera import Camera
+from .counted import counted
 from .html import table_html
 from .lights import Light
 from .parameter import brief
@@ -46,13 +47,13 @@ def _counts(shapes: Sequence[Shape], lights: Sequence[Light]) -> list[str]:
     """Return how many there are of each kind."""
     bare = [shape.mesh if isinstance(shape, Instance) else shape for shape in shapes]
     counts = {
-        "shapes": len(shapes),
-        "instances": sum(isinstance(shape, Instance) for shape in shapes),
-        "triangles": sum(len(shape.faces) for shape in bare if isinstance(shape, Mesh)),
-        "curved primitives": sum(_curved(shape) for shape in bare),
-        "lights": len(lights) + sum(shape.emission is not None for shape in shapes),
+        "shape": len(shapes),
+        "instance": sum(isinstance(shape, Instance) for shape in shapes),
+        "triangle": sum(len(shape.faces) for shape in bare if isinstance(shape, Mesh)),
+        "curved primitive": sum(_curved(shape) for shape in bare),
+        "light": len(lights) + sum(shape.emission is not None for shape in shapes),
     }
-    return [f"{count} {kind}" for kind, count in counts.items() if count or kind in ("shapes", "lights")]
+    return [counted(count, kind) for kind, count in counts.items() if count or kind in ("shape", "light")]
 
 
 def _curved(shape: Shape) -> int:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..counted import counted
 from ..errors import SceneError
 from ..vec import Doubles
 
@@ -44,7 +45,7 @@ class Distortion:
             raise SceneError(f"distortion must be numeric, got {coefficients!r}") from error
         if given.size not in COUNTS:
             raise SceneError(
-                f"distortion has {given.size} numbers; it must have 4, 5 or 8: {', '.join(NAMES)}"
+                f"distortion has {counted(given.size, 'number')}; it must have 4, 5 or 8: {', '.join(NAMES)}"
             )
         if not np.isfinite(given).all():
             raise SceneError(f"distortion is {given.tolist()}; it must be finite")

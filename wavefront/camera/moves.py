@@ -8,6 +8,7 @@ from copy import copy
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..counted import counted
 from ..elementary import arctan2, sin_cos
 from ..errors import SceneError, finite_array, number
 from ..vec import Doubles
@@ -75,7 +76,7 @@ def interpolate_cameras(cameras: Sequence[Camera], n: int) -> list[Camera]:
     array([0.5, 0. , 4. ])
     """
     if len(cameras) < 2 or n < 2:
-        raise SceneError(f"{n} cameras between {len(cameras)}; both numbers must be at least 2")
+        raise SceneError(f"{counted(n, 'camera')} between {len(cameras)}; both numbers must be at least 2")
     places = np.array([camera.origin for camera in cameras])
     # beyond both ends the path goes straight on
     ends = 2 * places[:1] - places[1:2], 2 * places[-1:] - places[-2:-1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from ..counted import counted
 from ..datasets import write_dataset
 from ..datasets.dataset import FORMATS
 from ..io.load import load
@@ -73,5 +74,6 @@ def _dataset(options: argparse.Namespace) -> int:
         **setting_values(options),
     )
     earlier = len(cameras) - rendered
-    print(f"{options.output}: {len(cameras)} views{f', {earlier} of them there before' if earlier else ''}")
+    before = f", {earlier} of them there before" if earlier else ""
+    print(f"{options.output}: {counted(len(cameras), 'view')}{before}")
     return 0

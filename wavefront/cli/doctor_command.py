@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from ..counted import counted
 from ..memory import available_memory
 from ..record import record
 from ..scheduling.executors import worker_count
@@ -94,7 +95,10 @@ def _about_machine() -> Iterator[str]:
     yield f"  memory: {'unknown' if math.isinf(memory) else f'{memory / 1e9:.1f} GB available'}"
     yield f"  CPU: {machine['architecture']}; NumPy uses {machine['CPU features']}"
     found = [each for each in threadpool_info() if each.get("user_api") == "blas"]
-    names = [f"{each['internal_api']} {each['version']}, {each['num_threads']} threads" for each in found]
+    names = [
+        f"{each['internal_api']} {each['version']}, {counted(each['num_threads'], 'thread')}"
+        for each in found
+    ]
     yield f"  BLAS: {'; '.join(names) or 'none found'}"
 
 

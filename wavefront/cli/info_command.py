@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..counted import counted
 from ..io.load import load
 from ..materials import Material
 from ..parameter import brief
@@ -48,8 +49,8 @@ def _lines(path: str, scene: Scene, messages: list[str]) -> Iterator[str]:
     meshes = _distinct(shape.mesh if isinstance(shape, Instance) else shape for shape in scene.shapes)
     low, high = scene.bounds
     yield (
-        f"{path}: {_count(len(scene.shapes), 'shape')}, {_count(_triangles(scene.shapes), 'triangle')}, "
-        f"{_count(len(scene.lights), 'light')}"
+        f"{path}: {counted(len(scene.shapes), 'shape')}, {counted(_triangles(scene.shapes), 'triangle')}, "
+        f"{counted(len(scene.lights), 'light')}"
     )
     yield f"size: file {_bytes(os.path.getsize(path))}, meshes {_bytes(_mesh_bytes(meshes))} in memory"
     yield f"bounds: {_triple(low)} to {_triple(high)}, {_triple(high - low)} across"
@@ -69,7 +70,7 @@ def _lines(path: str, scene: Scene, messages: list[str]) -> Iterator[str]:
     textures = _distinct(texture for material in materials for texture in _textures(material, set()))
     yield "textures:" if textures else "textures: none"
     for texture in textures:
-        yield f"  {texture!r}, {texture.channels} channels, {'sRGB' if texture.srgb else 'linear'}"
+        yield f"  {texture!r}, {counted(texture.channels, 'channel')}, {'sRGB' if texture.srgb else 'linear'}"
     yield f"warnings: {len(messages)}" if messages else "warnings: none"
     yield from (f"  {message}" for message in messages)
 
@@ -107,11 +108,6 @@ def _mesh_bytes(meshes: Iterable[Shape]) -> int:
     return sum(
         value.nbytes for mesh in meshes for value in vars(mesh).values() if isinstance(value, np.ndarray)
     )
-
-
-def _count(count: int, thing: str) -> str:
-    """Return a number of things."""
-    return f"{count} {thing}{'' if count == 1 else 's'}"
 
 
 def _bytes(count: int) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from ..accel.embree import installed
 from ..bsdfs import Dielectric, Diffuse
 from ..camera import Camera
+from ..counted import counted
 from ..lights import Environment
 from ..record import record
 from ..render import render
@@ -84,7 +85,7 @@ def _measure_speed(accelerator: str, seconds: float, workers: int) -> CheckResul
     )
     text = (
         f"{rays:.2f} million rays per second, {samples:.2f} million samples per second "
-        f"({workers} workers, in {passed:.1f} s)"
+        f"({counted(workers, 'worker')}, in {passed:.1f} s)"
     )
     return CheckResult(f"speed, {accelerator}", bool(np.isfinite(last.rgb).all()), text)
 

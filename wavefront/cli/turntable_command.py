@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from ..animation import check_animation, save_animation
+from ..counted import counted
 from ..io.load import load
 from ..views import render_many, turntable
 from .arguments import count
@@ -57,5 +58,5 @@ def _turntable(options: argparse.Namespace) -> int:
         tone=display.tone,
         white_balance=display.white_balance,
     )
-    print(f"{options.output}: {count} pictures")
+    print(f"{options.output}: {counted(count, 'picture')}")
     return 0

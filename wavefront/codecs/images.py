@@ -16,6 +16,7 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..counted import counted
 from ..errors import SaveError, SceneError
 from ..files import MAX_PIXELS, check_size, check_target, path_name, read_bytes, write_bytes
 from ..registry import Registry
@@ -221,7 +222,8 @@ def _finite(path: str | os.PathLike[str], picture: ImageData) -> ImageData:
     bad = int(np.count_nonzero(~np.isfinite(picture.rgb).all(axis=2)))
     if not bad:
         return picture
-    warnings.warn(f"{os.fspath(path)}: {bad} pixels are not finite; NaN is written as 0", stacklevel=3)
+    found = counted(bad, "pixel is", "pixels are")
+    warnings.warn(f"{os.fspath(path)}: {found} not finite; NaN is written as 0", stacklevel=3)
     return picture.with_rgb(np.nan_to_num(picture.rgb, nan=0.0))
 
 

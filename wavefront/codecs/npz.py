@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..counted import counted
 from ..errors import SceneError
 from .image_data import ImageData, from_json, from_named, to_json
 
@@ -54,7 +55,7 @@ def decode(data: bytes) -> ImageData:
         claimed, most = sum(member.file_size for member in members), max(MAX_BYTES, EXPANSION * len(data))
         if claimed > most:
             raise SceneError(
-                f"claims {claimed} bytes in {len(members)} arrays; the limit is {most} "
+                f"claims {claimed} bytes in {counted(len(members), 'array')}; the limit is {most} "
                 f"for a file of {len(data)} bytes"
             )
         arrays = {member.filename.removesuffix(".npy"): _read(archive, member) for member in members}

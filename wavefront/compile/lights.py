@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ..counted import counted
 from ..errors import SceneError
 from ..lights import (
     EnvironmentSum,
@@ -144,7 +145,8 @@ def _rows_of(
     faces = len(shape.faces) if isinstance(shape, Mesh) else shape.count
     if len(record) not in (1, faces):
         raise SceneError(
-            f"{name}: record has {len(record)} columns; it must have 1, or {faces}, one for each face"
+            f"{name}: record has {counted(len(record), 'column')}; "
+            f"it must have 1, or {faces}, one for each face"
         )
     return first_row[id(same[0])] + np.arange(faces)
 
@@ -252,5 +254,6 @@ def _with_area(meshes: Sequence[Mesh], mesh_of: Ints, triangles: NDArray[np.floa
     dark = mesh_of[~np.isin(mesh_of, mesh_of[shining])]
     if dark.size:
         mesh = meshes[dark[0]]
-        raise SceneError(f"{mesh.name}: a light must have an area; all {len(mesh.faces)} faces have none")
+        faces = counted(len(mesh.faces), "face has", "faces have")
+        raise SceneError(f"{mesh.name}: a light must have an area; its {faces} none")
     return shining

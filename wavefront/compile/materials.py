@@ -9,6 +9,7 @@ from copy import copy
 import numpy as np
 
 from ..bsdfs import Bsdf
+from ..counted import counted
 from ..errors import SceneError
 from ..materials import Material, Opacity
 from ..record import record
@@ -192,11 +193,12 @@ def attributes_read(shapes: Sequence[Shape]) -> list[str]:
             if isinstance(mesh, Mesh) and ATTRIBUTES[name].given(mesh) is None:
                 lacking.setdefault(ATTRIBUTES[name].title, {})[id(mesh)] = shape.name
     for title, names in lacking.items():
-        warnings.warn(
-            f"{len(names)} meshes lack the {title} that their materials read, "
-            f"first: {next(iter(names.values()))!r}",
-            stacklevel=5,
+        found = counted(
+            len(names),
+            f"mesh lacks the {title} that its material reads",
+            f"meshes lack the {title} that their materials read",
         )
+        warnings.warn(f"{found}, first: {next(iter(names.values()))!r}", stacklevel=5)
     return sorted(read)
 
 

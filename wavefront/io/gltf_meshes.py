@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..counted import counted
 from ..errors import SceneError
 from .gltf_document import Document
 from .repair import Faces, RawMesh, Table, wide
@@ -103,18 +104,19 @@ def attribute(
         listed = " or ".join(map(str, allowed))
         raise SceneError(f"{where} has {key} with {values.shape[1]} components; it must have {listed}")
     if count is not None and len(values) != count:
-        raise SceneError(f"{where} has {len(values)} of {key}; it has {count} vertices")
+        raise SceneError(f"{where} has {len(values)} of {key}; it has {counted(count, 'vertex', 'vertices')}")
     return values
 
 
 def _triangles(where: str, indices: NDArray[Any], mode: int, count: int) -> Faces:
     """Return faces (m, 3) of a list, strip or fan of triangles over `count` vertices."""
+    there = counted(len(indices), "index", "indices")
     if mode == TRIANGLES:
         if len(indices) % 3:
-            raise SceneError(f"{where} has {len(indices)} indices; triangles need a multiple of 3")
+            raise SceneError(f"{where} has {there}; triangles need a multiple of 3")
         return indices.astype(np.intp).reshape(-1, 3)
     if len(indices) < 3:
-        raise SceneError(f"{where} has {len(indices)} indices; a strip or fan needs at least 3")
+        raise SceneError(f"{where} has {there}; a strip or fan needs at least 3")
     # glTF forbids the largest index; where it occurs, it begins a new strip, as in graphics hardware
     largest = np.iinfo(indices.dtype).max
     restart = (indices == largest) & (largest >= count)

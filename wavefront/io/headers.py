@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
+from ..counted import counted
 from ..errors import SceneError
 
 TYPES = {
@@ -128,7 +129,9 @@ def _check_words(name: str, element: Element, number: int, words: list[str]) -> 
         if not all(_is_count(word.lstrip("+-")) for word in indices):
             raise SceneError(f"{name} line {number}: {' '.join(indices)!r} are not whole numbers")
     if len(words) != need:
-        raise SceneError(f"{name} line {number}: {element.name} has {len(words)} words; it must have {need}")
+        raise SceneError(
+            f"{name} line {number}: {element.name} has {counted(len(words), 'word')}; it must have {need}"
+        )
 
 
 def _is_count(word: str) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..counted import counted
 from ..errors import SceneError
 from ..files import decode_text
 from .repair import warn
@@ -30,7 +31,8 @@ def parse(name: str, data: bytes, strict: bool, materials: bool) -> Any:
         del rows[0]
     (vertices, faces), rows = _counts(name, rows), rows[1:]
     if len(rows) < vertices + faces:
-        raise SceneError(f"{name}: claims {vertices} vertices and {faces} faces; {len(rows)} lines are there")
+        claimed = f"{counted(vertices, 'vertex', 'vertices')} and {counted(faces, 'face')}"
+        raise SceneError(f"{name}: claims {claimed}; {counted(len(rows), 'line is', 'lines are')} there")
     for number, words in rows[:vertices]:
         if len(words) < 3 or not all(map(_is_number, words[:3])):
             raise SceneError(f"{name} line {number}: vertex is {' '.join(words)!r}; it must be 3 numbers")

@@ -15,6 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..counted import counted
 from ..errors import SceneError
 from .headers import SIZES, TYPES, Element, check_ply, ply_textures, unread
 from .repair import warn
@@ -129,7 +130,9 @@ def _split(name: str, lists: list[NDArray[np.int64]]) -> NDArray[np.int64]:
     """Return the triangles (m, 3) of polygons."""
     short = next((i for i, corners in enumerate(lists) if len(corners) < 3), None)
     if short is not None:
-        raise SceneError(f"{name}: face {short} has {len(lists[short])} corners; it needs at least 3")
+        raise SceneError(
+            f"{name}: face {short} has {counted(len(lists[short]), 'corner')}; it needs at least 3"
+        )
     return np.asarray(import_trimesh().geometry.triangulate_quads(lists), np.int64)
 
 

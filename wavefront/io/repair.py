@@ -9,13 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..counted import counted
 from ..errors import SceneError
 from ..materials import Material
 from ..shapes import Mesh
 from ..textures.parameter import Color
-from ..vec import FLOAT32_MAX, cross
+from ..vec import FLOAT32_MAX, cross, spans
 
 MAX_UV = 2.0**24  # above, float32 has no fractions, which textures need
+AT_ONCE = 1 << 14  # faces whose area is found together, so that they fit the cache
 FLAT = 1e-14  # a face is degenerate if twice its area is below this multiple of its longest edge squared
 
 Table = NDArray[np.float64]
@@ -107,9 +109,9 @@ def build(source: str, raw: RawMesh, strict: bool = False) -> Mesh | None:
         vertices,
         faces,
         normals=_normals(label, raw.normals, vertices, faces, strict),
-        uvs=_uvs(label, "uvs", raw.uvs, strict),
-        uvs1=_uvs(label, "second uvs", raw.uvs1, strict),
-        tangents=None if raw.normals is None else _finite(label, "tangents", raw.tangents, 0.0, strict),
+        uvs=_uvs(label, "uv", raw.uvs, strict),
+        uvs1=_uvs(label, "second uv", raw.uvs1, strict),
+        tangents=None if raw.normals is None else _finite(label, "tangent", raw.tangents, 0.0, strict),
         colors=_colors(label, raw.colors, strict),
         material=raw.material,
         emission=raw.emission,
@@ -134,16 +136,27 @@ def _report(label: str, raw: RawMesh, bad: NDArray[np.bool_], what: str, strict:
     if not len(found):
         return
     first = f"face {found[0]}" if raw.lines is None else f"line {raw.lines[found[0]]}"
-    warn(f"{label}: {'has' if strict else 'dropped'} {len(found)} faces {what}, first: {first}", strict)
+    warn(
+        f"{label}: {'has' if strict else 'dropped'} {counted(len(found), 'face')} {what}, first: {first}",
+        strict,
+    )
+
+
+def _warn_of_vertices(label: str, bad: Any, what: str, state: str, strict: bool) -> None:
+    found = counted(int(bad.sum()), f"{what} is", f"{what}s are")
+    warn(f"{label}: {found} {state}, first: vertex {bad.argmax()}", strict)
 
 
 def _has_area(vertices: Table, faces: Faces) -> NDArray[np.bool_]:
-    a, b, c = vertices.take(faces, 0).transpose(1, 2, 0)
-    edges = np.stack([b - a, c - b, a - c])  # (3, 3, m)
-    longest = np.abs(edges).max(axis=(0, 1))
-    # first divided by the longest edge, so that squares neither overflow nor underflow
-    unit = edges / np.where(longest > 0, longest, 1)
-    return np.asarray(np.abs(cross(unit[0], unit[1])).max(axis=0) > FLAT)
+    found = np.empty(len(faces), np.bool_)
+    for part in spans(len(faces), AT_ONCE):
+        a, b, c = np.ascontiguousarray(vertices.take(faces[part], 0).transpose(1, 2, 0))
+        edges = np.stack([b - a, c - b, a - c])  # (3, 3, m)
+        longest = np.abs(edges).max(axis=(0, 1))
+        # first divided by the longest edge, so that squares neither overflow nor underflow
+        unit = edges / np.where(longest > 0, longest, 1)
+        found[part] = np.abs(cross(unit[0], unit[1])).max(axis=0) > FLAT
+    return found
 
 
 def _normals(label: str, normals: Table | None, vertices: Table, faces: Faces, strict: bool) -> Table | None:
@@ -153,7 +166,7 @@ def _normals(label: str, normals: Table | None, vertices: Table, faces: Faces, s
     normals = np.array(normals, np.float64)
     broken = ~np.isfinite(normals).all(axis=1)
     if broken.any():
-        warn(f"{label}: {int(broken.sum())} normals are not finite, first: vertex {broken.argmax()}", strict)
+        _warn_of_vertices(label, broken, "normal", "not finite", strict)
         normals[broken] = 0
     largest = np.abs(normals).max(axis=1)
     absent = largest == 0
@@ -177,7 +190,7 @@ def _finite(label: str, what: str, values: Table | None, otherwise: float, stric
     values = np.array(values, np.float64)
     broken = ~(np.abs(values) <= FLOAT32_MAX).all(axis=1)
     if broken.any():
-        warn(f"{label}: {int(broken.sum())} {what} are not finite, first: vertex {broken.argmax()}", strict)
+        _warn_of_vertices(label, broken, what, "not finite", strict)
         values[broken] = otherwise
     return values
 
@@ -189,24 +202,16 @@ def _uvs(label: str, what: str, uvs: Table | None, strict: bool) -> Table | None
         return None
     large = (np.abs(uvs) > MAX_UV).any(axis=1)
     if large.any():
-        warn(
-            f"{label}: {int(large.sum())} {what} are beyond ±{MAX_UV:.0f} and were set to 0, "
-            f"first: vertex {large.argmax()}",
-            strict,
-        )
+        _warn_of_vertices(label, large, what, f"beyond ±{MAX_UV:.0f} and set to 0", strict)
         uvs[large] = 0
     return uvs
 
 
 def _colors(label: str, colors: Table | None, strict: bool) -> Table | None:
-    colors = _finite(label, "vertex colors", colors, 1.0, strict)
+    colors = _finite(label, "vertex color", colors, 1.0, strict)
     if colors is None:
         return None
     beyond = ((colors < 0) | (colors > 1)).any(axis=1)
     if beyond.any():
-        warn(
-            f"{label}: {int(beyond.sum())} vertex colors are outside [0, 1] and were clamped, "
-            f"first: vertex {beyond.argmax()}",
-            strict,
-        )
+        _warn_of_vertices(label, beyond, "vertex color", "outside [0, 1] and clamped", strict)
     return np.clip(colors, 0, 1)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..codecs.encoding import srgb_to_linear
 from ..codecs.images import read_codes
+from ..counted import counted
 from ..elementary import arctan2, sin_cos, sin_cos_turns
 from ..errors import SceneError
 from ..files import check_size
@@ -171,7 +172,8 @@ def environment_pixels(source: Any) -> Floats:
     if codes.shape[2] in (2, 4):
         clear = int((pixels[..., -1] != 1).sum())
         if clear:
-            warnings.warn(f"{name}: {clear} pixels are transparent; alpha is not used", stacklevel=4)
+            found = counted(clear, "pixel is", "pixels are")
+            warnings.warn(f"{name}: {found} transparent; alpha is not used", stacklevel=4)
         pixels = pixels[..., :-1]
     pixels = np.array(np.broadcast_to(pixels, (*pixels.shape[:2], 3)))
     _check_finite(name, pixels)
@@ -185,8 +187,8 @@ def _check_finite(name: str, pixels: Floats) -> None:
     if len(bad):
         row, column = bad[0]
         raise SceneError(
-            f"{name}: {len(bad)} pixels are not finite in float32, first: row {row}, column {column}, "
-            f"{pixels[row, column].tolist()}"
+            f"{name}: {counted(len(bad), 'pixel is', 'pixels are')} not finite in float32, "
+            f"first: row {row}, column {column}, {pixels[row, column].tolist()}"
         )
 
 
@@ -195,8 +197,8 @@ def _without_negative(name: str, pixels: Floats) -> Floats:
     if len(bad):
         row, column = bad[0]
         warnings.warn(
-            f"{name}: {len(bad)} pixels are negative and count as 0, first: row {row}, column {column}, "
-            f"{pixels[row, column].tolist()}",
+            f"{name}: {counted(len(bad), 'negative pixel counts', 'negative pixels count')} as 0, "
+            f"first: row {row}, column {column}, {pixels[row, column].tolist()}",
             stacklevel=5,
         )
     return np.maximum(pixels, f4(0))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..counted import counted
 from ..errors import SceneError
 from ..vec import BELOW_ONE, Floats, Ints, f4
 
@@ -19,7 +20,7 @@ def _checked(name: str, weights: ArrayLike, ndim: int) -> NDArray[np.float64]:
     array = np.asarray(weights, np.float64)
     if array.ndim != ndim or not array.size:
         raise SceneError(
-            f"{name} must have {ndim} dimension(s) and at least one item, got shape {array.shape}"
+            f"{name} must have {counted(ndim, 'dimension')} and at least one item, got shape {array.shape}"
         )
     bad = np.argwhere(~(np.isfinite(array) & (array >= 0)))
     if len(bad):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..counted import counted
 from ..errors import RenderError, warn_caller
 from ..film import Film
 from ..image import Image, film_image, last_film_image
@@ -70,7 +71,7 @@ class Accumulator:
             return
         width, height = self.film.size
         memory = sum(map(layer_bytes, names)) * width * height
-        check_memory(f"{len(names)} layers of {width}x{height} pixels", memory)
+        check_memory(f"{counted(len(names), 'layer')} of {width}x{height} pixels", memory)
         self.sums.layers = LayerSums(names, width * height)
 
     @property

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from ..counted import counted
 from ..memory import address_space_left
 
 BUFFER = (
@@ -70,7 +71,7 @@ def reserve_buffers(threads: int) -> None:
     if left == math.inf:
         return
     if left < threads * BUFFER:
-        raise MemoryError(f"BLAS needs {threads * BUFFER / 1e6:,.0f} MB for {threads} threads")
+        raise MemoryError(f"BLAS needs {threads * BUFFER / 1e6:,.0f} MB for {counted(threads, 'thread')}")
     together = threading.Barrier(threads)
     matrix = np.ones((LARGE, LARGE))
 

@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ..camera import Camera
+from ..counted import counted
 from ..layer_samples import LayerSamples
 from ..pixel_tiles import whole_tiles
 from ..record import record
@@ -113,7 +114,7 @@ class Job:
     def __str__(self) -> str:
         """Name the block in an error message."""
         first, last = (self.view.first_sample + each for each in (self.first_sample, self.end - 1))
-        return f"samples {first} to {last} of {self.pixels.size} pixels from {self.pixels[0]} on"
+        return f"samples {first} to {last} of {counted(self.pixels.size, 'pixel')} from {self.pixels[0]} on"
 
 
 @record

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..bsdfs import Diffuse
 from ..codecs.encoding import srgb_to_linear
+from ..counted import counted
 from ..errors import SceneError, finite_array
 from ..materials import Material
 from ..textures.vertex_colors import VertexColors
@@ -25,7 +26,7 @@ def linear_colors(name: str, values: ArrayLike | None) -> NDArray[np.float64] | 
         array[:, :3] = srgb_to_linear(array[:, :3].astype(f4) / f4(most))
         array[:, 3:] /= most
     if array.shape[1] not in (3, 4):
-        raise SceneError(f"{name} has {array.shape[1]} numbers per vertex; it must have 3 or 4")
+        raise SceneError(f"{name} has {counted(array.shape[1], 'number')} per vertex; it must have 3 or 4")
     bad = np.argwhere((array < 0) | (array > 1))
     if len(bad):
         i, j = bad[0]

@@ -9,15 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SceneError, finite_array
+from ..counted import counted
+from ..errors import SceneError, finite_array, warn_caller
 from ..materials import Material, MaterialLike
 from ..suggestions import suggests_keywords
 from ..textures.parameter import Color, color
-from ..vec import FLOAT32_MAX
+from ..vec import FLOAT32_MAX, cross, spans
 from .base import Checked
 from .colored import ColoredShape
 
 MOST_DOUBLINGS = 60  # log2 of the length, or its inverse, of vectors that are stored unchanged
+AT_ONCE = 1 << 14  # faces whose area is found together, so that they fit the cache
 FLOAT32_MIN = float(np.finfo(np.float32).tiny)
 
 
@@ -84,7 +86,8 @@ class Mesh(ColoredShape):
     vertices
         (n, 3) positions, scene units; kept in float64.
     faces
-        (m, 3) vertex indices, counter-clockwise seen from the front.
+        (m, 3) vertex indices, counter-clockwise seen from the front. No ray hits a face of zero area; a
+        warning counts those.
     normals
         (n, 3) shading normals; without them the facets are flat.
     uvs, uvs1
@@ -152,13 +155,15 @@ class Mesh(ColoredShape):
         self.tangents = tangents
         self.colors = colors
         self.check()
+        self._warn_of_zero_area()
         self.material = material
         self.emission = emission
         self.two_sided = two_sided
 
     def __repr__(self) -> str:
         """Return the name and the size of the mesh."""
-        return f"<Mesh {self.name!r}: {len(self.vertices)} vertices, {len(self.faces)} faces>"
+        vertices = counted(len(self.vertices), "vertex", "vertices")
+        return f"<Mesh {self.name!r}: {vertices}, {counted(len(self.faces), 'face')}>"
 
     @property
     def emission(self) -> Any:
@@ -192,10 +197,18 @@ class Mesh(ColoredShape):
             values = getattr(self, name)
             if values is not None and len(values) != count:
                 raise SceneError(
-                    f"{self.name}: {name} must have a row for each of {count} vertices, got {len(values)}"
+                    f"{self.name}: {name} must have a row for each of "
+                    f"{counted(count, 'vertex', 'vertices')}, got {len(values)}"
                 )
         if self.tangents is not None and self.normals is None:
             raise SceneError(f"{self.name}: has tangents without normals; pass both")
+
+    def _warn_of_zero_area(self) -> None:
+        flat = _faces_of_zero_area(self.vertices, self.faces)
+        if flat.size:
+            warn_caller(
+                f"{self.name}: dropped {counted(flat.size, 'face')} of zero area, first: face {flat[0]}"
+            )
 
     def scaled(self, factor: float) -> Mesh:
         """Return the mesh with all lengths multiplied by `factor`, and the same material."""
@@ -210,6 +223,23 @@ class Mesh(ColoredShape):
         used[self.faces] = True
         rows = np.ascontiguousarray(self.vertices[used].T)
         return np.stack([rows.min(1), rows.max(1)])
+
+
+def _faces_of_zero_area(vertices: NDArray[np.float64], faces: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the numbers of the faces whose corners lie on a line, or in a point."""
+    found = []
+    for part in spans(len(faces), AT_ONCE):
+        a, b, c = np.ascontiguousarray(vertices.take(faces[part], 0).transpose(1, 2, 0))
+        flat = np.flatnonzero(~cross(b - a, c - a).any(0))
+        found.append(part.start + flat)
+    flat = np.concatenate(found)
+    if flat.size:  # lengths are divided by the longest, so that squares of small ones do not underflow
+        a, b, c = vertices.take(faces[flat], 0).transpose(1, 2, 0)
+        edges = np.stack([b - a, c - a])
+        longest = np.abs(edges).max((0, 1))
+        first, second = edges / np.where(longest > 0, longest, 1)
+        flat = flat[~cross(first, second).any(0)]
+    return flat
 
 
 @suggests_keywords

@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..counted import counted
 from ..errors import SceneError
 from ..materials import MaterialLike
 from ..suggestions import suggests_keywords
@@ -58,7 +59,8 @@ class SegmentArray(PrimitiveArray):
             If there is no primitive, or an array does not have one row for each.
         """
         if len(self.starts) != len(self.ends):
-            raise SceneError(f"{self.name}: has {len(self.starts)} starts and {len(self.ends)} ends")
+            starts, ends = counted(len(self.starts), "start"), counted(len(self.ends), "end")
+            raise SceneError(f"{self.name}: has {starts} and {ends}")
         super().check()
 
     def scaled(self, factor: float) -> Self:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..codecs.encoding import srgb_to_linear
 from ..codecs.images import read_codes
+from ..counted import counted
 from ..errors import SceneError, finite_array, one_of
 from ..files import MAX_PIXELS, check_size
 from ..state import SurfaceInteraction
@@ -221,7 +222,8 @@ def _codes(source: Any, max_pixels: int) -> tuple[NDArray[Any], str]:
     if len(bad):
         row, column, _ = bad[0]
         raise SceneError(
-            f"texture {name!r} has {len(bad)} values that are not finite, first: row {row}, column {column}"
+            f"texture {name!r} has {counted(len(bad), 'value that is', 'values that are')} not finite, "
+            f"first: row {row}, column {column}"
         )
     return codes, name
 
