@@ -190,6 +190,12 @@ def test_an_own_material_is_shown() -> None:
     assert repr(Phong(3.0)) == "Phong(exponent=3)"
 
 
+def test_a_large_array_is_shown_by_its_shape() -> None:
+    """Such as in the table of lights of a notebook."""
+    lights = wf.PointLights(np.zeros((1000, 3)), np.ones(3))
+    assert repr(lights) == "PointLights(positions=<array (1000, 3)>, intensities=(1, 1, 1))"
+
+
 BYTES = np.full((4, 4), 200, np.uint8)
 
 

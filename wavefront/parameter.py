@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 MISSING = object()
+MOST_SHOWN = 16  # numbers of an array
 
 
 class Parameter:
@@ -80,7 +81,12 @@ def named_arguments(thing: Any) -> list[str]:
 
 
 def brief(value: Any) -> str:
-    """Return a value as a user would write it: equal channels as one number, six digits at most."""
+    """Return a value as a user would write it: equal channels as one number, six digits at most.
+
+    Of an array of more than `MOST_SHOWN` numbers it is the shape.
+    """
+    if isinstance(value, np.ndarray) and value.size > MOST_SHOWN:
+        return f"<array {value.shape}>"
     if isinstance(value, np.ndarray | np.generic | tuple | list):
         numbers = np.ravel(value)
         if numbers.dtype.kind not in "fiu" or numbers.size > 4:
