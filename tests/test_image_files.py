@@ -402,7 +402,7 @@ def test_an_archive_that_claims_too_much_is_refused_before_it_is_read(tmp_path, 
     monkeypatch.setattr("wavefront.codecs.npz.MAX_BYTES", 1_000_000)
     archive(tmp_path / "a.npz", {"rgb.npy": npy(np.zeros((500, 500, 3), np.float32))})
     size = (tmp_path / "a.npz").stat().st_size
-    message = rf"a\.npz: claims 3000128 bytes in 1 arrays; the limit is 1000000 for a file of {size} bytes"
+    message = rf"a\.npz: claims 3000128 bytes in 1 array; the limit is 1000000 for a file of {size} bytes"
     with pytest.raises(wf.SceneError, match=message):
         wf.Image.load(tmp_path / "a.npz")
 
