@@ -27,6 +27,7 @@ from rays import (
 )
 
 from wavefront.accel import Accelerator, Geometry, make_accelerator
+from wavefront.accel.brute_force import BruteForceTriangles
 from wavefront.accel.build import build_tree, stable_order
 from wavefront.accel.embree import installed
 from wavefront.accel.numpy_accel import NumpyAccelerator, leaf_size_for
@@ -241,6 +242,32 @@ def test_occluded_leaves_out_the_distance_itself() -> None:
     origin[2], direction[2] = 0, 1
     distance = np.array([1, np.nextafter(f4(1), f4(2))], f4)
     assert accelerator.occluded(origin, direction, distance, nothing(2)).tolist() == [False, True]
+
+
+@pytest.mark.parametrize("ends", ["inside", "outside", "both"])
+def test_shadow_rays_that_leave_out_the_walls_of_a_room_have_the_same_answer(ends: str) -> None:
+    """Points on walls, in the room and on boxes in it; with ends outside the walls block."""
+    rng = np.random.default_rng(0)
+    turn = trimesh.transformations.rotation_matrix(0.4, (1, 2, 3))
+    parts = [trimesh.creation.box((2, 2, 2)), trimesh.creation.box((0.5, 1, 0.6))]
+    triangles = np.concatenate([part.apply_transform(turn).triangles for part in parts])
+    accelerator = NumpyAccelerator(geometry(triangles))
+    room = accelerator._triangles
+    assert isinstance(room, BruteForceTriangles)
+    assert (room._inner, room._count) == (12, 24)
+    n = 20_000
+    prim = rng.integers(0, 24, n)
+    start = trimesh.triangles.barycentric_to_points(triangles[prim], rng.dirichlet((1, 1, 1), n))
+    end = rng.uniform(-0.99, 0.99, (n, 3)) @ turn[:3, :3].T
+    away = {"inside": np.zeros(n, bool), "outside": np.ones(n, bool), "both": rng.random(n) < 0.5}[ends]
+    end[away] *= 3 / np.abs(end[away] @ turn[:3, :3]).max(1, keepdims=True)
+    rays = start.T.astype(f4), (end - start).T.astype(f4), np.full(n, 0.999, f4), prim
+    blocked = accelerator.occluded(*rays)
+    room._inner = room._count
+    assert np.array_equal(blocked, accelerator.occluded(*rays))
+    assert 0.05 < blocked.mean() < (1 if ends == "outside" else 0.9)
+    wall = prim < 12
+    assert blocked[wall & away].mean() > 0.5 if away.any() else blocked.mean() < 0.5
 
 
 # --- special rays and triangles -------------------------------------------------------------------
