@@ -227,6 +227,33 @@ def test_first_points_are_shaded_alike_in_any_order() -> None:
         assert np.array_equal(whole[lanes], part)
 
 
+def balcony() -> wf.Scene:
+    """A balcony whose shading normals lean over its edge, to a lit ground below that it must not see."""
+    matte = wf.Diffuse(0.8)
+    corners = [[-1, 0, -1], [0, 0, -1], [0, 0, 1], [-1, 0, 1]]
+    normals = [[0.9, 0.44, 0]] * 4
+    shapes = [
+        wf.Mesh(corners, [[0, 2, 1], [0, 3, 2]], normals=normals, material=matte),
+        wf.Rectangle((-1, -1, -1), (0, 0, 2), (3, 0, 0), material=matte),
+        wf.Rectangle((1, -1, -1), (0, 0, 2), (0, 2, 0), material=matte),
+    ]
+    camera = wf.Camera.look_at((-0.5, 3, 0.01), (0, 0, 0), fov=40, size=(28, 28))
+    return wf.Scene(shapes, [wf.PointLight((0.5, -0.5, 0), 3)], camera)
+
+
+@pytest.mark.parametrize("build", [matte_corner, balcony])
+def test_lambertian_surfaces_are_evaluated_alike(
+    build: Callable[[], wf.Scene], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By their cosines alone, or as any BSDF."""
+    quick = render(build(), 4, reuse=True).rgb
+    monkeypatch.setattr(wf.Diffuse, "lambertian", False)
+    monkeypatch.setattr(wf.Diffuse, "view_independent", True)
+    slow = render(build(), 4, reuse=True).rgb
+    assert not np.array_equal(quick, slow)  # another order of factors
+    np.testing.assert_allclose(quick, slow, rtol=2e-5, atol=1e-6)
+
+
 def test_no_light_is_lost_or_won(close_tiles: None) -> None:
     """In a closed white room of radiance 1 each sample is 1, whichever pixels it comes from."""
     inside = scenes.box((-1, -1, -1), (1, 1, 1), wf.Diffuse(0.5), emission=0.5, inward=True)

@@ -221,7 +221,17 @@ class NotMatte(Diffuse):
         return super().f(wo, wi) * wo[2] * wi[2]
 
 
+class NotLambertian(Diffuse):
+    """Brighter towards the normal, the same from everywhere."""
+
+    view_independent = lambertian = True
+
+    def f(self, wo, wi):
+        return super().f(wo, wi) * wi[2]
+
+
 MUTANTS = [
+    (NotLambertian(1.0), "lambertian"),
     (NotMatte(1.0), "view_independent"),
     (TooDense(1.0), "integral of pdf"),
     (WrongPdf(0.5), "chi-square"),

@@ -90,6 +90,11 @@ class Bsdf(Parametrized, ABC):
         return False
 
     @property
+    def lambertian(self) -> bool:
+        """True if f is albedo/π and the pdf cosθ/π above the surface, so that cosines tell both."""
+        return False
+
+    @property
     def black(self) -> bool:
         """True if it scatters nothing: paths end on it."""
         return False

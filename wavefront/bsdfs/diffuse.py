@@ -42,6 +42,11 @@ class Diffuse(Bsdf):
     @property
     def view_independent(self) -> bool:
         """True for `Diffuse` itself; a subclass may define it."""
+        return self.lambertian
+
+    @property
+    def lambertian(self) -> bool:
+        """True for `Diffuse` itself; a subclass may define it."""
         return type(self) is Diffuse
 
     @property

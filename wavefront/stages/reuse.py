@@ -25,7 +25,7 @@ from ..compile.scene import CompiledScene
 from ..pixel_tiles import MEMBERS, WaveTiles
 from ..record import record
 from ..state import Hits, Paths, SoA
-from ..vec import ALL, Bools, Floats, Ints, dot, f4, highest, spans, take
+from ..vec import ALL, INV_PI, Bools, Floats, Ints, dot, f4, highest, positive, spans, take
 from .interaction import interaction, material_rows, offset_origin
 from .intersect import ShadowRays, visible
 from .shade import Shading, evaluate
@@ -140,11 +140,11 @@ def add_shared(
                 total = _sum(connections.pdf * connections.geometry)
                 found = total > 0
                 part = connections.geometry / (np.where(found, total, f4(1)) * f4(branches))
-                shared = connections.f * part
-                shared *= take(light, number)[:, None]
-                arriving += shared
+                arriving += connections.f * part * take(light, number)[:, None]
                 lost = number.compress((number >= 0) & ~found)  # by rounding: they stay the path's own
                 L[:, points.slot.take(lost)] += take(points.throughput, lost) * take(light, lost)
+        if first.albedo is not None:
+            arriving *= first.albedo
         cells = np.flatnonzero(first.present)
         received[:, lane_in[:, some].reshape(-1).take(cells)] = arriving.reshape(3, -1).take(cells, 1)
     L[:, slot] += paths.throughput[:, : slot.size] * received
@@ -156,6 +156,7 @@ class FirstPoints:
 
     present: Bools  # (members, t) which cells have a point; the others hold that of any other cell
     shade: Shading  # (members * t) columns
+    albedo: Floats | None  # (3, members, t) if all are Lambertian: by which f is multiplied in the end
 
     @classmethod
     def of(cls, scene: CompiledScene, shade: Shading, lane_in: Ints) -> FirstPoints | None:
@@ -165,14 +166,32 @@ class FirstPoints:
         if not some.size:
             return None
         lanes = np.where(present, lane_in, some[0])
-        return cls(present, shade.at(scene, lanes.reshape(-1)))
+        at = shade.at(scene, lanes.reshape(-1))
+        if not all(bsdf.lambertian for _, bsdf in at.groups):
+            return cls(present, at, None)
+        albedo = at.albedo().reshape(3, *present.shape)
+        return cls(present & (highest(albedo) != 0), at, albedo)
+
+    def evaluate(self, wi: Floats) -> tuple[Floats, Floats]:
+        """Return f times the cosine, (1 or 3, n), and the pdf (n,) of directions (3, n), one for each cell.
+
+        f is without the albedo where that is given.
+        """
+        if self.albedo is None:
+            local = self.shade.frame.to_local(wi)
+            f, pdf = evaluate(self.shade, local)
+            return f * self.shade.cosines(local, wi)[0], pdf
+        surface = self.shade.surface
+        pdf = positive(dot(self.shade.frame.z, wi)) * INV_PI
+        f = pdf if surface.ns is surface.ng else pdf * (dot(surface.ng, wi) > 0)
+        return f[None], pdf
 
 
 @record
 class Connections:
     """Connections of the first points of t tiles to one shared point each; all is 0 where there is none."""
 
-    f: Floats  # (3, members, t) BSDF times cosine at the first point, 1/sr
+    f: Floats  # (1 or 3, members, t) BSDF times cosine at the first point, 1/sr; see `FirstPoints.evaluate`
     pdf: Floats  # (members, t) density with which a path from the first point takes the direction, 1/sr
     geometry: Floats  # (members, t) cosine at the shared point / distance², 0 where something is between
     lanes: Ints  # (k,) cells of which that is not known yet
@@ -213,14 +232,11 @@ def connect(
     if scene.corner_normals is not None:
         possible &= -dot(target.ns[:, None], direction) > GRAZING
     wi = direction.reshape(3, -1)
-    local = shade.frame.to_local(wi)
-    f, pdf = evaluate(shade, local)
+    f, pdf = first.evaluate(wi)
     if shade.guidance is not None:
         pdf = shade.guidance.mixed(ALL, wi, pdf)
-    cos, _ = shade.cosines(local, wi)
-    f = f * cos
     # paths without throughput end at their first point
-    possible &= ((pdf > 0) & (highest(f) != 0)).reshape(shape)
+    possible &= ((pdf > 0) & (f.max(0) != 0)).reshape(shape)
     geometry = np.where(possible, cos_target * inverse * inverse, f4(0))
     if scene.opacities is None:
         possible[member] = False
@@ -233,7 +249,7 @@ def connect(
         distance=f4(1) / take(inverse.reshape(-1), lanes),
         cos_light=take(cos_target.reshape(-1), lanes),
     )
-    return Connections(f.reshape(3, *shape), pdf.reshape(shape), geometry, lanes, rays)
+    return Connections(f.reshape(-1, *shape), pdf.reshape(shape), geometry, lanes, rays)
 
 
 def attenuate(scene: CompiledScene, of_rows: list[Connections]) -> None:

@@ -147,6 +147,8 @@ def _check_view(
     _check_arrays(report, view, rng)
     if view.bsdf.view_independent:
         _check_view_independent(report, view, rng)
+    if view.bsdf.lambertian:
+        _check_lambertian(report, view, rng)
     pilot = view.sample(rng.random((dimensions, PILOT), f4))
     points, lobes = [], list[_Lobe]()
     total, squares = np.zeros(3), np.zeros(3)
@@ -232,6 +234,19 @@ def _check_view_independent(report: Report, view: _View, rng: np.random.Generato
         report.holds(
             "view_independent", f"{view}, {name}", seen != straight, "the same bits as from straight above"
         )
+
+
+def _check_lambertian(report: Report, view: _View, rng: np.random.Generator) -> None:
+    """Check that f and the pdf are those of a Lambertian surface."""
+    bound, wo = view.at(1000)
+    wi = uniform_directions(rng, 1000)
+    f, pdf = bound.evaluate(wo, wi)
+    albedo = bound.albedo(wo)
+    for name, seen, due in (
+        ("f", f, albedo * (wi[2] > 0) / np.pi),
+        ("pdf", pdf, np.maximum(wi[2], 0) / np.pi),
+    ):
+        report.at_most("lambertian", f"{view}, {name}", float(np.abs(seen - due).max()), 1e-6)
 
 
 def _check_samples(report: Report, view: _View, drawn: BsdfSample) -> None:
