@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +16,9 @@ from scenes import cornell_box, everything, room
 import wavefront as wf
 from wavefront import choice, pixel_tiles, trial
 from wavefront.compile.scene import compile_scene
-from wavefront.sampling.sampler import IndependentSampler
+from wavefront.sampling.sampler import IndependentSampler, SobolSampler
 from wavefront.settings import Settings
-from wavefront.trial import Reused, Trial, run_trial
+from wavefront.trial import Reused, Trial, TrialJob, TrialPart, run_trial
 
 SIZE = (192, 192)  # the smallest pictures that get a trial
 
@@ -145,7 +148,13 @@ def chosen(scene: wf.Scene, **settings: Any) -> choice.Choice:
     """Return what is chosen for a scene."""
     compiled = compile_scene(scene, scene.accelerators.maker("numpy"), mis=True)
     assert scene.camera is not None
-    return choice.choose(Settings(**settings), compiled, compiled.view(scene.camera))
+    options, view = Settings(**settings), compiled.view(scene.camera)
+    table = choice.learn_guide(options, compiled, view)
+
+    def run(jobs: list[TrialJob]) -> list[TrialPart]:
+        return [job.trace(compiled, SobolSampler, table) for job in jobs]
+
+    return choice.choose(options, compiled, view, table is not None, run)
 
 
 @pytest.mark.parametrize(
@@ -184,18 +193,18 @@ def test_paths_are_not_shared_with_some_settings(
 def test_a_guide_goes_with_what_pays(monkeypatch: pytest.MonkeyPatch) -> None:
     """The trial is of guided paths then; without a guide there is a hint where light is hard to find."""
     table: Any = object()
-    tables = []
+    with_table = []
 
     def trial(*args: Any) -> Trial:
-        tables.append(args[3])
+        with_table.append(args[4])
         return Trial(0, 2, 1, 1, 1, 1, Reused(pixels=0.1, blurred=0.1, again=0, connections=0, evaluations=0))
 
     monkeypatch.setattr(choice, "train", lambda *args: table)
     monkeypatch.setattr(choice, "_trial", trial)
     guided, plain = (chosen(cornell_box(SIZE), guide=guide) for guide in (True, False))
-    assert (guided.reuse, guided.table, guided.hint) == (True, table, None)
-    assert (plain.reuse, plain.table, plain.hint) == (True, None, choice.GUIDE_HINT)
-    assert tables == [table, None]
+    assert (guided.reuse, guided.guided, guided.hint) == (True, True, None)
+    assert (plain.reuse, plain.guided, plain.hint) == (True, False, choice.GUIDE_HINT)
+    assert with_table == [True, False]
 
 
 @pytest.mark.parametrize(("dim", "hint"), [(False, None), (True, choice.GUIDE_HINT)])
@@ -230,6 +239,42 @@ def test_there_is_no_trial_where_it_can_bring_nothing(
     monkeypatch.setattr(choice, "run_trial", None)
     found = chosen(scene, **settings)
     assert (found.branches, found.reuse) == (settings.get("branches", 1), settings.get("reuse", False))
+
+
+def test_workers_of_this_machine_do_the_trial(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At least two of them have something to do."""
+    threads = set()
+    trace = TrialJob.trace
+
+    def noted(self: TrialJob, *args: Any) -> TrialPart:
+        threads.add(threading.current_thread().name)
+        time.sleep(0.2)
+        return trace(self, *args)
+
+    monkeypatch.setattr(TrialJob, "trace", noted)
+    assert wf.render(cornell_box(SIZE), 1, workers=2, executor="threads").metadata["reuse"]
+    assert len(threads) == 2
+    assert threading.current_thread().name not in threads
+
+
+def test_a_session_may_be_stopped_during_the_trial_of_a_view() -> None:
+    """By another thread: the view has a choice and no picture, and the next one has its picture."""
+    scene = cornell_box(SIZE)
+    with wf.Session(scene, 1, workers=2, executor="threads", progress=False) as session:
+        run = session._pool.run
+
+        def stopped(*args: Any) -> Any:
+            session.drop()
+            return run(*args)
+
+        session._pool.run = stopped
+        session.set_camera(scene.camera)
+        assert session._plan.choice.reuse
+        session._pool.run = run
+        assert next(session, None) is None
+        session.set_camera(scene.camera)
+        image = session.run()
+    assert np.array_equal(image.rgb, render(scene, 1).rgb)
 
 
 def test_a_window_is_a_part_of_the_same_picture() -> None:
@@ -270,11 +315,12 @@ def test_trials_do_not_depend_on_how_they_are_cut_into_waves(
         pytest.importorskip("embreex")
     scene = cornell_box(SIZE)
     compiled = compile_scene(scene, scene.accelerators.maker(accel), mis=True)
-    samplers = IndependentSampler(1), IndependentSampler(2)
     found = []
     for tiles in (1, 3, 64):
         monkeypatch.setattr(trial, "WAVE", tiles)
-        found.append(run_trial(compiled, compiled.view(scene.camera), samplers, 5, tiles=7, reuse=True))
+        view = compiled.view(scene.camera)
+        run = partial(map, lambda job: job.trace(compiled, IndependentSampler, None))
+        found.append(run_trial(compiled, view, (1, 2), 5, run, tiles=7, reuse=True))
     for other in found[1:]:
         for name in ("shared", "separate", "before", "after"):
             assert getattr(other, name) == getattr(found[0], name)

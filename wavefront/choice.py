@@ -7,6 +7,9 @@ that a picture of 64 samples that gets 64 more is the one of 128.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 from .camera import Camera
 from .compile.scene import CompiledScene
 from .guiding import GuideTable
@@ -15,7 +18,7 @@ from .pixel_tiles import SIDE, STRIDE
 from .record import record
 from .settings import AUTO, Settings
 from .stages.reuse import can_reuse, shares_all
-from .trial import BLOCKS, MOST_TILES, Trial, is_worth_it, run_trial, tiles_for
+from .trial import BLOCKS, MOST_TILES, JobsRunner, Trial, is_worth_it, run_trial, tiles_for
 
 LEAST_PIXELS = 192 * 192  # of pictures that get a trial; smaller ones take no longer than a moment
 GUIDE_HINT = "most light is hard to find here: guide=True may pay (docs/guiding.md)"
@@ -28,63 +31,80 @@ class Choice:
 
     branches: int = 1
     reuse: bool = False
-    table: GuideTable | None = None
+    guided: bool = False
     hint: str | None = None  # what may pay besides
 
 
-def choose(settings: Settings, scene: CompiledScene, camera: Camera) -> Choice:
-    """Return how the paths of a picture go on; train a guide and run trials where they are needed.
+def learn_guide(settings: Settings, scene: CompiledScene, camera: Camera) -> GuideTable | None:
+    """Return what may guide the paths of a picture; None if that is not asked for, or there is nothing.
 
     Parameters
     ----------
     camera
         In the unit of the compiled scene.
     """
+    if not settings.guide or not settings.is_full:
+        return None
+    sampler = settings.sampler_maker()(settings.pilot_seed(), camera.film[0])
+    return train(scene, camera, sampler, settings.max_bounces)
+
+
+def choose(
+    settings: Settings, scene: CompiledScene, camera: Camera, has_guide: bool, run: JobsRunner
+) -> Choice:
+    """Return how the paths of a picture go on; run trials where they are needed.
+
+    Parameters
+    ----------
+    camera
+        In the unit of the compiled scene.
+    has_guide
+        Whether there is something to guide them.
+    run
+        Does the jobs of trials.
+    """
     asked = Choice(1 if settings.branches == AUTO else int(settings.branches), settings.reuse is True)
     if not settings.is_full:
         return asked
-    table = None
-    if settings.guide:
-        table = train(scene, camera, settings.pilot_sampler(camera.film[0]), settings.max_bounces)
     whole = camera.cropped((0, 0, *camera.film))  # a window is a part of the same picture
-    if settings.guide == AUTO and table is not None:
-        return _choose_guide(settings, scene, whole, asked, table)
+    trial = partial(_trial, settings, scene, whole, run)
+    if settings.guide == AUTO and has_guide:
+        return _choose_guide(settings, asked, trial)
     if _tries_something(settings, scene, whole):
         tiles, may_reuse = tiles_for(whole.size), _may_reuse(settings, whole) and can_reuse(scene)
         tries_reuse = may_reuse and shares_all(scene)
-        found = _trial(settings, scene, whole, table, tiles, tries_reuse)
+        found = trial(has_guide, tiles, tries_reuse)
         if may_reuse and not tries_reuse and found.light_is_rare and found.gloss_is_common:
             tries_reuse = True
-            found = _trial(settings, scene, whole, table, tiles, tries_reuse)
-        hint = GUIDE_HINT if table is None and found.light_is_rare else None
+            found = trial(has_guide, tiles, tries_reuse)
+        hint = GUIDE_HINT if not has_guide and found.light_is_rare else None
         if tries_reuse and found.reuse_pays():
-            return Choice(1, True, table, hint)
-        return Choice(found.best_ways(), False, table, hint)
-    return Choice(asked.branches, asked.reuse, table)
+            return Choice(1, True, has_guide, hint)
+        return Choice(found.best_ways(), False, has_guide, hint)
+    return Choice(asked.branches, asked.reuse, has_guide)
 
 
-def _choose_guide(
-    settings: Settings, scene: CompiledScene, camera: Camera, asked: Choice, table: GuideTable
-) -> Choice:
+def _choose_guide(settings: Settings, asked: Choice, trial: Callable[[bool, int], Trial]) -> Choice:
     """Return whether a guide is used, and how many branches go with that."""
     fixed = None if settings.branches == AUTO and not asked.reuse else asked.branches
-    guided, plain = (_trial(settings, scene, camera, each, GUIDE_TILES) for each in (table, None))
+    guided, plain = (trial(each, GUIDE_TILES) for each in (True, False))
     pays = is_worth_it(guided, plain, fixed)
-    found, chosen = (guided, table) if pays else (plain, None)
-    return Choice(fixed or found.best_ways(), asked.reuse, chosen)
+    found = guided if pays else plain
+    return Choice(fixed or found.best_ways(), asked.reuse, pays)
 
 
 def _trial(
     settings: Settings,
     scene: CompiledScene,
     camera: Camera,
-    table: GuideTable | None,
+    run: JobsRunner,
+    guided: bool,
     tiles: int,
     reuse: bool = False,
 ) -> Trial:
-    width = camera.film[0]
-    samplers = tuple(settings.pilot_sampler(width, number) for number in range(1, BLOCKS + 1))
-    return run_trial(scene, camera, samplers, settings.max_bounces, table, tiles, reuse)
+    seeds = tuple(settings.pilot_seed(number) for number in range(1, BLOCKS + 1))
+    bounces = settings.max_bounces
+    return run_trial(scene, camera, seeds, bounces, run, guided=guided, tiles=tiles, reuse=reuse)
 
 
 def _tries_something(settings: Settings, scene: CompiledScene, camera: Camera) -> bool:

@@ -30,7 +30,7 @@ from .memory import memory_size
 from .progress import Progress
 from .record import record
 from .registry import Registry
-from .sampling.sampler import SAMPLERS, Sampler, SamplerMaker, make_sampler
+from .sampling.sampler import SAMPLERS, SamplerMaker
 from .scheduling.budget import Budget, plan
 from .scheduling.executors import EXECUTORS, ExecutorLike, choose_executor, worker_count
 from .stages.reuse import SHARED_WAYS
@@ -434,7 +434,7 @@ class Settings:
         self.up_vector = upward("up", "y" if self.up is None else self.up)
         self._check_integrator()
         self._check_reuse()
-        self.sampler_maker()(1)
+        self.sampler_maker()(self.seed, 1)
         self.executor_for((0, 0))
 
     def _check_integrator(self) -> None:
@@ -488,13 +488,13 @@ class Settings:
         """Branches that a path may have."""
         return MOST_AUTO if isinstance(self.branches, str) else self.branches
 
-    def sampler_maker(self) -> Callable[[int], Sampler]:
-        """Return what makes the sampler of a picture so many pixels wide."""
-        return partial(make_sampler, SAMPLERS.find(self.sampler), self.seed)
+    def sampler_maker(self) -> SamplerMaker:
+        """Return what makes the sampler of a picture, given a seed and how many pixels wide it is."""
+        return SAMPLERS.find(self.sampler)
 
-    def pilot_sampler(self, width: int, number: int = 0) -> Sampler:
-        """Return the sampler of the pilot or of a block of the trial, with numbers of their own."""
-        return make_sampler(self.sampler, (self.seed ^ PILOT) + number, width)
+    def pilot_seed(self, number: int = 0) -> int:
+        """Return the seed of the pilot or of a block of the trial, whose numbers are their own."""
+        return (self.seed ^ PILOT) + number
 
     def executor_for(self, size: tuple[int, int]) -> str | ExecutorLike:
         """Return the executor for a picture of a size (width, height)."""

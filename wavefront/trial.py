@@ -16,7 +16,9 @@ Sources: J. Arvo and D. Kirk, Particle Transport and Image Synthesis, 1990 (spli
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -28,7 +30,7 @@ from .integrators import accumulate, follow, intersect_and_compact, prepare_shad
 from .pilot import spread
 from .pixel_tiles import MEMBERS, SIDE, STRIDE, WaveTiles
 from .record import record
-from .sampling.sampler import Sampler
+from .sampling.sampler import Sampler, SamplerMaker
 from .stages.bounce import bounce_sample
 from .stages.compact import roulette, select
 from .stages.generate import generate
@@ -44,7 +46,8 @@ SAMPLES = 4  # of each pixel in each block; stratified, as those of a picture ar
 PIXELS_PER_TILE = 2048  # of the picture: an eighth of a path for each of its pixels
 MOST_TILES = 256  # 65536 paths
 BOUNCES = 6  # of the trial's paths at most: few get further, and a wave of few costs as much as one of many
-WAVE = 32  # tiles that are traced together: two branches of their paths are a wave of 16384 lanes
+WAVE = 32  # tiles at most that are traced together: two branches of their paths are a wave of 16384 lanes
+LEAST_JOBS = 2  # of a trial, so that two workers have something to do
 OUTLIERS = 0.01  # part of the pixels, the noisiest, that do not count
 FLOOR = 0.01  # of the squared mean of all pixels, added to that of each
 MOST_WAYS = 4  # more gain nothing
@@ -141,32 +144,40 @@ def tiles_for(size: tuple[int, int]) -> int:
 def run_trial(
     scene: CompiledScene,
     camera: Camera,
-    samplers: tuple[Sampler, ...],
+    seeds: tuple[int, ...],
     max_bounces: int,
-    table: GuideTable | None = None,
+    run: JobsRunner,
+    *,
+    guided: bool = False,
     tiles: int = MOST_TILES // 2,
     reuse: bool = False,
 ) -> Trial:
-    """Render some pixels several times, with samplers whose numbers the picture does not use.
+    """Render some pixels several times, with random numbers that the picture does not use.
 
     Parameters
     ----------
+    scene
+        Whose trial it is.
     camera
         In the unit of the compiled scene.
-    samplers
-        One for each block of samples, at least two.
+    seeds
+        Of the samplers of each block of samples, at least two.
     max_bounces
         At least 2.
+    run
+        Does the jobs of the trial.
+    guided
+        Whether paths are guided.
     tiles
         How many tiles of sixteen pixels.
     reuse
         Whether to try sharing paths among pixels.
     """
     pixel, max_bounces = _spread_tiles(camera, tiles), min(max_bounces, BOUNCES)
-    parts = [
-        _trace(scene, camera, samplers, max_bounces, table, pixel[first : first + WAVE * MEMBERS], reuse)
-        for first in range(0, pixel.size, WAVE * MEMBERS)
-    ]
+    count = max(-(-tiles // WAVE), min(LEAST_JOBS, tiles))
+    places = np.array_split(pixel.reshape(tiles, MEMBERS), count)
+    jobs = [TrialJob(camera, seeds, max_bounces, each.ravel(), guided, reuse) for each in places]
+    parts = list(run(jobs))
     ways = np.concatenate([part.ways for part in parts], -1)
     deviation, mean = _deviations(ways), ways.mean((1, 2))
     of_tile = mean.reshape(3, tiles, MEMBERS).mean(-1).repeat(MEMBERS, -1)
@@ -186,7 +197,7 @@ def run_trial(
         total - shared,
         before,
         after,
-        1.0 if table is None else GUIDED_RAY,
+        GUIDED_RAY if guided else 1.0,
         _least_gloss(scene, np.sum([part.met for part in parts], 0)),
         reused,
     )
@@ -282,6 +293,39 @@ class TrialPart:
     again: int  # rays of the further paths from shared points
     connections: int  # rays between pixels
     evaluations: int  # of BSDFs, for these
+
+
+@record
+class TrialJob:
+    """Some tiles of a trial, which are traced together."""
+
+    camera: Camera  # in the unit of the compiled scene
+    seeds: tuple[int, ...]  # one for each block of samples
+    max_bounces: int
+    pixels: Words  # (k,) whole tiles in turn
+    guided: bool
+    reuse: bool  # whether to try sharing paths among pixels
+
+    def trace(self, scene: CompiledScene, make_sampler: SamplerMaker, table: GuideTable | None) -> TrialPart:
+        """Trace the tiles.
+
+        Parameters
+        ----------
+        make_sampler
+            Makes a sampler from a seed and the width of a picture.
+        table
+            Guides paths if they are to be guided.
+        """
+        table = table if self.guided else None
+        samplers = tuple(make_sampler(seed, self.camera.film[0]) for seed in self.seeds)
+        return _trace(scene, self.camera, samplers, self.max_bounces, table, self.pixels, self.reuse)
+
+    def __str__(self) -> str:
+        """Name the job in an error message."""
+        return f"the trial of {self.pixels.size} pixels from {self.pixels[0]} on"
+
+
+JobsRunner: TypeAlias = Callable[[list[TrialJob]], Iterable[TrialPart]]  # in the order of the jobs
 
 
 def _trace(

@@ -36,6 +36,7 @@ class View:
     first_sample: int = 0  # index of the first sample of every pixel
     branches: int = 1  # ways in which a path goes on from its first surface
     reuse: bool = False  # pixels share paths, so those of a tile (pixel_tiles.py) belong in one job
+    guided: bool = False  # by what the tracer has for it
 
     def parts(self, pixels: Words, width: int) -> Iterator[Words]:
         """Split pixels (k,) into parts of at most `width`, or of one tile where tiles stay whole."""

@@ -82,6 +82,7 @@ class WorkerPool(Generic[Job, Result]):
         self._lock = threading.RLock()  # of the workers and the deque; the idle timer takes it, too
         self._idle_timer: threading.Thread | None = None
         self._closed = threading.Event()
+        self._closing: threading.Thread | None = None
 
     def __enter__(self) -> Self:
         """Keep workers that are idle."""
@@ -105,9 +106,14 @@ class WorkerPool(Generic[Job, Result]):
         try:
             self._end_workers()
         finally:
-            timer = self._idle_timer
-            if timer is not None and timer is not threading.current_thread():
-                timer.join()
+            for thread in (self._idle_timer, self._closing):
+                if thread is not None and thread is not threading.current_thread():
+                    thread.join()
+
+    def begin_closing(self) -> None:
+        """Begin to close the pool, in a thread of its own: ending processes takes some milliseconds."""
+        self._closing = threading.Thread(target=self.close, daemon=True)
+        self._closing.start()
 
     def start(self) -> None:
         """Start the workers now; otherwise the first job does.

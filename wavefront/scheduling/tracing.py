@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +16,10 @@ from ..guiding import GuideTable
 from ..integrators import Integrator, integrator_for
 from ..record import record
 from ..sample_recorder import SampleRecorder, recorded_layers
-from ..sampling.sampler import Sampler
+from ..sampling.sampler import Sampler, SamplerMaker
 from ..stages.generate import generate
 from ..state import Words
+from ..trial import TrialJob, TrialPart
 from ..vec import Bools, Floats, Ints, broadcast
 from .jobs import Job, JobResult, WaveResult
 from .shared import SharedInt, Stopped
@@ -57,18 +59,38 @@ class Tracer:
     """How jobs are traced: what all views of a session have in common."""
 
     scene: CompiledScene
-    sampler: Callable[[int], Sampler]  # of a picture so many pixels wide
+    make_sampler: SamplerMaker  # from a seed and the width of a picture
+    seed: int
     filter: Filter
     integrator: Integrator
     max_bounces: int
     layers: tuple[str, ...] = ()  # sampled ones that are asked for
-    table: GuideTable | None = None  # guides paths
+    table: GuideTable | None = None  # guides the paths of views that want it
     clamp: float | None = None  # the limit of indirect light that a path finds at once
 
     @property
     def recorded_layers(self) -> tuple[str, ...]:
         """The layers that jobs return, those with a key by it."""
         return recorded_layers(self.layers, self.scene)
+
+    def sampler(self, width: int) -> Sampler:
+        """Return the sampler of a picture so many pixels wide."""
+        return self.make_sampler(self.seed, width)
+
+
+def trace_any_job(tracer: Tracer, monitor: WaveMonitor, job: Job | TrialJob) -> Any:
+    """Trace a job of a picture or of a trial.
+
+    Returns
+    -------
+    JobResult or TrialPart
+
+    Raises
+    ------
+    Stopped
+        If `monitor` or the deadline ends a wave between two bounces.
+    """
+    return trace_trial(tracer, monitor, job) if isinstance(job, TrialJob) else trace_job(tracer, monitor, job)
 
 
 def trace_job(tracer: Tracer, monitor: WaveMonitor, job: Job) -> JobResult:
@@ -80,6 +102,18 @@ def trace_job(tracer: Tracer, monitor: WaveMonitor, job: Job) -> JobResult:
         If `monitor` or the deadline ends a wave between two bounces.
     """
     return [_trace_wave(tracer, monitor, wave) for wave in job.waves()]
+
+
+def trace_trial(tracer: Tracer, monitor: WaveMonitor, job: TrialJob) -> TrialPart:
+    """Trace a job of a trial.
+
+    Raises
+    ------
+    Stopped
+        If `monitor` ends it between two bounces.
+    """
+    accelerator = MonitoredAccelerator(tracer.scene.accelerator, monitor, math.inf)
+    return job.trace(replace(tracer.scene, accelerator=accelerator), tracer.make_sampler, tracer.table)
 
 
 def _trace_wave(tracer: Tracer, monitor: WaveMonitor, job: Job) -> WaveResult:
@@ -96,7 +130,8 @@ def _trace_wave(tracer: Tracer, monitor: WaveMonitor, job: Job) -> WaveResult:
     recorder = SampleRecorder(tracer.layers, scene, k * n, tracer.clamp) if tracer.layers else None
     if recorder is not None:
         recorder.prepare(paths)
-    integrator = integrator_for(tracer.integrator, job.view.branches, job.view.reuse, tracer.table)
+    table = tracer.table if job.view.guided else None
+    integrator = integrator_for(tracer.integrator, job.view.branches, job.view.reuse, table)
     radiance = integrator(scene, paths, sampler, tracer.max_bounces)
     finite = np.isfinite(radiance).all(0)
     if recorder is not None:

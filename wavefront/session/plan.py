@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ..camera import Camera
-from ..choice import Choice, choose
+from ..choice import Choice, choose, learn_guide
 from ..filters import FILTERS
+from ..guiding import GuideTable
 from ..integrators import INTEGRATORS
 from ..progress import phase
 from ..record import record
@@ -14,7 +17,10 @@ from ..scheduling.delivery import can_be_sent
 from ..scheduling.executors import ExecutorLike, needs_pickling
 from ..scheduling.tracing import Tracer
 from ..settings import Settings
+from ..trial import JobsRunner
 from .prepared_scene import PreparedScene
+
+NO_CHOICE = Choice()
 
 
 @record
@@ -23,33 +29,43 @@ class Plan:
 
     settings: Settings
     scene: PreparedScene
-    choice: Choice
     tracer: Tracer
     executor: str | ExecutorLike
     budget: Budget
+    choice: Choice = NO_CHOICE  # until there is one
 
 
-def choose_paths(settings: Settings, scene: PreparedScene, camera: Camera) -> Choice:
-    """Return how paths go on; what is to be learned or decided is, for the camera."""
-    title = "learning where light comes from" if settings.guide else "trying what pays"
-    with phase(title, settings.progress), single_threaded_blas:
-        return choose(settings, scene.compiled, scene.compiled.view(camera))
+def learn_for(settings: Settings, scene: PreparedScene, camera: Camera) -> GuideTable | None:
+    """Return what may guide the paths that a camera sees, if that is asked for."""
+    if not settings.guide:
+        return None
+    with phase("learning where light comes from", settings.progress), single_threaded_blas:
+        return learn_guide(settings, scene.compiled, scene.compiled.view(camera))
 
 
-def make_plan(settings: Settings, scene: PreparedScene, camera: Camera, choice: Choice) -> Plan:
-    """Return how the view of a camera is rendered, given how paths go on."""
+def with_choice(plan: Plan, camera: Camera, run: JobsRunner) -> Plan:
+    """Return a plan with a choice of how the paths that a camera sees go on; `run` does trials' jobs."""
+    compiled, has_guide = plan.scene.compiled, plan.tracer.table is not None
+    with phase("trying what pays", plan.settings.progress), single_threaded_blas:
+        choice = choose(plan.settings, compiled, compiled.view(camera), has_guide, run)
+    return replace(plan, choice=choice)
+
+
+def make_plan(settings: Settings, scene: PreparedScene, camera: Camera, table: GuideTable | None) -> Plan:
+    """Return how the view of a camera is rendered, given what may guide its paths."""
     tracer = Tracer(
         scene.compiled,
         settings.sampler_maker(),
+        settings.seed,
         FILTERS.find(settings.filter),
         INTEGRATORS.find(settings.integrator),
         settings.max_bounces,
         settings.sampled_layers,
-        choice.table,
+        table,
         settings.clamp,
     )
     budget = settings.budget(camera.size, tracer.recorded_layers)
     executor = settings.executor_for(camera.size)
     if settings.executor is None and needs_pickling(executor) and not can_be_sent(tracer):
         executor = "threads"
-    return Plan(settings, scene, choice, tracer, executor, budget)
+    return Plan(settings, scene, tracer, executor, budget)

@@ -29,17 +29,17 @@ from ..renderable import as_scene, choose_camera
 from ..sampling.sampler import SamplerMaker
 from ..scheduling.accumulator import Accumulator, check_picture_memory
 from ..scheduling.blas import reserve_buffers
-from ..scheduling.executors import ExecutorLike
+from ..scheduling.executors import ExecutorLike, shares_scene
 from ..scheduling.interrupt import InterruptHandler
-from ..scheduling.jobs import Job, JobResult
 from ..scheduling.loop import PassSplitter, doubling, undivided
 from ..scheduling.pool import WorkerPool
-from ..scheduling.shared import STOP
-from ..scheduling.tracing import WaveMonitor, trace_job
+from ..scheduling.shared import STOP, Stopped
+from ..scheduling.tracing import WaveMonitor, trace_any_job
 from ..settings import Settings, check_camera
 from ..suggestions import suggests_keywords
+from ..trial import TrialJob, TrialPart
 from .last_checks import check_last_image
-from .plan import choose_paths, make_plan
+from .plan import learn_for, make_plan, with_choice
 from .prepared_scene import PreparedScene
 from .view_render import ViewRender, new_accumulator
 
@@ -128,7 +128,7 @@ class Session:
         progress: Progress = None,
     ) -> None:
         begin = time.perf_counter()
-        self._in_block = self._closed = self._once = False
+        self._in_block = self._closed = self._once = self._stopped = self._dropped = False
         self.command: dict[str, Any] | None = None
         self._settings = Settings(
             spp=spp,
@@ -176,10 +176,11 @@ class Session:
         check_picture_memory(*camera.size)
         settings.budget(camera.size)  # before work; again when the memory of the scene is known
         self._scene = PreparedScene(scene, settings)
-        self._plan = make_plan(settings, self._scene, camera, choose_paths(settings, self._scene, camera))
+        self._plan = make_plan(settings, self._scene, camera, learn_for(settings, self._scene, camera))
         self._make_pool()
         try:
             self._pool.start()  # before there are sums, of which forked processes would keep old copies
+            self._plan = with_choice(self._plan, camera, self._run_trial)
             accumulator = new_accumulator(camera, self._plan.tracer.recorded_layers)
             self._begin_picture(camera, accumulator, begin)
         except BaseException:
@@ -190,8 +191,8 @@ class Session:
         """Make a pool of workers, which start with the first job if not before."""
         self._monitor = WaveMonitor()
         self.interrupt_handler = InterruptHandler(self._monitor.stop)
-        self._pool = WorkerPool[Job, JobResult](
-            partial(trace_job, self._plan.tracer, self._monitor),
+        self._pool = WorkerPool[Any, Any](
+            partial(trace_any_job, self._plan.tracer, self._monitor),
             self._plan.budget.workers,
             self._plan.executor,
             self._monitor.stop,
@@ -200,11 +201,24 @@ class Session:
         if self._in_block:
             self._pool.__enter__()
 
+    def _run_trial(self, jobs: list[TrialJob]) -> list[TrialPart]:
+        """Do the jobs of a trial: by the workers where that costs nothing, else here while they start.
+
+        Also where they are stopped, as another view may follow.
+        """
+        if shares_scene(self._plan.executor):
+            try:
+                return [part for _, part in self._pool.run(jobs)]
+            except (Stopped, MemoryError):
+                self._pool.discard()
+        tracer = self._plan.tracer
+        return [job.trace(tracer.scene, tracer.make_sampler, tracer.table) for job in jobs]
+
     def _begin_picture(self, camera: Camera, accumulator: Accumulator, begin: float) -> None:
         """Get ready for a picture of a view; `begin` is when it was asked for, by `time.perf_counter`."""
         self._render = ViewRender(self._plan, camera, accumulator, begin)
         self._last_snapshot = begin
-        self._stopped = self._dropped = self._ended = self._warned = False
+        self._ended = self._warned = False
 
     # --- Use ------------------------------------------------------------------------------------------
 
@@ -326,18 +340,20 @@ class Session:
         executor = settings.executor_for(camera.size)
         with self.interrupt_handler:
             self._render.discard_sweeps()
+            self._stopped = self._dropped = False  # a stop from now on is one of the new picture
             if not self._pool.closed:
                 self._pool.cancel()
             others = (executor, self._plan.executor) == ("processes", "threads")
             others |= budget.workers != self._plan.budget.workers
-            choice = choose_paths(settings, self._scene, camera)
-            others |= choice.table is not self._plan.choice.table
+            table = learn_for(settings, self._scene, camera)
+            others |= table is not self._plan.tracer.table
             if self._monitor.stop.value or others:
                 self._pool.close()
-                self._plan = make_plan(settings, self._scene, camera, choice)
+                self._plan = make_plan(settings, self._scene, camera, table)
                 self._make_pool()
             else:
-                self._plan = replace(self._plan, choice=choice, budget=budget)
+                self._plan = replace(self._plan, budget=budget)
+            self._plan = with_choice(self._plan, camera, self._run_trial)
         self._begin_picture(camera, accumulator, begin)
 
     def stop(self) -> None:
@@ -435,6 +451,8 @@ class Session:
         self._ended = True
         if failure is not None or self._interrupted:
             self._pool.close()
+        elif self._once:
+            self._pool.begin_closing()
         else:
             self._pool.cancel()
         render.accumulator.release_reserve()

@@ -59,7 +59,7 @@ class ViewRender:
     """
 
     def __init__(self, plan: Plan, camera: Camera, accumulator: Accumulator, begin: float) -> None:
-        settings, view = plan.settings, plan.scene.compiled.view(camera)
+        settings, choice, view = plan.settings, plan.choice, plan.scene.compiled.view(camera)
         self.camera, self.accumulator = camera, accumulator
         self._plan, self._view = plan, view
         self._geometric: dict[str, NDArray[Any]] | None = None  # not made yet
@@ -81,11 +81,13 @@ class ViewRender:
             settings.seconds,
             plan.budget.wave_size,
             plan.budget.workers,
-            plan.choice.branches,
+            choice.branches,
             waves_per_job(plan.executor),
         )
         self.loop = RenderLoop(
-            View(view, scheduler.deadline, settings.first_sample, plan.choice.branches, plan.choice.reuse),
+            View(
+                view, scheduler.deadline, settings.first_sample, choice.branches, choice.reuse, choice.guided
+            ),
             accumulator,
             scheduler,
             spp=settings.max_spp,
@@ -201,7 +203,7 @@ class ViewRender:
             "filter": FILTERS.label(settings.filter),
             "branches": plan.choice.branches,
             "guide": settings.guide,
-            "guided": plan.choice.table is not None,
+            "guided": plan.choice.guided,
             "reuse": plan.choice.reuse,
             "hint": plan.choice.hint,
             "clamp": settings.clamp,
