@@ -201,7 +201,11 @@ def test_bad_arguments_are_named_before_any_work(change: dict, message: str, mon
     def work(*_):
         raise AssertionError("work began before the arguments were checked")
 
-    for module, name in ((session, "as_scene"), (prepared_scene, "compile_scene"), (session, "trace_job")):
+    for module, name in (
+        (session, "as_scene"),
+        (prepared_scene, "compile_scene"),
+        (session, "trace_any_job"),
+    ):
         monkeypatch.setattr(module, name, work)
     with pytest.raises(wf.SceneError, match=message):
         wf.render(small(), **{"progress": False, **change})
