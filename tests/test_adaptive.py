@@ -346,7 +346,7 @@ def test_samples_of_waves_that_time_ends_are_discarded(monkeypatch) -> None:
         while True:
             monitor.check(0, job.view.deadline)
 
-    monkeypatch.setattr(session, "trace_job", endless)
+    monkeypatch.setattr(session, "trace_any_job", endless)
     monkeypatch.setattr(scheduler, "FIRST_WAVE", 384)  # one sample of all pixels
     image = render(lit(), None, seconds=0.5)
     assert image.spp <= 3
@@ -362,7 +362,7 @@ def test_pixels_without_a_sample_are_told(monkeypatch) -> None:
             monitor.check(123, job.view.deadline)
         return tracing.trace_job(tracer, monitor, job)
 
-    monkeypatch.setattr(session, "trace_job", endless_after_the_first)
+    monkeypatch.setattr(session, "trace_any_job", endless_after_the_first)
     monkeypatch.setattr(scheduler, "FIRST_WAVE", 100)
     message = (
         r"288 pixels of 384 have no sample and are black: when seconds=0.5 were over, .* met 123 surfaces"
