@@ -196,14 +196,14 @@ class BruteForceTriangles:
             k = value.shape[1]
             start = np.matmul(start_rows[:m], batch.start[:, part], out=scratch("side", (m, k)))
             end = np.matmul(end_rows[:m], batch.end[:, part], out=scratch("end side", (m, k)))
-            padded = scratch("least", (m + 1, k))  # the first row is for no polygon
+            padded = scratch("least", (m + 2, k))  # the first row is for no polygon, the last for others
             # Above 1: the line certainly passes inside, and the ends are certainly on different sides.
-            least = np.maximum(start, end, out=padded[1:])
+            least = np.maximum(start, end, out=padded[1:-1])
             np.minimum(least, value, out=least)
             lower = np.minimum(start, end, out=start)
             np.minimum(least, np.negative(lower, out=lower), out=least)
             if exclude_prim is not None:
-                padded.reshape(-1)[exclude_prim[exclude_prim < padded.size] if inside else exclude_prim] = -2
+                padded.reshape(-1)[np.minimum(exclude_prim, (m + 1) * k)] = -2
             most = np.maximum.reduce(least, 0)
             blocked = most > 1
             found.blocked[part] |= blocked

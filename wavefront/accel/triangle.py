@@ -113,7 +113,7 @@ class PolygonPlanes(NamedTuple):
         the point is certainly on that side of the plane. For end points, the float32 distance t of the
         plane is then certainly less than the ray's length.
         """
-        near, far = np.abs(start[:3]).max(1), np.abs(end[:3]).max(1)
+        near, far = (np.maximum(each[:3].max(1), -each[:3].min(1)) for each in (start, end))
         near, far = near.astype(np.float64) + LEAST_EXTENT, far.astype(np.float64) + LEAST_EXTENT
         normal, offset = np.abs(self.plane[:3].T), np.abs(self.plane[3])
         # Errors in half ulps: 1 for the point, 1 for the plane, 4 for the sum of four terms. An end point is

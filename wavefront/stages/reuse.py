@@ -222,13 +222,14 @@ def connect(
         start = offset_origin(surface, cos.reshape(-1)).reshape(3, *shape)
     direction = point - start
     squared = dot(direction, direction)
-    possible = first.present & there & (squared > 0)
-    inverse = f4(1) / np.sqrt(np.where(possible, squared, f4(1)))
+    distinct = squared > 0
+    if not distinct.all():
+        np.copyto(direction, shade.frame.z.reshape(3, *shape), where=~distinct)
+        np.copyto(squared, f4(1), where=~distinct)
+    inverse = f4(1) / np.sqrt(squared)
     direction *= inverse
-    if not possible.all():
-        np.copyto(direction, shade.frame.z.reshape(3, *shape), where=~possible)
-    cos_target = -dot(ng, direction)
-    possible &= cos_target > 0
+    cos_target = dot(-ng, direction)
+    possible = first.present & there & distinct & (cos_target > 0)
     if scene.corner_normals is not None:
         possible &= -dot(target.ns[:, None], direction) > GRAZING
     wi = direction.reshape(3, -1)
@@ -241,11 +242,12 @@ def connect(
     if scene.opacities is None:
         possible[member] = False
     lanes = np.flatnonzero(possible)
+    error = surface.error.reshape(shape) + target.error
     rays = ShadowRays(
         origin=take(start.reshape(3, -1), lanes),
         direction=take(wi, lanes),
         exclude_prim=take(surface.prim, lanes),
-        error=take(surface.error, lanes) + take(target.error, lanes % there.size),
+        error=take(error.reshape(-1), lanes),
         distance=f4(1) / take(inverse.reshape(-1), lanes),
         cos_light=take(cos_target.reshape(-1), lanes),
     )
