@@ -9,7 +9,7 @@ import scenes
 from significance import Mean, assert_same_images, render, repeat
 
 import wavefront as wf
-from wavefront import integrators, pilot, settings
+from wavefront import integrators, pilot
 from wavefront.sampling.sampler import Dimension, Sampler, make_sampler
 from wavefront.stages import compact as compact_stage
 
@@ -126,11 +126,10 @@ def test_no_number_is_used_twice(
     """Not by two decisions, bounces or branches: the means of many scenes would not show it."""
     given: list[Once] = []
 
-    def record(*address) -> Once:
-        given.append(Once(*address))
+    def record(seed: int, width: int) -> Once:
+        given.append(Once("sobol", seed, width))
         return given[-1]
 
-    monkeypatch.setattr(settings, "make_sampler", record)
     monkeypatch.setattr(pilot, "PATHS", 1 << 13)
     scene = scenes.everything((12, 9))
     veils = [
@@ -140,7 +139,8 @@ def test_no_number_is_used_twice(
     blend = wf.Sphere((0.2, 0.3, 0.2), 0.2, material=wf.Mix(wf.Diffuse(0.7), wf.Dielectric(1.5, 0.3)))
     camera = wf.Camera.look_at((0, 0, 3.9), (0, 0, 0), size=(12, 9), aperture=0.1, focus=3.9)
     scene = wf.Scene([*scene.shapes, *veils, blend], [wf.Environment((0.2, 0.3, 0.5))], camera)
-    render(scene, 16, integrator=integrator, max_bounces=5, branches=branches, guide=guide)
+    options = {"integrator": integrator, "branches": branches, "guide": guide}
+    render(scene, 16, sampler=record, max_bounces=5, **options)
     left_out = {"naive": {Dimension.LIGHT, Dimension.LIGHT_POINT}, "full": set()}
     decisions = {*Dimension, Dimension.OPACITY + 1, Dimension.OPACITY + 2}  # three veils
     assert {dimension for _, dimension in given[-1].given} == decisions - left_out.get(

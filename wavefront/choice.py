@@ -16,6 +16,7 @@ from .guiding import GuideTable
 from .pilot import train
 from .pixel_tiles import SIDE, STRIDE
 from .record import record
+from .sampling.sampler import make_sampler
 from .settings import AUTO, Settings
 from .stages.reuse import can_reuse, shares_all
 from .trial import BLOCKS, MOST_TILES, JobsRunner, Trial, is_worth_it, run_trial, tiles_for
@@ -45,7 +46,7 @@ def learn_guide(settings: Settings, scene: CompiledScene, camera: Camera) -> Gui
     """
     if not settings.guide or not settings.is_full:
         return None
-    sampler = settings.sampler_maker()(settings.pilot_seed(), camera.film[0])
+    sampler = make_sampler(settings.sampler, settings.pilot_seed(), camera.film[0])
     return train(scene, camera, sampler, settings.max_bounces)
 
 

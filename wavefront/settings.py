@@ -30,7 +30,7 @@ from .memory import memory_size
 from .progress import Progress
 from .record import record
 from .registry import Registry
-from .sampling.sampler import SAMPLERS, SamplerMaker
+from .sampling.sampler import SAMPLERS, SamplerMaker, make_sampler
 from .scheduling.budget import Budget, plan
 from .scheduling.executors import EXECUTORS, ExecutorLike, choose_executor, worker_count
 from .stages.reuse import SHARED_WAYS
@@ -434,7 +434,7 @@ class Settings:
         self.up_vector = upward("up", "y" if self.up is None else self.up)
         self._check_integrator()
         self._check_reuse()
-        self.sampler_maker()(self.seed, 1)
+        make_sampler(self.sampler, self.seed)
         self.executor_for((0, 0))
 
     def _check_integrator(self) -> None:
