@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Generator, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from types import TracebackType
@@ -180,9 +181,10 @@ class Session:
         self._make_pool()
         try:
             self._pool.start()  # before there are sums, of which forked processes would keep old copies
-            self._plan = with_choice(self._plan, camera, self._run_trial)
-            accumulator = new_accumulator(camera, self._plan.tracer.recorded_layers)
-            self._begin_picture(camera, accumulator, begin)
+            with ThreadPoolExecutor(1) as aside:
+                sums = aside.submit(new_accumulator, camera, self._plan.tracer.recorded_layers)
+                self._plan = with_choice(self._plan, camera, self._run_trial)
+            self._begin_picture(camera, sums.result(), begin)
         except BaseException:
             self._pool.close()
             raise
