@@ -37,15 +37,13 @@ class Choice:
 
 
 def learn_guide(settings: Settings, scene: CompiledScene, camera: Camera) -> GuideTable | None:
-    """Return what may guide the paths of a picture; None if that is not asked for, or there is nothing.
+    """Return the table that may guide the paths of a picture; None if there is nothing to learn.
 
     Parameters
     ----------
     camera
         In the unit of the compiled scene.
     """
-    if not settings.guide or not settings.is_full:
-        return None
     sampler = make_sampler(settings.sampler, settings.pilot_seed(), camera.film[0])
     return train(scene, camera, sampler, settings.max_bounces)
 

@@ -35,9 +35,9 @@ class Plan:
     choice: Choice = NO_CHOICE  # until there is one
 
 
-def learn_for(settings: Settings, scene: PreparedScene, camera: Camera) -> GuideTable | None:
-    """Return what may guide the paths that a camera sees, if that is asked for."""
-    if not settings.guide:
+def trained_guide(settings: Settings, scene: PreparedScene, camera: Camera) -> GuideTable | None:
+    """Return the table that may guide the paths that a camera sees; None if none is asked for."""
+    if not settings.guide or not settings.is_full:
         return None
     with phase("learning where light comes from", settings.progress), single_threaded_blas:
         return learn_guide(settings, scene.compiled, scene.compiled.view(camera))

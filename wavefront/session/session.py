@@ -40,7 +40,7 @@ from ..settings import Settings, check_camera
 from ..suggestions import suggests_keywords
 from ..trial import TrialJob, TrialPart
 from .last_checks import check_last_image
-from .plan import learn_for, make_plan, with_choice
+from .plan import make_plan, trained_guide, with_choice
 from .prepared_scene import PreparedScene
 from .view_render import ViewRender, new_accumulator
 
@@ -177,7 +177,7 @@ class Session:
         check_picture_memory(*camera.size)
         settings.budget(camera.size)  # before work; again when the memory of the scene is known
         self._scene = PreparedScene(scene, settings)
-        self._plan = make_plan(settings, self._scene, camera, learn_for(settings, self._scene, camera))
+        self._plan = make_plan(settings, self._scene, camera, trained_guide(settings, self._scene, camera))
         self._make_pool()
         try:
             self._pool.start()  # before there are sums, of which forked processes would keep old copies
@@ -347,7 +347,7 @@ class Session:
                 self._pool.cancel()
             others = (executor, self._plan.executor) == ("processes", "threads")
             others |= budget.workers != self._plan.budget.workers
-            table = learn_for(settings, self._scene, camera)
+            table = trained_guide(settings, self._scene, camera)
             others |= table is not self._plan.tracer.table
             if self._monitor.stop.value or others:
                 self._pool.close()
