@@ -140,14 +140,15 @@ def render(
         Learn from a pilot of 262144 paths where light comes from, and choose directions by that; only "full"
         can be guided. It takes a second or two, and pays where light comes through narrow openings or several
         reflections: docs/guiding.md has figures. The pilot depends on the scene, the camera and the seed
-        alone. "auto" guides only where a trial of 131072 paths says that it pays; `metadata["guided"]` says
-        what it found.
+        alone. "auto" guides only where a short trial with it and without it says that it pays;
+        `metadata["guided"]` says what it found.
     reuse
         Share paths among pixels: what a path finds from its second surface on counts for sixteen pixels that
         lie a little apart; only "full" does so. It pays where most of the noise is in indirect light between
         matte surfaces. The errors of these pixels depend on each other then: docs/reuse.md has figures.
-        "auto" shares where all surfaces are matte and the trial says that it pays, but not with `branches`,
-        `clamp`, `noise`, `denoise` or light groups.
+        "auto" shares where a short trial says that it pays, beside gloss and glass only where light is hard
+        to find: docs/choices.md tells how. It never does with `branches`, `clamp`, `noise`, `denoise` or
+        light groups.
     clamp
         The most that a path may find as indirect light at once, as radiance, the mean of its channels; what
         is brighter is scaled down. It removes fireflies, and with them light: the picture gets too dark. The

@@ -332,7 +332,7 @@ class Settings:
         "Learn from a pilot of 262144 paths where light comes from, and choose directions by that; only "
         '"full" can be guided. It takes a second or two, and pays where light comes through narrow openings '
         "or several reflections: docs/guiding.md has figures. The pilot depends on the scene, the camera and "
-        'the seed alone. "auto" guides only where a trial of 131072 paths says that it pays; '
+        'the seed alone. "auto" guides only where a short trial with it and without it says that it pays; '
         '`metadata["guided"]` says what it found.',
         option="learn where light comes from, for scenes with much indirect light",
         check=auto_or(check_flag),
@@ -342,10 +342,11 @@ class Settings:
         "Share paths among pixels: what a path finds from its second surface on counts for sixteen pixels "
         'that lie a little apart; only "full" does so. It pays where most of the noise is in indirect light '
         "between matte surfaces. The errors of these pixels depend on each other then: docs/reuse.md has "
-        'figures. "auto" shares where all surfaces are matte and the trial says that it pays, but not with '
-        "`branches`, `clamp`, `noise`, `denoise` or light groups.",
+        'figures. "auto" shares where a short trial says that it pays, beside gloss and glass only where '
+        "light is hard to find: docs/choices.md tells how. It never does with `branches`, `clamp`, `noise`, "
+        "`denoise` or light groups.",
         check=auto_or(check_flag),
-        option="share paths among pixels: yes, no, or auto (default), in matte scenes where it pays",
+        option="share paths among pixels: yes, no, or auto (default), which tries whether it pays",
     )
     clamp: float | None = setting(
         None,
