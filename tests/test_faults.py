@@ -247,6 +247,20 @@ def test_a_layer_that_is_not_finite_is_dropped_counted_and_named(layer: str, val
     assert (image.rgb[there] > 0).all()
 
 
+def test_the_search_for_a_fault_asks_for_an_albedo_once() -> None:
+    """Also where two layers hold it."""
+    asked = []
+
+    class Counting(Spoiled):
+        def albedo(self, wo: Any) -> Any:
+            asked.append(wo.shape[1])
+            return super().albedo(wo)
+
+    with pytest.raises(wf.RenderError, match="bounce 0, BSDF sample of material Counting of 'wall'"):
+        render(wall_of(Counting(0.5)), 4, aovs=("albedo", "denoising_albedo"), executor="threads")
+    assert asked.count(1) == 1  # the path that is traced again is alone
+
+
 def test_a_normal_that_is_not_finite_is_dropped() -> None:
     """Although nothing is shaded there, so that the picture is finite."""
     scene = wall_of(wf.Diffuse(0.5))

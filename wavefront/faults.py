@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 
 import numpy as np
 
@@ -89,9 +90,10 @@ class PathChecker:
 
     def _surface_layers(self, shade: Shading, bounce: int) -> Iterator[tuple[str, Floats]]:
         """Yield the layers that a surface gives a path which meets it, by name."""
+        albedo = cache(shade.albedo)
         for name in self.layers:
             if (name == "albedo" and bounce == 0) or name == "denoising_albedo":
-                yield name, shade.albedo()
+                yield name, albedo()
             if name == "denoising_normal":
                 yield name, shade.surface.ns
 
