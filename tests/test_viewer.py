@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import gzip
 import multiprocessing
 import os
@@ -24,6 +25,7 @@ from scenes import cornell_box
 
 import wavefront as wf
 from wavefront.viewer import refiner as module
+from wavefront.viewer.front import Front, asked_first
 from wavefront.viewer.guard import is_value, may_connect
 from wavefront.viewer.refiner import Refiner, ViewerFrame
 from wavefront.viewer.shown import CHOICES, VIEWER_LAYERS, shown_codes
@@ -616,6 +618,32 @@ def test_the_page_is_that_of_viser_with_a_picture(viewer: wf.Viewer, encoding: s
     page = gzip.decompress(page) if encoding == "gzip" else page
     assert page.count(b"url(/first.jpg)") == page.count(b"<title>wavefront</title>") == 1
     assert b'<div id="root"></div>' in page
+
+
+def test_servers_of_others_are_left_as_they_are() -> None:
+    """Also where they start while a viewer does."""
+    from websockets.asyncio import server
+
+    async def answers() -> tuple[bytes, bytes]:
+        with asked_first(Front("127.0.0.1", lambda: b"jpg")):
+            plain = server.serve(lambda socket: None, "127.0.0.1", 0)  # type: ignore[arg-type, return-value]
+            own = server.serve(
+                lambda socket: None,  # type: ignore[arg-type, return-value]
+                "127.0.0.1",
+                0,
+                process_request=lambda connection, request: connection.respond(418, "own"),
+            )
+        async with plain as first, own as second:
+            return await page_of(first), await page_of(second)
+
+    async def page_of(listening: Any) -> bytes:
+        reader, writer = await asyncio.open_connection(*listening.sockets[0].getsockname())
+        writer.write(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        line = await reader.readline()
+        writer.close()
+        return line.split()[1]
+
+    assert asyncio.run(answers()) == (b"426", b"418")
 
 
 @pytest.mark.skipif(not hasattr(os, "getpriority"), reason="the system has no priorities")

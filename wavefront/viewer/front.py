@@ -99,18 +99,27 @@ class Front:
 
 @contextmanager
 def asked_first(front: Front) -> Iterator[None]:
-    """Let servers of viser that are started meanwhile ask `front` before they answer a request."""
+    """Let servers of viser that are started meanwhile ask `front` before they answer a request.
+
+    `websockets.asyncio.server.serve` takes a function for that, and viser calls it with its own one. Viser
+    has no parameter for another, so `serve` is replaced while viser starts. Servers that others start
+    meanwhile are left as they are.
+    """
     from websockets.asyncio import server
 
     serve = server.serve
 
-    def serve_asking(*arguments: Any, process_request: Callable[..., Any], **options: Any) -> Any:
+    def serve_asking(
+        *arguments: Any, process_request: Callable[..., Any] | None = None, **options: Any
+    ) -> Any:
         async def answer(connection: Any, request: Any) -> Any:
+            assert process_request is not None
             return await front.answer(request) or process_request(connection, request)
 
-        return serve(*arguments, process_request=answer, **options)
+        by_viser = getattr(process_request, "__module__", "").partition(".")[0] == "viser"
+        return serve(*arguments, process_request=answer if by_viser else process_request, **options)
 
-    server.serve = serve_asking  # type: ignore[assignment, misc]  # viser has no parameter for it
+    server.serve = serve_asking  # type: ignore[assignment, misc]
     try:
         yield
     finally:
