@@ -16,10 +16,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scenes
-from threadpoolctl import threadpool_info
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import wavefront as wf
 from wavefront.scheduling import executors
+from wavefront.scheduling.blas import single_threaded_blas
 
 QUIET = {"progress": False, "wave_size": 500}
 LINUX = sys.platform.startswith("linux")
@@ -51,6 +52,35 @@ def test_two_renders_at_once(executor: str, expected: bytes) -> None:
     assert threadpool_info() == before
     assert not [each.name for each in threading.enumerate() if each.name.startswith("wavefront")]
     assert not multiprocessing.active_children()
+
+
+def blas_threads() -> set[int]:
+    """Return how many threads libraries of BLAS have."""
+    return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
+
+
+@pytest.mark.parametrize("executor", NAMES)
+def test_blas_has_its_threads_back_after_a_render(executor: str, expected: bytes) -> None:
+    """Although a thread of the render's own ends it, and the caller has set their number."""
+    with threadpool_limits(3, "blas"):
+        for _ in range(2):
+            assert bits(executor) == expected
+            assert blas_threads() == {3}
+
+
+def test_blas_is_held_to_one_thread_by_any_thread() -> None:
+    """Also where the caller has set the number in another one, and can set it again."""
+
+    def held() -> set[int]:
+        with single_threaded_blas:
+            return blas_threads()
+
+    with ThreadPoolExecutor(1) as pool, threadpool_limits(3, "blas"):
+        assert pool.submit(held).result() == {1}
+        assert blas_threads() == {3}
+        with threadpool_limits(2, "blas"):
+            assert blas_threads() == {2}
+        assert blas_threads() == {3}
 
 
 @pytest.mark.parametrize(

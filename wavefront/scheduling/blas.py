@@ -7,7 +7,7 @@ import threading
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from ..counted import counted
 from ..memory import address_space_left
@@ -28,13 +28,16 @@ class _SingleThreadedBlas:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._users = 0
+        self._libraries: Any = None
         self._limits: Any = None
 
     def acquire(self) -> None:
         """Hold BLAS to one thread."""
         with self._lock:
             if not self._users:
-                self._limits = threadpool_limits(1, "blas")
+                self._libraries = ThreadpoolController()
+                _let_any_thread_set(self._libraries)
+                self._limits = self._libraries.limit(limits=1, user_api="blas")
             self._users += 1
 
     def release(self) -> None:
@@ -42,7 +45,9 @@ class _SingleThreadedBlas:
         with self._lock:
             self._users -= 1
             if not self._users:
+                _let_any_thread_set(self._libraries)
                 self._limits.restore_original_limits()
+                _let_any_thread_set(self._libraries)
 
     def __enter__(self) -> None:
         """Hold BLAS to one thread."""
@@ -51,6 +56,18 @@ class _SingleThreadedBlas:
     def __exit__(self, *raised: object) -> None:
         """Let BLAS have as many threads as before."""
         self.release()
+
+
+def _let_any_thread_set(libraries: Any) -> None:
+    """Let any thread set the number of threads of OpenBLAS, as this one is about to.
+
+    From 3.8 on threadpoolctl lets only that thread do so which did first, and nothing happens where others
+    try. But renders are ended by threads of their own.
+    """
+    for each in libraries.lib_controllers:
+        clear = getattr(each, "clear_controlling_thread", None)
+        if clear is not None:
+            clear(force=True)
 
 
 single_threaded_blas = _SingleThreadedBlas()
