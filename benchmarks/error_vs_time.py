@@ -65,6 +65,7 @@ import wavefront as wf
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
 from cornell_box import cornell_box
 
+PAUSE = 0.2  # seconds before each measurement: OpenBLAS's thread spins for 0.1 s after a render of ours
 IMPORT = """
 import time
 import numpy
@@ -218,6 +219,7 @@ def measure(name: str, subject: Subject, options: argparse.Namespace) -> dict[st
         rows: dict[str, list[tuple[float, ...]]] = {side: [] for side in sides}
         for seed in range(options.repeat):
             for side, render in sides.items():
+                time.sleep(PAUSE)
                 begin = time.perf_counter()
                 picture = render(spp, seed)
                 seconds = time.perf_counter() - begin
