@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -78,12 +77,8 @@ class Tracer:
         return self.make_sampler(self.seed, width)
 
 
-def trace_any_job(tracer: Tracer, monitor: WaveMonitor, job: Job | TrialJob) -> Any:
-    """Trace a job of a picture or of a trial.
-
-    Returns
-    -------
-    JobResult or TrialPart
+def trace_any_job(tracer: Tracer, monitor: WaveMonitor, job: Job | TrialJob) -> JobResult | TrialPart:
+    """Trace a job of a picture, or one of a trial: the result is of the same kind.
 
     Raises
     ------

@@ -193,7 +193,7 @@ class Session:
         """Make a pool of workers, which start with the first job if not before."""
         self._monitor = WaveMonitor()
         self.interrupt_handler = InterruptHandler(self._monitor.stop)
-        self._pool = WorkerPool[Any, Any](
+        self._pool = WorkerPool[Any, Any](  # of two kinds of jobs, each with its own kind of results
             partial(trace_any_job, self._plan.tracer, self._monitor),
             self._plan.budget.workers,
             self._plan.executor,
@@ -209,8 +209,9 @@ class Session:
         Also where they are stopped, as another view may follow.
         """
         if shares_scene(self._plan.executor):
+            pool: WorkerPool[TrialJob, TrialPart] = self._pool
             try:
-                return [part for _, part in self._pool.run(jobs)]
+                return [part for _, part in pool.run(jobs)]
             except (Stopped, MemoryError):
                 self._pool.discard()
         tracer = self._plan.tracer
