@@ -80,7 +80,8 @@ def test_workers_of_mpi_give_the_same_bits(launch: list[str], tmp_path: Path) ->
     module = ["-m", "mpi4py.futures"] if launch else []
     count = [] if launch else ["2"]
     command = [*launch, sys.executable, *module, str(script), str(seen), *count]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    # After a timeout MPI kills the process group of the script, which must not be that of the tests.
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, start_new_session=True)
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert lines[0] == "workers 2 MPIPoolExecutor 2"
