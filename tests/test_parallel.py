@@ -261,6 +261,29 @@ def test_much_work_goes_to_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     assert choose_executor("processes", 1, 1) == "processes"
 
 
+@processes
+@pytest.mark.parametrize("computes", [False, True])
+def test_a_thread_that_computes_keeps_processes_away(computes: bool) -> None:
+    """A thread that waits does not, nor those of BLAS, which spin when it has them back after a fork."""
+    end = threading.Event()
+
+    def other() -> None:
+        while computes and not end.is_set():
+            sum(range(1000))
+        end.wait()
+
+    thread = threading.Thread(target=other)
+    thread.start()
+    try:
+        with threadpool_limits(2, "blas"), WorkerPool(abs, 1, "processes") as pool:
+            assert list(pool.run([-1])) == [(-1, 1)]
+        expected = "threads" if computes else "processes"
+        assert choose_executor(None, 2, MIN_PATHS) == expected
+    finally:
+        end.set()
+        thread.join()
+
+
 def test_without_a_global_lock_threads_are_as_fast(monkeypatch: pytest.MonkeyPatch) -> None:
     """As in the free-threaded builds of Python."""
     monkeypatch.setattr(sys, "_is_gil_enabled", lambda: False, raising=False)

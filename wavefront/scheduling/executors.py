@@ -14,7 +14,9 @@ import os
 import sys
 import threading
 import time
+from collections.abc import Iterable
 from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import suppress
 from functools import partial
 from typing import Any, TypeAlias
 
@@ -40,6 +42,8 @@ MIN_PATHS_TO_SPAWN = 1 << 22  # fewer are traced sooner than processes are spawn
 
 NAP = 0.05  # seconds for which other threads are watched
 BUSY = 0.01  # part of a core; busy threads may get little of one on a busy machine
+THREAD_CLOCK = 6  # last bits of the id of the clock of a thread's CPU time, after those of ~thread
+# (Linux, include/linux/posix-timers_types.h; `time.pthread_getcpuclockid` may crash when a thread has ended)
 
 WAVES_PER_TASK = 4  # of a cluster, where a task costs 8 ms beside its work, and a wave takes 100 ms
 
@@ -176,15 +180,28 @@ def choose_executor(executor: str | ExecutorLike | None, workers: int, paths: in
 
 
 def _other_threads_compute() -> bool:
-    """Return whether other threads of this process are busy.
+    """Return whether other threads of Python are busy in this process.
 
     Before a fork OpenBLAS waits for its own threads, forever if another thread uses them: `os.fork` hangs.
+    Its own threads do no harm where nobody uses them, as in the 0.1 s for which they spin after a render.
     """
-    if threading.active_count() == 1:
+    this = threading.get_native_id()
+    others = {each.native_id for each in threading.enumerate()} - {this, None}
+    if not others:
         return False
-    begin = time.process_time()
+    clocks = [~other << 3 | THREAD_CLOCK for other in others if other is not None]
+    begin = _seconds(clocks)
     time.sleep(NAP)
-    return time.process_time() - begin > BUSY * NAP
+    return any(end - begin[clock] > BUSY * NAP for clock, end in _seconds(clocks).items() if clock in begin)
+
+
+def _seconds(clocks: Iterable[int]) -> dict[int, float]:
+    """Return the seconds of clocks by their ids, but for those of threads that have ended."""
+    found = {}
+    for clock in clocks:
+        with suppress(OSError):
+            found[clock] = time.clock_gettime(clock)
+    return found
 
 
 def waves_per_job(executor: str | ExecutorLike) -> int:
