@@ -3,20 +3,19 @@
 Two triangles that form a quadrilateral are tested as one polygon, by four edges and one plane. Most rays
 need no list of candidates: a ray that certainly hits exactly one polygon gets its distance in a vectorized
 step, and a shadow ray is decided if it certainly hits a polygon between its ends, or certainly hits none.
-All other pairs are tested one by one (exact.py). Polygons on the hull of the scene, as the walls of a room,
-are left out for shadow rays that begin and end on one side of each of them.
+All other pairs are tested one by one (exact.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..record import record
-from ..vec import Bools, Bytes, Doubles, Floats, Ints, f4
+from ..vec import Bools, Bytes, Floats, Ints, f4
 from . import triangle
 from .base import Geometry
 from .bvh import Ball, RayBatch, flat_true, scratch
@@ -27,11 +26,23 @@ from .quads import are_parallelograms, corners, diagonal_planes, find_quads, pla
 from .triangle import PolygonPlanes, TriangleTable, least_adjacent_product, least_opposite_product
 
 CHUNK = 1 << 19  # elements of one product
-FLAT = 1e-5  # of the radius: how far behind a polygon on the hull there may be corners
 
 
 @record
 class Polygons:
+    """Flat polygons of one kind."""
+
+    corners: Floats  # (e, m, 3)
+    prim: Ints  # (m,) triangles, of quadrilaterals the first one
+    parallelograms: bool
+
+    def where(self, mask: Bools) -> Polygons:
+        """Return those at which a mask (m,) is true."""
+        return Polygons(self.corners.compress(mask, 1), self.prim.compress(mask), self.parallelograms)
+
+
+@record
+class EdgeMatrix:
     """Polygons of one kind as a matrix."""
 
     rows: Floats  # (edges * m, 6) Plücker rows of the edges, see triangle.edge_rows
@@ -52,15 +63,71 @@ class Polygons:
 
 
 class BruteForceTriangles:
-    """The triangles `ids` (k,) of `geometry`.
+    """Some of the triangles of a table, as polygons.
 
-    The two triangles of a quadrilateral get one common plane in `table`.
+    Parameters
+    ----------
+    table
+        Of all triangles.
+    polygons
+        What is tested.
+    partner
+        (primitives + 1,) second triangle of the quadrilateral whose first triangle this is, -1 for none.
+    diagonal
+        (4, primitives + 1) planes through the diagonals of quadrilaterals whose triangles differ; None if
+        there are none.
+    ball
+        Around the scene.
     """
 
     tree = None
 
-    def __init__(self, table: TriangleTable, geometry: Geometry, ids: Ints, ball: Ball) -> None:
-        self._table = table
+    def __init__(
+        self,
+        table: TriangleTable,
+        polygons: list[Polygons],
+        partner: Ints,
+        diagonal: Floats | None,
+        ball: Ball,
+    ) -> None:
+        self.polygons = [each for each in polygons if each.prim.size]
+        self._table, self._partner, self._diagonal, self._ball = table, partner, diagonal, ball
+        self._matrices, begin = [], 0
+        self.planes: list[PolygonPlanes] = []  # of each kind
+        side_rows = []
+        away = table.deviation
+        for kind in self.polygons:
+            corner, prim = kind.corners, kind.prim
+            deviation = np.zeros(prim.size) if away is None else away.take(prim)
+            rows = triangle.edge_rows(corner, ball.center, ball.radius).reshape(-1, 6)
+            self._matrices.append(EdgeMatrix(rows, slice(begin, begin + prim.size), kind.parallelograms))
+            side_rows.append(triangle.side_rows(corner, ball.center, ball.radius, deviation))
+            self.planes.append(triangle.polygon_planes(table, prim, corner, ball.center, deviation))
+            begin += prim.size
+        self._count = begin
+        self._rows = sum(len(matrix.rows) for matrix in self._matrices)
+        self._number = np.arange(1, begin + 1, dtype=np.uint8)[:, None]
+        # Index 0 is for no polygon.
+        self._prim = np.concatenate([[-1], *(kind.prim for kind in self.polygons)])
+        self._prim_or_first = np.maximum(self._prim, 0)  # index 0 has t = NaN, a miss
+        self._plane = np.full((4, begin + 1), np.nan)
+        self._plane[:, 1:] = table.plane.take(self._prim[1:], 1)
+        self._slot = np.zeros(partner.size, np.intp)
+        self._slot[self._prim] = np.arange(begin + 1)
+        half = np.flatnonzero(partner.take(self._prim) >= 0)
+        self._slot[partner.take(self._prim.take(half))] = half
+        if begin:
+            self._side_rows = np.concatenate(side_rows)
+            self._planes = PolygonPlanes(
+                *(np.concatenate(parts, -1) for parts in zip(*self.planes, strict=True))
+            )
+
+    @classmethod
+    def of(cls, table: TriangleTable, geometry: Geometry, ids: Ints, ball: Ball) -> Self:
+        """Find the quadrilaterals among the triangles `ids` (k,) of `geometry`.
+
+        The two triangles of each get one common plane in `table`.
+        """
         triangles = geometry.triangles
         primitives = geometry.count
         first = find_quads(triangles)
@@ -70,67 +137,26 @@ class BruteForceTriangles:
         table.plane[:, first] = table.plane[:, first + 1] = planes(quads)
         share_planes(table, triangles, ids, first)
         # Index -1, the last one, is for misses.
-        self._partner = np.full(primitives + 1, -1)
-        self._partner[first] = first + 1
+        partner = np.full(primitives + 1, -1)
+        partner[first] = first + 1
         same = geometry.interchangeable
         differ = np.ones(first.size, np.bool_) if same is None else ~same.take(first)
-        self._diagonal: Floats | None = None
+        diagonal: Floats | None = None
         if differ.any():
-            self._diagonal = np.zeros((4, primitives + 1), f4)
-            self._diagonal[:, first[differ]] = diagonal_planes(quads[:, differ])
+            diagonal = np.zeros((4, primitives + 1), f4)
+            diagonal[:, first[differ]] = diagonal_planes(quads[:, differ])
         parallel = are_parallelograms(quads, ball.radius)
-        kinds = [
-            (quads[:, parallel], first[parallel], True),
-            (quads[:, ~parallel], first[~parallel], False),
-            (triangles.take(single, 0).transpose(1, 0, 2), single, False),
+        polygons = [
+            Polygons(quads[:, parallel], first[parallel], True),
+            Polygons(quads[:, ~parallel], first[~parallel], False),
+            Polygons(triangles.take(single, 0).transpose(1, 0, 2), single, False),
         ]
-        points = triangles.take(ids, 0).reshape(-1, 3)
-        sides = [side_of(points, table.plane.take(prim, 1), FLAT * ball.radius) for _, prim, _ in kinds]
-        inner, outer = (
-            [
-                (corner.compress((side != 0) == hull, 1), prim.compress((side != 0) == hull), parallelograms)
-                for (corner, prim, parallelograms), side in zip(kinds, sides, strict=True)
-            ]
-            for hull in (False, True)
-        )
-        self._inner = sum(prim.size for _, prim, _ in inner)
-        self._gather([*inner, *outer], ball)
-        if self._count:
-            side = np.concatenate(sides)
-            self._planes.plane[:, self._inner :] *= side[side != 0]  # positive within the hull
+        return cls(table, polygons, partner, diagonal, ball)
 
-    def _gather(self, kinds: list[tuple[Floats, Ints, bool]], ball: Ball) -> None:
-        """Build the matrices of each kind of polygon, given by corners (e, m, 3) and triangle ids (m,)."""
-        self._polygons, begin = [], 0
-        polygon_planes, side_rows = [], []
-        away = self._table.deviation
-        for corner, prim, parallelograms in kinds:
-            if prim.size:
-                deviation = np.zeros(prim.size) if away is None else away.take(prim)
-                rows = triangle.edge_rows(corner, ball.center, ball.radius).reshape(-1, 6)
-                self._polygons.append(Polygons(rows, slice(begin, begin + prim.size), parallelograms))
-                side_rows.append(triangle.side_rows(corner, ball.center, ball.radius, deviation))
-                polygon_planes.append(
-                    triangle.polygon_planes(self._table, prim, corner, ball.center, deviation)
-                )
-                begin += prim.size
-        self._count = begin
-        self._rows = sum(len(polygons.rows) for polygons in self._polygons)
-        self._number = np.arange(1, begin + 1, dtype=np.uint8)[:, None]
-        # Index 0 is for no polygon.
-        self._prim = np.concatenate([[-1], *(prim for _, prim, _ in kinds)])
-        self._prim_or_first = np.maximum(self._prim, 0)  # index 0 has t = NaN, a miss
-        self._plane = np.full((4, begin + 1), np.nan)
-        self._plane[:, 1:] = self._table.plane.take(self._prim[1:], 1)
-        self._slot = np.zeros(self._partner.size, np.intp)
-        self._slot[self._prim] = np.arange(begin + 1)
-        half = np.flatnonzero(self._partner.take(self._prim) >= 0)
-        self._slot[self._partner.take(self._prim.take(half))] = half
-        if begin:
-            self._side_rows = np.concatenate(side_rows)
-            self._planes = PolygonPlanes(
-                *(np.concatenate(parts, -1) for parts in zip(*polygon_planes, strict=True))
-            )
+    def only(self, masks: list[Bools]) -> BruteForceTriangles:
+        """Return those of the polygons at which the mask (m,) of their kind is true."""
+        some = [kind.where(mask) for kind, mask in zip(self.polygons, masks, strict=True)]
+        return BruteForceTriangles(self._table, some, self._partner, self._diagonal, self._ball)
 
     def find_hits(self, batch: RayBatch, found: HitAccumulator) -> None:
         """Add all hits to `found`; those of a quadrilateral as hits of its first triangle."""
@@ -188,22 +214,22 @@ class BruteForceTriangles:
             return self.find_hits(batch, found)
         tests = TriangleTests(self._table, batch, found, self._partner)
         uncertain = Candidates(tests.add)
-        start_rows, end_rows = self._planes.rows(batch.start, batch.end)
-        inside = self._inside(start_rows, batch.start) and self._inside(end_rows, batch.end)
-        m = self._inner if inside else self._count
-        for part, exclude_prim in self._parts(batch) if m else ():
-            value = self._lines(batch, part, None, m)
-            k = value.shape[1]
-            start = np.matmul(start_rows[:m], batch.start[:, part], out=scratch("side", (m, k)))
-            end = np.matmul(end_rows[:m], batch.end[:, part], out=scratch("end side", (m, k)))
-            padded = scratch("least", (m + 2, k))  # the first row is for no polygon, the last for others
+        start_rows, end_rows = self._planes.rows(
+            *(np.maximum(points[:3].max(1), -points[:3].min(1)) for points in (batch.start, batch.end))
+        )
+        for part, exclude_prim in self._parts(batch):
+            value = self._lines(batch, part, None)
+            m, k = value.shape
+            start = np.matmul(start_rows, batch.start[:, part], out=scratch("side", (m, k)))
+            end = np.matmul(end_rows, batch.end[:, part], out=scratch("end side", (m, k)))
+            padded = scratch("least", (m + 1, k))  # the first row is for no polygon
             # Above 1: the line certainly passes inside, and the ends are certainly on different sides.
-            least = np.maximum(start, end, out=padded[1:-1])
+            least = np.maximum(start, end, out=padded[1:])
             np.minimum(least, value, out=least)
             lower = np.minimum(start, end, out=start)
             np.minimum(least, np.negative(lower, out=lower), out=least)
             if exclude_prim is not None:
-                padded.reshape(-1)[np.minimum(exclude_prim, (m + 1) * k)] = -2
+                padded.reshape(-1)[exclude_prim] = -2
             most = np.maximum.reduce(least, 0)
             blocked = most > 1
             found.blocked[part] |= blocked
@@ -216,15 +242,6 @@ class BruteForceTriangles:
         uncertain.flush()
         tests.finish()
         return None
-
-    def _inside(self, rows: Floats, points: Floats) -> bool:
-        """Return whether points (4, n) are within the polygons on the hull, or on them within rounding.
-
-        Points on two walls next to a corner are on both. Nothing on the hull is between two such points.
-        """
-        hull = rows[self._inner :]
-        sides = np.matmul(hull, points, out=scratch("hull", (len(hull), points.shape[1])))
-        return bool(sides.min(initial=0) >= -1)
 
     def _parts(self, batch: RayBatch) -> Iterator[tuple[slice, Ints | None]]:
         """Yield slices of the batch, and the flat indices of their excluded polygons in (m + 1, k)."""
@@ -246,11 +263,11 @@ class BruteForceTriangles:
     def _filter(self, batch: RayBatch, part: slice, exclude_prim: Ints | None) -> tuple[Floats, Bools]:
         """Return the filter's values (m, k) of a slice of the batch, and a mask (m, k) of possible hits."""
         if batch.start is None:
-            value = least = self._lines(batch, part, None, self._count)
+            value = least = self._lines(batch, part, None)
         else:
             points = batch.start[:, part]
             side = np.matmul(self._side_rows, points, out=scratch("side", (self._count, points.shape[1])))
-            value = self._lines(batch, part, side, self._count)
+            value = self._lines(batch, part, side)
             least = np.minimum(value, side, out=side)
         met = scratch("met", (self._count + 1, value.shape[1]), np.bool_)  # the first row is for no polygon
         np.greater_equal(least, -1, out=met[1:])
@@ -258,14 +275,12 @@ class BruteForceTriangles:
             met.reshape(-1)[exclude_prim] = False
         return value, met[1:]
 
-    def _lines(self, batch: RayBatch, part: slice, side: Floats | None, count: int) -> Floats:
-        """Return the values (count, k) of `Polygons.test` for a slice of the batch."""
+    def _lines(self, batch: RayBatch, part: slice, side: Floats | None) -> Floats:
+        """Return the values (m, k) of `Polygons.test` for a slice of the batch."""
         line = batch.line[:, part]
-        value = scratch("value", (count, line.shape[1]))
-        for polygons in self._polygons:
-            if polygons.at.stop > count:
-                break
-            polygons.test(line, None if side is None else side[polygons.at], value[polygons.at])
+        value = scratch("value", (self._count, line.shape[1]))
+        for matrix in self._matrices:
+            matrix.test(line, None if side is None else side[matrix.at], value[matrix.at])
         return value
 
     def resolve_quads(self, prim: Ints, batch: RayBatch, t: Floats) -> Ints:
@@ -278,16 +293,6 @@ class BruteForceTriangles:
         px, py, pz = batch.origin + batch.direction * t
         x, y, z, offset = (row.take(prim) for row in self._diagonal)
         return prim + (x * px + y * py + z * pz + offset > 0)
-
-
-def side_of(points: Floats, planes: Doubles, margin: float) -> Doubles:
-    """Return on which side of planes (4, m), normal and offset, points (n, 3) are: 1, -1, or 0 for both.
-
-    Points less than `margin` away are on neither side.
-    """
-    distance = (points @ planes[:3] - planes[3]) / np.sqrt(np.square(planes[:3]).sum(0))
-    above, below = distance.max(0, initial=0) > margin, distance.min(0, initial=0) < -margin
-    return above.astype(float) - below
 
 
 def _sum(bytes_: NDArray[Any]) -> Bytes:

@@ -104,40 +104,61 @@ def prepare(
     within two radii of the center, and else in float64, because o - center would lose too many digits.
     """
     n = origin.shape[1]
-    center = ball.center[:, None]
-    start = scratch("start", (4, n))
-    start[3] = 1
-    local = np.subtract(origin, center, out=start[:3])
-    furthest = np.maximum(local.max(initial=0), -local.min(initial=0))
-    far = not float(furthest) * 3**0.5 <= 2 * ball.radius
-    work = np.multiply(direction, direction, out=scratch("work", (3, n)))
-    direction_length = np.add(work[0], work[1], out=scratch("direction_length", (n,)))
-    direction_length += work[2]
-    np.sqrt(direction_length, out=direction_length)
+    start, far = start_points(origin, ball)
+    direction_length = lengths(direction)
     line = scratch("line", (6, n + 1))
     line[:, -1] = np.nan
     unit, moment = line[:3, :-1], line[3:, :-1]
     np.divide(direction, direction_length, out=unit)
     if far:
         wide = scratch("wide", (8, n), np.float64)
-        local = np.subtract(origin, center, out=wide[:3], dtype=np.float64)
+        local = np.subtract(origin, ball.center[:, None], out=wide[:3], dtype=np.float64)
         np.divide(_cross(local, direction, wide[3:]), direction_length, out=moment, casting="same_kind")
-        np.multiply(moment, moment, out=work)
+        squared = np.multiply(moment, moment, out=scratch("work", (3, n)))
         # A line outside the ball hits nothing; the error bounds of the filters do not hold for it.
-        line[:, np.flatnonzero(work[0] + work[1] + work[2] > (1.01 * ball.radius) ** 2)] = np.nan
+        line[:, np.flatnonzero(squared[0] + squared[1] + squared[2] > (1.01 * ball.radius) ** 2)] = np.nan
         return RayBatch(origin, direction, exclude_prim, line, direction_length, local, None, None)
+    local = start[:3]
     moment[:] = _cross(local, unit, scratch("moment", (5, n)))
     end = None
     if distance is not None:
-        length = np.divide(f4(3.01 * ball.radius), direction_length, out=work[0])
-        np.minimum(distance, length, out=length)
-        np.maximum(length, f4(0), out=length)
-        end = _with_one("end", direction)
-        end[:3] *= length
-        end[:3] += local
-        if not np.isfinite(end.max(initial=0) + direction_length.max(initial=0)):
+        end = end_points(start, direction, direction_length, distance, ball)
+        if end is None:
             return RayBatch(origin, direction, exclude_prim, line, direction_length, local, None, None)
     return RayBatch(origin, direction, exclude_prim, line, direction_length, local, start, end)
+
+
+def start_points(origin: Floats, ball: Ball) -> tuple[Floats, bool]:
+    """Return o - center and a row of ones, (4, n), and whether some origin is far away from the ball."""
+    start = scratch("start", (4, origin.shape[1]))
+    start[3] = 1
+    local = np.subtract(origin, ball.center[:, None], out=start[:3])
+    furthest = np.maximum(local.max(initial=0), -local.min(initial=0))
+    return start, not float(furthest) * 3**0.5 <= 2 * ball.radius
+
+
+def lengths(direction: Floats) -> Floats:
+    """Return the lengths (n,) of directions (3, n)."""
+    squared = np.multiply(direction, direction, out=scratch("work", direction.shape))
+    length = np.add(squared[0], squared[1], out=scratch("direction_length", squared[2].shape))
+    length += squared[2]
+    return np.sqrt(length, out=length)
+
+
+def end_points(
+    start: Floats, direction: Floats, direction_length: Floats, distance: Floats, ball: Ball
+) -> Floats | None:
+    """Return the ends of shadow rays, as `start_points` does their origins; None if not all are finite.
+
+    Rays that reach beyond the ball end behind it.
+    """
+    length = np.divide(f4(3.01 * ball.radius), direction_length, out=scratch("length", distance.shape))
+    np.minimum(distance, length, out=length)
+    np.maximum(length, f4(0), out=length)
+    end = _with_one("end", direction)
+    end[:3] *= length
+    end[:3] += start[:3]
+    return end if np.isfinite(end.max(initial=0) + direction_length.max(initial=0)) else None
 
 
 def _cross(a: NDArray[Any], b: NDArray[Any], work: NDArray[Any]) -> NDArray[Any]:

@@ -106,14 +106,14 @@ class PolygonPlanes(NamedTuple):
     plane: Doubles  # (4, m) unit normal and offset: their product with (p, 1) is 0 on the plane
     deviation: Doubles  # (m,) largest distance of a corner from the plane
 
-    def rows(self, start: Floats, end: Floats) -> tuple[Floats, Floats]:
+    def rows(self, near: Floats, far: Floats) -> tuple[Floats, Floats]:
         """Return rows (m, 4) for the start points and rows (m, 4) for the end points of rays.
 
-        Points (4, n) are p - center and 1. The product of a row and a point is above 1 or below -1 where
-        the point is certainly on that side of the plane. For end points, the float32 distance t of the
-        plane is then certainly less than the ray's length.
+        Points (4, n) are p - center and 1. The largest absolute coordinates of the start points are `near`
+        (3,), and those of the end points `far` (3,). The product of a row and a point is above 1 or below -1
+        where the point is certainly on that side of the plane. For end points, the float32 distance t of
+        the plane is then certainly less than the ray's length.
         """
-        near, far = (np.maximum(each[:3].max(1), -each[:3].min(1)) for each in (start, end))
         near, far = near.astype(np.float64) + LEAST_EXTENT, far.astype(np.float64) + LEAST_EXTENT
         normal, offset = np.abs(self.plane[:3].T), np.abs(self.plane[3])
         # Errors in half ulps: 1 for the point, 1 for the plane, 4 for the sum of four terms. An end point is

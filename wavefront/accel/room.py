@@ -1,0 +1,168 @@
+"""Shadow rays within a room, most of which nothing can block.
+
+Polygons on the hull of the scene, such as walls, have all of it on one side, so none of them is between two
+points on that side. Everything else lies in a few boxes. A ray is clear if the box around its two ends is
+apart from all of these; the others are tested against what is in the boxes. A polygon that touches no other,
+such as a lamp, is not between two points on one side of it, either, nor where a ray ends on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..record import record
+from ..vec import Bools, Doubles, Floats, Ints, f4
+from .brute_force import BruteForceTriangles
+from .bvh import Ball, end_points, lengths, scratch, start_points
+from .coplanar import components
+from .primitives import CurvedPrimitives
+from .triangle import PolygonPlanes, TriangleTable
+
+FLAT = 1e-5  # of the radius: how far behind a wall there may be corners, and by how much boxes are larger
+NEAR = 100  # radii of the ball; of directions of length 1
+MOST_THINGS = 8  # each takes its time for each ray
+
+
+@record
+class Thing:
+    """Something in a room."""
+
+    low: Floats  # (3,) corners of a box around it
+    high: Floats
+    polygon: int | None = None  # its number, if it is one polygon
+
+
+@record
+class Room:
+    """The walls of a scene, and what is within them."""
+
+    walls: int  # number of walls
+    planes: PolygonPlanes  # of the walls, positive within, and then of things that are one polygon
+    things: BruteForceTriangles  # all other triangles
+    objects: list[Thing]
+    ball: Ball
+
+    @classmethod
+    def of(
+        cls,
+        triangles: BruteForceTriangles,
+        table: TriangleTable,
+        curved: Sequence[CurvedPrimitives],
+        ball: Ball,
+    ) -> Room | None:
+        """Find the walls among all triangles of a scene; None if there are none."""
+        kinds = triangles.polygons
+        points = np.concatenate([kind.corners.reshape(-1, 3) for kind in kinds] or [np.zeros((0, 3), f4)])
+        sides = [side_of(points, table.plane.take(kind.prim, 1), FLAT * ball.radius) for kind in kinds]
+        if not any(side.any() for side in sides):
+            return None
+        side = np.concatenate(sides)
+        plane, deviation = (np.concatenate(parts, -1) for parts in zip(*triangles.planes, strict=True))
+        things = triangles.only([each == 0 for each in sides])
+        objects = _connected(
+            [corners for kind in things.polygons for corners in kind.corners.transpose(1, 0, 2)]
+        )
+        objects += [
+            Thing(low.min(1), high.max(1)) for low, high in (kind.bounds for kind in curved if len(kind))
+        ]
+        if len(objects) > MOST_THINGS:
+            objects = [_around(objects)]
+        margin = f4(FLAT * ball.radius)
+        for each in objects:
+            each.low = each.low - ball.center - margin
+            each.high = each.high - ball.center + margin
+        walls, others = np.flatnonzero(side), np.flatnonzero(side == 0)
+        alone = [others[each.polygon] for each in objects if each.polygon is not None]
+        rows = np.array([*walls, *alone], np.intp)
+        sign = np.where(side, side, 1.0)
+        planes = PolygonPlanes((plane * sign).take(rows, 1), deviation.take(rows))
+        return cls(walls.size, planes, things, objects, ball)
+
+    def unclear(self, origin: Floats, direction: Floats, distance: Floats) -> Ints | None:
+        """Return which of the shadow rays (3, n) may be blocked; None if some are not within the walls.
+
+        Points on two walls next to a corner are on both. No wall is between two such points.
+        """
+        start, far = start_points(origin, self.ball)
+        end = None if far else self._ends(start, direction, distance)
+        if end is None:
+            return None
+        extents = [(points[:3].min(1), points[:3].max(1)) for points in (start, end)]
+        rows = self.planes.rows(*(np.maximum(-low, high) for low, high in extents))
+        if not all(map(self._within, rows, (start, end), extents)):
+            return None
+        low = np.minimum(start[:3], end[:3], out=scratch("low", (3, distance.size)))
+        high = np.maximum(start[:3], end[:3], out=scratch("high", (3, distance.size)))
+        sides = [each[self.walls :] @ points for each, points in zip(rows, (start, end), strict=True)]
+        alone = zip(*sides, strict=True)
+        clear = np.ones(distance.size, np.bool_)
+        for thing in self.objects:
+            apart = _apart(low, high, thing)
+            if thing.polygon is not None:
+                at_start, at_end = next(alone)
+                apart |= (at_start > 1) & (at_end >= -1)
+                apart |= (at_start < -1) & (at_end <= 1)
+            clear &= apart
+        return np.flatnonzero(~clear)
+
+    def _ends(self, start: Floats, direction: Floats, distance: Floats) -> Floats | None:
+        """Return what `end_points` does, faster where all are near enough; None if not all are finite."""
+        if not distance.max(initial=0) < NEAR * self.ball.radius:
+            return end_points(start, direction, lengths(direction), distance, self.ball)
+        end = scratch("end", start.shape)
+        np.multiply(direction, distance, out=end[:3])
+        end[:3] += start[:3]
+        end[3] = 1
+        return end
+
+    def _within(self, rows: Floats, points: Floats, extent: tuple[Floats, Floats]) -> bool:
+        """Return whether points (4, n), between low and high coordinates (3,), are within the walls."""
+        walls = rows[: self.walls]
+        least = np.minimum(*(walls[:, :3] * each for each in extent)).sum(1) + walls[:, 3]
+        if (least >= -1).all():
+            return True
+        sides = np.matmul(walls, points, out=scratch("side", (len(walls), points.shape[1])))
+        return bool(sides.min() >= -1)
+
+
+def side_of(points: Floats, planes: Doubles, margin: float) -> Doubles:
+    """Return on which side of planes (4, m), normal and offset, points (n, 3) are: 1, -1, or 0 for both.
+
+    Points less than `margin` away are on neither side.
+    """
+    distance = (points @ planes[:3] - planes[3]) / np.sqrt(np.square(planes[:3]).sum(0))
+    above, below = distance.max(0, initial=0) > margin, distance.min(0, initial=0) < -margin
+    return above.astype(float) - below
+
+
+def _connected(polygons: list[Floats]) -> list[Thing]:
+    """Return the connected parts of polygons (corners, 3), which share corners."""
+    if not polygons:
+        return []
+    owner = np.repeat(np.arange(len(polygons)), [len(polygon) for polygon in polygons])
+    _, corner = np.unique(np.concatenate(polygons), axis=0, return_inverse=True)
+    order = np.argsort(corner.reshape(-1), kind="stable")
+    same = np.diff(corner.reshape(-1).take(order)) == 0
+    part = components(len(polygons), owner.take(order[:-1][same]), owner.take(order[1:][same]))
+    singles = [Thing(polygon.min(0), polygon.max(0), number) for number, polygon in enumerate(polygons)]
+    return [_around([singles[k] for k in np.flatnonzero(part == one)]) for one in sorted(set(part.tolist()))]
+
+
+def _around(things: list[Thing]) -> Thing:
+    """Return some things as one."""
+    if len(things) == 1:
+        return things[0]
+    low, high = ([getattr(thing, name) for thing in things] for name in ("low", "high"))
+    return Thing(np.minimum.reduce(low), np.maximum.reduce(high))
+
+
+def _apart(low: Floats, high: Floats, thing: Thing) -> Bools:
+    """Return which boxes, with corners (3, n), are certainly apart from a thing; NaN is not."""
+    apart = low[0] > thing.high[0]
+    apart |= high[0] < thing.low[0]
+    for axis in (1, 2):
+        apart |= low[axis] > thing.high[axis]
+        apart |= high[axis] < thing.low[axis]
+    return apart
