@@ -13,7 +13,7 @@ Examples
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TypeAlias
 
@@ -40,6 +40,7 @@ from .stages.shade import Shading, direct, emitted, mis_weighted, shading
 from .state import Contribution, Hits, Paths
 from .vec import Floats, Ints, f4, take
 
+JOINED_AFTER = 3  # bounces: a quarter of the paths is left then
 Integrator: TypeAlias = Callable[[CompiledScene, Paths, Sampler, int], Floats]
 
 
@@ -139,10 +140,10 @@ def li_reuse(
         return L
     lanes, points = shared_points(scene, paths, hits, branches)
     own = np.setdiff1d(np.arange(len(paths)), lanes, assume_unique=True)
-    follow(scene, paths.take(own), hits.take(own), sampler, max_bounces, L, branches, table)
-    shared, hits, light = as_shared(paths.take(lanes)), hits.take(lanes), np.zeros((3, lanes.size), f4)
-    for paths in copies(shared, SHARED_WAYS):
-        follow(scene, paths, hits, sampler, max_bounces, light, branches, table)
+    follow(scene, [(paths.take(own), hits.take(own))], sampler, max_bounces, L, branches, table)
+    begun, hits, light = as_shared(paths.take(lanes)), hits.take(lanes), np.zeros((3, lanes.size), f4)
+    ways = [(way, hits) for way in copies(begun, SHARED_WAYS)]
+    follow(scene, ways, sampler, max_bounces, light, branches, table)
     light *= f4(1 / SHARED_WAYS)
     add_shared(scene, L, first, shade, points, light, tiles, branches)
     return L
@@ -150,23 +151,43 @@ def li_reuse(
 
 def follow(
     scene: CompiledScene,
-    paths: Paths,
-    hits: Hits,
+    ways: Sequence[tuple[Paths, Hits]],
     sampler: Sampler,
     max_bounces: int,
     L: Floats,
     branches: int,
     table: GuideTable | None,
 ) -> None:
-    """Add to L what paths find that have come to their second surfaces, and not been shaded there."""
+    """Add to L what paths find that have come to their second surfaces, and not been shaded there.
+
+    The ways go on one after the other, as smaller arrays fit the cache, and together once few paths are left.
+    """
     for bounce in range(1, max_bounces):
-        if not len(paths):
-            return
-        shade = guide(prepare_shading(scene, paths, hits), table)
-        accumulate(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
-        paths = bounce_sample(paths, shade, sampler, bounce)
-        paths = select(paths, roulette(paths, sampler, bounce, branches))
-        paths, hits = intersect_and_compact(scene, paths, sampler, bounce + 1, L, mis=True)
+        leaving = [
+            _scatter(scene, paths, hits, sampler, bounce, L, branches, table)
+            for paths, hits in ways
+            if len(paths)
+        ]
+        if bounce == JOINED_AFTER and leaving:
+            leaving = [Paths.concatenate(leaving)]
+        ways = [intersect_and_compact(scene, paths, sampler, bounce + 1, L, mis=True) for paths in leaving]
+
+
+def _scatter(
+    scene: CompiledScene,
+    paths: Paths,
+    hits: Hits,
+    sampler: Sampler,
+    bounce: int,
+    L: Floats,
+    branches: int,
+    table: GuideTable | None,
+) -> Paths:
+    """Add direct light to L, and return the paths that go on in new directions."""
+    shade = guide(prepare_shading(scene, paths, hits), table)
+    accumulate(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
+    paths = bounce_sample(paths, shade, sampler, bounce)
+    return select(paths, roulette(paths, sampler, bounce, branches))
 
 
 def integrator_for(

@@ -354,12 +354,12 @@ def _trace(
     paths, hits = intersect_and_compact(scene, paths, sampler, 1, L, mis=True)
     met = np.bincount(material_rows(scene, hits, ALL), minlength=scene.materials.group_of.size)
     if not reuse:
-        follow(scene, paths, hits, sampler, max_bounces, L, 1, table)
+        follow(scene, [(paths, hits)], sampler, max_bounces, L, 1, table)
         ways = _means(L, len(samplers), pixel.size)
         return TrialPart(ways, ways[:, :1], met, before, counter.rays - before, 0, 0, 0)
     lanes, points = shared_points(scene, paths, hits, 1)
     found = np.concatenate([L, np.zeros((3, lanes.size), np.float32)], 1)  # of paths, then of shared points
-    follow(scene, _cut(paths, lanes, 2 * n), hits, sampler, max_bounces, found, 1, table)
+    follow(scene, [(_cut(paths, lanes, 2 * n), hits)], sampler, max_bounces, found, 1, table)
     L, light, after = found[:, : 2 * n], found[:, 2 * n :], counter.rays
     together = L[:, :n].copy()
     L[:, points.slot] += points.throughput * light
@@ -368,7 +368,7 @@ def _trace(
     begun, hits = as_shared(paths.take(lanes)), hits.take(lanes)
     for way in range(1, SHARED_WAYS):
         other = replace(begun, pixel=_elsewhere(begun.pixel, camera, 2 * len(samplers) * way))
-        follow(scene, other, hits, sampler, max_bounces, light, 1, table)
+        follow(scene, [(other, hits)], sampler, max_bounces, light, 1, table)
     light *= f4(1 / SHARED_WAYS)
     again = counter.rays - after
     tile, member = np.divmod(np.arange(n), MEMBERS)
