@@ -9,6 +9,7 @@ import numpy as np
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
 LARGEST_BLOCK = 31 << 20  # bytes; glibc takes larger blocks from the system in any case
+BLOCKS = 3  # of that size that are kept: a wave of shared paths takes two blocks and a third of one
 
 
 def prepare_heap() -> None:
@@ -22,8 +23,8 @@ def prepare_heap() -> None:
     """
     with suppress(AttributeError, OSError, TypeError):  # another C library
         mallopt = ctypes.CDLL(None).mallopt
-        mallopt(M_TRIM_THRESHOLD, 2 * LARGEST_BLOCK)
+        mallopt(M_TRIM_THRESHOLD, BLOCKS * LARGEST_BLOCK)
         mallopt(M_MMAP_THRESHOLD, LARGEST_BLOCK)
     with suppress(MemoryError):
-        nearly_twice = [np.empty(9 * LARGEST_BLOCK // 10, np.uint8) for _ in range(2)]
-        del nearly_twice
+        grown = [np.empty(9 * LARGEST_BLOCK // 10, np.uint8) for _ in range(BLOCKS)]
+        del grown
