@@ -25,7 +25,7 @@ from ..compile.scene import CompiledScene
 from ..pixel_tiles import MEMBERS, WaveTiles
 from ..record import record
 from ..state import Hits, Paths, SoA
-from ..vec import ALL, INV_PI, Bools, Floats, Ints, dot, f4, highest, positive, spans, take
+from ..vec import ALL, INV_PI, TINY, Bools, Floats, Ints, dot, f4, highest, positive, spans, take
 from .interaction import interaction, material_rows, offset_origin
 from .intersect import ShadowRays, visible
 from .shade import Shading, evaluate
@@ -222,7 +222,7 @@ def connect(
         start = offset_origin(surface, cos.reshape(-1)).reshape(3, *shape)
     direction = point - start
     squared = dot(direction, direction)
-    distinct = squared > 0
+    distinct = squared > TINY  # so that 1 / distance² is finite
     if not distinct.all():
         np.copyto(direction, shade.frame.z.reshape(3, *shape), where=~distinct)
         np.copyto(squared, f4(1), where=~distinct)
@@ -238,7 +238,9 @@ def connect(
         pdf = shade.guidance.mixed(ALL, wi, pdf)
     # paths without throughput end at their first point
     possible &= ((pdf > 0) & (f.max(0) != 0)).reshape(shape)
-    geometry = np.where(possible, cos_target * inverse * inverse, f4(0))
+    geometry = cos_target * inverse
+    geometry *= inverse
+    geometry *= possible
     if scene.opacities is None:
         possible[member] = False
     lanes = np.flatnonzero(possible)
