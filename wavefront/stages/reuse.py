@@ -18,6 +18,7 @@ Workshop on Rendering 2002; E. Veach and L. Guibas, "Optimally Combining Samplin
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Self
 
 import numpy as np
 
@@ -28,7 +29,7 @@ from ..state import Hits, Paths, SoA
 from ..vec import ALL, INV_PI, TINY, Bools, Floats, Ints, dot, f4, highest, positive, spans, take
 from .interaction import interaction, material_rows, offset_origin
 from .intersect import ShadowRays, visible
-from .shade import Shading, evaluate
+from .shade import Guidance, Shading, evaluate
 from .transmittance import transmittance_along
 
 SHARED_WAYS = 2  # in which a path goes on from its shared point: many pixels use what it finds
@@ -124,9 +125,10 @@ def add_shared(
     number_in = [
         tiles.grid(points.slot, np.flatnonzero(shining & (points.way == way))) for way in range(branches)
     ]
+    albedo = lit.albedo() if all(bsdf.lambertian for _, bsdf in lit.groups) else None
     received = np.zeros((3, slot.size), f4)
     for some in spans(tiles.count, TILES_AT_ONCE):
-        first = FirstPoints.of(scene, lit, lane_in[:, some])
+        first = FirstPoints.of(scene, lit, albedo, lane_in[:, some])
         if first is None:
             continue
         arriving = np.zeros((3, *first.present.shape), f4)
@@ -152,39 +154,74 @@ def add_shared(
 
 @record
 class FirstPoints:
-    """First points of t tiles as a grid, so that each shared point stands beside those of its tile."""
+    """First points of t tiles as a grid, so that each shared point stands beside those of its tile.
+
+    All that is not a grid has (members * t) columns.
+    """
 
     present: Bools  # (members, t) which cells have a point; the others hold that of any other cell
-    shade: Shading  # (members * t) columns
-    albedo: Floats | None  # (3, members, t) if all are Lambertian: by which f is multiplied in the end
+    start: Floats  # (3, members, t) origins of rays that leave to the side from which the point was seen
+    error: Floats  # (members, t) bound on the rounding error of the point, scene units
+    prim: Ints  # primitive ids
+    normal: Floats  # (3, ·) unit shading normals
+    shade: Shading | None  # None if all are Lambertian, and then:
+    albedo: Floats | None  # (3, members, t) by which f is multiplied in the end
+    ng: Floats | None  # (3, ·) unit geometric normals, if they differ from the shading normals
+    guidance: Guidance | None
 
     @classmethod
-    def of(cls, scene: CompiledScene, shade: Shading, lane_in: Ints) -> FirstPoints | None:
-        """Return the points of a grid (members, t) of lanes, where -1 stands for none; None if all are -1."""
-        present = lane_in >= 0
+    def of(cls, scene: CompiledScene, lit: Shading, albedo: Floats | None, lane_in: Ints) -> Self | None:
+        """Return the points of a grid (members, t) of lanes, where -1 stands for none; None if all are -1.
+
+        Parameters
+        ----------
+        lit
+            The first surfaces of a wave, n lanes.
+        albedo
+            (3, n) if all are Lambertian.
+        """
+        present, shape = lane_in >= 0, lane_in.shape
         some = lane_in[present]
         if not some.size:
             return None
-        lanes = np.where(present, lane_in, some[0])
-        at = shade.at(scene, lanes.reshape(-1))
-        if not all(bsdf.lambertian for _, bsdf in at.groups):
-            return cls(present, at, None)
-        albedo = at.albedo().reshape(3, *present.shape)
-        return cls(present & (highest(albedo) != 0), at, albedo)
+        lanes = np.where(present, lane_in, some[0]).reshape(-1)
+        surface, ng = lit.surface, None
+        if albedo is not None:
+            albedo = take(albedo, lanes).reshape(3, *shape)
+            present &= highest(albedo) != 0
+            ng = None if surface.ns is surface.ng else take(surface.ng, lanes)
+        return cls(
+            present,
+            take(lit.start, lanes).reshape(3, *shape),
+            take(surface.error, lanes).reshape(shape),
+            take(surface.prim, lanes),
+            take(surface.ns, lanes),
+            None if albedo is not None else lit.at(scene, lanes),
+            albedo,
+            ng,
+            lit.guidance_at(lanes),
+        )
 
     def evaluate(self, wi: Floats) -> tuple[Floats, Floats]:
         """Return f times the cosine, (1 or 3, n), and the pdf (n,) of directions (3, n), one for each cell.
 
         f is without the albedo where that is given.
         """
-        if self.albedo is None:
+        if self.shade is not None:
             local = self.shade.frame.to_local(wi)
             f, pdf = evaluate(self.shade, local)
             return f * self.shade.cosines(local, wi)[0], pdf
-        surface = self.shade.surface
-        pdf = positive(dot(self.shade.frame.z, wi)) * INV_PI
-        f = pdf if surface.ns is surface.ng else pdf * (dot(surface.ng, wi) > 0)
+        pdf = positive(dot(self.normal, wi)) * INV_PI
+        f = pdf if self.ng is None else pdf * (dot(self.ng, wi) > 0)
         return f[None], pdf
+
+    def toward(self, point: Floats) -> Floats:
+        """Return the origins (3, members, t) of rays to points (3, 1, t)."""
+        if self.shade is None or not any(bsdf.transmissive for _, bsdf in self.shade.groups):
+            return self.start
+        surface, shape = self.shade.surface, self.start.shape
+        cos = dot(surface.ng.reshape(shape), point - surface.point.reshape(shape))
+        return offset_origin(surface, cos.reshape(-1)).reshape(shape)
 
 
 @record
@@ -214,17 +251,13 @@ def connect(
     member
         Whose paths have found these points, so that nothing is between.
     """
-    shade, shape = first.shade, first.present.shape
-    surface, start, ng = shade.surface, shade.start.reshape(3, *shape), target.ng[:, None]
-    point = target.point[:, None]
-    if any(bsdf.transmissive for _, bsdf in shade.groups):
-        cos = dot(surface.ng.reshape(3, *shape), point - surface.point.reshape(3, *shape))
-        start = offset_origin(surface, cos.reshape(-1)).reshape(3, *shape)
+    shape, ng, point = first.present.shape, target.ng[:, None], target.point[:, None]
+    start = first.toward(point)
     direction = point - start
     squared = dot(direction, direction)
     distinct = squared > TINY  # so that 1 / distance² is finite
     if not distinct.all():
-        np.copyto(direction, shade.frame.z.reshape(3, *shape), where=~distinct)
+        np.copyto(direction, first.normal.reshape(3, *shape), where=~distinct)
         np.copyto(squared, f4(1), where=~distinct)
     inverse = f4(1) / np.sqrt(squared)
     direction *= inverse
@@ -234,8 +267,8 @@ def connect(
         possible &= -dot(target.ns[:, None], direction) > GRAZING
     wi = direction.reshape(3, -1)
     f, pdf = first.evaluate(wi)
-    if shade.guidance is not None:
-        pdf = shade.guidance.mixed(ALL, wi, pdf)
+    if first.guidance is not None:
+        pdf = first.guidance.mixed(ALL, wi, pdf)
     # paths without throughput end at their first point
     possible &= ((pdf > 0) & (f.max(0) != 0)).reshape(shape)
     geometry = cos_target * inverse
@@ -244,11 +277,11 @@ def connect(
     if scene.opacities is None:
         possible[member] = False
     lanes = np.flatnonzero(possible)
-    error = surface.error.reshape(shape) + target.error
+    error = first.error + target.error
     rays = ShadowRays(
         origin=take(start.reshape(3, -1), lanes),
         direction=take(wi, lanes),
-        exclude_prim=take(surface.prim, lanes),
+        exclude_prim=take(first.prim, lanes),
         error=take(error.reshape(-1), lanes),
         distance=f4(1) / take(inverse.reshape(-1), lanes),
         cos_light=take(cos_target.reshape(-1), lanes),

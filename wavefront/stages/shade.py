@@ -68,9 +68,10 @@ class Shading:
         if self.surface.ns is self.surface.ng:
             surface.ns = surface.ng
         parts = surface, self.frame.take(lanes), take(self.wo, lanes), take(self.start, lanes)
-        return Shading(*parts, list(_groups_anywhere(scene.materials, surface)), self._guidance_at(lanes))
+        return Shading(*parts, list(_groups_anywhere(scene.materials, surface)), self.guidance_at(lanes))
 
-    def _guidance_at(self, lanes: Ints) -> Guidance | None:
+    def guidance_at(self, lanes: Ints) -> Guidance | None:
+        """Return what guides some lanes (k,) of `lit`; None where nothing does."""
         if self.guidance is None:
             return None
         return replace(
