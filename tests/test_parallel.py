@@ -284,6 +284,18 @@ def test_a_thread_that_computes_keeps_processes_away(computes: bool) -> None:
         thread.join()
 
 
+@processes
+def test_other_threads_are_watched_once_for_a_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It takes a moment each time."""
+    calls: list[bool] = []
+    monkeypatch.setattr(executors, "_other_threads_compute", lambda: calls.append(True) or True)
+    scene = [wf.Sphere((0, 0, 0), 1), wf.Environment(1)]
+    with wf.Session(scene, MIN_PATHS // 64, size=(8, 8), workers=2, progress=False) as session:
+        assert len(calls) == 1
+        session.set_camera(wf.Camera.look_at((0, 0, 5), (0, 0, 0), fov=30, size=(8, 8)))
+        assert len(calls) == 2
+
+
 def test_without_a_global_lock_threads_are_as_fast(monkeypatch: pytest.MonkeyPatch) -> None:
     """As in the free-threaded builds of Python."""
     monkeypatch.setattr(sys, "_is_gil_enabled", lambda: False, raising=False)

@@ -503,9 +503,11 @@ class Settings:
         paths = size[0] * size[1] * self.max_spp * branches
         return choose_executor(self.executor, self.worker_count, paths)
 
-    def budget(self, size: tuple[int, int], layers: Sequence[str] = ()) -> Budget:
+    def budget(
+        self, size: tuple[int, int], executor: str | ExecutorLike, layers: Sequence[str] = ()
+    ) -> Budget:
         """Return the workers, and the largest wave, for a picture of a size (width, height) with layers."""
-        processes = self.executor_for(size) != "threads"
+        processes = executor != "threads"
         return plan(self.memory_limit, size, self.worker_count, self.wave_size, processes, layers)
 
     def _most_samples(self) -> int:

@@ -64,8 +64,8 @@ def make_plan(settings: Settings, scene: PreparedScene, camera: Camera, table: G
         table,
         settings.clamp,
     )
-    budget = settings.budget(camera.size, tracer.recorded_layers)
     executor = settings.executor_for(camera.size)
     if settings.executor is None and needs_pickling(executor) and not can_be_sent(tracer):
         executor = "threads"
+    budget = settings.budget(camera.size, executor, tracer.recorded_layers)
     return Plan(settings, scene, tracer, executor, budget)

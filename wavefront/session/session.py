@@ -175,7 +175,8 @@ class Session:
         scene = as_scene(subject, settings.material, settings.progress)
         camera = choose_camera(scene, settings.camera, settings.size, settings.up_vector)
         check_picture_memory(*camera.size)
-        settings.budget(camera.size)  # before work; again when the memory of the scene is known
+        # before work, for what takes least; again when the memory of the scene is known
+        settings.budget(camera.size, settings.executor or "threads")
         self._scene = PreparedScene(scene, settings)
         self._plan = make_plan(settings, self._scene, camera, trained_guide(settings, self._scene, camera))
         self._make_pool()
@@ -338,9 +339,9 @@ class Session:
         size = None if size is None else image_size(size)
         camera = choose_camera(self._scene.scene, camera, size, settings.up_vector)
         self._scene.compiled.view(camera)  # checks its distance
-        budget = settings.budget(camera.size, self._plan.tracer.recorded_layers)
-        accumulator = new_accumulator(camera, self._plan.tracer.recorded_layers)
         executor = settings.executor_for(camera.size)
+        budget = settings.budget(camera.size, executor, self._plan.tracer.recorded_layers)
+        accumulator = new_accumulator(camera, self._plan.tracer.recorded_layers)
         with self.interrupt_handler:
             self._render.discard_sweeps()
             self._stopped = self._dropped = False  # a stop from now on is one of the new picture
