@@ -263,7 +263,7 @@ def test_shadow_rays_in_a_room_have_the_answer_of_all_triangles(things: str, end
     found = accelerator._room
     assert found is not None
     assert found.walls == 12
-    assert len(found.objects) == (2 if things == "box and lamp" else 1)
+    assert len(found.things) == (2 if things == "box and lamp" else 1)
     n = 20_000
     prim, onto = rng.integers(0, np.where(rng.random((2, n)) < 0.7, 12, len(triangles)))
     start, end = (

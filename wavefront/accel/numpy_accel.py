@@ -123,7 +123,7 @@ class NumpyAccelerator:
                 if room is None or unclear is None:
                     blocked[part] = self._occluded(self._triangles, rays)
                 elif unclear.size:
-                    blocked[at + unclear] = self._occluded(room.things, rays.take(unclear))
+                    blocked[at + unclear] = self._occluded(room.contents, rays.take(unclear))
         return blocked
 
     def _occluded(

@@ -1,9 +1,9 @@
 """Shadow rays within a room, most of which nothing can block.
 
 Polygons on the hull of the scene, such as walls, have all of it on one side, so none of them is between two
-points on that side. Everything else lies in a few boxes. A ray is clear if the box around its two ends is
-apart from all of these; the others are tested against what is in the boxes. A polygon that touches no other,
-such as a lamp, is not between two points on one side of it, either, nor where a ray ends on it.
+points on that side. The contents of the room lie in a few boxes, one around each thing. A ray is clear if
+the box around its two ends is apart from all of these; the others are tested against the contents. A thing
+that is one polygon, such as a lamp, is not between two points on one side of it, nor where a ray ends on it.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ MOST_THINGS = 8  # each takes its time for each ray
 
 @record
 class Thing:
-    """Something in a room."""
+    """A connected part of the contents of a room."""
 
     low: Floats  # (3,) corners of a box around it
     high: Floats
-    polygon: int | None = None  # its number, if it is one polygon
+    polygon: int | None = None  # its number among all of the contents, if it is one polygon
 
 
 @record
@@ -40,8 +40,8 @@ class Room:
 
     walls: int  # number of walls
     planes: PolygonPlanes  # of the walls, positive within, and then of things that are one polygon
-    things: BruteForceTriangles  # all other triangles
-    objects: list[Thing]
+    contents: BruteForceTriangles  # all other triangles
+    things: list[Thing]  # these in connected parts, and curved primitives
     ball: Ball
 
     @classmethod
@@ -60,25 +60,14 @@ class Room:
             return None
         side = np.concatenate(sides)
         plane, deviation = (np.concatenate(parts, -1) for parts in zip(*triangles.planes, strict=True))
-        things = triangles.only([each == 0 for each in sides])
-        objects = _connected(
-            [corners for kind in things.polygons for corners in kind.corners.transpose(1, 0, 2)]
-        )
-        objects += [
-            Thing(low.min(1), high.max(1)) for low, high in (kind.bounds for kind in curved if len(kind))
-        ]
-        if len(objects) > MOST_THINGS:
-            objects = [_around(objects)]
-        margin = f4(FLAT * ball.radius)
-        for each in objects:
-            each.low = each.low - ball.center - margin
-            each.high = each.high - ball.center + margin
+        contents = triangles.only([each == 0 for each in sides])
+        things = _things(contents, curved, ball)
         walls, others = np.flatnonzero(side), np.flatnonzero(side == 0)
-        alone = [others[each.polygon] for each in objects if each.polygon is not None]
+        alone = [others[each.polygon] for each in things if each.polygon is not None]
         rows = np.array([*walls, *alone], np.intp)
         sign = np.where(side, side, 1.0)
         planes = PolygonPlanes((plane * sign).take(rows, 1), deviation.take(rows))
-        return cls(walls.size, planes, things, objects, ball)
+        return cls(walls.size, planes, contents, things, ball)
 
     def unclear(self, origin: Floats, direction: Floats, distance: Floats) -> Ints | None:
         """Return which of the shadow rays (3, n) may be blocked; None if some are not within the walls.
@@ -98,7 +87,7 @@ class Room:
         sides = [each[self.walls :] @ points for each, points in zip(rows, (start, end), strict=True)]
         alone = zip(*sides, strict=True)
         clear = np.ones(distance.size, np.bool_)
-        for thing in self.objects:
+        for thing in self.things:
             apart = _apart(low, high, thing)
             if thing.polygon is not None:
                 at_start, at_end = next(alone)
@@ -135,6 +124,19 @@ def side_of(points: Floats, planes: Doubles, margin: float) -> Doubles:
     distance = (points @ planes[:3] - planes[3]) / np.sqrt(np.square(planes[:3]).sum(0))
     above, below = distance.max(0, initial=0) > margin, distance.min(0, initial=0) < -margin
     return above.astype(float) - below
+
+
+def _things(contents: BruteForceTriangles, curved: Sequence[CurvedPrimitives], ball: Ball) -> list[Thing]:
+    """Return the parts of what is in a room, relative to the center of the ball; one if there are many."""
+    things = _connected([each for kind in contents.polygons for each in kind.corners.transpose(1, 0, 2)])
+    things += [Thing(low.min(1), high.max(1)) for low, high in (kind.bounds for kind in curved if len(kind))]
+    if len(things) > MOST_THINGS:
+        things = [_around(things)]
+    margin = f4(FLAT * ball.radius)
+    return [
+        Thing(each.low - ball.center - margin, each.high - ball.center + margin, each.polygon)
+        for each in things
+    ]
 
 
 def _connected(polygons: list[Floats]) -> list[Thing]:
