@@ -78,7 +78,7 @@ def find_overlaps(triangles: Floats, ids: Ints, plane: Doubles, joined: Ints = N
     halves = np.stack([joined, joined + 1])
     pairs = np.concatenate([pairs, halves[:, np.isin(halves, pairs).any(0)]], 1)
     face, place = np.unique(pairs, return_inverse=True)
-    group = components(face.size, *place.reshape(2, -1))
+    group = connected_parts(face.size, *place.reshape(2, -1))
     common, deviation, flat = _common_planes(triangles.take(face, 0), group)
     return Overlaps(
         face,
@@ -323,7 +323,7 @@ def _coplanar(one: Floats, other: Floats) -> Bools:
     return np.where(higher, *distances) <= tolerance * (1 + np.minimum(reach, FARTHEST))
 
 
-def components(count: int, first: Ints, second: Ints) -> Ints:
+def connected_parts(count: int, first: Ints, second: Ints) -> Ints:
     """Return the lowest member of the connected part that each of `count` nodes is in, by edges (p,)."""
     label = np.arange(count)
     while first.size:

@@ -16,7 +16,7 @@ from ..record import record
 from ..vec import Bools, Doubles, Floats, Ints, f4
 from .brute_force import BruteForceTriangles
 from .bvh import Ball, end_points, lengths, scratch, start_points
-from .coplanar import components
+from .coplanar import connected_parts
 from .primitives import CurvedPrimitives
 from .triangle import PolygonPlanes, TriangleTable
 
@@ -147,7 +147,7 @@ def _connected(polygons: list[Floats]) -> list[Thing]:
     _, corner = np.unique(np.concatenate(polygons), axis=0, return_inverse=True)
     order = np.argsort(corner.reshape(-1), kind="stable")
     same = np.diff(corner.reshape(-1).take(order)) == 0
-    part = components(len(polygons), owner.take(order[:-1][same]), owner.take(order[1:][same]))
+    part = connected_parts(len(polygons), owner.take(order[:-1][same]), owner.take(order[1:][same]))
     singles = [Thing(polygon.min(0), polygon.max(0), number) for number, polygon in enumerate(polygons)]
     return [_around([singles[k] for k in np.flatnonzero(part == one)]) for one in sorted(set(part.tolist()))]
 
