@@ -33,7 +33,7 @@ from .shade import Guidance, Shading, evaluate
 from .transmittance import transmittance_along
 
 SHARED_WAYS = 2  # in which a path goes on from its shared point: many pixels use what it finds
-TILES_AT_ONCE = (1 << 14) // MEMBERS  # whose first points are connected together, so that they fit the cache
+TILES_AT_ONCE = (1 << 15) // MEMBERS  # whose first points are connected together, so that they fit the cache
 GRAZING = f4(1 / 16)  # cosine to interpolated normals below which they may have been bent towards the viewer
 
 
