@@ -12,8 +12,8 @@ converged renders, one of wavefront and one of Mitsuba, weighted by their noise,
 first. Printed are, for each side:
 
 - error and wall time at each sample count (with four branches a fourth of it), warm: medians over the
-  repeats, the sides in turn. The scene of Mitsuba is loaded once, beforehand. Cycles takes it from Blender
-  in each render: with `use_persistent_data` all its pictures have one seed. A render of wavefront includes
+  repeats, the sides in turn, forwards and backwards. The scene of Mitsuba is loaded once, beforehand. Cycles
+  takes it from Blender in each render: with `use_persistent_data` all its pictures have one seed. A render of wavefront includes
   setting up its scene and training a guide, but what rays are traced with, which stays with the scene, has
   been built by the render before;
 - the mean of the pictures of most samples over that of the reference;
@@ -218,10 +218,11 @@ def measure(name: str, subject: Subject, options: argparse.Namespace) -> dict[st
     for spp in subject.spp:
         rows: dict[str, list[tuple[float, ...]]] = {side: [] for side in sides}
         for seed in range(options.repeat):
-            for side, render in sides.items():
+            # in changing order, as a side may be slower after another one
+            for side in names if seed % 2 == 0 else names[::-1]:
                 time.sleep(PAUSE)
                 begin = time.perf_counter()
-                picture = render(spp, seed)
+                picture = sides[side](spp, seed)
                 seconds = time.perf_counter() - begin
                 soft = relative_mse(*(blurred(p, options.blur) for p in (picture, exact)))
                 ratio = picture.mean(dtype=float) / exact.mean()
