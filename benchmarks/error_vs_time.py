@@ -13,9 +13,9 @@ first. Printed are, for each side:
 
 - error and wall time at each sample count (with four branches a fourth of it), warm: medians over the
   repeats, the sides in turn, forwards and backwards. The scene of Mitsuba is loaded once, beforehand. Cycles
-  takes it from Blender in each render: with `use_persistent_data` all its pictures have one seed. A render of wavefront includes
-  setting up its scene and training a guide, but what rays are traced with, which stays with the scene, has
-  been built by the render before;
+  takes it from Blender in each render: with `use_persistent_data` all its pictures have one seed. A render
+  of wavefront includes setting up its scene and training a guide, but what rays are traced with, which
+  stays with the scene, has been built by the render before;
 - the mean of the pictures of most samples over that of the reference;
 - what a fresh process takes besides, once: importing the renderer, loading the scene, compiling. It is
   the time of a process of its own, with an empty cache of compiled kernels, less that of a warm render;
