@@ -276,7 +276,7 @@ class BruteForceTriangles:
         return value, met[1:]
 
     def _lines(self, batch: RayBatch, part: slice, side: Floats | None) -> Floats:
-        """Return the values (m, k) of `Polygons.test` for a slice of the batch."""
+        """Return the values (m, k) of `EdgeMatrix.test` for a slice of the batch."""
         line = batch.line[:, part]
         value = scratch("value", (self._count, line.shape[1]))
         for matrix in self._matrices:

@@ -21,7 +21,7 @@ from .primitives import CurvedPrimitives
 from .triangle import PolygonPlanes, TriangleTable
 
 FLAT = 1e-5  # of the radius: how far behind a wall there may be corners, and by how much boxes are larger
-NEAR = 100  # radii of the ball; of directions of length 1
+NEAR = 100  # radii of the ball: longest rays whose ends need not be moved to the ball
 MOST_THINGS = 8  # each takes its time for each ray
 
 

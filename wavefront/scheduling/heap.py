@@ -9,7 +9,7 @@ import numpy as np
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
 LARGEST_BLOCK = 31 << 20  # bytes; glibc takes larger blocks from the system in any case
-BLOCKS = 3  # of that size that are kept: a wave of shared paths takes two blocks and a third of one
+BLOCKS = 3  # of that size that are kept: a wave of shared paths takes nearly as much
 
 
 def prepare_heap() -> None:

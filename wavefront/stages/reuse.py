@@ -185,20 +185,20 @@ class FirstPoints:
         if not some.size:
             return None
         lanes = np.where(present, lane_in, some[0]).reshape(-1)
-        surface, ng = lit.surface, None
-        if albedo is not None:
-            albedo = take(albedo, lanes).reshape(3, *shape)
-            present &= highest(albedo) != 0
-            ng = None if surface.ns is surface.ng else take(surface.ng, lanes)
+        if albedo is None:
+            at = lit.at(scene, lanes)
+            start, error = at.start.reshape(3, *shape), at.surface.error.reshape(shape)
+            return cls(present, start, error, at.surface.prim, at.surface.ns, at, None, None, at.guidance)
+        surface, albedo = lit.surface, take(albedo, lanes).reshape(3, *shape)
         return cls(
-            present,
+            present & (highest(albedo) != 0),
             take(lit.start, lanes).reshape(3, *shape),
             take(surface.error, lanes).reshape(shape),
             take(surface.prim, lanes),
             take(surface.ns, lanes),
-            None if albedo is not None else lit.at(scene, lanes),
+            None,
             albedo,
-            ng,
+            None if surface.ns is surface.ng else take(surface.ng, lanes),
             lit.guidance_at(lanes),
         )
 
