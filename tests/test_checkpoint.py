@@ -23,6 +23,7 @@ import wavefront as wf
 from wavefront import cli, files
 from wavefront.checkpoint_file import read_header
 from wavefront.sampling.sampler import IndependentSampler
+from wavefront.scheduling.scheduler import Scheduler
 
 SIZE = (24, 18)
 BLOBS = [(-1.2, 0.3, 0), (1.1, -0.2, 0.4), (0, 0.9, -0.5)]
@@ -139,6 +140,18 @@ def test_seconds_are_those_of_all_parts(tmp_path: Path) -> None:
     more = wf.render(scene(), seconds=0.8, checkpoint=path)
     assert more.metadata["samples"] > first.metadata["samples"]
     assert first.metadata["seconds"] < more.metadata["seconds"] < 3
+
+
+def test_seconds_are_used_up_when_another_wave_would_be_late(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Such a render ends a little before its time; the same call is done at once all the same."""
+    path = tmp_path / "a"
+    with monkeypatch.context() as patch:
+        patch.setattr(Scheduler, "_late", lambda scheduler, lanes: True)
+        first = wf.render(scene(), seconds=3, checkpoint=path)
+    assert first.metadata["seconds"] < 2
+    assert digest(wf.render(scene(), seconds=3, checkpoint=path)) == digest(first)
 
 
 def test_sessions_save_what_renders_go_on_with(tmp_path: Path) -> None:

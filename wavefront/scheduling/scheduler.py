@@ -71,6 +71,11 @@ class Scheduler:
         return time.perf_counter() - self._begin
 
     @property
+    def spent(self) -> float:
+        """Seconds that the render has used: all it was given once there was no time for a further job."""
+        return max(self.elapsed, self._seconds or 0.0) if self.time_up else self.elapsed
+
+    @property
     def deadline(self) -> float:
         """When waves under way are discarded, by `time.perf_counter`."""
         return math.inf if self._seconds is None else self._begin + GRACE * self._seconds

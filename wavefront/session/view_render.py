@@ -180,7 +180,7 @@ class ViewRender:
         step = loop.step if self._plan.settings.noise is not None else None
         state = {
             **accumulator.state(),
-            "seconds": loop.scheduler.elapsed,
+            "seconds": loop.scheduler.spent,
             "first": 0 if step is None else step.first,
         }
         metadata = {**self.metadata(cut_short=True), **accumulator.counts()}
