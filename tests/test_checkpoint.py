@@ -554,11 +554,23 @@ def test_kill_9_at_fifty_moments_costs_no_bit(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_signals_keep_the_render(command: list[str], tmp_path: Path, number: int, status: int) -> None:
-    """Ctrl-C and SIGTERM write the checkpoint and the picture so far; the same command goes on."""
+@pytest.mark.parametrize(
+    ("number", "status", "background"),
+    [(signal.SIGINT, 130, False), (signal.SIGTERM, 143, False), (signal.SIGTERM, 143, True)],
+)
+def test_signals_keep_the_render(
+    command: list[str], tmp_path: Path, number: int, status: int, background: bool
+) -> None:
+    """Ctrl-C and SIGTERM write the checkpoint and the picture so far; the same command goes on.
+
+    What a script starts in the background ignores Ctrl-C.
+    """
     command[command.index("240")] = "30000"
+    before = signal.getsignal(signal.SIGINT)
+    if background:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     process = start(command, tmp_path)
+    signal.signal(signal.SIGINT, before)
     wait_for(tmp_path / "out.wfck", process)
     process.send_signal(number)
     error = process.communicate()[1]

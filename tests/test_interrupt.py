@@ -293,6 +293,18 @@ def test_a_press_is_not_lost() -> None:
         pass
 
 
+def test_sigterm_counts_where_it_has_pythons_handler_of_ctrl_c() -> None:
+    """As in the command, where that is ignored."""
+    stop, before = SharedInt(), signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt), InterruptHandler(stop):
+            signal.raise_signal(signal.SIGTERM)
+        assert stop.value == STOP
+        assert signal.getsignal(signal.SIGTERM) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
 def test_a_handler_of_the_programs_own_stays() -> None:
     """It knows better what Ctrl-C is to do."""
     calls: list = []

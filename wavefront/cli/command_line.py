@@ -60,8 +60,6 @@ class _Sigterm:
         """Handle the signal."""
         self.came = True
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        if not callable(signal.getsignal(signal.SIGINT)):  # ignored, as in the background
-            raise SystemExit(TERMINATED)
         signal.raise_signal(signal.SIGINT)
 
 
@@ -73,6 +71,9 @@ def _sigterm_as_ctrl_c() -> Iterator[_Sigterm]:
         yield sigterm
         return
     before = signal.signal(signal.SIGTERM, sigterm.handle)
+    if not callable(signal.getsignal(signal.SIGINT)):  # ignored, as in the background of a script
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        sigterm.came = True  # if anything interrupts
     try:
         yield sigterm
     finally:

@@ -9,6 +9,8 @@ from typing import Self
 
 from .shared import AT_ONCE, STOP, SharedInt
 
+SIGNALS = signal.SIGINT, signal.SIGTERM
+
 
 class InterruptHandler:
     """A context in which Ctrl-C sets a stop flag and raises nothing.
@@ -17,6 +19,7 @@ class InterruptHandler:
     being ended, and leave half of it undone. The first Ctrl-C therefore sets `stop` to STOP, the second
     to AT_ONCE, and only a third raises. Python calls signal handlers in the main thread alone, so in
     another thread the context does nothing, and neither where the program has a handler of its own.
+    SIGTERM counts as Ctrl-C where the program handles it by `signal.default_int_handler`, too.
     The context can be entered again within itself. The outermost exit restores Python's handler, and raises
     KeyboardInterrupt if Ctrl-C was pressed and nothing else is raised.
 
@@ -29,7 +32,8 @@ class InterruptHandler:
     def __init__(self, stop: SharedInt) -> None:
         self.pressed = False
         self._stop = stop
-        self._depth = 0  # of contexts since the handler was installed
+        self._signals: list[signal.Signals] = []  # for which the handler is installed
+        self._depth = 0  # of contexts since then
         self._answered = True  # with an exception, each first Ctrl-C
 
     def __enter__(self) -> Self:
@@ -37,9 +41,12 @@ class InterruptHandler:
         in_main_thread = threading.current_thread() is threading.main_thread()
         if self._depth and in_main_thread:
             self._depth += 1
-        elif in_main_thread and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-            signal.signal(signal.SIGINT, self._handle)
-            self._depth = 1
+        elif in_main_thread:
+            default = signal.default_int_handler
+            self._signals = [each for each in SIGNALS if signal.getsignal(each) is default]
+            for each in self._signals:
+                signal.signal(each, self._handle)
+            self._depth = min(1, len(self._signals))
         return self
 
     def __exit__(
@@ -51,7 +58,8 @@ class InterruptHandler:
         self._depth -= 1
         if self._depth:
             return
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        for each in self._signals:
+            signal.signal(each, signal.default_int_handler)
         answered, self._answered = self._answered or kind is not None, True
         if not answered:
             raise KeyboardInterrupt
