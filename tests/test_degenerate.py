@@ -3,6 +3,8 @@
 Warnings are errors in the tests.
 """
 
+import warnings
+
 import numpy as np
 import pytest
 from significance import render
@@ -154,3 +156,38 @@ def test_a_face_of_zero_area_in_memory_is_not_hit():
     assert np.array_equal(
         found.rgb, render(wf.Scene(wf.Mesh(PLACES, FACES), [wf.Environment(1.0)], camera), 4).rgb
     )
+
+
+def _load(tmp_path):
+    path = tmp_path / "strip.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 2 0 0\nf 1 2 3\nf 1 2 4\n")
+    wf.load(path)
+
+
+def _save(tmp_path):
+    wf.Image(np.full((2, 2, 3), np.nan, np.float32)).save(tmp_path / "nan.png")
+
+
+def _read_missing_uvs(tmp_path):
+    mesh = wf.Mesh(PLACES, [[0, 1, 2]], material=wf.Diffuse(wf.Texture(np.ones((2, 2, 3)) / 2)))
+    wf.render(wf.Scene([mesh], wf.Environment(1)), 1, size=(8, 8), progress=False)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        _load,
+        _save,
+        _read_missing_uvs,
+        lambda tmp_path: wf.Camera.look_at((0, 0, 4), (0, 0, 0), fov=0.7),
+        lambda tmp_path: wf.Scene([wf.Sphere((0, 0, 0), 1)]).framing_camera(fov=0.7),
+        lambda tmp_path: wf.Environment(np.full((4, 8, 3), -1.0) + np.eye(4, 8)[:, :, None] * 3),
+        lambda tmp_path: wf.Environment(np.full((4, 8, 4), 0.5, np.float32)),
+    ],
+    ids=["load", "save", "lacking uvs", "fov", "framing fov", "negative pixels", "transparent pixels"],
+)
+def test_warnings_are_at_the_line_of_the_caller(call, tmp_path):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", UserWarning)
+        call(tmp_path)
+    assert {each.filename for each in caught if issubclass(each.category, UserWarning)} == {__file__}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from copy import copy
 from typing import Any, Literal
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..elementary import arctan2
-from ..errors import SceneError, finite_array, number, rotation_matrix
+from ..errors import SceneError, finite_array, number, rotation_matrix, warn_caller
 from ..parameter import brief
 from ..state import Words
 from ..suggestions import suggests_keywords
@@ -542,10 +541,9 @@ def field_of_view(fov: float) -> float:
     degrees = number("Camera fov", fov, lambda x: 0 < x < 180, "above 0 and below 180 degrees")
     low, high = RADIANS
     if low <= degrees < high and degrees != int(degrees):
-        warnings.warn(
+        warn_caller(
             f"Camera fov is {degrees:.4g} degrees; if these are radians, pass np.degrees({degrees:.4g}), "
-            f"which is {np.degrees(degrees):.4g}",
-            stacklevel=4,
+            f"which is {np.degrees(degrees):.4g}"
         )
     return degrees
 

@@ -7,7 +7,6 @@ other readers do not decode: a texture may hold colors or data, which only the c
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
@@ -17,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..counted import counted
-from ..errors import SaveError, SceneError
+from ..errors import SaveError, SceneError, warn_caller
 from ..files import MAX_PIXELS, check_size, check_target, path_name, read_bytes, write_bytes
 from ..registry import Registry
 from ..vec import Floats
@@ -223,7 +222,7 @@ def _finite(path: str | os.PathLike[str], picture: ImageData) -> ImageData:
     if not bad:
         return picture
     found = counted(bad, "pixel is", "pixels are")
-    warnings.warn(f"{os.fspath(path)}: {found} not finite; NaN is written as 0", stacklevel=3)
+    warn_caller(f"{os.fspath(path)}: {found} not finite; NaN is written as 0")
     return picture.with_rgb(np.nan_to_num(picture.rgb, nan=0.0))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from copy import copy
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from ..bsdfs import Bsdf
 from ..counted import counted
-from ..errors import SceneError
+from ..errors import SceneError, warn_caller
 from ..materials import Material, Opacity
 from ..record import record
 from ..shapes import CurvedShape, Instance, Mesh, Shape
@@ -198,7 +197,7 @@ def attributes_read(shapes: Sequence[Shape]) -> list[str]:
             f"mesh lacks the {title} that its material reads",
             f"meshes lack the {title} that their materials read",
         )
-        warnings.warn(f"{found}, first: {next(iter(names.values()))!r}", stacklevel=5)
+        warn_caller(f"{found}, first: {next(iter(names.values()))!r}")
     return sorted(read)
 
 

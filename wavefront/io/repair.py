@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..counted import counted
-from ..errors import SceneError
+from ..errors import SceneError, warn_caller
 from ..materials import Material
 from ..shapes import Mesh
 from ..textures.parameter import Color
@@ -28,7 +27,7 @@ def warn(message: str, strict: bool) -> None:
     """Warn of a repair; if strict, raise a SceneError instead."""
     if strict:
         raise SceneError(message)
-    warnings.warn(message, UserWarning, stacklevel=2)
+    warn_caller(message)
 
 
 def wide(values: NDArray[Any]) -> Table:

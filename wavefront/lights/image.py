@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
@@ -15,7 +14,7 @@ from ..codecs.encoding import srgb_to_linear
 from ..codecs.images import read_codes
 from ..counted import counted
 from ..elementary import arctan2, sin_cos, sin_cos_turns
-from ..errors import SceneError
+from ..errors import SceneError, warn_caller
 from ..files import check_size
 from ..record import record
 from ..sampling.discrete import Distribution2D
@@ -173,7 +172,7 @@ def environment_pixels(source: Any) -> Floats:
         clear = int((pixels[..., -1] != 1).sum())
         if clear:
             found = counted(clear, "pixel is", "pixels are")
-            warnings.warn(f"{name}: {found} transparent; alpha is not used", stacklevel=4)
+            warn_caller(f"{name}: {found} transparent; alpha is not used")
         pixels = pixels[..., :-1]
     pixels = np.array(np.broadcast_to(pixels, (*pixels.shape[:2], 3)))
     _check_finite(name, pixels)
@@ -196,9 +195,8 @@ def _without_negative(name: str, pixels: Floats) -> Floats:
     bad = np.argwhere((pixels < 0).any(2))
     if len(bad):
         row, column = bad[0]
-        warnings.warn(
+        warn_caller(
             f"{name}: {counted(len(bad), 'negative pixel counts', 'negative pixels count')} as 0, "
-            f"first: row {row}, column {column}, {pixels[row, column].tolist()}",
-            stacklevel=5,
+            f"first: row {row}, column {column}, {pixels[row, column].tolist()}"
         )
     return np.maximum(pixels, f4(0))
