@@ -18,7 +18,7 @@ from wavefront.integrators import li_full
 from wavefront.memory import memory_size, resident_memory
 from wavefront.scheduling import budget
 from wavefront.scheduling.accumulator import picture_memory
-from wavefront.scheduling.budget import LANE_BYTES, LEAST_WAVE, PROCESS_BYTES, THREAD_BYTES, plan
+from wavefront.scheduling.budget import LANE_BYTES, LEAST_WAVE, PROCESS_BYTES, THREAD_BYTES, make_budget
 from wavefront.scheduling.scheduler import LARGE_WAVE, SMALL_WAVE
 
 MEGABYTE = 10**6
@@ -60,14 +60,14 @@ def test_other_sizes_are_refused_before_work(value: Any) -> None:
 def test_memory_sizes_waves_first_and_then_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     """With much memory waves are as large as pays; with little there are fewer workers, then small waves."""
     monkeypatch.setattr(budget, "resident_memory", lambda: 100 * MEGABYTE)
-    free = plan(None, (640, 480), 4, None, processes=True)
+    free = make_budget(None, (640, 480), 4, None, processes=True)
     assert (free.workers, free.wave_size) == (4, LARGE_WAVE)
-    ample = plan(10**12, (640, 480), 4, None, processes=True)
+    ample = make_budget(10**12, (640, 480), 4, None, processes=True)
     assert (ample.workers, ample.wave_size) == (4, SMALL_WAVE)
-    assert plan(10**12, (640, 480), 4, 500, processes=True).wave_size == 500
+    assert make_budget(10**12, (640, 480), 4, 500, processes=True).wave_size == 500
     before = free
     for megabytes in range(2000, 300, -20):
-        found = plan(megabytes * MEGABYTE, (640, 480), 4, None, processes=True)
+        found = make_budget(megabytes * MEGABYTE, (640, 480), 4, None, processes=True)
         used = found.workers * (PROCESS_BYTES + found.wave_size * LANE_BYTES)
         assert 100 * MEGABYTE + picture_memory(640, 480) + used <= megabytes * MEGABYTE
         assert found.workers <= before.workers
@@ -96,7 +96,7 @@ def test_layers_count(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(budget, "resident_memory", lambda: 100 * MEGABYTE)
     limit = 100 * MEGABYTE + picture_memory(640, 480) + PROCESS_BYTES + 40 * MEGABYTE
     plain, layered = (
-        plan(limit, (640, 480), 1, None, True, layers) for layers in ((), ("direct", "indirect"))
+        make_budget(limit, (640, 480), 1, None, True, layers) for layers in ((), ("direct", "indirect"))
     )
     assert layered.wave_size < plain.wave_size
     with pytest.raises(wf.SceneError, match="are needed"):
@@ -107,10 +107,10 @@ def test_the_least_memory_that_is_named_is_enough(monkeypatch: pytest.MonkeyPatc
     """And one byte less is not."""
     monkeypatch.setattr(budget, "resident_memory", lambda: 0)
     least = picture_memory(64, 64) + THREAD_BYTES + LEAST_WAVE * LANE_BYTES
-    found = plan(least, (64, 64), 8, None, processes=False)
+    found = make_budget(least, (64, 64), 8, None, processes=False)
     assert (found.workers, found.wave_size) == (1, LEAST_WAVE)
     with pytest.raises(wf.SceneError, match="are needed"):
-        plan(least - 1, (64, 64), 8, None, processes=False)
+        make_budget(least - 1, (64, 64), 8, None, processes=False)
 
 
 @pytest.mark.parametrize("executor", ["threads", "processes"])

@@ -19,7 +19,8 @@ import os
 import struct
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from typing import IO, Any
+from io import BufferedReader
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,7 +128,7 @@ def read(
     return header, arrays
 
 
-def _opened(path: str | os.PathLike[str]) -> IO[bytes]:
+def _opened(path: str | os.PathLike[str]) -> BufferedReader:
     check_regular(path)
     try:
         return open(path, "rb")
@@ -135,7 +136,7 @@ def _opened(path: str | os.PathLike[str]) -> IO[bytes]:
         raise SceneError(f"{os.fspath(path)}: cannot be read: {error}") from error
 
 
-def _header(file: IO[bytes], name: str) -> dict[str, Any]:
+def _header(file: BufferedReader, name: str) -> dict[str, Any]:
     prelude = file.read(PRELUDE.size)
     if prelude[: len(MAGIC)] != MAGIC:
         raise SceneError(f"{name}: is not a checkpoint of wavefront, or its first bytes are damaged")
@@ -163,10 +164,10 @@ def _size(kind: str, shape: list[int], name: str) -> int:
     return math.prod(shape) * np.dtype(kind).itemsize
 
 
-def _fill(file: IO[bytes], array: NDArray[Any], what: str) -> None:
+def _fill(file: BufferedReader, array: NDArray[Any], what: str) -> None:
     """Read the bytes of an array into it, and compare their checksum."""
     data = _bytes_of(array)
-    read = file.readinto(data) if len(data) else 0  # type: ignore[attr-defined]
+    read = file.readinto(data) if len(data) else 0
     if read != len(data) or file.read(DIGEST) != hashlib.sha256(data).digest():
         raise SceneError(f"{what} {DAMAGED}")
 

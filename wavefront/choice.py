@@ -19,7 +19,7 @@ from .record import record
 from .sampling.sampler import make_sampler
 from .settings import AUTO, Settings
 from .stages.reuse import can_reuse, shares_all
-from .trial import BLOCKS, MOST_TILES, JobsRunner, Trial, is_worth_it, run_trial, tiles_for
+from .trial import BLOCKS, MOST_TILES, JobsRunner, Trial, guide_pays, run_trial, tiles_for
 
 LEAST_PIXELS = 192 * 192  # of pictures that get a trial; smaller ones take no longer than a moment
 GUIDE_HINT = "most light is hard to find here: guide=True may pay (docs/guiding.md)"
@@ -87,7 +87,7 @@ def _choose_guide(settings: Settings, asked: Choice, trial: Callable[[bool, int]
     """Return whether a guide is used, and how many branches go with that."""
     fixed = None if settings.branches == AUTO and not asked.reuse else asked.branches
     guided, plain = (trial(each, GUIDE_TILES) for each in (True, False))
-    pays = is_worth_it(guided, plain, fixed)
+    pays = guide_pays(guided, plain, fixed)
     found = guided if pays else plain
     return Choice(fixed or found.best_ways(), asked.reuse, pays)
 

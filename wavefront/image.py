@@ -45,10 +45,11 @@ class Image:
         Settings and results of the render: lighting (the preset that was added, or None), background
         ("transparent", a color, or None for the environment), integrator,
         max_bounces, seed, sampler, sample_ranges (the half-open ranges [first, end] of the samples that some
-        pixel has), filter, accelerator, workers, executor, seconds (wall time), spp (mean
+        pixel has), filter, branches, guide, guided, reuse and hint (how paths went on, and what may pay
+        besides: docs/choices.md), accelerator, workers, executor, seconds (wall time), spp (mean
         over pixels), samples, rays, bad_samples, interrupted, version (of this package), numpy, noise
         (estimated relative error of the picture before denoising), clamp and clamped (the part of the light
-        that it removed), and of a denoised picture denoiser.
+        that it removed), boxes if they were asked for, and of a denoised picture denoiser.
     counts
         (H, W) int64 samples of each pixel, without those that were not finite.
     variance

@@ -158,9 +158,18 @@ def follow(
     branches: int,
     table: GuideTable | None,
 ) -> None:
-    """Add to L what paths find that have come to their second surfaces, and not been shaded there.
+    """Follow paths from their second surfaces on, and add the light that they find to L.
 
     The ways go on one after the other, as smaller arrays fit the cache, and together once few paths are left.
+
+    Parameters
+    ----------
+    ways
+        Records of paths, and their hits on their second surfaces, which are not shaded yet.
+    L
+        (3, n) radiance of each slot.
+    branches, table
+        As for `li_full`.
     """
     for bounce in range(1, max_bounces):
         leaving = [

@@ -273,9 +273,8 @@ def _axes(up: ArrayLike, camera: Camera | None) -> Doubles:
     vertical = turn[:, 1]
     front = turn @ FRAMING_VIEW if camera is None else camera.rotation[:, 2]
     if np.linalg.norm(np.cross(vertical, front)) < STEEP and camera is not None:
-        front = -camera.rotation[:, 1] * np.sign(
-            vertical @ front
-        )  # towards the lower edge of its picture if it looks down
+        # towards the lower edge of its picture if it looks down
+        front = -camera.rotation[:, 1] * np.sign(vertical @ front)
     right = np.cross(vertical, front)
     right /= np.linalg.norm(right)
     return np.stack([right, vertical, np.cross(right, vertical)], 1)

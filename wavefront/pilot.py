@@ -70,10 +70,8 @@ def train(scene: CompiledScene, camera: Camera, sampler: Sampler, max_bounces: i
             for first in range(done, done + count, WAVE)
         ]
         done += count
-        vertices, light = (
-            Vertices.concatenate([each for each, _ in found]),
-            np.concatenate([r for _, r in found]),
-        )
+        vertices = Vertices.concatenate([each for each, _ in found])
+        light = np.concatenate([each for _, each in found])
         if not len(vertices):
             return table
         cells = cells or GuideCells.around(vertices.point, LEVELS)

@@ -198,9 +198,8 @@ class Scene:
         view = view / np.linalg.norm(view)
         eye = (low + high) / 2 + view * radius / sin_half
         camera_up = turn[:, 1]
-        if (
-            np.linalg.norm(np.cross(camera_up, view)) < 1e-6
-        ):  # seen from above or below: the front is at the bottom of the picture
+        # seen from above or below, the front is at the bottom of the picture
+        if np.linalg.norm(np.cross(camera_up, view)) < 1e-6:
             camera_up = -turn[:, 2] * np.sign(view @ camera_up)
         return Camera.look_at(eye, (low + high) / 2, camera_up, fov=fov, size=size)
 

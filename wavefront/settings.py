@@ -31,22 +31,21 @@ from .progress import Progress
 from .record import record
 from .registry import Registry
 from .sampling.sampler import SAMPLERS, SamplerMaker, make_sampler
-from .scheduling.budget import Budget, plan
+from .scheduling.budget import Budget, make_budget
 from .scheduling.executors import EXECUTORS, ExecutorLike, choose_executor, worker_count
 from .stages.reuse import SHARED_WAYS
+from .trial import MOST_WAYS
 from .vec import Floats, f4
 
 DEFAULT_SPP = 100
 MAX_BRANCH_SAMPLES = 2**32  # a sample's index is 32 bits of its address, and each branch has one
 MAX_BRANCHES = 64
 AUTO = "auto"
-MOST_AUTO = 4  # branches that "auto" may choose
 PILOT = 0x5EED_0F_9417D  # the seed of the pilot is that of the picture XOR this
 MAX_SPP_FOR_NOISE = 2**16  # where only `noise` was given
 
-SettingCheck: TypeAlias = Callable[
-    [str, Any], Any
-]  # of the name and the value; returns the value as it is kept
+# called with the name and the value of a setting; returns the value as it is kept
+SettingCheck: TypeAlias = Callable[[str, Any], Any]
 
 
 def setting(
@@ -258,7 +257,7 @@ class Settings:
         "bit for bit. Not with `noise` or `seconds`.",
         option="FIRST:END, samples to render in place of --spp, such as 64:128; "
         "`wavefront merge` joins the pictures",
-        check=lambda name, value: check_samples(name, value),
+        check=check_samples,
     )
     sampler: str | SamplerMaker = setting(
         "sobol",
@@ -486,8 +485,8 @@ class Settings:
 
     @property
     def most_branches(self) -> int:
-        """Branches that a path may have."""
-        return MOST_AUTO if isinstance(self.branches, str) else self.branches
+        """The most branches that a path may have."""
+        return MOST_WAYS if isinstance(self.branches, str) else self.branches
 
     def sampler_maker(self) -> SamplerMaker:
         """Return what makes the sampler of a picture, given a seed and how many pixels wide it is."""
@@ -508,7 +507,7 @@ class Settings:
     ) -> Budget:
         """Return the workers, and the largest wave, for a picture of a size (width, height) with layers."""
         processes = executor != "threads"
-        return plan(self.memory_limit, size, self.worker_count, self.wave_size, processes, layers)
+        return make_budget(self.memory_limit, size, self.worker_count, self.wave_size, processes, layers)
 
     def _most_samples(self) -> int:
         ways = self.most_branches * (SHARED_WAYS if self.reuse is True else 1)

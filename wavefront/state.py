@@ -108,9 +108,7 @@ class Paths(Rays):
     roulette_scale: Floats  # (n,) throughput times this decides about roulette: see `stages.compact.roulette`
     prev_vertex: Floats | None = None  # (3, n) where the paths last scattered; None where that is `origin`
     # for layers (sample_recorder.py); None unless they are asked for
-    scattered: Bytes | None = (
-        None  # (n,) NOT_YET, JUST_ONCE or BEFORE: when the path scattered non-specularly
-    )
+    scattered: Bytes | None = None  # (n,) NOT_YET, JUST_ONCE or BEFORE: its scattering that is not specular
     met_rough: Bools | None = None  # (n,) the path has met a surface that is not specular
     recorder: Any = None  # the `SampleRecorder` of the wave
 

@@ -52,8 +52,9 @@ OUTLIERS = 0.01  # part of the pixels, the noisiest, that do not count
 FLOOR = 0.01  # of the squared mean of all pixels, added to that of each
 MOST_WAYS = 4  # more gain nothing
 ERRORS = 1  # standard errors, over tiles, by which more variance counts as shared than was found
-GAIN = 0.85  # variance times rays must fall below this part: rays tell the cost to about a tenth, and a trial
-# may miss the few paths that find most of the light
+# Variance times rays must fall below this part: rays tell the cost to about a tenth, and a trial may miss the
+# few paths that find most of the light.
+GAIN = 0.85
 GUIDE_GAIN = 0.9  # variance times rays of guided paths must fall below this part
 NEAR_BEST = 1.1  # the fewest branches are taken that cost no more than this times the least
 GUIDED_RAY = 1.35  # cost of a ray of a guided path, relative to that of a plain one
@@ -88,7 +89,7 @@ class Trial:
     separate: float  # and that between branches
     before: float  # rays up to the first surface, and of light samples there
     after: float  # rays of one branch of all paths
-    ray_cost: float
+    ray_cost: float  # cost of a ray, relative to that of a plain path
     least_gloss: float = 1.0  # part of the second points that are of the glossy material which is met least
     reused: Reused | None = None  # None where it was not tried
 
@@ -130,7 +131,7 @@ class Trial:
         return both < REUSE_GAIN * branches and max(pixels, blurred) < NO_WORSE
 
 
-def is_worth_it(guided: Trial, plain: Trial, ways: int | None) -> bool:
+def guide_pays(guided: Trial, plain: Trial, ways: int | None) -> bool:
     """Return whether a guide pays, with so many branches; None: with the best number for each."""
     with_guide, without = (trial.cost(ways or trial.best_ways()) for trial in (guided, plain))
     return with_guide < GUIDE_GAIN * without
@@ -264,7 +265,10 @@ def _reused(parts: list[TrialPart], together: Doubles, alone: Doubles, scale: Do
 
 
 def _least_gloss(scene: CompiledScene, met: Ints) -> float:
-    """Return the least part of all points (materials,) that are of one material which cannot be shared."""
+    """Return the part of the second points that are of the material met least of those that cannot be shared.
+
+    `met` (materials,) counts the points of each material. The part is 1 if all materials can be shared.
+    """
     glossy = met[~shared_materials(scene)]
     return float(glossy.min() / max(met.sum(), 1)) if glossy.size else 1.0
 

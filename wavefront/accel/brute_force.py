@@ -80,7 +80,7 @@ class BruteForceTriangles:
         Around the scene.
     """
 
-    tree = None
+    tree = None  # there is none: see `PrimitiveTree`
 
     def __init__(
         self,
@@ -106,7 +106,7 @@ class BruteForceTriangles:
             begin += prim.size
         self._count = begin
         self._rows = sum(len(matrix.rows) for matrix in self._matrices)
-        self._number = np.arange(1, begin + 1, dtype=np.uint8)[:, None]
+        self._number = np.arange(1, begin + 1, dtype=np.uint8)[:, None]  # there are at most `SMALL` triangles
         # Index 0 is for no polygon.
         self._prim = np.concatenate([[-1], *(kind.prim for kind in self.polygons)])
         self._prim_or_first = np.maximum(self._prim, 0)  # index 0 has t = NaN, a miss

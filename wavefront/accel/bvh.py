@@ -32,14 +32,20 @@ AT_ONCE = 1 << 15  # primitives whose bounds are found together, so that they fi
 NEAR_ROUNDS = 3  # rounds in which each ray visits its nearest child of the root; then it visits all others
 TOP = 128  # most children of the root: inner children are replaced by their own while these fit
 
-Codes = NDArray[np.int64]
+PAIRS = [(i, j) for i in range(6) for j in range(i, 6)]  # of Plücker coordinates
+BOX_MARGIN = 4e-6  # added to boxes on all sides, for the rounding of lines
+OFFSET = f4(4)  # makes distances positive, so that their bits sort like numbers
 
+Codes = NDArray[np.int64]
 
 _memory = threading.local()
 
 
 def scratch(name: str, shape: tuple[int, ...], dtype: type = f4) -> NDArray[Any]:
-    """Return this thread's buffer `name`, uninitialized; earlier arrays from it become invalid."""
+    """Return this thread's buffer `name`, uninitialized; earlier arrays from it become invalid.
+
+    A name must always be used with the same type.
+    """
     size = math.prod(shape)
     held = getattr(_memory, name, None)
     if held is None or held.size < size:
@@ -79,7 +85,7 @@ class RayBatch:
     line: Floats  # (6, n + 1) Plücker coordinates: unit direction d, then (o - center) × d; the last is NaN
     direction_length: Floats  # (n,) length of `direction`
     local: Floats | Doubles  # (3, n) o - center
-    start: Floats | None  # (4, n) o - center, 1; None if some origin is far away
+    start: Floats | None  # (4, n) o - center, 1; None if some origin is far away, or some end is not finite
     end: Floats | None  # (4, n) the same of the rays' end points; None if they have none, or start is None
 
     @property
@@ -279,14 +285,13 @@ def fit_ellipsoids(points: Floats, start: Ints) -> Doubles:
     """
     count = np.diff(start, append=points.shape[2])
     owner = np.repeat(np.arange(start.size), count)
-    chosen = points
     weight = 1 / (count * len(points))
-    mean = np.add.reduceat(chosen.sum(0, dtype=np.float64), start, 1) * weight
-    chosen -= mean.astype(f4).take(owner, 1)
+    mean = np.add.reduceat(points.sum(0, dtype=np.float64), start, 1) * weight
+    points -= mean.astype(f4).take(owner, 1)
     spread = np.empty((start.size, 3, 3))
     for i in range(3):
         for j in range(i + 1):
-            product = (chosen[:, i] * chosen[:, j]).sum(0)
+            product = (points[:, i] * points[:, j]).sum(0)
             spread[:, i, j] = spread[:, j, i] = np.add.reduceat(product, start) * weight
     axes = np.linalg.eigh(spread)[1]  # columns
     along = []
@@ -294,7 +299,7 @@ def fit_ellipsoids(points: Floats, start: Ints) -> Doubles:
     shift = np.empty((3, start.size))
     for axis in range(3):
         x, y, z = axes[:, :, axis].astype(f4).T.take(owner, 1)
-        value = chosen[:, 0] * x + chosen[:, 1] * y + chosen[:, 2] * z
+        value = points[:, 0] * x + points[:, 1] * y + points[:, 2] * z
         low = np.minimum.reduceat(value.min(0), start)
         high = np.maximum.reduceat(value.max(0), start)
         shift[axis] = middle = ((low + high) / 2).astype(f4)
@@ -302,7 +307,7 @@ def fit_ellipsoids(points: Floats, start: Ints) -> Doubles:
         value -= middle.astype(f4).take(owner)
         along.append(value)
     half = np.maximum(half, np.maximum(0.02 * half.max(0), 1e-5))
-    norm: Floats = np.zeros(chosen.shape[::2], f4)
+    norm: Floats = np.zeros(points.shape[::2], f4)
     for axis in range(3):
         value = along[axis]
         value *= (1 / half[axis]).astype(f4).take(owner)
@@ -313,9 +318,6 @@ def fit_ellipsoids(points: Floats, start: Ints) -> Doubles:
     shape[:, :3] = mean.T.astype(f4) + np.einsum("sij,js->si", axes, shift)
     shape[:, 3:] = (axes * (half * grow).T[:, None]).reshape(-1, 9)
     return shape
-
-
-PAIRS = [(i, j) for i in range(6) for j in range(i, 6)]
 
 
 def quadric_rows(shape: Doubles, center: Doubles, radius: Doubles) -> Floats:
@@ -426,10 +428,6 @@ def _nearest_of_each(lane: Ints, near: Floats, count: int) -> Ints:
     least = np.full(count, none, np.int64)
     np.minimum.at(least, lane, key)
     return least.compress(least != none) & 0xFFFFFFFF
-
-
-BOX_MARGIN = 4e-6  # added to boxes on all sides, for the rounding of lines
-OFFSET = f4(4)  # makes distances positive, so that their bits sort like numbers
 
 
 def _root_pairs(tree: Bvh, rays: _Lines, t_far: Floats) -> tuple[Ints, Ints, Floats]:

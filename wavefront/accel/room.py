@@ -22,7 +22,7 @@ from .triangle import PolygonPlanes, TriangleTable
 
 FLAT = 1e-5  # of the radius: how far behind a wall there may be corners, and by how much boxes are larger
 NEAR = 100  # radii of the ball: longest rays whose ends need not be moved to the ball
-MOST_THINGS = 8  # each takes its time for each ray
+MOST_THINGS = 8  # each is tested against each ray
 
 
 @record
@@ -156,8 +156,8 @@ def _around(things: list[Thing]) -> Thing:
     """Return some things as one."""
     if len(things) == 1:
         return things[0]
-    low, high = ([getattr(thing, name) for thing in things] for name in ("low", "high"))
-    return Thing(np.minimum.reduce(low), np.maximum.reduce(high))
+    low = np.minimum.reduce([thing.low for thing in things])
+    return Thing(low, np.maximum.reduce([thing.high for thing in things]))
 
 
 def _apart(low: Floats, high: Floats, thing: Thing) -> Bools:

@@ -18,7 +18,7 @@ AT_ONCE = 1 << 14  # primitives whose rows are made together, so that they fit t
 class PrimitiveList:
     """Few primitives: all lines are filtered by all of them. Their ids start at `first`."""
 
-    tree = None
+    tree = None  # there is none: see `PrimitiveTree`
 
     def __init__(self, primitives: Primitives, ball: Ball, first: int) -> None:
         self._primitives, self._ball, self._first = primitives, ball, first

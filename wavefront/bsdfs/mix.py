@@ -12,10 +12,8 @@ from ..parameter import Parameter
 from ..state import SurfaceInteraction
 from ..suggestions import suggests_keywords
 from ..textures.parameter import Scalar, scalar
-from ..vec import Floats, f4
+from ..vec import BELOW_ONE, Bools, Floats, f4
 from .base import Bsdf, BsdfSample, JointBsdf, weigh
-
-BELOW_1 = np.nextafter(f4(1), f4(0))
 
 
 def _component(name: str, value: Any) -> Bsdf:
@@ -88,7 +86,7 @@ class Mix(JointBsdf):
         low = np.where(second, f4(0), chance)
         size = np.where(second, chance, f4(1) - chance)
         again = u.copy()
-        again[2] = np.minimum((u[2] - low) / np.where(size > 0, size, f4(1)), BELOW_1)
+        again[2] = np.minimum((u[2] - low) / np.where(size > 0, size, f4(1)), BELOW_ONE)
         one, two = self.first.sample_f(wo, again), self.second.sample_f(wo, again)
         wi = np.where(second, two.wi, one.wi)
         specular = np.where(second, two.specular, one.specular)
@@ -103,7 +101,7 @@ class Mix(JointBsdf):
         return first + (second - first) * self.weight
 
 
-def _eta(one: BsdfSample, two: BsdfSample, second: np.ndarray) -> Floats:
+def _eta(one: BsdfSample, two: BsdfSample, second: Bools) -> Floats:
     """Relative index of the chosen samples, (n,)."""
     ones = np.ones_like(one.pdf)
     return np.where(second, ones if two.eta is None else two.eta, ones if one.eta is None else one.eta)

@@ -68,9 +68,9 @@ def check_gamma(gamma: Gamma) -> Gamma:
     """
     if gamma == "srgb":
         return gamma
-    if isinstance(gamma, str):
-        raise SceneError(f"gamma is {gamma!r}; it must be a number above 0 or 'srgb'")
     low, high = coded.GAMMAS
+    if isinstance(gamma, str):
+        raise SceneError(f"gamma is {gamma!r}; it must be a number from {low:g} to {high:g}, or 'srgb'")
     return number("gamma", gamma, lambda x: low <= x <= high, f"from {low:g} to {high:g}")
 
 

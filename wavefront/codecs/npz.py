@@ -32,9 +32,8 @@ def encode(picture: ImageData) -> bytes:
     arrays = {**picture.named(), **{SUMS + name: values for name, values in picture.sums.items()}}
     with zipfile.ZipFile(buffer, "w") as archive:
         for name, values in {**arrays, METADATA: np.array(to_json(picture.info))}.items():
-            member = zipfile.ZipInfo(
-                f"{name}.npy"
-            )  # with a fixed date: the same picture gives the same bytes
+            # with a fixed date: the same picture gives the same bytes
+            member = zipfile.ZipInfo(f"{name}.npy")
             with archive.open(member, "w", force_zip64=True) as file:
                 np.lib.format.write_array(file, np.asanyarray(values), allow_pickle=False)
     return buffer.getvalue()

@@ -170,9 +170,8 @@ def place_instances(
         low=np.ascontiguousarray((boxes[:, 0] - room).T, f4),
         high=np.ascontiguousarray((boxes[:, 1] + room).T, f4),
     )
-    longest = np.linalg.norm(
-        inverse, 2, (1, 2)
-    )  # length of a scene's unit vector in mesh coordinates, at most
+    # of a scene's unit vector in mesh coordinates: its greatest length
+    longest = np.linalg.norm(inverse, 2, (1, 2))
     table = InstanceTable(
         first=np.concatenate([[0, triangles], first]),
         shift=np.concatenate([[0, -int(sizes.sum())], first - rows.take(mesh_of)]),

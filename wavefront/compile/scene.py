@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,9 +54,8 @@ class CompiledScene:
     triangles: int  # number of triangles
     normals: Floats  # (3, m) unit geometric normals of the triangles
     corner_normals: tuple[Floats, Floats, Floats] | None  # 3 × (3, m); None when no mesh is smooth
-    attributes: dict[
-        str, Corners
-    ]  # by field of `SurfaceInteraction`, those that a material reads; 3 × (width, m)
+    # those that a material reads, by field of `SurfaceInteraction`; 3 × (width, m)
+    attributes: dict[str, Corners]
     curved: CurvedTable  # k of them
     shape_numbers: ShapeNumbers  # which shapes of the user's scene the primitives belong to
     shape_names: tuple[str, ...]  # of those shapes
@@ -68,9 +67,8 @@ class CompiledScene:
     opacities: Opacities | None  # None when every surface is opaque
     lights: LightTable
     light_groups: LightGroups
-    nonscattering_lights: (
-        Bools | None
-    )  # (lights,) those whose surface scatters nothing; None when there are none
+    # (lights,) those whose surface scatters nothing; None when there are none
+    nonscattering_lights: Bools | None
     instances: InstanceTable | None = None  # None when no mesh is instanced
     places: MortonGrid | None = None  # orders the paths of large scenes; None in small ones
     shadow_catchers: Bools | None = None  # (materials,) those that catch shadows; None when none does
@@ -95,7 +93,7 @@ class CompiledScene:
 
 def compile_scene(
     scene: Scene,
-    make_accelerator: Any,
+    make_accelerator: Callable[[Geometry], Accelerator],
     light_sampler: str | LightSamplerMaker = "spatial",
     most_copies: int = 0,
     mis: bool = False,

@@ -37,9 +37,8 @@ class MaterialSpec:
     tinted: dict[bool, MaterialSpec] = field(default_factory=dict)
 
 
-COLORED = MaterialSpec(
-    Material(Diffuse(VertexColors()))
-)  # of a mesh with vertex colors and without a material
+# of a mesh with vertex colors and without a material
+COLORED = MaterialSpec(Material(Diffuse(VertexColors())))
 
 
 def assign_material(raw: RawMesh, spec: MaterialSpec | None) -> bool:

@@ -9,7 +9,7 @@ from ..frame import Frame
 from ..record import record
 from ..sampling.warp import uniform_cone, uniform_sphere
 from ..state import SurfaceInteraction
-from ..vec import INV_FOUR_PI, TWO_PI, Floats, dot, f4
+from ..vec import INV_FOUR_PI, TWO_PI, Bools, Floats, dot, f4
 from .base import Emitters, LightRecord, LightSample
 
 
@@ -77,7 +77,7 @@ class SphereLights(LightRecord):
         axis[2] += np.where(distance > 0, f4(0), f4(1))  # any axis will do at the center
         return axis, distance
 
-    def _cone(self, distance: Floats) -> tuple[Floats, np.ndarray]:
+    def _cone(self, distance: Floats) -> tuple[Floats, Bools]:
         """Return 1 − cosθmax (n,), kept above 0, and whether the point is outside the sphere."""
         outside = distance > self.radius
         sin2 = (self.radius / np.where(outside, distance, self.radius)) ** 2

@@ -65,9 +65,8 @@ class LightTable:
         self.starts = np.cumsum([0, *(len(kind) for kind in kinds)])
         self.kind_of = np.repeat(np.arange(len(kinds)), [len(kind) for kind in kinds])
         varies = np.concatenate([np.zeros(0), *(np.broadcast_to(kind.varies, len(kind)) for kind in kinds)])
-        self.varies = (
-            varies.astype(np.bool_) if varies.any() else None
-        )  # (lights,) those with `le` by surface
+        # (lights,) those with `le` by surface; None if there are none
+        self.varies = varies.astype(np.bool_) if varies.any() else None
         self.reads = {name for kind in kinds for name in kind.reads}  # attributes of surfaces, for `le`
         self.delta_of = np.array([kind.delta for kind in kinds], np.bool_)[self.kind_of]
         extent = np.broadcast_to(np.asarray(half_size, float), 3)

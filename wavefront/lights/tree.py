@@ -109,7 +109,7 @@ class LightTreeSampler:
         return chance
 
     def _upto(self, nodes: Floats, node: Ints, point: Floats) -> Floats:
-        """Return the cumulative estimates of the children of nodes (n,), (WIDTH, n)."""
+        """Return the cumulative estimates of the children of nodes (n,), (children, n)."""
         if len(nodes) == 1:
             fields = nodes.reshape(FIELDS, -1, 1)
         else:

@@ -14,6 +14,7 @@ from ..image import Image, film_image, last_film_image
 from ..layer_sums import LayerSums, layer_bytes
 from ..memory import check_memory
 from ..picture_sums import PictureSums
+from ..vec import Bytes
 from .jobs import Job, JobResult, WaveResult
 
 MAX_BAD_SAMPLES = 1e-4  # part of all samples that may be lost to NaN before it is an error
@@ -55,9 +56,8 @@ class Accumulator:
         check_picture_memory(width, height)
         self.sums = PictureSums(Film(width, height), None, {})
         self.bad, self.rays = BadSamples(), 0
-        self._reserve: Any = np.empty(
-            PICTURE_BYTES * pixels + SPARE_BYTES, np.uint8
-        )  # for the picture so far when memory has run out
+        # for the picture so far when memory has run out
+        self._reserve: Bytes | None = np.empty(PICTURE_BYTES * pixels + SPARE_BYTES, np.uint8)
 
     def add_layers(self, names: Sequence[str]) -> None:
         """Sum up sampled layers, those with a key by it, such as "light_groups.sun".

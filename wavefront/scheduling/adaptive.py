@@ -1,4 +1,4 @@
-"""When a render is done: after so many samples, at a noise level, or when its time is up."""
+"""The passes of a render: which pixels get more samples, until all have enough or the noise is low enough."""
 
 from __future__ import annotations
 
@@ -13,9 +13,6 @@ from ..vec import Ints, distinct
 
 MIN_SPP = 32  # before anything is decided by an error estimate
 TILE = 8  # pixels; decisions are made for squares of this side
-
-
-GRACE = 1.1  # times the seconds that were given: when waves under way are discarded
 
 
 @record

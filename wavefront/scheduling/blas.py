@@ -12,9 +12,8 @@ from threadpoolctl import ThreadpoolController
 from ..counted import counted
 from ..memory import address_space_left
 
-BUFFER = (
-    64 << 20
-)  # bytes of address space; OpenBLAS takes 32 MB for each call at a time, and a thread its stack
+# Bytes of address space: OpenBLAS takes 32 MB for each call at a time, and a thread its stack.
+BUFFER = 64 << 20
 LARGE = 512  # rows of matrices whose product takes some milliseconds, so that two calls overlap
 
 

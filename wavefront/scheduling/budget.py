@@ -25,7 +25,7 @@ class Budget:
     wave_size: int  # lanes of the largest wave
 
 
-def plan(
+def make_budget(
     max_memory: int | None,
     size: tuple[int, int],
     workers: int,

@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Iterator
 
-from .adaptive import GRACE
 from .jobs import Job
 
 FIRST_WAVE = 4096  # lanes, while the speed is unknown and there is a time to keep
@@ -16,8 +15,7 @@ LANES_AT_ONCE = 1 << 19  # lanes of all workers together where that is a wave fo
 SMALLEST_WAVE = 64  # paths; without memory for as few there is an error
 SHARE = 1 / 4  # part of what is left for each worker that a job may be
 MAX_JOB_SECONDS = 1.0  # seconds that a large job may take, for progress waits for it
-
-
+GRACE = 1.1  # times the seconds that were given: when waves under way are discarded
 SHORT, LONG = 1 / 60, 1 / 20  # parts of the time there is that a wave should take
 SMOOTHING = 0.3  # weight of the latest wave in what a path is expected to cost
 

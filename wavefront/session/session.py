@@ -130,7 +130,7 @@ class Session:
     ) -> None:
         begin = time.perf_counter()
         self._in_block = self._closed = self._once = self._stopped = self._dropped = False
-        self.command: dict[str, Any] | None = None
+        self.command: dict[str, Any] | None = None  # of the command line, for checkpoints
         self._settings = Settings(
             spp=spp,
             camera=camera,
@@ -205,9 +205,10 @@ class Session:
             self._pool.__enter__()
 
     def _run_trial(self, jobs: list[TrialJob]) -> list[TrialPart]:
-        """Do the jobs of a trial: by the workers where that costs nothing, else here while they start.
+        """Do the jobs of a trial, in their order.
 
-        Also where they are stopped, as another view may follow.
+        Workers that share the scene do them. Where workers would have to be sent it first, where memory runs
+        out, or where the session was stopped, they are done here.
         """
         if shares_scene(self._plan.executor):
             pool: WorkerPool[TrialJob, TrialPart] = self._pool
@@ -326,7 +327,10 @@ class Session:
         Raises
         ------
         SceneError
-            If one of them is malformed. The picture that was begun is not changed.
+            If one of them is malformed, or the session has a checkpoint. The picture that was begun is not
+            changed.
+        RenderError
+            If the session is closed.
         """
         begin, settings = time.perf_counter(), self._settings
         if self._closed:
@@ -347,11 +351,11 @@ class Session:
             self._stopped = self._dropped = False  # a stop from now on is one of the new picture
             if not self._pool.closed:
                 self._pool.cancel()
-            others = (executor, self._plan.executor) == ("processes", "threads")
-            others |= budget.workers != self._plan.budget.workers
+            other_workers = (executor, self._plan.executor) == ("processes", "threads")
+            other_workers |= budget.workers != self._plan.budget.workers
             table = trained_guide(settings, self._scene, camera)
-            others |= table is not self._plan.tracer.table
-            if self._monitor.stop.value or others:
+            other_workers |= table is not self._plan.tracer.table
+            if self._monitor.stop.value or other_workers:
                 self._pool.close()
                 self._plan = make_plan(settings, self._scene, camera, table)
                 self._make_pool()

@@ -1,1 +1,1 @@
-"""The stages of the loop, a file each: generate, intersect, surface, absorb, shade, bounce, compact."""
+"""The stages of the loop, such as generate, intersect, shade, bounce and compact, a file each."""

@@ -18,7 +18,7 @@ from ..state import Paths
 from ..vec import Floats, Ints, f4, take
 from .shade import Guidance, Shading, evaluate
 
-FEWEST = f4(1e-3)  # density of the BSDF, relative to the mixture, below which roulette takes it for this
+LEAST_PDF_RATIO = f4(1e-3)  # least density of the BSDF, relative to that of the mixture, for roulette
 
 
 def guide(shade: Shading, table: GuideTable | None) -> Shading:
@@ -78,7 +78,7 @@ def mix_with_guide(
     delta = specular[:n]
     weight[:, :n] = np.where(delta, weight[:, :n] / (f4(1) - share), f * scale)
     density[:n] = np.where(delta, density[:n] * (f4(1) - share), np.where(good, pdf, f4(0)))
-    gain[:n] = np.where(delta | ~good, f4(1), divisor / np.maximum(pdf_bsdf, FEWEST * divisor))
+    gain[:n] = np.where(delta | ~good, f4(1), divisor / np.maximum(pdf_bsdf, LEAST_PDF_RATIO * divisor))
     return BsdfSample(wi, weight, density, specular, sample.eta), direction, gain
 
 

@@ -47,7 +47,7 @@ class Shading:
     frame: Frame
     wo: Floats  # (3, n) local frame; +z if all BSDFs are view-independent
     start: Floats  # (3, n) origins of rays that leave to the side of wo, scene units
-    # lanes of each group, in order and a slice but for `at`, and its material bound to them
+    # lanes of each group that occurs, and its BSDF bound to them: slices in order, but for what `at` returns
     groups: list[tuple[Lanes, Bsdf]]
     guidance: Guidance | None = None  # of the lanes of `lit`; None where BSDFs alone choose directions
 

@@ -24,9 +24,8 @@ from .shown import VIEWER_LAYERS
 from .viewpoint import Viewpoint
 
 SPP = 256
-WAVE_SIZE = (
-    1 << 15
-)  # paths; a movement waits for less of a smaller wave, and one of half the size costs 10 % more
+# Paths: a movement waits for less of a smaller wave, and one of half the size costs 10 % more.
+WAVE_SIZE = 1 << 15
 POLL = 0.5  # seconds
 FRAME = "100%", 600  # width and height of the page in a notebook
 REFUSED = ("checkpoint", "samples", "progress")  # settings that make no sense for views that change
