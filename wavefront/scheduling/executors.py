@@ -18,6 +18,7 @@ from collections.abc import Iterable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
+from pathlib import Path
 from typing import Any, TypeAlias
 
 from ..errors import SceneError
@@ -184,15 +185,25 @@ def _other_threads_compute() -> bool:
 
     Before a fork OpenBLAS waits for its own threads, forever if another thread uses them: `os.fork` hangs.
     Its own threads do no harm where nobody uses them, as in the 0.1 s for which they spin after a render.
+    A thread is busy if it used a core meanwhile, or waits for one that other programs keep from it.
     """
-    this = threading.get_native_id()
-    others = {each.native_id for each in threading.enumerate()} - {this, None}
+    others = {each.native_id for each in threading.enumerate() if each.native_id is not None}
+    others.discard(threading.get_native_id())
     if not others:
         return False
-    clocks = [~other << 3 | THREAD_CLOCK for other in others if other is not None]
+    clocks = [~other << 3 | THREAD_CLOCK for other in others]
     begin = _seconds(clocks)
     time.sleep(NAP)
-    return any(end - begin[clock] > BUSY * NAP for clock, end in _seconds(clocks).items() if clock in begin)
+    used = any(end - begin[clock] > BUSY * NAP for clock, end in _seconds(clocks).items() if clock in begin)
+    return used or any(map(_runnable, others))
+
+
+def _runnable(thread: int) -> bool:
+    """Return whether a thread of this process has a core or waits for one (Linux, proc(5))."""
+    try:
+        return Path(f"/proc/self/task/{thread}/stat").read_text().rpartition(")")[2].split()[0] == "R"
+    except OSError:  # it has ended, or nothing tells
+        return False
 
 
 def _seconds(clocks: Iterable[int]) -> dict[int, float]:

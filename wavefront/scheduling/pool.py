@@ -80,7 +80,8 @@ class WorkerPool(Generic[Job, Result]):
         self._kept = False  # by a context
         self._last_use = 0.0
         self._lock = threading.RLock()  # of the workers and the deque; the idle timer takes it, too
-        self._idle_timer: threading.Thread | None = None
+        self._idle_timer: threading.Thread | None = None  # the last one; it may be over
+        self._timed = False  # it is not over
         self._closed = threading.Event()
         self._closing: threading.Thread | None = None
 
@@ -243,9 +244,10 @@ class WorkerPool(Generic[Job, Result]):
         except BaseException:
             single_threaded_blas.release()
             raise
-        if not self._kept and self._idle_timer is None:
-            self._idle_timer = threading.Thread(target=self._end_idle_workers, daemon=True)
-            self._idle_timer.start()
+        if not self._kept and not self._timed:
+            timer = threading.Thread(target=self._end_idle_workers, daemon=True)
+            timer.start()
+            self._idle_timer, self._timed = timer, True
 
     def _end_workers(self, running: list[Future[Any]] | None = None) -> None:
         """End all workers; `running` are the futures that may not be done, by default those under way."""
@@ -273,7 +275,7 @@ class WorkerPool(Generic[Job, Result]):
                 left = self._last_use + IDLE_TIMEOUT - time.monotonic()
                 if left > 0 and self._workers is not None:
                     continue
-                workers, self._workers, self._idle_timer = self._workers, None, None
+                workers, self._workers, self._timed = self._workers, None, False
                 if workers is not None:
                     workers.shutdown([])
                     single_threaded_blas.release()
