@@ -1,5 +1,6 @@
 """Settings of the whole suite."""
 
+import math
 import signal
 from collections.abc import Iterator
 
@@ -31,6 +32,25 @@ def close_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
     from wavefront import pixel_tiles
 
     monkeypatch.setattr(pixel_tiles, "STRIDE", 1)
+
+
+@pytest.fixture
+def one_picture_per_pass(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let sessions show no pictures in between, as they do where a pass takes long, on any machine."""
+    from wavefront.session import session
+
+    monkeypatch.setattr(session, "SNAPSHOT_INTERVAL", math.inf)
+
+
+@pytest.fixture
+def no_estimates(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let jobs be admitted until `seconds` are over: what they cost is not known where a machine stutters."""
+    from wavefront.scheduling.scheduler import Scheduler
+
+    def late(scheduler: Scheduler, lanes: int) -> bool:
+        return scheduler._seconds is not None and scheduler.elapsed > scheduler._seconds
+
+    monkeypatch.setattr(Scheduler, "_late", late)
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
 """Stopping by noise or time: right errors, no bias, the same bits, and the time that was given."""
 
-import time
+import re
+import threading
 
 import numpy as np
 import pytest
@@ -299,11 +300,12 @@ def test_every_pixel_gets_a_sample(monkeypatch) -> None:
     assert (machine.run(500_000, 0.5) == 1).all()
 
 
+@pytest.mark.usefixtures("no_estimates")
 def test_seconds_end_a_render() -> None:
     """With an image that is whole; `spp` and `noise` may end it before."""
     image = render(lit((8, 8)), None, seconds=0.3, workers=2)
     assert image.counts.min() >= 1
-    assert image.metadata["seconds"] > 0.2
+    assert image.metadata["seconds"] >= 0.3
     assert (render(lit((8, 8)), 3, seconds=1000).counts == 3).all()
     assert render(lit((8, 8)), None, seconds=1000, noise=0.5).metadata["noise"] <= 0.5
 
@@ -329,14 +331,16 @@ def closed(size: tuple[int, int]) -> wf.Scene:
 @pytest.mark.filterwarnings("ignore:paths have met more than")  # as a fast machine does in the time
 def test_time_ends_waves_under_way() -> None:
     """Also those of first samples, if they take long: there is no picture then, and the error says why."""
-    begin = time.perf_counter()
-    message = r"no picture: when seconds=1 were over, .* had met \d+ surfaces; .* lower max_bounces"
+    message = r"no picture: when seconds=1 were over, .* had met (\d+) surfaces; .* lower max_bounces"
     with pytest.raises(wf.RenderError, match=message) as caught:
         render(closed((64, 64)), None, seconds=1, max_bounces=2**16, workers=2)
     assert caught.value.image is None
-    assert time.perf_counter() - begin < 10  # 3 s, while all its bounces take minutes
+    met = re.search(message, str(caught.value))
+    assert met is not None
+    assert int(met[1]) < 2**16  # which takes minutes
 
 
+@pytest.mark.usefixtures("no_estimates")
 def test_samples_of_waves_that_time_ends_are_discarded(monkeypatch) -> None:
     """What was done before is there, as if nothing else had been asked for."""
 
@@ -348,6 +352,8 @@ def test_samples_of_waves_that_time_ends_are_discarded(monkeypatch) -> None:
 
     monkeypatch.setattr(session, "trace_any_job", endless)
     monkeypatch.setattr(scheduler, "FIRST_WAVE", 384)  # one sample of all pixels
+    monkeypatch.setattr(scheduler, "SHORT", 0.0)  # and so are all other waves
+    monkeypatch.setattr(scheduler, "LONG", np.inf)
     image = render(lit(), None, seconds=0.5)
     assert image.spp <= 3
     monkeypatch.undo()
@@ -356,11 +362,14 @@ def test_samples_of_waves_that_time_ends_are_discarded(monkeypatch) -> None:
 
 def test_pixels_without_a_sample_are_told(monkeypatch) -> None:
     """They are black."""
+    first_is_done = threading.Event()
 
     def endless_after_the_first(tracer: tracing.Tracer, monitor: tracing.WaveMonitor, job: Job) -> JobResult:
-        while job.pixels[0]:
+        if not job.pixels[0]:
+            return tracing.trace_job(tracer, monitor, job)
+        assert first_is_done.wait(60)
+        while True:
             monitor.check(123, job.view.deadline)
-        return tracing.trace_job(tracer, monitor, job)
 
     monkeypatch.setattr(session, "trace_any_job", endless_after_the_first)
     monkeypatch.setattr(scheduler, "FIRST_WAVE", 100)
@@ -368,7 +377,7 @@ def test_pixels_without_a_sample_are_told(monkeypatch) -> None:
         r"288 pixels of 384 have no sample and are black: when seconds=0.5 were over, .* met 123 surfaces"
     )
     with pytest.warns(UserWarning, match=message):
-        image = render(lit(), None, seconds=0.5, workers=1)
+        image = render(lit(), None, seconds=0.5, workers=1, progress=lambda *_: first_is_done.set())
     assert (image.counts == 0).sum() == 288
     assert (image.rgb[image.counts == 0] == 0).all()
 

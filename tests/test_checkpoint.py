@@ -23,7 +23,7 @@ import wavefront as wf
 from wavefront import cli, files
 from wavefront.checkpoint_file import read_header
 from wavefront.sampling.sampler import IndependentSampler
-from wavefront.scheduling.scheduler import Scheduler
+from wavefront.scheduling.scheduler import FIRST_WAVE, Scheduler
 
 SIZE = (24, 18)
 BLOBS = [(-1.2, 0.3, 0), (1.1, -0.2, 0.4), (0, 0.9, -0.5)]
@@ -131,15 +131,32 @@ def test_a_finished_render_returns_at_once(tmp_path: Path) -> None:
     assert (path.read_bytes(), path.stat().st_mtime_ns) == (content, changed)
 
 
-def test_seconds_are_those_of_all_parts(tmp_path: Path) -> None:
+class Clock:
+    """Stands for `time.perf_counter`; it goes on with each job of a render that has it for `progress`."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, step: float) -> None:
+        self.now, self.step = 1000.0, step
+        monkeypatch.setattr(time, "perf_counter", lambda: self.now)
+
+    def __call__(self, done: float, total: float) -> None:
+        self.now += self.step
+
+
+def test_seconds_are_those_of_all_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same call is done at once; more seconds go on."""
-    path = tmp_path / "a"
-    first = wf.render(scene(), seconds=0.3, checkpoint=path)
-    again = wf.render(scene(), seconds=0.3, checkpoint=path)
+    clock = Clock(monkeypatch, 0.02)
+    settings: dict[str, Any] = {
+        "checkpoint": tmp_path / "a",
+        "progress": clock,
+        "workers": 1,
+        "wave_size": 432,
+    }
+    first = wf.render(scene(), seconds=0.3, **settings)
+    again = wf.render(scene(), seconds=0.3, **settings)
     assert digest(again) == digest(first)
-    more = wf.render(scene(), seconds=0.8, checkpoint=path)
+    more = wf.render(scene(), seconds=0.8, **settings)
     assert more.metadata["samples"] > first.metadata["samples"]
-    assert first.metadata["seconds"] < more.metadata["seconds"] < 3
+    assert first.metadata["seconds"] < more.metadata["seconds"] < 1
 
 
 def test_seconds_are_used_up_when_another_wave_would_be_late(
@@ -150,7 +167,7 @@ def test_seconds_are_used_up_when_another_wave_would_be_late(
     with monkeypatch.context() as patch:
         patch.setattr(Scheduler, "_late", lambda scheduler, lanes: True)
         first = wf.render(scene(), seconds=3, checkpoint=path)
-    assert first.metadata["seconds"] < 2
+    assert first.spp == FIRST_WAVE // (SIZE[0] * SIZE[1])
     assert digest(wf.render(scene(), seconds=3, checkpoint=path)) == digest(first)
 
 
@@ -168,6 +185,7 @@ def test_sessions_save_what_renders_go_on_with(tmp_path: Path) -> None:
     assert digest(wf.render(scene(), 16, checkpoint=path)) == digest(wf.render(scene(), 16))
 
 
+@pytest.mark.usefixtures("one_picture_per_pass")
 def test_a_session_iterates_from_where_the_checkpoint_is(tmp_path: Path) -> None:
     """And renders one view only."""
     wf.render(scene(), 6, checkpoint=tmp_path / "a")
@@ -199,17 +217,18 @@ def test_parts_of_the_samples_have_checkpoints_that_merge(tmp_path: Path) -> Non
     assert merged.rgb.tobytes() == wf.render(scene(), 11).rgb.tobytes()
 
 
-def test_the_file_is_written_at_the_interval(tmp_path: Path) -> None:
+def test_the_file_is_written_at_the_interval(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """While the render goes on; at first at the end of the first interval."""
     path, seen = tmp_path / "a", []
+    clock = Clock(monkeypatch, 0.02)
 
     def progress(done: float, total: float) -> None:
         seen.append(path.exists())
-        time.sleep(0.02)
+        clock(done, total)
 
-    wf.render(scene(), 30, checkpoint=path, checkpoint_interval=0.1, progress=progress, wave_size=400)
-    assert not seen[0]
-    assert seen[-1]
+    wf.render(scene(), 30, checkpoint=path, checkpoint_interval=0.11, progress=progress, wave_size=432)
+    assert seen.index(True) == 6
+    assert seen == sorted(seen)
 
 
 # --- What is refused ----------------------------------------------------------------------------------

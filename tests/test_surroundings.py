@@ -12,6 +12,7 @@ import sys
 import threading
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -32,9 +33,10 @@ NAMES = [
 ]
 
 
-def bits(executor: str = "threads", workers: int = 2) -> bytes:
+def bits(executor: str = "threads", workers: int = 2, **settings: Any) -> bytes:
     """Render, and return the bits of the picture."""
-    return wf.render(scenes.everything(), 8, workers=workers, executor=executor, **QUIET).rgb.tobytes()
+    settings = {"workers": workers, "executor": executor, **QUIET, **settings}
+    return wf.render(scenes.everything(), 8, **settings).rgb.tobytes()
 
 
 @pytest.fixture(scope="module")
@@ -96,18 +98,21 @@ def test_a_render_in_a_worker_process(method: str, executor: str, expected: byte
 @pytest.mark.parametrize("executor", NAMES)
 def test_a_render_in_asyncio(executor: str, expected: bytes) -> None:
     """In a thread, while the loop goes on, and in the loop itself."""
+    begun, turned = threading.Event(), threading.Event()
 
-    async def both() -> tuple[bytes, int, bytes]:
-        render = asyncio.create_task(asyncio.to_thread(bits, executor))
-        turns = 0
+    def wait_for_a_turn(done: int, total: int) -> None:
+        begun.set()
+        assert turned.wait(60)
+
+    async def both() -> tuple[bytes, bytes]:
+        render = asyncio.create_task(asyncio.to_thread(bits, executor, progress=wait_for_a_turn))
         while not render.done():
             await asyncio.sleep(0.001)
-            turns += 1
-        return await render, turns, bits(executor)
+            if begun.is_set():
+                turned.set()
+        return await render, bits(executor)
 
-    aside, turns, within = asyncio.run(both())
-    assert (aside, within) == (expected, expected)
-    assert turns > 1
+    assert asyncio.run(both()) == (expected, expected)
 
 
 @pytest.mark.parametrize("executor", [None, "threads", pytest.param("spawn", marks=pytest.mark.slow)])
@@ -116,16 +121,19 @@ def test_beside_threads_of_blas(
 ) -> None:
     """That multiply all the while: a fork would wait for them forever, so by default there is none."""
     monkeypatch.setattr(executors, "MIN_PATHS", 1)
-    over = threading.Event()
+    over, begun = threading.Event(), threading.Semaphore(0)
     matrix = np.ones((300, 300))
 
     def multiply() -> None:
+        matrix @ matrix
+        begun.release()
         while not over.is_set():
             matrix @ matrix
 
     others = [threading.Thread(target=multiply, daemon=True) for _ in range(2)]
     for each in others:
         each.start()
+        assert begun.acquire(timeout=60)
     try:
         image = wf.render(scenes.everything(), 8, workers=2, executor=executor, **QUIET)
     finally:

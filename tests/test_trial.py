@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -243,12 +242,13 @@ def test_there_is_no_trial_where_it_can_bring_nothing(
 
 def test_workers_of_this_machine_do_the_trial(monkeypatch: pytest.MonkeyPatch) -> None:
     """At least two of them have something to do."""
-    threads = set()
+    threads, both_have_one = set(), threading.Barrier(2)
     trace = TrialJob.trace
 
     def noted(self: TrialJob, *args: Any) -> TrialPart:
-        threads.add(threading.current_thread().name)
-        time.sleep(0.2)
+        if threading.current_thread().name not in threads:
+            threads.add(threading.current_thread().name)
+            both_have_one.wait(60)
         return trace(self, *args)
 
     monkeypatch.setattr(TrialJob, "trace", noted)

@@ -16,6 +16,7 @@ import urllib.request
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, cast
 
 import imageio.v3 as iio
@@ -24,9 +25,11 @@ import pytest
 from scenes import cornell_box
 
 import wavefront as wf
+from wavefront.viewer import page as page_module
 from wavefront.viewer import refiner as module
 from wavefront.viewer.front import Front, asked_first
 from wavefront.viewer.guard import is_value, may_connect
+from wavefront.viewer.page import Page
 from wavefront.viewer.refiner import Refiner, ViewerFrame
 from wavefront.viewer.shown import CHOICES, VIEWER_LAYERS, shown_codes
 from wavefront.viewer.viewpoint import Viewpoint
@@ -488,11 +491,18 @@ def test_a_page_moves_the_camera(viewer: wf.Viewer) -> None:
     client.socket.close()
 
 
+@pytest.fixture
+def clock(viewer: wf.Viewer, monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """Time as the page knows it, which stands still until `now` is changed."""
+    clock = SimpleNamespace(now=time.monotonic())
+    monkeypatch.setattr(page_module, "time", SimpleNamespace(monotonic=lambda: clock.now))
+    return clock
+
+
 def test_views_that_a_page_has_before_it_takes_ours_are_not_shown(
-    viewer: wf.Viewer, monkeypatch: pytest.MonkeyPatch
+    viewer: wf.Viewer, clock: SimpleNamespace
 ) -> None:
     """But for a time only, as some cameras cannot be taken; its size counts at once."""
-    monkeypatch.setattr("wavefront.viewer.page.ARRIVAL", 1.0)
     client = Client(viewer)
     client._looked = True
     for z in (-5.0, 3.0):
@@ -500,7 +510,7 @@ def test_views_that_a_page_has_before_it_takes_ours_are_not_shown(
     assert eventually(lambda: viewer.camera.film == (48, 48))
     assert viewer.camera.origin.tolist() == [0, 0, 5]
     before = viewer.camera
-    time.sleep(1.1)
+    clock.now += page_module.ARRIVAL
     client.look(position=(0.0, 0, 3.0), image_width=48)
     assert eventually(lambda: viewer.camera is not before)
     assert viewer.camera.origin[2] == pytest.approx(3 * np.sqrt(3), abs=1e-4)
@@ -510,7 +520,8 @@ def test_views_that_a_page_has_before_it_takes_ours_are_not_shown(
 def test_a_page_gets_a_picture_at_once(viewer: wf.Viewer) -> None:
     """It is there before the page has said how large it is."""
     client = Client(viewer)
-    assert any(b"BackgroundImageMessage" in kinds(client.socket.recv(timeout=SOON)) for _ in range(10))
+    while b"BackgroundImageMessage" not in kinds(client.socket.recv(timeout=SOON)):
+        pass
     client.socket.close()
 
 
@@ -520,6 +531,7 @@ def kinds(data: bytes) -> bytes:
     return zstandard.ZstdDecompressor().decompress(data[16 : 16 + size])
 
 
+@pytest.mark.usefixtures("clock")
 def test_what_a_page_says_is_checked(viewer: wf.Viewer) -> None:
     """Cameras that are none change nothing, and other messages do nothing; the viewer goes on."""
     client = Client(viewer)
@@ -570,23 +582,45 @@ def test_nothing_but_the_page_is_served(viewer: wf.Viewer) -> None:
         assert status(path) == 404
 
 
-def test_pictures_that_refine_leave_the_page_time() -> None:
-    """Other views and the last picture are sent at once, and so is another exposure."""
-    sent: list[tuple[float, ViewerFrame]] = []
-    with wf.view(BALL, 512, camera=CAMERA, port=0, open_browser=False, block=False) as viewer:
-        page = viewer._page
-        assert page is not None
-        page._send = lambda codes, frame: sent.append((time.monotonic(), frame))  # type: ignore[method-assign]
-        viewer.wait_for_picture(SOON)
-        assert eventually(lambda: sent and sent[-1][1].final)
-        count = len(sent)
-        page._show_as(exposure=1)
-        page._show_as(exposure=2)
-        assert eventually(lambda: len(sent) > count)
-    refined = [(then, frame) for then, frame in sent if not frame.final]
-    assert len(refined) > 1
-    for (before, first), (after, second) in pairwise(refined):
-        assert second.camera is not first.camera or after - before > 0.09
+@pytest.fixture
+def sent(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Page, list[tuple[float, ViewerFrame]]]]:
+    """A page without a viewer, and what it sends, and when."""
+    page = Page("127.0.0.1", 0, viewpoint(), None, look=lambda view: None, connected=lambda: None)
+    frames: list[tuple[float, ViewerFrame]] = []
+    page._send = lambda codes, frame: frames.append((page._sent[1], frame))  # type: ignore[method-assign]
+    yield page, frames
+    page.close()
+
+
+def frame(spp: int, camera: wf.Camera = CAMERA, final: bool = False) -> ViewerFrame:
+    """Return a picture of a view."""
+    return ViewerFrame(wf.Image(np.zeros((48, 64, 3), np.float32), spp), camera, final)
+
+
+def test_pictures_that_refine_leave_the_page_time(sent: Any) -> None:
+    """They are sent a tenth of a second apart."""
+    page, frames = sent
+    for number in (1, 2, 3):
+        page.show(frame(number))
+        assert eventually(lambda number=number: len(frames) == number)
+    assert all(after - before > 0.09 for (before, _), (after, _) in pairwise(frames))
+
+
+def test_other_pictures_do_not_wait(sent: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of other views and the last one are sent at once, and so is another exposure."""
+    monkeypatch.setattr(page_module, "PAUSE", 10 * SOON)
+    page, frames = sent
+    other = wf.Camera.look_at((0, 0, 6), (0, 0, 0), size=(64, 48))
+    shown = [frame(1), frame(1, other), frame(4, other, final=True)]
+    for each in shown:
+        page.show(each)
+        assert eventually(lambda each=each: frames and frames[-1][1] is each)
+        if each is shown[1]:
+            page.show(frame(2, other))  # waits, and is left out
+            time.sleep(0.1)
+    page._show_as(exposure=1)
+    assert eventually(lambda: len(frames) == 4)
+    assert [each for _, each in frames] == [*shown, shown[-1]]
 
 
 def test_a_page_gets_a_picture_with_its_first_requests(viewer: wf.Viewer) -> None:
