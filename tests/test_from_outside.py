@@ -148,6 +148,21 @@ def test_an_integrator():
         picture(room(), 1, integrator=own, branches=2)
 
 
+@pytest.mark.parametrize(
+    ("returned", "message"),
+    [
+        (lambda n: np.zeros((n, 3), np.float32), r"returns the shape \(\d+, 3\); an integrator must return"),
+        (lambda n: None, "returns None; an integrator must return"),
+    ],
+)
+def test_an_integrator_must_return_radiance(returned, message):
+    def own(scene, paths, sampler, max_bounces):
+        return returned(len(paths))
+
+    with pytest.raises(wf.SceneError, match=f"^own {message}"):
+        picture(room(), 1, integrator=own)
+
+
 @everywhere
 def test_an_executor(integrator):
     own = picture(

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from ..accel.base import Accelerator, Intersections
 from ..compile.scene import CompiledScene
+from ..errors import SceneError
 from ..filters import Filter
 from ..guiding import GuideTable
 from ..integrators import Integrator, integrator_for
@@ -128,6 +130,7 @@ def _trace_wave(tracer: Tracer, monitor: WaveMonitor, job: Job) -> WaveResult:
     table = tracer.table if job.view.guided else None
     integrator = integrator_for(tracer.integrator, job.view.branches, job.view.reuse, table)
     radiance = integrator(scene, paths, sampler, tracer.max_bounces)
+    _check_radiance(integrator, radiance, k * n)
     finite = np.isfinite(radiance).all(0)
     if recorder is not None:
         finite &= recorder.finish(integrator, radiance)
@@ -135,6 +138,14 @@ def _trace_wave(tracer: Tracer, monitor: WaveMonitor, job: Job) -> WaveResult:
     layers = None if recorder is None else recorder.result(n, bad)
     radiance[:, bad] = 0
     return WaveResult(radiance.reshape(3, n, k), bad, accelerator.rays, time.perf_counter() - begin, layers)
+
+
+def _check_radiance(integrator: Integrator, radiance: Any, lanes: int) -> None:
+    """Check the shape of what an integrator returns, which may be a user's."""
+    if np.shape(radiance) != (3, lanes):
+        name = getattr(integrator, "__name__", "integrator")
+        found = "None" if radiance is None else f"the shape {np.shape(radiance)}"
+        raise SceneError(f"{name} returns {found}; an integrator must return (3, n) = (3, {lanes})")
 
 
 def _samples(job: Job) -> Words:
