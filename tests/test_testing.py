@@ -200,6 +200,13 @@ class OneWayFresnel(Dielectric):
         return s
 
 
+class Transposed(Diffuse):
+    """Has a row for each lane."""
+
+    def f(self, wo, wi):
+        return super().f(wo, wi).T
+
+
 class WrongSnell(Dielectric):
     """Refracts as if the index were 1 % higher."""
 
@@ -243,6 +250,10 @@ MUTANTS = [
     (Mingling(0.5), "lanes independent"),
     (Doubles(0.5), "shape and type"),
     (Unbroadcast(0.5), "shape and type"),
+    (
+        Transposed(0.5),
+        "shape and type of f() at wo 0° outside: measured float32 (1000, 3), expected float32 (3, 1000)",
+    ),
     (NotFinite(0.5), "finite"),
     (WrongScaling(1.5), "albedo"),
     (NoScaling(1.5), "albedo"),

@@ -195,6 +195,10 @@ def _check_arrays(report: Report, view: _View, rng: np.random.Generator) -> None
     u = rng.random((view.bsdf.dimensions, n), f4)
     w = uniform_directions(rng, n)
 
+    bound, wo = view.at(n)
+    for name, array, shape in (("f()", bound.f(wo, w), (3, n)), ("pdf()", bound.pdf(wo, w), (n,))):
+        _check_array(report, where, name, array, shape, f4)
+
     def run(lanes: slice) -> list[NDArray[Any]]:
         drawn = view.sample(np.ascontiguousarray(u[:, lanes]))
         w_part = np.ascontiguousarray(w[:, lanes])
@@ -209,16 +213,24 @@ def _check_arrays(report: Report, view: _View, rng: np.random.Generator) -> None
     for k, (name, row) in enumerate(zip(names, rows, strict=True)):
         shape = (row, n) if row else (n,)
         dtype = np.bool_ if name == "specular" else f4
-        what = f"{where}, {name} {whole[k].dtype} {whole[k].shape}"
-        wrong = whole[k].shape != shape or whole[k].dtype != dtype
-        report.holds("shape and type", what, np.array(wrong), f"{np.dtype(dtype)} {shape}")
-        if wrong:
-            report.raise_if_failed()
+        _check_array(report, where, name, whole[k], shape, dtype)
         joined = np.concatenate([part[k] for part in parts], axis=-1)
         report.holds("lanes independent", f"{where}, {name}", joined != whole[k], "the same bits")
     for k, (plain, joint) in enumerate(((4, 6), (5, 7))):
         error = np.abs(whole[plain] - whole[joint]) / np.maximum(np.abs(whole[plain]), 1e-20)
         report.at_most("evaluate = f, pdf", f"{where}, {('f', 'pdf')[k]}", float(error.max()), 1e-5)
+
+
+def _check_array(
+    report: Report, where: str, name: str, array: Any, shape: tuple[int, ...], dtype: type[np.generic]
+) -> None:
+    """Check the shape and type of one array; without these, nothing else can be checked."""
+    have, wanted = f"{np.asarray(array).dtype} {np.shape(array)}", f"{np.dtype(dtype)} {shape}"
+    if have != wanted:
+        raise AssertionError(
+            f"{report.subject}: shape and type of {name} at {where}: measured {have}, expected {wanted}"
+        )
+    report.holds("shape and type", f"{where}, {name}", np.array(False), wanted)
 
 
 def _check_view_independent(report: Report, view: _View, rng: np.random.Generator) -> None:
