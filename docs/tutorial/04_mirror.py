@@ -6,8 +6,8 @@ A mirror scatters all light of a direction into one other direction, the reflect
 integral of the rendering equation then has a single direction that counts, and its estimate is the color
 that one more ray finds. No light sample could find that direction by chance, so none is taken.
 
-``max_bounces`` limits how often a path is scattered: with 1 the mirror is black, because what it shows
-needs a second step.
+``max_bounces`` limits how often a path is scattered. With 1 the mirror shows the sky and the lamp, and other
+surfaces in it are black: their light needs a second step.
 """
 
 import wavefront as wf

@@ -10,7 +10,8 @@ the reflectance::
 
 To follow n directions at each of r bounces would take nʳ rays. One direction at each bounce, and n paths
 for each pixel, have the same mean. The price is noise, which falls with 1/√n where samples are independent:
-100 times the samples leave a tenth of it. These are 1, 10, 100 and 1000 samples per pixel.
+100 times the samples leave a tenth of it. These are 1, 10, 100 and 1000 samples per pixel. The error is
+estimated from how much samples differ, so of a single one it is not known: nan.
 """
 
 import wavefront as wf
