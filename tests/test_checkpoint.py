@@ -355,7 +355,7 @@ def content(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """A checkpoint of all kinds of arrays."""
     path = tmp_path_factory.mktemp("whole") / "a"
     camera = wf.Camera.look_at((0, 1, 5), (0, 0, 0), size=(3, 2))
-    wf.render(scene(), 4, camera=camera, noise=9.0, aovs=("alpha", "albedo", "direct"), checkpoint=path)
+    wf.render(scene(), 4, camera=camera, noise=0.9, aovs=("alpha", "albedo", "direct"), checkpoint=path)
     return path.read_bytes()
 
 
@@ -409,7 +409,7 @@ def test_a_damaged_file_is_neither_used_nor_replaced(content: bytes, tmp_path: P
     damaged = content[:-1] + bytes([content[-1] ^ 1])
     (tmp_path / "a").write_bytes(damaged)
     camera = wf.Camera.look_at((0, 1, 5), (0, 0, 0), size=(3, 2))
-    settings: dict[str, Any] = {"noise": 9.0, "aovs": ("alpha", "albedo", "direct")}
+    settings: dict[str, Any] = {"noise": 0.9, "aovs": ("alpha", "albedo", "direct")}
     with pytest.raises(wf.SceneError, match=r"a: the array .* is damaged: delete it"):
         wf.render(scene(), 4, camera=camera, checkpoint=tmp_path / "a", **settings)
     assert (tmp_path / "a").read_bytes() == damaged

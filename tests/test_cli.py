@@ -328,6 +328,8 @@ def test_wrong_files(tmp_path, capsys, no_render, command):
     [
         (["rendr"], "; did you mean 'render'?; see wavefront --help"),
         (["render", "a.obj", "--sample-count", "4"], "; did you mean --spp?; see wavefront render --help"),
+        (["render", "a.obj", "--ssp", "4"], "; did you mean --spp?"),
+        ([__file__], f"; to render a file: wavefront render {__file__}; see wavefront --help"),
         (["render", "a.obj", "--most-bounces=3"], "; did you mean --max-bounces?"),
         (["turntable", "a.obj", "--frame", "4", "--tonemap", "aces"], "; did you mean --tone?"),
         (["render", "a.obj", "--sampler", "sobel"], "; did you mean 'sobol'?"),

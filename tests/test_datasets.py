@@ -423,6 +423,7 @@ def test_views_that_cannot_be_compared_are_rendered_again(tmp_path: Path) -> Non
         ({"cameras": []}, "cameras is empty"),
         ({"cameras": [START, wf.Camera.panorama((0, 0, 0))]}, r"cameras\[1\]: .* no intrinsic matrix"),
         ({"cameras": [3]}, r"cameras\[0\] must be a wf.Camera"),
+        ({"cameras": 3}, "cameras must be a list of cameras, such as .*, got 3"),
         ({"millimeters": 0, "format": "bop"}, "millimeters is 0; it must be above 0"),
         ({"depth_scale": -1, "format": "bop"}, "depth_scale is -1; it must be above 0"),
         ({"checkpoint": "a.wfck"}, "checkpoint is 'a.wfck'"),

@@ -109,7 +109,7 @@ def test_a_black_picture_names_its_cause(cause: str) -> None:
     assert not image.rgb.any()
 
 
-@pytest.mark.parametrize("radiance", [1e-5, 3e-4])
+@pytest.mark.parametrize("radiance", [1e-12, 1e-5, 3e-4])
 def test_a_dark_picture_names_the_exposure(radiance: float) -> None:
     with pytest.warns(UserWarning, match="the picture is almost black: its brightest pixel is") as caught:
         image = render([BALL], [wf.Environment(radiance)])

@@ -495,6 +495,16 @@ while True:
 )
 
 
+def test_errors_of_writing_name_no_file_but_the_users(tmp_path, monkeypatch):
+    def refuse(source, target):
+        raise PermissionError(13, "Permission denied", source, None, target)
+
+    monkeypatch.setattr(os, "replace", refuse)
+    with pytest.raises(wf.SaveError, match=r"a\.png: cannot be written: Permission denied$"):
+        with_everything().save(tmp_path / "a.png")
+    assert not list(tmp_path.iterdir())
+
+
 @posix
 @pytest.mark.parametrize("extension", ["png", "npz"])
 def test_a_full_disk_leaves_the_old_file(tmp_path, extension):

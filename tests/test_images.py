@@ -140,7 +140,8 @@ def test_float_formats_keep_nan(tmp_path, picture):
             r"a\.tga: extension is '\.tga'; it must be one of "
             r"\.png, \.jpg, \.jpeg, \.exr, \.hdr, \.npy, \.npz",
         ),
-        ("a", r"extension is ''; it must be one of"),
+        ("", r": is a folder, not a file"),
+        ("a", r"a: has no extension; it must be one of .png"),
         ("missing/a.png", r"a\.png: the folder .*missing does not exist"),
         ("folder.png", r"folder\.png: is a folder"),
     ],

@@ -88,6 +88,11 @@ def test_unknown_layers_are_named():
         with_everything().plot("dept")
 
 
+def test_layers_that_were_not_rendered_say_how_to_get_them():
+    with pytest.raises(wf.SceneError, match=r"no layer 'depth'; render it with aovs=\('depth',\)"):
+        wf.Image(np.zeros((2, 2, 3), np.float32)).plot("depth")
+
+
 def test_without_matplotlib_the_error_says_what_to_install():
     code = (
         "import sys, numpy as np, wavefront as wf\n"

@@ -153,6 +153,14 @@ BAD = [
         for v in (0, -1, 1.5, "9", True)
     ),
     *(({"spp": v}, r"spp is ") for v in (np.nan, 2**26 + 1)),
+    ({"spp": np.zeros((320, 3))}, r"spp is an array of shape \(320, 3\); it must be"),
+    ({"camera": [[0.0] * 99] * 2}, r"camera must be a wf.Camera, got .{121}; wf.Camera.look_at"),
+    *(
+        ({name: "yes"}, rf"{name} is 'yes'; it must be True or False")
+        for name in ("ground", "denoise", "strict")
+    ),
+    ({"progress": "yes"}, r"progress is 'yes'; it must be True, False, None or a function"),
+    ({"seconds": "30"}, r"seconds must be a number, got '30'"),
     ({"max_bounces": -1}, r"max_bounces is -1; it must be a whole number from 0"),
     ({"max_bounces": 2.0}, r"max_bounces is 2.0; it must be a whole number from 0"),
     ({"wave_size": 0}, r"wave_size is 0; it must be a whole number from 1"),
@@ -183,8 +191,9 @@ TRIANGLES = [np.zeros((3, 3)), np.array([[0, 1, 2]])]
 BAD_SCENES = [
     (None, r"cannot render NoneType: give a wf.Scene, a path"),
     (5, r"cannot render int"),
-    ([], r"cannot render list"),
+    ([], r"cannot render an empty list"),
     ([BALL, 5], r"cannot render int"),
+    ("https://example.com/a.glb", r"^https://example.com/a.glb: there is no such file$"),
     (TRIANGLES, r"cannot render ndarray: give .* \(vertices, faces\) as a tuple"),
     (([[0, 0, 0]], [[0, 0, 1]]), r"faces\[0\]\[2\] is 1; it must be in \[0, 0\]"),
     (([[0, 0, np.nan]] * 3, [[0, 1, 2]]), r"vertices\[0\]\[2\] is nan"),
@@ -209,6 +218,12 @@ def test_bad_arguments_are_named_before_any_work(change: dict, message: str, mon
         monkeypatch.setattr(module, name, work)
     with pytest.raises(wf.SceneError, match=message):
         wf.render(small(), **{"progress": False, **change})
+
+
+def test_an_error_of_the_size_of_the_picture_is_doubted() -> None:
+    """Who writes noise=2 for two percent is told."""
+    with pytest.warns(UserWarning, match=r"noise is 2, a relative error of 200 %; 2 % is 0\.02$"):
+        wf.render(small(), noise=2, progress=False)
 
 
 @pytest.mark.parametrize(("scene", "message"), BAD_SCENES, ids=range(len(BAD_SCENES)))

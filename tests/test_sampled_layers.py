@@ -90,6 +90,8 @@ def test_layers_that_are_not_asked_for_are_not_made() -> None:
     assert plain.layers == plain.light_groups == plain.coverage == {}
     image = render(room(8), 2, aovs="indirect")
     assert list(image.layers) == list(image.errors) == ["indirect"]
+    with pytest.raises(AttributeError, match="no attribute 'dept'; did you mean 'depth'"):
+        _ = image.dept
     with pytest.raises(AttributeError, match="render it with aovs="):
         _ = image.direct
 

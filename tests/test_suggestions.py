@@ -15,6 +15,9 @@ HERE = (0, 0, 5), (0, 0, 0)
 KEYWORDS = [
     (lambda: wf.render(BALL, sample_count=4), "render", "sample_count", "spp"),
     (lambda: wf.render(BALL, samples_per_pixel=4), "render", "samples_per_pixel", "spp"),
+    (lambda: wf.render(BALL, ssp=4), "render", "ssp", "spp"),
+    (lambda: wf.render(BALL, color=1), "render", "color", "material"),
+    (lambda: wf.render(BALL, environment=1), "render", "environment", "lighting"),
     (lambda: wf.render(BALL, max_depth=4), "render", "max_depth", "max_bounces"),
     (lambda: wf.render(BALL, resolution=4), "render", "resolution", "size"),
     (lambda: wf.render(BALL, threads=4), "render", "threads", "workers"),
@@ -40,6 +43,8 @@ KEYWORDS = [
     (lambda: wf.Conductor(1, 1, rougness=0.1), "Conductor", "rougness", "roughness"),
     (lambda: wf.Conductor.named("gold", rough=0.1), "Conductor.named", "rough", "roughness"),
     (lambda: wf.Sphere(centre=(0, 0, 0), radius=1), "Sphere", "centre", "center"),
+    (lambda: wf.Sphere((0, 0, 0), r=1), "Sphere", "r", "radius"),
+    (lambda: wf.Sphere((0, 0, 0), 1, color=1), "Sphere", "color", "material"),
     (lambda: wf.Sphere(pos=(0, 0, 0), radius=1), "Sphere", "pos", "center"),
     (lambda: wf.Mesh(*TRIANGLE, vertex_colors=1), "Mesh", "vertex_colors", "colors"),
     (lambda: wf.Mesh(verts=1, tris=2), "Mesh", "verts", "vertices"),

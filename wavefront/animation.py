@@ -15,7 +15,7 @@ from .codecs.display import Display
 from .codecs.images import check_writable
 from .codecs.white_balance import WhiteBalance
 from .errors import SaveError, SceneError, number
-from .files import check_target, path_name, write_bytes
+from .files import check_target, extension_of, path_name, write_bytes
 from .image import Image
 
 ANIMATIONS = (".gif", ".png", ".mp4")
@@ -87,10 +87,10 @@ def check_animation(path: str | os.PathLike[str]) -> None:
     if "{" in name:
         check_writable(numbered(name, 0))
         return
-    extension = Path(name).suffix.lower()
-    if extension not in ANIMATIONS:
-        raise SaveError(f"{name}: extension is {extension!r}; it must be one of {', '.join(ANIMATIONS)}")
-    if extension == ".mp4" and find_spec("av") is None:
+    kind = extension_of(name, ANIMATIONS, SaveError)
+    if kind not in ANIMATIONS:
+        raise SaveError(f"{name}: extension is {kind!r}; it must be one of {', '.join(ANIMATIONS)}")
+    if kind == ".mp4" and find_spec("av") is None:
         raise SaveError(f"{name}: mp4 needs pip install av")
     check_target(name)
 

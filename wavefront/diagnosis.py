@@ -26,7 +26,6 @@ from .stages.intersect import intersect, shadow_rays, visible
 from .state import Hits, Rays, SurfaceInteraction
 from .vec import Bools, Ints, dot, f4
 
-BLACK = (0.5 / 255) ** 2.2  # radiance below which the code in a PNG is 0
 GRID = 16  # rays across the picture and down
 SAMPLES = 16  # light samples at each visible point
 
@@ -51,7 +50,7 @@ def warn_of_black_or_white(
     sight = Sight(scene, compiled, view, integrator, max_bounces)
     if darkest > 1:
         warn_caller(f"the picture is white: {sight.why_white(darkest)}")
-    elif brightest > BLACK:
+    elif brightest > 0:
         stops = int(np.ceil(np.log2(0.5 / brightest)))
         warn_caller(
             f"the picture is almost black: its brightest pixel is {brightest:.2g}, and 1 is white; "

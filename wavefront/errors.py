@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import warnings
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from .suggestions import did_you_mean
 
 PACKAGE = os.path.join(os.path.dirname(__file__), "")
+MOST_LETTERS = 120  # of a value in a message
 
 
 class SceneError(ValueError):
@@ -117,6 +118,27 @@ def warn_caller(message: str) -> None:
     warnings.warn(message, stacklevel=level)
 
 
+def in_brief(value: Any) -> str:
+    """Return what a message says of a wrong value: its repr on one line, cut off where it is long."""
+    if isinstance(value, np.ndarray) and value.ndim:
+        return f"an array of shape {value.shape}"
+    text = " ".join(repr(value).split())
+    return text if len(text) <= MOST_LETTERS else f"{text[:MOST_LETTERS]}…"
+
+
+def iterable(name: str, value: Any, of: str) -> Iterator[Any]:
+    """Return an iterator over several things.
+
+    Raises
+    ------
+    SceneError
+        If `value` is a single thing.
+    """
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        raise SceneError(f"{name} must be a list of {of}, got {in_brief(value)}")
+    return iter(value)
+
+
 def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
     """Return `value` as a float64 array of `shape` (None matches any length).
 
@@ -128,7 +150,7 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> 
     try:
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise SceneError(f"{name} must be numeric, got {value!r}") from error
+        raise SceneError(f"{name} must be numeric, got {in_brief(value)}") from error
     fits = array.ndim == len(shape) and all(
         want is None or have == want for have, want in zip(array.shape, shape, strict=True)
     )
@@ -153,7 +175,8 @@ def one_of(name: str, value: Any, choices: Collection[Any]) -> Any:
     """
     if not isinstance(value, str | int) or value not in choices:
         hint = did_you_mean(value, [choice for choice in choices if isinstance(choice, str)])
-        raise SceneError(f"{name} is {value!r}; it must be one of {', '.join(map(str, choices))}{hint}")
+        listed = ", ".join(map(str, choices))
+        raise SceneError(f"{name} is {in_brief(value)}; it must be one of {listed}{hint}")
     return value
 
 
@@ -168,9 +191,11 @@ def number(
         Naming `name`, the value and `limit`.
     """
     try:
+        if isinstance(value, str | bytes):  # float reads these
+            raise TypeError
         result = float(value)
     except (TypeError, ValueError) as error:
-        raise SceneError(f"{name} must be a number, got {value!r}") from error
+        raise SceneError(f"{name} must be a number, got {in_brief(value)}") from error
     if not np.isfinite(result) or not holds(result):
         raise SceneError(f"{name} is {value!r}; it must be {limit}")
     return result

@@ -91,6 +91,25 @@ def path_name(path: str | os.PathLike[str], error: type[SceneError] = SceneError
     return name
 
 
+def extension_of(
+    path: str | os.PathLike[str], known: Iterable[str], error: type[SceneError] = SceneError
+) -> str:
+    """Return the extension of a path, such as ".png", in lower case.
+
+    Raises
+    ------
+    SceneError
+        Or the subclass `error`, if there is none; the message names those that are known.
+    """
+    name = path_name(path, error)
+    found = Path(name).suffix.lower()
+    if found:
+        return found
+    if os.path.isdir(name):
+        raise error(f"{name}: is a folder, not a file")
+    raise error(f"{name or repr(name)}: has no extension; it must be one of {', '.join(known)}")
+
+
 def check_target(path: str | os.PathLike[str]) -> Path:
     """Return the target of `path` after checking that a file can be written there.
 
@@ -204,7 +223,7 @@ def write_chunks(path: str | os.PathLike[str], chunks: Callable[[], Iterable[Any
     except SaveError:
         raise
     except OSError as error:
-        raise SaveError(f"{path}: cannot be written: {error}") from error
+        raise SaveError(f"{path}: cannot be written: {error.strerror or error}") from error
     finally:
         with contextlib.suppress(OSError):
             scratch.unlink()

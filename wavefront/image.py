@@ -27,6 +27,7 @@ from .layers import BOXES, CLAMPED, GIVEN_LAYERS, LAYERS, NOISY, is_radiance
 from .outlines import outline_coverage
 from .picture_sums import PictureSums, merged_metadata, merged_sums, restored_sums
 from .samples import shared_samples
+from .suggestions import did_you_mean
 from .vec import Floats, luminance
 
 FIELDS = ("counts", "variance", "standard_error")  # arrays (H, W, ...) besides rgb, layers and errors
@@ -130,7 +131,9 @@ class Image:
                 return self.layers[name]
             setting = "clamp=" if name == CLAMPED else f"aovs=({name!r},)"
             raise AttributeError(f"the image has no layer {name!r}; render it with {setting}")
-        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        known = () if name.startswith("_") else (*LAYERS, *GIVEN_LAYERS, *vars(self), *dir(type(self)))
+        hint = did_you_mean(name, [other for other in known if not other.startswith("_")])
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{hint}")
 
     @property
     def boxes(self) -> list[dict[str, Any]]:
@@ -600,6 +603,8 @@ class Image:
         from . import plot
 
         arrays = {**self._data().named(), "luminance": luminance(np.moveaxis(self.rgb, -1, 0))}
+        if name in LAYERS and name not in arrays:
+            raise SceneError(f"plot: the image has no layer {name!r}; render it with aovs=({name!r},)")
         values = arrays[one_of("layer", name, arrays)]
         table = self.names.get(name.removesuffix("_id"), {}) if name.endswith("_id") else None
         return plot.draw(name, self.to_uint8()[..., :3] if name == "rgb" else values, table, axes)

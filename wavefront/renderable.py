@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from copy import copy
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -54,14 +53,15 @@ def as_scene(subject: Any, material: MaterialLike | None = None, progress: Progr
     if isinstance(subject, str | os.PathLike):
         from .io.load import load  # here, so that scenes in memory do not pay for readers
 
-        return _all_made_of(load(Path(subject), progress=progress), material)
+        return _all_made_of(load(subject, progress=progress), material)
     if importer(subject) is not None:
         return _all_made_of(_imported(subject), material)
     if _is_pair(subject):
         return Scene([Mesh(*subject, material=material)])
     if isinstance(subject, list | tuple) and subject:
         return _joined(subject, material, progress)
-    raise SceneError(f"cannot render {type(subject).__name__}: give {CAN_BE_RENDERED}")
+    what = "an empty list" if isinstance(subject, list | tuple) and not subject else type(subject).__name__
+    raise SceneError(f"cannot render {what}: give {CAN_BE_RENDERED}")
 
 
 def choose_camera(scene: Scene, camera: Camera | None, size: tuple[int, int] | None, up: Any) -> Camera:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, ClassVar, Self, SupportsIndex, TypeAlias, TypeVar
@@ -10,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .accel import AcceleratorCache
-from .camera import Camera, field_of_view, image_size, upward
+from .camera import Camera, check_camera, field_of_view, image_size, upward
 from .counted import counted
 from .elementary import arctan2, sin_cos
-from .errors import SceneError, finite_array
+from .errors import SceneError, finite_array, in_brief
 from .lights import Environment, Light
 from .scene_html import scene_html
 from .shapes import Instance, Mesh, PrimitiveArray, Shape
@@ -106,9 +107,7 @@ class Scene:
 
     @camera.setter
     def camera(self, camera: Camera | None) -> None:
-        if camera is not None and not isinstance(camera, Camera):
-            raise SceneError(f"camera must be a wf.Camera, got {camera!r}")
-        self._camera = camera
+        self._camera = check_camera("camera", camera)
 
     def add(self, *items: Any) -> Self:
         """Add shapes, objects of trimesh, and lights; return the scene.
@@ -248,6 +247,10 @@ class CheckedList(list[T], ABC):
     def converted(self, item: Any) -> list[T] | None:
         """Return the elements for an item, None if the item is not allowed."""
 
+    @abstractmethod
+    def hint(self, item: Any) -> str:
+        """Return where an item belongs that is not allowed here, for messages; "" where that is unknown."""
+
     def append(self, item: Any) -> None:
         """Add an element at the end."""
         self.extend([item])
@@ -276,12 +279,14 @@ class CheckedList(list[T], ABC):
     def _all(self, items: Any, first: int) -> list[T]:
         """Return the elements for items; `first` is the index of the first one in the list, for messages."""
         if isinstance(items, str | dict) or not isinstance(items, Iterable):
-            raise SceneError(f"{self.name} must be a list of {self.allowed}, got {items!r}")
+            hint = self.hint(items)
+            raise SceneError(f"{self.name} must be a list of {self.allowed}, got {in_brief(items)}{hint}")
         found: list[T] = []
         for number, item in enumerate(items, first):
             elements = self.converted(item)
             if elements is None:
-                raise SceneError(f"{self.name}[{number}] is {item!r}; it must be one of {self.allowed}")
+                what, hint = in_brief(item), self.hint(item)
+                raise SceneError(f"{self.name}[{number}] is {what}; it must be one of {self.allowed}{hint}")
             found += elements
         return found
 
@@ -302,6 +307,12 @@ class Shapes(CheckedList[Shape]):
         convert = importer(item)
         return None if convert is None else convert(item).shapes
 
+    def hint(self, item: Any) -> str:
+        """Return where lights and files belong."""
+        if isinstance(item, Light):
+            return "; lights are given as lights=[...]"
+        return "; wf.load(path) reads a file as a scene" if isinstance(item, str | os.PathLike) else ""
+
 
 class Lights(CheckedList[Light]):
     """The lights of a scene."""
@@ -315,6 +326,12 @@ class Lights(CheckedList[Light]):
     def converted(self, item: Any) -> list[Light] | None:
         """Return a light."""
         return [item] if isinstance(item, Light) else None
+
+    def hint(self, item: Any) -> str:
+        """Return where shapes and cameras belong."""
+        if isinstance(item, Camera):
+            return "; a camera is given as camera=..."
+        return "; shapes that shine belong to the shapes" if isinstance(item, Shape) else ""
 
 
 def _check_environments(lights: Sequence[Light]) -> None:

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .accel.registry import ACCELERATORS, AcceleratorMaker
-from .camera import Camera, image_size, upward
+from .camera import Camera, check_camera, image_size, upward
 from .codecs.image_data import TRANSPARENT
-from .errors import SceneError, number, rgb
+from .errors import SceneError, in_brief, number, rgb, warn_caller
 from .exact_sum import MAX_TERMS
 from .files import check_target
 from .filters import FILTERS, Filter
@@ -99,7 +99,7 @@ def whole_number(low: int, high: int) -> SettingCheck:
     def check(name: str, value: Any) -> int:
         whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
         if not whole or not low <= value <= high:
-            raise SceneError(f"{name} is {value!r}; it must be a whole number from {low} to {high}")
+            raise SceneError(f"{name} is {in_brief(value)}; it must be a whole number from {low} to {high}")
         return int(value)
 
     return check
@@ -120,7 +120,7 @@ def auto_or(check: SettingCheck) -> SettingCheck:
 def check_flag(name: str, value: Any) -> bool:
     """Check that something is True or False."""
     if not isinstance(value, bool | np.bool_):
-        raise SceneError(f"{name} is {value!r}; it must be True or False")
+        raise SceneError(f"{name} is {in_brief(value)}; it must be True or False")
     return bool(value)
 
 
@@ -129,22 +129,32 @@ def above_zero(name: str, value: Any) -> float:
     return number(name, value, lambda x: x > 0, "above 0")
 
 
+def check_noise(name: str, value: Any) -> float:
+    """Check that a relative error is positive, and warn if it is no less than the picture."""
+    found = above_zero(name, value)
+    if found >= 1:
+        warn_caller(
+            f"{name} is {found:g}, a relative error of {100 * found:g} %; {found:g} % is {found / 100:g}"
+        )
+    return found
+
+
+def check_progress(name: str, value: Any) -> Progress:
+    """Check that something is True, False, None or can be called."""
+    if not (value is None or isinstance(value, bool) or callable(value)):
+        raise SceneError(f"{name} is {in_brief(value)}; it must be True, False, None or a function")
+    return value
+
+
 def check_samples(name: str, value: Any) -> range | None:
     """Check that something is a range of consecutive numbers from 0 on, or None."""
     if value is None:
         return None
     if not isinstance(value, range) or value.step != 1 or not value or value.start < 0:
         raise SceneError(
-            f"{name} is {value!r}; it must be a range of consecutive samples, such as range(64, 128); "
-            "spp is their number"
+            f"{name} is {in_brief(value)}; it must be a range of consecutive samples, "
+            "such as range(64, 128); spp is their number"
         )
-    return value
-
-
-def check_camera(name: str, value: Any) -> Camera | None:
-    """Check that something is a camera, or None."""
-    if value is not None and not isinstance(value, Camera):
-        raise SceneError(f"{name} must be a wf.Camera, got {value!r}")
     return value
 
 
@@ -223,6 +233,7 @@ class Settings:
         "Adds a level ground under the scene that catches its shadow and fades into the background. "
         "It belongs to the picture alone: the scene, its bounds and the numbers of its shapes stay.",
         option="add a ground that catches the shadow",
+        check=check_flag,
     )
     background: str | ArrayLike | None = setting(
         None,
@@ -293,7 +304,7 @@ class Settings:
         "Noisy parts get more samples than calm ones, and every pixel at least 32. When `spp` or "
         "`seconds` end the render above it, a warning says so.",
         option="go on to this relative error, such as 0.02",
-        check=optional(above_zero),
+        check=optional(check_noise),
     )
     seconds: float | None = setting(
         None,
@@ -390,6 +401,7 @@ class Settings:
         False,
         "True makes it an error, not a warning, when workers on other machines may compute other bits: "
         "because of another version of NumPy or of this package, or another processor.",
+        check=check_flag,
     )
     aovs: str | Sequence[str] = setting(
         (),
@@ -408,6 +420,7 @@ class Settings:
         'that the layers "denoising_albedo" and "denoising_normal" show, which it adds. `image.noisy` is the '
         "picture before.",
         option="remove noise from the picture",
+        check=check_flag,
     )
     progress: Progress = setting(
         None,
@@ -415,6 +428,7 @@ class Settings:
         "in its place, and refines. False shows neither; a function is called with how much is done and "
         "how much there is at most: samples, or seconds where `seconds` is given. While a wave takes long "
         "it is called every second.",
+        check=check_progress,
     )
     max_spp: int = field(init=False)  # the most samples that a pixel may get
     worker_count: int = field(init=False)

@@ -10,6 +10,8 @@ from typing import ParamSpec, TypeVar
 P = ParamSpec("P")
 R = TypeVar("R")
 
+COLORS = ("reflectance", "base_color", "intensity", "irradiance", "radiance", "colors")
+
 # Names in other programs, in lower case without underscores, and the names here. The first one that is known
 # where the name was used is suggested.
 SYNONYMS: dict[str, tuple[str, ...]] = {
@@ -19,13 +21,14 @@ SYNONYMS: dict[str, tuple[str, ...]] = {
     "bounces": ("max_bounces",),
     "center": ("position", "origin", "target"),
     "centre": ("center", "position", "origin"),
-    "color": ("reflectance", "base_color", "intensity", "irradiance", "radiance", "colors", "emission"),
-    "colour": ("reflectance", "base_color", "intensity", "irradiance", "radiance", "colors", "emission"),
+    "color": (*COLORS, "material", "emission"),
+    "colour": (*COLORS, "material", "emission"),
     "depth": ("max_bounces",),
     "diffuse": ("reflectance", "base_color"),
     "emit": ("emission",),
     "emissive": ("emission",),
     "energy": ("intensity", "irradiance", "radiance"),
+    "environment": ("lighting",),
     "eta": ("ior",),
     "eye": ("origin",),
     "fieldofview": ("fov",),
@@ -46,10 +49,12 @@ SYNONYMS: dict[str, tuple[str, ...]] = {
     "nsamples": ("spp",),
     "numsamples": ("spp",),
     "numthreads": ("workers",),
+    "pixels": ("rgb",),
     "pos": ("position", "origin", "center"),
     "position": ("origin", "center"),
     "power": ("intensity", "irradiance", "radiance"),
     "quality": ("spp",),
+    "r": ("radius",),
     "radiance": ("emission", "intensity", "irradiance"),
     "resolution": ("size",),
     "samplecount": ("spp",),
@@ -71,6 +76,8 @@ SYNONYMS: dict[str, tuple[str, ...]] = {
     "width": ("size",),
     "yfov": ("fov",),
     "arealight": ("Rectangle",),
+    "box": ("Mesh",),
+    "cube": ("Mesh",),
     "dome": ("Environment",),
     "envmap": ("Environment",),
     "environmentlight": ("Environment",),
@@ -82,10 +89,12 @@ SYNONYMS: dict[str, tuple[str, ...]] = {
     "pathtracer": ("full",),
     "pbr": ("Principled",),
     "perspectivecamera": ("Camera",),
+    "plane": ("Rectangle",),
     "plastic": ("Principled",),
     "quad": ("Rectangle",),
     "random": ("independent",),
     "sun": ("DirectionalLight",),
+    "triangle": ("Mesh",),
     "trianglemesh": ("Mesh",),
 }
 
@@ -113,7 +122,7 @@ def meant(name: str, known: Iterable[str]) -> str | None:
     for synonym in SYNONYMS.get(word, ()):
         if _plain(synonym) in plain:
             return plain[_plain(synonym)]
-    close = get_close_matches(word, plain, 1, 0.7)
+    close = get_close_matches(word, plain, 1, 0.66 if len(word) < 4 else 0.7)  # one letter of three
     return plain[close[0]] if close else None
 
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from .camera import Camera, upward
 from .camera.moves import orbit
-from .errors import SceneError
+from .errors import SceneError, iterable
 from .image import Image
 from .renderable import as_scene, choose_camera
 from .session import Session
@@ -51,7 +51,7 @@ def render_many(
     >>> [image.shape for image in wf.render_many(scene, cameras, spp=1)]
     [(16, 16, 3), (16, 16, 3), (16, 16, 3)]
     """
-    views = iter(cameras)
+    views = iterable("cameras", cameras, "cameras, such as wf.turntable(scene, 12)")
     first = next(views, None)
     if first is None:
         raise SceneError("cameras is empty; render_many needs at least one")

@@ -1,6 +1,6 @@
 """Cameras: rays through points of the film and of the lens."""
 
-from .base import Camera, field_of_view, image_size, upward
+from .base import Camera, check_camera, field_of_view, image_size, upward
 from .projection import Orthographic, Panorama, Perspective, Projection
 
 __all__ = [
@@ -9,6 +9,7 @@ __all__ = [
     "Panorama",
     "Perspective",
     "Projection",
+    "check_camera",
     "field_of_view",
     "image_size",
     "upward",

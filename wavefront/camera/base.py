@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..elementary import arctan2
-from ..errors import SceneError, finite_array, number, rotation_matrix, warn_caller
+from ..errors import SceneError, finite_array, in_brief, number, rotation_matrix, warn_caller
 from ..parameter import brief
 from ..state import Words
 from ..suggestions import suggests_keywords
@@ -473,7 +473,9 @@ def _axes(backward: NDArray[np.float64], up: ArrayLike) -> NDArray[np.float64]:
     vertical = upward("Camera up", up)
     right = np.cross(vertical, backward)
     if not np.linalg.norm(right) > 1e-9 * np.linalg.norm(vertical):
-        raise SceneError(f"Camera up {vertical.tolist()} must not be zero or parallel to the view")
+        raise SceneError(
+            f"Camera up {vertical.tolist()} must not be zero or parallel to the view; give another up="
+        )
     right = right / np.linalg.norm(right)
     return np.stack([right, np.cross(backward, right), backward], 1)
 
@@ -546,6 +548,15 @@ def field_of_view(fov: float) -> float:
             f"which is {np.degrees(degrees):.4g}"
         )
     return degrees
+
+
+def check_camera(name: str, value: Any) -> Camera | None:
+    """Check that something is a camera, or None."""
+    if value is not None and not isinstance(value, Camera):
+        raise SceneError(
+            f"{name} must be a wf.Camera, got {in_brief(value)}; wf.Camera.look_at(origin, target) makes one"
+        )
+    return value
 
 
 def image_size(size: tuple[int, int]) -> tuple[int, int]:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import os
 from typing import Any, NoReturn
 
 from ..suggestions import did_you_mean, meant
 from .status import ERROR
+
+COMMAND = "command"  # the name of the first word in messages
 
 
 class Parser(argparse.ArgumentParser):
@@ -30,6 +33,8 @@ class Parser(argparse.ArgumentParser):
             super()._check_value(action, value)
         except argparse.ArgumentError as error:
             hint = did_you_mean(value, map(str, action.choices or ()))
+            if action.metavar == COMMAND and os.path.isfile(value):
+                hint = f"; to render a file: {self.prog} render {value}"
             raise argparse.ArgumentError(action, error.message + hint) from None
 
     def error(self, message: str) -> NoReturn:

@@ -16,7 +16,7 @@ from typing import Any
 from ..errors import RenderError, SceneError
 from ..version import VERSION
 from .arguments import joined
-from .command import Parser
+from .command import COMMAND, Parser
 from .compare_command import add_compare_command
 from .completion_command import add_completion_command
 from .dataset_command import add_dataset_command
@@ -89,7 +89,7 @@ def parser() -> argparse.ArgumentParser:
         "1 doctor found a fault, 2 error, 130 stopped by Ctrl-C, 143 by SIGTERM.",
     )
     top.add_argument("--version", action="version", version=VERSION)
-    commands = top.add_subparsers(required=True, metavar="command")
+    commands = top.add_subparsers(required=True, metavar=COMMAND)
     add_render_command(commands)
     add_turntable_command(commands)
     add_view_command(commands)

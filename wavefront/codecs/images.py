@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..counted import counted
 from ..errors import SaveError, SceneError, warn_caller
-from ..files import MAX_PIXELS, check_size, check_target, path_name, read_bytes, write_bytes
+from ..files import MAX_PIXELS, check_size, check_target, extension_of, read_bytes, write_bytes
 from ..registry import Registry
 from ..vec import Floats
 from . import exr, npz
@@ -189,9 +189,9 @@ def _decode(name: str, decode: Callable[[bytes], T], data: bytes, kind: str) -> 
 
 def _find(table: Registry[T], path: str | os.PathLike[str], error: type[SceneError] = SceneError) -> T:
     """Return the entry of a table for the extension of a path."""
-    name = path_name(path, error)
+    kind = extension_of(path, table, error)
     try:
-        return table.find(Path(name).suffix.lower(), f"{name}: extension")
+        return table.find(kind, f"{os.fspath(path)}: extension")
     except SceneError as unknown:
         raise error(str(unknown)) from None
 

@@ -9,18 +9,17 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..camera import Camera
+from ..camera import Camera, check_camera
 from ..codecs.display import Display
 from ..codecs.png_jpeg import Gamma
 from ..codecs.white_balance import WhiteBalance
-from ..errors import SceneError, number, one_of
+from ..errors import SceneError, iterable, number, one_of
 from ..files import make_folder, path_name, read_json, write_json
 from ..identity import differences
 from ..layers import chosen_layers
 from ..renderable import as_scene
 from ..scene import Scene
 from ..session import Session
-from ..settings import check_camera
 from .annotated import AnnotatedObject, annotated_objects
 from .bop import BopLayout
 from .coco import CocoLayout
@@ -237,7 +236,7 @@ def _checked_cameras(
 ) -> list[Camera]:
     """Return the cameras in the size that is asked for."""
     found = []
-    for at, camera in enumerate(cameras):
+    for at, camera in enumerate(iterable("cameras", cameras, "cameras, such as wf.turntable(scene, 12)")):
         name = f"cameras[{at}]"
         check_camera(name, camera)
         found.append(camera if size is None else camera.resized(size))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from ..errors import SceneError
-from ..files import decode_text
+from ..files import decode_text, extension_of
 from ..registry import Registry
 from ..scene import Scene
 from . import dae, gltf, mtl, obj, off, ply, stl, threemf, trimesh_objects, visuals
@@ -40,11 +40,11 @@ def read(path: PathLike, wish: Wish) -> Contents:
         If it cannot be read. The message names the file, the line or element, the value and the limit.
     """
     name = os.fspath(path)
-    extension = Path(name).suffix.lower()
-    parse = READERS.find(extension, f"{name}: extension")
+    kind = extension_of(name, READERS)
+    parse = READERS.find(kind, f"{name}: extension")
     files = SceneFiles(path, wish.search_paths, wish.limits)
     data = files.read(path)
-    if extension in PLAIN:
+    if kind in PLAIN:
         _refuse(name, data)
     try:
         contents = parse(files, data, wish)

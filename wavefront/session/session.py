@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..accel.registry import AcceleratorMaker
-from ..camera import Camera, image_size
+from ..camera import Camera, check_camera, image_size
 from ..checkpoint import Checkpoint
 from ..errors import RenderError, SaveError, SceneError, warn_caller
 from ..filters import Filter
@@ -36,7 +36,7 @@ from ..scheduling.loop import PassSplitter, doubling, undivided
 from ..scheduling.pool import WorkerPool
 from ..scheduling.shared import STOP, Stopped
 from ..scheduling.tracing import WaveMonitor, trace_any_job
-from ..settings import Settings, check_camera
+from ..settings import Settings
 from ..suggestions import suggests_keywords
 from ..trial import TrialJob, TrialPart
 from .last_checks import check_last_image
