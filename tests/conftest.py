@@ -1,6 +1,5 @@
 """Settings of the whole suite."""
 
-import math
 import signal
 from collections.abc import Iterator
 
@@ -32,14 +31,6 @@ def close_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
     from wavefront import pixel_tiles
 
     monkeypatch.setattr(pixel_tiles, "STRIDE", 1)
-
-
-@pytest.fixture
-def one_picture_per_pass(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let sessions show no pictures in between, as they do where a pass takes long, on any machine."""
-    from wavefront.session import session
-
-    monkeypatch.setattr(session, "SNAPSHOT_INTERVAL", math.inf)
 
 
 @pytest.fixture

@@ -185,7 +185,6 @@ def test_sessions_save_what_renders_go_on_with(tmp_path: Path) -> None:
     assert digest(wf.render(scene(), 16, checkpoint=path)) == digest(wf.render(scene(), 16))
 
 
-@pytest.mark.usefixtures("one_picture_per_pass")
 def test_a_session_iterates_from_where_the_checkpoint_is(tmp_path: Path) -> None:
     """And renders one view only."""
     wf.render(scene(), 6, checkpoint=tmp_path / "a")

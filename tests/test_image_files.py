@@ -526,7 +526,7 @@ def test_a_killed_process_leaves_a_whole_file(tmp_path, extension, pause):
     script = FOREVER.format(folder=os.path.dirname(__file__))
     with subprocess.Popen([sys.executable, "-c", script, path], stdout=subprocess.PIPE) as process:
         process.stdout.readline()
-        while not path.exists():
+        while not path.exists() and process.poll() is None:
             time.sleep(0.01)
         time.sleep(pause)
         process.send_signal(signal.SIGKILL)

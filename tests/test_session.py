@@ -92,7 +92,6 @@ def test_long_passes_show_pictures_in_between(monkeypatch: pytest.MonkeyPatch) -
     assert all((image.counts == image.spp).all() for image in images)
 
 
-@pytest.mark.usefixtures("one_picture_per_pass")
 def test_noise_gives_a_picture_at_each_decision() -> None:
     """Among others; the last one is that of render."""
     options = {"noise": 0.05, "workers": 1, **QUIET}
@@ -133,6 +132,13 @@ def view(x: float, size: tuple[int, int] = (20, 15)) -> wf.Camera:
     return wf.Camera.look_at((x, 0.5, 3.9), (0, 0, 0), size=size)
 
 
+@pytest.fixture
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let sessions wait for workers that were stopped, and so keep them, however late these hear of it."""
+    monkeypatch.setattr(pool, "CANCEL_TIMEOUT", 60.0)
+
+
+@pytest.mark.usefixtures("patient")
 @pytest.mark.parametrize("executor", EXECUTORS)
 @pytest.mark.parametrize("sampler", ["sobol", "bluenoise"])
 def test_another_camera_compiles_nothing_and_starts_no_worker(
@@ -205,7 +211,7 @@ def test_time_begins_anew_with_another_camera(monkeypatch: pytest.MonkeyPatch) -
 # --- Stopping -------------------------------------------------------------------------------------
 
 
-@pytest.mark.usefixtures("one_picture_per_pass")
+@pytest.mark.usefixtures("patient")
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_stop_in_the_loop_ends_it(executor: str) -> None:
     """Another camera begins anew, with the same workers."""
