@@ -36,6 +36,9 @@ def telling(done, total):
 def sampled(done, total):
     if done:
         telling(done, total)
+def rest():
+    for _ in range(6000):  # one long sleep would go on if Ctrl-C came while Python hands its lock to a thread
+        time.sleep(0.01)
 def left():
     return [each.name for each in threading.enumerate()[1:]] + multiprocessing.active_children()
 """
@@ -183,7 +186,7 @@ def test_ctrl_c_while_a_scene_is_set_up() -> None:
     body = """
 def compile_scene(*_, **__):
     print("compiling", flush=True)
-    time.sleep(60)
+    rest()
 sys.modules["wavefront.session.prepared_scene"].compile_scene = compile_scene
 try:
     wf.render(light, 1)

@@ -367,7 +367,7 @@ try:
         for image in session:
             print("tracing", flush=True)
             if {where!r} == "looking":
-                time.sleep(60)
+                rest()
 except KeyboardInterrupt as stop:
     print(type(stop).__name__, "left", left(), flush=True)
 """
