@@ -256,7 +256,10 @@ CASES: dict[str, dict[str, tuple[Write, str]]] = {
             lambda folder: (os.symlink("/dev/zero", folder / "a.obj"), folder / "a.obj")[1],
             "device or pipe",
         ),
-        "http": (text("mtllib http://127.0.0.1/s.mtl\n" + FACE), "only files in its own folder are read"),
+        "http": (
+            text("mtllib http://127.0.0.1/s.mtl\n" + FACE),
+            "only files in its folder and the search paths are read",
+        ),
         "gltf": (
             gltf(lambda json: json["buffers"][0].update(uri="../a.bin")),
             r"a\.gltf: refers to '\.\./a\.bin', which is outside",
@@ -267,17 +270,17 @@ CASES: dict[str, dict[str, tuple[Write, str]]] = {
         ),
         "gltf, http": (
             gltf(lambda json: json["buffers"][0].update(uri="https://a.b/c")),
-            "only files in its own",
+            "only files in its folder",
         ),
     },
     "counts": {
         "ply": (
             binary(PLY.format("binary_little_endian", 3, 2 * 10**9).encode() + PLY_BODY, "a.ply"),
-            r"a\.ply: claims 2000000000 of face, at least 2000000036 bytes; \d+ are there",
+            r"a\.ply: claims 2000000000 rows of face, at least 2000000036 bytes; \d+ are there",
         ),
         "ply vertices": (
             binary(PLY.format("binary_little_endian", 10**15, 1).encode() + PLY_BODY, "a.ply"),
-            r"a\.ply: claims 1000000000000000 of vertex",
+            r"a\.ply: claims 1000000000000000 rows of vertex",
         ),
         "ply list": (
             binary(

@@ -880,7 +880,10 @@ def test_ply(write):
     ("data", "message"),
     [
         (ply(1, "0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n"), r"a\.ply"),
-        (ply(10**12, "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"), r"a\.ply: claims 1000000000000 of face, at least"),
+        (
+            ply(10**12, "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"),
+            r"claims 1000000000000 rows of face, at least",
+        ),
         (ply(1, "0 0 0\n1 0"), r"a\.ply: claims"),
         (ply(1, "0 0 0\n1 0\n0 1 0\n3 0 1 2\n"), r"a\.ply line 11: vertex has 2 words; it must have 3"),
         (ply(1, "0 0 0\n1 0 0 5\n0 1 0\n3 0 1 2\n"), r"a\.ply line 11: vertex has 4 words; it must have 3"),
@@ -888,8 +891,8 @@ def test_ply(write):
         (ply(1, "0 0 0\n1 0 0\n0 1 0\n3 0 1\n"), r"a\.ply line 13: face has 3 words; it must have 4"),
         (ply(1, "0 0 0\n1 0 0\n0 1 0\n3 0 1.5 2\n"), r"a\.ply line 13: '0 1\.5 2' are not whole numbers"),
         (ply(1, "0 0 0\n1 0 0\n0 1 0\nx 0 1 2\n"), r"a\.ply line 13: a list of face has the length 'x'"),
-        (ply(1, "0 0 0\n1 0 0\n0 1 0\n2 0 1\n"), r"a\.ply: claims 1 of face; 0 can be read"),
-        (ply(2, "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"), r"a\.ply: claims 2 of face; 1 are there"),
+        (ply(1, "0 0 0\n1 0 0\n0 1 0\n2 0 1\n"), r"a\.ply: claims 1 row of face; 0 can be read"),
+        (ply(2, "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"), r"a\.ply: claims 2 rows of face; 1 are there"),
         (ply("8²", "").encode("latin-1"), r"a\.ply line 7: 'element face 8²' is not part of a PLY header"),
         (ply("x", ""), r"a\.ply line 7: 'element face x' is not part of a PLY header"),
         (ply(1, "").replace("uchar int", "quad int"), r"a\.ply"),

@@ -99,8 +99,8 @@ def test_options_without_effect_are_named(one):
     [
         ("map_Kd -foo 1 t.png", r"s\.mtl line 2: map_Kd has the option '-foo', which is not known"),
         ("map_Kd -s 2", r"line 2: map_Kd names no file"),
-        ("map_Kd -mm a b t.png", r"-mm is 'a b'; it must be numbers"),
-        ("map_Pr -imfchan q t.png", r"-imfchan is 'q'; it must be one of r, g, b, m, l"),
+        ("map_Kd -mm a b t.png", r"line \d+: map_Kd: -mm is 'a b'; it must be numbers"),
+        ("map_Pr -imfchan q t.png", r"line \d+: map_Pr: -imfchan is 'q'; it must be one of r, g, b, m, l"),
         (
             "map_Pr -imfchan m t.png",
             r"line 2: map_Pr: channel is 3; texture 't\.png' has the channels 0 to 2",

@@ -86,7 +86,8 @@ def test_half_turns_can_be_interpolated() -> None:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: wf.turntable(SCENE, 0), "n is 0; it must be at least 1"),
+        (lambda: wf.turntable(SCENE, 0), "n is 0; it must be a whole number from 1 to 1000000"),
+        (lambda: wf.turntable(SCENE, 2.5), "n is 2.5; it must be a whole number from 1 to 1000000"),
         (lambda: wf.interpolate_cameras([look(1, 1, 1)], 4), "4 cameras between 1; both numbers"),
         (lambda: wf.orbit(look(1, 1, 1), (0, 0), 4), "center"),
         (lambda: wf.orbit(look(1, 1, 1), (0, 0, 0), float("nan")), "degrees"),

@@ -13,6 +13,9 @@ from .errors import SceneError, iterable
 from .image import Image
 from .renderable import as_scene, choose_camera
 from .session import Session
+from .settings import whole_number
+
+MOST_VIEWS = 1_000_000  # on a turntable
 
 
 def render_many(
@@ -74,7 +77,7 @@ def turntable(
     scene
         What `render` takes.
     n
-        At least 1.
+        From 1 to a million.
     size
         (width, height) in pixels, in place of the camera's.
     up
@@ -91,8 +94,7 @@ def turntable(
     >>> len(cameras)
     4
     """
-    if n < 1:
-        raise SceneError(f"n is {n}; it must be at least 1")
+    n = whole_number(1, MOST_VIEWS)("n", n)
     subject = as_scene(scene, None, False)
     axis = upward("up", up)
     camera = choose_camera(subject, None, size, axis)

@@ -54,7 +54,8 @@ def check_ply(name: str, data: bytes) -> list[Element]:
         need += element.count * (2 * element.words if text else element.size)
         if need > there + 1:
             raise SceneError(
-                f"{name}: claims {element.count} of {element.name}, at least {need} bytes; {there} are there"
+                f"{name}: claims {counted(element.count, 'row')} of {element.name}, "
+                f"at least {need} bytes; {there} are there"
             )
     if text:
         _check_lines(name, elements, data[end.end() :].decode("latin-1"), header.count("\n") + 2)
@@ -111,7 +112,8 @@ def _check_lines(name: str, elements: list[Element], body: str, first: int) -> N
     for element in elements:
         rows = lines[at : at + element.count]
         if len(rows) < element.count:
-            raise SceneError(f"{name}: claims {element.count} of {element.name}; {len(rows)} are there")
+            claimed = f"{counted(element.count, 'row')} of {element.name}"
+            raise SceneError(f"{name}: claims {claimed}; {len(rows)} are there")
         if element.lists < 2:
             for number, words in rows:
                 _check_words(name, element, number, words)

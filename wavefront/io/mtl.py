@@ -52,10 +52,12 @@ from .appearance import MaterialSpec, build_material
 from .repair import warn
 from .sources import LoadLimits, SceneFiles
 
+# values of `illum`
 GLASS = (4, 6, 7, 9)
 MIRROR = (3, 5, 8)
 NO_HIGHLIGHT = (0, 1)
-LARGEST_ILLUM = 9  # keywords that change the look of a surface
+LARGEST_ILLUM = 9
+
 GLASS_IOR = 1.5
 MATTE = 0.5  # default reflectance
 KS_F0 = 0.08  # the reflectance of `Ks 1`
@@ -148,15 +150,17 @@ class Entry:
         if not name:
             raise SceneError(f"{self.where(key)} names no file")
         self.read.add(key)
-        base, gain = self._option(options, "-mm", [0.0, 1.0])
+        base, gain = self._option(key, options, "-mm", [0.0, 1.0])
+        transform = self._placing(key, options)
+        channel = self._channel(key, options) if kind == "scalar" else None
         source = self.images[key] if key in self.images else self.find(key, name)
         try:
             return Texture(
                 source,
                 srgb=kind == "color",
                 wrap="clamp" if options.get("-clamp") == ["on"] else "repeat",
-                transform=self._placing(options),
-                channel=self._channel(options) if kind == "scalar" else None,
+                transform=transform,
+                channel=channel,
                 scale=np.asarray(scale) * gain,
                 offset=np.asarray(scale) * base,
                 max_pixels=LoadLimits().pixels if self.files is None else self.files.limits.pixels,
@@ -174,27 +178,37 @@ class Entry:
     def multiplier(self, key: str) -> float:
         """Return the option -bm of a map."""
         options, _ = _map(self, key)
-        return self._option(options, "-bm", [1.0])[0]
+        return self._option(key, options, "-bm", [1.0])[0]
 
-    def _option(self, options: dict[str, list[str]], name: str, default: list[float]) -> list[float]:
+    def _option(
+        self, key: str, options: dict[str, list[str]], name: str, default: list[float]
+    ) -> list[float]:
+        """Return the numbers of an option of a map; those that are not written are the last of `default`."""
+        words = options.get(name, [])
         try:
-            found = [float(word) for word in options.get(name, [])]
+            found = [float(word) for word in words]
         except ValueError:
             raise SceneError(
-                f"{self.file}: {name} is {' '.join(options[name])!r}; it must be numbers"
+                f"{self.where(key)}: {name} is {' '.join(words)!r}; it must be numbers"
             ) from None
         return found + default[len(found) :]
 
-    def _placing(self, options: dict[str, list[str]]) -> Doubles | None:
+    def _placing(self, key: str, options: dict[str, list[str]]) -> Doubles | None:
+        """Return the transform (3, 3) of texture coordinates by -s and -o, None without them."""
         if "-s" not in options and "-o" not in options:
             return None
-        scale, offset = self._option(options, "-s", [1.0] * 3), self._option(options, "-o", [0.0] * 3)
+        scale, offset = (
+            self._option(key, options, name, [default] * 3) for name, default in (("-s", 1.0), ("-o", 0.0))
+        )
         return np.array([[scale[0], 0, offset[0]], [0, scale[1], offset[1]], [0, 0, 1]])
 
-    def _channel(self, options: dict[str, list[str]]) -> Any:
+    def _channel(self, key: str, options: dict[str, list[str]]) -> Any:
+        """Return the channel of the image by -imfchan: a number, or "luminance" without it."""
         word = options.get("-imfchan", ["l"])[0]
         if word not in CHANNELS:
-            raise SceneError(f"{self.file}: -imfchan is {word!r}; it must be one of {', '.join(CHANNELS)}")
+            raise SceneError(
+                f"{self.where(key)}: -imfchan is {word!r}; it must be one of {', '.join(CHANNELS)}"
+            )
         return CHANNELS[word]
 
     def unread(self) -> list[str]:

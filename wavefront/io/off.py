@@ -50,21 +50,24 @@ def parse(name: str, data: bytes, strict: bool, materials: bool) -> Any:
 
 def _counts(name: str, rows: list[tuple[int, list[str]]]) -> tuple[int, int]:
     number, words = rows[0] if rows else (1, [])
-    if len(words) < 2 or not all(
-        word.isdecimal() and word.isascii() and len(word) < 18 for word in words[:2]
-    ):
+    if len(words) < 2 or not all(map(_is_whole, words[:2])):
         raise SceneError(f"{name} line {number}: counts are {' '.join(words)!r}; they must be whole numbers")
     return int(words[0]), int(words[1])
 
 
 def _check_face(name: str, number: int, words: list[str], vertices: int) -> None:
     where, text = f"{name} line {number}: face", " ".join(words[:9])
-    count = int(words[0]) if words[0].isdecimal() and words[0].isascii() and len(words[0]) < 18 else 0
+    count = int(words[0]) if _is_whole(words[0]) else 0
     if count < 3 or len(words) <= count:
         raise SceneError(f"{where} is {text!r}; it must be a count of at least 3 and as many indices")
     for word in words[1 : count + 1]:
-        if not (word.isdecimal() and word.isascii() and len(word) < 18 and int(word) < vertices):
+        if not (_is_whole(word) and int(word) < vertices):
             raise SceneError(f"{where} uses vertex {word}; it must be in [0, {vertices - 1}]")
+
+
+def _is_whole(word: str) -> bool:
+    """Return whether a word is a whole number of at least 0 that an int64 holds."""
+    return word.isdecimal() and word.isascii() and len(word) < 18
 
 
 def _is_number(word: str) -> bool:

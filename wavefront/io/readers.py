@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
 
+from ..counted import counted
 from ..errors import SceneError
 from ..files import decode_text, extension_of
 from ..registry import Registry
@@ -115,7 +116,7 @@ def _read_ply(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
     contents = trimesh_objects.read(found, name, wish.strict)
     faces = sum(len(raw.faces) for raw in contents.raws)
     if faces < claimed:
-        raise SceneError(f"{name}: claims {claimed} of face; {faces} can be read")
+        raise SceneError(f"{name}: claims {counted(claimed, 'row')} of face; {faces} can be read")
     return contents
 
 

@@ -110,7 +110,9 @@ class SceneFiles:
         source = self.scene if base is None else base
         name = reference.replace("\\", "/")
         if "://" in name or name.lower().startswith(SCHEMES):
-            raise SceneError(f"{source}: refers to {reference!r}; only files in its own folder are read")
+            raise SceneError(
+                f"{source}: refers to {reference!r}; only files in its folder and the search paths are read"
+            )
         if name.lower().endswith(ARCHIVES):
             raise SceneError(f"{source}: refers to {reference!r}; archives are not read")
         if name.startswith("/") or name[1:2] == ":":
@@ -123,7 +125,9 @@ class SceneFiles:
             if any(self._target(place, name, reference).is_relative_to(root) for root in roots)
         ]
         if not allowed:
-            raise SceneError(f"{source}: refers to {reference!r}, which is outside its folder")
+            raise SceneError(
+                f"{source}: refers to {reference!r}, which is outside its folder and the search paths"
+            )
         found = next((path for path in allowed if os.path.exists(path)), None)
         if found is not None:
             check_regular(found, self.limits.file_bytes)
