@@ -68,14 +68,7 @@ def build_tree(
         slots = np.zeros((parents, width), np.int32)
         slots[parent, rank] = code
         if fit is not None:
-            members_of = original.take(order)
-            fitted = np.concatenate(
-                [
-                    fit(members_of[part], start[group] - part.start)
-                    for group in _groups_of(count)
-                    for part in [slice(start[group.start], start[group.stop - 1] + count[group.stop - 1])]
-                ]
-            )
+            fitted = _fitted(fit, original.take(order), start, count)
             shape = np.ones((parents, width, fitted.shape[1]))
             shape[parent, rank] = fitted
             shapes.append(shape)
@@ -99,6 +92,17 @@ def build_tree(
         area_sum / root_area if root_area > 0 else float(leaves),
         np.concatenate(shapes) if shapes else None,
     )
+
+
+def _fitted(
+    fit: Callable[[Ints, Ints], NDArray[np.float64]], members: Ints, start: Ints, count: Ints
+) -> NDArray[np.float64]:
+    """Return the rows that `fit` gives for adjacent segments of `members`, a cache full at a time."""
+    rows = []
+    for group in _groups_of(count):
+        begin, end = start[group.start], start[group.stop - 1] + count[group.stop - 1]
+        rows.append(fit(members[begin:end], start[group] - begin))
+    return np.concatenate(rows)
 
 
 def _rows_taken(rows: Floats, order: Ints) -> Floats:

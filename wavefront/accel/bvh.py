@@ -217,62 +217,84 @@ def build_bvh(primitives: Bounded, ids: Ints, leaf_size: int, width: int, ball: 
 
     The caller fills in `leaves`.
     """
-    low, high = np.empty((3, ids.size), f4), np.empty((3, ids.size), f4)
-    for part in spans(ids.size, AT_ONCE):
-        points = primitives.take(ids[part]).hull()
-        low[:, part], high[:, part] = points.min(0), points.max(0)
 
     def fit(order: Ints, start: Ints) -> Doubles:
         points = primitives.take(ids.take(order)).hull()
         local = ((points - ball.center[:, None].astype(np.float64)) / ball.radius).astype(f4)
         return fit_ellipsoids(local, start)
 
-    tree = build_tree(low, high, leaf_size, width, fit)
-    del low, high
+    tree = build_tree(*_boxes(primitives, ids), leaf_size, width, fit)
     assert tree.shape is not None
     absent = tree.low[..., 0] > tree.high[..., 0]
-    nodes = len(absent)
-    center = np.zeros((nodes, 3))
-    inner = np.flatnonzero(~absent & (tree.child >= 0))
-    shapes = tree.shape.reshape(-1, 12)
-    center[tree.child.ravel()[inner]] = shapes[inner, :3]
-    radius = np.ones(nodes)
-    radius[tree.child.ravel()[inner]] = np.linalg.norm(shapes[inner, 3:], axis=1)
-    quadrics = np.empty((nodes, width, len(PAIRS)), f4)
-    for part in spans(nodes, AT_ONCE // width):
-        quadrics[part] = quadric_rows(tree.shape[part], center[part], radius[part])
-    quadrics[absent] = 0
-    for axis in range(3):
-        quadrics[absent, PAIRS.index((axis, axis))] = -1
+    child = tree.child.ravel().astype(np.intp)
+    quadrics, center = _inner_quadrics(tree.shape, child, absent)
+    top = _top_children(child, absent)
     corners = np.concatenate([tree.low.reshape(-1, 3).T, tree.high.reshape(-1, 3).T]).astype(np.float64)
     box = (corners - np.tile(ball.center, 2)[:, None]) / ball.radius
     box += np.repeat([-BOX_MARGIN, BOX_MARGIN], 3)[:, None]
-    top = np.flatnonzero(~absent[0])
-    child = tree.child.ravel().astype(np.intp)
-    while True:
-        inside = child.take(top) > 0
-        below = (child.take(top[inside])[:, None] * width + np.arange(width)).ravel()
-        wider = np.concatenate([top[~inside], below[~absent.ravel()[below]]])
-        if not inside.any() or wider.size > TOP:
-            break
-        top = wider
-    root = quadric_rows(shapes[None, top], np.zeros((1, 3)), np.ones(1))[0]
-    scale = f4(1 / ball.radius)
-    leaves = np.empty((0, 0, 0), f4)
     return Bvh(
-        root=root,
+        root=quadric_rows(tree.shape.reshape(1, -1, 12)[:, top], np.zeros((1, 3)), np.ones(1))[0],
         top=top,
         quadrics=quadrics,
         center=center.astype(f4),
         box=box.astype(f4),
         child=child,
-        leaves=leaves,
+        leaves=np.empty((0, 0, 0), f4),
         prim=tree.prim.ravel(),
         width=width,
         leaf_size=leaf_size,
         cost=tree.cost,
-        scale=scale,
+        scale=f4(1 / ball.radius),
     )
+
+
+def _boxes(primitives: Bounded, ids: Ints) -> tuple[Floats, Floats]:
+    """Return the lower and upper corners (3, m) of the boxes of primitives `ids` (m,)."""
+    low, high = np.empty((3, ids.size), f4), np.empty((3, ids.size), f4)
+    for part in spans(ids.size, AT_ONCE):
+        points = primitives.take(ids[part]).hull()
+        low[:, part], high[:, part] = points.min(0), points.max(0)
+    return low, high
+
+
+def _inner_quadrics(shape: Doubles, child: Ints, absent: Bools) -> tuple[Floats, Doubles]:
+    """Return the quadrics of the children of all nodes, and the points (nodes, 3) that they are about.
+
+    Parameters
+    ----------
+    shape
+        (nodes, width, 12) their ellipsoids, as of `fit_ellipsoids`.
+    child
+        (nodes * width,) child codes.
+    absent
+        (nodes, width) where there is no child; no line meets its quadric.
+    """
+    nodes, width = absent.shape
+    inner = np.flatnonzero(~absent.ravel() & (child >= 0))
+    of_child = shape.reshape(-1, 12)[inner]
+    center, radius = np.zeros((nodes, 3)), np.ones(nodes)
+    center[child[inner]] = of_child[:, :3]
+    radius[child[inner]] = np.linalg.norm(of_child[:, 3:], axis=1)
+    quadrics = np.empty((nodes, width, len(PAIRS)), f4)
+    for part in spans(nodes, AT_ONCE // width):
+        quadrics[part] = quadric_rows(shape[part], center[part], radius[part])
+    quadrics[absent] = 0
+    for axis in range(3):
+        quadrics[absent, PAIRS.index((axis, axis))] = -1
+    return quadrics, center
+
+
+def _top_children(child: Ints, absent: Bools) -> Ints:
+    """Return the slots (top,) of the children of the root, with inner ones replaced while at most `TOP`."""
+    width = absent.shape[1]
+    top = np.flatnonzero(~absent[0])
+    while True:
+        inside = child.take(top) > 0
+        below = (child.take(top[inside])[:, None] * width + np.arange(width)).ravel()
+        wider = np.concatenate([top[~inside], below[~absent.ravel()[below]]])
+        if not inside.any() or wider.size > TOP:
+            return top
+        top = wider
 
 
 def fit_ellipsoids(points: Floats, start: Ints) -> Doubles:

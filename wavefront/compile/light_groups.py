@@ -32,6 +32,11 @@ class LightGroups:
             yield name, radiance / total
 
 
+def primitive_count(shape: Mesh | CurvedShape) -> int:
+    """Return how many triangles, or other primitives, a shape has."""
+    return len(shape.faces) if isinstance(shape, Mesh) else shape.count
+
+
 class GroupNumbers:
     """Numbers the groups of the lights of a scene, while its table of lights is built."""
 
@@ -50,14 +55,10 @@ class GroupNumbers:
         """
         return self._number(group_name(f"{type(light).__name__} group", light.group))
 
-    def of_shapes(self, meshes: Sequence[Mesh], sizes: Sequence[int], curved: Sequence[CurvedShape]) -> Ints:
-        """Return the group of each triangle of meshes of so many, and of each other primitive.
-
-        It is -1 of those that are dark.
-        """
-        shapes: list[Mesh | CurvedShape] = [*meshes, *curved]
+    def of_shapes(self, shapes: Sequence[Mesh | CurvedShape]) -> Ints:
+        """Return the group of each primitive of shapes; it is -1 of those that are dark."""
         numbers = [-1 if shape.emission is None else self._number(shape.material.group) for shape in shapes]
-        return np.repeat(np.array(numbers, np.intp), [*sizes, *(shape.count for shape in curved)])
+        return np.repeat(np.array(numbers, np.intp), [primitive_count(shape) for shape in shapes])
 
     def add(self, numbers: Ints) -> None:
         """Add the next lights of the table by the numbers (k,) of their groups."""

@@ -32,7 +32,7 @@ from ..shapes import CurvedShape, Mesh, Shape, Sphere, Spheres
 from ..shapes.attributes import ATTRIBUTES
 from ..textures.base import BaseTexture
 from ..vec import Floats, Ints, f4
-from .light_groups import GroupNumbers, LightGroups
+from .light_groups import GroupNumbers, LightGroups, primitive_count
 
 # A record, and the primitives of its lights: (..., k) a column per light, or (..., m) of one light, or none.
 Part: TypeAlias = tuple[LightRecord, Ints | None]
@@ -70,15 +70,11 @@ def gather_lights(
     SceneError
         If a light is malformed, or a shape cannot shine as it should.
     """
-    sizes = [len(mesh.faces) for mesh in meshes]
-    triangles = sum(sizes)
-    starts = np.cumsum([0, *sizes])
-    first_row = {id(mesh): int(start) for mesh, start in zip(meshes, starts, strict=False)}
-    ends = triangles + np.cumsum([shape.count for shape in curved], dtype=np.intp)
-    first_row.update((id(shape), int(end) - shape.count) for shape, end in zip(curved, ends, strict=True))
+    traced: list[Mesh | CurvedShape] = [*meshes, *curved]
+    first_row, primitives = _first_rows(traced)
     parts: list[Part] = [*_area_lights(meshes, vertices), *_sphere_lights(curved, first_row, center)]
     groups = GroupNumbers()
-    of_row = groups.of_shapes(meshes, sizes, curved)
+    of_row = groups.of_shapes(traced)
     for _, rows in parts:
         assert rows is not None
         groups.add(of_row[np.atleast_2d(rows)[0]])
@@ -86,14 +82,7 @@ def gather_lights(
     infinite: list[InfiniteLight] = []
     surfaces: list[tuple[Part, int]] = []
     for light in scene.lights:
-        record = (light if scale == 1 else light.scaled(scale)).record(center)
-        if not isinstance(record, LightRecord):
-            raise SceneError(f"{type(light).__name__}: record must return a wf.LightRecord, got {record!r}")
-        unknown = [name for name in record.reads if name not in ATTRIBUTES]
-        if unknown:
-            raise SceneError(
-                f"{type(light).__name__} reads {unknown[0]!r}; it must be one of {', '.join(ATTRIBUTES)}"
-            )
+        record = _checked_record(light, scale, center)
         if isinstance(record, InfiniteLight):
             infinite.append(record.compensated() if mis else record)
             groups.add_to_environment(light, infinite[-1])
@@ -110,18 +99,45 @@ def gather_lights(
     for part, number in surfaces:
         parts.append(part)
         groups.add(np.full(len(part[0]), number))
-    light_of = np.full(int(ends[-1]) if curved else triangles, -1, np.intp)
-    count = 0
+    light_of, count = _lights_of_primitives(parts, primitives)
+    kinds = [record for record, _ in parts]
+    if infinite:
+        kinds.append(EnvironmentSum.of(infinite))
+    return LightTable(kinds, half_size, choice), groups.groups(), light_of, count if infinite else -1
+
+
+def _first_rows(shapes: Sequence[Mesh | CurvedShape]) -> tuple[dict[int, int], int]:
+    """Return the first primitive of each shape, by its id, and the number of all primitives."""
+    first_row, count = {}, 0
+    for shape in shapes:
+        first_row[id(shape)] = count
+        count += primitive_count(shape)
+    return first_row, count
+
+
+def _checked_record(light: Light, scale: float, center: NDArray[np.float64]) -> LightRecord:
+    """Return the record of a light whose lengths are multiplied by `scale`, relative to `center` (3,)."""
+    record = (light if scale == 1 else light.scaled(scale)).record(center)
+    if not isinstance(record, LightRecord):
+        raise SceneError(f"{type(light).__name__}: record must return a wf.LightRecord, got {record!r}")
+    unknown = [name for name in record.reads if name not in ATTRIBUTES]
+    if unknown:
+        raise SceneError(
+            f"{type(light).__name__} reads {unknown[0]!r}; it must be one of {', '.join(ATTRIBUTES)}"
+        )
+    return record
+
+
+def _lights_of_primitives(parts: Sequence[Part], primitives: int) -> tuple[Ints, int]:
+    """Return the light (primitives,) of each primitive, -1 for none, and the number of lights."""
+    light_of, count = np.full(primitives, -1, np.intp), 0
     for record, rows in parts:
         if rows is not None:
             if (light_of[rows] >= 0).any():
                 raise SceneError(f"{type(record).__name__}: its shape shines already")
             light_of[rows] = count + np.arange(len(record))
         count += len(record)
-    kinds = [record for record, _ in parts]
-    if infinite:
-        kinds.append(EnvironmentSum.of(infinite))
-    return LightTable(kinds, half_size, choice), groups.groups(), light_of, count if infinite else -1
+    return light_of, count
 
 
 def _rows_of(
@@ -142,7 +158,7 @@ def _rows_of(
     assert isinstance(shape, Mesh | CurvedShape)
     if shape.material.opacity is not None:
         raise SceneError(f"{name}: its shape {shape.name!r} must be opaque; its material has an alpha")
-    faces = len(shape.faces) if isinstance(shape, Mesh) else shape.count
+    faces = primitive_count(shape)
     if len(record) not in (1, faces):
         raise SceneError(
             f"{name}: record has {counted(len(record), 'column')}; "

@@ -131,25 +131,42 @@ def add_shared(
         first = FirstPoints.of(scene, lit, albedo, lane_in[:, some])
         if first is None:
             continue
-        arriving = np.zeros((3, *first.present.shape), f4)
-        for numbers in number_in:
-            rows = [(member, number) for member, number in enumerate(numbers[:, some]) if (number >= 0).any()]
-            of_rows = [
-                connect(scene, first, points.take(number), number >= 0, member) for member, number in rows
-            ]
-            attenuate(scene, of_rows)
-            for (_, number), connections in zip(rows, of_rows, strict=True):
-                total = _sum(connections.pdf * connections.geometry)
-                found = total > 0
-                part = connections.geometry / (np.where(found, total, f4(1)) * f4(branches))
-                arriving += connections.f * part * take(light, number)[:, None]
-                lost = number.compress((number >= 0) & ~found)  # by rounding: they stay the path's own
-                L[:, points.slot.take(lost)] += take(points.throughput, lost) * take(light, lost)
-        if first.albedo is not None:
-            arriving *= first.albedo
+        arriving, lost = _arriving(scene, first, points, light, [numbers[:, some] for numbers in number_in])
+        for number in lost:  # they stay the path's own
+            L[:, points.slot.take(number)] += take(points.throughput, number) * take(light, number)
         cells = np.flatnonzero(first.present)
         received[:, lane_in[:, some].reshape(-1).take(cells)] = arriving.reshape(3, -1).take(cells, 1)
     L[:, slot] += paths.throughput[:, : slot.size] * received
+
+
+def _arriving(
+    scene: CompiledScene, first: FirstPoints, points: SharedPoints, light: Floats, number_in: list[Ints]
+) -> tuple[Floats, list[Ints]]:
+    """Return what the first points of t tiles receive, (3, members, t), and the shared points left out.
+
+    Parameters
+    ----------
+    points, light
+        As of `add_shared`.
+    number_in
+        For each branch, which of the points (members, t) each path has found; -1 for none. Those that
+        rounding keeps from all first points are left out.
+    """
+    arriving = np.zeros((3, *first.present.shape), f4)
+    lost = []
+    for numbers in number_in:
+        rows = [(member, number) for member, number in enumerate(numbers) if (number >= 0).any()]
+        of_rows = [connect(scene, first, points.take(number), number >= 0, member) for member, number in rows]
+        attenuate(scene, of_rows)
+        for (_, number), connections in zip(rows, of_rows, strict=True):
+            total = _sum(connections.pdf * connections.geometry)
+            found = total > 0
+            part = connections.geometry / (np.where(found, total, f4(1)) * f4(len(number_in)))
+            arriving += connections.f * part * take(light, number)[:, None]
+            lost.append(number.compress((number >= 0) & ~found))
+    if first.albedo is not None:
+        arriving *= first.albedo
+    return arriving, lost
 
 
 @record
