@@ -123,13 +123,8 @@ def chosen_layers(name: str, value: Any) -> tuple[str, ...]:
 
 GUIDES = "denoising_albedo", "denoising_normal"  # the layers that guide denoisers
 NOISY = "noisy"  # the layer that holds `rgb` as it was before denoising
-RADIANCE = (
-    NOISY,
-    "direct",
-    "indirect",
-    "light_groups.",
-    CLAMPED,
-)  # what the names of layers that hold radiance begin with
+# what the names of layers that hold radiance begin with
+RADIANCE = (NOISY, "direct", "indirect", "light_groups.", CLAMPED)
 
 
 def is_radiance(name: str) -> bool:

@@ -10,6 +10,8 @@ from ..suggestions import did_you_mean, meant
 from .status import ERROR
 
 COMMAND = "command"  # the name of the first word in messages
+SCENE_FILE = "obj, ply, stl, off, glb, gltf, dae or 3mf file"
+PICTURE_FILE = "png, jpg, exr, hdr, npy or npz file"
 
 
 class Parser(argparse.ArgumentParser):
@@ -77,7 +79,3 @@ def add_command(commands: Any, name: str, what: str, examples: list[str]) -> arg
 def add_scene(command: argparse.ArgumentParser) -> None:
     """Add the argument for one scene file."""
     command.add_argument("scene", help=SCENE_FILE)
-
-
-SCENE_FILE = "obj, ply, stl, off, glb, gltf, dae or 3mf file"
-PICTURE_FILE = "png, jpg, exr, hdr, npy or npz file"

@@ -18,7 +18,10 @@ from ..scene import Scene
 from ..shapes import Instance, Mesh, Shape
 from ..textures.base import BaseTexture
 from ..textures.image import Texture
+from ..vec import Doubles
 from .command import add_command, add_scene
+
+_PACKAGE = BaseTexture.__module__.partition(".")[0] + "."
 
 
 def add_info_command(commands: Any) -> None:
@@ -90,9 +93,6 @@ def _textures(thing: Any, seen: set[int]) -> Iterator[Texture]:
             yield from _textures(part, seen)
 
 
-_PACKAGE = BaseTexture.__module__.partition(".")[0] + "."
-
-
 def _distinct(things: Iterable[Any]) -> list[Any]:
     """Return things, each once."""
     return list({id(thing): thing for thing in things}.values())
@@ -124,5 +124,5 @@ def _label(material: Material) -> str:
     return type(material.bsdf).__name__
 
 
-def _triple(values: np.ndarray) -> str:
+def _triple(values: Doubles) -> str:
     return "(" + ", ".join(f"{value:.6g}" for value in values) + ")"

@@ -52,7 +52,7 @@ class GltfMaterials:
 
     def __init__(self, document: Document) -> None:
         self._document = document
-        self._looks: dict[int, MaterialSpec] = {}
+        self._specs: dict[int, MaterialSpec] = {}
         self._images: dict[int, NDArray[Any] | None] = {}
         self._pixels = 0  # of these images
         _check_extensions(document)
@@ -60,13 +60,13 @@ class GltfMaterials:
     def spec(self, index: int) -> MaterialSpec:
         """Return the appearance of material `index`."""
         item = self._document.get("materials", index)
-        if index not in self._looks:
+        if index not in self._specs:
             where = f"materials[{index}]" + (f" {item['name']!r}" if "name" in item else "")
             with self._document.inside(where):
-                spec = self._looks[index] = _Reader(self, item, where).spec()
+                spec = self._specs[index] = _Reader(self, item, where).spec()
             for what in spec.lost:
                 self._document.lose(what, where)
-        return self._looks[index]
+        return self._specs[index]
 
     def texture(self, info: Any, where: str, **arguments: Any) -> Texture | None:
         """Return a texture for a texture-info object of the JSON, None if its image file is missing."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import SceneError
 from ..shapes.transform import Matrix
+from ..vec import Ints
 from .gltf_document import Document, shown, table
 from .gltf_meshes import attribute
 from .placing import MAX_ELEMENT, in_range
@@ -90,7 +91,7 @@ def _roots(document: Document) -> list[Any]:
         return [i for i in range(len(nodes)) if i not in children]
 
 
-def _to_scene(local: Matrix, parents: np.ndarray, depths: np.ndarray) -> Matrix:
+def _to_scene(local: Matrix, parents: Ints, depths: Ints) -> Matrix:
     """Return matrices (n, 4, 4) to the scene from the matrices to the parents, level by level."""
     world = np.empty((len(local) + 1, 4, 4))
     world[-1] = np.eye(4)  # the parent of the roots
@@ -105,7 +106,7 @@ def _to_scene(local: Matrix, parents: np.ndarray, depths: np.ndarray) -> Matrix:
 def _local(document: Document, indices: list[int], nodes: list[dict[str, Any]]) -> Matrix:
     """Return the local matrices (n, 4, 4) of nodes: as given, or translation · rotation · scale."""
 
-    def rows(key: str, default: list[float] | None, width: int, at: np.ndarray) -> Matrix:
+    def rows(key: str, default: list[float] | None, width: int, at: Ints) -> Matrix:
         values = [nodes[i].get(key, default) for i in at.tolist()]
         return table(values, width, lambda row: f"{document.name}: nodes[{indices[at[row]]}].{key}")
 

@@ -9,6 +9,7 @@ from ..errors import SceneError, finite_array
 from ..materials import MaterialLike, as_material
 from ..shapes import Mesh
 from ..shapes.transform import moved, moved_tangents
+from ..vec import Doubles
 from .repair import RawMesh, build
 
 
@@ -47,7 +48,7 @@ def join(
     return mesh
 
 
-def _joined(parts: list[np.ndarray | None]) -> np.ndarray | None:
+def _joined(parts: list[Doubles | None]) -> Doubles | None:
     """Concatenate an array if every part has it."""
     there = [part for part in parts if part is not None]
     return np.concatenate(there) if len(there) == len(parts) else None

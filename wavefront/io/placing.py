@@ -24,9 +24,8 @@ class Places:
 
     raw: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))  # (n,) index of the mesh
     matrix: Matrix = field(default_factory=lambda: np.zeros((0, 4, 4)))  # (n, 4, 4) to the scene
-    names: list[str] | None = (
-        None  # (n,) of the placed shapes, "" for that of the mesh; None for all of these
-    )
+    # (n,) of the placed shapes, "" for that of the mesh; None for all of these
+    names: list[str] | None = None
 
     @classmethod
     def once(cls, count: int) -> Places:

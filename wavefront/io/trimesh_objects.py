@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import SceneError
+from ..shapes.transform import Matrix
 from . import visuals
 from .appearance import MaterialSpec, assign_material, is_faint
 from .contents import Contents
@@ -44,7 +45,7 @@ def read(geometry: Any, source: str, strict: bool) -> Contents:
     return Contents(raws, Places(of, matrices, names))
 
 
-def _nodes(geometry: Any, trimesh: Any) -> list[tuple[Any, str, np.ndarray, str]]:
+def _nodes(geometry: Any, trimesh: Any) -> list[tuple[Any, str, Matrix, str]]:
     """Return every mesh with its name, its matrix to world space, and the name of its node."""
     if isinstance(geometry, trimesh.Trimesh):
         return [(geometry, str(geometry.metadata.get("name") or ""), np.eye(4), "")]
@@ -83,13 +84,13 @@ class _Visuals:
     """The materials of trimesh visuals, each made once, and their unsupported properties."""
 
     def __init__(self) -> None:
-        self._looks: dict[int, MaterialSpec] = {}
+        self._specs: dict[int, MaterialSpec] = {}
         self.lost: dict[str, str] = {}  # property -> its first place
 
     def assign_material(self, raw: RawMesh, mesh: trimesh.Trimesh, file_types: set[str | None]) -> None:
         """Give a raw mesh its material and emission; `file_types` are the formats that it was read from."""
         visual: Any = mesh.visual
-        spec = self._look(getattr(visual, "material", None), not file_types.isdisjoint(BARE))
+        spec = self._spec(getattr(visual, "material", None), not file_types.isdisjoint(BARE))
         for what in spec.lost if spec is not None else ():
             self.lost.setdefault(what, raw.name)
         painted = visual.kind == "face"
@@ -102,9 +103,9 @@ class _Visuals:
         if spec is None and is_faint(raw) and not visuals.is_gltf(mesh):  # where it has no effect
             self.lost.setdefault("opacity of vertex colors", raw.name)
 
-    def _look(self, material: Any, bare: bool) -> MaterialSpec | None:
+    def _spec(self, material: Any, bare: bool) -> MaterialSpec | None:
         if material is None or visuals.is_blank(material):
             return None
-        if id(material) not in self._looks:
-            self._looks[id(material)] = visuals.spec(material, f"trimesh material {material.name!r}", bare)
-        return self._looks[id(material)]
+        if id(material) not in self._specs:
+            self._specs[id(material)] = visuals.spec(material, f"trimesh material {material.name!r}", bare)
+        return self._specs[id(material)]

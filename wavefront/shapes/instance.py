@@ -181,9 +181,9 @@ def can_place(mesh: Mesh, transforms: NDArray[np.float64]) -> NDArray[np.bool_]:
     largest = np.abs(linear).max((1, 2))
     unit = linear / np.where(largest > 0, largest, 1)[:, None, None]
     least = np.abs(np.linalg.det(unit)) / np.maximum((unit**2).sum((1, 2)), 1) ** 1.5
-    open_ = np.flatnonzero(good & (least < CERTAINLY_REGULAR))
-    stretch = np.linalg.svd(linear[open_], compute_uv=False)
-    good[open_] = stretch[:, 2] > SINGULAR * stretch[:, 0]
+    undecided = np.flatnonzero(good & (least < CERTAINLY_REGULAR))
+    stretch = np.linalg.svd(linear[undecided], compute_uv=False)
+    good[undecided] = stretch[:, 2] > SINGULAR * stretch[:, 0]
     # the same for the range: first a bound, then the vertices themselves
     reach = np.abs(mesh.vertices).max(0)
     with np.errstate(over="ignore", invalid="ignore"):

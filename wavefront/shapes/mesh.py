@@ -68,6 +68,7 @@ def _coordinates(name: str, values: ArrayLike | None) -> NDArray[np.float64] | N
 
 
 def check_range(name: str, vertices: NDArray[np.float64]) -> None:
+    """Raise a SceneError if a vertex (n, 3) of the shape `name` is beyond the range of float32."""
     _check_float32(f"{name}: vertices", vertices)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError, finite_array
+from ..vec import Doubles, Ints
 
 Matrix = NDArray[np.float64]  # (4, 4), or several
 
@@ -45,7 +46,7 @@ def points_by(matrices: Matrix, points: NDArray[np.float64]) -> NDArray[np.float
     return (points @ matrices[:, :3, :3].transpose(0, 2, 1) + matrices[:, None, :3, 3]).reshape(-1, 3)
 
 
-def moved_tangents(matrix: np.ndarray, tangents: np.ndarray | None) -> np.ndarray | None:
+def moved_tangents(matrix: Matrix, tangents: Doubles | None) -> Doubles | None:
     """Apply a (4, 4) affine matrix to tangents (n, 4); a reflection changes their handedness.
 
     Tangents that become zero stay zero.
@@ -59,9 +60,17 @@ def moved_tangents(matrix: np.ndarray, tangents: np.ndarray | None) -> np.ndarra
 
 
 def moved(
-    matrix: np.ndarray, vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray | None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-    """Apply a (4, 4) affine matrix; a reflection also reverses the faces, to keep their front sides."""
+    matrix: Matrix, vertices: Doubles, faces: Ints, normals: Doubles | None
+) -> tuple[Doubles, Ints, Doubles | None]:
+    """Apply a (4, 4) affine matrix to the arrays of a mesh.
+
+    A reflection also reverses the faces, to keep their front sides. The lengths of normals have no meaning.
+
+    Raises
+    ------
+    SceneError
+        If the last row of the matrix is not that of an affine one.
+    """
     linear, shift = matrix[:3, :3], matrix[:3, 3]
     if (matrix == IDENTITY).all():
         return vertices, faces, normals

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -106,11 +107,11 @@ def check_bsdf(
     sides = (False, True) if bsdf.transmissive else (False,)
     tests = 4 * len(angles) * len(sides)
     alpha = 1 - (1 - significance) ** (1 / tests)
-    for number, (back_facing, angle) in enumerate((s, a) for s in sides for a in angles):
+    for number, (back_facing, angle) in enumerate(product(sides, angles)):
         view = _View(bsdf, _direction(angle, 0.7 + number), back_facing)
         rng = np.random.default_rng([seed, number])
         _check_view(report, view, rng, samples, alpha, albedo)
-        if reciprocal and not any(not c.passed for c in report.checks.values()):
+        if reciprocal and all(check.passed for check in report.checks.values()):
             _check_reciprocity(report, view, rng)
     return report.raise_if_failed()
 

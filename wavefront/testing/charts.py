@@ -71,4 +71,5 @@ CHARTS = {
 
 
 def uniform_directions(rng: np.random.Generator, n: int) -> Floats:
+    """Return n unit vectors (3, n), uniform over the sphere."""
     return _square_to_sphere(rng.random((2, n)))

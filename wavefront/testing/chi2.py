@@ -9,7 +9,7 @@ import numpy as np
 
 from ..vec import Doubles, Floats, Ints
 from .charts import Chart
-from .quadrature import COLUMNS, ROWS, Cells, _Integrator
+from .quadrature import COLUMNS, ROWS, Cells, DensityIntegrator
 from .report import Report
 
 
@@ -104,7 +104,7 @@ def check_density(
     on_square = chart.to_square(points)
     guide = points[:, : 1 << 17]
     height = density(guide).astype(np.float64)
-    integrator = _Integrator(density, chart, on_square[:, : 1 << 17], height)
+    integrator = DensityIntegrator(density, chart, on_square[:, : 1 << 17], height)
     expected, unresolved = integrator.cells(cells)
     observed = np.bincount(cells.find(on_square), minlength=ROWS * COLUMNS)
     integral = float(expected.sum())

@@ -31,7 +31,7 @@ def check_light(
     significance: float = 1e-3,
     seed: int = 0,
 ) -> Report:
-    """Prove that a light keeps the contract of `LightRecord`.
+    """Check that a light keeps the contract of `LightRecord`.
 
     Parameters
     ----------
@@ -43,6 +43,11 @@ def check_light(
         must not lie on the light itself.
     samples, significance, seed
         As for `check_bsdf`.
+
+    Returns
+    -------
+    Report
+        The worst value of each check; `print` it.
 
     Raises
     ------

@@ -65,7 +65,7 @@ WEIGHTS = np.linalg.solve(NODES ** np.arange(5)[:, None], 1 / np.arange(1, 6))
 
 
 @dataclass(slots=True)
-class _Integrator:
+class DensityIntegrator:
     """Adaptive integrals of a density over boxes of the unit square.
 
     Samples guide the refinement: if the density at a sample is far above that at all nodes of its box, the
@@ -136,20 +136,20 @@ class _Integrator:
     def _highest(self, home: Ints, boxes: int) -> Doubles:
         """Return the largest density among the samples of each box, (boxes,)."""
         highest = np.zeros(boxes)
-        back_facing = home >= 0
-        np.maximum.at(highest, home[back_facing], self.height[back_facing])
+        inside = home >= 0
+        np.maximum.at(highest, home[inside], self.height[inside])
         return highest
 
     def _descend(self, home: Ints, boxes: Doubles, across: Bools, split: Bools) -> Ints:
         """Return the box of each sample after the split; −1 in boxes that are finished."""
-        back_facing = (home >= 0) & split[home]
+        unfinished = (home >= 0) & split[home]
         rank = np.cumsum(split) - 1
-        box = home[back_facing]
+        box = home[unfinished]
         a0, a1, b0, b1 = boxes[:, box]
-        upper_a = self.guide[0, back_facing] >= (a0 + a1) / 2
-        upper_b = self.guide[1, back_facing] >= (b0 + b1) / 2
+        upper_a = self.guide[0, unfinished] >= (a0 + a1) / 2
+        upper_b = self.guide[1, unfinished] >= (b0 + b1) / 2
         below = np.full_like(home, -1)
-        below[back_facing] = np.where(across[box], upper_a, upper_b) * np.count_nonzero(split) + rank[box]
+        below[unfinished] = np.where(across[box], upper_a, upper_b) * np.count_nonzero(split) + rank[box]
         return below
 
     def _around_samples(self, boxes: Doubles, cell: Ints) -> tuple[Doubles, Ints]:

@@ -24,9 +24,8 @@ class BaseTexture(ABC):
     """
 
     reads: tuple[str, ...] = ("uv",)  # fields of `SurfaceInteraction` that `at` needs: "uv", "uv1", "color"
-    scalar: bool | None = (
-        None  # whether `at` returns numbers (n,) rather than colors; None: either, as the parameter needs
-    )
+    # whether `at` returns numbers (n,) rather than colors; None: either, as the parameter needs
+    scalar: bool | None = None
 
     def limits(self) -> tuple[float, ...]:
         """Return the least and the greatest value, or () where they are not known."""

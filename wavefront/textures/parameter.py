@@ -16,9 +16,8 @@ from ..state import SurfaceInteraction
 from ..vec import Floats, f4, luminance
 from .base import BaseTexture
 
-MAX_INDEX = (
-    1e6  # largest index of refraction; the least is its inverse: fourth powers stay in the range of float32
-)
+# Largest index of refraction; the least is its inverse: fourth powers stay in the range of float32.
+MAX_INDEX = 1e6
 
 Color: TypeAlias = ArrayLike | BaseTexture
 Scalar: TypeAlias = float | BaseTexture

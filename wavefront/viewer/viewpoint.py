@@ -20,7 +20,7 @@ FOV_DIGITS = 4  # behind the point
 OTHER_FOV = 40.0  # degrees, in place of cameras that are not perspective
 NEAREST, FARTHEST = 0.01, 10.0  # focus, in radii of the scene
 WIDEST = 0.2  # aperture, in radii of the scene
-DIGITS = 6  # of a coordinate, below the size of the scene: code of a camera is short
+DIGITS = 6  # of a coordinate, counted from the size of the scene: they keep the code of a camera short
 MOST_FAR = 1e6  # radii from the middle of a scene that a camera may be
 LARGEST_PAGE = 16_384  # pixels
 UPRIGHT = 1e-3  # sine of the least roll of a camera that counts
@@ -69,7 +69,7 @@ class Surroundings:
 
 @dataclass(frozen=True)
 class Viewpoint:
-    """A camera as a page knows it: a place that it is seen from, a target, and a lens."""
+    """A camera as a page knows it: its origin, its target, and its lens."""
 
     surroundings: Surroundings
     origin: Triple
@@ -110,7 +110,7 @@ class Viewpoint:
             _rounded(up if upright else camera.rotation[:, 1], DIGITS),
             round(float(np.clip(lens.fov, *FOV)), FOV_DIGITS),
             lens.aperture,
-            lens.focus if lens.aperture > 0 else float(f"{distance:.3g}"),  # of a slider, as it has no effect
+            lens.focus if lens.aperture > 0 else float(f"{distance:.3g}"),  # where the page's slider begins
             camera.film,
             camera.film[0] * camera.film[1],
         )
