@@ -1168,3 +1168,14 @@ def test_real_files_equal_what_trimesh_holds(name):
         for x, y in ((a.normals, b.normals), (a.uvs, b.uvs)):
             assert (x is None) == (y is None)
             assert x is None or np.array_equal(soup(a, x), soup(b, y))
+
+
+def test_load_mesh_tells_of_normals_that_only_some_parts_have(write):
+    """They are left out, as a mesh has them at all vertices or at none; strict, it is an error."""
+    faces = "usemtl a\nf 1//1 2//1 3//1\nusemtl b\nf 1 3 4\n"
+    path = write("mtllib s.mtl\n" + SQUARE + "vn 0 0 1\n" + faces, s_mtl="newmtl a\nnewmtl b\n")
+    message = "scene: vertex normals left out, which 1 of 2 meshes have"
+    with pytest.warns(UserWarning, match=message):
+        assert load_mesh(path, Diffuse(0.5)).normals is None
+    with pytest.raises(SceneError, match=message):
+        load_mesh(path, Diffuse(0.5), strict=True)

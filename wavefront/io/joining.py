@@ -10,18 +10,25 @@ from ..materials import MaterialLike, as_material
 from ..shapes import Mesh
 from ..shapes.transform import moved, moved_tangents
 from ..vec import Doubles
-from .repair import RawMesh, build
+from .repair import RawMesh, build, warn
 
 
 def join(
-    meshes: list[Mesh], name: str, material: MaterialLike | None = None, transform: ArrayLike | None = None
+    meshes: list[Mesh],
+    name: str,
+    material: MaterialLike | None = None,
+    transform: ArrayLike | None = None,
+    strict: bool = False,
 ) -> Mesh:
     """Return one mesh with the triangles of all meshes.
+
+    What only some of them have per vertex is left out: of normals a warning tells, and of what a material
+    reads, the render.
 
     Raises
     ------
     SceneError
-        If there are several materials and `material` is not given.
+        If there are several materials and `material` is not given. With `strict`, if normals are left out.
     """
     if material is None and len({id(mesh.material) for mesh in meshes}) > 1:
         raise SceneError(f"{name}: has {len(meshes)} materials; pass one, or use wf.load")
@@ -31,8 +38,10 @@ def join(
     starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
     vertices = np.concatenate([mesh.vertices for mesh in meshes])
     faces = np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts[:-1], strict=True)])
-    normals = _joined([mesh.normals for mesh in meshes])
-    raw = RawMesh(name, *moved(matrix, vertices, faces, normals))
+    normals = [mesh.normals for mesh in meshes if mesh.normals is not None]
+    if 0 < len(normals) < len(meshes):
+        warn(f"{name}: vertex normals left out, which {len(normals)} of {len(meshes)} meshes have", strict)
+    raw = RawMesh(name, *moved(matrix, vertices, faces, _joined([mesh.normals for mesh in meshes])))
     raw.uvs = _joined([mesh.uvs for mesh in meshes])
     raw.uvs1 = _joined([mesh.uvs1 for mesh in meshes])
     raw.tangents = moved_tangents(matrix, _joined([mesh.tangents for mesh in meshes]))

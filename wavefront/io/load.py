@@ -112,7 +112,7 @@ def load_mesh(
         meshes = load_meshes(
             path, strict=strict, materials=material is None, limits=limits, search_paths=search_paths
         )
-        return join(meshes, Path(path).stem, material, transform)
+        return join(meshes, Path(path).stem, material, transform, strict)
 
 
 def load_meshes(
