@@ -78,6 +78,12 @@ def test_paths_are_shared_where_that_pays() -> None:
     assert np.array_equal(image.rgb, render(cornell_box(SIZE), 1, reuse=True).rgb)
 
 
+@pytest.mark.parametrize("size", [SIZE, (256, 256)])
+def test_no_seed_keeps_a_matte_room_from_sharing(size: tuple[int, int]) -> None:
+    """The noise of a short trial may not decide: plain paths have ten times the variance."""
+    assert [seed for seed in range(30) if not chosen(cornell_box(size), seed=seed).reuse] == []
+
+
 def glossy(size: tuple[int, int]) -> wf.Scene:
     """The Cornell box with a ball of rough gold in it."""
     box = cornell_box(size)
