@@ -62,7 +62,7 @@ CONNECTION = 0.5  # cost of a ray that connects pixels, likewise
 EVALUATION = 0.3  # cost of evaluating the BSDF of a pixel for another one, relative to that of a ray
 RARE_LIGHT = 1.0  # relative variance of a pixel of SAMPLES samples, from where on light is hard to find
 COMMON_GLOSS = 0.05  # part of the second points, from where on a trial sees enough of what a material does
-NO_WORSE = 2.0  # what re-use may cost by pixels or after a blur: of few tiles the trial may find twice the truth
+NO_WORSE = 2.0  # what re-use may cost by pixels or after a blur: few tiles may tell twice the truth
 BLUR = 4  # standard deviation of the blur, pixels
 BLUR_WEIGHTS = [  # of a row of a tile for each other: the convolution of the blur with itself
     [math.exp(-(((row - other) * STRIDE / (2 * BLUR)) ** 2)) for other in range(SIDE)] for row in range(SIDE)
@@ -123,7 +123,7 @@ class Trial:
         return self.reused.pixels * cost, self.reused.blurred * cost
 
     def reuse_pays(self) -> bool:
-        """Return whether re-use costs less than the best number of branches, in the mean of pixels and blur."""
+        """Return whether re-use costs less than the best number of branches, in the mean of both."""
         pixels, blurred = self.costs_of_reuse()
         branches = self.cost(self.best_ways()) / self.cost(1) if self.cost(1) > 0 else 1.0
         both = math.sqrt(pixels * blurred)
