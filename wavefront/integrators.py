@@ -36,7 +36,7 @@ from .stages.intersect import intersect
 from .stages.medium import absorb
 from .stages.normal_mapping import perturb_normals
 from .stages.reuse import SHARED_WAYS, add_shared, as_shared, can_reuse, shared_points
-from .stages.shade import Shading, direct, emitted, mis_weighted, shading
+from .stages.shade import Shading, direct, emitted, mis_weighted, shading, without_caustics
 from .state import Contribution, Hits, Paths
 from .vec import Floats, Ints, f4, take
 
@@ -232,9 +232,9 @@ def intersect_and_compact(
     With `mis` the light is weighted against light sampling. `keep` returns the lanes of the paths that
     scatter; the others end here.
     """
-    hits = intersect(scene, paths)
+    hits, left = intersect(scene, paths), paths.exclude_prim
     paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce)
-    emission = emitted(scene, paths, hits)
+    emission = without_caustics(scene, paths, left, hits, emitted(scene, paths, hits))
     if bounce == 0:
         emission = show_background(scene, L, paths, hits, emission)
     accumulate(L, paths, mis_weighted(scene, paths, emission) if mis else emission)

@@ -13,11 +13,12 @@ from ..errors import SceneError, finite_array, in_brief, number, rotation_matrix
 from ..parameter import brief
 from ..state import Words
 from ..suggestions import suggests_keywords
-from ..vec import Floats, column, normalize
+from ..vec import Doubles, Floats, column, f4, normalize
 from .distortion import Distortion
 from .projection import Orthographic, Panorama, Perspective, Projection
 
 MAX_SIDE = 65_536  # pixels; a row-major pixel index then fits in 32 bits
+STEP = 1e-4  # of a point's distance: how far it is moved to find out how the film point moves
 RADIANS = (0.2, 3.2)  # a field of view in this range is probably in radians
 Window = tuple[int, int, int, int]
 
@@ -424,6 +425,47 @@ class Camera:
         origin = np.repeat(eye, len(x), 1) if offset is None else eye + self._turned(offset)
         return origin, towards if towards.shape[1] == len(x) else np.repeat(towards, len(x), 1)
 
+    def connections(
+        self, points: Floats, center: NDArray[np.float64], lens: Floats | None = None
+    ) -> tuple[Floats, Doubles, Doubles]:
+        """Return where rays to the camera end, at which film points they arrive, and how much counts there.
+
+        Parameters
+        ----------
+        points
+            (3, n) relative to the scene's center.
+        center, lens
+            As for `rays`.
+
+        Returns
+        -------
+        eye
+            (3, n) origins of the camera's rays through the points, relative to the center.
+        pixels
+            (2, n) film positions, as `project` has them; NaN for points that no picture could show.
+        importance
+            (n,) area of the film, pixels², for each area across the ray at the point, scene units².
+        """
+        film, project = self.film, self.projection.project
+        away = points.astype(np.float64) + (center - self.origin)[:, None]
+        at = np.stack([away[0] * x + away[1] * y + away[2] * z for x, y, z in self.rotation.T])
+        x, y = np.nan_to_num(project(at, film)[0]).astype(f4)
+        offset, _ = self.projection.rays(x, y, film, lens)
+        start = np.zeros_like(at) if offset is None else offset.astype(np.float64)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            pixels, _ = project(self.projection.in_focus(at, start), film)
+            step = STEP * np.sqrt(((start - at) ** 2).sum(0))
+            moves = []
+            for across in _across(start - at):
+                ends = [at + across * (step * sign) for sign in (1, -1)]
+                ahead, behind = (project(self.projection.in_focus(end, start), film)[0] for end in ends)
+                moved = ahead - behind
+                moved[0] -= film[0] * np.rint(moved[0] / film[0])  # both ends of a panorama are one place
+                moves.append(moved / (2 * step))
+            importance = np.abs(moves[0][0] * moves[1][1] - moves[0][1] * moves[1][0])
+        eye = column(self.origin - center) + self._turned(start.astype(f4))
+        return eye, pixels, importance
+
     def project(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the film positions and depths of points of the world.
 
@@ -456,6 +498,15 @@ class Camera:
         """Transform vectors (3, n) of camera space to world space."""
         right, up, backward = (column(axis) for axis in self.rotation.T)
         return right * v[0] + up * v[1] + backward * v[2]
+
+
+def _across(direction: Doubles) -> tuple[Doubles, Doubles]:
+    """Return two unit vectors (3, n) that are perpendicular to directions (3, n) and to each other."""
+    least = np.eye(3)[np.abs(direction).argmin(0)].T
+    first = np.cross(direction, least, axis=0)
+    first /= np.sqrt((first**2).sum(0))
+    second = np.cross(direction, first, axis=0)
+    return first, second / np.sqrt((second**2).sum(0))
 
 
 def _look(origin: ArrayLike, target: ArrayLike, up: ArrayLike) -> tuple[NDArray[Any], NDArray[Any], float]:

@@ -72,6 +72,14 @@ class Projection(Parametrized, ABC):
             (n,) scene units.
         """
 
+    def in_focus(self, points: Doubles, offset: Doubles) -> Doubles:
+        """Return the points (3, n) that a ray through the center of the lens meets at the same film points.
+
+        Rays through the points (3, n) start at `offset` (3, n), a point on the lens; camera space. Here: the
+        points themselves, as all rays of one film point start at one place.
+        """
+        return points
+
     def check(self, film: Size) -> None:
         """Check that every point of the film has a ray.
 
@@ -170,6 +178,12 @@ class Perspective(Projection):
             x, y = self.distortion.apply(np.where(seen, x, np.nan), np.where(seen, y, np.nan))
         middle, focal = self._intrinsics(film)
         return np.stack([(x + self.skew * y) * focal[0] + middle[0], y * focal[1] + middle[1]]), depth
+
+    def in_focus(self, points: Doubles, offset: Doubles) -> Doubles:
+        """Return where rays from lens points through the points meet the plane of focus."""
+        if not self.uses_lens:
+            return points
+        return np.asarray(offset + (points - offset) * (self.focus / -points[2]))
 
     def matrix(self, film: Size) -> Doubles:
         """Return the intrinsic matrix (3, 3), in pixels with centers at .5; distortion is no part of it."""

@@ -16,6 +16,7 @@ from ..scene import Scene
 from ..shapes import Shape
 from ..shapes.attributes import Corners, corner_values
 from ..vec import Bools, Floats, Ints
+from .casters import Casters, find_casters
 from .curved import CurvedTable
 from .geometry import compute_corner_normals, gather_triangles, same_as_next
 from .instances import InstanceTable, own_frame, place_instances, sort_shapes
@@ -73,6 +74,7 @@ class CompiledScene:
     places: MortonGrid | None = None  # orders the paths of large scenes; None in small ones
     shadow_catchers: Bools | None = None  # (materials,) those that catch shadows; None when none does
     background: Floats | None = None  # (3, 1) what camera rays that miss show; None for the environment
+    casters: Casters | None = None  # where light paths begin; None where none are traced
 
     @property
     def interpolates(self) -> bool:
@@ -97,6 +99,7 @@ def compile_scene(
     light_sampler: str | LightSamplerMaker = "spatial",
     most_copies: int = 0,
     mis: bool = False,
+    caustics: bool = False,
 ) -> CompiledScene:
     """Gather a scene into flat arrays.
 
@@ -112,6 +115,8 @@ def compile_scene(
         Up to this total of instanced triangles, each instance becomes a mesh of its own.
     mis
         Whether light samples are combined with BSDF samples by MIS. Environments then use MIS compensation.
+    caustics
+        Whether paths from lights find the light that comes by smooth glass and mirrors.
 
     Raises
     ------
@@ -159,6 +164,10 @@ def compile_scene(
         parts = np.split(triangles[once:], ends[:-1])
         built = [make_accelerator(Geometry(part, (), weights)) for part in parts]
         accelerator = InstanceAccelerator(accelerator, built, placements)
+    casters, groups_of = None, group_materials(user_materials)
+    if caustics and len(lights):
+        of_whole = np.append(material_of[:once], material_of[len(triangles) :])
+        casters = find_casters(triangles[:once], table_of_curved, of_whole, groups_of)
     return CompiledScene(
         scale=scale,
         center=center,
@@ -173,7 +182,7 @@ def compile_scene(
         material_of=material_of,
         light_of=light_of,
         emissive=light_of >= 0,
-        materials=group_materials(user_materials),
+        materials=groups_of,
         absorption=absorption_table(user_materials),
         opacities=opacity_table(user_materials, has_alpha),
         lights=lights,
@@ -181,5 +190,6 @@ def compile_scene(
         nonscattering_lights=nonscattering_lights,
         instances=table,
         shadow_catchers=find_shadow_catchers(user_materials),
+        casters=casters,
         places=MortonGrid.over((high - low) / 2) if len(triangles) >= LARGE else None,
     )

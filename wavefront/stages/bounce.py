@@ -75,6 +75,7 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         pdf=sample.pdf,
         specular=specular,
         roulette_scale=roulette_scale,
+        left_rough=~specular if bounce == 0 and paths.left_rough is not None else paths.left_rough,
         scattered=None if paths.scattered is None else _after(paths.scattered, specular),
         met_rough=paths.met_rough,
         recorder=paths.recorder,

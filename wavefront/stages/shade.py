@@ -125,6 +125,29 @@ def mis_weighted(scene: CompiledScene, paths: Paths, emission: Contribution) -> 
     return Contribution(emission.lanes, emission.radiance * weight, emission.light)
 
 
+def without_caustics(
+    scene: CompiledScene, paths: Paths, left: Ints, hits: Hits, emission: Contribution
+) -> Contribution:
+    """Return emission but for that which light paths find (light_paths.py).
+
+    Parameters
+    ----------
+    paths, left
+        n paths, and the primitives (n,) that they left, -1 for none.
+    hits, emission
+        What they hit, and the emission that they met there.
+    """
+    if scene.casters is None or paths.left_rough is None:
+        return emission
+    lanes = emission.lanes
+    found = take(paths.left_rough, lanes) & take(paths.specular, lanes)
+    found &= scene.casters.includes(take(left, lanes)) & (hits.prim.take(lanes) >= 0)
+    found &= scene.lights.chosen_from.take(emission.light)
+    if not found.any():
+        return emission
+    return emission.take(np.flatnonzero(~found))
+
+
 def shading(scene: CompiledScene, surface: SurfaceInteraction) -> Shading:
     """Return local frames and groups of surfaces; `compact` has ordered the lanes by group."""
     frame = surface.frame()

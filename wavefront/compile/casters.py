@@ -1,0 +1,105 @@
+"""Casters: surfaces that light leaves by delta lobes alone, such as smooth glass and mirrors.
+
+Light paths (light_paths.py) begin at points on them, which are drawn evenly by area.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..accel.sphere import SpherePrimitives
+from ..record import record
+from ..sampling.warp import uniform_sphere, uniform_triangle
+from ..state import SoA
+from ..vec import Bools, Doubles, Floats, Ints, f4
+from .curved import CurvedTable
+from .materials import MaterialTable
+
+
+@record
+class CasterPoints(SoA):
+    """Points on casters."""
+
+    point: Floats  # (3, n) scene units
+    prim: Ints  # (n,) primitive id
+    b1: Floats  # (n,) barycentric weight of the second vertex, of a triangle
+    b2: Floats  # (n,) and of the third
+
+
+@record
+class Casters:
+    """The casters of a scene: its triangles and spheres whose materials have only delta lobes."""
+
+    of_prim: Bools  # (m + k + 1,) whether each primitive id is one; False at the end, for others and a miss
+    prim: Ints  # (c,) their primitive ids, triangles first
+    corners: Floats  # (t, 3, 3) of the triangles
+    centers: Floats  # (3, c - t) of the spheres
+    radii: Floats  # (c - t,)
+    cumulative: Doubles  # (c,) sums of areas, scene units²
+
+    def includes(self, prim: Ints) -> Bools:
+        """Return whether primitives are casters, (n,), given their ids (n,); -1 is no primitive."""
+        return self.of_prim.take(np.minimum(prim, self.of_prim.size - 1))
+
+    @property
+    def area(self) -> float:
+        """Their area, scene units²."""
+        return float(self.cumulative[-1])
+
+    def sample(self, u_choice: Floats, u: Floats) -> CasterPoints:
+        """Draw points evenly by area, with u_choice (n,) and u (2, n) in [0, 1)."""
+        which = self.cumulative.searchsorted(u_choice * self.cumulative[-1], side="right")
+        which = np.minimum(which, self.prim.size - 1)
+        flat = np.flatnonzero(which < len(self.corners))
+        round_ = np.flatnonzero(which >= len(self.corners))
+        point, weights = np.empty((3, which.size), f4), np.zeros((2, which.size), f4)
+        weights[:, flat] = uniform_triangle(u[:, flat])
+        a, b, c = self.corners.take(which.take(flat), 0).transpose(1, 2, 0)
+        b1, b2 = weights[:, flat]
+        point[:, flat] = a * (f4(1) - b1 - b2) + b * b1 + c * b2
+        ball = which.take(round_) - len(self.corners)
+        directions = uniform_sphere(u[:, round_])
+        point[:, round_] = self.centers.take(ball, 1) + directions * self.radii.take(ball)
+        return CasterPoints(point, self.prim.take(which), *weights)
+
+
+def find_casters(
+    triangles: Floats, curved: CurvedTable, material_of: Ints, materials: MaterialTable
+) -> Casters | None:
+    """Return the casters of a scene; None if it has none.
+
+    Cylinders, capsules and instances that share their arrays are no casters.
+
+    Parameters
+    ----------
+    triangles
+        (m, 3, 3) those that no instance shares.
+    curved
+        The k curved primitives, whose ids follow those of the triangles.
+    material_of
+        (m + k,) material of each of these primitives.
+    """
+    delta = np.array([bsdf.specular for bsdf in materials.groups], np.bool_)[materials.group_of]
+    of_prim = np.append(delta.take(material_of), False)
+    of_prim[len(triangles) : -1] &= _spheres_among(curved)
+    flat = np.flatnonzero(of_prim[: len(triangles)])
+    corners = triangles.take(flat, 0)
+    edge, other = (corners[:, k].astype(np.float64) - corners[:, 0] for k in (1, 2))
+    area = np.linalg.norm(np.cross(edge, other), axis=1) / 2
+    ball = np.flatnonzero(of_prim[len(triangles) :])
+    centers, radii = np.zeros((3, 0), f4), np.zeros(0, f4)
+    for kind, first in zip(curved.kinds, curved.first, strict=True):
+        if isinstance(kind, SpherePrimitives) and ball.size:
+            centers, radii = kind.centers.take(ball - first, 1), kind.radii.take(ball - first)
+    cumulative = np.cumsum([*area, *(4 * np.pi * radii.astype(np.float64) ** 2)])
+    if not cumulative.size or not cumulative[-1] > 0:
+        return None
+    return Casters(of_prim, np.append(flat, ball + len(triangles)), corners, centers, radii, cumulative)
+
+
+def _spheres_among(curved: CurvedTable) -> Bools:
+    """Return whether each curved primitive is a sphere, (k,)."""
+    return np.concatenate(
+        [np.zeros(0, np.bool_)]
+        + [np.full(len(kind), isinstance(kind, SpherePrimitives)) for kind in curved.kinds]
+    )
