@@ -2,6 +2,7 @@
 
 from functools import cache
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import pytest
@@ -117,11 +118,16 @@ class Once(Sampler):
 
 
 @pytest.mark.parametrize(
-    ("integrator", "branches", "guide"),
-    [*((integrator, 1, False) for integrator in scenes.ALL), ("full", 3, False), ("full", 3, True)],
+    ("integrator", "options"),
+    [
+        *((integrator, {}) for integrator in scenes.ALL),
+        ("full", {"branches": 3}),
+        ("full", {"branches": 3, "guide": True}),
+        ("full", {"caustics": True}),
+    ],
 )
 def test_no_number_is_used_twice(
-    integrator: str, branches: int, guide: bool, monkeypatch: pytest.MonkeyPatch
+    integrator: str, options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Not by two decisions, bounces or branches: the means of many scenes would not show it."""
     given: list[Once] = []
@@ -139,13 +145,14 @@ def test_no_number_is_used_twice(
     blend = wf.Sphere((0.2, 0.3, 0.2), 0.2, material=wf.Mix(wf.Diffuse(0.7), wf.Dielectric(1.5, 0.3)))
     camera = wf.Camera.look_at((0, 0, 3.9), (0, 0, 0), size=(12, 9), aperture=0.1, focus=3.9)
     scene = wf.Scene([*scene.shapes, *veils, blend], [wf.Environment((0.2, 0.3, 0.5))], camera)
-    options = {"integrator": integrator, "branches": branches, "guide": guide}
-    render(scene, 16, sampler=record, max_bounces=5, **options)
+    render(scene, 16, sampler=record, max_bounces=5, integrator=integrator, **options)
     left_out = {"naive": {Dimension.LIGHT, Dimension.LIGHT_POINT}, "full": set()}
     decisions = {*Dimension, Dimension.OPACITY + 1, Dimension.OPACITY + 2}  # three veils
     assert {dimension for _, dimension in given[-1].given} == decisions - left_out.get(
         integrator, {Dimension.ROULETTE}
-    ) - (set() if guide else {Dimension.GUIDE, Dimension.GUIDE_DIRECTION})
+    ) - (set() if "guide" in options else {Dimension.GUIDE, Dimension.GUIDE_DIRECTION}) - (
+        set() if "caustics" in options else {Dimension.CASTER, Dimension.CASTER_POINT}
+    )
 
 
 @pytest.mark.parametrize("integrator", ["direct_simple", "direct_mis", "full"])

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .exact_sum import ExactSums
+from .light_sums import LightSums
 from .record import record
 from .state import Words
 from .vec import ALL, Doubles, Floats, Ints, Lanes, distinct, take
@@ -18,6 +19,7 @@ WHOLE_BATCH = 4  # samples; batches are at least this long if a pixel has two of
 EPSILON = 1e-2  # relative to the squared mean of a picture; added to the squares by which errors are divided
 OUTLIERS = 1e-3  # fraction of the pixels whose error is limited to that of the worst other pixel
 NONE = np.zeros(0, np.intp)
+LIGHT = "light."  # before the names of the arrays of light paths
 CHUNK = 8192  # pixels, or samples, that are added together: few enough for the cache
 
 
@@ -36,7 +38,15 @@ class Film:
 
     Samples that are not finite are dropped: they are counted, and the mean is that of the others.
 
-    Memory is 176 bytes per pixel, whatever the number of samples, and 4 more when one was dropped.
+    Memory is 176 bytes per pixel, whatever the number of samples, and 4 more when one was dropped. Light
+    paths take 96 more.
+
+    Parameters
+    ----------
+    width, height
+        Of the picture, pixels.
+    light_paths
+        Whether there are light paths, too, whose light adds to the mean.
 
     Attributes
     ----------
@@ -44,9 +54,11 @@ class Film:
         Samples of each pixel, (pixels,), with those that were dropped.
     dropped
         How many of them were dropped, (pixels,); empty as long as none was.
+    light
+        Sums over light paths; None where there are none.
     """
 
-    def __init__(self, width: int, height: int) -> None:
+    def __init__(self, width: int, height: int, light_paths: bool = False) -> None:
         pixels = width * height
         self.size = width, height
         self.count = np.zeros(pixels, np.int64)
@@ -55,6 +67,7 @@ class Film:
         self.squares = np.zeros((3, pixels))  # sum of squared samples
         self.batches = np.zeros((BATCHES, 3, pixels), np.float32)  # sums of full batches
         self.batches.fill(0)  # takes the memory now, so that a render that lacks it does not fail late
+        self.light = LightSums(pixels) if light_paths else None
         self.lengths: Ints | None = None  # samples of each batch; None: `batch_size` of them in all
 
     def release_errors(self) -> None:
@@ -137,6 +150,10 @@ class Film:
             "squares": self.squares,
             "batches": self.batches,
             "lengths": lengths,
+            **{
+                LIGHT + name: array
+                for name, array in ({} if self.light is None else self.light.arrays()).items()
+            },
         }
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
@@ -145,6 +162,8 @@ class Film:
         self.squares, self.batches = arrays["squares"], arrays["batches"]
         self.sums.restore(arrays)
         self.lengths = arrays["lengths"] if arrays["lengths"].size else None
+        if self.light is not None:
+            self.light.restore({name: arrays[LIGHT + name] for name in self.light.arrays()})
 
     def merge(self, other: Film) -> None:
         """Add the samples of another film.
@@ -169,6 +188,8 @@ class Film:
             self.batches[number] = batch
         lengths = [length for _, length in joined]
         self.lengths = None if lengths == [size] * (count // size) else np.array(lengths)
+        if self.light is not None and other.light is not None:
+            self.light.merge(other.light)
 
     def _all_batches(self) -> Iterator[tuple[Doubles, int]]:
         """Yield the sums (3, pixels) and lengths of consecutive batches, which hold all samples."""
@@ -183,13 +204,24 @@ class Film:
             yield rest, count - sum(lengths)
 
     def mean(self, span: slice = slice(None)) -> Doubles:
-        """Return the means of the samples of pixels, (3, k); 0 for pixels without samples."""
+        """Return the means of pixels, (3, k): of samples, and what light paths add; 0 without samples."""
+        mean = self._mean_of_samples(span)
+        return mean if self.light is None else mean + self.light.mean(span)
+
+    def _mean_of_samples(self, span: slice) -> Doubles:
         return self.sums.value(span) / np.maximum(self.used(span), 1)
 
     def variance(self, span: slice = slice(None)) -> Doubles:
-        """Estimate the variance of one sample of each pixel, (3, k); NaN for fewer than two."""
+        """Estimate the variance of one sample of each pixel, (3, k); NaN for fewer than two.
+
+        With light paths it is that of as many samples, each with its part of the light paths.
+        """
+        variance = self._variance_of_samples(span)
+        return variance if self.light is None else variance + self.light.squared_error(span) * self.used(span)
+
+    def _variance_of_samples(self, span: slice) -> Doubles:
         count = self.used(span)
-        spread = self.squares[:, span] - count * np.square(self.mean(span))
+        spread = self.squares[:, span] - count * np.square(self._mean_of_samples(span))
         return np.where(count > 1, np.maximum(spread, 0), np.nan) / np.maximum(count - 1, 1)
 
     def squared_error(self, span: slice = slice(None)) -> Doubles:
@@ -200,8 +232,8 @@ class Film:
         error = self._scatter_of_batches(span)
         if self.dropped.size:
             some = np.flatnonzero(self.dropped[span])
-            error[:, some] = (self.variance(span) / np.maximum(self.used(span), 1))[:, some]
-        return error
+            error[:, some] = (self._variance_of_samples(span) / np.maximum(self.used(span), 1))[:, some]
+        return error if self.light is None else error + self.light.squared_error(span)
 
     def _scatter_of_batches(self, span: slice) -> Doubles:
         """Estimate the variance of the mean of all samples, (3, k)."""

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 SCENE = "scene"
+CAUSTICS = "caustics"  # only where light paths are traced
 CODE = "code of the "  # before the names of settings that may be functions or classes of the user's
 HASH = 64  # characters of a fingerprint
 COMPILED_FOR = ("accelerator", "integrator", "light_sampler")  # settings on which the compiled scene depends

@@ -24,6 +24,7 @@ from .errors import SceneError, number, one_of, rgb
 from .film import Film
 from .html import picture_html
 from .layers import BOXES, CLAMPED, GIVEN_LAYERS, LAYERS, NOISY, is_radiance
+from .light_sums import LightSums
 from .outlines import outline_coverage
 from .picture_sums import PictureSums, merged_metadata, merged_sums, restored_sums
 from .samples import shared_samples
@@ -683,8 +684,18 @@ def _add_layers(image: Image, sums: PictureSums) -> None:
         found = sums.layers.estimate(name, sums.film.sums, sums.film.used())
         image.layers[name] = _of_shape(found.mean, width, height)
         image.errors[name] = _of_shape(found.standard_error, width, height)
+    if sums.film.light is not None and "indirect" in image.layers:
+        _add_light_paths(image, sums.film.light)
     if CLAMPED in image.layers:
         image.metadata[CLAMPED] = _removed_part(image.rgb, image.layers[CLAMPED])
+
+
+def _add_light_paths(image: Image, light: LightSums) -> None:
+    """Add what light paths have found, all of it indirect light, to that layer of a picture."""
+    layer, error = image.layers["indirect"], image.errors["indirect"]
+    mean, squared_error = (values.T.reshape(layer.shape) for values in (light.mean(), light.squared_error()))
+    image.layers["indirect"] = (layer + mean).astype(np.float32)
+    image.errors["indirect"] = np.sqrt(np.square(error, dtype=np.float64) + squared_error).astype(np.float32)
 
 
 def _removed_part(rgb: Floats, removed: Floats) -> float:

@@ -18,7 +18,6 @@ with Direct Computation of Pixel Intensities, 1993.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -48,6 +47,7 @@ LOWER_BITS = 2.0**-24  # of a number drawn: how far apart two of them are
 class Splats(SoA):
     """What light paths add to pixels, which may repeat."""
 
+    path: Ints  # (k,) number of the light path
     pixel: Words  # (k,) row-major index within the camera's window
     radiance: Floats  # (3, k) times the number of light paths
 
@@ -70,7 +70,7 @@ def trace_light(
     """
     assert scene.casters is not None
     if max_bounces < 2 or scene.lights.choice is None:
-        return Splats(np.zeros(0, np.uint32), np.zeros((3, 0), f4))
+        return _nothing()
     paths, hits, flux = _begin(scene, scene.casters, camera, sampler, pixel, sample)
     found = []
     for bounce in range(max_bounces - 1):
@@ -87,7 +87,11 @@ def trace_light(
     else:
         shade = prepare_shading(scene, paths, hits)
         found.append(_connect(scene, camera, sampler, paths, hits, shade, flux, max_bounces - 1))
-    return Splats.concatenate(found) if found else Splats(np.zeros(0, np.uint32), np.zeros((3, 0), f4))
+    return Splats.concatenate([_nothing(), *found])
+
+
+def _nothing() -> Splats:
+    return Splats(np.zeros(0, np.intp), np.zeros(0, np.uint32), np.zeros((3, 0), f4))
 
 
 def _begin(
@@ -266,7 +270,8 @@ def _connect(
         cos_light=broadcast(f4(1), lit.size),
     )
     radiance = take(radiance, lit) * _transmittance(scene, rays)
-    return Splats(_pixels(camera, film.take(lanes.take(lit), 1)), radiance)
+    at = lanes.take(lit)
+    return Splats(paths.slot.take(at), _pixels(camera, film.take(at, 1)), radiance)
 
 
 def _seen(scene: CompiledScene, camera: Camera, film: Doubles, hits: Hits, n: int) -> Ints:

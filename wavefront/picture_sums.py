@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .errors import SceneError
 from .film import Film
-from .identity import differences
+from .identity import CAUSTICS, differences
 from .layer_sums import LayerSums
 from .record import record
 from .samples import sample_ranges
@@ -82,7 +82,8 @@ def _part(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArray[
 def empty_sums(size: Sequence[int], layers: Sequence[str], identity: dict[str, Any]) -> PictureSums:
     """Return the sums of no samples for a picture of a size (width, height)."""
     width, height = size
-    return PictureSums(Film(width, height), LayerSums(layers, width * height) if layers else None, identity)
+    film = Film(width, height, identity.get(CAUSTICS, False))
+    return PictureSums(film, LayerSums(layers, width * height) if layers else None, identity)
 
 
 def restored_sums(

@@ -52,6 +52,7 @@ def render(
     guide: bool | str = False,
     reuse: bool | str = "auto",
     clamp: float | None = None,
+    caustics: bool = False,
     wave_size: int | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
     checkpoint_interval: float = 60,
@@ -155,6 +156,11 @@ def render(
         layer "clamped" holds what was removed, `metadata["clamped"]` says how much of all light that is, and
         a warning does above 2 %. Light seen directly, and that of lights on the first rough surface, is not
         clamped.
+    caustics
+        Trace paths from the lights as well, one for each sample, which find the light that smooth glass and
+        mirrors send on: caustics. Without it paths find that light by chance, and that of points, spots and
+        directional lights never. Only "full" has it, and it does not go with `reuse`, `noise`, another filter
+        or light groups: docs/caustics.md has figures.
     wave_size
         The most paths that are traced together by one worker; by default what suits their number and
         speed, at most 131 072. The picture does not depend on it.
@@ -237,6 +243,7 @@ def render(
         guide=guide,
         reuse=reuse,
         clamp=clamp,
+        caustics=caustics,
         wave_size=wave_size,
         checkpoint=checkpoint,
         checkpoint_interval=checkpoint_interval,

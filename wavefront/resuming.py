@@ -16,7 +16,7 @@ from .compile.scene import CompiledScene
 from .errors import SaveError, SceneError, warn_caller
 from .filters import FILTERS
 from .fingerprint import fingerprint
-from .identity import CODE, SCENE
+from .identity import CAUSTICS, CODE, SCENE
 from .integrators import INTEGRATORS
 from .lights.samplers import LIGHT_SAMPLERS
 from .picture_sums import PictureSums
@@ -79,6 +79,7 @@ def render_identity(
         **{name: getattr(settings, name) for name in PLAIN},
         "branches": choice.branches,
         "reuse": choice.reuse,
+        **({CAUSTICS: True} if settings.caustics else {}),
         **names,
         "accelerator": accelerator,
         "aovs": list(layers),

@@ -20,7 +20,7 @@ from .codecs.image_data import TRANSPARENT
 from .errors import SceneError, in_brief, number, rgb, warn_caller
 from .exact_sum import MAX_TERMS
 from .files import check_target
-from .filters import FILTERS, Filter
+from .filters import FILTERS, Filter, box
 from .integrators import INTEGRATORS, Integrator, li_full
 from .layers import CLAMPED, GUIDES, chosen_layers, sampled_names
 from .lighting import DEFAULT, LIGHTINGS, check_lighting
@@ -368,6 +368,15 @@ class Settings:
         option="most indirect light that a path finds at once; removes fireflies, and some light",
         check=optional(above_zero),
     )
+    caustics: bool = setting(
+        False,
+        "Trace paths from the lights as well, one for each sample, which find the light that smooth glass "
+        "and mirrors send on: caustics. Without it paths find that light by chance, and that of points, "
+        'spots and directional lights never. Only "full" has it, and it does not go with `reuse`, `noise`, '
+        "another filter or light groups: docs/caustics.md has figures.",
+        option="trace paths from lights for caustics of smooth glass and mirrors",
+        check=check_flag,
+    )
     wave_size: int | None = setting(
         None,
         "The most paths that are traced together by one worker; by default what suits their number "
@@ -448,6 +457,7 @@ class Settings:
         self.up_vector = upward("up", "y" if self.up is None else self.up)
         self._check_integrator()
         self._check_reuse()
+        self._check_caustics()
         make_sampler(self.sampler, self.seed)
         self.executor_for((0, 0))
 
@@ -456,7 +466,7 @@ class Settings:
         if self.is_full:
             return
         label = INTEGRATORS.label(self.integrator)
-        for name in ("guide", "reuse"):
+        for name in ("guide", "reuse", "caustics"):
             if getattr(self, name) is True:
                 raise SceneError(f"{name} is True; with integrator={label!r} it must be False")
         if self.branches not in (1, AUTO):
@@ -468,6 +478,19 @@ class Settings:
             raise SceneError("reuse is True; then aovs must not have 'light_groups'")
         if self.reuse is True and self.clamp is not None:
             raise SceneError(f"clamp is {self.clamp:g}; with reuse=True it must be None")
+
+    def _check_caustics(self) -> None:
+        """Check that nothing is asked for that light paths, which reach any pixel, cannot give."""
+        if not self.caustics:
+            return
+        if self.reuse is True:
+            raise SceneError("caustics is True; then reuse must not be True")
+        if self.noise is not None:
+            raise SceneError(f"noise is {self.noise:g}; with caustics=True it must be None")
+        if FILTERS.find(self.filter) is not box:
+            raise SceneError(f"filter is {FILTERS.label(self.filter)!r}; with caustics=True it must be 'box'")
+        if "light_groups" in self.aovs:
+            raise SceneError("caustics is True; then aovs must not have 'light_groups'")
 
     @property
     def first_sample(self) -> int:
@@ -521,7 +544,9 @@ class Settings:
     ) -> Budget:
         """Return the workers, and the largest wave, for a picture of a size (width, height) with layers."""
         processes = executor != "threads"
-        return make_budget(self.memory_limit, size, self.worker_count, self.wave_size, processes, layers)
+        return make_budget(
+            self.memory_limit, size, self.worker_count, self.wave_size, processes, layers, self.caustics
+        )
 
     def _most_samples(self) -> int:
         ways = self.most_branches * (SHARED_WAYS if self.reuse is True else 1)

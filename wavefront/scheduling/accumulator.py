@@ -19,18 +19,21 @@ from .jobs import Job, JobResult, WaveResult
 
 MAX_BAD_SAMPLES = 1e-4  # part of all samples that may be lost to NaN before it is an error
 FILM_BYTES = 176  # of a pixel of the film
+LIGHT_BYTES = 96  # of the sums over light paths, for each pixel
 PICTURE_BYTES = 64  # of a pixel of the picture, and of what is needed to make it
 SPARE_BYTES = 16 << 20
 
 
-def picture_memory(width: int, height: int, layers: Sequence[str] = ()) -> int:
+def picture_memory(width: int, height: int, layers: Sequence[str] = (), light_paths: bool = False) -> int:
     """Return how many bytes a film, sampled layers, and the picture that is made of them need."""
-    return (FILM_BYTES + PICTURE_BYTES + sum(map(layer_bytes, layers))) * width * height + SPARE_BYTES
+    film = FILM_BYTES + (LIGHT_BYTES if light_paths else 0)
+    return (film + PICTURE_BYTES + sum(map(layer_bytes, layers))) * width * height + SPARE_BYTES
 
 
-def check_picture_memory(width: int, height: int) -> None:
+def check_picture_memory(width: int, height: int, light_paths: bool = False) -> None:
     """Check that there is memory for a film and the picture, or raise a SceneError."""
-    check_memory(f"a picture of {width}x{height} pixels", picture_memory(width, height))
+    memory = picture_memory(width, height, light_paths=light_paths)
+    check_memory(f"a picture of {width}x{height} pixels", memory)
 
 
 class Accumulator:
@@ -51,10 +54,10 @@ class Accumulator:
         Queries of the accelerator.
     """
 
-    def __init__(self, width: int, height: int) -> None:
+    def __init__(self, width: int, height: int, light_paths: bool = False) -> None:
         pixels = width * height
-        check_picture_memory(width, height)
-        self.sums = PictureSums(Film(width, height), None, {})
+        check_picture_memory(width, height, light_paths)
+        self.sums = PictureSums(Film(width, height, light_paths), None, {})
         self.bad, self.rays = BadSamples(), 0
         # for the picture so far when memory has run out
         self._reserve: Bytes | None = np.empty(PICTURE_BYTES * pixels + SPARE_BYTES, np.uint8)
@@ -91,6 +94,8 @@ class Accumulator:
 
     def _add_wave(self, wave: Job, result: WaveResult) -> None:
         self.film.add(wave.pixels, result.radiance, result.bad)
+        if self.film.light is not None and result.splats is not None:
+            self.film.light.add(wave.lanes, result.splats.pixel, result.splats.radiance)
         if self.sums.layers is not None:
             assert result.layers is not None
             self.sums.layers.add(wave.pixels, result.layers, result.radiance, most=wave.end)

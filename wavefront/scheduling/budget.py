@@ -32,6 +32,7 @@ def make_budget(
     wave_size: int | None,
     processes: bool,
     layers: Sequence[str] = (),
+    light_paths: bool = False,
 ) -> Budget:
     """Return how many workers trace waves of how many lanes.
 
@@ -47,6 +48,8 @@ def make_budget(
         Whether workers are processes.
     layers
         The sampled layers of the picture.
+    light_paths
+        Whether paths from lights are summed up, too.
 
     Raises
     ------
@@ -56,7 +59,7 @@ def make_budget(
     if max_memory is None:
         return Budget(workers, wave_size or default_wave_size(workers))
     fixed = PROCESS_BYTES if processes else THREAD_BYTES
-    in_use, picture = resident_memory(), picture_memory(*size, layers)
+    in_use, picture = resident_memory(), picture_memory(*size, layers, light_paths)
     worker = fixed + min(LEAST_WAVE, wave_size or LEAST_WAVE) * LANE_BYTES
     left = max_memory - in_use - picture
     if left < worker:

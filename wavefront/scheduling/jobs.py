@@ -14,6 +14,7 @@ import numpy as np
 from ..camera import Camera
 from ..counted import counted
 from ..layer_samples import LayerSamples
+from ..light_paths import Splats
 from ..pixel_tiles import whole_tiles
 from ..record import record
 from ..state import Words
@@ -127,6 +128,7 @@ class WaveResult:
     rays: int  # queries of the accelerator
     seconds: float  # that it took its worker
     layers: LayerSamples | None = None  # None where no sampled layer is asked for
+    splats: Splats | None = None  # of as many light paths; None where none are traced
 
 
 JobResult: TypeAlias = list[WaveResult]  # of each wave

@@ -15,6 +15,7 @@ from ..errors import SceneError
 from ..filters import Filter
 from ..guiding import GuideTable
 from ..integrators import Integrator, integrator_for
+from ..light_paths import trace_light
 from ..record import record
 from ..sample_recorder import SampleRecorder, recorded_layers
 from ..sampling.sampler import Sampler, SamplerMaker
@@ -131,13 +132,22 @@ def _trace_wave(tracer: Tracer, monitor: WaveMonitor, job: Job) -> WaveResult:
     integrator = integrator_for(tracer.integrator, job.view.branches, job.view.reuse, table)
     radiance = integrator(scene, paths, sampler, tracer.max_bounces)
     _check_radiance(integrator, radiance, k * n)
-    finite = np.isfinite(radiance).all(0)
+    finite = np.logical_and.reduce(np.isfinite(radiance))
     if recorder is not None:
         finite &= recorder.finish(integrator, radiance)
+    splats = None
+    if scene.casters is not None:
+        splats = trace_light(
+            scene, camera, sampler, np.tile(job.pixels, n), _samples(job), tracer.max_bounces
+        )
+        good = np.isfinite(splats.radiance).all(0)
+        finite[splats.path[~good]] = False
+        splats = splats.take(np.flatnonzero(good))
     bad = np.flatnonzero(~finite)
     layers = None if recorder is None else recorder.result(n, bad)
     radiance[:, bad] = 0
-    return WaveResult(radiance.reshape(3, n, k), bad, accelerator.rays, time.perf_counter() - begin, layers)
+    seconds = time.perf_counter() - begin
+    return WaveResult(radiance.reshape(3, n, k), bad, accelerator.rays, seconds, layers, splats)
 
 
 def _check_radiance(integrator: Integrator, radiance: Any, lanes: int) -> None:

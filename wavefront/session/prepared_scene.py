@@ -60,6 +60,7 @@ class PreparedScene:
                 settings.light_sampler,
                 most_copies(settings.accel),
                 mis=INTEGRATORS.find(settings.integrator) in WITH_MIS,
+                caustics=settings.caustics,
             )
         self.compiled = replace(compiled, background=settings.background_color)
         self.shapes = ShapeTable(self.lighted.shapes)

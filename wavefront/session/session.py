@@ -65,7 +65,7 @@ class Session:
         As for `render`.
     integrator, max_bounces, seed, samples, sampler, accel, filter, light_sampler, branches, guide, reuse
         As for `render`.
-    workers, executor, noise, seconds, clamp, wave_size, max_memory, strict, aovs, denoise, progress
+    workers, executor, noise, seconds, clamp, caustics, wave_size, max_memory, strict, aovs, denoise, progress
         As for `render`.
     checkpoint, checkpoint_interval
         As for `render`.
@@ -119,6 +119,7 @@ class Session:
         guide: bool | str = False,
         reuse: bool | str = "auto",
         clamp: float | None = None,
+        caustics: bool = False,
         wave_size: int | None = None,
         checkpoint: str | os.PathLike[str] | None = None,
         checkpoint_interval: float = 60,
@@ -156,6 +157,7 @@ class Session:
             guide=guide,
             reuse=reuse,
             clamp=clamp,
+            caustics=caustics,
             wave_size=wave_size,
             checkpoint=checkpoint,
             checkpoint_interval=checkpoint_interval,
@@ -174,7 +176,7 @@ class Session:
         reserve_buffers(1)
         scene = as_scene(subject, settings.material, settings.progress)
         camera = choose_camera(scene, settings.camera, settings.size, settings.up_vector)
-        check_picture_memory(*camera.size)
+        check_picture_memory(*camera.size, settings.caustics)
         # before work, for what takes least; again when the memory of the scene is known
         settings.budget(camera.size, settings.executor or "threads")
         self._scene = PreparedScene(scene, settings)
@@ -183,7 +185,9 @@ class Session:
         try:
             self._pool.start()  # before there are sums, of which forked processes would keep old copies
             with ThreadPoolExecutor(1) as aside:
-                sums = aside.submit(new_accumulator, camera, self._plan.tracer.recorded_layers)
+                sums = aside.submit(
+                    new_accumulator, camera, self._plan.tracer.recorded_layers, settings.caustics
+                )
                 self._plan = with_choice(self._plan, camera, self._run_trial)
             self._begin_picture(camera, sums.result(), begin)
         except BaseException:
@@ -345,7 +349,7 @@ class Session:
         self._scene.compiled.view(camera)  # checks its distance
         executor = settings.executor_for(camera.size)
         budget = settings.budget(camera.size, executor, self._plan.tracer.recorded_layers)
-        accumulator = new_accumulator(camera, self._plan.tracer.recorded_layers)
+        accumulator = new_accumulator(camera, self._plan.tracer.recorded_layers, settings.caustics)
         with self.interrupt_handler:
             self._render.discard_sweeps()
             self._stopped = self._dropped = False  # a stop from now on is one of the new picture

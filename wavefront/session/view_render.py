@@ -207,6 +207,7 @@ class ViewRender:
             "reuse": plan.choice.reuse,
             "hint": plan.choice.hint,
             "clamp": settings.clamp,
+            "caustics": settings.caustics,
             "accelerator": plan.scene.compiled.accelerator.name,
             "workers": plan.budget.workers,
             "executor": EXECUTORS.label(plan.executor),
@@ -236,15 +237,15 @@ class ViewRender:
             image.metadata[BOXES] = deepcopy(self._boxes)
 
 
-def new_accumulator(camera: Camera, layers: Sequence[str]) -> Accumulator:
-    """Return sums for the picture of a camera and its sampled layers.
+def new_accumulator(camera: Camera, layers: Sequence[str], light_paths: bool) -> Accumulator:
+    """Return sums for the picture of a camera, its sampled layers, and light paths.
 
     Raises
     ------
     SceneError
         If there is not enough memory for them.
     """
-    accumulator = Accumulator(*camera.size)
+    accumulator = Accumulator(*camera.size, light_paths)
     accumulator.add_layers(layers)
     return accumulator
 
