@@ -17,6 +17,7 @@ def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
 
     What follows from another difference is left out.
     """
+    before, now = ({CAUSTICS: False, **identity} for identity in (before, now))
     changed = {key for key in {**before, **now} if before.get(key) != now.get(key)}
     follows = {CODE + key for key in changed}
     follows |= {SCENE} if changed.intersection(COMPILED_FOR) else set()
