@@ -165,7 +165,7 @@ def compile_scene(
         built = [make_accelerator(Geometry(part, (), weights)) for part in parts]
         accelerator = InstanceAccelerator(accelerator, built, placements)
     casters, groups_of = None, group_materials(user_materials)
-    if caustics and len(lights):
+    if caustics and len(lights) > int(environment >= 0):  # one is not at infinity
         of_whole = np.append(material_of[:once], material_of[len(triangles) :])
         casters = find_casters(triangles[:once], table_of_curved, of_whole, groups_of)
     return CompiledScene(
