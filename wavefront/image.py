@@ -21,7 +21,7 @@ from .codecs.images import read_picture, write_image
 from .codecs.png_jpeg import Gamma
 from .codecs.white_balance import WhiteBalance
 from .errors import SceneError, number, one_of, rgb
-from .film import Film
+from .film import Film, chunks
 from .html import picture_html
 from .layers import BOXES, CLAMPED, GIVEN_LAYERS, LAYERS, NOISY, is_radiance
 from .light_sums import LightSums
@@ -51,7 +51,7 @@ class Image:
         besides: docs/choices.md), accelerator, workers, executor, seconds (wall time), spp (mean
         over pixels), samples, rays, bad_samples, interrupted, version (of this package), numpy, noise
         (estimated relative error of the picture before denoising), clamp and clamped (the part of the light
-        that it removed), boxes if they were asked for, and of a denoised picture denoiser.
+        that it removed), caustics, boxes if they were asked for, and of a denoised picture denoiser.
     counts
         (H, W) int64 samples of each pixel, without those that were not finite.
     variance
@@ -692,10 +692,10 @@ def _add_layers(image: Image, sums: PictureSums) -> None:
 
 def _add_light_paths(image: Image, light: LightSums) -> None:
     """Add what light paths have found, all of it indirect light, to that layer of a picture."""
-    layer, error = image.layers["indirect"], image.errors["indirect"]
-    mean, squared_error = (values.T.reshape(layer.shape) for values in (light.mean(), light.squared_error()))
-    image.layers["indirect"] = (layer + mean).astype(np.float32)
-    image.errors["indirect"] = np.sqrt(np.square(error, dtype=np.float64) + squared_error).astype(np.float32)
+    layer, error = (values.reshape(-1, 3) for values in (image.layers["indirect"], image.errors["indirect"]))
+    for part in chunks(len(layer)):
+        layer[part] += light.mean(part).T
+        error[part] = np.sqrt(np.square(error[part], dtype=np.float64) + light.squared_error(part).T)
 
 
 def _removed_part(rgb: Floats, removed: Floats) -> float:
