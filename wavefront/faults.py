@@ -12,6 +12,7 @@ from .compile.scene import CompiledScene
 from .diagnosis import shape_name
 from .filters import Filter
 from .integrators import accumulate, intersect_and_compact, prepare_shading
+from .light_paths import trace_light
 from .record import record
 from .sampling.sampler import Sampler
 from .scene import Scene
@@ -19,7 +20,7 @@ from .stages.bounce import branch, copies
 from .stages.compact import roulette, select
 from .stages.generate import generate
 from .stages.shade import Shading, direct
-from .state import Paths, SurfaceInteraction
+from .state import Paths, SurfaceInteraction, Words
 from .vec import Bools, Floats, f4
 
 
@@ -52,6 +53,16 @@ class PathChecker:
                 fault = self._first_fault(paths, of_second)
                 if fault:
                     return fault
+            return self._light_path_fault(*address)
+
+    def _light_path_fault(self, pixel: Words, sample: Words) -> str:
+        """Return where a light path brings a value that is not finite; "" where none does."""
+        if self.scene.casters is None:
+            return ""
+        for scatterings in range(2, self.max_bounces + 1):
+            splats = trace_light(self.scene, self.camera, self.sampler, pixel, sample, scatterings)
+            if not np.isfinite(splats.radiance).all():
+                return f"bounce {scatterings - 1} of the path from the light"
         return ""
 
     def _first_fault(self, paths: Paths, of_second: int) -> str:
