@@ -212,7 +212,7 @@ class Sight:
         if self._compiled.lights.delta_of.all():
             return (
                 f"{name} lets light through, but bends it, and no path meets a light without size there; "
-                "give the light a size: a small wf.Sphere with an emission"
+                "caustics=True traces paths from it, or give it a size: a small wf.Sphere with an emission"
             )
         if self._integrator != "full":
             return (

@@ -148,8 +148,8 @@ def render(
         lie a little apart; only "full" does so. It pays where most of the noise is in indirect light between
         matte surfaces. The errors of these pixels depend on each other then: docs/reuse.md has figures.
         "auto" shares where a short trial says that it pays, beside gloss and glass only where light is hard
-        to find: docs/choices.md tells how. It never does with `branches`, `clamp`, `noise`, `denoise` or
-        light groups.
+        to find: docs/choices.md tells how. It never does with `branches`, `clamp`, `noise`, `denoise`,
+        `caustics` or light groups.
     clamp
         The most that a path may find as indirect light at once, as radiance, the mean of its channels; what
         is brighter is scaled down. It removes fireflies, and with them light: the picture gets too dark. The
