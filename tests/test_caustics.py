@@ -278,7 +278,9 @@ def test_damaged_sums_are_named(name: str, tmp_path: Path) -> None:
     key = f"sums.film.light.{name}"
     for spoiled in ({k: v for k, v in found.items() if k != key}, {**found, key: found[key][..., :-1]}):
         np.savez(tmp_path / "b.npz", **spoiled)
-        with pytest.raises(wf.SceneError, match=rf"b\.npz: the sums of its samples are damaged.*light\.{name}"):
+        with pytest.raises(
+            wf.SceneError, match=rf"b\.npz: the sums of its samples are damaged.*light\.{name}"
+        ):
             wf.Image.load(tmp_path / "b.npz")
 
 
@@ -352,7 +354,7 @@ def test_the_standard_error_is_honest(sampler: str) -> None:
 
 def test_the_variance_of_a_sample_has_its_part_of_the_light_paths() -> None:
     """So that variance / spp is the squared error of independent samples; noise is that of the whole."""
-    image = wf.render(scene(), 8, samples=None, caustics=True, **ALONE)
+    image = wf.render(scene(), 8, caustics=True, **ALONE)
     plain = wf.render(scene(), 8, **ALONE)
     kept = part(0, 8).sums.film
     light = kept.light.squared_error().T.reshape(image.shape)
@@ -571,9 +573,7 @@ def test_scenes_without_casters_or_placed_lights_cost_nothing(
     """No light path is traced, and all is as without them."""
     monkeypatch.delattr(tracing, "trace_light")
     subject = scene(**arguments)
-    found, plain = (
-        wf.render(subject, 4, **{**EVERY, "caustics": each, **ALONE}) for each in (True, False)
-    )
+    found, plain = (wf.render(subject, 4, **{**EVERY, "caustics": each, **ALONE}) for each in (True, False))
     assert digest(found) == digest(plain)
     assert found.metadata["rays"] == plain.metadata["rays"]
 

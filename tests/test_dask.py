@@ -52,6 +52,16 @@ def test_a_cluster_gives_the_same_bits(client: Any, expected: bytes) -> None:
     assert client.submit(abs, -1).result() == 1
 
 
+def test_light_paths_come_from_a_cluster(client: Any, expected: bytes) -> None:
+    """Which reach pixels of other tasks."""
+    images = [
+        wf.render(scenes.everything(), 8, caustics=True, **settings, **QUIET)
+        for settings in ({"executor": client}, {"workers": 1, "executor": "threads"})
+    ]
+    assert images[0].rgb.tobytes() == images[1].rgb.tobytes() != expected
+    assert images[0].standard_error.tobytes() == images[1].standard_error.tobytes()
+
+
 def test_a_task_has_several_waves(client: Any, expected: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     """Since Dask spends milliseconds on each."""
     jobs: list[Any] = []
