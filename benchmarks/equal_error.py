@@ -150,6 +150,14 @@ def courtyard(size: int) -> wf.Scene:
     return build(size)
 
 
+def gathered(thing: str, size: int) -> wf.Scene:
+    """Return a thing of examples/caustics.py on its table, in the light of a small lamp that can be met."""
+    import caustics
+
+    lamp = wf.Sphere(caustics.LAMP, 0.15, emission=np.array((60, 54, 45)) / (np.pi * 0.15**2))
+    return caustics.table([getattr(caustics, thing)(), lamp], [], (size, size))
+
+
 def square(build: Callable[[tuple[int, int]], wf.Scene], size: int) -> wf.Scene:
     """Return a scene of the tests in square pictures."""
     return build((size, size))
@@ -222,6 +230,11 @@ SCENES: dict[str, Callable[[int], Any]] = {
     **{name: partial(example, name) for name in EXAMPLES},
     **BESIDE_GLOSS,
 }
+SMALL_LAMPS: dict[str, Callable[[int], Any]] = {  # for caustics; measured where they are named
+    "lamp and glass ball": partial(gathered, "ball"),
+    "lamp and tumbler": partial(gathered, "tumbler"),
+    "lamp and gold ring": partial(gathered, "ring"),
+}
 
 
 def settings_of(text: str) -> dict[str, Any]:
@@ -258,7 +271,7 @@ def errors(pictures: list[np.ndarray], mean: np.ndarray) -> np.ndarray:
 
 def measure(name: str, options: argparse.Namespace) -> None:
     """Print a row of the table for each of the settings."""
-    subject = SCENES[name](options.size)
+    subject = (SCENES | SMALL_LAMPS)[name](options.size)
     scene, given = subject if isinstance(subject, tuple) else (subject, {})
     sides = {"plain": PLAIN, **{text: settings_of(text) for text in options.settings}}
     pictures: dict[str, list[np.ndarray]] = {side: [] for side in sides}
@@ -291,7 +304,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--scenes", nargs="*", default=list(SCENES), choices=SCENES, metavar="NAME")
+    parser.add_argument(
+        "--scenes", nargs="*", default=list(SCENES), choices=SCENES | SMALL_LAMPS, metavar="NAME"
+    )
     parser.add_argument("--settings", nargs="*", default=[""], help='such as "branches=4" or "guide=True"')
     parser.add_argument("--size", type=int, default=192)
     parser.add_argument("--spp", type=int, default=16)
@@ -301,7 +316,7 @@ def main() -> None:
     parser.add_argument("--list", action="store_true", help="print the names of the scenes")
     options = parser.parse_args()
     if options.list:
-        print(", ".join(SCENES))
+        print(", ".join(SCENES | SMALL_LAMPS))
         return
     warnings.simplefilter("ignore")
     decide_with(options.decide)

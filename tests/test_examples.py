@@ -16,6 +16,7 @@ from wavefront.materials import as_material
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 SHAPES = {  # the picture of --size 24, (height, width)
+    "caustics": (15, 24),
     "cornell_box": (24, 24),
     "course_spheres": (24, 24),
     "cuboids": (24, 24),
