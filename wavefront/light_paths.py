@@ -25,19 +25,19 @@ import numpy as np
 from .camera import Camera
 from .compile.casters import CasterPoints, Casters
 from .compile.scene import CompiledScene
-from .integrators import prepare_shading
 from .lights import LightSample
 from .record import record
 from .sampling.sampler import Dimension, Sampler
 from .stages.alpha import alpha_pass_through
 from .stages.bounce import bounce_sample
 from .stages.compact import compact, roulette, select
-from .stages.interaction import interaction, offset_origin
+from .stages.interaction import interaction, material_rows, offset_origin
 from .stages.intersect import ShadowRays, intersect, visible
+from .stages.medium import absorb
 from .stages.normal_mapping import perturb_normals
 from .stages.shade import Shading, evaluate, radiance_at_samples, shading
 from .stages.transmittance import transmittance_along
-from .state import Hits, Paths, Rays, SoA, Words
+from .state import Hits, Paths, Rays, SoA, SurfaceInteraction, Words
 from .vec import Doubles, Floats, Ints, broadcast, dot, f4, highest, length, take
 
 LOWER_BITS = 2.0**-24  # of a number drawn: how far apart two of them are
@@ -74,18 +74,22 @@ def trace_light(
     paths, hits, flux = _begin(scene, scene.casters, camera, sampler, pixel, sample)
     found = []
     for bounce in range(max_bounces - 1):
-        shade = prepare_shading(scene, paths, hits)
+        shade = _prepared(scene, paths, hits)
         if bounce:
             found.append(_connect(scene, camera, sampler, paths, hits, shade, flux, bounce))
         paths = _scatter(scene, paths, hits, shade, sampler, bounce)
-        paths = select(paths, roulette(paths, sampler, bounce))
+        lanes = roulette(paths, sampler, bounce)
+        paths = select(paths, lanes)
         hits = intersect(scene, paths)
+        if scene.absorption is not None:
+            t = np.where(hits.prim >= 0, hits.t, f4(0))
+            _absorb(scene, paths.throughput, shade.surface.take(lanes), paths.direction, t)
         paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce + 1)
         paths, hits = compact(scene, paths, hits, hits.found)
         if not len(paths):
             break
     else:
-        shade = prepare_shading(scene, paths, hits)
+        shade = _prepared(scene, paths, hits)
         found.append(_connect(scene, camera, sampler, paths, hits, shade, flux, max_bounces - 1))
     return Splats.concatenate([_nothing(), *found])
 
@@ -169,7 +173,8 @@ def _lit(
     arriving = arriving * _transmittance(scene, rays)
     cos = dot(surface.ng, light.wi)
     flux = np.zeros((3, slots), f4)
-    flux[:, paths.slot] = arriving * (cos * f4(casters.area) / light.pdf)
+    arriving = arriving * (cos * f4(casters.area) / light.pdf)
+    flux[:, paths.slot] = arriving if scene.opacities is None else arriving * scene.opacities.at(surface)
     lanes = np.flatnonzero(highest(take(flux, paths.slot)) != 0)
     return paths.take(lanes), hits.take(lanes), flux
 
@@ -179,6 +184,24 @@ def _transmittance(scene: CompiledScene, rays: ShadowRays) -> Floats:
     if scene.opacities is not None:
         return transmittance_along(scene, rays)
     return visible(scene, rays).astype(f4)
+
+
+def _prepared(scene: CompiledScene, rays: Rays, hits: Hits) -> Shading:
+    """Return the surfaces that rays hit, ready to shade."""
+    surface = interaction(scene, rays, hits)
+    perturb_normals(scene, surface)
+    return shading(scene, surface)
+
+
+def _absorb(
+    scene: CompiledScene, flux: Floats, surface: SurfaceInteraction, direction: Floats, t: Floats
+) -> None:
+    """Attenuate, in place, flux (3, n) that leaves surfaces and goes over lengths t (n,).
+
+    A path from the camera comes the other way, and is weakened where it meets these surfaces from behind.
+    """
+    behind = surface.back_facing ^ (dot(surface.ng, direction) < 0)
+    absorb(scene, flux, Hits(t, surface.prim, None, None), replace(surface, back_facing=behind))
 
 
 def _scatter(
@@ -226,13 +249,11 @@ def _towards(scene: CompiledScene, hits: Hits, point: Floats, wo: Floats, wi: Fl
     the geometric one, as the flux that arrives has the latter.
     """
     rays = Rays(point, -wo, broadcast(np.intp(-1), wo.shape[1]))
-    surface = interaction(scene, rays, replace(hits, t=np.zeros_like(hits.t)))
-    perturb_normals(scene, surface)
-    shade = shading(scene, surface)
+    shade = _prepared(scene, rays, replace(hits, t=np.zeros_like(hits.t)))
     local = shade.frame.to_local(wi)
     cos, cos_g = shade.cosines(local, wi)
     f, _ = evaluate(shade, local)
-    return f * (_divided(cos, np.abs(cos_g)) * np.abs(dot(surface.ng, wo)))
+    return f * (_divided(cos, np.abs(cos_g)) * np.abs(dot(shade.surface.ng, wo)))
 
 
 def _connect(
@@ -270,6 +291,8 @@ def _connect(
         cos_light=broadcast(f4(1), lit.size),
     )
     radiance = take(radiance, lit) * _transmittance(scene, rays)
+    if scene.absorption is not None:
+        _absorb(scene, radiance, seen, wo, rays.distance)
     at = lanes.take(lit)
     return Splats(paths.slot.take(at), _pixels(camera, film.take(at, 1)), radiance)
 
@@ -280,7 +303,7 @@ def _seen(scene: CompiledScene, camera: Camera, film: Doubles, hits: Hits, n: in
     x, y = film
     inside = (x >= x0) & (x < x1) & (y >= y0) & (y < y1)
     if scene.shadow_catchers is not None:
-        inside &= ~scene.shadow_catchers.take(scene.material_of.take(hits.prim[:n]))
+        inside &= ~scene.shadow_catchers.take(material_rows(scene, hits, slice(n)))
     return np.flatnonzero(inside)
 
 
