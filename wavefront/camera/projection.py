@@ -183,7 +183,8 @@ class Perspective(Projection):
         """Return where rays from lens points through the points meet the plane of focus."""
         if not self.uses_lens:
             return points
-        return np.asarray(offset + (points - offset) * (self.focus / -points[2]))
+        ahead = np.where(points[2] < 0, -points[2], np.nan)
+        return np.asarray(offset + (points - offset) * (self.focus / ahead))
 
     def matrix(self, film: Size) -> Doubles:
         """Return the intrinsic matrix (3, 3), in pixels with centers at .5; distortion is no part of it."""
