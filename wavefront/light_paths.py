@@ -126,14 +126,13 @@ def _begin(
 def _arriving(
     scene: CompiledScene, start: CasterPoints, light: LightSample, address: tuple[Words, Words], lanes: Ints
 ) -> tuple[Paths, Hits]:
-    """Return paths (k,) that come from lights, and their hits at points of casters."""
+    """Return paths (k,) that have come from lights to points of casters, and their hits there."""
     n = lanes.size
-    t = np.where(np.isfinite(light.distance), light.distance, f4(0))
     paths = Paths(
         slot=lanes,
         pixel=address[0].take(lanes),
         sample=address[1].take(lanes),
-        origin=start.point + light.wi * t,
+        origin=start.point,
         direction=-light.wi,
         exclude_prim=broadcast(np.intp(-1), n),
         throughput=np.ones((3, n), f4),
@@ -141,7 +140,7 @@ def _arriving(
         specular=broadcast(np.True_, n),
         roulette_scale=broadcast(f4(1), n),
     )
-    hits = Hits(t, start.prim, None, None)
+    hits = Hits(np.zeros(n, f4), start.prim, None, None)
     if scene.interpolates:
         hits.b1, hits.b2 = start.b1, start.b2
     if scene.instances is not None:

@@ -64,11 +64,12 @@ class Casters:
 
 
 def find_casters(
-    triangles: Floats, curved: CurvedTable, material_of: Ints, materials: MaterialTable
+    triangles: Floats, curved: CurvedTable, material_of: Ints, light_of: Ints, materials: MaterialTable
 ) -> Casters | None:
     """Return the casters of a scene; None if it has none.
 
-    Cylinders, capsules and instances that share their arrays are no casters.
+    Cylinders, capsules and instances that share their arrays are no casters, nor are spheres that shine: no
+    light sample tells whether a point on such a sphere is lit from the other side of the same sphere.
 
     Parameters
     ----------
@@ -76,12 +77,12 @@ def find_casters(
         (m, 3, 3) those that no instance shares.
     curved
         The k curved primitives, whose ids follow those of the triangles.
-    material_of
-        (m + k,) material of each of these primitives.
+    material_of, light_of
+        (m + k,) material of each of these primitives, and its light, -1 for none.
     """
     delta = np.array([bsdf.specular for bsdf in materials.groups], np.bool_)[materials.group_of]
     of_prim = np.append(delta.take(material_of), False)
-    of_prim[len(triangles) : -1] &= _spheres_among(curved)
+    of_prim[len(triangles) : -1] &= _spheres_among(curved) & (light_of[len(triangles) :] < 0)
     flat = np.flatnonzero(of_prim[: len(triangles)])
     corners = triangles.take(flat, 0)
     edge, other = (corners[:, k].astype(np.float64) - corners[:, 0] for k in (1, 2))

@@ -166,8 +166,10 @@ def compile_scene(
         accelerator = InstanceAccelerator(accelerator, built, placements)
     casters, groups_of = None, group_materials(user_materials)
     if caustics and len(lights) > int(environment >= 0):  # one is not at infinity
-        of_whole = np.append(material_of[:once], material_of[len(triangles) :])
-        casters = find_casters(triangles[:once], table_of_curved, of_whole, groups_of)
+        whole = np.append(np.arange(once), np.arange(len(triangles), len(material_of)))
+        casters = find_casters(
+            triangles[:once], table_of_curved, material_of.take(whole), light_of.take(whole), groups_of
+        )
     return CompiledScene(
         scale=scale,
         center=center,
