@@ -38,8 +38,9 @@ from .stages.normal_mapping import perturb_normals
 from .stages.shade import Shading, evaluate, radiance_at_samples, shading
 from .stages.transmittance import transmittance_along
 from .state import Hits, Paths, Rays, SoA, SurfaceInteraction, Words
-from .vec import Doubles, Floats, Ints, broadcast, dot, f4, highest, length, take
+from .vec import Bools, Doubles, Floats, Ints, broadcast, dot, f4, highest, length, take
 
+NEARBY = f4(16)  # error bounds within which another surface is at the same place
 LOWER_BITS = 2.0**-24  # of a number drawn: how far apart two of them are
 
 
@@ -175,7 +176,18 @@ def _lit(
     arriving = arriving * (cos * f4(casters.area) / light.pdf)
     flux[:, paths.slot] = arriving if scene.opacities is None else arriving * scene.opacities.at(surface)
     lanes = np.flatnonzero(highest(take(flux, paths.slot)) != 0)
+    lanes = lanes.compress(_first(scene, casters, rays.take(lanes)))
     return paths.take(lanes), hits.take(lanes), flux
+
+
+def _first(scene: CompiledScene, casters: Casters, rays: ShadowRays) -> Bools:
+    """Return whether light along rays (k) hits the casters that they start from, (k,).
+
+    Points are drawn on all faces, but of those that overlap in a plane only the first is ever hit.
+    """
+    away, nothing = NEARBY * rays.error, broadcast(np.intp(-1), len(rays))
+    found = scene.accelerator.closest(rays.origin + rays.direction * away, -rays.direction, nothing)
+    return ~((found.t < 2 * away) & (found.prim < casters.found_as.take(rays.exclude_prim)))
 
 
 def _transmittance(scene: CompiledScene, rays: ShadowRays) -> Floats:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..accel.quads import find_quads
 from ..accel.sphere import SpherePrimitives
 from ..record import record
 from ..sampling.warp import uniform_sphere, uniform_triangle
@@ -31,6 +32,9 @@ class Casters:
     """The casters of a scene: its triangles and spheres whose materials have only delta lobes."""
 
     of_prim: Bools  # (m + k + 1,) whether each primitive id is one; False at the end, for others and a miss
+    # (m + k,) the primitive id that a ray may find where it hits each primitive: that of the first triangle of a
+    # flat quadrilateral, or the id itself
+    found_as: Ints
     prim: Ints  # (c,) their primitive ids, triangles first
     corners: Floats  # (t, 3, 3) of the triangles
     centers: Floats  # (3, c - t) of the spheres
@@ -95,7 +99,10 @@ def find_casters(
     cumulative = np.cumsum([*area, *(4 * np.pi * radii.astype(np.float64) ** 2)])
     if not cumulative.size or not cumulative[-1] > 0:
         return None
-    return Casters(of_prim, np.append(flat, ball + len(triangles)), corners, centers, radii, cumulative)
+    found_as = np.arange(of_prim.size - 1)
+    found_as[find_quads(triangles) + 1] -= 1
+    prim = np.append(flat, ball + len(triangles))
+    return Casters(of_prim, found_as, prim, corners, centers, radii, cumulative)
 
 
 def _spheres_among(curved: CurvedTable) -> Bools:
