@@ -1,4 +1,4 @@
-"""Guided and re-used renders have the mean of plain ones, within three standard errors of at most 0.1 %.
+"""Guided and re-used renders, and those with caustics, have the mean of plain ones, within three standard errors of at most 0.1 %.
 
 Printed are all means: `pytest -s -m slow tests/test_equal_means.py`.
 """
@@ -33,11 +33,12 @@ PICTURES = {
     "glass ball": scenes.glass_ball,
     "glass box": scenes.glass_box,
 }
-PLAIN = {"branches": 1, "guide": False, "reuse": False}
+PLAIN = {"branches": 1, "guide": False, "reuse": False, "caustics": False}
 TECHNIQUES = {
     "guided": {**PLAIN, "guide": True},
     "guided, four branches": {**PLAIN, "guide": True, "branches": 4},
     "re-used": {**PLAIN, "reuse": True},
+    "caustics": {**PLAIN, "caustics": True},
 }
 CASES = [*scenes.DIRECT_CASES, *scenes.TRIANGLE_CASES, *scenes.INDIRECT_CASES, *scenes.SPECULAR_CASES]
 techniques = pytest.mark.parametrize("options", TECHNIQUES.values(), ids=list(TECHNIQUES))
@@ -68,7 +69,7 @@ def plain(name: str) -> Mean:
 @pytest.mark.parametrize("name", PICTURES)
 def test_pictures(name: str, options: dict[str, Any]) -> None:
     spp = SPP // options["branches"]
-    if options["reuse"]:
+    if options["reuse"] or options["caustics"]:
         found = mean_of_runs(PICTURES[name](), spp, accel="auto", workers=None, **options)
     else:
         found = mean_of_picture(name, spp, seed=1, **options)
@@ -86,6 +87,7 @@ def test_every_case(case: Case, options: dict[str, Any], close_tiles: None) -> N
     spp = 4 * case.spp
     unseen = 10 / (64 * spp * case.expected)  # see test_reference.py
     chosen = {"max_bounces": 4, **case.options, **options}
-    measured = (mean_of_runs if options["reuse"] else measure)(case.build(), spp, **chosen)
+    runs = options["reuse"] or options["caustics"]
+    measured = (mean_of_runs if runs else measure)(case.build(), spp, **chosen)
     print(f"{case}: {measured}, must be {case.expected:.6g}")
     assert_mean(measured, case.expected, MAX_ERROR, sigmas=3, rounding=ROUNDING + unseen)
