@@ -1,6 +1,6 @@
-"""Guided and re-used renders, and those with caustics, have the mean of plain ones, within three standard errors of at most 0.1 %.
+"""Guided and re-used renders, and those with caustics, have the mean of plain ones, within three errors.
 
-Printed are all means: `pytest -s -m slow tests/test_equal_means.py`.
+The errors are 0.1 % at most. Printed are all means: `pytest -s -m slow tests/test_equal_means.py`.
 """
 
 import sys
