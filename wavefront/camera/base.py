@@ -108,7 +108,7 @@ class Camera:
             height: the view moves without a change of perspective.
         crop
             (x0, y0, x1, y1) in pixels from the left and the top: renders only that window, with the same
-            pixels as in the whole picture.
+            pixels as in the whole picture, but for their noise where `reuse` or `caustics` is on.
 
         Raises
         ------
