@@ -17,7 +17,8 @@ from wavefront import choice, pixel_tiles, trial
 from wavefront.compile.scene import compile_scene
 from wavefront.sampling.sampler import IndependentSampler, SobolSampler
 from wavefront.settings import Settings
-from wavefront.trial import Reused, Trial, TrialJob, TrialPart, run_trial
+from wavefront.trial import Reused, Trial, run_trial
+from wavefront.trial_job import TrialJob, TrialPart
 
 SIZE = (192, 192)  # the smallest pictures that get a trial
 

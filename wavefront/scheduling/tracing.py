@@ -21,7 +21,7 @@ from ..sample_recorder import SampleRecorder, recorded_layers
 from ..sampling.sampler import Sampler, SamplerMaker
 from ..stages.generate import generate
 from ..state import Words
-from ..trial import TrialJob, TrialPart
+from ..trial_job import TrialJob, TrialPart
 from ..vec import Bools, Floats, Ints, broadcast
 from .jobs import Job, JobResult, WaveResult
 from .shared import SharedInt, Stopped

@@ -38,7 +38,7 @@ from ..scheduling.shared import STOP, Stopped
 from ..scheduling.tracing import WaveMonitor, trace_any_job
 from ..settings import Settings
 from ..suggestions import suggests_keywords
-from ..trial import TrialJob, TrialPart
+from ..trial_job import TrialJob, TrialPart
 from .last_checks import check_last_image
 from .plan import make_plan, trained_guide, with_choice
 from .prepared_scene import PreparedScene
