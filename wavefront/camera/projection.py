@@ -13,7 +13,7 @@ from copy import copy
 
 import numpy as np
 
-from ..elementary import sin_cos, sin_cos_turns
+from ..elementary import arctan2, sin_cos, sin_cos_turns
 from ..errors import SceneError, finite_array, number
 from ..parameter import Parametrized
 from ..sampling.warp import uniform_disk
@@ -282,8 +282,9 @@ class Panorama(Projection):
         width, height = film
         x, y, z = points
         distance = np.sqrt(x * x + y * y + z * z)
-        away = np.where(distance > 0, distance, np.nan)
-        longitude, latitude = np.arctan2(x, -z), np.arcsin(np.clip(y / away, -1, 1))
-        longitude = np.where(distance > 0, longitude, np.nan)
+        somewhere = np.where(distance > 0, 1, np.nan)
+        longitude, latitude = (
+            angle * somewhere for angle in (arctan2(x, -z), arctan2(y, np.sqrt(x * x + z * z)))
+        )
         pixels = [longitude * (width / (2 * np.pi)) + width / 2, height / 2 - latitude * (height / np.pi)]
         return np.stack(pixels), distance
