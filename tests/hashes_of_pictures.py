@@ -96,6 +96,9 @@ add(
 transform = np.array([[0.6, 0.4, 0, 0.3], [-0.3, 0.5, 0.1, 0.5], [0, 0.1, 0.7, 0], [0, 0, 0, 1]])
 moved = transform + np.array([[0, 0, 0, -0.9], [0, 0, 0, 0.2], [0, 0, 0, 0], [0, 0, 0, 0]])
 add("instances", [wf.Instance(mesh, matrix) for mesh in [net(GREY)] for matrix in (transform, moved)], [SKY])
+for number, camera in enumerate([CAMERA, wf.Camera.panorama((1, 0.5, 1), size=(32, 16))]):
+    glass = [ball(wf.Dielectric(1.5)), net(wf.Mirror()), wf.Sphere((1, 1, 1), 0.2, emission=4)]
+    add(f"caustics {number}", glass, [wf.PointLight((1, 2, -1), 9)], camera, caustics=True)
 codes = np.concatenate([np.arange(n, dtype=np.float32) / np.float32(n - 1) for n in (256, 65_536)])
 hashes["sRGB"] = hashlib.sha256(srgb_to_linear(codes).tobytes()).hexdigest()
 hashes["8 bits"] = hashlib.sha256(to_codes(codes).tobytes() + to_codes(codes, "srgb").tobytes()).hexdigest()
