@@ -323,6 +323,28 @@ def test_the_metadata_tell_of_it() -> None:
         assert image.metadata["caustics"] is bool(given_value)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "settings", "missing"),
+    [
+        ({}, {}, True),
+        ({"material": wf.Mirror(0.9)}, {}, True),
+        ({"lights": [wf.DirectionalLight((-1, -2, -1), 3)]}, {}, True),
+        ({}, {"caustics": True}, False),
+        ({}, {"integrator": "direct_mis"}, False),
+        ({}, {"max_bounces": 1}, False),
+        ({"material": wf.Diffuse(0.5)}, {}, False),
+        ({"lights": [wf.Environment(1)]}, {}, False),
+        ({"lights": [wf.Environment(1), wf.PointLight((0, 2.5, 0), 0)]}, {}, False),
+    ],
+)
+def test_a_hint_tells_where_light_is_missing(
+    arguments: dict[str, Any], settings: dict[str, Any], missing: bool
+) -> None:
+    """Where there are lights that no path can meet beside smooth glass or mirrors."""
+    hint = wf.render(scene(**arguments), 1, progress=False, **settings).metadata["hint"]
+    assert (hint is not None and "caustics=True adds it" in hint) == missing
+
+
 def test_re_use_is_never_chosen_with_it() -> None:
     """In a picture that is large enough for a trial."""
     camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), size=(512, 512))

@@ -68,14 +68,15 @@ def choose(
         Does the jobs of trials.
     """
     choice = _choose(settings, scene, camera, has_guide, run)
-    if settings.caustics or not (settings.is_full and _misses_caustics(scene)):
+    if settings.caustics or not settings.is_full or settings.max_bounces < 2 or not _misses_caustics(scene):
         return choice
     return replace(choice, hint=CAUSTICS_HINT)
 
 
 def _misses_caustics(scene: CompiledScene) -> bool:
     """Return whether there is light that smooth glass or mirrors send on, and that no path can meet."""
-    return any(bsdf.specular for bsdf in scene.materials.groups) and bool(scene.lights.delta_of.any())
+    shining = scene.lights.delta_of & scene.lights.chosen_from
+    return any(bsdf.specular for bsdf in scene.materials.groups) and bool(shining.any())
 
 
 def _choose(
