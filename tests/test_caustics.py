@@ -501,15 +501,15 @@ def bits(sums: LightSums) -> dict[str, bytes]:
 
 @given(splats)
 def test_sums_are_those_of_each_pixel(found: list[tuple[int, float]]) -> None:
-    """However often one occurs; each term is rounded once, by at most 2^-26 of the largest."""
+    """However often one occurs; each term is rounded once, by at most 2^-20 of the largest."""
     sums = summed(found)
     for pixel in range(5):
         terms = [value for at, value in found if at == pixel]
         squares = [float(f4(min(value * value, FLOAT32_MAX))) for value in terms]
         largest = max(map(abs, terms), default=0)
-        bound = 2.0**-26 * len(terms) * max(largest, 1e-45)
+        bound = 2.0**-20 * len(terms) * max(largest, 1e-45)
         assert abs(sums.sums.value()[0, pixel] - math.fsum(terms)) <= bound
-        bound = 2.0**-26 * len(terms) * max(*squares, 1e-45, 1e-45)
+        bound = 2.0**-20 * len(terms) * max(*squares, 1e-45, 1e-45)
         assert abs(sums.squares.value()[0, pixel] - math.fsum(squares)) <= bound
     assert (sums.mean() == sums.sums.value() / 7).all()
     assert (sums.squared_error() >= 0).all()
@@ -544,6 +544,19 @@ def test_many_splats_of_one_pixel_are_summed() -> None:
         assert sums.sums.value()[channel, 3] == pytest.approx(exact, rel=1e-12)
     assert (sums.sums.value()[:, 1] == radiance[:, -1]).all()
     assert not sums.sums.value()[:, [0, 2, 4]].any()
+
+
+@pytest.mark.parametrize("value", [1.0, 4095.9, 8191.9, 1e18, 3e38])
+def test_a_pixel_may_have_four_billion_splats(value: float) -> None:
+    """Where a small piece of glass is far away, all light paths fall on a few pixels of a large picture."""
+    sums = LightSums(1)
+    sums.add(1, np.zeros(1, np.uint32), np.full((3, 1), value, f4))
+    for _ in range(31):
+        sums.merge(sums)
+    assert sums.paths == 2**31
+    assert sums.sums.value() == pytest.approx(np.full((3, 1), float(f4(value)) * 2.0**31), rel=1e-6)
+    square = min(float(f4(value)) ** 2, FLOAT32_MAX)
+    assert sums.squares.value() == pytest.approx(np.full((3, 1), square * 2.0**31), rel=1e-6)
 
 
 def test_no_splats_are_no_light() -> None:

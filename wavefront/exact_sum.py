@@ -39,9 +39,12 @@ class ExactSums:
     ----------
     shape
         (c, n).
+    more_terms
+        A power of two: how many times `MAX_TERMS` a sum may have. Terms are rounded as many times more.
     """
 
-    def __init__(self, shape: tuple[int, int]) -> None:
+    def __init__(self, shape: tuple[int, int], more_terms: int = 1) -> None:
+        self._more_terms = more_terms
         self._high = np.full(shape, _ZEROS[0])
         self._low = self._high / _BIN
 
@@ -88,13 +91,14 @@ class ExactSums:
     def _raise_bins(self, lanes: Lanes, terms: Doubles) -> None:
         """Raise the bins of those columns where a term reaches the limit."""
         largest = np.abs(terms).max(1) if terms.shape[1] > 1 or terms.min() < 0 else terms[:, 0]
-        beyond = largest * _TERM_TO_ZERO > self._high[:, lanes]
+        beyond = largest * (_TERM_TO_ZERO * self._more_terms) > self._high[:, lanes]
         if not beyond.any():
             return
         channel, column = np.nonzero(beyond)
         sums = channel, column + (lanes.start or 0) if isinstance(lanes, slice) else lanes[column]
         zero, high, low = _without_offset(self._high[sums], self._low[sums])
-        new_zero = np.maximum(zero, _ZEROS.take(_LIMITS.searchsorted(largest[beyond], side="right")))
+        reach = largest[beyond] * self._more_terms
+        new_zero = np.maximum(zero, _ZEROS.take(_LIMITS.searchsorted(reach, side="right")))
         high, low = _raised(zero, new_zero, high, low)
         self._high[sums], self._low[sums] = high + new_zero, low + new_zero / _BIN
 

@@ -16,6 +16,7 @@ from .exact_sum import ExactSums
 from .state import Words
 from .vec import FLOAT32_MAX, Doubles, Floats, Ints
 
+MORE_TERMS = 64  # a pixel has 2^32 splats at most: those of all pixels may fall on one
 AT_ONCE = 1 << 16  # sums of one size that are added to together, times the terms of each
 
 
@@ -35,7 +36,7 @@ class LightSums:
 
     def __init__(self, pixels: int) -> None:
         self.paths = 0
-        self.sums, self.squares = ExactSums((3, pixels)), ExactSums((3, pixels))
+        self.sums, self.squares = (ExactSums((3, pixels), MORE_TERMS) for _ in range(2))
 
     def add(self, paths: int, pixel: Words, radiance: Floats) -> None:
         """Add what some more light paths bring to pixels.
