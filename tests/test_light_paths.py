@@ -36,6 +36,7 @@ CAMERA = wf.Camera.look_at(*VIEW, fov=40, size=SIZE)
 RNG = np.random.default_rng(4)
 NOISE = RNG.random((8, 8, 3)).astype(f4)
 WAVES = wf.NormalMap(np.dstack([NOISE[..., :2] * 0.4 + 0.3, np.full((8, 8), 0.95, f4)]))
+TILT = wf.NormalMap(np.full((2, 2, 3), (0.8, 0.5, 0.9), f4))
 PARTS = 2  # of the picture, along each side
 RUNS = 8
 
@@ -342,6 +343,7 @@ CASES = {
             ball(), wall(wf.Material(WHITE, normal_map=WAVES)), floor=wf.Material(WHITE, normal_map=WAVES)
         )
     ),
+    "tilted normals": Case(lambda: world(wall(wf.Mirror(0.9)), floor=wf.Material(WHITE, normal_map=TILT))),
     "smooth meshes": Case(
         lambda: world(
             ball(),
