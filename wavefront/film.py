@@ -39,7 +39,7 @@ class Film:
     Samples that are not finite are dropped: they are counted, and the mean is that of the others.
 
     Memory is 176 bytes per pixel, whatever the number of samples, and 4 more when one was dropped. Light
-    paths take 96 more.
+    paths take 192 more.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Sums of what light paths add to pixels, and of its squares.
+"""Sums of what light paths add to pixels.
 
 Light paths reach any pixel, any number of times. The sums are exact, so that they do not depend on the order
 in which paths are traced.
@@ -14,14 +14,21 @@ from numpy.typing import NDArray
 
 from .exact_sum import ExactSums
 from .state import Words
-from .vec import FLOAT32_MAX, Doubles, Floats, Ints
+from .vec import Doubles, Floats, Ints
 
+BATCHES = 4  # sample s belongs to the batch s mod 4
 MORE_TERMS = 64  # a pixel has 2^32 splats at most: those of all pixels may fall on one
 AT_ONCE = 1 << 16  # sums of one size that are added to together, times the terms of each
 
 
 class LightSums:
     """Sums over light paths, for each pixel.
+
+    The light paths of one sample of all pixels are stratified together, so their scatter does not give the
+    error of their mean. Samples are independent of each other: each belongs to one of `BATCHES` batches, and
+    the scatter of the batches' means gives the error.
+
+    Memory is 192 bytes per pixel.
 
     Parameters
     ----------
@@ -31,18 +38,20 @@ class LightSums:
     Attributes
     ----------
     paths
-        How many light paths were traced.
+        How many light paths were traced of each batch, (BATCHES,).
     """
 
     def __init__(self, pixels: int) -> None:
-        self.paths = 0
-        self.sums, self.squares = (ExactSums((3, pixels), MORE_TERMS) for _ in range(2))
+        self.paths = np.zeros(BATCHES, np.int64)
+        self.sums = tuple(ExactSums((3, pixels), MORE_TERMS) for _ in range(BATCHES))
 
-    def add(self, paths: int, pixel: Words, radiance: Floats) -> None:
-        """Add what some more light paths bring to pixels.
+    def add(self, sample: int, paths: int, pixel: Words, radiance: Floats) -> None:
+        """Add what some more light paths of a sample bring to pixels.
 
         Parameters
         ----------
+        sample
+            Its index.
         paths
             How many paths these are, with those that bring nothing.
         pixel
@@ -50,9 +59,9 @@ class LightSums:
         radiance
             (3, k) finite.
         """
-        self.paths += paths
+        batch = sample % BATCHES
+        self.paths[batch] += paths
         terms = radiance.astype(np.float64)
-        squares = np.minimum(np.square(terms), FLOAT32_MAX).astype(np.float32).astype(np.float64)
         order = np.argsort(pixel, kind="stable")
         found, first, count = _groups(pixel.take(order).astype(np.intp))
         for size in 1 << np.arange(int(count.max(initial=0)).bit_length() + 1):
@@ -62,37 +71,45 @@ class LightSums:
                     number = np.arange(size)[:, None]
                     real = number < count.take(lanes)
                     at = order.take(first.take(lanes) + np.where(real, number, 0))
-                    for sums, values in ((self.sums, terms), (self.squares, squares)):
-                        sums.add(found.take(lanes), values[:, at] * real)
+                    self.sums[batch].add(found.take(lanes), terms[:, at] * real)
 
     def mean(self, span: slice = slice(None)) -> Doubles:
         """Return what light paths bring to pixels, (3, k)."""
-        return self.sums.value(span) / max(self.paths, 1)
+        total = sum(sums.value(span) for sums in self.sums)
+        return np.asarray(total / max(int(self.paths.sum()), 1))
 
     def squared_error(self, span: slice = slice(None)) -> Doubles:
-        """Estimate the variance of `mean`, (3, k), as if light paths were independent."""
-        paths = max(self.paths, 1)
-        return np.maximum(self.squares.value(span) / paths - np.square(self.mean(span)), 0) / paths
+        """Estimate the variance of `mean`, (3, k), from the scatter of batches; NaN if there is only one."""
+        mean, total = self.mean(span), int(self.paths.sum())
+        used = np.flatnonzero(self.paths)
+        if used.size == 1:
+            return np.full_like(mean, np.nan)
+        scatter = np.zeros_like(mean)
+        for batch in used:
+            paths = float(self.paths[batch])
+            scatter += np.square(self.sums[batch].value(span) / paths - mean) * (paths / total)
+        return scatter / max(used.size - 1, 1)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return all sums as arrays by name."""
-        return {
-            "paths": np.array([self.paths]),
-            **{f"sums.{name}": array for name, array in self.sums.arrays().items()},
-            **{f"squares.{name}": array for name, array in self.squares.arrays().items()},
+        batches = {
+            f"{batch}.{name}": array
+            for batch, sums in enumerate(self.sums)
+            for name, array in sums.arrays().items()
         }
+        return {"paths": self.paths, **batches}
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Become the sums of which `arrays` returned these; they are not copied."""
-        self.paths = int(arrays["paths"][0])
-        self.sums.restore({name: arrays[f"sums.{name}"] for name in self.sums.arrays()})
-        self.squares.restore({name: arrays[f"squares.{name}"] for name in self.squares.arrays()})
+        self.paths = arrays["paths"]
+        for batch, sums in enumerate(self.sums):
+            sums.restore({name: arrays[f"{batch}.{name}"] for name in sums.arrays()})
 
     def merge(self, other: LightSums) -> None:
         """Add the sums of other light paths; the result is that of all of them at once."""
-        self.paths += other.paths
-        self.sums.merge(other.sums)
-        self.squares.merge(other.squares)
+        self.paths = self.paths + other.paths
+        for mine, others in zip(self.sums, other.sums, strict=True):
+            mine.merge(others)
 
 
 def _groups(ordered: Ints) -> tuple[Ints, Ints, Ints]:

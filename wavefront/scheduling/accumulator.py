@@ -12,6 +12,8 @@ from ..errors import RenderError, warn_caller
 from ..film import Film
 from ..image import Image, film_image, last_film_image
 from ..layer_sums import LayerSums, layer_bytes
+from ..light_paths import Splats
+from ..light_sums import LightSums
 from ..memory import check_memory
 from ..picture_sums import PictureSums
 from ..vec import Bytes
@@ -19,7 +21,7 @@ from .jobs import Job, JobResult, WaveResult
 
 MAX_BAD_SAMPLES = 1e-4  # part of all samples that may be lost to NaN before it is an error
 FILM_BYTES = 176  # of a pixel of the film
-LIGHT_BYTES = 96  # of the sums over light paths, for each pixel
+LIGHT_BYTES = 192  # of the sums over light paths, for each pixel
 PICTURE_BYTES = 64  # of a pixel of the picture, and of what is needed to make it
 SPARE_BYTES = 16 << 20
 
@@ -95,12 +97,19 @@ class Accumulator:
     def _add_wave(self, wave: Job, result: WaveResult) -> None:
         self.film.add(wave.pixels, result.radiance, result.bad)
         if self.film.light is not None and result.splats is not None:
-            self.film.light.add(wave.lanes, result.splats.pixel, result.splats.radiance)
+            self._add_splats(self.film.light, wave, result.splats)
         if self.sums.layers is not None:
             assert result.layers is not None
             self.sums.layers.add(wave.pixels, result.layers, result.radiance, most=wave.end)
         self.bad.count_in(wave, result)
         self.rays += result.rays
+
+    def _add_splats(self, sums: LightSums, wave: Job, splats: Splats) -> None:
+        """Add what the light paths of a wave bring, sample by sample."""
+        first, number = wave.view.first_sample + wave.first_sample, splats.path // wave.pixels.size
+        for sample in range(wave.samples):
+            some = splats.take(np.flatnonzero(number == sample))
+            sums.add(first + sample, wave.pixels.size, some.pixel, some.radiance)
 
     def release_reserve(self) -> None:
         """Free the memory that is kept for the last picture."""
