@@ -235,6 +235,7 @@ SMALL_LAMPS: dict[str, Callable[[int], Any]] = {  # for caustics; measured where
     "lamp and tumbler": partial(gathered, "tumbler"),
     "lamp and gold ring": partial(gathered, "ring"),
 }
+ALL_SCENES = SCENES | SMALL_LAMPS
 
 
 def settings_of(text: str) -> dict[str, Any]:
@@ -271,7 +272,7 @@ def errors(pictures: list[np.ndarray], mean: np.ndarray) -> np.ndarray:
 
 def measure(name: str, options: argparse.Namespace) -> None:
     """Print a row of the table for each of the settings."""
-    subject = (SCENES | SMALL_LAMPS)[name](options.size)
+    subject = ALL_SCENES[name](options.size)
     scene, given = subject if isinstance(subject, tuple) else (subject, {})
     sides = {"plain": PLAIN, **{text: settings_of(text) for text in options.settings}}
     pictures: dict[str, list[np.ndarray]] = {side: [] for side in sides}
@@ -304,9 +305,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument(
-        "--scenes", nargs="*", default=list(SCENES), choices=SCENES | SMALL_LAMPS, metavar="NAME"
-    )
+    parser.add_argument("--scenes", nargs="*", default=list(SCENES), choices=ALL_SCENES, metavar="NAME")
     parser.add_argument("--settings", nargs="*", default=[""], help='such as "branches=4" or "guide=True"')
     parser.add_argument("--size", type=int, default=192)
     parser.add_argument("--spp", type=int, default=16)
@@ -316,7 +315,7 @@ def main() -> None:
     parser.add_argument("--list", action="store_true", help="print the names of the scenes")
     options = parser.parse_args()
     if options.list:
-        print(", ".join(SCENES | SMALL_LAMPS))
+        print(", ".join(ALL_SCENES))
         return
     warnings.simplefilter("ignore")
     decide_with(options.decide)

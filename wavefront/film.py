@@ -143,6 +143,7 @@ class Film:
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return all that the film holds, as arrays by name."""
         lengths = np.zeros(0, np.int64) if self.lengths is None else self.lengths
+        light = {} if self.light is None else self.light.arrays()
         return {
             "count": self.count,
             "dropped": self.dropped,
@@ -150,10 +151,7 @@ class Film:
             "squares": self.squares,
             "batches": self.batches,
             "lengths": lengths,
-            **{
-                LIGHT + name: array
-                for name, array in ({} if self.light is None else self.light.arrays()).items()
-            },
+            **{LIGHT + name: array for name, array in light.items()},
         }
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:

@@ -6,8 +6,8 @@ caster (compile/casters.py), where light samples find what arrives, and goes on 
 surface on its way that does not scatter by delta lobes alone, it is connected to the camera, which adds to
 whatever pixel sees that surface.
 
-Paths from the camera leave out just this light: that of lights with a place, which a caster sends on by a
-delta lobe, and which leaves the first surface that the camera sees by another lobe.
+Paths from the camera leave out just this light: that of delta lights and of surfaces that shine, which a
+caster sends on by a delta lobe, and which leaves the first surface that the camera sees by another lobe.
 
 A BSDF is a function of the direction to the camera and that to the light, in this order, also where
 light comes along (E. Veach, thesis 1997, §5.2 and §5.3).
@@ -31,8 +31,8 @@ from .sampling.sampler import Dimension, Sampler
 from .stages.alpha import alpha_pass_through
 from .stages.bounce import bounce_sample
 from .stages.compact import compact, roulette, select
-from .stages.interaction import interaction, material_rows, offset_origin
-from .stages.intersect import ShadowRays, intersect, visible
+from .stages.interaction import interaction, material_rows, offset_origin, origin_above
+from .stages.intersect import ShadowRays, intersect, shadow_rays, visible
 from .stages.medium import absorb
 from .stages.normal_mapping import perturb_normals
 from .stages.shade import Shading, evaluate, radiance_at_samples, shading
@@ -161,15 +161,9 @@ def _lit(
     """Return the paths that nothing blocks on the way from the light, and the flux (3, slots) of each."""
     surface = interaction(scene, paths, hits)
     light, number = light.take(paths.slot), number.take(paths.slot)
-    rays = ShadowRays(
-        origin=offset_origin(surface, broadcast(f4(1), len(surface))),
-        direction=light.wi,
-        exclude_prim=surface.prim,
-        error=surface.error,
-        distance=light.distance,
-        cos_light=light.cos_light,
-    )
-    arriving = radiance_at_samples(scene, rays, light, np.arange(len(surface)), number)
+    everything = np.arange(len(surface))
+    rays = shadow_rays(surface, origin_above(surface), light, everything)
+    arriving = radiance_at_samples(scene, rays, light, everything, number)
     arriving = arriving * _transmittance(scene, rays)
     cos = dot(surface.ng, light.wi)
     flux = np.zeros((3, slots), f4)

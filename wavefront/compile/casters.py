@@ -12,7 +12,7 @@ from ..accel.sphere import SpherePrimitives
 from ..record import record
 from ..sampling.warp import uniform_sphere, uniform_triangle
 from ..state import SoA
-from ..vec import Bools, Doubles, Floats, Ints, f4
+from ..vec import Bools, Doubles, Floats, Ints, f4, interpolate
 from .curved import CurvedTable
 from .materials import MaterialTable
 
@@ -59,8 +59,7 @@ class Casters:
         point, weights = np.empty((3, which.size), f4), np.zeros((2, which.size), f4)
         weights[:, flat] = uniform_triangle(u[:, flat])
         a, b, c = self.corners.take(which.take(flat), 0).transpose(1, 2, 0)
-        b1, b2 = weights[:, flat]
-        point[:, flat] = a * (f4(1) - b1 - b2) + b * b1 + c * b2
+        point[:, flat] = interpolate(a, b, c, *weights[:, flat])
         ball = which.take(round_) - len(self.corners)
         directions = uniform_sphere(u[:, round_])
         point[:, round_] = self.centers.take(ball, 1) + directions * self.radii.take(ball)
@@ -96,7 +95,7 @@ def find_casters(
     for kind, first in zip(curved.kinds, curved.first, strict=True):
         if isinstance(kind, SpherePrimitives) and ball.size:
             centers, radii = kind.centers.take(ball - first, 1), kind.radii.take(ball - first)
-    cumulative = np.cumsum([*area, *(4 * np.pi * radii.astype(np.float64) ** 2)])
+    cumulative = np.cumsum(np.append(area, 4 * np.pi * radii.astype(np.float64) ** 2))
     if not cumulative.size or not cumulative[-1] > 0:
         return None
     found_as = np.arange(of_prim.size - 1)
