@@ -44,7 +44,7 @@ def test_opencvs_matrices_project_as_the_camera_does(name: str) -> None:
     camera = CAMERAS[name]
     points = points_before(camera)
     seen = np.column_stack([points, np.ones(50)]) @ (camera.intrinsics() @ camera.extrinsics()[:3]).T
-    pixels, depth = camera.project(points)
+    pixels, depth = camera.project(points, "integer")
     assert np.allclose(seen[:, :2] / seen[:, 2:], pixels, rtol=0, atol=1e-9)
     assert np.allclose(seen[:, 2], depth)
 

@@ -43,13 +43,13 @@ def off_ray(point, origin, direction) -> np.ndarray:
 
 @given(strategies.rotations(), st.data())
 def test_a_projected_point_is_seen_by_its_pixel(turn: np.ndarray, data) -> None:
-    """K(RX + t) gives a film point, and the ray through it goes to X."""
+    """K(RX + t) and half a pixel is a film point, and the ray through it goes to X."""
     near = [data.draw(st.floats(low, high)) for low, high in ((-2, 2), (-2, 2), (0.5, 9))]
     t = np.array([data.draw(st.floats(-5, 5)) for _ in range(3)])
     point = turn.T @ (np.array(near) - t)
     film = K @ (turn @ point + t)
     camera = wf.Camera.from_intrinsics(K, turn, t, (640, 480))
-    origin, direction = rays(camera, film[0] / film[2], film[1] / film[2])
+    origin, direction = rays(camera, film[0] / film[2] + 0.5, film[1] / film[2] + 0.5)
     assert off_ray(point, origin, direction)[0] < 2e-6
 
 
@@ -62,15 +62,15 @@ def test_a_rendered_point_lands_in_its_pixel() -> None:
     scene = wf.Scene([wf.Sphere(ball, 0.01, emission=1.0)], camera=camera)
     image = wf.render(scene, 4, max_bounces=0, progress=False, workers=1)
     y, x = np.unravel_index(image.rgb[..., 0].argmax(), (480, 640))
-    assert (abs(x + 0.5 - u / w), abs(y + 0.5 - v / w)) < (1, 1)
-    lit = np.argwhere(image.rgb[..., 0] > 0) + 0.5
+    assert (abs(x - u / w), abs(y - v / w)) < (1, 1)
+    lit = np.argwhere(image.rgb[..., 0] > 0)
     assert lit.mean(0) == pytest.approx([v / w, u / w], abs=0.3)
 
 
 def test_centred_intrinsics_are_a_plain_camera() -> None:
     """fx = fy, the principal point in the middle, and y down: the same picture as look_at."""
     f = 120 / np.tan(np.radians(25))
-    k = [[f, 0, 160], [0, f, 120], [0, 0, 1]]
+    k = [[f, 0, 159.5], [0, f, 119.5], [0, 0, 1]]
     camera = wf.Camera.from_intrinsics(k, np.diag([1, -1, -1]), (0, 0, 4), (320, 240))
     plain = wf.Camera.look_at((0, 0, 4), (0, 0, 0), fov=50, size=(320, 240))
     assert camera.origin == pytest.approx(plain.origin)

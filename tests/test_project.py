@@ -96,7 +96,7 @@ def test_pixels_have_their_centers_at_a_half() -> None:
 
 @pytest.mark.parametrize("name", [None, *LENSES])
 def test_project_is_opencvs_model(name: str | None) -> None:
-    """With the principal point half a pixel on, for the two ways of counting."""
+    """A calibration of OpenCV as it is; film positions are its coordinates and half a pixel."""
     d = () if name is None else LENSES[name]
     camera = wf.Camera.from_intrinsics(
         SKEWED, TURN, SHIFT[:, None], (640, 480), distortion=None if name is None else [d]
@@ -104,8 +104,49 @@ def test_project_is_opencvs_model(name: str | None) -> None:
     rng = np.random.default_rng(1)
     seen = np.column_stack([rng.uniform(-0.4, 0.4, (50, 2)), np.ones(50)]) * rng.uniform(1, 9, (50, 1))
     points = (seen - SHIFT) @ TURN
-    assert camera.project(points)[0] == pytest.approx(opencv(points, SKEWED, TURN, SHIFT, d), abs=1e-9)
+    expected = opencv(points, SKEWED, TURN, SHIFT, d)
+    assert camera.project(points, "integer")[0] == pytest.approx(expected, abs=1e-9)
+    assert camera.project(points)[0] == pytest.approx(expected + 0.5, abs=1e-9)
     assert camera.project(points)[1] == pytest.approx(seen[:, 2])
+
+
+@pytest.mark.parametrize("name", ["wide", "rational"])
+def test_a_calibration_of_opencv_agrees_with_the_pixels(name: str) -> None:
+    """What a pixel shows is projected by OpenCV's formulas onto its column and row, to 0.01 pixel."""
+    k = [[60, 1.5, 33.2], [0, 55, 21.7], [0, 0, 1]]
+    camera = wf.Camera.from_intrinsics(k, TURN, SHIFT, (64, 48), distortion=LENSES[name])
+    middle = camera.origin - 3 * camera.rotation[:, 2]
+    scene = wf.Scene(wf.Sphere(middle, 2, emission=1), camera=camera)
+    position = wf.render(scene, 1, max_bounces=0, aovs="position", progress=False).position
+    row, column = np.nonzero(np.isfinite(position).all(2))
+    assert len(row) > 1000
+    seen = opencv(position[row, column].astype(float), np.array(k), TURN, SHIFT, LENSES[name])
+    assert np.abs(seen - np.stack([column, row], 1)).max() < 0.01
+
+
+def test_pixel_centers_at_a_half_move_the_principal_point() -> None:
+    """A K of COLMAP is one of OpenCV with half a pixel more, and `intrinsics` gives either."""
+    half = np.add(SKEWED, [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])
+    camera = wf.Camera.from_intrinsics(SKEWED, TURN, SHIFT, (640, 480))
+    other = wf.Camera.from_intrinsics(half, TURN, SHIFT, (640, 480), pixel_centers="half")
+    points = [(-1.0, 1.5, 4.0), (1.2, -2.0, 9.0)]
+    assert other.project(points)[0] == pytest.approx(camera.project(points)[0], abs=1e-9)
+    for each in (camera, other):
+        assert each.intrinsics() == pytest.approx(SKEWED)
+        assert each.intrinsics("half") == pytest.approx(half)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: wf.Camera.from_intrinsics(K, np.eye(4), size=(640, 480), pixel_centers="corner"),
+        lambda: CAMERAS["skewed"].intrinsics("corner"),
+        lambda: CAMERAS["skewed"].project([(0, 0, 0)], "corner"),
+    ],
+)
+def test_other_pixel_centers_are_refused(call) -> None:
+    with pytest.raises(wf.SceneError, match=r"pixel_centers is 'corner'; it must be one of integer, half"):
+        call()
 
 
 def test_extrinsics_are_taken_in_one_matrix() -> None:
@@ -175,7 +216,7 @@ def test_points_beyond_a_fold_are_not_seen() -> None:
     camera = wf.Camera.from_intrinsics(K, np.eye(3), (0, 0, 0), (640, 480), distortion=(-0.3, 0, 0, 0))
     pixels, depth = camera.project([(1.8, 0, 1.0), (0.3, 0, 1.0)])
     assert np.isnan(pixels[0]).all()
-    assert pixels[1, 0] == pytest.approx(330 + 700 * 0.3 * (1 - 0.3 * 0.09))
+    assert pixels[1, 0] == pytest.approx(330.5 + 700 * 0.3 * (1 - 0.3 * 0.09))
     assert depth.tolist() == [1, 1]
 
 

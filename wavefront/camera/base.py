@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..elementary import arctan2
-from ..errors import SceneError, finite_array, in_brief, number, rotation_matrix, warn_caller
+from ..errors import SceneError, finite_array, in_brief, number, one_of, rotation_matrix, warn_caller
 from ..parameter import brief
 from ..state import Words
 from ..suggestions import suggests_keywords
@@ -20,6 +20,8 @@ from .projection import Orthographic, Panorama, Perspective, Projection
 MAX_SIDE = 65_536  # pixels; a row-major pixel index then fits in 32 bits
 STEP = 1e-4  # of a point's distance: how far it is moved to find out how the film point moves
 RADIANS = (0.2, 3.2)  # a field of view in this range is probably in radians
+CENTERS = {"integer": 0.5, "half": 0.0}  # film position less pixel coordinate, for each way of counting
+PixelCenters = Literal["integer", "half"]
 Window = tuple[int, int, int, int]
 
 
@@ -176,20 +178,19 @@ class Camera:
         size: tuple[int, int] | None = None,
         *,
         distortion: ArrayLike | None = None,
+        pixel_centers: PixelCenters = "integer",
         aperture: float = 0,
         focus: float | None = None,
         crop: Window | None = None,
     ) -> Camera:
         """Place a calibrated camera in OpenCV's convention: x right, y down, z forward.
 
-        A world point X is projected to the film point K·(R·X + t), divided by its third component.
+        A world point X is projected to the pixel coordinates K·(R·X + t), divided by their third component.
 
         Parameters
         ----------
         K
-            (3, 3) intrinsics [[fx, s, cx], [0, fy, cy], [0, 0, 1]] in pixels. The upper left pixel
-            has its center at (0.5, 0.5): a principal point in the middle is (width/2, height/2).
-            OpenCV counts centers from (0, 0): add 0.5 to its cx and cy.
+            (3, 3) intrinsics [[fx, s, cx], [0, fy, cy], [0, 0, 1]] in pixels.
         R, t
             Rotation (3, 3) and translation, (3,) or (3, 1), from world to camera space; or both in one
             matrix (4, 4) or (3, 4), the extrinsics, as `R` alone.
@@ -197,6 +198,10 @@ class Camera:
             (width, height) in pixels; it must be given.
         distortion
             Of the lens, OpenCV's (k1, k2, p1, p2), with k3, or with k3, k4, k5, k6 (Brown and Conrady).
+        pixel_centers
+            Where K has the centers of pixels. "integer", as OpenCV, ROS and BOP: the upper left center is
+            (0, 0), and a principal point in the middle is ((width - 1)/2, (height - 1)/2). "half", as COLMAP
+            and instant-ngp: the upper left center is (0.5, 0.5), and the middle (width/2, height/2).
         aperture, focus, crop
             As for `from_matrix`.
 
@@ -214,6 +219,7 @@ class Camera:
         if zero != 0 or last != [0, 0, 1] or not (fx > 0 and fy > 0):
             raise SceneError(f"K must be [[fx, s, cx], [0, fy, cy], [0, 0, 1]], fx, fy > 0; got {k.tolist()}")
         axes, shift = _extrinsics(R, t)
+        cx, cy = cx + _to_film(pixel_centers), cy + _to_film(pixel_centers)
         lens = Perspective(
             2 * float(np.degrees(arctan2(np.float64(height / 2), np.float64(fy)))),
             shift=(0.5 - cx / width, cy / height - 0.5),
@@ -303,18 +309,22 @@ class Camera:
 
     # --- Matrices -------------------------------------------------------------------------------
 
-    def intrinsics(self) -> NDArray[np.float64]:
-        """Return the matrix K (3, 3) of `from_intrinsics`: pixels of the whole picture, with centers at .5.
+    def intrinsics(self, pixel_centers: PixelCenters = "integer") -> NDArray[np.float64]:
+        """Return the matrix K (3, 3) of `from_intrinsics`, of the whole picture; distortion is no part of it.
 
-        OpenCV counts the centers of pixels from 0: subtract 0.5 from cx and cy. Lens distortion is no part
-        of K.
+        Parameters
+        ----------
+        pixel_centers
+            As for `from_intrinsics`: "integer", OpenCV's, or "half".
 
         Raises
         ------
         SceneError
-            If the camera is no perspective one.
+            If the camera is no perspective one, or `pixel_centers` is something else.
         """
-        return self._perspective().matrix(self.film)
+        k = self._perspective().matrix(self.film)
+        k[:2, 2] -= _to_film(pixel_centers)
+        return k
 
     def extrinsics(self) -> NDArray[np.float64]:
         """Return the matrix (4, 4) from the world to OpenCV's camera space: x right, y down, z forward."""
@@ -359,7 +369,7 @@ class Camera:
         """
         near = number("near", near, lambda x: x > 0, "above 0")
         far = number("far", far, lambda x: x > near, f"above near, which is {near:g}")
-        (fx, skew, cx), (_, fy, cy), _ = self.intrinsics().tolist()
+        (fx, skew, cx), (_, fy, cy), _ = self.intrinsics("half").tolist()
         width, height = self.film
         return np.array(
             [
@@ -466,19 +476,24 @@ class Camera:
         eye = column(self.origin - center) + self._turned(start.astype(f4))
         return eye, pixels, importance
 
-    def project(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the film positions and depths of points of the world.
+    def project(
+        self, points: ArrayLike, pixel_centers: PixelCenters = "half"
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the pixel coordinates and depths of points of the world.
 
         Parameters
         ----------
         points
             (n, 3) scene units.
+        pixel_centers
+            "half": film positions, where pixel (column, row) covers [column, column + 1] × [row, row + 1],
+            so that `floor` gives the pixel, and its center is at + 0.5. "integer": what OpenCV's
+            `projectPoints` returns, where `round` gives the pixel; 0.5 less.
 
         Returns
         -------
         pixels
-            (n, 2) x from the left and y from the top of the whole picture, in pixels; the center of the
-            upper left pixel is (0.5, 0.5), so OpenCV's coordinates are these less 0.5. Points beside the
+            (n, 2) x from the left and y from the top of the whole picture, in pixels. Points beside the
             picture have coordinates outside of it. NaN for points that no picture could show: behind the
             camera, or where its distortion has folded.
         depth
@@ -488,11 +503,12 @@ class Camera:
         Raises
         ------
         SceneError
-            If the points are malformed.
+            If the points are malformed, or `pixel_centers` is something else.
         """
+        to_film = _to_film(pixel_centers)
         away = finite_array("points", points, (None, 3)) - self.origin
         pixels, depth = self.projection.project((away @ self.rotation).T, self.film)
-        return np.ascontiguousarray(pixels.T), depth
+        return np.ascontiguousarray(pixels.T) - to_film, depth
 
     def _turned(self, v: Floats) -> Floats:
         """Transform vectors (3, n) of camera space to world space."""
@@ -536,6 +552,11 @@ def _axes_of(convention: str) -> tuple[int, int, int]:
     if convention not in ("opengl", "opencv"):
         raise SceneError(f"convention is {convention!r}; it must be 'opengl' or 'opencv'")
     return (1, -1, -1) if convention == "opencv" else (1, 1, 1)
+
+
+def _to_film(pixel_centers: str) -> float:
+    """Return what is added to pixel coordinates with these centers to get film positions."""
+    return CENTERS[one_of("pixel_centers", pixel_centers, tuple(CENTERS))]
 
 
 def _rigid(name: str, value: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

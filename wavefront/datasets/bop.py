@@ -22,7 +22,7 @@ from ..vec import Doubles, Floats
 from .annotated import AnnotatedObject
 from .masks import Mask, mask_box, touches_edge
 from .models import write_models
-from .view import DatasetView, opencv_intrinsics, pinhole
+from .view import DatasetView, pinhole
 
 SCENE = "train/000000"
 FOLDERS = ("rgb", "depth", "mask", "mask_visib")
@@ -129,7 +129,7 @@ class BopLayout:
     def _camera(self, camera: Camera, depth_scale: float) -> dict[str, Any]:
         world = camera.extrinsics()
         return {
-            "cam_K": opencv_intrinsics(camera).ravel().tolist(),
+            "cam_K": pinhole(camera).intrinsics("integer").ravel().tolist(),
             "depth_scale": depth_scale,
             "cam_R_w2c": world[:3, :3].ravel().tolist(),
             "cam_t_w2c": self._translation(world),

@@ -11,7 +11,6 @@ from ..camera import Camera, Perspective
 from ..codecs.display import Display
 from ..image import Image
 from ..record import record
-from ..vec import Doubles
 from .annotated import AnnotatedObject
 from .masks import Mask
 
@@ -60,13 +59,6 @@ def pinhole(camera: Camera) -> Camera:
     return Camera.from_intrinsics(k, camera.extrinsics(), size=camera.size)
 
 
-def opencv_intrinsics(camera: Camera) -> Doubles:
-    """Return K (3, 3) of the rendered window, where pixels have their centers at whole numbers."""
-    k = pinhole(camera).intrinsics()
-    k[:2, 2] -= 0.5
-    return k
-
-
 def camera_matrices(camera: Camera, farthest: float) -> dict[str, Any]:
     """Return the matrices of a view as values of JSON, row by row.
 
@@ -83,7 +75,7 @@ def camera_matrices(camera: Camera, farthest: float) -> dict[str, Any]:
     return {
         "size": list(camera.size),
         "opencv": {
-            "K": opencv_intrinsics(camera).tolist(),
+            "K": whole.intrinsics("integer").tolist(),
             "world_to_camera": camera.extrinsics().tolist(),
             "camera_to_world": camera.to_matrix("opencv").tolist(),
             "distortion": [0.0] * 8 if lens is None else np.asarray(lens.coefficients).tolist(),
