@@ -18,6 +18,7 @@ import wavefront as wf
 from wavefront import notebook as module
 from wavefront.material_ball import ball_png
 from wavefront.notebook import in_kernel, run_shown, shows_pictures
+from wavefront.session import hints
 
 BALL = [wf.Sphere((0, 0, 0), 1), wf.Environment(1)]
 
@@ -215,6 +216,19 @@ def test_an_interrupt_keeps_the_picture(kernel: Any) -> None:
         with pytest.raises(wf.Interrupted) as stop:
             run_shown(Pressed())  # type: ignore[arg-type]
     assert shown[-1] is stop.value.image
+
+
+def test_a_long_render_ends_with_hints(kernel: Any, monkeypatch: Any, capsys: Any) -> None:
+    """Below the picture, though there is no bar."""
+    monkeypatch.setattr(hints, "LONG", 0.0)
+    ball = wf.Sphere((0, 0, 0), 1, material=wf.Dielectric(1.5))
+    wf.render(
+        [ball, wf.Rectangle((-9, -1, 9), (18, 0, 0), (0, 0, -18)), wf.PointLight((0, 3, 0), 9)],
+        2,
+        workers=1,
+        size=(16, 16),
+    )
+    assert "hint: the light that smooth glass" in capsys.readouterr().err
 
 
 # --- In real kernels --------------------------------------------------------------------------------

@@ -8,7 +8,6 @@ that a picture of 64 samples that gets 64 more is the one of 128.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 
 from .camera import Camera
@@ -24,10 +23,6 @@ from .trial import BLOCKS, MOST_TILES, JobsRunner, Trial, guide_pays, run_trial,
 
 LEAST_PIXELS = 192 * 192  # of pictures that get a trial; smaller ones take no longer than a moment
 GUIDE_HINT = "most light is hard to find here: guide=True may pay (docs/guiding.md)"
-CAUSTICS_HINT = (
-    "the light that smooth glass and mirrors send on from points, spots and directional lights is missing: "
-    "caustics=True adds it (docs/caustics.md)"
-)
 GUIDE_TILES = MOST_TILES // 2  # whatever the size of the picture: the pilot takes longer anyway
 
 
@@ -67,21 +62,6 @@ def choose(
     run
         Does the jobs of trials.
     """
-    choice = _choose(settings, scene, camera, has_guide, run)
-    if settings.caustics or not settings.is_full or settings.max_bounces < 2 or not _misses_caustics(scene):
-        return choice
-    return replace(choice, hint=CAUSTICS_HINT)
-
-
-def _misses_caustics(scene: CompiledScene) -> bool:
-    """Return whether there is light that smooth glass or mirrors send on, and that no path can meet."""
-    shining = scene.lights.delta_of & scene.lights.chosen_from
-    return any(bsdf.specular for bsdf in scene.materials.groups) and bool(shining.any())
-
-
-def _choose(
-    settings: Settings, scene: CompiledScene, camera: Camera, has_guide: bool, run: JobsRunner
-) -> Choice:
     asked = Choice(1 if settings.branches == AUTO else int(settings.branches), settings.reuse is True)
     if not settings.is_full:
         return asked

@@ -44,6 +44,7 @@ def run_shown(session: Session) -> Image:
         shown.end(error.image)
         raise
     shown.end(image)
+    session.tell_hints(image)
     return image
 
 

@@ -18,6 +18,7 @@ from ..scheduling.executors import ExecutorLike, needs_pickling
 from ..scheduling.tracing import Tracer
 from ..settings import Settings
 from ..trial import JobsRunner
+from .hints import caustics_hint
 from .prepared_scene import PreparedScene
 
 NO_CHOICE = Choice()
@@ -48,7 +49,8 @@ def with_choice(plan: Plan, camera: Camera, run: JobsRunner) -> Plan:
     compiled, has_guide = plan.scene.compiled, plan.tracer.table is not None
     with phase("trying what pays", plan.settings.progress), single_threaded_blas:
         choice = choose(plan.settings, compiled, compiled.view(camera), has_guide, run)
-    return replace(plan, choice=choice)
+    hint = caustics_hint(plan.settings, plan.scene) or choice.hint
+    return replace(plan, choice=replace(choice, hint=hint))
 
 
 def make_plan(settings: Settings, scene: PreparedScene, camera: Camera, table: GuideTable | None) -> Plan:

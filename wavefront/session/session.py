@@ -39,6 +39,7 @@ from ..scheduling.tracing import WaveMonitor, trace_any_job
 from ..settings import Settings
 from ..suggestions import suggests_keywords
 from ..trial_job import TrialJob, TrialPart
+from .hints import Hints
 from .last_checks import check_last_image
 from .plan import make_plan, trained_guide, with_choice
 from .prepared_scene import PreparedScene
@@ -180,6 +181,7 @@ class Session:
         # before work, for what takes least; again when the memory of the scene is known
         settings.budget(camera.size, settings.executor or "threads")
         self._scene = PreparedScene(scene, settings)
+        self._hints = Hints(settings, self._scene)
         self._plan = make_plan(settings, self._scene, camera, trained_guide(settings, self._scene, camera))
         self._make_pool()
         try:
@@ -432,6 +434,18 @@ class Session:
         """
         return silhouettes(self._scene.compiled, self._render.camera if camera is None else camera)
 
+    def tell_hints(self, image: Image) -> None:
+        """Write what may help to stderr if the picture took over ten seconds: a line each, once in a session.
+
+        A render does so by itself where it shows its progress.
+
+        Parameters
+        ----------
+        image
+            The last picture of the session.
+        """
+        self._hints.tell(image)
+
     def close(self) -> None:
         """End the render and all workers; the session cannot be used again."""
         with self.interrupt_handler:
@@ -484,7 +498,10 @@ class Session:
             raise RenderError(f"the checkpoint was not written: {not_written}", image) from not_written
         if not render.accumulator.samples:
             return None
-        return image.denoise() if settings.denoise else image
+        image = image.denoise() if settings.denoise else image
+        if not (self._interrupted or self._stopped) and settings.progress in (None, True):
+            self.tell_hints(image)
+        return image
 
     @property
     def _interrupted(self) -> bool:

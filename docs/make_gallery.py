@@ -1,0 +1,75 @@
+"""Render the pictures of the gallery with its examples, and the cards that lead to them.
+
+python docs/make_gallery.py [name ...]
+
+Each picture is what `python examples/NAME.py --size SIZE --spp SPP` renders, as a jpg, denoised where the
+table says so. A card is the middle of it, 480 by 320 pixels. It needs pyoidn, and minutes for each picture.
+"""
+
+from __future__ import annotations
+
+import runpy
+import sys
+import tempfile
+from pathlib import Path
+
+import imageio.v3 as iio
+from PIL import Image as Pillow
+
+import wavefront as wf
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+CARD, QUALITY = (480, 320), 86
+PICTURES = {  # size, samples per pixel, whether it is denoised, whether it has a card
+    "terrace": (1920, 64, True, True),
+    "cornell_box": (1200, 32, True, True),
+    "course_spheres": (1200, 64, True, True),
+    "cuboids": (1200, 32, True, True),
+    "molecule": (1200, 32, True, True),
+    "spheres": (1200, 32, True, True),
+    "caustics": (1200, 48, True, True),
+    "depth_of_field": (1200, 48, True, True),
+    "environment": (1200, 48, True, True),
+    "gltf_scene": (1200, 48, True, True),
+    "own_material": (1200, 32, True, True),
+    "material_sheet": (1200, 48, True, False),
+    "layers": (267, 64, False, False),
+    "estimators": (300, 32, False, False),
+    "default_look": (1200, 48, True, False),
+}
+render = wf.render
+
+
+def denoised(*args: object, **options: object) -> wf.Image:
+    """Render as `wf.render` does, and denoise the picture."""
+    return render(*args, **{**options, "denoise": True})
+
+
+def make(name: str) -> None:
+    """Run an example, and write its picture and its card."""
+    size, spp, denoise, has_card = PICTURES[name]
+    wf.render = denoised if denoise else render
+    with tempfile.TemporaryDirectory() as folder:
+        output = Path(folder) / "picture.png"
+        sys.argv = [f"{name}.py", str(output), "--size", str(size), "--spp", str(spp)]
+        runpy.run_path(str(ROOT / "examples" / f"{name}.py"), run_name="__main__")
+        picture = Pillow.fromarray(iio.imread(output)[..., :3])
+    picture.save(DOCS / f"{name}.jpg", quality=QUALITY, optimize=True, progressive=True)
+    if has_card:
+        picture = middle(picture).resize(CARD, Pillow.Resampling.LANCZOS)
+        picture.save(DOCS / "cards" / f"{name}.jpg", quality=QUALITY, optimize=True)
+
+
+def middle(picture: Pillow.Image) -> Pillow.Image:
+    """Return the largest part in the middle of a picture that has the shape of a card."""
+    width, height = picture.size
+    wide, high = min(width, height * CARD[0] // CARD[1]), min(height, width * CARD[1] // CARD[0])
+    left, top = (width - wide) // 2, (height - high) // 2
+    return picture.crop((left, top, left + wide, top + high))
+
+
+if __name__ == "__main__":
+    (DOCS / "cards").mkdir(exist_ok=True)
+    for name in sys.argv[1:] or list(PICTURES):
+        make(name)

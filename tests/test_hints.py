@@ -1,0 +1,152 @@
+"""What may help is said where it is seen: in the metadata, and at the end of a render that takes long."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+import wavefront as wf
+from wavefront.accel import registry
+from wavefront.denoising import denoisers
+from wavefront.session import hints
+
+FLOOR = wf.Rectangle((-3, 0, 3), (6, 0, 0), (0, 0, -6))
+GLASS = wf.Sphere((0, 0.7, 0), 0.6, material=wf.Dielectric(1.5))
+MATTE = wf.Sphere((0, 0.7, 0), 0.6)
+LAMP = wf.Sphere((0.8, 3.5, 0), 0.1, emission=100)
+PANEL = wf.Rectangle((-1, 3.5, -1), (2, 0, 0), (0, 0, 2), emission=2)
+SKY = wf.Environment(1)
+CAMERA = wf.Camera.look_at((0, 2.5, 5), (0, 0.5, 0), fov=40, size=(8, 6))
+
+
+def render(things: Any, **settings: Any) -> wf.Image:
+    return wf.render(things, 1, camera=CAMERA, workers=1, **settings)
+
+
+def told(capsys: pytest.CaptureFixture) -> list[str]:
+    """Return the hints that were written since the last call."""
+    return [line for line in capsys.readouterr().err.splitlines() if line.startswith("hint: ")]
+
+
+@pytest.fixture
+def long_ago(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let every render count as one that takes long."""
+    monkeypatch.setattr(hints, "LONG", 0.0)
+
+
+@pytest.mark.parametrize(
+    ("things", "settings", "rare"),
+    [
+        ([FLOOR, GLASS, LAMP], {}, True),
+        ([FLOOR, GLASS, LAMP, wf.Environment(0.01)], {}, True),
+        (
+            [
+                FLOOR,
+                wf.Instance(wf.Rectangle((-1, 1, 0), (2, 0, 0), (0, 1, 0), material=wf.Mirror()), np.eye(4)),
+                LAMP,
+            ],
+            {},
+            True,
+        ),
+        ([FLOOR, GLASS, PANEL], {}, False),
+        ([FLOOR, GLASS, LAMP, wf.Environment(30)], {}, False),  # the lamp hardly counts
+        ([FLOOR, GLASS, SKY], {}, False),
+        ([FLOOR, MATTE, LAMP], {}, False),
+        ([FLOOR, GLASS, LAMP], {"caustics": True}, False),
+        ([FLOOR, GLASS, LAMP], {"integrator": "direct_mis"}, False),
+        ([FLOOR, GLASS, LAMP], {"max_bounces": 1}, False),
+        ([FLOOR, GLASS], {"lighting": None}, False),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:the picture is black")
+def test_small_lamps_by_glass_get_a_hint(things: list[Any], settings: dict[str, Any], rare: bool) -> None:
+    """Paths from the camera find their caustics as bright dots."""
+    hint = render(things, progress=False, **settings).metadata["hint"]
+    assert hint == (hints.RARE_CAUSTICS if rare else None)
+
+
+@pytest.mark.parametrize("factor", [1e-12, 1e12])
+def test_the_size_of_the_scene_does_not_matter(factor: float) -> None:
+    """In scenes that are compiled in another unit of length either."""
+    ball = wf.Sphere((0, 0.7 * factor, 0), 0.6 * factor, material=wf.Dielectric(1.5))
+    for radius, hint in ((0.1, hints.RARE_CAUSTICS), (1.5, None)):
+        lamp = wf.Sphere((0, 3.5 * factor, 0), radius * factor, emission=2)
+        scene = wf.Scene([ball, lamp], camera=wf.Camera.look_at((0, 0, 9 * factor), (0, 0, 0), size=(4, 4)))
+        assert wf.render(scene, 1, progress=False).metadata["hint"] == hint
+
+
+@pytest.mark.usefixtures("long_ago")
+def test_a_long_render_ends_with_the_hint(capsys: pytest.CaptureFixture) -> None:
+    """In one line, and once in a session."""
+    render([FLOOR, GLASS, LAMP])
+    assert told(capsys) == [f"hint: {hints.RARE_CAUSTICS}"]
+    with wf.Session([FLOOR, GLASS, LAMP], 2, camera=CAMERA, workers=1) as session:
+        for _ in session:
+            pass
+        assert len(told(capsys)) == 1
+        session.set_camera(CAMERA)
+        session.run()
+    assert told(capsys) == []
+
+
+def test_short_renders_say_nothing(capsys: pytest.CaptureFixture) -> None:
+    """They take less than ten seconds."""
+    assert hints.LONG == 10
+    render([FLOOR, GLASS, LAMP])
+    assert told(capsys) == []
+
+
+@pytest.mark.usefixtures("long_ago")
+@pytest.mark.parametrize("progress", [False, lambda done, total: None])
+def test_quiet_renders_say_nothing(progress: Any, capsys: pytest.CaptureFixture) -> None:
+    """A function shows progress in its own way."""
+    assert render([FLOOR, GLASS, LAMP], progress=progress).metadata["hint"] == hints.RARE_CAUSTICS
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.usefixtures("long_ago")
+@pytest.mark.parametrize("stream", [None, "closed"])
+def test_hints_never_end_a_render(stream: str | None, monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
+    """Where nothing can be written."""
+    file = (tmp_path / "stderr").open("w")
+    file.close()
+    monkeypatch.setattr("sys.stderr", file if stream else None)
+    assert render([FLOOR, GLASS, LAMP]).spp == 1
+
+
+@pytest.mark.usefixtures("long_ago")
+@pytest.mark.parametrize(
+    ("subdivisions", "there", "settings", "said"),
+    [
+        (3, False, {}, True),
+        (2, False, {}, False),
+        (3, True, {}, False),
+        (3, False, {"accel": "numpy"}, False),
+    ],
+)
+def test_a_missing_embree_is_told(
+    subdivisions: int,
+    there: bool,
+    settings: dict[str, Any],
+    said: bool,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture,
+) -> None:
+    """Where there are so many triangles that it matters, and the choice was left to the package."""
+    monkeypatch.setattr(hints, "installed", lambda: there)
+    monkeypatch.setattr(registry, "installed", lambda: False)
+    ball = trimesh.creation.icosphere(subdivisions)
+    render([ball, SKY], **settings)
+    assert told(capsys) == ([f"hint: {hints.NO_EMBREE}"] if said else [])
+
+
+@pytest.mark.usefixtures("long_ago")
+@pytest.mark.parametrize("denoise", [True, False])
+def test_a_missing_denoiser_is_told(
+    denoise: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    """Where it was asked for."""
+    monkeypatch.setattr(denoisers, "find_spec", lambda name: None)
+    render([FLOOR, MATTE, SKY], denoise=denoise)
+    assert told(capsys) == ([f"hint: {hints.NO_DENOISER}"] if denoise else [])

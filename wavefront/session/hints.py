@@ -1,0 +1,116 @@
+"""What may help a render: in its metadata, and in a line each at its end where it took long."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..accel.embree import installed
+from ..image import Image
+from ..lights import InfiniteLight
+from ..lights.table import IrradianceOf
+from ..scene import Scene
+from ..settings import AUTO, Settings
+from ..shapes import Instance
+from .prepared_scene import PreparedScene
+
+LONG = 10.0  # seconds of a render, from which on hints are shown
+SMALL = 0.01  # solid angle of a lamp at a caster, sr; from about 0.015 on light paths save a third at most
+MUCH = 0.1  # part of the light at a caster
+MOST_PAIRS = 1 << 17  # of casters and lights that are looked at
+MANY_TRIANGLES = 1000  # from which on Embree saves time that matters
+
+LOST_CAUSTICS = (
+    "the light that smooth glass and mirrors send on from points, spots and directional lights is missing: "
+    "caustics=True adds it (docs/caustics.md)"
+)
+RARE_CAUSTICS = (
+    "the light that smooth glass and mirrors send on from small lamps is found seldom, as bright dots: "
+    "caustics=True finds it (docs/caustics.md)"
+)
+NO_EMBREE = "Embree is not installed: with `pip install embreex` meshes render two to four times as fast"
+NO_DENOISER = (
+    "Open Image Denoise is not installed: with `pip install pyoidn` denoise=True is quicker and removes more "
+    "noise"
+)
+
+
+def caustics_hint(settings: Settings, prepared: PreparedScene) -> str | None:
+    """Return what paths from lights would bring; None if that is little, or if they are traced."""
+    if settings.caustics or not settings.is_full or settings.max_bounces < 2:
+        return None
+    compiled = prepared.compiled
+    lights, materials = compiled.lights, compiled.materials.groups
+    if not any(bsdf.specular for bsdf in materials):
+        return None
+    if (lights.delta_of & lights.chosen_from).any():
+        return LOST_CAUSTICS
+    casters = caster_boxes(prepared.lighted) * compiled.scale
+    casters[:, :2] -= compiled.center
+    kinds = [kind for kind in lights.kinds if not isinstance(kind, InfiniteLight)]
+    records = (light.record(compiled.center) for light in prepared.lighted.lights)
+    kinds += [
+        record for record in records if isinstance(record, InfiniteLight)
+    ]  # all their light, not a part
+    return RARE_CAUSTICS if lit_by_small_lamps(casters, IrradianceOf(kinds, 1.0)) else None
+
+
+def caster_boxes(scene: Scene) -> NDArray[np.float64]:
+    """Return the lower and upper corner (n, 2, 3) of each shape of smooth glass or mirror, scene units."""
+    boxes = [
+        shape.bounds
+        for shape in scene.shapes
+        if (shape.mesh if isinstance(shape, Instance) else shape).material.bsdf.specular
+    ]
+    return np.array(boxes, np.float64).reshape(-1, 2, 3)
+
+
+def lit_by_small_lamps(boxes: NDArray[np.float64], lights: IrradianceOf) -> bool:
+    """Return whether much of the light at the middle of some box (n, 2, 3) comes from small lamps."""
+    if not lights.kinds or not len(boxes):
+        return False
+    emitters = lights.emitters
+    boxes = boxes[: max(1, MOST_PAIRS // len(emitters))]
+    middle, radius = boxes.mean(1), np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1) / 2
+    away = np.linalg.norm(emitters.middle.T - middle[:, None], axis=-1)  # NaN for lights that are nowhere
+    small = (emitters.extent2 > 0) & (emitters.extent2 < SMALL * np.maximum(away, radius[:, None]) ** 2)
+    irradiance = lights(middle.T, 0.0)
+    return bool(((irradiance * small).sum(1) > MUCH * irradiance.sum(1)).any())
+
+
+class Hints:
+    """The hints of a session, each of which is shown once.
+
+    Parameters
+    ----------
+    settings, prepared
+        What is rendered.
+    """
+
+    def __init__(self, settings: Settings, prepared: PreparedScene) -> None:
+        self._settings, self._prepared = settings, prepared
+        self._told: set[str] = set()
+
+    def tell(self, image: Image) -> None:
+        """Write what may help to stderr, a line each, if the last picture took long."""
+        if image.metadata["seconds"] < LONG:
+            return
+        lines = [hint for hint in self._of(image) if hint not in self._told]
+        self._told.update(lines)
+        with suppress(OSError, ValueError, AttributeError):  # without a stderr there is none to see it
+            for line in lines:
+                sys.stderr.write(f"hint: {line}\n")
+            sys.stderr.flush()
+
+    def _of(self, image: Image) -> Iterator[str]:
+        if image.metadata["hint"] is not None:
+            yield image.metadata["hint"]
+        many = self._prepared.compiled.triangles >= MANY_TRIANGLES
+        if self._settings.accel == AUTO and many and not installed():
+            yield NO_EMBREE
+        if self._settings.denoise and image.metadata.get("denoiser") == "nonlocal_means":
+            yield NO_DENOISER
