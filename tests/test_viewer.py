@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import gzip
 import multiprocessing
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -14,10 +16,12 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
+from urllib.parse import urlsplit
 
 import imageio.v3 as iio
 import numpy as np
@@ -25,10 +29,11 @@ import pytest
 from scenes import cornell_box
 
 import wavefront as wf
+from wavefront.cli import main, view_command
 from wavefront.viewer import page as page_module
 from wavefront.viewer import refiner as module
 from wavefront.viewer.front import Front, asked_first
-from wavefront.viewer.guard import is_value, may_connect
+from wavefront.viewer.guard import Guard, is_message, is_own_address, token_of
 from wavefront.viewer.page import Page
 from wavefront.viewer.refiner import Refiner, ViewerFrame
 from wavefront.viewer.shown import CHOICES, VIEWER_LAYERS, shown_codes
@@ -39,6 +44,7 @@ msgspec = pytest.importorskip("msgspec")  # comes with viser, as the next ones
 zstandard = pytest.importorskip("zstandard")
 websockets = pytest.importorskip("websockets.sync.client")
 exceptions = pytest.importorskip("websockets.exceptions")
+datastructures = pytest.importorskip("websockets.datastructures")
 
 BALL = wf.Scene([wf.Sphere((0, 0, 0), 1, material=wf.Diffuse((0.7, 0.3, 0.1)))], wf.Environment(1))
 CAMERA = wf.Camera.look_at((0, 0, 5), (0, 0, 0), size=(64, 48))
@@ -394,39 +400,124 @@ def test_a_transparent_background_is_gray() -> None:
 
 
 @pytest.mark.parametrize(
-    ("origin", "host", "own", "may"),
+    ("host", "own", "ours"),
     [
-        ("http://127.0.0.1:8080", "127.0.0.1:8080", "127.0.0.1", True),
-        ("http://localhost:8080", "localhost:8080", "127.0.0.1", True),
-        ("http://[::1]:8080", "[::1]:8080", "::1", True),
-        (None, "127.0.0.1:8080", "127.0.0.1", True),  # not a browser
-        ("http://evil.example", "127.0.0.1:8080", "127.0.0.1", False),
-        ("http://127.0.0.1:8888", "127.0.0.1:8080", "127.0.0.1", False),  # another server of this machine
-        ("null", "127.0.0.1:8080", "127.0.0.1", False),
-        ("http://evil.example:8080", "evil.example:8080", "127.0.0.1", False),  # a name that leads here
-        ("http://desk.example:8080", "desk.example:8080", "0.0.0.0", True),
-        ("http://evil.example", "desk.example:8080", "0.0.0.0", False),
+        ("127.0.0.1:8080", "127.0.0.1", True),
+        ("localhost:8080", "127.0.0.1", True),
+        ("LOCALHOST.:8080", "127.0.0.1", True),
+        ("[::1]:8080", "::1", True),
+        ("192.168.1.7:8080", "0.0.0.0", True),
+        ("[fe80::1]:8080", "::", True),
+        (f"{socket.gethostname().upper()}:8080", "0.0.0.0", True),
+        (f"{socket.gethostname()}.local", "0.0.0.0", True),
+        ("desk.example:8080", "desk.example", True),
+        ("evil.example:8080", "127.0.0.1", False),
+        ("evil.example:8080", "0.0.0.0", False),
+        ("evil.example:8080", "desk.example", False),
+        ("127.0.0.1.evil.example", "0.0.0.0", False),
+        ("localhost@evil.example", "127.0.0.1", False),
+        ("[", "127.0.0.1", False),
+        ("", "127.0.0.1", False),
+        ("", "", False),
     ],
 )
-def test_pages_of_other_sites_may_not_connect(origin: str | None, host: str, own: str, may: bool) -> None:
-    """Browsers let them try."""
-    assert may_connect(origin, host, own) == may
+def test_names_that_others_can_make_lead_here_are_refused(host: str, own: str, ours: bool) -> None:
+    """Also where the whole network may connect: that is when it matters (DNS rebinding)."""
+    assert is_own_address(host, own) == ours
 
 
-def test_only_values_may_be_set() -> None:
-    """Not limits, names or callbacks of elements."""
-    assert is_value({"value": 1.5})
-    assert is_value({"value": "rgb"})
-    for updates in (
-        {"max": 1e9},
-        {"value": 1, "max": 2},
-        {"update_cb": []},
-        {"value": [1]},
-        {},
-        None,
-        "value",
-    ):
-        assert not is_value(updates)
+@pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
+@pytest.mark.parametrize(
+    ("headers", "refused"),
+    [
+        ([("Host", "localhost:8080")], False),  # no Origin: not a browser, or a page that loads
+        ([("Host", "localhost:8080"), ("Origin", "http://localhost:8080")], False),
+        ([("Host", "localhost:8080"), ("Origin", "http://evil.example")], True),
+        ([("Host", "localhost:8080"), ("Origin", "http://localhost:8888")], True),  # another server
+        ([("Host", "localhost:8080"), ("Origin", "null")], True),
+        ([("Host", "localhost:8080"), ("Origin", "http://[")], True),
+        ([("Host", "evil.example:8080"), ("Origin", "http://evil.example:8080")], True),
+        ([("Host", "localhost:8080"), ("Host", "evil.example")], True),
+        ([], True),
+    ],
+)
+def test_pages_of_other_sites_are_refused(host: str, headers: list[tuple[str, str]], refused: bool) -> None:
+    """Whether they know the token or not, and where there is none."""
+    for token, path in (("", "/"), ("secret", "/?token=secret")):
+        guard = Guard(host, token)
+        assert (guard.refusal(path, datastructures.Headers(headers)) is not None) == refused
+
+
+@pytest.mark.parametrize(
+    "path", ["/", "/?token=", "/?token=secre", "/?token=secret2", "/?x=secret", "/?token=\u00e9"]
+)
+def test_requests_without_the_token_are_refused(path: str) -> None:
+    """The page's, the picture's and the WebSocket's alike; a token may have any letters."""
+    headers = datastructures.Headers(Host="localhost:8080")
+    assert Guard("127.0.0.1", "secret").refusal(path, headers) is not None
+    for token in ("secret", 'a&b=c%\u00e9"<'):
+        guard = Guard("127.0.0.1", token)
+        assert guard.refusal("/first.jpg" + guard.query, headers) is None
+        assert not set(guard.query) & set('"<> ')
+
+
+def test_tokens_are_drawn_given_or_left_out() -> None:
+    """A drawn one is new each time, with 192 bits."""
+    drawn = {token_of(True) for _ in range(10)}
+    assert len(drawn) == 10
+    assert all(len(bytes.fromhex(token)) == 24 for token in drawn)
+    assert (token_of("mine"), token_of(False)) == ("mine", "")
+    for wrong in ("", None, 3, b"mine"):
+        with pytest.raises(wf.SceneError, match=r"^token is .*; it must be a text that is not empty"):
+            token_of(wrong)  # type: ignore[arg-type]
+
+
+CAMERA_MESSAGE: dict[str, Any] = {
+    "type": "ViewerCameraMessage",
+    "wxyz": (1.0, 0, 0, 0),
+    "position": (0, 0, 3.0),
+    "fov": 1.0,
+    "near": 0.1,
+    "far": 100.0,
+    "image_height": 48,
+    "image_width": 64,
+    "look_at": (0.0, 0, 0),
+    "up_direction": (0.0, 1, 0),
+}
+VALUE_MESSAGE: dict[str, Any] = {"type": "GuiUpdateMessage", "uuid": "x", "updates": {"value": 1.5}}
+MALFORMED: list[Any] = [
+    {},
+    [],
+    None,
+    7,
+    {"type": "NoSuchMessage"},
+    {"type": ["GuiUpdateMessage"]},
+    {"type": "ShareUrlRequest"},
+    {"type": "ViewerCameraMessage"},
+    CAMERA_MESSAGE | {"position": "far"},
+    CAMERA_MESSAGE | {"position": (0, 0)},
+    CAMERA_MESSAGE | {"fov": None},
+    CAMERA_MESSAGE | {"more": 1},
+    VALUE_MESSAGE | {"updates": {"max": 1e9}},
+    VALUE_MESSAGE | {"updates": {"value": 1, "max": 2}},
+    VALUE_MESSAGE | {"updates": {"value": [1]}},
+    VALUE_MESSAGE | {"updates": {}},
+    VALUE_MESSAGE | {"updates": None},
+    VALUE_MESSAGE | {"uuid": 3},
+]
+
+
+def test_only_cameras_and_values_may_be_sent() -> None:
+    """Not limits, names or callbacks of elements, no other messages, and nothing that is none."""
+    encode = msgspec.msgpack.encode
+    for message in (CAMERA_MESSAGE, VALUE_MESSAGE, VALUE_MESSAGE | {"updates": {"value": "rgb"}}):
+        assert is_message(encode(message))
+        assert not is_message(encode(message)[:-1])
+        assert not is_message(encode(message) + b"0")
+    for message in MALFORMED:
+        assert not is_message(encode(message)), message
+    for data in (b"", b"\xc1", b"\x91" * 100_000, "text", None):
+        assert not is_message(data)
 
 
 @pytest.fixture
@@ -445,11 +536,10 @@ class Client:
     """Speaks to a viewer as its page does."""
 
     def __init__(self, viewer: wf.Viewer, **options: Any) -> None:
-        address = viewer.url.replace("http", "ws")
-        protocol: Any = f"viser-v{viser.__version__}"
-        self.socket = websockets.connect(
-            address, subprotocols=[protocol], compression=None, max_size=None, **options
-        )
+        base, mark, query = viewer.url.replace("http", "ws").partition("?")
+        options = {"subprotocols": [f"viser-v{viser.__version__}"], **options}
+        address = base + options.pop("address", mark + query)
+        self.socket = websockets.connect(address, compression=None, max_size=None, **options)
         self._looked = False
 
     def send(self, kind: str, **values: Any) -> None:
@@ -458,17 +548,7 @@ class Client:
 
     def look(self, **values: Any) -> None:
         """Send a camera."""
-        camera: dict[str, Any] = {
-            "wxyz": (1.0, 0, 0, 0),
-            "position": (0, 0, 3.0),
-            "fov": 1.0,
-            "near": 0.1,
-            "far": 100.0,
-            "image_height": 48,
-            "image_width": 64,
-            "look_at": (0.0, 0, 0),
-            "up_direction": (0.0, 1, 0),
-        }
+        camera = {name: value for name, value in CAMERA_MESSAGE.items() if name != "type"}
         if not self._looked:  # where pages are before they take the view, which is that of CAMERA
             for z in (-5.0, 3.0, 5 / np.sqrt(3)):
                 self.send("ViewerCameraMessage", **(camera | {"position": (0, 0, float(z))}))
@@ -553,39 +633,111 @@ def test_what_a_page_says_is_checked(viewer: wf.Viewer) -> None:
     client.socket.close()
 
 
-def test_a_page_of_another_site_is_refused(viewer: wf.Viewer) -> None:
-    """Before it is sent anything."""
-    client = Client(viewer, origin="http://evil.example")
-    with pytest.raises(exceptions.ConnectionClosed) as refused:
-        client.socket.recv(timeout=SOON)
-    assert refused.value.rcvd.code == 1008
+@pytest.mark.parametrize(
+    ("change", "status"),
+    [
+        ({"address": ""}, 403),
+        ({"address": "?token=wrong"}, 403),
+        ({"origin": "http://evil.example"}, 403),
+        ({"additional_headers": {"Host": "evil.example"}}, 403),
+        ({"subprotocols": ["viser-v0"]}, 400),
+        ({"subprotocols": None}, 400),
+    ],
+)
+def test_a_page_that_may_not_connect_is_refused(
+    viewer: wf.Viewer, capfd: pytest.CaptureFixture[str], change: dict[str, Any], status: int
+) -> None:
+    """Before it is sent anything, and without a word here."""
+    with pytest.raises(exceptions.InvalidStatus) as refused:
+        Client(viewer, **change)
+    assert refused.value.response.status_code == status
+    assert capfd.readouterr() == ("", "")
+
+
+def status(url: str, **headers: str) -> int:
+    """Return how a request is answered."""
+    try:
+        with urllib.request.urlopen(urllib.request.Request(url, headers=headers), timeout=SOON) as answer:
+            return answer.status
+    except urllib.error.HTTPError as error:
+        error.close()
+        return error.code
 
 
 def test_nothing_but_the_page_is_served(viewer: wf.Viewer) -> None:
-    """No file of the machine, however it is named."""
+    """No file of the machine, however it is named; and nothing without the token."""
+    base, _, query = viewer.url.partition("?")
+    assert len(query) > 40
+    assert status(viewer.url) == status(f"{base}first.jpg?{query}") == 200
+    for path in ("../page.py", "%2e%2e/%2e%2e/_viser.py", "/etc/passwd", "..%5c..%5c_viser.py", "index.php"):
+        assert status(f"{base}{path}?{query}") == 404
+    for path in ("", "first.jpg", "index.html", "?token=wrong", "../page.py"):
+        assert status(base + path) == 403
+    assert status(viewer.url, Host="evil.example") == status(viewer.url, Origin="http://evil.example") == 403
 
-    def status(path: str) -> int:
-        try:
-            with urllib.request.urlopen(viewer.url + path, timeout=SOON) as answer:
-                return answer.status
-        except urllib.error.HTTPError as error:
-            return error.code
 
-    assert status("/") == 200
-    for path in (
-        "/../page.py",
-        "/%2e%2e/%2e%2e/_viser.py",
-        "//etc/passwd",
-        "/..%5c..%5c_viser.py",
-        "/index.php",
-    ):
-        assert status(path) == 404
+def test_a_token_may_be_given_or_left_out() -> None:
+    """Pages of other sites are refused all the same, also where the network may connect."""
+    shared: dict[str, Any] = {"size": (16, 16), "port": 0, "open_browser": False, "block": False}
+    with wf.view(BALL, 1, token="a b&c", **shared) as viewer:
+        assert viewer.url.endswith("/?token=a%20b%26c")
+        assert viewer.elsewhere is None
+        assert status(viewer.url) == 200
+        assert status(viewer.url.partition("?")[0]) == 403
+    with wf.view(BALL, 1, token=False, host="0.0.0.0", **shared) as viewer:
+        assert viewer.url.endswith("/")
+        assert viewer.elsewhere == viewer.url.replace("127.0.0.1", socket.gethostname())
+        assert status(viewer.url) == 200
+        assert status(viewer.url, Host="evil.example", Origin="http://evil.example") == 403
+
+
+def is_closed(client: Client) -> None:
+    """Read what a viewer sends until it closes the connection."""
+    with suppress(exceptions.ConnectionClosed):
+        while True:
+            client.socket.recv(timeout=SOON)
+
+
+def test_what_is_no_message_changes_and_prints_nothing(
+    viewer: wf.Viewer, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    """No traceback, whatever comes: the page that sent it goes on, and so do the others."""
+    client = Client(viewer)
+    slider = viewer._page._server.gui  # type: ignore[union-attr]
+    for name in list(slider._gui_input_handle_from_uuid):
+        for value in ("none", NAN, 10**18, True, -5):
+            client.send("GuiUpdateMessage", uuid=name, updates={"value": value})
+    for message in MALFORMED:
+        client.socket.send(msgspec.msgpack.encode(message))
+    for data in (b"", b"\xc1", b"\x91" * 10_000, "text"):
+        client.socket.send(data)
+    client.look(image_width=48)
+    assert eventually(lambda: viewer.camera.film == (48, 48))
+    for data in (b"\x00\xff" * 100, b"GET\r\n\r\n", b"POST / HTTP/1.1\r\n\r\n", b"GET / HTTP/1.1\r\n\r\n"):
+        where = urlsplit(viewer.url)
+        with socket.create_connection((where.hostname, where.port), timeout=SOON) as raw:
+            raw.sendall(data)
+            raw.shutdown(socket.SHUT_WR)
+            while raw.recv(1 << 16):
+                pass
+    for frames in (b"\x83\x80....", b"\xff\x80....", b"\x81\x84....\xd1..."):  # of no kind, and no text
+        broken = Client(viewer)
+        broken.socket.socket.sendall(frames)
+        is_closed(broken)
+    large = Client(viewer)
+    large.socket.send(bytes(1 << 20))
+    is_closed(large)
+    client.socket.close()
+    viewer.close()
+    gc.collect()  # tasks that failed say so then
+    assert capfd.readouterr() == ("", "")
+    assert caplog.records == []
 
 
 @pytest.fixture
 def sent(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Page, list[tuple[float, ViewerFrame]]]]:
     """A page without a viewer, and what it sends, and when."""
-    page = Page("127.0.0.1", 0, viewpoint(), None, look=lambda view: None, connected=lambda: None)
+    page = Page("127.0.0.1", 0, "", viewpoint(), None, look=lambda view: None, connected=lambda: None)
     frames: list[tuple[float, ViewerFrame]] = []
     page._send = lambda codes, frame: frames.append((page._sent[1], frame))  # type: ignore[method-assign]
     yield page, frames
@@ -624,18 +776,15 @@ def test_other_pictures_do_not_wait(sent: Any, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_page_gets_a_picture_with_its_first_requests(viewer: wf.Viewer) -> None:
-    """The newest one, as a jpg that pages of other sites cannot read, not even by a name that leads here."""
+    """The newest one, as a jpg that pages of other sites cannot show."""
     codes = viewer.wait_for_picture(SOON).to_uint8().astype(float)
     assert eventually(lambda: first(viewer.url).shape == codes.shape)
     assert np.abs(first(viewer.url) - codes).mean() < 3
-    for headers in ({"Host": "evil.example"}, {"Origin": "http://evil.example"}):
-        with pytest.raises(urllib.error.HTTPError, match="404"):
-            first(viewer.url, headers)
 
 
-def first(url: str, headers: dict[str, str] | None = None) -> np.ndarray:
+def first(url: str) -> np.ndarray:
     """Return the picture that a page fetches while it loads."""
-    request = urllib.request.Request(f"{url}/first.jpg", headers=headers or {})
+    request = urllib.request.Request(url.replace("/?", "/first.jpg?"))
     with urllib.request.urlopen(request, timeout=SOON) as answer:
         assert answer.headers["Cross-Origin-Resource-Policy"] == "same-origin"
         assert answer.headers["Cache-Control"] == "no-store"
@@ -650,7 +799,8 @@ def test_the_page_is_that_of_viser_with_a_picture(viewer: wf.Viewer, encoding: s
         page = answer.read()
         assert answer.headers.get("Content-Encoding", "identity") == encoding
     page = gzip.decompress(page) if encoding == "gzip" else page
-    assert page.count(b"url(/first.jpg)") == page.count(b"<title>wavefront</title>") == 1
+    assert page.count(b"url(/first.jpg" + viewer.url[viewer.url.index("?") :].encode() + b")") == 1
+    assert page.count(b"<title>wavefront</title>") == 1
     assert b'<div id="root"></div>' in page
 
 
@@ -659,7 +809,7 @@ def test_servers_of_others_are_left_as_they_are() -> None:
     from websockets.asyncio import server
 
     async def answers() -> tuple[bytes, bytes]:
-        with asked_first(Front("127.0.0.1", lambda: b"jpg")):
+        with asked_first(Front(Guard("127.0.0.1", ""), lambda: b"jpg", lambda: None)):
             plain = server.serve(lambda socket: None, "127.0.0.1", 0)  # type: ignore[arg-type, return-value]
             own = server.serve(
                 lambda socket: None,  # type: ignore[arg-type, return-value]
@@ -760,7 +910,7 @@ def test_the_command_ends_at_ctrl_c(tmp_path: Path) -> None:
         assert process.stdout is not None
         line = process.stdout.readline()
         assert line.startswith("wavefront: http://127.0.0.1:"), line
-        assert urllib.request.urlopen(line.split()[1], timeout=SOON).status == 200
+        assert status(line.split()[1]) == 200
         os.killpg(process.pid, signal.SIGINT)
         output, errors = process.communicate(timeout=SOON)
     finally:
@@ -779,3 +929,14 @@ def test_views_are_rendered_as_by_default() -> None:
         same = wf.render(box, 1, camera=viewer.camera, progress=False, **settings)
     assert image.metadata["reuse"] is True
     assert image.rgb.tobytes() == same.rgb.tobytes()
+
+
+def test_the_command_has_a_token_unless_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """As `view` has: drawn, given, or none."""
+    mesh = tmp_path / "triangle.obj"
+    mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    tokens: list[Any] = []
+    monkeypatch.setattr(view_command, "view", lambda scene, **settings: tokens.append(settings["token"]))
+    for words in ([], ["--token", "mine"], ["--no-token"]):
+        assert main(["view", str(mesh), *words]) == 0
+    assert tokens == [True, "mine", False]

@@ -21,9 +21,18 @@ def add_view_command(commands: Any) -> None:
     )
     add_scene(command)
     command.add_argument(
-        "--host", default="127.0.0.1", help="address to listen at; 0.0.0.0 lets the whole network in"
+        "--host",
+        default="127.0.0.1",
+        help="address to listen at; 0.0.0.0 lets the network in, with the token",
     )
     command.add_argument("--port", type=int, default=8080, help="port to listen at, or one of the next")
+    token = command.add_mutually_exclusive_group()
+    token.add_argument(
+        "--token",
+        default=True,
+        help="what the page's address has as ?token=; others see it here (default: drawn)",
+    )
+    token.add_argument("--no-token", dest="token", action="store_false", help="let in all who can connect")
     command.add_argument("--no-browser", action="store_true", help="do not open the page")
     add_settings(command)
     command.set_defaults(run=_view)
@@ -34,6 +43,7 @@ def _view(options: argparse.Namespace) -> int:
         load(options.scene),
         host=options.host,
         port=options.port,
+        token=options.token,
         open_browser=not options.no_browser,
         block=True,
         size=options.size,

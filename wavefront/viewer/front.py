@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import gzip
+import logging
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import cached_property
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
-from .guard import may_connect
+from .guard import LARGEST_MESSAGE, Guard, is_message
 
 PICTURE = "/first.jpg"
 WAIT = 10.0  # seconds that a page waits for the first picture
@@ -22,13 +23,18 @@ WAIT = 10.0  # seconds that a page waits for the first picture
 HEAD = """<head>
     <style>
       html, body { height: 100%; margin: 0; background-color: #141414 }
-      body { background: #141414 url(/first.jpg) center / auto 100% no-repeat }
+      body { background: #141414 url(FIRST) center / auto 100% no-repeat }
       canvas[data-engine] { opacity: 1 !important }
       html:not(.drawn) canvas[data-engine] { opacity: 0 !important }
       html:not(.drawn) #root div:has(canvas) { background: none !important }
     </style>
     <script>
       (() => {
+        const post = Worker.prototype.postMessage;  // the worker connects, with the token
+        Worker.prototype.postMessage = function (data, ...rest) {
+          if (data?.type === "set_server") data.server += "/" + location.search;
+          return post.call(this, data, ...rest);
+        };
         const context = HTMLCanvasElement.prototype.getContext;
         HTMLCanvasElement.prototype.getContext = function (kind, options) {
           const plain = kind.startsWith("webgl") ? { antialias: false, alpha: false } : {};
@@ -66,28 +72,38 @@ class Front:
 
     Parameters
     ----------
-    host
-        Where the server listens.
+    guard
+        Says which requests are refused.
     picture
         Returns the newest picture as a jpg; None if there is none yet.
+    let_in
+        Called before anything is sent to a page that opens a WebSocket.
     """
 
-    def __init__(self, host: str, picture: Callable[[], bytes | None]) -> None:
-        self._host, self._picture = host, picture
+    def __init__(
+        self, guard: Guard, picture: Callable[[], bytes | None], let_in: Callable[[], object]
+    ) -> None:
+        self._guard, self._picture, self._let_in = guard, picture, let_in
 
     async def answer(self, request: Any) -> Any:
         """Return the response to a request of `websockets`; None leaves it to viser."""
         headers, path = request.headers, request.path.partition("?")[0]
-        if headers.get("Upgrade") == "websocket" or path not in ("/", PICTURE):
+        why = self._guard.refusal(request.path, headers)
+        if why is not None:
+            return _refused(HTTPStatus.FORBIDDEN, why)
+        if headers.get("Upgrade", "").lower() == "websocket":
+            if _protocol() not in headers.get("Sec-WebSocket-Protocol", ""):
+                return _refused(HTTPStatus.BAD_REQUEST, "this page is of another version: load it again")
+            self._let_in()
             return None
         if path == PICTURE:
-            if not may_connect(headers.get("Origin"), headers.get("Host"), self._host):
-                return None
             jpg = await self._first()
             return None if jpg is None else _response("image/jpeg", jpg)
+        if path != "/":
+            return None
         if "gzip" not in headers.get("Accept-Encoding", ""):
-            return _response("text/html; charset=utf-8", _page())
-        return _response("text/html; charset=utf-8", _page_gzipped(), ("Content-Encoding", "gzip"))
+            return _response("text/html; charset=utf-8", self._page)
+        return _response("text/html; charset=utf-8", self._gzipped, ("Content-Encoding", "gzip"))
 
     async def _first(self) -> bytes | None:
         """Return the newest picture; wait for it for a while."""
@@ -96,28 +112,61 @@ class Front:
             await asyncio.sleep(0.01)
         return jpg
 
+    @cached_property
+    def _page(self) -> bytes:
+        """The page of viser with our head."""
+        import viser
+
+        page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_text("utf-8")
+        head = HEAD.replace("FIRST", PICTURE + self._guard.query)
+        page = page.replace("<head>", head, 1).replace("<title>Viser</title>", "<title>wavefront</title>", 1)
+        return page.encode()
+
+    @cached_property
+    def _gzipped(self) -> bytes:
+        return gzip.compress(self._page, 1)  # its script is compressed, so more effort gains nothing
+
 
 @contextmanager
 def asked_first(front: Front) -> Iterator[None]:
-    """Let servers of viser that are started meanwhile ask `front` before they answer a request.
+    """Let servers of viser that are started meanwhile ask `front` first, and hear nothing but its messages.
 
-    `websockets.asyncio.server.serve` takes a function for that, and viser calls it with its own one. Viser
-    has no parameter for another, so `serve` is replaced while viser starts. Servers that others start
-    meanwhile are left as they are.
+    The server of `websockets` takes all that is needed as parameters: a function that answers requests, a
+    class of connections, a limit and a logger. Viser calls it with its own ones, and has no parameters for
+    others, so `serve` is replaced while viser starts. Servers that others start meanwhile are left as they
+    are. Nothing is logged: an error would be a traceback for each request that is none.
     """
     from websockets.asyncio import server
 
     serve = server.serve
+    silent = logging.Logger("wavefront.viewer")
+    silent.addHandler(logging.NullHandler())
+
+    class PageConnection(server.ServerConnection):
+        """Leaves out messages that a page may not send."""
+
+        async def recv(self, *arguments: Any, **options: Any) -> Any:
+            while not is_message(data := await super().recv(*arguments, **options)):
+                pass
+            return data
 
     def serve_asking(
         *arguments: Any, process_request: Callable[..., Any] | None = None, **options: Any
     ) -> Any:
+        if getattr(process_request, "__module__", "").partition(".")[0] != "viser":
+            return serve(*arguments, process_request=process_request, **options)
+
         async def answer(connection: Any, request: Any) -> Any:
             assert process_request is not None
             return await front.answer(request) or process_request(connection, request)
 
-        by_viser = getattr(process_request, "__module__", "").partition(".")[0] == "viser"
-        return serve(*arguments, process_request=answer if by_viser else process_request, **options)
+        ours: dict[str, Any] = {
+            "process_request": answer,
+            "create_connection": PageConnection,
+            "max_size": LARGEST_MESSAGE,
+            "logger": silent,
+        }
+        return serve(*arguments, **(options | ours))
 
     server.serve = serve_asking  # type: ignore[assignment, misc]
     try:
@@ -126,22 +175,18 @@ def asked_first(front: Front) -> Iterator[None]:
         server.serve = serve  # type: ignore[misc]
 
 
-@cache
-def _page() -> bytes:
-    """Return the page of viser with our head."""
+def _protocol() -> str:
+    """Return the subprotocol of the pages of viser."""
     import viser
 
-    page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_text("utf-8")
-    page = page.replace("<head>", HEAD, 1).replace("<title>Viser</title>", "<title>wavefront</title>", 1)
-    return page.encode()
+    return f"viser-v{viser.__version__}"
 
 
-@cache
-def _page_gzipped() -> bytes:
-    return gzip.compress(_page(), 1)  # its script is compressed, so more effort gains nothing
+def _refused(status: HTTPStatus, why: str) -> Any:
+    return _response("text/plain; charset=utf-8", f"wavefront: {why}\n".encode(), status=status)
 
 
-def _response(kind: str, body: bytes, *headers: tuple[str, str]) -> Any:
+def _response(kind: str, body: bytes, *headers: tuple[str, str], status: HTTPStatus = HTTPStatus.OK) -> Any:
     from websockets.datastructures import Headers
     from websockets.http11 import Response
 
@@ -150,5 +195,6 @@ def _response(kind: str, body: bytes, *headers: tuple[str, str]) -> Any:
         "Content-Length": str(len(body)),
         "Cache-Control": "no-store",
         "Cross-Origin-Resource-Policy": "same-origin",  # pages of other sites cannot show it
+        "Referrer-Policy": "no-referrer",  # nor learn the token
     }
-    return Response(HTTPStatus.OK, "OK", Headers([*fixed.items(), *headers]), body)
+    return Response(status, status.phrase, Headers([*fixed.items(), *headers]), body)

@@ -1,73 +1,159 @@
-"""What a page may do: move its camera and set values, from pages of this server alone."""
+"""What a viewer answers: requests with its token, under its own address, and messages that it knows."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import secrets
+import socket
+from contextlib import suppress
+from functools import cache
+from ipaddress import ip_address
 from typing import Any
-from urllib.parse import urlsplit
+from urllib.parse import parse_qs, quote, urlsplit
 
-LOCAL = ("localhost", "127.0.0.1", "::1")
-FORBIDDEN = 1008  # close code of a WebSocket: policy violation (RFC 6455, 7.4.1)
+from ..errors import SceneError
+
+TOKEN_BYTES = 24  # of a token that is drawn: nobody can guess it
+LARGEST_MESSAGE = 1 << 16  # bytes; cameras and values are much smaller
 
 
-def may_connect(origin: str | None, host: str | None, own: str) -> bool:
-    """Return whether a page may connect.
-
-    Browsers let pages of any site open WebSockets to this machine, and say in the header Origin which site
-    it is. It must be the server that is connected to. A server of this machine alone must also be called by a
-    name of this machine, since other names can be made to lead here (DNS rebinding).
+def token_of(token: str | bool) -> str:
+    """Return the token that the address of a page has, "" for none.
 
     Parameters
     ----------
-    origin, host
-        The headers of the request. Programs other than browsers send no Origin.
+    token
+        True draws one, False leaves it out; a text is taken.
+
+    Raises
+    ------
+    SceneError
+        If it is something else, or an empty text.
+    """
+    if isinstance(token, bool):
+        return secrets.token_hex(TOKEN_BYTES) if token else ""
+    if not isinstance(token, str) or not token:
+        raise SceneError(f"token is {token!r}; it must be a text that is not empty, True or False")
+    return token
+
+
+class Guard:
+    """Refuses requests of those who do not know the token, and of pages of other sites.
+
+    The token is in the address of the page, as that of Jupyter. No cookie holds it: browsers send cookies
+    along with requests of any page.
+
+    Parameters
+    ----------
+    host
+        Where the server listens.
+    token
+        What requests must have as `token=`; "" for none.
+    """
+
+    def __init__(self, host: str, token: str) -> None:
+        self._host, self._token = host, token
+        self.query = f"?token={quote(token, safe='')}" if token else ""
+
+    def refusal(self, path: str, headers: Any) -> str | None:
+        """Return why a request is refused; None lets it in.
+
+        Parameters
+        ----------
+        path
+            The path and the query.
+        headers
+            A `Headers` of `websockets`.
+        """
+        hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
+        if len(hosts) != 1 or len(origins) > 1 or not is_own_address(hosts[0], self._host):
+            return "this name is not the viewer's own: use its address, or the name that host= has"
+        if origins and not _is_origin(origins[0], hosts[0]):
+            return "this page is of another site"
+        given = parse_qs(path.partition("?")[2]).get("token", [""])[0]
+        if not secrets.compare_digest(given.encode(), self._token.encode()) and self._token:
+            return "the token is missing or wrong: use the address that the viewer printed"
+        return None
+
+
+def is_own_address(host: str, own: str) -> bool:
+    """Return whether a header Host names this machine.
+
+    A page of another site can make its own name lead here (DNS rebinding); then its pages count as those of
+    this server. It cannot do so with an address, nor with the names that are taken here.
+
+    Parameters
+    ----------
+    host
+        The header.
     own
         The host that the server listens at.
     """
-    if origin is not None and urlsplit(origin).netloc != host:
+    try:
+        name = (urlsplit(f"//{host}").hostname or "").removesuffix(".")
+    except ValueError:
         return False
-    name = urlsplit(f"//{host}").hostname
-    return own not in LOCAL or name in LOCAL
+    machine = socket.gethostname().lower()
+    if name and name in ("localhost", own.lower(), machine, f"{machine}.local"):
+        return True
+    with suppress(ValueError):
+        return bool(ip_address(name))
+    return False
 
 
-def guard(server: Any, own: str, let_in: Callable[[], object]) -> None:
-    """Refuse pages of other sites, and all messages but cameras and values, of a `viser.ViserServer`.
+def _is_origin(origin: str, host: str) -> bool:
+    """Return whether a header Origin is that of a page of this server."""
+    with suppress(ValueError):
+        return urlsplit(origin).netloc.lower() == host.lower()
+    return False
 
-    Viser itself also takes uploads, commands, and the request to open a tunnel to the internet.
 
-    Parameters
-    ----------
-    server
-        The server.
-    own
-        The host that it listens at.
-    let_in
-        Called before anything is sent to a page that may connect.
+def is_message(data: Any) -> bool:
+    """Return whether a page may say this: a camera, or the value of an element.
+
+    Viser itself also takes uploads, commands, other properties of elements, and the request to open a tunnel
+    to the internet, and prints a traceback for what is none of its messages.
     """
+    from msgspec import DecodeError
+
+    if not isinstance(data, bytes):
+        return False
+    try:
+        _decoder().decode(data)
+    except (DecodeError, RecursionError):
+        return False
+    return True
+
+
+@cache
+def _decoder() -> Any:
+    """Return what decodes the messages that a page may send, and nothing else."""
+    from msgspec import defstruct
+    from msgspec.msgpack import Decoder
+
+    strict: dict[str, Any] = {"tag_field": "type", "forbid_unknown_fields": True}
+    triple = tuple[float, float, float]
+    camera = defstruct(
+        "Camera",
+        [
+            ("wxyz", tuple[float, float, float, float]),
+            *((name, triple) for name in ("position", "look_at", "up_direction")),
+            *((name, float) for name in ("fov", "near", "far", "image_height", "image_width")),
+        ],
+        tag="ViewerCameraMessage",
+        **strict,
+    )
+    value = defstruct("Value", [("value", bool | int | float | str)], forbid_unknown_fields=True)
+    update = defstruct("Update", [("uuid", str), ("updates", value)], tag="GuiUpdateMessage", **strict)
+    return Decoder(camera | update)
+
+
+def take_values(server: Any) -> None:
+    """Let a `viser.ViserServer` ignore values that an element cannot have; it would print a traceback."""
     from viser._messages import GuiUpdateMessage
 
-    sockets = server._websock_server
-
-    async def check(connection: Any) -> None:
-        socket = sockets._live_connections[connection.client_id]
-        headers = socket.request.headers
-        if not may_connect(headers.get("Origin"), headers.get("Host"), own):
-            await socket.close(FORBIDDEN, "this page is of another site")
-        else:
-            let_in()
-
     async def update(client_id: Any, message: Any) -> None:
-        if is_value(message.updates):
+        with suppress(ValueError):
             await server.gui._handle_gui_updates(client_id, message)
 
-    sockets._client_connect_cb.insert(0, check)  # before any message is sent
-    for kind in list(sockets._incoming_handlers):
-        sockets.unregister_handler(kind)
-    sockets.register_handler(GuiUpdateMessage, update)
-
-
-def is_value(updates: Any) -> bool:
-    """Return whether an update sets the value of an element, and nothing else of it."""
-    if not isinstance(updates, dict) or updates.keys() != {"value"}:
-        return False
-    return isinstance(updates["value"], bool | int | float | str)
+    server._websock_server.unregister_handler(GuiUpdateMessage)
+    server._websock_server.register_handler(GuiUpdateMessage, update)

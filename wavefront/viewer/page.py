@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..codecs import png_jpeg
 from ..errors import SceneError, one_of
 from .front import Front, asked_first
-from .guard import guard
+from .guard import Guard, take_values
 from .refiner import ViewerFrame
 from .shown import CHOICES, shown_codes
 from .viewpoint import FOV, Viewpoint, within
@@ -25,6 +25,7 @@ from .viewpoint import FOV, Viewpoint, within
 QUALITY = 85  # of pictures while they refine, sent as jpg; the last one is a png
 ARRIVAL = 3.0  # seconds in which a page that connects takes the view; before, it has views of its own
 PAUSE = 0.1  # seconds between pictures that refine, so that the browser has time for movements
+EVERYWHERE = "0.0.0.0", "::", ""  # hosts that are reached from other machines, too
 STOPS = 6.0  # exposure, up and down
 STEPS = 200  # of a slider
 COPY = (
@@ -45,6 +46,8 @@ class Page:
     ----------
     host, port
         Where it listens; if the port is taken, at one of the next ones.
+    token
+        What the address of the page must have; "" for none.
     viewpoint
         The first view.
     most_spp
@@ -64,6 +67,7 @@ class Page:
         self,
         host: str,
         port: int,
+        token: str,
         viewpoint: Viewpoint,
         most_spp: int | None,
         look: Callable[[Viewpoint], object],
@@ -78,9 +82,12 @@ class Page:
         self._codes: NDArray[np.uint8] | None = None  # of the picture that is shown
         self._arrived: set[int] = set()  # pages that have taken the view
         self._sent: tuple[ViewerFrame | None, float] = None, 0.0  # the newest one that was sent, and when
-        self._server = _serve(host, port, Front(host, self._picture))
-        guard(self._server, host, lambda: self._begin_at(self.viewpoint))
-        self.url = f"http://{_address(host)}:{self._server.get_port()}"
+        guard = Guard(host, token)
+        self._server = _serve(host, port, Front(guard, self._picture, lambda: self._begin_at(self.viewpoint)))
+        take_values(self._server)
+        where = f":{self._server.get_port()}/{guard.query}"
+        self.url = f"http://{_address(host)}{where}"
+        self.elsewhere = f"http://{socket.gethostname()}{where}" if host in EVERYWHERE else None
         self._add_camera()
         self._add_controls()
         self._server.on_client_connect(self._greet)
@@ -312,6 +319,6 @@ def _silence() -> Iterator[None]:
 
 def _address(host: str) -> str:
     """Return what a browser on this machine calls a host."""
-    if host in ("0.0.0.0", "::", ""):
+    if host in EVERYWHERE:
         return "127.0.0.1"
     return f"[{host}]" if ":" in host else host

@@ -18,6 +18,7 @@ from ..renderable import as_scene, choose_camera
 from ..scene import Scene
 from ..scheduling.executors import choose_executor, needs_pickling, worker_count
 from ..session import Session
+from .guard import token_of
 from .priority import giving_way
 from .refiner import FIRST_DIVISOR, Refiner, ViewerFrame
 from .shown import VIEWER_LAYERS
@@ -44,13 +45,17 @@ class Viewer:
         The first view.
     host, port
         Where the page listens.
+    token
+        What the address of the page must have; "" for none.
     spp
         Samples per pixel of the last picture of a view; None where they are not known before.
 
     Attributes
     ----------
     url
-        Where the page is.
+        Where the page is, with its token.
+    elsewhere
+        The address for other machines, if it listens for them; else None.
 
     Examples
     --------
@@ -60,7 +65,9 @@ class Viewer:
     ...     same = wf.render(ball, spp=4, camera=viewer.camera)
     """
 
-    def __init__(self, session: Session, viewpoint: Viewpoint, host: str, port: int, spp: int | None) -> None:
+    def __init__(
+        self, session: Session, viewpoint: Viewpoint, host: str, port: int, token: str, spp: int | None
+    ) -> None:
         self._wanted: Camera | None = None
         self._latest: ViewerFrame | None = None
         self._error: Exception | None = None  # that ended the newest view
@@ -73,11 +80,11 @@ class Viewer:
             self._look(viewpoint)
             from .page import Page  # while workers trace, as it takes long to import viser
 
-            self._page = Page(host, port, viewpoint, spp, self._look, self._refiner.refine)
+            self._page = Page(host, port, token, viewpoint, spp, self._look, self._refiner.refine)
         except BaseException:
             self._refiner.close()
             raise
-        self.url = self._page.url
+        self.url, self.elsewhere = self._page.url, self._page.elsewhere
         atexit.register(self.close)
         if self._latest is not None:
             self._page.show(self._latest)
@@ -183,6 +190,7 @@ def view(
     *,
     host: str = "127.0.0.1",
     port: int = 8080,
+    token: str | bool = True,
     open_browser: bool = True,
     block: bool | None = None,
     **settings: Any,
@@ -200,9 +208,12 @@ def view(
         or `seconds` are given.
     host
         The address to listen at. By default only this machine can connect; "0.0.0.0" lets all machines of
-        the network see and move the picture, without a password.
+        the network in that know the token.
     port
         Where to listen; if it is taken, one of the next.
+    token
+        What the address of the page has as `?token=`; requests without it are refused. True draws a new one,
+        a text is taken as it is, and False lets in all who can connect.
     open_browser
         Whether to open the page. In a notebook it is shown in a frame below the cell in any case.
     block
@@ -238,19 +249,23 @@ def view(
         raise SceneError(f"port is {port!r}; it must be a whole number from 0 to 65535")
     if spp is None and settings.get("noise") is None and settings.get("seconds") is None:
         spp = SPP
-    viewer = _opened(as_scene(scene, settings.pop("material", None)), spp, host, port, settings)
+    token = token_of(token)
+    viewer = _opened(as_scene(scene, settings.pop("material", None)), spp, host, port, token, settings)
     in_notebook = in_kernel()
     if in_notebook:
         _show_frame(viewer.url)
     elif open_browser:
         webbrowser.open(viewer.url)
     if block or (block is None and not in_notebook and not hasattr(sys, "ps1")):
-        print(f"wavefront: {viewer.url} shows the scene; Ctrl-C ends", flush=True)
+        also = f", and for other machines {viewer.elsewhere}" if viewer.elsewhere else ""
+        print(f"wavefront: {viewer.url}{also} shows the scene; Ctrl-C ends", flush=True)
         viewer.wait()
     return viewer
 
 
-def _opened(scene: Scene, spp: int | None, host: str, port: int, settings: dict[str, Any]) -> Viewer:
+def _opened(
+    scene: Scene, spp: int | None, host: str, port: int, token: str, settings: dict[str, Any]
+) -> Viewer:
     """Return a viewer of a scene with settings of `Session`."""
     up = settings.get("up")
     up = upward("up", "y" if up is None else up)
@@ -271,7 +286,7 @@ def _opened(scene: Scene, spp: int | None, host: str, port: int, settings: dict[
         settings["executor"] = _executor(settings.get("workers"), (spp or SPP) * viewpoint.pixels)
     with giving_way():
         session = Session(scene, spp, **settings)
-    return Viewer(session, viewpoint, host, port, spp)
+    return Viewer(session, viewpoint, host, port, token, spp)
 
 
 def _executor(workers: int | None, paths: int) -> str | None:
