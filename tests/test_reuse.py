@@ -19,31 +19,73 @@ from wavefront.stages.shade import evaluate
 
 
 def test_tiles_divide_a_picture() -> None:
-    """Each tile has sixteen different members, seven pixels apart, but for the edges of the picture."""
+    """Each tile has a pixel in each of the sixteen cells of its block, but for the edges of the picture."""
     width, height = 59, 57
-    tile, member = place_in_tiles(np.arange(width * height, dtype=np.uint32), width)
+    pixels = np.arange(width * height, dtype=np.uint32)
+    tile, member = place_in_tiles(pixels, width)
     pairs = set(zip(tile.tolist(), member.tolist(), strict=True))
     assert len(pairs) == width * height
     inside = tile.reshape(height, width)[:56, :56]
     assert (np.bincount(inside.ravel())[np.unique(inside)] == 16).all()
-    rows, columns = np.nonzero(inside == inside[8, 10])
-    assert (np.unique(rows).tolist(), np.unique(columns).tolist()) == ([1, 8, 15, 22], [3, 10, 17, 24])
     assert np.bincount(tile).max() == 16
-    with_one = np.ravel_multi_index(
-        np.meshgrid([1, 8, 15, 22], [3, 10, 17, 24], indexing="ij"), (height, width)
-    )
+    for number in np.unique(inside[28:, :28]):
+        rows, columns = np.nonzero(inside == number)
+        cells = sorted(zip(rows // 7, columns // 7, strict=True))
+        assert cells == [(row, column) for row in range(4, 8) for column in range(4)]
     one = 8 * width + 10
-    others = others_in_tile(np.arange(width * height, dtype=np.uint32), one, width)
-    assert sorted([one, *others.tolist()]) == np.sort(with_one, None).tolist()
+    others = others_in_tile(pixels, one, width)
+    assert sorted([one, *others.tolist()]) == np.flatnonzero(tile == tile[one]).tolist()
+
+
+def test_tiles_do_not_depend_on_the_width_of_the_picture() -> None:
+    """Pixels that share paths in one picture do so in a wider one."""
+    narrow, wide = (
+        place_in_tiles(np.arange(width * 56, dtype=np.uint32), width)[0].reshape(56, width)[:, :56]
+        for width in (59, 203)
+    )
+    same = np.unique(np.stack([narrow.ravel(), wide.ravel()]), axis=1)
+    assert same.shape[1] == np.unique(narrow).size == np.unique(wide).size == 4 * 49
+
+
+def autocorrelation(error: np.ndarray, lag: int, axis: int) -> float:
+    """Return the correlation of errors (H, W) of pixels so far apart."""
+    size = error.shape[axis]
+    one, other = np.take(error, range(lag, size), axis), np.take(error, range(size - lag), axis)
+    return float((one * other).mean() / np.square(error).mean())
+
+
+def test_noise_that_is_the_same_in_a_tile_has_no_period() -> None:
+    """Even then pixels at no distance along rows and columns have much of it in common."""
+    tile, _ = place_in_tiles(np.arange(448 * 448, dtype=np.uint32), 448)
+    error = np.random.default_rng(0).normal(size=tile.max() + 1)[tile].reshape(448, 448)
+    for axis in (0, 1):
+        assert max(abs(autocorrelation(error, lag, axis)) for lag in range(1, 28)) < 0.06
+
+
+@pytest.mark.parametrize("spp", [4, pytest.param(16, marks=pytest.mark.slow)])
+def test_errors_of_pixels_do_not_repeat(spp: int) -> None:
+    """In a room whose pixels share paths: at no distance is the correlation of errors above 0.05."""
+    scene = scenes.cornell_box((84, 84))
+    runs = repeat(scene, spp, 4, reuse=True, max_bounces=2).mean(-1)
+    error = (runs - runs.mean(0)) / (runs.mean(0) + 0.1 * runs.mean())
+    worst = np.quantile(np.abs(error), 0.99)
+    error = error.clip(-worst, worst)
+    for axis in (0, 1):
+        found = [np.mean([autocorrelation(e, lag, axis) for e in error]) for lag in range(1, 15)]
+        assert np.abs(found).max() < 0.05
 
 
 def test_samples_are_of_different_tiles() -> None:
-    pixel, sample = np.array([0, 7, 1, 0], np.uint32), np.array([3, 3, 3, 4], np.uint32)
+    in_tile, _ = place_in_tiles(np.arange(100 * 7, dtype=np.uint32), 100)
+    second = int(np.flatnonzero(in_tile == in_tile[0])[1])
+    pixel, sample = np.array([0, second, 1, 0], np.uint32), np.array([3, 3, 3, 4], np.uint32)
     tiles = WaveTiles.of(pixel, sample, 100)
     assert tiles.count == 3
     assert tiles.tile[0] == tiles.tile[1] != tiles.tile[2]
     assert tiles.tile[3] not in tiles.tile[:3]
-    assert tiles.member.tolist() == [0, 1, 0, 0]
+    members = place_in_tiles(pixel, 100)[1]
+    assert np.array_equal(tiles.member, members)
+    assert members[0] != members[1]
 
 
 @pytest.mark.parametrize("wave", [1, 16, 100, 1000, 5000])

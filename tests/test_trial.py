@@ -336,15 +336,17 @@ def test_trials_do_not_depend_on_how_they_are_cut_into_waves(
 
 
 def test_a_blur_adds_up_the_noise_that_a_tile_shares() -> None:
-    """The weights are those of pixels seven apart in a picture that is blurred by a Gaussian."""
+    """The weights are those of the pixels of a tile in a picture that is blurred by a Gaussian."""
     deviation = np.random.default_rng(0).normal(size=16)
-    picture = np.zeros((101, 101))
-    picture[40 : 40 + 4 * 7 : 7, 40 : 40 + 4 * 7 : 7] = deviation.reshape(4, 4)
+    x, y = trial._spread_tiles(cornell_box(SIZE).camera, 3)
+    x, y = (each[2:] - each[2].min() + 40 for each in (x, y))
+    picture = np.zeros((108, 108))
+    picture[y, x] = deviation
     away = np.arange(-40, 41)
     kernel = np.exp(-(away**2) / (2 * trial.BLUR**2))
     for axis in (0, 1):
         picture = np.apply_along_axis(np.convolve, axis, picture, kernel, "same")
-    found = trial._after_blur(deviation[None, None, None]).sum()
+    found = trial._after_blur(deviation[None, None, None], x, y).sum()
     assert found == pytest.approx(np.square(picture).sum() / np.square(kernel).sum() ** 2, rel=1e-3)
 
 

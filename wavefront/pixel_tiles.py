@@ -1,9 +1,11 @@
 """Interleaved tiles: pixels, some distance apart, whose paths share what they find.
 
-The picture is divided into blocks of (SIDE · STRIDE)² pixels, and each block into STRIDE² tiles of SIDE²
-pixels, which lie STRIDE pixels apart. So pixels next to each other are of different tiles, and their noise
-stays independent. Tiles depend on the place in the whole picture alone, and are the same for every sample:
-a pixel that needs more samples needs them together with the others of its tile, in one job.
+The picture is divided into blocks of SIDE² cells. Each cell has STRIDE² pixels, one of each of the STRIDE²
+tiles of its block. A hash of block and cell shifts the tiles within the cell, so the pixels of a tile lie at
+irregular distances, and the noise that they share does not repeat. Tiles depend on the place in the whole
+picture alone, and are the same for every sample: a pixel that needs more samples needs them together with the
+others of its tile, in one job. Partners that change from sample to sample would lose the stratification of
+what a pixel gets from the others.
 
 Source: A. Keller and W. Heidrich, "Interleaved Sampling", Eurographics Workshop on Rendering 2001.
 """
@@ -16,8 +18,8 @@ from .record import record
 from .state import Words
 from .vec import Ints
 
-SIDE = 4  # pixels of a tile, in each direction
-STRIDE = 7  # pixels between two of them
+SIDE = 4  # cells of a block, in each direction; each has a pixel of every tile
+STRIDE = 7  # pixels of a cell, in each direction
 MEMBERS = SIDE * SIDE
 
 
@@ -34,11 +36,25 @@ def place_in_tiles(pixel: Words, width: int) -> tuple[Ints, Ints]:
     y = number // width
     x = number - y * width
     block_x, block_y = x // block, y // block
-    tile_x, tile_y = x % STRIDE, y % STRIDE
+    member = (y % block // STRIDE) * SIDE + x % block // STRIDE
+    shift_x, shift_y = cell_shifts(block_x, block_y, member)
+    tile_x, tile_y = (x + shift_x) % STRIDE, (y + shift_y) % STRIDE
     across = -(-width // block)
     tile = ((block_y * across + block_x) * STRIDE + tile_y) * STRIDE + tile_x
-    member = (y % block // STRIDE) * SIDE + x % block // STRIDE
     return tile, member
+
+
+def cell_shifts(block_x: Ints, block_y: Ints, member: Ints) -> tuple[Ints, Ints]:
+    """Return by how many pixels, (n,) in x and y, the tiles of cells are shifted: a hash of the cells.
+
+    The hash is that of C. Wellons, Prospecting for Hash Functions, 2018, lowbias32.
+    """
+    h = (block_x * 0x9E3779B1 + block_y * 0x85EBCA77 + member * 0xC2B2AE3D).astype(np.uint32)
+    for shift, factor in ((16, 0x7FEB352D), (15, 0x846CA68B)):
+        h ^= h >> np.uint32(shift)
+        h *= np.uint32(factor)
+    h ^= h >> np.uint32(16)
+    return (h % STRIDE).astype(np.intp), (h // STRIDE % STRIDE).astype(np.intp)
 
 
 def others_in_tile(pixel: Words, one: int, width: int) -> Ints:

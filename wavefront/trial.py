@@ -24,10 +24,9 @@ import numpy as np
 from .camera import Camera
 from .compile.scene import CompiledScene
 from .pilot import spread
-from .pixel_tiles import MEMBERS, SIDE, STRIDE
+from .pixel_tiles import MEMBERS, SIDE, STRIDE, cell_shifts
 from .record import record
 from .stages.reuse import shared_materials
-from .state import Words
 from .trial_job import TrialJob, TrialPart
 from .vec import Doubles, Ints
 
@@ -55,9 +54,8 @@ RARE_LIGHT = 1.0  # relative variance of a pixel of four samples, from where on 
 COMMON_GLOSS = 0.05  # part of the second points, from where on a trial sees enough of what a material does
 NO_WORSE = 2.0  # what re-use may cost by pixels or after a blur: few tiles may tell twice the truth
 BLUR = 4  # standard deviation of the blur, pixels
-BLUR_WEIGHTS = [  # of a row of a tile for each other: the convolution of the blur with itself
-    [math.exp(-(((row - other) * STRIDE / (2 * BLUR)) ** 2)) for other in range(SIDE)] for row in range(SIDE)
-]
+# of a pixel for another one so many rows or columns away: the convolution of the blur with itself
+BLUR_WEIGHTS = np.array([math.exp(-((distance / (2 * BLUR)) ** 2)) for distance in range(SIDE * STRIDE)])
 
 
 @record
@@ -164,9 +162,12 @@ def run_trial(
     reuse
         Whether to try sharing paths among pixels.
     """
-    pixel, max_bounces = _spread_tiles(camera, tiles), min(max_bounces, BOUNCES)
+    max_bounces = min(max_bounces, BOUNCES)
+    width, height = camera.size
+    x, y = _spread_tiles(camera, tiles)
+    pixel = (y % height * width + x % width).astype(np.uint32)
     count = max(-(-tiles // WAVE), min(LEAST_JOBS, tiles))
-    places = np.array_split(pixel.reshape(tiles, MEMBERS), count)
+    places = np.array_split(pixel, count)
     jobs = [TrialJob(camera, seeds, max_bounces, each.ravel(), guided, reuse) for each in places]
     parts = list(run(jobs))
     ways = np.concatenate([part.ways for part in parts], -1)
@@ -182,7 +183,7 @@ def run_trial(
     reused = None
     if reuse:
         together = np.concatenate([part.together for part in parts], -1)
-        reused = _reused(parts, _deviations(together), deviation[:, :1], scale)
+        reused = _reused(parts, _deviations(together), deviation[:, :1], scale, x, y)
     return Trial(
         shared,
         total - shared,
@@ -194,16 +195,17 @@ def run_trial(
     )
 
 
-def _spread_tiles(camera: Camera, count: int) -> Words:
-    """Return the pixels (16 · count,) of tiles that are spread over a picture, those of each in turn."""
+def _spread_tiles(camera: Camera, count: int) -> tuple[Ints, Ints]:
+    """Return columns and rows (count, 16) of the pixels of tiles that are spread over a picture."""
     width, height = camera.size
-    reach = (SIDE - 1) * STRIDE
+    reach = SIDE * STRIDE - 1
     across, down = max(1, width - reach), max(1, height - reach)
     place = spread(np.arange(count, dtype=np.uint64), across * down).astype(np.intp)
-    row, column = np.divmod(np.arange(MEMBERS), SIDE)
-    y = (place // across)[:, None] + row * STRIDE
-    x = (place % across)[:, None] + column * STRIDE
-    return (y % height * width + x % width).ravel().astype(np.uint32)
+    member = np.arange(MEMBERS)
+    shift_x, shift_y = cell_shifts(place[:, None], np.zeros_like(place)[:, None], member)
+    y = (place // across)[:, None] + member // SIDE * STRIDE + shift_y
+    x = (place % across)[:, None] + member % SIDE * STRIDE + shift_x
+    return x, y
 
 
 def _deviations(blocks: Doubles) -> Doubles:
@@ -212,18 +214,17 @@ def _deviations(blocks: Doubles) -> Doubles:
     return (blocks - blocks.mean(2, keepdims=True)) * math.sqrt(count / (count - 1))
 
 
-def _after_blur(deviation: Doubles) -> Doubles:
+def _after_blur(deviation: Doubles, x: Ints, y: Ints) -> Doubles:
     """Return deviations (..., pixels) times what a blur gathers of those of their tiles; it may be negative.
 
     The mean over pixels is the variance after the blur, but for a factor. Two pixels count by the
-    convolution of the blur with itself.
+    convolution of the blur with itself. Columns x and rows y of the pixels are (tiles, MEMBERS).
     """
-    of_tile = deviation.reshape(*deviation.shape[:-1], -1, SIDE, SIDE)
-    gathered = of_tile
-    for axis in (-2, -1):
-        rows = np.moveaxis(gathered, axis, 0)
-        sums = [sum(w * row for w, row in zip(weights, rows, strict=True)) for weights in BLUR_WEIGHTS]
-        gathered = np.moveaxis(np.stack(sums), 0, axis)
+    of_tile = deviation.reshape(*deviation.shape[:-1], *x.shape)
+    gathered = np.zeros_like(of_tile)
+    for member in range(MEMBERS):
+        away_x, away_y = (np.abs(each - each[:, member, None]) for each in (x, y))
+        gathered += BLUR_WEIGHTS[away_x] * BLUR_WEIGHTS[away_y] * of_tile[..., member, None]
     return (of_tile * gathered).reshape(deviation.shape)
 
 
@@ -243,11 +244,13 @@ def _at_most(values: Doubles, kept: Ints) -> float:
     return max(mean, 0.0) + ERRORS * error
 
 
-def _reused(parts: list[TrialPart], together: Doubles, alone: Doubles, scale: Doubles) -> Reused:
+def _reused(
+    parts: list[TrialPart], together: Doubles, alone: Doubles, scale: Doubles, x: Ints, y: Ints
+) -> Reused:
     """Return what sharing brings, given deviations (3, 1, blocks, pixels) with it and without it."""
     return Reused(
         _ratio(*(np.square(each) / scale for each in (together, alone))),
-        _ratio(*(_by_tile(_after_blur(each) / scale) for each in (together, alone))),
+        _ratio(*(_by_tile(_after_blur(each, x, y) / scale) for each in (together, alone))),
         sum(part.again for part in parts),
         sum(part.connections for part in parts),
         sum(part.evaluations for part in parts),
