@@ -1,10 +1,11 @@
 """Settings of the whole suite."""
 
+import os
 import signal
 from collections.abc import Iterator
 
 import pytest
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, Phase, settings
 
 settings.register_profile(
     "deterministic",
@@ -13,7 +14,21 @@ settings.register_profile(
     database=None,
     suppress_health_check=[HealthCheck.too_slow],
 )
-settings.load_profile("deterministic")
+# HYPOTHESIS_PROFILE=explore draws new examples, many of them; what it finds is kept as an `@example`
+settings.register_profile(
+    "explore",
+    derandomize=False,
+    deadline=None,
+    database=None,
+    max_examples=int(os.environ.get("HYPOTHESIS_EXAMPLES", "2000")),
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
+    print_blob=True,
+)
+# the examples of the first profile, but a failure is not made simpler: for `mutants.py`
+settings.register_profile(
+    "mutants", settings.get_profile("deterministic"), phases=[Phase.explicit, Phase.generate]
+)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "deterministic"))
 
 
 def pytest_configure() -> None:

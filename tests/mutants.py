@@ -1,0 +1,368 @@
+"""Change a formula in one place, run tests, and list what they let pass.
+
+    python tests/mutants.py --kinds densities
+    python tests/mutants.py wavefront/stages/reuse.py --jobs 16
+
+Each mutant is one change of one file in a copy of the tree:
+
+- `constants`: a number times 1.1, or plus 1 if it is an integer; 0 becomes 1 and, in a name or a test of
+  equality, stays. Indices, shapes, texts and types are no formulas and are left out.
+- `factors`: a product or a quotient without one of its factors, `a *= b` or `a /= b` left out, `-a` as a.
+- `densities`: what a function named pdf or pmf returns, or what is assigned to such a name, times 1.1; and
+  all of these in one class at once, so that what is returned with a sample agrees with the function.
+
+The tests of a file stand in `TESTS`; they run with -x, and `--tests` names others.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import os
+import queue
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+# the tests that concern a file, quick ones first
+TESTS: dict[str, tuple[str, ...]] = {
+    "wavefront/stages/reuse.py": (
+        "tests/test_shared_connections.py",
+        "tests/test_reuse.py",
+        "tests/test_equal_means.py",
+    ),
+    "wavefront/light_paths.py": ("tests/test_light_paths.py", "tests/test_caustics.py"),
+    "wavefront/guiding/cells.py": ("tests/test_guiding.py",),
+    "wavefront/guiding/guide_table.py": (
+        "tests/test_guiding.py",
+        "tests/properties/test_density_of_tables.py",
+    ),
+    "wavefront/guiding/octahedral.py": (
+        "tests/test_guiding.py",
+        "tests/properties/test_density_of_tables.py",
+    ),
+    "wavefront/guiding/training.py": ("tests/test_guiding.py",),
+    "wavefront/geometric_layers.py": ("tests/test_geometric_layers.py", "tests/test_sampled_layers.py"),
+    "wavefront/sample_recorder.py": ("tests/test_sampled_layers.py", "tests/test_denoising.py"),
+    "wavefront/light_sums.py": (
+        "tests/test_light_paths.py",
+        "tests/test_merge.py",
+        "tests/test_checkpoint.py",
+    ),
+}
+FORMULAS = tuple(TESTS)
+# files with densities
+DENSITIES = (
+    "wavefront/sampling/warp.py",
+    "wavefront/sampling/spherical.py",
+    "wavefront/sampling/discrete.py",
+    "wavefront/bsdfs/base.py",
+    "wavefront/bsdfs/conductor.py",
+    "wavefront/bsdfs/dielectric.py",
+    "wavefront/bsdfs/diffuse.py",
+    "wavefront/bsdfs/microfacet.py",
+    "wavefront/bsdfs/mirror.py",
+    "wavefront/bsdfs/mix.py",
+    "wavefront/bsdfs/oren_nayar.py",
+    "wavefront/bsdfs/principled.py",
+    "wavefront/bsdfs/thin.py",
+    "wavefront/guiding/guide_table.py",
+    "wavefront/lights/directional.py",
+    "wavefront/lights/environment.py",
+    "wavefront/lights/image.py",
+    "wavefront/lights/infinite.py",
+    "wavefront/lights/planar.py",
+    "wavefront/lights/point.py",
+    "wavefront/lights/rectangle.py",
+    "wavefront/lights/samplers.py",
+    "wavefront/lights/sphere.py",
+    "wavefront/lights/spot.py",
+    "wavefront/lights/table.py",
+    "wavefront/lights/tree.py",
+    "wavefront/lights/triangle.py",
+)
+TESTS |= {
+    file: (f"tests/properties/test_density_of_{of}.py",)
+    for file in DENSITIES
+    if file not in TESTS
+    for of in (
+        *["bsdfs"] * ("/bsdfs/" in file),
+        *["tables"] * file.endswith(("discrete.py", "samplers.py", "tree.py")),
+        *["warps"] * file.endswith(("warp.py", "spherical.py")),
+        *["lights"] * ("/lights/" in file and not file.endswith(("samplers.py", "tree.py"))),
+    )
+}
+DENSITY_NAMES = ("pdf", "pmf", "density", "chance", "mixed")
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One change of a file, or several: the bytes from `start` to `end` become `new`."""
+
+    file: str
+    line: int
+    edits: tuple[tuple[int, int, str], ...]  # start, end, new
+    what: str
+
+    def applied(self, data: bytes) -> bytes:
+        """Return the file with the changes."""
+        for start, end, new in sorted(self.edits, reverse=True):
+            data = data[:start] + new.encode() + data[end:]
+        return data
+
+
+class Finder(ast.NodeVisitor):
+    """Collects the mutants of a file."""
+
+    def __init__(self, file: str, source: str, kinds: set[str]) -> None:
+        self.file, self.kinds = file, kinds
+        self.lines = source.encode().splitlines(keepends=True)
+        self.begins = [0]
+        for line in self.lines:
+            self.begins.append(self.begins[-1] + len(line))
+        self.data = source.encode()
+        self.found: list[Mutant] = []
+        self.functions: list[str] = []
+
+    def add(self, node: ast.AST, new: str, what: str) -> None:
+        start = self.begins[node.lineno - 1] + node.col_offset  # type: ignore[attr-defined]
+        end = self.begins[node.end_lineno - 1] + node.end_col_offset  # type: ignore[attr-defined]
+        self.found.append(Mutant(self.file, node.lineno, ((start, end, new),), what))  # type: ignore[attr-defined]
+
+    def text(self, node: ast.AST) -> str:
+        return ast.get_source_segment(self.data.decode(), node) or ""
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
+        self.functions.append(node.name)
+        for statement in node.body:
+            self.visit(statement)
+        self.functions.pop()
+
+    def visit_ClassDef(self, node: ast.ClassDef) -> None:
+        before = len(self.found)
+        for statement in node.body:
+            self.visit(statement)
+        # in functions that return a density the values on the way to it would be scaled twice
+        parts = [each for each in self.found[before:] if "()" in each.what or "sample" in each.what]
+        if "densities" in self.kinds and len(parts) > 1:
+            edits = tuple(edit for part in parts for edit in part.edits)
+            self.found.append(Mutant(self.file, node.lineno, edits, f"all densities of {node.name} x 1.1"))
+
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> None:
+        if node.value is not None:
+            self.visit(node.value)
+
+    def visit_Expr(self, node: ast.Expr) -> None:
+        if not isinstance(node.value, ast.Constant):  # docstrings
+            self.generic_visit(node)
+
+    def visit_Subscript(self, node: ast.Subscript) -> None:
+        self.visit(node.value)  # not the index
+
+    def visit_Raise(self, node: ast.Raise) -> None:
+        """Leave messages out."""
+
+    def visit_keyword(self, node: ast.keyword) -> None:
+        if node.arg not in ("axis", "maxsize", "ndim"):
+            self.visit(node.value)
+
+    def visit_Call(self, node: ast.Call) -> None:
+        name = self.text(node.func)
+        self.visit(node.func)
+        for argument in node.args:
+            whole = isinstance(argument, ast.Constant) and isinstance(argument.value, int)
+            shape = name.rpartition(".")[2] in (
+                *("reshape", "take", "concatenate", "stack", "repeat", "sum", "mean", "any", "all", "max"),
+                *("min", "moveaxis", "swapaxes", "transpose", "argmax", "argmin", "cumsum"),
+            )
+            if not (whole and shape):  # an axis or a shape
+                self.visit(argument)
+        for keyword in node.keywords:
+            self.visit(keyword)
+
+    def visit_Constant(self, node: ast.Constant) -> None:
+        value = node.value
+        if "constants" not in self.kinds or isinstance(value, bool) or not isinstance(value, int | float):
+            return
+        new = repr(value + 1) if isinstance(value, int) else repr(value * 1.1) if value else "1.0"
+        self.add(node, f"({new})", f"{self.text(node)} -> {new}")
+
+    def visit_BinOp(self, node: ast.BinOp) -> None:
+        if "factors" in self.kinds and isinstance(node.op, ast.Mult | ast.Div | ast.FloorDiv | ast.MatMult):
+            whole, left, right = self.text(node), self.text(node.left), self.text(node.right)
+            self.add(node, f"({left})", f"{_short(whole)} -> {_short(left)}")
+            if isinstance(node.op, ast.Mult):
+                self.add(node, f"({right})", f"{_short(whole)} -> {_short(right)}")
+            else:
+                self.add(node, f"(1 / ({right}))", f"{_short(whole)} -> 1 / {_short(right)}")
+        self.generic_visit(node)
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> None:
+        if (
+            "factors" in self.kinds
+            and isinstance(node.op, ast.USub)
+            and not isinstance(node.operand, ast.Constant)
+        ):
+            self.add(node, f"({self.text(node.operand)})", f"{_short(self.text(node))} without its sign")
+        self.generic_visit(node)
+
+    def visit_AugAssign(self, node: ast.AugAssign) -> None:
+        if "factors" in self.kinds and isinstance(node.op, ast.Mult | ast.Div):
+            self.add(node, "pass", f"{_short(self.text(node))} left out")
+        self.visit(node.value)
+
+    def visit_Assign(self, node: ast.Assign) -> None:
+        (target,) = node.targets[:1]
+        name = self.text(target)
+        if "densities" in self.kinds and not isinstance(target, ast.Tuple) and _is_density(name):
+            inside = self.functions[-1] if self.functions else "class"
+            self.add(
+                node.value, f"(({self.text(node.value)}) * np.float32(1.1))", f"{name} in {inside} x 1.1"
+            )
+        self.visit(node.value)
+
+    def visit_Return(self, node: ast.Return) -> None:
+        value, name = node.value, self.functions[-1] if self.functions else ""
+        if "densities" in self.kinds and value is not None:
+            if _is_density(name) and not isinstance(value, ast.Tuple):
+                text = self.text(value)
+                self.add(value, f"(({text}) * np.float32(1.1))", f"{name}() x 1.1")
+            elif name == "evaluate" and isinstance(value, ast.Tuple):
+                text = self.text(value.elts[1])
+                self.add(value.elts[1], f"(({text}) * np.float32(1.1))", "pdf of evaluate() x 1.1")
+        if value is not None:
+            self.visit(value)
+
+
+def _is_density(name: str) -> bool:
+    return bool(set(DENSITY_NAMES) & set(name.split("[")[0].rpartition(".")[2].split("_")))
+
+
+def _short(text: str) -> str:
+    text = " ".join(text.split())
+    return text if len(text) < 60 else text[:40] + " … " + text[-16:]
+
+
+def mutants_of(file: str, kinds: set[str]) -> Iterator[Mutant]:
+    """Yield the mutants of a file, those of one place side by side."""
+    source = (ROOT / file).read_text()
+    finder = Finder(file, source, kinds)
+    finder.visit(ast.parse(source))
+    for mutant in sorted(finder.found, key=lambda each: each.edits):
+        try:
+            compile(mutant.applied(finder.data), file, "exec")
+        except SyntaxError:
+            continue
+        yield mutant
+
+
+class Copies:
+    """Copies of the tree, one for each job."""
+
+    def __init__(self, folder: Path, jobs: int) -> None:
+        self.free: queue.Queue[Path] = queue.Queue()
+        for number in range(jobs):
+            place = folder / str(number)
+            for part in ("wavefront", "tests", "examples", "docs", "benchmarks"):
+                if (ROOT / part).exists():
+                    ignored = shutil.ignore_patterns("__pycache__", "*.png", "*.jpg", "*.svg")
+                    shutil.copytree(ROOT / part, place / part, ignore=ignored)
+            shutil.copy(ROOT / "pyproject.toml", place)
+            self.free.put(place)
+
+    def run(self, mutant: Mutant | None, tests: list[str], limit: float) -> tuple[str, float, str]:
+        """Return "killed", "survived" or "too slow", the seconds, and the first test that failed."""
+        place = self.free.get()
+        try:
+            path = place / mutant.file if mutant else None
+            before = path.read_bytes() if path else b""
+            if path and mutant:
+                path.write_bytes(mutant.applied(before))
+            start = time.perf_counter()
+            options = ["-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", "--no-header", "--tb=line"]
+            environment = {
+                **os.environ,
+                "PYTHONPATH": f"{place}{os.pathsep}{os.environ.get('PYTHONPATH', '')}",
+                "PYTHONDONTWRITEBYTECODE": "1",
+                "OMP_NUM_THREADS": "1",
+                "HYPOTHESIS_PROFILE": "mutants",
+            }
+            there = [test for test in tests if (place / test.split("::")[0]).exists()]
+            command = [sys.executable, "-m", "pytest", *options, *there]
+            try:
+                done = subprocess.run(
+                    command, cwd=place, env=environment, capture_output=True, text=True, timeout=limit
+                )
+                state = "survived" if done.returncode == 0 else "killed"
+                failed = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+                by = failed[0].split(" - ")[0] if failed else f"exit status {done.returncode}"
+            except subprocess.TimeoutExpired:
+                state, by = "too slow", ""
+            if path:
+                path.write_bytes(before)
+            return state, time.perf_counter() - start, "" if state == "survived" else by
+        finally:
+            self.free.put(place)
+
+
+def main() -> int:
+    """Run the mutants, print each that is not killed, and the counts."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("files", nargs="*", help="of the package; by default those of TESTS")
+    parser.add_argument("--kinds", default="constants,factors")
+    parser.add_argument("--tests", nargs="+", help="in place of those of each file")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--limit", type=float, default=180.0, help="seconds for one mutant")
+    parser.add_argument("--seconds", type=float, default=float("inf"), help="after which no mutant begins")
+    parser.add_argument("--from-line", type=int, default=0)
+    parser.add_argument("--part", default="0/1", help="k/n: every n-th mutant, from the k-th on")
+    parser.add_argument("--list", action="store_true", help="print the mutants and run nothing")
+    parser.add_argument("--verbose", action="store_true", help="print those that are killed, too")
+    given = parser.parse_args()
+    kinds = set(given.kinds.split(","))
+    files = given.files or (DENSITIES if kinds == {"densities"} else FORMULAS)
+    first, step = (int(each) for each in given.part.split("/"))
+    mutants = [mutant for file in files for mutant in mutants_of(file, kinds)]
+    mutants = [mutant for mutant in mutants if mutant.line >= given.from_line][first::step]
+    if given.list:
+        for mutant in mutants:
+            print(f"{mutant.file}:{mutant.line}: {mutant.what}")
+        print(len(mutants), "mutants")
+        return 0
+    begin, counts = time.perf_counter(), {"killed": 0, "survived": 0, "too slow": 0, "not run": 0}
+
+    def tests_of(mutant: Mutant) -> list[str]:
+        return list(given.tests or TESTS[mutant.file])
+
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(given.jobs) as pool:
+        copies = Copies(Path(folder), given.jobs)
+        for tests in {tuple(tests_of(mutant)) for mutant in mutants}:
+            state, seconds, by = copies.run(None, list(tests), 10 * given.limit)
+            print(f"unchanged: {state} in {seconds:.0f} s {by}", flush=True)
+            if state != "survived":
+                return 1
+
+        def run(mutant: Mutant) -> None:
+            if time.perf_counter() - begin > given.seconds:
+                counts["not run"] += 1
+                return
+            state, seconds, by = copies.run(mutant, tests_of(mutant), given.limit)
+            counts[state] += 1
+            if state != "killed" or given.verbose:
+                where = f"{mutant.file}:{mutant.line}: {mutant.what}"
+                print(f"{state} ({seconds:.0f} s): {where} {by}", flush=True)
+
+        list(pool.map(run, mutants))
+    print(", ".join(f"{count} {state}" for state, count in counts.items()))
+    return int(counts["survived"] > 0)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

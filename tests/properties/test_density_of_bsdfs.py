@@ -1,0 +1,267 @@
+"""The densities of all BSDFs, by differentiation at any u, and what else their samples promise.
+
+A BSDF chooses a lobe by u[2], and the lobe maps u[:2] to a direction. So its density at a direction is the
+sum, over all u[:2] that lead there, of the part of the numbers u[2] with which they do over the Jacobian of
+the map. The u[:2] that may lead to a direction are found by the inverses of the maps that BSDFs are made of.
+"""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from jacobians import columns, doubles, few, inner, jacobian, some
+
+from wavefront import bsdfs
+from wavefront.bsdfs import (
+    Bsdf,
+    Conductor,
+    Dielectric,
+    Diffuse,
+    Mirror,
+    Mix,
+    OrenNayar,
+    Principled,
+    ShadowCatcher,
+    ThinDielectric,
+)
+from wavefront.bsdfs.microfacet import alpha_of, visible_normals
+from wavefront.sampling.warp import cosine_hemisphere_inverse
+from wavefront.state import SurfaceInteraction
+
+f4 = np.float32
+CHOICES = 1024  # numbers u[2] that are tried: the part of a lobe is known to 2/CHOICES
+part = st.floats(0.05, 1)
+rough = st.floats(0.2, 1)
+color = st.tuples(part, part, part)
+index = st.floats(1.1, 2.5) | st.floats(0.4, 0.9)
+
+MATTE = st.one_of(st.builds(Diffuse, color), st.builds(OrenNayar, color, st.floats(0, 1)))
+SHINY = st.one_of(
+    st.builds(Conductor, color, st.floats(0.5, 5), rough),
+    st.builds(Dielectric, index, rough),
+)
+KINDS = {
+    Diffuse: st.builds(Diffuse, color),
+    ShadowCatcher: st.builds(ShadowCatcher, color),
+    OrenNayar: st.builds(OrenNayar, color, st.floats(0, 1), energy_preserving=st.booleans()),
+    Mirror: st.builds(Mirror, color),
+    Conductor: st.builds(Conductor, color, st.floats(0.5, 5), st.just(0.0) | rough),
+    Dielectric: st.builds(Dielectric, index, st.just(0.0) | rough, reflectance=color, transmittance=color),
+    ThinDielectric: st.builds(
+        ThinDielectric, index, st.just(0.0) | rough, reflectance=color, transmittance=color
+    ),
+    Principled: st.builds(
+        Principled,
+        color,
+        st.floats(0, 1),
+        rough,
+        index,
+        st.just(0.0) | st.floats(0, 1),
+        thin=st.booleans(),
+        clearcoat=st.just(0.0) | part,
+        clearcoat_roughness=rough,
+        sheen=st.just(0.0) | part,
+        specular=st.floats(0, 1),
+    ),
+    Mix: st.builds(Mix, MATTE, SHINY | st.builds(Mirror, color), st.floats(0.1, 0.9)),
+}
+kinds = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+scattering = pytest.mark.parametrize(
+    "kind", [kind for kind in KINDS if kind is not Mirror], ids=lambda kind: kind.__name__
+)
+cosines = st.floats(0.1, 1)
+cubes = st.tuples(inner, inner, inner)
+
+
+def test_every_bsdf_is_here() -> None:
+    assert {*bsdfs.ALL, ShadowCatcher} == set(KINDS)
+
+
+def bound_to(bsdf: Bsdf, wo: np.ndarray, inside: bool) -> Bsdf:
+    """The BSDF at n points seen along wo (3, n), perhaps from inside."""
+    n = wo.shape[1]
+    up, zero = np.repeat(f4([[0], [0], [1]]), n, 1), np.zeros(n, f4)
+    lane = np.zeros(n, np.intp)
+    back = np.full(n, inside and bsdf.transmissive)
+    return bsdf.bind(SurfaceInteraction(np.zeros((3, n), f4), zero, up, up, wo, lane, lane, back))
+
+
+def toward(z: float, turn: float = 0.4) -> np.ndarray:
+    """A unit vector (3, 1) of float64."""
+    r = np.sqrt(1 - z * z)
+    return columns(r * np.cos(turn), r * np.sin(turn), z)
+
+
+def sampled(bsdf: Bsdf, wo: np.ndarray, u: np.ndarray, inside: bool):
+    wide = np.repeat(wo, u.shape[1], 1)
+    return bound_to(bsdf, wide, inside).sample_f(wide, u)
+
+
+def alphas_of(bsdf: Bsdf) -> list[float]:
+    """The roughness of all lobes of microfacets."""
+    if isinstance(bsdf, Mix):
+        return [*alphas_of(bsdf.first), *alphas_of(bsdf.second)]
+    names = [name for name in ("roughness", "clearcoat_roughness") if name in vars(type(bsdf)) | vars(bsdf)]
+    names = names or (["roughness"] if hasattr(type(bsdf), "roughness") else [])
+    return [float(alpha_of(np.atleast_1d(getattr(bsdf, name)))[0]) for name in names]
+
+
+def indices_of(bsdf: Bsdf, inside: bool) -> list[float]:
+    """The relative indices of refraction."""
+    if isinstance(bsdf, Mix):
+        return [*indices_of(bsdf.first, inside), *indices_of(bsdf.second, inside)]
+    ior = getattr(bsdf, "ior", None) if bsdf.transmissive else None
+    return [] if ior is None else [1.0 / float(ior[0]) if inside else float(ior[0])]
+
+
+def normal_inverse(wo: np.ndarray, m: np.ndarray, alpha: float) -> np.ndarray:
+    """The u (2, 1) that `visible_normals` maps to the normal m (3, 1)."""
+    squeezed = wo * columns(alpha, alpha, 1)
+    squeezed /= np.linalg.norm(squeezed)
+    half = m / columns(alpha, alpha, 1)
+    half /= np.linalg.norm(half)
+    cap = 2 * (squeezed * half).sum() * half - squeezed
+    turn = np.arctan2(cap[1], cap[0]) / (2 * np.pi) % 1
+    return np.stack([turn, 1 - (cap[2] + squeezed[2]) / (1 + squeezed[2])])
+
+
+def preimages(bsdf: Bsdf, wo: np.ndarray, wi: np.ndarray, inside: bool) -> list[np.ndarray]:
+    """All u (2, 1) that may be mapped to wi, without repeats."""
+    found = [cosine_hemisphere_inverse(wi)]
+    halves = [wo + wi, wo + wi * columns(1, 1, -1)]
+    halves += [wo + eta * wi for eta in indices_of(bsdf, inside)]
+    for half in halves:
+        size = np.linalg.norm(half)
+        if size < 1e-3:
+            continue
+        m = half * (np.copysign(1, half[2]) / size)
+        found += [normal_inverse(wo, m, alpha) for alpha in alphas_of(bsdf)]
+    kept: list[np.ndarray] = []
+    for u in found:
+        if not ((u >= 0) & (u < 1)).all():
+            continue
+        assume(((u > 1e-6) & (u < 1 - 1e-6)).all())  # there are no differences at the edge of the square
+        if all(np.abs(u - v).max() > 1e-9 for v in kept):
+            kept.append(u)
+    return kept
+
+
+def density_by_differentiation(
+    bsdf: Bsdf, wo: np.ndarray, wi: np.ndarray, inside: bool
+) -> tuple[float, float]:
+    """Return the density at wi (3, 1) and a bound on its error."""
+    third = (np.arange(CHOICES) + 0.5) / CHOICES
+    total, bound = 0.0, 0.0
+    for u in preimages(bsdf, wo, wi, inside):
+        tried = np.concatenate([np.repeat(u, CHOICES, 1), third[None]])[: max(bsdf.dimensions, 2)]
+        sample = sampled(bsdf, wo, tried, inside)
+        same = (np.abs(sample.wi - wi).max(0) < 1e-6) & (sample.pdf > 0) & ~sample.specular
+        lanes = np.flatnonzero(same)
+        if not lanes.size:
+            continue
+        choice = third[lanes[lanes.size // 2]]
+
+        def direction(v, choice=choice):
+            numbers = np.concatenate([v, np.full((1, v.shape[1]), choice)])[: max(bsdf.dimensions, 2)]
+            return sampled(bsdf, wo, numbers, inside).wi
+
+        area, error = jacobian(direction, (float(u[0, 0]), float(u[1, 0])))
+        chance = lanes.size / CHOICES
+        total += chance / area
+        bound += (chance * error + (2 / CHOICES if lanes.size < CHOICES else 0)) / area
+    return total, bound
+
+
+@scattering
+@some
+@given(data=st.data(), z=cosines, inside=st.booleans(), u=cubes)
+def test_density_of_directions(kind: type[Bsdf], data: st.DataObject, z: float, inside: bool, u) -> None:
+    bsdf, wo = data.draw(KINDS[kind]), toward(z)
+    assume(not bsdf.specular)
+    with doubles():
+        numbers = columns(*u)[: bsdf.dimensions]
+        sample = sampled(bsdf, wo, numbers, inside)
+        assume(sample.pdf[0] > 0)
+        assume(not sample.specular[0])
+        assume(abs(sample.wi[2, 0]) > 1e-3)
+        density, bound = density_by_differentiation(bsdf, wo, sample.wi, inside)
+        assume(bound < 0.06 * density)
+        assert abs(sample.pdf[0] - density) <= bound + 1e-4 * density
+
+
+@kinds
+@some
+@given(data=st.data(), z=cosines, inside=st.booleans(), u=cubes)
+def test_samples_keep_their_promises(
+    kind: type[Bsdf], data: st.DataObject, z: float, inside: bool, u
+) -> None:
+    """In float32, as in a render: the density at the sample is the one returned; weight = f·cos/pdf."""
+    bsdf, wo = data.draw(KINDS[kind]), toward(z).astype(f4)
+    sample = sampled(bsdf, wo, columns(*u).astype(f4)[: bsdf.dimensions], inside)
+    here = bound_to(bsdf, wo, inside)
+    assert sample.wi.dtype == sample.pdf.dtype == f4
+    assert np.linalg.norm(sample.wi.astype(float)) == pytest.approx(1, abs=3e-6)
+    if sample.pdf[0] == 0:
+        assert not sample.weight.any()
+        return
+    f, pdf = here.f(wo, sample.wi), here.pdf(wo, sample.wi)
+    if sample.specular[0]:
+        assert 0 < sample.pdf[0] <= 1 + 1e-6
+        if bsdf.specular:
+            assert not f.any()
+            assert not pdf.any()
+        return
+    assert pdf[0] == pytest.approx(sample.pdf[0], rel=1e-5)
+    due = f.astype(float) * abs(float(sample.wi[2, 0])) / float(sample.pdf[0])
+    np.testing.assert_allclose(sample.weight, due, rtol=2e-5, atol=1e-7)
+
+
+@kinds
+@few
+@given(data=st.data(), z=cosines, inside=st.booleans())
+def test_densities_integrate_to_the_chance_of_a_sample(
+    kind: type[Bsdf], data: st.DataObject, z: float, inside: bool
+) -> None:
+    """Over the sphere, by the midpoint rule; delta lobes and directions to the wrong side are left out."""
+    bsdf, wo = data.draw(KINDS[kind]), toward(z).astype(f4)
+    rows = 200
+    z_of, phi = np.meshgrid(
+        (np.arange(rows) + 0.5) / rows * 2 - 1, 2 * np.pi * (np.arange(2 * rows) + 0.5) / (2 * rows)
+    )
+    r = np.sqrt(1 - z_of * z_of)
+    w = np.stack([r * np.cos(phi), r * np.sin(phi), z_of]).reshape(3, -1).astype(f4)
+    wide = np.repeat(wo, w.shape[1], 1)
+    total = 4 * np.pi * bound_to(bsdf, wide, inside).pdf(wide, w).mean(dtype=float)
+    side = 32
+    grid = (np.indices((side,) * 3).reshape(3, -1) + 0.5) / side
+    sample = sampled(bsdf, wo, grid.astype(f4)[: bsdf.dimensions], inside)
+    chance = np.mean((sample.pdf > 0) & ~sample.specular)
+    # a facet's horizon and the lobes' ends cross cells of the grid of u: less than one in `side` is wrong
+    assert total == pytest.approx(chance, abs=1 / side)
+
+
+@kinds
+@some
+@given(data=st.data(), z=cosines, inside=st.booleans(), u=cubes)
+def test_delta_lobes_have_their_chance(
+    kind: type[Bsdf], data: st.DataObject, z: float, inside: bool, u
+) -> None:
+    """The part of the numbers u[2] that lead to a delta lobe is the probability returned with it."""
+    bsdf, wo = data.draw(KINDS[kind]), toward(z)
+    third = (np.arange(CHOICES) + 0.5) / CHOICES
+    tried = np.concatenate([np.repeat(columns(*u[:2]), CHOICES, 1), third[None]])[: bsdf.dimensions]
+    with doubles():
+        sample = sampled(bsdf, wo, tried, inside)
+    delta = np.flatnonzero(sample.specular & (sample.pdf > 0))
+    for lane in delta[:1], delta[-1:]:
+        if lane.size:
+            same = (sample.wi == sample.wi[:, lane]).all(0) & sample.specular
+            assert same.mean() == pytest.approx(sample.pdf[lane[0]], abs=2 / CHOICES)
+
+
+@some
+@given(alpha=st.floats(0.01, 1), z=cosines, u=st.tuples(inner, inner))
+def test_visible_normals_have_their_inverse(alpha: float, z: float, u: tuple[float, float]) -> None:
+    with doubles():
+        m = visible_normals(toward(z), np.float64(alpha), columns(*u))
+    np.testing.assert_allclose(normal_inverse(toward(z), m, alpha)[:, 0], u, atol=1e-6)
