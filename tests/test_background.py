@@ -77,7 +77,7 @@ def test_integrators_of_users_have_backgrounds_if_they_are_made_of_the_stages() 
         wf.render(subject(), spp=1, background="transparent", integrator=foreign, executor="threads")
 
 
-@pytest.mark.parametrize("bad", ["clear", (1, 2), -1, "red"])
+@pytest.mark.parametrize("bad", ["clear", (1, 2), -1, "rde"])
 def test_malformed_backgrounds_are_errors(bad) -> None:
     with pytest.raises(wf.SceneError, match="background"):
         wf.render(subject(), spp=1, background=bad)

@@ -234,7 +234,7 @@ def test_mirror_reflects_in_the_normal():
         (lambda: Diffuse(1.5), r"Diffuse reflectance is 1.5; it must be in \[0, 1\]"),
         (lambda: Diffuse((0.5, -0.1, 0)), r"Diffuse reflectance\[1\] is -0.1; it must be in \[0, 1\]"),
         (lambda: Diffuse((0.5, 0.1)), r"Diffuse reflectance must have shape \(3,\), got \(2,\)"),
-        (lambda: Diffuse("red"), "Diffuse reflectance must be numeric, got 'red'"),
+        (lambda: Diffuse("rde"), "Diffuse reflectance is 'rde', which is no color"),
         (lambda: Diffuse(np.nan), "Diffuse reflectance is nan; it must be finite"),
         (lambda: Mirror(2), r"Mirror reflectance is 2; it must be in \[0, 1\]"),
         (lambda: Dielectric(0), "Dielectric ior is 0; it must be more than 0"),

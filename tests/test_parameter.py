@@ -81,7 +81,7 @@ def wf_parameters(kind: type) -> list[str]:
     ("thing", "name", "value", "message"),
     [
         (wf.Diffuse(), "reflectance", 5.0, r"Diffuse reflectance is 5; it must be in \[0, 1\]"),
-        (wf.Diffuse(), "reflectance", "red", r"Diffuse reflectance must be numeric, got 'red'"),
+        (wf.Diffuse(), "reflectance", "rde", r"Diffuse reflectance is 'rde', which is no color"),
         (wf.Diffuse(), "reflectance", None, r"Diffuse reflectance "),
         (wf.Mirror(), "reflectance", (0, -1, 0), r"Mirror reflectance\[1\] is -1"),
         (wf.Conductor(1, 1), "roughness", 2, r"Conductor roughness is 2; it must be in \[0, 1\]"),

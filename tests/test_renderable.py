@@ -64,9 +64,9 @@ def test_a_material_replaces_no_other(subject, message) -> None:
 
 def test_a_material_must_be_one() -> None:
     with pytest.raises(
-        wf.SceneError, match=r"material must be a material such as wf.Diffuse\(0.5\), got 'red'"
+        wf.SceneError, match=r'material must be a material such as wf.Diffuse\(0.5\) or "gold", got 3'
     ):
-        render(TRIANGLE, 1, material="red")
+        render(TRIANGLE, 1, material=3)
 
 
 # --- What is up -----------------------------------------------------------------------------------

@@ -19,6 +19,7 @@ from .bsdfs import (
     ThinDielectric,
 )
 from .camera import Camera
+from .colors import srgb
 from .errors import Interrupted, RenderError, SaveError, SceneError
 from .extensions import (
     register_accelerator,
@@ -182,6 +183,7 @@ __all__ = [
     "render",
     "render_many",
     "save_animation",
+    "srgb",
     "studio",
     "testing",
     "turntable",

@@ -201,31 +201,6 @@ def number(
     return result
 
 
-def rgb(
-    name: str, value: ArrayLike, high: float = np.inf, dtype: type[np.floating] = np.float32
-) -> NDArray[Any]:
-    """Return a color as a (3, 1) column, of float32 unless another type is given; a scalar means gray.
-
-    Raises
-    ------
-    SceneError
-        If it is not one or three finite numbers in [0, `high`], or exceeds the type.
-    """
-    scalar = np.ndim(value) == 0
-    if np.shape(value) == (3, 1):  # as stored
-        value = np.ravel(value)
-    array = finite_array(name, value, () if scalar else (3,))
-    largest = float(np.finfo(dtype).max)
-    bad = np.flatnonzero(~((array >= 0) & (array <= min(high, largest))))
-    if len(bad):
-        where = "" if scalar else f"[{bad[0]}]"
-        limit = f"in [0, {high:g}]"
-        if np.isinf(high):
-            limit = "at least 0" if array.flat[bad[0]] < 0 else f"at most {largest:.3g}"
-        raise SceneError(f"{name}{where} is {array.flat[bad[0]]:g}; it must be {limit}")
-    return np.broadcast_to(array.astype(dtype).reshape(-1, 1), (3, 1)).copy()
-
-
 def rotation_matrix(name: str, value: ArrayLike, tolerance: float = 1e-4) -> NDArray[np.float64]:
     """Return a (3, 3) rotation, replaced by the nearest exact rotation if it is inexact by rounding.
 

@@ -20,7 +20,8 @@ from .codecs.image_data import ERROR, ImageData
 from .codecs.images import read_picture, write_image
 from .codecs.png_jpeg import Gamma
 from .codecs.white_balance import WhiteBalance
-from .errors import SceneError, number, one_of, rgb
+from .colors import rgb
+from .errors import SceneError, number, one_of
 from .film import Film, chunks
 from .html import picture_html
 from .layers import BOXES, CLAMPED, GIVEN_LAYERS, LAYERS, NOISY, is_radiance

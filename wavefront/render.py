@@ -78,7 +78,8 @@ def render(
         (width, height) in pixels, in place of the camera's; by default (512, 512).
     material
         What bare meshes are made of: those of files and of trimesh, where it replaces what they say,
-        (vertices, faces), and shapes that were given no material.
+        (vertices, faces), and shapes that were given no material. A material, or the name of one, such as
+        "gold".
     up
         What is up in the scene: a vector (3,), or the name of an axis, such as "z" for most STL and CAD
         files; by default "y". It turns the camera that frames a scene without one, and the `lighting` and

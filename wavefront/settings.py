@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from .accel.registry import ACCELERATORS, AcceleratorMaker
 from .camera import Camera, check_camera, image_size, upward
 from .codecs.image_data import TRANSPARENT
-from .errors import SceneError, in_brief, number, rgb, warn_caller
+from .colors import rgb
+from .errors import SceneError, in_brief, number, warn_caller
 from .exact_sum import MAX_TERMS
 from .files import check_target
 from .filters import FILTERS, Filter, box
@@ -25,7 +26,7 @@ from .integrators import INTEGRATORS, Integrator, li_full
 from .layers import CLAMPED, GUIDES, chosen_layers, sampled_names
 from .lighting import DEFAULT, LIGHTINGS, check_lighting
 from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
-from .materials import MaterialLike
+from .materials import NAMED_MATERIALS, MaterialLike
 from .memory import memory_size
 from .progress import Progress
 from .record import record
@@ -160,9 +161,12 @@ def check_samples(name: str, value: Any) -> range | None:
 
 def check_background(name: str, value: Any) -> Any:
     """Check a background: "transparent", or a color, which becomes (3, 1)."""
-    if isinstance(value, str) and value != TRANSPARENT:
-        raise SceneError(f"{name} is {value!r}; it must be {TRANSPARENT!r}, a color or None")
-    return value if value is None or isinstance(value, str) else rgb(name, value)
+    if value is None or (isinstance(value, str) and value == TRANSPARENT):
+        return value
+    try:
+        return rgb(name, value)
+    except SceneError as error:
+        raise SceneError(f"{error}, or {TRANSPARENT!r}" if isinstance(value, str) else f"{error}") from None
 
 
 def check_checkpoint(name: str, value: Any) -> str | None:
@@ -210,7 +214,9 @@ class Settings:
     material: MaterialLike | None = setting(
         None,
         "What bare meshes are made of: those of files and of trimesh, where it replaces what they "
-        "say, (vertices, faces), and shapes that were given no material.",
+        "say, (vertices, faces), and shapes that were given no material. A material, or the name of one, "
+        'such as "gold".',
+        option=f"material in place of the file's: {', '.join(NAMED_MATERIALS)}",
     )
     up: ArrayLike | None = setting(
         None,
@@ -240,7 +246,8 @@ class Settings:
         '"transparent" or a color: replaces what the camera sees directly of the environment; its light '
         "stays, and so do its reflections. Either gives the layer `alpha`. Colors of a transparent picture "
         "are premultiplied by alpha.",
-        option="transparent, or a color R,G,B in place of the visible environment",
+        option="transparent, or a color in place of the visible environment: a name such as white, #rrggbb, "
+        "or linear R,G,B",
         check=check_background,
     )
     integrator: str | Integrator = setting(

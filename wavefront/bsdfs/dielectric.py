@@ -7,8 +7,11 @@ from typing import Self
 
 import numpy as np
 
+from ..errors import one_of
 from ..state import SurfaceInteraction
+from ..suggestions import suggests_keywords
 from ..textures.base import BaseTexture
+from ..textures.parameter import Color, Scalar
 from ..vec import Floats, broadcast, dot, f4
 from .base import BsdfSample, weigh
 from .fresnel import fresnel_dielectric
@@ -17,6 +20,31 @@ from .refractive import RefractiveBsdf
 
 # Closer to 1 than this, refraction bends light by less than half vectors resolve: the boundary is smooth.
 LEAST_BEND = 1e-3
+
+# Refractive indices at 20 °C in the yellow light of sodium (589.3 nm) or helium (587.6 nm); they differ by
+# 0.0003 at most. BK7, F2, SF11: data sheets of Schott. Fused silica: I. Malitson 1965, J. Opt. Soc. Am. 55,
+# 1205. Others: CRC Handbook of Chemistry and Physics; the ordinary ray of birefringent crystals. Acrylic,
+# polycarbonate, oil and window glass vary by 0.01.
+INDICES = {
+    "acetone": 1.3588,
+    "acrylic": 1.4914,
+    "air": 1.00027,
+    "bk7": 1.5168,
+    "diamond": 2.4173,
+    "ethanol": 1.3611,
+    "f2": 1.62004,
+    "fused silica": 1.45846,
+    "glass": 1.52,
+    "glycerol": 1.4746,
+    "ice": 1.309,
+    "oil": 1.47,
+    "polycarbonate": 1.585,
+    "quartz": 1.5442,
+    "salt": 1.5443,
+    "sapphire": 1.7681,
+    "sf11": 1.78472,
+    "water": 1.333,
+}
 
 
 class Dielectric(RefractiveBsdf):
@@ -45,7 +73,26 @@ class Dielectric(RefractiveBsdf):
     --------
     >>> glass = wf.Dielectric(1.5)
     >>> frosted = wf.Dielectric(1.5, roughness=0.3)
+    >>> lens = wf.Dielectric.named("BK7")
     """
+
+    @classmethod
+    @suggests_keywords
+    def named(
+        cls, name: str, roughness: Scalar = 0.0, *, reflectance: Color = 1.0, transmittance: Color = 1.0
+    ) -> Self:
+        """Return the clear material `name` in air: one of `INDICES`, such as "water", in capitals or not.
+
+        The index is that of yellow light, for all channels: dispersion is not simulated.
+
+        Raises
+        ------
+        SceneError
+            If the name is not known, listing those that are.
+        """
+        key = name.lower() if isinstance(name, str) else name
+        index = INDICES[one_of("Dielectric name", key, INDICES)]
+        return cls(index, roughness, reflectance=reflectance, transmittance=transmittance)
 
     def derive(self) -> None:
         """Set `specular`, and the relative index as seen from outside, from the parameters."""

@@ -12,8 +12,10 @@ from ..camera import image_size, upward
 from ..codecs.display import Display
 from ..codecs.encoding import check_exposure, check_gamma
 from ..codecs.image_data import TRANSPARENT
+from ..colors import rgb
 from ..errors import SceneError
 from ..lighting import check_lighting
+from ..materials import Material
 
 VECTOR_OPTIONS = ("--origin", "--target", "--up", "--direction")
 
@@ -113,13 +115,28 @@ def up(text: str) -> tuple[float, float, float]:
 
 
 def background(text: str) -> str | tuple[float, float, float]:
-    """Return "transparent", or R,G,B as three floats."""
-    if text == TRANSPARENT:
-        return text
-    try:
+    """Return "transparent", or a color."""
+    return text if text == TRANSPARENT else color_value(text)
+
+
+def color_value(text: str) -> str | tuple[float, float, float]:
+    """Return the name of a color as it is, or R,G,B as three floats."""
+    if "," in text:
         return vector(text)
-    except argparse.ArgumentTypeError:
-        raise argparse.ArgumentTypeError(f"{text!r} is neither {TRANSPARENT!r} nor R,G,B") from None
+    try:
+        rgb("the color", text)
+    except SceneError as error:
+        raise argparse.ArgumentTypeError(f"{error}, or R,G,B") from None
+    return text
+
+
+def material(text: str) -> str:
+    """Return the name of a material."""
+    try:
+        Material.named(text)
+    except SceneError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return text
 
 
 def gamma(text: str) -> float | str:

@@ -8,11 +8,10 @@ from typing import Any
 from ..counted import counted
 from ..datasets import write_dataset
 from ..datasets.dataset import FORMATS
-from ..io.load import load
 from ..views import turntable
 from .arguments import Several, count
 from .command import add_command, add_scene
-from .options import add_display, add_settings, display_of, setting_values
+from .options import add_display, add_settings, display_of, read_scene, setting_values
 
 
 def add_dataset_command(commands: Any) -> None:
@@ -56,7 +55,7 @@ def add_dataset_command(commands: Any) -> None:
 def _dataset(options: argparse.Namespace) -> int:
     display = display_of(options)
     progress = False if options.quiet else None
-    scene = load(options.scene, progress=progress)
+    scene = read_scene(options.scene, options, progress)
     cameras = turntable(scene, options.views, size=options.size, up="y" if options.up is None else options.up)
     rendered = write_dataset(
         options.output,

@@ -9,6 +9,10 @@ from typing import Any
 
 from ..codecs.display import Display
 from ..codecs.tone import TONES
+from ..materials import Material, MaterialLike
+from ..progress import Progress
+from ..renderable import as_scene
+from ..scene import Scene
 from ..settings import Settings
 from . import arguments
 
@@ -16,16 +20,24 @@ TYPES: dict[str, Callable[[str], Any]] = {"int": int, "float": float, "str": str
 PARSERS: dict[str, Callable[[str], Any]] = {
     "size": arguments.size,
     "lighting": arguments.lighting,
+    "material": arguments.material,
     "background": arguments.background,
     "up": arguments.up,
     "samples": arguments.samples,
     "branches": arguments.branches,
     "reuse": arguments.reuse,
 }
-METAVARS = {"lighting": "PRESET", "background": "COLOR", "up": "X,Y,Z", "samples": "FIRST:END"}
-CAMERA_OPTIONS = ("size",)  # settings that the command line uses for its own camera
+METAVARS = {
+    "lighting": "PRESET",
+    "material": "NAME",
+    "background": "COLOR",
+    "up": "X,Y,Z",
+    "samples": "FIRST:END",
+}
+# settings that the command line uses itself, for its own camera and where it reads a scene
+OWN_OPTIONS = ("size", "material")
 RENDER_OPTIONS = [
-    each.name for each in fields(Settings) if each.metadata.get("option") and each.name not in CAMERA_OPTIONS
+    each.name for each in fields(Settings) if each.metadata.get("option") and each.name not in OWN_OPTIONS
 ]
 
 
@@ -34,10 +46,24 @@ def add_settings(command: argparse.ArgumentParser) -> None:
     for each in fields(Settings):
         if each.metadata.get("option"):
             _add_setting(command, each)
+    command.add_argument(
+        "--color",
+        type=arguments.color_value,
+        help="of the --material, or of a matte one: a name such as orange, #rrggbb, or linear R,G,B",
+    )
+
+
+def read_scene(path: str, options: argparse.Namespace, progress: Progress) -> Scene:
+    """Read a scene file, with the material that the options ask for in place of its own."""
+    material: MaterialLike | None = options.material
+    if options.color is not None:
+        name = "matte" if options.material is None else options.material
+        material = Material.named(name, options.color)
+    return as_scene(path, material, progress)
 
 
 def setting_values(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the settings that were given, but for those of the command line's own camera."""
+    """Return the settings that were given, but for those that the command line uses itself."""
     return {name: getattr(options, name) for name in RENDER_OPTIONS}
 
 

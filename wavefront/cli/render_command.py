@@ -12,7 +12,6 @@ from ..camera import Camera
 from ..codecs.images import check_display, check_writable
 from ..errors import Interrupted, RenderError, SaveError, SceneError
 from ..image import Image
-from ..io.load import load
 from ..render import finish
 from ..scene import Scene
 from ..session import Session
@@ -20,7 +19,7 @@ from ..viewer import view
 from . import arguments
 from .command import PICTURE_FILE, SCENE_FILE, add_command
 from .messages import print_error, print_note
-from .options import add_display, add_settings, display_of, setting_values
+from .options import add_display, add_settings, display_of, read_scene, setting_values
 from .outputs import output_paths
 from .rescue import save_elsewhere
 from .status import ERROR, INTERRUPTED
@@ -103,7 +102,7 @@ def _show(options: argparse.Namespace) -> int:
     if len(options.scenes) > 1:
         raise SceneError(f"--view is for one scene; there are {len(options.scenes)}")
     (path,) = options.scenes
-    scene = load(path, progress=False if options.quiet else None)
+    scene = read_scene(path, options, False if options.quiet else None)
     scene.camera = _camera(path, scene, options)
     view(scene, block=True, **setting_values(options))
     return 0
@@ -112,7 +111,7 @@ def _show(options: argparse.Namespace) -> int:
 def _render_scene(path: str, output: str, options: argparse.Namespace) -> int:
     """Render a scene and save the picture; return the exit status."""
     progress = False if options.quiet else None
-    scene = load(path, progress=progress)
+    scene = read_scene(path, options, progress)
     scene.camera = _camera(path, scene, options)
     image: Image | None
     status = 0

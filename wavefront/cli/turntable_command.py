@@ -7,11 +7,10 @@ from typing import Any
 
 from ..animation import check_animation, save_animation
 from ..counted import counted
-from ..io.load import load
 from ..views import render_many, turntable
 from .arguments import count
 from .command import add_command, add_scene
-from .options import add_display, add_settings, display_of, setting_values
+from .options import add_display, add_settings, display_of, read_scene, setting_values
 
 
 def add_turntable_command(commands: Any) -> None:
@@ -44,7 +43,7 @@ def _turntable(options: argparse.Namespace) -> int:
     check_animation(options.output)
     display = display_of(options)
     progress = False if options.quiet else None
-    scene = load(options.scene, progress=progress)
+    scene = read_scene(options.scene, options, progress)
     cameras = turntable(
         scene, options.frames, size=options.size, up="y" if options.up is None else options.up
     )

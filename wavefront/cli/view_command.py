@@ -5,10 +5,9 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..io.load import load
 from ..viewer import view
 from .command import add_command, add_scene
-from .options import add_settings, setting_values
+from .options import add_settings, read_scene, setting_values
 
 
 def add_view_command(commands: Any) -> None:
@@ -40,7 +39,7 @@ def add_view_command(commands: Any) -> None:
 
 def _view(options: argparse.Namespace) -> int:
     view(
-        load(options.scene),
+        read_scene(options.scene, options, None),
         host=options.host,
         port=options.port,
         token=options.token,

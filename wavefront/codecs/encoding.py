@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..colors import linear_to_srgb, srgb_to_linear
 from ..errors import SceneError, number
 from ..vec import Floats
 from . import png_jpeg as coded
@@ -24,21 +25,6 @@ def codes_to_linear(codes: NDArray[Any], gamma: Gamma = "srgb") -> Floats:
     else:
         colors[:] = colors.astype(np.float64) ** gamma
     return values
-
-
-def srgb_to_linear(values: Floats) -> Floats:
-    """Return the linear values of sRGB values in [0, 1], any shape (IEC 61966-2-1)."""
-    values = np.asarray(values, np.float64)  # rounded at the end: float32 powers differ between machines
-    low = values / 12.92
-    high = ((values + 0.055) / 1.055) ** 2.4
-    return np.where(values <= 0.04045, low, high).astype(np.float32)
-
-
-def linear_to_srgb(values: Floats) -> Floats:
-    """Return linear values in [0, 1] as sRGB values, any shape (IEC 61966-2-1)."""
-    values = np.asarray(values, np.float64)
-    high = 1.055 * np.maximum(values, 0) ** (1 / 2.4) - 0.055
-    return np.where(values <= 0.0031308, values * 12.92, high).astype(np.float32)
 
 
 def exposed(rgb: Floats, exposure: float) -> Floats:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import SceneError, number, rgb
+from ..colors import rgb
+from ..errors import SceneError, number
 from ..vec import Doubles
 
 WhiteBalance = float | ArrayLike  # kelvin, or the linear RGB of something that is gray

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..codecs.encoding import linear_to_srgb
+from ..colors import linear_to_srgb
 from ..files import make_folder, write_bytes, write_json
 from ..shapes import Instance, Mesh, Shape
 from ..vec import Doubles, f4

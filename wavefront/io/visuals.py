@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bsdfs import Diffuse
-from ..codecs.encoding import srgb_to_linear
+from ..colors import srgb_to_linear
 from ..materials import Material
 from ..textures.image import Texture
 from ..textures.normal_map import NormalMap

@@ -7,8 +7,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..colors import rgb
 from ..elementary import sin_cos
-from ..errors import SceneError, finite_array, number, rgb
+from ..errors import SceneError, finite_array, number
 from ..frame import Frame
 from ..layers import DEFAULT_GROUP, group_name
 from ..parameter import Parameter, Parametrized

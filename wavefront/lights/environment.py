@@ -9,7 +9,8 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import one_of, rgb, rotation_matrix
+from ..colors import is_color_name, rgb
+from ..errors import one_of, rotation_matrix
 from ..layers import DEFAULT_GROUP, group_name
 from ..parameter import Parameter, Parametrized
 from ..record import record
@@ -58,9 +59,9 @@ class Environment(Parametrized, Light):
     Parameters
     ----------
     radiance
-        W·sr⁻¹·m⁻²: one number or three for the same from all around; or an image, a file (exr,
-        hdr, npy, png, jpg) or an array (H, W, 3), top row first. Pictures of 8 and 16 bits are
-        decoded from sRGB and count from 0 to 1; all others are linear. Alpha is not used.
+        W·sr⁻¹·m⁻²: a color (a number, three, or a name such as "white") for the same from all around;
+        or an image, a file (exr, hdr, npy, png, jpg) or an array (H, W, 3), top row first. Pictures of
+        8 and 16 bits are decoded from sRGB and count from 0 to 1; all others are linear. Alpha is not used.
     transform
         (3, 3) rotation to world space from the environment's.
     filter
@@ -121,7 +122,9 @@ class Environment(Parametrized, Light):
 
     @radiance.setter
     def radiance(self, radiance: ArrayLike | str | os.PathLike[str]) -> None:
-        if isinstance(radiance, str | os.PathLike) or (
+        if isinstance(radiance, str) and is_color_name(radiance):
+            self._radiance, self._image = rgb("Environment radiance", radiance), None
+        elif isinstance(radiance, str | os.PathLike) or (
             np.ndim(radiance) > 1 and np.shape(radiance) != (3, 1)  # a color as it is kept
         ):
             image = ImageEnvironment.of(environment_pixels(radiance), self._filter, self._transform)

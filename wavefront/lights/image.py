@@ -10,8 +10,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..codecs.encoding import srgb_to_linear
 from ..codecs.images import read_codes
+from ..colors import srgb_to_linear
 from ..counted import counted
 from ..elementary import arctan2, sin_cos, sin_cos_turns
 from ..errors import SceneError, warn_caller

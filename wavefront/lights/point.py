@@ -8,7 +8,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SceneError, finite_array, rgb
+from ..colors import rgb
+from ..errors import SceneError, finite_array
 from ..layers import DEFAULT_GROUP, group_name
 from ..parameter import Parameter, Parametrized
 from ..record import record
@@ -144,6 +145,8 @@ def intensities_of(name: str, value: ArrayLike) -> NDArray[np.float64]:
     SceneError
         If an element is negative or not finite.
     """
+    if isinstance(value, str):
+        return intensity_of(name, value)[:, 0]
     array = finite_array(name, value, (None,) * np.ndim(value))
     bad = np.argwhere(array < 0)
     if len(bad):

@@ -2,5 +2,6 @@
 
 from .alpha import Opacity
 from .material import Material, MaterialLike, as_material
+from .named import NAMED_MATERIALS
 
-__all__ = ["Material", "MaterialLike", "Opacity", "as_material"]
+__all__ = ["NAMED_MATERIALS", "Material", "MaterialLike", "Opacity", "as_material"]

@@ -17,6 +17,7 @@ from ..suggestions import suggests_keywords
 from ..textures.normal_map import BaseNormalMap
 from ..textures.parameter import Color, Scalar, color
 from .alpha import Opacity, alpha_value
+from .named import named_bsdf
 
 
 def _bsdf(name: str, value: Any) -> Bsdf:
@@ -60,7 +61,8 @@ def _name(name: str, value: Any) -> str | None:
 class Material(Parametrized):
     """A BSDF, and everything else that a surface is made of.
 
-    Wherever a material is taken, a `Bsdf` alone is taken too and stands for `Material(bsdf)`.
+    Wherever a material is taken, a `Bsdf` alone is taken too and stands for `Material(bsdf)`, and a name
+    for `Material.named(name)`.
 
     Parameters
     ----------
@@ -132,6 +134,33 @@ class Material(Parametrized):
         self.name = name
         self.derive()
 
+    @classmethod
+    @suggests_keywords
+    def named(cls, name: str, color: Color | None = None) -> Self:
+        """Return a material by its name, such as "gold", "glass", "plastic" or "clay".
+
+        Parameters
+        ----------
+        name
+            In capitals or not; docs/materials.md lists all. Metals and clear materials have measured
+            constants, all others are made for their look.
+        color
+            In place of the usual one, as of `Diffuse`; metals and mirrors have their own. Of clear materials
+            it is the tint of what goes through their surface.
+
+        Raises
+        ------
+        SceneError
+            If the name is unknown, or the material has a color of its own.
+
+        Examples
+        --------
+        >>> ball = wf.Sphere((0, 0, 0), 1, material="gold")
+        >>> blue = wf.Sphere((2, 0, 0), 1, material=wf.Material.named("plastic", color="royalblue"))
+        """
+        key, bsdf = named_bsdf("Material name", name, color)
+        return cls(bsdf, name=key)
+
     def _repr_html_(self) -> str:
         """Show a ball in a notebook."""
         return preview_html(self)
@@ -154,19 +183,22 @@ class Material(Parametrized):
         return other
 
 
-MaterialLike: TypeAlias = Material | Bsdf
+MaterialLike: TypeAlias = Material | Bsdf | str
 
 
 def as_material(name: str, value: Any) -> Material:
-    """Return a material; a `Bsdf` becomes one that has nothing else.
+    """Return a material; a `Bsdf` becomes one that has nothing else, and a name that of the table.
 
     Raises
     ------
     SceneError
-        If the value, called `name`, is neither.
+        If the value, called `name`, is none of these.
     """
+    if isinstance(value, str):
+        key, bsdf = named_bsdf(name, value, None)
+        return Material(bsdf, name=key)
     if isinstance(value, Material):
         return value
     if isinstance(value, Bsdf):
         return Material(value)
-    raise SceneError(f"{name} must be a material such as wf.Diffuse(0.5), got {value!r}")
+    raise SceneError(f'{name} must be a material such as wf.Diffuse(0.5) or "gold", got {value!r}')

@@ -8,7 +8,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import SceneError, rgb
+from ..colors import rgb
+from ..errors import SceneError
 from ..parameter import Parameter, Parametrized
 from ..suggestions import suggests_keywords
 from ..textures.base import BaseTexture

@@ -77,7 +77,8 @@ class PrimitiveArray(ColoredShape, CurvedShape):
         for name in self._points:
             setattr(shape, name, points_by(matrices, getattr(self, name)))
         shape.radii = (scale[:, None] * np.broadcast_to(self.radii, self.count)).ravel()
-        shape.colors = None if self.colors is None else np.tile(self.colors, (len(matrices), 1))
+        if self.colors is not None:
+            vars(shape)["colors"] = np.tile(self.colors, (len(matrices), 1))  # they have been checked
         shape.check()
         return shape
 

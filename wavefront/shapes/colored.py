@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..bsdfs import Diffuse
-from ..codecs.encoding import srgb_to_linear
+from ..colors import named_rows, srgb_to_linear, warn_of_colormap
 from ..counted import counted
 from ..errors import SceneError, finite_array
 from ..materials import Material
@@ -19,6 +19,9 @@ def linear_colors(name: str, values: ArrayLike | None) -> NDArray[np.float64] | 
     """Return (n, 4) linear colors in [0, 1]; colors without an opacity are opaque."""
     if values is None:
         return None
+    names = named_rows(name, values)
+    if names is not None:
+        values = names
     array = finite_array(name, values, (None, None))
     codes = getattr(values, "dtype", None)
     if codes in (np.uint8, np.uint16):
@@ -31,6 +34,8 @@ def linear_colors(name: str, values: ArrayLike | None) -> NDArray[np.float64] | 
     if len(bad):
         i, j = bad[0]
         raise SceneError(f"{name}[{i}][{j}] is {array[i, j]:g}; it must be in [0, 1], or uint8")
+    if codes is not None:
+        warn_of_colormap(name, np.asarray(values))
     return array if array.shape[1] == 4 else np.column_stack([array, np.ones(len(array))])
 
 

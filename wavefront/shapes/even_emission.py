@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..errors import SceneError, rgb
+from ..colors import rgb
+from ..errors import SceneError
 from ..textures.base import BaseTexture
 from .base import CurvedShape
 

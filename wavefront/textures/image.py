@@ -10,8 +10,8 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..codecs.encoding import srgb_to_linear
 from ..codecs.images import read_codes
+from ..colors import srgb_to_linear
 from ..counted import counted
 from ..errors import SceneError, finite_array, one_of
 from ..files import MAX_PIXELS, check_size

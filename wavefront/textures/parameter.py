@@ -11,7 +11,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import SceneError, number, rgb
+from ..colors import rgb
+from ..errors import SceneError, number
 from ..state import SurfaceInteraction
 from ..vec import Floats, f4, luminance
 from .base import BaseTexture

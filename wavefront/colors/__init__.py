@@ -1,0 +1,15 @@
+"""Colors as people write them, and as light adds up: linear RGB."""
+
+from .color import is_color_name, named_rows, rgb, srgb
+from .colormaps import warn_of_colormap
+from .transfer import linear_to_srgb, srgb_to_linear
+
+__all__ = [
+    "is_color_name",
+    "linear_to_srgb",
+    "named_rows",
+    "rgb",
+    "srgb",
+    "srgb_to_linear",
+    "warn_of_colormap",
+]
