@@ -1,6 +1,8 @@
 """Records of columns: take, concatenate, compact and roulette keep every column whole."""
 
 from dataclasses import fields, replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ from significance import render
 import wavefront as wf
 from wavefront import integrators
 from wavefront.accel.numpy_accel import NumpyAccelerator
-from wavefront.compile.scene import CompiledScene, compile_scene
+from wavefront.compile.scene import ROULETTE_AFTER, CompiledScene, compile_scene
 from wavefront.frame import Frame
 from wavefront.sampling.sampler import make_sampler
 from wavefront.stages import compact as stage
@@ -210,9 +212,10 @@ def carrying(throughput: float, roulette_scale: float, n: int) -> Paths:
     return paths
 
 
-def survivors(paths: Paths, bounce: int = stage.ROULETTE_AFTER, branches: int = 1) -> Paths:
+def survivors(paths: Paths, bounce: int = ROULETTE_AFTER, branches: int = 1) -> Paths:
     """The paths that roulette leaves."""
-    return paths.take(stage.roulette(paths, make_sampler("independent"), bounce, branches))
+    scene: Any = SimpleNamespace(roulette_after=ROULETTE_AFTER)
+    return paths.take(stage.roulette(scene, paths, make_sampler("independent"), bounce, branches))
 
 
 @pytest.mark.parametrize("throughput", [0.45, 0.25, 0.05])
@@ -246,7 +249,7 @@ def test_roulette_waits() -> None:
     """In the first bounces only paths that carry nothing end."""
     paths = carrying(0.01, 1, 100)
     paths.throughput[:, ::2] = 0
-    left = survivors(paths, stage.ROULETTE_AFTER - 1)
+    left = survivors(paths, ROULETTE_AFTER - 1)
     assert left.pixel.tolist() == list(range(1, 100, 2))
     assert left.throughput == pytest.approx(0.01)
     assert len(survivors(paths)) <= 50
@@ -262,10 +265,34 @@ def test_paths_remember_by_how_much_glass_compresses(monkeypatch: pytest.MonkeyP
     """η² inside a ball of index 1.5, 1 where they were reflected and after they have left it."""
     seen = []
 
-    def note(paths: Paths, sampler, bounce: int, branches: int):
+    def note(scene: CompiledScene, paths: Paths, sampler, bounce: int, branches: int):
         seen.append(np.unique(paths.roulette_scale.round(4)).tolist())
         return np.arange(len(paths))
 
     monkeypatch.setattr(integrators, "roulette", note)
     render(scenes.glass_ball(), 16, max_bounces=2)
     assert seen == [[1, 2.25], [1, 2.25]]
+
+
+def test_roulette_is_a_setting() -> None:
+    """From the first event on, from a later one, or never: the same mean, and other paths."""
+    dim = [
+        wf.Sphere((0, 0, 0), 1, material=wf.Diffuse(0.3)),
+        wf.Rectangle((-3, -1, 3), (6, 0, 0), (0, 0, -6)),
+    ]
+    scene = [*dim, wf.Environment(1)]
+    options = {"size": (16, 16), "reuse": False, "branches": 1, "progress": False}
+    always, usual, late, never = (wf.render(scene, 64, roulette=n, **options) for n in (0, 2, 13, False))
+    assert late.rgb.tobytes() == never.rgb.tobytes() != usual.rgb.tobytes()
+    assert always.rgb.mean() == pytest.approx(never.rgb.mean(), rel=0.02)
+    assert always.standard_error.mean() > 1.1 * never.standard_error.mean()
+    assert never.metadata["roulette"] is False
+
+
+def test_a_checkpoint_of_another_roulette_is_refused(tmp_path) -> None:
+    """Its samples would be others."""
+    scene, options = [wf.Sphere((0, 0, 0), 1), wf.Environment(1)], {"size": (8, 8), "progress": False}
+    wf.render(scene, 2, checkpoint=tmp_path / "a.wfck", **options)
+    assert wf.render(scene, 4, checkpoint=tmp_path / "a.wfck", roulette=2, **options).spp == 4
+    with pytest.raises(wf.SceneError, match="roulette was 2 and is False"):
+        wf.render(scene, 8, checkpoint=tmp_path / "a.wfck", roulette=False, **options)

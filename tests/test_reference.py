@@ -9,10 +9,10 @@ from scenes import Case, each
 from significance import ROUNDING, Mean, assert_mean, measure, repeat
 
 import wavefront as wf
+from wavefront.compile.scene import ROULETTE_AFTER
 from wavefront.lights import LightTable, TriangleLights
 from wavefront.sampling import warp
 from wavefront.sampling.sampler import SAMPLERS, Dimension, make_sampler
-from wavefront.stages import compact
 from wavefront.vec import f4
 
 
@@ -57,7 +57,7 @@ def test_specular_light(case: Case, integrator: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("after", [compact.ROULETTE_AFTER, 1000], ids=["roulette", "no roulette"])
+@pytest.mark.parametrize("after", [ROULETTE_AFTER, False], ids=["roulette", "no roulette"])
 @pytest.mark.parametrize("filter", ["box", "tent", "gaussian"])
 @pytest.mark.parametrize("sampler", SAMPLERS)
 @pytest.mark.parametrize(
@@ -65,15 +65,12 @@ def test_specular_light(case: Case, integrator: str) -> None:
     [*scenes.DIRECT_CASES, *scenes.TRIANGLE_CASES, *scenes.INDIRECT_CASES, *scenes.SPECULAR_CASES],
     ids=str,
 )
-def test_every_case_by_every_sampler_and_filter(
-    case: Case, sampler: str, filter: str, after: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_case_by_every_sampler_and_filter(case: Case, sampler: str, filter: str, after: int) -> None:
     """The means stay what they are, whatever numbers and filter are used, with roulette and without."""
-    monkeypatch.setattr(compact, "ROULETTE_AFTER", after)
     if sampler == "independent" and case in scenes.SPECULAR_CASES:  # a rare lobe, chosen without strata
         case = replace(case, spp=4 * case.spp)
     unseen = 10 / (64 * case.spp * case.expected)
-    measured = run(case, case.integrators[-1], sampler=sampler, filter=filter)
+    measured = run(case, case.integrators[-1], sampler=sampler, filter=filter, roulette=after)
     assert_mean(measured, case.expected, 3 * case.max_error, rounding=ROUNDING + unseen)
 
 
@@ -113,13 +110,12 @@ def test_field_of_view(integrator: str) -> None:
 
 @pytest.mark.parametrize("build", [scenes.glass_ball, scenes.glass_box])
 @pytest.mark.parametrize("integrator", scenes.ALL)
-def test_lossless_glass_vanishes(build, integrator: str, monkeypatch) -> None:
+def test_lossless_glass_vanishes(build, integrator: str) -> None:
     """In an environment of 1 every sample is 1, whatever way it takes; roulette keeps the mean."""
     options = {"integrator": integrator, "max_bounces": 1000}
     runs = repeat(build(), 64, **options)
     assert_mean(Mean.of(runs.mean((1, 2, 3))), 1.0, 0.0005)
-    monkeypatch.setattr(compact, "ROULETTE_AFTER", 1000)
-    assert repeat(build(), 64, runs=1, **options) == pytest.approx(1.0, abs=2e-5)
+    assert repeat(build(), 64, runs=1, roulette=False, **options) == pytest.approx(1.0, abs=2e-5)
 
 
 def test_mirrors_take_part_of_the_light_each_time() -> None:

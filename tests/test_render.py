@@ -162,6 +162,8 @@ BAD = [
     ({"progress": "yes"}, r"progress is 'yes'; it must be True, False, None or a function"),
     ({"seconds": "30"}, r"seconds must be a number, got '30'"),
     ({"max_bounces": -1}, r"max_bounces is -1; it must be a whole number from 0"),
+    ({"roulette": True}, r"roulette is True; it must be False or a whole number, by default 2"),
+    ({"roulette": -1}, r"roulette is -1; it must be a whole number from 0 to 65536, or False"),
     ({"max_bounces": 2.0}, r"max_bounces is 2.0; it must be a whole number from 0"),
     ({"wave_size": 0}, r"wave_size is 0; it must be a whole number from 1"),
     ({"workers": 0}, r"workers is 0; it must be a whole number of at least 1"),
@@ -282,6 +284,7 @@ def test_the_result_tells_how_it_was_made() -> None:
     wanted = {
         "integrator": "naive",
         "max_bounces": 4,
+        "roulette": 2,
         "seed": 9,
         "sampler": "independent",
         "accelerator": "numpy",

@@ -94,7 +94,7 @@ class PathChecker:
             if _bad(paths).any():
                 of_surface: Bools = np.logical_or.reduce(_bad(paths).reshape(ways, -1), 0)
                 return self._at(bounce, shade.surface, of_surface, "BSDF sample of")
-            paths = select(paths, roulette(paths, self.sampler, bounce, self.branches))
+            paths = select(paths, roulette(self.scene, paths, self.sampler, bounce, self.branches))
             if bounce == 0 and of_second > 1:
                 paths = Paths.concatenate(copies(paths, of_second))
         return ""

@@ -53,7 +53,7 @@ def li_naive(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: 
             break
         shade = prepare_shading(scene, paths, hits)
         paths = bounce_sample(paths, shade, sampler, bounce)
-        paths = select(paths, roulette(paths, sampler, bounce))
+        paths = select(paths, roulette(scene, paths, sampler, bounce))
     return L
 
 
@@ -108,7 +108,7 @@ def li_full(
         shade = guide(prepare_shading(scene, paths, hits), table)
         accumulate(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
         paths = branch(paths, shade, sampler, bounce, ways=branches if bounce == 0 else 1)
-        paths = select(paths, roulette(paths, sampler, bounce, branches))
+        paths = select(paths, roulette(scene, paths, sampler, bounce, branches))
     return L
 
 
@@ -134,7 +134,7 @@ def li_reuse(
     shade = guide(prepare_shading(scene, first, hits), table)
     accumulate(L, first, direct(scene, first, shade, sampler, 0, mis=True))
     paths = branch(first, shade, sampler, 0, ways=branches)
-    paths = select(paths, roulette(paths, sampler, 0, branches))
+    paths = select(paths, roulette(scene, paths, sampler, 0, branches))
     paths, hits = intersect_and_compact(scene, paths, sampler, 1, L, mis=True)
     if max_bounces == 1 or not len(paths):
         return L
@@ -196,7 +196,7 @@ def _scatter(
     shade = guide(prepare_shading(scene, paths, hits), table)
     accumulate(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
     paths = bounce_sample(paths, shade, sampler, bounce)
-    return select(paths, roulette(paths, sampler, bounce, branches))
+    return select(paths, roulette(scene, paths, sampler, bounce, branches))
 
 
 def integrator_for(

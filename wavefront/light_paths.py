@@ -79,7 +79,7 @@ def trace_light(
         if bounce:
             found.append(_connect(scene, camera, sampler, paths, hits, shade, flux, bounce))
         paths = _scatter(scene, paths, hits, shade, sampler, bounce)
-        lanes = roulette(paths, sampler, bounce)
+        lanes = roulette(scene, paths, sampler, bounce)
         paths = select(paths, lanes)
         hits = intersect(scene, paths)
         if scene.absorption is not None:

@@ -121,7 +121,7 @@ def li_pilot(
         accumulate(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
         left = bounce_sample(paths, shade, sampler, bounce)
         note(_vertices(L, paths, left, shade))
-        paths = select(left, roulette(left, sampler, bounce))
+        paths = select(left, roulette(scene, left, sampler, bounce))
     return L
 
 

@@ -38,6 +38,7 @@ def render(
     background: str | ArrayLike | None = None,
     integrator: str | Integrator = "full",
     max_bounces: int = 12,
+    roulette: bool | int = 2,
     seed: int = 0,
     samples: range | None = None,
     sampler: str | SamplerMaker = "sobol",
@@ -100,6 +101,9 @@ def render(
         take a thing of your own, such as a function; docs/extending.md has an example of each.
     max_bounces
         Scattering events along a path: 0 shows only light seen directly, 1 direct light.
+    roulette
+        Scattering events of a path before Russian roulette may end it, by chance and without a change of
+        the mean; False never ends a path so, which takes longer, mostly for less noise than that is worth.
     seed
         The same seed gives the same picture, bit for bit, unless `seconds` is given.
     samples
@@ -230,6 +234,7 @@ def render(
         background=background,
         integrator=integrator,
         max_bounces=max_bounces,
+        roulette=roulette,
         seed=seed,
         samples=samples,
         sampler=sampler,

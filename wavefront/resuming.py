@@ -12,11 +12,11 @@ from .accel import Geometry, InstanceAccelerator
 from .camera import Camera
 from .checkpoint import Checkpoint, check_identity, other_versions, read_checkpoint
 from .choice import Choice
-from .compile.scene import CompiledScene
+from .compile.scene import ROULETTE_AFTER, CompiledScene
 from .errors import SaveError, SceneError, warn_caller
 from .filters import FILTERS
 from .fingerprint import fingerprint
-from .identity import CAUSTICS, CODE, SCENE
+from .identity import CAUSTICS, CODE, ROULETTE, SCENE
 from .integrators import INTEGRATORS
 from .lights.samplers import LIGHT_SAMPLERS
 from .picture_sums import PictureSums
@@ -46,6 +46,7 @@ def scene_fingerprint(compiled: CompiledScene, geometries: Sequence[Geometry]) -
     parts = {each.name: getattr(compiled, each.name) for each in fields(compiled)}
     accelerator = parts.pop("accelerator")
     del parts["casters"]  # they follow from the rest, and the setting is compared by itself
+    del parts["roulette_after"]  # a setting, which is compared by itself
     placements = accelerator.placements if isinstance(accelerator, InstanceAccelerator) else None
     return fingerprint("the scene", {**parts, "geometries": list(geometries), "placements": placements})
 
@@ -81,6 +82,7 @@ def render_identity(
         "branches": choice.branches,
         "reuse": choice.reuse,
         **({CAUSTICS: True} if settings.caustics else {}),
+        **({ROULETTE: settings.roulette} if settings.roulette_after != ROULETTE_AFTER else {}),
         **names,
         "accelerator": accelerator,
         "aovs": list(layers),

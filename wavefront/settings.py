@@ -18,6 +18,7 @@ from .accel.registry import ACCELERATORS, AcceleratorMaker
 from .camera import Camera, check_camera, image_size, upward
 from .codecs.image_data import TRANSPARENT
 from .colors import rgb
+from .compile.scene import ROULETTE_AFTER
 from .errors import SceneError, in_brief, number, warn_caller
 from .exact_sum import MAX_TERMS
 from .files import check_target
@@ -169,6 +170,20 @@ def check_background(name: str, value: Any) -> Any:
         raise SceneError(f"{error}, or {TRANSPARENT!r}" if isinstance(value, str) else f"{error}") from None
 
 
+def check_roulette(name: str, value: Any) -> int | bool:
+    """Check that something is False, or how many scattering events roulette spares."""
+    if isinstance(value, bool | np.bool_):
+        if value:
+            raise SceneError(
+                f"{name} is True; it must be False or a whole number, by default {ROULETTE_AFTER}"
+            )
+        return False
+    try:
+        return int(whole_number(0, 2**16)(name, value))
+    except SceneError as error:
+        raise SceneError(f"{error}, or False") from None
+
+
 def check_checkpoint(name: str, value: Any) -> str | None:
     """Check that a checkpoint can be written to a path, or that there is none."""
     if value is None:
@@ -262,6 +277,13 @@ class Settings:
         "Scattering events along a path: 0 shows only light seen directly, 1 direct light.",
         option="scattering events along a path",
         check=whole_number(0, 2**16),
+    )
+    roulette: bool | int = setting(
+        ROULETTE_AFTER,
+        "Scattering events of a path before Russian roulette may end it, by chance and without a change of "
+        "the mean; False never ends a path so, which takes longer, mostly for less noise than that is worth.",
+        option="scattering events before Russian roulette may end a path, or no",
+        check=check_roulette,
     )
     seed: int = setting(
         0,
@@ -510,6 +532,11 @@ class Settings:
         if self.background is None:
             return None
         return np.zeros((3, 1), f4) if isinstance(self.background, str) else np.asarray(self.background, f4)
+
+    @property
+    def roulette_after(self) -> float:
+        """Scattering events before Russian roulette may end paths; infinite where it may not."""
+        return np.inf if self.roulette is False else self.roulette
 
     @property
     def sampled_layers(self) -> tuple[str, ...]:

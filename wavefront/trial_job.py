@@ -93,7 +93,7 @@ def _trace(
     before = counter.rays
     second = replace(first, slot=first.slot + n, pixel=_elsewhere(first.pixel, camera, 1))
     paths = Paths.concatenate([bounce_sample(each, shade, sampler, 0) for each in (first, second)])
-    paths = select(paths, roulette(paths, sampler, 0))
+    paths = select(paths, roulette(scene, paths, sampler, 0))
     paths, hits = intersect_and_compact(scene, paths, sampler, 1, L, mis=True)
     met = np.bincount(material_rows(scene, hits, ALL), minlength=scene.materials.group_of.size)
     if not reuse:

@@ -187,3 +187,8 @@ def reuse(text: str) -> bool | str:
     if text not in values:
         raise argparse.ArgumentTypeError(f"{text!r} is not yes, no or auto")
     return values[text]
+
+
+def roulette_after(text: str) -> int | bool:
+    """Return a number of scattering events, or False for "no"."""
+    return False if text == "no" else int(text)

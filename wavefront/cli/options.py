@@ -26,6 +26,7 @@ PARSERS: dict[str, Callable[[str], Any]] = {
     "samples": arguments.samples,
     "branches": arguments.branches,
     "reuse": arguments.reuse,
+    "roulette": arguments.roulette_after,
 }
 METAVARS = {
     "lighting": "PRESET",
@@ -33,6 +34,7 @@ METAVARS = {
     "background": "COLOR",
     "up": "X,Y,Z",
     "samples": "FIRST:END",
+    "roulette": "EVENTS",
 }
 # settings that the command line uses itself, for its own camera and where it reads a scene
 OWN_OPTIONS = ("size", "material")

@@ -38,6 +38,7 @@ from .morton import MortonGrid
 from .scale import check_distance, check_lights, length_factor, scaled_shapes
 from .shape_numbers import ShapeNumbers, number_shapes
 
+ROULETTE_AFTER = 2  # scattering events, by default
 LARGE = 20_000  # triangles; from here on the order of rays matters more than sorting them costs
 
 
@@ -74,6 +75,7 @@ class CompiledScene:
     places: MortonGrid | None = None  # orders the paths of large scenes; None in small ones
     shadow_catchers: Bools | None = None  # (materials,) those that catch shadows; None when none does
     background: Floats | None = None  # (3, 1) what camera rays that miss show; None for the environment
+    roulette_after: float = ROULETTE_AFTER  # scattering events before Russian roulette may end paths
     casters: Casters | None = None  # where light paths begin; None where none are traced
 
     @property

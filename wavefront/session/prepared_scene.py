@@ -62,7 +62,9 @@ class PreparedScene:
                 mis=INTEGRATORS.find(settings.integrator) in WITH_MIS,
                 caustics=settings.caustics,
             )
-        self.compiled = replace(compiled, background=settings.background_color)
+        self.compiled = replace(
+            compiled, background=settings.background_color, roulette_after=settings.roulette_after
+        )
         self.shapes = ShapeTable(self.lighted.shapes)
 
     def fingerprint(self) -> str:

@@ -64,11 +64,11 @@ class Session:
     ----------
     scene, spp, camera, size, material, up, lighting, ground, background
         As for `render`.
-    integrator, max_bounces, seed, samples, sampler, accel, filter, light_sampler, branches, guide, reuse
+    integrator, max_bounces, roulette, seed, samples, sampler, accel, filter, light_sampler, branches, guide
         As for `render`.
-    workers, executor, noise, seconds, clamp, caustics, wave_size, max_memory, strict, aovs, denoise, progress
+    reuse, workers, executor, noise, seconds, clamp, caustics, wave_size, max_memory, strict, aovs, denoise
         As for `render`.
-    checkpoint, checkpoint_interval
+    progress, checkpoint, checkpoint_interval
         As for `render`.
 
     Raises
@@ -106,6 +106,7 @@ class Session:
         background: str | ArrayLike | None = None,
         integrator: str | Integrator = "full",
         max_bounces: int = 12,
+        roulette: bool | int = 2,
         seed: int = 0,
         samples: range | None = None,
         sampler: str | SamplerMaker = "sobol",
@@ -144,6 +145,7 @@ class Session:
             background=background,
             integrator=integrator,
             max_bounces=max_bounces,
+            roulette=roulette,
             seed=seed,
             samples=samples,
             sampler=sampler,

@@ -197,6 +197,7 @@ class ViewRender:
             "background": _background_label(settings.background),
             "integrator": INTEGRATORS.label(settings.integrator),
             "max_bounces": settings.max_bounces,
+            "roulette": settings.roulette,
             "seed": settings.seed,
             "sampler": SAMPLERS.label(settings.sampler),
             "sample_ranges": [[first, first + most]],

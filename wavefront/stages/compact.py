@@ -12,7 +12,6 @@ from ..state import Contribution, Hits, Paths
 from ..vec import Bools, Ints, broadcast, f4, highest, take
 from .interaction import material_rows
 
-ROULETTE_AFTER = 2  # scattering events before Russian roulette may end paths
 ROULETTE_THRESHOLD = f4(0.5)  # paths of at least this throughput always survive
 TINY = np.finfo(f4).tiny  # least probability of survival: keeps the division finite where a path ends
 
@@ -78,17 +77,17 @@ def alive(paths: Paths) -> Bools:
     return highest(paths.throughput) != 0
 
 
-def roulette(paths: Paths, sampler: Sampler, bounce: int, branches: int = 1) -> Ints:
+def roulette(scene: CompiledScene, paths: Paths, sampler: Sampler, bounce: int, branches: int = 1) -> Ints:
     """Return the lanes of paths that survive, and divide their throughput by the probability of that.
 
     The probability is the ratio of the path's throughput and `ROULETTE_THRESHOLD`, at most 1. The throughput
     counts by its largest channel, times `roulette_scale`, which undoes the scaling of radiance by refraction
     and the effect of a guide, and relative to 1 / `branches`, with which the paths of a branched path begin.
-    During the first `ROULETTE_AFTER` events only paths without throughput end.
+    During the first `scene.roulette_after` events only paths without throughput end.
 
     Sources: E. Veach, thesis 1997, §10.4.1; pbrt-v4, §13.2.1.
     """
-    if bounce < ROULETTE_AFTER or not len(paths):
+    if bounce < scene.roulette_after or not len(paths):
         return np.flatnonzero(alive(paths))
     chance = np.clip(
         highest(paths.throughput) * paths.roulette_scale * (branches / ROULETTE_THRESHOLD), TINY, f4(1)
