@@ -97,9 +97,9 @@ def phase(title: str, progress: Progress = None) -> Iterator[None]:
         return
     ended = threading.Event()
     writer = threading.Thread(target=_show, args=(title, ended), daemon=True)
-    with suppress(RuntimeError):  # without a thread there is no line
-        writer.start()
     try:
+        with suppress(RuntimeError):  # without a thread there is no line
+            writer.start()
         yield
     finally:
         ended.set()

@@ -11,6 +11,7 @@ from threadpoolctl import ThreadpoolController
 
 from ..counted import counted
 from ..memory import address_space_left
+from .interrupt import deferred_signals
 
 # Bytes of address space: OpenBLAS takes 32 MB for each call at a time, and a thread its stack.
 BUFFER = 64 << 20
@@ -32,7 +33,7 @@ class _SingleThreadedBlas:
 
     def acquire(self) -> None:
         """Hold BLAS to one thread."""
-        with self._lock:
+        with deferred_signals(), self._lock:
             if not self._users:
                 self._libraries = ThreadpoolController()
                 _let_any_thread_set(self._libraries)
@@ -41,7 +42,7 @@ class _SingleThreadedBlas:
 
     def release(self) -> None:
         """Let BLAS have as many threads as before, if nobody else needs it to have one."""
-        with self._lock:
+        with deferred_signals(), self._lock:
             self._users -= 1
             if not self._users:
                 _let_any_thread_set(self._libraries)

@@ -17,6 +17,7 @@ from ..errors import RenderError
 from ..record import record
 from .blas import single_threaded_blas
 from .executors import EXECUTORS, ExecutorLike
+from .interrupt import deferred_signals
 from .shared import AT_ONCE, STOP, SharedInt, Stopped
 from .workers import JobFailed, StoppableWork, Workers, all_done
 
@@ -124,7 +125,7 @@ class WorkerPool(Generic[Job, Result]):
         RenderError
             If one cannot be started.
         """
-        with self._lock, _start_errors():
+        with self._lock, _start_errors(), deferred_signals():
             if self._workers is None:
                 self._start_workers()
 
@@ -229,7 +230,7 @@ class WorkerPool(Generic[Job, Result]):
             self._running[0] = self._running.pop()
 
     def _submit(self, job: Job, attempt: int = 0) -> None:
-        with self._lock, _start_errors():
+        with self._lock, _start_errors(), deferred_signals():
             if self._workers is None:
                 self._start_workers()
             assert self._workers is not None

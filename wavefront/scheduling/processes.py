@@ -25,6 +25,7 @@ from types import ModuleType
 from typing import Any
 
 from .heap import prepare_heap
+from .interrupt import SIGNALS
 from .remote import RemoteWorkers
 from .shared import AT_ONCE, SharedInt
 from .workers import POLL_INTERVAL, LocalWorkers, StoppableWork, all_done
@@ -80,7 +81,8 @@ class ProcessPool:
         answer = _Answer()
         with ExitStack() as stack:
             if len(self._context.processes) < self._count:  # this task starts some
-                stack.enter_context(_blocking_ctrl_c())
+                stack.enter_context(self._context.starting())
+                stack.enter_context(_blocking_signals())
                 stack.enter_context(_forking() if self._forks else _without_main())
             self._pool.submit(function, *args).add_done_callback(answer.follow)
         return answer
@@ -175,6 +177,18 @@ class _Context:
         self._results.append(queue)
         return queue
 
+    @contextmanager
+    def starting(self) -> Iterator[None]:
+        """End the processes that were started if not all can be: Python would wait for them when it ends."""
+        try:
+            yield
+        except BaseException:
+            self.kill()
+            for process in self.processes:
+                if process.pid is not None:
+                    process.join(TERM_TIMEOUT)
+            raise
+
     def end_processes(self, stop: SharedInt) -> None:
         """Wait for all processes to end, and kill those that do not within `END_TIMEOUT`."""
         end = time.monotonic() + END_TIMEOUT
@@ -236,12 +250,12 @@ def _without_main() -> Iterator[None]:
 
 
 @contextmanager
-def _blocking_ctrl_c() -> Iterator[None]:
-    """Start children that ignore Ctrl-C, which the parent handles."""
+def _blocking_signals() -> Iterator[None]:
+    """Start children that do not hear of Ctrl-C and of the end of a terminal, which the parent handles."""
     if sys.platform == "win32":
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP})
     try:
         yield
     finally:
@@ -256,8 +270,8 @@ def _initialize_worker(work: Callable[[Any], Any] | None) -> None:
     global _work
     _work = work
     prepare_heap()
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_DFL if number == signal.SIGTERM else signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

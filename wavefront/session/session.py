@@ -187,15 +187,17 @@ class Session:
         self._plan = make_plan(settings, self._scene, camera, trained_guide(settings, self._scene, camera))
         self._make_pool()
         try:
-            self._pool.start()  # before there are sums, of which forked processes would keep old copies
-            with ThreadPoolExecutor(1) as aside:
-                sums = aside.submit(
-                    new_accumulator, camera, self._plan.tracer.recorded_layers, settings.caustics
-                )
-                self._plan = with_choice(self._plan, camera, self._run_trial)
-            self._begin_picture(camera, sums.result(), begin)
+            with self.interrupt_handler:
+                self._pool.start()  # before there are sums, of which forked processes would keep old copies
+                with ThreadPoolExecutor(1) as aside:
+                    sums = aside.submit(
+                        new_accumulator, camera, self._plan.tracer.recorded_layers, settings.caustics
+                    )
+                    self._plan = with_choice(self._plan, camera, self._run_trial)
+                self._begin_picture(camera, sums.result(), begin)
         except BaseException:
-            self._pool.close()
+            with self.interrupt_handler:
+                self._pool.close()
             raise
 
     def _make_pool(self) -> None:
@@ -217,15 +219,25 @@ class Session:
 
         Workers that share the scene do them. Where workers would have to be sent it first, where memory runs
         out, or where the session was stopped, they are done here.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            If Ctrl-C was pressed.
         """
         if shares_scene(self._plan.executor):
             pool: WorkerPool[TrialJob, TrialPart] = self._pool
             try:
                 return [part for _, part in pool.run(jobs)]
             except (Stopped, MemoryError):
-                self._pool.discard()
-        tracer = self._plan.tracer
-        return [job.trace(tracer.scene, tracer.make_sampler, tracer.table) for job in jobs]
+                if not self.interrupt_handler.pressed:
+                    self._pool.discard()
+        tracer, parts = self._plan.tracer, []
+        for job in jobs:
+            if self.interrupt_handler.pressed:
+                raise KeyboardInterrupt
+            parts.append(job.trace(tracer.scene, tracer.make_sampler, tracer.table))
+        return parts
 
     def _begin_picture(self, camera: Camera, accumulator: Accumulator, begin: float) -> None:
         """Get ready for a picture of a view; `begin` is when it was asked for, by `time.perf_counter`."""
