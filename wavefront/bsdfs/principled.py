@@ -156,12 +156,12 @@ class Principled(JointBsdf):
         at_f0, at_f90 = (lookup(table, self.roughness, wo[2]) for table in (low, high))
         gloss = self._dielectric(np.zeros(1, f4)) * at_f0 + self.specular_weight * at_f90
         metal = self.base_color * at_f0 + at_f90
-        opaque = gloss + self.base_color * (f4(1) - gloss.max(0))
-        albedo = opaque + (metal - opaque) * self.metallic
+        albedo = gloss + self.base_color * (f4(1) - gloss.max(0))
         if self.transmissive:
             reflected, _ = self._fresnel(wo[2])
             clear = self.base_color + (f4(1) - self.base_color) * reflected
-            albedo = albedo + (clear - albedo) * ((f4(1) - self.metallic) * self.transmission)
+            albedo = albedo + (clear - albedo) * self.transmission
+        albedo = albedo + (metal - albedo) * self.metallic
         if self._cloth:
             fibers = self.sheen * sheen_albedo(wo[2], self.sheen_roughness)
             albedo = albedo * (f4(1) - fibers * self.sheen_color.max(0)) + self.sheen_color * fibers

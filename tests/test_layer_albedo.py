@@ -1,0 +1,84 @@
+"""The layer albedo of glass and of `Principled`, in closed form: tints that differ, a part that transmits."""
+
+import numpy as np
+import pytest
+
+import wavefront as wf
+from wavefront.bsdfs import albedo_of
+
+f4 = np.float32
+COSINES = np.array([1.0, 0.8, 0.5, 0.2])
+WO = np.stack([np.sqrt(1 - COSINES**2), 0 * COSINES, COSINES]).astype(f4)
+
+
+def fresnel(ior: float) -> np.ndarray:
+    """Unpolarized reflectance by Snell and Fresnel (E. Hecht, Optics, eqs. 4.34 and 4.40)."""
+    inside = np.sqrt(1 - (1 - COSINES**2) / ior**2)
+    s = (COSINES - ior * inside) / (COSINES + ior * inside)
+    p = (ior * COSINES - inside) / (ior * COSINES + inside)
+    return (s**2 + p**2) / 2
+
+
+REFLECTED, THROUGH = np.array([[0.9], [0.3], [0.1]]), np.array([[0.2], [0.6], [1.0]])
+
+
+@pytest.mark.parametrize("ior", [1.3, 1.5, 2.4])
+@pytest.mark.parametrize("roughness", [0.0, 0.3])
+def test_glass_reflects_and_lets_through_its_tints(ior: float, roughness: float) -> None:
+    part = fresnel(ior)
+    tints = {"reflectance": REFLECTED[:, 0], "transmittance": THROUGH[:, 0]}
+    due = REFLECTED * part + THROUGH * (1 - part)
+    np.testing.assert_allclose(albedo_of(wf.Dielectric(ior, roughness, **tints), WO), due, rtol=1e-5)
+    sheet = 2 * part / (1 + part)  # of both faces
+    due = REFLECTED * sheet + THROUGH * (1 - sheet)
+    np.testing.assert_allclose(albedo_of(wf.ThinDielectric(ior, roughness, **tints), WO), due, rtol=1e-5)
+
+
+@pytest.mark.parametrize("thin", [False, True])
+@pytest.mark.parametrize("ior", [1.3, 2.4])
+def test_clear_parts_of_principled_are_glass(ior: float, thin: bool) -> None:
+    """What is let through has the base color; metal and the opaque part have their own."""
+    part = fresnel(ior)
+    part = 2 * part / (1 + part) if thin else part
+    color, options = THROUGH[:, 0], {"roughness": 0.2, "ior": ior}
+    clear = THROUGH * (1 - part) + part
+    found = albedo_of(wf.Principled(color, transmission=1.0, thin=thin, **options), WO)
+    np.testing.assert_allclose(found, clear, rtol=1e-5)
+    opaque = albedo_of(wf.Principled(color, **options), WO).astype(float)
+    metal = albedo_of(wf.Principled(color, metallic=1.0, **options), WO).astype(float)
+    found = albedo_of(wf.Principled(color, metallic=0.2, transmission=0.7, thin=thin, **options), WO)
+    due = 0.2 * metal + 0.8 * (0.7 * clear + 0.3 * opaque)
+    np.testing.assert_allclose(found, due, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "bsdf",
+    [
+        wf.Dielectric(1.5, reflectance=(0.9, 0.3, 0.1), transmittance=(0.2, 0.6, 1)),
+        wf.Dielectric(1.5, 0.2, reflectance=(0.9, 0.3, 0.1), transmittance=(0.2, 0.6, 1)),
+        wf.ThinDielectric(1.5, reflectance=(0.9, 0.3, 0.1), transmittance=(0.2, 0.6, 1)),
+        wf.Principled((0.2, 0.6, 0.9), roughness=0.2, transmission=1.0),
+        wf.Principled((0.2, 0.6, 0.9), roughness=0.2, transmission=0.5, metallic=0.3),
+    ],
+    ids=repr,
+)
+def test_albedo_is_what_samples_scatter(bsdf: wf.Bsdf) -> None:
+    """By the mean weight of 4 096 samples for each direction, stratified."""
+    side = 16
+    u = ((np.indices((side,) * 3).reshape(3, -1) + 0.5) / side).astype(f4)[: bsdf.dimensions]
+    wo = WO[:, :3].repeat(u.shape[1], 1)
+    sample = bsdf.sample_f(wo, np.tile(u, 3))
+    weight = sample.weight if sample.eta is None else sample.weight * sample.eta**2
+    seen = weight.reshape(3, 3, -1).mean(2)
+    np.testing.assert_allclose(albedo_of(bsdf, WO[:, :3]), seen, atol=0.04)
+
+
+def test_the_layer_shows_it() -> None:
+    """A pane of tinted glass, seen from in front."""
+    glass = wf.Dielectric(1.5, reflectance=(0.9, 0.3, 0.1), transmittance=(0.2, 0.6, 1))
+    pane = wf.Rectangle((-2, -2, 0), (4, 0, 0), (0, 4, 0), material=glass)
+    camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), fov=2, size=(4, 4))
+    scene = wf.Scene([pane], [wf.Environment(1)], camera)
+    image = wf.render(scene, 2, aovs="albedo", workers=1, accel="numpy", progress=False)
+    due = 0.04 * REFLECTED[:, 0] + 0.96 * THROUGH[:, 0]
+    np.testing.assert_allclose(image.layers["albedo"].mean((0, 1)), due, atol=1e-4)
