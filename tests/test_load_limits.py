@@ -12,6 +12,7 @@ import trimesh
 
 import wavefront as wf
 from wavefront.codecs.images import write_image
+from wavefront.io import obj
 from wavefront.io.load import load_meshes
 from wavefront.io.sources import SceneFiles
 
@@ -172,3 +173,32 @@ def test_limits_are_limits(scene: Path) -> None:
     """And nothing else."""
     with pytest.raises(wf.SceneError, match=r"limits is 5; it must be a wf\.LoadLimits"):
         wf.load(scene, limits=5)  # type: ignore[arg-type]
+
+
+def test_many_materials_are_few_meshes_for_trimesh(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its time grows with the square of their number. Each material gets its own faces, whatever their form."""
+    rng = np.random.default_rng(7)
+    points, texels = rng.random((300, 3)).round(6), rng.random((300, 2)).round(6)
+    text = ["v {} {} {}".format(*point) for point in points] + ["vt {} {}".format(*texel) for texel in texels]
+    expected: dict[str, tuple[list[int], bool]] = {}
+    for number in range(400):
+        width, textured = 3 + number % 2, number % 3 == 0
+        corners = rng.choice(300, width, replace=False)
+        # an index that counts back, in some
+        words = [str(i - 300 if number % 5 == 0 else i + 1) for i in corners]
+        text += [f"usemtl m{number}", "f " + " ".join(f"{w}/{w}" if textured else w for w in words)]
+        order = corners[[0, 1, 2]] if width == 3 else corners[[0, 1, 2, 2, 3, 0]]
+        expected[f"m{number}"] = (order.tolist(), textured)
+    seen = []
+    whole = obj.geometries
+    monkeypatch.setattr(obj, "geometries", lambda *args: seen.append(whole(*args)) or seen[-1])
+    raws = obj.parse("a.obj", "\n".join(text)).raws
+    assert len(seen[0]) == 4
+    assert [raw.name for raw in raws] == list(expected)
+    for raw in raws:
+        order, textured = expected[raw.name]
+        assert len(raw.vertices) == len(set(order))
+        assert np.array_equal(raw.vertices[raw.faces].reshape(-1, 3), points[order])
+        assert (raw.uvs is not None) == textured
+        if textured:
+            assert np.array_equal(raw.uvs[raw.faces].reshape(-1, 2), texels[order])

@@ -11,12 +11,14 @@ from __future__ import annotations
 import re
 from bisect import bisect
 from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import SceneError
 from .lines import NUMBER, check_lines, words
@@ -51,6 +53,17 @@ class Kind(NamedTuple):
     keyword: str = ""  # v, vt, vn or f; empty for all others
     width: int = 0  # number of words that follow
     form: str = ""  # of f: the corners with 1 for every number; empty if they differ
+
+
+@dataclass
+class _Class:
+    """Groups whose faces have corners of one form and number: one mesh for trimesh.
+
+    Its time grows with the square of the number of meshes.
+    """
+
+    faces: list[str] = field(default_factory=list)
+    groups: list[tuple[str, int]] = field(default_factory=list)  # material, number of faces
 
 
 @dataclass
@@ -97,11 +110,18 @@ def parse(name: str, text: str, strict: bool = False) -> Obj:
                 out.ignored.setdefault(keyword, at + 1)
     if not lines.groups:
         raise SceneError(f"{name}: has no faces")
-    meshes = geometries(name, "obj", "\n".join(_tables(lines) + _faces(lines)).encode())
+    added, classes = _faces(lines)
+    faces = [line for number, each in enumerate(classes) for line in (f"usemtl {number}", *each.faces)]
+    meshes = geometries(name, "obj", "\n".join(_tables(lines) + added + faces).encode())
     for message in lines.absent.values():
         warn(message, strict)
     # trimesh lists the last mesh first
-    out.raws = [_raw(lines, *mesh) for mesh in zip(lines.groups, reversed(meshes), strict=True)]
+    raws = {
+        raw.name: raw
+        for each, mesh in zip(classes, reversed(meshes), strict=True)
+        for raw in _raws(lines, each, mesh)
+    }
+    out.raws = [raws[material] for material in lines.groups]
     if smooth and any(raw.normals is None or not raw.normals.any(axis=1).all() for raw in out.raws):
         out.ignored["s, of faces without normals"] = smooth[0]
     return out
@@ -146,22 +166,26 @@ def _tables(lines: _Lines) -> list[str]:
     return written
 
 
-def _faces(lines: _Lines) -> list[str]:
-    """Return lines from which trimesh makes a mesh for each group of faces.
+def _faces(lines: _Lines) -> tuple[list[str], list[_Class]]:
+    """Return lines that follow those of the file, and the faces from which trimesh makes meshes.
 
     If one face of a group has a vt or a vn, all faces of the group get one: a vt of 0, and a vn of length 0
-    for a face without normals, which is flat. Their lines follow those of the file.
+    for a face without normals, which is flat.
     """
-    written: list[str] = []
-    for number, group in enumerate(lines.groups.values()):
+    added: list[str] = []
+    classes: dict[tuple[str, int], _Class] = defaultdict(_Class)
+    for material, group in lines.groups.items():
         faces = [lines.texts[at] for at in group]
         if not _is_plain(lines, group, faces):
             faces = _rewritten(lines, group)
-            written += ["vt 0 0"] + ["vn 0 0 0"] * len(group)
+            added += ["vt 0 0"] + ["vn 0 0 0"] * len(group)
         if len({lines.kinds[at].width for at in group}) > 1:
             faces = [triangle for face in faces for triangle in _fan(face)]
-        written += [f"usemtl {number}", *faces]
-    return written
+        corners = words(faces[0])[1:]
+        same = classes[re.sub(r"\d+", "1", corners[0]), len(corners)]
+        same.faces += faces
+        same.groups.append((material, len(faces)))
+    return added, list(classes.values())
 
 
 def _is_plain(lines: _Lines, group: list[int], faces: list[str]) -> bool:
@@ -216,13 +240,22 @@ def _fan(face: str) -> list[str]:
     return [f"f {first} {second} {third}" for second, third in pairwise(others)]
 
 
-def _raw(lines: _Lines, material: str, mesh: dict[str, Any]) -> RawMesh:
-    """Return the mesh of the faces of a material."""
-    group, uvs = lines.groups[material], mesh["visual"] and mesh["visual"].uv
-    faces = import_trimesh().geometry.triangulate_quads(mesh["faces"])
-    raw = RawMesh(material, mesh["vertices"], faces, mesh.get("vertex_normals"), uvs)
-    raw.colors = mesh.get("vertex_colors")
-    numbers, triangles = np.array(group) + 1, np.array([lines.kinds[at].width - 2 for at in group])
-    # of a mesh of quads, trimesh lists all first halves, then all second halves
-    raw.lines = np.tile(numbers, 2) if (triangles == 2).all() else np.repeat(numbers, triangles)
-    return raw
+def _raws(lines: _Lines, same: _Class, mesh: dict[str, Any]) -> Iterator[RawMesh]:
+    """Yield the mesh of each group of a class, from the mesh of all of them."""
+    visual, normals, colors = mesh["visual"], mesh.get("vertex_normals"), mesh.get("vertex_colors")
+    uvs, begin = visual and visual.uv, 0
+    for material, count in same.groups:
+        faces, begin = mesh["faces"][begin : begin + count], begin + count
+        used: NDArray[np.intp] | slice = slice(None)
+        if len(same.groups) > 1:
+            used, inverse = np.unique(faces, return_inverse=True)
+            faces = inverse.reshape(faces.shape)
+        raw = RawMesh(material, mesh["vertices"][used], import_trimesh().geometry.triangulate_quads(faces))
+        raw.normals, raw.uvs, raw.colors = (
+            None if values is None else values[used] for values in (normals, uvs, colors)
+        )
+        group = lines.groups[material]
+        numbers, triangles = np.array(group) + 1, np.array([lines.kinds[at].width - 2 for at in group])
+        # of a mesh of quads, trimesh lists all first halves, then all second halves
+        raw.lines = np.tile(numbers, 2) if (triangles == 2).all() else np.repeat(numbers, triangles)
+        yield raw
