@@ -2,11 +2,14 @@
 
 import io
 import json
+import math
 import os
 import signal
+import struct
 import subprocess
 import sys
 import time
+import tracemalloc
 import zipfile
 
 import numpy as np
@@ -398,13 +401,62 @@ def test_hostile_archives_are_named(tmp_path, change, message):
         wf.Image.load(tmp_path / "a.npz")
 
 
-def test_an_archive_that_claims_too_much_is_refused_before_it_is_read(tmp_path, monkeypatch):
-    monkeypatch.setattr("wavefront.codecs.npz.MAX_BYTES", 1_000_000)
-    archive(tmp_path / "a.npz", {"rgb.npy": npy(np.zeros((500, 500, 3), np.float32))})
-    size = (tmp_path / "a.npz").stat().st_size
-    message = rf"a\.npz: claims 3000128 bytes in 1 array; the limit is 1000000 for a file of {size} bytes"
-    with pytest.raises(wf.SceneError, match=message):
+def claiming(path, sizes):
+    """Write an npz file whose headers and directory claim float32 arrays of these shapes, without content."""
+    out = {}
+    for name, shape in sizes.items():
+        buffer = io.BytesIO()
+        header = {"descr": "<f4", "fortran_order": False, "shape": shape}
+        np.lib.format.write_array_header_1_0(buffer, header)
+        out[f"{name}.npy"] = buffer.getvalue()
+    archive(path, out)
+    data = path.read_bytes()
+    for name, shape in sizes.items():
+        entry = data.rindex(b"PK\x01\x02", 0, data.rindex(f"{name}.npy".encode()))
+        claimed = len(out[f"{name}.npy"]) + 4 * math.prod(shape)
+        data = data[: entry + 24] + struct.pack("<I", claimed) + data[entry + 28 :]
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "message"),
+    [
+        ({"rgb": (16384, 8193, 3)}, r"image has 8193 × 16384 pixels; the limit is 134217728"),
+        (
+            {"rgb": (8192, 8192, 3), "a": (8192, 8192, 3), "b": (8192, 8192, 3)},
+            r"the content of 3 arrays takes 2415919\d+ bytes of memory; the limit is 2147\d+ ",
+        ),
+    ],
+)
+def test_an_archive_that_claims_too_much_is_refused_before_it_is_read(tmp_path, monkeypatch, sizes, message):
+    monkeypatch.setattr("wavefront.codecs.npz._read", None)
+    claiming(tmp_path / "a.npz", sizes)
+    with pytest.raises(wf.SceneError, match=rf"a\.npz: {message}"):
         wf.Image.load(tmp_path / "a.npz")
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_archives_of_other_methods_are_refused(tmp_path, method):
+    """Python unpacks a block of bzip2 at once, whatever its size."""
+    with zipfile.ZipFile(tmp_path / "a.npz", "w", method) as file:
+        file.writestr("rgb.npy", npy(np.zeros((3, 4, 3), np.float32)))
+    with pytest.raises(wf.SceneError, match=r"a\.npz: its member 'rgb\.npy' is compressed by (bzip2|lzma)"):
+        wf.Image.load(tmp_path / "a.npz")
+
+
+def test_a_member_that_inflates_to_more_than_it_claims_is_refused(tmp_path):
+    """And is not inflated beyond its claim."""
+    content = npy(np.zeros((300, 400, 3), np.float32))
+    archive(tmp_path / "a.npz", {"rgb.npy": content + bytes(2**26)})
+    path = tmp_path / "a.npz"
+    data = path.read_bytes()
+    entry = data.rindex(b"PK\x01\x02")
+    path.write_bytes(data[: entry + 24] + struct.pack("<I", len(content)) + data[entry + 28 :])
+    tracemalloc.start()
+    with pytest.raises(wf.SceneError, match=r"a\.npz: not a readable npz image: Bad CRC"):
+        wf.Image.load(path)
+    assert tracemalloc.get_traced_memory()[1] < 2**23
+    tracemalloc.stop()
 
 
 def test_missing_rgb_and_no_archive(tmp_path):

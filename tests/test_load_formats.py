@@ -378,6 +378,88 @@ def test_members_of_3mf_are_limited(write, monkeypatch):
         load_meshes(write(package(**{str(i): b"" for i in range(5)}), "a.3mf"))
 
 
+def zipped(members, method=zipfile.ZIP_DEFLATED):
+    """Return an archive of (name, content)."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", method) as archive:
+        for name, content in members:
+            archive.writestr(name, content)
+    return buffer.getvalue()
+
+
+SPY = "<!DOCTYPE a [<!ENTITY b SYSTEM 'file:///etc/passwd'>]>"
+PART = model(
+    '<object id="1"><components><component objectid="2" p:path="/parts/{}"/></components></object>'
+).format
+
+
+@pytest.mark.parametrize(
+    ("members", "message"),
+    [
+        ([("3D/3dmodel.modelx", SPY + model()[38:])], r"3dmodel\.modelx line 1: has a document type"),
+        ([("x/3D/3DModel.MODEL.bak", SPY + model()[38:])], r"MODEL\.bak line 1: has a document type"),
+        (
+            [("3D/3dmodel.model", PART("a.xml")), ("parts/a.xml", SPY + model()[38:])],
+            r"refers to 'parts/a\.xml', which is no model",
+        ),
+        ([("3D/3dmodel.model", PART("a.model"))], r"refers to 'parts/a\.model', which is no model"),
+        ([("3D/3dmodel.txt", model())], "has no member '3d/3dmodel.model'"),
+    ],
+)
+def test_the_members_of_3mf_that_are_read_are_those_that_are_checked(write, members, message):
+    """Whatever their names."""
+    pytest.importorskip("lxml")
+    pytest.importorskip("networkx")
+    with pytest.raises(SceneError, match=rf"a\.3mf: .*{message}"):
+        load_meshes(write(zipped(members), "a.3mf"))
+
+
+def test_trimesh_gets_checked_members_only(write, monkeypatch):
+    """The first model by its rule, and other models; no pictures or the like."""
+    pytest.importorskip("lxml")
+    pytest.importorskip("networkx")
+    seen = []
+    whole = threemf.by_trimesh
+    monkeypatch.setattr(
+        threemf, "by_trimesh", lambda name, data, kind: seen.append(data) or whole(name, data, kind)
+    )
+    members = [("thumbnail.png", b"x"), ("3D/3dmodel.modelx", model()), ("b.model", model())]
+    assert len(load_meshes(write(zipped(members), "a.3mf"))) == 1
+    with zipfile.ZipFile(io.BytesIO(seen[0])) as archive:
+        assert archive.namelist() == ["3D/3dmodel.modelx", "b.model"]
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_other_methods_of_compression_are_refused_in_3mf(write, method):
+    """Python's decoders of these have no limit."""
+    pytest.importorskip("lxml")
+    pytest.importorskip("networkx")
+    data = zipped([("3D/3dmodel.model", model())], method)
+    with pytest.raises(SceneError, match=r"a\.3mf: its member '3D/3dmodel\.model' is compressed by"):
+        load_meshes(write(data, "a.3mf"))
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_members_of_one_name_are_refused(write):
+    """Readers differ in which of them they take."""
+    pytest.importorskip("lxml")
+    pytest.importorskip("networkx")
+    data = zipped([("3D/3dmodel.model", model())] * 2)
+    with pytest.raises(SceneError, match=r"a\.3mf: has two members '3D/3dmodel\.model'"):
+        load_meshes(write(data, "a.3mf"))
+
+
+@pytest.mark.parametrize("name", ["a.dae", "a.3mf"])
+def test_unknown_encodings_are_refused(write, name):
+    """In XML's first line."""
+    for package_name in ("collada", "lxml", "networkx"):
+        pytest.importorskip(package_name)
+    text = '<?xml version="1.0" encoding="foo"?><COLLADA/>'
+    data = text if name == "a.dae" else zipped([("3D/3dmodel.model", text)])
+    with pytest.raises(SceneError, match=rf"{name}: .*unknown encoding: foo"):
+        load_meshes(write(data, name))
+
+
 @pytest.mark.parametrize(
     ("name", "hint"), [("a.dae", "pip install pycollada"), ("a.3mf", "pip install lxml networkx")]
 )

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import os
+import struct
+import time
+import zlib
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +17,7 @@ import trimesh
 
 import wavefront as wf
 from wavefront.codecs.images import write_image
-from wavefront.io import obj
+from wavefront.io import obj, sources
 from wavefront.io.load import load_meshes
 from wavefront.io.sources import SceneFiles
 
@@ -159,7 +164,7 @@ def test_textures_of_the_users_own_take_a_limit(tmp_path: Path, extension: str) 
         wf.Texture(path, max_pixels=98)
 
 
-@pytest.mark.parametrize("name", ["file_bytes", "pixels", "triangles", "instances", "unpacked_bytes"])
+@pytest.mark.parametrize("name", [field.name for field in fields(wf.LoadLimits)])
 @pytest.mark.parametrize("value", [0, -1, 1.5, "9", True, None, float("inf")])
 def test_limits_are_whole_numbers(name: str, value: Any) -> None:
     """Of at least 1."""
@@ -176,7 +181,7 @@ def test_limits_are_limits(scene: Path) -> None:
 
 
 def test_many_materials_are_few_meshes_for_trimesh(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its time grows with the square of their number. Each material gets its own faces, whatever their form."""
+    """Its time grows with the square of their number. Each material gets its own faces."""
     rng = np.random.default_rng(7)
     points, texels = rng.random((300, 3)).round(6), rng.random((300, 2)).round(6)
     text = ["v {} {} {}".format(*point) for point in points] + ["vt {} {}".format(*texel) for texel in texels]
@@ -202,3 +207,120 @@ def test_many_materials_are_few_meshes_for_trimesh(monkeypatch: pytest.MonkeyPat
         assert (raw.uvs is not None) == textured
         if textured:
             assert np.array_equal(raw.uvs[raw.faces].reshape(-1, 2), texels[order])
+
+
+def png(width: int, height: int, bits: int, color: int) -> bytes:
+    """Return a png whose pixels are all 0, deflated as far as possible."""
+
+    def chunk(kind: bytes, content: bytes) -> bytes:
+        check = zlib.crc32(kind + content)
+        return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", check)
+
+    deflate = zlib.compressobj(9)
+    row = bytes(1 + (width * bits * (3 if color == 2 else 1) + 7) // 8)
+    rows = b"".join(deflate.compress(row) for _ in range(height)) + deflate.flush()
+    header = struct.pack(">IIBBBBB", width, height, bits, color, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", rows) + chunk(b"IEND", b"")
+
+
+def test_memory_of_accessors_is_checked_before_it_is_taken(tmp_path: Path) -> None:
+    """Two hundred bytes of glTF can claim gigabytes of zeros."""
+    count = 89_478_483
+    position = {"componentType": 5126, "count": count, "type": "VEC3"}
+    document = {
+        "asset": {"version": "2.0"},
+        "accessors": [position],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "nodes": [{"mesh": 0}],
+    }
+    path = tmp_path / "zeros.gltf"
+    path.write_text(json.dumps(document))
+    before = time.process_time()
+    message = (
+        r"zeros\.gltf: accessors\[0\] takes 5368708980 bytes of memory; the limit is 21\d+ .*memory_bytes"
+    )
+    with pytest.raises(wf.SceneError, match=message):
+        wf.load(path)
+    assert time.process_time() - before < 1
+    position["count"] = 30_000
+    path.write_text(json.dumps(document))
+    budget = 30_000 * 3 * 20 - 128 * path.stat().st_size
+    with pytest.raises(wf.SceneError, match=rf"the limit is {30_000 * 60 - 1} "):
+        wf.load(path, limits=wf.LoadLimits(memory_bytes=budget - 1))
+    with pytest.raises(wf.SceneError, match="has no faces"), pytest.warns(UserWarning, match="zero area"):
+        wf.load(path, limits=wf.LoadLimits(memory_bytes=budget))
+
+
+def test_memory_of_pictures_is_checked_before_it_is_taken(tmp_path: Path) -> None:
+    """16 kB of png have 2^27 pixels. As codes they are a texture; as colors they are refused."""
+    path = tmp_path / "zeros.png"
+    path.write_bytes(png(16384, 8192, 1, 0))
+    assert path.stat().st_size < 20_000
+    message = r"zeros\.png.* bytes of memory, which makes \d+ in all; the limit is 21\d+ "
+    for load in (wf.Image.load, wf.Environment):
+        with pytest.raises(wf.SceneError, match=message):
+            load(path)
+
+
+def test_images_of_a_scene_share_its_budget_and_are_read_once(
+    scene: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However often materials refer to them."""
+    names = [scene.with_name(f"{letter}.png") for letter in "tu"]
+    for name in names:
+        name.write_bytes(png(256, 256, 8, 2))
+    library = scene.with_name("s.mtl")
+    library.write_text("".join(f"newmtl m{i}\nmap_Kd {'tu'[i // 4]}.png\n" for i in range(8)))
+    faces = "".join(f"usemtl m{i}\nf 1/1 2/2 3/3\n" for i in range(8))
+    scene.write_text(OBJ.format(library="s.mtl").partition("usemtl")[0] + faces)
+    allowed = 128 * sum(file.stat().st_size for file in (scene, library, *names))
+    need = 2 * 256 * 256 * 3 * 2
+    assert need > allowed
+    message = rf"map_Kd: .*u\.png: .* takes 393216 bytes of memory, which makes {need} in all"
+    with pytest.raises(wf.SceneError, match=message):
+        wf.load(scene, limits=wf.LoadLimits(memory_bytes=need - allowed - 1))
+    read = []
+    whole = sources.read_codes
+    monkeypatch.setattr(sources, "read_codes", lambda path, budget: read.append(path) or whole(path, budget))
+    assert len(wf.load(scene, limits=wf.LoadLimits(memory_bytes=need - allowed)).shapes) == 8
+    assert read == names
+
+
+def test_the_number_of_meshes_is_limited(tmp_path: Path) -> None:
+    """Of materials of an OBJ file, and of primitives of glTF."""
+    path = tmp_path / "a.obj"
+    library = "".join(f"newmtl m{i}\n" for i in range(5))
+    (tmp_path / "s.mtl").write_text(library)
+    faces = "".join(f"usemtl m{i}\nf 1 2 3\n" for i in range(5))
+    path.write_text("mtllib s.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n" + faces)
+    trimesh.Scene([trimesh.creation.box() for _ in range(5)]).export(tmp_path / "a.glb")
+    for each in (path, tmp_path / "a.glb"):
+        assert len(wf.load(each, limits=wf.LoadLimits(meshes=5)).shapes) == 5
+        with pytest.raises(wf.SceneError, match=r"has 5 meshes; the limit is 4 \(LoadLimits\.meshes\)"):
+            wf.load(each, limits=wf.LoadLimits(meshes=4))
+
+
+def test_where_memory_runs_out_the_file_and_its_size_are_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In place of a bare MemoryError, wherever it is raised."""
+
+    def full(*_: Any, **__: Any) -> None:
+        raise MemoryError("Unable to allocate 9 GiB")
+
+    path = tmp_path / "a.png"
+    write_image(path, np.full((4, 4, 3), 0.5))
+    mesh = tmp_path / "a.obj"
+    mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    size = f"a.png: has {path.stat().st_size} bytes, and what it holds does not fit in memory: Unable"
+    for where, call, named in (
+        ("wavefront.codecs.images.codes_to_linear", lambda: wf.Image.load(path), size),
+        ("wavefront.codecs.png_jpeg._decode", lambda: wf.Image.load(path), size),
+        ("wavefront.lights.environment.ImageEnvironment.of", lambda: wf.Environment(path), size),
+        ("wavefront.io.load.place_shapes", lambda: wf.load(mesh), "a.obj: has 32 bytes"),
+        ("wavefront.io.obj.geometries", lambda: wf.load(mesh), "a.obj: has 32 bytes"),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(where, full)
+            with pytest.raises(wf.SceneError, match=named):
+                call()

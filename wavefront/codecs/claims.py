@@ -10,17 +10,18 @@ import zlib
 from collections.abc import Iterable, Iterator
 
 from ..errors import SceneError
-from ..files import MAX_PIXELS, check_size
+from .budget import Budget
 
 PNG = b"\x89PNG\r\n\x1a\n"
 JPG = b"\xff\xd8"
 PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # by color type
+PALETTE = 3  # the color type of indices, which become up to four channels
 ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))
 JPG_PIXELS_PER_BYTE = 512  # at most: a block of 8 × 8 pixels takes at least a bit
 CHUNK = 2**18  # bytes that are inflated at once
 
 
-def check_claims(data: bytes, max_pixels: int = MAX_PIXELS) -> None:
+def check_claims(data: bytes, budget: Budget) -> None:
     """Check that a png or jpg can hold the picture that its header claims, before it is decoded.
 
     The memory for this check does not depend on the size that the header claims.
@@ -31,19 +32,23 @@ def check_claims(data: bytes, max_pixels: int = MAX_PIXELS) -> None:
         If the header is damaged, or claims too many pixels or more than the file can hold.
     """
     if data.startswith(PNG):
-        _check_png(data, max_pixels)
+        _check_png(data, budget)
     elif data.startswith(JPG):
-        _check_jpg(data, max_pixels)
+        _check_jpg(data, budget)
     else:
         raise SceneError("not a readable png or jpg image: its header is damaged")
 
 
-def _check_png(data: bytes, max_pixels: int) -> None:
+def _check_png(data: bytes, budget: Budget) -> None:
     header = data[16:29]
     if len(header) < 13 or header[9] not in PNG_CHANNELS:
         raise SceneError("not a readable png image: its header is damaged")
     width, height = int.from_bytes(header[:4], "big"), int.from_bytes(header[4:8], "big")
-    check_size(height, width, max_pixels)
+    budget.check_size(height, width)
+    item, channels = (2 if header[8] == 16 else 1), max(PNG_CHANNELS[header[9]], 4 * (header[9] == PALETTE))
+    # 16 bits of several channels are unfiltered as words of 16 bits for each byte
+    copies = 6 if item == 2 and channels > 1 else 2
+    budget.charge(f"a picture of {width} × {height} pixels", height * width * channels * item * copies)
     bits, interlaced = header[8] * PNG_CHANNELS[header[9]], header[12] == 1
     need = sum(rows * (1 + (columns * bits + 7) // 8) for columns, rows in _passes(width, height, interlaced))
     pixels = (content for name, content, _ in png_chunks(data) if name == b"IDAT")
@@ -81,15 +86,16 @@ def _inflated(pieces: Iterable[memoryview], need: int) -> int:
     return count
 
 
-def _check_jpg(data: bytes, max_pixels: int) -> None:
+def _check_jpg(data: bytes, budget: Budget) -> None:
     at = len(JPG)
     while at + 9 <= len(data) and data[at] == 0xFF:
         marker, length = data[at + 1], int.from_bytes(data[at + 2 : at + 4], "big")
         if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):  # a start of frame
             height, width = (int.from_bytes(data[at + k : at + k + 2], "big") for k in (5, 7))
-            check_size(height, width, max_pixels)
+            budget.check_size(height, width)
             if height * width > JPG_PIXELS_PER_BYTE * (len(data) - at):
                 raise SceneError(f"ends early: {len(data) - at} bytes cannot hold {width} × {height} pixels")
+            budget.charge(f"a picture of {width} × {height} pixels", height * width * 3 * 2)
             return
         at += 1 if marker == 0xFF else 2 + length
     raise SceneError("not a readable jpg image: its header is damaged")

@@ -18,12 +18,12 @@ MAX_STOPS = 100
 
 def codes_to_linear(codes: NDArray[Any], gamma: Gamma = "srgb") -> Floats:
     """Return the linear values of uint8 or uint16 codes (H, W, C); alpha is not decoded."""
-    values = codes.astype(np.float32) / np.float32(np.iinfo(codes.dtype).max)
-    colors = values[..., : 3 if values.shape[2] > 2 else 1]
-    if isinstance(gamma, str):
-        colors[:] = srgb_to_linear(colors)
-    else:
-        colors[:] = colors.astype(np.float64) ** gamma
+    most = np.iinfo(codes.dtype).max
+    table = np.arange(most + 1, dtype=np.float32) / np.float32(most)
+    decoded = srgb_to_linear(table) if isinstance(gamma, str) else (table.astype(np.float64) ** gamma)
+    values, colors = np.empty(codes.shape, np.float32), 3 if codes.shape[2] > 2 else 1
+    values[..., :colors] = decoded.astype(np.float32)[codes[..., :colors]]
+    values[..., colors:] = table[codes[..., colors:]]
     return values
 
 

@@ -12,15 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SaveError, SceneError
-from ..files import MAX_PIXELS, check_size
+from ..files import MAX_PIXELS
 from ..layers import components
 from ..vec import Floats
+from .budget import Budget
 from .image_data import ERROR, ImageData, from_json, from_named, to_json
 
 ATTRIBUTE = "wavefront"  # the attribute that describes all arrays
 TYPES = ("f4", "u4", "i4", "f8", "i8", "u8")  # of arrays, as NumPy writes them
 
 MAX_VALUES = 2**27  # of all channels of all parts: 512 MB as float32
+VALUE_BYTES = 8  # of memory for each
 VALUES_PER_BYTE = 16  # for larger files, the limit is this number of values per byte of the file
 
 
@@ -74,7 +76,7 @@ def _fits(value: Any) -> bool:
     return isinstance(value, int | float) or (isinstance(value, str) and value.isprintable())
 
 
-def decode(data: bytes, max_pixels: int = MAX_PIXELS) -> Floats:
+def decode(data: bytes, budget: Budget | None = None) -> Floats:
     """Return the pixels of the first part of an exr file, (H, W, C) float32, top row first.
 
     The channels C are R, G, B and A if they exist, else the first channel by name.
@@ -84,12 +86,12 @@ def decode(data: bytes, max_pixels: int = MAX_PIXELS) -> Floats:
     SceneError
         If the file claims too much, holds deep pixels, or a part of it cannot be decoded.
     """
-    channels = _channels(data, max_pixels)
+    channels = _channels(data, budget or Budget.of(data))
     names = [n for n in ("R", "G", "B", "A") if n in channels] or sorted(channels)[:1]
     return np.stack([channels[name]().astype(np.float32, copy=False) for name in names], axis=-1)
 
 
-def decode_all(data: bytes) -> ImageData | None:
+def decode_all(data: bytes, budget: Budget | None = None) -> ImageData | None:
     """Return the picture that `encode` wrote; None for an exr file of another origin.
 
     Raises
@@ -102,7 +104,7 @@ def decode_all(data: bytes) -> ImageData | None:
     text = OpenEXR.File(BytesIO(data), header_only=True).header().get(ATTRIBUTE)
     if not isinstance(text, str):
         return None
-    info, channels = from_json(text), _channels(data)
+    info, channels = from_json(text), _channels(data, budget or Budget.of(data))
     layout = info.pop("arrays", {})
     try:
         arrays = {
@@ -124,12 +126,12 @@ def _array(words: list[NDArray[Any]], part: dict[str, Any]) -> NDArray[Any]:
     return values.reshape(*stacked.shape[:2], *part["shape"])
 
 
-def _channels(data: bytes, max_pixels: int = MAX_PIXELS) -> dict[str, Callable[[], NDArray[Any]]]:
+def _channels(data: bytes, budget: Budget) -> dict[str, Callable[[], NDArray[Any]]]:
     """Return functions for the channels (H, W) of the first part of an exr file, by name."""
     import OpenEXR
 
     claimed = OpenEXR.File(BytesIO(data), header_only=True).parts
-    size = _check_claims(claimed, len(data), max_pixels)
+    size = _check_claims(claimed, len(data), budget)
     # OpenEXR decodes all parts, and leaves out those that it cannot decode.
     parts = OpenEXR.File(BytesIO(data), separate_channels=True).parts
     read = {(part.part_index, part.name()) for part in parts}
@@ -149,24 +151,26 @@ def _pixels(name: str, values: NDArray[Any], size: tuple[int, int]) -> NDArray[A
     return values
 
 
-def _check_claims(parts: list[Any], size: int, max_pixels: int) -> tuple[int, int]:
+def _check_claims(parts: list[Any], size: int, budget: Budget) -> tuple[int, int]:
     """Check the headers of all parts, and return (height, width) of the first one."""
     import OpenEXR
 
     if not parts:
         raise SceneError("has no picture: its header is damaged")
-    values, most = 0, max(MAX_VALUES * max(1, max_pixels // MAX_PIXELS), VALUES_PER_BYTE * size)
+    values, most = 0, max(MAX_VALUES * max(1, budget.pixels // MAX_PIXELS), VALUES_PER_BYTE * size)
     for part in parts:
         if part.type() in (OpenEXR.deepscanline, OpenEXR.deeptile):
             raise SceneError(f"part {part.part_index} holds deep pixels; only flat pictures are read")
         height, width = _window(part)
-        check_size(height, width, max_pixels)
+        budget.check_size(height, width)
         values += height * width * len(part.header["channels"])
     if values > most:
         raise SceneError(
             f"claims {values} values in {len(parts)} parts; the limit is {most} for a file of {size} bytes"
         )
-    return _window(parts[0])
+    height, width = _window(parts[0])
+    budget.charge(f"the channels of {width} × {height} pixels", VALUE_BYTES * values)
+    return height, width
 
 
 def _window(part: Any) -> tuple[int, int]:

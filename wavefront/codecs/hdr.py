@@ -10,10 +10,11 @@ import re
 import numpy as np
 
 from ..errors import SceneError
-from ..files import MAX_PIXELS, check_size
 from ..vec import Bytes, Floats
+from .budget import Budget
 
 SIGNATURES = (b"#?RADIANCE", b"#?RGBE")
+PIXEL_BYTES = 48  # of memory for each pixel, until it is float32
 MIN_RUN = 4  # shorter runs take more bytes than literals
 
 
@@ -29,7 +30,7 @@ def encode(pixels: Floats) -> bytes:
     return header + b"".join(rows)
 
 
-def decode(data: bytes, max_pixels: int = MAX_PIXELS) -> Floats:
+def decode(data: bytes, budget: Budget | None = None) -> Floats:
     """Return the pixels (H, W, 3) of a .hdr file, top row first.
 
     Raises
@@ -45,8 +46,25 @@ def decode(data: bytes, max_pixels: int = MAX_PIXELS) -> Floats:
     if (head[2], head[4]) != (b"-Y", b"+X"):
         raise SceneError(f"rows run {(head[2] + b' ' + head[4]).decode()}; only -Y +X is read")
     height, width = int(head[3]), int(head[5])
-    check_size(height, width, max_pixels)
-    return from_rgbe(_scanlines(np.frombuffer(data, np.uint8, offset=head.end()), height, width))
+    budget = budget or Budget.of(data)
+    budget.check_size(height, width)
+    rows = np.frombuffer(data, np.uint8, offset=head.end())
+    is_flat = _check_claims(rows, height, width)
+    budget.charge(f"a picture of {width} × {height} pixels", PIXEL_BYTES * height * width)
+    return from_rgbe(rows.reshape(height, width, 4) if is_flat else _scanlines(rows, height, width))
+
+
+def _check_claims(data: Bytes, height: int, width: int) -> bool:
+    """Check that rows of pixels can be there; return whether they are stored without run-length coding."""
+    if not 8 <= width < 32768 or len(data) < 4 or tuple(data[:2]) != (2, 2) or data[2] & 128:
+        if len(data) != 4 * height * width:
+            raise SceneError(
+                f"holds {len(data)} bytes of pixels; {width} × {height} pixels need {4 * height * width}"
+            )
+        return True
+    if len(data) < height * (4 + 4 * 2 * -(-width // 127)):
+        raise SceneError(f"ends early: {len(data)} bytes cannot hold {width} × {height} pixels")
+    return False
 
 
 def to_rgbe(pixels: Floats) -> Bytes:
@@ -91,10 +109,7 @@ def _pack_literal(out: bytearray, values: Bytes) -> None:
 
 
 def _scanlines(data: Bytes, height: int, width: int) -> Bytes:
-    if not 8 <= width < 32768 or len(data) < 4 or tuple(data[:2]) != (2, 2) or data[2] & 128:
-        return _flat(data, height, width)
-    if len(data) < height * (4 + 4 * 2 * -(-width // 127)):
-        raise SceneError(f"ends early: {len(data)} bytes cannot hold {width} × {height} pixels")
+    """Return pixels (H, W, 4) whose rows are stored by run lengths."""
     raw, at = data.tobytes(), 0
     image = np.empty((height, 4, width), np.uint8)
     for y in range(height):
@@ -124,12 +139,3 @@ def _unpack(raw: bytes, at: int, size: int, y: int) -> tuple[bytes, int]:
     if len(out) != size:
         raise SceneError(f"row {y} is damaged or cut off")
     return bytes(out), at
-
-
-def _flat(data: Bytes, height: int, width: int) -> Bytes:
-    """Return pixels (H, W, 4) that are stored without run-length coding."""
-    if len(data) != 4 * height * width:
-        raise SceneError(
-            f"holds {len(data)} bytes of pixels; {width} × {height} pixels need {4 * height * width}"
-        )
-    return data.reshape(height, width, 4)

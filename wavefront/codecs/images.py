@@ -17,20 +17,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..counted import counted
 from ..errors import SaveError, SceneError, warn_caller
-from ..files import MAX_PIXELS, check_size, check_target, extension_of, read_bytes, write_bytes
+from ..files import check_target, extension_of, read_bytes, write_bytes
 from ..registry import Registry
 from ..vec import Floats
 from . import exr, npz
 from . import hdr as rgbe
 from . import png_jpeg as coded
+from .budget import Budget, in_memory
 from .display import Display
 from .encoding import codes_to_linear
 from .image_data import TRANSPARENT, ImageData
 
 T = TypeVar("T")
+COLOR_BYTES = 24  # of memory for each pixel of codes that become linear colors
 
-# called with a file and the most pixels; returns uint8 or uint16 codes, or linear float32, (H, W, C)
-Decoder: TypeAlias = Callable[[bytes, int], NDArray[Any]]
+# called with a file and what it may take; returns uint8 or uint16 codes, or linear float32, (H, W, C)
+Decoder: TypeAlias = Callable[[bytes, Budget], NDArray[Any]]
 # called with an adjusted picture, how it is shown, and the bits of a code; returns the file
 Encoder: TypeAlias = Callable[[ImageData, Display, int], bytes]
 
@@ -113,7 +115,7 @@ def read_image(path: str | os.PathLike[str]) -> Floats:
     ------
     SceneError
         With the name of the file, if it is missing, of another format, damaged, truncated, or larger than
-        `files.MAX_PIXELS`.
+        `files.MAX_PIXELS`, or takes more memory than a `Budget` of its size.
     """
     codes = read_codes(path)
     if codes.dtype == np.float32:
@@ -121,10 +123,13 @@ def read_image(path: str | os.PathLike[str]) -> Floats:
     return codes.astype(np.float32) / np.float32(np.iinfo(codes.dtype).max)
 
 
-def read_codes(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> NDArray[Any]:
+def read_codes(path: str | os.PathLike[str], budget: Budget | None = None) -> NDArray[Any]:
     """Return the pixels of an image file as stored, uint8, uint16 or float32, (H, W, C)."""
-    decode = _at_most(max_pixels, _find(IMAGE_READERS, path))
-    return _decode(os.fspath(path), decode, read_bytes(path), Path(path).suffix.lower()[1:])
+    budget = budget or Budget()
+    decode, data = _find(IMAGE_READERS, path), read_bytes(path)
+    budget.add_file(len(data))
+    with in_memory(path):
+        return _decode(os.fspath(path), decode, data, Path(path).suffix.lower()[1:], budget)
 
 
 def read_picture(path: str | os.PathLike[str]) -> ImageData:
@@ -139,16 +144,24 @@ def read_picture(path: str | os.PathLike[str]) -> ImageData:
     SceneError
         As `read_image`.
     """
+    with in_memory(path):
+        return _picture(path)
+
+
+def _picture(path: str | os.PathLike[str]) -> ImageData:
     decode = _find(IMAGE_READERS, path)
     data, name, extension = read_bytes(path), os.fspath(path), Path(path).suffix.lower()
     whole = ALL_OF_IT.get(extension)
-    found = None if whole is None else _decode(name, whole, data, extension[1:])
+    budget = Budget.of(data)
+    found = None if whole is None else _decode(name, whole, data, extension[1:], budget)
     if found is not None:
         return found
-    pixels = _decode(name, _at_most(MAX_PIXELS, decode), data, extension[1:])
+    pixels = _decode(name, decode, data, extension[1:], budget)
     if not 1 <= pixels.shape[2] <= 4:
         raise SceneError(f"{name}: has {pixels.shape[2]} channels; a picture has 1 to 4")
     is_coded = pixels.dtype != np.float32
+    height, width = pixels.shape[:2]
+    budget.charge(f"{name}: colors of {width} × {height} pixels", COLOR_BYTES * height * width)
     values = codes_to_linear(pixels, coded.gamma_of(data)) if is_coded else pixels
     rgb = np.ascontiguousarray(three_channels(values))
     if values.shape[2] in (1, 3):
@@ -163,24 +176,19 @@ def three_channels(pixels: NDArray[Any]) -> NDArray[Any]:
     return pixels[..., :3] if pixels.shape[2] > 2 else np.repeat(pixels[..., :1], 3, axis=2)
 
 
-def decode_codes(data: bytes, name: str, max_pixels: int = MAX_PIXELS) -> NDArray[Any]:
+def decode_codes(data: bytes, name: str, budget: Budget) -> NDArray[Any]:
     """Return the stored values (H, W, C) of a png or jpg in memory; `name` is for messages."""
-    return _decode(name, _at_most(max_pixels, coded.decode), data, "png")
+    return _decode(name, coded.decode, data, "png", budget)
 
 
-def _at_most(max_pixels: int, decode: Decoder) -> Callable[[bytes], NDArray[Any]]:
-    """Return a decoder of pictures of so many pixels."""
-    return lambda data: decode(data, max_pixels)
-
-
-def _decode(name: str, decode: Callable[[bytes], T], data: bytes, kind: str) -> T:
+def _decode(name: str, decode: Callable[[bytes, Budget], T], data: bytes, kind: str, budget: Budget) -> T:
     """Return the result of `decode`; its errors name the file."""
     try:
-        return decode(data)
+        return decode(data, budget)
+    except MemoryError:  # `in_memory` says more
+        raise
     except SceneError as error:
         raise SceneError(f"{name}: {error}") from error
-    except MemoryError as error:
-        raise SceneError(f"{name}: does not fit in memory") from error
     # decoders raise exceptions of any type on damaged data
     except Exception as error:
         reason = error.__cause__ or error  # imageio hides what is wrong with a file behind its own error
@@ -232,11 +240,11 @@ def _encode_npy(pixels: Floats) -> bytes:
     return buffer.getvalue()
 
 
-def _decode_npy(data: bytes, max_pixels: int) -> Floats:
+def _decode_npy(data: bytes, budget: Budget) -> Floats:
     pixels = np.load(BytesIO(data), allow_pickle=False)
     if pixels.ndim not in (2, 3) or pixels.dtype.kind not in "fiub":
         raise SceneError(f"array is {pixels.dtype} of shape {pixels.shape}; an image is (H, W) or (H, W, C)")
-    check_size(pixels.shape[0], pixels.shape[1], max_pixels)
+    budget.check_size(pixels.shape[0], pixels.shape[1])
     return np.atleast_3d(pixels).astype(np.float32)
 
 
@@ -262,11 +270,11 @@ def _whole(encode: Callable[[ImageData], bytes]) -> Encoder:
 def _checked_pixels(decode: Callable[[bytes], Any]) -> Decoder:
     """Return a decoder that checks what `decode`, a user's own function, returns."""
 
-    def checked(data: bytes, max_pixels: int) -> NDArray[Any]:
+    def checked(data: bytes, budget: Budget) -> NDArray[Any]:
         pixels = np.asarray(decode(data))
         if pixels.ndim != 3 or not 1 <= pixels.shape[2] <= 4 or not pixels.size:
             raise SceneError(f"the reader returned the shape {pixels.shape}; an image is (H, W, 1 to 4)")
-        check_size(pixels.shape[0], pixels.shape[1], max_pixels)
+        budget.check_size(pixels.shape[0], pixels.shape[1])
         return pixels if pixels.dtype in (np.uint8, np.uint16) else pixels.astype(np.float32)
 
     return checked
@@ -280,7 +288,7 @@ IMAGE_READERS: Registry[Decoder] = Registry(
         ".exr": exr.decode,
         ".hdr": rgbe.decode,
         ".npy": _decode_npy,
-        ".npz": lambda data, max_pixels: npz.decode(data).rgb,
+        ".npz": lambda data, budget: npz.decode(data, budget).rgb,
     },
     adapt=_checked_pixels,
 )
@@ -297,7 +305,7 @@ IMAGE_WRITERS: Registry[Encoder] = Registry(
     },
     adapt=_colors,
 )
-ALL_OF_IT: dict[str, Callable[[bytes], ImageData | None]] = {  # formats that hold all of a picture
+ALL_OF_IT: dict[str, Callable[[bytes, Budget], ImageData | None]] = {  # formats that hold all of a picture
     ".exr": exr.decode_all,
     ".npz": npz.decode,
 }

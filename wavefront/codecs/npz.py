@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from ..counted import counted
 from ..errors import SceneError
+from .archive import checked_members
+from .budget import Budget
 from .image_data import ImageData, from_json, from_named, to_json
 
 if TYPE_CHECKING:
@@ -19,8 +21,8 @@ if TYPE_CHECKING:
 
 METADATA = "metadata"  # the array of text
 SUMS = "sums."  # before the names of arrays that only merging reads
-MAX_BYTES = 2**31  # of all arrays
-EXPANSION = 64  # for larger archives, the limit is this number of bytes per byte of the file
+MAX_ARRAYS = 2**12
+MAX_HEADER = 2**14  # bytes of an array's header
 KINDS = "fiubU"  # of NumPy types that are read
 
 
@@ -39,8 +41,10 @@ def encode(picture: ImageData) -> bytes:
     return buffer.getvalue()
 
 
-def decode(data: bytes) -> ImageData:
+def decode(data: bytes, budget: Budget | None = None) -> ImageData:
     """Return the picture of an npz file.
+
+    Every header is checked before an array is read.
 
     Raises
     ------
@@ -49,15 +53,17 @@ def decode(data: bytes) -> ImageData:
     """
     import zipfile
 
+    budget = budget or Budget.of(data)
     with zipfile.ZipFile(BytesIO(data)) as archive:
-        members = archive.infolist()
-        claimed, most = sum(member.file_size for member in members), max(MAX_BYTES, EXPANSION * len(data))
-        if claimed > most:
-            raise SceneError(
-                f"claims {claimed} bytes in {counted(len(members), 'array')}; the limit is {most} "
-                f"for a file of {len(data)} bytes"
-            )
-        arrays = {member.filename.removesuffix(".npy"): _read(archive, member) for member in members}
+        members = {
+            member.filename.removesuffix(".npy"): member for member in checked_members(archive, MAX_ARRAYS)
+        }
+        shapes = {name: _shape(archive, member) for name, member in members.items()}
+        if len(shapes.get("rgb", ())) > 1:
+            budget.check_size(*shapes["rgb"][:2])
+        claimed = sum(member.file_size for member in members.values())
+        budget.charge(f"the content of {counted(len(members), 'array')}", claimed)
+        arrays = {name: _read(archive, member) for name, member in members.items()}
     text = arrays.pop(METADATA, np.array("{}"))
     if text.dtype.kind != "U" or text.ndim:
         raise SceneError(f"the array {METADATA!r} is {text.dtype} of shape {text.shape}; it must be one text")
@@ -66,9 +72,10 @@ def decode(data: bytes) -> ImageData:
     return replace(picture, sums={name.removeprefix(SUMS): values for name, values in sums.items()})
 
 
-def _read(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
-    """Return an array of an archive, after checking that its header claims what the archive holds."""
-    with archive.open(member) as file:
+def _shape(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> tuple[int, ...]:
+    """Return the shape of an array, after checking that its header claims what the archive holds."""
+    with archive.open(member) as packed:
+        file = BytesIO(packed.read(MAX_HEADER))
         major, _ = np.lib.format.read_magic(file)
         header = {1: np.lib.format.read_array_header_1_0, 2: np.lib.format.read_array_header_2_0}.get(major)
         if header is None:
@@ -80,5 +87,9 @@ def _read(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
                 f"the array {member.filename!r} is {kind} of shape {shape}, in {member.file_size} bytes; "
                 "only numbers and text of their own size are read"
             )
+    return tuple(shape)
+
+
+def _read(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
     with archive.open(member) as file:
         return np.asarray(np.lib.format.read_array(file, allow_pickle=False))

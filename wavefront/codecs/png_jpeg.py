@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SaveError, SceneError
-from ..files import MAX_PIXELS
 from . import png16
+from .budget import Budget
 from .claims import JPG, check_claims
 
 Gamma = float | str  # an exponent, or "srgb" for the exact sRGB curve
@@ -51,7 +51,7 @@ def encode(codes: NDArray[Any], extension: str, gamma: Gamma) -> bytes:
     return bytes(iio.imwrite("<bytes>", codes, extension=".jpg", plugin="pillow", **options))
 
 
-def decode(data: bytes, max_pixels: int = MAX_PIXELS) -> NDArray[Any]:
+def decode(data: bytes, budget: Budget | None = None) -> NDArray[Any]:
     """Return the codes (H, W, C) of a png or jpg, uint8 or uint16.
 
     Raises
@@ -59,7 +59,7 @@ def decode(data: bytes, max_pixels: int = MAX_PIXELS) -> NDArray[Any]:
     SceneError
         If the file claims more than it holds, ends early, or holds other kinds of numbers.
     """
-    check_claims(data, max_pixels)
+    check_claims(data, budget or Budget.of(data))
     codes = _decode(data)
     if data.startswith(JPG) and _ends_early(data, codes):
         raise SceneError("ends early: its last pixels are missing")

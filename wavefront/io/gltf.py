@@ -57,6 +57,7 @@ def contents(document: Document) -> GltfContents:
         if "mesh" in json:
             with document.inside(f"nodes[{node.index}]"):
                 parts = _parts(document, out, numbers, json["mesh"])
+                document.files.limits.check_meshes(document.name, len(out.raws))
                 count = count_placements(document, node)
                 total = len(of) + count * len(parts)
                 if total > document.files.limits.instances:

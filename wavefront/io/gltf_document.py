@@ -35,6 +35,7 @@ COMPONENTS: dict[int, type[np.generic]] = {
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 MAX_ELEMENTS = 2**28  # in one accessor, with or without data
 MAX_NUMBERS = 2**29  # in all accessors that are read, as several meshes may share one
+NUMBER_BYTES = 20  # of memory for each number that is read, until a mesh is made of it
 MAX_COUNT = 2**53  # of bytes or elements: all JSON readers represent whole numbers up to here exactly
 LARGEST = float(np.finfo(np.float64).max)
 SHOWN = 80  # characters of a value in a message
@@ -187,6 +188,7 @@ class Document:
                 f"{self.name}: {where}: the accessors that its meshes read have {self._numbers} numbers "
                 f"so far; the limit is {MAX_NUMBERS * scale}"
             )
+        self.files.budget.charge(f"{self.name}: {where}", count * width * NUMBER_BYTES)
         if "bufferView" in item:
             values = self._strided(item, count, width, kind, where)
         else:

@@ -125,7 +125,7 @@ class GltfMaterials:
         else:
             raise SceneError(f"{name} has neither a uri nor a bufferView")
         limits = document.files.limits
-        codes = decode_codes(content, name, limits.pixels)
+        codes = decode_codes(content, name, document.files.budget)
         self._pixels += codes.shape[0] * codes.shape[1]
         if self._pixels > IMAGES * limits.pixels:
             raise SceneError(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
 from numpy.typing import ArrayLike
 
+from ..codecs.budget import in_memory
 from ..errors import SceneError
 from ..materials import MaterialLike
 from ..progress import Progress, phase
@@ -64,7 +65,7 @@ def load(
     >>> len(scene.shapes[0].faces)
     1
     """
-    with _phase(path, progress):
+    with _reading(path, progress):
         wish = Wish(strict, limits=checked_limits(limits), search_paths=folders(search_paths))
         name, contents = os.fspath(path), read(path, wish)
         placed = place_shapes(name, contents.raws, contents.places, strict)
@@ -108,7 +109,7 @@ def load_mesh(
     >>> mesh.vertices.shape
     (3, 3)
     """
-    with _phase(path, progress):
+    with _reading(path, progress):
         meshes = load_meshes(
             path, strict=strict, materials=material is None, limits=limits, search_paths=search_paths
         )
@@ -138,8 +139,11 @@ def _as_mesh(name: str, shape: Shape) -> Mesh:
     return shape
 
 
-def _phase(path: PathLike, progress: Progress) -> AbstractContextManager[None]:
-    return phase(f"loading {os.path.basename(os.fspath(path))}", progress)
+@contextmanager
+def _reading(path: PathLike, progress: Progress) -> Iterator[None]:
+    """Show that a file is read. If memory runs out, the error names the file."""
+    with phase(f"loading {os.path.basename(os.fspath(path))}", progress), in_memory(path):
+        yield
 
 
 def from_trimesh(geometry: Any) -> Scene:

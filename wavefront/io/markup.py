@@ -15,7 +15,7 @@ NODE_BYTES = 2**11  # bytes that a node counts at least; this limits the number 
 
 def look_through(
     name: str,
-    data: bytes,
+    data: bytes | bytearray,
     begin: Callable[[str, dict[str, str], int], None],
     end: Callable[[str, int], None] = lambda tag, at: None,
 ) -> None:
@@ -45,7 +45,10 @@ def look_through(
     parser.EndElementHandler = lambda tag: end(tag.rpartition(" ")[2], parser.CurrentByteIndex)
     try:
         parser.Parse(data, True)
-    except expat.ExpatError as error:
+    # LookupError: an encoding that Python does not have
+    except (expat.ExpatError, LookupError, ValueError) as error:
+        if isinstance(error, SceneError):
+            raise
         raise SceneError(f"{name}: not a readable file: {error}") from error
 
 

@@ -44,13 +44,13 @@ from numpy.typing import NDArray
 from ..bsdfs import Dielectric, Diffuse, Mirror
 from ..errors import SceneError
 from ..materials import Material
-from ..textures.image import Texture
+from ..textures.image import StoredImage, Texture
 from ..textures.normal_map import BaseNormalMap, BumpMap, NormalMap
 from ..textures.parameter import MAX_INDEX
 from ..vec import Doubles
 from .appearance import MaterialSpec, build_material
 from .repair import warn
-from .sources import LoadLimits, SceneFiles
+from .sources import SceneFiles
 
 # values of `illum`
 GLASS = (4, 6, 7, 9)
@@ -153,8 +153,8 @@ class Entry:
         base, gain = self._option(key, options, "-mm", [0.0, 1.0])
         transform = self._placing(key, options)
         channel = self._channel(key, options) if kind == "scalar" else None
-        source = self.images[key] if key in self.images else self.find(key, name)
         try:
+            source: Any = self.images[key] if key in self.images else self._image(name)
             return Texture(
                 source,
                 srgb=kind == "color",
@@ -163,10 +163,15 @@ class Entry:
                 channel=channel,
                 scale=np.asarray(scale) * gain,
                 offset=np.asarray(scale) * base,
-                max_pixels=LoadLimits().pixels if self.files is None else self.files.limits.pixels,
             )
         except SceneError as error:
             raise SceneError(f"{self.where(key)}: {error}") from error
+
+    def _image(self, name: str) -> StoredImage:
+        """Return the image of the file in a line."""
+        files = self.files or SceneFiles(self.file)
+        path = files.find(name, self.file)
+        return StoredImage(files.image(path), path.name)
 
     def find(self, key: str, name: str) -> Path:
         """Return the path of the file in a line."""

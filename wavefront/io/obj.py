@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from .lines import NUMBER, check_lines, words
 from .repair import RawMesh, warn
+from .sources import LoadLimits
 from .trimesh_import import import_trimesh
 from .trimesh_loading import geometries
 
@@ -78,7 +79,7 @@ class _Lines:
     absent: dict[str, str] = field(default_factory=dict)  # keyword that only faces use -> message
 
 
-def parse(name: str, text: str, strict: bool = False) -> Obj:
+def parse(name: str, text: str, strict: bool = False, limits: LoadLimits | None = None) -> Obj:
     """Read OBJ text; `name` is for messages.
 
     Raises
@@ -110,6 +111,7 @@ def parse(name: str, text: str, strict: bool = False) -> Obj:
                 out.ignored.setdefault(keyword, at + 1)
     if not lines.groups:
         raise SceneError(f"{name}: has no faces")
+    (limits or LoadLimits()).check_meshes(name, len(lines.groups))
     added, classes = _faces(lines)
     faces = [line for number, each in enumerate(classes) for line in (f"usemtl {number}", *each.faces)]
     meshes = geometries(name, "obj", "\n".join(_tables(lines) + added + faces).encode())

@@ -47,10 +47,8 @@ def read(path: PathLike, wish: Wish) -> Contents:
     data = files.read(path)
     if kind in PLAIN:
         _refuse(name, data)
-    try:
-        contents = parse(files, data, wish)
-    except MemoryError as error:
-        raise SceneError(f"{name}: does not fit in memory") from error
+    contents = parse(files, data, wish)
+    wish.limits.check_meshes(name, len(contents.raws))
     wish.limits.check_triangles(name, sum(len(raw.faces) for raw in contents.raws))
     return contents
 
@@ -80,7 +78,7 @@ def _read_gltf(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
 
 def _read_obj(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
     name, strict, materials = os.fspath(files.scene), wish.strict, wish.materials
-    parsed = obj.parse(name, decode_text(data), strict)
+    parsed = obj.parse(name, decode_text(data), strict, wish.limits)
     if parsed.ignored:
         listed = ", ".join(f"{keyword} (line {line})" for keyword, line in parsed.ignored.items())
         warn(f"{name}: not honored: {listed}", strict)

@@ -6,9 +6,13 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..codecs.budget import MEMORY_BYTES, Budget
+from ..codecs.images import read_codes
 from ..errors import SceneError
 from ..files import MAX_BYTES, MAX_PIXELS, check_regular, path_name, read_bytes
 
@@ -33,10 +37,15 @@ class LoadLimits:
         Pixels of one image. All images of a glTF file together may have four times as many.
     triangles
         Triangles of all meshes of a file, before they are placed.
+    meshes
+        Meshes of a file, one for each of its materials or primitives, before they are placed.
     instances
         Meshes that the nodes of a glTF file place.
     unpacked_bytes
         Size of the unpacked members of a 3mf file, the only archive that is read.
+    memory_bytes
+        Memory that may be taken for all arrays and images, whatever the size of the files, in bytes; 128 for
+        each byte of the files are added. It is compared with what headers claim, before it is taken.
 
     Raises
     ------
@@ -57,8 +66,10 @@ class LoadLimits:
     file_bytes: int = MAX_BYTES
     pixels: int = MAX_PIXELS
     triangles: int = MAX_TRIANGLES
+    meshes: int = 2**17
     instances: int = 2**20
     unpacked_bytes: int = 2**30
+    memory_bytes: int = MEMORY_BYTES
 
     def __post_init__(self) -> None:
         for each in fields(self):
@@ -67,6 +78,11 @@ class LoadLimits:
                 raise SceneError(
                     f"LoadLimits {each.name} is {value!r}; it must be a whole number of at least 1"
                 )
+
+    def check_meshes(self, name: str, count: int) -> None:
+        """Refuse a file of more meshes with a SceneError."""
+        if count > self.meshes:
+            raise SceneError(f"{name}: has {count} meshes; the limit is {self.meshes} (LoadLimits.meshes)")
 
     def check_triangles(self, name: str, count: int) -> None:
         """Refuse a file of more triangles with a SceneError."""
@@ -94,6 +110,11 @@ class SceneFiles:
     scene: PathLike
     search_paths: tuple[Path, ...] = ()
     limits: LoadLimits = field(default_factory=LoadLimits)
+    budget: Budget = field(init=False)  # of all these files together
+    _images: dict[Path, NDArray[Any]] = field(init=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "budget", Budget(self.limits.pixels, self.limits.memory_bytes))
 
     def find(self, reference: str, base: PathLike | None = None) -> Path:
         """Return the path of a file that the scene refers to by a relative name.
@@ -135,7 +156,16 @@ class SceneFiles:
 
     def read(self, path: PathLike) -> bytes:
         """Return the content of a regular file of at most `limits.file_bytes`."""
-        return read_bytes(path, self.limits.file_bytes)
+        data = read_bytes(path, self.limits.file_bytes)
+        self.budget.add_file(len(data))
+        return data
+
+    def image(self, path: Path) -> NDArray[Any]:
+        """Return the pixels of an image as stored, (H, W, C); each file is read once."""
+        if path not in self._images:
+            check_regular(path, self.limits.file_bytes)
+            self._images[path] = read_codes(path, self.budget)
+        return self._images[path]
 
     def _target(self, folder: Path, name: str, reference: str) -> Path:
         """Return where a name in a folder leads to."""

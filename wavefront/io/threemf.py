@@ -10,6 +10,7 @@ import zipfile
 from io import BytesIO
 from typing import Any
 
+from ..codecs.archive import checked_members, unpacked
 from ..errors import SceneError
 from .markup import check_expanded, look_through, need
 from .repair import warn
@@ -17,6 +18,8 @@ from .sources import SceneFiles
 from .trimesh_loading import by_trimesh
 
 MAX_MEMBERS = 2**12
+XML_BYTES = 4  # of memory for each byte of a member
+ROOT = "3d/3dmodel.model"  # trimesh reads the first member whose name contains this, in any case
 LOST = (
     "basematerials",
     "colorgroup",
@@ -37,37 +40,55 @@ def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> Any:
     """
     name = os.fspath(files.scene)
     need(name, ".3mf", ("lxml", "lxml"), ("networkx", "networkx"))
-    package = _Package(name, _models(name, data, files.limits.unpacked_bytes))
+    models = _models(files, data)
+    package = _Package(name, models)
     check_expanded(name, package.children, {}, "build")
     if package.lost and materials:
         warn(f"{name}: not honored: {', '.join(package.lost)}", strict)
-    return by_trimesh(name, data, "3mf")
+    return by_trimesh(name, _archive(models), "3mf")
 
 
-def _models(name: str, data: bytes, most: int) -> dict[str, bytes]:
-    """Return the members of the archive that contain geometry."""
+def _models(files: SceneFiles, data: bytes) -> dict[str, bytearray]:
+    """Return the members of the archive that are read: the model, and those that it refers to."""
+    name, most = os.fspath(files.scene), files.limits.unpacked_bytes
     try:
         with zipfile.ZipFile(BytesIO(data)) as archive:
-            members = archive.infolist()
+            members = checked_members(archive, MAX_MEMBERS)
             size = sum(member.file_size for member in members)
-            if len(members) > MAX_MEMBERS:
-                raise SceneError(f"{name}: has {len(members)} members; the limit is {MAX_MEMBERS}")
             if size > most:
-                raise SceneError(
-                    f"{name}: unpacks to {size} bytes; the limit is {most} (LoadLimits.unpacked_bytes)"
-                )
-            models = [member for member in members if member.filename.lower().endswith(".model")]
-            return {member.filename: archive.read(member) for member in models}
-    except (MemoryError, SceneError):
+                raise SceneError(f"unpacks to {size} bytes; the limit is {most} (LoadLimits.unpacked_bytes)")
+            root = next((each for each in members if ROOT in each.filename.lower()), None)
+            if root is None:
+                raise SceneError(f"has no member {ROOT!r}")
+            read = [root, *(each for each in members if each is not root and _is_model(each.filename))]
+            for member in read:
+                files.budget.charge(f"its member {member.filename!r}", XML_BYTES * member.file_size)
+            return {member.filename: unpacked(archive, member) for member in read}
+    except MemoryError:
         raise
+    except SceneError as error:
+        raise SceneError(f"{name}: {error}") from error
     except Exception as error:  # damaged archives raise errors of many kinds
         raise SceneError(f"{name}: not a readable 3mf file: {error!r}") from error
+
+
+def _is_model(name: str) -> bool:
+    return ROOT in name.lower() or name.lower().endswith(".model")
+
+
+def _archive(models: dict[str, bytearray]) -> bytes:
+    """Return an archive of the members that have been checked, and of no others: all that trimesh gets."""
+    buffer = BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, content in models.items():
+            archive.writestr(name, content)
+    return buffer.getvalue()
 
 
 class _Package:
     """The references of a package's objects, and the elements that are not read."""
 
-    def __init__(self, name: str, models: dict[str, bytes]) -> None:
+    def __init__(self, name: str, models: dict[str, bytearray]) -> None:
         self.children: dict[str, list[str]] = {}
         self.lost: dict[str, None] = {}
         self._object = ""
@@ -89,6 +110,8 @@ class _Package:
 
             look_through(f"{name}: {member}", content, begin)
         for member in sorted(referred):
+            if member and member not in models:
+                raise SceneError(f"{name}: refers to {member!r}, which is no model of the package")
             if meshes.get(member, 0) > 1:  # trimesh uses all of them for each reference
                 raise SceneError(
                     f"{name}: refers to {member}, which holds {meshes[member]} meshes; only one is read"

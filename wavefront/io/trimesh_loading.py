@@ -35,7 +35,7 @@ class Images:
             if os.path.exists(file):
                 content = self.files.read(file)
                 name = f"{os.fspath(self.files.scene)}: texture {reference!r}"
-                decode_codes(content, name, self.files.limits.pixels)
+                decode_codes(content, name, self.files.budget)
                 return content
         except SceneError as error:
             self.error = self.error or error

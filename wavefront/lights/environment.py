@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..codecs.budget import in_memory
 from ..colors import is_color_name, rgb
 from ..errors import one_of, rotation_matrix
 from ..layers import DEFAULT_GROUP, group_name
@@ -127,7 +129,8 @@ class Environment(Parametrized, Light):
         elif isinstance(radiance, str | os.PathLike) or (
             np.ndim(radiance) > 1 and np.shape(radiance) != (3, 1)  # a color as it is kept
         ):
-            image = ImageEnvironment.of(environment_pixels(radiance), self._filter, self._transform)
+            with in_memory(radiance) if isinstance(radiance, str | os.PathLike) else nullcontext():
+                image = ImageEnvironment.of(environment_pixels(radiance), self._filter, self._transform)
             self._radiance, self._image = image.mean, image
         else:
             self._radiance, self._image = rgb("Environment radiance", radiance), None

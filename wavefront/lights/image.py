@@ -10,8 +10,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..codecs.images import read_codes
-from ..colors import srgb_to_linear
+from ..codecs.budget import Budget
+from ..codecs.encoding import codes_to_linear
+from ..codecs.images import COLOR_BYTES, read_codes
 from ..counted import counted
 from ..elementary import arctan2, sin_cos, sin_cos_turns
 from ..errors import SceneError, warn_caller
@@ -156,7 +157,9 @@ def environment_pixels(source: Any) -> Floats:
         If it is no image, or a pixel is not finite.
     """
     if isinstance(source, str | os.PathLike):
-        codes, name = read_codes(source), f"Environment {Path(source).name!r}"
+        budget, name = Budget(), f"Environment {Path(source).name!r}"
+        codes = read_codes(source, budget)
+        budget.charge(name, COLOR_BYTES * codes.shape[0] * codes.shape[1])
     else:
         codes, name = np.asarray(source), "Environment image"
     if codes.ndim == 2:
@@ -164,10 +167,9 @@ def environment_pixels(source: Any) -> Floats:
     if codes.ndim != 3 or not 1 <= codes.shape[2] <= 4 or codes.dtype.kind not in "uif":
         raise SceneError(f"{name} is {codes.dtype} of shape {codes.shape}; it must be (H, W, 3)")
     check_size(codes.shape[0], codes.shape[1])
+    is_coded = codes.dtype in (np.uint8, np.uint16)
     with np.errstate(over="ignore"):  # an overflow is infinite, and is reported below
-        pixels = codes.astype(f4)
-    if codes.dtype in (np.uint8, np.uint16):
-        pixels /= f4(np.iinfo(codes.dtype).max)
+        pixels = codes_to_linear(codes) if is_coded else codes.astype(f4)
     if codes.shape[2] in (2, 4):
         clear = int((pixels[..., -1] != 1).sum())
         if clear:
@@ -176,9 +178,7 @@ def environment_pixels(source: Any) -> Floats:
         pixels = pixels[..., :-1]
     pixels = np.array(np.broadcast_to(pixels, (*pixels.shape[:2], 3)))
     _check_finite(name, pixels)
-    if codes.dtype in (np.uint8, np.uint16):
-        return srgb_to_linear(pixels)
-    return _without_negative(name, pixels)
+    return pixels if is_coded else _without_negative(name, pixels)
 
 
 def _check_finite(name: str, pixels: Floats) -> None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import os
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..codecs.budget import Budget
 from ..codecs.images import read_codes
 from ..colors import srgb_to_linear
 from ..counted import counted
@@ -200,10 +201,19 @@ class Texture(BaseTexture):
         return codes if table is None else table.take(codes)
 
 
+class StoredImage(NamedTuple):
+    """An image file that has been read."""
+
+    codes: NDArray[Any]  # (H, W, C) as stored
+    name: str
+
+
 def _codes(source: Any, max_pixels: int) -> tuple[NDArray[Any], str]:
     """Return texels (H, W, C) as uint8 or float32, and a name for messages."""
-    if isinstance(source, str | os.PathLike):
-        codes, name = read_codes(source, max_pixels), Path(source).name
+    if isinstance(source, StoredImage):
+        codes, name = source
+    elif isinstance(source, str | os.PathLike):
+        codes, name = read_codes(source, Budget(max_pixels)), Path(source).name
     else:
         codes, name = np.asarray(source), "array"
     if codes.ndim == 2:
