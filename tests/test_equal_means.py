@@ -1,9 +1,13 @@
 """Guided and re-used renders, and those with caustics, have the mean of plain ones, within three errors.
 
 The errors are 0.1 % at most. Printed are all means: `pytest -s -m slow tests/test_equal_means.py`.
+
+So have renders with default settings, which are large enough for the trial that chooses branches and re-use
+(`choice.py`): each reference scene again, of at least 192 × 192 pixels.
 """
 
 import sys
+from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -15,15 +19,16 @@ from scenes import Case
 from significance import ROUNDING, Mean, assert_mean, measure, repeat
 
 import wavefront as wf
+from wavefront import choice
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 from hard_scenes import HARD_SCENES
 
-pytestmark = pytest.mark.slow
 MAX_ERROR = 0.001
 SPP = 4096
 RUNS = 16  # pictures that share no noise, where pixels do
 SIZE = 64
+TUNED = 192  # the least side of pictures of which a trial chooses how paths go on
 PICTURES = {
     **{name: partial(build, SIZE) for name, build in HARD_SCENES.items()},
     **{
@@ -74,6 +79,7 @@ def plain(name: str) -> Mean:
     return mean_of_picture(name, SPP, **PLAIN)
 
 
+@pytest.mark.slow
 @techniques
 @pytest.mark.parametrize("name", PICTURES)
 def test_pictures(name: str, options: dict[str, Any]) -> None:
@@ -92,6 +98,7 @@ def test_pictures(name: str, options: dict[str, Any]) -> None:
     assert off <= 3 * np.hypot(found.error, exact.error)
 
 
+@pytest.mark.slow
 @techniques
 @pytest.mark.parametrize("case", [case for case in CASES if "full" in case.integrators], ids=str)
 def test_every_case(case: Case, options: dict[str, Any], close_tiles: None) -> None:
@@ -103,3 +110,79 @@ def test_every_case(case: Case, options: dict[str, Any], close_tiles: None) -> N
     measured = (mean_of_runs if runs else measure)(case.build(), spp, **chosen)
     print(f"{case}: {measured}, must be {case.expected:.6g}")
     assert_mean(measured, case.expected, MAX_ERROR, sigmas=3, rounding=ROUNDING + unseen)
+
+
+# --- What the trial chooses ------------------------------------------------------------------------
+
+# small pictures of a probe get no such warning
+all_one_color = pytest.mark.filterwarnings("ignore:the picture is")
+
+
+def tuned(scene: wf.Scene) -> wf.Scene:
+    """Give a scene a picture that is large enough for a trial."""
+    camera = scene.camera
+    scene.camera = wf.Camera(camera.origin, camera.rotation, camera.projection, (TUNED, TUNED))
+    return scene
+
+
+def mean_by_default(build: Callable[[], wf.Scene], spp: int, runs: int, **options: Any) -> tuple[Mean, str]:
+    """Render with default settings and several seeds, and return the mean and what was chosen."""
+    means, chosen = [], set()
+    for seed in range(1, runs + 1):
+        image = wf.render(tuned(build()), spp, seed=seed, progress=False, **options)
+        means.append(float(image.rgb.mean(dtype=float)))
+        chosen.add("shared" if image.metadata["reuse"] else f"branches {image.metadata['branches']}")
+    return Mean.of(np.array(means)), ", ".join(sorted(chosen))
+
+
+def has_trial(case: Case) -> bool:
+    """Whether the trial can choose anything for a case."""
+    return "full" in case.integrators and int(case.options.get("max_bounces", 4)) > 1  # type: ignore[call-overload]
+
+
+TUNED_CASES = [case for case in CASES if has_trial(case)]
+
+
+@all_one_color
+@pytest.mark.slow
+@pytest.mark.parametrize("case", TUNED_CASES, ids=str)
+def test_every_case_by_default(case: Case) -> None:
+    """The probe of each scene measures its known light, whatever the trial chooses."""
+    spp = 8
+    found, chosen = mean_by_default(case.build, spp, RUNS, **{"max_bounces": 4, **case.options})
+    print(f"{case}: {found} ({chosen}), must be {case.expected:.6g}")
+    unseen = 10 / (TUNED**2 * RUNS * spp * case.expected)  # see test_reference.py
+    assert_mean(found, case.expected, 3 * MAX_ERROR, rounding=ROUNDING + unseen)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PICTURES)
+def test_pictures_by_default(name: str) -> None:
+    found, chosen = mean_by_default(PICTURES[name], 16, RUNS)
+    exact = plain(name)
+    print(f"{name}: {found} ({chosen}) and plain {exact}")
+    assert max(exact.error / exact.value, found.error / found.value) <= 3 * MAX_ERROR
+    off = abs(found.value - exact.value) - ROUNDING * exact.value
+    assert off <= 3.5 * np.hypot(found.error, exact.error)  # with 16 runs, 1 % by Student's t
+
+
+@all_one_color
+@pytest.mark.parametrize(
+    ("name", "due"),
+    [
+        ("furnace of 0.5, 8 bounces", "shared"),
+        ("point light in a sphere", "shared"),
+        ("half-hidden rectangle", "branches 3"),
+        ("point light, offset 1.5", "branches 1"),
+    ],
+)
+def test_the_trial_keeps_means(name: str, due: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Some of the cases, quickly; the trial has taken place."""
+    trials, run_trial = [], choice.run_trial
+    monkeypatch.setattr(choice, "run_trial", lambda *a, **k: trials.append(1) or run_trial(*a, **k))
+    (case,) = (case for case in CASES if case.name == name)
+    options = {"max_bounces": 4, **case.options, "workers": 1, "accel": "numpy"}
+    found, chosen = mean_by_default(case.build, 1, 6, **options)
+    assert len(trials) >= 6
+    assert chosen == due
+    assert_mean(found, case.expected, 0.003)

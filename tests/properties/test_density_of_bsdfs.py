@@ -27,6 +27,7 @@ from wavefront.bsdfs import (
 from wavefront.bsdfs.microfacet import alpha_of, visible_normals
 from wavefront.sampling.warp import cosine_hemisphere_inverse
 from wavefront.state import SurfaceInteraction
+from wavefront.vec import INV_PI
 
 f4 = np.float32
 CHOICES = 1024  # numbers u[2] that are tried: the part of a lobe is known to 2/CHOICES
@@ -34,6 +35,17 @@ part = st.floats(0.05, 1)
 rough = st.floats(0.2, 1)
 color = st.tuples(part, part, part)
 index = st.floats(1.1, 2.5) | st.floats(0.4, 0.9)
+
+
+class ByValue(Bsdf):
+    """A material of one's own that gives its value only."""
+
+    def __init__(self, reflectance: float) -> None:
+        self.reflectance = np.float32(reflectance)
+
+    def f(self, wo, wi):
+        return self.reflectance * INV_PI * (wi[2] > 0) * (1 + wi[0]) * np.ones_like(wi)
+
 
 MATTE = st.one_of(st.builds(Diffuse, color), st.builds(OrenNayar, color, st.floats(0, 1)))
 SHINY = st.one_of(
@@ -63,6 +75,7 @@ KINDS = {
         sheen=st.just(0.0) | part,
         specular=st.floats(0, 1),
     ),
+    ByValue: st.builds(ByValue, part),
     Mix: st.builds(Mix, MATTE, SHINY | st.builds(Mirror, color), st.floats(0.1, 0.9)),
 }
 kinds = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
@@ -74,7 +87,7 @@ cubes = st.tuples(inner, inner, inner)
 
 
 def test_every_bsdf_is_here() -> None:
-    assert {*bsdfs.ALL, ShadowCatcher} == set(KINDS)
+    assert {*bsdfs.ALL, ShadowCatcher, ByValue} == set(KINDS)
 
 
 def bound_to(bsdf: Bsdf, wo: np.ndarray, inside: bool) -> Bsdf:
@@ -224,14 +237,15 @@ def test_densities_integrate_to_the_chance_of_a_sample(
 ) -> None:
     """Over the sphere, by the midpoint rule; delta lobes and directions to the wrong side are left out."""
     bsdf, wo = data.draw(KINDS[kind]), toward(z).astype(f4)
-    rows = 200
-    z_of, phi = np.meshgrid(
-        (np.arange(rows) + 0.5) / rows * 2 - 1, 2 * np.pi * (np.arange(2 * rows) + 0.5) / (2 * rows)
+    rows = 256
+    theta, phi = np.meshgrid(
+        np.pi * (np.arange(rows) + 0.5) / rows, np.pi * (np.arange(2 * rows) + 0.5) / rows
     )
-    r = np.sqrt(1 - z_of * z_of)
-    w = np.stack([r * np.cos(phi), r * np.sin(phi), z_of]).reshape(3, -1).astype(f4)
+    r = np.sin(theta)
+    w = np.stack([r * np.cos(phi), r * np.sin(phi), np.cos(theta)]).reshape(3, -1).astype(f4)
     wide = np.repeat(wo, w.shape[1], 1)
-    total = 4 * np.pi * bound_to(bsdf, wide, inside).pdf(wide, w).mean(dtype=float)
+    pdf = bound_to(bsdf, wide, inside).pdf(wide, w)
+    total = 2 * np.pi**2 * (pdf * r.ravel()).mean(dtype=float)
     side = 32
     grid = (np.indices((side,) * 3).reshape(3, -1) + 0.5) / side
     sample = sampled(bsdf, wo, grid.astype(f4)[: bsdf.dimensions], inside)
