@@ -77,7 +77,7 @@ BAD = {
     "segments two": ({"segments": 2}, "disk: segments is 2; it must be a whole number from 3 to 65536"),
     "segments fraction": ({"segments": 8.5}, "disk: segments is 8.5; it must be a whole number"),
     "emission": ({"emission": -1}, "disk: emission is -1; it must be at least 0"),
-    "material": ({"material": "red"}, "disk: material must be a material"),
+    "material": ({"material": 3}, "disk: material must be a material"),
 }
 
 

@@ -181,7 +181,7 @@ CASES: dict[str, dict[str, tuple[Write, str]]] = {
     "short lines": {
         "v": (text(FACE.replace("v 1 0 0", "v 1 0")), r"a\.obj line 2: v has 2 numbers"),
         "f": (text(POINTS + "f 1 2\n"), r"a\.obj line 4: f has 2 corners"),
-        "no faces": (text(POINTS), r"a\.obj: has no faces"),
+        "no faces": (text("vn 0 0 1\n"), r"a\.obj: has no faces"),
         "ply": (
             text(PLY.format("ascii", 3, 1) + "0 0 0\n1 0\n0 1 0\n3 0 1 2\n", "a.ply"),
             r"a\.ply line 11: vertex has 2 words; it must have 3",

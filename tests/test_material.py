@@ -41,7 +41,7 @@ def test_a_bare_bsdf_is_taken_wherever_a_material_is(shape) -> None:
     assert bsdf.reflectance[0] == np.float32(0.1)
     material = wf.Material(bsdf, alpha=0.5)
     assert shape(material).material is material
-    with pytest.raises(wf.SceneError, match=r"material must be a material such as wf.Diffuse\(0.5\), got 3"):
+    with pytest.raises(wf.SceneError, match=r'material must be a material such as .* or "gold", got 3'):
         shape(3)
 
 
@@ -52,7 +52,7 @@ def test_render_takes_both() -> None:
     bare = render(ball, 2, material=wf.Diffuse(0.2), **options).rgb
     assert np.array_equal(render(ball, 2, material=wf.Material(wf.Diffuse(0.2)), **options).rgb, bare)
     with pytest.raises(wf.SceneError, match="material must be a material such as"):
-        render(ball, 2, material="red", **options)
+        render(ball, 2, material=3, **options)
 
 
 @pytest.mark.parametrize(

@@ -70,7 +70,7 @@ BAD = [
     (wf.PointLight, POINT, {"position": (0, 0, NAN)}, rf"PointLight position\[2\] is nan; {FINITE}"),
     (wf.PointLight, POINT, {"intensity": -1}, r"PointLight intensity is -1; it must be at least 0"),
     (wf.PointLight, POINT, {"intensity": (1, NAN, 1)}, r"PointLight intensity\[1\] is nan"),
-    (wf.PointLight, POINT, {"intensity": "bright"}, r"PointLight intensity must be numeric, got 'bright'"),
+    (wf.PointLight, POINT, {"intensity": "bright"}, r"PointLight intensity is 'bright', which is no color"),
     (wf.Environment, {}, {"radiance": -0.5}, r"Environment radiance is -0.5; it must be at least 0"),
     (wf.Environment, {}, {"radiance": INF}, r"Environment radiance is inf"),
     (wf.Environment, {}, {"radiance": (1, 2, 3, 4)}, r"Environment radiance must have shape \(3,\), got \(4,\)"),

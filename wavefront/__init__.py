@@ -57,10 +57,12 @@ from .sampling.sampler import Sampler
 from .scene import Scene
 from .session import Session
 from .shapes import (
+    Box,
     Capsules,
     Cylinders,
     Disk,
     Edges,
+    HeightField,
     Instance,
     Mesh,
     Points,
@@ -80,6 +82,7 @@ if TYPE_CHECKING:
     from .animation import save_animation
     from .camera.moves import interpolate_cameras, orbit
     from .datasets import write_dataset
+    from .io.foreign import from_open3d, from_pyvista
     from .io.load import from_trimesh, load, load_mesh
     from .io.sources import LoadLimits
     from .metrics import Comparison, compare
@@ -92,6 +95,8 @@ register_preview(ball_png)
 _LATER = {  # what many programs do without is imported when they ask for it
     "Comparison": ".metrics",
     "compare": ".metrics",
+    "from_open3d": ".io.foreign",
+    "from_pyvista": ".io.foreign",
     "from_trimesh": ".io.load",
     "interpolate_cameras": ".camera.moves",
     "LoadLimits": ".io.sources",
@@ -110,6 +115,7 @@ _LATER = {  # what many programs do without is imported when they ask for it
 __all__ = [
     "Accelerator",
     "BaseTexture",
+    "Box",
     "Bsdf",
     "BsdfSample",
     "BumpMap",
@@ -128,6 +134,7 @@ __all__ = [
     "Environment",
     "Frame",
     "Geometry",
+    "HeightField",
     "Image",
     "InfiniteLight",
     "Instance",
@@ -167,6 +174,8 @@ __all__ = [
     "Viewer",
     "compare",
     "elementary",
+    "from_open3d",
+    "from_pyvista",
     "from_trimesh",
     "integrators",
     "interpolate_cameras",

@@ -19,8 +19,8 @@ from .shapes import Instance, Mesh, Shape
 
 SIZE = (512, 512)  # pixels
 CAN_BE_RENDERED = (
-    "a wf.Scene, a path, a trimesh mesh or scene, (vertices, faces) as a tuple, a shape such as wf.Mesh, "
-    "wf.Rectangle, wf.Disk or wf.Sphere, or a list of these"
+    "a wf.Scene, a path, a mesh of trimesh, PyVista or Open3D, (vertices, faces) as a tuple, a shape such as "
+    "wf.Mesh, wf.Rectangle, wf.Disk or wf.Sphere, or a list of these"
 )
 
 
@@ -54,8 +54,9 @@ def as_scene(subject: Any, material: MaterialLike | None = None, progress: Progr
         from .io.load import load  # here, so that scenes in memory do not pay for readers
 
         return _all_made_of(load(subject, progress=progress), material)
-    if importer(subject) is not None:
-        return _all_made_of(_imported(subject), material)
+    convert = importer(subject)
+    if convert is not None:
+        return _all_made_of(convert(subject), material)
     if _is_pair(subject):
         return Scene([Mesh(*subject, material=material)])
     if isinstance(subject, list | tuple) and subject:
@@ -131,4 +132,18 @@ def _imported(geometry: Any) -> Scene:
     return from_trimesh(geometry)
 
 
+def _from_pyvista(data: Any) -> Scene:
+    from .io.foreign import from_pyvista
+
+    return from_pyvista(data)
+
+
+def _from_open3d(data: Any) -> Scene:
+    from .io.foreign import from_open3d
+
+    return from_open3d(data)
+
+
 register_importer("trimesh", _imported)
+register_importer("pyvista", _from_pyvista)
+register_importer("open3d", _from_open3d)

@@ -50,14 +50,15 @@ def scaled_shapes(shapes: Sequence[Shape], factor: float) -> list[Shape]:
         return materials[id(given)]
 
     meshes = {
-        key: _with_material(mesh.scaled(own[key]), material(mesh.material)) for key, mesh in placed.items()
+        key: _with_material(mesh.lengths_times(own[key]), material(mesh.material))
+        for key, mesh in placed.items()
     }
     out: list[Shape] = []
     for shape in shapes:
         if isinstance(shape, Instance):
-            part: Shape = shape.scaled(factor, meshes[id(shape.mesh)], own[id(shape.mesh)])
+            part: Shape = shape.with_mesh(factor, meshes[id(shape.mesh)], own[id(shape.mesh)])
         elif isinstance(shape, Mesh | CurvedShape):
-            part = shape.scaled(factor)
+            part = shape.lengths_times(factor)
         else:
             raise SceneError(f"{shape.name}: cannot scale a {type(shape).__name__}")
         out.append(_with_material(part, material(shape.material)))

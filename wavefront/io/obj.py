@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from .lines import NUMBER, check_lines, words
-from .repair import RawMesh, warn
+from .repair import RawMesh, Table, warn
 from .sources import LoadLimits
 from .trimesh_import import import_trimesh
 from .trimesh_loading import geometries
@@ -46,6 +46,7 @@ class Obj:
     raws: list[RawMesh] = field(default_factory=list)  # by material; colors sRGB, NaN where a line has none
     libraries: list[str] = field(default_factory=list)  # material files, as written
     ignored: dict[str, int] = field(default_factory=dict)  # keyword that is not read -> its first line
+    points: Table | None = None  # (n, 3), or (n, 6) with sRGB colors, of a file without faces
 
 
 class Kind(NamedTuple):
@@ -110,7 +111,8 @@ def parse(name: str, text: str, strict: bool = False, limits: LoadLimits | None 
             elif keyword not in UNSEEN and rest not in OFF:
                 out.ignored.setdefault(keyword, at + 1)
     if not lines.groups:
-        raise SceneError(f"{name}: has no faces")
+        out.points = _points(lines)
+        return out
     (limits or LoadLimits()).check_meshes(name, len(lines.groups))
     added, classes = _faces(lines)
     faces = [line for number, each in enumerate(classes) for line in (f"usemtl {number}", *each.faces)]
@@ -166,6 +168,13 @@ def _tables(lines: _Lines) -> list[str]:
         width = min(MOST[keyword], max([least, *(lines.kinds[at].width for at in rows)]))
         written += [lines.texts[at] + fill * (width - lines.kinds[at].width) for at in rows]
     return written
+
+
+def _points(lines: _Lines) -> Table:
+    """Return the numbers of all lines of v, (n, 3), or (n, 6) where all have colors."""
+    rows = lines.rows["v"]
+    width = 6 if rows and all(lines.kinds[at].width >= 6 for at in rows) else 3
+    return np.array([words(lines.texts[at])[1 : width + 1] for at in rows], np.float64).reshape(-1, width)
 
 
 def _faces(lines: _Lines) -> tuple[list[str], list[_Class]]:

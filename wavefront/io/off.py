@@ -23,10 +23,11 @@ def parse(name: str, data: bytes, strict: bool, materials: bool) -> Any:
     """
     lines = [line.partition("#")[0].split() for line in decode_text(data).split("\n")]
     rows = [(number, words) for number, words in enumerate(lines, 1) if words]
-    header = rows[0][1][0].upper() if rows else ""
+    first = rows[0][1][0].upper() if rows else ""
+    header = first.rstrip("0123456789")  # some files have the counts at once after it: OFF8 6 12
     if header not in HEADERS:
-        raise SceneError(f"{name}: begins with {header[:20]!r}; it must be one of {', '.join(HEADERS)}")
-    rows[0] = (rows[0][0], rows[0][1][1:])
+        raise SceneError(f"{name}: begins with {first[:20]!r}; it must be one of {', '.join(HEADERS)}")
+    rows[0] = (rows[0][0], [word for word in (first[len(header) :], *rows[0][1][1:]) if word])
     if not rows[0][1]:
         del rows[0]
     (vertices, faces), rows = _counts(name, rows), rows[1:]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeAlias
 
@@ -15,6 +15,7 @@ from ..registry import Registry
 from ..scene import Scene
 from . import dae, gltf, mtl, obj, off, ply, stl, threemf, trimesh_objects, visuals
 from .appearance import MaterialSpec, assign_material
+from .clouds import cloud, cloud_of_trimesh
 from .contents import Contents
 from .gltf_materials import GltfMaterials
 from .placing import Places
@@ -82,6 +83,10 @@ def _read_obj(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
     if parsed.ignored:
         listed = ", ".join(f"{keyword} (line {line})" for keyword, line in parsed.ignored.items())
         warn(f"{name}: not honored: {listed}", strict)
+    if parsed.points is not None:
+        codes = None if parsed.points.shape[1] < 6 else visuals.from_srgb(parsed.points[:, 3:])
+        points = cloud(name, parsed.points[:, :3], codes, strict)
+        return Contents([], Places.once(0), shapes=[] if points is None else [points])
     specs = _libraries(files, parsed.libraries, strict) if materials else {}
     for raw in parsed.raws:
         raw.colors = None if raw.colors is None else visuals.from_srgb(raw.colors)
@@ -115,7 +120,8 @@ def _read_ply(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
     faces = sum(len(raw.faces) for raw in contents.raws)
     if faces < claimed:
         raise SceneError(f"{name}: claims {counted(claimed, 'row')} of face; {faces} can be read")
-    return contents
+    points = cloud_of_trimesh(name, found, wish.strict) if not faces else None
+    return contents if points is None else replace(contents, shapes=[points])
 
 
 def _read_stl(files: SceneFiles, data: bytes, wish: Wish) -> Contents:

@@ -20,6 +20,8 @@ def _coefficient(name: str, value: Any) -> Any:
     """Return a coefficient per channel, (3, 1) float32, at least 0."""
     if isinstance(value, BaseTexture):
         raise SceneError(f"{name} must be a color, not a texture: it belongs to a volume, not to a surface")
+    if isinstance(value, str):
+        raise SceneError(f"{name} must be numeric, not the name of a color, got {value!r}")
     return rgb(name, value)
 
 

@@ -2,7 +2,9 @@
 
 from .arrays import PrimitiveArray
 from .base import CurvedShape, Shape
+from .box import Box
 from .disk import Disk
+from .height_field import HeightField
 from .instance import Instance
 from .mesh import Mesh, Rectangle
 from .points import Edges, Points
@@ -11,11 +13,13 @@ from .sphere import Sphere
 from .spheres import Spheres
 
 __all__ = [
+    "Box",
     "Capsules",
     "CurvedShape",
     "Cylinders",
     "Disk",
     "Edges",
+    "HeightField",
     "Instance",
     "Mesh",
     "Points",

@@ -82,6 +82,10 @@ class PrimitiveArray(ColoredShape, CurvedShape):
         shape.check()
         return shape
 
+    def transformed(self, matrix: ArrayLike) -> Self:
+        """Return a copy that is moved, turned, mirrored or scaled by one factor: as `placed`."""
+        return self.placed(finite_array(f"{self.name}: transform", matrix, (4, 4)))
+
     def check(self) -> None:
         """Check the arrays against each other; they may have been assigned one by one.
 

@@ -7,9 +7,11 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from ..errors import number
 from ..materials import Material, MaterialLike, as_material
+from .transform import rotation, scaling, translation
 
 
 class Checked:
@@ -85,6 +87,95 @@ class Shape(ABC):
     def bounds(self) -> NDArray[np.float64]:
         """Lower and upper corner, (2, 3), scene units."""
 
+    @abstractmethod
+    def transformed(self, matrix: ArrayLike) -> Self:
+        """Return a copy that is placed by an affine matrix; the shape itself stays.
+
+        Parameters
+        ----------
+        matrix
+            (4, 4), for column vectors: the translation is its last column. A reflection keeps the front
+            side. Texture coordinates of spheres, cylinders and capsules are those of shapes made there.
+
+        Raises
+        ------
+        SceneError
+            If the matrix is malformed, or scales a shape that is not made of triangles by several factors.
+
+        Examples
+        --------
+        >>> wf.Box((0, 0, 0), 1).transformed(np.diag([2, 1, 1, 1])).bounds.tolist()
+        [[-1.0, -0.5, -0.5], [1.0, 0.5, 0.5]]
+        """
+
+    def translated(self, offset: ArrayLike) -> Self:
+        """Return a copy that is moved by `offset` (3,), scene units.
+
+        Raises
+        ------
+        SceneError
+            If the offset is malformed.
+
+        Examples
+        --------
+        >>> wf.Sphere((0, 0, 0), 1).translated((0, 1, 0)).center.tolist()
+        [0.0, 1.0, 0.0]
+        """
+        return self.transformed(translation(f"{self.name}: offset", offset))
+
+    def rotated(self, axis: ArrayLike, degrees: float, about: ArrayLike = (0, 0, 0)) -> Self:
+        """Return a copy that is turned about an axis, counter-clockwise for who looks against the axis.
+
+        Parameters
+        ----------
+        axis
+            (3,) of any length, or "x", "y" or "z".
+        degrees
+            The angle.
+        about
+            (3,) a point of the axis, scene units.
+
+        Raises
+        ------
+        SceneError
+            If an argument is malformed, or the axis zero.
+
+        Examples
+        --------
+        >>> wf.Sphere((1, 0, 0), 0.5).rotated("z", 90).center.tolist()
+        [0.0, 1.0, 0.0]
+        """
+        return self.transformed(rotation(self.name, axis, degrees, about))
+
+    def scaled(self, factor: ArrayLike) -> Self:
+        """Return a copy whose lengths are multiplied, about the origin; the material is the same.
+
+        Parameters
+        ----------
+        factor
+            One number, or one for each axis (3,), which only meshes and instances take. None may be 0; an
+            odd number of negative ones mirrors.
+
+        Raises
+        ------
+        SceneError
+            If a factor is 0 or not finite, or the shape takes one alone.
+
+        Examples
+        --------
+        >>> wf.Sphere((1, 0, 0), 0.5).scaled(2).bounds.tolist()
+        [[1.0, -1.0, -1.0], [3.0, 1.0, 1.0]]
+        """
+        if np.ndim(factor) == 0:
+            one = number(f"{self.name}: factor", factor, lambda x: x != 0, "other than 0")
+            if one > 0:
+                return self.lengths_times(one)
+        return self.transformed(scaling(f"{self.name}: factor", factor))
+
+    def lengths_times(self, factor: float) -> Self:
+        """Return a copy with all lengths multiplied by a factor above 0, without other rounding."""
+        return self.transformed(scaling(f"{self.name}: factor", factor))
+
 
 class CurvedShape(Shape):
     """Base class of shapes whose primitives are not triangles: one `Sphere`, or many of one kind."""
@@ -95,7 +186,3 @@ class CurvedShape(Shape):
     @abstractmethod
     def count(self) -> int:
         """Number of primitives."""
-
-    @abstractmethod
-    def scaled(self, factor: float) -> Self:
-        """Return the shape with all lengths multiplied by `factor`, and the same material."""

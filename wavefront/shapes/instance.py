@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -155,7 +156,15 @@ class Instance(Shape):
         mesh.tangents = moved_tangents(self.transform, mesh.tangents)
         return mesh
 
-    def scaled(self, factor: float, mesh: Mesh, own: float) -> Instance:
+    def transformed(self, matrix: ArrayLike) -> Self:
+        """Return a copy that is placed by a further matrix (4, 4), as of every `Shape`."""
+        placing = _invertible(f"{self.name}: transform", matrix)
+        instance = copy(self)
+        instance.transform = placing @ self.transform
+        check_range(self.name, _placed(instance.transform, self.mesh.vertices).T)
+        return instance
+
+    def with_mesh(self, factor: float, mesh: Mesh, own: float) -> Instance:
         """Return the instance with all lengths multiplied by `factor`, and the same material.
 
         Parameters

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from copy import copy
 from functools import partial
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,7 @@ from ..textures.parameter import Color, color
 from ..vec import FLOAT32_MAX, cross, spans
 from .base import Checked
 from .colored import ColoredShape
+from .transform import moved, moved_tangents
 
 MOST_DOUBLINGS = 60  # log2 of the length, or its inverse, of vectors that are stored unchanged
 AT_ONCE = 1 << 14  # faces whose area is found together, so that they fit the cache
@@ -211,8 +212,16 @@ class Mesh(ColoredShape):
                 f"{self.name}: dropped {counted(flat.size, 'face')} of zero area, first: face {flat[0]}"
             )
 
-    def scaled(self, factor: float) -> Mesh:
-        """Return the mesh with all lengths multiplied by `factor`, and the same material."""
+    def transformed(self, matrix: ArrayLike) -> Self:
+        """Return a copy that is placed by an affine matrix (4, 4), as of every `Shape`."""
+        placing = finite_array(f"{self.name}: transform", matrix, (4, 4))
+        mesh = copy(self)
+        mesh.vertices, mesh.faces, mesh.normals = moved(placing, self.vertices, self.faces, self.normals)
+        mesh.tangents = moved_tangents(placing, self.tangents)
+        return mesh
+
+    def lengths_times(self, factor: float) -> Self:
+        """Return the mesh with all lengths multiplied by `factor`."""
         mesh = copy(self)
         mesh.vertices = self.vertices * factor
         return mesh

@@ -8,18 +8,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SceneError, finite_array
+from ..colors import srgb
+from ..errors import SceneError, finite_array, warn_caller
 from ..materials import MaterialLike
 from ..suggestions import suggests_keywords
-from .mesh import Mesh
+from .mesh import Mesh, positions
 from .segments import Capsules
 from .spheres import Spheres
+
+NEIGHBOR = 4  # of a square grid a point has so many neighbors at the same distance
+MOST_DISTANCES, LEAST_POINTS = 1 << 22, 64  # that are looked at to choose a radius
 
 
 @suggests_keywords
 def Points(
     points: Any,
-    radius: ArrayLike,
+    radius: ArrayLike | None = None,
     colors: ArrayLike | None = None,
     *,
     material: MaterialLike | None = None,
@@ -30,9 +34,11 @@ def Points(
     Parameters
     ----------
     points
-        (n, 3) scene units, or a `trimesh.PointCloud`, whose colors are taken if it has any.
+        (n, 3) scene units; or a `trimesh.PointCloud`, a point cloud of Open3D or points of PyVista, whose
+        colors are taken if it has any.
     radius
-        One number, or (n,), scene units.
+        One number, or (n,), scene units. By default half of the median distance of a point to its fourth
+        nearest neighbor, so that spheres on a grid touch; a warning states it.
     colors
         (n, 3) or (n, 4), as of `Spheres`.
     material, name
@@ -47,12 +53,13 @@ def Points(
     --------
     >>> cloud = wf.Points(np.random.default_rng(1).random((100, 3)), radius=0.01)
     """
-    if hasattr(points, "vertices"):
-        given = getattr(points, "colors", None)
-        if colors is None and given is not None and len(given) == len(points.vertices):
-            colors = given
-        points = points.vertices
-    return Spheres(points, radius, colors, material=material, name=name)
+    places, given = cloud_arrays(points)
+    colors = given if colors is None else colors
+    places = positions(f"{name}: centers", places)
+    if radius is None:
+        radius = usual_radius(places)
+        warn_caller(f"{name}: {len(places)} points are shown as spheres of radius {radius:.3g}")
+    return Spheres(places, radius, colors, material=material, name=name)
 
 
 @suggests_keywords
@@ -85,6 +92,47 @@ def Edges(
     if not len(starts):
         raise SceneError(f"{name}: has no edges")
     return Capsules(starts, ends, radius, material=material, name=name)
+
+
+def cloud_arrays(points: Any) -> tuple[Any, Any]:
+    """Return the points (n, 3) of an array or of an object that has some, and their colors, or None.
+
+    Known are the attributes of trimesh (`vertices`, `colors`), of Open3D (`points`, `colors`, which are sRGB)
+    and of PyVista (`points`, `point_data`).
+    """
+    if hasattr(points, "vertices"):
+        given, places, kind = getattr(points, "colors", None), points.vertices, None
+    elif hasattr(points, "points"):
+        data = getattr(points, "point_data", None)
+        given = getattr(points, "colors", None) if data is None else point_colors(data)
+        places, kind = np.asarray(points.points), np.float64
+    else:
+        return points, None
+    if given is None or len(given) != len(places):
+        return places, None
+    colors = np.asarray(given)
+    return places, srgb(np.clip(colors, 0, 1)) if kind is not None and colors.dtype == kind else colors
+
+
+def point_colors(data: Any) -> Any:
+    """Return the colors of PyVista's `point_data`: an array of bytes, (n, 3) or (n, 4); None without one."""
+    arrays = [np.asarray(data[name]) for name in data.keys()]  # noqa: SIM118
+    found = [each for each in arrays if each.dtype == np.uint8 and each.ndim == 2 and each.shape[1] in (3, 4)]
+    return found[0] if found else None
+
+
+def usual_radius(points: NDArray[np.float64]) -> float:
+    """Return a radius for spheres at points (n, 3) so that they nearly touch: see `Points`."""
+    count = len(points)
+    some = points[:: max(1, count // max(LEAST_POINTS, MOST_DISTANCES // count))]
+    rank = min(NEIGHBOR, count - 1)
+    found = np.zeros(len(some))
+    for number, point in enumerate(some):
+        away = points - point
+        squares = away[:, 0] * away[:, 0] + away[:, 1] * away[:, 1] + away[:, 2] * away[:, 2]
+        found[number] = np.partition(squares, rank)[rank]
+    radius = 0.5 * float(np.sqrt(np.median(found)))
+    return radius or 0.01 * float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
 
 
 def _ends_of_mesh(mesh: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -63,8 +63,8 @@ class SegmentArray(PrimitiveArray):
             raise SceneError(f"{self.name}: has {starts} and {ends}")
         super().check()
 
-    def scaled(self, factor: float) -> Self:
-        """Return the shape with all lengths multiplied by `factor`, and the same material."""
+    def lengths_times(self, factor: float) -> Self:
+        """Return the shape with all lengths multiplied by `factor`."""
         shape = copy(self)
         shape.starts, shape.ends = self.starts * factor, self.ends * factor
         shape.radii = self.radii * factor

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -106,13 +107,17 @@ class Sphere(EvenEmission):
         """The radius as an array, (1,)."""
         return np.array([self.radius])
 
-    def scaled(self, factor: float) -> Sphere:
-        """Return the sphere with all lengths multiplied by `factor`, and the same material."""
+    def transformed(self, matrix: ArrayLike) -> Self:
+        """Return a copy that is moved, turned, mirrored or scaled by one factor: as `placed`."""
+        return self.placed(matrix)
+
+    def lengths_times(self, factor: float) -> Self:
+        """Return the sphere with all lengths multiplied by `factor`."""
         sphere = copy(self)
         sphere.center, sphere.radius = self.center * factor, self.radius * factor
         return sphere
 
-    def placed(self, transform: ArrayLike) -> Sphere:
+    def placed(self, transform: ArrayLike) -> Self:
         """Return a copy that is moved, turned, mirrored or scaled by one factor.
 
         Parameters

@@ -74,8 +74,8 @@ class Spheres(EvenEmission, PrimitiveArray):
         """Number of spheres."""
         return len(self.centers)
 
-    def scaled(self, factor: float) -> Self:
-        """Return the spheres with all lengths multiplied by `factor`, and the same material."""
+    def lengths_times(self, factor: float) -> Self:
+        """Return the shape with all lengths multiplied by `factor`."""
         spheres = copy(self)
         spheres.centers, spheres.radii = self.centers * factor, self.radii * factor
         return spheres

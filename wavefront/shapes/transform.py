@@ -1,4 +1,4 @@
-"""Affine transforms of meshes."""
+"""Affine transforms of shapes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from functools import reduce
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SceneError, finite_array
+from ..elementary import sin_cos_turns
+from ..errors import SceneError, finite_array, number, one_of
 from ..vec import Doubles, Ints
 
 Matrix = NDArray[np.float64]  # (4, 4), or several
@@ -85,3 +86,36 @@ def moved(
         cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
         normals = normals @ (-cofactors if mirrored else cofactors).T
     return vertices @ linear.T + shift, faces, normals
+
+
+def translation(name: str, offset: ArrayLike) -> Matrix:
+    """Return the matrix (4, 4) that moves by an offset (3,), which `name` names in messages."""
+    matrix = IDENTITY.copy()
+    matrix[:3, 3] = finite_array(name, offset, (3,))
+    return matrix
+
+
+def rotation(name: str, axis: ArrayLike, degrees: float, about: ArrayLike) -> Matrix:
+    """Return the matrix (4, 4) that turns a shape, called `name`, about an axis through a point (3,)."""
+    if isinstance(axis, str):
+        direction = np.eye(3)["xyz".index(one_of(f"{name}: axis", axis, ("x", "y", "z")))]
+    else:
+        direction = finite_array(f"{name}: axis", axis, (3,))
+    if not direction.any():
+        raise SceneError(f"{name}: axis is {direction.tolist()}; it must not be zero")
+    x, y, z = unit = direction / np.linalg.norm(direction)
+    sin, cos = sin_cos_turns(np.array([number(f"{name}: degrees", degrees) / 360]))
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    matrix = IDENTITY.copy()
+    matrix[:3, :3] = cos * np.eye(3) + (1 - cos) * np.outer(unit, unit) + sin * skew
+    point = finite_array(f"{name}: about", about, (3,))
+    matrix[:3, 3] = point - matrix[:3, :3] @ point
+    return matrix
+
+
+def scaling(name: str, factor: ArrayLike) -> Matrix:
+    """Return the matrix (4, 4) that multiplies lengths by one factor, or by one for each axis."""
+    factors = finite_array(name, factor, () if np.ndim(factor) == 0 else (3,))
+    if not factors.all():
+        raise SceneError(f"{name} is {factors.tolist()}; none may be 0")
+    return np.diag([*np.broadcast_to(factors, 3), 1.0])

@@ -1,0 +1,47 @@
+"""Files of points without faces."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..counted import counted
+from ..shapes import Points, Spheres
+from ..shapes.points import usual_radius
+from .repair import Table, warn
+
+
+def cloud(name: str, points: Table, colors: Any, strict: bool) -> Spheres | None:
+    """Return a sphere at each point (n, 3) of a file, and say so; None if there is none.
+
+    Raises
+    ------
+    SceneError
+        If `strict`, as this is a repair.
+    """
+    sound = np.isfinite(points).all(1)
+    if not sound.any():
+        return None
+    if not sound.all():
+        lost = counted(int((~sound).sum()), "point")
+        warn(f"{name}: dropped {lost} not finite, first: point {np.argmin(sound)}", strict)
+    places = points[sound]
+    radius = usual_radius(places)
+    warn(
+        f"{name}: has no faces; {counted(len(places), 'point')} become spheres of radius {radius:.3g} "
+        "(wf.Points takes another)",
+        strict,
+    )
+    return Points(places, radius, None if colors is None else colors[sound])
+
+
+def cloud_of_trimesh(name: str, scene: Any, strict: bool) -> Spheres | None:
+    """Return a sphere at each point of the clouds of a trimesh scene; None if there is none."""
+    clouds = [each for each in scene.geometry.values() if type(each).__name__ == "PointCloud"]
+    if not clouds:
+        return None
+    points = np.concatenate([np.asarray(each.vertices, np.float64).reshape(-1, 3) for each in clouds])
+    colors = [np.asarray(each.colors) for each in clouds]
+    whole = sum(map(len, colors)) == len(points) and all(each.dtype == np.uint8 for each in colors)
+    return cloud(name, points, np.concatenate(colors) if whole else None, strict)

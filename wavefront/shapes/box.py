@@ -1,0 +1,69 @@
+"""Boxes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import SceneError, finite_array
+from ..materials import MaterialLike
+from ..suggestions import suggests_keywords
+from ..textures.parameter import Color
+from .mesh import Mesh
+
+# of each side: the axes along u and v, whose cross product is the axis of the normal
+SIDES = ((1, 2, 0), (2, 0, 1), (0, 1, 2))
+
+
+@suggests_keywords
+def Box(
+    center: ArrayLike,
+    size: ArrayLike,
+    *,
+    material: MaterialLike | None = None,
+    emission: Color | None = None,
+    name: str = "box",
+) -> Mesh:
+    """Return a box along the axes as a mesh of twelve triangles; its outside is the front.
+
+    Parameters
+    ----------
+    center
+        (3,) scene units.
+    size
+        Edge lengths along x, y and z (3,), or one for a cube, scene units, above 0.
+    material, emission, name
+        As for `Mesh`. Texture coordinates run from 0 to 1 over each side.
+
+    Raises
+    ------
+    SceneError
+        If an argument is malformed or out of range.
+
+    Examples
+    --------
+    >>> crate = wf.Box((0, 0.5, 0), 1, material="clay").rotated("y", 30)
+    >>> wf.Box((0, 1, 0), (4, 2, 4)).bounds.tolist()
+    [[-2.0, 0.0, -2.0], [2.0, 2.0, 2.0]]
+    """
+    middle = finite_array(f"{name}: center", center, (3,))
+    edges = finite_array(f"{name}: size", size, () if np.ndim(size) == 0 else (3,))
+    if not (edges > 0).all():
+        raise SceneError(f"{name}: size is {edges.tolist()}; it must be above 0")
+    half = np.broadcast_to(edges / 2, 3)
+    square = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    corners = np.empty((6, 4, 3))
+    for side, (u, v, axis) in enumerate(SIDES):
+        for sign in (0, 1):
+            part = corners[2 * side + sign]
+            part[:, axis] = 2 * sign - 1
+            part[:, u], part[:, v] = square[:, 0] * (2 * sign - 1), square[:, 1]
+    quad = 4 * np.arange(6)[:, None, None] + np.array([[0, 1, 2], [0, 2, 3]])
+    return Mesh(
+        middle + half * corners.reshape(-1, 3),
+        quad.reshape(-1, 3),
+        uvs=np.tile([(0, 0), (1, 0), (1, 1), (0, 1)], (6, 1)),
+        material=material,
+        emission=emission,
+        name=name,
+    )
