@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import json
 import os
 import pickle
 import random
@@ -21,7 +22,7 @@ import pytest
 
 import wavefront as wf
 from wavefront import cli, files
-from wavefront.checkpoint_file import read_header
+from wavefront.checkpoint_file import MAGIC, PRELUDE, VERSION, read_header
 from wavefront.sampling.sampler import IndependentSampler
 from wavefront.scheduling.scheduler import FIRST_WAVE, Scheduler
 
@@ -438,6 +439,77 @@ def test_a_file_is_on_the_disk_before_it_takes_its_place(
     monkeypatch.setattr(files.os, "replace", replace)
     wf.render(scene(), 1, checkpoint=tmp_path / "a")
     assert steps == ["file", "replace", "folder"]
+
+
+def signed(header: bytes) -> bytes:
+    """Return a file with any header, and its right checksum."""
+    start = PRELUDE.pack(MAGIC, VERSION, len(header)) + header
+    return start + hashlib.sha256(start).digest()
+
+
+HEADERS = {
+    "empty": b"{}",
+    "a list": b"[]",
+    "a number": b"1",
+    "no JSON": b"[",
+    "deep": b"[" * 100_000,
+    "a long number": b"9" * 5000,
+    "no keys": b'{"arrays": []}',
+    "a huge array": b'{"arrays": [["a", "<f8", [1' + b"0" * 30 + b"]]]}",
+    "arrays are a number": b'{"arrays": 5}',
+    "array of two": b'{"arrays": [["a", "<f8"]]}',
+    "array of a number": b'{"arrays": [7]}',
+    "kind is a list": b'{"arrays": [["a", [], [1]]]}',
+    "size is text": b'{"arrays": [], "size": ["a", "b"], "layers": [], "identity": {}}',
+    "not unicode": b"\xff\xfe\xff",
+}
+
+
+@pytest.mark.parametrize("header", HEADERS.values(), ids=HEADERS)
+def test_wrong_contents_with_a_right_checksum_are_refused(header: bytes, tmp_path: Path) -> None:
+    """By everything that reads checkpoints, with the name of the file."""
+    path = tmp_path / "a.wfck"
+    path.write_bytes(signed(header))
+    for read in (
+        lambda: wf.Image.load(path),
+        lambda: wf.render(scene(), 2, checkpoint=path, progress=False),
+    ):
+        with pytest.raises(wf.SceneError, match=r"a\.wfck: "):
+            read()
+    assert cli.main(["resume", str(path)]) != 0
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        *((key, 5) for key in ("size", "layers", "identity", "metadata", "state", "command", "wavefront")),
+        ("size", [24.0, 18.0]),
+        ("size", [24]),
+        ("size", [10**9, 10**9]),
+        ("layers", ["no such layer"]),
+        ("metadata", {}),
+        ("metadata", {"sample_ranges": 5}),
+        ("metadata", {"sample_ranges": []}),
+        ("state", {}),
+        ("state", {"rays": 1, "bad": 0, "first_bad": 5}),
+    ],
+)
+def test_each_wrong_part_of_a_header_is_refused(tmp_path: Path, key: str, value: Any) -> None:
+    """By a render; its picture is not begun anew in silence."""
+    path = tmp_path / "a.wfck"
+    wf.render(scene(), 1, checkpoint=path, progress=False)
+    content = path.read_bytes()
+    _, _, length = PRELUDE.unpack(content[: PRELUDE.size])
+    end = PRELUDE.size + length
+    header = json.loads(content[PRELUDE.size : end])
+    assert key in header
+    for changed in (header, header | {key: value}):
+        path.write_bytes(signed(json.dumps(changed).encode()) + content[end + 32 :])
+        if changed is header:
+            wf.render(scene(), 1, checkpoint=path, progress=False)
+            continue
+        with pytest.raises(wf.SceneError, match=r"a\.wfck: "):
+            wf.render(scene(), 2, checkpoint=path, progress=False)
 
 
 def test_nothing_of_a_file_is_unpickled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import platform
 from collections.abc import Callable, Mapping
+from operator import index
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import checkpoint_file
-from .errors import SceneError
+from .errors import SceneError, in_brief
 from .files import check_size
 from .identity import differences
 from .picture_sums import PictureSums, empty_sums
@@ -20,6 +21,13 @@ from .version import VERSION
 
 PIXELS = "pixels"  # the array of those of the pass
 VERSIONS = {"wavefront": VERSION, "numpy": np.__version__}
+
+FORM: dict[str, type | tuple[type, ...]] = {  # of a header
+    **dict.fromkeys((*VERSIONS, "python"), str),
+    **dict.fromkeys(("size", "layers"), list),
+    **dict.fromkeys(("identity", "metadata", "state"), dict),
+    "command": (dict, type(None)),
+}
 
 SumsMaker = Callable[[Mapping[str, Any]], PictureSums]  # of the header
 
@@ -60,7 +68,7 @@ class Checkpoint:
 
 def sums_of(header: Mapping[str, Any]) -> PictureSums:
     """Return sums for the samples of a checkpoint with a header."""
-    width, height = header["size"]
+    width, height = (index(side) for side in header["size"])
     check_size(height, width)
     return empty_sums((width, height), header["layers"], header["identity"])
 
@@ -83,15 +91,21 @@ def read_checkpoint(path: str | os.PathLike[str], make_sums: SumsMaker = sums_of
     made: list[PictureSums] = []
 
     def places(header: Mapping[str, Any]) -> Mapping[str, NDArray[Any]]:
+        for key, kind in FORM.items():
+            if not isinstance(header[key], kind):
+                raise TypeError(f"{key} is {in_brief(header[key])}")
         made.append(make_sums(header))
+        if header["size"] != list(made[0].film.size) or header["layers"] != made[0].layer_names:
+            raise ValueError("its size or layers are not those of its identity")
         return made[0].arrays()
 
     header, arrays = checkpoint_file.read(path, places)
     pixels = arrays.pop(PIXELS, None)
-    try:
+    with checkpoint_file.contents_of(path):
         made[0].restore(arrays)
-    except SceneError as error:
-        raise SceneError(f"{os.fspath(path)}: {error}") from error
+        count = made[0].film.count
+        if count.min() < 0 or (pixels is not None and not _are_pixels(pixels, count.size)):
+            raise ValueError("counts of samples or numbers of pixels are out of range")
     return Checkpoint(
         made[0],
         header["metadata"],
@@ -99,6 +113,12 @@ def read_checkpoint(path: str | os.PathLike[str], make_sums: SumsMaker = sums_of
         None if pixels is None else pixels.astype(np.uint32),
         header["command"],
     )
+
+
+def _are_pixels(pixels: NDArray[Any], count: int) -> bool:
+    """Return whether an array holds indices of pixels."""
+    whole = pixels.ndim == 1 and pixels.dtype.kind == "i"
+    return whole and bool(((pixels >= 0) & (pixels < count)).all())
 
 
 def check_identity(path: str | os.PathLike[str], before: Mapping[str, Any], now: Mapping[str, Any]) -> None:

@@ -18,6 +18,7 @@ import math
 import os
 import struct
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from io import BufferedReader
 from typing import Any
@@ -36,6 +37,8 @@ DIGEST = 32  # bytes of a SHA-256
 MAX_HEADER = 2**24  # bytes
 TYPES = ("<i8", "<i4", "<f8", "<f4")  # of arrays
 DAMAGED = "is damaged: delete it, or restore it from a copy"
+# errors of values of JSON of another form: a list in place of a number, text in place of a list
+MALFORMED = (TypeError, KeyError, AttributeError, IndexError, ValueError, OverflowError, RecursionError)
 
 
 def write(
@@ -85,6 +88,21 @@ def is_checkpoint(path: str | os.PathLike[str]) -> bool:
         return False
 
 
+@contextmanager
+def contents_of(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Raise a SceneError that names a file whose contents are wrong, though their checksum is right."""
+    name = os.fspath(path)
+    try:
+        yield
+    except SceneError as error:
+        if str(error).startswith(name):
+            raise
+        raise SceneError(f"{name}: {error}") from error
+    except MALFORMED as error:
+        what = f"its contents are not those of a checkpoint ({type(error).__name__}: {error})"
+        raise SceneError(f"{name}: {what}; it {DAMAGED}") from error
+
+
 def read_header(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Return the header of a file.
 
@@ -93,7 +111,7 @@ def read_header(path: str | os.PathLike[str]) -> dict[str, Any]:
     SceneError
         If the file is missing, of another kind or version, damaged or truncated. The message names it.
     """
-    with _opened(path) as file:
+    with _opened(path) as file, contents_of(path):
         return _header(file, os.fspath(path))
 
 
@@ -115,7 +133,7 @@ def read(
         If the file is missing, of another kind or version, damaged or truncated. The message names it.
     """
     name = os.fspath(path)
-    with _opened(path) as file:
+    with _opened(path) as file, contents_of(path):
         header = _header(file, name)
         places = place_for(header)
         arrays = {}
@@ -148,7 +166,7 @@ def _header(file: BufferedReader, name: str) -> dict[str, Any]:
     text = file.read(min(length, MAX_HEADER))
     if file.read(DIGEST) != hashlib.sha256(prelude + text).digest():
         raise SceneError(f"{name}: the header {DAMAGED}")
-    header: dict[str, Any] = json.loads(text)
+    header: dict[str, Any] = json.loads(text.decode())
     size = file.tell() + sum(_size(kind, shape, name) + DIGEST for _, kind, shape in header["arrays"])
     found = os.fstat(file.fileno()).st_size
     if found != size:

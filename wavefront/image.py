@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .camera import Camera
 from .checkpoint import read_checkpoint
-from .checkpoint_file import is_checkpoint
+from .checkpoint_file import contents_of, is_checkpoint
 from .codecs import png_jpeg
 from .codecs.display import Display
 from .codecs.image_data import ERROR, ImageData
@@ -384,7 +384,8 @@ class Image:
         """
         if is_checkpoint(path):
             checkpoint = read_checkpoint(path)
-            return film_image(checkpoint.sums, checkpoint.metadata, keep_sums=True)
+            with contents_of(path):
+                return film_image(checkpoint.sums, checkpoint.metadata, keep_sums=True)
         found = read_picture(path)
         errors = {name.removeprefix(ERROR): a for name, a in found.arrays.items() if name.startswith(ERROR)}
         layers = {

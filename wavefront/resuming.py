@@ -11,6 +11,7 @@ from typing import Any
 from .accel import Geometry, InstanceAccelerator
 from .camera import Camera
 from .checkpoint import Checkpoint, check_identity, other_versions, read_checkpoint
+from .checkpoint_file import contents_of
 from .choice import Choice
 from .compile.scene import ROULETTE_AFTER, CompiledScene
 from .errors import SaveError, SceneError, warn_caller
@@ -138,7 +139,8 @@ class CheckpointFile:
                 f"{os.fspath(self.path)}: has {most} samples per pixel, more than the "
                 f"{settings.max_spp} asked for"
             )
-        accumulator.count_earlier(checkpoint.state)
+        with contents_of(self.path):
+            accumulator.count_earlier(checkpoint.state)
         self._samples = accumulator.samples
         return checkpoint
 

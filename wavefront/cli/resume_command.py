@@ -6,7 +6,7 @@ import argparse
 import os
 from typing import Any
 
-from ..checkpoint_file import read_header
+from ..checkpoint_file import contents_of, read_header
 from ..codecs.images import check_writable
 from ..errors import SceneError
 from ..image import Image
@@ -36,11 +36,15 @@ def add_resume_commands(commands: Any, parser: argparse.ArgumentParser) -> None:
 
 def _resume(path: str, parser: argparse.ArgumentParser) -> int:
     """Give the command that began a render once more; return the exit status."""
-    command = read_header(path)["command"]
-    if command is None:
-        raise SceneError(f"{path}: was not begun by wavefront render; call render(checkpoint=...) again")
-    options = parser.parse_args(command["arguments"])
-    options.arguments, options.folder = command["arguments"], command["folder"]
+    with contents_of(path):
+        command = read_header(path)["command"]
+        if command is None:
+            raise SceneError(f"{path}: was not begun by wavefront render; call render(checkpoint=...) again")
+        arguments, folder = command["arguments"], os.fspath(command["folder"])
+        if not all(isinstance(each, str) for each in arguments):
+            raise TypeError("an argument is no text")
+    options = parser.parse_args(arguments)
+    options.arguments, options.folder = arguments, folder
     options.scenes = [os.path.join(options.folder, each) for each in options.scenes]
     options.output = os.path.join(options.folder, options.output)
     options.checkpoint = path
