@@ -1,10 +1,12 @@
 """Paths shared among pixels: the same means, less noise, the same bits however a render is cut."""
 
+import importlib.util
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 import scenes
+from scipy import stats
 from significance import Mean, assert_mean, assert_same_images, render, repeat
 
 import wavefront as wf
@@ -403,15 +405,227 @@ def test_only_full_can_share() -> None:
         wf.render(scenes.room(), 1, reuse=True, clamp=2)
 
 
+# --- Errors of regions, and comparisons -----------------------------------------------------------
+
+
+def without_scatter(image: wf.Image) -> wf.Image:
+    """Return a picture as if its pixels were independent."""
+    metadata = {**image.metadata, "reuse": False}
+    return wf.Image(
+        image.rgb,
+        image.spp,
+        metadata,
+        counts=image.counts,
+        variance=image.variance,
+        standard_error=image.standard_error,
+    )
+
+
 def test_comparisons_allow_for_shared_noise(close_tiles: None) -> None:
     """Blocks of pixels that share noise differ by more than their standard errors say."""
     scene = scenes.cornell_box((32, 32))
     p, blind = [], []
-    for seed in range(12):
-        a, b = (render(scene, 16, reuse=True, seed=2 * seed + k) for k in (0, 1))
+    for seed in range(8):
+        a, b = (render(scene, 16, reuse=True, seed=2 * seed + k, max_bounces=4) for k in (0, 1))
         p.append(wf.compare(a, b).p_value)
-        for image in (a, b):
-            image.metadata["reuse"] = False
-        blind.append(wf.compare(a, b).p_blocks)
+        blind.append(wf.compare(without_scatter(a), without_scatter(b)).p_blocks)
     assert min(p) > 0.01
     assert min(blind) < 1e-4
+
+
+def below_the_lamp(size: int) -> wf.Scene:
+    """The Cornell box without the lamp in view, whose edges are most of the noise of a mean."""
+    camera = wf.Camera.look_at((0, -0.2, 3.8), (0, -0.35, 0), fov=27, size=(size, size))
+    return wf.Scene(scenes.cornell_box().shapes, camera=camera)
+
+
+def test_small_changes_are_found() -> None:
+    """Two percent in nearly all pairs, and nothing where there is no change."""
+    scene = below_the_lamp(56)
+    images = [render(scene, 16, reuse=True, seed=seed, max_bounces=3) for seed in range(4)]
+    pairs = list(zip(images[::2], images[1::2], strict=True))
+    assert min(wf.compare(a, b).p_value for a, b in pairs) > 0.01
+    assert max(wf.compare(1.02 * a, b).p_value for a, b in pairs) < 1e-3
+
+
+@pytest.mark.slow
+def test_false_alarms_and_power() -> None:
+    """Of pictures that share paths: alarms are as rare as they say, and one percent is found."""
+    scene, runs = below_the_lamp(56), 120
+    alarms, found = 0, 0
+    for seed in range(0, 2 * runs, 2):
+        a, b = (render(scene, 4, reuse=True, seed=seed + k, max_bounces=3) for k in (0, 1))
+        alarms += wf.compare(a, b).p_value < 0.01
+        found += wf.compare(1.02 * a, b).p_value < 0.01
+    assert alarms <= stats.binom.isf(1e-4, runs, 0.01)
+    assert found >= 0.9 * runs
+
+
+REGIONS = [(slice(0, 28), slice(0, 28)), (slice(9, 33), slice(14, 40)), (slice(30, 38), slice(6, 20)), None]
+
+
+CHANCES = (0.6827, 0.9545)  # of one and of two standard deviations of a normal distribution
+
+
+def coverage(images: list[wf.Image]) -> tuple[np.ndarray, np.ndarray]:
+    """Return how often means of regions lie within intervals of two confidences: (2,), with errors (2,).
+
+    The converged mean is that of the other pictures, for which intervals are widened.
+    """
+    inside: list[np.ndarray] = []
+    wider = np.sqrt(1 + 1 / (len(images) - 1))
+    for region in REGIONS:
+        found = [image.mean(region) for image in images]
+        values = np.array([each.value for each in found])
+        others = (values.sum(0) - values) / (len(images) - 1)
+        away = np.abs(values - others) / wider
+        freedom, error = (
+            np.array([getattr(each, name) for each in found]) for name in ("freedom", "standard_error")
+        )
+        limits = [stats.t.ppf((1 + chance) / 2, freedom) * error for chance in CHANCES]
+        inside.append(np.array([(away < limit).mean(1) for limit in limits]))  # channels go together
+    kept = np.array(inside)  # (regions, 2, images)
+    return kept.mean((0, 2)), kept.mean(0).std(1, ddof=1) / np.sqrt(len(images))
+
+
+def caustic(size: int) -> wf.Scene:
+    """A glass ball below a small bright lamp, in a room."""
+    scene = scenes.cornell_box((size, size))
+    ball = wf.Sphere((0.1, -0.5, 0.2), 0.35, material=wf.Dielectric(1.5))
+    return wf.Scene([*scene.shapes[:5], ball], [wf.PointLight((0, 0.8, 0.1), 2)], scene.camera)
+
+
+@pytest.mark.parametrize(
+    ("runs", "options"),
+    [
+        pytest.param(16, {"reuse": True, "sampler": "independent"}, id="shared"),
+        pytest.param(16, {"sampler": "independent"}, id="plain"),
+        pytest.param(16, {"caustics": True}, id="caustic"),
+        pytest.param(
+            200, {"reuse": True, "sampler": "independent"}, id="shared, alone", marks=pytest.mark.slow
+        ),
+        pytest.param(100, {"reuse": True}, id="shared, many", marks=pytest.mark.slow),
+        pytest.param(100, {}, id="plain, many", marks=pytest.mark.slow),
+        pytest.param(100, {"caustics": True}, id="caustic, many", marks=pytest.mark.slow),
+        pytest.param(40, {"reuse": True, "guide": True}, id="guided", marks=pytest.mark.slow),
+    ],
+)
+def test_errors_of_regions(runs: int, options: dict, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Intervals hold the converged mean as often as they say; stratified samples more often."""
+    monkeypatch.setattr(pilot, "PATHS", 1 << 12)
+    scene = caustic(42) if "caustics" in options else below_the_lamp(42)
+    images = [render(scene, 4, seed=seed, max_bounces=3, **options) for seed in range(runs)]
+    found, error = coverage(images)
+    off = (found - CHANCES) / np.maximum(error, 0.01)
+    assert (off > -4).all(), (found, error)
+    if "sampler" in options:
+        assert (off < 4).all(), (found, error)
+    if "reuse" in options:
+        block = REGIONS[0]
+        known, blind = (
+            np.mean([each(image).mean(block).standard_error for image in images])
+            for each in (lambda image: image, without_scatter)
+        )
+        assert blind < 0.9 * known
+
+
+def test_intervals_are_those_of_student() -> None:
+    found = render(scenes.room((21, 21)), 4, reuse=True).mean()
+    for confidence in (0.1, 0.68, 0.95, 0.9999):
+        away = stats.t.ppf((1 + confidence) / 2, found.freedom) * found.standard_error
+        low, high = found.interval(confidence)
+        assert low == pytest.approx(found.value - away, rel=1e-6)
+        assert high == pytest.approx(found.value + away, rel=1e-6)
+    with pytest.raises(wf.SceneError, match="confidence is 95; it must be above 0 and below 1"):
+        found.interval(95)
+
+
+def test_regions_of_shared_pictures_with_different_counts() -> None:
+    """Where tiles have pixels of several counts, the error is that of the scatter over seeds, or more."""
+    scene = below_the_lamp(28)
+    options = {"reuse": True, "noise": 0.08, "max_bounces": 2}
+    images = [render(scene, 512, seed=seed, **options) for seed in range(8)]
+    assert np.unique(images[0].scatter[0].level).size > 1
+    means = [image.mean() for image in images]
+    scatter = np.std([each.value for each in means], axis=0, ddof=1).mean()
+    assert 0.6 * scatter < np.mean([each.standard_error for each in means]) < 3 * scatter
+
+
+def test_a_region_is_a_mask_slices_an_id_or_a_name() -> None:
+    scene = scenes.everything((31, 25))
+    image = render(scene, 4, reuse=True, aovs="shape_id")
+    ids = image.shape_id
+    mask = np.zeros((25, 31), bool)
+    mask[3:20:2, -8:] = True
+    for region, same in (((slice(3, 20, 2), slice(-8, None)), mask), (slice(2, 4), np.s_[2:4])):
+        one, other = image.mean(region), image.mean(same)
+        assert one.value.tolist() == other.value.tolist()
+        assert one.standard_error.tolist() == other.standard_error.tolist()
+    assert image.mean(mask).value == pytest.approx(image.rgb[mask].mean(0), rel=1e-5)
+    some = int(np.bincount(ids[ids >= 0]).argmax())
+    assert image.mean(some).pixels == image.mean(np.int64(some)).pixels == (ids == some).sum()
+    assert image.mean().pixels == 31 * 25
+    for region, message in (
+        (np.zeros((25, 31), bool), "no pixel"),
+        (mask.astype(int), "mask of booleans of shape"),
+        (mask[:4], "mask of booleans of shape"),
+        ((slice(1), slice(2), slice(3), 4), "no part of 25 rows and 31 columns"),
+        ((99, 0), "no part of"),
+        ("no such thing", "there is no shape"),
+        (True, "mask of booleans"),
+        (1.5, "mask of booleans"),
+    ):
+        with pytest.raises(wf.SceneError, match=message):
+            image.mean(region)
+    assert np.mean(image) == np.mean(image.rgb)
+    assert np.stack([image, image]).shape == (2, 25, 31, 3)
+
+
+def test_files_and_parts_keep_what_regions_need(tmp_path) -> None:
+    """Files of npz, checkpoints, windows and merged parts do, files of exr say that they do not."""
+    scene, region = scenes.everything((33, 30)), (slice(4, 20), slice(5, 25))
+    options = {"reuse": True, "max_bounces": 3}
+    whole = render(scene, 16, checkpoint=tmp_path / "render.wfck", **options)
+    found = whole.mean(region)
+    whole.save(tmp_path / "a.npz")
+    loaded = wf.Image.load(tmp_path / "a.npz")
+    assert loaded.mean(region).standard_error.tolist() == found.standard_error.tolist()
+    assert wf.compare(loaded, render(scene, 16, seed=1, **options)).p_value > 1e-3
+    again = wf.Image.load(tmp_path / "render.wfck")
+    assert again.mean(region).standard_error.tolist() == found.standard_error.tolist()
+    parts = [render(scene, None, samples=part, **options) for part in (range(8), range(8, 16))]
+    merged = wf.Image.merge(*parts)
+    assert merged.mean(region).standard_error == pytest.approx(found.standard_error, rel=0.02)
+    window = render(scene, 16, camera=scene.camera.cropped((5, 3, 33, 30)), **options)
+    assert window.metadata["window"] == [5, 3, 33, 30]
+    assert np.array_equal(window.scatter[0].tile, whole.scatter[0].tile[3:, 5:])
+    if importlib.util.find_spec("OpenEXR"):
+        whole.save(tmp_path / "a.exr")
+        absent = wf.Image.load(tmp_path / "a.exr").mean(region)
+        assert absent.standard_error is None
+        assert "npz files and checkpoints keep it" in absent.error_absent
+        assert absent.value.tolist() == found.value.tolist()
+        with pytest.raises(wf.SceneError, match="the error is not known: its pixels share paths"):
+            absent.interval()
+
+
+def test_differences_and_multiples_know_what_pixels_share() -> None:
+    scene = below_the_lamp(42)
+    plain, *shared = (
+        render(scene, 16, seed=seed, reuse=seed > 0, max_bounces=3, aovs="direct") for seed in range(3)
+    )
+    errors = [image.mean().standard_error for image in (plain, *shared)]
+    for a, b, parts in ((plain, shared[0], (0, 1)), (shared[1], shared[0], (1, 2)), (plain, plain * 2, ())):
+        found = a - b
+        assert found.metadata["reuse"] is bool(parts)
+        if parts:
+            expected = np.hypot(*(errors[part] for part in parts))
+            assert found.mean().standard_error == pytest.approx(expected, rel=0.01)
+            assert (-2 * found).mean().standard_error == pytest.approx(2 * expected, rel=0.01)
+            chain = found - render(scene, 4, seed=9, max_bounces=3)
+            assert (chain.mean().standard_error > found.mean().standard_error).all()
+    assert shared[0].denoise("nonlocal_means").mean().standard_error is None
+    noisy = shared[0].denoise("nonlocal_means").noisy
+    assert noisy.mean().standard_error.tolist() == errors[1].tolist()
+    lost = wf.Image(shared[0].rgb, 16, shared[0].metadata, standard_error=shared[0].standard_error)
+    assert (plain - lost).mean().standard_error is None

@@ -86,6 +86,7 @@ if TYPE_CHECKING:
     from .io.load import from_trimesh, load, load_mesh
     from .io.sources import LoadLimits
     from .metrics import Comparison, compare
+    from .statistics import RegionMean
     from .viewer import Viewer, view
     from .views import render_many, turntable
 
@@ -104,6 +105,7 @@ _LATER = {  # what many programs do without is imported when they ask for it
     "load_mesh": ".io.load",
     "orbit": ".camera.moves",
     "render_many": ".views",
+    "RegionMean": ".statistics",
     "save_animation": ".animation",
     "testing": ".testing",
     "turntable": ".views",
@@ -157,6 +159,7 @@ __all__ = [
     "Points",
     "Principled",
     "Rectangle",
+    "RegionMean",
     "RenderError",
     "Sampler",
     "SaveError",

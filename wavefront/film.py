@@ -248,6 +248,29 @@ class Film:
             error[:, lanes] = batch_means.var(0, ddof=1) * (size / count)
         return error
 
+    def deviations(self, span: slice = slice(None)) -> Doubles:
+        """Return how batches deviate from the mean, (batches, 3, k), for pixels with two samples or more.
+
+        They are scaled so that their squares add up to `_scatter_of_batches`. Batches that a pixel does not
+        have, and all of a pixel of which samples were dropped, are 0.
+        """
+        if self.lengths is not None:
+            samples = self.lengths.astype(np.float64)[:, None, None]
+            means = self.batches[: self.lengths.size, :, span] / samples
+            mean = (means * samples).sum(0) / samples.sum()
+            found = (means - mean) * np.sqrt(samples / ((samples.size - 1) * self.count[0]))
+        else:
+            counts, most = self.count[span], max(count // batch_size(count) for count in distinct(self.count))
+            found = np.zeros((most, 3, counts.size))
+            for count in distinct(counts):
+                lanes, size = np.flatnonzero(counts == count), batch_size(count)
+                used = count // size
+                means = take(self.batches[:used, :, span], lanes) / np.float64(size)
+                found[:used, :, lanes] = (means - means.mean(0)) * np.sqrt(size / (count * (used - 1)))
+        if self.dropped.size:
+            found[:, :, self.dropped[span] > 0] = 0
+        return found
+
     def relative_variance(self) -> Doubles:
         """Estimate the squared relative error of each pixel, the mean of its channels, (pixels,).
 

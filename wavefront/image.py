@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -22,13 +22,23 @@ from .codecs.png_jpeg import Gamma
 from .codecs.white_balance import WhiteBalance
 from .colors import rgb
 from .errors import SceneError, number, one_of
-from .film import Film, chunks
+from .film import Film, batch_size, chunks
 from .html import picture_html
 from .layers import BOXES, CLAMPED, GIVEN_LAYERS, LAYERS, NOISY, is_radiance
 from .light_sums import LightSums
 from .outlines import outline_coverage
 from .picture_sums import PictureSums, merged_metadata, merged_sums, restored_sums
 from .samples import shared_samples
+from .statistics import (
+    RegionMean,
+    Scatter,
+    film_scatter,
+    region_mean,
+    restored_scatter,
+    scatter_arrays,
+    scatter_of_difference,
+)
+from .statistics.scatter import PREFIX as SCATTER
 from .suggestions import did_you_mean
 from .vec import Floats, luminance
 
@@ -48,7 +58,8 @@ class Image:
         Settings and results of the render: lighting (the preset that was added, or None), background
         ("transparent", a color, or None for the environment), integrator,
         max_bounces, seed, sampler, sample_ranges (the half-open ranges [first, end] of the samples that some
-        pixel has), filter, branches, guide, guided, reuse and hint (how paths went on, and what may pay
+        pixel has), film (width and height of the whole picture), window (the part [x0, y0, x1, y1] of it that
+        this one is), filter, branches, guide, guided, reuse and hint (how paths went on, and what may pay
         besides: docs/choices.md), accelerator, workers, executor, seconds (wall time), spp (mean
         over pixels), samples, rays, bad_samples, interrupted, version (of this package), numpy, noise
         (estimated relative error of the picture before denoising), clamp and clamped (the part of the light
@@ -60,6 +71,9 @@ class Image:
     standard_error
         (H, W, 3) float32 estimated standard error of `rgb`, from the scatter of 2 to 8 batches of samples. It
         includes most of the gain of stratified sampling. NaN where there are fewer than two samples.
+        It is the error of each pixel alone. Where paths are shared (`metadata["reuse"]`) pixels depend on
+        each other, and a mean over pixels errs by more than the root of the sum of squares says: `mean`
+        gives the error of a region.
     layers
         The other layers by name, (H, W) or (H, W, channels): see `layers.LAYERS`. Each is an attribute as
         well: `image.depth` is `image.layers["depth"]`.
@@ -71,6 +85,9 @@ class Image:
     sums
         The sums of the samples, for `merge`. Only pictures of `render(samples=...)`, of checkpoints and of
         npz files of these have them.
+    scatter
+        What `mean` and `wf.compare` need of a picture whose pixels share paths; else nothing. npz files have
+        it, exr files do not.
 
     `counts`, `variance` and `standard_error` are None in an image that was not rendered, `standard_error`
     also in one that was denoised.
@@ -98,6 +115,7 @@ class Image:
         errors: Mapping[str, NDArray[np.float32]] | None = None,
         names: Mapping[str, Mapping[int, str]] | None = None,
         sums: PictureSums | None = None,
+        scatter: Sequence[Scatter] = (),
     ) -> None:
         self.rgb = rgb
         self.spp = spp
@@ -109,6 +127,7 @@ class Image:
         self.errors = dict(errors or {})
         self.names = {kind: dict(table) for kind, table in (names or {}).items()}
         self.sums = sums
+        self.scatter = tuple(scatter)
 
     @property
     def light_groups(self) -> dict[str, NDArray[np.float32]]:
@@ -171,6 +190,95 @@ class Image:
             )
         return np.isin(ids, chosen)
 
+    def mean(self, region: Any = None, kind: str = "shape") -> RegionMean:
+        """Return the mean of a region and its standard error, also where pixels depend on each other.
+
+        Pixels of pictures that share paths depend on each other within tiles; the error then comes from the
+        scatter of batches of samples over the pixels of each tile. Other pixels are independent.
+
+        Parameters
+        ----------
+        region
+            A mask (H, W) of booleans; slices or numbers as for `image[region]`, such as
+            (slice(8, 16), slice(20)); an id or a name as for `mask`; None for the whole picture.
+        kind
+            "shape", "instance" or "material", for an id or a name.
+
+        Returns
+        -------
+        RegionMean
+            With `value` (3,), `standard_error` (3,), None where it is not known, and `interval`.
+
+        Raises
+        ------
+        SceneError
+            If the region is malformed or empty, or there is no such id.
+
+        Examples
+        --------
+        >>> scene = [wf.Sphere((0, 0, 0), 1, name="ball"), wf.PointLight((3, 3, 3), 90)]
+        >>> image = wf.render(scene, spp=16, size=(24, 24), aovs="shape_id")
+        >>> ball = image.mean("ball")
+        >>> ball.value.shape, ball.standard_error.shape
+        ((3,), (3,))
+        >>> ball.pixels == image.mean(image.shape_id == 0).pixels
+        True
+        """
+        return region_mean(
+            self.rgb,
+            self._region(region, kind),
+            self.standard_error,
+            self._freedom(),
+            self.scatter,
+            self._error_absent(),
+        )
+
+    def _region(self, region: Any, kind: str) -> NDArray[np.bool_]:
+        """Return the pixels (H, W) of a region, as `mean` takes it."""
+        shape = self.rgb.shape[:2]
+        if region is None:
+            return np.ones(shape, np.bool_)
+        if isinstance(region, str) or (isinstance(region, int | np.integer) and not isinstance(region, bool)):
+            mask = self.mask(int(region) if isinstance(region, np.integer) else region, kind)
+        elif isinstance(region, tuple | slice):
+            mask = np.zeros(shape, np.bool_)
+            try:
+                mask[region] = True
+            except (IndexError, TypeError) as error:
+                where = f"{shape[0]} rows and {shape[1]} columns"
+                raise SceneError(f"mean: the region {region!r} is no part of {where}: {error}") from None
+        else:
+            mask = np.asarray(region)
+            if mask.dtype != np.bool_ or mask.shape != shape:
+                raise SceneError(
+                    f"mean: the region is {mask.dtype} of shape {mask.shape}; it must be a mask of booleans "
+                    f"of shape {shape}, slices, an id or a name"
+                )
+        if not mask.any():
+            raise SceneError("mean: the region has no pixel")
+        return mask
+
+    def _freedom(self) -> NDArray[np.float64]:
+        """Return the degrees of freedom (H, W) of the standard error of each pixel."""
+        shape = self.rgb.shape[:2]
+        counts = np.full(shape, self.spp) if self.counts is None else self.counts
+        distinct, which = np.unique(counts, return_inverse=True)
+        batches = [count // batch_size(count) if count > 1 else 2 for count in distinct.tolist()]
+        return np.maximum(np.array(batches)[which].reshape(shape) - 1.0, 1)
+
+    def _error_absent(self) -> str:
+        """Return the reason why the errors of means over pixels are not known, or nothing."""
+        if NOISY in self.layers:
+            return "the picture was denoised; image.noisy has an error"
+        if self.standard_error is None or not np.isfinite(self.standard_error).all():
+            return "the picture has no standard error of each pixel"
+        if self.metadata.get("reuse") and not self.scatter:
+            return (
+                "its pixels share paths, and how batches of samples scatter is not known; npz files and "
+                "checkpoints keep it"
+            )
+        return ""
+
     def motion(self, camera: Camera) -> NDArray[np.float32]:
         """Return the optical flow to a picture of the same scene by another camera, (H, W, 2) in pixels.
 
@@ -208,6 +316,12 @@ class Image:
         """Return `rgb`."""
         return np.array(self.rgb, dtype=dtype, copy=copy)
 
+    def __array_function__(
+        self, function: Callable[..., Any], types: Any, args: Sequence[Any], kwargs: Mapping[str, Any]
+    ) -> Any:
+        """Call a function of NumPy, such as `np.mean`, with `rgb` in place of pictures."""
+        return function(*_as_arrays(args), **{name: _as_arrays(value) for name, value in kwargs.items()})
+
     def __getitem__(self, key: Any) -> NDArray[np.float32]:
         """Return `rgb[key]`: image[y, x] is one pixel, (3,)."""
         return self.rgb[key]
@@ -216,7 +330,8 @@ class Image:
         """Return the difference of two pictures of one size: `rgb` and its standard error, no layers.
 
         The error is that of independent pictures. It is None if one of them has none, or if they share
-        samples, since their errors then depend on each other.
+        samples, since their errors then depend on each other. Where the pixels of one of them share paths
+        those of the difference do as well: `metadata["reuse"]` says so, and `mean` knows it.
 
         Raises
         ------
@@ -235,7 +350,14 @@ class Image:
             and shared_samples(self.metadata, other.metadata) is None
         ):
             error = np.hypot(self.standard_error, other.standard_error)
-        return Image(self.rgb - other.rgb, min(self.spp, other.spp), standard_error=error)
+        sharing = [each for each in (self, other) if each.metadata.get("reuse")]
+        scatter: tuple[Scatter, ...] = ()
+        if error is not None and all(each.scatter for each in sharing):
+            parts = [(x.scatter, x.standard_error) for x in sharing if x.standard_error is not None]
+            scatter = scatter_of_difference(parts, error)
+        metadata = {"reuse": bool(sharing)}
+        spp = min(self.spp, other.spp)
+        return Image(self.rgb - other.rgb, spp, metadata, standard_error=error, scatter=scatter)
 
     def __mul__(self, factor: ArrayLike) -> Image:
         """Return the picture times a number or an rgb triple, with its errors and its layers.
@@ -267,6 +389,7 @@ class Image:
             layers=scaled(self.layers, scale),
             errors=scaled(self.errors, size),
             names=self.names,
+            scatter=self.scatter,
         )
 
     __rmul__ = __mul__
@@ -307,6 +430,7 @@ class Image:
             errors={**source.errors, **error},
             names=source.names,
             sums=source.sums,
+            scatter=source.scatter,
         )
 
     @property
@@ -325,6 +449,7 @@ class Image:
             errors={name: error for name, error in self.errors.items() if name != NOISY},
             names=self.names,
             sums=self.sums,
+            scatter=self.scatter,
         )
 
     def merge(self, other: Image) -> Image:
@@ -391,6 +516,8 @@ class Image:
         layers = {
             name: a for name, a in found.arrays.items() if name not in FIELDS and not name.startswith(ERROR)
         }
+        scatter = {name: array for name, array in found.sums.items() if name.startswith(SCATTER)}
+        sums = {name: array for name, array in found.sums.items() if name not in scatter}
         return cls(
             found.rgb,
             found.info.get("spp", 0),
@@ -401,7 +528,8 @@ class Image:
             layers=layers,
             errors=errors,
             names=found.info.get("names"),
-            sums=restored_sums(os.fspath(path), found.rgb.shape, found.info.get("sums"), found.sums),
+            sums=restored_sums(os.fspath(path), found.rgb.shape, found.info.get("sums"), sums),
+            scatter=restored_scatter(os.fspath(path), found.rgb.shape, scatter),
         )
 
     def outlined(
@@ -455,6 +583,7 @@ class Image:
             layers=layers,
             errors=self.errors,
             names=self.names,
+            scatter=self.scatter,
         )
 
     def to_uint8(
@@ -617,9 +746,10 @@ class Image:
         arrays = {name: getattr(self, name) for name in FIELDS if getattr(self, name) is not None}
         arrays |= self.layers | {ERROR + name: values for name, values in self.errors.items()}
         info: dict[str, Any] = {"spp": self.spp, "metadata": self.metadata, "names": self.names}
+        kept = scatter_arrays(self.scatter)
         if self.sums is None:
-            return ImageData(self.rgb, arrays, info)
-        return ImageData(self.rgb, arrays, {**info, "sums": self.sums.info}, self.sums.arrays())
+            return ImageData(self.rgb, arrays, info, kept)
+        return ImageData(self.rgb, arrays, {**info, "sums": self.sums.info}, {**self.sums.arrays(), **kept})
 
     def _codes(self, display: Display, bits: int) -> NDArray[Any]:
         return display.codes(display.adjusted(self._data()), bits)
@@ -667,14 +797,29 @@ def _film_rgb(film: Film, metadata: Mapping[str, Any]) -> Image:
     width, height = film.size
     shape = height, width, 3
     estimates = film.estimates()
+    error = estimates.standard_error.reshape(shape)
+    scatter: tuple[Scatter, ...] = ()
+    if metadata.get("reuse") and {"film", "window"} <= metadata.keys():
+        whole, window = metadata["film"], metadata["window"]
+        scatter = film_scatter(film, error, (int(whole[0]), int(whole[1])), (int(window[0]), int(window[1])))
     return Image(
         estimates.mean.reshape(shape),
         round(float(film.count.mean())),
         {**metadata, "noise": estimates.noise},
         counts=film.used().reshape(height, width).copy(),
         variance=estimates.variance.reshape(shape),
-        standard_error=estimates.standard_error.reshape(shape),
+        standard_error=error,
+        scatter=scatter,
     )
+
+
+def _as_arrays(value: Any) -> Any:
+    """Return a value with `rgb` in place of the pictures in it."""
+    if isinstance(value, Image):
+        return value.rgb
+    if isinstance(value, tuple | list):
+        return type(value)(map(_as_arrays, value))
+    return value
 
 
 def _add_layers(image: Image, sums: PictureSums) -> None:

@@ -96,7 +96,8 @@ def compare(a: Picture, b: Picture) -> Comparison:
     in a hundred below 0.01. They need two rendered pictures with at least two samples per pixel and their
     standard errors, that share no samples: with the same seed and sampler the samples must not overlap.
     Otherwise they are None, and `p_absent` says why. Of pictures with `reuse=True`, whose pixels share noise,
-    those of blocks and of the mean allow for that, and so find less. Sources are in
+    those of blocks and of the mean take the errors of their tiles from batches of samples; where a file does
+    not keep these (exr), they take the worst case, and find less. Sources are in
     `wavefront/significance.py`.
 
     FLIP needs `pip install flip-evaluator`. For two pictures of 8 bits it is LDR-FLIP, else
@@ -223,7 +224,8 @@ def _estimate(picture: Image | ArrayLike, mean: Doubles) -> Estimate:
     squared_error = np.square(picture.standard_error, dtype=np.float64)
     variance = None if picture.variance is None else picture.variance.astype(np.float64)
     sharing = MEMBERS if picture.metadata.get("reuse") else 1
-    return estimate(mean, squared_error, variance, _batches(picture.counts), picture.counts, sharing)
+    batches = _batches(picture.counts)
+    return estimate(mean, squared_error, variance, batches, picture.counts, picture.scatter, sharing)
 
 
 def _batches(counts: Ints) -> Ints:

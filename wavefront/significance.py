@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from .record import record
+from .statistics import Scatter, sums_by_label
 from .student_t import log_gamma, t_tail
 from .vec import Doubles, Ints
 
@@ -31,7 +32,8 @@ class Estimate:
     freedom: Doubles  # (..., 3) degrees of freedom of `squared_error`
     samples: Doubles  # (..., 1) number of samples
     variance: Doubles  # (..., 3) estimated variance of one sample; 0 where it is not known
-    sharing: int = 1  # pixels in a group whose errors may depend on each other; those of groups do not
+    scatter: tuple[Scatter, ...] = ()  # of pixels that depend on each other, where it is known
+    sharing: int = 1  # where it is not: pixels in a group whose errors may depend on each other
 
 
 @record
@@ -129,14 +131,20 @@ def _combinations(m: Doubles, n: Doubles) -> Doubles:
 def _averaged(picture: Estimate, side: int) -> Estimate:
     """Return the means over blocks of pixels; those at the right and lower edge may be smaller.
 
-    The errors of pixels are independent, or in groups of `sharing` pixels: then they are taken to be all the
-    same in a group, which is the worst case (by the inequality of Cauchy and Schwarz). The degrees of freedom
-    are those of Satterthwaite's approximation (F. E. Satterthwaite, An Approximate Distribution of Estimates
-    of Variance Components, 1946).
+    The errors of pixels are independent, or depend on each other as their `scatter` tells. Where it is not
+    known, those of groups of `sharing` pixels are taken to be all the same, which is the worst case (by the
+    inequality of Cauchy and Schwarz). The degrees of freedom are those of Satterthwaite's approximation
+    (F. E. Satterthwaite, An Approximate Distribution of Estimates of Variance Components, 1946).
     """
     pixels = _block_sums(np.ones((*picture.mean.shape[:2], 1)), side)
-    variance = picture.sharing * _block_sums(picture.squared_error, side)
-    spread = picture.sharing**3 * _block_sums(picture.squared_error**2 / picture.freedom, side)
+    if picture.scatter:
+        label = _block_numbers(picture.mean.shape[0], picture.mean.shape[1], side)
+        error = np.sqrt(picture.squared_error)
+        found = sums_by_label(error, picture.freedom[..., 0], picture.scatter, label, pixels.size)
+        variance, spread = (each.reshape(*pixels.shape[:2], 3) for each in found)
+    else:
+        variance = picture.sharing * _block_sums(picture.squared_error, side)
+        spread = picture.sharing**3 * _block_sums(picture.squared_error**2 / picture.freedom, side)
     freedom = _block_sums(picture.freedom, side) / picture.sharing
     return Estimate(
         _block_sums(picture.mean, side) / pixels,
@@ -154,12 +162,19 @@ def _block_sums(values: Doubles, side: int) -> Doubles:
     return values
 
 
+def _block_numbers(height: int, width: int, side: int) -> Ints:
+    """Return the number of the block of each pixel, (H, W), row by row."""
+    across = -(-width // side)
+    return np.add.outer(np.arange(height) // side * across, np.arange(width) // side)
+
+
 def estimate(
     mean: Doubles,
     squared_error: Doubles,
     variance: Doubles | None,
     batches: Ints,
     samples: Ints,
+    scatter: tuple[Scatter, ...] = (),
     sharing: int = 1,
 ) -> Estimate:
     """Return the estimate of a picture.
@@ -172,9 +187,12 @@ def estimate(
         (H, W, 3) of one sample; None if it is not known.
     batches, samples
         (H, W) numbers of each pixel, at least 2.
+    scatter
+        Of a picture whose pixels share paths, where it is known.
     sharing
-        Pixels in a group whose errors may depend on each other.
+        Pixels in a group whose errors may depend on each other, where it is not.
     """
     freedom = np.broadcast_to((batches - 1.0)[..., None], mean.shape)
     variance = np.zeros_like(mean) if variance is None else variance
-    return Estimate(mean, squared_error, freedom, samples[..., None].astype(np.float64), variance, sharing)
+    number = samples[..., None].astype(np.float64)
+    return Estimate(mean, squared_error, freedom, number, variance, scatter, sharing)

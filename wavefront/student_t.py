@@ -10,6 +10,7 @@ from .vec import Doubles
 
 CHUNK = 1 << 17  # values that are computed together: few enough for the cache
 ITERATIONS = 400  # at most, of the continued fraction
+BISECTIONS = 50
 
 
 def t_tail(t: Doubles, freedom: Doubles) -> Doubles:
@@ -25,6 +26,16 @@ def t_tail(t: Doubles, freedom: Doubles) -> Doubles:
         total = nu + squared
         tail[part] = _incomplete_beta(nu / total, squared / total, nu / 2, np.full_like(nu, 0.5))
     return tail
+
+
+def t_quantile(confidence: float, freedom: Doubles) -> Doubles:
+    """Return t (n,) for which P(|T| < t) of Student's distribution is `confidence`, by bisection."""
+    low, high = np.full_like(freedom, -20.0), np.full_like(freedom, 30.0)  # logarithms
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2
+        inside = 1 - t_tail(np.exp(middle), freedom) < confidence
+        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+    return np.exp((low + high) / 2)
 
 
 def _incomplete_beta(x: Doubles, rest: Doubles, a: Doubles, b: Doubles) -> Doubles:

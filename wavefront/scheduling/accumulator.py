@@ -22,7 +22,7 @@ from .jobs import Job, JobResult, WaveResult
 MAX_BAD_SAMPLES = 1e-4  # part of all samples that may be lost to NaN before it is an error
 FILM_BYTES = 176  # of a pixel of the film
 LIGHT_BYTES = 192  # of the sums over light paths, for each pixel
-PICTURE_BYTES = 64  # of a pixel of the picture, and of what is needed to make it
+PICTURE_BYTES = 96  # of a pixel of the picture, and of what is needed to make it
 SPARE_BYTES = 16 << 20
 
 

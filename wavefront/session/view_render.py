@@ -201,6 +201,8 @@ class ViewRender:
             "seed": settings.seed,
             "sampler": SAMPLERS.label(settings.sampler),
             "sample_ranges": [[first, first + most]],
+            "film": list(self.camera.film),
+            "window": list(self.camera.window),
             "filter": FILTERS.label(settings.filter),
             "branches": plan.choice.branches,
             "guide": settings.guide,

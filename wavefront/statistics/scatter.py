@@ -1,0 +1,226 @@
+"""How batches of samples scatter where pixels share paths: what the error of a mean over pixels is made of.
+
+The errors of the pixels of a tile depend on each other, those of tiles do not (pixel_tiles.py). So the sum
+over the pixels of one tile is formed for each batch of samples, and the scatter of these sums over batches is
+the squared error of the tile's part. The squared errors of tiles add up, and so do their degrees of freedom.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import count
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from ..film import Film, batch_size, chunks
+from ..pixel_tiles import place_in_tiles
+from ..record import record
+from ..vec import Doubles, Floats, Ints, distinct
+
+UNIT = 127  # deviations are whole multiples of this part of the standard error
+NAMES = {"deviations": (np.int8, 4), "tile": (np.int32, 2), "level": (np.uint8, 2)}  # types and dimensions
+PREFIX = "scatter."  # before the names of arrays in files
+
+
+@record
+class Scatter:
+    """How the batches of pixels that share paths scatter.
+
+    The squares of a pixel's deviations add up to its squared error, or less: the rest is its own.
+    """
+
+    deviations: NDArray[np.int8]  # (H, W, batches, 3) times the pixel's standard error / UNIT; see above
+    tile: NDArray[np.int32]  # (H, W) pixels of different tiles are independent
+    level: NDArray[np.uint8]  # (H, W) logarithm to base 2 of the samples of a batch
+
+    def rescaled(self, factor: Floats) -> Scatter:
+        """Return the same scatter where standard errors are 1 / factor (H, W, 3) times as large."""
+        scaled = np.empty_like(self.deviations)
+        for row, other, by in zip(scaled, self.deviations, factor, strict=True):
+            row[:] = _whole(other * by[:, None])
+        return Scatter(scaled, self.tile, self.level)
+
+
+def _whole(values: Any) -> NDArray[np.int8]:
+    return np.asarray(np.clip(np.rint(values), -UNIT, UNIT).astype(np.int8))
+
+
+def film_scatter(
+    film: Film, standard_error: Floats, whole: tuple[int, int], corner: tuple[int, int]
+) -> tuple[Scatter, ...]:
+    """Return the scatter of a film whose pixels share paths; nothing where pixels lack a second sample.
+
+    Parameters
+    ----------
+    standard_error
+        (H, W, 3) of its picture.
+    whole, corner
+        (width, height) of the whole picture, and the column and row in it of the film's first pixel.
+    """
+    width, height = film.size
+    if film.count.min() < 2:
+        return ()
+    batches = film.deviations(slice(0, 1)).shape[0]
+    deviations = np.empty((width * height, batches, 3), np.int8)
+    errors = standard_error.reshape(-1, 3)
+    for span in chunks(width * height):
+        scale = np.maximum(errors[span], np.finfo(np.float32).tiny)
+        found = film.deviations(span).transpose(2, 0, 1)
+        deviations[span] = _whole(found * (UNIT / scale.astype(np.float64))[:, None])
+    pixel = np.add.outer(
+        (np.arange(height, dtype=np.int64) + corner[1]) * whole[0], np.arange(width) + corner[0]
+    )
+    tile, _ = place_in_tiles(pixel.ravel().astype(np.uint32), whole[0])
+    level = np.empty(film.count.size, np.uint8)
+    for samples in distinct(film.count):
+        level[film.count == samples] = batch_size(int(samples)).bit_length() - 1
+    shape = height, width
+    return (
+        Scatter(
+            deviations.reshape(*shape, batches, 3),
+            tile.astype(np.int32).reshape(shape),
+            level.reshape(shape),
+        ),
+    )
+
+
+def sums_by_label(
+    standard_error: Floats, freedom: Doubles, scatter: Sequence[Scatter], label: Ints, labels: int
+) -> tuple[Doubles, Doubles]:
+    """Estimate the variance of sums over the pixels of each label, and how well it is known.
+
+    Where batches of the pixels of a tile have different lengths, their samples overlap in part. The
+    correlation of two means is then at most the root of the ratio of the lengths, which is what is taken.
+
+    Parameters
+    ----------
+    standard_error
+        (H, W, 3)
+    freedom
+        (H, W) degrees of freedom of each pixel's error.
+    scatter
+        Of the picture, for each part of it that shares paths.
+    label
+        (H, W) from 0 to `labels` - 1, or -1 for pixels that do not count.
+
+    Returns
+    -------
+    variance
+        (labels, 3)
+    spread
+        (labels, 3) sum of the squares of independent parts of the variance over their degrees of freedom, so
+        that variance² / spread are those of the whole (F. E. Satterthwaite, An Approximate Distribution of
+        Estimates of Variance Components, 1946).
+    """
+    some = np.flatnonzero(label.ravel() >= 0)
+    where = label.ravel().take(some)
+    error = standard_error.reshape(-1, 3)[some].astype(np.float64)
+    variance, spread, own = np.zeros((labels, 3)), np.zeros((labels, 3)), np.ones_like(error)
+    for each in scatter:
+        part = each.deviations.reshape(-1, *each.deviations.shape[2:])[some] / np.float64(UNIT)
+        own -= np.square(part).sum(1)
+        part *= error[:, None]
+        shared, tile = _by_tile(part, each.tile.ravel()[some], each.level.ravel()[some], where)
+        _add_to(variance, tile, shared[0])
+        _add_to(spread, tile, shared[1])
+    alone = np.square(error) * np.where(own > ROUNDING, own, 0)
+    _add_to(variance, where, alone)
+    _add_to(spread, where, np.square(alone) / freedom.ravel()[some, None])
+    return variance, spread
+
+
+ROUNDING = 0.05  # part of a squared error that the rounding of deviations may leave over
+
+
+def _by_tile(
+    part: Doubles, tile: NDArray[np.int32], level: NDArray[np.uint8], label: Ints
+) -> tuple[tuple[Doubles, Doubles], Ints]:
+    """Return variance and spread (m, 3) of the sums over pixels of one tile and label, and labels (m,).
+
+    Parameters
+    ----------
+    part
+        (k, batches, 3) deviations of pixels.
+    """
+    key = np.stack([label, tile.astype(np.intp), level.astype(np.intp)])
+    order = np.lexsort(key[::-1])
+    key = key[:, order]
+    new = np.append(True, (key[:, 1:] != key[:, :-1]).any(0)) if order.size else np.zeros(0, np.bool_)
+    first = np.flatnonzero(new)
+    if not first.size:
+        return (np.zeros((0, 3)), np.zeros((0, 3))), np.zeros(0, np.intp)
+    sums = np.add.reduceat(part[order], first, axis=0)
+    key = key[:, first]
+    own = np.square(sums).sum(1)
+    batches = (sums != 0).any(2).sum(1)
+    total = own.copy()
+    for step in count(1):  # pairs of levels of one tile and label
+        same = (key[:2, step:] == key[:2, :-step]).all(0)
+        if not same.any():
+            break
+        ratio = np.exp2(-(key[2, step:] - key[2, :-step]) / 2)[:, None]
+        total[step:] += np.where(same[:, None], 2 * ratio * np.sqrt(own[step:] * own[:-step]), 0)
+    starts = np.flatnonzero(np.append(True, (key[:2, 1:] != key[:2, :-1]).any(0)))
+    variance = np.add.reduceat(total, starts, axis=0)
+    freedom = np.maximum(np.minimum.reduceat(batches, starts) - 1, 1)[:, None]
+    return (variance, np.square(variance) / freedom), key[0, starts]
+
+
+def _add_to(sums: Doubles, label: Ints, values: Doubles) -> None:
+    """Add values (m, 3) to sums (labels, 3) by their labels (m,)."""
+    for channel in range(values.shape[1]):
+        sums[:, channel] += np.bincount(label, values[:, channel], sums.shape[0])
+
+
+def scatter_of_difference(
+    parts: Sequence[tuple[Sequence[Scatter], Floats]], standard_error: Floats
+) -> tuple[Scatter, ...]:
+    """Return the scatter of the difference, or sum, of independent pictures.
+
+    Parameters
+    ----------
+    parts
+        Scatter and standard error (H, W, 3) of each picture.
+    standard_error
+        (H, W, 3) of the result.
+    """
+    tiny = np.finfo(np.float32).tiny
+    return tuple(
+        each.rescaled(error / np.maximum(standard_error, tiny))
+        for scatter, error in parts
+        for each in scatter
+    )
+
+
+def scatter_arrays(scatter: Sequence[Scatter]) -> dict[str, NDArray[Any]]:
+    """Return all arrays by the names that they have in files."""
+    return {
+        f"{PREFIX}{number}.{name}": getattr(each, name)
+        for number, each in enumerate(scatter)
+        for name in NAMES
+    }
+
+
+def restored_scatter(
+    file: str, shape: tuple[int, ...], arrays: Mapping[str, NDArray[Any]]
+) -> tuple[Scatter, ...]:
+    """Return the scatter of a picture (H, W, 3) of which `scatter_arrays` returned these, from a file.
+
+    Raises
+    ------
+    SceneError
+        If one is missing, or is of another shape or type.
+    """
+    found: list[Scatter] = []
+    for _ in range(len(arrays) // len(NAMES)):
+        values = {name: arrays.get(f"{PREFIX}{len(found)}.{name}") for name in NAMES}
+        for name, (kind, dimensions) in NAMES.items():
+            each = values[name]
+            right = each is not None and each.dtype == kind and each.ndim == dimensions
+            if each is None or not right or each.shape[:2] != shape[:2] or each.shape[3:] not in ((), (3,)):
+                raise SceneError(f"{file}: the scatter of its samples is damaged: {name!r}")
+        found.append(Scatter(**values))  # type: ignore[arg-type]
+    return tuple(found)
