@@ -470,20 +470,67 @@ def test_instances_shine_by_the_material_they_have() -> None:
     assert a.mean() == pytest.approx(b.mean(), rel=0.01)
 
 
+# --- Spheres ---------------------------------------------------------------------------------------
+
+TOP, LEFT = texture([[1.0], [0.0]]), texture([[1.0, 0.0]])  # halves of a sphere by latitude and longitude
+
+
+@pytest.mark.parametrize("integrator", ALL)
+@pytest.mark.parametrize(("turned", "share"), [(TOP, 0.0), (texture([[0.0], [1.0]]), 1.0), (LEFT, 0.5)])
+def test_a_sphere_shines_by_a_texture(turned: wf.Texture, share: float, integrator: str) -> None:
+    """From right below, E = π·L·(r/d)² of the lower half, none of the upper, and half of one beside."""
+    lamp = wf.Sphere((0, 2, 0), 0.5, emission=turned, material=BLACK)
+    spp = 4096 if integrator == "naive" else 256
+    found = measure(lit(lamp), spp, integrator=integrator, max_bounces=1)
+    assert_mean(found, share * ALBEDO * (0.5 / 2) ** 2, 0.01 * share, rounding=1e-6)
+
+
+def test_an_even_texture_on_spheres_is_their_emission() -> None:
+    """Beside a sphere that shines evenly, a mesh with a texture, and from inside."""
+
+    def shapes(glow) -> list[wf.Shape]:
+        room = wf.Sphere((0, 0, 0), 9, emission=glow(0.25), material=wf.Diffuse(0.3))
+        balls = wf.Spheres([(-1, 1, 0), (1, 1, 0)], 0.3, emission=glow(2.0), material=BLACK)
+        even = wf.Sphere((0, 1, 1), 0.2, emission=3, material=BLACK)
+        return [room, balls, even, area_light(texture(QUARTERS))]
+
+    a, b = two_pictures(shapes(lambda value: value), shapes(lambda value: texture([[value]])))
+    assert a == pytest.approx(b, abs=1e-6)
+
+
+def test_spheres_shine_by_their_colors() -> None:
+    """Each by its own, with a factor; what is seen is what light samples bring."""
+    colors = [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
+    balls = wf.Spheres(
+        [(-1, 1, 0), (0, 1, 0), (1, 1, 0)], 0.3, colors, emission=wf.VertexColors(0.5), material=BLACK
+    )
+    camera = wf.Camera.look_at((0, 1, 9), (0, 1, 0), size=(30, 10), fov=6)
+    seen = render(wf.Scene([balls], camera=camera), 1).rgb
+    assert seen[5, [5, 15, 25]].tolist() == (0.5 * np.array(colors)).tolist()
+    light = compiled(balls).lights
+    assert light.kinds[0].radiance.T.tolist() == (0.5 * np.array(colors)).tolist()
+    full, naive = (
+        repeat(lit(balls), spp, integrator=name, max_bounces=2)
+        for name, spp in (("full", 64), ("naive", 1024))
+    )
+    assert_same_images(full, naive, 0.01)
+
+
+def test_the_mean_of_a_texture_on_a_sphere_weighs_areas() -> None:
+    """The caps by latitude are as large as they are: a band of a quarter of v has (1 − cos 45°)/2."""
+    rows = texture([[1.0], [0.0], [0.0], [0.0]])
+    ball = wf.Sphere(HERE, 1, emission=rows)
+    mean = compiled(ball).lights.kinds[0].radiance
+    assert mean[:, 0] == pytest.approx((1 - np.cos(np.pi / 4)) / 2, abs=2e-3)
+
+
 # --- Complaints ------------------------------------------------------------------------------------
 
 
 def test_complaints() -> None:
-    """A sphere shines evenly; a mesh without coordinates is named; a light needs a number or a texture."""
-    with pytest.raises(wf.SceneError, match="sphere: a sphere shines evenly; a mesh can shine by <Texture"):
-        wf.Sphere(HERE, 1, emission=texture(QUARTERS))
+    """A mesh without coordinates is named; a light needs a color or a texture."""
     with pytest.raises(wf.SceneError, match="rectangle: emission"):
         area_light("bright")
-    ball = wf.Sphere(
-        HERE, 1, material=wf.Material(wf.Principled(0.5), emission=texture(QUARTERS)), name="moon"
-    )
-    with pytest.raises(wf.SceneError, match="moon: a sphere shines evenly; a mesh can shine by <Texture"):
-        render(wf.Scene([ball]), 1)
     with pytest.raises(wf.SceneError, match=r"Material emission\[1\] is -1; it must be at least 0"):
         wf.Material(wf.Principled(0.5), emission=(0, -1, 0))
     bare = wf.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], emission=texture(QUARTERS))

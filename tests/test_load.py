@@ -222,7 +222,7 @@ def test_a_truncated_file_is_an_error_or_a_shorter_mesh(write, cut):
     text = SQUARE + "f 1 2 3\nf 1 3 4\nf 2 3 4\n"
     whole = soup(load_meshes(write(text))[0])
     try:
-        (mesh,) = load_meshes(write(text[:cut]))
+        (mesh,) = load_meshes(write(text[:cut]), strict=True)  # what has vertices alone would be points
     except SceneError:
         return
     assert np.array_equal(soup(mesh), whole[: len(mesh.faces)])

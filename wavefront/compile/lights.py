@@ -18,6 +18,7 @@ from ..lights import (
     LightTable,
     RectangleLights,
     SphereLights,
+    TexturedSphereLights,
     TexturedTriangleLights,
     TriangleLights,
     TwoSidedRectangleLights,
@@ -27,6 +28,7 @@ from ..lights import (
 )
 from ..lights.samplers import LightSamplerMaker
 from ..lights.textured_emission import has_textured_emission, mean_radiance
+from ..lights.textured_sphere import mean_sphere_radiance
 from ..scene import Scene
 from ..shapes import CurvedShape, Mesh, Shape, Sphere, Spheres
 from ..shapes.attributes import ATTRIBUTES
@@ -177,8 +179,6 @@ def _sphere_lights(
             raise SceneError(
                 f"{shape.name}: a {type(shape).__name__} cannot shine; a wf.Sphere or a wf.Mesh can"
             )
-        if isinstance(shape.emission, BaseTexture):
-            raise SceneError(f"{shape.name}: a sphere shines evenly; a mesh can shine by {shape.emission!r}")
         if shape.material.opacity is not None:
             raise SceneError(
                 f"{shape.name}: a sphere that shines must be all there; its material has an alpha"
@@ -186,14 +186,26 @@ def _sphere_lights(
     if not emitting:
         return []
     rows = [first_row[id(shape)] + np.arange(shape.count) for shape in emitting]
-    lights = [_lights_of_spheres(shape, center) for shape in emitting]
-    return [(SphereLights.concatenate(lights), np.concatenate(rows))]
+    lights = SphereLights.concatenate([_lights_of_spheres(shape, center) for shape in emitting])
+    emissions, source_of = _distinct_emissions(
+        [shape.emission if isinstance(shape.emission, BaseTexture) else None for shape in emitting]
+    )
+    every = np.concatenate(rows)
+    if not emissions:
+        return [(lights, every)]
+    source = np.repeat(source_of, [shape.count for shape in emitting])
+    prim = np.where(source >= 0, every, -1)
+    plain = lights.center, lights.radius, lights.radiance
+    return [(TexturedSphereLights(*plain, prim=prim, source=source, emissions=emissions), every)]
 
 
 def _lights_of_spheres(shape: Any, center: NDArray[np.float64]) -> SphereLights:
-    """Return the lights of a shape of emitting spheres, relative to `center` (3,)."""
+    """Return the lights of a shape of emitting spheres, relative to `center` (3,); the mean of a texture."""
     middles = np.ascontiguousarray((shape.centers - center).T, f4)
-    radiance = np.repeat(shape.emission, shape.count, 1)
+    if isinstance(shape.emission, BaseTexture):
+        radiance = mean_sphere_radiance(shape)
+    else:
+        radiance = np.repeat(shape.emission, shape.count, 1)
     radii = np.broadcast_to(shape.radii, shape.count).astype(f4)
     return SphereLights(middles, radii, radiance)
 
@@ -243,17 +255,29 @@ def _area_lights(meshes: Sequence[Mesh], vertices: Sequence[NDArray[np.float64]]
 
 def _textured_emissions(meshes: Sequence[Mesh]) -> tuple[tuple[Floats | BaseTexture, ...], Ints]:
     """Return the distinct emissions of meshes that do not shine evenly, and their numbers, -1 for none."""
+    return _distinct_emissions(
+        [
+            mesh.emission if mesh.emission is not None and has_textured_emission(mesh) else None
+            for mesh in meshes
+        ]
+    )
+
+
+def _distinct_emissions(
+    given: Sequence[Floats | BaseTexture | None],
+) -> tuple[tuple[Floats | BaseTexture, ...], Ints]:
+    """Return emissions, each once, and the number of that of each shape, -1 for None."""
     numbers: dict[int, int] = {}
     emissions: list[Floats | BaseTexture] = []
-    of_mesh = np.full(len(meshes), -1, np.intp)
-    for number, mesh in enumerate(meshes):
-        if mesh.emission is None or not has_textured_emission(mesh):
+    of_shape = np.full(len(given), -1, np.intp)
+    for shape, emission in enumerate(given):
+        if emission is None:
             continue
-        if id(mesh.emission) not in numbers:
-            numbers[id(mesh.emission)] = len(emissions)
-            emissions.append(mesh.emission)
-        of_mesh[number] = numbers[id(mesh.emission)]
-    return tuple(emissions), of_mesh
+        if id(emission) not in numbers:
+            numbers[id(emission)] = len(emissions)
+            emissions.append(emission)
+        of_shape[shape] = numbers[id(emission)]
+    return tuple(emissions), of_shape
 
 
 def _radiance(mesh: Mesh, triangles: NDArray[np.float64]) -> Floats:

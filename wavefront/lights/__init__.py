@@ -11,6 +11,7 @@ from .sphere import SphereLights
 from .spot import SpotLight, SpotLights
 from .table import LightTable
 from .textured_emission import TexturedTriangleLights, TwoSidedTexturedTriangleLights
+from .textured_sphere import TexturedSphereLights
 from .triangle import TriangleLights, TwoSidedTriangleLights
 
 __all__ = [
@@ -35,6 +36,7 @@ __all__ = [
     "SpotLight",
     "SpotLights",
     "SunLight",
+    "TexturedSphereLights",
     "TexturedTriangleLights",
     "TriangleLights",
     "TwoSidedRectangleLights",

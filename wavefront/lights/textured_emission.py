@@ -64,20 +64,41 @@ class TexturedTriangleLights(TriangleLights):
         """Return the radiance of points on the triangles, (3, n), where they are opaque."""
         if surface is None:
             return TriangleLights.le(self, wi)
-        radiance = np.empty_like(wi)
-        source = np.broadcast_to(self.source, wi.shape[1:])
-        for number, emission in enumerate(self.emissions):
-            lanes = np.flatnonzero(source == number)
-            if lanes.size:
-                at = surface if lanes.size == source.size else surface.take(lanes)
-                value = emission_at(emission, at)
-                radiance[:, lanes] = value if self.sides == 2 else value * ~at.back_facing
-        return radiance
+        return radiance_by_source(self.emissions, self.source, wi, surface, self.sides == 2)
 
 
 @record
 class TwoSidedTexturedTriangleLights(TwoSided, TexturedTriangleLights):
     """k triangles that emit from both sides, some of them by a texture."""
+
+
+def radiance_by_source(
+    emissions: tuple[Floats | BaseTexture, ...],
+    source: Ints,
+    wi: Floats,
+    surface: SurfaceInteraction,
+    two_sided: bool,
+) -> Floats:
+    """Return the radiance (3, n) of points on lights that vary.
+
+    Parameters
+    ----------
+    emissions, source
+        The emissions, and their numbers (n,) or (1,).
+    wi, surface
+        (3, n) directions to the points, and the points.
+    two_sided
+        Whether back sides shine, too.
+    """
+    radiance = np.empty_like(wi)
+    source = np.broadcast_to(source, wi.shape[1:])
+    for number, emission in enumerate(emissions):
+        lanes = np.flatnonzero(source == number)
+        if lanes.size:
+            at = surface if lanes.size == source.size else surface.take(lanes)
+            value = emission_at(emission, at)
+            radiance[:, lanes] = value if two_sided else value * ~at.back_facing
+    return radiance
 
 
 def emission_at(emission: Floats | BaseTexture, surface: SurfaceInteraction) -> Floats:

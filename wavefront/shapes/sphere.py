@@ -12,10 +12,11 @@ from ..bsdfs import Diffuse
 from ..errors import SceneError, finite_array, number
 from ..materials import Material, MaterialLike
 from ..suggestions import suggests_keywords
+from ..textures.parameter import Color
 from ..vec import FLOAT32_MAX
 from .base import Checked
-from .even_emission import EvenEmission
 from .mesh import FLOAT32_MIN
+from .sphere_emission import SphereEmission
 from .transform import points_by, similarities
 
 
@@ -33,7 +34,7 @@ def _radius(name: str, value: float) -> float:
     return number(name, value, lambda x: FLOAT32_MIN <= x <= FLOAT32_MAX, limit)
 
 
-class Sphere(EvenEmission):
+class Sphere(SphereEmission):
     """A sphere, intersected exactly.
 
     Parameters
@@ -45,15 +46,15 @@ class Sphere(EvenEmission):
     material
         What the surface is made of: a `Material` or a `Bsdf`. Its outside is the front.
     emission
-        Radiance W·sr⁻¹·m⁻², one number or three, the same everywhere; it leaves the surface on both
-        sides. By default that of the material, if it has one.
+        Radiance W·sr⁻¹·m⁻²: a color, at least 0, or a texture; it leaves the surface on both sides. By
+        default that of the material, if it has one.
     name
         Used in messages.
 
     Raises
     ------
     SceneError
-        If an argument is malformed, or the emission is a texture.
+        If an argument is malformed.
 
     Examples
     --------
@@ -71,7 +72,7 @@ class Sphere(EvenEmission):
         radius: float,
         *,
         material: MaterialLike | None = None,
-        emission: ArrayLike | None = None,
+        emission: Color | None = None,
         name: str = "sphere",
     ) -> None:
         self.name = name

@@ -10,13 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..materials import MaterialLike
 from ..suggestions import suggests_keywords
+from ..textures.parameter import Color
 from .arrays import PrimitiveArray
 from .base import Checked
-from .even_emission import EvenEmission
 from .mesh import positions
+from .sphere_emission import SphereEmission
 
 
-class Spheres(EvenEmission, PrimitiveArray):
+class Spheres(SphereEmission, PrimitiveArray):
     """Spheres, given by arrays: atoms, particles, points.
 
     Parameters
@@ -32,8 +33,8 @@ class Spheres(EvenEmission, PrimitiveArray):
         What all surfaces are made of: a `Material` or a `Bsdf`. By default a `Diffuse` that shows the
         `colors`, or is gray. The outside is the front.
     emission
-        Radiance W·sr⁻¹·m⁻² of all spheres, one number or three; it leaves the surfaces on both sides. By
-        default that of the material, if it has one.
+        Radiance W·sr⁻¹·m⁻² of all spheres: a color, at least 0, or a texture, such as `VertexColors()` for
+        the `colors`; it leaves the surfaces on both sides. By default that of the material, if it has one.
     name
         Used in messages.
 
@@ -61,7 +62,7 @@ class Spheres(EvenEmission, PrimitiveArray):
         colors: ArrayLike | None = None,
         *,
         material: MaterialLike | None = None,
-        emission: ArrayLike | None = None,
+        emission: Color | None = None,
         name: str = "spheres",
     ) -> None:
         self.name = name
