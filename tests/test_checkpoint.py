@@ -646,12 +646,17 @@ def test_kill_9_at_fifty_moments_costs_no_bit(
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 @pytest.mark.parametrize(
     ("number", "status", "background"),
-    [(signal.SIGINT, 130, False), (signal.SIGTERM, 143, False), (signal.SIGTERM, 143, True)],
+    [
+        (signal.SIGINT, 130, False),
+        (signal.SIGTERM, 143, False),
+        (signal.SIGTERM, 143, True),
+        (signal.Signals.__members__.get("SIGHUP"), 129, False),
+    ],
 )
 def test_signals_keep_the_render(
     command: list[str], tmp_path: Path, number: int, status: int, background: bool
 ) -> None:
-    """Ctrl-C and SIGTERM write the checkpoint and the picture so far; the same command goes on.
+    """Ctrl-C, SIGTERM and SIGHUP write the checkpoint and the picture so far; the same command goes on.
 
     What a script starts in the background ignores Ctrl-C.
     """

@@ -67,7 +67,7 @@ def test_help_has_examples_that_are_valid(name: str) -> None:
 def test_help_and_the_document_name_the_exit_codes() -> None:
     done = run("--help")
     assert done.returncode == 0
-    for code in ("0", "1", "2", "130", "143"):
+    for code in ("0", "1", "2", "129", "130", "143"):
         assert re.search(rf"\b{code}\b", " ".join(done.stdout.split()).split("Exit status:")[1])
         assert f"\n| {code} |" in DOCUMENT
 

@@ -6,6 +6,7 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -103,19 +104,24 @@ class Interrupted(_WithImage, KeyboardInterrupt):
         Kernels call it once for the notebook and once more for their reply.
         """
         if self.image is not None and not self._displayed:
-            from IPython.display import display  # IPython is installed: it called this method
-
             self._displayed = True
-            display(self.image)
+            with suppress(Exception):  # what it shows is beside what it says
+                from IPython.display import display  # IPython is installed: it called this method
+
+                display(self.image)
         return [f"{type(self).__name__}: {self}"]
 
 
 def warn_caller(message: str) -> None:
-    """Warn, at the line of the user's program that called into this package."""
+    """Warn, at the line of the user's program that called into this package.
+
+    A warning that cannot be shown, as standard error is closed, is lost.
+    """
     frame, level = sys._getframe(1), 2
     while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
         frame, level = frame.f_back, level + 1
-    warnings.warn(message, stacklevel=level)
+    with suppress(OSError, ValueError, AttributeError):
+        warnings.warn(message, stacklevel=level)
 
 
 def in_brief(value: Any) -> str:

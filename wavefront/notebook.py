@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
+from contextlib import suppress
 from typing import Any
 
 from .errors import Interrupted, RenderError
@@ -51,6 +52,8 @@ def run_shown(session: Session) -> Image:
 class LivePicture:
     """A picture below the cell that is replaced by better ones.
 
+    A picture that cannot be shown is left out: the render goes on.
+
     When the cell ends with the last picture, as its result or with the error that holds it, Jupyter shows it
     once more. Then this one disappears.
     """
@@ -75,16 +78,18 @@ class LivePicture:
             return
         if image is not self._last:
             self._put(image)
-        _shell().events.register("post_run_cell", self._cell_ended)
+        with suppress(Exception):
+            _shell().events.register("post_run_cell", self._cell_ended)
 
     def _put(self, image: Image) -> None:
         from IPython.display import display  # it is there: this program runs in its kernel
 
         self._last = image
-        if self._handle is None:
-            self._handle = display(image, display_id=True)
-        else:
-            self._handle.update(image)
+        with suppress(Exception):
+            if self._handle is None:
+                self._handle = display(image, display_id=True)
+            else:
+                self._handle.update(image)
 
     def _cell_ended(self, result: Any) -> None:
         """Remove the picture if the cell shows it as its result or with its error."""

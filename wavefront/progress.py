@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -73,10 +74,34 @@ class Bar:
         style: dict[str, Any] = {"unit_scale": True}
         if self._timed:
             style = {"bar_format": "{l_bar}{bar}| {n:.0f}/{total:.0f} s{postfix}"}
-        bar = tqdm(total=self._total, initial=self._done, unit="sample", **style)
+        bar = tqdm(total=self._total, initial=self._done, unit="sample", file=_Screen(), **style)
         if not bar.disable:  # by the environment variable TQDM_DISABLE
             bar.start_t -= elapsed
         return bar
+
+
+class _Screen:
+    """The standard error, where there is one: what it cannot show is lost, and nothing else.
+
+    It is None in programs without a console, and may be closed, full, or a pipe that nobody reads.
+    """
+
+    def __init__(self) -> None:
+        self._file: Any = sys.stderr
+
+    def __getattr__(self, name: str) -> Any:
+        """Return everything else of the file."""
+        return getattr(self._file, name)
+
+    def write(self, text: str) -> None:
+        """Write if that is possible."""
+        with suppress(Exception):
+            self._file.write(text)
+
+    def flush(self) -> None:
+        """Show what was written if that is possible."""
+        with suppress(Exception):
+            self._file.flush()
 
 
 @contextmanager
@@ -114,7 +139,7 @@ def _show(title: str, ended: threading.Event) -> None:
         return
     from tqdm import tqdm  # as above
 
-    with tqdm(desc=title, bar_format="{desc}: {elapsed}") as line:
+    with tqdm(desc=title, bar_format="{desc}: {elapsed}", file=_Screen()) as line:
         if not line.disable:
             line.start_t -= time.monotonic() - start
         while not ended.wait(TICK):

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from ..errors import RenderError, SceneError
+from ..scheduling.interrupt import SIGNALS
 from ..version import VERSION
 from .arguments import joined
 from .command import COMMAND, Parser
@@ -25,7 +26,7 @@ from .info_command import add_info_command
 from .messages import print_error, print_note, print_warning
 from .render_command import add_render_command
 from .resume_command import add_resume_commands
-from .status import ERROR, INTERRUPTED, TERMINATED
+from .status import ERROR, HUNG_UP, INTERRUPTED, TERMINATED
 from .turntable_command import add_turntable_command
 from .view_command import add_view_command
 
@@ -36,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="backslashreplace")
     words = joined(sys.argv[1:] if arguments is None else arguments)
     options = parser().parse_args(words, argparse.Namespace(arguments=words, folder=os.getcwd()))
-    with _sigterm_as_ctrl_c() as sigterm, warnings.catch_warnings():
+    with _endings_as_ctrl_c() as ending, warnings.catch_warnings():
         warnings.simplefilter("always", UserWarning)
         warnings.showwarning = lambda message, *_: print_warning(message)
         try:
@@ -48,36 +49,56 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if str(stop):
                 print_note(stop)
             status = INTERRUPTED
-    return TERMINATED if sigterm.came and status == INTERRUPTED else status
+    return ending.status if status == INTERRUPTED else status
 
 
-class _Sigterm:
-    """What to do at SIGTERM: the same as at Ctrl-C, which keeps the picture; a second one ends at once."""
+class _Ending:
+    """What to do at SIGTERM and SIGHUP: the same as at Ctrl-C, which keeps the picture.
 
-    came = False
+    A second SIGTERM ends the program at once. SIGHUP, which says that the terminal was closed, may come from
+    the system and from the shell, and beside SIGTERM: it counts once.
 
-    def handle(self, signal_number: int, frame: Any) -> None:
+    Attributes
+    ----------
+    status
+        The exit status, if one of them interrupts the program.
+    """
+
+    status = INTERRUPTED
+
+    def __init__(self) -> None:
+        ends = {number: signal.getsignal(number) for number in SIGNALS if number != signal.SIGINT}
+        self.before = {number: handler for number, handler in ends.items() if handler != signal.SIG_IGN}
+
+    def handle(self, number: int, frame: Any) -> None:
         """Handle the signal."""
-        self.came = True
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        self.status = TERMINATED if number == signal.SIGTERM else HUNG_UP
+        for each in self.before:
+            if each != signal.SIGTERM:
+                signal.signal(each, signal.SIG_IGN)
+            elif each == number:
+                signal.signal(each, signal.SIG_DFL)
         signal.raise_signal(signal.SIGINT)
 
 
 @contextmanager
-def _sigterm_as_ctrl_c() -> Iterator[_Sigterm]:
-    """Handle SIGTERM as Ctrl-C."""
-    sigterm = _Sigterm()
+def _endings_as_ctrl_c() -> Iterator[_Ending]:
+    """Handle SIGTERM and SIGHUP as Ctrl-C, but for one that is ignored, as `nohup` has it."""
+    ending = _Ending()
     if threading.current_thread() is not threading.main_thread():  # only that one may set handlers
-        yield sigterm
+        yield ending
         return
-    before = signal.signal(signal.SIGTERM, sigterm.handle)
+    handler: Any = ending.handle
     if not callable(signal.getsignal(signal.SIGINT)):  # ignored, as in the background of a script
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-        sigterm.came = True  # if anything interrupts
+        handler = signal.default_int_handler
+        ending.status = TERMINATED  # if anything interrupts
+    for number in ending.before:
+        signal.signal(number, handler)
     try:
-        yield sigterm
+        yield ending
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, before in ending.before.items():
+            signal.signal(number, before)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -86,7 +107,7 @@ def parser() -> argparse.ArgumentParser:
         prog="wavefront",
         description="A path tracer in whole-array NumPy.",
         epilog="wavefront COMMAND --help has the options of a command, and examples. Exit status: 0 done, "
-        "1 doctor found a fault, 2 error, 130 stopped by Ctrl-C, 143 by SIGTERM.",
+        "1 doctor found a fault, 2 error, 130 stopped by Ctrl-C, 143 by SIGTERM, 129 by a closed terminal.",
     )
     top.add_argument("--version", action="version", version=VERSION)
     commands = top.add_subparsers(required=True, metavar=COMMAND)

@@ -11,6 +11,7 @@ from ..datasets.dataset import FORMATS
 from ..views import turntable
 from .arguments import Several, count
 from .command import add_command, add_scene
+from .messages import print_done
 from .options import add_display, add_settings, display_of, read_scene, setting_values
 
 
@@ -74,5 +75,5 @@ def _dataset(options: argparse.Namespace) -> int:
     )
     earlier = len(cameras) - rendered
     before = f", {earlier} of them there before" if earlier else ""
-    print(f"{options.output}: {counted(len(cameras), 'view')}{before}")
+    print_done(f"{options.output}: {counted(len(cameras), 'view')}{before}")
     return 0

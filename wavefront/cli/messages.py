@@ -1,8 +1,10 @@
-"""Messages of the command line, a line each, to standard error."""
+"""Messages of the command line, a line each. One that cannot be shown is lost, and ends nothing."""
 
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
+from typing import TextIO
 
 
 def print_error(error: BaseException | str) -> None:
@@ -21,5 +23,17 @@ def print_note(message: object) -> None:
     _print_line(str(message))
 
 
+def print_done(text: str) -> None:
+    """Say to standard output what was written to a file, which is there in any case."""
+    _print_to(sys.stdout, text)
+
+
 def _print_line(text: str) -> None:
-    print("wavefront: " + " ".join(text.splitlines()), file=sys.stderr)
+    _print_to(sys.stderr, "wavefront: " + " ".join(text.splitlines()))
+
+
+def _print_to(file: TextIO | None, text: str) -> None:
+    """Print where there is a file that takes it: a terminal may be closed, a disk full."""
+    if file is not None:
+        with suppress(OSError, ValueError):
+            print(text, file=file, flush=True)

@@ -18,7 +18,7 @@ from ..session import Session
 from ..viewer import view
 from . import arguments
 from .command import PICTURE_FILE, SCENE_FILE, add_command
-from .messages import print_error, print_note
+from .messages import print_done, print_error, print_note
 from .options import add_display, add_settings, display_of, read_scene, setting_values
 from .outputs import output_paths
 from .rescue import save_elsewhere
@@ -161,7 +161,7 @@ def _save(image: Image, output: str, options: argparse.Namespace) -> int:
         place = save_elsewhere(save, output)
         print_note(f"the picture {f'was saved as {place}' if place else 'is lost'}")
         return ERROR
-    print(_summary(image, output))
+    print_done(_summary(image, output))
     return 0
 
 

@@ -11,6 +11,7 @@ from ..codecs.images import check_writable
 from ..errors import SceneError
 from ..image import Image
 from .command import PICTURE_FILE, add_command
+from .messages import print_done
 
 
 def add_resume_commands(commands: Any, parser: argparse.ArgumentParser) -> None:
@@ -64,7 +65,7 @@ def _merge(options: argparse.Namespace) -> int:
             raise SceneError(f"{path}: {error}") from error
     assert merged is not None
     merged.save(options.output)
-    print(f"{options.output}: {merged.spp} spp, samples {_listed(merged.metadata['sample_ranges'])}")
+    print_done(f"{options.output}: {merged.spp} spp, samples {_listed(merged.metadata['sample_ranges'])}")
     return 0
 
 

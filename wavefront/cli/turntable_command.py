@@ -10,6 +10,7 @@ from ..counted import counted
 from ..views import render_many, turntable
 from .arguments import count
 from .command import add_command, add_scene
+from .messages import print_done
 from .options import add_display, add_settings, display_of, read_scene, setting_values
 
 
@@ -57,5 +58,5 @@ def _turntable(options: argparse.Namespace) -> int:
         tone=display.tone,
         white_balance=display.white_balance,
     )
-    print(f"{options.output}: {counted(count, 'picture')}")
+    print_done(f"{options.output}: {counted(count, 'picture')}")
     return 0
