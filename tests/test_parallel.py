@@ -377,6 +377,34 @@ def test_where_processes_are_not_forked_they_need_more_work(monkeypatch: pytest.
 
 
 @processes
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="processes are forked on Linux alone")
+@pytest.mark.parametrize(
+    "error",
+    [
+        OSError(38, "Function not implemented"),  # as serverless platforms have it
+        FileNotFoundError(2, "No such file or directory"),  # without /dev/shm
+        ImportError("This platform lacks a functioning sem_open implementation"),
+    ],
+)
+def test_without_semaphores_there_are_threads(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a line that says so, where processes would be faster, and an error where they are asked for."""
+
+    def fail(*given: object, **named: object) -> None:
+        raise error
+
+    monkeypatch.setattr("multiprocessing.synchronize.SemLock.__init__", fail)
+    monkeypatch.setattr(executors, "MIN_PATHS", 1)
+    monkeypatch.setattr(executors, "_other_threads_compute", lambda: False)
+    picture: dict[str, Any] = {"spp": 1, "size": (16, 16), "workers": 2}
+    with pytest.warns(UserWarning, match=r"workers are threads.*no semaphores.*/dev/shm"):
+        image = wf.render(scenes.everything(), **picture)
+    assert image.metadata["executor"] == "threads"
+    for name in ("processes", "spawn", "forkserver"):
+        with pytest.raises(wf.SceneError, match=rf"'{name}'.*no semaphores.*use 'threads'"):
+            wf.render(scenes.everything(), executor=name, **picture)
+    wf.render(scenes.everything(), executor="threads", **picture)
+
+
 def test_a_daemon_has_threads() -> None:
     """multiprocessing allows it no children."""
     daemon = multiprocessing.current_process()

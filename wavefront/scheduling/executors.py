@@ -21,7 +21,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from ..errors import SceneError
+from ..errors import SceneError, warn_caller
 from ..registry import Registry
 from .blas import reserve_buffers
 from .dask import DaskClient, dask_workers
@@ -160,6 +160,8 @@ def _workers_in(executor: str | ExecutorLike | None) -> int | None:
 def choose_executor(executor: str | ExecutorLike | None, workers: int, paths: int) -> str | ExecutorLike:
     """Return what was asked for, else "threads" or "processes", whichever is faster for so many paths.
 
+    Warns where it were processes, but the system has no semaphores for them.
+
     Raises
     ------
     SceneError
@@ -167,8 +169,8 @@ def choose_executor(executor: str | ExecutorLike | None, workers: int, paths: in
     """
     if executor is not None:
         EXECUTORS.find(executor)
-    obstacle = _obstacle_to_processes()
-    if executor in PROCESSES and obstacle:
+    obstacle = _daemon() or _missing_semaphores() if executor in PROCESSES else None
+    if obstacle:
         raise SceneError(f"executor is {executor!r}, but {obstacle}; use 'threads'")
     if executor == "forkserver" and executor not in multiprocessing.get_all_start_methods():
         raise SceneError(f"executor is 'forkserver', which {sys.platform} does not have; use 'spawn'")
@@ -176,8 +178,12 @@ def choose_executor(executor: str | ExecutorLike | None, workers: int, paths: in
         return executor
     without_lock = not getattr(sys, "_is_gil_enabled", lambda: True)()
     few = workers == 1 or paths < (MIN_PATHS if _forks() else MIN_PATHS_TO_SPAWN)
-    threads = few or without_lock or obstacle or (_forks() and _other_threads_compute())
-    return "threads" if threads else "processes"
+    if few or without_lock or _daemon() or (_forks() and _other_threads_compute()):
+        return "threads"
+    obstacle = _missing_semaphores()
+    if obstacle:
+        warn_caller(f"workers are threads, which are slower than processes: {obstacle}")
+    return "threads" if obstacle else "processes"
 
 
 def _other_threads_compute() -> bool:
@@ -230,8 +236,18 @@ def needs_pickling(executor: str | ExecutorLike) -> bool:
     return executor in ("spawn", "forkserver") or (executor == "processes" and not _forks())
 
 
-def _obstacle_to_processes() -> str | None:
-    """Return why workers cannot be processes; None if they can."""
+def _daemon() -> str | None:
+    """Return why workers cannot be processes, as this one is a daemon; None if it is none."""
     if multiprocessing.current_process().daemon:
         return "this process is a daemon of multiprocessing, which may have no children"
+    return None
+
+
+def _missing_semaphores() -> str | None:
+    """Return why workers cannot be processes, as sandboxes have no semaphores for them; None if there are."""
+    method = "fork" if "fork" in multiprocessing.get_all_start_methods() else None  # leaves nothing behind
+    try:
+        multiprocessing.get_context(method).Lock()
+    except (ImportError, OSError) as error:
+        return f"this system has no semaphores for processes ({error}), perhaps as it has no /dev/shm"
     return None
