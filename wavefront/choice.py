@@ -118,8 +118,6 @@ def _tries_something(settings: Settings, scene: CompiledScene, camera: Camera) -
 
 def _may_reuse(settings: Settings, camera: Camera) -> bool:
     """Return whether settings and size of a picture allow that its pixels share paths by themselves."""
-    plain = (
-        settings.clamp is None and settings.noise is None and not settings.denoise and not settings.caustics
-    )
+    plain = settings.clamp is None and settings.noise is None and not settings.caustics
     told_apart = "light_groups" in settings.aovs
     return settings.reuse == AUTO and plain and not told_apart and min(camera.size) >= SIDE * STRIDE

@@ -153,7 +153,7 @@ def render(
         lie a little apart; only "full" does so. It pays where most of the noise is in indirect light between
         matte surfaces. The errors of these pixels depend on each other then: docs/reuse.md has figures.
         "auto" shares where a short trial says that it pays, beside gloss and glass only where light is hard
-        to find: docs/choices.md tells how. It never does with `branches`, `clamp`, `noise`, `denoise`,
+        to find: docs/choices.md tells how. It never does with `branches`, `clamp`, `noise`,
         `caustics` or light groups.
     clamp
         The most that a path may find as indirect light at once, as radiance, the mean of its channels; what

@@ -383,7 +383,7 @@ class Settings:
         "between matte surfaces. The errors of these pixels depend on each other then: docs/reuse.md has "
         'figures. "auto" shares where a short trial says that it pays, beside gloss and glass only where '
         "light is hard to find: docs/choices.md tells how. It never does with `branches`, `clamp`, `noise`, "
-        "`denoise`, `caustics` or light groups.",
+        "`caustics` or light groups.",
         check=auto_or(check_flag),
         option="share paths among pixels: yes, no, or auto (default), which tries whether it pays",
     )
