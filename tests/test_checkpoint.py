@@ -483,7 +483,7 @@ def test_wrong_contents_with_a_right_checksum_are_refused(header: bytes, tmp_pat
     ("key", "value"),
     [
         *((key, 5) for key in ("size", "layers", "identity", "metadata", "state", "command", "wavefront")),
-        ("size", [24.0, 18.0]),
+        ("size", [24.5, 18]),
         ("size", [24]),
         ("size", [10**9, 10**9]),
         ("layers", ["no such layer"]),

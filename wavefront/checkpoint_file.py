@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .counted import counted
-from .errors import SceneError
+from .errors import SceneError, printable
 from .files import check_regular, write_chunks
 
 MAGIC = b"\x93WFCK\r\n\n"
@@ -95,7 +95,7 @@ def contents_of(path: str | os.PathLike[str]) -> Iterator[None]:
     try:
         yield
     except SceneError as error:
-        if str(error).startswith(name):
+        if str(error).startswith(printable(name)):
             raise
         raise SceneError(f"{name}: {error}") from error
     except MALFORMED as error:

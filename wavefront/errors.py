@@ -16,6 +16,21 @@ from .suggestions import did_you_mean
 
 PACKAGE = os.path.join(os.path.dirname(__file__), "")
 MOST_LETTERS = 120  # of a value in a message
+BEGIN, END = 1500, 500  # letters at both ends of a message that is kept where it is longer
+
+
+def printable(text: str) -> str:
+    """Return text with control characters, which could steer a terminal, as escapes such as \\x1b."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
+
+def plain(message: str) -> str:
+    """Return a message as it is shown: printable, and without the middle where a value in it is very long."""
+    if len(message) > BEGIN + END:
+        message = f"{message[:BEGIN]} … {message[-END:]}"
+    return "\n".join(map(printable, message.split("\n")))
 
 
 class SceneError(ValueError):
@@ -31,6 +46,9 @@ class SceneError(ValueError):
     ...     print(error)
     Diffuse reflectance[1] is 1.5; it must be in [0, 1]
     """
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(plain(message))
 
 
 class SaveError(SceneError, OSError):
@@ -51,7 +69,7 @@ class _WithImage(BaseException):
     """An error that may hold the picture so far."""
 
     def __init__(self, message: str, image: Any = None) -> None:
-        super().__init__(message)
+        super().__init__(plain(message))
         self.image = image
 
 
@@ -121,7 +139,7 @@ def warn_caller(message: str) -> None:
     while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
         frame, level = frame.f_back, level + 1
     with suppress(OSError, ValueError, AttributeError):
-        warnings.warn(message, stacklevel=level)
+        warnings.warn(plain(message), stacklevel=level)
 
 
 def in_brief(value: Any) -> str:

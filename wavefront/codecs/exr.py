@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import sys
+import threading
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from functools import partial
 from io import BytesIO
 from typing import Any
@@ -21,6 +24,7 @@ from .image_data import ERROR, ImageData, from_json, from_named, to_json
 ATTRIBUTE = "wavefront"  # the attribute that describes all arrays
 TYPES = ("f4", "u4", "i4", "f8", "i8", "u8")  # of arrays, as NumPy writes them
 
+_LOCK = threading.Lock()  # standard output is restored in the order in which it was replaced
 MAX_VALUES = 2**27  # of all channels of all parts: 512 MB as float32
 VALUE_BYTES = 8  # of memory for each
 VALUES_PER_BYTE = 16  # for larger files, the limit is this number of values per byte of the file
@@ -133,12 +137,27 @@ def _channels(data: bytes, budget: Budget) -> dict[str, Callable[[], NDArray[Any
     claimed = OpenEXR.File(BytesIO(data), header_only=True).parts
     size = _check_claims(claimed, len(data), budget)
     # OpenEXR decodes all parts, and leaves out those that it cannot decode.
-    parts = OpenEXR.File(BytesIO(data), separate_channels=True).parts
+    with _LOCK, redirect_stdout(_OneThread(sys.stdout)):  # it prints warnings of parts
+        parts = OpenEXR.File(BytesIO(data), separate_channels=True).parts
     read = {(part.part_index, part.name()) for part in parts}
     for part in claimed:
         if (part.part_index, part.name()) not in read:
             raise SceneError(f"part {part.part_index} ({part.name()!r}) of {len(claimed)} is damaged")
     return {name: partial(_pixels, name, each.pixels, size) for name, each in parts[0].channels.items()}
+
+
+class _OneThread:
+    """Standard output that drops what this thread writes, and nothing of others."""
+
+    def __init__(self, out: Any) -> None:
+        self._out, self._thread = out, threading.get_ident()
+
+    def write(self, text: str) -> int:
+        """Write, or drop, a text."""
+        return len(text) if threading.get_ident() == self._thread else int(self._out.write(text))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._out, name)
 
 
 def _pixels(name: str, values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..camera import Camera
-from ..errors import SceneError
+from ..errors import SceneError, printable
 from ..lights import DirectionalLight, PointLight, SpotLight
 from ..shapes.transform import Matrix
 from .gltf_document import Document, floats, shown
@@ -83,7 +83,7 @@ def contents(document: Document) -> GltfContents:
 
 def _names_of_parts(node: Node, parts: int) -> list[str]:
     """Return the names of the shapes of a node; "" if it has none."""
-    name = str(node.json.get("name") or "")
+    name = printable(str(node.json.get("name") or ""))
     return [f"{name}_{part}" if name and parts > 1 else name for part in range(parts)]
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..counted import counted
-from ..errors import SceneError
+from ..errors import SceneError, printable
 from ..shapes.transform import Matrix
 from .sources import MAX_TRIANGLES, SceneFiles
 
@@ -77,7 +77,7 @@ class Document:
         try:
             yield
         except SceneError as error:
-            if str(error).startswith(self.name):
+            if str(error).startswith(printable(self.name)):
                 raise
             raise SceneError(f"{self.name}: {element}: {error}") from error
         except MALFORMED as error:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..codecs.images import decode_codes
 from ..elementary import log, sin_cos_turns
-from ..errors import SceneError
+from ..errors import SceneError, printable
 from ..textures.image import Texture
 from ..textures.normal_map import NormalMap
 from ..textures.parameter import MAX_INDEX
@@ -162,7 +162,7 @@ class _Reader:
             self._extended(extensions)
         radiance = self._emission(extensions.get("KHR_materials_emissive_strength", {}))
         material, lost = build_material(self._wanted, normal_map)
-        material.name = str(self._item["name"]) if self._item.get("name") else None
+        material.name = printable(str(self._item["name"])) if self._item.get("name") else None
         both = bool(self._item.get("doubleSided"))
         return MaterialSpec(material, radiance, both, self._lost + lost, self._alpha_given, self._cutoff)
 

@@ -42,7 +42,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bsdfs import Dielectric, Diffuse, Mirror
-from ..errors import SceneError
+from ..errors import SceneError, printable
 from ..materials import Material
 from ..textures.image import StoredImage, Texture
 from ..textures.normal_map import BaseNormalMap, BumpMap, NormalMap
@@ -277,7 +277,7 @@ def specs(entries: dict[str, Entry], strict: bool = False) -> dict[str, Material
     unread: dict[str, str] = {}
     for name, entry in entries.items():
         out[name] = spec(entry)
-        out[name].material.name = name
+        out[name].material.name = printable(name)
         for keyword in (*entry.unread(), *sorted(entry.idle_options), *out[name].lost):
             unread.setdefault(keyword, name)
     if unread:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..counted import counted
-from ..errors import SceneError, warn_caller
+from ..errors import SceneError, printable, warn_caller
 from ..materials import Material
 from ..shapes import Mesh
 from ..textures.parameter import Color
@@ -115,7 +115,7 @@ def build(source: str, raw: RawMesh, strict: bool = False) -> Mesh | None:
         material=raw.material,
         emission=raw.emission,
         two_sided=raw.two_sided,
-        name=raw.name or "mesh",
+        name=printable(raw.name) or "mesh",
     )
 
 

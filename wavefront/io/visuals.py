@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..bsdfs import Diffuse
 from ..colors import srgb_to_linear
+from ..errors import printable
 from ..materials import Material
 from ..textures.image import Texture
 from ..textures.normal_map import NormalMap
@@ -32,7 +33,7 @@ def spec(material: Any, where: str, bare: bool) -> MaterialSpec:
     else:
         found = MaterialSpec(Material(Diffuse(MATTE)), lost=[type(material).__name__])
     name = getattr(material, "name", None)
-    found.material.name = str(name) if name else None
+    found.material.name = printable(str(name)) if name else None
     return found
 
 
