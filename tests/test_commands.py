@@ -319,6 +319,4 @@ def test_doctor_knows_all_extras(monkeypatch, capsys) -> None:
     assert list(doctor_command.REQUIRED) == [re.split("[<>=]", each)[0] for each in project["dependencies"]]
     monkeypatch.setattr(doctor_command, "_version", lambda package: None)
     assert cli.main(["doctor", "--seconds", "0"]) == 0
-    assert "formats: scenes in dae and 3mf files; not installed: pip install pycollada lxml networkx" in (
-        capsys.readouterr().out
-    )
+    assert "plot: Image.plot; not installed: pip install matplotlib" in (capsys.readouterr().out)

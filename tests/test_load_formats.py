@@ -9,7 +9,7 @@ import trimesh
 from PIL import Image
 
 from wavefront.errors import SceneError
-from wavefront.io import markup, threemf
+from wavefront.io import threemf
 from wavefront.io.load import from_trimesh, load, load_mesh, load_meshes
 from wavefront.io.sources import LoadLimits
 
@@ -141,7 +141,6 @@ def image(tmp_path):
 
 
 def test_dae(write, image):
-    pytest.importorskip("collada")
     matrix = '<node><matrix>1 0 0 5 0 1 0 0 0 0 1 0 0 0 0 1</matrix><instance_geometry url="#g">{bind}'
     path = write(dae(matrix + "</instance_geometry></node>"), "a.dae")
     (mesh,) = load_meshes(path, strict=True)
@@ -157,7 +156,6 @@ def test_dae(write, image):
 
 
 def test_images_of_dae(write, image, tmp_path):
-    pytest.importorskip("collada")
     with pytest.warns(UserWarning, match=r"a\.dae: texture 'no\.png' is missing"):
         load_meshes(write(dae(image="no.png"), "a.dae"))
     with pytest.raises(SceneError, match=r"a\.dae: texture 'no\.png' is missing"):
@@ -173,7 +171,6 @@ def test_images_of_dae(write, image, tmp_path):
 
 
 def test_what_is_not_read_of_dae_is_named(write, image):
-    pytest.importorskip("collada")
     more = '<library_lights><light id="l"><technique_common><ambient><color>1 1 1</color></ambient>'
     more += "</technique_common></light></library_lights>"
     nodes = '<node><instance_light url="#l"/><instance_geometry url="#g">{bind}</instance_geometry></node>'
@@ -185,14 +182,12 @@ def test_what_is_not_read_of_dae_is_named(write, image):
 
 
 def test_opacity_of_dae_is_named(write, image):
-    pytest.importorskip("collada")
     clear = "</diffuse><transparent><color>1 1 1 0.5</color></transparent>"
     with pytest.warns(UserWarning, match=r"a\.dae: not honored: opacity of materials$"):
         load_meshes(write(dae().replace("</diffuse>", clear), "a.dae"))
 
 
 def test_damaged_parts_of_dae_are_announced(write, image):
-    pytest.importorskip("collada")
     data = dae()
     begin, end = data.index("<geometry"), data.index("</geometry>") + len("</geometry>")
     broken = data[begin:end].replace('"g"', '"h"').replace("0 0 0 1 0 1 2 0 2", "0 0 0 1 0 1 9 0 2")
@@ -239,13 +234,11 @@ def multiplied(levels, width=10):
     ],
 )
 def test_damaged_dae(write, image, data, message):
-    pytest.importorskip("collada")
     with pytest.raises(SceneError, match=message):
         load_meshes(write(data, "a.dae"))
 
 
 def test_an_archive_behind_a_dae_is_refused(write, image):
-    pytest.importorskip("collada")
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w") as archive:
         archive.writestr("b.dae", dae())
@@ -276,8 +269,6 @@ def package(content=None, **others):
 
 
 def test_3mf(write):
-    pytest.importorskip("lxml")
-    pytest.importorskip("networkx")
     (mesh,) = load_meshes(write(package(), "a.3mf"), strict=True)
     assert np.array_equal(soup(mesh)[0], [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
     build = '<item objectid="1"/><item objectid="1" transform="1 0 0 0 1 0 0 0 1 5 0 0"/>'
@@ -290,8 +281,6 @@ def test_3mf(write):
 
 
 def test_3mf_equals_the_object_in_memory(tmp_path):
-    pytest.importorskip("lxml")
-    pytest.importorskip("networkx")
     ball = trimesh.creation.icosphere(1)
     ball.export(tmp_path / "a.3mf")
     (mesh,) = load_meshes(tmp_path / "a.3mf")
@@ -301,15 +290,64 @@ def test_3mf_equals_the_object_in_memory(tmp_path):
 
 
 def test_what_is_not_read_of_3mf_is_named(write):
-    pytest.importorskip("lxml")
-    pytest.importorskip("networkx")
-    materials = '<basematerials id="5"><base name="red" displaycolor="#FF0000FF"/></basematerials>'
-    path = write(package(model(f'{materials}<object id="1">{MESH}</object>')), "a.3mf")
-    with pytest.warns(UserWarning, match=r"a\.3mf: not honored: basematerials$"):
+    textures = '<texture2dgroup id="5"/><multiproperties id="6"/>'
+    path = write(package(model(f'{textures}<object id="1">{MESH}</object>')), "a.3mf")
+    with pytest.warns(UserWarning, match=r"a\.3mf: not honored: texture2dgroup, multiproperties$"):
         load_meshes(path)
     load_mesh(path, from_trimesh(trimesh.creation.box()).shapes[0].material)
     with pytest.raises(SceneError, match="not honored"):
         load_meshes(path, strict=True)
+
+
+SIDES = MESH.replace("</triangles>", "{}</triangles>").replace('v3="2"/>', 'v3="2" {}/>')
+COLORS = """<basematerials id="5"><base name="a" displaycolor="#FF8800"/>
+<base name="b" displaycolor="#0000FFFF"/></basematerials>
+<colorgroup id="6"><color color="#FF0000"/><color color="#00FF00"/><color color="#0000FF"/></colorgroup>"""
+ORANGE, GRAY = [1, 0.2462013, 0], [0.5, 0.5, 0.5]
+SECOND = '<triangle v1="0" v2="2" v3="1" {}/>'
+
+
+@pytest.mark.parametrize(
+    ("own", "first", "second", "colors"),
+    [
+        ('pid="5" pindex="0"', "", "", None),
+        ('pid="5" pindex="1"', 'pid="5" p1="0"', "", [[ORANGE] * 3, [[0, 0, 1]] * 3]),
+        ("", 'pid="6" p1="0" p2="1" p3="2"', "", [np.eye(3), [GRAY] * 3]),
+        ('pid="6" pindex="0"', 'p1="2"', 'pid="5" p1="0"', [[[0, 0, 1]] * 3, [ORANGE] * 3]),
+    ],
+)
+def test_colors_of_3mf(write, own, first, second, colors):
+    """Of an object, of triangles and of corners; sRGB, from materials and from groups of colors."""
+    mesh = SIDES.format(first, SECOND.format(second))
+    content = model(f'{COLORS}<object id="1" {own}>{mesh}</object>')
+    (found,) = load_meshes(write(package(content), "a.3mf"), strict=True)
+    if colors is None:
+        assert found.colors is None
+        assert found.material.bsdf.reflectance.ravel() == pytest.approx(ORANGE)
+    else:
+        assert found.colors[found.faces][..., :3] == pytest.approx(np.array(colors, float))
+        assert (found.colors[:, 3] == 1).all()
+
+
+def test_clear_colors_of_3mf_are_named(write):
+    """They are taken as opaque."""
+    content = model(COLORS.replace("FFFF", "FF80") + f'<object id="1" pid="5" pindex="1">{MESH}</object>')
+    with pytest.warns(UserWarning, match="not honored: opacity of colors"):
+        (found,) = load_meshes(write(package(content), "a.3mf"))
+    assert found.material.bsdf.reflectance.ravel() == pytest.approx([0, 0, 1])
+
+
+def test_several_meshes_of_a_member_of_3mf(write):
+    """Objects of another member are found by their ids, with the matrices on the way."""
+    part = '<component objectid="{}" p:path="/b.model" transform="1 0 0 0 1 0 0 0 1 {} 0 0"/>'
+    parts = part.format(2, 5) + part.format(3, 9)
+    other = model(f'<object id="2">{MESH}</object><object id="3">{MESH}</object>', "")
+    build = '<item objectid="1" transform="0 1 0 -1 0 0 0 0 1 0 0 0"/>'
+    content = model(f'<object id="1"><components>{parts}</components></object>', build)
+    found = load_meshes(write(package(content, **{"b.model": other}), "a.3mf"), strict=True)
+    assert [mesh.vertices.tolist() for mesh in found] == [
+        [[0, x, 0], [0, x + 1, 0], [-1, x, 0]] for x in (5, 9)
+    ]
 
 
 def components(levels, width=10):
@@ -337,21 +375,21 @@ def components(levels, width=10):
             "itself",
         ),
         (package(model("", "")), r"a\.3mf"),
+        (package(model(build='<item objectid="7"/>')), r"build refers to object .*#7, which does not exist"),
+        (package(model(MESH.join(['<object id="1">', "</object>"]).replace('x="0"', ""))), "x is missing"),
+        (package(model(MESH.join(['<object id="1">', "</object>"]).replace('x="1"', 'x="b"'))), "x is 'b'"),
+        (package(model(build='<item objectid="1" transform="1 2"/>')), "transform has 2 numbers"),
         (
-            package(
-                model(
-                    '<object id="1"><components><component objectid="2" p:path="/b.model"/>'
-                    "</components></object>"
-                ),
-                **{"b.model": model(f'<object id="2">{MESH}</object><object id="3">{MESH}</object>', "")},
-            ),
-            r"a\.3mf: refers to b\.model, which holds 2 meshes; only one is read",
+            package(model(f'{COLORS}<object id="1" pid="5" pindex="2">{MESH}</object>')),
+            "group 5 has 2 colors, not number 2",
+        ),
+        (
+            package(model(f'{COLORS}<object id="1" pid="5" pindex="0">{MESH}</object>'.replace("#FF8", "x"))),
+            "which is no color",
         ),
     ],
 )
 def test_damaged_3mf(write, data, message):
-    pytest.importorskip("lxml")
-    pytest.importorskip("networkx")
     with pytest.raises(SceneError, match=message):
         load_meshes(write(data, "a.3mf"))
 
@@ -359,16 +397,12 @@ def test_damaged_3mf(write, data, message):
 @pytest.mark.parametrize("element", ["inf", "nan", "1e300"])
 def test_matrices_of_3mf_that_are_not_finite_are_named(write, element):
     """Found by damaged files: a matrix that is not finite gave a warning of NumPy."""
-    pytest.importorskip("lxml")
-    pytest.importorskip("networkx")
     build = f'<item objectid="1" transform="{element} 0 0 0 1 0 0 0 1 5 0 0"/>'
     with pytest.raises(SceneError, match=r"a\.3mf: .*(matrix|not a readable 3mf)"):
         load_meshes(write(package(model(build=build)), "a.3mf"))
 
 
 def test_members_of_3mf_are_limited(write, monkeypatch):
-    pytest.importorskip("lxml")
-    pytest.importorskip("networkx")
     bomb = package(**{"zeros": bytes(2**22)})
     assert len(bomb) < 2**14
     with pytest.raises(SceneError, match=r"a\.3mf: unpacks to \d+ bytes; the limit is 4194304"):
@@ -408,32 +442,19 @@ PART = model(
 )
 def test_the_members_of_3mf_that_are_read_are_those_that_are_checked(write, members, message):
     """Whatever their names."""
-    pytest.importorskip("lxml")
-    pytest.importorskip("networkx")
     with pytest.raises(SceneError, match=rf"a\.3mf: .*{message}"):
         load_meshes(write(zipped(members), "a.3mf"))
 
 
-def test_trimesh_gets_checked_members_only(write, monkeypatch):
-    """The first model by its rule, and other models; no pictures or the like."""
-    pytest.importorskip("lxml")
-    pytest.importorskip("networkx")
-    seen = []
-    whole = threemf.by_trimesh
-    monkeypatch.setattr(
-        threemf, "by_trimesh", lambda name, data, kind: seen.append(data) or whole(name, data, kind)
-    )
+def test_the_first_model_of_a_package_is_the_one(write):
+    """Also under a longer name; others are read where it refers to them alone."""
     members = [("thumbnail.png", b"x"), ("3D/3dmodel.modelx", model()), ("b.model", model())]
     assert len(load_meshes(write(zipped(members), "a.3mf"))) == 1
-    with zipfile.ZipFile(io.BytesIO(seen[0])) as archive:
-        assert archive.namelist() == ["3D/3dmodel.modelx", "b.model"]
 
 
 @pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
 def test_other_methods_of_compression_are_refused_in_3mf(write, method):
     """Python's decoders of these have no limit."""
-    pytest.importorskip("lxml")
-    pytest.importorskip("networkx")
     data = zipped([("3D/3dmodel.model", model())], method)
     with pytest.raises(SceneError, match=r"a\.3mf: its member '3D/3dmodel\.model' is compressed by"):
         load_meshes(write(data, "a.3mf"))
@@ -442,8 +463,6 @@ def test_other_methods_of_compression_are_refused_in_3mf(write, method):
 @pytest.mark.filterwarnings("ignore:Duplicate name")
 def test_members_of_one_name_are_refused(write):
     """Readers differ in which of them they take."""
-    pytest.importorskip("lxml")
-    pytest.importorskip("networkx")
     data = zipped([("3D/3dmodel.model", model())] * 2)
     with pytest.raises(SceneError, match=r"a\.3mf: has two members '3D/3dmodel\.model'"):
         load_meshes(write(data, "a.3mf"))
@@ -452,18 +471,7 @@ def test_members_of_one_name_are_refused(write):
 @pytest.mark.parametrize("name", ["a.dae", "a.3mf"])
 def test_unknown_encodings_are_refused(write, name):
     """In XML's first line."""
-    for package_name in ("collada", "lxml", "networkx"):
-        pytest.importorskip(package_name)
     text = '<?xml version="1.0" encoding="foo"?><COLLADA/>'
     data = text if name == "a.dae" else zipped([("3D/3dmodel.model", text)])
     with pytest.raises(SceneError, match=rf"{name}: .*unknown encoding: foo"):
         load_meshes(write(data, name))
-
-
-@pytest.mark.parametrize(
-    ("name", "hint"), [("a.dae", "pip install pycollada"), ("a.3mf", "pip install lxml networkx")]
-)
-def test_packages_that_are_missing_are_named(write, monkeypatch, name, hint):
-    monkeypatch.setattr(markup, "find_spec", lambda module: None)
-    with pytest.raises(SceneError, match=rf"{name}: reading \.\w+ needs .*: {hint}$"):
-        load_meshes(write("x", name))

@@ -26,6 +26,7 @@ from wavefront.codecs.image_data import ImageData
 from wavefront.codecs.images import read_image, read_picture, write_image
 from wavefront.errors import SceneError
 from wavefront.io.load import load
+from wavefront.shapes import Spheres
 
 MEMORY = 3 << 30  # bytes
 SECONDS = 25  # for one file
@@ -97,6 +98,9 @@ def attempt(folder, name):
             assert found.shapes
             for shape in found.shapes:
                 mesh = getattr(shape, "mesh", shape)
+                if isinstance(mesh, Spheres):  # a file whose faces are damaged, not its points
+                    assert np.isfinite(mesh.centers).all()
+                    continue
                 assert np.isfinite(mesh.vertices).all()
                 assert mesh.faces.max() < len(mesh.vertices)
     except SceneError as error:

@@ -22,7 +22,7 @@ from .status import FAULT
 
 SECONDS = 10.0
 CHECKS_TAKE = 2.0  # seconds, about; the rest is for speed
-REQUIRED = ("numpy", "imageio", "trimesh", "OpenEXR", "tqdm", "threadpoolctl")
+REQUIRED = ("numpy", "imageio", "trimesh", "OpenEXR", "tqdm", "threadpoolctl", "pycollada")
 
 
 @record
@@ -36,7 +36,6 @@ class Extra:
 EXTRAS = {
     "embree": Extra(("embreex",), "ray queries on meshes by Intel Embree, several times as fast"),
     "denoise": Extra(("pyoidn",), "Intel Open Image Denoise, for denoise=True"),
-    "formats": Extra(("pycollada", "lxml", "networkx"), "scenes in dae and 3mf files"),
     "metrics": Extra(("flip-evaluator",), "FLIP in wavefront compare"),
     "dask": Extra(("distributed",), "renders on a Dask cluster"),
     "plot": Extra(("matplotlib",), "Image.plot"),

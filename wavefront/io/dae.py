@@ -11,7 +11,7 @@ from io import BytesIO
 from typing import Any
 
 from ..errors import SceneError
-from .markup import check_expanded, look_through, need, total
+from .markup import check_expanded, look_through, total
 from .repair import warn
 from .sources import SceneFiles
 from .trimesh_loading import Images, by_trimesh
@@ -27,10 +27,9 @@ def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> Any:
     Raises
     ------
     SceneError
-        If pycollada is missing, or the file is malformed; the message names the file and the error.
+        If the file is malformed; the message names the file and the error.
     """
     name = os.fspath(files.scene)
-    need(name, ".dae", ("collada", "pycollada"))
     if zipfile.is_zipfile(BytesIO(data)):  # an archive may begin after other bytes
         raise SceneError(f"{name}: is an archive; unpack it first")
     document = _Document(name, data)

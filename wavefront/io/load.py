@@ -35,7 +35,7 @@ def load(
 ) -> Scene:
     """Read a scene: .obj (with its .mtl), .ply, .stl, .glb, .gltf, .off, .dae, .3mf.
 
-    The last two need the packages of the extra `formats`: `pip install pycollada lxml networkx`.
+    Points of .obj and .ply files without faces become `Spheres`, whose radius a warning states.
 
     A mesh of several nodes of a glTF file is read once, and becomes an `Instance` for each node.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from importlib.util import find_spec
 from xml.parsers import expat
 
 from ..errors import SceneError
@@ -100,12 +99,3 @@ def total(name: str, children: Mapping[str, list[str]], own: Callable[[str], int
         return known[node]
 
     return below(root, ())
-
-
-def need(name: str, kind: str, *packages: tuple[str, str]) -> None:
-    """Raise a SceneError that says what to install if a package (module, name to install) is missing."""
-    missing = [install for module, install in packages if find_spec(module) is None]
-    if missing:
-        raise SceneError(
-            f"{name}: reading {kind} needs {' and '.join(missing)}: pip install {' '.join(missing)}"
-        )

@@ -139,8 +139,7 @@ def _read_dae(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
 
 
 def _read_3mf(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
-    name = os.fspath(files.scene)
-    return trimesh_objects.read(threemf.parse(files, data, wish.strict, wish.materials), name, wish.strict)
+    return threemf.parse(files, data, wish.strict, wish.materials)
 
 
 def _from_scene(load: Callable[[str, bytes], Scene]) -> Reader:
