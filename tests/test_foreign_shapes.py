@@ -108,6 +108,27 @@ def test_a_box_is_a_box() -> None:
             wf.Box((0, 0, 0), size)
 
 
+def test_a_plane_is_a_large_square_that_is_not_framed() -> None:
+    """Its uvs are lengths; the camera and the ground are those of the other shapes."""
+    plane = wf.Plane((1, 2, 3), (0, 0, 2), size=50)
+    assert plane.bounds.tolist() == [[-24, -23, 3], [26, 27, 3]]
+    assert np.ptp(plane.uvs, 0).tolist() == [50, 50]
+    a, b, c = plane.vertices[plane.faces[0]]
+    assert np.cross(b - a, c - a)[2] > 0
+    ball, floor = wf.Sphere((0, 1, 0), 1), wf.Plane((0, 0, 0))
+    alone, both = wf.Scene(ball).framing_camera(), wf.Scene([ball, floor]).framing_camera()
+    assert both.origin == pytest.approx(alone.origin)
+    assert np.linalg.norm(wf.Scene(floor).framing_camera().origin) > 100
+    for arguments, message in (
+        (((0, 0, 0), (0, 0, 0)), "normal is .* must not be zero"),
+        (((0, 0),), "point must have shape"),
+    ):
+        with pytest.raises(wf.SceneError, match=message):
+            wf.Plane(*arguments)
+    with pytest.raises(wf.SceneError, match="size is 0; it must be above 0"):
+        wf.Plane((0, 0, 0), size=0)
+
+
 @pytest.mark.parametrize("up", ["y", "z"])
 def test_height_fields_rise_where_they_should(up: str) -> None:
     """Front sides and normals point up, whichever way x and y run."""

@@ -180,6 +180,9 @@ class Scene:
         SceneError
             If an argument is malformed or out of range.
         """
+        framed = [shape for shape in self.shapes if shape.framed]
+        if framed and len(framed) < len(self.shapes):
+            return Scene(framed).framing_camera(fov, size, up=up, direction=direction)
         size = image_size(size)
         fov = field_of_view(fov)
         turn = turned_up(upward("up", up))

@@ -2,7 +2,7 @@
 
 from .arrays import PrimitiveArray
 from .base import CurvedShape, Shape
-from .box import Box
+from .box import Box, Plane
 from .disk import Disk
 from .height_field import HeightField
 from .instance import Instance
@@ -22,6 +22,7 @@ __all__ = [
     "HeightField",
     "Instance",
     "Mesh",
+    "Plane",
     "Points",
     "PrimitiveArray",
     "Rectangle",

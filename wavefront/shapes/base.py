@@ -47,6 +47,8 @@ class Shape(ABC):
     ----------
     name
         Used in messages.
+    framed
+        Whether `Scene.framing_camera` shows all of it; False for a `Plane`.
 
     Examples
     --------
@@ -56,6 +58,7 @@ class Shape(ABC):
     """
 
     name: str
+    framed: bool = True
     _material: Material | None = None  # what was given
 
     @property

@@ -1,15 +1,15 @@
-"""Boxes."""
+"""Boxes and planes."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import SceneError, finite_array
+from ..errors import SceneError, finite_array, number
 from ..materials import MaterialLike
 from ..suggestions import suggests_keywords
 from ..textures.parameter import Color
-from .mesh import Mesh
+from .mesh import Mesh, Rectangle
 
 # of each side: the axes along u and v, whose cross product is the axis of the normal
 SIDES = ((1, 2, 0), (2, 0, 1), (0, 1, 2))
@@ -67,3 +67,55 @@ def Box(
         emission=emission,
         name=name,
     )
+
+
+@suggests_keywords
+def Plane(
+    point: ArrayLike,
+    normal: ArrayLike = (0, 1, 0),
+    *,
+    size: float = 200.0,
+    material: MaterialLike | None = None,
+    name: str = "plane",
+) -> Mesh:
+    """Return a large square in place of an infinite plane, which framing cameras do not try to show.
+
+    Boxes around all shapes, by which rays find them, have to be finite. What the square lacks is a strip at
+    the horizon: seen from a height h above it, its edge lies atan(2h / size) below the horizon, 0.6° for
+    h = 1 and a size of 200. A plane of a size of 1e4 or more costs precision: positions are float32.
+
+    Parameters
+    ----------
+    point
+        (3,) its middle, scene units.
+    normal
+        (3,) of its front, of any length.
+    size
+        Length of its edges, scene units, above 0.
+    material, name
+        As for `Mesh`. Texture coordinates are scene units from `point`, so that textures repeat.
+
+    Raises
+    ------
+    SceneError
+        If an argument is malformed or out of range.
+
+    Examples
+    --------
+    >>> floor = wf.Plane((0, 0, 0), material=wf.Diffuse("tan"))
+    >>> wf.render([floor, wf.Sphere((0, 1, 0), 1)], spp=1, size=(8, 8), lighting="cloudy").shape
+    (8, 8, 3)
+    """
+    middle = finite_array(f"{name}: point", point, (3,))
+    axis = finite_array(f"{name}: normal", normal, (3,))
+    if not axis.any():
+        raise SceneError(f"{name}: normal is {axis.tolist()}; it must not be zero")
+    half = number(f"{name}: size", size, lambda x: x > 0, "above 0") / 2
+    axis = axis / np.linalg.norm(axis)
+    u = np.cross(np.eye(3)[np.abs(axis).argmin()], axis)
+    u /= np.linalg.norm(u)
+    v = np.cross(axis, u)
+    mesh = Rectangle(middle - half * (u + v), 2 * half * u, 2 * half * v, material=material, name=name)
+    mesh.uvs = (2 * np.asarray(mesh.uvs) - 1) * half
+    mesh.framed = False
+    return mesh
