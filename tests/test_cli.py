@@ -131,10 +131,20 @@ def test_version_and_help(capsys):
         assert text in capsys.readouterr().out
 
 
-def test_a_scene_without_light_is_rendered_with_a_warning(tmp_path, fast, capsys):
+def test_a_scene_without_light_is_lit_without_a_warning(tmp_path, fast, capsys):
+    """The picture is that of `render`; `info` says what is added."""
+    path = str(tmp_path / "dark.obj")
     (tmp_path / "dark.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    assert main(["render", str(tmp_path / "dark.obj"), *fast[1]]) == 0
-    assert "wavefront: warning: the scene has no light" in capsys.readouterr().err
+    output, options = fast
+    assert main(["render", path, *options]) == 0
+    assert capsys.readouterr().err == ""
+    expected = wf.render(path, 2, size=np.load(output).shape[1::-1], progress=False)
+    np.testing.assert_array_equal(np.load(output), expected.rgb)
+    assert main(["info", path]) == 0
+    out = capsys.readouterr().out
+    assert "camera: none; render frames the scene, view='three_quarter'" in out
+    assert "light: none; render adds lighting='studio' and a ground" in out
+    assert "up: y, the default; --up changes it" in out
 
 
 def test_lighting_and_ground_are_handed_on(tmp_path, fast, capsys):
@@ -145,10 +155,13 @@ def test_lighting_and_ground_are_handed_on(tmp_path, fast, capsys):
     for arguments, settings in (
         (["--lighting", "cloudy"], {"lighting": "cloudy"}),
         (["--lighting", "even", "--ground"], {"lighting": "even", "ground": True}),
+        (["--no-ground"], {"ground": False}),
+        (["--view", "iso", "--fov", "30"], {"view": "iso", "fov": 30}),
+        (["--view", "-1,2,3"], {"view": (-1, 2, 3)}),
     ):
         assert main(["render", str(path), *options, *arguments]) == 0
         picture = np.load(output)
-        scene.camera = scene.framing_camera(size=picture.shape[1::-1])
+        settings["size"] = picture.shape[1::-1]
         np.testing.assert_array_equal(picture, wf.render(scene, 2, **settings).rgb)
     assert capsys.readouterr().err == ""
     with pytest.raises(SystemExit):
@@ -183,8 +196,7 @@ def test_the_camera_of_the_file_is_used_and_resized(gltf, tmp_path, capsys):
     assert main(["render", gltf, "-o", str(output), "--spp", "2", "--size", "12x6", "--quiet"]) == 0
     scene = wf.load(gltf)
     scene.camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), fov=np.degrees(0.7), size=(12, 6))
-    with pytest.warns(UserWarning, match="no light"):
-        expected = wf.render(scene, 2)
+    expected = wf.render(scene, 2)
     np.testing.assert_allclose(np.load(output), expected.rgb, atol=1e-5)
     main(["info", gltf])
     assert "camera: in the file" in capsys.readouterr().out
@@ -194,7 +206,7 @@ def test_the_camera_of_the_file_is_used_and_resized(gltf, tmp_path, capsys):
     ("options", "message"),
     [
         (["--target", "0,0,0"], "--target needs --origin"),
-        (["--origin", "0,1,0", "--direction", "0,0,1"], "--direction is for scenes that are framed"),
+        (["--origin", "0,1,0", "--direction", "0,0,1"], "--view is for scenes that are framed"),
         (["--origin", "0,1,0", "--target", "0,1,0"], "must differ"),
         (["--origin", "0,1"], "is not X,Y,Z"),
         (["--origin", "nan,1,0"], "finite"),
@@ -211,10 +223,20 @@ def test_fov_does_not_silently_yield_to_the_camera_of_the_file(gltf, fast, capsy
     assert "has a camera of its own" in error_of(capsys, ["render", gltf, *fast[1], "--fov", "20"])
 
 
-@pytest.mark.parametrize("option", ["--up", "--direction"])
-def test_what_frames_a_scene_does_not_silently_yield_either(gltf, fast, capsys, no_render, option):
-    found = error_of(capsys, ["render", gltf, *fast[1], option, "0,0,1"])
-    assert f"{option} needs --origin: {gltf} has a camera of its own" in found
+def test_what_frames_a_scene_does_not_silently_yield_either(gltf, fast, capsys, no_render):
+    found = error_of(capsys, ["render", gltf, *fast[1], "--up", "0,0,1"])
+    assert f"--up needs --origin or --view: {gltf} has a camera of its own" in found
+
+
+@pytest.mark.parametrize("option", ["--view", "--direction"])
+def test_a_view_frames_a_file_with_a_camera(gltf, fast, option):
+    output, options = fast
+    assert main(["render", gltf, *options, option, "0,0,1"]) == 0
+    scene = wf.load(gltf)
+    scene.camera = None
+    picture = np.load(output)
+    expected = wf.render(scene, 2, view="front", size=picture.shape[1::-1], progress=False)
+    np.testing.assert_array_equal(picture, expected.rgb)
 
 
 @pytest.mark.parametrize("up", ["z", "0,0,1", "-Z"])
@@ -345,11 +367,11 @@ def test_no_command_is_an_error(capsys):
 
 
 def test_ctrl_c_while_loading_gives_130(obj, fast, monkeypatch):
-    def interrupt(path, progress):
+    def interrupt(path, options, progress):
         assert progress is False  # as --quiet asks
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(render_command, "load", interrupt)
+    monkeypatch.setattr(render_command, "read_scene", interrupt)
     assert main(["render", obj, *fast[1]]) == 130
 
 

@@ -190,10 +190,10 @@ def test_a_scene_is_shown_with_the_options_of_a_render(mesh: Path, monkeypatch, 
     """In place of a picture; what the viewer does not take is refused."""
     shown = []
     monkeypatch.setattr(
-        render_command, "view", lambda scene, **settings: shown.append((scene.camera, settings))
+        render_command, "view", lambda scene, **settings: shown.append((settings["camera"], settings))
     )
     monkeypatch.chdir(mesh.parent)
-    words = ["render", mesh.name, "--view", "--origin", "3,3,3", "--seed", "7", *FAST]
+    words = ["render", mesh.name, "--show", "--origin", "3,3,3", "--seed", "7", *FAST]
     assert cli.main(words) == 0
     ((camera, settings),) = shown
     assert camera.origin.tolist() == [3, 3, 3]
@@ -203,7 +203,7 @@ def test_a_scene_is_shown_with_the_options_of_a_render(mesh: Path, monkeypatch, 
     assert cli.main(["render", "other.obj", *words[1:]]) == 2
     monkeypatch.undo()
     assert cli.main([*words[:1], str(mesh), *words[2:], "--checkpoint", str(mesh.with_name("a.wfck"))]) == 2
-    assert "--view is for one scene" in (err := capsys.readouterr().err)
+    assert "--show is for one scene" in (err := capsys.readouterr().err)
     assert "checkpoint" in err
 
 

@@ -632,7 +632,6 @@ def test_nodes_that_share_a_mesh_become_instances(tmp_path):
     assert (np.abs(a - b).max(2) > 1e-3).mean() < 0.01
 
 
-@pytest.mark.filterwarnings("ignore:the scene has no light")
 def test_a_scene_in_memory_looks_like_its_file(tmp_path):
     """Bit for bit."""
     forest().export(tmp_path / "a.glb")

@@ -15,6 +15,14 @@ CUBE_PARTS = [np.s_[34:44, 18:34], np.s_[24:40, 48:49], np.s_[16:17, 38:46], np.
 Z_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], float)  # takes y to z, and z to -y
 
 
+def in_front(scene: wf.Scene, size: tuple[int, int]) -> wf.Camera:
+    """A camera of one's own: the picture has no ground by itself, and the light is where it is by default."""
+    low, high = scene.bounds
+    view = np.array(lighting.FRONT) / np.linalg.norm(lighting.FRONT)
+    distance = np.linalg.norm(high - low) / 2 / np.sin(np.radians(20))
+    return wf.Camera.look_at((low + high) / 2 + view * distance, (low + high) / 2, size=size)
+
+
 def cube(material: wf.Bsdf | None = None) -> wf.Mesh:
     faces = [corner for a, b, c, d in SIDES for corner in ([a, b, c], [a, c, d])]
     return wf.Mesh(CUBE, faces, material=material)
@@ -22,7 +30,7 @@ def cube(material: wf.Bsdf | None = None) -> wf.Mesh:
 
 def ball(material: wf.Bsdf | None = None) -> wf.Scene:
     scene = wf.Scene([wf.Sphere((0, 0, 0), 1, material=material)])
-    scene.camera = scene.framing_camera(size=(48, 48))
+    scene.camera = in_front(scene, (48, 48))
     return scene
 
 
@@ -47,7 +55,7 @@ def around(n: int, seed: int = 1) -> np.ndarray:
 def test_three_sides_of_a_cube_can_be_told_apart_and_from_the_background() -> None:
     """What an even environment shows as a hexagon."""
     scene = wf.Scene([cube()])
-    scene.camera = scene.framing_camera(size=(64, 64))
+    scene.camera = in_front(scene, (64, 64))
     picture = render(scene).mean(2)
     front, right, top, behind = (picture[rows, columns].mean() for rows, columns in CUBE_PARTS)
     assert top > 1.15 * front
@@ -77,22 +85,11 @@ def test_dark_and_white_things_stand_out(albedo: float) -> None:
     assert picture.max() < 1
 
 
-def test_no_light_warns_once_and_names_the_preset() -> None:
-    scene = ball()
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("default")
-        render(scene, 1)
-        render(ball(), 1)
-    (warning,) = caught
-    assert str(warning.message).startswith("the scene has no light; it is rendered with lighting='studio'")
-
-
-def test_the_default_is_no_reason_to_fail() -> None:
-    """Where warnings are errors the picture is still made, and says how it was lit."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        image = wf.render(ball(), 1, progress=False)
-    assert image.metadata["lighting"] == "studio"
+@pytest.mark.filterwarnings("error")
+def test_no_light_is_no_reason_to_warn() -> None:
+    """The picture says how it was lit."""
+    image = wf.render(ball(), 1, progress=False)
+    assert (image.metadata["lighting"], image.metadata["ground"]) == ("studio", False)
 
 
 @pytest.mark.filterwarnings("error")
@@ -274,3 +271,51 @@ def test_the_ground_lies_just_below(up) -> None:
     heights = ground.vertices @ np.array(up, float)
     np.testing.assert_allclose(heights, -1, atol=1e-3)
     assert (heights < -1).all()
+
+
+CHOSEN = {"spp": 1, "size": (8, 8), "progress": False}
+
+
+@pytest.mark.parametrize(
+    ("settings", "there"),
+    [
+        ({}, True),
+        ({"view": "front"}, True),
+        ({"view": "top", "up": "z"}, True),
+        ({"view": "bottom"}, False),
+        ({"view": (0, -1, 2)}, False),
+        ({"ground": False}, False),
+        ({"lighting": "studio"}, False),
+        ({"lighting": "studio", "ground": True}, True),
+        ({"background": "transparent"}, False),
+        ({"background": (1, 1, 1), "ground": True}, True),
+        ({"camera": wf.Camera.look_at((0, 1, 5), (0, 0, 0))}, False),
+    ],
+)
+def test_the_ground_is_there_where_everything_is_chosen(settings, there) -> None:
+    """Where nobody chose a light or a camera, it would hide nothing, and no background is wanted."""
+    image = wf.render(cube(), **CHOSEN, **settings)
+    assert image.metadata["ground"] is there
+    same = wf.render(cube(), **CHOSEN, **{**settings, "ground": there})
+    assert image.rgb.tobytes() == same.rgb.tobytes()
+    other = wf.render(cube(), **CHOSEN, **{**settings, "ground": not there, "aovs": "shape_id"})
+    assert ("ground" in other.names["shape"].values()) is not there
+
+
+def test_scenes_with_a_light_or_a_camera_get_no_ground() -> None:
+    lit = wf.Scene([cube()], [wf.Environment(1)])
+    assert wf.render(lit, **CHOSEN).metadata["ground"] is False
+    assert wf.render(ball(), **CHOSEN).metadata["ground"] is False
+    with pytest.raises(wf.SceneError, match="ground is 'yes'; it must be True or False, or 'auto'"):
+        wf.render(lit, ground="yes")
+
+
+def test_the_light_goes_with_a_camera_that_was_chosen() -> None:
+    """A ball before a gray backdrop looks the same from each side, and as in the light of `studio`."""
+    front, back = (wf.render(cube(), 64, size=(24, 24), view=view).rgb for view in ("front", "back"))
+    assert np.abs(front - back).mean() < 0.01
+    scene = wf.Scene([cube()])
+    camera = scene.framing_camera(size=(24, 24), direction="left")
+    scene.lights = wf.studio(camera=camera)
+    chosen = wf.render(cube(), 2, size=(24, 24), view="left", ground=False)
+    np.testing.assert_array_equal(chosen.rgb, wf.render(scene, 2, camera=camera).rgb)

@@ -838,9 +838,9 @@ def test_a_reflected_instance_keeps_its_front():
 
 def test_from_trimesh_takes_normals_that_are_there():
     flat, smooth = trimesh.creation.icosphere(1), trimesh.creation.icosphere(1)
-    smooth.vertex_normals = smooth.vertices
-    assert from_trimesh(flat).shapes[0].normals is None
-    assert from_trimesh(smooth).shapes[0].normals == pytest.approx(smooth.vertices)
+    smooth.vertex_normals = -smooth.vertices
+    assert from_trimesh(flat, smooth=False).shapes[0].normals is None
+    assert from_trimesh(smooth).shapes[0].normals == pytest.approx(-smooth.vertices)
 
 
 def test_several_materials_of_one_trimesh_object_are_named():
@@ -1169,12 +1169,13 @@ def test_real_files_equal_what_trimesh_holds(name):
             assert x is None or np.array_equal(soup(a, x), soup(b, y))
 
 
-def test_load_mesh_tells_of_normals_that_only_some_parts_have(write):
-    """They are left out, as a mesh has them at all vertices or at none; strict, it is an error."""
+def test_load_mesh_keeps_normals_that_only_some_parts_have(write):
+    """The others get those of their facets."""
     faces = "usemtl a\nf 1//1 2//1 3//1\nusemtl b\nf 1 3 4\n"
-    path = write("mtllib s.mtl\n" + SQUARE + "vn 0 0 1\n" + faces, s_mtl="newmtl a\nnewmtl b\n")
-    message = "scene: vertex normals left out, which 1 of 2 meshes have"
-    with pytest.warns(UserWarning, match=message):
-        assert load_mesh(path, Diffuse(0.5)).normals is None
-    with pytest.raises(SceneError, match=message):
-        load_mesh(path, Diffuse(0.5), strict=True)
+    path = write("mtllib s.mtl\n" + SQUARE + "vn 0 1 1\n" + faces, s_mtl="newmtl a\nnewmtl b\n")
+    mesh = load_mesh(path, Diffuse(0.5), strict=True)
+    tilted, flat = mesh.normals[mesh.faces].tolist()
+    assert tilted == [pytest.approx([0, 0.5**0.5, 0.5**0.5])] * 3
+    a, b, c = mesh.vertices[mesh.faces[1]]
+    normal = np.cross(b - a, c - a)
+    assert flat == [pytest.approx(normal / np.linalg.norm(normal))] * 3

@@ -270,8 +270,7 @@ def test_a_path_can_be_rendered(tmp_path) -> None:
     """A string or a Path."""
     (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     for path in (tmp_path / "a.obj", str(tmp_path / "a.obj")):
-        with pytest.warns(UserWarning, match="no light"):
-            assert render(path, 1, size=(6, 5)).rgb.shape == (5, 6, 3)
+        assert render(path, 1, size=(6, 5)).rgb.shape == (5, 6, 3)
 
 
 # --- Result ---------------------------------------------------------------------------------------

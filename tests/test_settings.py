@@ -61,7 +61,8 @@ def test_options_follow_the_declaration() -> None:
         assert found[name].default == each.default
         assert found[name].choices is each.metadata["choices"]
         flag = each.metadata["flag"] or name
-        assert found[name].option_strings == ["--" + flag.replace("_", "-")]
+        negated = ["--no-" + flag] if name == "ground" else []
+        assert found[name].option_strings == ["--" + flag.replace("_", "-"), *negated]
 
 
 @pytest.mark.parametrize("name", [name for name, each in DECLARED.items() if each.metadata["choices"]])

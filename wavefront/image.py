@@ -55,8 +55,8 @@ class Image:
     spp
         Samples per pixel; the rounded mean where pixels differ.
     metadata
-        Settings and results of the render: lighting (the preset that was added, or None), background
-        ("transparent", a color, or None for the environment), integrator,
+        Settings and results of the render: lighting (the preset that was added, or None), ground (whether one
+        was added), background ("transparent", a color, or None for the environment), integrator,
         max_bounces, seed, sampler, sample_ranges (the half-open ranges [first, end] of the samples that some
         pixel has), film (width and height of the whole picture), window (the part [x0, y0, x1, y1] of it that
         this one is), filter, branches, guide, guided, reuse and hint (how paths went on, and what may pay

@@ -7,8 +7,6 @@ the scene if it looks horizontally or down.
 
 from __future__ import annotations
 
-import warnings
-from contextlib import suppress
 from copy import copy
 
 import numpy as np
@@ -21,7 +19,7 @@ from .errors import SceneError
 from .lights import Environment
 from .materials import Material
 from .record import record
-from .scene import FRAMING_VIEW, Scene, turned_up
+from .scene import Scene, turned_up
 from .shapes import Disk, Mesh
 from .textures.image import Texture
 from .vec import Doubles
@@ -137,6 +135,7 @@ PRESETS = {
 }
 LIGHTINGS = (*PRESETS, "even")
 DEFAULT = "studio"
+FRONT = 0.35, 0.3, 1.0  # direction of the camera that light is relative to by default, where y is up
 STEEP = 1e-3  # sine between the view and the vertical below which a camera looks straight down
 
 
@@ -153,9 +152,10 @@ def studio(preset: str = DEFAULT, *, up: ArrayLike = "y", camera: Camera | None 
     up
         Up direction of the scene: (3,), or the name of an axis, such as "z".
     camera
-        Left, right, front and behind are relative to this camera. By default they are relative to
-        `Scene.framing_camera`, also if another camera renders the scene: the light stays in place while a
-        camera moves around the scene.
+        Left, right, front and behind are relative to this camera. By default they are relative to one in
+        front of the scene, 19° to the right, also if another camera renders the scene: the light stays in
+        place while a camera moves around the scene. The `lighting` of a scene that `render` frames is
+        relative to the camera of the picture.
 
     Returns
     -------
@@ -197,7 +197,7 @@ def check_lighting(lighting: str | None) -> None:
 def choose_preset(scene: Scene, lighting: str | None) -> str | None:
     """Return the preset that lights a scene; None for none.
 
-    "auto" means the default preset, with a warning, for a scene without lights, and none for other scenes.
+    "auto" means the default preset for a scene without lights, and none for other scenes.
 
     Raises
     ------
@@ -205,10 +205,7 @@ def choose_preset(scene: Scene, lighting: str | None) -> str | None:
         If a preset is requested and the scene has an `Environment`.
     """
     if lighting == "auto":
-        if scene.emits:
-            return None
-        _say_that_it_is_lit()
-        return DEFAULT
+        return None if scene.emits else DEFAULT
     if lighting is not None and any(isinstance(light, Environment) for light in scene.lights):
         raise SceneError(
             f"lighting={lighting!r} brings an Environment, and the scene has one; at most one is allowed"
@@ -216,26 +213,48 @@ def choose_preset(scene: Scene, lighting: str | None) -> str | None:
     return lighting
 
 
-def _say_that_it_is_lit() -> None:
-    """Warn of the default light, at this line: Python shows a warning once for each line.
+def choose_ground(
+    ground: bool | str, chosen_light: bool, framed: Camera | None, background: object, up: ArrayLike
+) -> bool:
+    """Return whether a ground is added.
 
-    Where warnings are errors, no warning is given: the default is documented and is not an error.
+    Parameters
+    ----------
+    ground
+        As for `render`: "auto" adds one where everything else is chosen, too.
+    chosen_light
+        Whether the light was chosen because the scene has none.
+    framed
+        The camera, if it was made to frame the scene.
+    background
+        As for `render`; a ground would cover it.
+    up
+        What is up: from below, a ground would hide the scene.
     """
-    with suppress(UserWarning):
-        warnings.warn(
-            f"the scene has no light; it is rendered with lighting={DEFAULT!r} "
-            f"(or choose {', '.join(name for name in LIGHTINGS if name != DEFAULT)}, or None for no light)",
-            stacklevel=1,
-        )
+    if not isinstance(ground, str):
+        return ground
+    if not chosen_light or framed is None or background is not None:
+        return False
+    return bool(framed.rotation[:, 2] @ turned_up(upward("up", up))[:, 1] > -STEEP)
 
 
-def lighted(scene: Scene, preset: str | None, *, ground: bool = False, up: ArrayLike = "y") -> Scene:
-    """Return a copy of the scene with the light of a preset and a ground; the scene itself without both."""
+def lighted(
+    scene: Scene,
+    preset: str | None,
+    *,
+    ground: bool = False,
+    up: ArrayLike = "y",
+    camera: Camera | None = None,
+) -> Scene:
+    """Return a copy of the scene with the light of a preset and a ground; the scene itself without both.
+
+    The light is relative to the camera, as in `studio`.
+    """
     if preset is None and not ground:
         return scene
     complete = copy(scene)  # keeps the accelerators of the last render
     if preset is not None:
-        complete.lights = [*scene.lights, *studio(preset, up=up)]
+        complete.lights = [*scene.lights, *studio(preset, up=up, camera=camera)]
     if ground:
         complete.shapes = [*scene.shapes, _ground(scene, preset, up)]
     return complete
@@ -271,7 +290,7 @@ def _axes(up: ArrayLike, camera: Camera | None) -> Doubles:
     """Return the axes right, up and front of a studio, columns of (3, 3)."""
     turn = turned_up(upward("up", up))
     vertical = turn[:, 1]
-    front = turn @ FRAMING_VIEW if camera is None else camera.rotation[:, 2]
+    front = turn @ FRONT if camera is None else camera.rotation[:, 2]
     if np.linalg.norm(np.cross(vertical, front)) < STEEP and camera is not None:
         # towards the lower edge of its picture if it looks down
         front = -camera.rotation[:, 1] * np.sign(vertical @ front)

@@ -31,10 +31,13 @@ def render(
     *,
     camera: Camera | None = None,
     size: tuple[int, int] | None = None,
+    view: str | ArrayLike | None = None,
+    fov: float | None = None,
     material: MaterialLike | None = None,
-    up: ArrayLike | None = None,
+    smooth: bool | float | str = "auto",
+    up: ArrayLike = "auto",
     lighting: str | None = "auto",
-    ground: bool = False,
+    ground: bool | str = "auto",
     background: str | ArrayLike | None = None,
     integrator: str | Integrator = "full",
     max_bounces: int = 12,
@@ -77,21 +80,36 @@ def render(
         What sees the scene, in place of the scene's own camera. Without either the scene is framed.
     size
         (width, height) in pixels, in place of the camera's; by default (512, 512).
+    view
+        From where a scene is framed, in place of the scene's own camera: "three_quarter", "front", "back",
+        "left", "right", "top", "bottom", "iso", or (3,) from its middle to the camera. Without a camera it is
+        "three_quarter", which is 35° to the right of the front and 22° above. Not with `camera`.
+    fov
+        Vertical field of view of the camera that frames a scene, degrees; by default 40. Not with another
+        camera.
     material
         What bare meshes are made of: those of files and of trimesh, where it replaces what they say,
         (vertices, faces), and shapes that were given no material. A material, or the name of one, such as
         "gold".
+    smooth
+        Normals of bare meshes: True averages those of the faces around each vertex, False shows the facets,
+        and a crease angle in degrees averages only over faces that are within it of each other. These replace
+        the normals that a mesh has. "auto" keeps them, and computes those of files and trimesh objects that
+        have none by a crease angle of 30°, but for glTF, whose facets are flat then: docs/formats.md says
+        why. (vertices, faces) and `Mesh` stay as they are.
     up
-        What is up in the scene: a vector (3,), or the name of an axis, such as "z" for most STL and CAD
-        files; by default "y". It turns the camera that frames a scene without one, and the `lighting` and
-        the `ground`.
+        What is up in the scene: a vector (3,), or the name of an axis, such as "z". "auto" goes by the file:
+        z for STL and 3MF, what a DAE says, else y. It turns the camera that frames a scene without one, and
+        the `lighting` and the `ground`.
     lighting
-        "studio", "softbox", "three_point", "cloudy" or "even": adds the light of that name, which
-        `studio` describes, to the scene's own. "auto" adds "studio" where nothing shines, with a
-        warning, and nothing elsewhere; None adds nothing.
+        "studio", "softbox", "three_point", "cloudy" or "even": adds the light of that name, which `studio`
+        describes, to the scene's own. "auto" adds "studio" where nothing shines, and nothing elsewhere; None
+        adds nothing.
     ground
-        Adds a level ground under the scene that catches its shadow and fades into the background. It
-        belongs to the picture alone: the scene, its bounds and the numbers of its shapes stay.
+        Adds a level ground under the scene that catches its shadow and fades into the background. It belongs
+        to the picture alone: the scene, its bounds and the numbers of its shapes stay. "auto" adds it where
+        the light is chosen by itself and the camera is framed, unless that looks from below or a `background`
+        is asked for.
     background
         "transparent" or a color: replaces what the camera sees directly of the environment; its light
         stays, and so do its reflections. Either gives the layer `alpha`. Colors of a transparent picture
@@ -227,7 +245,10 @@ def render(
         spp=spp,
         camera=camera,
         size=size,
+        view=view,
+        fov=fov,
         material=material,
+        smooth=smooth,
         up=up,
         lighting=lighting,
         ground=ground,

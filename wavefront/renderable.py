@@ -14,7 +14,7 @@ from .errors import SceneError
 from .lights import Light
 from .materials import Material, MaterialLike, as_material
 from .progress import Progress
-from .scene import Scene, importer, register_importer
+from .scene import AUTO, FRAMING_FOV, FRAMING_VIEW, Scene, importer, register_importer
 from .shapes import Instance, Mesh, Shape
 
 SIZE = (512, 512)  # pixels
@@ -24,7 +24,12 @@ CAN_BE_RENDERED = (
 )
 
 
-def as_scene(subject: Any, material: MaterialLike | None = None, progress: Progress = None) -> Scene:
+def as_scene(
+    subject: Any,
+    material: MaterialLike | None = None,
+    progress: Progress = None,
+    smooth: bool | float | str = AUTO,
+) -> Scene:
     """Return what `render` was given as a `Scene`.
 
     Parameters
@@ -35,54 +40,81 @@ def as_scene(subject: Any, material: MaterialLike | None = None, progress: Progr
         What bare meshes are made of; None leaves everything as it is.
     progress
         As for `load`.
+    smooth
+        As for `render`.
 
     Raises
     ------
     SceneError
-        If it is nothing that can be rendered, or the material is meant for what has one of its own.
+        If it is nothing that can be rendered, or the material or `smooth` is meant for what has its own.
     """
     if material is not None:
         material = as_material("material", material)
     if isinstance(subject, Scene):
         if material is not None:
             raise SceneError("material is for bare meshes; in a wf.Scene set those of its shapes")
+        if smooth != AUTO:
+            raise SceneError("smooth is for bare meshes; for those of a wf.Scene use Mesh(..., smooth=...)")
         subject.check()
         return subject
     if isinstance(subject, Shape):
-        return Scene([_made_of(subject, material)])
+        return Scene([_made_of(subject, material, smooth)])
     if isinstance(subject, str | os.PathLike):
         from .io.load import load  # here, so that scenes in memory do not pay for readers
 
-        return _all_made_of(load(subject, progress=progress), material)
+        return _all_made_of(load(subject, progress=progress, smooth=smooth), material)
     convert = importer(subject)
     if convert is not None:
-        return _all_made_of(convert(subject), material)
+        return _all_made_of(convert(subject, smooth), material)
     if _is_pair(subject):
-        return Scene([Mesh(*subject, material=material)])
+        return Scene([Mesh(*subject, material=material, smooth=False if smooth == AUTO else smooth)])
     if isinstance(subject, list | tuple) and subject:
-        return _joined(subject, material, progress)
+        return _joined(subject, material, progress, smooth)
     what = "an empty list" if isinstance(subject, list | tuple) and not subject else type(subject).__name__
     raise SceneError(f"cannot render {what}: give {CAN_BE_RENDERED}")
 
 
-def choose_camera(scene: Scene, camera: Camera | None, size: tuple[int, int] | None, up: Any) -> Camera:
-    """Return the camera that sees a scene.
+def choose_camera(
+    scene: Scene,
+    camera: Camera | None,
+    size: tuple[int, int] | None,
+    up: Any = AUTO,
+    view: Any = None,
+    fov: float | None = None,
+    turning: bool = False,
+) -> tuple[Camera, bool]:
+    """Return the camera that sees a scene, and whether it was made to frame it.
 
     Parameters
     ----------
     scene
         What is seen.
     camera
-        In place of the scene's own. Without either the scene is framed.
+        In place of the scene's own. Without either the scene is framed, and with a `view`.
     size
         (width, height) in pixels, in place of the camera's.
     up
-        (3,) what is up in the scene: it turns the camera that frames it.
+        What is up in the scene, as for `render`: it turns the camera that frames it.
+    view, fov
+        As for `render`.
+    turning
+        As of `Scene.framing_camera`.
+
+    Raises
+    ------
+    SceneError
+        If one of the last is meant for a camera that frames the scene, and there is another.
     """
-    camera = camera or scene.camera
-    if camera is None:
-        return scene.framing_camera(size=size or SIZE, up=up)
-    return camera if size is None else camera.resized(size)
+    if camera is None and view is None:  # a camera that is given counts more than a view
+        camera = scene.camera
+        if camera is not None and fov is not None:
+            raise SceneError(f"fov is {fov:g}; the scene has a camera of its own, or give a view to frame it")
+    if camera is not None:
+        return camera if size is None else camera.resized(size), False
+    if size is None:
+        size = SIZE if scene.camera is None else scene.camera.size
+    view, fov = FRAMING_VIEW if view is None else view, FRAMING_FOV if fov is None else fov
+    return scene.framing_camera(fov, size, up=up, direction=view, turning=turning), True
 
 
 def _is_pair(subject: Any) -> bool:
@@ -94,27 +126,35 @@ def _is_pair(subject: Any) -> bool:
     )
 
 
-def _joined(subjects: Sequence[Any], material: Material | None, progress: Progress) -> Scene:
-    """Return one scene of all; the camera is the first that there is."""
+def _joined(
+    subjects: Sequence[Any], material: Material | None, progress: Progress, smooth: bool | float | str
+) -> Scene:
+    """Return one scene of all; the camera, and what is up, is the first that there is."""
     lights = [item for item in subjects if isinstance(item, Light)]
-    parts = [as_scene(item, material, progress) for item in subjects if not isinstance(item, Light)]
+    parts = [as_scene(item, material, progress, smooth) for item in subjects if not isinstance(item, Light)]
     cameras = [part.camera for part in parts if part.camera is not None]
     return Scene(
         [shape for part in parts for shape in part.shapes],
         [*lights, *(light for part in parts for light in part.lights)],
         cameras[0] if cameras else None,
+        up=next((part.up for part in parts if part.up is not None), None),
     )
 
 
-def _made_of(shape: Shape, material: Material | None) -> Shape:
-    """Return a user's shape with a material; the user's own stays as it is."""
-    if material is None:
+def _made_of(shape: Shape, material: Material | None, smooth: bool | float | str) -> Shape:
+    """Return a user's shape with a material and normals; the user's own stays as it is."""
+    if material is None and smooth == AUTO:
         return shape
     mesh = shape.mesh if isinstance(shape, Instance) else shape
-    if shape.has_material or mesh.has_material:
-        raise SceneError(f"material is for bare meshes; {shape.name} has a material of its own")
     bare = copy(shape)
-    bare.material = material
+    if material is not None:
+        if shape.has_material or mesh.has_material:
+            raise SceneError(f"material is for bare meshes; {shape.name} has a material of its own")
+        bare.material = material
+    if smooth != AUTO and isinstance(shape, Instance):
+        raise SceneError(f"smooth is for bare meshes; {shape.name} is an instance: use Mesh(..., smooth=...)")
+    if smooth != AUTO and isinstance(bare, Mesh):
+        bare.compute_normals(smooth)
     return bare
 
 
@@ -126,22 +166,22 @@ def _all_made_of(scene: Scene, material: Material | None) -> Scene:
     return scene
 
 
-def _imported(geometry: Any) -> Scene:
+def _imported(geometry: Any, smooth: bool | float | str = AUTO) -> Scene:
     from .io.load import from_trimesh
 
-    return from_trimesh(geometry)
+    return from_trimesh(geometry, smooth=smooth)
 
 
-def _from_pyvista(data: Any) -> Scene:
+def _from_pyvista(data: Any, smooth: bool | float | str = AUTO) -> Scene:
     from .io.foreign import from_pyvista
 
-    return from_pyvista(data)
+    return from_pyvista(data, smooth=smooth)
 
 
-def _from_open3d(data: Any) -> Scene:
+def _from_open3d(data: Any, smooth: bool | float | str = AUTO) -> Scene:
     from .io.foreign import from_open3d
 
-    return from_open3d(data)
+    return from_open3d(data, smooth=smooth)
 
 
 register_importer("trimesh", _imported)

@@ -12,16 +12,31 @@ from numpy.typing import ArrayLike, NDArray
 
 from .accel import AcceleratorCache
 from .camera import Camera, check_camera, field_of_view, image_size, upward
+from .camera.framing import FILL, Balls, fitting_offset, turned_balls
 from .counted import counted
-from .elementary import arctan2, sin_cos
+from .elementary import sin_cos
 from .errors import SceneError, finite_array, in_brief
 from .lights import Environment, Light
 from .scene_html import scene_html
 from .shapes import Instance, Mesh, PrimitiveArray, Shape
-from .shapes.instance import instance_bounds
-from .suggestions import suggests_keywords
+from .shapes.instance import instance_bounds, instance_hulls
+from .suggestions import did_you_mean, suggests_keywords
 
-FRAMING_VIEW = 0.35, 0.3, 1.0  # direction from the center of a scene to its framing camera, where y is up
+AUTO = "auto"
+FRAMING_FOV = 40.0  # degrees
+# directions from the center of a scene to its framing camera, where y is up
+VIEWS = {
+    "three_quarter": (0.5736, 0.4040, 0.8192),  # 35° to the right of the front, 22° above
+    "front": (0.0, 0.0, 1.0),
+    "back": (0.0, 0.0, -1.0),
+    "left": (-1.0, 0.0, 0.0),
+    "right": (1.0, 0.0, 0.0),
+    "top": (0.0, 1.0, 0.0),
+    "bottom": (0.0, -1.0, 0.0),
+    "iso": (1.0, 1.0, 1.0),
+}
+FRAMING_VIEW = "three_quarter"
+MIN_DISTANCE = 1e-2  # of a framing camera from the center, in radii of the scene
 
 
 class Scene:
@@ -37,6 +52,9 @@ class Scene:
         `Environment`. A scene without any light is rendered in the light of a studio: see `render`.
     camera
         Without a camera, `render` uses `framing_camera`.
+    up
+        What is up, for that camera, for ready-made light and for the ground: (3,), or the name of an axis.
+        None is y. `load` sets it to z for the formats that have z up.
 
     Notes
     -----
@@ -64,10 +82,13 @@ class Scene:
         shapes: Iterable[Any] | Any,
         lights: Iterable[Light] | Light = (),
         camera: Camera | None = None,
+        *,
+        up: ArrayLike | None = None,
     ) -> None:
         self.shapes = shapes
         self.lights = lights
         self.camera = camera
+        self.up = up
         self.accelerators = AcceleratorCache()  # of the last render, for the next one
         self.check()
 
@@ -108,6 +129,21 @@ class Scene:
     @camera.setter
     def camera(self, camera: Camera | None) -> None:
         self._camera = check_camera("camera", camera)
+
+    @property
+    def up(self) -> NDArray[np.float64] | None:
+        """What is up, (3,) of any length; None means y."""
+        return self._up
+
+    @up.setter
+    def up(self, up: ArrayLike | None) -> None:
+        self._up = None if up is None else upward("up", up)
+
+    def vertical(self, up: ArrayLike = AUTO) -> NDArray[np.float64]:
+        """Return what is up, (3,) of any length: a vector, an axis by its name, or "auto", the scene's."""
+        if isinstance(up, str) and up == AUTO:
+            return upward("up", "y") if self.up is None else self.up
+        return upward("up", up)
 
     def add(self, *items: Any) -> Self:
         """Add shapes, objects of trimesh, and lights; return the scene.
@@ -155,13 +191,14 @@ class Scene:
     @suggests_keywords
     def framing_camera(
         self,
-        fov: float = 40,
+        fov: float = FRAMING_FOV,
         size: tuple[int, int] = (512, 512),
         *,
-        up: ArrayLike = (0, 1, 0),
-        direction: ArrayLike | None = None,
+        up: ArrayLike = AUTO,
+        direction: ArrayLike = FRAMING_VIEW,
+        turning: bool = False,
     ) -> Camera:
-        """Return a camera that sees the whole scene, from the front and slightly above and to the right.
+        """Return a camera that sees the whole scene, which fills 85 % of the picture's width or height.
 
         Parameters
         ----------
@@ -170,10 +207,15 @@ class Scene:
         size
             (width, height) in pixels.
         up
-            Up direction of the picture: (3,), or the name of an axis, such as "z" for most STL and CAD
-            files. With "y" the front is the side of +z, with "z" that of -y.
+            Up direction of the picture: (3,), or the name of an axis; "auto" is that of the scene. With "y"
+            the front is the side of +z, with "z" that of -y.
         direction
-            (3,) direction from the center of the scene to the camera, of any length, in place of the default.
+            From where it looks: "three_quarter" (35° to the right of the front and 22° above), "front",
+            "back", "left", "right", "top", "bottom" or "iso"; or (3,) from the center of the scene to the
+            camera, of any length.
+        turning
+            Leaves room for a whole turn of the scene about the vertical through its center, as for
+            `turntable`.
 
         Raises
         ------
@@ -185,29 +227,60 @@ class Scene:
             return Scene(framed).framing_camera(fov, size, up=up, direction=direction)
         size = image_size(size)
         fov = field_of_view(fov)
-        turn = turned_up(upward("up", up))
+        turn = turned_up(self.vertical(up))
+        view = view_direction("direction", direction)
+        if isinstance(direction, str):
+            view = turn @ view
         low, high = self.bounds
-        radius = float(np.linalg.norm(high - low)) / 2 or 1.0
-        narrow = min(1.0, size[0] / size[1])
-        sin, cos = sin_cos(np.float64(np.radians(fov) / 2))
-        sin_half, _ = sin_cos(arctan2(sin * narrow, cos))
-        view = turn @ FRAMING_VIEW
-        if direction is not None:
-            view = finite_array("direction", direction, (3,))
-            if not view.any():
-                raise SceneError(f"direction is {view.tolist()}; it must not be zero")
-            view = view / np.abs(view).max()
-        view = view / np.linalg.norm(view)
-        eye = (low + high) / 2 + view * radius / sin_half
+        middle, reach = (low + high) / 2, float(np.linalg.norm(high - low)) / 2 or 1.0
         camera_up = turn[:, 1]
         # seen from above or below, the front is at the bottom of the picture
         if np.linalg.norm(np.cross(camera_up, view)) < 1e-6:
             camera_up = -turn[:, 2] * np.sign(view @ camera_up)
-        return Camera.look_at(eye, (low + high) / 2, camera_up, fov=fov, size=size)
+        axes = Camera.look_at(middle + view * reach, middle, camera_up).rotation
+        centers, radii = self._hull()
+        balls = (centers - middle, radii)
+        if turning:
+            balls = turned_balls(balls, turn)
+        sin, cos = sin_cos(np.float64(np.radians(fov) / 2))
+        half = FILL * float(sin / cos)
+        x, y, z = fitting_offset(balls, axes, (half * size[0] / size[1], half))
+        beside, distance = middle + axes[:, 0] * x + axes[:, 1] * y, max(z, MIN_DISTANCE * reach)
+        return Camera.look_at(beside + axes[:, 2] * distance, beside, axes[:, 1], fov, size=size)
+
+    def _hull(self) -> Balls:
+        """Return balls whose convex hull holds all shapes."""
+        found = [shape.hull() for shape in self.shapes if not isinstance(shape, Instance)]
+        instances = [shape for shape in self.shapes if isinstance(shape, Instance)]
+        found += [(points, np.zeros(len(points))) for points in instance_hulls(instances)]
+        return np.concatenate([centers for centers, _ in found]), np.concatenate(
+            [radii for _, radii in found]
+        )
+
+
+def view_direction(name: str, view: ArrayLike) -> NDArray[np.float64]:
+    """Return the unit direction (3,) of a view, from its name, where y is up, or from a vector.
+
+    Raises
+    ------
+    SceneError
+        If there is no such view, or the vector is malformed or zero.
+    """
+    if isinstance(view, str):
+        if view not in VIEWS:
+            known = ", ".join(VIEWS)
+            hint = did_you_mean(view, VIEWS)
+            raise SceneError(f"{name} is {view!r}; it must be a direction (3,), or one of {known}{hint}")
+        view = VIEWS[view]
+    direction = finite_array(name, view, (3,))
+    if not direction.any():
+        raise SceneError(f"{name} is {direction.tolist()}; it must not be zero")
+    direction = direction / np.abs(direction).max()
+    return direction / np.linalg.norm(direction)
 
 
 T = TypeVar("T")
-Importer: TypeAlias = Callable[[Any], Scene]
+Importer: TypeAlias = Callable[..., Scene]  # of an object, and `smooth` as for `load`
 _IMPORTERS: dict[str, Importer] = {}  # by the package of an object's class
 
 
@@ -219,7 +292,7 @@ def register_importer(package: str, convert: Importer) -> None:
     package
         First part of the name of the modules that define the classes.
     convert
-        Called with an object; returns a scene, whose shapes are used.
+        Called with an object, and with `smooth` where that is given; returns a scene, whose shapes are used.
     """
     _IMPORTERS[package] = convert
 

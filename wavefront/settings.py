@@ -12,10 +12,10 @@ from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .accel.registry import ACCELERATORS, AcceleratorMaker
-from .camera import Camera, check_camera, image_size, upward
+from .camera import Camera, check_camera, field_of_view, image_size, upward
 from .codecs.image_data import TRANSPARENT
 from .colors import rgb
 from .compile.scene import ROULETTE_AFTER
@@ -33,8 +33,10 @@ from .progress import Progress
 from .record import record
 from .registry import Registry
 from .sampling.sampler import SAMPLERS, SamplerMaker, make_sampler
+from .scene import FRAMING_FOV, FRAMING_VIEW, VIEWS, view_direction
 from .scheduling.budget import Budget, make_budget
 from .scheduling.executors import EXECUTORS, ExecutorLike, choose_executor, worker_count
+from .shapes.smoothing import check_smooth
 from .stages.reuse import SHARED_WAYS
 from .trial import MOST_WAYS
 from .vec import Floats, f4
@@ -193,6 +195,17 @@ def check_checkpoint(name: str, value: Any) -> str | None:
     return str(check_target(value))
 
 
+def check_view(name: str, value: Any) -> Any:
+    """Check the name of a view, or a direction."""
+    view_direction(name, value)
+    return value
+
+
+def check_up(name: str, value: Any) -> Any:
+    """Check what is up: a vector, the name of an axis, or "auto"."""
+    return value if isinstance(value, str) and value == AUTO else upward(name, value)
+
+
 def check_preset(name: str, value: Any) -> str | None:
     """Check the name of a preset."""
     check_lighting(value)
@@ -226,6 +239,23 @@ class Settings:
         option="WIDTHxHEIGHT in pixels (default: the camera's, or 512x512)",
         check=optional(lambda name, value: image_size(value)),
     )
+    view: str | ArrayLike | None = setting(
+        None,
+        "From where a scene is framed, in place of the scene's own camera: "
+        '"three_quarter", "front", "back", "left", "right", "top", "bottom", "iso", or (3,) from its middle '
+        'to the camera. Without a camera it is "three_quarter", which is 35° to the right of the front and '
+        "22° above. Not with `camera`.",
+        option=f"from where the scene is framed: {', '.join(VIEWS)} (default: {FRAMING_VIEW}, "
+        "where the file has no camera)",
+        check=optional(check_view),
+    )
+    fov: float | None = setting(
+        None,
+        "Vertical field of view of the camera that frames a scene, degrees; by default 40. Not with another "
+        "camera.",
+        option=f"vertical field of view, degrees (default: {FRAMING_FOV:g})",
+        check=optional(lambda name, value: field_of_view(value)),
+    )
     material: MaterialLike | None = setting(
         None,
         "What bare meshes are made of: those of files and of trimesh, where it replaces what they "
@@ -233,28 +263,43 @@ class Settings:
         'such as "gold".',
         option=f"material in place of the file's: {', '.join(NAMED_MATERIALS)}",
     )
-    up: ArrayLike | None = setting(
-        None,
-        'What is up in the scene: a vector (3,), or the name of an axis, such as "z" for most STL and '
-        'CAD files; by default "y". It turns the camera that frames a scene without one, and the '
-        "`lighting` and the `ground`.",
-        option="what is up in the scene, or an axis such as z, as in most stl and CAD files (default: y)",
+    smooth: bool | float | str = setting(
+        AUTO,
+        "Normals of bare meshes: True averages those of the faces around each vertex, False shows the "
+        "facets, and a crease angle in degrees averages only over faces that are within it of each other. "
+        'These replace the normals that a mesh has. "auto" keeps them, and computes those of files and '
+        "trimesh objects that have none by a crease angle of 30°, but for glTF, whose facets are flat then: "
+        "docs/formats.md says why. (vertices, faces) and `Mesh` stay as they are.",
+        option="normals of meshes: yes, no, a crease angle in degrees, or auto (default), which is 30 where "
+        "the file has none",
+        check=check_smooth,
+    )
+    up: ArrayLike = setting(
+        AUTO,
+        'What is up in the scene: a vector (3,), or the name of an axis, such as "z". "auto" goes by the '
+        "file: z for STL and 3MF, what a DAE says, else y. It turns the camera that frames a scene without "
+        "one, and the `lighting` and the `ground`.",
+        option="what is up in the scene, or an axis such as z (default: by the file; z for stl and 3mf)",
+        check=check_up,
     )
     lighting: str | None = setting(
         "auto",
         '"studio", "softbox", "three_point", "cloudy" or "even": adds the light of that name, which '
-        '`studio` describes, to the scene\'s own. "auto" adds "studio" where nothing shines, with a '
-        "warning, and nothing elsewhere; None adds nothing.",
+        '`studio` describes, to the scene\'s own. "auto" adds "studio" where nothing shines, and '
+        "nothing elsewhere; None adds nothing.",
         option=f"light to add: {', '.join(LIGHTINGS)}, none, "
         f"or auto, which is {DEFAULT} where nothing shines",
         check=check_preset,
     )
-    ground: bool = setting(
-        False,
+    ground: bool | str = setting(
+        AUTO,
         "Adds a level ground under the scene that catches its shadow and fades into the background. "
-        "It belongs to the picture alone: the scene, its bounds and the numbers of its shapes stay.",
-        option="add a ground that catches the shadow",
-        check=check_flag,
+        "It belongs to the picture alone: the scene, its bounds and the numbers of its shapes stay. "
+        '"auto" adds it where the light is chosen by itself and the camera is framed, unless that looks from '
+        "below or a `background` is asked for.",
+        option="add a ground that catches the shadow, or leave it out (default: where light and camera are "
+        "chosen by themselves)",
+        check=auto_or(check_flag),
     )
     background: str | ArrayLike | None = setting(
         None,
@@ -471,19 +516,20 @@ class Settings:
     max_spp: int = field(init=False)  # the most samples that a pixel may get
     worker_count: int = field(init=False)
     memory_limit: int | None = field(init=False)  # bytes
-    up_vector: NDArray[np.float64] = field(init=False)  # (3,)
 
     def __post_init__(self) -> None:
         for each in fields(self):
             check = each.metadata.get("check")
             if check is not None:
                 setattr(self, each.name, check(each.name, getattr(self, each.name)))
+        for name in ("view", "fov"):
+            if self.camera is not None and getattr(self, name) is not None:
+                raise SceneError(f"{name} is {getattr(self, name)!r}; with a camera it must be None")
         if self.denoise:
             self.aovs = chosen_layers("aovs", (*self.aovs, *GUIDES))
         self.max_spp = self._most_samples()
         self.memory_limit = None if self.max_memory is None else int(self.max_memory)
         self.worker_count = worker_count(self.workers, self.executor)
-        self.up_vector = upward("up", "y" if self.up is None else self.up)
         self._check_integrator()
         self._check_reuse()
         self._check_caustics()

@@ -7,7 +7,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from .camera import Camera, upward
+from .camera import Camera
 from .camera.moves import orbit
 from .errors import SceneError, iterable
 from .image import Image
@@ -66,11 +66,17 @@ def render_many(
 
 
 def turntable(
-    scene: Any, n: int = 60, *, size: tuple[int, int] | None = None, up: ArrayLike = "y"
+    scene: Any,
+    n: int = 60,
+    *,
+    size: tuple[int, int] | None = None,
+    up: ArrayLike = "auto",
+    view: str | ArrayLike | None = None,
+    fov: float | None = None,
 ) -> list[Camera]:
     """Return n cameras on a circle around the middle of a scene, at equal angles.
 
-    The first is the scene's camera, or one that frames it.
+    The first is the scene's camera, or one that frames it with room for a whole turn.
 
     Parameters
     ----------
@@ -81,7 +87,9 @@ def turntable(
     size
         (width, height) in pixels, in place of the camera's.
     up
-        What is up in the scene: (3,), or the name of an axis.
+        What is up in the scene: (3,), the name of an axis, or "auto", as for `render`.
+    view, fov
+        The first camera, as for `render`.
 
     Raises
     ------
@@ -96,6 +104,6 @@ def turntable(
     """
     n = whole_number(1, MOST_VIEWS)("n", n)
     subject = as_scene(scene, None, False)
-    axis = upward("up", up)
-    camera = choose_camera(subject, None, size, axis)
+    axis = subject.vertical(up)
+    camera, _ = choose_camera(subject, None, size, axis, view, fov, turning=True)
     return [orbit(camera, subject.bounds.mean(0), 360 * k / n, axis) for k in range(n)]

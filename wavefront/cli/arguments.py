@@ -16,8 +16,10 @@ from ..colors import rgb
 from ..errors import SceneError
 from ..lighting import check_lighting
 from ..materials import Material
+from ..scene import view_direction
+from ..shapes.smoothing import check_smooth
 
-VECTOR_OPTIONS = ("--origin", "--target", "--up", "--direction")
+VECTOR_OPTIONS = ("--origin", "--target", "--up", "--direction", "--view")
 
 
 class Several(argparse.Action):
@@ -28,6 +30,19 @@ class Several(argparse.Action):
     ) -> None:
         """Add a value."""
         setattr(namespace, self.dest, (*getattr(namespace, self.dest), values))
+
+
+class Flag(argparse.Action):
+    """An option that says yes, beside one that says no; without both the default stays."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, **how: Any) -> None:
+        super().__init__(option_strings, dest, nargs=0, **how)
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option: Any = None
+    ) -> None:
+        """Set it."""
+        setattr(namespace, self.dest, not str(option).startswith("--no-"))
 
 
 def joined(arguments: Sequence[str]) -> list[str]:
@@ -103,8 +118,10 @@ def vector(text: str) -> tuple[float, float, float]:
     return x, y, z
 
 
-def up(text: str) -> tuple[float, float, float]:
-    """Return X,Y,Z, or the name of an axis, as three floats."""
+def up(text: str) -> str | tuple[float, float, float]:
+    """Return X,Y,Z, or the name of an axis, as three floats; "auto" as it is."""
+    if text == "auto":
+        return text
     if "," in text:
         return vector(text)
     try:
@@ -112,6 +129,27 @@ def up(text: str) -> tuple[float, float, float]:
     except SceneError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
     return x, y, z
+
+
+def named_view(text: str) -> str | tuple[float, float, float]:
+    """Return the name of a view, or X,Y,Z as three floats."""
+    found = vector(text) if "," in text else text
+    try:
+        view_direction("view", found)
+    except SceneError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return found
+
+
+def smooth(text: str) -> bool | float | str:
+    """Return whether normals are smooth, a crease angle in degrees, or "auto"."""
+    values: dict[str, bool | float | str] = {"yes": True, "no": False, "auto": "auto"}
+    try:
+        return values[text] if text in values else check_smooth("smooth", float(text))
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not yes, no, auto, or a crease angle from 0 to 180 degrees"
+        ) from None
 
 
 def background(text: str) -> str | tuple[float, float, float]:

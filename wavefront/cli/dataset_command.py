@@ -57,7 +57,9 @@ def _dataset(options: argparse.Namespace) -> int:
     display = display_of(options)
     progress = False if options.quiet else None
     scene = read_scene(options.scene, options, progress)
-    cameras = turntable(scene, options.views, size=options.size, up="y" if options.up is None else options.up)
+    cameras = turntable(
+        scene, options.views, size=options.size, up=options.up, view=options.view, fov=options.fov
+    )
     rendered = write_dataset(
         options.output,
         scene,

@@ -12,9 +12,10 @@ import numpy as np
 
 from ..counted import counted
 from ..io.load import load
+from ..lighting import DEFAULT
 from ..materials import Material
 from ..parameter import brief
-from ..scene import Scene
+from ..scene import FRAMING_VIEW, Scene
 from ..shapes import Instance, Mesh, Shape
 from ..textures.base import BaseTexture
 from ..textures.image import Texture
@@ -57,7 +58,11 @@ def _lines(path: str, scene: Scene, messages: list[str]) -> Iterator[str]:
     )
     yield f"size: file {_bytes(os.path.getsize(path))}, meshes {_bytes(_mesh_bytes(meshes))} in memory"
     yield f"bounds: {_triple(low)} to {_triple(high)}, {_triple(high - low)} across"
-    yield f"camera: {'in the file' if scene.camera else 'none; the scene will be framed'}"
+    camera, lit = scene.camera is not None, scene.emits
+    yield f"up: {_axis(scene)}"
+    yield f"camera: {'in the file' if camera else f'none; render frames the scene, view={FRAMING_VIEW!r}'}"
+    if not lit:
+        yield f"light: none; render adds lighting={DEFAULT!r}{'' if camera else ' and a ground'}"
     yield "shapes:"
     for shape in scene.shapes:
         glow = "" if shape.emission is None else ", emits"
@@ -118,6 +123,12 @@ def _bytes(count: int) -> str:
             break
         size /= 1000
     return f"{size:.4g} {unit}"
+
+
+def _axis(scene: Scene) -> str:
+    """Return what is up, and who says so."""
+    axis = "xyz"[int(scene.vertical().argmax())]
+    return f"{axis}, {'the default' if scene.up is None else 'by the file or its format'}; --up changes it"
 
 
 def _label(material: Material) -> str:

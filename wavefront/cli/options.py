@@ -13,7 +13,7 @@ from ..materials import Material, MaterialLike
 from ..progress import Progress
 from ..renderable import as_scene
 from ..scene import Scene
-from ..settings import Settings
+from ..settings import AUTO, Settings
 from . import arguments
 
 TYPES: dict[str, Callable[[str], Any]] = {"int": int, "float": float, "str": str}
@@ -27,8 +27,14 @@ PARSERS: dict[str, Callable[[str], Any]] = {
     "branches": arguments.branches,
     "reuse": arguments.reuse,
     "roulette": arguments.roulette_after,
+    "view": arguments.named_view,
+    "fov": arguments.fov,
+    "smooth": arguments.smooth,
 }
 METAVARS = {
+    "view": "NAME|X,Y,Z",
+    "fov": "DEGREES",
+    "smooth": "WHICH",
     "lighting": "PRESET",
     "material": "NAME",
     "background": "COLOR",
@@ -37,7 +43,7 @@ METAVARS = {
     "roulette": "EVENTS",
 }
 # settings that the command line uses itself, for its own camera and where it reads a scene
-OWN_OPTIONS = ("size", "material")
+OWN_OPTIONS = ("size", "view", "fov", "material", "smooth")
 RENDER_OPTIONS = [
     each.name for each in fields(Settings) if each.metadata.get("option") and each.name not in OWN_OPTIONS
 ]
@@ -61,7 +67,7 @@ def read_scene(path: str, options: argparse.Namespace, progress: Progress) -> Sc
     if options.color is not None:
         name = "matte" if options.material is None else options.material
         material = Material.named(name, options.color)
-    return as_scene(path, material, progress)
+    return as_scene(path, material, progress, options.smooth)
 
 
 def setting_values(options: argparse.Namespace) -> dict[str, Any]:
@@ -95,6 +101,9 @@ def _add_setting(command: argparse.ArgumentParser, setting: Field[Any]) -> None:
     """Add the option of a setting that has one."""
     how: dict[str, Any] = {"help": setting.metadata["option"], "default": setting.default}
     flag = setting.metadata["flag"] or setting.name
+    if str(setting.type) == "bool | str" and setting.default == AUTO and setting.name not in PARSERS:
+        command.add_argument(f"--{flag}", f"--no-{flag}", action=arguments.Flag, **how)
+        return
     if str(setting.type).startswith("bool") and setting.name not in PARSERS:
         how["action"] = "store_true"
     elif setting.metadata["flag"]:

@@ -13,7 +13,8 @@ from ..codecs.images import check_display, check_writable
 from ..errors import Interrupted, RenderError, SaveError, SceneError
 from ..image import Image
 from ..render import finish
-from ..scene import Scene
+from ..renderable import SIZE
+from ..scene import AUTO, FRAMING_FOV, Scene
 from ..session import Session
 from ..viewer import view
 from . import arguments
@@ -24,8 +25,6 @@ from .outputs import output_paths
 from .rescue import save_elsewhere
 from .status import ERROR, INTERRUPTED
 
-FOV = 40.0  # degrees
-
 
 def add_render_command(commands: Any) -> None:
     """Add the command and its options to a parser's commands."""
@@ -35,7 +34,7 @@ def add_render_command(commands: Any) -> None:
         "render scene files",
         [
             "wavefront render scene.glb -o out.png --spp 256",
-            "wavefront render part.stl --up z --lighting softbox --ground --size 800x600 --noise 0.02",
+            "wavefront render part.stl --view iso --size 800x600 --noise 0.02",
             "wavefront render a.obj b.ply -o pictures/",
             "wavefront render a.obj b.ply -o 'layers/{}.exr' --aov depth --aov normal --denoise",
             "wavefront render room.gltf --spp 4096 --guide --checkpoint room.wfck -o room.exr",
@@ -55,17 +54,12 @@ def add_render_command(commands: Any) -> None:
     command.add_argument(
         "--target", **where, help="point that the camera looks at (default: the scene's middle)"
     )
-    command.add_argument(
-        "--direction", **where, help="from where a scene is framed: from its middle to the camera"
-    )
-    command.add_argument(
-        "--fov", type=arguments.fov, help=f"vertical field of view, degrees (default: {FOV:g})"
-    )
+    command.add_argument("--direction", **where, help="the same as --view X,Y,Z")
     add_display(command)
     command.add_argument("--bits", type=int, choices=(8, 16), default=8, help="of each channel of a png")
     command.add_argument("--quiet", action="store_true", help="no progress bar")
     command.add_argument(
-        "--view",
+        "--show",
         action="store_true",
         help="show the scene with these options in the browser, in place of writing a picture",
     )
@@ -74,7 +68,7 @@ def add_render_command(commands: Any) -> None:
 
 def _render(options: argparse.Namespace) -> int:
     """Render all scenes; return the worst exit status."""
-    if options.view:
+    if options.show:
         return _show(options)
     paths = output_paths(options.scenes, options.output)
     if len(paths) > 1 and options.checkpoint is not None:
@@ -100,11 +94,10 @@ def _render(options: argparse.Namespace) -> int:
 def _show(options: argparse.Namespace) -> int:
     """Show the scene in the browser until Ctrl-C; return the exit status."""
     if len(options.scenes) > 1:
-        raise SceneError(f"--view is for one scene; there are {len(options.scenes)}")
+        raise SceneError(f"--show is for one scene; there are {len(options.scenes)}")
     (path,) = options.scenes
     scene = read_scene(path, options, False if options.quiet else None)
-    scene.camera = _camera(path, scene, options)
-    view(scene, block=True, **setting_values(options))
+    view(scene, block=True, **_view(path, scene, options), **setting_values(options))
     return 0
 
 
@@ -112,13 +105,13 @@ def _render_scene(path: str, output: str, options: argparse.Namespace) -> int:
     """Render a scene and save the picture; return the exit status."""
     progress = False if options.quiet else None
     scene = read_scene(path, options, progress)
-    scene.camera = _camera(path, scene, options)
     image: Image | None
     status = 0
     try:
         image = render_by_command(
             scene,
             {"arguments": options.arguments, "folder": options.folder},
+            **_view(path, scene, options),
             **setting_values(options),
             progress=progress,
         )
@@ -165,24 +158,23 @@ def _save(image: Image, output: str, options: argparse.Namespace) -> int:
     return 0
 
 
-def _camera(path: str, scene: Scene, options: argparse.Namespace) -> Camera:
-    """Return the camera that the options describe, else the file's, else one that frames the scene."""
-    size = options.size or (scene.camera.size if scene.camera else (512, 512))
-    fov = FOV if options.fov is None else options.fov
-    up = (0.0, 1.0, 0.0) if options.up is None else options.up
-    if options.origin is not None:
-        if options.direction is not None:
-            raise SceneError("--direction is for scenes that are framed; with --origin use --target")
-        target = scene.bounds.mean(0) if options.target is None else options.target
-        return Camera.look_at(options.origin, target, up, fov=fov, size=size)
-    if options.target is not None:
-        raise SceneError("--target needs --origin")
-    if scene.camera is None:
-        return scene.framing_camera(fov, size, up=up, direction=options.direction)
-    for name in ("fov", "up", "direction"):
-        if getattr(options, name) is not None:
-            raise SceneError(f"--{name} needs --origin: {path} has a camera of its own")
-    return scene.camera.resized(size)
+def _view(path: str, scene: Scene, options: argparse.Namespace) -> dict[str, Any]:
+    """Return the settings of the camera that the options describe."""
+    named = options.direction if options.view is None else options.view
+    if options.origin is None:
+        if options.target is not None:
+            raise SceneError("--target needs --origin")
+        if scene.camera is not None and named is None:
+            for name in ("fov", "up"):
+                if getattr(options, name) not in (None, AUTO):
+                    raise SceneError(f"--{name} needs --origin or --view: {path} has a camera of its own")
+        return {"size": options.size, "view": named, "fov": options.fov}
+    if named is not None:
+        raise SceneError("--view is for scenes that are framed; with --origin use --target")
+    size = options.size or (scene.camera.size if scene.camera else SIZE)
+    target = scene.bounds.mean(0) if options.target is None else options.target
+    fov = FRAMING_FOV if options.fov is None else options.fov
+    return {"camera": Camera.look_at(options.origin, target, scene.vertical(options.up), fov, size=size)}
 
 
 def _summary(image: Image, path: str) -> str:

@@ -22,7 +22,7 @@ def add_turntable_command(commands: Any) -> None:
         "render an animation around a scene",
         [
             "wavefront turntable mesh.obj -o spin.mp4 --frames 90 --fps 30 --spp 64 --size 640x480",
-            "wavefront turntable part.stl --up z -o 'frame_{:03d}.png'",
+            "wavefront turntable part.stl -o 'frame_{:03d}.png'",
         ],
     )
     add_scene(command)
@@ -46,7 +46,7 @@ def _turntable(options: argparse.Namespace) -> int:
     progress = False if options.quiet else None
     scene = read_scene(options.scene, options, progress)
     cameras = turntable(
-        scene, options.frames, size=options.size, up="y" if options.up is None else options.up
+        scene, options.frames, size=options.size, up=options.up, view=options.view, fov=options.fov
     )
     images = render_many(scene, cameras, progress=progress, **setting_values(options))
     count = save_animation(

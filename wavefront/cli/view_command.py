@@ -16,7 +16,7 @@ def add_view_command(commands: Any) -> None:
         commands,
         "view",
         "show a scene in the browser, rendered while one moves around",
-        ["wavefront view scene.glb", "wavefront view part.stl --up z --no-browser --port 9000"],
+        ["wavefront view scene.glb", "wavefront view part.stl --no-browser --port 9000"],
     )
     add_scene(command)
     command.add_argument(
@@ -46,6 +46,8 @@ def _view(options: argparse.Namespace) -> int:
         open_browser=not options.no_browser,
         block=True,
         size=options.size,
+        view=options.view,
+        fov=options.fov,
         **setting_values(options),
     )
     return 0

@@ -1,11 +1,12 @@
 """COLLADA (.dae), read by trimesh and pycollada after a check of its references.
 
-Positions are those of the file: trimesh applies neither `up_axis` nor `unit`.
+Positions are those of the file: trimesh applies neither `up_axis` nor `unit`. The scene is told what is up.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import zipfile
 from io import BytesIO
 from typing import Any
@@ -18,11 +19,12 @@ from .trimesh_loading import Images, by_trimesh
 
 LOST = ("instance_controller", "instance_light", "instance_camera", "lines", "linestrips", "animation")
 PRIMITIVES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
+UP_AXIS = re.compile(rb"[^<>]*>\s*([XYZ])_UP")  # after the bytes "<" of an element up_axis
 PLACES = ("node", "visual_scene", "scene")  # elements that hold nodes, or refer to them
 
 
-def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> Any:
-    """Return the trimesh scene of a COLLADA file.
+def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> tuple[Any, str]:
+    """Return the trimesh scene of a COLLADA file, and the axis that is up.
 
     Raises
     ------
@@ -50,7 +52,7 @@ def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> Any:
         raise SceneError(f"{name}: not a readable dae file: all parts of its geometry are damaged")
     if absent > 0:
         warn(f"{name}: left out {absent} of {there} parts of its geometry, which are damaged", strict)
-    return found
+    return found, document.up
 
 
 def _is_clear(mesh: Any) -> bool:
@@ -66,6 +68,7 @@ class _Document:
         self.sizes: dict[str, int] = {}  # bytes of the geometries
         self.primitives: dict[str, int] = {}  # their number in each geometry
         self.lost: dict[str, int] = {}  # tag -> first line
+        self.up = "y"  # by the standard, where the file does not say
         self._inside: list[str] = []
         self._geometry = ("", 0)
         self._data = data
@@ -74,6 +77,8 @@ class _Document:
     def _begin(self, tag: str, attributes: dict[str, str], at: int) -> None:
         if tag in LOST:
             self.lost.setdefault(tag, self._data.count(b"\n", 0, at) + 1)
+        if tag == "up_axis" and (found := UP_AXIS.match(self._data, at + 1)) is not None:
+            self.up = found[1].decode().lower()
         if tag in PLACES:
             key = "scene" if tag == "scene" else "#" + attributes.get("id", f" {at}")
             if self._inside:

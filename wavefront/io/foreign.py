@@ -12,20 +12,29 @@ from ..errors import SceneError, warn_caller
 from ..scene import Scene
 from ..shapes import Capsules, Shape
 from ..shapes.points import point_colors
+from ..shapes.smoothing import AUTO, check_smooth
 from .appearance import assign_material
 from .clouds import cloud
+from .contents import Contents
 from .repair import RawMesh, Table, build, with_face_colors
 
 LINE = 0.0025  # radius of lines, in parts of the diagonal of all
 
 
-def from_pyvista(data: Any) -> Scene:
+def from_pyvista(data: Any, *, smooth: bool | float | str = AUTO) -> Scene:
     """Convert an object of PyVista to a scene: `PolyData`, or a grid, whose surface is taken.
 
     Taken are points, faces, the point data "Normals", the active texture coordinates, and colors: the first
     array of bytes (n, 3) or (n, 4) of the point data, or else of the cell data, which are sRGB. Data without
     faces become spheres or capsules of a radius that a warning states. Scalars are not shown; colors of them
     are `shape.colors = wf.srgb(cmap(scalars))`.
+
+    Parameters
+    ----------
+    data
+        The object.
+    smooth
+        As for `load`.
 
     Raises
     ------
@@ -43,7 +52,14 @@ def from_pyvista(data: Any) -> Scene:
     """
     name = "PyVista"
     if hasattr(data, "n_blocks"):
-        return Scene([shape for block in data if block is not None for shape in from_pyvista(block).shapes])
+        return Scene(
+            [
+                shape
+                for block in data
+                if block is not None
+                for shape in from_pyvista(block, smooth=smooth).shapes
+            ]
+        )
     if not hasattr(data, "faces") and hasattr(data, "extract_surface"):
         data = data.extract_surface()
     if not hasattr(data, "faces") or not hasattr(data, "points"):
@@ -60,18 +76,25 @@ def from_pyvista(data: Any) -> Scene:
             raw.colors = _opaque(srgb(colors))
         elif of_faces is not None and len(of_faces) == len(corners):
             raw = with_face_colors(name, raw, _opaque(srgb(of_faces)))
-        return Scene(_built(raw))
+        return Scene(_built(raw, smooth))
     lines = np.asarray(getattr(data, "lines", ()), np.intp)
     if lines.size:
         return Scene([_capsules(name, points, _segments(lines), None)])
     return Scene(_spheres(name, points, point_colors(values)))
 
 
-def from_open3d(data: Any) -> Scene:
+def from_open3d(data: Any, *, smooth: bool | float | str = AUTO) -> Scene:
     """Convert an object of Open3D to a scene: `TriangleMesh`, `PointCloud` or `LineSet`, also of tensors.
 
     Colors of vertices and points are taken as sRGB, as Open3D shows them. Points become spheres and lines
     capsules of a radius that a warning states. Textures are not read.
+
+    Parameters
+    ----------
+    data
+        The object.
+    smooth
+        As for `load`.
 
     Raises
     ------
@@ -100,7 +123,7 @@ def from_open3d(data: Any) -> Scene:
         raw.colors = None if colors is None else _opaque(srgb(np.clip(colors, 0, 1)))
         if len(getattr(data, "textures", ())):
             warn_caller(f"{name}: not honored: textures")
-        return Scene(_built(raw))
+        return Scene(_built(raw, smooth))
     if not hasattr(data, "points"):
         raise SceneError(
             f"expected a TriangleMesh, PointCloud or LineSet of Open3D, got {type(data).__name__}"
@@ -144,7 +167,8 @@ def _opaque(colors: Any) -> Table:
     return np.hstack([colors.astype(np.float64), ones])
 
 
-def _built(raw: RawMesh) -> list[Shape]:
+def _built(raw: RawMesh, smooth: bool | float | str) -> list[Shape]:
+    Contents.once([raw]).smooth(check_smooth("smooth", smooth))
     assign_material(raw, None)
     mesh = build(raw.name, raw)
     if mesh is None:

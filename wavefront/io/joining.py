@@ -10,7 +10,7 @@ from ..materials import MaterialLike, as_material
 from ..shapes import Mesh
 from ..shapes.transform import moved, moved_tangents
 from ..vec import Doubles
-from .repair import RawMesh, build, warn
+from .repair import RawMesh, build
 
 
 def join(
@@ -18,29 +18,28 @@ def join(
     name: str,
     material: MaterialLike | None = None,
     transform: ArrayLike | None = None,
-    strict: bool = False,
 ) -> Mesh:
     """Return one mesh with the triangles of all meshes.
 
-    What only some of them have per vertex is left out: of normals a warning tells, and of what a material
-    reads, the render.
+    Where only some of them have normals, the others get those of their facets. What else only some have per
+    vertex is left out; the render tells of what a material reads.
 
     Raises
     ------
     SceneError
-        If there are several materials and `material` is not given. With `strict`, if normals are left out.
+        If there are several materials and `material` is not given.
     """
     if material is None and len({id(mesh.material) for mesh in meshes}) > 1:
         raise SceneError(f"{name}: has {len(meshes)} materials; pass one, or use wf.load")
     matrix = np.eye(4) if transform is None else finite_array("transform", transform, (4, 4))
     if np.linalg.det(matrix) == 0:
         raise SceneError("transform is singular; it must be invertible")
+    if any(mesh.normals is not None for mesh in meshes):
+        for each in meshes:
+            each.keep_facets()
     starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
     vertices = np.concatenate([mesh.vertices for mesh in meshes])
     faces = np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts[:-1], strict=True)])
-    normals = [mesh.normals for mesh in meshes if mesh.normals is not None]
-    if 0 < len(normals) < len(meshes):
-        warn(f"{name}: vertex normals left out, which {len(normals)} of {len(meshes)} meshes have", strict)
     raw = RawMesh(name, *moved(matrix, vertices, faces, _joined([mesh.normals for mesh in meshes])))
     raw.uvs = _joined([mesh.uvs for mesh in meshes])
     raw.uvs1 = _joined([mesh.uvs1 for mesh in meshes])

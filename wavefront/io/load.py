@@ -16,6 +16,7 @@ from ..materials import MaterialLike
 from ..progress import Progress, phase
 from ..scene import Scene
 from ..shapes import Instance, Mesh, Shape
+from ..shapes.smoothing import AUTO, check_smooth
 from . import trimesh_objects, trimesh_view
 from .joining import join
 from .placing import place_meshes, place_shapes
@@ -32,6 +33,7 @@ def load(
     progress: Progress = None,
     limits: LoadLimits | None = None,
     search_paths: PathLike | Sequence[PathLike] = (),
+    smooth: bool | float | str = AUTO,
 ) -> Scene:
     """Read a scene: .obj (with its .mtl), .ply, .stl, .glb, .gltf, .off, .dae, .3mf.
 
@@ -51,6 +53,10 @@ def load(
         How large the file, its images and its meshes may be; None for the defaults of `LoadLimits`.
     search_paths
         A folder, or several, where files that it refers to may be, too.
+    smooth
+        Normals of the meshes. "auto" keeps those of the file, and computes missing ones by a crease angle of
+        30°, but for glTF, whose facets are flat then. True, False or another crease angle in degrees, as of
+        `Mesh`, replace those of the file.
 
     Raises
     ------
@@ -66,10 +72,16 @@ def load(
     1
     """
     with _reading(path, progress):
-        wish = Wish(strict, limits=checked_limits(limits), search_paths=folders(search_paths))
+        wish = Wish(
+            strict,
+            limits=checked_limits(limits),
+            search_paths=folders(search_paths),
+            smooth=check_smooth("smooth", smooth),
+        )
         name, contents = os.fspath(path), read(path, wish)
         placed = place_shapes(name, contents.raws, contents.places, strict)
-        return Scene(_some(name, [*placed, *contents.shapes]), contents.lights, contents.camera)
+        shapes = _some(name, [*placed, *contents.shapes])
+        return Scene(shapes, contents.lights, contents.camera, up=contents.up)
 
 
 def load_mesh(
@@ -81,6 +93,7 @@ def load_mesh(
     progress: Progress = None,
     limits: LoadLimits | None = None,
     search_paths: PathLike | Sequence[PathLike] = (),
+    smooth: bool | float | str = AUTO,
 ) -> Mesh:
     """Read all geometry of a file as one mesh.
 
@@ -93,7 +106,7 @@ def load_mesh(
         one.
     transform
         (4, 4) matrix applied to the vertices.
-    strict, progress, limits, search_paths
+    strict, progress, limits, search_paths, smooth
         As for `load`.
 
     Raises
@@ -111,9 +124,14 @@ def load_mesh(
     """
     with _reading(path, progress):
         meshes = load_meshes(
-            path, strict=strict, materials=material is None, limits=limits, search_paths=search_paths
+            path,
+            strict=strict,
+            materials=material is None,
+            limits=limits,
+            search_paths=search_paths,
+            smooth=smooth,
         )
-        return join(meshes, Path(path).stem, material, transform, strict)
+        return join(meshes, Path(path).stem, material, transform)
 
 
 def load_meshes(
@@ -123,9 +141,12 @@ def load_meshes(
     materials: bool = True,
     limits: LoadLimits | None = None,
     search_paths: PathLike | Sequence[PathLike] = (),
+    smooth: bool | float | str = AUTO,
 ) -> list[Mesh]:
     """Read the meshes of a file, one for each material and node; arguments as for `load`."""
-    wish = Wish(strict, materials, checked_limits(limits), folders(search_paths))
+    wish = Wish(
+        strict, materials, checked_limits(limits), folders(search_paths), check_smooth("smooth", smooth)
+    )
     name, contents = os.fspath(path), read(path, wish)
     placed = place_meshes(name, contents.raws, contents.places, strict)
     return _some(name, [*placed, *(_as_mesh(name, shape) for shape in contents.shapes)])
@@ -146,7 +167,7 @@ def _reading(path: PathLike, progress: Progress) -> Iterator[None]:
         yield
 
 
-def from_trimesh(geometry: Any) -> Scene:
+def from_trimesh(geometry: Any, *, smooth: bool | float | str = AUTO) -> Scene:
     """Convert a `trimesh.Trimesh` or `trimesh.Scene` to a scene, as if it had been read from a file.
 
     Normals are used if the object has them: from its file, or computed by an access to
@@ -160,6 +181,13 @@ def from_trimesh(geometry: Any) -> Scene:
     Some properties of files are lost in trimesh: of glTF it rounds base colors to 8 bits, and drops
     extensions, lights, tangents and the scale of normal maps; of MTL it keeps only the image of `map_Kd`.
     `load` reads all of these.
+
+    Parameters
+    ----------
+    geometry
+        The object.
+    smooth
+        As for `load`.
 
     Raises
     ------
@@ -176,8 +204,9 @@ def from_trimesh(geometry: Any) -> Scene:
     """
     source = "trimesh object"
     contents = trimesh_objects.read(geometry, source, strict=False)
+    contents.smooth(check_smooth("smooth", smooth))
     shapes = _some(source, place_shapes(source, contents.raws, contents.places, strict=False))
-    scene = Scene(shapes, trimesh_view.lights(geometry))
+    scene = Scene(shapes, trimesh_view.lights(geometry), up=contents.up)
     trimesh_view.add_camera(scene, geometry)
     return scene
 

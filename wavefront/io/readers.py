@@ -13,6 +13,7 @@ from ..errors import SceneError
 from ..files import decode_text, extension_of
 from ..registry import Registry
 from ..scene import Scene
+from ..shapes.smoothing import AUTO
 from . import dae, gltf, mtl, obj, off, ply, stl, threemf, trimesh_objects, visuals
 from .appearance import MaterialSpec, assign_material
 from .clouds import cloud, cloud_of_trimesh
@@ -31,6 +32,7 @@ class Wish:
     materials: bool = True  # read materials
     limits: LoadLimits = field(default_factory=LoadLimits)
     search_paths: tuple[Path, ...] = ()  # folders whose files the file may refer to, beside its own
+    smooth: bool | float | str = AUTO  # normals, as for `load`
 
 
 def read(path: PathLike, wish: Wish) -> Contents:
@@ -49,6 +51,7 @@ def read(path: PathLike, wish: Wish) -> Contents:
     if kind in PLAIN:
         _refuse(name, data)
     contents = parse(files, data, wish)
+    contents.smooth(wish.smooth)
     wish.limits.check_meshes(name, len(contents.raws))
     wish.limits.check_triangles(name, sum(len(raw.faces) for raw in contents.raws))
     return contents
@@ -74,7 +77,8 @@ def _read_gltf(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
     if document.lost and wish.materials:
         listed = ", ".join(f"{what} ({where})" for what, where in document.lost.items())
         warn(f"{document.name}: not honored: {listed}", wish.strict)
-    return Contents([raw for raw, _ in found.raws], found.places, found.lights, found.camera)
+    raws = [raw for raw, _ in found.raws]
+    return Contents(raws, found.places, found.lights, found.camera, flat=True)
 
 
 def _read_obj(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
@@ -125,7 +129,9 @@ def _read_ply(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
 
 
 def _read_stl(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
-    return Contents.once(stl.parse(os.fspath(files.scene), data, wish.strict))
+    contents = Contents.once(stl.parse(os.fspath(files.scene), data, wish.strict))
+    contents.up = "z"
+    return contents
 
 
 def _read_off(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
@@ -134,12 +140,16 @@ def _read_off(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
 
 
 def _read_dae(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
-    found = dae.parse(files, data, wish.strict, wish.materials)
-    return trimesh_objects.read(found, os.fspath(files.scene), wish.strict)
+    found, up = dae.parse(files, data, wish.strict, wish.materials)
+    contents = trimesh_objects.read(found, os.fspath(files.scene), wish.strict)
+    contents.up = up
+    return contents
 
 
 def _read_3mf(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
-    return threemf.parse(files, data, wish.strict, wish.materials)
+    contents = threemf.parse(files, data, wish.strict, wish.materials)
+    contents.up = "z"
+    return contents
 
 
 def _from_scene(load: Callable[[str, bytes], Scene]) -> Reader:

@@ -52,6 +52,7 @@ class RawMesh:
     material: Material | None = None
     emission: Color | None = None
     two_sided: bool = False  # the emission leaves both sides
+    smooth: bool | float | str = False  # as of `Mesh`, where there are no normals
 
 
 def with_face_colors(source: str, raw: RawMesh, colors: Table) -> RawMesh:
@@ -116,6 +117,7 @@ def build(source: str, raw: RawMesh, strict: bool = False) -> Mesh | None:
         emission=raw.emission,
         two_sided=raw.two_sided,
         name=printable(raw.name) or "mesh",
+        smooth=False if raw.normals is not None else raw.smooth,
     )
 
 

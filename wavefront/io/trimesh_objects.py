@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 # objects of trimesh without faces, and what makes shapes of them
 WITHOUT_FACES = {"PointCloud": "Points", "Path2D": "Edges", "Path3D": "Edges"}
+Z_UP = ("stl", "stl_ascii", "3mf")  # formats with z up
+FLAT = ("glb", "gltf")  # formats in which meshes without normals have flat facets
 BARE = ("obj", "ply")  # formats whose materials may lack a color; trimesh then invents a gray one
 
 
@@ -42,7 +44,10 @@ def read(geometry: Any, source: str, strict: bool) -> Contents:
     matrices = np.array([matrix for *_, matrix, _ in nodes]).reshape(-1, 4, 4)
     several = np.bincount(of, minlength=len(raws)).take(of) > 1
     names = [node if placed else "" for (*_, node), placed in zip(nodes, several, strict=True)]
-    return Contents(raws, Places(of, matrices, names))
+    types = {getattr(mesh.source, "file_type", None) for mesh in (geometry, *(mesh for mesh, *_ in nodes))}
+    contents = Contents(raws, Places(of, matrices, names), flat=not types.isdisjoint(FLAT))
+    contents.up = None if types.isdisjoint(Z_UP) else "z"
+    return contents
 
 
 def _nodes(geometry: Any, trimesh: Any) -> list[tuple[Any, str, Matrix, str]]:

@@ -5,15 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..accel import Accelerator, Geometry, most_copies
+from ..camera import Camera
 from ..compile.scene import compile_scene
 from ..geometric_layers import ShapeTable
 from ..integrators import INTEGRATORS, WITH_MIS
-from ..lighting import choose_preset, lighted
+from ..lighting import choose_ground, choose_preset, lighted
 from ..outcome import warn_of_unseen_lights
 from ..progress import phase
 from ..resuming import scene_fingerprint
 from ..scene import Scene
-from ..settings import Settings
+from ..settings import AUTO, Settings
 
 
 class PreparedScene:
@@ -25,6 +26,8 @@ class PreparedScene:
         The user's.
     settings
         Of the render.
+    framed
+        The camera, if it was made to frame the scene.
 
     Attributes
     ----------
@@ -32,18 +35,22 @@ class PreparedScene:
         The user's.
     preset
         Name of the light that was added; None if there is none.
+    ground
+        Whether a ground was added.
     lighted
-        The scene with it.
+        The scene with both.
     compiled
         That one, compiled.
     shapes
         Names and ids of its shapes.
     """
 
-    def __init__(self, scene: Scene, settings: Settings) -> None:
+    def __init__(self, scene: Scene, settings: Settings, framed: Camera | None) -> None:
         self.scene = scene
-        self.preset = choose_preset(scene, settings.lighting)
-        self.lighted = lighted(scene, self.preset, ground=settings.ground, up=settings.up_vector)
+        self.preset, up = choose_preset(scene, settings.lighting), scene.vertical(settings.up)
+        chosen = settings.lighting == AUTO and self.preset is not None
+        self.ground = choose_ground(settings.ground, chosen, framed, settings.background, up)
+        self.lighted = lighted(scene, self.preset, ground=self.ground, up=up, camera=framed)
         warn_of_unseen_lights(self.lighted, settings.integrator)
         self._geometries: list[Geometry] = []
         self._fingerprint: str | None = None

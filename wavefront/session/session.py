@@ -62,7 +62,7 @@ class Session:
 
     Parameters
     ----------
-    scene, spp, camera, size, material, up, lighting, ground, background
+    scene, spp, camera, size, view, fov, material, smooth, up, lighting, ground, background
         As for `render`.
     integrator, max_bounces, roulette, seed, samples, sampler, accel, filter, light_sampler, branches, guide
         As for `render`.
@@ -99,10 +99,13 @@ class Session:
         *,
         camera: Camera | None = None,
         size: tuple[int, int] | None = None,
+        view: str | ArrayLike | None = None,
+        fov: float | None = None,
         material: MaterialLike | None = None,
-        up: ArrayLike | None = None,
+        smooth: bool | float | str = "auto",
+        up: ArrayLike = "auto",
         lighting: str | None = "auto",
-        ground: bool = False,
+        ground: bool | str = "auto",
         background: str | ArrayLike | None = None,
         integrator: str | Integrator = "full",
         max_bounces: int = 12,
@@ -138,7 +141,10 @@ class Session:
             spp=spp,
             camera=camera,
             size=size,
+            view=view,
+            fov=fov,
             material=material,
+            smooth=smooth,
             up=up,
             lighting=lighting,
             ground=ground,
@@ -177,12 +183,14 @@ class Session:
         """Compile the scene and begin the first picture."""
         settings = self._settings
         reserve_buffers(1)
-        scene = as_scene(subject, settings.material, settings.progress)
-        camera = choose_camera(scene, settings.camera, settings.size, settings.up_vector)
+        scene = as_scene(subject, settings.material, settings.progress, settings.smooth)
+        camera, framed = choose_camera(
+            scene, settings.camera, settings.size, settings.up, settings.view, settings.fov
+        )
         check_picture_memory(*camera.size, settings.caustics)
         # before work, for what takes least; again when the memory of the scene is known
         settings.budget(camera.size, settings.executor or "threads")
-        self._scene = PreparedScene(scene, settings)
+        self._scene = PreparedScene(scene, settings, camera if framed else None)
         self._hints = Hints(settings, self._scene)
         self._plan = make_plan(settings, self._scene, camera, trained_guide(settings, self._scene, camera))
         self._make_pool()
@@ -361,7 +369,7 @@ class Session:
             )
         check_camera("camera", camera)
         size = None if size is None else image_size(size)
-        camera = choose_camera(self._scene.scene, camera, size, settings.up_vector)
+        camera, _ = choose_camera(self._scene.scene, camera, size, settings.up, settings.view, settings.fov)
         self._scene.compiled.view(camera)  # checks its distance
         executor = settings.executor_for(camera.size)
         budget = settings.budget(camera.size, executor, self._plan.tracer.recorded_layers)

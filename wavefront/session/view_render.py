@@ -194,6 +194,7 @@ class ViewRender:
         most = int(self.accumulator.film.count.max())
         return {
             "lighting": plan.scene.preset,
+            "ground": plan.scene.ground,
             "background": _background_label(settings.background),
             "integrator": INTEGRATORS.label(settings.integrator),
             "max_bounces": settings.max_bounces,

@@ -90,6 +90,11 @@ class Shape(ABC):
     def bounds(self) -> NDArray[np.float64]:
         """Lower and upper corner, (2, 3), scene units."""
 
+    def hull(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return balls, centers (n, 3) and radii (n,), whose convex hull holds the shape, closely."""
+        corners = np.stack(np.meshgrid(*self.bounds.T), -1).reshape(-1, 3)
+        return corners, np.zeros(len(corners))
+
     @abstractmethod
     def transformed(self, matrix: ArrayLike) -> Self:
         """Return a copy that is placed by an affine matrix; the shape itself stays.

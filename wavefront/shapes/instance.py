@@ -20,6 +20,7 @@ from .transform import moved, moved_tangents
 
 SINGULAR = 1e-12  # least scale of a transform along an axis, relative to the greatest
 MOST_PLACED = 1 << 16  # vertices that are transformed at once
+MOST_HULL = 1 << 22  # vertices of all instances of a mesh; above, its box stands for it where it is framed
 CERTAINLY_REGULAR = 1e-6  # above this value, a cheap bound of that ratio is sufficient
 
 
@@ -219,6 +220,22 @@ def instance_bounds(instances: Sequence[Instance]) -> NDArray[np.float64]:
             with np.errstate(over="ignore", invalid="ignore"):
                 placed = transforms[:, :3, :3] @ vertices + transforms[:, :3, 3:]
             out[some, 0], out[some, 1] = placed.min(2), placed.max(2)
+    return out
+
+
+def instance_hulls(instances: Sequence[Instance]) -> list[NDArray[np.float64]]:
+    """Return points (n, 3) whose convex hull holds the instances, of each mesh apart."""
+    groups: dict[int, list[Instance]] = {}
+    for instance in instances:
+        groups.setdefault(id(instance.mesh), []).append(instance)
+    out = []
+    for members in groups.values():
+        mesh = members[0].mesh
+        points = (mesh.hull() if len(members) * len(mesh.vertices) <= MOST_HULL else Shape.hull(mesh))[0]
+        rows = np.stack([instance.transform[:3] for instance in members])[..., None]
+        x, y, z = points.T
+        placed = rows[:, :, 0] * x + rows[:, :, 1] * y + rows[:, :, 2] * z + rows[:, :, 3]
+        out.append(placed.transpose(0, 2, 1).reshape(-1, 3))
     return out
 
 

@@ -17,6 +17,7 @@ from ..textures.parameter import Color, color
 from ..vec import FLOAT32_MAX, cross, spans
 from .base import Checked
 from .colored import ColoredShape
+from .smoothing import AUTO, CREASE, check_smooth, crease_normals, facet_normals, split_vertices
 from .transform import moved, moved_tangents
 
 MOST_DOUBLINGS = 60  # log2 of the length, or its inverse, of vectors that are stored unchanged
@@ -91,7 +92,7 @@ class Mesh(ColoredShape):
         (m, 3) vertex indices, counter-clockwise seen from the front. No ray hits a face of zero area; a
         warning counts those.
     normals
-        (n, 3) shading normals; without them the facets are flat.
+        (n, 3) shading normals; without them the facets are flat, unless `smooth` says otherwise.
     uvs, uvs1
         (n, 2) texture coordinates, and a second set of them.
     tangents
@@ -112,12 +113,18 @@ class Mesh(ColoredShape):
         Whether the emission leaves the back side as well.
     name
         Used in messages.
+    smooth
+        Computes the normals: True averages those of all faces around a vertex, a crease angle in degrees only
+        those that are within it of a face, and "auto" is what files get, 30°. Vertices in one place count as
+        one, and those on creases are split, so that there may be more of them than were given. Not with
+        `normals`.
 
     Raises
     ------
     SceneError
         If an array has a wrong shape, a value is not finite, a position or a texture coordinate is
-        beyond float32, an index is out of range, there is no face, or there are tangents without normals.
+        beyond float32, an index is out of range, there is no face, there are tangents without normals, or
+        normals that are to be computed.
 
     Examples
     --------
@@ -148,6 +155,7 @@ class Mesh(ColoredShape):
         emission: Color | None = None,
         two_sided: bool = False,
         name: str = "mesh",
+        smooth: bool | float | str = False,
     ) -> None:
         self.name = name
         self.vertices = vertices
@@ -158,6 +166,10 @@ class Mesh(ColoredShape):
         self.colors = colors
         self.check()
         self._warn_of_zero_area()
+        if check_smooth(f"{name}: smooth", smooth) is not False:
+            if normals is not None:
+                raise SceneError(f"{name}: has normals; then smooth must be False")
+            self.compute_normals(smooth)
         self.material = material
         self.emission = emission
         self.two_sided = two_sided
@@ -205,6 +217,42 @@ class Mesh(ColoredShape):
         if self.tangents is not None and self.normals is None:
             raise SceneError(f"{self.name}: has tangents without normals; pass both")
 
+    def compute_normals(self, smooth: bool | float | str) -> None:
+        """Compute the normals from the faces, in place of those that there are.
+
+        Parameters
+        ----------
+        smooth
+            As of the constructor; False shows the facets.
+
+        Raises
+        ------
+        SceneError
+            If it is malformed.
+        """
+        smooth = check_smooth(f"{self.name}: smooth", smooth)
+        self.normals = self.tangents = None
+        if smooth is False:
+            return
+        degrees = 180.0 if smooth is True else CREASE if smooth == AUTO else float(smooth)
+        corners = crease_normals(self.vertices, self.faces, degrees)
+        if corners is not None:
+            self._split(corners)
+
+    def keep_facets(self) -> None:
+        """Give a mesh without normals those of its facets, which look the same."""
+        if self.normals is None:
+            self._split(np.repeat(facet_normals(self.vertices, self.faces).T[:, None], 3, 1))
+
+    def _split(self, corners: NDArray[np.float64]) -> None:
+        """Give the corners of the faces normals (m, 3, 3): vertices with several are split."""
+        faces, normals, origin = split_vertices(self.faces, corners)
+        self.faces, self.vertices, self.normals = faces, self.vertices[origin], normals
+        for name in ("uvs", "uvs1", "colors"):
+            values = getattr(self, name)
+            if values is not None:
+                setattr(self, name, values[origin])
+
     def _warn_of_zero_area(self) -> None:
         flat = _faces_of_zero_area(self.vertices, self.faces)
         if flat.size:
@@ -229,10 +277,15 @@ class Mesh(ColoredShape):
     @property
     def bounds(self) -> NDArray[np.float64]:
         """Lower and upper corner, (2, 3), of the vertices that faces use."""
+        rows = np.ascontiguousarray(self.hull()[0].T)
+        return np.stack([rows.min(1), rows.max(1)])
+
+    def hull(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the vertices that faces use, as balls without a size."""
         used = np.zeros(len(self.vertices), np.bool_)
         used[self.faces] = True
-        rows = np.ascontiguousarray(self.vertices[used].T)
-        return np.stack([rows.min(1), rows.max(1)])
+        points = self.vertices[used]
+        return points, np.zeros(len(points))
 
 
 def _faces_of_zero_area(vertices: NDArray[np.float64], faces: NDArray[np.intp]) -> NDArray[np.intp]:

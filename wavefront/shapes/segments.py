@@ -9,12 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..counted import counted
+from ..elementary import sin_cos_turns
 from ..errors import SceneError
+from ..frame import Frame
 from ..materials import MaterialLike
 from ..suggestions import suggests_keywords
 from .arrays import PrimitiveArray
 from .base import Checked
 from .mesh import positions
+
+HULL_SIDES = 16  # of the polygons about the ends of cylinders
 
 
 class SegmentArray(PrimitiveArray):
@@ -77,6 +81,11 @@ class SegmentArray(PrimitiveArray):
         low = np.minimum(self.starts, self.ends) - reach
         return np.stack([low.min(0), (np.maximum(self.starts, self.ends) + reach).max(0)])
 
+    def hull(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return balls about both ends."""
+        radii = np.broadcast_to(self.radii, self.count)
+        return np.concatenate([self.starts, self.ends]), np.tile(radii, 2)
+
     def _reach(self) -> NDArray[np.float64]:
         """Return how far the surfaces reach beyond the ends of the segments, (n, 3) or (n, 1)."""
         return self.radii[:, None]
@@ -138,6 +147,17 @@ class Cylinders(SegmentArray):
         span = self.ends - self.starts
         axis = span / np.linalg.norm(span, axis=1, keepdims=True)
         return self.radii[:, None] * np.sqrt(np.maximum(1 - axis**2, 0))
+
+    def hull(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the corners of polygons about the circles at both ends."""
+        span = self.ends - self.starts
+        frame = Frame.from_normal((span / np.linalg.norm(span, axis=1, keepdims=True)).T.astype(np.float32))
+        sin, cos = sin_cos_turns(np.arange(HULL_SIDES) / HULL_SIDES)
+        _, inner = sin_cos_turns(np.float64(0.5 / HULL_SIDES))
+        x, y = ((axis.T * (self.radii / inner)[:, None])[:, None] for axis in (frame.x, frame.y))
+        rim = x * sin[:, None] + y * cos[:, None]  # (n, sides, 3)
+        points = np.concatenate([self.starts[:, None] + rim, self.ends[:, None] + rim]).reshape(-1, 3)
+        return points, np.zeros(len(points))
 
     def check(self) -> None:
         """Check the arrays against each other; they may have been assigned one by one.

@@ -142,3 +142,7 @@ class Sphere(SphereEmission):
     def bounds(self) -> NDArray[np.float64]:
         """Lower and upper corner, (2, 3)."""
         return np.stack([self.center - self.radius, self.center + self.radius])
+
+    def hull(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return centers and radii."""
+        return self.centers, np.broadcast_to(self.radii, self.count)

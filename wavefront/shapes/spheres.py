@@ -86,3 +86,7 @@ class Spheres(SphereEmission, PrimitiveArray):
         """Lower and upper corner, (2, 3)."""
         radii = self.radii[:, None]
         return np.stack([(self.centers - radii).min(0), (self.centers + radii).max(0)])
+
+    def hull(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return centers and radii."""
+        return self.centers, np.broadcast_to(self.radii, self.count)

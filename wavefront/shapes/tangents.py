@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..elementary import arccos
 from ..vec import Doubles
 from .mesh import Mesh
+from .smoothing import corner_angles
 
 MAX_LENGTH = 2.0**60  # of derivatives: float32 can square them
 
@@ -33,7 +33,7 @@ def mesh_dpduv(mesh: Mesh, uvs: Doubles | None) -> Doubles:
     flat[regular] = directions[regular] / area[regular, None]
     if mesh.normals is None:
         return np.repeat(flat[:, None], 3, 1)
-    return _smooth(mesh, flat, area, _angles(corner))
+    return _smooth(mesh, flat, area, corner_angles(corner))
 
 
 def mesh_tangent_frame(mesh: Mesh, uvs: Doubles | None) -> Doubles:
@@ -66,13 +66,3 @@ def _smooth(mesh: Mesh, flat: Doubles, area: Doubles, angles: Doubles) -> Double
         out[:, part] = (direction * scale[:, None])[groups]
     out[np.repeat(area == 0, 3)] = 0
     return out.reshape(-1, 3, 6)
-
-
-def _angles(corner: Doubles) -> Doubles:
-    """Return the angles of triangles (m, 3, 3) at their corners, (m, 3)."""
-    forward = np.roll(corner, -1, 1) - corner
-    backward = np.roll(corner, 1, 1) - corner
-    size = np.linalg.norm(forward, axis=2) * np.linalg.norm(backward, axis=2)
-    cos = (forward * backward).sum(2) / np.where(size > 0, size, 1)
-    angles: Doubles = arccos(np.clip(cos, -1, 1))
-    return angles

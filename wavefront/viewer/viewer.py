@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from types import TracebackType
 from typing import Any, Self
 
-from ..camera import Camera, upward
+from ..camera import Camera
 from ..errors import RenderError, SceneError
 from ..image import Image
 from ..notebook import in_kernel
@@ -250,7 +250,8 @@ def view(
     if spp is None and settings.get("noise") is None and settings.get("seconds") is None:
         spp = SPP
     token = token_of(token)
-    viewer = _opened(as_scene(scene, settings.pop("material", None)), spp, host, port, token, settings)
+    subject = as_scene(scene, settings.pop("material", None), smooth=settings.pop("smooth", "auto"))
+    viewer = _opened(subject, spp, host, port, token, settings)
     in_notebook = in_kernel()
     if in_notebook:
         _show_frame(viewer.url)
@@ -267,9 +268,9 @@ def _opened(
     scene: Scene, spp: int | None, host: str, port: int, token: str, settings: dict[str, Any]
 ) -> Viewer:
     """Return a viewer of a scene with settings of `Session`."""
-    up = settings.get("up")
-    up = upward("up", "y" if up is None else up)
-    camera = choose_camera(scene, settings.get("camera"), settings.get("size"), up)
+    up = scene.vertical(settings.get("up", "auto"))
+    framing = settings.pop("view", None), settings.pop("fov", None)
+    camera, _ = choose_camera(scene, settings.get("camera"), settings.get("size"), up, *framing)
     viewpoint = Viewpoint.of(camera, scene.bounds, up)
     aovs = settings.pop("aovs", ())
     wanted = (*((aovs,) if isinstance(aovs, str) else aovs), *VIEWER_LAYERS)
