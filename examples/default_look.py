@@ -2,8 +2,7 @@
 
 python examples/default_look.py [out.png] [--spp 256] [--size 720]
 
-Every picture of the sheet has its camera and its light from `wf.render`. The last row stands on the ground
-that `ground=True` adds.
+Every picture of the sheet has its camera, its light and its ground from `wf.render`.
 """
 
 from __future__ import annotations
@@ -263,21 +262,15 @@ def subjects() -> list[wf.Mesh | wf.Sphere]:
     ]
     clear = [wf.Sphere((0, 0, 0), 1, material=GLASS), torus(GLASS), cushion(0.5, GLASS)]
     metal = [knot(GOLD), lathe(VASE, COPPER), blob(STEEL)]
-    grounded = [blocks(LETTERS), lathe(TOP, WHITE), lathe(PAWN, PIANO)]
-    grounded += [blocks(STAIRS), spring(GOLD), lathe(BOWL, BLUE)]
-    return [*plain, *curved, *painted, *clear, *metal, *grounded]
+    more = [blocks(LETTERS), lathe(TOP, WHITE), lathe(PAWN, PIANO)]
+    more += [blocks(STAIRS), spring(GOLD), lathe(BOWL, BLUE)]
+    return [*plain, *curved, *painted, *clear, *metal, *more]
 
 
 def sheet(width: int, spp: int) -> wf.Image:
     """Render all of them, side by side; the picture is `width` pixels wide."""
     size = width // COLUMNS
-    shown = subjects()
-    tiles = []
-    for number, subject in enumerate(shown):
-        scene = wf.Scene([subject])
-        scene.camera = scene.framing_camera(size=(size, size))
-        on_ground = number >= len(shown) - COLUMNS
-        tiles.append(wf.render(scene, spp, lighting="studio", ground=on_ground, progress=False).rgb)
+    tiles = [wf.render(subject, spp, size=(size, size), progress=False).rgb for subject in subjects()]
     rows = [np.hstack(tiles[first : first + COLUMNS]) for first in range(0, len(tiles), COLUMNS)]
     return wf.Image(np.vstack(rows), spp)
 
