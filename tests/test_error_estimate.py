@@ -1,5 +1,7 @@
 """Error estimates: exact sums, bits that depend on nothing else, and truth across seeds."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import scenes
@@ -11,6 +13,7 @@ import wavefront as wf
 from wavefront.film import OUTLIERS, Film, batch_size
 from wavefront.image import film_image
 from wavefront.picture_sums import PictureSums
+from wavefront.scheduling.adaptive import Pass, passes
 from wavefront.vec import f4
 
 
@@ -169,3 +172,50 @@ def test_metadata_says_what_was_done() -> None:
         assert render(light, 3, integrator=integrator, max_bounces=1).metadata["rays"] == each * 3 * 64
     rays = [render(lit(), 4, **cut).metadata["rays"] for cut in ({}, {"wave_size": 50, "workers": 2})]
     assert rays[0] == rays[1]
+
+
+# --- Few samples that bring most of the light -----------------------------------------------------
+
+
+def sums(draw: Callable[[np.random.Generator, tuple[int, ...]], np.ndarray], spp: int = 64) -> Film:
+    """A film of 32 x 32 pixels of drawn samples."""
+    film = Film(32, 32)
+    samples = draw(np.random.default_rng(3), (3, spp, 1024)).astype(np.float32)
+    film.add(np.arange(1024, dtype=np.uint32), samples)
+    return film
+
+
+def rare(chance: float, spp: int = 64) -> Film:
+    """A film whose samples are 1, but 100 by a small chance."""
+    return sums(
+        lambda rng, shape: np.broadcast_to(np.where(rng.random(shape[1:]) < chance, 100, 1), shape), spp
+    )
+
+
+def test_the_part_of_rare_samples() -> None:
+    """Is small where many samples make up the error, and nearly 1 where one does."""
+
+    def part(film: Film) -> float | None:
+        return film.rare_part(film.relative_variance())
+
+    assert part(sums(lambda rng, shape: rng.normal(3, 1, shape))) < 0.1
+    assert part(rare(0.5)) < 0.1
+    assert 0.1 < part(rare(0.05)) < 0.6
+    assert part(rare(0.001)) > 0.9
+    assert part(rare(0.001, 15)) is None
+    assert part(sums(lambda rng, shape: np.ones(shape))) is None
+
+
+def test_noise_goes_on_where_rare_samples_bring_the_light() -> None:
+    """Although the estimated error is what was asked for; not where many samples make it up."""
+    for film, goes_on in ((rare(0.001), True), (rare(0.5), False)):
+        asked = 1.01 * film.noise()
+        steps = passes(film, 1 << 20, asked, Pass(np.arange(1024, dtype=np.uint32), 48, 64))
+        next(steps)
+        assert (next(steps, None) is not None) is goes_on
+
+
+def test_a_picture_tells_of_rare_samples() -> None:
+    scene = scenes.room((24, 24))
+    assert render(scene, 8).metadata["rare"] is None
+    assert 0 <= render(scene, 16).metadata["rare"] <= 1

@@ -150,3 +150,14 @@ def test_a_missing_denoiser_is_told(
     monkeypatch.setattr(denoisers, "find_spec", lambda name: None)
     render([FLOOR, MATTE, SKY], denoise=denoise)
     assert told(capsys) == ([f"hint: {hints.NO_DENOISER}"] if denoise else [])
+
+
+def test_errors_that_rest_on_few_samples_are_told(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    """Only where they are much of the error."""
+    monkeypatch.setattr(hints, "LONG", 0.0)
+    for much in (0.99, -1.0):
+        monkeypatch.setattr(hints, "MUCH_RARE", much)
+        wf.render([FLOOR, LAMP], 16, camera=CAMERA, workers=1)
+        assert (f"hint: {hints.RARE_PATHS}" in told(capsys)) is (much < 0)

@@ -17,9 +17,12 @@ from .vec import ALL, Doubles, Floats, Ints, Lanes, distinct, take
 BATCHES = 8  # at most
 WHOLE_BATCH = 4  # samples; batches are at least this long if a pixel has two of them
 EPSILON = 1e-2  # relative to the squared mean of a picture; added to the squares by which errors are divided
+LEAST_FOR_RARE = 16  # samples of every pixel, so that it has four batches
+MUCH_RARE = 0.6  # part of the squared error that rests on few samples, from where on it is too small
 OUTLIERS = 1e-3  # fraction of the pixels whose error is limited to that of the worst other pixel
 NONE = np.zeros(0, np.intp)
 LIGHT = "light."  # before the names of the arrays of light paths
+TINY = 1e-180  # its power of 1.5 is above 0
 CHUNK = 8192  # pixels, or samples, that are added together: few enough for the cache
 
 
@@ -284,6 +287,30 @@ class Film:
             out[span] = self._relative(self.squared_error(span), span, floor)
         return _without_outliers(out)
 
+    def rare_part(self, relative: Doubles) -> float | None:
+        """Estimate the part of the squared error that rests on few samples; None below `LEAST_FOR_RARE`.
+
+        Where one sample of a pixel brings most of its light, one batch is far above the others: the skewness
+        of b batches is then (b − 2)/√(b (b − 1)), the greatest that so many numbers can have. It is about 0
+        where many samples of either sign make up the error. The part is the mean of skewness over its
+        greatest value, over pixels by their squared error.
+
+        Parameters
+        ----------
+        relative
+            (pixels,) squared relative errors, as `relative_variance` returns them.
+        """
+        if self.count.min() < LEAST_FOR_RARE or not relative.sum() > 0:
+            return None
+        skewed = np.empty(relative.size)
+        for span in chunks(relative.size):
+            deviations = self.deviations(span)
+            batches = (deviations != 0).any(1).sum(0).clip(3)
+            square, cube = np.square(deviations).sum(0), (deviations**3).sum(0)
+            skewness = (cube / np.maximum(square, TINY) ** 1.5).mean(0)
+            skewed[span] = skewness * np.sqrt(batches * (batches - 1.0)) / (batches - 2)
+        return float(max(0.0, (skewed * relative).sum() / relative.sum()))
+
     def noise(self) -> float:
         """Estimate the relative error of the picture, which `render(noise=...)` limits."""
         return float(np.sqrt(self.relative_variance().mean()))
@@ -310,7 +337,8 @@ class Film:
                 variance[span] = self.variance(span).T
                 error[span] = np.sqrt(squared_error).T
             relative[span] = self._relative(squared_error, span, floor)
-        return Estimates(mean, variance, error, float(np.sqrt(_without_outliers(relative).mean())))
+        relative = _without_outliers(relative)
+        return Estimates(mean, variance, error, float(np.sqrt(relative.mean())), self.rare_part(relative))
 
 
 @record
@@ -321,6 +349,7 @@ class Estimates:
     variance: Floats  # (pixels, 3) of one sample; NaN for fewer than two
     standard_error: Floats  # (pixels, 3) of `mean`; NaN for fewer than two samples
     noise: float  # relative error of the picture
+    rare: float | None  # part of its square that rests on few samples; None if that is not known
 
 
 def _without_outliers(relative: Doubles) -> Doubles:

@@ -62,8 +62,10 @@ class Image:
         this one is), filter, branches, guide, guided, reuse and hint (how paths went on, and what may pay
         besides: docs/choices.md), accelerator, workers, executor, seconds (wall time), spp (mean
         over pixels), samples, rays, bad_samples, interrupted, version (of this package), numpy, noise
-        (estimated relative error of the picture before denoising), clamp and clamped (the part of the light
-        that it removed), caustics, boxes if they were asked for, and of a denoised picture denoiser.
+        (estimated relative error of the picture before denoising), rare (the part of the square of noise that
+        rests on few samples, see docs/convergence.md; None below sixteen samples), clamp and clamped (the
+        part of the light that it removed), caustics, boxes if they were asked for, and of a denoised picture
+        denoiser.
     counts
         (H, W) int64 samples of each pixel, without those that were not finite.
     variance
@@ -805,7 +807,7 @@ def _film_rgb(film: Film, metadata: Mapping[str, Any]) -> Image:
     return Image(
         estimates.mean.reshape(shape),
         round(float(film.count.mean())),
-        {**metadata, "noise": estimates.noise},
+        {**metadata, "noise": estimates.noise, "rare": estimates.rare},
         counts=film.used().reshape(height, width).copy(),
         variance=estimates.variance.reshape(shape),
         standard_error=error,

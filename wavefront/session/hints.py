@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..accel.embree import installed
+from ..film import MUCH_RARE
 from ..image import Image
 from ..lights import InfiniteLight
 from ..lights.table import IrradianceOf
@@ -31,6 +32,10 @@ LOST_CAUSTICS = (
 RARE_CAUSTICS = (
     "the light that smooth glass and mirrors send on from small lamps is found seldom, as bright dots: "
     "caustics=True finds it (docs/caustics.md)"
+)
+RARE_PATHS = (
+    "much of the noise rests on few bright samples, so errors look smaller than they are: more samples, "
+    "larger lamps, guide=True or caustics=True help (docs/convergence.md#rare-paths)"
 )
 NO_EMBREE = "Embree is not installed: with `pip install embreex` meshes render two to four times as fast"
 NO_DENOISER = (
@@ -109,6 +114,8 @@ class Hints:
     def _of(self, image: Image) -> Iterator[str]:
         if image.metadata["hint"] is not None:
             yield image.metadata["hint"]
+        if (image.metadata["rare"] or 0) > MUCH_RARE:
+            yield RARE_PATHS
         many = self._prepared.compiled.triangles >= MANY_TRIANGLES
         if self._settings.accel == AUTO and many and not installed():
             yield NO_EMBREE
