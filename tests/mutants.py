@@ -3,7 +3,8 @@
     python tests/mutants.py --kinds densities
     python tests/mutants.py wavefront/stages/reuse.py --jobs 16
 
-Each mutant is one change of one file in a copy of the tree:
+Each mutant is one change of one file. It is made in a process of its own, which is forked where all is
+imported already, so that a mutant costs no more than the tests that it fails:
 
 - `constants`: a number times 1.1, or plus 1 if it is an integer; 0 becomes 1 and, in a name or a test of
   equality, stays. Indices, shapes, texts and types are no formulas and are left out.
@@ -18,17 +19,19 @@ from __future__ import annotations
 
 import argparse
 import ast
+import contextlib
 import os
-import queue
-import shutil
-import subprocess
+import signal
 import sys
-import tempfile
 import time
+import types
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 # the tests that concern a file, quick ones first
@@ -99,6 +102,7 @@ TESTS |= {
         *["lights"] * ("/lights/" in file and not file.endswith(("samplers.py", "tree.py"))),
     )
 }
+CONSTANTS = (bool, int, float, str, tuple, list, dict, np.generic, np.ndarray)
 DENSITY_NAMES = ("pdf", "pmf", "density", "chance", "mixed")
 
 
@@ -177,7 +181,8 @@ class Finder(ast.NodeVisitor):
         name = self.text(node.func)
         self.visit(node.func)
         for argument in node.args:
-            whole = isinstance(argument, ast.Constant) and isinstance(argument.value, int)
+            inner = argument.operand if isinstance(argument, ast.UnaryOp) else argument
+            whole = isinstance(inner, ast.Constant) and isinstance(inner.value, int)
             shape = name.rpartition(".")[2] in (
                 *("reshape", "take", "concatenate", "stack", "repeat", "sum", "mean", "any", "all", "max"),
                 *("min", "moveaxis", "swapaxes", "transpose", "argmax", "argmin", "cumsum"),
@@ -198,7 +203,9 @@ class Finder(ast.NodeVisitor):
         if "factors" in self.kinds and isinstance(node.op, ast.Mult | ast.Div | ast.FloorDiv | ast.MatMult):
             whole, left, right = self.text(node), self.text(node.left), self.text(node.right)
             self.add(node, f"({left})", f"{_short(whole)} -> {_short(left)}")
-            if isinstance(node.op, ast.Mult):
+            if left in ("1", "f4(1)", "1.0"):
+                pass
+            elif isinstance(node.op, ast.Mult):
                 self.add(node, f"({right})", f"{_short(whole)} -> {_short(right)}")
             else:
                 self.add(node, f"(1 / ({right}))", f"{_short(whole)} -> 1 / {_short(right)}")
@@ -263,53 +270,116 @@ def mutants_of(file: str, kinds: set[str]) -> Iterator[Mutant]:
         yield mutant
 
 
-class Copies:
-    """Copies of the tree, one for each job."""
+def apply(mutant: Mutant) -> None:
+    """Change the module in this process, where everybody has imported it already.
 
-    def __init__(self, folder: Path, jobs: int) -> None:
-        self.free: queue.Queue[Path] = queue.Queue()
-        for number in range(jobs):
-            place = folder / str(number)
-            for part in ("wavefront", "tests", "examples", "docs", "benchmarks"):
-                if (ROOT / part).exists():
-                    ignored = shutil.ignore_patterns("__pycache__", "*.png", "*.jpg", "*.svg")
-                    shutil.copytree(ROOT / part, place / part, ignore=ignored)
-            shutil.copy(ROOT / "pyproject.toml", place)
-            self.free.put(place)
+    The code of its functions and methods is replaced in the function objects, and its constants in all
+    modules that have taken them by name.
+    """
+    name = mutant.file.removesuffix(".py").replace("/", ".")
+    module = sys.modules[name]
+    fresh = types.ModuleType(name)
+    fresh.__dict__.update(__file__=module.__file__, __package__=module.__package__)
+    sys.modules[name] = fresh  # `@dataclass` looks it up
+    exec(compile(mutant.applied((ROOT / mutant.file).read_bytes()), mutant.file, "exec"), vars(fresh))
+    sys.modules[name] = module
+    for key, new in vars(fresh).items():
+        old = vars(module).get(key)
+        if key.startswith("__") or old is None or isinstance(new, types.ModuleType):
+            continue
+        if isinstance(new, type | types.FunctionType) or hasattr(new, "cache_clear"):
+            if new.__module__ != name:
+                continue
+            _replace_code(old, new)
+        elif isinstance(old, CONSTANTS):
+            for other in list(sys.modules.values()):
+                if other is not None and getattr(other, "__dict__", {}).get(key) is old:
+                    setattr(other, key, new)
 
-    def run(self, mutant: Mutant | None, tests: list[str], limit: float) -> tuple[str, float, str]:
-        """Return "killed", "survived" or "too slow", the seconds, and the first test that failed."""
-        place = self.free.get()
+
+def _replace_code(old: Any, new: Any) -> None:
+    """Let a function, or all methods of a class, do what another does."""
+    if isinstance(old, type):
+        for key, value in vars(new).items():
+            if key in vars(old):
+                if isinstance(_function(value), types.FunctionType):
+                    _replace_code(vars(old)[key], value)
+                elif isinstance(value, CONSTANTS) and not key.startswith("__"):
+                    setattr(old, key, value)
+        return
+    function, changed = _function(old), _function(new)
+    if hasattr(old, "cache_clear"):
+        old.cache_clear()
+    if isinstance(function, types.FunctionType) and isinstance(changed, types.FunctionType):
+        function.__code__ = changed.__code__
+        function.__defaults__, function.__kwdefaults__ = changed.__defaults__, changed.__kwdefaults__
+
+
+def _function(value: Any) -> Any:
+    """Return the function in a method, a property or a cache."""
+    for name in ("__func__", "fget", "__wrapped__"):
+        value = getattr(value, name, value)
+    return value
+
+
+def run_tests(tests: list[str]) -> tuple[int, str]:
+    """Run tests in this process; return the exit status and the first test that failed."""
+    failed = []
+
+    class Watch:
+        def pytest_runtest_logreport(self, report: Any) -> None:
+            if report.failed:
+                failed.append(report.nodeid)
+
+        def pytest_collectreport(self, report: Any) -> None:
+            if report.failed:
+                failed.append(report.nodeid)
+
+    options = ["-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", "--tb=no", "--no-summary"]
+    with open(os.devnull, "w") as nothing, contextlib.redirect_stdout(nothing):
+        status = pytest.main(
+            [*options, "--rootdir", str(ROOT), *(str(ROOT / test) for test in tests)], [Watch()]
+        )
+    return int(status), failed[0] if failed else ""
+
+
+class Child:
+    """A process of its own, in which one mutant meets its tests."""
+
+    def __init__(self, mutant: Mutant, tests: list[str], limit: float) -> None:
+        self.mutant, self.begin, self.limit = mutant, time.perf_counter(), limit
+        self.end, answer = os.pipe()
+        self.pid = os.fork()
+        if self.pid:
+            os.close(answer)
+            return
+        status, by = 1, "cannot be imported"
         try:
-            path = place / mutant.file if mutant else None
-            before = path.read_bytes() if path else b""
-            if path and mutant:
-                path.write_bytes(mutant.applied(before))
-            start = time.perf_counter()
-            options = ["-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", "--no-header", "--tb=line"]
-            environment = {
-                **os.environ,
-                "PYTHONPATH": f"{place}{os.pathsep}{os.environ.get('PYTHONPATH', '')}",
-                "PYTHONDONTWRITEBYTECODE": "1",
-                "OMP_NUM_THREADS": "1",
-                "HYPOTHESIS_PROFILE": "mutants",
-            }
-            there = [test for test in tests if (place / test.split("::")[0]).exists()]
-            command = [sys.executable, "-m", "pytest", *options, *there]
-            try:
-                done = subprocess.run(
-                    command, cwd=place, env=environment, capture_output=True, text=True, timeout=limit
-                )
-                state = "survived" if done.returncode == 0 else "killed"
-                failed = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
-                by = failed[0].split(" - ")[0] if failed else f"exit status {done.returncode}"
-            except subprocess.TimeoutExpired:
-                state, by = "too slow", ""
-            if path:
-                path.write_bytes(before)
-            return state, time.perf_counter() - start, "" if state == "survived" else by
+            os.setsid()  # its workers end with it
+            quiet = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(quiet, 1)
+            os.dup2(quiet, 2)
+            apply(mutant)
+            status, by = run_tests(tests)
         finally:
-            self.free.put(place)
+            os.write(answer, f"{status} {by}"[:4000].encode())
+            os._exit(0)
+
+    def result(self) -> tuple[str, float, str] | None:
+        """Return what came of it, the seconds, and the first test that failed; None while it runs."""
+        seconds = time.perf_counter() - self.begin
+        slow = seconds > self.limit
+        if slow:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self.pid, signal.SIGKILL)
+        done, _ = os.waitpid(self.pid, 0 if slow else os.WNOHANG)
+        if not done:
+            return None
+        status, _, by = os.read(self.end, 4096).decode().partition(" ")
+        os.close(self.end)
+        if slow:
+            return "too slow", seconds, ""
+        return ("survived" if status == "0" else "killed"), seconds, by
 
 
 def main() -> int:
@@ -337,29 +407,47 @@ def main() -> int:
         print(len(mutants), "mutants")
         return 0
     begin, counts = time.perf_counter(), {"killed": 0, "survived": 0, "too slow": 0, "not run": 0}
+    os.environ["HYPOTHESIS_PROFILE"] = "mutants"
+    os.chdir(ROOT)
+    running: list[Child] = []
 
-    def tests_of(mutant: Mutant) -> list[str]:
-        return list(given.tests or TESTS[mutant.file])
+    def collect(most: int) -> None:
+        while len(running) > most:
+            time.sleep(0.02)
+            for child in list(running):
+                result = child.result()
+                if result is None:
+                    continue
+                running.remove(child)
+                state, seconds, by = result
+                counts[state] += 1
+                if state != "killed" or given.verbose:
+                    where = f"{child.mutant.file}:{child.mutant.line}: {child.mutant.what}"
+                    print(f"{state} ({seconds:.0f} s): {where} {by}", flush=True)
 
-    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(given.jobs) as pool:
-        copies = Copies(Path(folder), given.jobs)
-        for tests in {tuple(tests_of(mutant)) for mutant in mutants}:
-            state, seconds, by = copies.run(None, list(tests), 10 * given.limit)
-            print(f"unchanged: {state} in {seconds:.0f} s {by}", flush=True)
-            if state != "survived":
+    known: set[tuple[str, ...]] = set()
+    for mutant in mutants:
+        tests = tuple(given.tests or TESTS[mutant.file])
+        if tests not in known:  # also imports all that is needed
+            collect(0)
+            start = time.perf_counter()
+            status, by = run_tests(list(tests))
+            print(f"unchanged, {' '.join(tests)}: {time.perf_counter() - start:.0f} s {by}", flush=True)
+            if status:
                 return 1
-
-        def run(mutant: Mutant) -> None:
-            if time.perf_counter() - begin > given.seconds:
-                counts["not run"] += 1
-                return
-            state, seconds, by = copies.run(mutant, tests_of(mutant), given.limit)
-            counts[state] += 1
-            if state != "killed" or given.verbose:
-                where = f"{mutant.file}:{mutant.line}: {mutant.what}"
-                print(f"{state} ({seconds:.0f} s): {where} {by}", flush=True)
-
-        list(pool.map(run, mutants))
+            same = Child(Mutant(mutant.file, 0, (), "nothing"), list(tests), 10 * given.limit)
+            while (result := same.result()) is None:
+                time.sleep(0.02)
+            if result[0] != "survived":
+                print(f"the mechanism itself fails tests: {result}")
+                return 1
+            known.add(tests)
+        if time.perf_counter() - begin > given.seconds:
+            counts["not run"] += 1
+            continue
+        collect(given.jobs - 1)
+        running.append(Child(mutant, list(tests), given.limit))
+    collect(0)
     print(", ".join(f"{count} {state}" for state, count in counts.items()))
     return int(counts["survived"] > 0)
 
