@@ -69,6 +69,46 @@ def test_neighbors_touch() -> None:
     assert all((b, a) in pairs for a, b in pairs)
 
 
+def triangle_solid_angle(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
+    """A. van Oosterom and J. Strackee, The Solid Angle of a Plane Triangle, 1983."""
+    triple = abs(float(a @ np.cross(b, c)))
+    return 2 * float(np.arctan2(triple, 1 + a @ b + b @ c + c @ a))
+
+
+def test_solid_angles_of_bins_are_those_of_their_triangles() -> None:
+    """Lines on the octahedron are arcs of great circles, so a bin is two spherical triangles.
+
+    They meet in a diagonal of the bin that is parallel to the edge of the octahedron in its quadrant.
+    """
+    side = 8
+    found = solid_angles(side).reshape(side, side)
+    for row, column in np.ndindex(side, side):
+        x, y = np.array([column, column + 1]) * 2 / side - 1, np.array([row, row + 1]) * 2 / side - 1
+        corners = [
+            directions_at(np.array([x[i]]), np.array([y[j]]))[:, 0].astype(float)
+            for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))
+        ]
+        if (x[0] < 0) == (y[0] < 0):
+            corners = corners[1:] + corners[:1]
+        a, b, c, d = corners
+        exact = triangle_solid_angle(a, b, c) + triangle_solid_angle(a, c, d)
+        assert found[row, column] == pytest.approx(exact, rel=4e-3)
+    assert found == pytest.approx(found.T, rel=1e-12)
+    assert found == pytest.approx(found[::-1], rel=1e-12)
+
+
+def test_bins_have_eight_neighbors_that_differ() -> None:
+    """But for the corners of the square, which are one direction."""
+    near = neighbors(8)
+    for number in range(64):
+        row, column = divmod(number, 8)
+        inside = 0 < row < 7 and 0 < column < 7
+        found = set(near[:, number].tolist()) - {number}
+        assert len(found) == 8 if inside else len(found) >= 5
+        if inside:
+            assert found == {8 * (row + i) + column + j for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j}
+
+
 @pytest.mark.parametrize("row", [0, 1, 2])
 def test_tables_sample_their_pdf(row: int) -> None:
     """By a chi-squared test, and the density integrates to 1."""
