@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .counted import counted
 from .suggestions import did_you_mean
 
 PACKAGE = os.path.join(os.path.dirname(__file__), "")
@@ -163,8 +164,30 @@ def iterable(name: str, value: Any, of: str) -> Iterator[Any]:
     return iter(value)
 
 
+def as_array(name: str, value: Any) -> NDArray[Any]:
+    """Return `value` as an array of real numbers, of whatever type they are; an array is not copied.
+
+    Raises
+    ------
+    SceneError
+        If it is no array, for whatever reason, or has complex numbers, or masked ones.
+    """
+    try:
+        array = np.asanyarray(value)
+    except MemoryError:
+        raise
+    except Exception as error:  # whatever an object's own __array__ raises
+        raise SceneError(f"{name} must be numeric, got {in_brief(value)}") from error
+    if np.ma.is_masked(array):
+        masked = counted(int(np.ma.count_masked(array)), "masked value")
+        raise SceneError(f"{name} has {masked}; leave their rows out, or give them numbers with filled(...)")
+    if array.dtype.kind == "c":
+        raise SceneError(f"{name} must be real numbers, got {array.dtype}")
+    return np.asarray(array)
+
+
 def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
-    """Return `value` as a float64 array of `shape` (None matches any length).
+    """Return a copy of `value` as a float64 array of `shape` (None matches any length).
 
     Raises
     ------
@@ -172,8 +195,10 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> 
         If the shape differs, the value is not numeric, or an element is not finite.
     """
     try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+        array = np.array(as_array(name, value), dtype=np.float64)
+    except SceneError:
+        raise
+    except (TypeError, ValueError, OverflowError) as error:
         raise SceneError(f"{name} must be numeric, got {in_brief(value)}") from error
     fits = array.ndim == len(shape) and all(
         want is None or have == want for have, want in zip(array.shape, shape, strict=True)
@@ -218,7 +243,7 @@ def number(
         if isinstance(value, str | bytes):  # float reads these
             raise TypeError
         result = float(value)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise SceneError(f"{name} must be a number, got {in_brief(value)}") from error
     if not np.isfinite(result) or not holds(result):
         raise SceneError(f"{name} is {value!r}; it must be {limit}")

@@ -21,7 +21,7 @@ from .codecs.images import read_picture, write_image
 from .codecs.png_jpeg import Gamma
 from .codecs.white_balance import WhiteBalance
 from .colors import rgb
-from .errors import SceneError, number, one_of
+from .errors import SceneError, as_array, number, one_of
 from .film import Film, batch_size, chunks
 from .html import picture_html
 from .layers import BOXES, CLAMPED, GIVEN_LAYERS, LAYERS, NOISY, is_radiance
@@ -94,6 +94,11 @@ class Image:
     `counts`, `variance` and `standard_error` are None in an image that was not rendered, `standard_error`
     also in one that was denoised.
 
+    Raises
+    ------
+    SceneError
+        If `rgb` has no pixels, or is no array of three axes.
+
     Examples
     --------
     >>> image = wf.render([wf.Sphere((0, 0, 0), 1), wf.Environment(1)], spp=4, size=(32, 24), aovs="depth")
@@ -119,7 +124,7 @@ class Image:
         sums: PictureSums | None = None,
         scatter: Sequence[Scatter] = (),
     ) -> None:
-        self.rgb = rgb
+        self.rgb = _checked_pixels(rgb)
         self.spp = spp
         self.metadata = dict(metadata or {})
         self.counts = counts
@@ -784,6 +789,20 @@ def film_image(sums: PictureSums, metadata: Mapping[str, Any], keep_sums: bool) 
     image.sums = sums if keep_sums else None
     _add_layers(image, sums)
     return image
+
+
+def _checked_pixels(rgb: Any) -> NDArray[Any]:
+    """Return the pixels of a picture as they are, but as an array.
+
+    Raises
+    ------
+    SceneError
+        If there are none.
+    """
+    pixels = as_array("image rgb", rgb)
+    if pixels.ndim != 3 or not pixels.size:
+        raise SceneError(f"image rgb must have shape (H, W, 3), with at least one pixel, got {pixels.shape}")
+    return pixels
 
 
 def last_film_image(sums: PictureSums, metadata: Mapping[str, Any]) -> Image:

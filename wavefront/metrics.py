@@ -14,7 +14,7 @@ from .codecs.encoding import codes_to_linear
 from .codecs.images import three_channels
 from .codecs.png_jpeg import EXTENSIONS
 from .counted import counted
-from .errors import SceneError
+from .errors import SceneError, as_array
 from .film import EPSILON, batch_size
 from .image import Image
 from .pixel_tiles import MEMBERS
@@ -56,6 +56,12 @@ class Comparison:
     p_value: float | None  # p-value of all three
     p_absent: str  # the reason why they are None
     difference: Image = field(repr=False)  # |a − b|
+
+    def __repr__(self) -> str:
+        """Return the numbers that tell most, on one line."""
+        flip = "" if self.flip is None else f", FLIP {self.flip:.4g}"
+        p_value = "" if self.p_value is None else f", p_value {self.p_value:.3g}"
+        return f"<Comparison: relative MSE {self.relative_mse:.4g}, PSNR {self.psnr:.2f} dB{flip}{p_value}>"
 
     def __str__(self) -> str:
         """Return a table of all numbers."""
@@ -177,7 +183,7 @@ def _pixels(name: str, picture: Image | ArrayLike) -> Doubles:
     """Return linear values, (H, W, 3)."""
     values: Any = picture.rgb if isinstance(picture, Image) else picture
     try:
-        pixels = np.asarray(values)
+        pixels = as_array("picture", values)
         pixels = pixels if _is_coded(pixels) else pixels.astype(np.float64)
     except (TypeError, ValueError) as error:
         raise SceneError(f"{name} is not a picture: {type(picture).__name__}") from error

@@ -29,6 +29,7 @@ def as_scene(
     material: MaterialLike | None = None,
     progress: Progress = None,
     smooth: bool | float | str = AUTO,
+    within: tuple[int, ...] = (),
 ) -> Scene:
     """Return what `render` was given as a `Scene`.
 
@@ -42,11 +43,14 @@ def as_scene(
         As for `load`.
     smooth
         As for `render`.
+    within
+        The lists, by their ids, in which it is.
 
     Raises
     ------
     SceneError
-        If it is nothing that can be rendered, or the material or `smooth` is meant for what has its own.
+        If it is nothing that can be rendered, or a list that contains itself, or the material or `smooth` is
+        meant for what has its own.
     """
     if material is not None:
         material = as_material("material", material)
@@ -69,7 +73,9 @@ def as_scene(
     if _is_pair(subject):
         return Scene([Mesh(*subject, material=material, smooth=False if smooth == AUTO else smooth)])
     if isinstance(subject, list | tuple) and subject:
-        return _joined(subject, material, progress, smooth)
+        if id(subject) in within:
+            raise SceneError("cannot render a list that contains itself")
+        return _joined(subject, material, progress, smooth, (*within, id(subject)))
     what = "an empty list" if isinstance(subject, list | tuple) and not subject else type(subject).__name__
     raise SceneError(f"cannot render {what}: give {CAN_BE_RENDERED}")
 
@@ -127,11 +133,16 @@ def _is_pair(subject: Any) -> bool:
 
 
 def _joined(
-    subjects: Sequence[Any], material: Material | None, progress: Progress, smooth: bool | float | str
+    subjects: Sequence[Any],
+    material: Material | None,
+    progress: Progress,
+    smooth: bool | float | str,
+    within: tuple[int, ...],
 ) -> Scene:
     """Return one scene of all; the camera, and what is up, is the first that there is."""
     lights = [item for item in subjects if isinstance(item, Light)]
-    parts = [as_scene(item, material, progress, smooth) for item in subjects if not isinstance(item, Light)]
+    bodies = (item for item in subjects if not isinstance(item, Light))
+    parts = [as_scene(item, material, progress, smooth, within) for item in bodies]
     cameras = [part.camera for part in parts if part.camera is not None]
     return Scene(
         [shape for part in parts for shape in part.shapes],

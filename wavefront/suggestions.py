@@ -147,7 +147,9 @@ def suggests_keywords(function: Callable[P, R]) -> Callable[P, R]:
         for name in kwargs:
             if name not in known:
                 elsewhere = getattr(args[0], "given_elsewhere", {}) if args else {}
-                hint = f"; write {elsewhere[name]}" if name in elsewhere else did_you_mean(name, known)
+                hint = did_you_mean(name, known)
+                if name in elsewhere and (makes or not hint):
+                    hint = f"; write {elsewhere[name]}"
                 title = type(args[0]).__name__ if makes else function.__qualname__
                 raise TypeError(f"{title}() got an unexpected keyword argument {name!r}{hint}")
         return function(*args, **kwargs)

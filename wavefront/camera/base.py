@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..elementary import arctan2
-from ..errors import SceneError, finite_array, in_brief, number, one_of, rotation_matrix, warn_caller
+from ..errors import (
+    SceneError,
+    as_array,
+    finite_array,
+    in_brief,
+    number,
+    one_of,
+    rotation_matrix,
+    warn_caller,
+)
 from ..parameter import brief
 from ..state import Words
 from ..suggestions import suggests_keywords
@@ -50,6 +59,12 @@ class Camera:
     (array([32., 24.]), np.float64(4.0))
     """
 
+    given_elsewhere: ClassVar[dict[str, str]] = dict.fromkeys(
+        ("position", "location", "eye", "target", "look_at", "up", "fov"),
+        "wf.Camera.look_at(origin, target, up, fov=..., size=...)",
+    )
+
+    @suggests_keywords
     def __init__(
         self,
         origin: ArrayLike,
@@ -561,7 +576,7 @@ def _to_film(pixel_centers: str) -> float:
 
 def _rigid(name: str, value: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return rotation (3, 3) and position (3,) of a (4, 4) or (3, 4) matrix."""
-    rows = 3 if np.shape(value) == (3, 4) else 4
+    rows = 3 if as_array(name, value).shape == (3, 4) else 4
     matrix = finite_array(name, value, (rows, 4))
     if rows == 4 and matrix[3].tolist() != [0, 0, 0, 1]:
         raise SceneError(f"{name}[3] is {matrix[3].tolist()}; it must be [0, 0, 0, 1]")
@@ -570,14 +585,14 @@ def _rigid(name: str, value: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np
 
 def _extrinsics(R: ArrayLike, t: ArrayLike | None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return rotation (3, 3) and translation (3,) from world to camera space."""
-    if np.shape(R) in ((4, 4), (3, 4)):
+    if as_array("R", R).shape in ((4, 4), (3, 4)):
         if t is not None:
             raise SceneError(f"R has the shape {np.shape(R)} and holds a translation; leave t out")
         return _rigid("R", R)
     axes = rotation_matrix("R", R)
     if t is None:
         raise SceneError("from_intrinsics needs t, or both in one matrix R of shape (4, 4) or (3, 4)")
-    return axes, finite_array("t", np.ravel(t) if np.shape(t) in ((3, 1), (1, 3)) else t, (3,))
+    return axes, finite_array("t", np.ravel(t) if as_array("t", t).shape in ((3, 1), (1, 3)) else t, (3,))
 
 
 def upward(name: str, value: ArrayLike) -> NDArray[np.float64]:
@@ -593,7 +608,7 @@ def upward(name: str, value: ArrayLike) -> NDArray[np.float64]:
         if axis.removeprefix("-") not in ("x", "y", "z"):
             raise SceneError(f"{name} is {value!r}; it must be a vector, or one of x, y, z, -x, -y, -z")
         return np.eye(3)["xyz".index(axis[-1])] * (-1.0 if axis[0] == "-" else 1.0)
-    if np.ndim(value) == 0:
+    if as_array(name, value).ndim == 0:
         raise SceneError(
             f"{name} is {value!r}; it must be a vector (3,) or the name of an axis. "
             "A field of view is given by name: fov=40"
@@ -642,6 +657,7 @@ def image_size(size: tuple[int, int]) -> tuple[int, int]:
     try:
         width, height = size
         whole = int(width) == width and int(height) == height
+        whole &= not isinstance(width, bool | np.bool_) and not isinstance(height, bool | np.bool_)
     except (TypeError, ValueError, OverflowError) as error:
         raise SceneError(f"size must be (width, height), got {size!r}") from error
     if not whole or not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):

@@ -72,6 +72,7 @@ def add_command(commands: Any, name: str, what: str, examples: list[str]) -> arg
         description=what[0].upper() + what[1:] + ".",
         epilog=f"examples:\n{lines}",
         formatter_class=Help,
+        allow_abbrev=False,  # an option of a later version would change what an abbreviation means
     )
     return command
 

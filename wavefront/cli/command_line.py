@@ -105,6 +105,7 @@ def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     top = Parser(
         prog="wavefront",
+        allow_abbrev=False,
         description="A path tracer in whole-array NumPy.",
         epilog="wavefront COMMAND --help has the options of a command, and examples. Exit status: 0 done, "
         "1 doctor found a fault, 2 error, 130 stopped by Ctrl-C, 143 by SIGTERM, 129 by a closed terminal.",

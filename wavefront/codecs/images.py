@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..counted import counted
-from ..errors import SaveError, SceneError, warn_caller
+from ..errors import SaveError, SceneError, as_array, warn_caller
 from ..files import check_target, extension_of, read_bytes, write_bytes
 from ..registry import Registry
 from ..vec import Floats
@@ -98,7 +98,11 @@ def write_image(
     encode = _find(IMAGE_WRITERS, path, SaveError)
     shown = Display() if display is None else display
     check_display(path, shown, bits)
-    data = picture if isinstance(picture, ImageData) else ImageData(np.asarray(picture, np.float32))
+    data = (
+        picture
+        if isinstance(picture, ImageData)
+        else ImageData(as_array("picture", picture).astype(np.float32, copy=False))
+    )
     adjusted = shown.adjusted(_checked(path, data))
     if Path(path).suffix.lower() in FINITE:
         adjusted = _finite(path, adjusted)

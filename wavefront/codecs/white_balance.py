@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..colors import rgb
-from ..errors import SceneError, number
+from ..errors import SceneError, as_array, number
 from ..vec import Doubles
 
 WhiteBalance = float | ArrayLike  # kelvin, or the linear RGB of something that is gray
@@ -42,7 +42,7 @@ def white_balance_matrix(white: WhiteBalance) -> Doubles:
     SceneError
         If it is neither.
     """
-    if np.ndim(white) == 0:
+    if as_array("white_balance", white).ndim == 0:
         low, high = KELVIN
         limit = f"{low:g} to {high:g} kelvin, or a linear RGB"
         kelvin = number("white_balance", white, lambda x: low <= x <= high, limit)

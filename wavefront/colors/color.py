@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SceneError, finite_array, in_brief
+from ..errors import SceneError, as_array, finite_array, in_brief
 from ..vec import Floats, f4
 from .names import CSS_COLORS
 from .transfer import srgb_to_linear
@@ -59,6 +59,7 @@ def rgb(
     """
     if isinstance(value, str):
         return named_color(name, value).astype(dtype).reshape(3, 1)
+    value = as_array(name, value)
     scalar = np.ndim(value) == 0
     if np.shape(value) == (3, 1):  # as stored
         value = np.ravel(value)
@@ -116,7 +117,7 @@ def srgb(*color: Any) -> Floats:
     names = named_rows("srgb color", value)
     if names is not None:
         return names
-    given = np.asarray(value)
+    given = as_array("srgb color", value)
     array = finite_array("srgb color", given, (None,) * given.ndim)
     if array.ndim == 0:
         array = np.broadcast_to(array, 3)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..codecs.budget import in_memory
 from ..errors import SceneError
+from ..files import path_name
 from ..materials import MaterialLike
 from ..progress import Progress, phase
 from ..scene import Scene
@@ -78,7 +79,7 @@ def load(
             search_paths=folders(search_paths),
             smooth=check_smooth("smooth", smooth),
         )
-        name, contents = os.fspath(path), read(path, wish)
+        name, contents = path_name(path), read(path, wish)
         placed = place_shapes(name, contents.raws, contents.places, strict)
         shapes = _some(name, [*placed, *contents.shapes])
         return Scene(shapes, contents.lights, contents.camera, up=contents.up)
@@ -147,7 +148,7 @@ def load_meshes(
     wish = Wish(
         strict, materials, checked_limits(limits), folders(search_paths), check_smooth("smooth", smooth)
     )
-    name, contents = os.fspath(path), read(path, wish)
+    name, contents = path_name(path), read(path, wish)
     placed = place_meshes(name, contents.raws, contents.places, strict)
     return _some(name, [*placed, *(_as_mesh(name, shape) for shape in contents.shapes)])
 
@@ -163,7 +164,7 @@ def _as_mesh(name: str, shape: Shape) -> Mesh:
 @contextmanager
 def _reading(path: PathLike, progress: Progress) -> Iterator[None]:
     """Show that a file is read. If memory runs out, the error names the file."""
-    with phase(f"loading {os.path.basename(os.fspath(path))}", progress), in_memory(path):
+    with phase(f"loading {os.path.basename(path_name(path))}", progress), in_memory(path):
         yield
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..codecs.budget import in_memory
 from ..colors import is_color_name, rgb
-from ..errors import one_of, rotation_matrix
+from ..errors import as_array, one_of, rotation_matrix
 from ..layers import DEFAULT_GROUP, group_name
 from ..parameter import Parameter, Parametrized
 from ..record import record
@@ -127,7 +127,8 @@ class Environment(Parametrized, Light):
         if isinstance(radiance, str) and is_color_name(radiance):
             self._radiance, self._image = rgb("Environment radiance", radiance), None
         elif isinstance(radiance, str | os.PathLike) or (
-            np.ndim(radiance) > 1 and np.shape(radiance) != (3, 1)  # a color as it is kept
+            as_array("Environment radiance", radiance).ndim > 1
+            and np.shape(radiance) != (3, 1)  # a color as it is kept
         ):
             with in_memory(radiance) if isinstance(radiance, str | os.PathLike) else nullcontext():
                 image = ImageEnvironment.of(environment_pixels(radiance), self._filter, self._transform)

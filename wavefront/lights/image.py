@@ -15,7 +15,7 @@ from ..codecs.encoding import codes_to_linear
 from ..codecs.images import COLOR_BYTES, read_codes
 from ..counted import counted
 from ..elementary import arctan2, sin_cos, sin_cos_turns
-from ..errors import SceneError, warn_caller
+from ..errors import SceneError, as_array, warn_caller
 from ..files import check_size
 from ..record import record
 from ..sampling.discrete import Distribution2D
@@ -161,7 +161,7 @@ def environment_pixels(source: Any) -> Floats:
         codes = read_codes(source, budget)
         budget.charge(name, COLOR_BYTES * codes.shape[0] * codes.shape[1])
     else:
-        codes, name = np.asarray(source), "Environment image"
+        codes, name = as_array("Environment image", source), "Environment image"
     if codes.ndim == 2:
         codes = codes[:, :, None]
     if codes.ndim != 3 or not 1 <= codes.shape[2] <= 4 or codes.dtype.kind not in "uif":

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..colors import rgb
-from ..errors import SceneError, finite_array
+from ..errors import SceneError, as_array, finite_array
 from ..layers import DEFAULT_GROUP, group_name
 from ..parameter import Parameter, Parametrized
 from ..record import record
@@ -147,7 +147,7 @@ def intensities_of(name: str, value: ArrayLike) -> NDArray[np.float64]:
     """
     if isinstance(value, str):
         return intensity_of(name, value)[:, 0]
-    array = finite_array(name, value, (None,) * np.ndim(value))
+    array = finite_array(name, value, (None,) * as_array(name, value).ndim)
     bad = np.argwhere(array < 0)
     if len(bad):
         where = "".join(f"[{i}]" for i in bad[0])

@@ -58,7 +58,8 @@ def passes(film: Film, spp: int, noise: float | None, begun: Pass | None = None)
         yield Pass(pixels, first, last)
         first = last
         error = film.relative_variance()
-        limit = noise**2 * _trust(film.rare_part(error))
+        # inf where noise**2 would be an error
+        limit = noise * noise * _trust(film.rare_part(error))
         if error.mean() <= limit:
             return
         noisy = np.bincount(tile_of, error) / sizes > limit

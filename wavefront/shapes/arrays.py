@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SceneError, finite_array
+from ..errors import SceneError, as_array, finite_array
 from ..materials import MaterialLike
 from ..vec import FLOAT32_MAX
 from .base import Checked, CurvedShape
@@ -19,10 +19,11 @@ from .transform import points_by, similarities
 
 def _radii(name: str, value: ArrayLike) -> NDArray[np.float64]:
     """Return radii (n,), or (1,) for a single number."""
-    radii = finite_array(name, value, () if np.ndim(value) == 0 else (None,)).reshape(-1)
+    single = as_array(name, value).ndim == 0
+    radii = finite_array(name, value, () if single else (None,)).reshape(-1)
     bad = np.flatnonzero(~((radii >= FLOAT32_MIN) & (radii <= FLOAT32_MAX)))
     if len(bad):
-        where = f"[{bad[0]}]" if np.ndim(value) else ""
+        where = f"[{bad[0]}]" if not single else ""
         limit = f"above 0, from {FLOAT32_MIN:.3g} to {FLOAT32_MAX:.3g}"
         raise SceneError(f"{name}{where} is {radii[bad[0]]:g}; it must be {limit}")
     return radii

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..counted import counted
-from ..errors import SceneError, finite_array, warn_caller
+from ..errors import SceneError, as_array, finite_array, warn_caller
 from ..materials import Material, MaterialLike
 from ..suggestions import suggests_keywords
 from ..textures.parameter import Color, color
@@ -26,10 +26,7 @@ FLOAT32_MIN = float(np.finfo(np.float32).tiny)
 
 
 def _faces(name: str, faces: ArrayLike) -> NDArray[np.intp]:
-    try:
-        array = np.asarray(faces)
-    except ValueError as error:
-        raise SceneError(f"{name} must be integers of shape (m, 3), got rows of several lengths") from error
+    array = as_array(name, faces)
     if array.size == 0:
         raise SceneError(f"{name.removesuffix(': faces')}: has no faces")
     if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "iu":
@@ -118,6 +115,8 @@ class Mesh(ColoredShape):
         those that are within it of a face, and "auto" is what files get, 30°. Vertices in one place count as
         one, and those on creases are split, so that there may be more of them than were given. Not with
         `normals`.
+
+    Arrays are copied: what is done to them afterwards does not change the mesh.
 
     Raises
     ------

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..colors import srgb
-from ..errors import SceneError, finite_array, warn_caller
+from ..errors import SceneError, as_array, finite_array, warn_caller
 from ..materials import MaterialLike
 from ..suggestions import suggests_keywords
 from .mesh import Mesh, positions
@@ -158,11 +158,11 @@ def _ends_of_lines(name: str, lines: Any) -> tuple[NDArray[np.float64], NDArray[
     if not isinstance(given, Iterable):
         raise SceneError(f"{name}: lines must be a mesh, a path, or points (n, 3), got {lines!r}")
     parts = list(given)
-    if parts and np.ndim(parts[0]) == 1:
+    if parts and as_array(f"{name}: lines[0]", parts[0]).ndim == 1:
         parts = [parts]
     starts, ends = [np.zeros((0, 3))], [np.zeros((0, 3))]
     for number, part in enumerate(parts):
-        points = np.asarray(part)
+        points = as_array(f"{name}: lines[{number}]", part)
         if of_path and points.shape[-1] == 2:
             points = np.column_stack([points, np.zeros(len(points))])
         points = finite_array(f"{name}: lines[{number}]", points, (None, 3))

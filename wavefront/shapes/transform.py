@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..elementary import sin_cos_turns
-from ..errors import SceneError, finite_array, number, one_of
+from ..errors import SceneError, as_array, finite_array, number, one_of
 from ..vec import Doubles, Ints
 
 Matrix = NDArray[np.float64]  # (4, 4), or several
@@ -25,7 +25,7 @@ def similarities(name: str, value: ArrayLike) -> tuple[Matrix, NDArray[np.float6
     SceneError
         If a matrix is malformed, or scales lengths along one direction more than along another.
     """
-    shape = (4, 4) if np.ndim(value) == 2 else (None, 4, 4)
+    shape = (4, 4) if as_array(name, value).ndim == 2 else (None, 4, 4)
     matrices = finite_array(name, value, shape).reshape(-1, 4, 4)
     scales = np.linalg.svd(matrices[:, :3, :3], compute_uv=False)
     bad = np.flatnonzero((matrices[:, 3] != (0, 0, 0, 1)).any(1))

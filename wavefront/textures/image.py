@@ -14,7 +14,7 @@ from ..codecs.budget import Budget
 from ..codecs.images import read_codes
 from ..colors import srgb_to_linear
 from ..counted import counted
-from ..errors import SceneError, finite_array, one_of
+from ..errors import SceneError, as_array, finite_array, one_of
 from ..files import MAX_PIXELS, check_size
 from ..state import SurfaceInteraction
 from ..suggestions import suggests_keywords
@@ -215,7 +215,7 @@ def _codes(source: Any, max_pixels: int) -> tuple[NDArray[Any], str]:
     elif isinstance(source, str | os.PathLike):
         codes, name = read_codes(source, Budget(max_pixels)), Path(source).name
     else:
-        codes, name = np.asarray(source), "array"
+        codes, name = as_array("image array", source), "array"
     if codes.ndim == 2:
         codes = codes[:, :, None]
     if codes.ndim != 3 or not 1 <= codes.shape[2] <= 4 or codes.dtype.kind not in "uifb":
@@ -264,7 +264,7 @@ def _table(kind: np.dtype[Any], srgb: bool) -> Floats | None:
 
 def _factor(name: str, value: ArrayLike, scalar: bool) -> Floats:
     """Return one number or three as a (3, 1) column."""
-    single = np.ndim(value) == 0
+    single = as_array(name, value).ndim == 0
     if scalar and not single:
         raise SceneError(f"{name} is {value!r}; with a channel it must be one number")
     array = finite_array(name, value, () if single else (3,))
