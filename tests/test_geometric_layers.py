@@ -318,3 +318,28 @@ def test_names_come_from_nodes_and_materials_of_files(tmp_path) -> None:
     (tmp_path / "a.mtl").write_text("newmtl blue tin\nKd 0 0 1\n")
     image = wf.render(tmp_path / "a.obj", spp=1, size=(8, 8), aovs="material_id")
     assert image.names["material"] == {0: "blue tin"}
+
+
+def test_uv_of_a_folded_mesh_in_tilted_and_sheared_instances() -> None:
+    """Texture coordinates are a linear function of the place on the mesh, wherever it is put."""
+    vertices = 0.5 * np.array([[-1, -1, 0.4], [1, -1, 0], [1, 1, 0.5], [-1, 1, -0.3], [0, 0, 0.9]])
+    uvs = np.stack([vertices[:, 0] + 0.3 * vertices[:, 2], vertices[:, 1] - 0.2 * vertices[:, 2]], 1)
+    faces = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
+    tent = wf.Mesh(vertices, faces, uvs=uvs)
+    shear = np.eye(4)
+    shear[0, 2], shear[1, 0], shear[2, 1] = 0.7, 0.3, -0.4
+    places = [
+        translation_matrix((x, y, 0.2)) @ euler_matrix(0.4 * x, 0.5, y) @ shear
+        for x, y in ((-1.4, 0), (1.3, 0.3))
+    ]
+    scene = wf.Scene([wf.Instance(tent, place) for place in places], [SKY])
+    scene.camera = wf.Camera.look_at((0.3, 0.5, 8), (0, 0, 0), fov=24, size=SIZE)
+    image = wf.render(scene, 1, aovs=("uv", "position", "shape_id"), workers=1, accel="numpy", progress=False)
+    layers = image.layers
+    for number, place in enumerate(places):
+        seen = layers["shape_id"] == number
+        assert seen.sum() > 100
+        world = np.c_[layers["position"][seen].astype(float), np.ones(seen.sum())]
+        x, y, z = (world @ np.linalg.inv(place).T)[:, :3].T
+        due = np.stack([x + 0.3 * z, y - 0.2 * z], 1)
+        np.testing.assert_allclose(layers["uv"][seen], due, atol=2e-5)
