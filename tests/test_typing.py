@@ -65,7 +65,7 @@ BAD = {
     "wf.Diffuse(albedo=0.5)": "call-arg",
     "wf.Scene([wf.Sphere((0, 0, 0), 1)], camera=(0, 0, 5))": "arg-type",
     'wf.Camera.look_at((0, 0, 5), (0, 0, 0), fov="wide")': "arg-type",
-    'wf.Mesh([[0, 0, 0]], [[0, 0, 0]]).material = "red"': "assignment",
+    "wf.Mesh([[0, 0, 0]], [[0, 0, 0]]).material = 0.5": "assignment",
     "wf.Diffuse().with_alpha(0.5)": "attr-defined",
     "wf.Material(0.5)": "arg-type",
     "wf.Environment().emission": "attr-defined",
