@@ -26,6 +26,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx_gallery.gen_gallery",
+    "sphinx_mathjax_offline",  # formulas without another server
 ]
 root_doc = "docs/index"
 include_patterns = ["docs/**", "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "benchmarks/README.md"]
@@ -42,6 +43,8 @@ html_show_sphinx = False
 html_copy_source = False
 
 myst_heading_anchors = 4
+myst_enable_extensions = ["dollarmath"]
+myst_dmath_allow_digits = myst_dmath_allow_space = False
 
 autosummary_generate = True
 autodoc_typehints = "none"  # numpydoc's sections say what an argument is
@@ -53,6 +56,7 @@ sphinx_gallery_conf = {
     "examples_dirs": "docs/tutorial",
     "gallery_dirs": "docs/generated/tutorial",
     "filename_pattern": r"/\d\d_",
+    "ignore_pattern": r"tracer\.py",
     "within_subsection_order": "FileNameSortKey",
     "image_scrapers": ("saved_pictures.scraper",),
     "reset_modules": (),

@@ -27,6 +27,6 @@ metal = wf.Principled((0.9, 0.85, 0.75), metallic=1, roughness=0.2)
 plastic = wf.Principled((0.02, 0.04, 0.5), roughness=0.15)
 blocks = wf.Instance.many(wf.Mesh(box.vertices, box.faces), places, material=plastic)
 shapes = [*blocks, wf.Capsules(a, b, 0.03, material=metal)]
-camera = wf.Camera.look_at((14, 11, 25), (2.3, 2.2, 1.3), fov=17, size=(options.size, options.size))
+camera = wf.Camera.look_at((14, 11, 25), (2.3, 2.2, 1.3), fov=17, size=(options.size, options.size * 2 // 3))
 wf.render(shapes, options.spp, camera=camera, lighting="studio").save(options.output)
 print(f"wrote {options.output}")

@@ -22,7 +22,7 @@ for _ in range(150):  # push overlapping spheres apart, within a box
     centers = np.clip(centers, 0, 7)
 green = wf.Principled((0.01, 0.6, 0.01), roughness=0.8)
 balls = wf.Spheres(centers, 0.5, material=green)
-camera = wf.Camera.look_at((14, 12, 24), (3.5, 3.4, 3.5), fov=27, size=(options.size, options.size))
+camera = wf.Camera.look_at((14, 12, 24), (3.5, 3.4, 3.5), fov=27, size=(options.size, options.size * 2 // 3))
 layers = "shape_id", "normal", "depth"
 image = wf.render(balls, options.spp, camera=camera, lighting="cloudy", aovs=layers)
 image.outlined(0, width=options.size / 150).save(options.output, exposure=0.6)

@@ -1,6 +1,9 @@
 """Every Python block of the README and the documents runs, and no link leads nowhere."""
 
+import ast
+import importlib
 import re
+import sys
 import tomllib
 from itertools import pairwise
 from pathlib import Path
@@ -13,7 +16,8 @@ import wavefront as wf
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "how_to").glob("*.md")])
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES]
-TUTORIAL = sorted((ROOT / "docs" / "tutorial").glob("*.py"))
+TUTORIAL = sorted((ROOT / "docs" / "tutorial").glob("[0-9]*.py"))
+TRACER = ROOT / "docs" / "tutorial" / "tracer.py"
 BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)#]*)(?:#([^)]*))?\)")
 HEADING = re.compile(r"^#+ (.*)$", re.MULTILINE)
@@ -49,11 +53,86 @@ def test_block_runs(document, line, code, tmp_path):
         assert picture.stat().st_size > 100
 
 
-@pytest.mark.usefixtures("few_samples")
+@pytest.fixture
+def tracer(monkeypatch):
+    """Return the module that the tutorial builds, whose `render` traces two paths for each pixel at most."""
+    monkeypatch.syspath_prepend(TRACER.parent)
+    monkeypatch.delitem(sys.modules, "tracer", raising=False)
+    module = importlib.import_module("tracer")
+    render = module.render
+    monkeypatch.setattr(
+        module, "render", lambda one, w, h, paths, *seed: render(one, w, h, min(paths, 2), *seed)
+    )
+    yield module
+    del sys.modules["tracer"]
+
+
+@pytest.mark.usefixtures("few_samples", "tracer")
 @pytest.mark.parametrize("script", TUTORIAL, ids=lambda path: path.stem)
 def test_step_of_the_tutorial_runs(script, tmp_path):
     exec(compile(script.read_text("utf-8"), str(script), "exec"), {"__name__": "__main__"})
     assert list(tmp_path.glob("*.png"))
+
+
+def functions(path):
+    """Return the functions of a file by name, as their syntax trees."""
+    tree = ast.parse(path.read_text("utf-8"))
+    return {node.name: ast.dump(node) for node in tree.body if isinstance(node, ast.FunctionDef)}
+
+
+def test_the_steps_of_the_tutorial_build_the_tracer():
+    """Every function of the whole is in a step, the same, and the whole has about a hundred lines."""
+    whole, shown = functions(TRACER), {}
+    for script in TUTORIAL:
+        for name, tree in functions(script).items():
+            assert whole.get(name, tree) == tree, f"{script.name}: {name}"
+            shown[name] = tree
+    assert whole.keys() <= shown.keys()
+    lines = [line.strip() for line in TRACER.read_text("utf-8").splitlines()]
+    assert len([line for line in lines if line and line[0] != "#"]) <= 150
+
+
+def test_the_tracer_of_the_tutorial_is_right(tracer):
+    """All its estimators agree with the library, in a room without the glass, whose caustic is noisy."""
+    tracer.KIND[8] = tracer.MATTE
+    kinds = {tracer.MIRROR: wf.Mirror, tracer.MATTE: wf.Diffuse}
+    balls = [
+        wf.Sphere(center, radius, material=kinds[kind](color), emission=light if light.any() else None)
+        for center, radius, kind, color, light in zip(
+            tracer.CENTER, tracer.RADIUS, tracer.KIND, tracer.COLOR, tracer.EMISSION, strict=False
+        )
+    ]
+    camera = wf.Camera.look_at(tracer.EYE, tracer.TARGET, fov=60, size=(16, 12))
+    for estimator, parts, limit in ((tracer.full, 24, 0.02), (tracer.naive, 64, 0.06)):
+        means = [tracer.render(estimator, 16, 12, 2, seed).mean() for seed in range(parts)]
+        exact = wf.render(wf.Scene(balls, camera=camera), 512, max_bounces=5, progress=False).rgb.mean()
+        error = np.std(means, ddof=1) / np.sqrt(parts)
+        # Student's t with 23 degrees of freedom is beyond 4.5 with a probability of 2e-4
+        assert abs(np.mean(means) - exact) < 4.5 * error
+        assert error < limit * exact
+
+
+def test_a_mirror_of_the_tutorial_cancels_the_cosine(tracer):
+    """f·cosθ/p is the reflectance for a delta, which is written as density infinity."""
+    direction = np.array([[0.6, -0.8, 0.0]])
+    following, factor, pdf = tracer.scatter(
+        direction, np.array([[0.0, 1, 0]]), np.array([7]), np.random.default_rng(0)
+    )
+    np.testing.assert_allclose(following, [[0.6, 0.8, 0]])
+    np.testing.assert_array_equal(factor, tracer.COLOR[[7]])
+    assert np.isinf(pdf).all()
+
+
+def test_formulas_are_typeset_without_another_server():
+    settings = (ROOT / "docs" / "conf.py").read_text("utf-8")
+    assert "sphinx_mathjax_offline" in settings
+    for script in TUTORIAL[:8]:
+        assert ".. math::" in script.read_text("utf-8"), script.name
+    for script in TUTORIAL:
+        text = script.read_text("utf-8")
+        assert "# Exercises" in text, script.name
+        assert "*Expect*" in text, script.name
+        assert "In the library" in text or "What is where" in text, script.name
 
 
 def test_there_are_blocks_to_run():
@@ -141,11 +220,24 @@ def test_commands_of_the_readme_are_single_lines():
 
 
 def test_pictures_are_small_and_are_pictures():
-    pictures = sorted((ROOT / "docs").glob("*.png"))
+    pictures = sorted(each for each in (ROOT / "docs").glob("**/*.*") if each.suffix in (".png", ".jpg"))
     assert pictures
     for picture in pictures:
-        assert picture.stat().st_size < 300_000, picture.name
-        assert picture.read_bytes().startswith(b"\x89PNG"), picture.name
+        if "generated" in picture.parts:
+            continue
+        assert picture.stat().st_size < 500_000, picture.name
+        begin = b"\x89PNG" if picture.suffix == ".png" else b"\xff\xd8\xff"
+        assert picture.read_bytes().startswith(begin), picture.name
+
+
+def test_cards_of_the_gallery_are_equal_and_lead_to_large_pictures():
+    text = (ROOT / "docs" / "gallery.md").read_text("utf-8")
+    cards = re.findall(r"\[!\[[^\]]+\]\((cards/\S+)\)\]\((\S+)\)", text)
+    assert len(cards) >= 14
+    for card, picture in cards:
+        assert wf.Image.load(ROOT / "docs" / card).rgb.shape == (320, 480, 3), card
+        assert wf.Image.load(ROOT / "docs" / picture).rgb.shape[1] >= 1200, picture
+    assert wf.Image.load(ROOT / "docs" / "terrace.jpg").rgb.shape[1] == 1920
 
 
 PICTURE = re.compile(r"!\[([^\]]+)\]\((\S+)\)")
