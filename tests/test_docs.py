@@ -125,7 +125,7 @@ def test_a_mirror_of_the_tutorial_cancels_the_cosine(tracer):
 
 def test_formulas_are_typeset_without_another_server():
     settings = (ROOT / "docs" / "conf.py").read_text("utf-8")
-    assert "sphinx_mathjax_offline" in settings
+    assert "sphinx-mathjax-offline" in settings
     for script in TUTORIAL[:8]:
         assert ".. math::" in script.read_text("utf-8"), script.name
     for script in TUTORIAL:
@@ -232,7 +232,7 @@ def test_pictures_are_small_and_are_pictures():
 
 def test_cards_of_the_gallery_are_equal_and_lead_to_large_pictures():
     text = (ROOT / "docs" / "gallery.md").read_text("utf-8")
-    cards = re.findall(r"\[!\[[^\]]+\]\((cards/\S+)\)\]\((\S+)\)", text)
+    cards = re.findall(r"\[!\[[^\]]+\]\((cards/[^)]+)\)\]\(([^)]+)\)", text)
     assert len(cards) >= 14
     for card, picture in cards:
         assert wf.Image.load(ROOT / "docs" / card).rgb.shape == (320, 480, 3), card
