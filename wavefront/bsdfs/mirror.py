@@ -25,6 +25,11 @@ class Mirror(Bsdf):
     SceneError
         If the reflectance is outside [0, 1] or not finite.
 
+    Notes
+    -----
+    f(wo, wi) = ρ · δ(wi − reflect(wo)) / |cosθi|. The division cancels the cosine of the rendering equation,
+    so the mirror is as bright at every angle, and a sample has the weight f·|cosθi|/p = ρ (pbrt-v4, §9.3).
+
     Examples
     --------
     >>> mirror = wf.Sphere((0, 0, 0), 1, material=wf.Mirror(0.95))
