@@ -70,7 +70,7 @@ def photograph(size: int, spp: int) -> bytes:
 
 
 def composed(file: bytes, size: int, spp: int) -> wf.Image:
-    """Return the photograph with a knot of copper, a ball of glass and a dice on the desk."""
+    """Return the photograph with a knot of copper, a green ball and a die on the desk."""
     with io.BytesIO(file) as stream:
         codes = iio.imread(stream) / 255.0
     behind = codes**2.2  # linear, as colors of a render are

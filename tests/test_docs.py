@@ -236,7 +236,8 @@ def test_cards_of_the_gallery_are_equal_and_lead_to_large_pictures():
     assert len(cards) >= 14
     for card, picture in cards:
         assert wf.Image.load(ROOT / "docs" / card).rgb.shape == (320, 480, 3), card
-        assert wf.Image.load(ROOT / "docs" / picture).rgb.shape[1] >= 1200, picture
+        if picture.endswith(".jpg"):
+            assert wf.Image.load(ROOT / "docs" / picture).rgb.shape[1] >= 1200, picture
     assert wf.Image.load(ROOT / "docs" / "terrace.jpg").rgb.shape[1] == 1920
 
 
