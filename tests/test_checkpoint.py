@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scenes
 
 import wavefront as wf
 from wavefront import cli, files
@@ -671,6 +672,7 @@ def test_signals_keep_the_render(
     error = process.communicate()[1]
     assert process.returncode == status, error
     assert "interrupted: the picture so far has" in error
+    assert "out.wfck holds it, and wavefront resume" in error
     so_far, kept = wf.Image.load(tmp_path / "out.npy"), wf.Image.load(tmp_path / "out.wfck")
     assert so_far.rgb.tobytes() == kept.rgb.tobytes()
 
@@ -712,3 +714,17 @@ def test_resume_gives_the_command_again(
     wf.render(scene(), 1, checkpoint="of_python")
     assert cli.main(["resume", "of_python"]) == 2
     assert "was not begun by wavefront render" in capsys.readouterr().err
+
+
+def test_an_interrupted_render_says_how_it_goes_on(tmp_path: Path) -> None:
+    """Where a checkpoint is kept, and written."""
+    path = tmp_path / "ball.wfck"
+
+    def press(done: float, total: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(wf.Interrupted, match=r"ball.wfck holds it, and the same call goes on from there$"):
+        wf.render(scenes.everything(), 64, checkpoint=path, progress=press)
+    assert path.exists()
+    with pytest.raises(wf.Interrupted, match=r"samples per pixel$"):
+        wf.render(scenes.everything(), 64, progress=press)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import signal
 import time
 from collections.abc import Iterator
+from concurrent.futures import Future
 from functools import partial
 from typing import Any
 
@@ -14,6 +16,7 @@ import scenes
 
 import wavefront as wf
 from wavefront.scheduling import delivery
+from wavefront.scheduling.dask import ClusterTasks
 from wavefront.scheduling.pool import WorkerPool
 from wavefront.scheduling.remote import RemoteWorkers
 from wavefront.scheduling.shared import STOP, SharedInt, Stopped
@@ -186,3 +189,41 @@ def test_any_number_of_jobs_at_once_gives_the_same_bits(client: Any, expected: b
     """More than the cluster has threads, or fewer."""
     image = wf.render(scenes.everything(), 8, workers=workers, executor=client, **QUIET)
     assert image.rgb.tobytes() == expected
+
+
+def test_a_closed_client_is_an_error() -> None:
+    """Before any work, and by its name."""
+    cluster = {"n_workers": 1, "processes": False, "dashboard_address": ":0"}
+    with distributed.LocalCluster(**cluster) as here, distributed.Client(here) as client:
+        client.close()
+        with pytest.raises(wf.SceneError, match=r"executor is a client of Dask .*closed\?"):
+            wf.render(scenes.everything(), 1, executor=client)
+        with pytest.raises(wf.RenderError, match="the cluster of Dask cannot be given work"):
+            wf.render(scenes.everything(), 1, executor=client, workers=1)
+
+
+def test_the_picture_outlives_the_cluster() -> None:
+    """A scheduler that is lost, or begins anew without workers, ends the render with the picture so far."""
+    cluster = {"n_workers": 1, "processes": False, "dashboard_address": ":0"}
+    with distributed.LocalCluster(**cluster) as here, distributed.Client(here) as client:
+
+        def end_it(done: float, total: float) -> None:
+            if done:
+                here.close()
+
+        with pytest.raises(wf.RenderError, match="Dask") as failed:
+            wf.render(scenes.everything(), 100_000, executor=client, progress=end_it, wave_size=500)
+    assert failed.value.image is not None
+
+
+def test_tasks_that_are_cancelled_with_their_scheduler_are_errors() -> None:
+    """Asyncio's CancelledError is none that a render knows: it is a BaseException."""
+
+    class Client:
+        async def gather(self, task: Any, **options: Any) -> None:
+            raise asyncio.CancelledError("scheduler-restart")
+
+    answer: Any = Future()
+    asyncio.run(ClusterTasks(Client(), SharedInt())._fetch(None, answer))  # type: ignore[arg-type]
+    with pytest.raises(ConnectionError, match="CancelledError: scheduler-restart"):
+        answer.result()

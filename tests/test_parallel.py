@@ -405,6 +405,20 @@ def test_without_semaphores_there_are_threads(error: Exception, monkeypatch: pyt
     wf.render(scenes.everything(), executor="threads", **picture)
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="folders in use cannot be removed")
+def test_a_working_folder_that_is_gone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processes that are not forked begin in it; others do not need it."""
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    folder.rmdir()
+    for name in ("spawn", "forkserver"):
+        with pytest.raises(wf.SceneError, match=rf"'{name}', but the working folder.*not exist.*'threads'"):
+            wf.render(scenes.everything(), 1, executor=name)
+    for name in ("processes", "threads"):
+        assert wf.render(scenes.everything(), 1, executor=name, workers=2).spp == 1
+
+
 def test_a_daemon_has_threads() -> None:
     """multiprocessing allows it no children."""
     daemon = multiprocessing.current_process()

@@ -384,3 +384,38 @@ except KeyboardInterrupt as stop:
     assert any(f"{name} left []" in output for name in names), output
     assert len(workers) == (2 if executor == "processes" else 0)
     assert not any(map(runs, workers))
+
+
+# --- Several threads ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("executor", ["threads", "processes"])
+def test_a_second_thread_gets_an_error(executor: str) -> None:
+    """It may stop the session, or close it: the render ends with its picture so far."""
+    begun, images = threading.Event(), []
+
+    def report(done: float, total: float) -> None:
+        if done:
+            begun.set()
+
+    session = wf.Session(
+        scenes.everything(), 1_000_000, executor=executor, workers=2, wave_size=500, progress=report
+    )
+    renderer = threading.Thread(target=lambda: images.append(session.run()))
+    renderer.start()
+    assert begun.wait(60)
+    for use in (session.run, session.run_once, lambda: next(session), lambda: session.set_camera(None)):
+        with pytest.raises(
+            wf.RenderError, match="in use by another thread; meanwhile it can only be stopped"
+        ):
+            use()
+    session.close()
+    renderer.join(60)
+    assert images[0].metadata["interrupted"]
+
+
+def test_a_function_of_progress_cannot_use_its_session() -> None:
+    """It is called within."""
+    session = wf.Session(scenes.everything(), 4, progress=lambda done, total: session.run())
+    with session, pytest.raises(wf.RenderError, match="in use by the caller of this function"):
+        session.run()

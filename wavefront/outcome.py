@@ -30,13 +30,16 @@ def setup_errors() -> Iterator[None]:
         raise RenderError(f"out of memory while the scene was set up: {error}") from error
 
 
-def interrupted(image: Image, spp: int | None) -> Interrupted:
-    """Return the error that says how much of `spp` samples per pixel there is; None if that is open."""
+def interrupted(image: Image, spp: int | None, go_on: str = "") -> Interrupted:
+    """Return the error that says how much of `spp` samples per pixel there is; None if that is open.
+
+    `go_on` says how the render goes on, if it does.
+    """
     if not image.metadata["samples"]:
         return Interrupted("interrupted: there is no picture yet")
     found = image.metadata["spp"]
     there = f"{found:.4g} of " + counted(spp, "sample") if spp else counted(found, "sample", form=".4g")
-    return Interrupted(f"interrupted: the picture so far has {there} per pixel", image)
+    return Interrupted(f"interrupted: the picture so far has {there} per pixel{go_on}", image)
 
 
 def is_black_or_white(image: Image) -> bool:

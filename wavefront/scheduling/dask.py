@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import Future, InvalidStateError
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from typing import Any, Protocol, runtime_checkable
 
+from ..errors import RenderError, SceneError
 from .delivery import Payload
 from .remote import RemoteWorkers
 from .shared import SharedInt
@@ -46,7 +47,9 @@ class ClusterTasks:
 
     def submit(self, function: Callable[..., Any], /, *args: Any) -> Future[Any]:
         """Have the first worker that is free call a function."""
-        task, answer = self._client.submit(function, *args, pure=False), Future[Any]()
+        with _reached():
+            task = self._client.submit(function, *args, pure=False)
+        answer = Future[Any]()
         answer.add_done_callback(lambda done: task.cancel() if done.cancelled() else None)
         self._client.loop.add_callback(self._fetch, task, answer)
         return answer
@@ -56,8 +59,10 @@ class ClusterTasks:
         with suppress(InvalidStateError):  # it was canceled meanwhile
             try:
                 answer.set_result(await self._client.gather(task, asynchronous=True))
-            except BaseException as error:
+            except Exception as error:
                 answer.set_exception(error)
+            except BaseException as error:  # asyncio's own of tasks that are lost with their scheduler
+                answer.set_exception(ConnectionError(f"{type(error).__name__}: {error}"))
 
     def shutdown(self, running: Collection[Future[Any]]) -> None:
         """Withdraw jobs that have not begun; nobody waits for the others."""
@@ -76,12 +81,41 @@ class ScatterDelivery:
 
     def first(self, payload: Payload) -> Any:
         """Return the future of the payload, which Dask replaces with the payload."""
-        self._scattered = self._client.scatter(payload, broadcast=True, hash=False)
+        with _reached():
+            self._scattered = self._client.scatter(payload, broadcast=True, hash=False)
         return self._scattered
 
     def again(self, payload: Payload) -> Any:
         """Return the same future, or another one if all workers that had the payload are lost."""
         return self._scattered if self._scattered.status == "finished" else self.first(payload)
+
+
+def threads_in(client: DaskClient) -> int:
+    """Return the number of threads of all workers of a cluster.
+
+    Raises
+    ------
+    SceneError
+        If the client does not tell, as it is closed.
+    """
+    try:
+        return sum(client.nthreads().values())
+    except Exception as error:  # of whatever kind: a closed client has lost its parts
+        raise SceneError(
+            f"executor is a client of Dask that does not answer: {error}; is it closed?"
+        ) from error
+
+
+@contextmanager
+def _reached() -> Iterator[None]:
+    """Turn whatever says that a cluster cannot be reached into the error of a render."""
+    try:
+        yield
+    except (MemoryError, SceneError):
+        raise
+    except Exception as error:
+        message = f"{type(error).__name__}: {error}"
+        raise RenderError(f"the cluster of Dask cannot be given work: {message}") from error
 
 
 def dask_workers(client: DaskClient, work: StoppableWork, count: int, strict: bool) -> RemoteWorkers:

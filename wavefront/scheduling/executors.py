@@ -24,7 +24,7 @@ from typing import Any, TypeAlias
 from ..errors import SceneError, warn_caller
 from ..registry import Registry
 from .blas import reserve_buffers
-from .dask import DaskClient, dask_workers
+from .dask import DaskClient, dask_workers, threads_in
 from .remote import RemoteWorkers
 from .workers import (
     ExecutorMaker,
@@ -150,7 +150,7 @@ def _cores() -> int:
 def _workers_in(executor: str | ExecutorLike | None) -> int | None:
     """Return how many workers an executor has; None if it does not say."""
     if isinstance(executor, DaskClient):
-        return sum(executor.nthreads().values())
+        return threads_in(executor)
     if not isinstance(executor, Executor):
         return None
     sizes = getattr(executor, "_max_workers", None), getattr(executor, "num_workers", None)  # the latter: MPI
@@ -169,7 +169,7 @@ def choose_executor(executor: str | ExecutorLike | None, workers: int, paths: in
     """
     if executor is not None:
         EXECUTORS.find(executor)
-    obstacle = _daemon() or _missing_semaphores() if executor in PROCESSES else None
+    obstacle = _daemon() or _obstacle_to_starting(str(executor)) if executor in PROCESSES else None
     if obstacle:
         raise SceneError(f"executor is {executor!r}, but {obstacle}; use 'threads'")
     if executor == "forkserver" and executor not in multiprocessing.get_all_start_methods():
@@ -180,7 +180,7 @@ def choose_executor(executor: str | ExecutorLike | None, workers: int, paths: in
     few = workers == 1 or paths < (MIN_PATHS if _forks() else MIN_PATHS_TO_SPAWN)
     if few or without_lock or _daemon() or (_forks() and _other_threads_compute()):
         return "threads"
-    obstacle = _missing_semaphores()
+    obstacle = _obstacle_to_starting("processes")
     if obstacle:
         warn_caller(f"workers are threads, which are slower than processes: {obstacle}")
     return "threads" if obstacle else "processes"
@@ -240,6 +240,20 @@ def _daemon() -> str | None:
     """Return why workers cannot be processes, as this one is a daemon; None if it is none."""
     if multiprocessing.current_process().daemon:
         return "this process is a daemon of multiprocessing, which may have no children"
+    return None
+
+
+def _obstacle_to_starting(executor: str) -> str | None:
+    """Return why no processes can be started here; None if they can."""
+    return _missing_semaphores() or (_missing_folder() if needs_pickling(executor) else None)
+
+
+def _missing_folder() -> str | None:
+    """Return why processes that are not forked cannot be started; None if there is a folder to start in."""
+    try:
+        os.getcwd()
+    except OSError:
+        return "the working folder of this process does not exist any more"
     return None
 
 

@@ -288,5 +288,7 @@ def _start_errors() -> Iterator[None]:
     """Turn a limit of threads, processes or memory into the error of a render."""
     try:
         yield
+    except RenderError:
+        raise
     except (RuntimeError, OSError) as error:
         raise RenderError(f"a worker cannot be started: {error}; use fewer workers") from error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import time
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -43,6 +44,7 @@ from .hints import Hints
 from .last_checks import check_last_image
 from .plan import make_plan, trained_guide, with_choice
 from .prepared_scene import PreparedScene
+from .sole_use import SoleUse
 from .view_render import ViewRender, new_accumulator
 
 SNAPSHOT_INTERVAL = 1.0  # seconds between two pictures of a long pass
@@ -59,6 +61,8 @@ class Session:
     As a context manager the session keeps its workers until the end of the block, and leaves no
     process, thread or shared memory behind it, also after an error or Ctrl-C. Outside of a block, workers
     that were idle for 10 seconds end, and start again when they are needed.
+
+    One thread at a time may use it: meanwhile others may only `stop`, `drop` or `close` it.
 
     Parameters
     ----------
@@ -137,6 +141,7 @@ class Session:
         begin = time.perf_counter()
         self._in_block = self._closed = self._once = self._stopped = self._dropped = False
         self.command: dict[str, Any] | None = None  # of the command line, for checkpoints
+        self._use = SoleUse()
         self._settings = Settings(
             spp=spp,
             camera=camera,
@@ -286,7 +291,7 @@ class Session:
         """
         if self._ended:
             raise StopIteration
-        with self.interrupt_handler:
+        with self.interrupt_handler, self._use:
             if self._stopped:  # since the last picture
                 self._keep_render()
                 self._ended = True
@@ -331,7 +336,7 @@ class Session:
     def _run(self) -> Image:
         if self._ended:
             raise RenderError("the render is over; set_camera begins another picture")
-        with self.interrupt_handler:
+        with self.interrupt_handler, self._use:
             for _ in () if self._stopped else self._sweeps_of(undivided):
                 pass
             image = self._end()
@@ -374,7 +379,7 @@ class Session:
         executor = settings.executor_for(camera.size)
         budget = settings.budget(camera.size, executor, self._plan.tracer.recorded_layers)
         accumulator = new_accumulator(camera, self._plan.tracer.recorded_layers, settings.caustics)
-        with self.interrupt_handler:
+        with self.interrupt_handler, self._use:
             self._render.discard_sweeps()
             self._stopped = self._dropped = False  # a stop from now on is one of the new picture
             if not self._pool.closed:
@@ -390,7 +395,7 @@ class Session:
             else:
                 self._plan = replace(self._plan, budget=budget)
             self._plan = with_choice(self._plan, camera, self._run_trial)
-        self._begin_picture(camera, accumulator, begin)
+            self._begin_picture(camera, accumulator, begin)
 
     def stop(self) -> None:
         """End the render: the loop ends, with the picture so far where one is waited for.
@@ -469,8 +474,14 @@ class Session:
         self._hints.tell(image)
 
     def close(self) -> None:
-        """End the render and all workers; the session cannot be used again."""
-        with self.interrupt_handler:
+        """End the render and all workers; the session cannot be used again.
+
+        A render that another thread waits for ends with its picture so far.
+        """
+        if self._use.elsewhere:
+            self.stop()
+            self._use.wait()
+        with self.interrupt_handler, self._use:
             if not self._ended:
                 self._keep_render()
             self._closed = self._ended = True
@@ -515,7 +526,7 @@ class Session:
         if not self._interrupted and not self._stopped:
             check_last_image(image, self._plan, render.loop, self._monitor.surfaces.value)
         if self._interrupted:
-            raise interrupted(image, settings.target_spp)
+            raise interrupted(image, settings.target_spp, "" if not_written else self._how_to_go_on())
         if not_written is not None:
             raise RenderError(f"the checkpoint was not written: {not_written}", image) from not_written
         if not render.accumulator.samples:
@@ -536,6 +547,14 @@ class Session:
     def _write_checkpoint(self) -> SaveError | MemoryError | None:
         """Write the checkpoint, where one is kept; return why it cannot be written, if it cannot."""
         return None if self._render.file is None else self._render.file.write(self._make_checkpoint)
+
+    def _how_to_go_on(self) -> str:
+        """Return what a message says of the checkpoint; "" where none is kept."""
+        if self._settings.checkpoint is None:
+            return ""
+        path = os.fspath(self._settings.checkpoint)
+        how = "the same call" if self.command is None else f"wavefront resume {shlex.quote(path)}"
+        return f"; {path} holds it, and {how} goes on from there"
 
     def _keep_render(self) -> None:
         """Write the checkpoint of a render that is left before its end; warn if that is not possible."""
