@@ -81,3 +81,37 @@ def test_integrators_of_users_have_backgrounds_if_they_are_made_of_the_stages() 
 def test_malformed_backgrounds_are_errors(bad) -> None:
     with pytest.raises(wf.SceneError, match="background"):
         wf.render(subject(), spp=1, background=bad)
+
+
+@pytest.mark.parametrize("integrator", ["naive", "direct_simple", "direct_mis", "full"])
+def test_a_backdrop_is_what_the_camera_sees_of_an_environment(integrator: str) -> None:
+    """Directly and through veils, as a background; its light and its reflections stay."""
+    settings = {"spp": 16, "integrator": integrator, "max_bounces": 3}
+    scene = subject()
+    scene.lights = [wf.Environment((0.9, 1.1, 1.4), backdrop=COLOR)]
+    image = wf.render(scene, aovs=("direct", "indirect", "light_groups"), **settings)
+    expected = wf.render(subject(), background=COLOR, **settings)
+    assert image.rgb == pytest.approx(expected.rgb, rel=1e-5, abs=1e-6)
+    assert image.direct + image.indirect == pytest.approx(image.rgb, rel=1e-5, abs=1e-6)
+    assert "alpha" not in image.layers
+    assert scene.lights[0].backdrop.radiance.ravel() == pytest.approx(COLOR)
+
+
+def test_a_backdrop_may_be_an_image_and_hides_no_sun() -> None:
+    """It turns with the light, and a background replaces it, too."""
+    rows = np.linspace(1, 0, 8)[:, None, None] * np.ones((8, 16, 3))
+    sun = wf.DirectionalLight((0, -1, -1), 2, angle=20)
+    turn = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
+    camera = wf.Camera.look_at((0, 0, 4), (0, 1, 4.9), fov=90, size=(32, 24))
+    ball = wf.Sphere((0, 0, 0), 1)
+    settings = {"spp": 4, "camera": camera}
+    shown = wf.render([ball, wf.Environment(rows, transform=turn), sun], **settings)
+    backdrop = wf.Environment(0.3, transform=turn, backdrop=rows)
+    assert wf.render([ball, backdrop, sun], **settings).rgb == pytest.approx(shown.rgb, rel=1e-5)
+    colored = wf.render([ball, backdrop], background=COLOR, **settings)
+    assert colored.rgb[0, 0] == pytest.approx(COLOR)
+
+
+def test_a_malformed_backdrop_is_refused() -> None:
+    with pytest.raises(wf.SceneError, match=r"^Environment radiance"):
+        wf.Environment(1, backdrop=(1, 2))

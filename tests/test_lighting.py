@@ -319,3 +319,15 @@ def test_the_light_goes_with_a_camera_that_was_chosen() -> None:
     scene.lights = wf.studio(camera=camera)
     chosen = wf.render(cube(), 2, size=(24, 24), view="left", ground=False)
     np.testing.assert_array_equal(chosen.rgb, wf.render(scene, 2, camera=camera).rgb)
+
+
+@pytest.mark.parametrize("name", ["studio", "softbox", "three_point"])
+def test_no_camera_sees_a_box(name: str) -> None:
+    """Whichever way it looks; a mirror does, as it shows what lights the scene."""
+    ball = wf.Sphere((0, 0, 0), 1, material=wf.Mirror())
+    around = wf.Camera.panorama((0, 0, 5), (0, 0, 0), size=(64, 32))
+    scene = wf.Scene([ball], wf.studio(name))
+    seen = wf.render(scene, spp=4, camera=around, aovs="alpha", progress=False)
+    brightest = max(level for _, level in PRESETS[name].gradient)
+    assert seen.rgb[seen.alpha == 0].max() <= brightest * 1.001
+    assert seen.rgb[seen.alpha > 0].max() > 3 * brightest

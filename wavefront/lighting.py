@@ -1,8 +1,8 @@
 """Ready-made light for scenes that have none of their own, and a ground that catches their shadow.
 
 The light of a preset is an environment image: a gradient with soft boxes. The boxes are above the horizon, as
-in a photo studio. The image below and slightly above the horizon is the backdrop that a camera sees behind
-the scene if it looks horizontally or down.
+in a photo studio. The gradient alone is the backdrop that a camera sees behind the scene; mirrors and glass
+show the boxes, too.
 """
 
 from __future__ import annotations
@@ -68,13 +68,16 @@ class Preset:
 
     def pixels(self) -> Doubles:
         """Return the image (H, W, 3) of the environment, as `Environment` lays it out."""
+        return sum((box.radiance_at(_directions()) for box in self.boxes), self.backdrop())
+
+    def backdrop(self) -> Doubles:
+        """Return the same without the boxes, which a camera does not see."""
         directions = _directions()
         heights, levels = np.array(self.gradient).T
         place = np.clip(np.searchsorted(heights, directions[1]) - 1, 0, len(heights) - 2)
         step = (directions[1] - heights[place]) / np.diff(heights)[place]
-        backdrop = levels[place] + np.diff(levels)[place] * smoothstep(step)
-        boxes = [box.radiance_at(directions) for box in self.boxes]
-        return sum(boxes, np.repeat(backdrop[:, :, None], 3, 2))
+        shade = levels[place] + np.diff(levels)[place] * smoothstep(step)
+        return np.repeat(shade[:, :, None], 3, 2)
 
     def ground_albedo(self) -> tuple[float, float, float]:
         """Return the albedo of a level ground that is as bright as the gradient below the horizon."""
@@ -178,7 +181,8 @@ def studio(preset: str = DEFAULT, *, up: ArrayLike = "y", camera: Camera | None 
     axes = _axes(up, camera)
     if preset == "even":
         return [Environment(1.0)]
-    return [Environment(PRESETS[preset].pixels().astype(np.float32), transform=axes)]
+    pixels, backdrop = PRESETS[preset].pixels(), PRESETS[preset].backdrop()
+    return [Environment(pixels.astype(np.float32), transform=axes, backdrop=backdrop.astype(np.float32))]
 
 
 def check_lighting(lighting: str | None) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..counted import counted
 from ..errors import SceneError
 from ..lights import (
+    Environment,
     EnvironmentSum,
     InfiniteLight,
     Light,
@@ -38,6 +39,15 @@ from .light_groups import GroupNumbers, LightGroups, primitive_count
 
 # A record, and the primitives of its lights: (..., k) a column per light, or (..., m) of one light, or none.
 Part: TypeAlias = tuple[LightRecord, Ints | None]
+
+
+def find_backdrop(scene: Scene, scale: float, center: NDArray[np.float64]) -> InfiniteLight | None:
+    """Return what the camera sees of lights at infinity, None if it sees these themselves."""
+    shown = [light.backdrop or light if isinstance(light, Environment) else light for light in scene.lights]
+    if shown == list(scene.lights):
+        return None
+    records = [_checked_record(light, scale, center) for light in shown]
+    return EnvironmentSum.of([record for record in records if isinstance(record, InfiniteLight)])
 
 
 def gather_lights(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..accel import Accelerator, Geometry, InstanceAccelerator
 from ..camera import Camera
-from ..lights import LightTable
+from ..lights import InfiniteLight, LightTable
 from ..lights.samplers import LightSamplerMaker
 from ..record import record
 from ..scene import Scene
@@ -21,7 +21,7 @@ from .curved import CurvedTable
 from .geometry import compute_corner_normals, gather_triangles, same_as_next
 from .instances import InstanceTable, own_frame, place_instances, sort_shapes
 from .light_groups import LightGroups
-from .lights import gather_lights
+from .lights import find_backdrop, gather_lights
 from .materials import (
     MaterialTable,
     Opacities,
@@ -75,6 +75,7 @@ class CompiledScene:
     places: MortonGrid | None = None  # orders the paths of large scenes; None in small ones
     shadow_catchers: Bools | None = None  # (materials,) those that catch shadows; None when none does
     background: Floats | None = None  # (3, 1) what camera rays that miss show; None for the environment
+    backdrop: InfiniteLight | None = None  # what they show of the environment; None for all of its light
     roulette_after: float = ROULETTE_AFTER  # scattering events before Russian roulette may end paths
     casters: Casters | None = None  # where light paths begin; None where none are traced
 
@@ -192,6 +193,7 @@ def compile_scene(
         lights=lights,
         light_groups=groups,
         nonscattering_lights=nonscattering_lights,
+        backdrop=find_backdrop(scene, scale, center),
         instances=table,
         shadow_catchers=find_shadow_catchers(user_materials),
         casters=casters,

@@ -70,11 +70,16 @@ class Environment(Parametrized, Light):
         "bilinear" between the centers of the image's pixels, or "nearest".
     group
         Name of the layer of radiance that the light counts for, with `aovs="light_groups"`.
+    backdrop
+        What the camera sees directly in place of the light, as `radiance`; None shows the light. Mirrors and
+        glass show the light in any case.
 
     Attributes
     ----------
     radiance
         (3, 1) W·sr⁻¹·m⁻²; of an image, the mean over all directions.
+    backdrop
+        What the camera sees in its place, an `Environment`; None if it sees the light.
 
     Notes
     -----
@@ -109,7 +114,11 @@ class Environment(Parametrized, Light):
         transform: ArrayLike | None = None,
         filter: Literal["bilinear", "nearest"] = "bilinear",
         group: str = DEFAULT_GROUP,
+        backdrop: ArrayLike | str | os.PathLike[str] | None = None,
     ) -> None:
+        self.backdrop = (
+            None if backdrop is None else Environment(backdrop, transform=transform, filter=filter)
+        )
         self._filter = one_of("filter", filter, ("bilinear", "nearest"))
         self._transform = None if transform is None else rotation_matrix("Environment transform", transform)
         self._image: ImageEnvironment | None = None
