@@ -30,6 +30,7 @@ from scenes import cornell_box
 
 import wavefront as wf
 from wavefront.cli import main, view_command
+from wavefront.viewer import denoiser as denoiser_module
 from wavefront.viewer import page as page_module
 from wavefront.viewer import refiner as module
 from wavefront.viewer.front import Front, asked_first
@@ -205,8 +206,8 @@ def test_a_first_picture_is_finished_and_shown_while_the_view_moves() -> None:
     assert watched.frames[0].camera is cameras[0]
 
 
-def test_first_pictures_become_smaller_where_they_take_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And larger again, up to the whole picture, where they are quick; never less than there is to see."""
+def test_first_pictures_are_larger_where_they_are_quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Up to the whole picture; a quarter of the width and height where they take long, and never less."""
     session = Scripted(pictures=1)
     session.go.release(1000)
     camera = wf.Camera.look_at((0, 0, 5), (0, 0, 0), size=(640, 480))
@@ -222,8 +223,8 @@ def test_first_pictures_become_smaller_where_they_take_long(monkeypatch: pytest.
             assert eventually(lambda done=done: len(watched.frames) > done and watched.frames[-1].final)
         return [size for _, size in session.views if size != (640, 480)]
 
-    assert sizes(0, -1) == [(160, 120)] + 4 * [(80, 60)]
-    assert sizes(SOON, SOON) == [(80, 60), (160, 120), (320, 240)]
+    assert sizes(0, -1) == 5 * [(160, 120)]
+    assert sizes(SOON, SOON) == [(160, 120), (320, 240)]
     watched.refiner.close()
 
 
@@ -374,12 +375,14 @@ def test_lenses_that_are_none_are_refused(lens: Any) -> None:
 def test_layers_are_shown_as_colors() -> None:
     """Each choice; exposure changes radiance alone."""
     image = wf.render(BALL, 4, camera=CAMERA, aovs=VIEWER_LAYERS, progress=False)
-    shown = {choice: shown_codes(image, choice, 0) for choice in CHOICES}
+    shown = {choice: shown_codes(image, choice, 0) for choice in CHOICES if choice != "denoised"}
     for codes in shown.values():
         assert codes.shape == (48, 64, 3)
         assert codes.dtype == np.uint8
     assert (shown["rgb"] == image.to_uint8()).all()
-    assert (shown["denoised"] == image.denoise().to_uint8()).all()
+    smooth = image.denoise("nonlocal_means")
+    assert (shown_codes(smooth, "denoised", 1, "agx") == smooth.to_uint8(exposure=1, tone="agx")).all()
+    assert (shown_codes(image, "rgb", 0, "agx") != shown["rgb"]).any()
     middle, corner = (24, 32), (0, 0)
     assert shown["depth"][middle].tolist() == [255, 255, 255]  # the nearest
     assert shown["normal"][middle][2] > 250  # towards the camera
@@ -597,12 +600,29 @@ def test_views_that_a_page_has_before_it_takes_ours_are_not_shown(
     client.socket.close()
 
 
-def test_a_page_gets_a_picture_at_once(viewer: wf.Viewer) -> None:
-    """It is there before the page has said how large it is."""
-    client = Client(viewer)
-    while b"BackgroundImageMessage" not in kinds(client.socket.recv(timeout=SOON)):
-        pass
-    client.socket.close()
+def test_a_page_gets_a_picture_when_it_has_said_how_large_it_is(viewer: wf.Viewer) -> None:
+    """It would stretch one of another shape over its window. One that was left has none for the next."""
+    viewer.wait_for_picture(SOON)
+    for width in (48, 100):
+        client = Client(viewer)
+        with pytest.raises(TimeoutError):
+            pictures(client, 0.5)
+        client._looked = True  # or it says another size first
+        client.look(image_width=width)
+        codes = pictures(client, SOON)
+        assert codes.shape[1] / codes.shape[0] == pytest.approx(width / 48, rel=0.05)
+        client.socket.close()
+        assert eventually(lambda: not viewer._page._server.get_clients())  # type: ignore[union-attr]
+
+
+def pictures(client: Client, timeout: float) -> np.ndarray:
+    """Return the next picture that a page is sent."""
+    end = time.monotonic() + timeout
+    while True:
+        window = kinds(client.socket.recv(timeout=max(0, end - time.monotonic())))
+        for message in msgspec.msgpack.decode(window)["messages"]:
+            if message["type"] == "BackgroundImageMessage" and message["rgb_data"]:
+                return iio.imread(message["rgb_data"])
 
 
 def kinds(data: bytes) -> bytes:
@@ -737,9 +757,9 @@ def test_what_is_no_message_changes_and_prints_nothing(
 @pytest.fixture
 def sent(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Page, list[tuple[float, ViewerFrame]]]]:
     """A page without a viewer, and what it sends, and when."""
-    page = Page("127.0.0.1", 0, "", viewpoint(), None, look=lambda view: None, connected=lambda: None)
+    page = Page("127.0.0.1", 0, "", viewpoint(), None, "none", look=lambda view: None, connected=lambda: None)
     frames: list[tuple[float, ViewerFrame]] = []
-    page._send = lambda codes, frame: frames.append((page._sent[1], frame))  # type: ignore[method-assign]
+    page._send = lambda codes, frame, image: frames.append((page._sent[1], frame))  # type: ignore[method-assign]
     yield page, frames
     page.close()
 
@@ -773,6 +793,87 @@ def test_other_pictures_do_not_wait(sent: Any, monkeypatch: pytest.MonkeyPatch) 
     page._show_as(exposure=1)
     assert eventually(lambda: len(frames) == 4)
     assert [each for _, each in frames] == [*shown, shown[-1]]
+
+
+def looks(seed: int = 0) -> wf.Image:
+    """Return a noisy picture with the layers of a page."""
+    settings: dict[str, Any] = {"seed": seed, "aovs": VIEWER_LAYERS, "progress": False}
+    return wf.render(BALL, 4, camera=CAMERA.resized((16, 12)), **settings)
+
+
+@pytest.fixture
+def slow_filter(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[list[wf.Image], threading.Semaphore]]:
+    """A denoiser that waits for `go` and doubles the picture; and what it was given."""
+    given: list[wf.Image] = []
+    go = threading.Semaphore(0)
+
+    def denoise(image: wf.Image) -> wf.Image:
+        given.append(image)
+        go.acquire()
+        return wf.Image(2 * image.rgb, image.spp, image.metadata, layers=image.layers)
+
+    monkeypatch.setattr(wf.Image, "denoise", denoise)
+    monkeypatch.setattr(denoiser_module, "is_quick", lambda: True)
+    monkeypatch.setattr(page_module, "is_quick", lambda: True)
+    yield given, go
+    go.release(1000)
+
+
+def test_denoising_is_never_in_the_way(sent: Any, slow_filter: Any) -> None:
+    """Controls and pictures go on; of several pictures the newest is next."""
+    (page, frames), (given, go) = sent, slow_filter
+    images = [looks(seed) for seed in range(4)]
+    page._show_as(choice="denoised")
+    for image in images[:3]:
+        page.show(ViewerFrame(image, CAMERA, final=False))
+        assert eventually(lambda image=image: frames and frames[-1][1].image is image)
+    assert given == [images[0]]
+    page._show_as(exposure=1, tone="agx")
+    assert eventually(lambda: (page._codes == shown_codes(images[2], "rgb", 1, "agx")).all())
+    go.release()
+    assert eventually(lambda: given == [images[0], images[2]])
+    brighter = wf.Image(2 * images[0].rgb, 4)
+    assert eventually(lambda: (page._codes == shown_codes(brighter, "rgb", 1, "agx")).all())
+    page.show(ViewerFrame(images[3], wf.Camera.look_at((0, 0, 6), (0, 0, 0), size=(64, 48)), final=True))
+    assert eventually(lambda: (page._codes == shown_codes(images[3], "rgb", 1, "agx")).all())
+
+
+def test_few_samples_are_shown_denoised_where_that_is_quick(sent: Any, slow_filter: Any) -> None:
+    """The picture as it is until then, with more samples, and at the end."""
+    (page, _), (given, go) = sent, slow_filter
+    go.release(1000)
+    few, more = looks(), wf.Image(looks().rgb, page_module.FEW, layers=looks().layers)
+    page.show(ViewerFrame(few, CAMERA, final=False))
+    assert eventually(lambda: page._codes is not None and (page._codes == (2 * few).to_uint8()).all())
+    for image, final in ((more, False), (few, True)):
+        page.show(ViewerFrame(image, CAMERA, final))
+        assert eventually(lambda image=image: (page._codes == image.to_uint8()).all())
+    assert given == [few]
+
+
+def test_a_slow_denoiser_is_a_process_that_another_view_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It gives what `denoise` does. Nothing is left of it."""
+    monkeypatch.setattr(denoiser_module, "is_quick", lambda: False)
+    done: list[tuple[ViewerFrame, wf.Image]] = []
+    denoiser = denoiser_module.Denoiser(lambda frame, image: done.append((frame, image)))
+    first, second = ViewerFrame(looks(), CAMERA, True), ViewerFrame(looks(1), CAMERA.resized((8, 8)), True)
+    denoiser.want(first)
+    assert eventually(lambda: denoiser._process is not None)
+    process = denoiser._process
+    denoiser.want(second)
+    assert eventually(lambda: done)
+    assert process is not None
+    assert process.returncode < 0
+    ((frame, image),) = done
+    assert frame is second
+    assert image.rgb.tobytes() == second.image.denoise().rgb.tobytes()
+    denoiser.want(first)
+    assert eventually(lambda: denoiser._process is not None)
+    process = denoiser._process
+    denoiser.close()
+    assert process is not None
+    assert process.poll() is not None
+    assert len(done) == 1
 
 
 def test_a_page_gets_a_picture_with_its_first_requests(viewer: wf.Viewer) -> None:
@@ -857,6 +958,8 @@ def test_a_viewer_refuses_what_it_cannot_do() -> None:
         ({"samples": range(3)}, "view: samples is"),
         ({"port": 70000}, "port is 70000; it must be a whole number from 0 to 65535"),
         ({"spp": 0}, "spp is 0"),
+        ({"token": ""}, "token is ''"),
+        ({"tone": "loud"}, "tone is 'loud'"),
         ({"host": "no such host."}, "cannot listen at host 'no such host.'"),
         ({"host": "203.0.113.1"}, "cannot listen at host '203.0.113.1'"),
     ]
@@ -865,6 +968,16 @@ def test_a_viewer_refuses_what_it_cannot_do() -> None:
         with pytest.raises(wf.SceneError, match=text):
             wf.view(BALL, **{"open_browser": False, "block": False, "size": (16, 16), **settings})  # type: ignore[arg-type]
     assert set(threading.enumerate()) <= before
+
+
+def test_a_viewer_takes_the_samples_that_render_takes(capsys: pytest.CaptureFixture[str]) -> None:
+    """As the help of the command says."""
+    with wf.view(BALL, size=(16, 16), port=0, open_browser=False, block=False) as viewer:
+        spp = viewer.wait_for_picture(SOON).spp
+    assert spp == wf.render(BALL, size=(16, 16), progress=False).spp
+    with pytest.raises(SystemExit):
+        main(["view", "--help"])
+    assert f"samples per pixel (default: {spp})" in capsys.readouterr().out
 
 
 def test_a_viewer_that_is_closed_says_so() -> None:

@@ -190,7 +190,7 @@ def test_controls_change_the_lens_and_what_is_shown(page: Any, viewer: wf.Viewer
     page.wait_for_timeout(500)
     dark = shot(page)
     assert dark.mean() < 0.8 * bright.mean()
-    page.get_by_role("combobox").last.click()
+    page.get_by_role("combobox").nth(-2).click()  # above that of the tone
     page.get_by_role("option", name="normal").click()
     assert eventually(lambda: np.abs(shot(page) - dark).mean() > 10)
     assert viewer.image is picture
@@ -328,3 +328,32 @@ def test_the_first_frame_and_a_restart_come_soon(browser: Any, capsys: pytest.Ca
         print(f"restarts after {each} s")
     assert fetched < painted < begin + FIRST_FRAME
     assert np.median(restarts) < RESTART
+
+
+def test_the_panel_of_a_phone_is_folded(viewer: wf.Viewer, browser: Any) -> None:
+    """It would hide half of the picture; a tap on its title unfolds it. That of a large page is open."""
+    phone = browser.new_context(viewport={"width": 390, "height": 780}, is_mobile=True, has_touch=True)
+    page = phone.new_page()
+    page.goto(viewer.url)
+    page.get_by_text("spp").wait_for(state="hidden", timeout=1000 * SOON)
+    page.get_by_text("spp").wait_for(state="attached", timeout=1000 * SOON)
+    assert eventually(lambda: page.get_by_text("wavefront").last.bounding_box()["y"] > 700)
+    page.get_by_text("wavefront").last.tap()
+    page.get_by_text("spp").wait_for(timeout=1000 * SOON)
+
+
+def test_the_first_picture_that_scripts_show_is_not_stretched(browser: Any) -> None:
+    """A ball is round on a wide page, from the first picture of its canvas on."""
+    ball = wf.Scene([wf.Sphere((0, 0, 0), 1, material=wf.Diffuse((1, 0, 0)))], wf.Environment(1))
+    camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), size=(128, 128))
+    shapes = []
+    with wf.view(ball, 64, camera=camera, port=0, open_browser=False, block=False) as viewer:
+        page = browser.new_page(viewport={"width": 1200, "height": 400})
+        page.goto(viewer.url)
+        for _ in range(20):
+            picture = iio.imread(io.BytesIO(page.screenshot()))[:, 300:860, :3].astype(float)
+            red = picture[..., 0] > 1.5 * picture[..., 1] + 10
+            if red.any():
+                shapes.append((red.any(0).sum(), red.any(1).sum()))
+    assert len(shapes) > 5
+    assert all(width == pytest.approx(height, rel=0.1) for width, height in shapes), shapes

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from ..codecs.tone import TONES
 from ..viewer import view
 from .command import add_command, add_scene
 from .options import add_settings, read_scene, setting_values
@@ -32,6 +33,7 @@ def add_view_command(commands: Any) -> None:
         help="what the page's address has as ?token=; others see it here (default: drawn)",
     )
     token.add_argument("--no-token", dest="token", action="store_false", help="let in all who can connect")
+    command.add_argument("--tone", choices=TONES, default="none", help="tone curve that the page begins with")
     command.add_argument("--no-browser", action="store_true", help="do not open the page")
     add_settings(command)
     command.set_defaults(run=_view)
@@ -43,6 +45,7 @@ def _view(options: argparse.Namespace) -> int:
         host=options.host,
         port=options.port,
         token=options.token,
+        tone=options.tone,
         open_browser=not options.no_browser,
         block=True,
         size=options.size,

@@ -45,6 +45,16 @@ HEAD = """<head>
         const pixels = small.getContext("2d", { willReadFrequently: true });
         pixels.imageSmoothingQuality = "high";
         const isColor = (code, k) => k % 4 < 3 && code;
+        const fold = () => {  // the panel of a phone, which hides half of the picture, by its handle
+          const handle = [...document.querySelectorAll("#root div")].find(
+            div => div.style.cursor === "pointer" && div.textContent.trim() === "wavefront");
+          const filled = handle && handle.parentElement.textContent.includes("save picture");
+          if (!filled) return;
+          clearInterval(folding);
+          if (matchMedia("(max-width: 36em)").matches) handle.click();
+        };
+        const folding = setInterval(fold, 200);
+        setTimeout(() => clearInterval(folding), 30000);  // where the panel is another one
         let end = Infinity;  // a picture may be black
         const look = () => {
           const canvas = document.querySelector("canvas[data-engine]");

@@ -15,7 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..codecs import png_jpeg
+from ..codecs.tone import TONES
 from ..errors import SceneError, one_of
+from ..image import Image
+from .denoiser import Denoiser, is_quick
 from .front import Front, asked_first
 from .guard import Guard, take_values
 from .refiner import ViewerFrame
@@ -28,6 +31,8 @@ PAUSE = 0.1  # seconds between pictures that refine, so that the browser has tim
 EVERYWHERE = "0.0.0.0", "::", ""  # hosts that are reached from other machines, too
 STOPS = 6.0  # exposure, up and down
 STEPS = 200  # of a slider
+FEW = 16  # samples per pixel; with fewer, rgb is shown denoised where that is quick
+SAME_SHAPE = 0.03  # relative difference of the aspects of two pictures that are shown as the same
 COPY = (
     "const c=this.dataset.code;(navigator.clipboard?navigator.clipboard.writeText(c):Promise.reject())"
     ".then(()=>{this.textContent='copied'},()=>prompt('Copy the camera:',c))"
@@ -52,6 +57,8 @@ class Page:
         The first view.
     most_spp
         Samples per pixel of the last picture of a view; None where they are not known before.
+    tone
+        The first tone curve.
     look
         Called with the viewpoint when it has changed; it must return at once.
     connected
@@ -70,15 +77,18 @@ class Page:
         token: str,
         viewpoint: Viewpoint,
         most_spp: int | None,
+        tone: str,
         look: Callable[[Viewpoint], object],
         connected: Callable[[], object],
     ) -> None:
         self._look, self._connected, self._most_spp = look, connected, most_spp
         self._lock = threading.Condition()
         self._viewpoint = viewpoint
-        self._exposure, self._choice = 0.0, "rgb"
+        self._exposure, self._choice, self._tone = 0.0, "rgb", tone
         self._frame: ViewerFrame | None = None
+        self._denoised: tuple[ViewerFrame, Image] | None = None  # the newest one
         self._fresh = self._closed = False
+        self._sized = False  # whether a page has said how large it is
         self._codes: NDArray[np.uint8] | None = None  # of the picture that is shown
         self._arrived: set[int] = set()  # pages that have taken the view
         self._sent: tuple[ViewerFrame | None, float] = None, 0.0  # the newest one that was sent, and when
@@ -91,6 +101,8 @@ class Page:
         self._add_camera()
         self._add_controls()
         self._server.on_client_connect(self._greet)
+        self._server.on_client_disconnect(self._forget)
+        self._denoiser = Denoiser(self._take_denoised)
         self._presenter = threading.Thread(target=self._present, name="wavefront-page", daemon=True)
         self._presenter.start()
 
@@ -117,6 +129,7 @@ class Page:
             self._closed = True
             self._refresh()
         self._presenter.join()
+        self._denoiser.close()
         with _silence():
             self._server.stop()
         self._server._thread_executor.shutdown(wait=True)
@@ -145,6 +158,8 @@ class Page:
         self._state = gui.add_html(_line("…"))  # markdown would be compiled for each picture
         layer = gui.add_dropdown("layer", tuple(CHOICES), initial_value="rgb")
         layer.on_update(self._on(lambda event: self._show_as(choice=event.target.value)))
+        tone = gui.add_dropdown("tone", tuple(TONES), initial_value=self._tone)
+        tone.on_update(self._on(lambda event: self._show_as(tone=event.target.value)))
         exposure = gui.add_slider("exposure", -STOPS, STOPS, 0.1, 0.0, hint="stops")
         exposure.on_update(self._on(lambda event: self._show_as(exposure=event.target.value)))
         hints = {"fov": "degrees", "focus": "distance, scene units", "aperture": "diameter, scene units"}
@@ -191,8 +206,18 @@ class Page:
         view = view.moved(camera.position, camera.look_at, camera.up_direction)
         self._change(view.resized(camera.image_width, camera.image_height))
 
+    async def _forget(self, client: Any) -> None:
+        """Keep nothing for the next page when the last one is left: it may have another shape."""
+        if not self._server.get_clients() and not self._closed:
+            with self._lock:
+                self._sized = False
+            self._server.scene.set_background_image(None)
+
     def _resize(self, camera: Any) -> None:
         self._change(self.viewpoint.resized(camera.image_width, camera.image_height))
+        with self._lock:
+            self._sized = True
+            self._refresh()
 
     def _set_lens(self, name: str, event: Any) -> None:
         self._change(self.viewpoint.with_lens(**{name: event.target.value}))
@@ -207,14 +232,17 @@ class Page:
             self._viewpoint = viewpoint
         self._look(viewpoint)
 
-    def _show_as(self, choice: str | None = None, exposure: Any = None) -> None:
+    def _show_as(self, choice: str | None = None, exposure: Any = None, tone: str | None = None) -> None:
         if choice is not None:
             one_of("layer", choice, CHOICES)
+        if tone is not None:
+            one_of("tone", tone, TONES)
         if exposure is not None:
             exposure = within("exposure", exposure, -STOPS, STOPS)
         with self._lock:
             self._choice = self._choice if choice is None else choice
             self._exposure = self._exposure if exposure is None else exposure
+            self._tone = self._tone if tone is None else tone
             self._refresh()
 
     def _save(self, event: Any) -> None:
@@ -246,18 +274,39 @@ class Page:
                 if self._closed:
                     return
                 self._fresh = False
-                frame, choice, exposure = self._frame, self._choice, self._exposure
+                frame, choice, denoised = self._frame, self._choice, self._denoised
+                exposure, tone = self._exposure, self._tone
             if frame is None:
                 continue
+            wants = choice == "denoised" or (
+                choice == "rgb" and is_quick() and frame.image.spp < FEW and not frame.final
+            )
+            self._denoiser.want(frame if wants else None)
+            of_view = wants and denoised is not None and denoised[0].camera is frame.camera
+            image = denoised[1] if of_view and denoised is not None else frame.image
             try:
-                codes = shown_codes(frame.image, choice, exposure)
+                codes = shown_codes(image, choice, exposure, tone)
             except SceneError as error:
                 self.say(str(error))
                 continue
             with self._lock:
                 self._codes = codes
                 self._sent = frame, time.monotonic()
-            self._send(codes, frame)
+            self._send(codes, frame, image)
+
+    def _take_denoised(self, frame: ViewerFrame, image: Image) -> None:
+        """Show a picture that was denoised, if it is still wanted."""
+        with self._lock:
+            self._denoised = frame, image
+            self._refresh()
+
+    def _about(self, frame: ViewerFrame, image: Image) -> str:
+        """Return what the line says of denoising."""
+        if image is not frame.image:
+            return f" · denoised at {image.spp} spp" if image.spp < frame.image.spp else " · denoised"
+        if self._choice != "denoised":
+            return ""
+        return " · denoising" if is_quick() else " · denoising, slowly: pip install pyoidn makes it quick"
 
     def _urgent(self) -> bool:
         """Return whether what is to be shown may not wait: all but a better picture of the same view."""
@@ -265,17 +314,28 @@ class Page:
         better = last is not None and frame is not None and frame is not last and frame.camera is last.camera
         return self._closed or not better or (frame is not None and frame.final)
 
-    def _send(self, codes: NDArray[np.uint8], frame: ViewerFrame) -> None:
-        kind = {"format": "png"} if frame.final else {"format": "jpeg", "jpeg_quality": QUALITY}
+    def _send(self, codes: NDArray[np.uint8], frame: ViewerFrame, image: Image) -> None:
+        """Send a picture, unless the page would stretch it, and the line about it."""
+        if not self._sized or not _same_shape(frame.camera.film, self.viewpoint.size):
+            return
+        last = frame.final and (image is frame.image or image.spp == frame.image.spp)
+        kind = {"format": "png"} if last else {"format": "jpeg", "jpeg_quality": QUALITY}
         self._server.scene.set_background_image(np.ascontiguousarray(codes), **kind)
         height, width = codes.shape[:2]
         of = "" if self._most_spp is None else f" of {self._most_spp}"
         noise = frame.image.metadata["noise"]
         error = f" · error {noise:.2%}" if np.isfinite(noise) else ""
-        self._state.content = _line(f"{width} × {height} · {frame.image.spp}{of} spp{error}")
+        self._state.content = _line(
+            f"{width} × {height} · {frame.image.spp}{of} spp{error}{self._about(frame, image)}"
+        )
         if (width, height) == frame.camera.film:  # not with the first picture of a view, which is in a hurry
             self._copy.content = self._copy_button()
         self._server.flush()  # viser would wait for more messages
+
+
+def _same_shape(size: tuple[int, int], other: tuple[int, int]) -> bool:
+    """Return whether two pictures have about the same aspect; small ones are rounded."""
+    return abs(size[0] * other[1] / (size[1] * other[0]) - 1) < SAME_SHAPE + 1 / min(*size, *other)
 
 
 def _is_at(camera: Any, view: Viewpoint) -> bool:

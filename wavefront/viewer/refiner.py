@@ -11,8 +11,7 @@ from ..image import Image
 from ..record import record
 from ..session import Session
 
-FIRST_DIVISOR = 4  # of the width and height of the first picture of a view
-MOST = 8  # as a divisor, so that there is something to see
+FIRST_DIVISOR = 4  # of the width and height of the first picture of a view; more would leave little to see
 TOO_LONG, SHORT = 0.06, 0.015  # seconds for the first picture of a view; the next one is smaller, or larger
 LEAST_SIDE = 16  # pixels of the first picture of a view
 PATIENCE = 2.0  # seconds that the first view waits in lower resolution for somebody to look at it
@@ -143,7 +142,7 @@ class Refiner:
         self._show(ViewerFrame(image, camera, final=False))
         seconds = time.perf_counter() - begin
         if seconds > TOO_LONG:
-            self._divisor = min(MOST, 2 * self._divisor)
+            self._divisor = min(FIRST_DIVISOR, 2 * self._divisor)
         elif seconds < SHORT:
             self._divisor = max(1, self._divisor // 2)
 

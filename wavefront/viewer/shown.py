@@ -22,23 +22,24 @@ CHOICES = {  # what the page lists, and the layers that it needs
     "ids": ("shape_id",),
     "denoised": GUIDES,
 }
+RADIANCE = ("rgb", "denoised")
 VIEWER_LAYERS = tuple(name for names in CHOICES.values() for name in names)
 
 
-def shown_codes(image: Image, choice: str, exposure: float) -> NDArray[np.uint8]:
+def shown_codes(image: Image, choice: str, exposure: float, tone: str = "none") -> NDArray[np.uint8]:
     """Return what a page shows of a picture, (H, W, 3).
 
     Parameters
     ----------
     image
-        A picture with all `VIEWER_LAYERS`.
+        A picture with all `VIEWER_LAYERS`; to be shown as "denoised" it must have been denoised.
     choice
         A key of `CHOICES`.
-    exposure
-        Stops, of radiance.
+    exposure, tone
+        Stops and tone curve, of radiance.
     """
-    if choice in ("rgb", "denoised"):
-        return _opaque((image.denoise() if choice == "denoised" else image).to_uint8(exposure=exposure))
+    if choice in RADIANCE:
+        return _opaque(image.to_uint8(exposure=exposure, tone=tone))
     (name,) = CHOICES[choice]
     values = image.layers[name]
     if choice == "depth":

@@ -11,20 +11,21 @@ from types import TracebackType
 from typing import Any, Self
 
 from ..camera import Camera
-from ..errors import RenderError, SceneError
+from ..codecs.tone import TONES
+from ..errors import RenderError, SceneError, one_of
 from ..image import Image
 from ..notebook import in_kernel
 from ..renderable import as_scene, choose_camera
 from ..scene import Scene
 from ..scheduling.executors import choose_executor, needs_pickling, worker_count
 from ..session import Session
+from ..settings import DEFAULT_SPP
 from .guard import token_of
 from .priority import giving_way
 from .refiner import FIRST_DIVISOR, Refiner, ViewerFrame
 from .shown import VIEWER_LAYERS
 from .viewpoint import Viewpoint
 
-SPP = 256
 # Paths: a movement waits for less of a smaller wave, and one of half the size costs 10 % more.
 WAVE_SIZE = 1 << 15
 POLL = 0.5  # seconds
@@ -47,6 +48,8 @@ class Viewer:
         Where the page listens.
     token
         What the address of the page must have; "" for none.
+    tone
+        The first tone curve.
     spp
         Samples per pixel of the last picture of a view; None where they are not known before.
 
@@ -66,7 +69,14 @@ class Viewer:
     """
 
     def __init__(
-        self, session: Session, viewpoint: Viewpoint, host: str, port: int, token: str, spp: int | None
+        self,
+        session: Session,
+        viewpoint: Viewpoint,
+        host: str,
+        port: int,
+        token: str,
+        tone: str,
+        spp: int | None,
     ) -> None:
         self._wanted: Camera | None = None
         self._latest: ViewerFrame | None = None
@@ -80,7 +90,7 @@ class Viewer:
             self._look(viewpoint)
             from .page import Page  # while workers trace, as it takes long to import viser
 
-            self._page = Page(host, port, token, viewpoint, spp, self._look, self._refiner.refine)
+            self._page = Page(host, port, token, viewpoint, spp, tone, self._look, self._refiner.refine)
         except BaseException:
             self._refiner.close()
             raise
@@ -191,6 +201,7 @@ def view(
     host: str = "127.0.0.1",
     port: int = 8080,
     token: str | bool = True,
+    tone: str = "none",
     open_browser: bool = True,
     block: bool | None = None,
     **settings: Any,
@@ -204,8 +215,7 @@ def view(
     scene
         As for `render`.
     spp
-        Samples per pixel of the last picture of a view; by default 256, or as for `render` where `noise`
-        or `seconds` are given.
+        Samples per pixel of the last picture of a view; by default as for `render`.
     host
         The address to listen at. By default only this machine can connect; "0.0.0.0" lets all machines of
         the network in that know the token.
@@ -214,6 +224,8 @@ def view(
     token
         What the address of the page has as `?token=`; requests without it are refused. True draws a new one,
         a text is taken as it is, and False lets in all who can connect.
+    tone
+        The tone curve that the page begins with, as for `Image.save`; the page can change it.
     open_browser
         Whether to open the page. In a notebook it is shown in a frame below the cell in any case.
     block
@@ -248,10 +260,11 @@ def view(
     if not isinstance(port, int) or not 0 <= port < 2**16:
         raise SceneError(f"port is {port!r}; it must be a whole number from 0 to 65535")
     if spp is None and settings.get("noise") is None and settings.get("seconds") is None:
-        spp = SPP
+        spp = DEFAULT_SPP
     token = token_of(token)
+    one_of("tone", tone, TONES)
     subject = as_scene(scene, settings.pop("material", None), smooth=settings.pop("smooth", "auto"))
-    viewer = _opened(subject, spp, host, port, token, settings)
+    viewer = _opened(subject, spp, host, port, token, tone, settings)
     in_notebook = in_kernel()
     if in_notebook:
         _show_frame(viewer.url)
@@ -265,7 +278,7 @@ def view(
 
 
 def _opened(
-    scene: Scene, spp: int | None, host: str, port: int, token: str, settings: dict[str, Any]
+    scene: Scene, spp: int | None, host: str, port: int, token: str, tone: str, settings: dict[str, Any]
 ) -> Viewer:
     """Return a viewer of a scene with settings of `Session`."""
     up = scene.vertical(settings.get("up", "auto"))
@@ -284,10 +297,10 @@ def _opened(
     if settings.get("wave_size") is None:
         settings["wave_size"] = WAVE_SIZE
     if settings.get("executor") is None:
-        settings["executor"] = _executor(settings.get("workers"), (spp or SPP) * viewpoint.pixels)
+        settings["executor"] = _executor(settings.get("workers"), (spp or DEFAULT_SPP) * viewpoint.pixels)
     with giving_way():
         session = Session(scene, spp, **settings)
-    return Viewer(session, viewpoint, host, port, token, spp)
+    return Viewer(session, viewpoint, host, port, token, tone, spp)
 
 
 def _executor(workers: int | None, paths: int) -> str | None:
