@@ -30,7 +30,7 @@ from scenes import cornell_box
 
 import wavefront as wf
 from wavefront.cli import main, view_command
-from wavefront.viewer import denoiser as denoiser_module
+from wavefront.viewer import background_denoiser as denoiser_module
 from wavefront.viewer import page as page_module
 from wavefront.viewer import refiner as module
 from wavefront.viewer.front import Front, asked_first
@@ -855,7 +855,10 @@ def test_a_slow_denoiser_is_a_process_that_another_view_ends(monkeypatch: pytest
     """It gives what `denoise` does. Nothing is left of it."""
     monkeypatch.setattr(denoiser_module, "is_quick", lambda: False)
     done: list[tuple[ViewerFrame, wf.Image]] = []
-    denoiser = denoiser_module.Denoiser(lambda frame, image: done.append((frame, image)))
+    errors: list[Exception] = []
+    denoiser = denoiser_module.BackgroundDenoiser(
+        lambda frame, image: done.append((frame, image)), errors.append
+    )
     first, second = ViewerFrame(looks(), CAMERA, True), ViewerFrame(looks(1), CAMERA.resized((8, 8)), True)
     denoiser.want(first)
     assert eventually(lambda: denoiser._process is not None)
@@ -867,7 +870,12 @@ def test_a_slow_denoiser_is_a_process_that_another_view_ends(monkeypatch: pytest
     ((frame, image),) = done
     assert frame is second
     assert image.rgb.tobytes() == second.image.denoise().rgb.tobytes()
+    monkeypatch.setattr(denoiser_module, "COMMAND", "raise OSError('no room')")
     denoiser.want(first)
+    assert eventually(lambda: errors)
+    assert str(errors[0]) == "OSError: no room"
+    monkeypatch.setattr(denoiser_module, "COMMAND", "import time; time.sleep(1000)")
+    denoiser.want(second)
     assert eventually(lambda: denoiser._process is not None)
     process = denoiser._process
     denoiser.close()

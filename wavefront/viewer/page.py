@@ -18,7 +18,7 @@ from ..codecs import png_jpeg
 from ..codecs.tone import TONES
 from ..errors import SceneError, one_of
 from ..image import Image
-from .denoiser import Denoiser, is_quick
+from .background_denoiser import BackgroundDenoiser, is_quick
 from .front import Front, asked_first
 from .guard import Guard, take_values
 from .refiner import ViewerFrame
@@ -102,7 +102,9 @@ class Page:
         self._add_controls()
         self._server.on_client_connect(self._greet)
         self._server.on_client_disconnect(self._forget)
-        self._denoiser = Denoiser(self._take_denoised)
+        self._denoiser = BackgroundDenoiser(
+            self._take_denoised, lambda error: self.say(f"not denoised: {error}")
+        )
         self._presenter = threading.Thread(target=self._present, name="wavefront-page", daemon=True)
         self._presenter.start()
 

@@ -12,11 +12,12 @@ from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 
+from ..errors import RenderError
 from ..image import Image
 from .priority import NICENESS
 from .refiner import ViewerFrame
 
-COMMAND = "from wavefront.viewer.denoiser import denoise_input; denoise_input()"
+COMMAND = "from wavefront.viewer.background_denoiser import denoise_input; denoise_input()"
 
 
 def is_quick() -> bool:
@@ -24,7 +25,7 @@ def is_quick() -> bool:
     return find_spec("pyoidn") is not None
 
 
-class Denoiser:
+class BackgroundDenoiser:
     """Denoises the newest picture that is wanted, one at a time.
 
     A picture of the same view waits until the one before is done. One of another view ends it.
@@ -33,10 +34,14 @@ class Denoiser:
     ----------
     done
         Called with each picture and what became of it, in the denoiser's thread.
+    fail
+        Called with an error, in the same thread; the next picture may do.
     """
 
-    def __init__(self, done: Callable[[ViewerFrame, Image], object]) -> None:
-        self._done = done
+    def __init__(
+        self, done: Callable[[ViewerFrame, Image], object], fail: Callable[[Exception], object]
+    ) -> None:
+        self._done, self._fail = done, fail
         self._lock = threading.Condition()
         self._wanted: ViewerFrame | None = None
         self._current: ViewerFrame | None = None
@@ -75,11 +80,14 @@ class Denoiser:
                     return
                 self._current = last = self._wanted
             assert last is not None
-            image = last.image.denoise() if is_quick() else self._denoised_elsewhere(last.image)
+            try:
+                image = last.image.denoise() if is_quick() else self._denoised_elsewhere(last.image)
+                if image is not None:
+                    self._done(last, image)
+            except Exception as error:  # of a library: the pictures go on as they are
+                self._fail(error)
             with self._lock:
                 self._current = None
-            if image is not None:
-                self._done(last, image)
 
     def _denoised_elsewhere(self, image: Image) -> Image | None:
         """Return a picture denoised by a process; None where that was ended."""
@@ -92,13 +100,17 @@ class Denoiser:
                 [sys.executable, "-c", COMMAND],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
                 env={**os.environ, "PYTHONPATH": path},
             )
-        output, _ = process.communicate(pickle.dumps(image))
+        output, errors = process.communicate(pickle.dumps(image))
         with self._lock:
             self._process = None
-        return pickle.loads(output) if process.returncode == 0 else None
+        if process.returncode < 0:  # it was ended
+            return None
+        if process.returncode:
+            raise RenderError(errors.decode(errors="replace").strip().rpartition("\n")[2])
+        return pickle.loads(output)
 
 
 def denoise_input() -> None:
