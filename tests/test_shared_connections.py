@@ -4,6 +4,8 @@ The points lie at any distance of each other, in place of those of neighboring p
 hardly differs and cancels.
 """
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,8 +16,20 @@ from wavefront.accel import make_accelerator
 from wavefront.compile.scene import compile_scene
 from wavefront.guiding.cells import GuideCells
 from wavefront.guiding.guide_table import GuideTable
-from wavefront.stages.reuse import FirstPoints, SharedPoints, _arriving, attenuate, connect
+from wavefront.pixel_tiles import MEMBERS as MEMBERS_OF_TILES
+from wavefront.pixel_tiles import WaveTiles
+from wavefront.stages import reuse
+from wavefront.stages.reuse import (
+    FirstPoints,
+    SharedPoints,
+    _arriving,
+    add_shared,
+    as_shared,
+    attenuate,
+    connect,
+)
 from wavefront.stages.shade import Guidance
+from wavefront.state import Paths
 
 f4 = np.float32
 some = settings(max_examples=settings.default.max_examples * 3 // 10)
@@ -181,3 +195,59 @@ def test_nothing_comes_from_behind_or_from_the_point_itself() -> None:
     found = connect(OPEN, first, points.take(np.array([0, 0])), np.ones(2, bool), 0)
     assert found.geometry[0, 0] == 0
     assert np.isfinite(found.geometry).all()
+
+
+def test_paths_begin_anew_at_shared_points() -> None:
+    """With a throughput of 1; roulette goes by the one that they had."""
+    n = 4
+    had = np.random.default_rng(0).uniform(0.1, 1, (3, n)).astype(f4)
+    scale = np.arange(1, n + 1, dtype=f4)
+    paths = Paths(
+        slot=np.array([7, 3, 5, 1]),
+        pixel=np.arange(n, dtype=np.uint32),
+        sample=np.arange(n, dtype=np.uint32),
+        origin=np.zeros((3, n), f4),
+        direction=np.ones((3, n), f4),
+        exclude_prim=np.zeros(n, np.intp),
+        throughput=had,
+        pdf=np.ones(n, f4),
+        specular=np.zeros(n, bool),
+        roulette_scale=scale,
+    )
+    anew = as_shared(paths)
+    assert (anew.throughput == 1).all()
+    assert anew.slot.tolist() == [0, 1, 2, 3]
+    np.testing.assert_allclose(anew.roulette_scale, scale * had.max(0))
+
+
+def test_what_nobody_reaches_stays_with_its_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The others receive light times the throughput of their first points."""
+    rng = np.random.default_rng(1)
+    lit = SimpleNamespace(groups=[(slice(0, 2), wf.Diffuse(0.5))], surface=range(2))
+    lit.albedo = lambda: np.ones((3, 2), f4)
+    paths = SimpleNamespace(slot=np.array([1, 0]), throughput=rng.uniform(0.2, 1, (3, 2)).astype(f4))
+    points = shared_points(rng, 1, OPEN.center).take(np.array([0, 1]))
+    points.slot[:] = 0, 1
+    points.throughput = rng.uniform(0.2, 1, (3, 2)).astype(f4)
+    light = rng.uniform(0.2, 1, (3, 2)).astype(f4)
+    tiles = WaveTiles.of(np.array([0, 0], np.uint32), np.array([0, 1], np.uint32), 100)
+    arrived = rng.uniform(0.2, 1, (3, MEMBERS_OF_TILES, tiles.count)).astype(f4)
+
+    def first_of(scene, lit, albedo, lane_in):
+        return SimpleNamespace(present=lane_in >= 0)
+
+    def arriving(scene, first, points, light, numbers):
+        return arrived[:, :, : first.present.shape[1]], [np.array([1])]
+
+    monkeypatch.setattr(reuse.FirstPoints, "of", first_of)
+    monkeypatch.setattr(reuse, "_arriving", arriving)
+    L = np.ones((3, 2), f4)
+    shade = SimpleNamespace(lit=lambda: lit)
+    add_shared(OPEN, L, paths, shade, points, light, tiles, 1)
+    due = np.ones((3, 2))
+    due[:, 1] += points.throughput[:, 1] * light[:, 1]
+    grid = tiles.grid(paths.slot)
+    for member, tile in zip(*np.nonzero(grid >= 0), strict=True):
+        lane = grid[member, tile]
+        due[:, paths.slot[lane]] += paths.throughput[:, lane] * arrived[:, member, tile]
+    np.testing.assert_allclose(L, due, rtol=1e-6)
