@@ -72,6 +72,15 @@ def test_a_scene_fills_85_percent_of_the_picture(name: str, size: tuple[int, int
         assert (found[0] + found[-1] + 1) / side == pytest.approx(1, abs=0.06)
 
 
+def test_a_ball_fills_as_much_from_near() -> None:
+    """Where the picture is wide, its outline is no longer a circle; lines of sight touch the ball."""
+    scene = wf.Scene(wf.Sphere((2, 1, 0), 0.5))
+    for fov in (20, 100):
+        there = covered(scene, scene.framing_camera(fov, (200, 200)))
+        for axis in (0, 1):
+            assert np.flatnonzero(there.any(axis)).size / 200 == pytest.approx(0.85, abs=0.011)
+
+
 @given(
     sides=st.tuples(*[st.floats(1e-3, 1e3)] * 3),
     direction=st.sampled_from(sorted(VIEWS)) | st.tuples(*[st.floats(-1, 1)] * 2, st.just(0.5)),
