@@ -353,7 +353,7 @@ def test_wrong_files(tmp_path, capsys, no_render, command):
         (["render", "a.obj", "--ssp", "4"], "; did you mean --spp?"),
         ([__file__], f"; to render a file: wavefront render {__file__}; see wavefront --help"),
         (["render", "a.obj", "--most-bounces=3"], "; did you mean --max-bounces?"),
-        (["turntable", "a.obj", "--frame", "4", "--tonemap", "aces"], "; did you mean --tone?"),
+        (["turntable", "a.obj", "--frames", "4", "--tonemap", "aces"], "; did you mean --tone?"),
         (["render", "a.obj", "--sampler", "sobel"], "; did you mean 'sobol'?"),
         (["info", "a.obj", "b.obj"], "unrecognized arguments: b.obj; see wavefront info --help"),
     ],
