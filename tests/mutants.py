@@ -53,12 +53,12 @@ TESTS: dict[str, tuple[str, ...]] = {
     ),
     "wavefront/guiding/training.py": ("tests/test_guiding.py",),
     "wavefront/geometric_layers.py": ("tests/test_geometric_layers.py", "tests/test_sampled_layers.py"),
-    "wavefront/sample_recorder.py": ("tests/test_sampled_layers.py", "tests/test_denoising.py"),
-    "wavefront/light_sums.py": (
-        "tests/test_light_paths.py",
-        "tests/test_merge.py",
-        "tests/test_checkpoint.py",
+    "wavefront/sample_recorder.py": (
+        "tests/test_clamp.py",
+        "tests/test_sampled_layers.py",
+        "tests/test_denoising.py",
     ),
+    "wavefront/light_sums.py": ("tests/test_caustics.py",),
 }
 FORMULAS = tuple(TESTS)
 # files with densities

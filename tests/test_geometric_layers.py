@@ -307,7 +307,8 @@ def test_names_come_from_nodes_and_materials_of_files(tmp_path) -> None:
         both.graph.update(name, matrix=translation_matrix((x, 0, 0)), geometry="crate")
     both.export(tmp_path / "crates.glb")
     for scene in (wf.load(tmp_path / "crates.glb"), both):
-        image = wf.render(scene, spp=1, size=(40, 20), aovs=("shape_id", "instance_id", "material_id"))
+        ids = ("shape_id", "instance_id", "material_id")
+            image = wf.render(scene, spp=1, size=(40, 20), ground=False, aovs=ids)
         assert sorted(image.names["shape"].values()) == ["left crate", "right crate"]
         assert image.names["instance"] == image.names["shape"]
         assert image.names["material"] == {0: "red paint"}

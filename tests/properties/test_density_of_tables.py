@@ -188,3 +188,9 @@ def check_light_sampler(choice, place, u: float, lights: int) -> None:
     check_choice(
         lambda v: choice.sample(at(v.size), v), lambda light: choice.pmf(light, at(light.size)), u, lights
     )
+
+
+@some
+@given(place=places, u=inner)
+def test_the_only_light_is_always_chosen(place, u: float) -> None:
+    check_light_sampler(samplers.SingleLightSampler(), place, u, 1)
