@@ -308,7 +308,7 @@ def test_names_come_from_nodes_and_materials_of_files(tmp_path) -> None:
     both.export(tmp_path / "crates.glb")
     for scene in (wf.load(tmp_path / "crates.glb"), both):
         ids = ("shape_id", "instance_id", "material_id")
-            image = wf.render(scene, spp=1, size=(40, 20), ground=False, aovs=ids)
+        image = wf.render(scene, spp=1, size=(40, 20), ground=False, aovs=ids)
         assert sorted(image.names["shape"].values()) == ["left crate", "right crate"]
         assert image.names["instance"] == image.names["shape"]
         assert image.names["material"] == {0: "red paint"}
@@ -317,7 +317,7 @@ def test_names_come_from_nodes_and_materials_of_files(tmp_path) -> None:
     lines = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl blue tin\nf 1 2 3\n"
     (tmp_path / "a.obj").write_text(lines)
     (tmp_path / "a.mtl").write_text("newmtl blue tin\nKd 0 0 1\n")
-    image = wf.render(tmp_path / "a.obj", spp=1, size=(8, 8), aovs="material_id")
+    image = wf.render(tmp_path / "a.obj", spp=1, size=(8, 8), ground=False, aovs="material_id")
     assert image.names["material"] == {0: "blue tin"}
 
 

@@ -485,6 +485,32 @@ def test_samples_that_are_not_finite_count_in_no_layer() -> None:
     assert image.denoising_normal[..., 2] == pytest.approx(1)
     assert np.isfinite(image.direct).all()
     assert ulps(image.rgb, image.direct, image.indirect) <= 1
+    assert np.abs(image.indirect).max() < 1e-6  # nothing but direct light: they count as 0 there
+
+
+def test_two_lights_of_the_sky_have_their_own_groups() -> None:
+    """A floor below a sky that is the same all around, and below a wide sun."""
+    lights = [
+        wf.Environment((1, 0.5, 0.2), group="sky"),
+        wf.DirectionalLight((0, -1, 0), 3, angle=30, group="sun"),
+    ]
+    floor = wf.Rectangle((-9, 0, -9), (0, 0, 18), (18, 0, 0), material=wf.Diffuse(0.5))
+    camera = wf.Camera.look_at((0, 5, 0.1), (0, 0, 0), fov=20, size=(24, 24))
+    image = render(wf.Scene([floor], lights, camera), 64, aovs="light_groups")
+    found = {name: layer.mean((0, 1)) for name, layer in image.light_groups.items()}
+    assert found["sky"] == pytest.approx([0.5, 0.25, 0.1], rel=0.01)
+    assert found["sun"] == pytest.approx([0.5 / np.pi * 3] * 3, rel=0.01)
+
+
+def test_paths_may_end_at_the_first_primitive() -> None:
+    """A wall, triangle number 0, is seen in a mirror at the last bounce."""
+    wall = wf.Mesh([[-90, -90, 5], [90, -90, 5], [0, 90, 5]], [[0, 1, 2]], material=wf.Diffuse(0.4))
+    mirror = wf.Rectangle((-9, -9, 0), (18, 0, 0), (0, 18, 0), material=wf.Mirror(1.0))
+    scene = wf.Scene([wall, mirror], [wf.PointLight((0, 0, 2), 1)])
+    scene.camera = wf.Camera.look_at((0, 0, 3), (0, 0, 0), fov=20, size=(6, 6))
+    image = render(scene, 2, aovs=("denoising_normal", "denoising_albedo"), max_bounces=1)
+    assert np.allclose(image.denoising_albedo, 0.4, atol=1e-6)
+    assert np.allclose(np.abs(image.denoising_normal), (0, 0, 1), atol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,7 @@ from wavefront.stages.reuse import (
     connect,
 )
 from wavefront.stages.shade import Guidance
-from wavefront.state import Paths
+from wavefront.state import Paths, SurfaceInteraction
 
 f4 = np.float32
 some = settings(max_examples=settings.default.max_examples * 3 // 10)
@@ -230,6 +230,7 @@ def test_what_nobody_reaches_stays_with_its_path(monkeypatch: pytest.MonkeyPatch
     points.slot[:] = 0, 1
     points.throughput = rng.uniform(0.2, 1, (3, 2)).astype(f4)
     light = rng.uniform(0.2, 1, (3, 2)).astype(f4)
+    light[:, 0] = 1  # is no other than any light
     tiles = WaveTiles.of(np.array([0, 0], np.uint32), np.array([0, 1], np.uint32), 100)
     arrived = rng.uniform(0.2, 1, (3, MEMBERS_OF_TILES, tiles.count)).astype(f4)
 
@@ -237,10 +238,12 @@ def test_what_nobody_reaches_stays_with_its_path(monkeypatch: pytest.MonkeyPatch
         return SimpleNamespace(present=lane_in >= 0)
 
     def arriving(scene, first, points, light, numbers):
+        asked.extend(sorted(int(each) for each in np.unique(numbers) if each >= 0))
         return arrived[:, :, : first.present.shape[1]], [np.array([1])]
 
     monkeypatch.setattr(reuse.FirstPoints, "of", first_of)
     monkeypatch.setattr(reuse, "_arriving", arriving)
+    asked: list[int] = []
     L = np.ones((3, 2), f4)
     shade = SimpleNamespace(lit=lambda: lit)
     add_shared(OPEN, L, paths, shade, points, light, tiles, 1)
@@ -251,3 +254,46 @@ def test_what_nobody_reaches_stays_with_its_path(monkeypatch: pytest.MonkeyPatch
         lane = grid[member, tile]
         due[:, paths.slot[lane]] += paths.throughput[:, lane] * arrived[:, member, tile]
     np.testing.assert_allclose(L, due, rtol=1e-6)
+    assert asked == [0, 1]
+    light[:, 0] = 0
+    asked.clear()
+    add_shared(OPEN, L, paths, shade, points, light, tiles, 1)
+    assert asked == [1]
+
+
+def test_the_first_of_all_points_is_shared() -> None:
+    """Its number is 0, also where nobody has found another one."""
+    rng = np.random.default_rng(2)
+    first, points = first_points(rng, False, OPEN.center), shared_points(rng, 1, OPEN.center)
+    points.ng = np.repeat(f4([[0], [0], [-1]]), len(points), 1)
+    first.normal[:] = f4([[0], [0], [1]])
+    numbers = np.full((MEMBERS, TILES), -1)
+    numbers[1, 0] = 0
+    arriving, lost = _arriving(OPEN, first, points, np.ones((3, len(points)), f4), [numbers])
+    assert (arriving[:, :, 0] > 0).all()
+    assert not arriving[:, :, 1].any()
+    assert not any(each.size for each in lost)
+
+
+@pytest.mark.parametrize(("albedo", "there"), [(0.0, False), (1.0, True), (0.5, True)])
+def test_black_first_points_take_no_part(albedo: float, there: bool) -> None:
+    """Their paths end; those of white points go on as all others do."""
+    n = 4
+    up, zero = np.repeat(f4([[0], [0], [1]]), n, 1), np.zeros(n, f4)
+    lane = np.zeros(n, np.intp)
+    surface = SurfaceInteraction(np.zeros((3, n), f4), zero, up, up, up, lane, lane, np.zeros(n, bool))
+    lit = SimpleNamespace(surface=surface, start=np.zeros((3, n), f4), guidance_at=lambda lanes: None)
+    lane_in = np.array([[0, 1], [2, -1]])
+    first = FirstPoints.of(OPEN, lit, np.full((3, n), albedo, f4), lane_in)
+    assert first is not None
+    assert np.array_equal(first.present, (lane_in >= 0) & there)
+
+
+def test_materials_that_look_alike_from_all_sides_are_shared() -> None:
+    """Not glossy ones, and none with a normal map, be it the first of the scene."""
+    bumps = wf.NormalMap(np.full((2, 2, 3), (0.5, 0.5, 1.0), f4))
+    uvs = [[0, 0], [1, 0], [0, 1]]
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
+    kinds = [wf.Material(wf.Diffuse(0.5), normal_map=bumps), wf.Diffuse(0.5), wf.Principled(0.5)]
+    meshes = [wf.Mesh(corners + k, [[0, 1, 2]], uvs=uvs, material=kind) for k, kind in enumerate(kinds)]
+    assert reuse.shared_materials(compiled(*meshes)).tolist() == [False, True, False]
