@@ -503,13 +503,12 @@ def test_two_lights_of_the_sky_have_their_own_groups() -> None:
 
 
 def test_paths_may_end_at_the_first_primitive() -> None:
-    """A wall, triangle number 0, is seen in a mirror at the last bounce."""
-    wall = wf.Mesh([[-90, -90, 5], [90, -90, 5], [0, 90, 5]], [[0, 1, 2]], material=wf.Diffuse(0.4))
+    """A light without any reflection, triangle number 0, is seen in a mirror."""
+    wall = wf.Mesh([[-90, -90, 5], [0, 90, 5], [90, -90, 5]], [[0, 1, 2]], material=wf.Diffuse(0), emission=1)
     mirror = wf.Rectangle((-9, -9, 0), (18, 0, 0), (0, 18, 0), material=wf.Mirror(1.0))
-    scene = wf.Scene([wall, mirror], [wf.PointLight((0, 0, 2), 1)])
+    scene = wf.Scene([wall, mirror])
     scene.camera = wf.Camera.look_at((0, 0, 3), (0, 0, 0), fov=20, size=(6, 6))
-    image = render(scene, 2, aovs=("denoising_normal", "denoising_albedo"), max_bounces=1)
-    assert np.allclose(image.denoising_albedo, 0.4, atol=1e-6)
+    image = render(scene, 2, aovs="denoising_normal", max_bounces=4)
     assert np.allclose(np.abs(image.denoising_normal), (0, 0, 1), atol=1e-6)
 
 
