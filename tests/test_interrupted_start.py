@@ -16,11 +16,13 @@ from wavefront.scheduling.processes import ProcessPool
 from wavefront.scheduling.shared import STOP, SharedInt
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="signals and processes of Linux")
+SOON = 2.0  # seconds to the prompt
 TIMEOUT = 120.0  # seconds for all tries of a script; one that hangs takes longer
 
 # Prints the seconds from each Ctrl-C to the prompt, and what is left then, as a notebook's kernel has it.
 TRIES = """
 import json, multiprocessing, os, random, signal, sys, threading, time
+from contextlib import suppress
 from pathlib import Path
 import wavefront as wf
 executor, accel, when, tries, seed = sys.argv[1], sys.argv[2], sys.argv[3], int(sys.argv[4]), int(sys.argv[5])
@@ -32,9 +34,14 @@ OTHERS = "resource_tracker", "forkserver"  # of multiprocessing, which end with 
 def children():
     found = []
     for thread in Path("/proc/self/task").iterdir():
-        found += (thread / "children").read_text().split()
-    lines = {pid: Path(f"/proc/{pid}/cmdline").read_text() for pid in found}
-    return [pid for pid, line in lines.items() if not any(other in line for other in OTHERS)]
+        with suppress(OSError):  # it has ended
+            found += (thread / "children").read_text().split()
+    return [pid for pid in found if not any(other in command(pid) for other in OTHERS)]
+
+def command(pid):
+    with suppress(OSError):
+        return Path(f"/proc/{pid}/cmdline").read_text()
+    return ""
 
 def threads():
     return [each.name for each in threading.enumerate() if each.name != "MainThread"]
@@ -111,6 +118,7 @@ def test_ctrl_c_at_two_hundred_moments(executor: str, accel: str) -> None:
     seconds = tries(executor, accel, "any", 17, seed=2)
     seconds += tries(executor, accel, "any" if executor == "threads" else "fork", 17, seed=3)
     ordered = sorted(seconds)
+    assert ordered[len(ordered) // 2] < SOON  # a busy machine may be slower now and then
     print(executor, accel, "median", ordered[len(ordered) // 2], "longest", ordered[-3:])
 
 
