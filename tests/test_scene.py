@@ -39,7 +39,7 @@ BAD = [
     (wf.Mesh, TRIANGLE, {"faces": [[0, 1, 2, 0]]}, r"mesh: faces must be integers of shape \(m, 3\), got int64 of shape \(1, 4\)"),
     (wf.Mesh, TRIANGLE, {"faces": [[0.0, 1.0, 2.0]]}, r"mesh: faces must be integers of shape \(m, 3\), got float64"),
     (wf.Mesh, TRIANGLE, {"faces": [0, 1, 2]}, r"mesh: faces must be integers of shape \(m, 3\), got int64 of shape \(3,\)"),
-    (wf.Mesh, TRIANGLE, {"faces": [[0, 1, 2], [0, 1]]}, r"mesh: faces must be integers of shape \(m, 3\), got rows"),
+    (wf.Mesh, TRIANGLE, {"faces": [[0, 1, 2], [0, 1]]}, r"mesh: faces must have rows of one length, got \[\[0, 1, 2\], \[0, 1\]\]"),
     (wf.Mesh, TRIANGLE, {"normals": [[0, 0, 1]]}, r"mesh: normals must have a row for each of 3 vertices, got 1"),
     (wf.Mesh, TRIANGLE, {"normals": [[0, 0, 1], [0, 0, NAN], [0, 0, 1]]}, r"mesh: normals\[1\]\[2\] is nan"),
     (wf.Mesh, TRIANGLE, {"uvs": [[0, 0], [1, 0], [INF, 0]]}, r"mesh: uvs\[2\]\[0\] is inf"),

@@ -773,7 +773,7 @@ def test_pictures_that_refine_leave_the_page_time(sent: Any) -> None:
     """They are sent a tenth of a second apart."""
     page, frames = sent
     for number in (1, 2, 3):
-        page.show(frame(number))
+        page.show(frame(page_module.FEW + number))
         assert eventually(lambda number=number: len(frames) == number)
     assert all(after - before > 0.09 for (before, _), (after, _) in pairwise(frames))
 
@@ -783,12 +783,13 @@ def test_other_pictures_do_not_wait(sent: Any, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(page_module, "PAUSE", 10 * SOON)
     page, frames = sent
     other = wf.Camera.look_at((0, 0, 6), (0, 0, 0), size=(64, 48))
-    shown = [frame(1), frame(1, other), frame(4, other, final=True)]
+    few = page_module.FEW  # with fewer samples a denoised picture would follow
+    shown = [frame(few), frame(few, other), frame(2 * few, other, final=True)]
     for each in shown:
         page.show(each)
         assert eventually(lambda each=each: frames and frames[-1][1] is each)
         if each is shown[1]:
-            page.show(frame(2, other))  # waits, and is left out
+            page.show(frame(few + 1, other))  # waits, and is left out
             time.sleep(0.1)
     page._show_as(exposure=1)
     assert eventually(lambda: len(frames) == 4)

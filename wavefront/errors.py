@@ -65,6 +65,9 @@ class SaveError(SceneError, OSError):
     the picture is not saved
     """
 
+    def __new__(cls, *args: Any) -> SaveError:
+        return OSError.__new__(cls, *args)  # that of ValueError, which comes first, refuses an OSError
+
 
 class _WithImage(BaseException):
     """An error that may hold the picture so far."""
@@ -177,9 +180,11 @@ def as_array(name: str, value: Any) -> NDArray[Any]:
     except MemoryError:
         raise
     except Exception as error:  # whatever an object's own __array__ raises
-        raise SceneError(f"{name} must be numeric, got {in_brief(value)}") from error
-    if np.ma.is_masked(array):
-        masked = counted(int(np.ma.count_masked(array)), "masked value")
+        wanted = "have rows of one length" if "inhomogeneous" in str(error) else "be numeric"
+        raise SceneError(f"{name} must {wanted}, got {in_brief(value)}") from error
+    ma = sys.modules.get("numpy.ma")  # whoever has masked values has imported it
+    if ma is not None and ma.is_masked(array):
+        masked = counted(int(ma.count_masked(array)), "masked value")
         raise SceneError(f"{name} has {masked}; leave their rows out, or give them numbers with filled(...)")
     if array.dtype.kind == "c":
         raise SceneError(f"{name} must be real numbers, got {array.dtype}")

@@ -323,6 +323,8 @@ class Page:
         last = frame.final and (image is frame.image or image.spp == frame.image.spp)
         kind = {"format": "png"} if last else {"format": "jpeg", "jpeg_quality": QUALITY}
         self._server.scene.set_background_image(np.ascontiguousarray(codes), **kind)
+        if not self._sized:  # the last page was left meanwhile
+            self._server.scene.set_background_image(None)
         height, width = codes.shape[:2]
         of = "" if self._most_spp is None else f" of {self._most_spp}"
         noise = frame.image.metadata["noise"]
