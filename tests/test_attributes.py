@@ -178,7 +178,7 @@ def test_the_checker_takes_materials_with_vertex_colors():
         ([[0, 0, 0], [0, 0, 0], [0, 1.5, 0], [0, 0, 0]], r"colors\[2\]\[1\] is 1\.5; it must be in \[0, 1\]"),
         ([[0, 0, 0, -1]] * 4, r"colors\[0\]\[3\] is -1"),
         ([[0, np.nan, 0]] * 4, r"colors\[0\]\[1\] is nan; it must be finite"),
-        ([[0, 0, 0], [0]], r"colors must be numeric"),
+        ([[0, 0, 0], [0]], r"colors must have rows of one length"),
     ],
 )
 def test_bad_colors(colors, message):
