@@ -5,11 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from .compile.scene import ROULETTE_AFTER
-
 SCENE = "scene"
-CAUSTICS = "caustics"  # only where light paths are traced
-ROULETTE = "roulette"  # only where it is not the default
+CAUSTICS = "caustics"
 CODE = "code of the "  # before the names of settings that may be functions or classes of the user's
 HASH = 64  # characters of a fingerprint
 COMPILED_FOR = ("accelerator", "integrator", "light_sampler")  # settings on which the compiled scene depends
@@ -20,8 +17,6 @@ def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
 
     What follows from another difference is left out.
     """
-    usual = {CAUSTICS: False, ROULETTE: ROULETTE_AFTER}
-    before, now = ({**usual, **identity} for identity in (before, now))
     changed = {key for key in {**before, **now} if before.get(key) != now.get(key)}
     follows = {CODE + key for key in changed}
     follows |= {SCENE} if changed.intersection(COMPILED_FOR) else set()

@@ -13,7 +13,7 @@ from .camera import Camera
 from .checkpoint import Checkpoint, check_identity, other_versions, read_checkpoint
 from .checkpoint_file import contents_of
 from .choice import Choice
-from .compile.scene import ROULETTE_AFTER, CompiledScene
+from .compile.scene import CompiledScene
 from .errors import SaveError, SceneError, warn_caller
 from .filters import FILTERS
 from .fingerprint import fingerprint
@@ -82,8 +82,8 @@ def render_identity(
         **{name: getattr(settings, name) for name in PLAIN},
         "branches": choice.branches,
         "reuse": choice.reuse,
-        **({CAUSTICS: True} if settings.caustics else {}),
-        **({ROULETTE: settings.roulette} if settings.roulette_after != ROULETTE_AFTER else {}),
+        CAUSTICS: settings.caustics,
+        ROULETTE: settings.roulette,
         **names,
         "accelerator": accelerator,
         "aovs": list(layers),
