@@ -21,9 +21,9 @@ from typing import Any
 
 import numpy as np
 
+from wavefront.arrays.state import SurfaceInteraction
 from wavefront.bsdfs import Bsdf, Conductor, Dielectric, Diffuse, Mirror, Principled
 from wavefront.bsdfs.microfacet import alpha_of, stretched
-from wavefront.state import SurfaceInteraction
 
 LIMIT = 1e-4
 Array = np.ndarray

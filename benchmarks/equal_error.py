@@ -36,8 +36,8 @@ from many_lights import lit
 from scipy.ndimage import gaussian_filter
 
 import wavefront as wf
-from wavefront.choice import Choice
 from wavefront.session import plan
+from wavefront.session.choice import Choice
 from wavefront.settings import Settings
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))

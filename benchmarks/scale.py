@@ -34,7 +34,7 @@ import numpy as np
 from distributed import Client, LocalCluster
 
 import wavefront as wf
-from wavefront.film import Film
+from wavefront.film.film import Film
 from wavefront.scheduling.delivery import pack
 from wavefront.scheduling.jobs import WaveResult
 from wavefront.scheduling.pool import WorkerPool

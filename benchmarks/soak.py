@@ -28,8 +28,8 @@ from typing import Any
 import numpy as np
 
 import wavefront as wf
+from wavefront.core.memory import resident_memory
 from wavefront.integrators import li_full
-from wavefront.memory import resident_memory
 
 GROWTH = 0.02  # of memory, that is no leak
 WARM_UP = 1 / 5  # of the time

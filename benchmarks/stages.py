@@ -20,7 +20,7 @@ from typing import Any
 from unittest import mock
 
 import wavefront as wf
-from wavefront import integrators
+from wavefront.integrators import ladder as integrators
 from wavefront.stages import shade
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))

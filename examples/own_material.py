@@ -13,7 +13,7 @@ import argparse
 import numpy as np
 
 import wavefront as wf
-from wavefront.elementary import exp, log, sin_cos_turns
+from wavefront.arrays.elementary import exp, log, sin_cos_turns
 
 
 class RetroReflector(wf.Bsdf):

@@ -43,7 +43,7 @@ def pytest_configure() -> None:
 @pytest.fixture
 def close_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let pixels that share paths be next to each other, so that small pictures have whole tiles."""
-    from wavefront import pixel_tiles
+    from wavefront.sampling import tiles as pixel_tiles
 
     monkeypatch.setattr(pixel_tiles, "STRIDE", 1)
 
@@ -64,10 +64,10 @@ def tables_restored() -> Iterator[None]:
     """Take what a test registers out of the tables again, so that no other test finds it there."""
     from wavefront.accel.registry import ACCELERATORS
     from wavefront.codecs.images import IMAGE_READERS, IMAGE_WRITERS
-    from wavefront.filters import FILTERS
     from wavefront.integrators import INTEGRATORS
     from wavefront.io.readers import READERS
     from wavefront.lights.samplers import LIGHT_SAMPLERS
+    from wavefront.sampling.filters import FILTERS
     from wavefront.sampling.sampler import SAMPLERS
     from wavefront.scheduling.executors import EXECUTORS
 

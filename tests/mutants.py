@@ -37,28 +37,34 @@ ROOT = Path(__file__).resolve().parent.parent
 # the tests that concern a file, quick ones first
 TESTS: dict[str, tuple[str, ...]] = {
     "wavefront/stages/reuse.py": (
-        "tests/test_shared_connections.py",
-        "tests/test_reuse.py",
-        "tests/test_equal_means.py",
+        "tests/integrators/test_shared_connections.py",
+        "tests/integrators/test_reuse.py",
+        "tests/physics/test_equal_means.py",
     ),
-    "wavefront/light_paths.py": ("tests/test_light_paths.py", "tests/test_caustics.py"),
-    "wavefront/guiding/cells.py": ("tests/test_guiding.py",),
+    "wavefront/integrators/light_tracing.py": (
+        "tests/integrators/test_light_paths.py",
+        "tests/integrators/test_caustics.py",
+    ),
+    "wavefront/guiding/cells.py": ("tests/guiding/test_guiding.py",),
     "wavefront/guiding/guide_table.py": (
-        "tests/test_guiding.py",
+        "tests/guiding/test_guiding.py",
         "tests/properties/test_density_of_tables.py",
     ),
     "wavefront/guiding/octahedral.py": (
-        "tests/test_guiding.py",
+        "tests/guiding/test_guiding.py",
         "tests/properties/test_density_of_tables.py",
     ),
-    "wavefront/guiding/training.py": ("tests/test_guiding.py",),
-    "wavefront/geometric_layers.py": ("tests/test_geometric_layers.py", "tests/test_sampled_layers.py"),
-    "wavefront/sample_recorder.py": (
-        "tests/test_clamp.py",
-        "tests/test_sampled_layers.py",
-        "tests/test_denoising.py",
+    "wavefront/guiding/training.py": ("tests/guiding/test_guiding.py",),
+    "wavefront/aovs/geometric.py": (
+        "tests/aovs/test_geometric_layers.py",
+        "tests/aovs/test_sampled_layers.py",
     ),
-    "wavefront/light_sums.py": ("tests/test_caustics.py",),
+    "wavefront/aovs/recorder.py": (
+        "tests/integrators/test_clamp.py",
+        "tests/aovs/test_sampled_layers.py",
+        "tests/denoising/test_denoising.py",
+    ),
+    "wavefront/film/light_sums.py": ("tests/integrators/test_caustics.py",),
 }
 FORMULAS = tuple(TESTS)
 # files with densities

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from significance import SIDE
 
 import wavefront as wf
+from wavefront.arrays.vec import Floats, f4
 from wavefront.lights import ConstantEnvironment
-from wavefront.vec import Floats, f4
 
 BLACK = wf.Diffuse(0.0)
 ALBEDO = 0.5

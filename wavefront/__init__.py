@@ -3,8 +3,9 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from . import elementary, integrators, vec
 from .accel import Accelerator, Geometry, Intersections
+from .arrays import elementary, vec
+from .arrays.frame import Frame
 from .bsdfs import (
     Bsdf,
     BsdfSample,
@@ -20,7 +21,9 @@ from .bsdfs import (
 )
 from .camera import Camera
 from .colors import srgb
-from .errors import Interrupted, RenderError, SaveError, SceneError
+from .core.errors import Interrupted, RenderError, SaveError, SceneError
+from .core.html import register_preview
+from .core.suggestions import did_you_mean
 from .extensions import (
     register_accelerator,
     register_executor,
@@ -30,10 +33,8 @@ from .extensions import (
     register_light_sampler,
     register_sampler,
 )
-from .frame import Frame
-from .html import register_preview
 from .image import Image
-from .lighting import studio
+from .integrators import ladder as integrators
 from .lights import (
     DeltaLight,
     DirectionalLight,
@@ -55,6 +56,7 @@ from .render import render
 from .sampling import warp
 from .sampling.sampler import Sampler
 from .scene import Scene
+from .scene.lighting import studio
 from .session import Session
 from .shapes import (
     Box,
@@ -72,7 +74,6 @@ from .shapes import (
     Sphere,
     Spheres,
 )
-from .suggestions import did_you_mean
 from .textures.base import BaseTexture
 from .textures.image import Texture
 from .textures.normal_map import BumpMap, NormalMap
@@ -83,10 +84,10 @@ if TYPE_CHECKING:
     from .animation import save_animation
     from .camera.moves import interpolate_cameras, orbit
     from .datasets import write_dataset
+    from .image.comparison import Comparison, compare
     from .io.foreign import from_open3d, from_pyvista
     from .io.load import from_trimesh, load, load_mesh
     from .io.sources import LoadLimits
-    from .metrics import Comparison, compare
     from .statistics import RegionMean
     from .viewer import Viewer, view
     from .views import render_many, turntable
@@ -95,8 +96,8 @@ __version__ = VERSION
 register_preview(ball_png)
 
 _LATER = {  # what many programs do without is imported when they ask for it
-    "Comparison": ".metrics",
-    "compare": ".metrics",
+    "Comparison": ".image.comparison",
+    "compare": ".image.comparison",
     "from_open3d": ".io.foreign",
     "from_pyvista": ".io.foreign",
     "from_trimesh": ".io.load",

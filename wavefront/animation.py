@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from .codecs.display import Display
 from .codecs.images import check_writable
 from .codecs.white_balance import WhiteBalance
-from .errors import SaveError, SceneError, number
-from .files import check_target, extension_of, path_name, write_bytes
+from .core.errors import SaveError, SceneError, number
+from .core.files import check_target, extension_of, path_name, write_bytes
 from .image import Image
 
 ANIMATIONS = (".gif", ".png", ".mp4")

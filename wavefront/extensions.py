@@ -11,16 +11,16 @@ from collections.abc import Callable
 from typing import Any
 
 from .accel.registry import ACCELERATORS, AcceleratorMaker
+from .arrays.vec import Floats
 from .codecs.images import IMAGE_READERS, IMAGE_WRITERS
-from .errors import SceneError
-from .filters import FILTERS, Filter
+from .core.errors import SceneError
+from .core.registry import Registry
 from .integrators import INTEGRATORS, Integrator
 from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
-from .registry import Registry
+from .sampling.filters import FILTERS, Filter
 from .sampling.sampler import SAMPLERS, SamplerMaker
 from .scene import Scene
 from .scheduling.executors import EXECUTORS, ExecutorLike
-from .vec import Floats
 
 
 def register_integrator(name: str, integrator: Integrator) -> None:

@@ -9,8 +9,8 @@ import numpy as np
 from .bsdfs import Bsdf
 from .camera import Camera
 from .codecs import png_jpeg
-from .errors import SceneError
-from .fingerprint import fingerprint
+from .core.errors import SceneError
+from .core.fingerprint import fingerprint
 from .materials import Material
 from .render import render
 from .scene import Scene

@@ -10,18 +10,18 @@ from numpy.typing import ArrayLike
 
 from .accel.registry import AcceleratorMaker
 from .camera import Camera
-from .filters import Filter
+from .core.progress import Progress
+from .core.suggestions import suggests_keywords
 from .image import Image
 from .integrators import Integrator
 from .lights.samplers import LightSamplerMaker
 from .materials import MaterialLike
-from .notebook import run_shown, shows_pictures
-from .outcome import interrupted
-from .progress import Progress
+from .sampling.filters import Filter
 from .sampling.sampler import SamplerMaker
 from .scheduling.executors import ExecutorLike
 from .session import Session
-from .suggestions import suggests_keywords
+from .session.final_checks import interrupted
+from .session.notebook import run_shown, shows_pictures
 
 
 @suggests_keywords

@@ -15,31 +15,31 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .accel.registry import ACCELERATORS, AcceleratorMaker
+from .arrays.record import record
+from .arrays.vec import Floats, f4
 from .camera import Camera, check_camera, field_of_view, image_size, upward
 from .codecs.image_data import TRANSPARENT
 from .colors import rgb
 from .compile.scene import ROULETTE_AFTER
-from .errors import SceneError, in_brief, number, warn_caller
-from .exact_sum import MAX_TERMS
-from .files import check_target
-from .filters import FILTERS, Filter, box
+from .core.errors import SceneError, in_brief, number, warn_caller
+from .core.files import check_target
+from .core.memory import memory_size
+from .core.progress import Progress
+from .core.registry import Registry
+from .film.aov_names import CLAMPED, GUIDES, chosen_layers, sampled_names
+from .film.exact_sum import MAX_TERMS
 from .integrators import INTEGRATORS, Integrator, li_full
-from .layers import CLAMPED, GUIDES, chosen_layers, sampled_names
-from .lighting import DEFAULT, LIGHTINGS, check_lighting
+from .integrators.tuning import MOST_WAYS
 from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
 from .materials import NAMED_MATERIALS, MaterialLike
-from .memory import memory_size
-from .progress import Progress
-from .record import record
-from .registry import Registry
+from .sampling.filters import FILTERS, Filter, box
 from .sampling.sampler import SAMPLERS, SamplerMaker, make_sampler
-from .scene import FRAMING_FOV, FRAMING_VIEW, VIEWS, view_direction
+from .scene.lighting import DEFAULT, LIGHTINGS, check_lighting
+from .scene.scene import FRAMING_FOV, FRAMING_VIEW, VIEWS, view_direction
 from .scheduling.budget import Budget, make_budget
 from .scheduling.executors import EXECUTORS, ExecutorLike, choose_executor, worker_count
 from .shapes.smoothing import check_smooth
 from .stages.reuse import SHARED_WAYS
-from .trial import MOST_WAYS
-from .vec import Floats, f4
 
 DEFAULT_SPP = 100
 MAX_BRANCH_SAMPLES = 2**32  # a sample's index is 32 bits of its address, and each branch has one

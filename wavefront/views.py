@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 
 from .camera import Camera
 from .camera.moves import orbit
-from .errors import SceneError, iterable
+from .core.errors import SceneError, iterable
 from .image import Image
-from .renderable import as_scene, choose_camera
+from .io.to_scene import as_scene, choose_camera
 from .session import Session
 from .settings import whole_number
 

@@ -83,8 +83,8 @@ iio.imwrite("1_naive.png", np.concatenate(pictures, 1).repeat(4, 0).repeat(4, 1)
 # In the library
 # --------------
 #
-# ``integrator="naive"``: ``li_naive`` in ``integrators.py``. It is there for comparisons and tests. It cannot
-# find points and spots, which have no size.
+# ``integrator="naive"``: ``li_naive`` in ``integrators/ladder.py``. It is there for comparisons and tests. It
+# cannot find points and spots, which have no size.
 #
 # Exercises
 # ---------

@@ -70,7 +70,7 @@ better.save("2_caustics_and_denoised.png")
 #      - microfacets, layers, textures
 #    * - 4
 #      - ``render``
-#      - ``scheduling/``, ``film.py``
+#      - ``scheduling/``, ``film/film.py``
 #      - workers, errors of pixels, checkpoints
 #    * - 6
 #      - ``light_sample``
@@ -82,7 +82,7 @@ better.save("2_caustics_and_denoised.png")
 #      - MIS compensation
 #    * - 8
 #      - ``full``
-#      - ``integrators.py``
+#      - ``integrators/ladder.py``
 #      - branches, shared paths, guiding
 #    * - 8
 #      - roulette and compaction

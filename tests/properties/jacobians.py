@@ -20,7 +20,7 @@ from wavefront.bsdfs.sheen import _albedo_table as sheen_table
 
 Doubles = np.ndarray
 ROOMS = ("wavefront.sampling.", "wavefront.bsdfs.", "wavefront.lights.", "wavefront.guiding.")
-ALONE = ("wavefront.vec", "wavefront.frame", "wavefront.filters")
+ALONE = ("wavefront.arrays.vec", "wavefront.arrays.frame", "wavefront.sampling.filters")
 # functions that read the bits of float32 numbers, and what they compute
 OF_BITS = {
     "log": np.log,
@@ -53,7 +53,7 @@ def doubles() -> Iterator[None]:
             continue
         for attribute, wide in {"f4": np.float64, **OF_BITS}.items():
             have = vars(module).get(attribute)
-            own = getattr(have, "__module__", None) in ("wavefront.elementary", "wavefront.vec")
+            own = getattr(have, "__module__", None) in ("wavefront.arrays.elementary", "wavefront.arrays.vec")
             if have is np.float32 or (own and attribute in OF_BITS):
                 replaced.append((module, attribute, have))
                 setattr(module, attribute, wide)

@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from jacobians import columns, doubles, few, inner, jacobian, some
 
 from wavefront import bsdfs
+from wavefront.arrays.state import SurfaceInteraction
+from wavefront.arrays.vec import INV_PI
 from wavefront.bsdfs import (
     Bsdf,
     Conductor,
@@ -26,8 +28,6 @@ from wavefront.bsdfs import (
 )
 from wavefront.bsdfs.microfacet import alpha_of, visible_normals
 from wavefront.sampling.warp import cosine_hemisphere_inverse
-from wavefront.state import SurfaceInteraction
-from wavefront.vec import INV_PI
 
 f4 = np.float32
 CHOICES = 1024  # numbers u[2] that are tried: the part of a lobe is known to 2/CHOICES

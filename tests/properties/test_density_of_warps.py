@@ -6,8 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from jacobians import assert_density, columns, doubles, inner, points_of_the_square, some
 
-from wavefront import filters
-from wavefront.sampling import warp
+from wavefront.sampling import filters, warp
 from wavefront.sampling.spherical import SphericalRectangle
 
 EMPTY = st.just(())

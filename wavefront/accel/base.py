@@ -5,8 +5,8 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import Protocol
 
-from ..record import record
-from ..vec import Bools, Floats, Ints
+from ..arrays.record import record
+from ..arrays.vec import Bools, Floats, Ints
 from .primitives import CurvedPrimitives
 
 

@@ -14,8 +14,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..record import record
-from ..vec import Bools, Bytes, Floats, Ints, f4
+from ..arrays.record import record
+from ..arrays.vec import Bools, Bytes, Floats, Ints, f4
 from . import triangle
 from .base import Geometry
 from .bvh import Ball, RayBatch, flat_true, scratch

@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..record import record
-from ..vec import Floats, Ints, f4
+from ..arrays.record import record
+from ..arrays.vec import Floats, Ints, f4
 
 EMPTY = f4(3e38)  # an empty box, which no ray meets, extends from EMPTY to -EMPTY
 AT_ONCE = 1 << 16  # primitives that are split together, so that temporary arrays fit the cache

@@ -20,8 +20,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..record import record
-from ..vec import TINY, Bools, Doubles, Floats, Ints, f4, spans
+from ..arrays.record import record
+from ..arrays.vec import TINY, Bools, Doubles, Floats, Ints, f4, spans
 from .build import build_tree, stable_order
 from .triangle import ROUNDOFF
 

@@ -16,8 +16,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..record import record
-from ..vec import Bools, Doubles, Floats, Ints, cross, dot, f4, length, spans
+from ..arrays.record import record
+from ..arrays.vec import Bools, Doubles, Floats, Ints, cross, dot, f4, length, spans
 from .duplicates import FACTORS, Keys, repeated
 from .triangle import AXES, ROUNDOFF, TriangleTable
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..record import record
+from ..arrays.record import record
+from ..arrays.vec import Bools, Doubles, Floats, Ints, f4, length
 from ..shapes import Cylinders
-from ..vec import Bools, Doubles, Floats, Ints, f4, length
 from .primitives import first_hit
 from .segment import Cut, SegmentPrimitives
 

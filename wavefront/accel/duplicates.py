@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..vec import Bools, Floats, Ints, spans
+from ..arrays.vec import Bools, Floats, Ints, spans
 from .triangle import has_area
 
 AT_ONCE = 1 << 14  # triangles whose keys are made together, so that they fit the cache

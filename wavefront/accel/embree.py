@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import SceneError
-from ..vec import Bools, Doubles, Floats, Ints, cross, dot, f4, length
+from ..arrays.vec import Bools, Doubles, Floats, Ints, cross, dot, f4, length
+from ..core.errors import SceneError
 from . import triangle
 from .base import Geometry, Intersections
 from .coplanar import Overlaps, find_overlaps

@@ -6,8 +6,8 @@ from functools import partial
 
 import numpy as np
 
-from ..record import record
-from ..vec import Floats, Ints, Lanes
+from ..arrays.record import record
+from ..arrays.vec import Floats, Ints, Lanes
 from . import triangle
 from .bvh import Ball, RayBatch
 from .hits import Candidates, HitAccumulator

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..vec import Doubles, Floats, Ints, f4
+from ..arrays.vec import Doubles, Floats, Ints, f4
 from .bvh import Ball, Codes, RayBatch
 from .triangle import ROUNDOFF
 

@@ -14,8 +14,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..record import record
-from ..vec import Bools, Doubles, Floats, Ints, f4
+from ..arrays.record import record
+from ..arrays.vec import Bools, Doubles, Floats, Ints, f4
 from .base import Accelerator, Intersections
 from .build import build_tree
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..errors import SceneError
+from ..core.errors import SceneError
 from ..shapes import CurvedShape
 from .capsule import CapsulePrimitives
 from .cylinder import CylinderPrimitives

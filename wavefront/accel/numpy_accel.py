@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..record import record
-from ..state import SoA
-from ..vec import Bools, Floats, Ints, f4
+from ..arrays.record import record
+from ..arrays.state import SoA
+from ..arrays.vec import Bools, Floats, Ints, f4
 from . import triangle
 from .base import Geometry, Intersections
 from .brute_force import BruteForceTriangles

@@ -14,9 +14,9 @@ from typing import Any, ClassVar, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays.state import SoA
+from ..arrays.vec import Bools, Doubles, Floats, Ints
 from ..shapes import CurvedShape
-from ..state import SoA
-from ..vec import Bools, Doubles, Floats, Ints
 from .bvh import Ball, RayBatch
 from .hits import HitAccumulator
 

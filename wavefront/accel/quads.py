@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..arrays.vec import Bools, Doubles, Floats, Ints
 from ..shapes.fans import are_fans, disjoint_pairs
-from ..vec import Bools, Doubles, Floats, Ints
 from .triangle import ROUNDOFF
 
 FLATNESS = 2 * ROUNDOFF  # largest distance between the diagonals, relative to the coordinates

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeAlias
 
-from ..registry import Registry
+from ..core.registry import Registry
 from .base import Accelerator, Geometry
 from .embree import EmbreeAccelerator, installed
 from .numpy_accel import NumpyAccelerator

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..record import record
-from ..vec import Bools, Doubles, Floats, Ints, f4
+from ..arrays.record import record
+from ..arrays.vec import Bools, Doubles, Floats, Ints, f4
 from .brute_force import BruteForceTriangles
 from .bvh import Ball, end_points, lengths, scratch, start_points
 from .coplanar import connected_parts

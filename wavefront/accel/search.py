@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from ..vec import Floats, Ints, f4, spans
+from ..arrays.vec import Floats, Ints, f4, spans
 from .bvh import BLOCK, BLOCK_SHIFT, CHUNK, Ball, RayBatch, blocks, build_bvh, flat_true, scratch, trace
 from .hits import AnyHit, Candidates, HitAccumulator
 from .primitives import Primitives, PrimitiveTests

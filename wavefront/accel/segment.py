@@ -14,10 +14,10 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..elementary import arctan2
-from ..record import record
-from ..state import SoA
-from ..vec import Bools, Doubles, Floats, Ints, cross, dot, f4, highest, length
+from ..arrays.elementary import arctan2
+from ..arrays.record import record
+from ..arrays.state import SoA
+from ..arrays.vec import Bools, Doubles, Floats, Ints, cross, dot, f4, highest, length
 from .bvh import PAIRS, Ball, quadric_rows
 from .primitives import CurvedPrimitives
 

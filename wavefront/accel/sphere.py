@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..record import record
+from ..arrays.record import record
+from ..arrays.vec import Bools, Doubles, Floats, Ints, f4, normalize
 from ..shapes import Sphere, Spheres
 from ..shapes.attributes import sphere_dpduv, sphere_uv
-from ..vec import Bools, Doubles, Floats, Ints, f4, normalize
 from .bvh import Ball
 from .primitives import CurvedPrimitives
 from .triangle import ROUNDOFF

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..record import record
-from ..vec import Bools, Doubles, Floats, Ints, cross, f4, spans
+from ..arrays.record import record
+from ..arrays.vec import Bools, Doubles, Floats, Ints, cross, f4, spans
 
 ROUNDOFF = 2.0**-24  # half an ulp of float32
 AT_ONCE = 1 << 14  # triangles whose float64 data are made together, so that they fit the cache

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from ..vec import Floats, dot, f4
+from ..arrays.vec import Floats, dot, f4
 from .microfacet import alpha_of, reflect, stretched, visible_normals
 
 SIZE = 32  # rows of roughness in [0, 1], and columns of the square root of the cosine in [0, 1]

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from ..errors import SceneError
-from ..html import preview_html
-from ..parameter import Parametrized
-from ..record import record
+from ..arrays.record import record
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import Bools, Floats, broadcast
+from ..core.errors import SceneError
+from ..core.html import preview_html
+from ..core.parameter import Parametrized
+from ..core.suggestions import MATERIAL_ARGUMENTS
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
-from ..state import SurfaceInteraction
-from ..suggestions import MATERIAL_ARGUMENTS
 from ..textures.base import BaseTexture
-from ..vec import Bools, Floats, broadcast
 
 # (16, 3), evenly spread (M. Roberts 2018, "The Unreasonable Effectiveness of Quasirandom Sequences", d = 3)
 ALBEDO_NUMBERS = ((0.5 + np.arange(16)[:, None] * 1.2207440846057596 ** -np.arange(1.0, 4.0)) % 1).astype(

@@ -7,11 +7,11 @@ from typing import Self
 
 import numpy as np
 
-from ..errors import one_of
-from ..parameter import Parameter
-from ..suggestions import suggests_keywords
+from ..arrays.vec import Floats, broadcast
+from ..core.errors import one_of
+from ..core.parameter import Parameter
+from ..core.suggestions import suggests_keywords
 from ..textures.parameter import MAX_INDEX, Color, Scalar, color, scalar
-from ..vec import Floats, broadcast
 from .base import BsdfSample, JointBsdf, weigh
 from .fresnel import fresnel_conductor
 from .microfacet import alpha_of, is_smooth, mirror_lobe, reflect, visible_normals

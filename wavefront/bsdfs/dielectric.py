@@ -7,12 +7,12 @@ from typing import Self
 
 import numpy as np
 
-from ..errors import one_of
-from ..state import SurfaceInteraction
-from ..suggestions import suggests_keywords
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import Floats, broadcast, dot, f4
+from ..core.errors import one_of
+from ..core.suggestions import suggests_keywords
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar
-from ..vec import Floats, broadcast, dot, f4
 from .base import BsdfSample, weigh
 from .fresnel import fresnel_dielectric
 from .microfacet import alpha_of, is_smooth, mirror_lobe, reflect, refract, refraction_lobe, visible_normals

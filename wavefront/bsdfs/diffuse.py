@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..parameter import Parameter
+from ..arrays.vec import INV_PI, Floats, broadcast
+from ..core.parameter import Parameter
+from ..core.suggestions import suggests_keywords
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
-from ..suggestions import suggests_keywords
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, color
-from ..vec import INV_PI, Floats, broadcast
 from .base import Bsdf, BsdfSample
 
 

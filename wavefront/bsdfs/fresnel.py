@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..vec import TINY, Floats, f4
+from ..arrays.vec import TINY, Floats, f4
 
 
 def fresnel_dielectric(cos: Floats, eta: Floats) -> tuple[Floats, Floats]:

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from ..elementary import sin_cos_turns
+from ..arrays.elementary import sin_cos_turns
+from ..arrays.vec import INV_PI, TINY, Bools, Floats, dot, f4, normalize
 from ..textures.base import BaseTexture
-from ..vec import INV_PI, TINY, Bools, Floats, dot, f4, normalize
 
 # Below this α a lobe is narrower than 0.1°, and half vectors of float32 directions no longer
 # resolve it: constants below count as smooth, and textures are raised to it.

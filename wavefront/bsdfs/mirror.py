@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..parameter import Parameter
-from ..suggestions import suggests_keywords
+from ..arrays.vec import Floats
+from ..core.parameter import Parameter
+from ..core.suggestions import suggests_keywords
 from ..textures.parameter import Color, color
-from ..vec import Floats
 from .base import Bsdf, BsdfSample
 
 

@@ -7,12 +7,12 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..errors import SceneError
-from ..parameter import Parameter
-from ..state import SurfaceInteraction
-from ..suggestions import suggests_keywords
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import BELOW_ONE, Bools, Floats, f4
+from ..core.errors import SceneError
+from ..core.parameter import Parameter
+from ..core.suggestions import suggests_keywords
 from ..textures.parameter import Scalar, scalar
-from ..vec import BELOW_ONE, Bools, Floats, f4
 from .base import Bsdf, BsdfSample, JointBsdf, weigh
 
 

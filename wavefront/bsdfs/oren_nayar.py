@@ -6,14 +6,14 @@ from functools import partial
 
 import numpy as np
 
-from ..elementary import arctan2
-from ..errors import SceneError
-from ..parameter import Parameter, brief
+from ..arrays.elementary import arctan2
+from ..arrays.vec import INV_PI, Floats, dot, f4
+from ..core.errors import SceneError
+from ..core.parameter import Parameter, brief
+from ..core.suggestions import suggests_keywords
 from ..sampling.warp import cosine_hemisphere_pdf
-from ..suggestions import suggests_keywords
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, color, scalar
-from ..vec import INV_PI, Floats, dot, f4
 from .base import Bsdf
 
 A_SLOPE = f4(0.5 - 2 / (3 * np.pi))

@@ -8,13 +8,13 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from ..parameter import Parameter
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import INV_PI, Bools, Floats, broadcast, dot, f4, luminance
+from ..core.parameter import Parameter
+from ..core.suggestions import suggests_keywords
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
-from ..state import SurfaceInteraction
-from ..suggestions import suggests_keywords
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
-from ..vec import INV_PI, Bools, Floats, broadcast, dot, f4, luminance
 from .albedo import gloss_tables, lookup
 from .base import BsdfSample, JointBsdf, weigh
 from .dielectric import LEAST_BEND

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..parameter import Parameter
-from ..suggestions import suggests_keywords
+from ..core.parameter import Parameter
+from ..core.suggestions import suggests_keywords
 from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
 from .base import JointBsdf
 

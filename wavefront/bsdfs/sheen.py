@@ -10,9 +10,9 @@ from functools import cache
 
 import numpy as np
 
-from ..elementary import exp, log
+from ..arrays.elementary import exp, log
+from ..arrays.vec import TWO_PI, Floats, dot, f4
 from ..sampling.warp import uniform_hemisphere
-from ..vec import TWO_PI, Floats, dot, f4
 from .albedo import lookup, tabulate
 
 LEAST_ROUGHNESS = f4(0.07)  # below it the distribution is a spike at the horizon

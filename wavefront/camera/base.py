@@ -8,8 +8,10 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..elementary import arctan2
-from ..errors import (
+from ..arrays.elementary import arctan2
+from ..arrays.state import Words
+from ..arrays.vec import Doubles, Floats, column, f4, normalize
+from ..core.errors import (
     SceneError,
     as_array,
     finite_array,
@@ -19,10 +21,8 @@ from ..errors import (
     rotation_matrix,
     warn_caller,
 )
-from ..parameter import brief
-from ..state import Words
-from ..suggestions import suggests_keywords
-from ..vec import Doubles, Floats, column, f4, normalize
+from ..core.parameter import brief
+from ..core.suggestions import suggests_keywords
 from .distortion import Distortion
 from .projection import Orthographic, Panorama, Perspective, Projection
 

@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..counted import counted
-from ..errors import SceneError
-from ..vec import Doubles
+from ..arrays.vec import Doubles
+from ..core.counted import counted
+from ..core.errors import SceneError
 
 NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 COUNTS = (4, 5, 8, 12, 14)  # of OpenCV's coefficients; those after the eighth must be 0

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..elementary import sin_cos_turns
-from ..vec import Doubles
+from ..arrays.elementary import sin_cos_turns
+from ..arrays.vec import Doubles
 
 FILL = 0.85  # of the picture's width or height, whichever things fill first
 STEPS = 8  # of Newton's method; it ends where no other ball touches the edge, mostly after three

@@ -8,10 +8,10 @@ from copy import copy
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..counted import counted
-from ..elementary import arctan2, sin_cos
-from ..errors import SceneError, finite_array, number
-from ..vec import Doubles
+from ..arrays.elementary import arctan2, sin_cos
+from ..arrays.vec import Doubles
+from ..core.counted import counted
+from ..core.errors import SceneError, finite_array, number
 from .base import Camera, upward
 
 

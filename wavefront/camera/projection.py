@@ -13,11 +13,11 @@ from copy import copy
 
 import numpy as np
 
-from ..elementary import arctan2, sin_cos, sin_cos_turns
-from ..errors import SceneError, finite_array, number
-from ..parameter import Parametrized
+from ..arrays.elementary import arctan2, sin_cos, sin_cos_turns
+from ..arrays.vec import Doubles, Floats, column, f4
+from ..core.errors import SceneError, finite_array, number
+from ..core.parameter import Parametrized
 from ..sampling.warp import uniform_disk
-from ..vec import Doubles, Floats, column, f4
 from .distortion import GRID, Distortion
 
 Size = tuple[int, int]

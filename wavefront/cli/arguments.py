@@ -13,10 +13,10 @@ from ..codecs.display import Display
 from ..codecs.encoding import check_exposure, check_gamma
 from ..codecs.image_data import TRANSPARENT
 from ..colors import rgb
-from ..errors import SceneError
-from ..lighting import check_lighting
+from ..core.errors import SceneError
 from ..materials import Material
-from ..scene import view_direction
+from ..scene.lighting import check_lighting
+from ..scene.scene import view_direction
 from ..shapes.smoothing import check_smooth
 
 VECTOR_OPTIONS = ("--origin", "--target", "--up", "--direction", "--view")

@@ -6,7 +6,7 @@ import argparse
 import os
 from typing import Any, NoReturn
 
-from ..suggestions import did_you_mean, meant
+from ..core.suggestions import did_you_mean, meant
 from .status import ERROR
 
 COMMAND = "command"  # the name of the first word in messages

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from ..errors import RenderError, SceneError
+from ..core.errors import RenderError, SceneError
 from ..scheduling.interrupt import SIGNALS
 from ..version import VERSION
 from .arguments import joined

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from ..codecs.images import check_writable
-from ..metrics import compare
+from ..image.comparison import compare
 from .command import PICTURE_FILE, add_command
 
 

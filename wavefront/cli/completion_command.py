@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 from typing import Any
 
-from ..errors import SceneError
+from ..core.errors import SceneError
 from .command import add_command
 
 SHELLS = ("bash", "zsh")

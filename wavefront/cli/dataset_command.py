@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..counted import counted
+from ..core.counted import counted
 from ..datasets import write_dataset
 from ..datasets.dataset import FORMATS
 from ..views import turntable

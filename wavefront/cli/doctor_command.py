@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from ..counted import counted
-from ..memory import available_memory
-from ..record import record
+from ..arrays.record import record
+from ..core.counted import counted
+from ..core.memory import available_memory
 from ..scheduling.executors import worker_count
 from ..scheduling.machine import describe_machine
 from ..version import VERSION

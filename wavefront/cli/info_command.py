@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from ..counted import counted
+from ..arrays.vec import Doubles
+from ..core.counted import counted
+from ..core.parameter import brief
 from ..io.load import load
-from ..lighting import DEFAULT
 from ..materials import Material
-from ..parameter import brief
-from ..scene import FRAMING_VIEW, Scene
+from ..scene.lighting import DEFAULT
+from ..scene.scene import FRAMING_VIEW, Scene
 from ..shapes import Instance, Mesh, Shape
 from ..textures.base import BaseTexture
 from ..textures.image import Texture
-from ..vec import Doubles
 from .command import add_command, add_scene
 
 _PACKAGE = BaseTexture.__module__.partition(".")[0] + "."

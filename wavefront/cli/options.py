@@ -9,9 +9,9 @@ from typing import Any
 
 from ..codecs.display import Display
 from ..codecs.tone import TONES
+from ..core.progress import Progress
+from ..io.to_scene import as_scene
 from ..materials import Material, MaterialLike
-from ..progress import Progress
-from ..renderable import as_scene
 from ..scene import Scene
 from ..settings import AUTO, Settings
 from . import arguments

@@ -6,8 +6,8 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..errors import SaveError
-from ..files import make_folder
+from ..core.errors import SaveError
+from ..core.files import make_folder
 
 PLACE = "{}"  # in a path, stands for the name of the scene's file without extension
 

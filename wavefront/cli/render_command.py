@@ -10,11 +10,11 @@ import numpy as np
 
 from ..camera import Camera
 from ..codecs.images import check_display, check_writable
-from ..errors import Interrupted, RenderError, SaveError, SceneError
+from ..core.errors import Interrupted, RenderError, SaveError, SceneError
 from ..image import Image
+from ..io.to_scene import SIZE
 from ..render import finish
-from ..renderable import SIZE
-from ..scene import AUTO, FRAMING_FOV, Scene
+from ..scene.scene import AUTO, FRAMING_FOV, Scene
 from ..session import Session
 from ..viewer import view
 from . import arguments

@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from ..errors import SaveError
+from ..core.errors import SaveError
 
 MAX_STEM = 40  # characters of the name that are kept
 ALWAYS = ".npz"  # can hold any picture, with all that belongs to it

@@ -6,9 +6,9 @@ import argparse
 import os
 from typing import Any
 
-from ..checkpoint_file import contents_of, read_header
 from ..codecs.images import check_writable
-from ..errors import SceneError
+from ..core.errors import SceneError
+from ..film.checkpoint_file import contents_of, read_header
 from ..image import Image
 from .command import PICTURE_FILE, add_command
 from .messages import print_done

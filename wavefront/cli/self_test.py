@@ -7,16 +7,16 @@ import time
 import numpy as np
 
 from ..accel.embree import installed
+from ..arrays.record import record
+from ..arrays.vec import Doubles, Ints
 from ..bsdfs import Dielectric, Diffuse
 from ..camera import Camera
-from ..counted import counted
+from ..core.counted import counted
 from ..lights import Environment
-from ..record import record
 from ..render import render
 from ..scene import Scene
 from ..session import Session
 from ..shapes import Mesh, Rectangle, Sphere
-from ..vec import Doubles, Ints
 
 SIZE = (128, 128)
 FURNACE_SPP = 64

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from ..animation import check_animation, save_animation
-from ..counted import counted
+from ..core.counted import counted
 from ..views import render_many, turntable
 from .arguments import count
 from .command import add_command, add_scene

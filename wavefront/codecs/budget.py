@@ -6,9 +6,9 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from ..counted import counted
-from ..errors import SceneError
-from ..files import MAX_PIXELS, check_size
+from ..core.counted import counted
+from ..core.errors import SceneError
+from ..core.files import MAX_PIXELS, check_size
 
 MEMORY_BYTES = 2**31  # that files of any size may take
 PER_BYTE = 128  # bytes of memory that each byte of the files may take beyond that

@@ -9,7 +9,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Iterable, Iterator
 
-from ..errors import SceneError
+from ..core.errors import SceneError
 from .budget import Budget
 
 PNG = b"\x89PNG\r\n\x1a\n"

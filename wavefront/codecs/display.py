@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import one_of
-from ..vec import Floats
+from ..arrays.vec import Floats
+from ..core.errors import one_of
 from .encoding import check_exposure, check_gamma, exposed, to_codes
 from .image_data import ImageData
 from .png_jpeg import Gamma

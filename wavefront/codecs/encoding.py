@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays.vec import Floats
 from ..colors import linear_to_srgb, srgb_to_linear
-from ..errors import SceneError, number
-from ..vec import Floats
+from ..core.errors import SceneError, number
 from . import png_jpeg as coded
 from .png_jpeg import Gamma
 

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SaveError, SceneError
-from ..files import MAX_PIXELS
-from ..layers import components
-from ..vec import Floats
+from ..arrays.vec import Floats
+from ..core.errors import SaveError, SceneError
+from ..core.files import MAX_PIXELS
+from ..film.aov_names import components
 from .budget import Budget
 from .image_data import ERROR, ImageData, from_json, from_named, to_json
 

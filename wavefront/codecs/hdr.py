@@ -9,8 +9,8 @@ import re
 
 import numpy as np
 
-from ..errors import SceneError
-from ..vec import Bytes, Floats
+from ..arrays.vec import Bytes, Floats
+from ..core.errors import SceneError
 from .budget import Budget
 
 SIGNATURES = (b"#?RADIANCE", b"#?RGBE")

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SceneError
-from ..files import check_size
-from ..vec import Floats
+from ..arrays.vec import Floats
+from ..core.errors import SceneError
+from ..core.files import check_size
 
 TRANSPARENT = "transparent"  # the background in the metadata of a picture with an alpha channel
 ERROR = "error."  # before the name of a layer: its standard error

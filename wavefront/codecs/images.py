@@ -15,11 +15,11 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..counted import counted
-from ..errors import SaveError, SceneError, as_array, warn_caller
-from ..files import check_target, extension_of, read_bytes, write_bytes
-from ..registry import Registry
-from ..vec import Floats
+from ..arrays.vec import Floats
+from ..core.counted import counted
+from ..core.errors import SaveError, SceneError, as_array, warn_caller
+from ..core.files import check_target, extension_of, read_bytes, write_bytes
+from ..core.registry import Registry
 from . import exr, npz
 from . import hdr as rgbe
 from . import png_jpeg as coded

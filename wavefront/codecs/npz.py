@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..counted import counted
-from ..errors import SceneError
+from ..core.counted import counted
+from ..core.errors import SceneError
 from .archive import checked_members
 from .budget import Budget
 from .image_data import ImageData, from_json, from_named, to_json

@@ -11,8 +11,8 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SceneError
-from ..vec import Bytes, Ints
+from ..arrays.vec import Bytes, Ints
+from ..core.errors import SceneError
 from .claims import PNG, PNG_CHANNELS, png_chunks
 
 COLOR_TYPES = {3: 2, 4: 6}  # by channels

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SaveError, SceneError
+from ..core.errors import SaveError, SceneError
 from . import png16
 from .budget import Budget
 from .claims import JPG, check_claims

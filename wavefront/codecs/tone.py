@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..vec import Doubles
+from ..arrays.vec import Doubles
 
 LUMINANCE = np.array([[0.2126, 0.7152, 0.0722]])  # of linear RGB, ITU-R BT.709
 LARGEST = 1e30  # radiance; larger values are the same on the display
@@ -33,7 +33,7 @@ AGX_GAMMA = 2.2  # of the display that the curve is made for
 
 
 def transformed(matrix: Doubles, rgb: Doubles) -> Doubles:
-    """Return `matrix` (k, 3) times each color (..., 3); the sums are written out, see `vec.py`."""
+    """Return `matrix` (k, 3) times each color (..., 3); the sums are written out, see `arrays/vec.py`."""
     return np.stack([a * rgb[..., 0] + b * rgb[..., 1] + c * rgb[..., 2] for a, b, c in matrix], axis=-1)
 
 

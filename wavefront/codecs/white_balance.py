@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.vec import Doubles
 from ..colors import rgb
-from ..errors import SceneError, as_array, number
-from ..vec import Doubles
+from ..core.errors import SceneError, as_array, number
 
 WhiteBalance = float | ArrayLike  # kelvin, or the linear RGB of something that is gray
 

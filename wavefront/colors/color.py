@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SceneError, as_array, finite_array, in_brief
-from ..vec import Floats, f4
+from ..arrays.vec import Floats, f4
+from ..core.errors import SceneError, as_array, finite_array, in_brief
 from .names import CSS_COLORS
 from .transfer import srgb_to_linear
 

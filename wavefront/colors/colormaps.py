@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import warn_caller
-from ..vec import f4
+from ..arrays.vec import f4
+from ..core.errors import warn_caller
 
 MOST_ROWS = 16  # that are looked up
 

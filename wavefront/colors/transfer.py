@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..vec import Floats
+from ..arrays.vec import Floats
 
 
 def srgb_to_linear(values: Floats) -> Floats:

@@ -1,6 +1,6 @@
 """Casters: surfaces that light leaves by delta lobes alone, such as smooth glass and mirrors.
 
-Light paths (light_paths.py) begin at points on them, which are drawn evenly by area.
+Light paths (integrators/light_tracing.py) begin at points on them, which are drawn evenly by area.
 """
 
 from __future__ import annotations
@@ -9,10 +9,10 @@ import numpy as np
 
 from ..accel.quads import find_quads
 from ..accel.sphere import SpherePrimitives
-from ..record import record
+from ..arrays.record import record
+from ..arrays.state import SoA
+from ..arrays.vec import Bools, Doubles, Floats, Ints, f4, interpolate
 from ..sampling.warp import uniform_sphere, uniform_triangle
-from ..state import SoA
-from ..vec import Bools, Doubles, Floats, Ints, f4, interpolate
 from .curved import CurvedTable
 from .materials import MaterialTable
 

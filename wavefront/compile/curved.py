@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..accel import KINDS, CurvedPrimitives, kind_of
-from ..record import record
+from ..arrays.record import record
+from ..arrays.vec import ALL, Floats, Ints, Lanes, f4, put, take
 from ..shapes import CurvedShape
-from ..vec import ALL, Floats, Ints, Lanes, f4, put, take
 
 
 def order_by_kind(shapes: Sequence[CurvedShape]) -> list[int]:

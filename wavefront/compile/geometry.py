@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays.vec import Bools, Floats, Ints, cross, f4, length, spans
 from ..shapes import Mesh
-from ..vec import Bools, Floats, Ints, cross, f4, length, spans
 
 AT_ONCE = 1 << 14  # triangles that are made in float64 together, so that they fit the cache
 

@@ -8,12 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..accel import Placements
-from ..errors import SceneError
-from ..record import record
+from ..arrays.record import record
+from ..arrays.state import SoA
+from ..arrays.vec import Doubles, Floats, Ints, f4
+from ..core.errors import SceneError
 from ..shapes import CurvedShape, Instance, Mesh, Shape
 from ..shapes.instance import instance_bounds
-from ..state import SoA
-from ..vec import Doubles, Floats, Ints, f4
 from .curved import order_by_kind
 from .overlaps import overlapping_instances
 

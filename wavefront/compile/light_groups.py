@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ..layers import group_name
+from ..arrays.record import record
+from ..arrays.vec import Floats, Ints
+from ..film.aov_names import group_name
 from ..lights import EnvironmentSum, InfiniteLight, Light
-from ..record import record
 from ..shapes import CurvedShape, Mesh
-from ..vec import Floats, Ints
 
 
 @record

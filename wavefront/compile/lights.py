@@ -8,8 +8,9 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..counted import counted
-from ..errors import SceneError
+from ..arrays.vec import Floats, Ints, f4
+from ..core.counted import counted
+from ..core.errors import SceneError
 from ..lights import (
     Environment,
     EnvironmentSum,
@@ -34,7 +35,6 @@ from ..scene import Scene
 from ..shapes import CurvedShape, Mesh, Shape, Sphere, Spheres
 from ..shapes.attributes import ATTRIBUTES
 from ..textures.base import BaseTexture
-from ..vec import Floats, Ints, f4
 from .light_groups import GroupNumbers, LightGroups, primitive_count
 
 # A record, and the primitives of its lights: (..., k) a column per light, or (..., m) of one light, or none.

@@ -7,17 +7,17 @@ from copy import copy
 
 import numpy as np
 
+from ..arrays.record import record
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import Bools, Floats, Ints, f4
 from ..bsdfs import Bsdf
-from ..counted import counted
-from ..errors import SceneError, warn_caller
+from ..core.counted import counted
+from ..core.errors import SceneError, warn_caller
 from ..materials import Material, Opacity
-from ..record import record
 from ..shapes import CurvedShape, Instance, Mesh, Shape
 from ..shapes.attributes import ATTRIBUTES
-from ..state import SurfaceInteraction
 from ..textures.base import BaseTexture
 from ..textures.normal_map import BaseNormalMap
-from ..vec import Bools, Floats, Ints, f4
 
 
 @record

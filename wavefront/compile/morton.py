@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..record import record
-from ..vec import Floats, f4
+from ..arrays.record import record
+from ..arrays.vec import Floats, f4
 
 BITS = 5  # along each axis: codes have 15 bits, and NumPy sorts integers of 16 bits by radix
 

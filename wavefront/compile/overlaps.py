@@ -12,10 +12,10 @@ import numpy as np
 
 from ..accel.coplanar import find_overlaps
 from ..accel.triangle import has_area, triangle_table
+from ..arrays.vec import Doubles, Floats, Ints, f4
 from ..shapes import Instance, Mesh
 from ..shapes.instance import instance_bounds
 from ..shapes.transform import points_by
-from ..vec import Doubles, Floats, Ints, f4
 
 MOST_FACES = 1 << 18  # of instances, and of meshes beside them, among which overlaps are searched
 ROOM = 2.0**-20  # margin of the box of all instances, relative to its coordinates

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SceneError
+from ..core.errors import SceneError
 from ..lights import Light
 from ..materials import Material
 from ..shapes import CurvedShape, Instance, Mesh, Shape

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..accel import Accelerator, Geometry, InstanceAccelerator
+from ..arrays.record import record
+from ..arrays.vec import Bools, Floats, Ints
 from ..camera import Camera
 from ..lights import InfiniteLight, LightTable
 from ..lights.samplers import LightSamplerMaker
-from ..record import record
 from ..scene import Scene
 from ..shapes import Shape
 from ..shapes.attributes import Corners, corner_values
-from ..vec import Bools, Floats, Ints
 from .casters import Casters, find_casters
 from .curved import CurvedTable
 from .geometry import compute_corner_normals, gather_triangles, same_as_next

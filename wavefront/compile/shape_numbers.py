@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..record import record
+from ..arrays.record import record
+from ..arrays.state import Hits
+from ..arrays.vec import Ints
 from ..shapes import CurvedShape, Instance, Mesh
-from ..state import Hits
-from ..vec import Ints
 
 SINGLE_COLUMNS = 2  # of the `InstanceTable`, for what is not instanced
 

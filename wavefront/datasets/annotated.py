@@ -6,11 +6,11 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from ..errors import SceneError
-from ..record import record
+from ..arrays.record import record
+from ..arrays.vec import Doubles
+from ..core.errors import SceneError
+from ..core.suggestions import did_you_mean
 from ..shapes import Instance, Shape
-from ..suggestions import did_you_mean
-from ..vec import Doubles
 
 RIGID = 1e-6  # largest element of MᵀM − 1 of a matrix that neither scales nor shears
 

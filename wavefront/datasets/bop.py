@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays.vec import Doubles, Floats
 from ..camera import Camera, Perspective
-from ..errors import SceneError
-from ..files import make_folder, write_bytes, write_json
+from ..core.errors import SceneError
+from ..core.files import make_folder, write_bytes, write_json
 from ..shapes import Shape
-from ..vec import Doubles, Floats
 from .annotated import AnnotatedObject
 from .masks import Mask, mask_box, touches_edge
 from .models import write_models

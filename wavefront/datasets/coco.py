@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..camera import Camera
-from ..files import make_folder, write_json
+from ..core.files import make_folder, write_json
 from ..version import VERSION
 from .annotated import AnnotatedObject
 from .masks import mask_box, run_lengths

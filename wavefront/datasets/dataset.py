@@ -13,11 +13,11 @@ from ..camera import Camera, check_camera
 from ..codecs.display import Display
 from ..codecs.png_jpeg import Gamma
 from ..codecs.white_balance import WhiteBalance
-from ..errors import SceneError, iterable, number, one_of
-from ..files import make_folder, path_name, read_json, write_json
-from ..identity import differences
-from ..layers import chosen_layers
-from ..renderable import as_scene
+from ..core.errors import SceneError, iterable, number, one_of
+from ..core.files import make_folder, path_name, read_json, write_json
+from ..film.aov_names import chosen_layers
+from ..film.identity import differences
+from ..io.to_scene import as_scene
 from ..scene import Scene
 from ..session import Session
 from .annotated import AnnotatedObject, annotated_objects

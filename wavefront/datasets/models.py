@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays.vec import Doubles, f4
 from ..colors import linear_to_srgb
-from ..files import make_folder, write_bytes, write_json
+from ..core.files import make_folder, write_bytes, write_json
 from ..shapes import Instance, Mesh, Shape
-from ..vec import Doubles, f4
 from .annotated import AnnotatedObject
 
 FOLDER = "models"

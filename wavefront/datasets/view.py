@@ -7,10 +7,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from ..arrays.record import record
 from ..camera import Camera, Perspective
 from ..codecs.display import Display
 from ..image import Image
-from ..record import record
 from .annotated import AnnotatedObject
 from .masks import Mask
 

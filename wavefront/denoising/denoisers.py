@@ -8,8 +8,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ..registry import Registry
-from ..vec import Floats
+from ..arrays.vec import Floats
+from ..core.registry import Registry
 from .noisy import NoisyPicture
 from .nonlocal_means import nonlocal_means
 from .open_image_denoise import open_image_denoise

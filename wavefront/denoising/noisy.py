@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..layers import GUIDES
-from ..record import record
-from ..vec import Doubles, Floats
+from ..arrays.record import record
+from ..arrays.vec import Doubles, Floats
+from ..film.aov_names import GUIDES
 
 
 @record

@@ -14,9 +14,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..elementary import exp
-from ..record import record
-from ..vec import Doubles, Floats
+from ..arrays.elementary import exp
+from ..arrays.record import record
+from ..arrays.vec import Doubles, Floats
 from .noisy import Guide, NoisyPicture
 
 REACH = 7  # pixels from the middle of the window to its sides

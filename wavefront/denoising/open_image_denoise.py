@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import RenderError, SceneError
-from ..vec import Floats
+from ..arrays.vec import Floats
+from ..core.errors import RenderError, SceneError
 from .noisy import Guide, NoisyPicture
 
 SMALLEST = 64  # pixels along a side; smaller pictures are extended, since the network sees black beyond

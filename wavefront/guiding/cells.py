@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..record import record
-from ..vec import Floats, Ints, f4
+from ..arrays.record import record
+from ..arrays.vec import Floats, Ints, f4
 
 OUTLYING = 0.002  # part of the points, along each axis and side, that the grid leaves outside
 MARGIN = 0.01  # of the grid's extent, on each side

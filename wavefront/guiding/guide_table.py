@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..record import record
-from ..vec import Doubles, Floats, Ints, f4
+from ..arrays.record import record
+from ..arrays.vec import Doubles, Floats, Ints, f4
 from .cells import GuideCells
 from .octahedral import bins_of, directions_at
 

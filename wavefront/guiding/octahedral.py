@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..vec import Doubles, Floats, Ints, dot, f4
+from ..arrays.vec import Doubles, Floats, Ints, dot, f4
 
 PARTS = 8  # along each side of a bin, for its solid angle
 

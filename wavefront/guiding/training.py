@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..record import record
-from ..state import SoA
-from ..vec import Doubles, Floats, Ints
+from ..arrays.record import record
+from ..arrays.state import SoA
+from ..arrays.vec import Doubles, Floats, Ints
 from .cells import GuideCells
 from .guide_table import GuideTable
 from .octahedral import neighbors, solid_angles

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..counted import counted
+from ..core.counted import counted
 from ..shapes import Points, Spheres
 from ..shapes.points import usual_radius
 from .repair import Table, warn

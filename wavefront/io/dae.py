@@ -11,7 +11,7 @@ import zipfile
 from io import BytesIO
 from typing import Any
 
-from ..errors import SceneError
+from ..core.errors import SceneError
 from .markup import check_expanded, look_through, total
 from .repair import warn
 from .sources import SceneFiles

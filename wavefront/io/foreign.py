@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from ..colors import srgb
-from ..counted import counted
-from ..errors import SceneError, warn_caller
+from ..core.counted import counted
+from ..core.errors import SceneError, warn_caller
 from ..scene import Scene
 from ..shapes import Capsules, Shape
 from ..shapes.points import point_colors

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..camera import Camera
-from ..errors import SceneError, printable
+from ..core.errors import SceneError, printable
 from ..lights import DirectionalLight, PointLight, SpotLight
 from ..shapes.transform import Matrix
 from .gltf_document import Document, floats, shown

@@ -19,8 +19,8 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from ..counted import counted
-from ..errors import SceneError, printable
+from ..core.counted import counted
+from ..core.errors import SceneError, printable
 from ..shapes.transform import Matrix
 from .sources import MAX_TRIANGLES, SceneFiles
 

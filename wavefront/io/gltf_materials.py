@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays.elementary import log, sin_cos_turns
+from ..arrays.vec import FLOAT32_MAX
 from ..codecs.images import decode_codes
-from ..elementary import log, sin_cos_turns
-from ..errors import SceneError, printable
+from ..core.errors import SceneError, printable
 from ..textures.image import Texture
 from ..textures.normal_map import NormalMap
 from ..textures.parameter import MAX_INDEX
-from ..vec import FLOAT32_MAX
 from .appearance import MaterialSpec, build_material
 from .gltf_document import SHOWN, Document, floats, shown
 from .gltf_specular_glossiness import F0, BesideSpecular

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..counted import counted
-from ..errors import SceneError
+from ..core.counted import counted
+from ..core.errors import SceneError
 from .gltf_document import Document
 from .repair import Faces, RawMesh, Table, wide
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import SceneError
+from ..arrays.vec import Ints
+from ..core.errors import SceneError
 from ..shapes.transform import Matrix
-from ..vec import Ints
 from .gltf_document import Document, shown, table
 from .gltf_meshes import attribute
 from .placing import MAX_ELEMENT, in_range

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import SceneError, finite_array
+from ..arrays.vec import Doubles
+from ..core.errors import SceneError, finite_array
 from ..materials import MaterialLike, as_material
 from ..shapes import Mesh
 from ..shapes.transform import moved, moved_tangents
-from ..vec import Doubles
 from .repair import RawMesh, build
 
 

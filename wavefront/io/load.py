@@ -11,10 +11,10 @@ from typing import Any, TypeVar
 from numpy.typing import ArrayLike
 
 from ..codecs.budget import in_memory
-from ..errors import SceneError
-from ..files import path_name
+from ..core.errors import SceneError
+from ..core.files import path_name
+from ..core.progress import Progress, phase
 from ..materials import MaterialLike
-from ..progress import Progress, phase
 from ..scene import Scene
 from ..shapes import Instance, Mesh, Shape
 from ..shapes.smoothing import AUTO, check_smooth

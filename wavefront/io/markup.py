@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from xml.parsers import expat
 
-from ..errors import SceneError
+from ..core.errors import SceneError
 
 MAX_DEPTH = 128  # nesting of nodes
 MAX_EXPANDED = 2**31  # bytes of a file with every reference replaced by its target

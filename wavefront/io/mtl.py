@@ -41,13 +41,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays.vec import Doubles
 from ..bsdfs import Dielectric, Diffuse, Mirror
-from ..errors import SceneError, printable
+from ..core.errors import SceneError, printable
 from ..materials import Material
 from ..textures.image import StoredImage, Texture
 from ..textures.normal_map import BaseNormalMap, BumpMap, NormalMap
 from ..textures.parameter import MAX_INDEX
-from ..vec import Doubles
 from .appearance import MaterialSpec, build_material
 from .repair import warn
 from .sources import SceneFiles

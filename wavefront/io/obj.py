@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SceneError
+from ..core.errors import SceneError
 from .lines import NUMBER, check_lines, words
 from .repair import RawMesh, Table, warn
 from .sources import LoadLimits

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..counted import counted
-from ..errors import SceneError
-from ..files import decode_text
+from ..core.counted import counted
+from ..core.errors import SceneError
+from ..core.files import decode_text
 from .repair import warn
 from .trimesh_loading import by_trimesh
 

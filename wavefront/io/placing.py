@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SceneError
+from ..core.errors import SceneError
 from ..shapes import Instance, Mesh
 from ..shapes.instance import can_place
 from ..shapes.transform import Matrix, moved, moved_tangents

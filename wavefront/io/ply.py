@@ -15,8 +15,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..counted import counted
-from ..errors import SceneError
+from ..core.counted import counted
+from ..core.errors import SceneError
 from .headers import SIZES, TYPES, Element, check_ply, ply_textures, unread
 from .repair import warn
 from .sources import SceneFiles

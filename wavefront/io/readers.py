@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeAlias
 
-from ..counted import counted
-from ..errors import SceneError
-from ..files import decode_text, extension_of
-from ..registry import Registry
+from ..core.counted import counted
+from ..core.errors import SceneError
+from ..core.files import decode_text, extension_of
+from ..core.registry import Registry
 from ..scene import Scene
 from ..shapes.smoothing import AUTO
 from . import dae, gltf, mtl, obj, off, ply, stl, threemf, trimesh_objects, visuals

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..counted import counted
-from ..errors import SceneError, printable, warn_caller
+from ..arrays.vec import FLOAT32_MAX, cross, spans
+from ..core.counted import counted
+from ..core.errors import SceneError, printable, warn_caller
 from ..materials import Material
 from ..shapes import Mesh
 from ..textures.parameter import Color
-from ..vec import FLOAT32_MAX, cross, spans
 
 MAX_UV = 2.0**24  # above, float32 has no fractions, which textures need
 AT_ONCE = 1 << 14  # faces whose area is found together, so that they fit the cache

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ..codecs.budget import MEMORY_BYTES, Budget
 from ..codecs.images import read_codes
-from ..errors import SceneError
-from ..files import MAX_BYTES, MAX_PIXELS, check_regular, path_name, read_bytes
+from ..core.errors import SceneError
+from ..core.files import MAX_BYTES, MAX_PIXELS, check_regular, path_name, read_bytes
 
 PathLike = str | os.PathLike[str]
 
@@ -60,7 +60,7 @@ class LoadLimits:
     >>> wf.load("big.off", limits=small)
     Traceback (most recent call last):
         ...
-    wavefront.errors.SceneError: ...
+    wavefront.core.errors.SceneError: ...
     """
 
     file_bytes: int = MAX_BYTES

@@ -6,9 +6,9 @@ from functools import partial
 
 import numpy as np
 
-from ..counted import counted
-from ..errors import SceneError
-from ..files import decode_text
+from ..core.counted import counted
+from ..core.errors import SceneError
+from ..core.files import decode_text
 from .lines import NUMBER, check_lines, words
 from .repair import RawMesh, warn, wide
 from .trimesh_loading import geometries

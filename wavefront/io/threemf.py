@@ -13,13 +13,13 @@ from io import BytesIO
 
 import numpy as np
 
+from ..arrays.vec import Ints
 from ..bsdfs import Diffuse
 from ..codecs.archive import checked_members, unpacked
 from ..colors import srgb
-from ..errors import SceneError
+from ..core.errors import SceneError
 from ..materials import Material
 from ..shapes.transform import IDENTITY, Matrix
-from ..vec import Ints
 from .appearance import MaterialSpec, assign_material
 from .contents import Contents
 from .markup import check_expanded, look_through

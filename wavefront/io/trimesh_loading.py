@@ -12,7 +12,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from ..codecs.images import decode_codes
-from ..errors import SceneError
+from ..core.errors import SceneError
 from .repair import warn
 from .sources import SceneFiles
 from .trimesh_import import ctrl_c_is_kept, import_trimesh

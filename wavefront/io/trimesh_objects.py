@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import SceneError
+from ..core.errors import SceneError
 from ..shapes.transform import Matrix
 from . import visuals
 from .appearance import MaterialSpec, assign_material, is_faint

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..camera import Camera
 from ..camera.projection import Perspective
-from ..errors import SceneError
+from ..core.errors import SceneError
 from ..lights import DirectionalLight, PointLight, SpotLight
 from ..scene import Scene
 from ..shapes.transform import Matrix

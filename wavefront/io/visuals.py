@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays.vec import f4
 from ..bsdfs import Diffuse
 from ..colors import srgb_to_linear
-from ..errors import printable
+from ..core.errors import printable
 from ..materials import Material
 from ..textures.image import Texture
 from ..textures.normal_map import NormalMap
-from ..vec import f4
 from . import mtl
 from .appearance import MaterialSpec, build_material
 from .mtl import MATTE

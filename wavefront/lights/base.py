@@ -14,12 +14,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SceneError, finite_array
-from ..layers import DEFAULT_GROUP
-from ..record import record
+from ..arrays.record import record
+from ..arrays.state import SoA, SurfaceInteraction
+from ..arrays.vec import Bools, Doubles, Floats, Ints, f4
+from ..core.errors import SceneError, finite_array
+from ..film.aov_names import DEFAULT_GROUP
 from ..shapes import Shape
-from ..state import SoA, SurfaceInteraction
-from ..vec import Bools, Doubles, Floats, Ints, f4
 
 
 @record

@@ -7,17 +7,17 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays.elementary import sin_cos
+from ..arrays.frame import Frame
+from ..arrays.record import record
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import TWO_PI, Floats, column, dot, f4
 from ..colors import rgb
-from ..elementary import sin_cos
-from ..errors import SceneError, finite_array, number
-from ..frame import Frame
-from ..layers import DEFAULT_GROUP, group_name
-from ..parameter import Parameter, Parametrized
-from ..record import record
+from ..core.errors import SceneError, finite_array, number
+from ..core.parameter import Parameter, Parametrized
+from ..core.suggestions import suggests_keywords
+from ..film.aov_names import DEFAULT_GROUP, group_name
 from ..sampling.warp import uniform_cone
-from ..state import SurfaceInteraction
-from ..suggestions import suggests_keywords
-from ..vec import TWO_PI, Floats, column, dot, f4
 from .base import DeltaLight, Light, LightSample
 from .infinite import InfiniteLight, at_infinity, facing_irradiance, through_scene, turned
 

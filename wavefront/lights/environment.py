@@ -10,16 +10,16 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays.record import record
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import INV_FOUR_PI, Floats, f4
 from ..codecs.budget import in_memory
 from ..colors import is_color_name, rgb
-from ..errors import as_array, one_of, rotation_matrix
-from ..layers import DEFAULT_GROUP, group_name
-from ..parameter import Parameter, Parametrized
-from ..record import record
+from ..core.errors import as_array, one_of, rotation_matrix
+from ..core.parameter import Parameter, Parametrized
+from ..core.suggestions import suggests_keywords
+from ..film.aov_names import DEFAULT_GROUP, group_name
 from ..sampling.warp import uniform_sphere
-from ..state import SurfaceInteraction
-from ..suggestions import suggests_keywords
-from ..vec import INV_FOUR_PI, Floats, f4
 from .base import Light, LightSample
 from .image import ImageEnvironment, environment_pixels
 from .infinite import InfiniteLight, at_infinity, through_scene

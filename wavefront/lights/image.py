@@ -10,18 +10,18 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays.elementary import arctan2, sin_cos, sin_cos_turns
+from ..arrays.record import record
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import INV_PI, INV_TWO_PI, Floats, f4, luminance
 from ..codecs.budget import Budget
 from ..codecs.encoding import codes_to_linear
 from ..codecs.images import COLOR_BYTES, read_codes
-from ..counted import counted
-from ..elementary import arctan2, sin_cos, sin_cos_turns
-from ..errors import SceneError, as_array, warn_caller
-from ..files import check_size
-from ..record import record
+from ..core.counted import counted
+from ..core.errors import SceneError, as_array, warn_caller
+from ..core.files import check_size
 from ..sampling.discrete import Distribution2D
-from ..state import SurfaceInteraction
 from ..textures.image import Texture
-from ..vec import INV_PI, INV_TWO_PI, Floats, f4, luminance
 from .base import LightSample
 from .infinite import InfiniteLight, at_infinity, through_scene, turned
 

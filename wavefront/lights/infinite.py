@@ -9,10 +9,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..record import record
+from ..arrays.record import record
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import Floats, Lanes, column, f4
 from ..sampling.discrete import Discrete
-from ..state import SurfaceInteraction
-from ..vec import Floats, Lanes, column, f4
 from .base import LightRecord, LightSample
 
 

@@ -7,9 +7,9 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..record import record
-from ..state import SurfaceInteraction
-from ..vec import Floats, dot, f4, positive
+from ..arrays.record import record
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import Floats, dot, f4, positive
 from .base import Emitters, LightRecord
 
 LEAST_SQUARE = f4(1e-35)  # added to squared distances before their root, so that nothing is divided by 0

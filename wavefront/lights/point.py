@@ -8,13 +8,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays.record import record
+from ..arrays.vec import FLOAT32_MAX, Floats, dot, f4
 from ..colors import rgb
-from ..errors import SceneError, as_array, finite_array
-from ..layers import DEFAULT_GROUP, group_name
-from ..parameter import Parameter, Parametrized
-from ..record import record
-from ..suggestions import suggests_keywords
-from ..vec import FLOAT32_MAX, Floats, dot, f4
+from ..core.errors import SceneError, as_array, finite_array
+from ..core.parameter import Parameter, Parametrized
+from ..core.suggestions import suggests_keywords
+from ..film.aov_names import DEFAULT_GROUP, group_name
 from .base import DeltaLight, Emitters, Light, LightSample, position
 
 

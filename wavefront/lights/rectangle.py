@@ -8,10 +8,10 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..record import record
+from ..arrays.record import record
+from ..arrays.vec import Bools, Floats, Ints, dot, f4, put
 from ..sampling.spherical import SphericalRectangle
 from ..shapes.fans import are_fans, disjoint_pairs
-from ..vec import Bools, Floats, Ints, dot, f4, put
 from .base import LightSample
 from .planar import LEAST_SQUARE, PlanarLights, TwoSided, area_pdf
 

@@ -8,9 +8,9 @@ from typing import Protocol, TypeAlias
 
 import numpy as np
 
-from ..registry import Registry
+from ..arrays.vec import Bools, Doubles, Floats, Ints, broadcast, f4
+from ..core.registry import Registry
 from ..sampling.discrete import Discrete, rounded_up
-from ..vec import Bools, Doubles, Floats, Ints, broadcast, f4
 from .base import Emitters
 from .tree import LightTreeSampler
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..frame import Frame
-from ..record import record
+from ..arrays.frame import Frame
+from ..arrays.record import record
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import INV_FOUR_PI, TWO_PI, Bools, Floats, dot, f4
 from ..sampling.warp import uniform_cone, uniform_sphere
-from ..state import SurfaceInteraction
-from ..vec import INV_FOUR_PI, TWO_PI, Bools, Floats, dot, f4
 from .base import Emitters, LightRecord, LightSample
 
 

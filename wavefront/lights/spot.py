@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..elementary import arccos, arcsin, sin_cos, sin_cos_turns
-from ..errors import SceneError, finite_array, number
-from ..layers import DEFAULT_GROUP
-from ..parameter import Parameter
-from ..record import record
-from ..suggestions import suggests_keywords
-from ..vec import Floats, dot, f4
+from ..arrays.elementary import arccos, arcsin, sin_cos, sin_cos_turns
+from ..arrays.record import record
+from ..arrays.vec import Floats, dot, f4
+from ..core.errors import SceneError, finite_array, number
+from ..core.parameter import Parameter
+from ..core.suggestions import suggests_keywords
+from ..film.aov_names import DEFAULT_GROUP
 from .base import DeltaLight, Emitters, LightSample
 from .directional import unit
 from .point import LightAtPoint

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import ALL, Floats, Ints, Lanes, f4, put, take
 from ..sampling.mis import power_heuristic
-from ..state import SurfaceInteraction
-from ..vec import ALL, Floats, Ints, Lanes, f4, put, take
 from .base import Emitters, LightRecord, LightSample, emitters_of, sampled_li
 from .samplers import (
     LIGHT_SAMPLERS,

@@ -7,13 +7,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays.record import record
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import Bools, Floats, Ints, cross, f4, interpolate, normalize
 from ..materials.alpha import Opacity
-from ..record import record
 from ..shapes import Mesh
 from ..shapes.attributes import Corners, corner_values
-from ..state import SurfaceInteraction
 from ..textures.base import BaseTexture
-from ..vec import Bools, Floats, Ints, cross, f4, interpolate, normalize
 from .base import LightSample
 from .planar import TwoSided
 from .triangle import TriangleLights

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from ..elementary import sin_cos_turns
-from ..record import record
+from ..arrays.elementary import sin_cos_turns
+from ..arrays.record import record
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import Bools, Floats, Ints, f4, spans
 from ..shapes.attributes import sphere_uv
-from ..state import SurfaceInteraction
 from ..textures.base import BaseTexture
-from ..vec import Bools, Floats, Ints, f4, spans
 from .base import LightSample
 from .sphere import SphereLights
 from .textured_emission import MOST_SAMPLES, emission_at, radiance_by_source

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..vec import Doubles, Floats, Ints, f4, spans
+from ..arrays.vec import Doubles, Floats, Ints, f4, spans
 from .base import Emitters
 
 BITS = 4  # of the number of a child: a node has 16 children; the root may have fewer

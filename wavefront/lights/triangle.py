@@ -7,9 +7,9 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..record import record
+from ..arrays.record import record
+from ..arrays.vec import Floats, cross, dot, f4
 from ..sampling.warp import uniform_triangle
-from ..vec import Floats, cross, dot, f4
 from .base import LightSample
 from .planar import LEAST_SQUARE, PlanarLights, TwoSided, area_pdf
 

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import SceneError
-from ..state import SurfaceInteraction
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import Floats, f4
+from ..core.errors import SceneError
 from ..textures.base import BaseTexture
 from ..textures.parameter import Scalar, scalar
-from ..vec import Floats, f4
 
 
 class Opacity:

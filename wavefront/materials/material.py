@@ -8,12 +8,12 @@ from typing import Any, Self, TypeAlias
 import numpy as np
 
 from ..bsdfs import Bsdf
-from ..errors import SceneError, number
-from ..html import preview_html
-from ..layers import DEFAULT_GROUP, group_name
+from ..core.errors import SceneError, number
+from ..core.html import preview_html
+from ..core.parameter import Parameter, Parametrized
+from ..core.suggestions import suggests_keywords
+from ..film.aov_names import DEFAULT_GROUP, group_name
 from ..media import Medium
-from ..parameter import Parameter, Parametrized
-from ..suggestions import suggests_keywords
 from ..textures.normal_map import BaseNormalMap
 from ..textures.parameter import Color, Scalar, color
 from .alpha import Opacity, alpha_value

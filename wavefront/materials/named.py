@@ -7,7 +7,7 @@ from collections.abc import Callable
 from ..bsdfs import Bsdf, Conductor, Dielectric, Diffuse, Mirror, OrenNayar, Principled
 from ..bsdfs.conductor import METALS, SPELLINGS
 from ..colors import is_color_name
-from ..errors import SceneError, one_of
+from ..core.errors import SceneError, one_of
 from ..textures.parameter import Color
 
 METAL_ROUGHNESS = 0.2

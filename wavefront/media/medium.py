@@ -8,12 +8,12 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.vec import f4
 from ..colors import rgb
-from ..errors import SceneError
-from ..parameter import Parameter, Parametrized
-from ..suggestions import suggests_keywords
+from ..core.errors import SceneError
+from ..core.parameter import Parameter, Parametrized
+from ..core.suggestions import suggests_keywords
 from ..textures.base import BaseTexture
-from ..vec import f4
 
 
 def _coefficient(name: str, value: Any) -> Any:

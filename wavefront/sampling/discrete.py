@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..counted import counted
-from ..errors import SceneError
-from ..vec import BELOW_ONE, Floats, Ints, f4
+from ..arrays.vec import BELOW_ONE, Floats, Ints, f4
+from ..core.counted import counted
+from ..core.errors import SceneError
 
 _LARGE = 1 << 19  # tables of more items get fewer cells per item, to save memory
 

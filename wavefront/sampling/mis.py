@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..vec import Floats, f4
+from ..arrays.vec import Floats, f4
 
 
 def power_heuristic(pdf: Floats, other: Floats) -> Floats:

@@ -16,10 +16,10 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SceneError
-from ..registry import Registry
-from ..state import Words
-from ..vec import Floats, f4
+from ..arrays.state import Words
+from ..arrays.vec import Floats, f4
+from ..core.errors import SceneError
+from ..core.registry import Registry
 
 Longs = NDArray[np.uint64]
 

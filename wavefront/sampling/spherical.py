@@ -6,9 +6,9 @@ from typing import Self
 
 import numpy as np
 
-from ..elementary import arctan2, sin_cos
-from ..record import record
-from ..vec import Floats, cross, dot, f4, normalize
+from ..arrays.elementary import arctan2, sin_cos
+from ..arrays.record import record
+from ..arrays.vec import Floats, cross, dot, f4, normalize
 
 
 @record

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..elementary import log, sin_cos, sin_cos_turns
-from ..vec import BELOW_ONE, INV_FOUR_PI, INV_PI, INV_TWO_PI, TINY, Floats, f4, positive
+from ..arrays.elementary import log, sin_cos, sin_cos_turns
+from ..arrays.vec import BELOW_ONE, INV_FOUR_PI, INV_PI, INV_TWO_PI, TINY, Floats, f4, positive
 
 HALF_PI = f4(np.pi / 2)
 QUARTER_PI = f4(np.pi / 4)

@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from ..counted import counted
-from ..errors import RenderError, warn_caller
-from ..film import Film
-from ..image import Image, film_image, last_film_image
-from ..layer_sums import LayerSums, layer_bytes
-from ..light_paths import Splats
-from ..light_sums import LightSums
-from ..memory import check_memory
-from ..picture_sums import PictureSums
-from ..vec import Bytes
+from ..arrays.vec import Bytes
+from ..core.counted import counted
+from ..core.errors import RenderError, warn_caller
+from ..core.memory import check_memory
+from ..film.aov_sums import LayerSums, layer_bytes
+from ..film.film import Film
+from ..film.light_sums import LightSums
+from ..film.picture_sums import PictureSums
+from ..image.image import Image, film_image, last_film_image
+from ..integrators.light_tracing import Splats
 from .jobs import Job, JobResult, WaveResult
 
 MAX_BAD_SAMPLES = 1e-4  # part of all samples that may be lost to NaN before it is an error

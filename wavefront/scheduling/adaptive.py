@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..film import MUCH_RARE, Film
-from ..record import record
-from ..state import Words
-from ..vec import Ints, distinct
+from ..arrays.record import record
+from ..arrays.state import Words
+from ..arrays.vec import Ints, distinct
+from ..film.film import MUCH_RARE, Film
 
 MIN_SPP = 32  # before anything is decided by an error estimate
 MOST_RARE = 0.9  # part of the squared error, from where on it counts as this part

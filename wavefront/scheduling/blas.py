@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from ..counted import counted
-from ..memory import address_space_left
+from ..core.counted import counted
+from ..core.memory import address_space_left
 from .interrupt import deferred_signals
 
 # Bytes of address space: OpenBLAS takes 32 MB for each call at a time, and a thread its stack.

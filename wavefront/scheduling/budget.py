@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..errors import SceneError
-from ..memory import megabytes, resident_memory
-from ..record import record
+from ..arrays.record import record
+from ..core.errors import SceneError
+from ..core.memory import megabytes, resident_memory
 from .accumulator import picture_memory
 from .scheduler import SMALL_WAVE, default_wave_size
 

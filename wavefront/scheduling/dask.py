@@ -7,7 +7,7 @@ from concurrent.futures import Future, InvalidStateError
 from contextlib import contextmanager, suppress
 from typing import Any, Protocol, runtime_checkable
 
-from ..errors import RenderError, SceneError
+from ..core.errors import RenderError, SceneError
 from .delivery import Payload
 from .remote import RemoteWorkers
 from .shared import SharedInt

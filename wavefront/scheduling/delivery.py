@@ -20,8 +20,8 @@ from contextlib import contextmanager
 from itertools import count
 from typing import Any
 
-from ..errors import SceneError
-from ..record import record
+from ..arrays.record import record
+from ..core.errors import SceneError
 from .blas import single_threaded_blas
 from .heap import prepare_heap
 from .machine import machine_differences

@@ -21,8 +21,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from ..errors import SceneError, warn_caller
-from ..registry import Registry
+from ..core.errors import SceneError, warn_caller
+from ..core.registry import Registry
 from .blas import reserve_buffers
 from .dask import DaskClient, dask_workers, threads_in
 from .remote import RemoteWorkers

@@ -11,14 +11,14 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from ..arrays.record import record
+from ..arrays.state import Words
+from ..arrays.vec import Floats, Ints
 from ..camera import Camera
-from ..counted import counted
-from ..layer_samples import LayerSamples
-from ..light_paths import Splats
-from ..pixel_tiles import whole_tiles
-from ..record import record
-from ..state import Words
-from ..vec import Floats, Ints
+from ..core.counted import counted
+from ..film.aov_samples import LayerSamples
+from ..integrators.light_tracing import Splats
+from ..sampling.tiles import whole_tiles
 
 DEEPEST = 8  # samples of a pixel that a job should have: the more, the less it costs to send and add sums
 DEPTH_SHARE = 1 / 2  # of the samples so far, so that the pixels of a render that is ended differ by no more,
@@ -36,7 +36,7 @@ class View:
     deadline: float = math.inf  # when jobs under way are discarded, by `time.perf_counter`
     first_sample: int = 0  # index of the first sample of every pixel
     branches: int = 1  # ways in which a path goes on from its first surface
-    reuse: bool = False  # pixels share paths, so those of a tile (pixel_tiles.py) belong in one job
+    reuse: bool = False  # pixels share paths, so those of a tile (sampling/tiles.py) belong in one job
     guided: bool = False  # by what the tracer has for it
 
     def parts(self, pixels: Words, width: int) -> Iterator[Words]:

@@ -7,8 +7,8 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from itertools import chain
 from typing import TypeAlias
 
-from ..errors import RenderError
-from ..progress import Bar, Progress
+from ..core.errors import RenderError
+from ..core.progress import Bar, Progress
 from .accumulator import Accumulator
 from .adaptive import Pass, passes, unfinished
 from .jobs import Job, JobResult, View, split_jobs

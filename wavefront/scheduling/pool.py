@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Generic, Self, TypeVar
 
-from ..errors import RenderError
-from ..record import record
+from ..arrays.record import record
+from ..core.errors import RenderError
 from .blas import single_threaded_blas
 from .executors import EXECUTORS, ExecutorLike
 from .interrupt import deferred_signals

@@ -11,7 +11,7 @@ from concurrent.futures import BrokenExecutor, Future
 from dataclasses import replace
 from typing import Any, Protocol
 
-from ..errors import RenderError, warn_caller
+from ..core.errors import RenderError, warn_caller
 from .delivery import Payload, Reply, do_job, pack
 from .machine import describe_machine
 from .workers import JobFailed, StoppableWork, TaskPool, submit_to

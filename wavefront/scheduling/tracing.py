@@ -10,19 +10,19 @@ from typing import Any
 import numpy as np
 
 from ..accel.base import Accelerator, Intersections
+from ..aovs.recorder import SampleRecorder, recorded_layers
+from ..arrays.record import record
+from ..arrays.state import Words
+from ..arrays.vec import Bools, Floats, Ints, broadcast
 from ..compile.scene import CompiledScene
-from ..errors import SceneError
-from ..filters import Filter
+from ..core.errors import SceneError
 from ..guiding import GuideTable
 from ..integrators import Integrator, integrator_for
-from ..light_paths import trace_light
-from ..record import record
-from ..sample_recorder import SampleRecorder, recorded_layers
+from ..integrators.light_tracing import trace_light
+from ..integrators.tuning_job import TrialJob, TrialPart
+from ..sampling.filters import Filter
 from ..sampling.sampler import Sampler, SamplerMaker
 from ..stages.generate import generate
-from ..state import Words
-from ..trial_job import TrialJob, TrialPart
-from ..vec import Bools, Floats, Ints, broadcast
 from .jobs import Job, JobResult, WaveResult
 from .shared import SharedInt, Stopped
 

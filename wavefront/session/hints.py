@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..accel.embree import installed
-from ..film import MUCH_RARE
+from ..film.film import MUCH_RARE
 from ..image import Image
 from ..lights import InfiniteLight
 from ..lights.table import IrradianceOf

@@ -6,10 +6,10 @@ import numpy as np
 
 from ..image import Image
 from ..integrators import INTEGRATORS, WITH_MIS, li_naive
-from ..outcome import check_first_samples, is_black_or_white, warn_of_clamped_light, warn_of_noise
-from ..pixel_tiles import others_in_tile
+from ..sampling.tiles import others_in_tile
 from ..scheduling.loop import RenderLoop
 from ..stages.reuse import SHARED_WAYS
+from .final_checks import check_first_samples, is_black_or_white, warn_of_clamped_light, warn_of_noise
 from .plan import Plan
 
 
@@ -38,7 +38,7 @@ def check_last_image(image: Image, plan: Plan, loop: RenderLoop, surfaces: int) 
     if settings.clamp is not None:
         warn_of_clamped_light(image, settings.clamp)
     if settings.background is None and is_black_or_white(image):
-        from ..diagnosis import warn_of_black_or_white  # here, as most pictures do without
+        from .diagnosis import warn_of_black_or_white  # here, as most pictures do without
 
         warn_of_black_or_white(
             image,
@@ -54,7 +54,7 @@ def check_last_image(image: Image, plan: Plan, loop: RenderLoop, surfaces: int) 
 
 def _cause_of_bad_sample(plan: Plan, loop: RenderLoop, pixel: int, sample: int) -> str:
     """Return in which bounce, and at which material, a sample that is not finite became so."""
-    from ..faults import PathChecker  # here, as most pictures do without
+    from .nan_trace import PathChecker  # here, as most pictures do without
 
     tracer, camera = plan.tracer, loop.view.camera
     integrator = INTEGRATORS.find(plan.settings.integrator)

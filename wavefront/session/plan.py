@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from ..arrays.record import record
 from ..camera import Camera
-from ..choice import Choice, choose, learn_guide
-from ..filters import FILTERS
+from ..core.progress import phase
 from ..guiding import GuideTable
 from ..integrators import INTEGRATORS
-from ..progress import phase
-from ..record import record
+from ..integrators.tuning import JobsRunner
+from ..sampling.filters import FILTERS
 from ..scheduling.blas import single_threaded_blas
 from ..scheduling.budget import Budget
 from ..scheduling.delivery import can_be_sent
 from ..scheduling.executors import ExecutorLike, needs_pickling
 from ..scheduling.tracing import Tracer
 from ..settings import Settings
-from ..trial import JobsRunner
+from .choice import Choice, choose, learn_guide
 from .hints import caustics_hint
 from .prepared_scene import PreparedScene
 

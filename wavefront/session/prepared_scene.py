@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..accel import Accelerator, Geometry, most_copies
+from ..aovs.geometric import ShapeTable
 from ..camera import Camera
 from ..compile.scene import compile_scene
-from ..geometric_layers import ShapeTable
+from ..core.progress import phase
 from ..integrators import INTEGRATORS, WITH_MIS
-from ..lighting import choose_ground, choose_preset, lighted
-from ..outcome import warn_of_unseen_lights
-from ..progress import phase
-from ..resuming import scene_fingerprint
 from ..scene import Scene
+from ..scene.lighting import choose_ground, choose_preset, lighted
 from ..settings import AUTO, Settings
+from .final_checks import warn_of_unseen_lights
+from .resuming import scene_fingerprint
 
 
 class PreparedScene:

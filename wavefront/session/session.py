@@ -16,18 +16,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..accel.registry import AcceleratorMaker
+from ..aovs.boxes import silhouettes
 from ..camera import Camera, check_camera, image_size
-from ..checkpoint import Checkpoint
-from ..errors import RenderError, SaveError, SceneError, warn_caller
-from ..filters import Filter
+from ..core.errors import RenderError, SaveError, SceneError, warn_caller
+from ..core.progress import Progress
+from ..core.suggestions import suggests_keywords
+from ..film.checkpoint import Checkpoint
 from ..image import Image
 from ..integrators import Integrator
+from ..integrators.tuning_job import TrialJob, TrialPart
+from ..io.to_scene import as_scene, choose_camera
 from ..lights.samplers import LightSamplerMaker
 from ..materials import MaterialLike
-from ..object_boxes import silhouettes
-from ..outcome import LONG_PATH, interrupted, render_error, setup_errors, warn_of_long_paths
-from ..progress import Progress
-from ..renderable import as_scene, choose_camera
+from ..sampling.filters import Filter
 from ..sampling.sampler import SamplerMaker
 from ..scheduling.accumulator import Accumulator, check_picture_memory
 from ..scheduling.blas import reserve_buffers
@@ -38,8 +39,7 @@ from ..scheduling.pool import WorkerPool
 from ..scheduling.shared import STOP, Stopped
 from ..scheduling.tracing import WaveMonitor, trace_any_job
 from ..settings import Settings
-from ..suggestions import suggests_keywords
-from ..trial_job import TrialJob, TrialPart
+from .final_checks import LONG_PATH, interrupted, render_error, setup_errors, warn_of_long_paths
 from .hints import Hints
 from .last_checks import check_last_image
 from .plan import make_plan, trained_guide, with_choice

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from types import TracebackType
 
-from ..errors import RenderError
+from ..core.errors import RenderError
 
 
 class SoleUse:

@@ -11,16 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..aovs.boxes import object_boxes
+from ..aovs.geometric import IDS, geometric_layers
 from ..camera import Camera
-from ..checkpoint import Checkpoint
 from ..compile.scene import CompiledScene
-from ..filters import FILTERS
-from ..geometric_layers import IDS, geometric_layers
+from ..film.aov_names import BOXES, geometric_names
+from ..film.checkpoint import Checkpoint
 from ..image import Image
 from ..integrators import INTEGRATORS
-from ..layers import BOXES, geometric_names
-from ..object_boxes import object_boxes
-from ..resuming import CheckpointFile, render_identity
+from ..sampling.filters import FILTERS
 from ..sampling.sampler import SAMPLERS
 from ..scheduling.accumulator import Accumulator
 from ..scheduling.adaptive import Pass
@@ -32,6 +31,7 @@ from ..scheduling.scheduler import Scheduler
 from ..scheduling.tracing import MonitoredAccelerator, WaveMonitor
 from ..version import VERSION
 from .plan import Plan
+from .resuming import CheckpointFile, render_identity
 
 
 class ViewRender:

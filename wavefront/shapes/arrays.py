@@ -8,9 +8,9 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SceneError, as_array, finite_array
+from ..arrays.vec import FLOAT32_MAX
+from ..core.errors import SceneError, as_array, finite_array
 from ..materials import MaterialLike
-from ..vec import FLOAT32_MAX
 from .base import Checked, CurvedShape
 from .colored import ColoredShape
 from .mesh import FLOAT32_MIN

@@ -14,8 +14,8 @@ from typing import Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..elementary import arccos, arctan2
-from ..vec import Floats, Ints, f4
+from ..arrays.elementary import arccos, arctan2
+from ..arrays.vec import Floats, Ints, f4
 from .mesh import Mesh
 from .tangents import mesh_dpduv, mesh_tangent_frame
 

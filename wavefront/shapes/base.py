@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import number
+from ..core.errors import number
 from ..materials import Material, MaterialLike, as_material
 from .transform import rotation, scaling, translation
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import SceneError, finite_array, number
+from ..core.errors import SceneError, finite_array, number
+from ..core.suggestions import suggests_keywords
 from ..materials import MaterialLike
-from ..suggestions import suggests_keywords
 from ..textures.parameter import Color
 from .mesh import Mesh, Rectangle
 

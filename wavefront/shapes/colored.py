@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays.vec import f4
 from ..bsdfs import Diffuse
 from ..colors import named_rows, srgb_to_linear, warn_of_colormap
-from ..counted import counted
-from ..errors import SceneError, finite_array
+from ..core.counted import counted
+from ..core.errors import SceneError, finite_array
 from ..materials import Material
 from ..textures.vertex_colors import VertexColors
-from ..vec import f4
 from .base import Checked, Shape
 
 

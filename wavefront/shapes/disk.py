@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..elementary import sin_cos_turns
-from ..errors import SceneError, finite_array, number
+from ..arrays.elementary import sin_cos_turns
+from ..core.errors import SceneError, finite_array, number
+from ..core.suggestions import suggests_keywords
 from ..materials import MaterialLike
-from ..suggestions import suggests_keywords
 from ..textures.parameter import Color
 from .mesh import Mesh
 

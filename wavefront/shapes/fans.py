@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..vec import Bools, Ints
+from ..arrays.vec import Bools, Ints
 
 
 def are_fans(triangles: NDArray[np.floating[Any]]) -> Bools:

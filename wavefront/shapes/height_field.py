@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SceneError, finite_array, one_of
+from ..arrays.vec import Doubles
+from ..core.errors import SceneError, finite_array, one_of
+from ..core.suggestions import suggests_keywords
 from ..materials import MaterialLike
-from ..suggestions import suggests_keywords
-from ..vec import Doubles
 from .mesh import Mesh
 
 

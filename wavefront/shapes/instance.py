@@ -9,11 +9,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SceneError, finite_array
+from ..arrays.vec import FLOAT32_MAX
+from ..core.errors import SceneError, finite_array
+from ..core.suggestions import suggests_keywords
 from ..materials import Material, MaterialLike, as_material
-from ..suggestions import suggests_keywords
 from ..textures.base import BaseTexture
-from ..vec import FLOAT32_MAX
 from .base import Checked, CurvedShape, Shape
 from .mesh import Mesh, check_range
 from .transform import moved, moved_tangents

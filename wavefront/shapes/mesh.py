@@ -9,12 +9,12 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..counted import counted
-from ..errors import SceneError, as_array, finite_array, warn_caller
+from ..arrays.vec import FLOAT32_MAX, cross, spans
+from ..core.counted import counted
+from ..core.errors import SceneError, as_array, finite_array, warn_caller
+from ..core.suggestions import suggests_keywords
 from ..materials import Material, MaterialLike
-from ..suggestions import suggests_keywords
 from ..textures.parameter import Color, color
-from ..vec import FLOAT32_MAX, cross, spans
 from .base import Checked
 from .colored import ColoredShape
 from .smoothing import AUTO, CREASE, check_smooth, crease_normals, facet_normals, split_vertices

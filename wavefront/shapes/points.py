@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..colors import srgb
-from ..errors import SceneError, as_array, finite_array, warn_caller
+from ..core.errors import SceneError, as_array, finite_array, warn_caller
+from ..core.suggestions import suggests_keywords
 from ..materials import MaterialLike
-from ..suggestions import suggests_keywords
 from .mesh import Mesh, positions
 from .segments import Capsules
 from .spheres import Spheres

@@ -8,12 +8,12 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..counted import counted
-from ..elementary import sin_cos_turns
-from ..errors import SceneError
-from ..frame import Frame
+from ..arrays.elementary import sin_cos_turns
+from ..arrays.frame import Frame
+from ..core.counted import counted
+from ..core.errors import SceneError
+from ..core.suggestions import suggests_keywords
 from ..materials import MaterialLike
-from ..suggestions import suggests_keywords
 from .arrays import PrimitiveArray
 from .base import Checked
 from .mesh import positions

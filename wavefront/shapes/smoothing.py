@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..elementary import arccos, sin_cos
-from ..errors import SceneError, in_brief, number
-from ..vec import Bools, Doubles, Floats, Ints, cross, dot, length, normalize
+from ..arrays.elementary import arccos, sin_cos
+from ..arrays.vec import Bools, Doubles, Floats, Ints, cross, dot, length, normalize
+from ..core.errors import SceneError, in_brief, number
 
 AUTO = "auto"
 CREASE = 30.0  # degrees between the normals of two faces above which their edge is sharp, for "auto"

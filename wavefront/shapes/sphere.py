@@ -8,12 +8,12 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays.vec import FLOAT32_MAX
 from ..bsdfs import Diffuse
-from ..errors import SceneError, finite_array, number
+from ..core.errors import SceneError, finite_array, number
+from ..core.suggestions import suggests_keywords
 from ..materials import Material, MaterialLike
-from ..suggestions import suggests_keywords
 from ..textures.parameter import Color
-from ..vec import FLOAT32_MAX
 from .base import Checked
 from .mesh import FLOAT32_MIN
 from .sphere_emission import SphereEmission

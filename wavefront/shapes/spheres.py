@@ -8,8 +8,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.suggestions import suggests_keywords
 from ..materials import MaterialLike
-from ..suggestions import suggests_keywords
 from ..textures.parameter import Color
 from .arrays import PrimitiveArray
 from .base import Checked

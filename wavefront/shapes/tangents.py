@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..vec import Doubles
+from ..arrays.vec import Doubles
 from .mesh import Mesh
 from .smoothing import corner_angles
 

@@ -7,9 +7,9 @@ from functools import reduce
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..elementary import sin_cos_turns
-from ..errors import SceneError, as_array, finite_array, number, one_of
-from ..vec import Doubles, Ints
+from ..arrays.elementary import sin_cos_turns
+from ..arrays.vec import Doubles, Ints
+from ..core.errors import SceneError, as_array, finite_array, number, one_of
 
 Matrix = NDArray[np.float64]  # (4, 4), or several
 

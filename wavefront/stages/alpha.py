@@ -12,11 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arrays.state import Hits, Paths, Rays, SurfaceInteraction
+from ..arrays.vec import Floats, Ints, f4
 from ..compile.scene import CompiledScene
-from ..errors import RenderError
+from ..core.errors import RenderError
 from ..sampling.sampler import Dimension, Sampler, numbers_of
-from ..state import Hits, Paths, Rays, SurfaceInteraction
-from ..vec import Floats, Ints, f4
 from .caught_shadow import catcher_lanes, shadow_opacity
 from .interaction import interaction
 from .intersect import intersect

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arrays.state import Contribution, Hits, Paths
+from ..arrays.vec import Floats, take
 from ..compile.scene import CompiledScene
 from ..lights import InfiniteLight
-from ..state import Contribution, Hits, Paths
-from ..vec import Floats, take
 
 
 def show_background(

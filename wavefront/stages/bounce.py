@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arrays.state import BEFORE, JUST_ONCE, NOT_YET, Paths
+from ..arrays.vec import Bools, Bytes, Floats, Ints, broadcast, f4, normalize, signs, take
 from ..bsdfs import BsdfSample, sampled
 from ..sampling.sampler import Dimension, Sampler
-from ..state import BEFORE, JUST_ONCE, NOT_YET, Paths
-from ..vec import Bools, Bytes, Floats, Ints, broadcast, f4, normalize, signs, take
 from .guidance import mix_with_guide
 from .interaction import LIFT, offset_origin
 from .shade import Shading

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..arrays.state import Hits, Paths, SurfaceInteraction
+from ..arrays.vec import INV_PI, Floats, Ints, dot, f4, luminance, positive, take
 from ..compile.scene import CompiledScene
 from ..lights import LightSample
 from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
 from ..sampling.warp import cosine_hemisphere
-from ..state import Hits, Paths, SurfaceInteraction
-from ..vec import INV_PI, Floats, Ints, dot, f4, luminance, positive, take
 from .interaction import material_rows, origin_above
 from .intersect import shadow_rays, visible
 from .transmittance import transmittance_along

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arrays.state import Contribution, Hits, Paths
+from ..arrays.vec import Bools, Ints, broadcast, f4, highest, take
 from ..compile.scene import CompiledScene
 from ..sampling.sampler import Dimension, Sampler
-from ..state import Contribution, Hits, Paths
-from ..vec import Bools, Ints, broadcast, f4, highest, take
 from .interaction import material_rows
 
 ROULETTE_THRESHOLD = f4(0.5)  # paths of at least this throughput always survive

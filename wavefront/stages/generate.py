@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..arrays.state import Paths, Rays, Words
+from ..arrays.vec import Floats, broadcast, f4
 from ..camera import Camera
 from ..compile.scene import CompiledScene
-from ..filters import Filter, box
+from ..sampling.filters import Filter, box
 from ..sampling.sampler import Dimension, Sampler
-from ..state import Paths, Rays, Words
-from ..vec import Floats, broadcast, f4
 
 HALF = f4(0.5)
 

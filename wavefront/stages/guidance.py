@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..arrays.state import Paths
+from ..arrays.vec import Floats, Ints, f4, take
 from ..bsdfs import BsdfSample
 from ..guiding import GuideTable
 from ..sampling.sampler import Dimension, Sampler
-from ..state import Paths
-from ..vec import Floats, Ints, f4, take
 from .shade import Guidance, Shading, evaluate
 
 LEAST_PDF_RATIO = f4(1e-3)  # least density of the BSDF, relative to that of the mixture, for roulette

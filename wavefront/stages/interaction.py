@@ -4,11 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..arrays.state import Hits, Rays, SurfaceInteraction
+from ..arrays.vec import (
+    ALL,
+    Floats,
+    Ints,
+    Lanes,
+    dot,
+    f4,
+    highest,
+    interpolate,
+    length,
+    normalize,
+    signs,
+    take,
+)
 from ..compile.instances import InstanceTable
 from ..compile.scene import CompiledScene
 from ..shapes.attributes import ATTRIBUTES, Corners
-from ..state import Hits, Rays, SurfaceInteraction
-from ..vec import ALL, Floats, Ints, Lanes, dot, f4, highest, interpolate, length, normalize, signs, take
 
 # o + t·d has at most three rounding errors of half an ulp (2⁻²⁴) of its terms; this is five times as much.
 POINT_ERROR = f4(2**-21)

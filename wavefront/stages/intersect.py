@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..arrays.record import record
+from ..arrays.state import Hits, Rays, SurfaceInteraction
+from ..arrays.vec import Bools, Floats, Ints, f4, positive, take
 from ..compile.scene import CompiledScene
 from ..lights import LightSample
-from ..record import record
-from ..state import Hits, Rays, SurfaceInteraction
-from ..vec import Bools, Floats, Ints, f4, positive, take
 
 TARGET_ERROR = f4(2**-20)  # rounding of a sampled point on a light, relative to its distance
 

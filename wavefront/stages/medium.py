@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..arrays.elementary import exp
+from ..arrays.state import Hits, SurfaceInteraction
+from ..arrays.vec import Floats
 from ..compile.scene import CompiledScene
-from ..elementary import exp
-from ..state import Hits, SurfaceInteraction
-from ..vec import Floats
 
 
 def absorb(scene: CompiledScene, throughput: Floats, hits: Hits, surface: SurfaceInteraction) -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import Floats, dot, f4, normalize
 from ..compile.scene import CompiledScene
-from ..state import SurfaceInteraction
-from ..vec import Floats, dot, f4, normalize
 from .interaction import LIFT, face_viewer
 
 SHALLOWER = f4(0.9)  # reflected directions are raised to at most this part of wo's cosine with `ng`

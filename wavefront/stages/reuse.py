@@ -22,11 +22,11 @@ from typing import Self
 
 import numpy as np
 
+from ..arrays.record import record
+from ..arrays.state import Hits, Paths, SoA
+from ..arrays.vec import ALL, INV_PI, TINY, Bools, Floats, Ints, dot, f4, highest, positive, spans, take
 from ..compile.scene import CompiledScene
-from ..pixel_tiles import MEMBERS, WaveTiles
-from ..record import record
-from ..state import Hits, Paths, SoA
-from ..vec import ALL, INV_PI, TINY, Bools, Floats, Ints, dot, f4, highest, positive, spans, take
+from ..sampling.tiles import MEMBERS, WaveTiles
 from .interaction import interaction, material_rows, offset_origin
 from .intersect import ShadowRays, visible
 from .shade import Guidance, Shading, evaluate

@@ -7,17 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arrays.frame import Frame
+from ..arrays.record import record
+from ..arrays.state import Contribution, Hits, Paths, SurfaceInteraction
+from ..arrays.vec import ALL, Floats, Ints, Lanes, broadcast, column, dot, f4, highest, take
 from ..bsdfs import Bsdf, albedo_of, evaluated
 from ..compile.materials import MaterialTable
 from ..compile.scene import CompiledScene
-from ..frame import Frame
 from ..guiding import GuideTable
 from ..lights import LightSample
-from ..record import record
 from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
-from ..state import Contribution, Hits, Paths, SurfaceInteraction
-from ..vec import ALL, Floats, Ints, Lanes, broadcast, column, dot, f4, highest, take
 from .interaction import interaction, offset_origin, origin_above
 from .intersect import ShadowRays, shadow_rays, visible
 from .transmittance import transmittance_along
@@ -128,7 +128,7 @@ def mis_weighted(scene: CompiledScene, paths: Paths, emission: Contribution) -> 
 def without_caustics(
     scene: CompiledScene, paths: Paths, left: Ints, hits: Hits, emission: Contribution
 ) -> Contribution:
-    """Return emission but for that which light paths find (light_paths.py).
+    """Return emission but for that which light paths find (integrators/light_tracing.py).
 
     Parameters
     ----------

@@ -7,9 +7,9 @@ from typing import TypeVar
 
 import numpy as np
 
+from ..arrays.state import Rays, SurfaceInteraction
+from ..arrays.vec import Floats, dot, f4
 from ..compile.scene import CompiledScene
-from ..state import Rays, SurfaceInteraction
-from ..vec import Floats, dot, f4
 from .interaction import interaction, offset_origin
 from .intersect import ShadowRays, intersect, shadow_ray_length, visible
 from .medium import absorb

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import SceneError, number
-from ..student_t import t_quantile
-from ..vec import Bools, Doubles, Floats
+from ..arrays.vec import Bools, Doubles, Floats
+from ..core.errors import SceneError, number
 from .scatter import Scatter, sums_by_label
+from .student_t import t_quantile
 
 
 @dataclass(frozen=True, slots=True)

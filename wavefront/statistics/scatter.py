@@ -1,6 +1,6 @@
 """How batches of samples scatter where pixels share paths: what the error of a mean over pixels is made of.
 
-The errors of the pixels of a tile depend on each other, those of tiles do not (pixel_tiles.py). So the sum
+The errors of the pixels of a tile depend on each other, those of tiles do not (sampling/tiles.py). So the sum
 over the pixels of one tile is formed for each batch of samples, and the scatter of these sums over batches is
 the squared error of the tile's part. The squared errors of tiles add up, and so do their degrees of freedom.
 """
@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SceneError
-from ..film import Film, batch_size, chunks
-from ..pixel_tiles import place_in_tiles
-from ..record import record
-from ..vec import Doubles, Floats, Ints, distinct
+from ..arrays.record import record
+from ..arrays.vec import Doubles, Floats, Ints, distinct
+from ..core.errors import SceneError
+from ..film.film import Film, batch_size, chunks
+from ..sampling.tiles import place_in_tiles
 
 UNIT = 127  # deviations are whole multiples of this part of the standard error
 NAMES = {"deviations": (np.int8, 4), "tile": (np.int32, 2), "level": (np.uint8, 2)}  # types and dimensions

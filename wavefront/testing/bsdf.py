@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import Bools, Doubles, Floats, f4
 from ..bsdfs.base import Bsdf, BsdfSample
-from ..state import SurfaceInteraction
-from ..vec import Bools, Doubles, Floats, f4
 from .charts import CHARTS, uniform_directions
 from .chi2 import binomial_p, check_density
 from .report import PAIRS, PILOT, Report

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..vec import Doubles, Floats, f4
+from ..arrays.vec import Doubles, Floats, f4
 
 
 @dataclass(frozen=True, slots=True)

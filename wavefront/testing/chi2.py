@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..vec import Doubles, Floats, Ints
+from ..arrays.vec import Doubles, Floats, Ints
 from .charts import Chart
 from .quadrature import COLUMNS, ROWS, Cells, DensityIntegrator
 from .report import Report

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..accel import make_accelerator
+from ..arrays.state import Rays
+from ..arrays.vec import Floats, f4
 from ..compile.scene import CompiledScene, compile_scene
 from ..lights.base import LightRecord, LightSample, emitters_of
 from ..scene import Scene
 from ..stages.interaction import interaction
 from ..stages.intersect import intersect
-from ..state import Rays
-from ..vec import Floats, f4
 from .bsdf import chunk_sizes
 from .charts import CHARTS
 from .chi2 import check_density

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..vec import Bools, Doubles, Floats, Ints
+from ..arrays.vec import Bools, Doubles, Floats, Ints
 from .charts import Chart
 
 ROWS, COLUMNS = 20, 40

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..vec import Bools
+from ..arrays.vec import Bools
 
 PILOT = 20_000
 PAIRS = 4096

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..vec import Floats, f4
+from ..arrays.vec import Floats, f4
 from .bsdf import chunk_sizes
 from .charts import CHARTS
 from .chi2 import check_density

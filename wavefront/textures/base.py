@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-from ..state import SurfaceInteraction
-from ..vec import Floats
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import Floats
 
 
 class BaseTexture(ABC):

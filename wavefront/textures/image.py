@@ -10,15 +10,15 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import Floats, Ints, f4, luminance
 from ..codecs.budget import Budget
 from ..codecs.images import read_codes
 from ..colors import srgb_to_linear
-from ..counted import counted
-from ..errors import SceneError, as_array, finite_array, one_of
-from ..files import MAX_PIXELS, check_size
-from ..state import SurfaceInteraction
-from ..suggestions import suggests_keywords
-from ..vec import Floats, Ints, f4, luminance
+from ..core.counted import counted
+from ..core.errors import SceneError, as_array, finite_array, one_of
+from ..core.files import MAX_PIXELS, check_size
+from ..core.suggestions import suggests_keywords
 from .base import BaseTexture
 
 Wrap: TypeAlias = Literal["repeat", "mirror", "clamp"]

@@ -10,10 +10,10 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import SceneError, number
-from ..state import SurfaceInteraction
-from ..suggestions import suggests_keywords
-from ..vec import Floats, Ints, cross, dot, f4, highest, normalize
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import Floats, Ints, cross, dot, f4, highest, normalize
+from ..core.errors import SceneError, number
+from ..core.suggestions import suggests_keywords
 from .image import UV_SETS, Texture
 
 

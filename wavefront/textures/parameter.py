@@ -11,10 +11,10 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import Floats, f4, luminance
 from ..colors import rgb
-from ..errors import SceneError, number
-from ..state import SurfaceInteraction
-from ..vec import Floats, f4, luminance
+from ..core.errors import SceneError, number
 from .base import BaseTexture
 
 # Largest index of refraction; the least is its inverse: fourth powers stay in the range of float32.

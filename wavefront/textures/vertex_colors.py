@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..errors import SceneError
-from ..state import SurfaceInteraction
-from ..suggestions import suggests_keywords
-from ..vec import Floats
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import Floats
+from ..core.errors import SceneError
+from ..core.suggestions import suggests_keywords
 from .base import BaseTexture
 from .parameter import Color, color, scalar
 

@@ -12,7 +12,7 @@ from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 
-from ..errors import RenderError
+from ..core.errors import RenderError
 from ..image import Image
 from .priority import NICENESS
 from .refiner import ViewerFrame

@@ -10,7 +10,7 @@ from ipaddress import ip_address
 from typing import Any
 from urllib.parse import parse_qs, quote, urlsplit
 
-from ..errors import SceneError
+from ..core.errors import SceneError
 
 TOKEN_BYTES = 24  # of a token that is drawn: nobody can guess it
 LARGEST_MESSAGE = 1 << 16  # bytes; cameras and values are much smaller

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..codecs import png_jpeg
 from ..codecs.tone import TONES
-from ..errors import SceneError, one_of
+from ..core.errors import SceneError, one_of
 from ..image import Image
 from .background_denoiser import BackgroundDenoiser, is_quick
 from .front import Front, asked_first

@@ -6,9 +6,9 @@ import threading
 import time
 from collections.abc import Callable
 
+from ..arrays.record import record
 from ..camera import Camera
 from ..image import Image
-from ..record import record
 from ..session import Session
 
 FIRST_DIVISOR = 4  # of the width and height of the first picture of a view; more would leave little to see

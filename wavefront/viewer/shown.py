@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays.vec import Floats
+from ..film.aov_names import GUIDES
 from ..image import Image
-from ..layers import GUIDES
-from ..plot import id_colors, layer_colors
-from ..vec import Floats
+from ..image.plot import id_colors, layer_colors
 
 BACKDROP = 0.85  # gray behind what is transparent
 

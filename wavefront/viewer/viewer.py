@@ -12,13 +12,13 @@ from typing import Any, Self
 
 from ..camera import Camera
 from ..codecs.tone import TONES
-from ..errors import RenderError, SceneError, one_of
+from ..core.errors import RenderError, SceneError, one_of
 from ..image import Image
-from ..notebook import in_kernel
-from ..renderable import as_scene, choose_camera
+from ..io.to_scene import as_scene, choose_camera
 from ..scene import Scene
 from ..scheduling.executors import choose_executor, needs_pickling, worker_count
 from ..session import Session
+from ..session.notebook import in_kernel
 from ..settings import DEFAULT_SPP
 from .guard import token_of
 from .priority import giving_way

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..camera import Camera
 from ..camera.projection import Perspective
-from ..errors import SceneError, finite_array, number
+from ..core.errors import SceneError, finite_array, number
 
 Triple = tuple[float, float, float]
 

@@ -1,0 +1,283 @@
+"""Every material under the one contract: what is in `bsdfs.ALL` is checked here."""
+
+import numpy as np
+import pytest
+
+from wavefront import bsdfs, testing
+from wavefront.arrays.state import SurfaceInteraction
+from wavefront.bsdfs import Conductor, Dielectric, Diffuse, Mirror, Mix, OrenNayar, Principled, ThinDielectric
+from wavefront.core.errors import SceneError
+from wavefront.textures.base import BaseTexture
+
+F4 = np.float32
+
+# Arguments for each material, in full and in the corners of its parameters.
+EXAMPLES = {
+    Diffuse: [{"reflectance": 0.5}, {"reflectance": (1, 0.5, 0)}],
+    Mirror: [{}, {"reflectance": (0.9, 0.5, 0)}],
+    Dielectric: [
+        {},
+        {"ior": 1.0},
+        {"ior": 1 / 1.33},
+        {"ior": 2.4, "reflectance": (1, 0.5, 0.2), "transmittance": (0.2, 0.9, 1)},
+        {"roughness": 1e-3},
+        {"roughness": 0.04},
+        {"roughness": 0.5, "transmittance": (0.2, 0.9, 1)},
+        {"ior": 1 / 1.33, "roughness": 1.0},
+        {"ior": 1.0, "roughness": 0.5},
+    ],
+    Conductor: [
+        {"eta": 2, "k": 4},
+        {"eta": (0.15, 0.4, 1.4), "k": (3.5, 2.4, 1.6), "roughness": 0.04},
+        {"eta": 2.0, "k": 4.0, "roughness": 0.5},
+        {"eta": 0.1, "k": 8.0, "roughness": 1.0},
+    ],
+    OrenNayar: [
+        {"reflectance": (1, 0.5, 0), "sigma": 0.5},
+        {"reflectance": 0.7, "sigma": 0.0},
+        {"reflectance": (1, 0.5, 0.1), "sigma": 1.0, "energy_preserving": True},
+    ],
+    ThinDielectric: [
+        {},
+        {"ior": 1.7, "roughness": 0.3, "transmittance": (1, 0.5, 0)},
+        {"roughness": 1.0},
+    ],
+    Principled: [
+        {},
+        {"base_color": (0.9, 0.5, 0.1), "metallic": 1.0, "roughness": 0.3},
+        {"base_color": 1.0, "roughness": 0.0},
+        {"base_color": 0.0, "roughness": 1.0, "specular": 0.0},
+        {"base_color": (1, 0.5, 0.2), "metallic": 0.2, "roughness": 0.3, "transmission": 0.6},
+        {"base_color": (1, 0.5, 0.2), "transmission": 0.7, "thin": True, "ior": 1.3},
+        {"base_color": 1.0, "roughness": 0.4, "transmission": 1.0, "ior": 1.0},
+        {"base_color": 1.0, "clearcoat": 1.0, "clearcoat_roughness": 0.2},
+        {"base_color": (0.2, 0.1, 0.8), "sheen": 1.0, "sheen_color": (1, 0.5, 0.5), "sheen_roughness": 0.1},
+        {
+            "base_color": (1, 0.5, 0.2),
+            "metallic": 0.2,
+            "transmission": 0.5,
+            "clearcoat": 0.7,
+            "sheen": 0.5,
+            "specular": 0.5,
+            "specular_color": (1, 0.9, 0.2),
+        },
+    ],
+    Mix: [
+        {"first": Diffuse(0.8), "second": Mirror(0.9), "weight": 0.3},
+        {"first": Dielectric(1.5), "second": Diffuse((0.9, 0.5, 0.1)), "weight": 0.5},
+        {"first": Mix(Diffuse(1.0), Conductor(2, 4, 0.3)), "second": Dielectric(1.5, 0.4), "weight": 0.7},
+        {"first": Diffuse(0.8), "second": Mirror(0.9), "weight": 0.0},
+        {"first": Mirror(0.8), "second": Mirror(0.8), "weight": 1.0},
+    ],
+}
+# Materials that absorb nothing.
+LOSSLESS = [
+    Mirror(),
+    Diffuse(1.0),
+    Dielectric(),
+    Dielectric(1 / 1.33),
+    ThinDielectric(),
+    OrenNayar(1.0, 1.0, energy_preserving=True),
+    OrenNayar(1.0, 0.2, energy_preserving=True),
+    Mix(Mirror(), Dielectric(), 0.4),
+]
+
+CASES = [(kind, arguments) for kind, examples in EXAMPLES.items() for arguments in examples]
+NAMES = [f"{kind.__name__}{number}" for number, (kind, _) in enumerate(CASES)]
+
+
+class Constant(BaseTexture):
+    """A texture of one value."""
+
+    def __init__(self, value):
+        self.value = value
+
+    def at(self, surface):
+        n = len(surface)
+        if np.ndim(self.value) == 0:
+            return np.full(n, self.value, F4)
+        return np.repeat(np.array(self.value, F4).reshape(3, 1), n, 1)
+
+
+def varying(bsdf, name, value):
+    """A texture of a parameter's value, a color where the material keeps a color."""
+    if not isinstance(value, float | tuple):
+        return value
+    is_color = getattr(getattr(bsdf, name, None), "ndim", 0) == 2
+    return Constant(np.broadcast_to(value, 3) if is_color else value)
+
+
+def surface(wo, back_facing=False):
+    n = wo.shape[1]
+    normal = np.repeat(np.array([[0], [0], [1]], F4), n, 1)
+    zero, index = np.zeros(n, F4), np.zeros(n, np.intp)
+    return SurfaceInteraction(
+        np.zeros((3, n), F4), zero, normal, normal, wo, index, index, np.full(n, back_facing)
+    )
+
+
+def directions(n, seed=0, upper=True):
+    v = np.random.default_rng(seed).normal(size=(3, n))
+    v /= np.linalg.norm(v, axis=0)
+    if upper:
+        v[2] = np.abs(v[2])
+    return v.astype(F4)
+
+
+def uniforms(bsdf, n, seed=1):
+    return np.random.default_rng(seed).random((bsdf.dimensions, n), dtype=F4)
+
+
+def test_every_material_has_examples():
+    assert set(EXAMPLES) == set(bsdfs.ALL)
+
+
+def test_every_material_is_public():
+    assert {kind.__name__ for kind in bsdfs.ALL} <= set(bsdfs.__all__)
+
+
+@pytest.mark.parametrize(("kind", "arguments"), CASES, ids=NAMES)
+def test_contract(kind, arguments):
+    testing.check_bsdf(kind(**arguments), samples=100_000, angles=(0.0, 60.0, 89.0))
+
+
+@pytest.mark.parametrize("bsdf", LOSSLESS, ids=lambda b: type(b).__name__)
+def test_nothing_is_lost(bsdf):
+    testing.check_bsdf(bsdf, samples=100_000, albedo=(1, 1))
+
+
+def test_only_diffuse_is_matte():
+    """Classes derived from it need not be."""
+
+    class Glossy(Diffuse):
+        pass
+
+    assert [kind for kind, arguments in CASES if kind(**arguments).view_independent] == [Diffuse, Diffuse]
+    assert not Glossy(0).view_independent
+    assert not Glossy(0).black
+    assert [Diffuse(reflectance).black for reflectance in (0, (0, 0, 0.1))] == [True, False]
+
+
+@pytest.mark.parametrize(("kind", "arguments"), CASES, ids=NAMES)
+def test_textures_of_one_value_equal_the_value(kind, arguments):
+    plain = kind(**arguments)
+    textured = kind(**{name: varying(plain, name, value) for name, value in arguments.items()})
+    wo, wi, u = directions(500), directions(500, 2, upper=False), uniforms(plain, 500)
+    for back_facing in (False, True):
+        a, b = plain.bind(surface(wo, back_facing)), textured.bind(surface(wo, back_facing))
+        if plain.specular and "roughness" in arguments:
+            continue  # a texture of roughness 0 is raised to a very sharp lobe
+        assert a.f(wo, wi) == pytest.approx(b.f(wo, wi), rel=1e-5)
+        assert a.pdf(wo, wi) == pytest.approx(b.pdf(wo, wi), rel=1e-5)
+        one, two = a.sample_f(wo, u), b.sample_f(wo, u)
+        assert one.wi == pytest.approx(two.wi, rel=1e-6, abs=1e-6)
+        assert one.weight == pytest.approx(two.weight, rel=1e-5)
+
+
+@pytest.mark.parametrize(("kind", "arguments"), CASES, ids=NAMES)
+@pytest.mark.parametrize("n", [0, 1])
+def test_few_lanes(kind, arguments, n):
+    bsdf = kind(**arguments)
+    wo, wi = directions(n), directions(n, 3)
+    bound = bsdf.bind(surface(wo))
+    sample = bound.sample_f(wo, uniforms(bsdf, n))
+    assert sample.wi.shape == sample.weight.shape == bound.f(wo, wi).shape == (3, n)
+    assert sample.pdf.shape == sample.specular.shape == bound.pdf(wo, wi).shape == (n,)
+
+
+@pytest.mark.parametrize(("kind", "arguments"), CASES, ids=NAMES)
+def test_corners_of_the_random_numbers(kind, arguments):
+    bsdf = kind(**arguments)
+    last = np.nextafter(F4(1), F4(0))
+    corners = (
+        np.stack(np.meshgrid(*[[0, 0.5, last]] * bsdf.dimensions)).reshape(bsdf.dimensions, -1).astype(F4)
+    )
+    for z in (1, 0.5, 1e-3, 1e-6):
+        wo = np.repeat(np.array([[np.sqrt(1 - z * z)], [0], [z]], F4), corners.shape[1], 1)
+        for back_facing in (False, True):
+            bound = bsdf.bind(surface(wo, back_facing))
+            sample = bound.sample_f(wo, corners)
+            values = np.concatenate([sample.wi, sample.weight, sample.pdf[None], bound.f(wo, sample.wi)])
+            assert np.isfinite(values).all()
+            assert (sample.weight >= 0).all()
+
+
+def test_dielectric_knows_its_side():
+    glass = Dielectric(1.5)
+    wo = directions(4)
+    at = surface(wo)
+    at.back_facing = np.array([False, True, False, True])
+    assert glass.bind(at).eta == pytest.approx([1.5, 1 / 1.5, 1.5, 1 / 1.5])
+    assert glass.eta == pytest.approx([1.5])
+
+
+def test_index_1_goes_straight_through():
+    wo = directions(1000)
+    for back_facing in (False, True):
+        clear = Dielectric(1.0).bind(surface(wo, back_facing))
+        sample = clear.sample_f(wo, uniforms(clear, 1000))
+        assert sample.wi == pytest.approx(-wo, abs=1e-7)
+        assert (sample.weight == 1).all()
+        assert (sample.pdf == 1).all()
+
+
+def test_mirror_reflects_in_the_normal():
+    wo = directions(100)
+    sample = Mirror((0.1, 0.2, 0.3)).sample_f(wo, np.zeros((2, 100), F4))
+    assert (sample.wi == wo * np.array([[-1], [-1], [1]])).all()
+    assert sample.weight[:, 7] == pytest.approx([0.1, 0.2, 0.3])
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Diffuse(1.5), r"Diffuse reflectance is 1.5; it must be in \[0, 1\]"),
+        (lambda: Diffuse((0.5, -0.1, 0)), r"Diffuse reflectance\[1\] is -0.1; it must be in \[0, 1\]"),
+        (lambda: Diffuse((0.5, 0.1)), r"Diffuse reflectance must have shape \(3,\), got \(2,\)"),
+        (lambda: Diffuse("rde"), "Diffuse reflectance is 'rde', which is no color"),
+        (lambda: Diffuse(np.nan), "Diffuse reflectance is nan; it must be finite"),
+        (lambda: Mirror(2), r"Mirror reflectance is 2; it must be in \[0, 1\]"),
+        (lambda: Dielectric(0), "Dielectric ior is 0; it must be more than 0"),
+        (lambda: Dielectric(-1.5), "Dielectric ior is -1.5; it must be more than 0"),
+        (lambda: Dielectric(np.inf), "Dielectric ior is inf; it must be more than 0"),
+        (lambda: Dielectric("glass"), "Dielectric ior must be a number, got 'glass'"),
+        (lambda: Dielectric(transmittance=3), r"Dielectric transmittance is 3; it must be in \[0, 1\]"),
+        (lambda: Dielectric(reflectance=-1), r"Dielectric reflectance is -1; it must be in \[0, 1\]"),
+        (lambda: Conductor(0, 1), "Conductor eta is 0; it must be more than 0"),
+        (lambda: Conductor((1, 0, 1), 1), r"Conductor eta is \(1, 0, 1\); it must be more than 0"),
+        (lambda: Conductor(1, -1), r"Conductor k is -1; it must be in \[0, 1e\+06\]"),
+        (lambda: Conductor(1e7, 1), r"Conductor eta is 1e\+07; it must be in \[0, 1e\+06\]"),
+        (lambda: Dielectric(1e30), r"Dielectric ior is 1e\+30; it must be .* from 1e-06 to 1e\+06"),
+        (lambda: Dielectric(1e-30), r"Dielectric ior is 1e-30; it must be .* from 1e-06 to 1e\+06"),
+        (lambda: ThinDielectric(1e20), r"ThinDielectric ior is 1e\+20; it must be .* from 1e-06 to 1e\+06"),
+        (lambda: Principled(ior=1e20), r"Principled ior is 1e\+20; it must be .* from 1e-06 to 1e\+06"),
+        (lambda: Conductor(1, 1, 1.1), r"Conductor roughness is 1.1; it must be in \[0, 1\]"),
+        (lambda: Conductor.named("oak"), "Conductor name is 'oak'; it must be one of aluminum, .*gold"),
+        (lambda: Dielectric(1.5, -0.1), r"Dielectric roughness is -0.1; it must be in \[0, 1\]"),
+        (lambda: ThinDielectric(0), "ThinDielectric ior is 0; it must be more than 0"),
+        (lambda: ThinDielectric(1.5, 2), r"ThinDielectric roughness is 2; it must be in \[0, 1\]"),
+        (lambda: ThinDielectric(reflectance=2), r"ThinDielectric reflectance is 2; it must be in"),
+        (lambda: ThinDielectric(transmittance=2), r"ThinDielectric transmittance is 2; it must be in"),
+        (lambda: OrenNayar(2), r"OrenNayar reflectance is 2; it must be in \[0, 1\]"),
+        (lambda: OrenNayar(0.5, 1.6), r"OrenNayar sigma is 1.6; it must be in \[0, π/2\]"),
+        (lambda: OrenNayar(0.5, 1.2, energy_preserving=True), "sigma is 1.2; it must be in .* energy"),
+        (lambda: Principled(2), r"Principled base_color is 2; it must be in \[0, 1\]"),
+        (lambda: Principled(metallic=2), r"Principled metallic is 2; it must be in \[0, 1\]"),
+        (lambda: Principled(roughness=-1), r"Principled roughness is -1; it must be in \[0, 1\]"),
+        (lambda: Principled(ior=0), "Principled ior is 0; it must be more than 0"),
+        (lambda: Principled(transmission=2), r"Principled transmission is 2; it must be in"),
+        (lambda: Principled(clearcoat=2), "Principled clearcoat is 2; it must be in"),
+        (lambda: Principled(clearcoat_roughness=2), "Principled clearcoat_roughness is 2; it must be in"),
+        (lambda: Principled(sheen=2), "Principled sheen is 2; it must be in"),
+        (lambda: Principled(sheen_color=(0, 0, 2)), r"Principled sheen_color\[2\] is 2; it must be in"),
+        (lambda: Principled(sheen_roughness=2), "Principled sheen_roughness is 2; it must be in"),
+        (lambda: Principled(specular=2), "Principled specular is 2; it must be in"),
+        (lambda: Principled(specular_color=-1), "Principled specular_color is -1; it must be at least 0"),
+        (lambda: Mix(Diffuse(), 0.5), "Mix second must be a Bsdf such as .*, got 0.5"),
+        (lambda: Mix(None, Diffuse()), "Mix first must be a Bsdf such as .*, got None"),
+        (lambda: Mix(Diffuse(), Mirror(), 1.5), r"Mix weight is 1.5; it must be in \[0, 1\]"),
+    ],
+)
+def test_bad_parameters_are_named(make, message):
+    with pytest.raises(SceneError, match=message):
+        make()

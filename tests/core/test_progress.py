@@ -1,0 +1,173 @@
+"""The bar: late, so that short renders have none, and right from when it appears."""
+
+import threading
+import time
+from functools import partial
+from itertools import count
+from types import SimpleNamespace
+
+import pytest
+import scenes
+from tqdm import tqdm
+
+import wavefront as wf
+from wavefront.core import progress as module
+from wavefront.core.progress import DELAY, Bar, phase
+from wavefront.io import readers
+from wavefront.io.load import load, load_mesh
+from wavefront.session import prepared_scene
+
+
+def wait_for(text: str, capsys) -> None:
+    """Wait until something is shown, as a thread does."""
+    shown, end = "", time.monotonic() + 60
+    while text not in shown and time.monotonic() < end:
+        time.sleep(0.01)
+        shown += capsys.readouterr().err
+    assert text in shown
+
+
+@pytest.mark.parametrize("progress", [None, True])
+def test_a_bar_appears_after_a_while(progress, monkeypatch, capsys) -> None:
+    """It knows of what was done before, and since when."""
+    monkeypatch.setattr("tqdm.std.time", lambda: 1000.0)
+    with Bar(progress, 1000, None) as bar:
+        bar.advance(100, DELAY)
+        assert capsys.readouterr().err == ""
+        bar.advance(200, DELAY + 3)
+        assert "30%" in capsys.readouterr().err
+        bar.advance(50, DELAY + 4)
+        assert bar._bar.n == 350
+        assert bar._bar.format_dict["elapsed"] == DELAY + 3
+    assert "350/1.00k" in capsys.readouterr().err
+
+
+def test_a_bar_of_time_counts_seconds(capsys) -> None:
+    """Up to the time there is."""
+    with Bar(None, 1000, 10.0) as bar:
+        bar.advance(100, 4.2)
+        assert "4/10 s" in capsys.readouterr().err
+        bar.advance(100, 11)
+    assert "10/10 s" in capsys.readouterr().err
+
+
+def test_a_bar_may_be_disabled_by_the_environment(monkeypatch, capsys) -> None:
+    """TQDM_DISABLE, which tqdm reads when it is imported, stands for an argument."""
+    monkeypatch.setattr("tqdm.tqdm", partial(tqdm, disable=True))
+    monkeypatch.setattr(module, "DELAY", 0.0)
+    monkeypatch.setattr(threading, "excepthook", lambda failure: pytest.fail(str(failure)))
+    with Bar(None, 1000, None) as bar:
+        bar.advance(100, DELAY + 1)
+        bar.wait(3, DELAY + 10)
+    with phase("loading"):
+        time.sleep(0.2)
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("seconds", [None, 20.0])
+def test_a_bar_shows_how_far_paths_are(seconds, capsys) -> None:
+    """While nothing is done, every second."""
+    with Bar(None, 1000, seconds) as bar:
+        bar.wait(100, DELAY - 0.5)
+        assert capsys.readouterr().err == ""
+        bar.wait(200, DELAY + 0.7)
+        bar.wait(300, DELAY + 0.8)
+        assert "paths of 200 surfaces under way" in capsys.readouterr().err
+        bar.wait(400, DELAY + 1.8)
+        assert "paths of 400 surfaces under way" in capsys.readouterr().err
+        bar.advance(1000, DELAY + 30)
+    assert capsys.readouterr().err.rstrip().splitlines()[-1].count("surfaces") == 0
+
+
+def test_there_is_no_bar_for_a_function_or_for_false(capsys) -> None:
+    """A function is called in its place."""
+    calls: list = []
+    for progress in (False, lambda *call: calls.append(call)):
+        with Bar(progress, 100, None) as bar:
+            bar.advance(20, 1)
+            bar.advance(30, 60)
+    assert calls == [(20, 100), (50, 100)]
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("progress", [None, True])
+def test_a_long_phase_shows_its_title(progress, monkeypatch, capsys) -> None:
+    """The line counts from the beginning of the phase, and its thread ends with the phase."""
+    monkeypatch.setattr(module, "DELAY", 0.0)
+    monkeypatch.setattr(module, "TICK", 0.01)
+    monkeypatch.setattr("tqdm.std.time", lambda: 1000.0)
+    clock = count(0, 7)  # it is asked at the beginning, and when the line appears
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: next(clock)))
+    before = threading.active_count()
+    with phase("loading a.glb", progress):
+        wait_for("loading a.glb: 00:07", capsys)
+    # tqdm keeps one thread of its own
+    assert threading.active_count() <= before + 1
+
+
+def test_a_long_phase_is_shown_when_it_fails(monkeypatch, capsys) -> None:
+    """An error passes through."""
+    monkeypatch.setattr(module, "DELAY", 0.001)
+
+    def fail() -> None:
+        with phase("loading a.glb"):
+            wait_for("loading a.glb", capsys)
+            raise ValueError("bad")
+
+    with pytest.raises(ValueError, match="bad"):
+        fail()
+
+
+def test_short_phases_and_silent_ones_show_nothing(monkeypatch, capsys) -> None:
+    """A function is not called either: it counts samples."""
+    calls: list = []
+    assert module.DELAY == 2
+    monkeypatch.setattr(module, "DELAY", 60.0)
+    with phase("loading a.glb"):
+        pass
+    monkeypatch.setattr(module, "DELAY", 0.001)
+    for progress in (False, lambda *call: calls.append(call)):
+        with phase("loading a.glb", progress):
+            time.sleep(0.05)
+    assert capsys.readouterr().err == ""
+    assert not calls
+
+
+@pytest.mark.parametrize("load", [load, load_mesh])
+@pytest.mark.parametrize("progress", [None, False])
+def test_loading_is_a_phase(load, progress, tmp_path, monkeypatch, capsys) -> None:
+    """Only its name is shown, not the folder."""
+    monkeypatch.setattr(module, "DELAY", 0.001)
+    monkeypatch.setattr("tqdm.std.time", lambda: 1000.0)
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: 1000.0))
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+
+    read = readers.SceneFiles.read
+
+    def slow(files: readers.SceneFiles, path: object) -> bytes:
+        if progress is None:
+            wait_for("\rloading a.obj: 00:00", capsys)
+        else:
+            time.sleep(0.1)
+        return read(files, path)
+
+    monkeypatch.setattr(readers.SceneFiles, "read", slow)
+    load(tmp_path / "a.obj", progress=progress)
+    shown = capsys.readouterr().err
+    assert progress is None or shown == ""
+    assert str(tmp_path) not in shown
+
+
+def test_building_a_scene_shows_a_line(monkeypatch, capsys) -> None:
+    """Where it takes long, and is not asked to be quiet."""
+    compile_scene = prepared_scene.compile_scene
+
+    def shown(*given, **options):
+        wait_for("building the scene: 00:", capsys)
+        return compile_scene(*given, **options)
+
+    monkeypatch.setattr(module, "DELAY", 0.05)
+    wf.render(scenes.everything(), 1, progress=False)
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(prepared_scene, "compile_scene", shown)
+    wf.render(scenes.everything(), 1)

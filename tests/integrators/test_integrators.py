@@ -1,0 +1,175 @@
+"""The four estimators against each other, where they estimate the same thing."""
+
+from functools import cache
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pytest
+import scenes
+from significance import Mean, assert_same_images, render, repeat
+
+import wavefront as wf
+from wavefront.integrators import ladder as integrators
+from wavefront.integrators import training as pilot
+from wavefront.sampling.sampler import Dimension, Sampler, make_sampler
+
+DIRECT_SPP = {"naive": 256, "direct_simple": 96, "direct_mis": 64, "full": 64}
+
+
+@cache
+def room(integrator: str, max_bounces: int, spp: int, sampler: str = "sobol"):
+    """Runs of the room with a mirror and a glass sphere; every estimator has seeds of its own."""
+    first_seed = 1000 * scenes.ALL.index(integrator)
+    options = {"integrator": integrator, "max_bounces": max_bounces, "sampler": sampler}
+    return repeat(scenes.room(), spp, first_seed=first_seed, **options)
+
+
+@pytest.mark.parametrize(("a", "b"), list(combinations(scenes.ALL, 2)))
+def test_direct_light_agrees(a: str, b: str) -> None:
+    """With one scattering event all four estimate emission and direct light."""
+    assert_same_images(room(a, 1, DIRECT_SPP[a]), room(b, 1, DIRECT_SPP[b]), 0.002)
+
+
+def test_direct_light_behind_mirrors_and_glass_agrees() -> None:
+    """Both direct estimators follow specular surfaces to the first that is not."""
+    a, b = room("direct_simple", 8, 96), room("direct_mis", 8, 64)
+    assert_same_images(a, b, 0.002)
+    assert a.mean() > 1.05 * room("direct_simple", 1, 96).mean()
+
+
+@pytest.mark.parametrize("max_bounces", [2, 8])
+def test_indirect_light_agrees(max_bounces: int) -> None:
+    """Naive and full, with light that took several bounces, caustics among it."""
+    naive, full = room("naive", max_bounces, 256), room("full", max_bounces, 128)
+    assert_same_images(naive, full, 0.003)
+
+
+@pytest.mark.parametrize(("sampler", "spp"), [("independent", 256), ("bluenoise", 128)])
+def test_samplers_agree(sampler: str, spp: int) -> None:
+    """Plain random numbers and blue noise give the same picture as Sobol points."""
+    assert_same_images(room("full", 8, 128), room("full", 8, spp, sampler), 0.004)
+
+
+@pytest.mark.parametrize("integrator", scenes.INDIRECT)
+@pytest.mark.parametrize("after", [0, False])
+def test_roulette_changes_nothing_but_noise(integrator: str, after: int) -> None:
+    """From the first bounce on, or never."""
+    usual = room(integrator, 8, 256 if integrator == "naive" else 128)
+    options = {"integrator": integrator, "max_bounces": 8, "first_seed": 9000, "roulette": after}
+    other = repeat(scenes.room(), 256 if integrator == "naive" else 128, **options)
+    assert_same_images(usual, other, 0.004)
+
+
+def test_full_has_a_tenth_of_the_variance_of_naive() -> None:
+    """On the Cornell box at equal spp."""
+    variance = {}
+    for integrator in scenes.INDIRECT:
+        runs = repeat(scenes.cornell_box(), 64, runs=8, integrator=integrator)
+        variance[integrator] = runs.var(0, ddof=1).mean()
+    assert variance["full"] < 0.1 * variance["naive"]
+
+
+@pytest.mark.parametrize("integrator", scenes.SAMPLING_LIGHTS)
+def test_no_bounce_shows_only_lights(integrator: str) -> None:
+    """Nothing is lit, but the lights and the environment are seen."""
+    image = render(scenes.everything((33, 25)), 1, integrator=integrator, max_bounces=0)
+    seen = np.unique(image.rgb.reshape(-1, 3).round(5), axis=0)
+    lights = np.array([[0, 0, 0], [0.2, 0.3, 0.5], [0.5, 1, 2], [3, 2.5, 2]])
+    assert all(np.abs(lights - value).sum(1).min() < 1e-4 for value in seen)
+
+
+@pytest.mark.parametrize("integrator", scenes.INDIRECT)
+def test_every_bounce_adds_its_own_light(integrator: str) -> None:
+    """The light of exactly k bounces of a furnace of 0.5 is 2^-k; the same numbers give the rest."""
+    scene = scenes.furnace(0.5)
+    means = [
+        Mean.of(render(scene, 256, integrator=integrator, max_bounces=k).rgb.astype(float)) for k in range(4)
+    ]
+    steps = np.diff([0, *(mean.value for mean in means)])
+    assert steps == pytest.approx([1, 0.5, 0.25, 0.125], rel=0.01)
+
+
+class Once(Sampler):
+    """Another sampler's numbers, none of which may be asked for twice."""
+
+    def __init__(self, name: str, seed: int = 0, width: int = 1) -> None:
+        super().__init__(seed)
+        self.inner = make_sampler(name, seed, width)
+        self.given: dict[tuple[int, int], np.ndarray] = {}
+
+    def draw_1d(self, pixel, sample, bounce, dimension):
+        self.note(pixel, sample, bounce, dimension)
+        return self.inner.draw_1d(pixel, sample, bounce, dimension)
+
+    def draw_2d(self, pixel, sample, bounce, dimension):
+        self.note(pixel, sample, bounce, dimension)
+        return self.inner.draw_2d(pixel, sample, bounce, dimension)
+
+    def note(self, pixel, sample, bounce, dimension) -> None:
+        """Remember addresses, and complain of those that come again."""
+        stream = int(bounce), int(dimension)
+        now = pixel.astype(np.uint64) << np.uint64(32) | sample
+        before = self.given.get(stream, now[:0])
+        everything = np.concatenate([before, now])
+        assert len(np.unique(everything)) == len(everything), f"numbers of {stream} are used twice"
+        self.given[stream] = everything
+
+
+@pytest.mark.parametrize(
+    ("integrator", "options"),
+    [
+        *((integrator, {}) for integrator in scenes.ALL),
+        ("full", {"branches": 3}),
+        ("full", {"branches": 3, "guide": True}),
+        ("full", {"caustics": True}),
+    ],
+)
+def test_no_number_is_used_twice(
+    integrator: str, options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not by two decisions, bounces or branches: the means of many scenes would not show it."""
+    given: list[Once] = []
+
+    def record(seed: int, width: int) -> Once:
+        given.append(Once("sobol", seed, width))
+        return given[-1]
+
+    monkeypatch.setattr(pilot, "PATHS", 1 << 13)
+    scene = scenes.everything((12, 9))
+    veils = [
+        wf.Rectangle((-2, -2, z), (4, 0, 0), (0, 4, 0), material=wf.Material(wf.Diffuse(0.5), alpha=0.3))
+        for z in (1.1, 1.2, 1.3)
+    ]
+    blend = wf.Sphere((0.2, 0.3, 0.2), 0.2, material=wf.Mix(wf.Diffuse(0.7), wf.Dielectric(1.5, 0.3)))
+    camera = wf.Camera.look_at((0, 0, 3.9), (0, 0, 0), size=(12, 9), aperture=0.1, focus=3.9)
+    scene = wf.Scene([*scene.shapes, *veils, blend], [wf.Environment((0.2, 0.3, 0.5))], camera)
+    render(scene, 16, sampler=record, max_bounces=5, integrator=integrator, **options)
+    left_out = {"naive": {Dimension.LIGHT, Dimension.LIGHT_POINT}, "full": set()}
+    decisions = {*Dimension, Dimension.OPACITY + 1, Dimension.OPACITY + 2}  # three veils
+    assert {dimension for _, dimension in given[-1].given} == decisions - left_out.get(
+        integrator, {Dimension.ROULETTE}
+    ) - (set() if "guide" in options else {Dimension.GUIDE, Dimension.GUIDE_DIRECTION}) - (
+        set() if "caustics" in options else {Dimension.CASTER, Dimension.CASTER_POINT}
+    )
+
+
+@pytest.mark.parametrize("integrator", ["direct_simple", "direct_mis", "full"])
+def test_contributions_keep_the_number_of_their_light(monkeypatch, integrator: str) -> None:
+    """What is added to a picture, summed by light, is what each light brings alone."""
+    lamp = wf.Rectangle((-1, 3, -1), (2, 0, 0), (0, 0, 2), material=wf.Diffuse(0), emission=(2, 0, 0))
+    points = [wf.PointLight((0, 2, 1), (0, 5, 0)), wf.PointLight((1, 2, 0), (0, 0, 4))]
+    camera = wf.Camera.look_at((0, 2, 4), (0, 1.5, 0), fov=70, size=(8, 6))
+    floor = wf.Rectangle((-4, 0, 4), (8, 0, 0), (0, 0, -8), material=wf.Diffuse(0.5))
+    sums = np.zeros(3)
+    accumulate = integrators.accumulate
+
+    def recorded(L, paths, contribution):
+        carried = (paths.throughput[:, contribution.lanes] * contribution.radiance).sum(0)
+        sums[:] += np.bincount(contribution.light, carried, 3)
+        accumulate(L, paths, contribution)
+
+    monkeypatch.setattr(integrators, "accumulate", recorded)
+    image = render(wf.Scene([floor, lamp], points, camera), 16, integrator=integrator, executor="threads")
+    found = sums / (16 * 8 * 6)
+    assert found == pytest.approx(image.rgb.mean((0, 1)), rel=1e-4)  # each light has a channel of its own

@@ -1,0 +1,452 @@
+"""What is chosen where `branches`, `reuse` or `guide` is "auto", and that choices stay the same."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scenes import cornell_box, everything, room
+
+import wavefront as wf
+from wavefront.compile.scene import compile_scene
+from wavefront.integrators import tuning as trial
+from wavefront.integrators.tuning import Reused, Trial, run_trial
+from wavefront.integrators.tuning_job import TrialJob, TrialPart
+from wavefront.sampling import tiles as pixel_tiles
+from wavefront.sampling.sampler import IndependentSampler, SobolSampler
+from wavefront.session import choice
+from wavefront.settings import Settings
+
+SIZE = (192, 192)  # the smallest pictures that get a trial
+
+
+def many_lights(size: tuple[int, int] = (32, 32)) -> wf.Scene:
+    """The Cornell box with a thousand small lights in it: direct light is noisy."""
+    scene = cornell_box(size)
+    places = np.random.default_rng(0).uniform(-0.9, 0.9, (1000, 3))
+    scene.lights = [wf.PointLights(places, 0.02)]
+    return scene
+
+
+def open_scene(size: tuple[int, int] = (32, 32)) -> wf.Scene:
+    """A ball on a floor under a sky: nothing to guide."""
+    return wf.Scene(
+        [wf.Sphere((0, 0, 0), 1), wf.Rectangle((-4, -1, -4), (0, 0, 8), (8, 0, 0))],
+        wf.Environment(1),
+        wf.Camera.look_at((0, 1, 5), (0, 0, 0), fov=40, size=size),
+    )
+
+
+def lamp_at_the_ceiling(size: tuple[int, int] = (32, 32)) -> wf.Scene:
+    """A room lit by a lamp that shines onto its ceiling."""
+    white, wall = wf.Diffuse(0.7), wf.Rectangle
+    return wf.Scene(
+        [
+            wall((-1, -1, -1), (0, 0, 2), (2, 0, 0), material=white),
+            wall((-1, 1, -1), (2, 0, 0), (0, 0, 2), material=white),
+            wall((-1, -1, -1), (2, 0, 0), (0, 2, 0), material=white),
+            wall((-1, -1, -1), (0, 2, 0), (0, 0, 2), material=white),
+            wall((1, -1, -1), (0, 0, 2), (0, 2, 0), material=white),
+            wall((-0.2, 0.8, -0.2), (0, 0, 0.4), (0.4, 0, 0), emission=20),
+            wall((-0.25, 0.79, -0.25), (0.5, 0, 0), (0, 0, 0.5), material=wf.Diffuse(0.0)),
+        ],
+        camera=wf.Camera.look_at((0, 0, 3.5), (0, 0, 0), fov=38, size=size),
+    )
+
+
+def render(scene: wf.Scene, spp: int = 2, **settings: Any) -> wf.Image:
+    """Render a scene with one thread."""
+    return wf.render(scene, spp, **{"workers": 1, "executor": "threads", **settings})
+
+
+def test_branches_where_the_noise_is_in_indirect_light() -> None:
+    """The picture is that of the number that was chosen."""
+    assert chosen(many_lights((320, 320)), reuse=False).branches == 1
+    image = render(open_scene(SIZE), 1)
+    found = image.metadata["branches"]
+    assert found > 1
+    assert image.metadata["reuse"] is False
+    assert np.array_equal(image.rgb, render(open_scene(SIZE), 1, branches=found).rgb)
+
+
+def test_paths_are_shared_where_that_pays() -> None:
+    """In a matte room, by default; the picture is that of `reuse=True`."""
+    image = render(cornell_box(SIZE), 1)
+    assert (image.metadata["branches"], image.metadata["reuse"]) == (1, True)
+    assert np.array_equal(image.rgb, render(cornell_box(SIZE), 1, reuse=True).rgb)
+
+
+@pytest.mark.parametrize("size", [SIZE, (256, 256)])
+def test_no_seed_keeps_a_matte_room_from_sharing(size: tuple[int, int]) -> None:
+    """The noise of a short trial may not decide: plain paths have ten times the variance."""
+    assert [seed for seed in range(30) if not chosen(cornell_box(size), seed=seed).reuse] == []
+
+
+def glossy(size: tuple[int, int]) -> wf.Scene:
+    """The Cornell box with a ball of rough gold in it."""
+    box = cornell_box(size)
+    ball = wf.Sphere((0, -0.5, 0), 0.5, material=wf.Conductor.named("gold", roughness=0.3))
+    return wf.Scene([*box.shapes[:6], ball], camera=box.camera)
+
+
+@pytest.mark.parametrize("build", [room, everything, glossy, open_scene])
+@pytest.mark.parametrize("by", ["light", "trial"])
+def test_paths_are_not_shared_where_glass_and_gloss_make_the_noise(
+    build: Callable[[tuple[int, int]], wf.Scene], by: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Little light that is hard to find says so, and so would the trial."""
+    if by == "trial":
+        monkeypatch.setattr(choice, "shares_all", lambda scene: True)
+    assert not chosen(build((240, 240))).reuse
+
+
+@pytest.mark.parametrize(
+    "gloss",
+    [
+        wf.Mix(wf.Diffuse((0.3, 0.25, 0.2)), wf.Conductor.named("gold", roughness=0.25), 0.15),
+        wf.Principled((0.5, 0.4, 0.3), roughness=0.3),
+    ],
+    ids=["mix", "principled"],
+)
+def test_paths_are_shared_beside_gloss_where_light_is_hard_to_find(gloss: wf.Bsdf) -> None:
+    """A glossy floor does not keep the matte walls of a room from it; a small ball, seldom met, does."""
+    scene = lamp_at_the_ceiling((256, 256))
+    scene.shapes[0].material = wf.Material(gloss)
+    assert chosen(scene).reuse
+    scene.shapes.append(wf.Sphere((0.4, -0.8, 0.3), 0.1, material=wf.Dielectric(1.5)))
+    assert not chosen(scene).reuse
+
+
+@pytest.mark.parametrize(
+    ("build", "variance", "gloss", "tries"),
+    [
+        (cornell_box, 0.1, 1, [True]),
+        (glossy, 0.1, 0.3, [False]),
+        (glossy, 2, 0.01, [False]),
+        (glossy, 2, 0.3, [False, True]),
+    ],
+    ids=["matte", "glossy", "seldom met", "often met, and light is rare"],
+)
+def test_sharing_is_tried_where_all_is_matte_or_light_is_rare(
+    build: Callable[[tuple[int, int]], wf.Scene],
+    variance: float,
+    gloss: float,
+    tries: list[bool],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Elsewhere rare caustics may be most of the noise, and a trial may miss them."""
+    tried: list[bool] = []
+
+    def trial(*args: Any) -> Trial:
+        tried.append(args[-1])
+        reused = Reused(pixels=0.1, blurred=0.1, again=0, connections=0, evaluations=0)
+        return Trial(0, variance, 1, 1, 1, gloss, reused)
+
+    monkeypatch.setattr(choice, "_trial", trial)
+    assert chosen(build(SIZE)).reuse is tries[-1]
+    assert tried == tries
+
+
+def chosen(scene: wf.Scene, **settings: Any) -> choice.Choice:
+    """Return what is chosen for a scene."""
+    compiled = compile_scene(scene, scene.accelerators.maker("numpy"), mis=True)
+    assert scene.camera is not None
+    options, view = Settings(**settings), compiled.view(scene.camera)
+    table = choice.learn_guide(options, compiled, view) if options.guide else None
+
+    def run(jobs: list[TrialJob]) -> list[TrialPart]:
+        return [job.trace(compiled, SobolSampler, table) for job in jobs]
+
+    return choice.choose(options, compiled, view, table is not None, run)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"reuse": False},
+        {"clamp": 2},
+        {"noise": 0.1},
+        {"aovs": "light_groups"},
+        {"branches": 1},
+        {"branches": 3},
+        {"max_bounces": 1},
+        {"integrator": "direct_mis"},
+    ],
+    ids=str,
+)
+def test_paths_are_not_shared_with_some_settings(
+    settings: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever a trial would say."""
+    pays = Trial(0, 1, 1, 1, 1, 1, Reused(pixels=0.1, blurred=0.1, again=0, connections=0, evaluations=0))
+    tried: list[bool] = []
+
+    def trial(*args: Any) -> Trial:
+        tried.append(args[-1])
+        return pays
+
+    monkeypatch.setattr(choice, "_trial", trial)
+    for without in ({}, {"denoise": True}):
+        assert chosen(cornell_box(SIZE), **without).reuse
+        assert tried.pop()
+    assert not chosen(cornell_box(SIZE), **settings).reuse
+    assert not any(tried)
+
+
+def test_a_guide_goes_with_what_pays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The trial is of guided paths then; without a guide there is a hint where light is hard to find."""
+    table: Any = object()
+    with_table = []
+
+    def trial(*args: Any) -> Trial:
+        with_table.append(args[4])
+        return Trial(0, 2, 1, 1, 1, 1, Reused(pixels=0.1, blurred=0.1, again=0, connections=0, evaluations=0))
+
+    monkeypatch.setattr(choice, "train", lambda *args: table)
+    monkeypatch.setattr(choice, "_trial", trial)
+    guided, plain = (chosen(cornell_box(SIZE), guide=guide) for guide in (True, False))
+    assert (guided.reuse, guided.guided, guided.hint) == (True, True, None)
+    assert (plain.reuse, plain.guided, plain.hint) == (True, False, choice.GUIDE_HINT)
+    assert with_table == [True, False]
+
+
+@pytest.mark.parametrize(("dim", "hint"), [(False, None), (True, choice.GUIDE_HINT)])
+def test_metadata_hint_at_a_guide(dim: bool, hint: str | None) -> None:
+    """Where a lamp shines away from what is seen, not in the Cornell box."""
+    scene = lamp_at_the_ceiling(SIZE) if dim else cornell_box(SIZE)
+    assert render(scene, 1).metadata["hint"] == hint
+
+
+@pytest.mark.parametrize(
+    ("scene", "settings"),
+    [
+        (cornell_box((191, 192)), {}),
+        (cornell_box(SIZE), {"max_bounces": 1}),
+        (cornell_box(SIZE), {"integrator": "naive"}),
+        (cornell_box(SIZE), {"branches": 2}),
+        (cornell_box(SIZE), {"reuse": True}),
+        (wf.Scene([wf.Sphere((0, 0, 0), 1)], camera=cornell_box(SIZE).camera), {}),
+        (
+            wf.Scene(
+                [wf.Sphere((0, 0, 0), 1, material=wf.Mirror())], wf.Environment(1), cornell_box(SIZE).camera
+            ),
+            {},
+        ),
+    ],
+    ids=["small", "direct light", "naive", "branches", "reuse", "dark", "mirror"],
+)
+def test_there_is_no_trial_where_it_can_bring_nothing(
+    scene: wf.Scene, settings: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Small pictures, direct light, other integrators, no light, no rough surface."""
+    monkeypatch.setattr(choice, "run_trial", None)
+    found = chosen(scene, **settings)
+    assert (found.branches, found.reuse) == (settings.get("branches", 1), settings.get("reuse", False))
+
+
+def test_workers_of_this_machine_do_the_trial(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At least two of them have something to do."""
+    threads, both_have_one = set(), threading.Barrier(2)
+    trace = TrialJob.trace
+
+    def noted(self: TrialJob, *args: Any) -> TrialPart:
+        if threading.current_thread().name not in threads:
+            threads.add(threading.current_thread().name)
+            both_have_one.wait(60)
+        return trace(self, *args)
+
+    monkeypatch.setattr(TrialJob, "trace", noted)
+    assert wf.render(cornell_box(SIZE), 1, workers=2, executor="threads").metadata["reuse"]
+    assert len(threads) == 2
+    assert threading.current_thread().name not in threads
+
+
+def test_a_session_may_be_stopped_during_the_trial_of_a_view() -> None:
+    """By another thread: the view has a choice and no picture, and the next one has its picture."""
+    scene = cornell_box(SIZE)
+    with wf.Session(scene, 1, workers=2, executor="threads", progress=False) as session:
+        run = session._pool.run
+
+        def stopped(*args: Any) -> Any:
+            session.drop()
+            return run(*args)
+
+        session._pool.run = stopped
+        session.set_camera(scene.camera)
+        assert session._plan.choice.reuse
+        session._pool.run = run
+        assert next(session, None) is None
+        session.set_camera(scene.camera)
+        image = session.run()
+    assert np.array_equal(image.rgb, render(scene, 1).rgb)
+
+
+def test_a_window_is_a_part_of_the_same_picture() -> None:
+    """The whole picture decides, so its bits stay."""
+    scene = cornell_box((240, 160))
+    window = scene.camera.cropped((28, 0, 56, 28))
+    assert chosen(scene).reuse
+    assert chosen(wf.Scene(scene.shapes, camera=window)).reuse
+    whole, part = (render(scene, 1, camera=camera) for camera in (scene.camera, window))
+    assert np.array_equal(part.rgb, whole.rgb[:28, 28:56])
+
+
+def test_decisions_do_not_depend_on_workers_waves_samples_or_time() -> None:
+    """Counted rays decide."""
+    whole = render(cornell_box(SIZE), 2)
+    same = [
+        {"workers": 2, "wave_size": 5000},
+        {"workers": 1, "seconds": 600},
+        {"workers": 2, "executor": "processes"},
+    ]
+    for settings in same:
+        image = render(cornell_box(SIZE), 2, **settings)
+        assert image.metadata["reuse"] is True
+        assert np.array_equal(image.rgb, whole.rgb)
+    parts = [
+        wf.render(cornell_box(SIZE), samples=part, workers=1, executor="threads")
+        for part in (range(1), range(1, 2))
+    ]
+    assert np.array_equal(wf.Image.merge(*parts).rgb, whole.rgb)
+
+
+@pytest.mark.parametrize("accel", ["numpy", "embree"])
+def test_trials_do_not_depend_on_how_they_are_cut_into_waves(
+    accel: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Means and counts are the same for any number of tiles that are traced together."""
+    if accel == "embree":
+        pytest.importorskip("embreex")
+    scene = cornell_box(SIZE)
+    compiled = compile_scene(scene, scene.accelerators.maker(accel), mis=True)
+    found = []
+    for tiles in (1, 3, 64):
+        monkeypatch.setattr(trial, "WAVE", tiles)
+        view = compiled.view(scene.camera)
+        run = partial(map, lambda job: job.trace(compiled, IndependentSampler, None))
+        found.append(run_trial(compiled, view, (1, 2), 5, run, tiles=7, reuse=True))
+    for other in found[1:]:
+        for name in ("shared", "separate", "before", "after"):
+            assert getattr(other, name) == getattr(found[0], name)
+        for name in ("pixels", "blurred", "again", "connections", "evaluations"):
+            assert getattr(other.reused, name) == getattr(found[0].reused, name)
+
+
+def test_a_blur_adds_up_the_noise_that_a_tile_shares() -> None:
+    """The weights are those of the pixels of a tile in a picture that is blurred by a Gaussian."""
+    deviation = np.random.default_rng(0).normal(size=16)
+    x, y = trial._spread_tiles(cornell_box(SIZE).camera, 3)
+    x, y = (each[2:] - each[2].min() + 40 for each in (x, y))
+    picture = np.zeros((108, 108))
+    picture[y, x] = deviation
+    away = np.arange(-40, 41)
+    kernel = np.exp(-(away**2) / (2 * trial.BLUR**2))
+    for axis in (0, 1):
+        picture = np.apply_along_axis(np.convolve, axis, picture, kernel, "same")
+    found = trial._after_blur(deviation[None, None, None], x, y).sum()
+    assert found == pytest.approx(np.square(picture).sum() / np.square(kernel).sum() ** 2, rel=1e-3)
+
+
+def test_sharing_costs_rays_evaluations_and_further_paths() -> None:
+    """All of them relative to the rays of plain paths; what is gained must be more."""
+    reused = Reused(pixels=0.2, blurred=0.3, again=50, connections=100, evaluations=100)
+    found = Trial(0.0, 1.0, 50, 50, 1.0, 1, reused)
+    assert found.costs_of_reuse() == pytest.approx((0.2 * 2.3, 0.3 * 2.3))
+    assert found.reuse_pays()
+    dear = Reused(pixels=0.2, blurred=0.3, again=350, connections=100, evaluations=100)
+    assert not Trial(0.0, 1.0, 50, 50, 1.0, 1, dear).reuse_pays()
+
+
+def test_a_guide_is_used_where_it_pays() -> None:
+    """Under an open sky it is not; the picture is that without or with it."""
+    for scene, pays in ((open_scene(), False), (lamp_at_the_ceiling(), True)):
+        image = render(scene, guide="auto")
+        assert image.metadata["guided"] is pays
+        assert image.metadata["guide"] == "auto"
+        same = render(scene, guide=pays, branches=image.metadata["branches"])
+        assert np.array_equal(image.rgb, same.rgb)
+
+
+def test_renders_go_on_with_the_same_decision(tmp_path: Path) -> None:
+    """A checkpoint knows what was decided, and goes on where the same is asked for."""
+    path = tmp_path / "box.wfck"
+    render(cornell_box(SIZE), 1, checkpoint=path)
+    image = render(cornell_box(SIZE), 2, checkpoint=path)
+    assert np.array_equal(image.rgb, render(cornell_box(SIZE), 2).rgb)
+    with pytest.raises(wf.SceneError, match="reuse was True and is False"):
+        render(cornell_box(SIZE), 2, reuse=False, checkpoint=path)
+    assert np.array_equal(render(cornell_box(SIZE), 2, reuse=True, checkpoint=path).rgb, image.rgb)
+
+
+def test_each_camera_has_a_trial_of_its_own() -> None:
+    """A session decides anew; its workers go on, as jobs say how their paths do."""
+    box = wf.Scene(cornell_box(SIZE).shapes, wf.Environment(0.01), cornell_box(SIZE).camera)
+    away_from_it = wf.Camera.look_at((0, 0, 30), (0, 0, 300), fov=40, size=SIZE)
+    with wf.Session(box, 1, workers=1, executor="threads", lighting=None) as session:
+        first = session.run()
+        pool = session._pool
+        session.set_camera(away_from_it)
+        away = session.run()
+        session.set_camera(None)
+        assert np.array_equal(session.run().rgb, first.rgb)
+        session.set_camera(box.camera)
+        assert session._pool is pool
+    assert (first.metadata["reuse"], away.metadata["reuse"]) == (True, False)
+    assert np.array_equal(away.rgb, render(box, 1, camera=away_from_it).rgb)
+
+
+def test_other_integrators_have_nothing_to_decide() -> None:
+    """ "auto" is then one branch and no guide."""
+    for integrator in ("naive", "direct_simple", "direct_mis"):
+        image = render(cornell_box((8, 8)), integrator=integrator, branches="auto", guide="auto")
+        assert (image.metadata["branches"], image.metadata["guided"]) == (1, False)
+        assert np.array_equal(image.rgb, render(cornell_box((8, 8)), integrator=integrator).rgb)
+
+
+def test_the_cost_is_variance_times_rays() -> None:
+    """The best number is near the one of the splitting formula, √(V2/V1 · c1/c2)."""
+    found = Trial(shared=1.0, separate=9.0, before=100, after=100.0, ray_cost=1.0)
+    assert found.cost(1) == 10 * 200
+    assert found.cost(3) == 4 * 400
+    assert min(range(1, 9), key=found.cost) == 3  # √9
+    assert found.best_ways() == 2  # the fewest that cost about as little
+    assert Trial(0.0, 9.0, 300, 100.0, 1.0).best_ways() == 4
+    assert Trial(1.0, 0.9, 100, 100.0, 1.0).best_ways() == 1
+    assert Trial(1.0, 1.2, 110, 100.0, 1.0).best_ways() == 1  # the gain is too small
+    assert Trial(0.0, 0.0, 100, 0.0, 1.0).best_ways() == 1
+
+
+@pytest.mark.parametrize(("before", "ways"), [(0.5, 3), (0.4, 3), (0.32, 3), (0.3, 1), (0.2, 1)])
+def test_branches_need_many_rays_before_them(before: float, ways: int) -> None:
+    """Two branches that halve the variance take 1.7 times as long in a closed room: too little is gained."""
+    assert Trial(0.0, 1.0, before, 1 - before, 1.0).best_ways() == ways
+
+
+def test_chance_does_not_make_variance_that_branches_share_less_than_none() -> None:
+    """A covariance below 0 counts as 0, and its standard error is added all the same."""
+    of_tile = np.array([-3.0, -1.0, -3.0, -1.0])
+    values = of_tile.repeat(pixel_tiles.MEMBERS)
+    error = of_tile.std(ddof=1) / 2
+    kept = np.arange(values.size)
+    assert trial._at_most(values, kept) == pytest.approx(error)
+    assert trial._at_most(values + 5, kept) == pytest.approx(3 + error)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"branches": "many"}, r"branches is 'many'; it must be a whole number from 1 to 64, or 'auto'"),
+        ({"branches": 0}, r"branches is 0; it must be a whole number from 1 to 64, or 'auto'"),
+        ({"guide": "yes"}, r"guide is 'yes'; it must be True or False, or 'auto'"),
+        ({"reuse": "yes"}, r"reuse is 'yes'; it must be True or False, or 'auto'"),
+    ],
+)
+def test_other_values_are_refused(settings: dict[str, Any], message: str) -> None:
+    """Before any work."""
+    with pytest.raises(wf.SceneError, match=message):
+        wf.render("no such file", **settings)

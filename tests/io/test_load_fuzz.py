@@ -1,0 +1,158 @@
+"""Damaged files of every kind: a typed error or a scene, never anything else, within memory and time.
+
+Half of the damage is to bytes, the other half to the structure of the format (mutations.py). It is done in a
+process of its own with 3 GB of memory and 25 s for each file; `python tests/io/test_load_fuzz.py SEED COUNT`
+repeats a run, and leaves a file that fails as `fuzz-SEED-NUMBER-NAME` in the current folder if KEEP is set.
+"""
+
+import os
+import random
+import subprocess
+import sys
+import tempfile
+import warnings
+from collections import Counter
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from gltf_builder import Builder
+from mutations import mutate
+
+from wavefront.codecs.display import Display
+from wavefront.codecs.image_data import ImageData
+from wavefront.codecs.images import read_image, read_picture, write_image
+from wavefront.core.errors import SceneError
+from wavefront.io.load import load
+from wavefront.shapes import Spheres
+
+MEMORY = 3 << 30  # bytes
+SECONDS = 25  # for one file
+WORDS = b'0|-1|nan|inf|99999999999|1e400|/|//|\\|#|"|[|{|null|\x00|\xff| |\n|property|f |v |true|-'.split(
+    b"|"
+)
+NUMBERS = (b"\xff\xff\xff\xff", b"\0\0\0\0", b"\xff\xff\xff\x7f", b"\0\0\0\x80")
+OBJ = "mtllib s.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvn 0 0 1\nusemtl m\nf 1/1/1 2/2/1 3/1/1\n"
+OBJ += "f -3//1 2 1/1\n"
+MTL = "newmtl m\nKd 1 1 1\nmap_Kd -s 1 1 1 t.png\nPr 0.3\nd 0.5\nKe 1 1 1\n"
+
+
+def make_seeds(folder):
+    """Write a sound file of every kind."""
+    ball = trimesh.creation.icosphere(1)
+    for extension in ("obj", "ply", "stl", "glb", "off", "dae", "3mf"):
+        ball.export(folder / f"ball.{extension}")
+    (folder / "text.ply").write_bytes(trimesh.exchange.ply.export_ply(ball, encoding="ascii"))
+    (folder / "text.stl").write_text(trimesh.exchange.stl.export_stl_ascii(ball))
+    (folder / "m.obj").write_text(OBJ)
+    (folder / "s.mtl").write_text(MTL)
+    build = Builder()
+    info = build.image(np.zeros((4, 4, 3), np.uint8))
+    build.material(
+        pbrMetallicRoughness={"baseColorTexture": info, "metallicRoughnessTexture": info}, normalTexture=info
+    )
+    build.gltf(folder / "m.gltf")
+    build.glb(folder / "m.glb")
+    for extension in ("png", "jpg", "exr", "hdr", "npy"):
+        write_image(folder / f"t.{extension}", np.random.default_rng(0).random((9, 11, 3)))
+    rgb = np.random.default_rng(1).random((9, 11, 3), np.float32)
+    arrays = {"alpha": rgb[..., 0], "shape_id": np.arange(99, dtype=np.int32).reshape(9, 11)}
+    metadata = {"background": "transparent", "noise": 0.1}
+    layered = ImageData(rgb, arrays, {"spp": 4, "metadata": metadata, "names": {"shape": {0: "a"}}})
+    for extension in ("exr", "npz"):
+        write_image(folder / f"p.{extension}", layered)
+    write_image(folder / "p.png", layered, Display(), bits=16)
+
+
+def damage(data, rng):
+    """Change bytes, put words in, cut, or repeat a part."""
+    for _ in range(rng.choice((1, 1, 2, 5))):
+        at = rng.randrange(len(data) + 1)
+        kind = rng.randrange(6)
+        if kind == 0:
+            data = data[:at] + bytes([rng.randrange(256)]) + data[at + 1 :]
+        elif kind == 1:
+            data = data[:at] + rng.choice(WORDS) + data[at:]
+        elif kind == 2:
+            data = data[:at] + rng.choice(WORDS) + data[at + rng.randrange(12) :]
+        elif kind == 3:
+            data = data[:at] + rng.choice(NUMBERS) + data[at + 4 :]
+        elif kind == 4:
+            data = data[:at] + data[at // 2 : at // 2 + 60] + data[at:]
+        else:
+            data = data[:at]
+    return data
+
+
+def attempt(folder, name):
+    """Load a file and return whether it loads; only a SceneError may stop it."""
+    try:
+        if name.startswith("t."):
+            assert read_image(folder / name).ndim == 3
+        elif name.startswith("p."):
+            assert read_picture(folder / name).rgb.shape[2] == 3
+        else:
+            found = load(folder / ("m.obj" if name == "s.mtl" else name))
+            assert found.shapes
+            for shape in found.shapes:
+                mesh = getattr(shape, "mesh", shape)
+                if isinstance(mesh, Spheres):  # a file whose faces are damaged, not its points
+                    assert np.isfinite(mesh.centers).all()
+                    continue
+                assert np.isfinite(mesh.vertices).all()
+                assert mesh.faces.max() < len(mesh.vertices)
+    except SceneError as error:
+        if len(str(error)) < 10:
+            raise AssertionError(f"{name}: {error!r} says nothing") from error
+        return False
+    return True
+
+
+def main(seed, count):
+    """Damage `count` files, and print how many of each kind loaded and were refused."""
+    import resource
+    import signal
+
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    warnings.simplefilter("error")
+    warnings.simplefilter("ignore", UserWarning)  # repairs are announced
+    rng = random.Random(seed)
+    tally: Counter[tuple[str, bool]] = Counter()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        make_seeds(folder)
+        sound = {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+        for number in range(count):
+            name = rng.choice(list(sound))
+            change = damage if rng.random() < 0.5 else partial(mutate, name)
+            data = change(sound[name], rng)
+            (folder / name).write_bytes(data)
+            print(number, name, flush=True)
+            if "KEEP" in os.environ:
+                Path(f"fuzz-{seed}-{number}-{name}").write_bytes(data)
+            signal.alarm(SECONDS)
+            tally[name.rpartition(".")[2], attempt(folder, name)] += 1
+            signal.alarm(0)
+            if "KEEP" in os.environ:
+                Path(f"fuzz-{seed}-{number}-{name}").unlink()
+            (folder / name).write_bytes(sound[name])
+    for kind in sorted({kind for kind, _ in tally}):
+        print(f"{kind}: {tally[kind, True]} loaded, {tally[kind, False]} refused")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory limits as Linux has them")
+@pytest.mark.parametrize(("seed", "count"), [(0, 400), pytest.param(1, 20000, marks=pytest.mark.slow)])
+def test_damaged_files(seed, count):
+    done = subprocess.run(
+        [sys.executable, __file__, str(seed), str(count)], capture_output=True, text=True, errors="replace"
+    )
+    assert done.returncode == 0, done.stdout[-100:] + done.stderr[-3000:]
+    print(f"{count} inputs tried")
+    print(done.stdout.partition(f"\n{count - 1} ")[2])
+    assert f"{count - 1} " in done.stdout
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(sys.argv[2]))

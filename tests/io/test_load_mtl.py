@@ -1,0 +1,376 @@
+"""MTL maps, their options, and the PBR extension."""
+
+import inspect
+from types import SimpleNamespace
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+import trimesh
+
+from wavefront.bsdfs import Dielectric, Diffuse, Principled
+from wavefront.core.errors import SceneError
+from wavefront.io import appearance
+from wavefront.io.load import from_trimesh, load_meshes
+from wavefront.textures.image import Texture
+from wavefront.textures.normal_map import BumpMap, NormalMap
+
+CODES = np.random.default_rng(0).integers(0, 256, (4, 8, 3), np.uint8)
+POINTS = np.random.default_rng(1).random((2, 40), np.float32)
+
+
+@pytest.fixture
+def one(tmp_path):
+    """Load a textured triangle whose material has the given lines, beside an image `t.png`."""
+    iio.imwrite(tmp_path / "t.png", CODES)
+    (tmp_path / "t.tga").write_bytes(bytes(100))
+    (tmp_path / "broken.png").write_bytes((tmp_path / "t.png").read_bytes()[:60])
+
+    def load_one(*lines, **arguments):
+        (tmp_path / "s.mtl").write_text("\n".join(["newmtl m", *lines]))
+        text = "mtllib s.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n"
+        (tmp_path / "a.obj").write_text(text)
+        (mesh,) = load_meshes(tmp_path / "a.obj", **arguments)
+        return mesh
+
+    return load_one
+
+
+class Recorder(Diffuse):
+    """Stands for Principled and takes everything."""
+
+    def __init__(
+        self, base_color, metallic=0, roughness=0.5, sheen=0, clearcoat=0, clearcoat_roughness=0,
+        anisotropy=0, ior=1.5, specular=1, specular_color=1,
+    ):  # fmt: skip
+        self.given = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
+        super().__init__(0.5)
+
+
+@pytest.fixture
+def given(monkeypatch, one):
+    """Load a material as the parameters that `Principled` would be given."""
+    monkeypatch.setattr(appearance, "Principled", Recorder)
+    monkeypatch.setattr(appearance, "PARAMETERS", frozenset(inspect.signature(Recorder).parameters))
+    return lambda *lines: one(*lines).material.bsdf.given
+
+
+def same(texture, **arguments):
+    """Tell whether a texture is the image with these arguments."""
+    return np.array_equal(texture.lookup(POINTS), Texture(CODES, **arguments).lookup(POINTS))
+
+
+def test_map_kd_is_multiplied_by_kd(one):
+    assert same(one("Kd 1 0.5 0", "map_Kd t.png").material.bsdf.reflectance, scale=[1, 0.5, 0])
+    assert same(one("map_Kd t.png").material.bsdf.reflectance)
+    assert same(one("Kd 0 0 0", "map_Kd t.png").material.bsdf.reflectance)
+
+
+@pytest.mark.parametrize("name", ["a b.png", "1 2 3.png", "sub\\c.png", "sub/c.png", "ü#1.png"])
+def test_names_of_images(one, tmp_path, name):
+    (tmp_path / "sub").mkdir()
+    iio.imwrite(tmp_path / name.replace("\\", "/"), CODES)
+    assert same(one(f"map_Kd {name}").material.bsdf.reflectance)
+    assert same(one(f"map_Kd -s 1 1 1 {name}").material.bsdf.reflectance)
+
+
+def test_options_place_the_image(one):
+    found = one("map_Kd -s 2 3 1 -o 0.25 0.5 t.png").material.bsdf.reflectance
+    assert same(found, transform=[[2, 0, 0.25], [0, 3, 0.5], [0, 0, 1]])
+    assert same(one("map_Kd -s 2 t.png").material.bsdf.reflectance, transform=np.diag([2.0, 1, 1]))
+    clamped = one("map_Kd -clamp on -o 0.7 t.png").material.bsdf.reflectance
+    assert same(clamped, wrap="clamp", transform=[[1, 0, 0.7], [0, 1, 0], [0, 0, 1]])
+    assert same(
+        one("Kd 0.5 0.5 0.5", "map_Kd -mm 0.25 0.5 t.png").material.bsdf.reflectance, scale=0.25, offset=0.125
+    )
+
+
+def test_options_without_effect_are_named(one):
+    with pytest.warns(
+        UserWarning, match=r"not honored: -blendu of map_Kd \(material 'm'\), -texres of map_Kd"
+    ):
+        assert same(one("map_Kd -blendu off -texres 512 t.png").material.bsdf.reflectance)
+    with pytest.warns(UserWarning, match="not honored: -imfchan of map_Kd"):
+        assert same(one("map_Kd -imfchan r t.png").material.bsdf.reflectance)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("map_Kd -foo 1 t.png", r"s\.mtl line 2: map_Kd has the option '-foo', which is not known"),
+        ("map_Kd -s 2", r"line 2: map_Kd names no file"),
+        ("map_Kd -mm a b t.png", r"line \d+: map_Kd: -mm is 'a b'; it must be numbers"),
+        ("map_Pr -imfchan q t.png", r"line \d+: map_Pr: -imfchan is 'q'; it must be one of r, g, b, m, l"),
+        (
+            "map_Pr -imfchan m t.png",
+            r"line 2: map_Pr: channel is 3; texture 't\.png' has the channels 0 to 2",
+        ),
+        ("map_Kd t.tga", r"line 2: map_Kd: .*t\.tga: extension is '\.tga'; it must be one of"),
+        (
+            "map_Kd ../t.png",
+            r"line 2: map_Kd: .*s\.mtl: refers to '\.\./t\.png', which is outside its folder",
+        ),
+        ("map_Kd broken.png", r"s\.mtl line 2: map_Kd: .*broken\.png"),
+        ("map_Kd C:\\t.png", r"absolute path is not followed"),
+    ],
+)
+def test_defects_of_maps(one, line, message):
+    with pytest.raises(SceneError, match=message):
+        one(line)
+
+
+@pytest.mark.parametrize(
+    ("lines", "missing", "plain"),
+    [
+        (("Kd 0.2 0.4 0.6", "map_Kd no.png"), "line 3: map_Kd: texture 'no.png'", ("Kd 0.2 0.4 0.6",)),
+        (("map_Kd -s 2 2 sub/no.png",), "line 2: map_Kd: texture 'sub/no.png'", ()),
+        (("map_Ke no.exr",), "line 2: map_Ke: texture 'no.exr'", ()),
+        (("map_d no.png",), "line 2: map_d: texture 'no.png'", ()),
+        (("map_Pr no.png",), "line 2: map_Pr: texture 'no.png'", ()),
+        (("norm no.png",), "line 2: norm: texture 'no.png'", ()),
+        (("map_Bump -bm 2 no.tga",), "line 2: map_Bump: texture 'no.tga'", ()),
+        (("map_Kd " + "n" * 300,), "line 2: map_Kd: texture 'nnn", ()),
+    ],
+)
+def test_missing_images_are_announced_and_left_out(one, lines, missing, plain):
+    with pytest.warns(UserWarning, match=rf"s\.mtl {missing}.* is missing$") as record:
+        mesh = one(*lines)
+    assert len(record) == 1
+    expected = one(*plain)
+    assert type(mesh.material.bsdf) is type(expected.material.bsdf) is Diffuse
+    assert np.array_equal(mesh.material.bsdf.reflectance, expected.material.bsdf.reflectance)
+    assert mesh.emission is None
+    with pytest.raises(SceneError, match=rf"s\.mtl {missing}.* is missing$"):
+        one(*lines, strict=True)
+
+
+def test_the_pbr_extension(given):
+    found = given("Kd 0.2 0.4 0.6", "Pr 0.3", "Pm 0.9", "Ps 0.1", "Pc 0.5", "Pcr 0.25", "aniso 0.75")
+    assert found.pop("base_color").tolist() == [0.2, 0.4, 0.6]
+    assert found == {
+        "roughness": 0.3,
+        "metallic": 0.9,
+        "sheen": 0.1,
+        "clearcoat": 0.5,
+        "clearcoat_roughness": 0.25,
+        "anisotropy": 0.75,
+        "ior": 1.5,
+        "specular": 1,
+        "specular_color": 1,
+    }
+
+
+def test_pbr_maps(given):
+    found = given("map_Pr t.png", "Pm 0.5", "map_Pm -imfchan b t.png")
+    assert same(found["roughness"], srgb=False, channel="luminance")
+    assert same(found["metallic"], srgb=False, channel=2, scale=0.5)
+
+
+@pytest.mark.parametrize(
+    "lines", [["Kd 1 0 0"], ["Pr 0.3", "Pm 1"], ["illum 7", "Ni 1.5"], ["illum 3", "Ks 1 1 1"]]
+)
+def test_norm_is_a_normal_map_of_any_material(one, lines):
+    normal_map = one(*lines, "norm -bm 0.5 -s 2 2 t.png").material.normal_map
+    assert isinstance(normal_map, NormalMap)
+    assert normal_map.strength == 0.5
+    assert same(normal_map.texture, srgb=False, transform=np.diag([2.0, 2, 1]))
+    assert one(*lines).material.normal_map is None
+
+
+@pytest.mark.parametrize("keyword", ["bump", "map_bump", "map_Bump"])
+def test_bump_is_a_map_of_heights(one, keyword):
+    normal_map = one(f"{keyword} -bm 0.2 -mm 0.1 2 t.png").material.normal_map
+    assert isinstance(normal_map, BumpMap)
+    assert normal_map.height == np.float32(0.2)
+    assert same(normal_map.texture, srgb=False, channel="luminance", scale=2, offset=0.1)
+    chosen = one(f"{keyword} -imfchan g t.png").material.normal_map
+    assert chosen.height == 1
+    assert same(chosen.texture, srgb=False, channel=1)
+
+
+def test_a_bump_map_that_looks_like_normals_is_one(one, tmp_path):
+    codes = np.random.default_rng(1).normal([128, 128, 240], 8, (16, 16, 3)).clip(0, 255).astype(np.uint8)
+    iio.imwrite(tmp_path / "n.png", codes)
+    normal_map = one("map_Bump -bm 0.7 n.png").material.normal_map
+    assert isinstance(normal_map, NormalMap)
+    assert normal_map.strength == np.float32(0.7)
+    assert isinstance(one("map_Bump -imfchan b n.png").material.normal_map, BumpMap)
+    iio.imwrite(tmp_path / "n.png", codes[..., 2])
+    assert isinstance(one("map_Bump n.png").material.normal_map, BumpMap)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("norm broken.png", r"s\.mtl line 2: norm: .*broken\.png: ends early"),
+        ("bump -bm x t.png", r"s\.mtl line 2: bump: .*-bm is 'x'; it must be numbers|-bm is 'x'"),
+        ("norm -s 0 t.png", r"s\.mtl line 2: norm: NormalMap: the transform of .* is singular"),
+        ("bump -bm nan t.png", r"s\.mtl line 2: bump: BumpMap height is nan"),
+    ],
+)
+def test_defects_of_normal_maps(one, line, message):
+    with pytest.raises(SceneError, match=message):
+        one(line)
+
+
+@pytest.mark.filterwarnings(r"ignore:.*s\.mtl. not honored")
+@pytest.mark.parametrize(
+    "line", ["map_Pr t.png", "map_Ke t.png", "map_d t.png", "norm t.png", "map_Bump t.png"]
+)
+def test_images_that_trimesh_leaves_out_are_named(one, tmp_path, monkeypatch, line):
+    one("Kd 1 0.5 0", "map_Kd t.png", line)
+    monkeypatch.chdir(tmp_path)  # where t.png is: it is not looked for
+    held = trimesh.load(tmp_path / "a.obj", process=False)
+    with pytest.warns(UserWarning, match=f"not honored: {line.split()[0].lower()}"):
+        (mesh,) = from_trimesh(held).shapes
+    assert isinstance(mesh.material.bsdf, Diffuse)
+    assert mesh.emission is None
+
+
+def test_roughness_0_is_kept_and_absent_roughness_is_matte(given):
+    assert given("Pr 0")["roughness"] == 0
+    matte = given("Ps 0.5")
+    assert (matte["roughness"], matte["specular"]) == (1, 0)
+
+
+@pytest.mark.parametrize("illum", [(), ("illum 2",)])
+@pytest.mark.parametrize(("ns", "roughness"), [(1e-3, 0.999), (10, 0.9), (250, 0.5), (1000, 0), (1e5, 0)])
+def test_ks_and_ns_are_a_gloss(one, illum, ns, roughness):
+    """The reflectance along the normal is 0.08 · Ks, the roughness 1 − √(Ns/1000), as in Blender."""
+    found = one("Kd 0.25 0.5 1", "Ks 1 0.5 0.25", f"Ns {ns}", *illum).material.bsdf
+    assert isinstance(found, Principled)
+    assert found.base_color.ravel().tolist() == [0.25, 0.5, 1]
+    assert found.roughness == pytest.approx([roughness])
+    assert found._dielectric(np.zeros(1, np.float32)).ravel() == pytest.approx([0.08, 0.04, 0.02], rel=1e-6)
+    assert found.specular_weight == 1
+
+
+def test_the_gloss_that_blender_writes_is_that_of_principled(one):
+    found = one("Kd 0.5 0.5 0.5", "Ks 0.5 0.5 0.5", "Ns 250", "Ni 1.45").material.bsdf
+    plain = Principled(0.5)
+    assert vars(found).keys() == vars(plain).keys()
+    for name, value in vars(plain).items():
+        assert value is None or getattr(found, name) == pytest.approx(value), name
+
+
+def test_a_faint_gloss_is_faint_at_grazing_angles_too(one):
+    faint = one("Ks 0.05 0.05 0.05", "Ns 250").material.bsdf
+    assert faint._dielectric(np.zeros(1, np.float32)) == pytest.approx(np.full((3, 1), 0.004), rel=1e-5)
+    assert faint._dielectric(np.ones(1, np.float32)) == pytest.approx(np.full((3, 1), 0.2))
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ["Ks 1 1 1", "Ns 200", "illum 1"],
+        ["Ks 1 1 1", "Ns 0", "map_Ks t.png", "illum 2"],
+        ["Ks 0 0 0", "Ns 200"],
+        ["Ns 200", "illum 2"],
+    ],
+)
+def test_without_a_highlight_a_surface_is_matte(one, lines):
+    assert isinstance(one("Kd 0.5 0.5 0.5", *lines).material.bsdf, Diffuse)
+
+
+def test_a_gloss_without_an_exponent_is_as_rough_as_can_be(given):
+    assert given("Ks 0.5 0.5 0.5")["roughness"] == 1
+
+
+def test_an_exponent_below_0_is_clamped(given):
+    with pytest.warns(UserWarning, match=r"s\.mtl line 3: Ns is -3; it must be at least 0 and was clamped"):
+        assert given("Ks 0.5 0.5 0.5", "Ns -3")["roughness"] == 1
+
+
+def test_the_pbr_extension_goes_before_ks_and_ns(given):
+    both = given("Ks 1 1 1", "Ns 250", "Pr 0.3")
+    assert both["roughness"] == 0.3
+    assert ((both["ior"] - 1) / (both["ior"] + 1)) ** 2 == pytest.approx(0.08)
+    assert given("Ks 1 1 1", "Ns 250", "Pm 0.7")["roughness"] == 0.5
+    assert given("Ns 250", "Pm 0.7")["roughness"] == 0.5
+    black = given("Ks 0 0 0", "Pr 0.3", "illum 1")
+    assert (black["roughness"], black["ior"], black["specular"]) == (0.3, 1.5, 1)
+
+
+def test_map_ks_is_the_strength_of_the_gloss(given):
+    """Below a reflectance of 0.02 the strength is less than 1 everywhere."""
+    assert same(given("map_Ks t.png")["specular"])
+    found = given("Ks 0.125 0.0625 0.125", "map_Ks -s 2 2 t.png")
+    assert same(found["specular"], scale=0.5, transform=np.diag([2.0, 2, 1]))
+    assert found["specular_color"].tolist() == [1, 0.5, 1]
+
+
+def test_a_map_of_the_gloss_counts_by_its_luminance(one):
+    strength = one("Ks 1 1 1", "map_Ks t.png").material.bsdf.specular_weight
+    assert strength.scalar
+    seen = Texture(CODES).lookup(POINTS)
+    surface = SimpleNamespace(uv=POINTS)
+    assert strength.at(surface) == pytest.approx(0.2126 * seen[0] + 0.7152 * seen[1] + 0.0722 * seen[2])
+
+
+def test_parts_outside_their_range_are_clamped(given):
+    with pytest.warns(
+        UserWarning, match=r"s\.mtl line 2: Pr is 1\.5; it must be in \[0, 1\] and was clamped"
+    ):
+        assert given("Pr 1.5")["roughness"] == 1
+
+
+def test_alpha(one):
+    assert one("d 0.25").material.opacity.constant == 0.25
+    assert one("Tr 0.25").material.opacity.constant == 0.75
+    assert one("d 0.5", "Pr 0.3").material.opacity.constant == 0.5
+    assert one("d 0.5", "Ks 1 1 1", "illum 3").material.opacity.constant == 0.5
+    assert one("Kd 1 1 1").material.opacity is None
+    found = one("d 0.5", "Ni 1.5", "map_d t.png").material  # a cut-out, not glass
+    assert isinstance(found.bsdf, Diffuse)
+    assert same(found.opacity.alpha, srgb=False, channel="luminance", scale=0.5)
+    assert found.opacity.cutoff is None
+
+
+def test_map_ke(one):
+    assert same(one("Ke 4 2 1", "map_Ke t.png").emission, scale=[4, 2, 1])
+    assert same(one("map_Ke t.png").emission)
+    assert one("Ke 4 2 1").emission.ravel().tolist() == [4, 2, 1]
+
+
+@pytest.mark.parametrize(
+    ("lines", "named"),
+    [
+        (["Ka 0.2 0.2 0.2"], "Ka"),
+        (["Ks 0.5 0.5 0.5", "Ni 1.5", "illum 4"], "Ks"),
+        (["norm t.png", "map_Bump t.png"], "map_Bump"),
+        (["disp t.png"], "disp"),
+        (["refl -type sphere t.png"], "refl"),
+        (["Tf 0.5 0.5 0.5"], "Tf"),
+        (["Ks 0.5 0.5 0.5", "map_Ns t.png"], "map_Ns"),
+        (["illum 10"], "illum"),
+        (["anisor 0.5"], "anisor"),
+    ],
+)
+def test_what_is_not_honored_is_named(one, lines, named):
+    with pytest.warns(UserWarning, match=rf"s\.mtl: not honored: {named} \(material 'm'\)$") as record:
+        one("Kd 0.5 0.5 0.5", *lines)
+    assert len(record) == 1
+    with pytest.raises(SceneError, match="not honored"):
+        one("Kd 0.5 0.5 0.5", *lines, strict=True)
+
+
+def test_values_that_change_nothing_are_quiet(one):
+    one("Ka 0 0 0", "Kd 0.5 0.5 0.5", "Ks 0.000000 0.000000 0.000000", "Ns 96", "Ni 1.45", "d 1.0", "illum 2")
+    one("Kd 0.5 0.5 0.5", "Tf 1 1 1", "Tr 0", "illum 1", "sharpness 60")
+    one("Kd 0.5 0.5 0.5", "Ks 1 1 1", "Ns 200", "map_Ks t.png", "illum 0")
+
+
+def test_comments_may_follow_numbers(one):
+    assert one("# a comment", "Kd 1 0 0 # red").material.bsdf.reflectance.ravel().tolist() == [1, 0, 0]
+
+
+def test_glass_keeps_a_kd_quiet(one):
+    mesh = one("Kd 0.8 0.8 0.8", "Ni 1.5", "d 0.1", "illum 4")
+    assert isinstance(mesh.material.bsdf, Dielectric)
+    assert one("Pr 0.3", "illum 4").material.bsdf.roughness == pytest.approx([0.3])
+
+
+def test_the_pbr_extension_is_principled(one):
+    found = one("Kd 0.5 0.5 0.5", "Pr 0.3", "Pm 1").material.bsdf
+    assert isinstance(found, Principled)
+    assert (found.roughness, found.metallic) == (pytest.approx([0.3]), pytest.approx([1]))

@@ -1,0 +1,115 @@
+"""Out of memory: refused before work where it can be known, else an error that has the picture so far."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import scenes
+
+import wavefront as wf
+from wavefront.core.memory import available_memory, check_memory
+from wavefront.film.film import Film
+from wavefront.film.picture_sums import PictureSums
+from wavefront.image.image import film_image
+from wavefront.scheduling.accumulator import FILM_BYTES, PICTURE_BYTES, Accumulator
+from wavefront.session import prepared_scene
+
+linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of Linux")
+
+LIMITED = """
+import resource, sys
+import wavefront as wf
+from wavefront.session import session
+import wavefront.scheduling.processes
+mesh = wf.Mesh(*{mesh})
+camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), size=(96, 96))
+scene = wf.Scene([mesh, wf.Sphere((0, -100, 0), 99)], [wf.Environment(1.0)], camera)
+wf.render(scene, 1, progress=False, accel="numpy")  # all modules are there from now on
+pages = int(open("/proc/self/statm").read().split()[0])
+limit = pages * resource.getpagesize() + (int(sys.argv[1]) << 20)
+resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+calls = []
+try:
+    image = wf.render(scene, 64, progress=lambda *call: calls.append(call), executor=sys.argv[2],
+                      workers=2, accel="numpy")
+    print("picture of", image.spp)
+except (wf.RenderError, wf.SceneError) as error:
+    print(type(error).__name__, error)
+    if isinstance(error, wf.RenderError) and calls:
+        print("so far", (error.image.metadata["samples"] if error.image else 0) == calls[-1][0])
+"""
+
+
+@linux
+@pytest.mark.parametrize("executor", ["threads", "processes"])
+@pytest.mark.parametrize("megabytes", [5, 70, 160])
+def test_without_memory_there_is_an_error(megabytes: int, executor: str) -> None:
+    """One that has a type, with the picture of the waves that were done; never an abort of BLAS's."""
+    script = LIMITED.format(mesh="([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])")
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(megabytes), executor], capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith(("RenderError", "SceneError", "picture of 64")), done.stdout
+    assert megabytes > 5 or "memory" in done.stdout
+    assert "so far False" not in done.stdout
+
+
+@linux
+def test_a_picture_that_does_not_fit_is_refused() -> None:
+    """Before the scene is built, with how much it needs and what there is; a lazy system would give it."""
+    camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), size=(2**16, 2**16))
+    scene = wf.Scene([wf.Sphere((0, 0, 0), 1)], [wf.Environment(1.0)], camera)
+    message = r"a picture of 65536x65536 pixels needs [\d,]+ MB of memory; [\d,]+ MB are available"
+    if available_memory() > 10**12:
+        pytest.skip("this machine has a terabyte")
+    with pytest.raises(wf.SceneError, match=message):
+        wf.render(scene, 1, progress=False)
+
+
+def test_memory_that_is_there_is_not_refused() -> None:
+    """And what is not is named."""
+    check_memory("nothing", 0)
+    with pytest.raises(wf.SceneError, match=r"all needs 1,000,000,000,000,000 MB of memory; .* available"):
+        check_memory("all", 10**21)
+
+
+def test_the_film_is_as_large_as_is_checked() -> None:
+    """A pixel of it, and of the picture."""
+    film = Film(100, 100)
+    arrays = [film.count, film.squares, film.batches, *vars(film.sums).values()]
+    size = sum(each.nbytes for each in arrays if isinstance(each, np.ndarray))
+    assert size == pytest.approx(FILM_BYTES * 10_000, rel=0.01)
+    image = film_image(PictureSums(film, None, {}), {}, keep_sums=False)
+    assert image.rgb.nbytes + image.variance.nbytes + image.standard_error.nbytes < PICTURE_BYTES * 10_000
+
+
+def test_the_picture_so_far_is_kept_when_memory_runs_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Even if the last allocation failed."""
+    monkeypatch.setattr(Accumulator, "add", fail_after(Accumulator.add, 4))
+    with pytest.raises(wf.RenderError, match="out of memory: no room; use fewer workers") as caught:
+        wf.render(scenes.everything(), 64, wave_size=300, workers=1, progress=False)
+    assert 0 < caught.value.image.metadata["samples"] <= 4 * 300
+
+
+def test_no_memory_for_the_scene_is_an_error_without_a_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It has a type, too."""
+    monkeypatch.setattr(prepared_scene, "compile_scene", fail_after(abs, 0))
+    with pytest.raises(wf.RenderError, match="out of memory while the scene was set up: no room") as caught:
+        wf.render(scenes.everything(), 1, progress=False)
+    assert caught.value.image is None
+
+
+def fail_after(function, calls: int):
+    """Return the function, which finds no memory after so many calls."""
+    count = iter(range(calls))
+
+    def limited(*given, **options):
+        if next(count, None) is None:
+            raise MemoryError("no room")
+        return function(*given, **options)
+
+    return limited

@@ -1,0 +1,281 @@
+"""Every Python block of the README and the documents runs, and no link leads nowhere."""
+
+import ast
+import importlib
+import re
+import sys
+import tomllib
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wavefront as wf
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted([*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "how_to").glob("*.md")])
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES]
+TUTORIAL = sorted((ROOT / "docs" / "tutorial").glob("[0-9]*.py"))
+TRACER = ROOT / "docs" / "tutorial" / "tracer.py"
+BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"\]\(([^)#]*)(?:#([^)]*))?\)")
+HEADING = re.compile(r"^#+ (.*)$", re.MULTILINE)
+MOST_SPP = 1
+
+
+def blocks():
+    for document in DOCUMENTS:
+        for number, match in enumerate(BLOCK.finditer(document.read_text("utf-8"))):
+            line = document.read_text("utf-8")[: match.start(1)].count("\n") + 1
+            name = f"{document.name}-{number}"
+            yield pytest.param(document, line, match[1], id=name)
+
+
+@pytest.fixture
+def few_samples(tmp_path, monkeypatch):
+    """Let `wf.render` take one sample per pixel, in an empty folder."""
+    render = wf.render
+
+    def quick(scene, spp=MOST_SPP, noise=None, **options):
+        few = {} if "samples" in options else {"spp": min(spp, MOST_SPP)}
+        return render(scene, **few, progress=False, **options)
+
+    monkeypatch.setattr(wf, "render", quick)
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.usefixtures("few_samples")
+@pytest.mark.parametrize(("document", "line", "code"), list(blocks()))
+def test_block_runs(document, line, code, tmp_path):
+    exec(compile("\n" * (line - 1) + code, str(document), "exec"), {"__name__": "__main__"})
+    for picture in tmp_path.iterdir():
+        assert picture.stat().st_size > 100
+
+
+@pytest.fixture
+def tracer(monkeypatch):
+    """Return the module that the tutorial builds, whose `render` traces two paths for each pixel at most."""
+    monkeypatch.syspath_prepend(TRACER.parent)
+    monkeypatch.delitem(sys.modules, "tracer", raising=False)
+    module = importlib.import_module("tracer")
+    render = module.render
+    monkeypatch.setattr(
+        module, "render", lambda one, w, h, paths, *seed: render(one, w, h, min(paths, 2), *seed)
+    )
+    yield module
+    del sys.modules["tracer"]
+
+
+@pytest.mark.usefixtures("few_samples", "tracer")
+@pytest.mark.parametrize("script", TUTORIAL, ids=lambda path: path.stem)
+def test_step_of_the_tutorial_runs(script, tmp_path):
+    exec(compile(script.read_text("utf-8"), str(script), "exec"), {"__name__": "__main__"})
+    assert list(tmp_path.glob("*.png"))
+
+
+def functions(path):
+    """Return the functions of a file by name, as their syntax trees."""
+    tree = ast.parse(path.read_text("utf-8"))
+    return {node.name: ast.dump(node) for node in tree.body if isinstance(node, ast.FunctionDef)}
+
+
+def test_the_steps_of_the_tutorial_build_the_tracer():
+    """Every function of the whole is in a step, the same, and the whole has about a hundred lines."""
+    whole, shown = functions(TRACER), {}
+    for script in TUTORIAL:
+        for name, tree in functions(script).items():
+            assert whole.get(name, tree) == tree, f"{script.name}: {name}"
+            shown[name] = tree
+    assert whole.keys() <= shown.keys()
+    lines = [line.strip() for line in TRACER.read_text("utf-8").splitlines()]
+    assert len([line for line in lines if line and line[0] != "#"]) <= 150
+
+
+def test_the_tracer_of_the_tutorial_is_right(tracer):
+    """All its estimators agree with the library, in a room without the glass, whose caustic is noisy."""
+    tracer.KIND[8] = tracer.MATTE
+    kinds = {tracer.MIRROR: wf.Mirror, tracer.MATTE: wf.Diffuse}
+    balls = [
+        wf.Sphere(center, radius, material=kinds[kind](color), emission=light if light.any() else None)
+        for center, radius, kind, color, light in zip(
+            tracer.CENTER, tracer.RADIUS, tracer.KIND, tracer.COLOR, tracer.EMISSION, strict=False
+        )
+    ]
+    camera = wf.Camera.look_at(tracer.EYE, tracer.TARGET, fov=60, size=(16, 12))
+    for estimator, parts, limit in ((tracer.full, 24, 0.02), (tracer.naive, 64, 0.06)):
+        means = [tracer.render(estimator, 16, 12, 2, seed).mean() for seed in range(parts)]
+        exact = wf.render(wf.Scene(balls, camera=camera), 512, max_bounces=5, progress=False).rgb.mean()
+        error = np.std(means, ddof=1) / np.sqrt(parts)
+        # Student's t with 23 degrees of freedom is beyond 4.5 with a probability of 2e-4
+        assert abs(np.mean(means) - exact) < 4.5 * error
+        assert error < limit * exact
+
+
+def test_a_mirror_of_the_tutorial_cancels_the_cosine(tracer):
+    """f·cosθ/p is the reflectance for a delta, which is written as density infinity."""
+    direction = np.array([[0.6, -0.8, 0.0]])
+    following, factor, pdf = tracer.scatter(
+        direction, np.array([[0.0, 1, 0]]), np.array([7]), np.random.default_rng(0)
+    )
+    np.testing.assert_allclose(following, [[0.6, 0.8, 0]])
+    np.testing.assert_array_equal(factor, tracer.COLOR[[7]])
+    assert np.isinf(pdf).all()
+
+
+def test_formulas_are_typeset_without_another_server():
+    settings = (ROOT / "docs" / "conf.py").read_text("utf-8")
+    assert "sphinx-mathjax-offline" in settings
+    for script in TUTORIAL[:8]:
+        assert ".. math::" in script.read_text("utf-8"), script.name
+    for script in TUTORIAL:
+        text = script.read_text("utf-8")
+        assert "# Exercises" in text, script.name
+        assert "*Expect*" in text, script.name
+        assert "In the library" in text or "What is where" in text, script.name
+
+
+def test_there_are_blocks_to_run():
+    assert len(list(blocks())) >= 9
+
+
+def anchors(document):
+    """Return the names that GitHub gives to the headings of a document."""
+    headings = HEADING.findall(document.read_text("utf-8"))
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize(
+    "document",
+    [*DOCUMENTS, ROOT / "CHANGELOG.md", ROOT / "benchmarks" / "README.md"],
+    ids=lambda path: str(path.relative_to(ROOT)),
+)
+def test_links_lead_somewhere(document):
+    links = LINK.findall(document.read_text("utf-8"))
+    missing = []
+    for path, anchor in links:
+        target = document.parent / path if path else document
+        if ":" in path:
+            continue
+        if not target.exists() or (anchor and anchor not in anchors(target)):
+            missing.append(f"{path}#{anchor}")
+    assert missing == []
+
+
+def test_files_named_in_the_documents_exist():
+    """But for the appendices, which name files of their time."""
+    files = {f"/{path.relative_to(ROOT).as_posix()}" for path in ROOT.glob("*/**/*.py")}
+    for document in DOCUMENTS:
+        for name in re.findall(r"`([\w/]+\.py)`", document.read_text("utf-8")):
+            found = any(file.endswith(f"/{name}") for file in files)
+            assert found or document.name.startswith("appendix_"), f"{document.name}: {name}"
+
+
+def test_the_index_lists_every_document():
+    pages = {path for path, _ in LINK.findall((ROOT / "docs" / "index.md").read_text("utf-8"))}
+    documents = {path.relative_to(ROOT / "docs").as_posix() for path in PAGES}
+    assert documents - pages == {"index.md"}
+
+
+def test_the_rooms_of_the_architecture_are_the_layers():
+    """The table has every module and folder, in the order in which imports may point."""
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"][
+        "contracts"
+    ]
+    layers = [re.findall(r"wavefront\.(\w+)", layer) for layer in reversed(contracts[0]["layers"])]
+    level = {name: number for number, layer in enumerate(layers) for name in layer}
+    table = (ROOT / "docs" / "architecture.md").read_text("utf-8").partition("## Rooms")[2]
+    rows = [
+        re.findall(r"`(\w+)(?:\.py|/)`", row) for row in re.findall(r"^\| (`.*?) \|", table, re.MULTILINE)
+    ]
+    rooms = [[level[name] for name in row] for row in rows if row and row[0] in level]
+    modules = {path.stem for path in (ROOT / "wavefront").iterdir() if path.suffix in (".py", "")}
+    assert {name for row in rows for name in row} >= modules - {"__init__", "__pycache__"}
+    for below, above in pairwise(rooms):
+        assert max(below) <= min(above)
+
+
+def test_every_public_name_is_written_about():
+    text = "\n".join(document.read_text("utf-8") for document in DOCUMENTS)
+    missing = [name for name in wf.__all__ if not re.search(rf"\b{name}\b", text)]
+    assert missing == []
+
+
+def test_names_in_the_documents_exist():
+    text = "\n".join(document.read_text("utf-8") for document in DOCUMENTS)
+    for dotted in set(re.findall(r"\bwf((?:\.[A-Za-z_]\w*)+)", text)):
+        thing = wf
+        for part in dotted[1:].split("."):
+            assert hasattr(thing, part), f"wf{dotted}"
+            thing = getattr(thing, part)
+
+
+def test_commands_of_the_readme_are_single_lines():
+    lines = (ROOT / "README.md").read_text("utf-8").splitlines()
+    for name in ("render", "tests"):
+        at = lines.index(f"<!-- command: {name} -->")
+        assert lines[at + 1] == "```sh"
+        assert lines[at + 2].startswith("python3 -m venv .venv && .venv/bin/pip install -q ")
+        assert lines[at + 3] == "```"
+
+
+def test_pictures_are_small_and_are_pictures():
+    pictures = sorted(each for each in (ROOT / "docs").glob("**/*.*") if each.suffix in (".png", ".jpg"))
+    assert pictures
+    for picture in pictures:
+        if "generated" in picture.parts:
+            continue
+        assert picture.stat().st_size < 500_000, picture.name
+        begin = b"\x89PNG" if picture.suffix == ".png" else b"\xff\xd8\xff"
+        assert picture.read_bytes().startswith(begin), picture.name
+
+
+def test_cards_of_the_gallery_are_equal_and_lead_to_large_pictures():
+    text = (ROOT / "docs" / "gallery.md").read_text("utf-8")
+    cards = re.findall(r"\[!\[[^\]]+\]\((cards/[^)]+)\)\]\(([^)]+)\)", text)
+    assert len(cards) >= 14
+    for card, picture in cards:
+        assert wf.Image.load(ROOT / "docs" / card).rgb.shape == (320, 480, 3), card
+        if picture.endswith(".jpg"):
+            assert wf.Image.load(ROOT / "docs" / picture).rgb.shape[1] >= 1200, picture
+    assert wf.Image.load(ROOT / "docs" / "terrace.jpg").rgb.shape[1] == 1920
+
+
+PICTURE = re.compile(r"!\[([^\]]+)\]\((\S+)\)")
+
+
+@pytest.mark.parametrize("page", sorted((ROOT / "docs" / "how_to").glob("*.md")), ids=lambda page: page.stem)
+def test_a_how_to_page_shows_what_its_code_makes(page):
+    """A small picture, described for those who do not see it."""
+    shown = PICTURE.findall(page.read_text("utf-8"))
+    assert shown
+    for _, path in shown:
+        picture = page.parent / path
+        assert picture.stat().st_size < 60_000, path
+        assert wf.Image.load(picture).rgb.std() > 0.02, path
+
+
+def test_pages_of_classes_have_what_the_classes_inherit():
+    """`Spheres.placed` is a method of a base class that is not public."""
+    template = (ROOT / "docs" / "_templates" / "autosummary" / "class.rst").read_text("utf-8")
+    assert ":inherited-members:" in template
+    assert "placed" not in vars(wf.Spheres)
+    assert callable(wf.Spheres.placed)
+
+
+def test_pages_load_nothing_from_other_servers():
+    """No diagram that needs a script, and no extension that brings one."""
+    settings = (ROOT / "docs" / "conf.py").read_text("utf-8")
+    assert "mermaid" not in settings
+    for page in PAGES:
+        text = page.read_text("utf-8")
+        assert "```mermaid" not in text, page.name
+        assert not [path for _, path in PICTURE.findall(text) if ":" in path], page.name
+
+
+def test_the_conventions_hold_for_the_constant_environment():
+    """The claim on conventions.md: a floor of reflectance 0.5 in an environment of 1 is 0.5."""
+    floor = wf.Rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2), material=wf.Diffuse(0.5))
+    camera = wf.Camera.look_at((0, 1, 0), (0, 0, 0), up=(0, 0, -1), fov=20, size=(8, 8))
+    image = wf.render(wf.Scene(floor, [wf.Environment(1)], camera), spp=64, progress=False)
+    assert np.abs(image.rgb.mean() - 0.5) < 0.01

@@ -1,0 +1,333 @@
+"""Ready-made light: what a scene without lights looks like, each preset, and the ground."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import wavefront as wf
+from wavefront.scene import lighting
+from wavefront.scene.lighting import LIGHTINGS, PRESETS, lighted
+
+CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+SIDES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+CUBE_PARTS = [np.s_[34:44, 18:34], np.s_[24:40, 48:49], np.s_[16:17, 38:46], np.s_[24:40, 54:60]]
+Z_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], float)  # takes y to z, and z to -y
+
+
+def in_front(scene: wf.Scene, size: tuple[int, int]) -> wf.Camera:
+    """A camera of one's own: the picture has no ground by itself, and the light is where it is by default."""
+    low, high = scene.bounds
+    view = np.array(lighting.FRONT) / np.linalg.norm(lighting.FRONT)
+    distance = np.linalg.norm(high - low) / 2 / np.sin(np.radians(20))
+    return wf.Camera.look_at((low + high) / 2 + view * distance, (low + high) / 2, size=size)
+
+
+def cube(material: wf.Bsdf | None = None) -> wf.Mesh:
+    faces = [corner for a, b, c, d in SIDES for corner in ([a, b, c], [a, c, d])]
+    return wf.Mesh(CUBE, faces, material=material)
+
+
+def ball(material: wf.Bsdf | None = None) -> wf.Scene:
+    scene = wf.Scene([wf.Sphere((0, 0, 0), 1, material=material)])
+    scene.camera = in_front(scene, (48, 48))
+    return scene
+
+
+def render(scene: wf.Scene, spp: int = 32, **options) -> np.ndarray:
+    return wf.render(scene, spp, accel="numpy", workers=1, progress=False, **options).rgb
+
+
+def arriving(lights: list, directions: np.ndarray) -> np.ndarray:
+    """Radiance (3, n) of a preset's environment from directions (3, n)."""
+    (environment,) = lights
+    return environment.record(np.zeros(3)).le(directions.astype(np.float32))
+
+
+def around(n: int, seed: int = 1) -> np.ndarray:
+    d = np.random.default_rng(seed).normal(size=(3, n))
+    return d / np.linalg.norm(d, axis=0)
+
+
+# --- The default ----------------------------------------------------------------------------------
+
+
+def test_three_sides_of_a_cube_can_be_told_apart_and_from_the_background() -> None:
+    """What an even environment shows as a hexagon."""
+    scene = wf.Scene([cube()])
+    scene.camera = in_front(scene, (64, 64))
+    picture = render(scene).mean(2)
+    front, right, top, behind = (picture[rows, columns].mean() for rows, columns in CUBE_PARTS)
+    assert top > 1.15 * front
+    assert front > 1.5 * right
+    assert right > 1.5 * behind
+    even = render(scene, lighting="even").mean(2)
+    assert np.ptp([even[rows, columns].mean() for rows, columns in CUBE_PARTS[:3]]) < 0.02
+
+
+@pytest.mark.parametrize("albedo", [0.02, 0.5, 0.8])
+def test_dark_and_white_things_stand_out(albedo: float) -> None:
+    """All around, by the least of their brightness and that of the background behind."""
+    scene = ball(wf.Diffuse(albedo))
+    picture = render(scene).mean(2)
+    height, width = picture.shape
+    y, x = np.mgrid[:height, :width]
+    distance = np.hypot(y - (height - 1) / 2, x - (width - 1) / 2)
+    back_facing, outside = (
+        picture[(distance > 9) & (distance < 11.5)],
+        picture[(distance > 14) & (distance < 17)],
+    )
+    assert (
+        (back_facing < 0.6 * outside.min()).all()
+        if albedo < 0.1
+        else np.median(back_facing) > 1.7 * outside.max()
+    )
+    assert picture.max() < 1
+
+
+@pytest.mark.filterwarnings("error")
+def test_no_light_is_no_reason_to_warn() -> None:
+    """The picture says how it was lit."""
+    image = wf.render(ball(), 1, progress=False)
+    assert (image.metadata["lighting"], image.metadata["ground"]) == ("studio", False)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", LIGHTINGS)
+def test_a_preset_that_was_asked_for_gives_no_warning(name: str) -> None:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        image = wf.render(ball(), 4, lighting=name, progress=False)
+    assert caught == []
+    assert image.metadata["lighting"] == name
+    assert 0.1 < image.rgb[20:28, 20:28].mean() < 0.6
+
+
+def test_even_is_an_environment_of_one() -> None:
+    """Bit for bit what scenes without lights were rendered in before there were presets."""
+    own = ball()
+    own.lights = [wf.Environment(1.0)]
+    np.testing.assert_array_equal(render(ball(), 4, lighting="even"), render(own, 4))
+
+
+# --- What is asked for ----------------------------------------------------------------------------
+
+
+def test_a_scene_with_light_stays_as_it_is() -> None:
+    scene = ball()
+    scene.lights = [wf.PointLight((0, 4, 4), 50)]
+    assert lighted(scene, lighting.choose_preset(scene, "auto")) is scene
+    assert wf.render(scene, 1, progress=False).metadata["lighting"] is None
+    shining = wf.Scene([wf.Sphere((0, 0, 0), 1, emission=1.0)])
+    assert lighting.choose_preset(shining, "auto") is None
+
+
+def test_a_preset_is_added_to_the_lights_of_the_scene() -> None:
+    """A ball alone is lit by their sum; the scene itself keeps the lights that it had."""
+    scene, point = ball(), wf.PointLight((0, 4, 4), 20)
+    studio = render(scene, 64, lighting="studio")
+    scene.lights = [point]
+    alone = render(scene, 64)
+    both = render(scene, 64, lighting="studio")
+    assert scene.lights == [point]
+    np.testing.assert_allclose(both[15:33, 15:33].mean(), (alone + studio)[15:33, 15:33].mean(), rtol=0.01)
+
+
+def test_two_environments_are_refused() -> None:
+    scene = ball()
+    scene.lights = [wf.Environment(0.5)]
+    with pytest.raises(wf.SceneError, match="lighting='cloudy' brings an Environment, and the scene has"):
+        wf.render(scene, 1, lighting="cloudy")
+
+
+@pytest.mark.parametrize("name", ["Studio", "", 3, ["even"]])
+def test_other_names_are_refused(name) -> None:
+    known = "studio, softbox, three_point, cloudy, even"
+    with pytest.raises(wf.SceneError, match=f"lighting is .* must be auto, None or one of {known}"):
+        wf.render("no such file.obj", 1, lighting=name)
+    with pytest.raises(wf.SceneError, match=f"preset is .* one of {known}"):
+        wf.studio(name)
+
+
+@pytest.mark.parametrize("up", [(0, 0, 0), (1, 0), "left", (0, np.nan, 0)])
+def test_up_is_checked(up) -> None:
+    with pytest.raises(wf.SceneError, match="up"):
+        wf.studio(up=up)
+
+
+# --- The presets ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_the_brightest_side_is_as_bright_as_in_an_even_environment(name: str) -> None:
+    """By quadrature over the image, for 400 sides: white keeps its shading, and no preset is dark."""
+    pixels = PRESETS[name].pixels()
+    height, width, _ = pixels.shape
+    polar = (np.arange(height) + 0.5) * np.pi / height
+    longitude = 2 * np.pi * (0.5 - (np.arange(width) + 0.5) / width)
+    sin, cos = np.sin(polar)[:, None], np.cos(polar)[:, None] * np.ones(width)
+    directions = np.stack([sin * np.sin(longitude), cos, sin * np.cos(longitude)]).reshape(3, -1)
+    weight = (sin * np.ones(width)).ravel() * (np.pi / height) * (2 * np.pi / width)
+    sides = around(400).T
+    level = np.maximum(sides @ directions, 0) @ (pixels.mean(2).ravel() * weight) / np.pi
+    assert 0.9 < level.max() < 1.1
+    assert level.min() > 0.03
+    assert pixels.min() > 0
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_a_camera_that_goes_around_sees_no_box(name: str) -> None:
+    """But the backdrop, whose brightest part is darker than a lit white surface."""
+    scene = ball()
+    for angle in np.arange(0, 2 * np.pi, np.pi / 8):
+        camera = scene.framing_camera(direction=(np.sin(angle), 0.3, np.cos(angle)), size=(24, 24))
+        assert render(scene, 1, camera=camera, max_bounces=0, lighting=name).max() < 0.5
+
+
+@pytest.mark.parametrize("name", LIGHTINGS)
+def test_studio_gives_the_lights_that_render_adds(name: str) -> None:
+    scene = ball()
+    by_name = render(scene, 2, lighting=name)
+    scene.lights = wf.studio(name)
+    np.testing.assert_array_equal(by_name, render(scene, 2))
+
+
+def test_the_light_stays_where_it_is_while_a_camera_goes_around() -> None:
+    directions, scene = around(100), ball()
+    first = arriving(lighted(scene, "studio").lights, directions)
+    scene.camera = wf.Camera.look_at((-3, 1, -2), (0, 0, 0))
+    np.testing.assert_array_equal(arriving(lighted(scene, "studio").lights, directions), first)
+
+
+def test_up_turns_the_light() -> None:
+    directions = around(100)
+    upright = arriving(wf.studio(), directions)
+    turned = arriving(wf.studio(up=(0, 0, 2)), Z_UP @ directions)
+    np.testing.assert_allclose(turned, upright, atol=1e-4)
+
+
+def test_a_z_up_mesh_looks_as_the_same_mesh_with_y_up() -> None:
+    """By default, and on the ground."""
+    y_up = cube()
+    z_up = wf.Mesh(y_up.vertices @ Z_UP.T, y_up.faces)
+    for ground in (False, True):
+        upright, turned = (
+            wf.render(mesh, 64, size=(32, 32), up=up, ground=ground, progress=False).rgb
+            for mesh, up in ((y_up, "y"), (z_up, "z"))
+        )
+        assert np.abs(upright - turned).mean() < 0.01
+
+
+@pytest.mark.parametrize("origin", [(3, 1, 0), (0, 2, -5), (0, 5, 0.0)])
+def test_the_key_light_is_left_of_the_camera_that_is_given(origin) -> None:
+    """And above; a camera that looks straight down has its front at the lower edge of the picture."""
+    up = (0, 1, 0) if origin[0] or origin[2] else (0, 0, -1)
+    camera = wf.Camera.look_at(origin, (0, 0, 0), up)
+    directions = around(20_000)
+    radiance = arriving(wf.studio(camera=camera), directions).mean(0)
+    key = (directions * radiance**4).sum(1)
+    assert key @ camera.rotation[:, 0] < 0
+    assert key[1] > 0
+    front = camera.rotation[:, 2] if up[1] else -camera.rotation[:, 1]
+    assert key @ front > 0
+
+
+# --- The ground -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_the_ground_has_no_edge(name: str) -> None:
+    """Where nothing throws a shadow on it, it is as bright as the environment that it hides."""
+    scene = wf.Scene([wf.Sphere((x, 0, 0), 0.01) for x in (-1, 1)])
+    scene.camera = wf.Camera.look_at((0, 1.5, 1), (0, 0, 0), size=(24, 24))
+    bare, grounded = (render(scene, 64, lighting=name, ground=ground) for ground in (False, True))
+    assert (grounded != bare).any()
+    np.testing.assert_allclose(grounded[14:].mean(0), bare[14:].mean(0), rtol=0.04)
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_the_ground_catches_the_shadow(name: str) -> None:
+    scene = ball()
+    bare, grounded = (render(scene, lighting=name, ground=ground) for ground in (False, True))
+    assert grounded[38, 22:27].mean() < 0.75 * bare[38, 22:27].mean()
+
+
+def test_the_ground_is_no_part_of_the_scene() -> None:
+    """Neither of its shapes nor of its bounds; it comes after all shapes of the picture."""
+    scene = ball()
+    bounds, shapes = scene.bounds, list(scene.shapes)
+    complete = lighted(scene, None, ground=True)
+    render(scene, 1, ground=True, lighting="even")
+    np.testing.assert_array_equal(scene.bounds, bounds)
+    assert scene.shapes == shapes
+    assert complete.shapes[:-1] == shapes
+    assert complete.shapes[-1].name == "ground"
+
+
+@pytest.mark.parametrize("up", [(0, 1, 0), (0, 0, 1), (-1, 0, 0)])
+def test_the_ground_lies_just_below(up) -> None:
+    scene = wf.Scene([cube()])
+    ground = lighted(scene, "studio", ground=True, up=up).shapes[-1]
+    heights = ground.vertices @ np.array(up, float)
+    np.testing.assert_allclose(heights, -1, atol=1e-3)
+    assert (heights < -1).all()
+
+
+CHOSEN = {"spp": 1, "size": (8, 8), "progress": False}
+
+
+@pytest.mark.parametrize(
+    ("settings", "there"),
+    [
+        ({}, True),
+        ({"view": "front"}, True),
+        ({"view": "top", "up": "z"}, True),
+        ({"view": "bottom"}, False),
+        ({"view": (0, -1, 2)}, False),
+        ({"ground": False}, False),
+        ({"lighting": "studio"}, False),
+        ({"lighting": "studio", "ground": True}, True),
+        ({"background": "transparent"}, False),
+        ({"background": (1, 1, 1), "ground": True}, True),
+        ({"camera": wf.Camera.look_at((0, 1, 5), (0, 0, 0))}, False),
+    ],
+)
+def test_the_ground_is_there_where_everything_is_chosen(settings, there) -> None:
+    """Where nobody chose a light or a camera, it would hide nothing, and no background is wanted."""
+    image = wf.render(cube(), **CHOSEN, **settings)
+    assert image.metadata["ground"] is there
+    same = wf.render(cube(), **CHOSEN, **{**settings, "ground": there})
+    assert image.rgb.tobytes() == same.rgb.tobytes()
+    other = wf.render(cube(), **CHOSEN, **{**settings, "ground": not there, "aovs": "shape_id"})
+    assert ("ground" in other.names["shape"].values()) is not there
+
+
+def test_scenes_with_a_light_or_a_camera_get_no_ground() -> None:
+    lit = wf.Scene([cube()], [wf.Environment(1)])
+    assert wf.render(lit, **CHOSEN).metadata["ground"] is False
+    assert wf.render(ball(), **CHOSEN).metadata["ground"] is False
+    with pytest.raises(wf.SceneError, match="ground is 'yes'; it must be True or False, or 'auto'"):
+        wf.render(lit, ground="yes")
+
+
+def test_the_light_goes_with_a_camera_that_was_chosen() -> None:
+    """A ball before a gray backdrop looks the same from each side, and as in the light of `studio`."""
+    front, back = (wf.render(cube(), 64, size=(24, 24), view=view).rgb for view in ("front", "back"))
+    assert np.abs(front - back).mean() < 0.01
+    scene = wf.Scene([cube()])
+    camera = scene.framing_camera(size=(24, 24), direction="left")
+    scene.lights = wf.studio(camera=camera)
+    chosen = wf.render(cube(), 2, size=(24, 24), view="left", ground=False)
+    np.testing.assert_array_equal(chosen.rgb, wf.render(scene, 2, camera=camera).rgb)
+
+
+@pytest.mark.parametrize("name", ["studio", "softbox", "three_point"])
+def test_no_camera_sees_a_box(name: str) -> None:
+    """Whichever way it looks; a mirror does, as it shows what lights the scene."""
+    ball = wf.Sphere((0, 0, 0), 1, material=wf.Mirror())
+    around = wf.Camera.panorama((0, 0, 5), (0, 0, 0), size=(64, 32))
+    scene = wf.Scene([ball], wf.studio(name))
+    seen = wf.render(scene, spp=4, camera=around, aovs="alpha", progress=False)
+    brightest = max(level for _, level in PRESETS[name].gradient)
+    assert seen.rgb[seen.alpha == 0].max() <= brightest * 1.001
+    assert seen.rgb[seen.alpha > 0].max() > 3 * brightest

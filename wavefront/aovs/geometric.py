@@ -1,0 +1,234 @@
+"""The geometric layers of a picture: what the ray through the center of each pixel and of the lens meets.
+
+Nothing in them is random or filtered. A surface with alpha is met where its opacity is at least 0.5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays.state import Hits, Rays, Words
+from ..arrays.vec import Doubles, Ints, distinct, dot, f4, length
+from ..camera import Camera
+from ..compile.materials import material_parts
+from ..compile.scene import CompiledScene
+from ..film.aov_names import LAYERS
+from ..materials import Material
+from ..shapes import Instance, Mesh, Shape
+from ..stages.alpha import covering_hits
+from ..stages.generate import center_rays
+from ..stages.interaction import interaction
+from ..stages.normal_mapping import perturb_normals
+
+RAYS_AT_ONCE = 1 << 16
+IDS = {"shape_id": "shape", "instance_id": "instance", "material_id": "material"}
+NORMALS = ("normal", "normal_geometric")
+
+
+class ShapeTable:
+    """The numbers and names of shapes, instances and materials, as the layers have them.
+
+    Parameters
+    ----------
+    shapes
+        Those of the rendered scene.
+    """
+
+    def __init__(self, shapes: Sequence[Shape]) -> None:
+        self.shapes = shapes
+        self.instance_of = np.full(len(shapes), -1, np.int32)
+        self.material_of = np.empty(len(shapes), np.int32)
+        self._materials: list[Material] = []
+        numbers: dict[object, int] = {}  # by identity, and by the parts and the name
+        instances = 0
+        for at, shape in enumerate(shapes):
+            if isinstance(shape, Instance):
+                self.instance_of[at] = instances
+                instances += 1
+            self.material_of[at] = self._number(shape.material, numbers)
+
+    def _number(self, material: Material, numbers: dict[object, int]) -> int:
+        if id(material) not in numbers:
+            number = numbers.setdefault((material.name, material_parts(material)), len(self._materials))
+            numbers[id(material)] = number
+            if number == len(self._materials):
+                self._materials.append(material)
+        return numbers[id(material)]
+
+    def ids(self, name: str, shape: Ints) -> NDArray[np.int32]:
+        """Return the ids of a layer for the numbers of shapes (n,)."""
+        if name == "shape_id":
+            return shape.astype(np.int32)
+        return (self.instance_of if name == "instance_id" else self.material_of).take(shape)
+
+    def names(self, kind: str) -> dict[int, str]:
+        """Return the name of each id of a kind: "shape", "instance" or "material"."""
+        if kind == "shape":
+            return {at: shape.name for at, shape in enumerate(self.shapes)}
+        if kind == "instance":
+            return {
+                int(number): shape.name
+                for number, shape in zip(self.instance_of, self.shapes, strict=True)
+                if number >= 0
+            }
+        named = [material.name or type(material.bsdf).__name__ for material in self._materials]
+        return dict(enumerate(named))
+
+
+def geometric_layers(
+    scene: CompiledScene, camera: Camera, shapes: ShapeTable, names: Sequence[str]
+) -> dict[str, NDArray[Any]]:
+    """Return geometric layers of a picture by name, (height, width) or (height, width, channels).
+
+    Parameters
+    ----------
+    scene
+        The compiled scene.
+    camera
+        In the scene's own unit of length.
+    shapes
+        Those of the scene.
+    names
+        The layers that are asked for.
+    """
+    width, height = camera.size
+    layers = {name: _empty(name, width * height) for name in names}
+    view = scene.view(camera)
+    corners = _Corners(shapes.shapes) if "uv" in names else None
+    for span, pixel in pixel_spans(width * height):
+        center = center_rays(scene, view, pixel)
+        moved, hits = covering_hits(scene, center)
+        met = hits.found
+        if not met.size:
+            continue
+        hits = hits.take(met)
+        rays = center.take(met), moved.take(met)
+        for name, values in _found(scene, camera, shapes, corners, names, *rays, hits):
+            layers[name][span][met] = values
+    return {
+        name: values.reshape((height, width) if values.ndim == 1 else (height, width, -1))
+        for name, values in layers.items()
+    }
+
+
+def _empty(name: str, pixels: int) -> NDArray[Any]:
+    """Return a layer without any hit."""
+    if name in IDS:
+        return np.full(pixels, -1, np.int32)
+    channels = LAYERS[name].channels
+    return np.full(pixels if channels == 1 else (pixels, channels), np.nan, f4)
+
+
+def pixel_spans(pixels: int) -> Iterator[tuple[slice, Words]]:
+    """Yield spans of so many pixels, and their numbers."""
+    for start in range(0, pixels, RAYS_AT_ONCE):
+        end = min(start + RAYS_AT_ONCE, pixels)
+        yield slice(start, end), np.arange(start, end, dtype=np.uint32)
+
+
+def _found(
+    scene: CompiledScene,
+    camera: Camera,
+    shapes: ShapeTable,
+    corners: _Corners | None,
+    names: Sequence[str],
+    center: Rays,
+    moved: Rays,
+    hits: Hits,
+) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield the layers of rays that hit something: (n,) or (n, channels)."""
+    shape = scene.shape_numbers.of(hits)
+    for name in IDS:
+        if name in names:
+            yield name, shapes.ids(name, shape)
+    point, distance = _points(scene, center, moved, hits)
+    if "position" in names:
+        yield "position", point
+    if "distance" in names:
+        yield "distance", distance
+    if "depth" in names:
+        yield "depth", camera.project(point)[1]
+    if corners is not None:
+        uv = corners.uv(shape, scene.shape_numbers.face(hits), point)
+        curved = np.flatnonzero(hits.prim >= scene.triangles)
+        if curved.size:
+            met = moved.take(curved)
+            on = met.origin + met.direction * hits.t.take(curved)
+            uv[curved] = scene.curved.uv(hits.prim.take(curved) - scene.triangles, on).T
+        yield "uv", uv
+    if any(name in names for name in NORMALS):
+        surface = interaction(scene, moved, hits)
+        perturb_normals(scene, surface)
+        if "normal" in names:
+            yield "normal", surface.ns.T
+        if "normal_geometric" in names:
+            yield "normal_geometric", surface.ng.T
+
+
+def _points(scene: CompiledScene, center: Rays, moved: Rays, hits: Hits) -> tuple[Doubles, Doubles]:
+    """Return the points that rays meet, (n, 3), and their distances (n,), in the scene's own unit.
+
+    `moved` are the rays behind what they have passed, a little beside the line. The points are on it.
+    """
+    direction = center.direction.astype(np.float64)
+    direction /= length(direction)
+    origin = center.origin.astype(np.float64)
+    met = moved.origin.astype(np.float64) + moved.direction.astype(np.float64) * hits.t
+    distance = dot(met - origin, direction)
+    points = (scene.center[:, None] + origin + direction * distance) / scene.scale
+    return np.ascontiguousarray(points.T), np.asarray(distance / scene.scale, np.float64)
+
+
+class _Corners:
+    """The triangles of the user's shapes, for values at points on them."""
+
+    def __init__(self, shapes: Sequence[Shape]) -> None:
+        self._shapes = shapes
+        meshes = [shape.mesh if isinstance(shape, Instance) else shape for shape in shapes]
+        numbers: dict[int, int] = {}
+        self._of_shape = np.array([numbers.setdefault(id(mesh), len(numbers)) for mesh in meshes], np.intp)
+        self._meshes: Mapping[int, Shape] = {numbers[id(mesh)]: mesh for mesh in meshes}
+
+    def uv(self, shape: Ints, face: Ints, point: Doubles) -> Doubles:
+        """Return texture coordinates (n, 2) at points (n, 3) on faces of meshes, NaN where there are none."""
+        out = np.full((len(shape), 2), np.nan)
+        number = self._of_shape.take(shape)
+        for mesh in distinct(number):
+            lanes = np.flatnonzero(number == mesh)
+            out[lanes] = self._uv(self._meshes[mesh], shape.take(lanes), face.take(lanes), point[lanes])
+        return out
+
+    def _uv(self, mesh: Shape, shape: Ints, face: Ints, point: Doubles) -> Doubles:
+        if not isinstance(mesh, Mesh) or mesh.uvs is None:
+            return np.full((len(point), 2), np.nan)
+        corners = mesh.faces.take(face, 0)
+        a, b, c = mesh.vertices.take(corners, 0).transpose(1, 2, 0)
+        a, b, c = (self._placed(shape, corner) for corner in (a, b, c))
+        b1, b2 = _weights(a, b, c, point.T)
+        at_a, at_b, at_c = mesh.uvs.take(corners, 0).transpose(1, 2, 0)
+        return (at_a + (at_b - at_a) * b1 + (at_c - at_a) * b2).T
+
+    def _placed(self, number: Ints, vertex: Doubles) -> Doubles:
+        """Return vertices (3, n) of the meshes of shapes (n,) in the scene."""
+        if not isinstance(self._shapes[number[0]], Instance):
+            return vertex
+        used = distinct(number)
+        lane = np.searchsorted(used, number)
+        placed = [self._shapes[each] for each in used]
+        m = np.stack([shape.transform for shape in placed if isinstance(shape, Instance)])
+        m = m.take(lane, 0).transpose(1, 2, 0)
+        x, y, z = vertex
+        return np.stack([row[0] * x + row[1] * y + row[2] * z + row[3] for row in m[:3]])
+
+
+def _weights(a: Doubles, b: Doubles, c: Doubles, point: Doubles) -> tuple[Doubles, Doubles]:
+    """Return the barycentric weights (n,) of b and c at points (3, n) of triangles; 0 without an area."""
+    u, v, w = b - a, c - a, point - a
+    uu, uv, vv, wu, wv = dot(u, u), dot(u, v), dot(v, v), dot(w, u), dot(w, v)
+    area = uu * vv - uv * uv
+    area = np.where(area > 0, area, np.inf)
+    return (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area

@@ -1,0 +1,353 @@
+"""The recorder of a wave: takes from the stages what the sampled layers of its samples need.
+
+A recorder travels with the paths (`Paths.recorder`), so integrators need not know which layers are asked for,
+and integrators of a user's own give the same layers if they are made of the same stages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ..arrays.record import record
+from ..arrays.state import BEFORE, JUST_ONCE, NOT_YET, Contribution, Hits, Paths
+from ..arrays.vec import Bools, Bytes, Floats, Ints, broadcast, f4, put, take
+from ..compile.scene import CompiledScene
+from ..core.errors import SceneError
+from ..film.aov_names import CLAMPED, KEYED_LAYERS, LAYERS
+from ..film.aov_samples import BOUNDED, FixedPointSamples, LayerSamples, fixed_point
+from ..stages.compact import compact
+from ..stages.interaction import interaction
+from ..stages.normal_mapping import perturb_normals
+from ..stages.shade import Shading, shading
+
+FEATURES = ("denoising_albedo", "denoising_normal")
+OF_LIGHT = ("direct", "indirect", "light_groups", CLAMPED)
+
+
+@record
+class AwaitedSurfaces:
+    """Surfaces that paths have met, and that nobody has shaded yet."""
+
+    scene: CompiledScene
+    paths: Paths
+    hits: Hits
+    first: bool  # of their paths
+
+
+class SampleRecorder:
+    """Records the sampled layers of one wave.
+
+    Parameters
+    ----------
+    wanted
+        The layers that are asked for.
+    scene
+        What is rendered.
+    n
+        Samples of the wave: slots of its paths.
+    clamp
+        The most indirect light that a path may find at once, as radiance, the mean of its channels.
+    """
+
+    def __init__(
+        self, wanted: Sequence[str], scene: CompiledScene, n: int, clamp: float | None = None
+    ) -> None:
+        self._wanted = tuple(wanted)
+        self._values = {name: np.zeros((LAYERS[name].channels, n), f4) for name in BOUNDED if name in wanted}
+        self._covered = np.zeros(n, np.bool_) if "alpha" in wanted else None
+        self._coverage = Coverage(scene, n) if "coverage" in wanted else None
+        self._light: dict[str, Floats] = {}
+        if "direct" in wanted or "indirect" in wanted:
+            self._light["direct"] = np.zeros((3, n), f4)
+        self._clamp = clamp
+        if CLAMPED in wanted:
+            self._light[CLAMPED] = np.zeros((3, n), f4)
+        self._groups = scene.light_groups if "light_groups" in wanted else None
+        if self._groups is not None:
+            self._light.update((f"light_groups.{name}", np.zeros((3, n), f4)) for name in self._groups.names)
+        self._awaited: AwaitedSurfaces | None = None
+        self._begun = False
+        self._all_rough = True  # no first surface is specular
+        self._picture: Floats | None = None  # to which all light has been added
+        self._share = 1.0  # part of a sample that each path is
+
+    def prepare(self, paths: Paths) -> None:
+        """Have paths that start at the camera carry the recorder."""
+        paths.recorder = self
+        if "direct" in self._light or CLAMPED in self._light:
+            paths.scattered = broadcast(np.uint8(NOT_YET), len(paths))
+        if any(name in self._values for name in FEATURES):
+            paths.met_rough = np.zeros(len(paths), np.bool_)
+
+    @property
+    def needs_directions(self) -> bool:
+        """Whether contributions of light samples must have their directions: to divide an environment."""
+        return self._groups is not None and len(self._groups.environment) > 1
+
+    def branched(self, ways: int) -> None:
+        """Note that each path goes on in several ways."""
+        self._share /= ways
+
+    # --- Surfaces -------------------------------------------------------------------------------------
+
+    def record_hits(
+        self, scene: CompiledScene, paths: Paths, hits: Hits, kept: Ints, kept_paths: Paths, kept_hits: Hits
+    ) -> None:
+        """Record what paths meet next.
+
+        Parameters
+        ----------
+        paths, hits
+            All paths.
+        kept
+            (k,) those that go on.
+        kept_paths, kept_hits
+            The same as records, as they will be shaded.
+        """
+        self._shade_awaited()
+        first, self._begun = not self._begun, True
+        if first and self._covered is not None:
+            self._covered[paths.slot] = hits.prim >= 0
+        if first and self._coverage is not None:
+            self._coverage.record(scene, paths, hits)
+        if not self._needs_surfaces(paths, first):
+            return
+        ends = hits.prim >= 0
+        ends[kept] = False
+        if ends.any():
+            self._awaited = AwaitedSurfaces(
+                scene, *compact(scene, paths, hits, np.flatnonzero(ends)), first=first
+            )
+            self._shade_awaited()
+        if len(kept_paths):
+            self._awaited = AwaitedSurfaces(scene, kept_paths, kept_hits, first)
+
+    def record_surfaces(self, scene: CompiledScene, paths: Paths, shade: Shading) -> None:
+        """Record the surfaces that paths have met, which are ready to shade."""
+        awaited, self._awaited = self._awaited, None
+        if awaited is None:
+            return
+        albedo = None
+        if awaited.first and "albedo" in self._values:
+            albedo = shade.albedo()
+            put(self._values["albedo"], paths.slot, albedo)
+        if paths.met_rough is None:
+            return
+        lanes = np.flatnonzero(~paths.met_rough)
+        if not lanes.size:
+            return
+        if lanes.size < len(paths):  # so these are not the first surfaces
+            shade = shading(scene, shade.surface.take(lanes))
+        self._record_features(paths, lanes, shade, shade.albedo() if albedo is None else albedo)
+
+    def _needs_surfaces(self, paths: Paths, first: bool) -> bool:
+        """Return whether a layer needs the next surfaces of the paths."""
+        if first and "albedo" in self._values:
+            return True
+        return paths.met_rough is not None and not paths.met_rough.all()
+
+    def _shade_awaited(self) -> None:
+        """Record surfaces that no integrator has shaded."""
+        if self._awaited is None:
+            return
+        scene, paths, hits = self._awaited.scene, self._awaited.paths, self._awaited.hits
+        surface = interaction(scene, paths, hits)
+        perturb_normals(scene, surface)
+        self.record_surfaces(scene, paths, shading(scene, surface))
+
+    def _record_features(self, paths: Paths, lanes: Ints, shade: Shading, albedo: Floats) -> None:
+        """Record the features for a denoiser for lanes (k,), those of `shade`, that meet a rough surface."""
+        assert paths.met_rough is not None
+        end = len(shade.lit().surface)
+        rough = slice(0, end)  # groups that are specular come last
+        self._all_rough &= end == lanes.size
+        slot = take(paths.slot, lanes[rough])
+        for name, values in zip(FEATURES, (albedo, shade.surface.ns), strict=True):
+            if name in self._values:
+                if self._share == 1:  # a slot has one path
+                    put(self._values[name], slot, values[:, rough])
+                else:
+                    add_to_slots(self._values[name], slot, values[:, rough] * f4(self._share))
+        if end == len(paths):
+            paths.met_rough = broadcast(np.True_, end)
+        else:
+            paths.met_rough[lanes[rough]] = True
+
+    # --- Light ----------------------------------------------------------------------------------------
+
+    def clamped(self, paths: Paths, contribution: Contribution, slot: Ints, arriving: Floats) -> Floats:
+        """Return light `arriving` (3, k) at slots (k,), its indirect part scaled down to the clamp.
+
+        A path of several branches is clamped like one of a sample of its own. What is not finite stays so.
+        """
+        if self._clamp is None or paths.scattered is None:
+            return arriving
+        limit, (x, y, z) = f4(self._clamp * self._share), arriving * f4(1 / 3)
+        mean = x + y + z
+        bright = (mean > limit) & (mean < np.inf) & ~_is_direct(paths.scattered, contribution)
+        lanes = np.flatnonzero(bright)
+        if not lanes.size:
+            return arriving
+        left = arriving.copy()
+        left[:, lanes] *= limit / mean.take(lanes)
+        removed = arriving.take(lanes, 1) - left.take(lanes, 1)
+        add_to_slots(self._light[CLAMPED], slot.take(lanes), removed)
+        return left
+
+    def record_light(
+        self, picture: Floats, paths: Paths, contribution: Contribution, slot: Ints, arriving: Floats
+    ) -> None:
+        """Record light `arriving` (3, k) that has been added to slots (k,) of the `picture` (3, n)."""
+        if self._picture is None:
+            self._picture = picture
+        if self._picture is not picture:
+            self._picture = np.empty(0, f4)  # no integrator returns this
+        if "direct" in self._light and paths.scattered is not None and (paths.scattered != BEFORE).any():
+            self._add("direct", np.flatnonzero(_is_direct(paths.scattered, contribution)), slot, arriving)
+        if self._groups is not None:
+            group = self._groups.of_light.take(contribution.light)
+            for number, name in enumerate(self._groups.names):
+                lanes = np.flatnonzero(group == number)
+                self._add(f"light_groups.{name}", lanes, slot, arriving)
+            mixed = np.flatnonzero(group < 0)
+            if mixed.size:
+                toward = contribution.wi
+                if toward is None:
+                    toward = take(paths.direction, contribution.lanes)
+                for name, part in self._groups.parts_of_environment(take(toward, mixed)):
+                    light = take(arriving, mixed) * part
+                    add_to_slots(self._light[f"light_groups.{name}"], slot.take(mixed), light)
+
+    def record_background(self, slot: Ints, color: Floats) -> None:
+        """Record a background (3, 1) that has been added to slots (k,)."""
+        if "direct" in self._light:
+            self._light["direct"][:, slot] += color
+
+    def _add(self, name: str, lanes: Ints, slot: Ints, arriving: Floats) -> None:
+        if lanes.size == slot.size:
+            add_to_slots(self._light[name], slot, arriving)
+        elif lanes.size:
+            add_to_slots(self._light[name], slot.take(lanes), take(arriving, lanes))
+
+    # --- The result -----------------------------------------------------------------------------------
+
+    def finish(self, integrator: object, radiance: Floats) -> Bools:
+        """Record what is left, and return a mask (n,) of the slots whose layers are all finite.
+
+        Parameters
+        ----------
+        integrator
+            What has traced the paths.
+        radiance
+            (3, n) that it returned.
+
+        Raises
+        ------
+        SceneError
+            If the integrator is not made of the stages that tell of the layers.
+        """
+        self._check(integrator, radiance)
+        self._shade_awaited()
+        finite: Bools = np.ones(radiance.shape[1], np.bool_)
+        for values in (*self._values.values(), *self._light.values()):
+            for row in values:
+                finite &= np.isfinite(row)
+        return finite
+
+    def result(self, samples: int, dropped: Ints) -> LayerSamples:
+        """Return the layers, after `finish`.
+
+        Parameters
+        ----------
+        samples
+            Of each pixel.
+        dropped
+            Slots of samples that are dropped, because they were not finite; they count as 0.
+        """
+        light = {name: values.reshape(3, samples, -1) for name, values in self._light.items()}
+        for values in self._light.values():
+            values[:, dropped] = 0
+        counts = {}
+        if self._covered is not None:
+            self._covered[dropped] = False
+            counts["alpha"] = self._covered.reshape(samples, -1).sum(0, dtype=np.int32)
+        if self._coverage is not None:
+            counts.update(self._coverage.counts(samples, dropped))
+        return LayerSamples(counts, self._bounded(samples, dropped), light)
+
+    def _bounded(self, samples: int, dropped: Ints) -> dict[str, FixedPointSamples]:
+        """Return the layers with values in [-1, 1]."""
+        bounded: dict[str, FixedPointSamples] = {}
+        for name, values in self._values.items():
+            if name == "denoising_albedo" and self._all_rough and "albedo" in bounded:
+                bounded[name] = bounded["albedo"]  # the same values: sent once
+            else:
+                bounded[name] = fixed_point(values, samples, dropped)
+        return bounded
+
+    def _check(self, integrator: object, radiance: Floats) -> None:
+        label = getattr(integrator, "__name__", repr(integrator))
+        for name in self._wanted:
+            if name in OF_LIGHT and self._picture is not radiance:
+                raise SceneError(
+                    f"the integrator {label} cannot give the layer {name!r}: all light must be added by "
+                    "wavefront.integrators.accumulate to the array that it returns"
+                )
+            if name not in OF_LIGHT and not self._begun:
+                raise SceneError(
+                    f"the integrator {label} cannot give the layer {name!r}: its paths must find their "
+                    "surfaces by wavefront.integrators.intersect_and_compact"
+                )
+
+
+class Coverage:
+    """Which of the names of a scene's shapes each sample of a wave sees first.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    n
+        Samples of the wave.
+    """
+
+    def __init__(self, scene: CompiledScene, n: int) -> None:
+        self._names = tuple(dict.fromkeys(scene.shape_names))
+        numbers = {name: number for number, name in enumerate(self._names)}
+        self._of_shape = np.array([numbers[name] for name in scene.shape_names], np.intp)
+        self._seen = np.full(n, -1, np.intp)
+
+    def record(self, scene: CompiledScene, paths: Paths, hits: Hits) -> None:
+        """Record the first surfaces of paths."""
+        found = hits.found
+        self._seen[take(paths.slot, found)] = self._of_shape.take(scene.shape_numbers.of(hits.take(found)))
+
+    def counts(self, samples: int, dropped: Ints) -> Iterator[tuple[str, Ints]]:
+        """Yield each layer, and how many samples of each pixel (k,) see a shape of that name."""
+        self._seen[dropped] = -1
+        seen = self._seen.reshape(samples, -1)
+        for number, name in enumerate(self._names):
+            yield f"coverage.{name}", (seen == number).sum(0, dtype=np.int32)
+
+
+def recorded_layers(wanted: Sequence[str], scene: CompiledScene) -> tuple[str, ...]:
+    """Return the layers that recorders of a scene return, those with a key by it."""
+    names: list[str] = []
+    for name in wanted:
+        keys = scene.light_groups.names if name == "light_groups" else dict.fromkeys(scene.shape_names)
+        names += [f"{name}.{key}" for key in keys] if name in KEYED_LAYERS else [name]
+    return tuple(names)
+
+
+def _is_direct(scattered: Bytes, contribution: Contribution) -> Bools:
+    """Return a mask (k,) of the contributions that count for the layer "direct"."""
+    at = take(scattered, contribution.lanes)
+    return at == NOT_YET if contribution.sampled else at <= JUST_ONCE
+
+
+def add_to_slots(rows: Floats, slot: Ints, values: Floats) -> None:
+    """Add values (3, k) to the slots (k,), in which numbers may repeat, of rows (3, n)."""
+    for row, channel in zip(rows, values, strict=True):  # a row at a time: much faster
+        np.add.at(row, slot, channel)

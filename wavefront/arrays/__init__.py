@@ -1,0 +1,1 @@
+"""Arrays: vectors, elementary functions, frames, and the records that the stages pass on."""

@@ -1,0 +1,172 @@
+"""The records that the stages pass on: structures of arrays with one column per path.
+
+Each field is declared once, with its shape and unit; `take`, `concatenate` and `len` are derived.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
+from functools import cache
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .frame import Frame
+from .record import record
+from .vec import Bools, Bytes, Floats, Ints, Lanes, take
+
+Words = NDArray[np.uint32]
+
+# Scattering that is not specular, along a path:
+NOT_YET = 0  # none so far
+JUST_ONCE = 1  # the last scattering, and none before
+BEFORE = 2  # one that is not the last, or several
+
+
+@cache
+def _names(kind: type) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(kind))
+
+
+class SoA:
+    """Structure of arrays: base of dataclasses of arrays with one column (last axis) per element.
+
+    A field that is not an array is shared by all elements; one that is None is absent.
+    """
+
+    __slots__ = ()
+
+    def _values(self) -> list[tuple[str, Any]]:
+        kind: Any = type(self)
+        return [(name, getattr(self, name)) for name in _names(kind)]
+
+    def __len__(self) -> int:
+        """Return the number of columns."""
+        kind: Any = type(self)
+        values = (getattr(self, name) for name in _names(kind))
+        return int(next(value.shape[-1] for value in values if isinstance(value, np.ndarray)))
+
+    def shared(self) -> list[Any]:
+        """Return the values that all elements share; records are only joined where these are the same."""
+        return [value for _, value in self._values() if not isinstance(value, np.ndarray)]
+
+    def take(self, index: Lanes) -> Self:
+        """Return columns `index` (m,) of every field as a new record; views for a slice."""
+        out = object.__new__(type(self))
+        for name, value in self._values():
+            setattr(out, name, take(value, index) if isinstance(value, np.ndarray) else value)
+        return out
+
+    def put(self, index: Ints, other: Self) -> None:
+        """Write the columns of another record to columns `index` (m,) of this one."""
+        for (_, value), (_, new) in zip(self._values(), other._values(), strict=True):
+            if isinstance(value, np.ndarray):
+                value[..., index] = new
+
+    @classmethod
+    def concatenate(cls, records: Sequence[Self]) -> Self:
+        """Return a record of the columns of several records of one type."""
+        out = object.__new__(cls)
+        kind: Any = cls
+        for name in _names(kind):
+            setattr(out, name, _joined([getattr(record, name) for record in records]))
+        return out
+
+
+def _joined(values: Sequence[Any]) -> Any:
+    """Concatenate arrays along the last axis; equal arrays from `broadcast` give one such array."""
+    arrays = [value for value in values if isinstance(value, np.ndarray)]
+    if not arrays:
+        return values[0]
+    first, shape = arrays[0], arrays[0].shape[:-1]
+    if all(a.strides[-1] == 0 and np.array_equal(a[..., :1], first[..., :1]) for a in arrays):
+        return np.broadcast_to(first[..., :1], (*shape, sum(a.shape[-1] for a in arrays)))
+    return np.concatenate(arrays, axis=-1)
+
+
+@record
+class Rays(SoA):
+    """Rays for an accelerator."""
+
+    origin: Floats  # (3, n) start of the ray, scene units
+    direction: Floats  # (3, n) unit direction
+    exclude_prim: Ints  # (n,) primitive that the ray starts on, -1 for none
+
+
+@record
+class Paths(Rays):
+    """Paths: the current ray, throughput and random-number address of each."""
+
+    slot: Ints  # (n,) column of the radiance buffer
+    pixel: Words  # (n,) row-major pixel index: first part of the random-number address
+    sample: Words  # (n,) sample index within the pixel: second part of the address
+    throughput: Floats  # (3, n) product of BSDF weights since the camera
+    pdf: Floats  # (n,) density of the last BSDF sample, 1/sr; unused where specular
+    specular: Bools  # (n,) the last direction is of a delta lobe or the camera: light sampling cannot find it
+    roulette_scale: Floats  # (n,) throughput times this decides about roulette: see `stages.compact.roulette`
+    prev_vertex: Floats | None = None  # (3, n) where the paths last scattered; None where that is `origin`
+    # (n,) the path has left its first surface by a lobe that is not a delta lobe; None without light paths
+    left_rough: Bools | None = None
+    # for layers (aovs/recorder.py); None unless they are asked for
+    scattered: Bytes | None = None  # (n,) NOT_YET, JUST_ONCE or BEFORE: its scattering that is not specular
+    met_rough: Bools | None = None  # (n,) the path has met a surface that is not specular
+    recorder: Any = None  # the `SampleRecorder` of the wave
+
+
+@record
+class Hits(SoA):
+    """The nearest hit of each ray."""
+
+    t: Floats  # (n,) distance along the ray, scene units; inf on a miss
+    prim: Ints  # (n,) row of the scene's tables, -1 on a miss; the primitive id in scenes without instances
+    b1: Floats | None  # (n,) barycentric weight of the second vertex; None if the scene interpolates nothing
+    b2: Floats | None  # (n,) barycentric weight of the third vertex
+    instance: Ints | None = None  # (n,) column of the scene's `InstanceTable`; None when it has none
+
+    @property
+    def found(self) -> Ints:
+        """Lanes that hit a surface."""
+        return np.flatnonzero(self.prim >= 0)
+
+
+@record
+class SurfaceInteraction(SoA):
+    """The surface geometry at hit points. Normals are on the side that the ray came from."""
+
+    point: Floats  # (3, n) hit point, scene units
+    error: Floats  # (n,) bound on the rounding error of `point`, scene units
+    ng: Floats  # (3, n) unit geometric normal, on the side of wo
+    ns: Floats  # (3, n) unit shading normal, on the side of wo
+    wo: Floats  # (3, n) unit direction towards the ray's origin, world frame
+    prim: Ints  # (n,) primitive id
+    material: Ints  # (n,) row of the scene's material table
+    back_facing: Bools  # (n,) the ray came from the back side of the surface
+    # attributes (shapes/attributes.py), None unless a material of the scene reads them
+    uv: Floats | None = None  # (2, n) texture coordinates
+    uv1: Floats | None = None  # (2, n) the second set of texture coordinates
+    color: Floats | None = None  # (4, n) linear RGB and opacity, given per vertex
+    dpduv: Floats | None = None  # (6, n) dpdu and dpdv, the derivatives of the point by u and v, scene units
+    dpduv1: Floats | None = None  # (6, n) the same for uv1
+    tangent_frame: Floats | None = None  # (6, n) tangent and bitangent of normal maps, of any length
+    tangent_frame1: Floats | None = None  # (6, n) the same for uv1
+
+    def frame(self) -> Frame:
+        """Return the shading frames, z = ns."""
+        return Frame.from_normal(self.ns)
+
+
+@record
+class Contribution(SoA):
+    """Light that arrives at the camera along some paths: emission that they met, or direct light.
+
+    Everything that is added to a picture is a contribution, so its parts by light, or by how they were
+    found, are sums over contributions.
+    """
+
+    lanes: Ints  # (k,) columns of the paths
+    radiance: Floats  # (3, k) that reaches the last vertex of each path, W·sr⁻¹·m⁻²
+    light: Ints  # (k,) number of the light, as in the scene's `LightTable`
+    sampled: bool = False  # found by light samples; else the paths' rays met the lights
+    wi: Floats | None = None  # (3, k) directions of light samples; None unless a recorder asks for them

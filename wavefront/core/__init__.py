@@ -1,0 +1,1 @@
+"""What every package uses: errors, tables of names, files, memory, progress, fingerprints."""

@@ -1,0 +1,143 @@
+"""The layers of a picture besides `rgb`: their names, kinds and meanings.
+
+A geometric layer comes from one ray through the center of each pixel and the center of the lens. It is not
+filtered and has no error; where the ray meets nothing it is NaN, or -1 in ids. A sampled layer is a
+filtered mean over the samples of the pixel, as `rgb` is, and has a standard error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from ..arrays.record import record
+from ..core.errors import SceneError
+from ..core.suggestions import did_you_mean
+
+
+@record
+class Layer:
+    """One layer."""
+
+    channels: int
+    sampled: bool
+    text: str  # what it holds, and its unit
+
+
+def _geometric(channels: int, text: str) -> Layer:
+    return Layer(channels, False, text)
+
+
+def _sampled(channels: int, text: str) -> Layer:
+    return Layer(channels, True, text)
+
+
+LAYERS: dict[str, Layer] = {
+    "position": _geometric(3, "point that the ray meets, scene units"),
+    "depth": _geometric(1, "distance along the camera's axis, scene units"),
+    "distance": _geometric(1, "distance along the ray, scene units"),
+    "normal": _geometric(3, "unit shading normal, world, on the side of the camera"),
+    "normal_geometric": _geometric(3, "unit geometric normal, world, on the side of the camera"),
+    "uv": _geometric(2, "texture coordinates"),
+    "shape_id": _geometric(1, "number of the shape in the scene, int32"),
+    "instance_id": _geometric(1, "number of the instance in the scene, int32"),
+    "material_id": _geometric(1, "number of the material in the scene, int32"),
+    "alpha": _sampled(1, "part of the pixel that surfaces cover"),
+    "albedo": _sampled(3, "reflectance of the surfaces that the camera sees"),
+    "direct": _sampled(3, "radiance that the integrator direct_mis estimates, emission included"),
+    "indirect": _sampled(3, "the rest of the radiance"),
+    "denoising_albedo": _sampled(3, "albedo of the first surfaces that are not specular"),
+    "denoising_normal": _sampled(3, "shading normal there, world"),
+}
+
+KEYED_LAYERS: dict[str, Layer] = {  # one layer for each key, named "light_groups.KEY" and "coverage.KEY"
+    "light_groups": _sampled(3, "radiance by the group of the light that it comes from"),
+    "coverage": _sampled(1, "part of the pixel that each shape covers, by the name of the shape"),
+}
+CLAMPED = "clamped"
+GIVEN_LAYERS: dict[str, Layer] = {  # layers that a setting gives, beside those that are asked for
+    CLAMPED: _sampled(3, "radiance that the setting `clamp` removed"),
+}
+BOXES = "boxes"  # of objects: no array, but `Image.boxes`
+ALL_LAYERS = "all"  # stands for all of `LAYERS`, and for nothing else
+
+DEFAULT_GROUP = "default"  # of lights and emitting materials
+
+
+def group_name(name: str, value: Any) -> str:
+    """Return the name of a group of lights.
+
+    Raises
+    ------
+    SceneError
+        If the value, called `name`, is no text or an empty one.
+    """
+    if not isinstance(value, str) or not value:
+        raise SceneError(f"{name} is {value!r}; it must be a name, such as 'sun'")
+    return value
+
+
+def sampled_names(chosen: Iterable[str]) -> tuple[str, ...]:
+    """Return the names of the sampled layers among those that were chosen."""
+    return tuple(name for name in chosen if name != BOXES and layer_of(name).sampled)
+
+
+def geometric_names(chosen: Iterable[str]) -> tuple[str, ...]:
+    """Return the names of the geometric layers among those that were chosen."""
+    return tuple(name for name in chosen if name != BOXES and not layer_of(name).sampled)
+
+
+def layer_of(name: str) -> Layer:
+    """Return a layer by its name, that of a layer with a key such as "light_groups.sun"."""
+    return {**LAYERS, **KEYED_LAYERS, **GIVEN_LAYERS}[name.partition(".")[0]]
+
+
+def chosen_layers(name: str, value: Any) -> tuple[str, ...]:
+    """Return the names of the layers that were asked for, each once, in the order of the tables.
+
+    Parameters
+    ----------
+    name
+        What the value is called in errors.
+    value
+        A name, or several: of `LAYERS`, of `KEYED_LAYERS`, "boxes" or "all".
+
+    Raises
+    ------
+    SceneError
+        If one is unknown. The message lists all of them.
+    """
+    known = (*LAYERS, *KEYED_LAYERS, BOXES)
+    chosen = [value] if isinstance(value, str) else list(value) if isinstance(value, Iterable) else None
+    if chosen is None:
+        raise SceneError(f"{name} is {value!r}; it must be the name of a layer, or several names")
+    for each in chosen:
+        if not isinstance(each, str) or each not in (*known, ALL_LAYERS):
+            raise SceneError(
+                f"{name} has {each!r}; there are {', '.join(known)}, and {ALL_LAYERS!r} for all but "
+                f"{', '.join((*KEYED_LAYERS, BOXES))}{did_you_mean(each, known)}"
+            )
+    wanted = {*chosen, *(LAYERS if ALL_LAYERS in chosen else ())}
+    return tuple(each for each in known if each in wanted)
+
+
+GUIDES = "denoising_albedo", "denoising_normal"  # the layers that guide denoisers
+NOISY = "noisy"  # the layer that holds `rgb` as it was before denoising
+# what the names of layers that hold radiance begin with
+RADIANCE = (NOISY, "direct", "indirect", "light_groups.", CLAMPED)
+
+
+def is_radiance(name: str) -> bool:
+    """Return whether a layer holds radiance, as `rgb` does."""
+    return name.startswith(RADIANCE)
+
+
+_AXES = dict.fromkeys(("position", "normal", "normal_geometric", "denoising_normal"), "XYZ")
+_KNOWN = {**_AXES, "uv": "UV", "depth": "Z", "distance": "Z", "alpha": "A"}
+_BY_COUNT = {1: "X", 2: "XY", 3: "RGB"}
+
+
+def components(name: str, count: int) -> list[str]:
+    """Return the letters of the `count` components of an array of a picture: X, Y, Z or R, G, B and so on."""
+    known = _KNOWN.get(name, "")
+    return list(known) if len(known) == count else list(_BY_COUNT.get(count, map(str, range(count))))

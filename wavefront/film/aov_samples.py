@@ -1,0 +1,61 @@
+"""The sampled layers of one wave, as its worker returns them.
+
+Layers with values in [-1, 1] are rounded to multiples of 2^-24, so that their sums are exact in any order,
+and the worker adds up the samples of each pixel. Layers of radiance are returned sample by sample.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays.record import record
+from ..arrays.vec import Floats, Ints, f4
+
+FRACTION_BITS = 24  # of fixed-point numbers
+ONE = f4(2**FRACTION_BITS)
+NARROW_TERMS = 127  # so many fixed-point numbers from -1 to 1 can be summed as int32
+COUNTED = ("alpha", "coverage")  # layers whose samples are 0 or 1
+BOUNDED = ("albedo", "denoising_albedo", "denoising_normal")  # layers whose samples are in [-1, 1]
+
+FixedPoint = NDArray[np.int32] | NDArray[np.int64]
+
+
+@record
+class FixedPointSamples:
+    """Sums over some samples of each pixel."""
+
+    sums: FixedPoint  # (c, k) multiples of 2^-24
+    squares: FixedPoint  # (c, k) of the squared samples, each rounded down to a multiple of 2^-24
+
+
+@record
+class LayerSamples:
+    """The sampled layers of a wave: samples of k pixels."""
+
+    counts: dict[str, Ints]  # (k,) how many samples of each pixel are 1: "alpha", and "coverage.NAME"
+    bounded: dict[str, FixedPointSamples]
+    radiance: dict[str, Floats]  # (3, samples, k): "direct", and "light_groups.NAME"
+
+
+def fixed_point(values: Floats, samples: int, dropped: Ints) -> FixedPointSamples:
+    """Return sums of samples in [-1, 1].
+
+    Parameters
+    ----------
+    values
+        (c, samples · k) float32, which is overwritten.
+    samples
+        Of each of k pixels.
+    dropped
+        Columns that count as 0.
+    """
+    values *= ONE
+    np.rint(values, out=values)
+    values[:, dropped] = 0
+    fixed = values.astype(np.int32).reshape(len(values), samples, -1)
+    squares = fixed.astype(np.int64)
+    squares *= squares
+    squares >>= FRACTION_BITS
+    dtype = np.int32 if samples <= NARROW_TERMS else np.int64
+    return FixedPointSamples(fixed.sum(1, dtype=dtype), squares.sum(1, dtype=dtype))

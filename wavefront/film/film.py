@@ -1,0 +1,414 @@
+"""The film: sums of samples for each pixel, and estimates of their error."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays.record import record
+from ..arrays.state import Words
+from ..arrays.vec import ALL, Doubles, Floats, Ints, Lanes, distinct, take
+from .exact_sum import ExactSums
+from .light_sums import LightSums
+
+BATCHES = 8  # at most
+WHOLE_BATCH = 4  # samples; batches are at least this long if a pixel has two of them
+EPSILON = 1e-2  # relative to the squared mean of a picture; added to the squares by which errors are divided
+LEAST_FOR_RARE = 16  # samples of every pixel, so that it has four batches
+MUCH_RARE = 0.6  # part of the squared error that rests on few samples, from where on it is too small
+OUTLIERS = 1e-3  # fraction of the pixels whose error is limited to that of the worst other pixel
+NONE = np.zeros(0, np.intp)
+LIGHT = "light."  # before the names of the arrays of light paths
+TINY = 1e-180  # its power of 1.5 is above 0
+CHUNK = 8192  # pixels, or samples, that are added together: few enough for the cache
+
+
+class Film:
+    """Sums of samples per pixel, and the sums that the error estimate needs.
+
+    The sums are exact (`ExactSums`), so the picture depends neither on the division of a render
+    into jobs nor on the division of samples between two films that are merged.
+
+    The samples of a stratified sampler depend on each other, so their scatter does not give the error of
+    their mean. Consecutive samples therefore form batches of `batch_size`, a power of two that doubles with
+    the number of samples, so that 4 to 8 batches are full from the sixteenth sample on. Aligned blocks of
+    Sobol points are stratified like the first block, so the scatter of the batches' means includes the gain
+    within a batch. It does not include the gain between batches: for Sobol points the error is
+    over-estimated, by 7 to 15 % at 16 and 64 samples, by less later. Independent samples have no such bias.
+
+    Samples that are not finite are dropped: they are counted, and the mean is that of the others.
+
+    Memory is 176 bytes per pixel, whatever the number of samples, and 4 more when one was dropped. Light
+    paths take 192 more.
+
+    Parameters
+    ----------
+    width, height
+        Of the picture, pixels.
+    light_paths
+        Whether there are light paths, too, whose light adds to the mean.
+
+    Attributes
+    ----------
+    count
+        Samples of each pixel, (pixels,), with those that were dropped.
+    dropped
+        How many of them were dropped, (pixels,); empty as long as none was.
+    light
+        Sums over light paths; None where there are none.
+    """
+
+    def __init__(self, width: int, height: int, light_paths: bool = False) -> None:
+        pixels = width * height
+        self.size = width, height
+        self.count = np.zeros(pixels, np.int64)
+        self.dropped = np.zeros(0, np.int32)
+        self.sums = ExactSums((3, pixels))  # of samples
+        self.squares = np.zeros((3, pixels))  # sum of squared samples
+        self.batches = np.zeros((BATCHES, 3, pixels), np.float32)  # sums of full batches
+        self.batches.fill(0)  # takes the memory now, so that a render that lacks it does not fail late
+        self.light = LightSums(pixels) if light_paths else None
+        self.lengths: Ints | None = None  # samples of each batch; None: `batch_size` of them in all
+
+    def release_errors(self) -> None:
+        """Free the sums of variances and errors, 120 bytes per pixel; nothing can be added after that."""
+        self.squares, self.batches = np.zeros((3, 0)), np.zeros((BATCHES, 3, 0), np.float32)
+
+    def add(self, pixels: Words, radiance: Floats, dropped: Ints = NONE) -> None:
+        """Add samples.
+
+        Parameters
+        ----------
+        pixels
+            (k,) row-major indices in rising order, of pixels with equally many samples so far.
+        radiance
+            (3, samples, k): the next samples of each pixel.
+        dropped
+            Numbers of those, in [0, samples · k), that are dropped; they are 0 in `radiance`.
+        """
+        if dropped.size:
+            self._drop(pixels[dropped % pixels.size])
+        for start in range(0, pixels.size, CHUNK):
+            part = slice(start, start + CHUNK)
+            self._add(pixel_span(pixels[part]), radiance[:, :, part])
+
+    def _add(self, lanes: Lanes, radiance: Floats) -> None:
+        """Add samples (3, samples, k) of at most `CHUNK` pixels."""
+        at_once = max(1, CHUNK // radiance.shape[2])
+        squares = self.squares[:, lanes]  # a view of a span, else a copy
+        count, samples = int(self.count[lanes][0]), radiance.shape[1]
+        start = 0
+        while start < samples:
+            size = batch_size(count + 1)
+            if count and size > batch_size(count):
+                self._pair_batches(lanes)
+            stop = min(samples, start + at_once, start + size - count % size)
+            rows = radiance[:, start:stop].astype(np.float64)
+            add_in_order(squares, np.square(rows))
+            self.sums.add(lanes, rows)
+            count += stop - start
+            start = stop
+            if count % size == 0:
+                self._close_batch(lanes, count // size - 1)
+        if not isinstance(lanes, slice):
+            self.squares[:, lanes] = squares
+        self.count[lanes] = count
+
+    def _drop(self, pixels: Words) -> None:
+        """Count dropped samples of pixels, which may repeat."""
+        if not self.dropped.size:
+            self.dropped = np.zeros(self.count.size, np.int32)
+        np.add.at(self.dropped, pixels, 1)
+
+    def used(self, span: slice = slice(None)) -> Ints:
+        """Return how many samples of each pixel were not dropped, (k,)."""
+        return self.count[span] - self.dropped[span] if self.dropped.size else self.count[span]
+
+    def _close_batch(self, lanes: Lanes, number: int) -> None:
+        """Store the sum of a full batch: the sums less all batches before it.
+
+        Rounding errors of batches do not accumulate, since each batch corrects those before it.
+        """
+        before = np.zeros_like(self.squares[:, lanes])
+        for batch in self.batches[:number]:
+            before += batch[:, lanes]
+        self.batches[number][:, lanes] = self.sums.value(lanes) - before
+
+    def _pair_batches(self, lanes: Lanes) -> None:
+        """Add pairs of batches, so that half as many batches are twice as long."""
+        for half in range(BATCHES // 2):
+            pair = self.batches[2 * half : 2 * half + 2, :, lanes]
+            self.batches[half][:, lanes] = pair[0] + pair[1]
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return all that the film holds, as arrays by name."""
+        lengths = np.zeros(0, np.int64) if self.lengths is None else self.lengths
+        light = {} if self.light is None else self.light.arrays()
+        return {
+            "count": self.count,
+            "dropped": self.dropped,
+            **self.sums.arrays(),
+            "squares": self.squares,
+            "batches": self.batches,
+            "lengths": lengths,
+            **{LIGHT + name: array for name, array in light.items()},
+        }
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Become the film of which `arrays` returned these; they are not copied."""
+        self.count, self.dropped = arrays["count"], arrays["dropped"]
+        self.squares, self.batches = arrays["squares"], arrays["batches"]
+        self.sums.restore(arrays)
+        self.lengths = arrays["lengths"] if arrays["lengths"].size else None
+        if self.light is not None:
+            self.light.restore({name: arrays[LIGHT + name] for name in self.light.arrays()})
+
+    def merge(self, other: Film) -> None:
+        """Add the samples of another film.
+
+        On each of the films all pixels have equally many samples. The sums, and so the picture, are those of
+        one film with all samples, bit for bit. `squares` are rounded in another order. Batches are
+        joined, in order, until they are as long as those of one film; where they do not end at the same
+        samples, they have different lengths, which the error estimate allows for.
+        """
+        count = int(self.count[0] + other.count[0])
+        size = batch_size(count)
+        joined = _joined([*self._all_batches(), *other._all_batches()], size)
+        self.count = self.count + other.count
+        if self.dropped.size and other.dropped.size:
+            self.dropped = self.dropped + other.dropped
+        elif other.dropped.size:
+            self.dropped = other.dropped.copy()
+        self.sums.merge(other.sums)
+        self.squares = self.squares + other.squares
+        self.batches = np.zeros_like(self.batches)
+        for number, (batch, _) in enumerate(joined):
+            self.batches[number] = batch
+        lengths = [length for _, length in joined]
+        self.lengths = None if lengths == [size] * (count // size) else np.array(lengths)
+        if self.light is not None and other.light is not None:
+            self.light.merge(other.light)
+
+    def _all_batches(self) -> Iterator[tuple[Doubles, int]]:
+        """Yield the sums (3, pixels) and lengths of consecutive batches, which hold all samples."""
+        count = int(self.count[0])
+        size = batch_size(count)
+        lengths = [size] * (count // size) if self.lengths is None else self.lengths.tolist()
+        rest = self.sums.value()
+        for batch, length in zip(self.batches, lengths, strict=False):
+            rest -= batch
+            yield batch.astype(np.float64), length
+        if sum(lengths) < count:
+            yield rest, count - sum(lengths)
+
+    def mean(self, span: slice = slice(None)) -> Doubles:
+        """Return the means of pixels, (3, k): of samples, and what light paths add; 0 without samples."""
+        mean = self._mean_of_samples(span)
+        return mean if self.light is None else mean + self.light.mean(span)
+
+    def _mean_of_samples(self, span: slice) -> Doubles:
+        return self.sums.value(span) / np.maximum(self.used(span), 1)
+
+    def variance(self, span: slice = slice(None)) -> Doubles:
+        """Estimate the variance of one sample of each pixel, (3, k); NaN for fewer than two.
+
+        With light paths it is that of as many samples, each with its part of the light paths.
+        """
+        variance = self._variance_of_samples(span)
+        return variance if self.light is None else variance + self.light.squared_error(span) * self.used(span)
+
+    def _variance_of_samples(self, span: slice) -> Doubles:
+        count = self.used(span)
+        spread = self.squares[:, span] - count * np.square(self._mean_of_samples(span))
+        return np.where(count > 1, np.maximum(spread, 0), np.nan) / np.maximum(count - 1, 1)
+
+    def squared_error(self, span: slice = slice(None)) -> Doubles:
+        """Estimate the variance of `mean` from batches, (3, k); NaN for fewer than two samples.
+
+        Where samples were dropped, which batches hold as 0, it is that of as many independent samples.
+        """
+        error = self._scatter_of_batches(span)
+        if self.dropped.size:
+            some = np.flatnonzero(self.dropped[span])
+            error[:, some] = (self._variance_of_samples(span) / np.maximum(self.used(span), 1))[:, some]
+        return error if self.light is None else error + self.light.squared_error(span)
+
+    def _scatter_of_batches(self, span: slice) -> Doubles:
+        """Estimate the variance of the mean of all samples, (3, k)."""
+        if self.lengths is not None:
+            return _unequal_error(self.batches[: self.lengths.size, :, span], self.lengths, self.count[0])
+        counts = self.count[span]
+        error = np.full((3, counts.size), np.nan)
+        for count in distinct(counts[counts > 1]):
+            same = counts == count
+            lanes = ALL if same.all() else np.flatnonzero(same)
+            size = batch_size(count)
+            used = count // size
+            batch_means = take(self.batches[:used, :, span], lanes) / np.float64(size)
+            error[:, lanes] = batch_means.var(0, ddof=1) * (size / count)
+        return error
+
+    def deviations(self, span: slice = slice(None)) -> Doubles:
+        """Return how batches deviate from the mean, (batches, 3, k), for pixels with two samples or more.
+
+        They are scaled so that their squares add up to `_scatter_of_batches`. Batches that a pixel does not
+        have, and all of a pixel of which samples were dropped, are 0.
+        """
+        if self.lengths is not None:
+            samples = self.lengths.astype(np.float64)[:, None, None]
+            means = self.batches[: self.lengths.size, :, span] / samples
+            mean = (means * samples).sum(0) / samples.sum()
+            found = (means - mean) * np.sqrt(samples / ((samples.size - 1) * self.count[0]))
+        else:
+            counts, most = self.count[span], max(count // batch_size(count) for count in distinct(self.count))
+            found = np.zeros((most, 3, counts.size))
+            for count in distinct(counts):
+                lanes, size = np.flatnonzero(counts == count), batch_size(count)
+                used = count // size
+                means = take(self.batches[:used, :, span], lanes) / np.float64(size)
+                found[:used, :, lanes] = (means - means.mean(0)) * np.sqrt(size / (count * (used - 1)))
+        if self.dropped.size:
+            found[:, :, self.dropped[span] > 0] = 0
+        return found
+
+    def relative_variance(self) -> Doubles:
+        """Estimate the squared relative error of each pixel, the mean of its channels, (pixels,).
+
+        It is relative to the square of the channel plus `EPSILON` times the picture's squared mean, which
+        limits the weight of black pixels. The error of the worst `OUTLIERS` of the pixels is limited to that
+        of the worst other pixel, so that fireflies do not dominate the picture.
+        """
+        floor = self._floor()
+        out = np.empty(self.count.size)
+        for span in chunks(self.count.size):
+            out[span] = self._relative(self.squared_error(span), span, floor)
+        return _without_outliers(out)
+
+    def rare_part(self, relative: Doubles) -> float | None:
+        """Estimate the part of the squared error that rests on few samples; None below `LEAST_FOR_RARE`.
+
+        Where one sample of a pixel brings most of its light, one batch is far above the others: the skewness
+        of b batches is then (b − 2)/√(b (b − 1)), the greatest that so many numbers can have. It is about 0
+        where many samples of either sign make up the error. The part is the mean of skewness over its
+        greatest value, over pixels by their squared error.
+
+        Parameters
+        ----------
+        relative
+            (pixels,) squared relative errors, as `relative_variance` returns them.
+        """
+        if self.count.min() < LEAST_FOR_RARE or not relative.sum() > 0:
+            return None
+        skewed = np.empty(relative.size)
+        for span in chunks(relative.size):
+            deviations = self.deviations(span)
+            batches = (deviations != 0).any(1).sum(0).clip(3)
+            square, cube = np.square(deviations).sum(0), (deviations**3).sum(0)
+            skewness = (cube / np.maximum(square, TINY) ** 1.5).mean(0)
+            skewed[span] = skewness * np.sqrt(batches * (batches - 1.0)) / (batches - 2)
+        return float(max(0.0, (skewed * relative).sum() / relative.sum()))
+
+    def noise(self) -> float:
+        """Estimate the relative error of the picture, which `render(noise=...)` limits."""
+        return float(np.sqrt(self.relative_variance().mean()))
+
+    def _relative(self, squared_error: Doubles, span: slice, floor: float) -> Doubles:
+        """Return squared errors (3, k) of some pixels relative to their brightness, (k,)."""
+        return np.asarray((squared_error / (np.square(self.mean(span)) + floor)).mean(0))
+
+    def _floor(self) -> float:
+        return EPSILON * (self._overall_mean() ** 2) or 1.0
+
+    def _overall_mean(self) -> float:
+        return float(sum(self.mean(span).sum() for span in chunks(self.count.size)) / (3 * self.count.size))
+
+    def estimates(self) -> Estimates:
+        """Estimate the picture and its errors; a pixel without samples is black."""
+        pixels = self.count.size
+        mean, variance, error = (np.empty((pixels, 3), np.float32) for _ in range(3))
+        relative, floor = np.empty(pixels), self._floor()
+        for span in chunks(self.count.size):
+            squared_error = self.squared_error(span)
+            with np.errstate(over="ignore"):  # values beyond float32 become infinite
+                mean[span] = self.mean(span).T
+                variance[span] = self.variance(span).T
+                error[span] = np.sqrt(squared_error).T
+            relative[span] = self._relative(squared_error, span, floor)
+        relative = _without_outliers(relative)
+        return Estimates(mean, variance, error, float(np.sqrt(relative.mean())), self.rare_part(relative))
+
+
+@record
+class Estimates:
+    """What the samples on a film come to."""
+
+    mean: Floats  # (pixels, 3)
+    variance: Floats  # (pixels, 3) of one sample; NaN for fewer than two
+    standard_error: Floats  # (pixels, 3) of `mean`; NaN for fewer than two samples
+    noise: float  # relative error of the picture
+    rare: float | None  # part of its square that rests on few samples; None if that is not known
+
+
+def _without_outliers(relative: Doubles) -> Doubles:
+    """Limit the worst `OUTLIERS` of the pixels to the worst of the others."""
+    worst = relative.size - 1 - int(OUTLIERS * relative.size)
+    return np.minimum(relative, np.partition(relative, worst)[worst])
+
+
+def _joined(batches: list[tuple[Doubles, int]], size: int) -> list[tuple[Doubles, int]]:
+    """Add up neighbors until each batch has `size` samples or more; a last one with fewer is dropped."""
+    joined: list[tuple[Doubles, int]] = []
+    for batch, length in batches:
+        if joined and joined[-1][1] < size:
+            before, samples = joined.pop()
+            joined.append((before + batch, samples + length))
+        else:
+            joined.append((batch, length))
+    return joined[:-1] if len(joined) > 2 and joined[-1][1] < size else joined
+
+
+def _unequal_error(batches: Floats, lengths: Ints, count: int) -> Doubles:
+    """Estimate the variance of the mean of `count` samples, (3, k), from batches (b, 3, k) of `lengths` (b,).
+
+    The mean of a batch of n samples is taken to have 1/n of the variance of a sample. With equal lengths
+    this is the estimate from the scatter of the batches' means.
+    """
+    samples = lengths.astype(np.float64)[:, None, None]
+    means = batches / samples
+    mean = (means * samples).sum(0) / samples.sum()
+    scatter = (samples * np.square(means - mean)).sum(0) / (lengths.size - 1)
+    return np.asarray(scatter / count)
+
+
+def batch_size(count: int) -> int:
+    """Return the samples per batch of a pixel with `count` samples: a power of two."""
+    power = 1 << (count - 1).bit_length()
+    return max(1, min(WHOLE_BATCH, power // 4), power // BATCHES)
+
+
+def chunks(pixels: int) -> Iterator[slice]:
+    """Yield spans of so many pixels, so that temporary arrays stay small."""
+    for start in range(0, pixels, CHUNK):
+        yield slice(start, min(start + CHUNK, pixels))
+
+
+def pixel_span(pixels: Words) -> Lanes:
+    """Return rising indices as a slice if they have no gaps, which is much faster to add to."""
+    first, last = int(pixels[0]), int(pixels[-1])
+    return slice(first, last + 1) if last - first + 1 == pixels.size else pixels.astype(np.intp)
+
+
+def add_in_order(sums: Floats, rows: Floats) -> None:
+    """Add rows (c, n, k) to sums (c, k), strictly in order.
+
+    `sum` along the axis would group terms by the layout of the array, and so round differently.
+    """
+    if rows.shape[1] < rows.shape[2]:
+        for row in rows.swapaxes(0, 1):
+            sums += row
+    else:
+        terms = np.concatenate([sums[:, None], rows], axis=1)
+        sums[:] = np.cumsum(terms, axis=1)[:, -1]

@@ -1,0 +1,118 @@
+"""Sums of what light paths add to pixels.
+
+Light paths reach any pixel, any number of times. The sums are exact, so that they do not depend on the order
+in which paths are traced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays.state import Words
+from ..arrays.vec import Doubles, Floats, Ints
+from .exact_sum import ExactSums
+
+BATCHES = 4  # sample s belongs to the batch s mod 4
+MORE_TERMS = 64  # a pixel has 2^32 splats at most: those of all pixels may fall on one
+AT_ONCE = 1 << 16  # sums of one size that are added to together, times the terms of each
+
+
+class LightSums:
+    """Sums over light paths, for each pixel.
+
+    The light paths of one sample of all pixels are stratified together, so their scatter does not give the
+    error of their mean. Samples are independent of each other: each belongs to one of `BATCHES` batches, and
+    the scatter of the batches' means gives the error.
+
+    Memory is 192 bytes per pixel.
+
+    Parameters
+    ----------
+    pixels
+        How many there are.
+
+    Attributes
+    ----------
+    paths
+        How many light paths were traced of each batch, (BATCHES,).
+    """
+
+    def __init__(self, pixels: int) -> None:
+        self.paths = np.zeros(BATCHES, np.int64)
+        self.sums = tuple(ExactSums((3, pixels), MORE_TERMS) for _ in range(BATCHES))
+
+    def add(self, sample: int, paths: int, pixel: Words, radiance: Floats) -> None:
+        """Add what some more light paths of a sample bring to pixels.
+
+        Parameters
+        ----------
+        sample
+            Its index.
+        paths
+            How many paths these are, with those that bring nothing.
+        pixel
+            (k,) row-major indices, which may repeat.
+        radiance
+            (3, k) finite.
+        """
+        batch = sample % BATCHES
+        self.paths[batch] += paths
+        terms = radiance.astype(np.float64)
+        order = np.argsort(pixel, kind="stable")
+        found, first, count = _groups(pixel.take(order).astype(np.intp))
+        for size in 1 << np.arange(int(count.max(initial=0)).bit_length() + 1):
+            some = np.flatnonzero((count > size // 2) & (count <= size))
+            for lanes in np.array_split(some, -(-some.size * int(size) // AT_ONCE) or 1):
+                if lanes.size:
+                    number = np.arange(size)[:, None]
+                    real = number < count.take(lanes)
+                    at = order.take(first.take(lanes) + np.where(real, number, 0))
+                    self.sums[batch].add(found.take(lanes), terms[:, at] * real)
+
+    def mean(self, span: slice = slice(None)) -> Doubles:
+        """Return what light paths bring to pixels, (3, k)."""
+        total = sum(sums.value(span) for sums in self.sums)
+        return np.asarray(total / max(int(self.paths.sum()), 1))
+
+    def squared_error(self, span: slice = slice(None)) -> Doubles:
+        """Estimate the variance of `mean`, (3, k), from the scatter of batches; NaN if there is only one."""
+        mean, total = self.mean(span), int(self.paths.sum())
+        used = np.flatnonzero(self.paths)
+        if used.size == 1:
+            return np.full_like(mean, np.nan)
+        scatter = np.zeros_like(mean)
+        for batch in used:
+            paths = float(self.paths[batch])
+            scatter += np.square(self.sums[batch].value(span) / paths - mean) * (paths / total)
+        return scatter / max(used.size - 1, 1)
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return all sums as arrays by name."""
+        batches = {
+            f"{batch}.{name}": array
+            for batch, sums in enumerate(self.sums)
+            for name, array in sums.arrays().items()
+        }
+        return {"paths": self.paths, **batches}
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Become the sums of which `arrays` returned these; they are not copied."""
+        self.paths = arrays["paths"]
+        for batch, sums in enumerate(self.sums):
+            sums.restore({name: arrays[f"{batch}.{name}"] for name in sums.arrays()})
+
+    def merge(self, other: LightSums) -> None:
+        """Add the sums of other light paths; the result is that of all of them at once."""
+        self.paths = self.paths + other.paths
+        for mine, others in zip(self.sums, other.sums, strict=True):
+            mine.merge(others)
+
+
+def _groups(ordered: Ints) -> tuple[Ints, Ints, Ints]:
+    """Return the distinct values (d,) of rising numbers, where each begins, and how often it occurs."""
+    first = np.flatnonzero(np.diff(ordered, prepend=-1))
+    return ordered.take(first), first, np.diff(first, append=ordered.size)

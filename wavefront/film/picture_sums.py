@@ -1,0 +1,172 @@
+"""The sums that a picture is made of: what checkpoints keep, and what merging adds up."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays.record import record
+from ..core.errors import SceneError
+from .aov_sums import LayerSums
+from .film import Film
+from .identity import CAUSTICS, differences
+from .samples import sample_ranges
+
+FILM, LAYER = "film.", "layer."  # before the names of arrays
+ADDED = ("seconds", "spp", "samples", "rays", "bad_samples")  # metadata of parts that add up
+
+
+@record
+class PictureSums:
+    """Sums of the samples of a picture and its layers."""
+
+    film: Film
+    layers: LayerSums | None
+    identity: dict[str, Any]  # of the render, see film/identity.py
+
+    @property
+    def layer_names(self) -> list[str]:
+        """The sampled layers."""
+        return [] if self.layers is None else list(self.layers.names)
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return all sums as arrays by name."""
+        layers = {} if self.layers is None else self.layers.arrays()
+        return {
+            **{FILM + name: array for name, array in self.film.arrays().items()},
+            **{LAYER + name: array for name, array in layers.items()},
+        }
+
+    @property
+    def info(self) -> dict[str, Any]:
+        """What `restored_sums` needs beside the arrays."""
+        return {"identity": self.identity, "layers": self.layer_names}
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Become the sums of which `arrays` returned these; they are not copied.
+
+        Raises
+        ------
+        SceneError
+            If one is missing, or is of another shape or kind.
+        """
+        for name, mine in self.arrays().items():
+            found = arrays.get(name)
+            wrong = found is None or found.dtype.kind != mine.dtype.kind
+            if found is None or wrong or (mine.dtype.kind == "f" and found.dtype != mine.dtype):
+                raise SceneError(
+                    f"the sums of the samples are incomplete: {name!r} is missing or of another type"
+                )
+            if found.shape != mine.shape and not self._may_vary(name, found):
+                raise SceneError(f"the sums {name!r} have shape {found.shape}; it must be {mine.shape}")
+        self.film.restore(_part(arrays, FILM))
+        if self.layers is not None:
+            self.layers.restore(_part(arrays, LAYER))
+
+    def _may_vary(self, name: str, found: NDArray[Any]) -> bool:
+        """Return whether an array may have this shape, too."""
+        return name == FILM + "lengths" or (
+            name == FILM + "dropped" and found.shape in ((0,), self.film.count.shape)
+        )
+
+
+def _part(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArray[Any]]:
+    return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
+
+
+def empty_sums(size: Sequence[int], layers: Sequence[str], identity: dict[str, Any]) -> PictureSums:
+    """Return the sums of no samples for a picture of a size (width, height)."""
+    width, height = size
+    film = Film(width, height, identity.get(CAUSTICS, False))
+    return PictureSums(film, LayerSums(layers, width * height) if layers else None, identity)
+
+
+def restored_sums(
+    name: str, shape: Sequence[int], info: Any, arrays: Mapping[str, NDArray[Any]]
+) -> PictureSums | None:
+    """Return the sums of a picture (H, W, 3) in the file `name` from their `info` and arrays.
+
+    None if the file has none.
+
+    Raises
+    ------
+    SceneError
+        If they are not those of such a picture.
+    """
+    if not arrays:
+        return None
+    try:
+        sums = empty_sums((shape[1], shape[0]), info["layers"], dict(info["identity"]))
+        sums.restore(arrays)
+    except (SceneError, TypeError, KeyError, ValueError) as error:
+        raise SceneError(f"{name}: the sums of its samples are damaged: {error}") from error
+    return sums
+
+
+def merged_sums(a: PictureSums | None, b: PictureSums | None) -> PictureSums:
+    """Return the sums of all samples of two pictures of one scene.
+
+    Raises
+    ------
+    SceneError
+        If one has no sums, or its pixels have different numbers of samples, or they are of different
+        renders.
+    """
+    if a is None or b is None:
+        raise SceneError(
+            "pictures without the sums of their samples cannot be merged: render with samples=range(...) and "
+            "save as npz, or merge checkpoints"
+        )
+    for part in (a, b):
+        _check_counts(part.film.count)
+    found = differences(a.identity, b.identity)
+    if found:
+        raise SceneError(f"pictures of different renders cannot be merged: {', '.join(found)}")
+    merged = deepcopy(a)
+    merged.film.merge(b.film)
+    if merged.layers is not None and b.layers is not None:
+        merged.layers.merge(b.layers)
+    return merged
+
+
+def _check_counts(count: NDArray[np.int64]) -> None:
+    least, most = int(count.min()), int(count.max())
+    if least != most or not most:
+        raise SceneError(
+            f"a picture whose pixels have {least} to {most} samples cannot be merged: all must have equally "
+            "many; finish it first"
+        )
+
+
+def merged_metadata(a: Mapping[str, Any], b: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the metadata of the picture of all samples of two others.
+
+    Raises
+    ------
+    SceneError
+        If they share samples.
+    """
+    ranges = sorted([*sample_ranges(a), *sample_ranges(b)])
+    for (_, end), (first, last) in pairwise(ranges):
+        if first < end:
+            raise SceneError(
+                f"pictures that share samples cannot be merged: {first} to {min(end, last) - 1} are in both"
+            )
+    totals = {name: a[name] + b[name] for name in ADDED}
+    return {**a, **totals, "sample_ranges": _joined(ranges)}
+
+
+def _joined(ranges: list[tuple[int, int]]) -> list[list[int]]:
+    """Join ranges of which one ends where the next begins."""
+    joined: list[list[int]] = []
+    for first, last in ranges:
+        if joined and joined[-1][1] == first:
+            joined[-1][1] = last
+        else:
+            joined.append([first, last])
+    return joined

@@ -1,0 +1,877 @@
+"""Rendered pictures as data."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..arrays.vec import Floats, luminance
+from ..camera import Camera
+from ..codecs import png_jpeg
+from ..codecs.display import Display
+from ..codecs.image_data import ERROR, ImageData
+from ..codecs.images import read_picture, write_image
+from ..codecs.png_jpeg import Gamma
+from ..codecs.white_balance import WhiteBalance
+from ..colors import rgb
+from ..core.errors import SceneError, as_array, number, one_of
+from ..core.html import picture_html
+from ..core.suggestions import did_you_mean
+from ..film.aov_names import BOXES, CLAMPED, GIVEN_LAYERS, LAYERS, NOISY, is_radiance
+from ..film.checkpoint import read_checkpoint
+from ..film.checkpoint_file import contents_of, is_checkpoint
+from ..film.film import Film, batch_size, chunks
+from ..film.light_sums import LightSums
+from ..film.picture_sums import PictureSums, merged_metadata, merged_sums, restored_sums
+from ..film.samples import shared_samples
+from ..statistics import (
+    RegionMean,
+    Scatter,
+    film_scatter,
+    region_mean,
+    restored_scatter,
+    scatter_arrays,
+    scatter_of_difference,
+)
+from ..statistics.scatter import PREFIX as SCATTER
+from .outlines import outline_coverage
+
+FIELDS = ("counts", "variance", "standard_error")  # arrays (H, W, ...) besides rgb, layers and errors
+
+
+class Image:
+    """A rendered picture.
+
+    Attributes
+    ----------
+    rgb
+        (H, W, 3) float32 linear radiance; row 0 is the top.
+    spp
+        Samples per pixel; the rounded mean where pixels differ.
+    metadata
+        Settings and results of the render: lighting (the preset that was added, or None), ground (whether one
+        was added), background ("transparent", a color, or None for the environment), integrator,
+        max_bounces, seed, sampler, sample_ranges (the half-open ranges [first, end] of the samples that some
+        pixel has), film (width and height of the whole picture), window (the part [x0, y0, x1, y1] of it that
+        this one is), filter, branches, guide, guided, reuse and hint (how paths went on, and what may pay
+        besides: docs/choices.md), accelerator, workers, executor, seconds (wall time), spp (mean
+        over pixels), samples, rays, bad_samples, interrupted, version (of this package), numpy, noise
+        (estimated relative error of the picture before denoising), rare (the part of the square of noise that
+        rests on few samples, see docs/convergence.md; None below sixteen samples), clamp and clamped (the
+        part of the light that it removed), caustics, boxes if they were asked for, and of a denoised picture
+        denoiser.
+    counts
+        (H, W) int64 samples of each pixel, without those that were not finite.
+    variance
+        (H, W, 3) float32 estimated variance of one sample; NaN where there are fewer than two.
+    standard_error
+        (H, W, 3) float32 estimated standard error of `rgb`, from the scatter of 2 to 8 batches of samples. It
+        includes most of the gain of stratified sampling. NaN where there are fewer than two samples.
+        It is the error of each pixel alone. Where paths are shared (`metadata["reuse"]`) pixels depend on
+        each other, and a mean over pixels errs by more than the root of the sum of squares says: `mean`
+        gives the error of a region.
+    layers
+        The other layers by name, (H, W) or (H, W, channels): see `layers.LAYERS`. Each is an attribute as
+        well: `image.depth` is `image.layers["depth"]`.
+    errors
+        Estimated standard error of each sampled layer, of its shape.
+    names
+        For "shape", "instance" and "material" the name of each id of the layers `shape_id`, `instance_id`
+        and `material_id`.
+    sums
+        The sums of the samples, for `merge`. Only pictures of `render(samples=...)`, of checkpoints and of
+        npz files of these have them.
+    scatter
+        What `mean` and `wf.compare` need of a picture whose pixels share paths; else nothing. npz files have
+        it, exr files do not.
+
+    `counts`, `variance` and `standard_error` are None in an image that was not rendered, `standard_error`
+    also in one that was denoised.
+
+    Raises
+    ------
+    SceneError
+        If `rgb` has no pixels, or is no array of three axes.
+
+    Examples
+    --------
+    >>> image = wf.render([wf.Sphere((0, 0, 0), 1), wf.Environment(1)], spp=4, size=(32, 24), aovs="depth")
+    >>> image.save("ball.exr")
+    >>> wf.Image.load("ball.exr").depth.shape
+    (24, 32)
+    >>> image.to_uint8(tone="agx").dtype
+    dtype('uint8')
+    """
+
+    def __init__(
+        self,
+        rgb: NDArray[np.float32],
+        spp: int = 0,
+        metadata: dict[str, Any] | None = None,
+        *,
+        counts: NDArray[np.int64] | None = None,
+        variance: NDArray[np.float32] | None = None,
+        standard_error: NDArray[np.float32] | None = None,
+        layers: Mapping[str, NDArray[Any]] | None = None,
+        errors: Mapping[str, NDArray[np.float32]] | None = None,
+        names: Mapping[str, Mapping[int, str]] | None = None,
+        sums: PictureSums | None = None,
+        scatter: Sequence[Scatter] = (),
+    ) -> None:
+        self.rgb = _checked_pixels(rgb)
+        self.spp = spp
+        self.metadata = dict(metadata or {})
+        self.counts = counts
+        self.variance = variance
+        self.standard_error = standard_error
+        self.layers = dict(layers or {})
+        self.errors = dict(errors or {})
+        self.names = {kind: dict(table) for kind, table in (names or {}).items()}
+        self.sums = sums
+        self.scatter = tuple(scatter)
+
+    @property
+    def light_groups(self) -> dict[str, NDArray[np.float32]]:
+        """The radiance (H, W, 3) of each group of lights, by its name; empty if it was not asked for."""
+        return self._keyed("light_groups")
+
+    @property
+    def coverage(self) -> dict[str, NDArray[np.float32]]:
+        """The part (H, W) of each pixel that shapes cover, by their name; empty if it was not asked for."""
+        return self._keyed("coverage")
+
+    def _keyed(self, kind: str) -> dict[str, NDArray[np.float32]]:
+        prefix = kind + "."
+        return {
+            name.removeprefix(prefix): layer for name, layer in self.layers.items() if name.startswith(prefix)
+        }
+
+    def __getattr__(self, name: str) -> NDArray[Any]:
+        """Return a layer by its name."""
+        if name in LAYERS or name in GIVEN_LAYERS:
+            if name in self.__dict__.get("layers", ()):
+                return self.layers[name]
+            setting = "clamp=" if name == CLAMPED else f"aovs=({name!r},)"
+            raise AttributeError(f"the image has no layer {name!r}; render it with {setting}")
+        known = () if name.startswith("_") else (*LAYERS, *GIVEN_LAYERS, *vars(self), *dir(type(self)))
+        hint = did_you_mean(name, [other for other in known if not other.startswith("_")])
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{hint}")
+
+    @property
+    def boxes(self) -> list[dict[str, Any]]:
+        """Boxes of objects, from `aovs="boxes"`: see docs/layers.md. They are part of the metadata."""
+        if BOXES not in self.metadata:
+            raise AttributeError(f"the image has no boxes; render it with aovs=({BOXES!r},)")
+        found: list[dict[str, Any]] = self.metadata[BOXES]
+        return found
+
+    def mask(self, which: int | str, kind: str = "shape") -> NDArray[np.bool_]:
+        """Return the pixels (H, W) whose center ray meets something, by the layer of its ids.
+
+        Parameters
+        ----------
+        which
+            An id, or a name: of several things of that name, the pixels of all.
+        kind
+            "shape", "instance" or "material".
+
+        Raises
+        ------
+        SceneError
+            If there is no such thing, or the layer `shape_id`, `instance_id` or `material_id` is missing.
+        """
+        names = self.names.get(one_of("kind", kind, ("shape", "instance", "material")))
+        ids = self.layers.get(f"{kind}_id")
+        if names is None or ids is None:
+            raise SceneError(f"mask: the image has no layer '{kind}_id'; render it with aovs=('{kind}_id',)")
+        chosen = [which] if which in names else [at for at, name in names.items() if name == which]
+        if not chosen:
+            raise SceneError(
+                f"mask: there is no {kind} {which!r}; names are {', '.join(map(repr, names.values()))[:200]}"
+            )
+        return np.isin(ids, chosen)
+
+    def mean(self, region: Any = None, kind: str = "shape") -> RegionMean:
+        """Return the mean of a region and its standard error, also where pixels depend on each other.
+
+        Pixels of pictures that share paths depend on each other within tiles; the error then comes from the
+        scatter of batches of samples over the pixels of each tile. Other pixels are independent.
+
+        Parameters
+        ----------
+        region
+            A mask (H, W) of booleans; slices or numbers as for `image[region]`, such as
+            (slice(8, 16), slice(20)); an id or a name as for `mask`; None for the whole picture.
+        kind
+            "shape", "instance" or "material", for an id or a name.
+
+        Returns
+        -------
+        RegionMean
+            With `value` (3,), `standard_error` (3,), None where it is not known, and `interval`.
+
+        Raises
+        ------
+        SceneError
+            If the region is malformed or empty, or there is no such id.
+
+        Examples
+        --------
+        >>> scene = [wf.Sphere((0, 0, 0), 1, name="ball"), wf.PointLight((3, 3, 3), 90)]
+        >>> image = wf.render(scene, spp=16, size=(24, 24), aovs="shape_id")
+        >>> ball = image.mean("ball")
+        >>> ball.value.shape, ball.standard_error.shape
+        ((3,), (3,))
+        >>> ball.pixels == image.mean(image.shape_id == 0).pixels
+        True
+        """
+        return region_mean(
+            self.rgb,
+            self._region(region, kind),
+            self.standard_error,
+            self._freedom(),
+            self.scatter,
+            self._error_absent(),
+        )
+
+    def _region(self, region: Any, kind: str) -> NDArray[np.bool_]:
+        """Return the pixels (H, W) of a region, as `mean` takes it."""
+        shape = self.rgb.shape[:2]
+        if region is None:
+            return np.ones(shape, np.bool_)
+        if isinstance(region, str) or (isinstance(region, int | np.integer) and not isinstance(region, bool)):
+            mask = self.mask(int(region) if isinstance(region, np.integer) else region, kind)
+        elif isinstance(region, tuple | slice):
+            mask = np.zeros(shape, np.bool_)
+            try:
+                mask[region] = True
+            except (IndexError, TypeError) as error:
+                where = f"{shape[0]} rows and {shape[1]} columns"
+                raise SceneError(f"mean: the region {region!r} is no part of {where}: {error}") from None
+        else:
+            mask = np.asarray(region)
+            if mask.dtype != np.bool_ or mask.shape != shape:
+                raise SceneError(
+                    f"mean: the region is {mask.dtype} of shape {mask.shape}; it must be a mask of booleans "
+                    f"of shape {shape}, slices, an id or a name"
+                )
+        if not mask.any():
+            raise SceneError("mean: the region has no pixel")
+        return mask
+
+    def _freedom(self) -> NDArray[np.float64]:
+        """Return the degrees of freedom (H, W) of the standard error of each pixel."""
+        shape = self.rgb.shape[:2]
+        counts = np.full(shape, self.spp) if self.counts is None else self.counts
+        distinct, which = np.unique(counts, return_inverse=True)
+        batches = [count // batch_size(count) if count > 1 else 2 for count in distinct.tolist()]
+        return np.maximum(np.array(batches)[which].reshape(shape) - 1.0, 1)
+
+    def _error_absent(self) -> str:
+        """Return the reason why the errors of means over pixels are not known, or nothing."""
+        if NOISY in self.layers:
+            return "the picture was denoised; image.noisy has an error"
+        if self.standard_error is None or not np.isfinite(self.standard_error).all():
+            return "the picture has no standard error of each pixel"
+        if self.metadata.get("reuse") and not self.scatter:
+            return (
+                "its pixels share paths, and how batches of samples scatter is not known; npz files and "
+                "checkpoints keep it"
+            )
+        return ""
+
+    def motion(self, camera: Camera) -> NDArray[np.float32]:
+        """Return the optical flow to a picture of the same scene by another camera, (H, W, 2) in pixels.
+
+        What is seen in the middle of pixel [y, x] is seen by the other camera at (x + dx, y + dy), in
+        columns and rows of the picture that it renders. It may be hidden there, or outside. NaN where this
+        picture shows nothing, or the point is behind the other camera.
+
+        Parameters
+        ----------
+        camera
+            The other camera. This picture must have the layer `position`.
+
+        Raises
+        ------
+        SceneError
+            If the layer is missing.
+        """
+        position = self.layers.get("position")
+        if position is None:
+            raise SceneError("motion: the image has no layer 'position'; render it with aovs=('position',)")
+        height, width = position.shape[:2]
+        flow = np.full((height, width, 2), np.nan, np.float32)
+        row, column = np.nonzero(np.isfinite(position).all(2))
+        pixels, _ = camera.project(position[row, column])
+        here = np.stack([column, row], 1) + 0.5
+        flow[row, column] = pixels - camera.window[:2] - here
+        return flow
+
+    def __repr__(self) -> str:
+        """Return the size and the sample count."""
+        height, width = self.rgb.shape[:2]
+        return f"<Image {width}x{height}, {self.spp} spp>"
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        """Return `rgb`."""
+        return np.array(self.rgb, dtype=dtype, copy=copy)
+
+    def __array_function__(
+        self, function: Callable[..., Any], types: Any, args: Sequence[Any], kwargs: Mapping[str, Any]
+    ) -> Any:
+        """Call a function of NumPy, such as `np.mean`, with `rgb` in place of pictures."""
+        return function(*_as_arrays(args), **{name: _as_arrays(value) for name, value in kwargs.items()})
+
+    def __getitem__(self, key: Any) -> NDArray[np.float32]:
+        """Return `rgb[key]`: image[y, x] is one pixel, (3,)."""
+        return self.rgb[key]
+
+    def __sub__(self, other: Image) -> Image:
+        """Return the difference of two pictures of one size: `rgb` and its standard error, no layers.
+
+        The error is that of independent pictures. It is None if one of them has none, or if they share
+        samples, since their errors then depend on each other. Where the pixels of one of them share paths
+        those of the difference do as well: `metadata["reuse"]` says so, and `mean` knows it.
+
+        Raises
+        ------
+        SceneError
+            If the sizes differ.
+        """
+        if not isinstance(other, Image):
+            return NotImplemented
+        if self.shape != other.shape:
+            sizes = " and ".join(f"{x.shape[1]}x{x.shape[0]}" for x in (self, other))
+            raise SceneError(f"pictures of different sizes cannot be subtracted: {sizes}")
+        error = None
+        if (
+            self.standard_error is not None
+            and other.standard_error is not None
+            and shared_samples(self.metadata, other.metadata) is None
+        ):
+            error = np.hypot(self.standard_error, other.standard_error)
+        sharing = [each for each in (self, other) if each.metadata.get("reuse")]
+        scatter: tuple[Scatter, ...] = ()
+        if error is not None and all(each.scatter for each in sharing):
+            parts = [(x.scatter, x.standard_error) for x in sharing if x.standard_error is not None]
+            scatter = scatter_of_difference(parts, error)
+        metadata = {"reuse": bool(sharing)}
+        spp = min(self.spp, other.spp)
+        return Image(self.rgb - other.rgb, spp, metadata, standard_error=error, scatter=scatter)
+
+    def __mul__(self, factor: ArrayLike) -> Image:
+        """Return the picture times a number or an rgb triple, with its errors and its layers.
+
+        Layers of radiance are multiplied too: `direct`, `indirect` and light groups. The others stay.
+
+        Raises
+        ------
+        SceneError
+            If the factor is neither a finite number nor three of them.
+        """
+        if isinstance(factor, Image) or np.asarray(factor).dtype.kind not in "fiu":
+            return NotImplemented
+        scale = np.asarray(factor, np.float32)
+        if scale.shape not in ((), (3,)) or not np.isfinite(scale).all():
+            raise SceneError(f"a picture can be multiplied by a number or an rgb triple, not by {factor!r}")
+        size = np.abs(scale)
+
+        def scaled(arrays: Mapping[str, NDArray[Any]], by: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
+            return {name: array * by if is_radiance(name) else array for name, array in arrays.items()}
+
+        return Image(
+            self.rgb * scale,
+            self.spp,
+            self.metadata,
+            counts=self.counts,
+            variance=None if self.variance is None else self.variance * size**2,
+            standard_error=None if self.standard_error is None else self.standard_error * size,
+            layers=scaled(self.layers, scale),
+            errors=scaled(self.errors, size),
+            names=self.names,
+            scatter=self.scatter,
+        )
+
+    __rmul__ = __mul__
+
+    def denoise(self, denoiser: str = "auto") -> Image:
+        """Return the picture without most of its noise.
+
+        Only `rgb` is denoised; all layers stay as they are, and `noisy` is the picture before. The layers
+        `denoising_albedo` and `denoising_normal`, which `render(denoise=True)` adds, guide the denoiser
+        along edges and textures. Pixels that are not finite are filled. The standard error of the result is
+        not known. A picture that was denoised is denoised anew from the noisy one.
+
+        Parameters
+        ----------
+        denoiser
+            "oidn": Intel Open Image Denoise, through pyoidn (`pip install pyoidn`). "nonlocal_means": a
+            filter of this package, slower and less good; it needs nothing. "auto": "oidn" if it is
+            installed. `metadata["denoiser"]` says which it was.
+
+        Raises
+        ------
+        SceneError
+            If there is no such denoiser, or it is not installed.
+        """
+        from ..denoising import denoise, noisy_picture
+
+        source = self.noisy or self
+        picture = noisy_picture(source.rgb, source.standard_error, source.layers, source.errors)
+        rgb, used = denoise(picture, denoiser)
+        error = {} if source.standard_error is None else {NOISY: source.standard_error}
+        return Image(
+            rgb,
+            source.spp,
+            {**source.metadata, "denoiser": used},
+            counts=source.counts,
+            variance=source.variance,
+            layers={**source.layers, NOISY: source.rgb},
+            errors={**source.errors, **error},
+            names=source.names,
+            sums=source.sums,
+            scatter=source.scatter,
+        )
+
+    @property
+    def noisy(self) -> Image | None:
+        """The picture before denoising; None if this one was not denoised."""
+        if NOISY not in self.layers:
+            return None
+        return Image(
+            self.layers[NOISY],
+            self.spp,
+            {name: value for name, value in self.metadata.items() if name != "denoiser"},
+            counts=self.counts,
+            variance=self.variance,
+            standard_error=self.errors.get(NOISY),
+            layers={name: layer for name, layer in self.layers.items() if name != NOISY},
+            errors={name: error for name, error in self.errors.items() if name != NOISY},
+            names=self.names,
+            sums=self.sums,
+            scatter=self.scatter,
+        )
+
+    def merge(self, other: Image) -> Image:
+        """Return the picture of the samples of two pictures of one scene, which share none.
+
+        It is that of one render of all these samples, bit for bit; so are sampled layers. `variance` and
+        `standard_error` may differ from those of one render in how their sums are rounded; where the
+        samples of a part do not fill whole batches (of `film.batch_size`), the error is estimated from
+        batches of other lengths. Layers that are not sampled are those of this picture. In the metadata
+        counts and seconds are added, and `sample_ranges` are joined; the rest is that of this picture.
+        Of denoised pictures the noisy ones are merged.
+
+        Parameters
+        ----------
+        other
+            A picture of other samples: of `render(samples=...)`, or of a checkpoint.
+
+        Raises
+        ------
+        SceneError
+            If one of the pictures was not rendered with `samples=` (or read from a checkpoint), its
+            pixels have different numbers of samples, scenes or settings differ, or samples are in both.
+        """
+        if not isinstance(other, Image):
+            raise SceneError(f"a picture is merged with another one, got {type(other).__name__}")
+        source = self.noisy or self
+        sums = merged_sums(self.sums, other.sums)
+        image = film_image(sums, merged_metadata(source.metadata, other.metadata), keep_sums=True)
+        image.layers = {**source.layers, **image.layers}
+        image.names = self.names
+        return image
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W, 3), of `rgb`."""
+        return self.rgb.shape
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Image:
+        """Read a picture by its extension, as linear values.
+
+        exr and npz files of `save` give the same image again: rgb, layers, errors, names and metadata, bit
+        for bit. png and jpg files are decoded by the gamma that they record, as files of `save` do, and by
+        the sRGB curve if they record none. exr, hdr, npy and npz are linear. The last of two or four channels
+        becomes the layer "alpha"; colors of a png are multiplied by it. One channel of color becomes three.
+        A checkpoint gives the picture so far.
+
+        Parameters
+        ----------
+        path
+            A png, jpg, exr, hdr, npy or npz file, or a checkpoint with any extension.
+
+        Raises
+        ------
+        SceneError
+            If the file is missing, of another kind, corrupt, truncated, or too large. The message names it.
+        """
+        if is_checkpoint(path):
+            checkpoint = read_checkpoint(path)
+            with contents_of(path):
+                return film_image(checkpoint.sums, checkpoint.metadata, keep_sums=True)
+        found = read_picture(path)
+        errors = {name.removeprefix(ERROR): a for name, a in found.arrays.items() if name.startswith(ERROR)}
+        layers = {
+            name: a for name, a in found.arrays.items() if name not in FIELDS and not name.startswith(ERROR)
+        }
+        scatter = {name: array for name, array in found.sums.items() if name.startswith(SCATTER)}
+        sums = {name: array for name, array in found.sums.items() if name not in scatter}
+        return cls(
+            found.rgb,
+            found.info.get("spp", 0),
+            dict(found.metadata),
+            counts=found.arrays.get("counts"),
+            variance=found.arrays.get("variance"),
+            standard_error=found.arrays.get("standard_error"),
+            layers=layers,
+            errors=errors,
+            names=found.info.get("names"),
+            sums=restored_sums(os.fspath(path), found.rgb.shape, found.info.get("sums"), sums),
+            scatter=restored_scatter(os.fspath(path), found.rgb.shape, scatter),
+        )
+
+    def outlined(
+        self, color: ArrayLike = 0.0, width: float = 2.0, *, crease: float = 40.0, jump: float = 0.01
+    ) -> Image:
+        """Return the picture with lines where one thing ends in front of another, and along sharp edges.
+
+        The picture must have the layers `shape_id`, `normal` and `depth`: render it with
+        aovs=("shape_id", "normal", "depth"). Its layers stay as they are, except that the lines cover a
+        transparent background.
+
+        Parameters
+        ----------
+        color
+            Linear RGB of the lines, or one number.
+        width
+            Of the lines, pixels, above 0 and at most 100.
+        crease
+            Degrees, above 0 and at most 180: there is a line where the normal turns by more from one pixel to
+            the next.
+        jump
+            Above 0: there is a line where the depth changes by more than this part of itself from one pixel
+            to the next, and not as evenly as on a slanting surface.
+
+        Raises
+        ------
+        SceneError
+            If a layer is missing, or an argument is out of range.
+        """
+        wanted = "shape_id", "normal", "depth"
+        missing = [name for name in wanted if name not in self.layers]
+        if missing:
+            raise SceneError(f"outlines: the image has no layer {missing[0]!r}; render it with aovs={wanted}")
+        ink = rgb("outlines: color", color)[:, 0]
+        width = number("outlines: width", width, lambda x: 0 < x <= 100, "above 0 and at most 100")
+        crease = number("outlines: crease", crease, lambda x: 0 < x <= 180, "above 0 and at most 180")
+        jump = number("outlines: jump", jump, lambda x: x > 0, "above 0")
+        ids, normal, depth = (self.layers[name] for name in wanted)
+        covered = outline_coverage(ids, normal, depth, width, crease, jump)
+        left: NDArray[np.float32] = 1 - covered[..., None]
+        layers = dict(self.layers)
+        if "alpha" in layers:
+            layers["alpha"] = layers["alpha"] * (1 - covered) + covered
+        return Image(
+            np.asarray(self.rgb * left + ink * covered[..., None], np.float32),
+            self.spp,
+            self.metadata,
+            counts=self.counts,
+            variance=None if self.variance is None else self.variance * left**2,
+            standard_error=None if self.standard_error is None else self.standard_error * left,
+            layers=layers,
+            errors=self.errors,
+            names=self.names,
+            scatter=self.scatter,
+        )
+
+    def to_uint8(
+        self,
+        gamma: Gamma = 2.2,
+        exposure: float = 0.0,
+        tone: str = "none",
+        white_balance: WhiteBalance | None = None,
+    ) -> NDArray[np.uint8]:
+        """Return the picture as codes for display, the same that `save` writes into a png.
+
+        Parameters
+        ----------
+        gamma
+            Values are clipped to [0, 1] and raised to 1/gamma; "srgb" is the exact sRGB curve.
+        exposure
+            Stops (factors of 2) by which the picture is brightened first.
+        tone
+            The curve that maps radiance above 1 into the range of a display: "none", "reinhard", "aces" or
+            "agx" (`codecs/tone.py` names their sources).
+        white_balance
+            Color temperature of the light, 1667 to 25000 K, or the linear RGB of something gray in the
+            picture. It is made neutral after the exposure. 6504 K changes nothing.
+
+        Returns
+        -------
+        NDArray[np.uint8]
+            (H, W, 3); with a transparent background (H, W, 4), colors not multiplied by alpha.
+
+        Raises
+        ------
+        SceneError
+            If a value is out of range.
+        """
+        return self._codes(Display(gamma, exposure, tone, white_balance), bits=8)
+
+    def to_uint16(
+        self,
+        gamma: Gamma = 2.2,
+        exposure: float = 0.0,
+        tone: str = "none",
+        white_balance: WhiteBalance | None = None,
+    ) -> NDArray[np.uint16]:
+        """Return the picture as codes of 16 bits; parameters and shape are those of `to_uint8`."""
+        return self._codes(Display(gamma, exposure, tone, white_balance), bits=16)
+
+    def to_pil(
+        self,
+        gamma: Gamma = 2.2,
+        exposure: float = 0.0,
+        tone: str = "none",
+        white_balance: WhiteBalance | None = None,
+    ) -> Any:
+        """Return the picture as a `PIL.Image.Image`, RGB or RGBA; the parameters are those of `to_uint8`."""
+        from PIL.Image import fromarray
+
+        return fromarray(self.to_uint8(gamma, exposure, tone, white_balance))
+
+    def show(
+        self,
+        gamma: Gamma = 2.2,
+        exposure: float = 0.0,
+        tone: str = "none",
+        white_balance: WhiteBalance | None = None,
+    ) -> None:
+        """Show the picture: in a notebook below the cell, else in the system's viewer.
+
+        The parameters are those of `to_uint8`.
+        """
+        picture = self.to_pil(gamma, exposure, tone, white_balance)
+        if "IPython" in sys.modules and sys.modules["IPython"].get_ipython() is not None:
+            from IPython.display import display
+
+            display(picture)
+        else:
+            picture.show()
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        gamma: Gamma = 2.2,
+        exposure: float = 0.0,
+        tone: str = "none",
+        white_balance: WhiteBalance | None = None,
+        *,
+        bits: int = 8,
+    ) -> None:
+        """Write the picture by its extension: png or jpg for display; exr, hdr, npy and npz linear.
+
+        exr and npz hold everything: layers, errors, counts, names and metadata, and npz the sums for `merge`.
+        Where exposure or white balance change rgb, they hold only rgb and the alpha of a transparent
+        background, since the rest belongs to the picture before. A transparent background gives a png an
+        alpha channel; hdr, npy and jpg have none, so it is black there. `docs/formats.md` has the names of
+        all channels.
+
+        The file holds its old content or all of the new content, never a part. It keeps its permissions, and
+        symbolic links are followed.
+
+        Parameters
+        ----------
+        path
+            Where to write.
+        gamma
+            png and jpg hold value^(1/gamma), and record gamma; "srgb" is the exact sRGB curve.
+        exposure
+            Stops (factors of 2) by which the picture is brightened first, in every format.
+        tone
+            A tone curve for png and jpg, as in `to_uint8`.
+        white_balance
+            The color that becomes neutral, in every format, as in `to_uint8`.
+        bits
+            Bits of each channel of a png, 8 or 16.
+
+        Raises
+        ------
+        SaveError
+            If the file cannot be written: an unknown extension, a folder that is missing, no space, or a
+            tone or bits that the format cannot hold. It is a SceneError and an OSError.
+        SceneError
+            If gamma, exposure, tone or white balance is out of range.
+        """
+        write_image(path, self._data(), Display(gamma, exposure, tone, white_balance), bits)
+
+    def plot(self, name: str = "rgb", axes: Any = None) -> Any:
+        """Plot the picture or a layer with matplotlib.
+
+        Layers of one number per pixel are shown in false color with a color bar, ids in distinct colors with
+        a legend of their names, colors as `to_uint8` shows them, normals and positions as colors.
+
+        Parameters
+        ----------
+        name
+            "rgb", "luminance" (of rgb), a layer, or "counts", "variance" or "standard_error".
+        axes
+            Axes of matplotlib to draw into; by default those of a new figure.
+
+        Returns
+        -------
+        Any
+            The axes.
+
+        Raises
+        ------
+        SceneError
+            If there is no such layer.
+        ImportError
+            If matplotlib is not installed. The message says how to install it.
+        """
+        from . import plot
+
+        arrays = {**self._data().named(), "luminance": luminance(np.moveaxis(self.rgb, -1, 0))}
+        if name in LAYERS and name not in arrays:
+            raise SceneError(f"plot: the image has no layer {name!r}; render it with aovs=({name!r},)")
+        values = arrays[one_of("layer", name, arrays)]
+        table = self.names.get(name.removesuffix("_id"), {}) if name.endswith("_id") else None
+        return plot.draw(name, self.to_uint8()[..., :3] if name == "rgb" else values, table, axes)
+
+    def _data(self) -> ImageData:
+        """Return all of the image as files hold it."""
+        arrays = {name: getattr(self, name) for name in FIELDS if getattr(self, name) is not None}
+        arrays |= self.layers | {ERROR + name: values for name, values in self.errors.items()}
+        info: dict[str, Any] = {"spp": self.spp, "metadata": self.metadata, "names": self.names}
+        kept = scatter_arrays(self.scatter)
+        if self.sums is None:
+            return ImageData(self.rgb, arrays, info, kept)
+        return ImageData(self.rgb, arrays, {**info, "sums": self.sums.info}, {**self.sums.arrays(), **kept})
+
+    def _codes(self, display: Display, bits: int) -> NDArray[Any]:
+        return display.codes(display.adjusted(self._data()), bits)
+
+    def _repr_png_(self) -> bytes:
+        """Show the picture in a notebook."""
+        return png_jpeg.encode(self.to_uint8(), ".png", 2.2)
+
+    def _repr_html_(self) -> str:
+        """Show the picture in a notebook, with its size, samples, error, time and layers."""
+        height, width = self.rgb.shape[:2]
+        facts = [f"{width} × {height}", f"{self.spp} spp"]
+        noise = self.metadata.get("noise", np.nan)
+        if np.isfinite(noise):
+            facts.append(f"error {noise:.2%}{' before denoising' if 'denoiser' in self.metadata else ''}")
+        if "seconds" in self.metadata:
+            facts.append(f"{self.metadata['seconds']:.1f} s")
+        if self.layers:
+            facts.append(f"layers: {', '.join(self.layers)}")
+        caption = escape(" · ".join(facts))
+        return f"<div>{picture_html(self._repr_png_())}<div><small>{caption}</small></div></div>"
+
+
+def film_image(sums: PictureSums, metadata: Mapping[str, Any], keep_sums: bool) -> Image:
+    """Return the picture on a film and its layers; a pixel without samples is black.
+
+    Its noise joins the metadata. With `keep_sums` the picture refers to the sums, which must not change then.
+    """
+    image = _film_rgb(sums.film, metadata)
+    image.sums = sums if keep_sums else None
+    _add_layers(image, sums)
+    return image
+
+
+def _checked_pixels(rgb: Any) -> NDArray[Any]:
+    """Return the pixels of a picture as they are, but as an array.
+
+    Raises
+    ------
+    SceneError
+        If there are none.
+    """
+    pixels = as_array("image rgb", rgb)
+    if pixels.ndim != 3 or not pixels.size:
+        raise SceneError(f"image rgb must have shape (H, W, 3), with at least one pixel, got {pixels.shape}")
+    return pixels
+
+
+def last_film_image(sums: PictureSums, metadata: Mapping[str, Any]) -> Image:
+    """Return the picture as `film_image` does; the film is left without what its errors were made of."""
+    image = _film_rgb(sums.film, metadata)
+    sums.film.release_errors()
+    _add_layers(image, sums)
+    return image
+
+
+def _film_rgb(film: Film, metadata: Mapping[str, Any]) -> Image:
+    """Return the picture on a film, without layers."""
+    width, height = film.size
+    shape = height, width, 3
+    estimates = film.estimates()
+    error = estimates.standard_error.reshape(shape)
+    scatter: tuple[Scatter, ...] = ()
+    if metadata.get("reuse") and {"film", "window"} <= metadata.keys():
+        whole, window = metadata["film"], metadata["window"]
+        scatter = film_scatter(film, error, (int(whole[0]), int(whole[1])), (int(window[0]), int(window[1])))
+    return Image(
+        estimates.mean.reshape(shape),
+        round(float(film.count.mean())),
+        {**metadata, "noise": estimates.noise, "rare": estimates.rare},
+        counts=film.used().reshape(height, width).copy(),
+        variance=estimates.variance.reshape(shape),
+        standard_error=error,
+        scatter=scatter,
+    )
+
+
+def _as_arrays(value: Any) -> Any:
+    """Return a value with `rgb` in place of the pictures in it."""
+    if isinstance(value, Image):
+        return value.rgb
+    if isinstance(value, tuple | list):
+        return type(value)(map(_as_arrays, value))
+    return value
+
+
+def _add_layers(image: Image, sums: PictureSums) -> None:
+    """Add the sampled layers to a picture."""
+    if sums.layers is None:
+        return
+    width, height = sums.film.size
+    for name in sums.layers.names:
+        found = sums.layers.estimate(name, sums.film.sums, sums.film.used())
+        image.layers[name] = _of_shape(found.mean, width, height)
+        image.errors[name] = _of_shape(found.standard_error, width, height)
+    if sums.film.light is not None and "indirect" in image.layers:
+        _add_light_paths(image, sums.film.light)
+    if CLAMPED in image.layers:
+        image.metadata[CLAMPED] = _removed_part(image.rgb, image.layers[CLAMPED])
+
+
+def _add_light_paths(image: Image, light: LightSums) -> None:
+    """Add what light paths have found, all of it indirect light, to that layer of a picture."""
+    layer, error = (values.reshape(-1, 3) for values in (image.layers["indirect"], image.errors["indirect"]))
+    for part in chunks(len(layer)):
+        layer[part] += light.mean(part).T
+        error[part] = np.sqrt(np.square(error[part], dtype=np.float64) + light.squared_error(part).T)
+
+
+def _removed_part(rgb: Floats, removed: Floats) -> float:
+    """Return the part of the light that is not in a picture (H, W, 3) because it was `removed`, as it is."""
+    left, lost = (float(values.mean(dtype=np.float64)) for values in (rgb, removed))
+    return lost / (left + lost) if lost else 0.0
+
+
+def _of_shape(values: Floats, width: int, height: int) -> Floats:
+    """Return a layer (pixels, c) as (height, width, c), or (height, width) if it has one channel."""
+    return values.reshape((height, width, -1) if values.shape[1] > 1 else (height, width))

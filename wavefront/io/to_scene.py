@@ -1,0 +1,200 @@
+"""What can be rendered, as a scene and the camera that sees it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from copy import copy
+from typing import Any
+
+import numpy as np
+
+from ..camera import Camera
+from ..core.errors import SceneError
+from ..core.progress import Progress
+from ..lights import Light
+from ..materials import Material, MaterialLike, as_material
+from ..scene.scene import AUTO, FRAMING_FOV, FRAMING_VIEW, Scene, importer, register_importer
+from ..shapes import Instance, Mesh, Shape
+
+SIZE = (512, 512)  # pixels
+CAN_BE_RENDERED = (
+    "a wf.Scene, a path, a mesh of trimesh, PyVista or Open3D, (vertices, faces) as a tuple, a shape such as "
+    "wf.Mesh, wf.Rectangle, wf.Disk or wf.Sphere, or a list of these"
+)
+
+
+def as_scene(
+    subject: Any,
+    material: MaterialLike | None = None,
+    progress: Progress = None,
+    smooth: bool | float | str = AUTO,
+    within: tuple[int, ...] = (),
+) -> Scene:
+    """Return what `render` was given as a `Scene`.
+
+    Parameters
+    ----------
+    subject
+        As for `render`.
+    material
+        What bare meshes are made of; None leaves everything as it is.
+    progress
+        As for `load`.
+    smooth
+        As for `render`.
+    within
+        The lists, by their ids, in which it is.
+
+    Raises
+    ------
+    SceneError
+        If it is nothing that can be rendered, or a list that contains itself, or the material or `smooth` is
+        meant for what has its own.
+    """
+    if material is not None:
+        material = as_material("material", material)
+    if isinstance(subject, Scene):
+        if material is not None:
+            raise SceneError("material is for bare meshes; in a wf.Scene set those of its shapes")
+        if smooth != AUTO:
+            raise SceneError("smooth is for bare meshes; for those of a wf.Scene use Mesh(..., smooth=...)")
+        subject.check()
+        return subject
+    if isinstance(subject, Shape):
+        return Scene([_made_of(subject, material, smooth)])
+    if isinstance(subject, str | os.PathLike):
+        from .load import load  # here, so that scenes in memory do not pay for readers
+
+        return _all_made_of(load(subject, progress=progress, smooth=smooth), material)
+    convert = importer(subject)
+    if convert is not None:
+        return _all_made_of(convert(subject, smooth), material)
+    if _is_pair(subject):
+        return Scene([Mesh(*subject, material=material, smooth=False if smooth == AUTO else smooth)])
+    if isinstance(subject, list | tuple) and subject:
+        if id(subject) in within:
+            raise SceneError("cannot render a list that contains itself")
+        return _joined(subject, material, progress, smooth, (*within, id(subject)))
+    what = "an empty list" if isinstance(subject, list | tuple) and not subject else type(subject).__name__
+    raise SceneError(f"cannot render {what}: give {CAN_BE_RENDERED}")
+
+
+def choose_camera(
+    scene: Scene,
+    camera: Camera | None,
+    size: tuple[int, int] | None,
+    up: Any = AUTO,
+    view: Any = None,
+    fov: float | None = None,
+    turning: bool = False,
+) -> tuple[Camera, bool]:
+    """Return the camera that sees a scene, and whether it was made to frame it.
+
+    Parameters
+    ----------
+    scene
+        What is seen.
+    camera
+        In place of the scene's own. Without either the scene is framed, and with a `view`.
+    size
+        (width, height) in pixels, in place of the camera's.
+    up
+        What is up in the scene, as for `render`: it turns the camera that frames it.
+    view, fov
+        As for `render`.
+    turning
+        As of `Scene.framing_camera`.
+
+    Raises
+    ------
+    SceneError
+        If one of the last is meant for a camera that frames the scene, and there is another.
+    """
+    if camera is None and view is None:  # a camera that is given counts more than a view
+        camera = scene.camera
+        if camera is not None and fov is not None:
+            raise SceneError(f"fov is {fov:g}; the scene has a camera of its own, or give a view to frame it")
+    if camera is not None:
+        return camera if size is None else camera.resized(size), False
+    if size is None:
+        size = SIZE if scene.camera is None else scene.camera.size
+    view, fov = FRAMING_VIEW if view is None else view, FRAMING_FOV if fov is None else fov
+    return scene.framing_camera(fov, size, up=up, direction=view, turning=turning), True
+
+
+def _is_pair(subject: Any) -> bool:
+    """Return True for (vertices, faces)."""
+    if not isinstance(subject, tuple) or len(subject) != 2:
+        return False
+    return all(isinstance(part, np.ndarray | list | tuple) for part in subject) and not any(
+        isinstance(item, Shape) or importer(item) is not None for part in subject for item in part[:1]
+    )
+
+
+def _joined(
+    subjects: Sequence[Any],
+    material: Material | None,
+    progress: Progress,
+    smooth: bool | float | str,
+    within: tuple[int, ...],
+) -> Scene:
+    """Return one scene of all; the camera, and what is up, is the first that there is."""
+    lights = [item for item in subjects if isinstance(item, Light)]
+    bodies = (item for item in subjects if not isinstance(item, Light))
+    parts = [as_scene(item, material, progress, smooth, within) for item in bodies]
+    cameras = [part.camera for part in parts if part.camera is not None]
+    return Scene(
+        [shape for part in parts for shape in part.shapes],
+        [*lights, *(light for part in parts for light in part.lights)],
+        cameras[0] if cameras else None,
+        up=next((part.up for part in parts if part.up is not None), None),
+    )
+
+
+def _made_of(shape: Shape, material: Material | None, smooth: bool | float | str) -> Shape:
+    """Return a user's shape with a material and normals; the user's own stays as it is."""
+    if material is None and smooth == AUTO:
+        return shape
+    mesh = shape.mesh if isinstance(shape, Instance) else shape
+    bare = copy(shape)
+    if material is not None:
+        if shape.has_material or mesh.has_material:
+            raise SceneError(f"material is for bare meshes; {shape.name} has a material of its own")
+        bare.material = material
+    if smooth != AUTO and isinstance(shape, Instance):
+        raise SceneError(f"smooth is for bare meshes; {shape.name} is an instance: use Mesh(..., smooth=...)")
+    if smooth != AUTO and isinstance(bare, Mesh):
+        bare.compute_normals(smooth)
+    return bare
+
+
+def _all_made_of(scene: Scene, material: Material | None) -> Scene:
+    """Give all shapes of a scene that was just read a material in place of their own."""
+    for shape in scene.shapes if material is not None else ():
+        bare = shape.mesh if isinstance(shape, Instance) else shape
+        bare.material = material
+    return scene
+
+
+def _imported(geometry: Any, smooth: bool | float | str = AUTO) -> Scene:
+    from .load import from_trimesh
+
+    return from_trimesh(geometry, smooth=smooth)
+
+
+def _from_pyvista(data: Any, smooth: bool | float | str = AUTO) -> Scene:
+    from .foreign import from_pyvista
+
+    return from_pyvista(data, smooth=smooth)
+
+
+def _from_open3d(data: Any, smooth: bool | float | str = AUTO) -> Scene:
+    from .foreign import from_open3d
+
+    return from_open3d(data, smooth=smooth)
+
+
+register_importer("trimesh", _imported)
+register_importer("pyvista", _from_pyvista)
+register_importer("open3d", _from_open3d)

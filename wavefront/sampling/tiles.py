@@ -1,0 +1,121 @@
+"""Interleaved tiles: pixels, some distance apart, whose paths share what they find.
+
+The picture is divided into blocks of SIDE² cells. Each cell has STRIDE² pixels, one of each of the STRIDE²
+tiles of its block. A hash of block and cell shifts the tiles within the cell, so the pixels of a tile lie at
+irregular distances, and the noise that they share does not repeat. Tiles depend on the place in the whole
+picture alone, and are the same for every sample: a pixel that needs more samples needs them together with the
+others of its tile, in one job. Partners that change from sample to sample would lose the stratification of
+what a pixel gets from the others.
+
+Source: A. Keller and W. Heidrich, "Interleaved Sampling", Eurographics Workshop on Rendering 2001.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays.record import record
+from ..arrays.state import Words
+from ..arrays.vec import Ints
+
+SIDE = 4  # cells of a block, in each direction; each has a pixel of every tile
+STRIDE = 7  # pixels of a cell, in each direction
+MEMBERS = SIDE * SIDE
+
+
+def place_in_tiles(pixel: Words, width: int) -> tuple[Ints, Ints]:
+    """Return the number of the tile of each pixel (n,), and which of its members it is, (n,).
+
+    Parameters
+    ----------
+    pixel
+        (n,) row-major indices in a picture so many pixels wide.
+    """
+    block = SIDE * STRIDE
+    number = pixel.astype(np.intp)
+    y = number // width
+    x = number - y * width
+    block_x, block_y = x // block, y // block
+    member = (y % block // STRIDE) * SIDE + x % block // STRIDE
+    shift_x, shift_y = cell_shifts(block_x, block_y, member)
+    tile_x, tile_y = (x + shift_x) % STRIDE, (y + shift_y) % STRIDE
+    across = -(-width // block)
+    tile = ((block_y * across + block_x) * STRIDE + tile_y) * STRIDE + tile_x
+    return tile, member
+
+
+def cell_shifts(block_x: Ints, block_y: Ints, member: Ints) -> tuple[Ints, Ints]:
+    """Return by how many pixels, (n,) in x and y, the tiles of cells are shifted: a hash of the cells.
+
+    The hash is that of C. Wellons, Prospecting for Hash Functions, 2018, lowbias32.
+    """
+    h = (block_x * 0x9E3779B1 + block_y * 0x85EBCA77 + member * 0xC2B2AE3D).astype(np.uint32)
+    for shift, factor in ((16, 0x7FEB352D), (15, 0x846CA68B)):
+        h ^= h >> np.uint32(shift)
+        h *= np.uint32(factor)
+    h ^= h >> np.uint32(16)
+    return (h % STRIDE).astype(np.intp), (h // STRIDE % STRIDE).astype(np.intp)
+
+
+def others_in_tile(pixel: Words, one: int, width: int) -> Ints:
+    """Return which of pixels (n,) share the tile of pixel[one], without that one; arguments as above."""
+    tile, _ = place_in_tiles(pixel, width)
+    same = np.flatnonzero(tile == tile[one])
+    return same[same != one]
+
+
+@record
+class WaveTiles:
+    """The tiles of the paths of a wave: those of one tile and one sample belong together.
+
+    Pixels that a tile lacks, because they lie outside of the picture or need no samples, are not in it.
+    """
+
+    tile: Ints  # (n,) number of the tile of each path, from 0 on
+    member: Ints  # (n,) which member of the tile it is
+    count: int  # number of tiles
+
+    @classmethod
+    def of(cls, pixel: Words, sample: Words, width: int) -> WaveTiles:
+        """Return the tiles of paths, given pixels (n,) and samples (n,)."""
+        tile, member = place_in_tiles(pixel, width)
+        key = (sample.astype(np.intp) << 32) | tile
+        order = np.argsort(key, kind="stable")
+        ordered = key.take(order)
+        number = np.empty(key.size, np.intp)
+        number[order] = np.cumsum(np.diff(ordered, prepend=ordered[:1]) != 0)
+        return cls(number, member, int(number.max(initial=-1)) + 1)
+
+    def grid(self, path: Ints, which: Ints | None = None) -> Ints:
+        """Return which of some paths belongs to each member of each tile, (MEMBERS, tiles); -1 for none.
+
+        Parameters
+        ----------
+        path
+            (k,) paths of the wave. The result holds indices into this array.
+        which
+            Indices of those that count, at most one for each member of a tile; None for all.
+        """
+        numbers = np.arange(path.size) if which is None else which
+        path = path.take(numbers)
+        grid = np.full((MEMBERS, self.count), -1, np.intp)
+        grid[self.member.take(path), self.tile.take(path)] = numbers
+        return grid
+
+
+def whole_tiles(pixel: Words, width: int) -> tuple[Ints, Ints]:
+    """Return an order (n,) of pixels (n,) in which the members of each tile follow each other, and its cuts.
+
+    Cuts (k,) are the places in this order at which a tile ends, rising. Tiles come in the order of
+    their last pixels, so that as many whole rows as possible lie side by side.
+    """
+    tile, _ = place_in_tiles(pixel, width)
+    by_tile = np.argsort(tile, kind="stable")
+    ends = np.append(np.flatnonzero(np.diff(tile.take(by_tile))) + 1, pixel.size)
+    sizes = np.diff(ends, prepend=0)
+    last = pixel.take(by_tile.take(ends - 1))  # pixels rise, also within a tile
+    in_turn = np.argsort(last, kind="stable")
+    turn = np.empty(ends.size, np.intp)
+    turn[in_turn] = np.arange(ends.size)
+    order = by_tile.take(np.argsort(np.repeat(turn, sizes), kind="stable"))
+    return order, np.cumsum(sizes.take(in_turn))

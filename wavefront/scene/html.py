@@ -1,0 +1,82 @@
+"""What notebooks show for a scene: counts, bounds, and tables of its materials and lights."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Camera
+from ..core.counted import counted
+from ..core.html import table_html
+from ..core.parameter import brief
+from ..lights import Light
+from ..shapes import Instance, Mesh, PrimitiveArray, Shape
+
+
+def scene_html(
+    shapes: Sequence[Shape],
+    lights: Sequence[Light],
+    camera: Camera | None,
+    bounds: NDArray[np.float64] | None,
+) -> str:
+    """Return a scene as HTML.
+
+    Parameters
+    ----------
+    shapes, lights, camera
+        What it holds.
+    bounds
+        (2, 3) lower and upper corner; None if there are no shapes.
+    """
+    lines = [", ".join(_counts(shapes, lights))]
+    if bounds is not None:
+        lines.append(f"bounds {brief(bounds[0])} to {brief(bounds[1])}")
+    lines.append("no camera; the scene is framed" if camera is None else repr(camera))
+    text = "<br>".join(escape(line) for line in lines)
+    tables = table_html("Materials", _material_rows(shapes)) + table_html(
+        "Lights", _light_rows(shapes, lights)
+    )
+    return f"<div><b>Scene</b><br>{text}{tables}</div>"
+
+
+def _counts(shapes: Sequence[Shape], lights: Sequence[Light]) -> list[str]:
+    """Return how many there are of each kind."""
+    bare = [shape.mesh if isinstance(shape, Instance) else shape for shape in shapes]
+    counts = {
+        "shape": len(shapes),
+        "instance": sum(isinstance(shape, Instance) for shape in shapes),
+        "triangle": sum(len(shape.faces) for shape in bare if isinstance(shape, Mesh)),
+        "curved primitive": sum(_curved(shape) for shape in bare),
+        "light": len(lights) + sum(shape.emission is not None for shape in shapes),
+    }
+    return [counted(count, kind) for kind, count in counts.items() if count or kind in ("shape", "light")]
+
+
+def _curved(shape: Shape) -> int:
+    if isinstance(shape, PrimitiveArray):
+        return shape.count
+    return 0 if isinstance(shape, Mesh) else 1
+
+
+def _material_rows(shapes: Sequence[Shape]) -> list[list[Any]]:
+    """Return each material once: its name, what it is, and what is made of it."""
+    users: dict[int, list[Shape]] = {}
+    for shape in shapes:
+        users.setdefault(id(shape.material), []).append(shape)
+    rows = []
+    for made in users.values():
+        material = made[0].material
+        of = made[0].name if len(made) == 1 else f"{len(made)} shapes"
+        rows.append([material.name or "", repr(material.bsdf), of])
+    return rows
+
+
+def _light_rows(shapes: Sequence[Shape], lights: Sequence[Light]) -> list[list[Any]]:
+    """Return the lights, and the shapes that emit."""
+    rows = [[repr(light), ""] for light in lights]
+    emitting = [shape for shape in shapes if shape.emission is not None]
+    return rows + [[repr(shape), f"emits {brief(shape.emission)}"] for shape in emitting]

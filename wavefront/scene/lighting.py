@@ -1,0 +1,303 @@
+"""Ready-made light for scenes that have none of their own, and a ground that catches their shadow.
+
+The light of a preset is an environment image: a gradient with soft boxes. The boxes are above the horizon, as
+in a photo studio. The gradient alone is the backdrop that a camera sees behind the scene; mirrors and glass
+show the boxes, too.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays.elementary import sin_cos_turns
+from ..arrays.record import record
+from ..arrays.vec import Doubles
+from ..bsdfs import Diffuse
+from ..camera import Camera, upward
+from ..core.errors import SceneError
+from ..lights import Environment
+from ..materials import Material
+from ..shapes import Disk, Mesh
+from ..textures.image import Texture
+from .scene import Scene, turned_up
+
+HEIGHT, WIDTH = 128, 256  # pixels of an environment's image
+GROUND_REACH = 6.0  # radius of the ground in radii of the scene
+GROUND_FADE = 0.25  # width of the faded rim, relative to the ground's radius
+MOST_GROUND = 0.9  # albedo of the ground at most
+GROUND_GAP = 1e-4  # distance of the ground from the scene, relative to the scene's half height
+OWN_LIGHT_GROUND = 0.4  # albedo of the ground where no preset is used
+
+
+@record
+class SoftBox:
+    """A bright rectangle with soft edges, infinitely far away."""
+
+    azimuth: float  # degrees from the direction of the camera, to its right
+    elevation: float  # degrees above the horizon
+    width: float  # degrees, below 180
+    height: float  # degrees, below 180
+    radiance: tuple[float, float, float]  # W·sr⁻¹·m⁻² at the center
+    feather: float = 0.35  # width of the soft edge, relative to the half width
+
+    def radiance_at(self, directions: Doubles) -> Doubles:
+        """Return the radiance (H, W, 3) from unit directions (3, H, W): x right, y up, z to the camera."""
+        across, along = sin_cos_turns(np.float64(self.azimuth / 360))
+        high, level = sin_cos_turns(np.float64(self.elevation / 360))
+        right = np.array([along, 0.0, -across])
+        ahead = np.array([across * level, high, along * level])
+        depth = np.tensordot(ahead, directions, 1)
+        in_front = depth > 1e-3
+        part = in_front.astype(float)
+        for axis, size in ((right, self.width), (np.cross(ahead, right), self.height)):
+            sin, cos = sin_cos_turns(np.float64(size / 720))
+            offset = np.abs(np.tensordot(axis, directions, 1)) / np.where(in_front, depth, 1)
+            part *= smoothstep((1 - offset * cos / sin) / self.feather)
+        return part[:, :, None] * np.array(self.radiance)
+
+
+@record
+class Preset:
+    """A gradient from bottom to top, and soft boxes."""
+
+    gradient: tuple[tuple[float, float], ...]  # sine of the elevation, rising; radiance, W·sr⁻¹·m⁻²
+    boxes: tuple[SoftBox, ...] = ()
+
+    def pixels(self) -> Doubles:
+        """Return the image (H, W, 3) of the environment, as `Environment` lays it out."""
+        return sum((box.radiance_at(_directions()) for box in self.boxes), self.backdrop())
+
+    def backdrop(self) -> Doubles:
+        """Return the same without the boxes, which a camera does not see."""
+        directions = _directions()
+        heights, levels = np.array(self.gradient).T
+        place = np.clip(np.searchsorted(heights, directions[1]) - 1, 0, len(heights) - 2)
+        step = (directions[1] - heights[place]) / np.diff(heights)[place]
+        shade = levels[place] + np.diff(levels)[place] * smoothstep(step)
+        return np.repeat(shade[:, :, None], 3, 2)
+
+    def ground_albedo(self) -> tuple[float, float, float]:
+        """Return the albedo of a level ground that is as bright as the gradient below the horizon."""
+        pixels, (_, up, _) = self.pixels(), _directions()
+        irradiance = (pixels * (np.maximum(up, 0) * _solid_angles())[:, :, None]).sum((0, 1))
+        red, green, blue = np.minimum(np.pi * self.gradient[0][1] / irradiance, MOST_GROUND).tolist()
+        return red, green, blue
+
+
+def smoothstep(x: Doubles) -> Doubles:
+    """Return 0 below 0, 1 above 1, and 3x² − 2x³ between them."""
+    x = np.clip(x, 0, 1)
+    return x * x * (3 - 2 * x)
+
+
+def _directions() -> Doubles:
+    """Return the unit directions (3, H, W) of the pixels' centers."""
+    level, high = sin_cos_turns((np.arange(HEIGHT) + 0.5)[:, None] / (2 * HEIGHT))
+    across, along = sin_cos_turns(0.5 - (np.arange(WIDTH) + 0.5) / WIDTH)
+    return np.stack([level * across, high * np.ones(WIDTH), level * along])
+
+
+def _solid_angles() -> Doubles:
+    """Return the solid angle of each pixel, (H, W) sr."""
+    _, edges = sin_cos_turns(np.arange(HEIGHT + 1) / (2 * HEIGHT))
+    return np.repeat((edges[:-1] - edges[1:])[:, None] * (2 * np.pi / WIDTH), WIDTH, 1)
+
+
+def _tinted(radiance: float, warmth: float) -> tuple[float, float, float]:
+    return radiance * (1 + warmth), radiance, radiance * (1 - warmth)
+
+
+# A surface that faces the brightest side gets 0.9 to 1.1 times the irradiance of a constant environment of
+# radiance 1, so white surfaces are not clipped. A camera at the height of `Scene.framing_camera` sees no box,
+# from any side.
+PRESETS = {
+    "studio": Preset(
+        ((-1, 0.1), (-0.4, 0.1), (0.12, 0.045), (0.95, 0.18)),
+        (
+            SoftBox(-62, 34, 60, 56, _tinted(4.6, 0.02)),  # key
+            SoftBox(75, 34, 66, 54, _tinted(1.35, -0.03)),  # fill
+            SoftBox(140, 34, 40, 40, _tinted(2.6, 0.0)),  # rim
+        ),
+    ),
+    "softbox": Preset(
+        ((-1, 0.09), (-0.4, 0.09), (0.12, 0.035), (1, 0.05)),
+        (SoftBox(-30, 52, 80, 70, _tinted(2.7, 0.01), feather=0.25),),
+    ),
+    "three_point": Preset(
+        ((-1, 0.1), (-0.4, 0.1), (0.12, 0.04), (1, 0.06)),
+        (
+            SoftBox(-45, 38, 26, 26, _tinted(17.0, 0.03)),  # key
+            SoftBox(55, 25, 34, 34, _tinted(3.2, -0.03)),  # fill
+            SoftBox(155, 42, 24, 24, _tinted(12.0, 0.0)),  # back
+        ),
+    ),
+    "cloudy": Preset(((-1, 0.1), (-0.35, 0.1), (0.12, 0.45), (1, 1.3))),
+}
+LIGHTINGS = (*PRESETS, "even")
+DEFAULT = "studio"
+FRONT = 0.35, 0.3, 1.0  # direction of the camera that light is relative to by default, where y is up
+STEEP = 1e-3  # sine between the view and the vertical below which a camera looks straight down
+
+
+def studio(preset: str = DEFAULT, *, up: ArrayLike = "y", camera: Camera | None = None) -> list[Environment]:
+    """Return the lights of a preset, to be put into a `Scene`.
+
+    Parameters
+    ----------
+    preset
+        "studio": a large key light from the left, a weak fill from the right and a rim light from behind,
+        before a dark gray gradient. "softbox": one large light before a darker one. "three_point": key, fill
+        and back light, smaller, with harder shadows. "cloudy": an overcast sky, brightest overhead. "even":
+        the same from all around.
+    up
+        Up direction of the scene: (3,), or the name of an axis, such as "z".
+    camera
+        Left, right, front and behind are relative to this camera. By default they are relative to one in
+        front of the scene, 19° to the right, also if another camera renders the scene: the light stays in
+        place while a camera moves around the scene. The `lighting` of a scene that `render` frames is
+        relative to the camera of the picture.
+
+    Returns
+    -------
+    list
+        One `Environment`. Its light comes from infinity, so it suits scenes of any size.
+
+    Raises
+    ------
+    SceneError
+        If there is no such preset, or `up` is malformed or zero.
+
+    Examples
+    --------
+    >>> scene = wf.Scene(wf.Sphere((0, 0, 0), 1), lights=wf.studio("softbox"))
+    >>> wf.render(scene, spp=1, size=(16, 16)).shape
+    (16, 16, 3)
+    """
+    if preset not in LIGHTINGS:
+        raise SceneError(f"preset is {preset!r}; it must be one of {', '.join(LIGHTINGS)}")
+    axes = _axes(up, camera)
+    if preset == "even":
+        return [Environment(1.0)]
+    pixels, backdrop = PRESETS[preset].pixels(), PRESETS[preset].backdrop()
+    return [Environment(pixels.astype(np.float32), transform=axes, backdrop=backdrop.astype(np.float32))]
+
+
+def check_lighting(lighting: str | None) -> None:
+    """Check the setting `lighting` of `render`.
+
+    Raises
+    ------
+    SceneError
+        If it is not the name of a preset, "auto" or None.
+    """
+    if lighting is not None and lighting not in ("auto", *LIGHTINGS):
+        known = ", ".join(LIGHTINGS)
+        raise SceneError(f"lighting is {lighting!r}; it must be auto, None or one of {known}")
+
+
+def choose_preset(scene: Scene, lighting: str | None) -> str | None:
+    """Return the preset that lights a scene; None for none.
+
+    "auto" means the default preset for a scene without lights, and none for other scenes.
+
+    Raises
+    ------
+    SceneError
+        If a preset is requested and the scene has an `Environment`.
+    """
+    if lighting == "auto":
+        return None if scene.emits else DEFAULT
+    if lighting is not None and any(isinstance(light, Environment) for light in scene.lights):
+        raise SceneError(
+            f"lighting={lighting!r} brings an Environment, and the scene has one; at most one is allowed"
+        )
+    return lighting
+
+
+def choose_ground(
+    ground: bool | str, chosen_light: bool, framed: Camera | None, background: object, up: ArrayLike
+) -> bool:
+    """Return whether a ground is added.
+
+    Parameters
+    ----------
+    ground
+        As for `render`: "auto" adds one where everything else is chosen, too.
+    chosen_light
+        Whether the light was chosen because the scene has none.
+    framed
+        The camera, if it was made to frame the scene.
+    background
+        As for `render`; a ground would cover it.
+    up
+        What is up: from below, a ground would hide the scene.
+    """
+    if not isinstance(ground, str):
+        return ground
+    if not chosen_light or framed is None or background is not None:
+        return False
+    return bool(framed.rotation[:, 2] @ turned_up(upward("up", up))[:, 1] > -STEEP)
+
+
+def lighted(
+    scene: Scene,
+    preset: str | None,
+    *,
+    ground: bool = False,
+    up: ArrayLike = "y",
+    camera: Camera | None = None,
+) -> Scene:
+    """Return a copy of the scene with the light of a preset and a ground; the scene itself without both.
+
+    The light is relative to the camera, as in `studio`.
+    """
+    if preset is None and not ground:
+        return scene
+    complete = copy(scene)  # keeps the accelerators of the last render
+    if preset is not None:
+        complete.lights = [*scene.lights, *studio(preset, up=up, camera=camera)]
+    if ground:
+        complete.shapes = [*scene.shapes, _ground(scene, preset, up)]
+    return complete
+
+
+def _ground(scene: Scene, preset: str | None, up: ArrayLike) -> Mesh:
+    """Return a level disk under a scene that fades out towards its rim.
+
+    Outside of shadows it is as bright as the lower half of the preset's environment, so neither an edge nor a
+    horizon is visible.
+    """
+    low, high = scene.bounds
+    center, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
+    vertical = turned_up(upward("up", up))[:, 1]
+    depth = float(np.abs(vertical) @ (high - low)) / 2  # of the lowest corner of the box below its center
+    if preset is None:
+        albedo = (OWN_LIGHT_GROUND,) * 3
+    else:
+        albedo = PRESETS[preset].ground_albedo() if preset in PRESETS else (MOST_GROUND,) * 3
+    texels = np.linspace(-1, 1, 129)
+    rim = np.sqrt(texels[:, None] * texels[:, None] + texels * texels)
+    alpha = smoothstep((1 - rim) / (1 - GROUND_FADE))
+    return Disk(
+        center - vertical * depth * (1 + GROUND_GAP),
+        vertical,
+        GROUND_REACH * radius,
+        material=Material(Diffuse(albedo), alpha=Texture(alpha, channel=0, wrap="clamp")),
+        name="ground",
+    )
+
+
+def _axes(up: ArrayLike, camera: Camera | None) -> Doubles:
+    """Return the axes right, up and front of a studio, columns of (3, 3)."""
+    turn = turned_up(upward("up", up))
+    vertical = turn[:, 1]
+    front = turn @ FRONT if camera is None else camera.rotation[:, 2]
+    if np.linalg.norm(np.cross(vertical, front)) < STEEP and camera is not None:
+        # towards the lower edge of its picture if it looks down
+        front = -camera.rotation[:, 1] * np.sign(vertical @ front)
+    right = np.cross(vertical, front)
+    right /= np.linalg.norm(right)
+    return np.stack([right, vertical, np.cross(right, vertical)], 1)

@@ -1,0 +1,427 @@
+"""Scenes: shapes, lights and a camera, as the user puts them together."""
+
+from __future__ import annotations
+
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, ClassVar, Self, SupportsIndex, TypeAlias, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..accel import AcceleratorCache
+from ..arrays.elementary import sin_cos
+from ..camera import Camera, check_camera, field_of_view, image_size, upward
+from ..camera.framing import FILL, Balls, fitting_offset, turned_balls
+from ..core.counted import counted
+from ..core.errors import SceneError, finite_array, in_brief
+from ..core.suggestions import did_you_mean, suggests_keywords
+from ..lights import Environment, Light
+from ..shapes import Instance, Mesh, PrimitiveArray, Shape
+from ..shapes.instance import instance_bounds, instance_hulls
+from .html import scene_html
+
+AUTO = "auto"
+FRAMING_FOV = 40.0  # degrees
+# directions from the center of a scene to its framing camera, where y is up
+VIEWS = {
+    "three_quarter": (0.5736, 0.4040, 0.8192),  # 35° to the right of the front, 22° above
+    "front": (0.0, 0.0, 1.0),
+    "back": (0.0, 0.0, -1.0),
+    "left": (-1.0, 0.0, 0.0),
+    "right": (1.0, 0.0, 0.0),
+    "top": (0.0, 1.0, 0.0),
+    "bottom": (0.0, -1.0, 0.0),
+    "iso": (1.0, 1.0, 1.0),
+}
+FRAMING_VIEW = "three_quarter"
+MIN_DISTANCE = 1e-2  # of a framing camera from the center, in radii of the scene
+
+
+class Scene:
+    """Shapes, lights and a camera.
+
+    Parameters
+    ----------
+    shapes
+        `Mesh`, `Sphere`, `Spheres`, `Cylinders`, `Capsules` and `Instance` objects, and what functions such
+        as `Rectangle` return; shapes with an emission are lights. Objects of trimesh are converted.
+    lights
+        `PointLight`, `SpotLight`, `DirectionalLight` and `Environment` objects, or any `Light`; at most one
+        `Environment`. A scene without any light is rendered in the light of a studio: see `render`.
+    camera
+        Without a camera, `render` uses `framing_camera`.
+    up
+        What is up, for that camera, for ready-made light and for the ground: (3,), or the name of an axis.
+        None is y. `load` sets it to z for the formats that have z up.
+
+    Notes
+    -----
+    All of it may be changed between renders. Values that are assigned or added to the lists are checked as
+    in the constructor. The accelerator of a render is kept with the scene, and is used again as long as no
+    vertex and no sphere has moved.
+
+    Raises
+    ------
+    SceneError
+        If there is no shape, or an element is of the wrong type.
+
+    Examples
+    --------
+    >>> floor = wf.Rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2))
+    >>> scene = wf.Scene([floor], lights=[wf.PointLight((0, 2, 0), 10)])
+    >>> scene.add(wf.Sphere((0, 0.5, 0), 0.5)).bounds
+    array([[-1.,  0., -1.],
+           [ 1.,  1.,  1.]])
+    """
+
+    @suggests_keywords
+    def __init__(
+        self,
+        shapes: Iterable[Any] | Any,
+        lights: Iterable[Light] | Light = (),
+        camera: Camera | None = None,
+        *,
+        up: ArrayLike | None = None,
+    ) -> None:
+        self.shapes = shapes
+        self.lights = lights
+        self.camera = camera
+        self.up = up
+        self.accelerators = AcceleratorCache()  # of the last render, for the next one
+        self.check()
+
+    def __repr__(self) -> str:
+        """Return the numbers of shapes and lights."""
+        return (
+            f"<Scene: {counted(len(self.shapes), 'shape')}, {counted(len(self.lights), 'light')}, "
+            f"camera={self.camera is not None}>"
+        )
+
+    def _repr_html_(self) -> str:
+        """Show counts, bounds, materials and lights in a notebook."""
+        return scene_html(self.shapes, self.lights, self.camera, self.bounds if self.shapes else None)
+
+    @property
+    def shapes(self) -> list[Shape]:
+        """The shapes of the scene."""
+        return self._shapes
+
+    @shapes.setter
+    def shapes(self, shapes: Any) -> None:
+        self._shapes = Shapes(shapes)
+
+    @property
+    def lights(self) -> list[Light]:
+        """The lights of the scene, besides emitting shapes."""
+        return self._lights
+
+    @lights.setter
+    def lights(self, lights: Any) -> None:
+        self._lights = Lights(lights)
+
+    @property
+    def camera(self) -> Camera | None:
+        """The camera; None means `framing_camera`."""
+        return self._camera
+
+    @camera.setter
+    def camera(self, camera: Camera | None) -> None:
+        self._camera = check_camera("camera", camera)
+
+    @property
+    def up(self) -> NDArray[np.float64] | None:
+        """What is up, (3,) of any length; None means y."""
+        return self._up
+
+    @up.setter
+    def up(self, up: ArrayLike | None) -> None:
+        self._up = None if up is None else upward("up", up)
+
+    def vertical(self, up: ArrayLike = AUTO) -> NDArray[np.float64]:
+        """Return what is up, (3,) of any length: a vector, an axis by its name, or "auto", the scene's."""
+        if isinstance(up, str) and up == AUTO:
+            return upward("up", "y") if self.up is None else self.up
+        return upward("up", up)
+
+    def add(self, *items: Any) -> Self:
+        """Add shapes, objects of trimesh, and lights; return the scene.
+
+        Raises
+        ------
+        SceneError
+            If an item is something else, or a second `Environment`; the scene is then unchanged.
+        """
+        shapes = Shapes([item for item in items if not isinstance(item, Light)])
+        lights = Lights([*self.lights, *(item for item in items if isinstance(item, Light))])
+        _check_environments(lights)
+        self.shapes.extend(shapes)
+        self._lights = lights
+        return self
+
+    def check(self) -> None:
+        """Check the scene as a whole.
+
+        Raises
+        ------
+        SceneError
+            If there is no shape, more than one `Environment`, or a face with an invalid index.
+        """
+        if not self.shapes:
+            raise SceneError("the scene has no shapes")
+        _check_environments(self.lights)
+        for shape in self.shapes:
+            if isinstance(shape, Mesh | PrimitiveArray):
+                shape.check()
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Lower and upper corner of all shapes, (2, 3), scene units."""
+        instances = [shape for shape in self.shapes if isinstance(shape, Instance)]
+        alone = [shape.bounds for shape in self.shapes if not isinstance(shape, Instance)]
+        boxes = np.concatenate([np.array(alone).reshape(-1, 2, 3), instance_bounds(instances)])
+        return np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
+
+    @property
+    def emits(self) -> bool:
+        """True if the scene has any light."""
+        return bool(self.lights) or any(shape.emission is not None for shape in self.shapes)
+
+    @suggests_keywords
+    def framing_camera(
+        self,
+        fov: float = FRAMING_FOV,
+        size: tuple[int, int] = (512, 512),
+        *,
+        up: ArrayLike = AUTO,
+        direction: ArrayLike = FRAMING_VIEW,
+        turning: bool = False,
+    ) -> Camera:
+        """Return a camera that sees the whole scene, which fills 85 % of the picture's width or height.
+
+        Parameters
+        ----------
+        fov
+            Vertical field of view, degrees.
+        size
+            (width, height) in pixels.
+        up
+            Up direction of the picture: (3,), or the name of an axis; "auto" is that of the scene. With "y"
+            the front is the side of +z, with "z" that of -y.
+        direction
+            From where it looks: "three_quarter" (35° to the right of the front and 22° above), "front",
+            "back", "left", "right", "top", "bottom" or "iso"; or (3,) from the center of the scene to the
+            camera, of any length.
+        turning
+            Leaves room for a whole turn of the scene about the vertical through its center, as for
+            `turntable`.
+
+        Raises
+        ------
+        SceneError
+            If an argument is malformed or out of range.
+        """
+        framed = [shape for shape in self.shapes if shape.framed]
+        if framed and len(framed) < len(self.shapes):
+            return Scene(framed).framing_camera(fov, size, up=up, direction=direction)
+        size = image_size(size)
+        fov = field_of_view(fov)
+        turn = turned_up(self.vertical(up))
+        view = view_direction("direction", direction)
+        if isinstance(direction, str):
+            view = turn @ view
+        low, high = self.bounds
+        middle, reach = (low + high) / 2, float(np.linalg.norm(high - low)) / 2 or 1.0
+        camera_up = turn[:, 1]
+        # seen from above or below, the front is at the bottom of the picture
+        if np.linalg.norm(np.cross(camera_up, view)) < 1e-6:
+            camera_up = -turn[:, 2] * np.sign(view @ camera_up)
+        axes = Camera.look_at(middle + view * reach, middle, camera_up).rotation
+        centers, radii = self._hull()
+        balls = (centers - middle, radii)
+        if turning:
+            balls = turned_balls(balls, turn)
+        sin, cos = sin_cos(np.float64(np.radians(fov) / 2))
+        half = FILL * float(sin / cos)
+        x, y, z = fitting_offset(balls, axes, (half * size[0] / size[1], half))
+        beside, distance = middle + axes[:, 0] * x + axes[:, 1] * y, max(z, MIN_DISTANCE * reach)
+        return Camera.look_at(beside + axes[:, 2] * distance, beside, axes[:, 1], fov, size=size)
+
+    def _hull(self) -> Balls:
+        """Return balls whose convex hull holds all shapes."""
+        found = [shape.hull() for shape in self.shapes if not isinstance(shape, Instance)]
+        instances = [shape for shape in self.shapes if isinstance(shape, Instance)]
+        found += [(points, np.zeros(len(points))) for points in instance_hulls(instances)]
+        return np.concatenate([centers for centers, _ in found]), np.concatenate(
+            [radii for _, radii in found]
+        )
+
+
+def view_direction(name: str, view: ArrayLike) -> NDArray[np.float64]:
+    """Return the unit direction (3,) of a view, from its name, where y is up, or from a vector.
+
+    Raises
+    ------
+    SceneError
+        If there is no such view, or the vector is malformed or zero.
+    """
+    if isinstance(view, str):
+        if view not in VIEWS:
+            known = ", ".join(VIEWS)
+            hint = did_you_mean(view, VIEWS)
+            raise SceneError(f"{name} is {view!r}; it must be a direction (3,), or one of {known}{hint}")
+        view = VIEWS[view]
+    direction = finite_array(name, view, (3,))
+    if not direction.any():
+        raise SceneError(f"{name} is {direction.tolist()}; it must not be zero")
+    direction = direction / np.abs(direction).max()
+    return direction / np.linalg.norm(direction)
+
+
+T = TypeVar("T")
+Importer: TypeAlias = Callable[..., Scene]  # of an object, and `smooth` as for `load`
+_IMPORTERS: dict[str, Importer] = {}  # by the package of an object's class
+
+
+def register_importer(package: str, convert: Importer) -> None:
+    """Let scenes take objects of a package's classes in place of shapes.
+
+    Parameters
+    ----------
+    package
+        First part of the name of the modules that define the classes.
+    convert
+        Called with an object, and with `smooth` where that is given; returns a scene, whose shapes are used.
+    """
+    _IMPORTERS[package] = convert
+
+
+def importer(item: Any) -> Importer | None:
+    """Return the function that converts an object of another package to a scene, or None."""
+    packages = (kind.__module__.split(".")[0] for kind in type(item).__mro__)
+    return next((_IMPORTERS[package] for package in packages if package in _IMPORTERS), None)
+
+
+class CheckedList(list[T], ABC):
+    """A list that checks and converts its elements.
+
+    Parameters
+    ----------
+    items
+        A list, or a single element.
+    """
+
+    name: ClassVar[str]
+    allowed: ClassVar[str]  # for messages
+
+    def __init__(self, items: Any = ()) -> None:
+        super().__init__()
+        self.extend([items] if self.converted(items) is not None else items)
+
+    @abstractmethod
+    def converted(self, item: Any) -> list[T] | None:
+        """Return the elements for an item, None if the item is not allowed."""
+
+    @abstractmethod
+    def hint(self, item: Any) -> str:
+        """Return where an item belongs that is not allowed here, for messages; "" where that is unknown."""
+
+    def append(self, item: Any) -> None:
+        """Add an element at the end."""
+        self.extend([item])
+
+    def extend(self, items: Any) -> None:
+        """Add elements at the end."""
+        super().extend(self._all(items, len(self)))
+
+    def insert(self, index: SupportsIndex, item: Any) -> None:
+        """Add an element before another."""
+        self[index:index] = [item]
+
+    def __iadd__(self, items: Any) -> Self:  # type: ignore[override, misc]
+        """Add elements at the end."""
+        self.extend(items)
+        return self
+
+    def __setitem__(self, index: Any, value: Any) -> None:
+        """Replace elements."""
+        if isinstance(index, slice):
+            super().__setitem__(index, self._all(value, index.indices(len(self))[0]))
+        else:
+            first = range(len(self))[index]
+            super().__setitem__(slice(first, first + 1), self._all([value], first))
+
+    def _all(self, items: Any, first: int) -> list[T]:
+        """Return the elements for items; `first` is the index of the first one in the list, for messages."""
+        if isinstance(items, str | dict) or not isinstance(items, Iterable):
+            hint = self.hint(items)
+            raise SceneError(f"{self.name} must be a list of {self.allowed}, got {in_brief(items)}{hint}")
+        found: list[T] = []
+        for number, item in enumerate(items, first):
+            elements = self.converted(item)
+            if elements is None:
+                what, hint = in_brief(item), self.hint(item)
+                raise SceneError(f"{self.name}[{number}] is {what}; it must be one of {self.allowed}{hint}")
+            found += elements
+        return found
+
+
+class Shapes(CheckedList[Shape]):
+    """The shapes of a scene."""
+
+    name = "shapes"
+    allowed = (
+        "wf.Mesh, wf.Rectangle, wf.Disk, wf.Sphere, wf.Spheres, wf.Cylinders, wf.Capsules, wf.Instance, "
+        "or a mesh or scene of trimesh"
+    )
+
+    def converted(self, item: Any) -> list[Shape] | None:
+        """Return a shape, or those of an object of another package."""
+        if isinstance(item, Shape):
+            return [item]
+        convert = importer(item)
+        return None if convert is None else convert(item).shapes
+
+    def hint(self, item: Any) -> str:
+        """Return where lights and files belong."""
+        if isinstance(item, Light):
+            return "; lights are given as lights=[...]"
+        return "; wf.load(path) reads a file as a scene" if isinstance(item, str | os.PathLike) else ""
+
+
+class Lights(CheckedList[Light]):
+    """The lights of a scene."""
+
+    name = "lights"
+    allowed = (
+        "wf.PointLight, wf.SpotLight, wf.DirectionalLight, wf.Environment, wf.PointLights, or a wf.Light of "
+        "your own"
+    )
+
+    def converted(self, item: Any) -> list[Light] | None:
+        """Return a light."""
+        return [item] if isinstance(item, Light) else None
+
+    def hint(self, item: Any) -> str:
+        """Return where shapes and cameras belong."""
+        if isinstance(item, Camera):
+            return "; a camera is given as camera=..."
+        return "; shapes that shine belong to the shapes" if isinstance(item, Shape) else ""
+
+
+def _check_environments(lights: Sequence[Light]) -> None:
+    if sum(isinstance(light, Environment) for light in lights) > 1:
+        raise SceneError("the scene has more than one Environment; at most one is allowed")
+
+
+def turned_up(up: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the shortest rotation (3, 3) that takes +y to the direction of `up` (3,)."""
+    up = up / np.abs(up).max()
+    up = up / np.linalg.norm(up)
+    cos = up[1]
+    if cos < -1 + 1e-12:
+        return np.diag([1.0, -1.0, -1.0])
+    x, _, z = np.cross((0.0, 1.0, 0.0), up)
+    skew = np.array([[0.0, -z, 0.0], [z, 0.0, -x], [0.0, x, 0.0]])
+    return np.eye(3) + skew + skew @ skew / (1 + cos)

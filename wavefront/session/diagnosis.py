@@ -1,0 +1,244 @@
+"""The likely cause of a black or white picture.
+
+The cause is found by a grid of camera rays and by light samples at the surfaces that they meet. The checks
+run from the most general cause to the most special one, and the first cause that applies is named. They run
+only for pictures that are black or white all over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+
+import numpy as np
+
+from ..arrays.state import Hits, Rays, SurfaceInteraction
+from ..arrays.vec import Bools, Ints, dot, f4
+from ..bsdfs import Bsdf
+from ..camera import Camera
+from ..compile.instances import sort_shapes
+from ..compile.scene import CompiledScene
+from ..core.errors import warn_caller
+from ..image import Image
+from ..lights import LightSample
+from ..scene import Scene
+from ..shapes import Instance, Shape
+from ..stages.interaction import interaction, origin_above
+from ..stages.intersect import intersect, shadow_rays, visible
+
+GRID = 16  # rays across the picture and down
+SAMPLES = 16  # light samples at each visible point
+
+
+def warn_of_black_or_white(
+    image: Image, scene: Scene, compiled: CompiledScene, view: Camera, integrator: str, max_bounces: int
+) -> None:
+    """Warn of a picture that `is_black_or_white`, with the likely cause.
+
+    Parameters
+    ----------
+    image
+        The picture.
+    scene, compiled
+        Its scene, as the user made it and as it was rendered.
+    view
+        The camera, in the units of `compiled`.
+    integrator, max_bounces
+        Settings of the render.
+    """
+    brightest, darkest = float(image.rgb.max()), float(image.rgb.min())
+    sight = Sight(scene, compiled, view, integrator, max_bounces)
+    if darkest > 1:
+        warn_caller(f"the picture is white: {sight.why_white(darkest)}")
+    elif brightest > 0:
+        stops = int(np.ceil(np.log2(0.5 / brightest)))
+        warn_caller(
+            f"the picture is almost black: its brightest pixel is {brightest:.2g}, and 1 is white; "
+            f"save(..., exposure={stops}) shows it, or lights {2**stops} times as bright"
+        )
+    elif not sight.lights_are_off:
+        warn_caller(f"the picture is black: {sight.why_black()}")
+
+
+class Sight:
+    """The part of a scene that a camera sees, by a grid of rays."""
+
+    def __init__(
+        self, scene: Scene, compiled: CompiledScene, view: Camera, integrator: str, max_bounces: int
+    ) -> None:
+        self._scene, self._compiled, self._view = scene, compiled, view
+        self._integrator, self._max_bounces = integrator, max_bounces
+
+    @property
+    def lights_are_off(self) -> bool:
+        """True if there are lights, and all have zero radiance."""
+        lights = self._compiled.lights
+        if not len(lights) or lights.choice is not None:
+            return False
+        environment = self._compiled.light_of[-1]
+        if environment < 0:
+            return True
+        around = np.concatenate([np.eye(3, dtype=f4), -np.eye(3, dtype=f4)], 1)
+        return not lights.le(np.full(6, environment), around).any()
+
+    def why_black(self) -> str:
+        """Return the likely cause of a black picture."""
+        if not len(self._compiled.lights):
+            return "nothing in the scene shines; lighting='studio' lights it"
+        if not len(self._seen):
+            return f"the camera sees no shape; {self._where_the_scene_is()}"
+        if self._max_bounces == 0:
+            return "max_bounces=0 shows lights alone, and the camera sees none that shines towards it"
+        if all(bsdf.black for bsdf in self._materials_seen()):
+            return "the materials of all that the camera sees reflect nothing"
+        found = self._why_no_light_arrives()
+        if found is None and self._around.back_facing.all() and len(self._around) == GRID * GRID:
+            found = f"the camera is inside {self._name(self._around.prim)}, where no light gets in"
+        return found or self._why_it_is_not_found()
+
+    def why_white(self, darkest: float) -> str:
+        """Return the likely cause of a white picture."""
+        fix = f"save(..., exposure={-int(np.ceil(np.log2(darkest)))}) shows what is below"
+        shines = self._compiled.emissive.take(self._hits.prim)
+        if not len(self._seen):
+            return f"the camera sees no shape, only light from all around that is above 1; {fix}"
+        if shines.all():
+            return f"the camera sees nothing but {self._name(self._seen.prim)}, which shines; {fix}"
+        return f"its darkest pixel is {darkest:.3g}, and 1 is white; {fix}"
+
+    # --- Visible surfaces -----------------------------------------------------------------------------
+
+    @cached_property
+    def _rays(self) -> Rays:
+        x0, y0, x1, y1 = self._view.window
+        step = (np.arange(GRID) + 0.5) / GRID
+        x, y = np.meshgrid(x0 + (x1 - x0) * step, y0 + (y1 - y0) * step)
+        origin, direction = self._view.rays(
+            x.ravel().astype(f4), y.ravel().astype(f4), self._compiled.center, None
+        )
+        return Rays(origin, direction, np.full(GRID * GRID, -1, np.intp))
+
+    @cached_property
+    def _hits(self) -> Hits:
+        return intersect(self._compiled, self._rays)
+
+    @cached_property
+    def _seen(self) -> SurfaceInteraction:
+        return self._surface(self._rays, self._hits)
+
+    @cached_property
+    def _around(self) -> SurfaceInteraction:
+        """The surfaces around the camera, in all directions."""
+        n = GRID * GRID
+        height = 1 - (2 * np.arange(n) + 1) / n
+        turn = np.arange(n) * np.pi * (3 - np.sqrt(5))  # steps by the golden angle distribute points evenly
+        level = np.sqrt(1 - height**2)
+        direction = np.stack([level * np.cos(turn), height, level * np.sin(turn)]).astype(f4)
+        rays = Rays(self._rays.origin[:, :1].repeat(n, 1), direction, np.full(n, -1, np.intp))
+        return self._surface(rays, intersect(self._compiled, rays))
+
+    def _surface(self, rays: Rays, hits: Hits) -> SurfaceInteraction:
+        found = hits.found
+        return interaction(self._compiled, rays.take(found), hits.take(found))
+
+    def _materials_seen(self) -> list[Bsdf]:
+        materials = self._compiled.materials
+        return [materials.groups[group] for group in np.unique(materials.group_of.take(self._seen.material))]
+
+    def _where_the_scene_is(self) -> str:
+        backward = self._view.rotation[:, 2]
+        middle = self._compiled.center - self._view.origin
+        if float(middle @ backward) > 0:
+            return "the middle of the scene is behind it: look the other way"
+        return "it looks past the scene"
+
+    def _name(self, prims: Ints) -> str:
+        return shape_name(self._scene, prims)
+
+    # --- Light at surfaces ----------------------------------------------------------------------------
+
+    def _why_no_light_arrives(self) -> str | None:
+        """Return why light samples reach no visible point; None if some do, or there are no light samples."""
+        if self._compiled.lights.choice is None:
+            return None
+        shining = facing = False
+        blockers: list[Ints] = []
+        for light, lanes in self._light_samples():
+            shining |= bool(lanes.any())
+            lanes &= (dot(self._seen.ng, light.wi) > 0) | self._transmissive(self._seen.material)
+            facing |= bool(lanes.any())
+            rays = shadow_rays(self._seen, origin_above(self._seen), light, np.flatnonzero(lanes))
+            if visible(self._compiled, rays).any():
+                return None
+            blockers.append(self._first_met(rays))
+        if not shining:
+            return f"the lights shine away from all that the camera sees; {self._how_to_turn_lights()}"
+        if not facing:
+            return "the camera sees only the sides of surfaces that are turned away from the lights"
+        return self._why_it_is_blocked(np.concatenate(blockers))
+
+    def _light_samples(self) -> Iterator[tuple[LightSample, Bools]]:
+        """Yield light samples at the visible points, and a mask of those with radiance."""
+        random = np.random.default_rng(0)
+        n = len(self._seen)
+        for _ in range(SAMPLES):
+            u = random.random((3, n), f4)
+            light, _ = self._compiled.lights.sample_li(origin_above(self._seen), u[0], u[1:])
+            yield light, (light.pdf > 0) & (light.radiance > 0).any(0)
+
+    def _first_met(self, rays: Rays) -> Ints:
+        """Return the primitives that rays meet first."""
+        hits = intersect(self._compiled, rays)
+        return hits.prim.take(hits.found)
+
+    def _transmissive(self, rows: Ints) -> Bools:
+        materials = self._compiled.materials
+        clear = np.array([bsdf.transmissive for bsdf in materials.groups], np.bool_)
+        return clear.take(materials.group_of.take(rows))
+
+    def _how_to_turn_lights(self) -> str:
+        hints = [light.hint for light in self._scene.lights if light.hint is not None]
+        if hints:
+            return hints[0]
+        return "reverse their faces, or give them two_sided=True"
+
+    def _why_it_is_blocked(self, prims: Ints) -> str:
+        name = self._name(prims)
+        through = self._transmissive(self._compiled.material_of.take(prims))
+        if not through.any():
+            if self._around.back_facing.all() and len(self._around) == GRID * GRID:
+                return f"the camera is inside {name}, where no light gets in"
+            return f"all that the camera sees is in the shadow of {name}"
+        if self._compiled.lights.delta_of.all():
+            return (
+                f"{name} lets light through, but bends it, and no path meets a light without size there; "
+                "caustics=True traces paths from it, or give it a size: a small wf.Sphere with an emission"
+            )
+        if self._integrator != "full":
+            return (
+                f"light comes through {name} alone, which integrator={self._integrator!r} does not follow; "
+                "integrator='full' does"
+            )
+        return f"light comes through {name} alone, too seldom to be found by so few samples"
+
+    def _why_it_is_not_found(self) -> str:
+        """Return why light that exists does not reach the camera."""
+        if self._integrator == "naive" and self._compiled.lights.delta_of.all():
+            return "the naive integrator meets lights by chance, and lights without size never"
+        if self._integrator in ("direct_simple", "direct_mis"):
+            return (
+                f"integrator={self._integrator!r} shows direct light only, and none reaches what the camera "
+                "sees; integrator='full' shows all light"
+            )
+        return "no light reaches what the camera sees"
+
+
+def shape_name(scene: Scene, prims: Ints) -> str:
+    """Return the name of the shape that most of the primitives (n,) belong to."""
+    if any(isinstance(shape, Instance) for shape in scene.shapes):
+        return "a shape"
+    meshes, curved, _, _ = sort_shapes(list(scene.shapes), 0)
+    counts = [len(mesh.faces) for mesh in meshes] + [shape.count for shape in curved]
+    shapes: list[Shape] = [*meshes, *curved]
+    numbers = np.searchsorted(np.cumsum(counts), prims, "right")
+    return repr(shapes[int(np.bincount(numbers).argmax())].name)
