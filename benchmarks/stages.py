@@ -14,13 +14,14 @@ import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from statistics import median
 from typing import Any
 from unittest import mock
 
 import wavefront as wf
-from wavefront.integrators import ladder as integrators
+from wavefront.integrators import ladder, shared_paths, steps
 from wavefront.stages import shade
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
@@ -57,11 +58,14 @@ def profile(scene: wf.Scene, spp: int, accel: str) -> dict[str, float]:
     """Render once with a clock on every stage; the shadow test is taken out of `direct`."""
     clock: dict[str, float] = defaultdict(float)
     with (
-        mock.patch.multiple(
-            integrators, **{name: timed(getattr(integrators, name), name, clock) for name in STAGES}
-        ),
+        ExitStack() as stages,
         mock.patch.object(shade, "visible", timed(shade.visible, "visible", clock)),
     ):
+        for name in STAGES:  # each module that calls a stage has a name for it
+            for module in (ladder, shared_paths, steps):
+                if hasattr(module, name):
+                    timer = timed(getattr(module, name), name, clock)
+                    stages.enter_context(mock.patch.object(module, name, timer))
         image = wf.render(scene, spp, max_bounces=7, accel=accel, workers=1, branches=1, progress=False)
     clock["direct"] -= clock["visible"]
     clock["rest"] = image.metadata["seconds"] - sum(clock.values())

@@ -3,6 +3,7 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from . import integrators
 from .accel import Accelerator, Geometry, Intersections
 from .arrays import elementary, vec
 from .arrays.frame import Frame
@@ -34,7 +35,6 @@ from .extensions import (
     register_sampler,
 )
 from .image import Image
-from .integrators import ladder as integrators
 from .lights import (
     DeltaLight,
     DirectionalLight,

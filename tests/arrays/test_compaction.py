@@ -18,7 +18,7 @@ from wavefront.arrays.frame import Frame
 from wavefront.arrays.state import Hits, Paths, SurfaceInteraction
 from wavefront.arrays.vec import broadcast, f4, normalize
 from wavefront.compile.scene import ROULETTE_AFTER, CompiledScene, compile_scene
-from wavefront.integrators import ladder as integrators
+from wavefront.integrators import ladder
 from wavefront.sampling.sampler import make_sampler
 from wavefront.stages import compact as stage
 from wavefront.stages.shade import shading
@@ -269,7 +269,7 @@ def test_paths_remember_by_how_much_glass_compresses(monkeypatch: pytest.MonkeyP
         seen.append(np.unique(paths.roulette_scale.round(4)).tolist())
         return np.arange(len(paths))
 
-    monkeypatch.setattr(integrators, "roulette", note)
+    monkeypatch.setattr(ladder, "roulette", note)
     render(scenes.glass_ball(), 16, max_bounces=2)
     assert seen == [[1, 2.25], [1, 2.25]]
 

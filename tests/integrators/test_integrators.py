@@ -10,7 +10,7 @@ import scenes
 from significance import Mean, assert_same_images, render, repeat
 
 import wavefront as wf
-from wavefront.integrators import ladder as integrators
+from wavefront.integrators import ladder, steps
 from wavefront.integrators import training as pilot
 from wavefront.sampling.sampler import Dimension, Sampler, make_sampler
 
@@ -162,14 +162,15 @@ def test_contributions_keep_the_number_of_their_light(monkeypatch, integrator: s
     camera = wf.Camera.look_at((0, 2, 4), (0, 1.5, 0), fov=70, size=(8, 6))
     floor = wf.Rectangle((-4, 0, 4), (8, 0, 0), (0, 0, -8), material=wf.Diffuse(0.5))
     sums = np.zeros(3)
-    accumulate = integrators.accumulate
+    accumulate = steps.accumulate
 
     def recorded(L, paths, contribution):
         carried = (paths.throughput[:, contribution.lanes] * contribution.radiance).sum(0)
         sums[:] += np.bincount(contribution.light, carried, 3)
         accumulate(L, paths, contribution)
 
-    monkeypatch.setattr(integrators, "accumulate", recorded)
+    for module in (ladder, steps):
+        monkeypatch.setattr(module, "accumulate", recorded)
     image = render(wf.Scene([floor, lamp], points, camera), 16, integrator=integrator, executor="threads")
     found = sums / (16 * 8 * 6)
     assert found == pytest.approx(image.rgb.mean((0, 1)), rel=1e-4)  # each light has a channel of its own

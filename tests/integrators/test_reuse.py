@@ -10,7 +10,8 @@ from scipy import stats
 from significance import Mean, assert_mean, assert_same_images, render, repeat
 
 import wavefront as wf
-from wavefront.integrators import ladder as integrators
+from wavefront import integrators
+from wavefront.integrators import shared_paths
 from wavefront.integrators import training as pilot
 from wavefront.sampling.sampler import SobolSampler
 from wavefront.sampling.tiles import WaveTiles, others_in_tile, place_in_tiles, whole_tiles
@@ -243,7 +244,7 @@ def test_paths_that_go_on_from_a_shared_point_are_independent(
     """Two of them have the mean of one, and less noise."""
     runs = []
     for ways in (1, 2):
-        monkeypatch.setattr(integrators, "SHARED_WAYS", ways)
+        monkeypatch.setattr(shared_paths, "SHARED_WAYS", ways)
         runs.append(repeat(scenes.cornell_box((16, 16)), 16, reuse=True, first_seed=100 * ways))
     assert_same_images(*runs, 0.015)
     one, two = (np.var(run, axis=0, ddof=1).mean() for run in runs)

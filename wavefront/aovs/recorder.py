@@ -21,6 +21,7 @@ from ..stages.compact import compact
 from ..stages.interaction import interaction
 from ..stages.normal_mapping import perturb_normals
 from ..stages.shade import Shading, shading
+from .path_recorder import PathRecorder
 
 FEATURES = ("denoising_albedo", "denoising_normal")
 OF_LIGHT = ("direct", "indirect", "light_groups", CLAMPED)
@@ -36,7 +37,7 @@ class AwaitedSurfaces:
     first: bool  # of their paths
 
 
-class SampleRecorder:
+class SampleRecorder(PathRecorder):
     """Records the sampled layers of one wave.
 
     Parameters
@@ -67,6 +68,7 @@ class SampleRecorder:
         self._groups = scene.light_groups if "light_groups" in wanted else None
         if self._groups is not None:
             self._light.update((f"light_groups.{name}", np.zeros((3, n), f4)) for name in self._groups.names)
+            self.needs_directions = len(self._groups.environment) > 1  # to divide an environment
         self._awaited: AwaitedSurfaces | None = None
         self._begun = False
         self._all_rough = True  # no first surface is specular
@@ -81,11 +83,6 @@ class SampleRecorder:
         if any(name in self._values for name in FEATURES):
             paths.met_rough = np.zeros(len(paths), np.bool_)
 
-    @property
-    def needs_directions(self) -> bool:
-        """Whether contributions of light samples must have their directions: to divide an environment."""
-        return self._groups is not None and len(self._groups.environment) > 1
-
     def branched(self, ways: int) -> None:
         """Note that each path goes on in several ways."""
         self._share /= ways
@@ -93,19 +90,16 @@ class SampleRecorder:
     # --- Surfaces -------------------------------------------------------------------------------------
 
     def record_hits(
-        self, scene: CompiledScene, paths: Paths, hits: Hits, kept: Ints, kept_paths: Paths, kept_hits: Hits
+        self,
+        bounce: int,
+        scene: CompiledScene,
+        paths: Paths,
+        hits: Hits,
+        kept: Ints,
+        kept_paths: Paths,
+        kept_hits: Hits,
     ) -> None:
-        """Record what paths meet next.
-
-        Parameters
-        ----------
-        paths, hits
-            All paths.
-        kept
-            (k,) those that go on.
-        kept_paths, kept_hits
-            The same as records, as they will be shaded.
-        """
+        """Record what paths meet next; see `PathRecorder`."""
         self._shade_awaited()
         first, self._begun = not self._begun, True
         if first and self._covered is not None:

@@ -112,7 +112,7 @@ class Paths(Rays):
     # for layers (aovs/recorder.py); None unless they are asked for
     scattered: Bytes | None = None  # (n,) NOT_YET, JUST_ONCE or BEFORE: its scattering that is not specular
     met_rough: Bools | None = None  # (n,) the path has met a surface that is not specular
-    recorder: Any = None  # the `SampleRecorder` of the wave
+    recorder: Any = None  # the `PathRecorder` of the wave
 
 
 @record

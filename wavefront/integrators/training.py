@@ -6,13 +6,12 @@ of the picture are others, so it stays unbiased, and it does not depend on worke
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 
+from ..aovs.path_recorder import PathRecorder
 from ..arrays.record import record
-from ..arrays.state import Paths, SoA, Words
+from ..arrays.state import Contribution, Paths, SoA, Words
 from ..arrays.vec import Floats, Ints, highest, take
 from ..camera import Camera
 from ..compile.scene import CompiledScene
@@ -20,12 +19,9 @@ from ..guiding import GuideCells, GuideTable
 from ..guiding.octahedral import bins_of
 from ..guiding.training import LEVELS, SIDE, Records, build_table, learn_shares
 from ..sampling.sampler import Sampler
-from ..stages.bounce import bounce_sample
-from ..stages.compact import roulette, select
 from ..stages.generate import generate
-from ..stages.guidance import guide
-from ..stages.shade import Shading, direct, evaluate
-from .ladder import accumulate, intersect_and_compact, prepare_shading
+from ..stages.shade import Shading, evaluate
+from .ladder import li_full
 
 PATHS = 1 << 18
 ROUNDS = (1 / 7, 2 / 7, 4 / 7)  # parts of the paths; each round is guided by those before it
@@ -93,36 +89,32 @@ def _trace(
 ) -> tuple[Vertices, Floats]:
     """Trace a wave; return its vertices, and what each of their paths found afterwards, (k,)."""
     pixel, sample = _addresses(camera, first, count)
-    vertices: list[Vertices] = []
-    L = li_pilot(
-        scene, generate(scene, camera, sampler, pixel, sample), sampler, max_bounces, table, vertices.append
-    )
-    joined = Vertices.concatenate(vertices) if vertices else _none()
+    paths = generate(scene, camera, sampler, pixel, sample)
+    recorder = paths.recorder = VertexRecorder()
+    L = li_full(scene, paths, sampler, max_bounces, table=table)
+    joined = Vertices.concatenate(recorder.vertices) if recorder.vertices else _none()
     light = L.sum(0).take(joined.slot) - joined.found
     good = np.flatnonzero((joined.pdf > 0) & (joined.after > 0) & np.isfinite(light))
     return joined.take(good), light.take(good).clip(0, np.inf)
 
 
-def li_pilot(
-    scene: CompiledScene,
-    paths: Paths,
-    sampler: Sampler,
-    max_bounces: int,
-    table: GuideTable | None,
-    note: Callable[[Vertices], object],
-) -> Floats:
-    """Estimate radiance as `li_full` does, and call `note` with the vertices of each bounce."""
-    L = np.zeros((3, len(paths)), np.float32)
-    for bounce in range(max_bounces + 1):
-        paths, hits = intersect_and_compact(scene, paths, sampler, bounce, L, mis=True)
-        if bounce == max_bounces or not len(paths):
-            break
-        shade = guide(prepare_shading(scene, paths, hits), table)
-        accumulate(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
-        left = bounce_sample(paths, shade, sampler, bounce)
-        note(_vertices(L, paths, left, shade))
-        paths = select(left, roulette(scene, left, sampler, bounce))
-    return L
+class VertexRecorder(PathRecorder):
+    """Keeps the vertices of the paths that carry it."""
+
+    def __init__(self) -> None:
+        self.vertices: list[Vertices] = []
+        self._picture: Floats | None = None  # the light that was found so far, (3, slots)
+
+    def record_light(
+        self, picture: Floats, paths: Paths, contribution: Contribution, slot: Ints, arriving: Floats
+    ) -> None:
+        """Keep the picture, to which all light is added."""
+        self._picture = picture
+
+    def record_scattering(self, paths: Paths, shade: Shading, left: Paths) -> None:
+        """Keep the vertices that paths leave."""
+        assert self._picture is not None  # each step adds its light before its paths go on
+        self.vertices.append(_vertices(self._picture, paths, left, shade))
 
 
 def _vertices(L: Floats, paths: Paths, left: Paths, shade: Shading) -> Vertices:

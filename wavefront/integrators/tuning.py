@@ -1,13 +1,13 @@
 """The trial before a render: what more branches, paths that pixels share, or a guide would bring.
 
-Pixels of some tiles (sampling/tiles.py) are rendered several times under seeds of their own, with two branches
-that are kept apart. The variance of a picture with N branches is shared + separate / N: the covariance of the
-two branches is what they share, and the rest lies between them. With the rays of both parts of the paths,
-counted and not timed, this gives variance times rays for every N, which is least near the square root of
-(separate / shared) · (rays before / rays of a branch). What the first branches find is shared among the
-pixels of each tile, too, and compared with the same paths alone: in each pixel, and after a blur, which adds
-up what is the same in the noise of a tile. So decisions depend on the scene, the camera and the settings
-alone.
+Pixels of some tiles (sampling/tiles.py) are rendered several times under seeds of their own, with two
+branches that are kept apart. The variance of a picture with N branches is shared + separate / N: the
+covariance of the two branches is what they share, and the rest lies between them. With the rays of both parts
+of the paths, counted and not timed, this gives variance times rays for every N, which is least near the
+square root of (separate / shared) · (rays before / rays of a branch). What the first branches find is shared
+among the pixels of each tile, too, and compared with the same paths alone: in each pixel, and after a blur,
+which adds up what is the same in the noise of a tile. So decisions depend on the scene, the camera and the
+settings alone.
 
 Sources: J. Arvo and D. Kirk, Particle Transport and Image Synthesis, 1990 (splitting); E. Veach, thesis 1997,
 §10.4.2 (efficiency).

@@ -1,4 +1,4 @@
-"""A job of a trial (integrators/tuning.py): pixels of some tiles, with two branches, alone and shared among them."""
+"""A job of a trial (tuning.py): pixels of some tiles, with two branches, alone and shared among them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ from ..stages.guidance import guide
 from ..stages.interaction import material_rows
 from ..stages.reuse import SHARED_WAYS, add_shared, as_shared, shared_points
 from ..stages.shade import direct
-from .ladder import accumulate, follow, intersect_and_compact, prepare_shading
+from .shared_paths import follow
+from .steps import accumulate, intersect_and_compact, prepare_shading
 
 SAMPLES = 4  # of each pixel in each block; stratified, as those of a picture are
 

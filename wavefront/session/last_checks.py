@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..image import Image
-from ..integrators import INTEGRATORS, WITH_MIS, li_naive
+from ..integrators import INTEGRATORS
 from ..sampling.tiles import others_in_tile
 from ..scheduling.loop import RenderLoop
-from ..stages.reuse import SHARED_WAYS
 from .final_checks import check_first_samples, is_black_or_white, warn_of_clamped_light, warn_of_noise
 from .plan import Plan
 
@@ -54,25 +53,10 @@ def check_last_image(image: Image, plan: Plan, loop: RenderLoop, surfaces: int) 
 
 def _cause_of_bad_sample(plan: Plan, loop: RenderLoop, pixel: int, sample: int) -> str:
     """Return in which bounce, and at which material, a sample that is not finite became so."""
-    from .nan_trace import PathChecker  # here, as most pictures do without
+    from .nan_trace import first_fault  # here, as most pictures do without
 
-    tracer, camera = plan.tracer, loop.view.camera
-    integrator = INTEGRATORS.find(plan.settings.integrator)
-    checker = PathChecker(
-        plan.scene.lighted,
-        tracer.scene,
-        camera,
-        tracer.sampler(camera.film[0]),
-        tracer.filter,
-        tracer.max_bounces,
-        plan.choice.branches,
-        SHARED_WAYS if plan.choice.reuse else 1,
-        light_samples=integrator is not li_naive,
-        mis=integrator in WITH_MIS,
-        layers=tracer.layers,
-    )
-    pixels = [pixel]
+    camera, pixels = loop.view.camera, np.array([pixel], np.uint32)
     if plan.choice.reuse:
         every = camera.address(np.arange(camera.size[0] * camera.size[1], dtype=np.uint32))
-        pixels += others_in_tile(every, pixel, camera.film[0]).tolist()
-    return next(filter(None, (checker.first_fault(each, sample) for each in pixels)), "")
+        pixels = np.append(pixels, others_in_tile(every, pixel, camera.film[0]).astype(np.uint32))
+    return first_fault(plan.scene.lighted, plan.tracer, loop.view, pixels, sample)

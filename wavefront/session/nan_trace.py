@@ -1,4 +1,4 @@
-"""Where a sample that is not finite comes from: its path is traced once more, step by step."""
+"""Where a sample that is not finite comes from: its path is traced once more, and each step is looked at."""
 
 from __future__ import annotations
 
@@ -7,115 +7,146 @@ from functools import cache
 
 import numpy as np
 
-from ..arrays.record import record
-from ..arrays.state import Paths, SurfaceInteraction, Words
-from ..arrays.vec import Bools, Floats, f4
+from ..aovs.path_recorder import PathRecorder
+from ..arrays.state import Contribution, Hits, Paths, Words
+from ..arrays.vec import Bools, Floats, Ints
 from ..camera import Camera
 from ..compile.scene import CompiledScene
-from ..integrators import accumulate, intersect_and_compact, prepare_shading
 from ..integrators.light_tracing import trace_light
-from ..sampling.filters import Filter
-from ..sampling.sampler import Sampler
+from ..integrators.registry import integrator_for
 from ..scene import Scene
-from ..stages.bounce import branch, copies
-from ..stages.compact import roulette, select
+from ..scheduling.jobs import View
+from ..scheduling.tracing import Tracer
 from ..stages.generate import generate
-from ..stages.shade import Shading, direct
+from ..stages.shade import Shading
 from .diagnosis import shape_name
 
 
-@record
-class PathChecker:
-    """Traces single paths as the integrators do, and checks what each step adds."""
+def first_fault(user_scene: Scene, tracer: Tracer, view: View, pixels: Words, sample: int) -> str:
+    """Return the bounce and the material where a path first gets a value that is not finite.
 
-    user_scene: Scene
-    scene: CompiledScene
-    camera: Camera  # in the unit of the compiled scene
-    sampler: Sampler
-    filter: Filter
-    max_bounces: int
-    branches: int
-    copies: int  # in which a path goes on from its second surface where pixels share what it finds
-    light_samples: bool  # at surfaces
-    mis: bool  # light samples are weighted against BSDF samples
-    layers: tuple[str, ...] = ()  # sampled ones that are asked for
+    Bounce 0 is at the first surface that the camera sees. The text is empty if no step of the integrators of
+    this package gives such a value.
 
-    def first_fault(self, pixel: int, sample: int) -> str:
-        """Return the bounce and the material where a path gets a value that is not finite.
+    Parameters
+    ----------
+    user_scene
+        Whose shapes have names.
+    tracer, view
+        How the sample was traced.
+    pixels
+        (n,) the pixel, and those that share their paths with it.
+    sample
+        Its number.
+    """
+    camera = view.camera
+    sampler = tracer.sampler(camera.film[0])
+    samples = np.full(pixels.size, sample, np.uint32)
+    paths = generate(tracer.scene, camera, sampler, pixels, samples, tracer.filter)
+    recorder = paths.recorder = FaultRecorder(user_scene, tracer.layers)
+    table = tracer.table if view.guided else None
+    integrator = integrator_for(tracer.integrator, view.branches, view.reuse, table)
+    with np.errstate(all="ignore"):
+        integrator(tracer.scene, paths, sampler, tracer.max_bounces)
+        return recorder.fault or _fault_of_light(tracer, camera, pixels, samples)
 
-        Bounce 0 is at the first surface that the camera sees. The text is empty if no step of the integrators
-        of this package gives such a value.
-        """
-        address = np.array([pixel], np.uint32), np.array([sample], np.uint32)
-        with np.errstate(all="ignore"):
-            for of_second in sorted({1, self.copies}):
-                paths = generate(self.scene, self.camera, self.sampler, *address, self.filter)
-                fault = self._first_fault(paths, of_second)
-                if fault:
-                    return fault
-            return self._light_path_fault(*address)
 
-    def _light_path_fault(self, pixel: Words, sample: Words) -> str:
-        """Return where a light path brings a value that is not finite; "" where none does."""
-        if self.scene.casters is None:
-            return ""
-        for scatterings in range(2, self.max_bounces + 1):
-            splats = trace_light(self.scene, self.camera, self.sampler, pixel, sample, scatterings)
-            if not np.isfinite(splats.radiance).all():
-                return f"bounce {scatterings - 1} of the path from the light"
+def _fault_of_light(tracer: Tracer, camera: Camera, pixels: Words, samples: Words) -> str:
+    """Return where a path from a light brings a value that is not finite; "" where none does."""
+    if tracer.scene.casters is None:
         return ""
+    sampler = tracer.sampler(camera.film[0])
+    for scatterings in range(2, tracer.max_bounces + 1):
+        splats = trace_light(tracer.scene, camera, sampler, pixels, samples, scatterings)
+        if not np.isfinite(splats.radiance).all():
+            return f"bounce {scatterings - 1} of the path from the light"
+    return ""
 
-    def _first_fault(self, paths: Paths, of_second: int) -> str:
-        for bounce in range(self.max_bounces + 1):
-            radiance = np.zeros((3, 1), f4)
-            paths, hits = intersect_and_compact(
-                self.scene, paths, self.sampler, bounce, radiance, mis=self.mis
-            )
-            if not np.isfinite(radiance).all():
-                return f"bounce {bounce}, emission that the path meets"
-            if bounce == self.max_bounces or not len(paths):
-                break
-            shade = prepare_shading(self.scene, paths, hits)
-            if _bad(paths).any():
-                return self._at(bounce, shade.surface, _bad(paths), "absorption in front of")
-            for name, layer in self._surface_layers(shade, bounce):
-                bad = np.asarray(np.isnan(layer).any(0))
-                if bad.any():
-                    return self._at(bounce, shade.surface, bad, f"layer {name!r} at")
-            if self.light_samples:
-                lit = direct(self.scene, paths, shade, self.sampler, bounce, mis=self.mis)
-                accumulate(radiance, paths, lit)
-                bad = np.zeros(len(paths), np.bool_)
-                bad[lit.lanes] = ~np.isfinite(lit.radiance).all(0)
-                if not np.isfinite(radiance).all():
-                    return self._at(bounce, shade.surface, bad, "light sample at")
-            ways = self.branches if bounce == 0 else 1
-            paths = branch(paths, shade, self.sampler, bounce, ways)
-            if _bad(paths).any():
-                of_surface: Bools = np.logical_or.reduce(_bad(paths).reshape(ways, -1), 0)
-                return self._at(bounce, shade.surface, of_surface, "BSDF sample of")
-            paths = select(paths, roulette(self.scene, paths, self.sampler, bounce, self.branches))
-            if bounce == 0 and of_second > 1:
-                paths = Paths.concatenate(copies(paths, of_second))
-        return ""
 
-    def _surface_layers(self, shade: Shading, bounce: int) -> Iterator[tuple[str, Floats]]:
-        """Yield the layers that a surface gives a path which meets it, by name."""
+class FaultRecorder(PathRecorder):
+    """Notes the first value along some paths that is not finite.
+
+    Attributes
+    ----------
+    fault
+        Where it comes from; empty for none.
+    """
+
+    def __init__(self, user_scene: Scene, layers: tuple[str, ...]) -> None:
+        self.fault = ""
+        self._user_scene, self._layers = user_scene, layers
+        self._bounce = 0
+        self._bad_emission = False
+        self._at: tuple[CompiledScene, Shading] | None = None  # the surfaces that are shaded
+
+    def of_shared(self) -> FaultRecorder:
+        """Go on at the second surfaces, from which paths begin anew."""
+        self._bounce = 1
+        return self
+
+    def record_hits(
+        self,
+        bounce: int,
+        scene: CompiledScene,
+        paths: Paths,
+        hits: Hits,
+        kept: Ints,
+        kept_paths: Paths,
+        kept_hits: Hits,
+    ) -> None:
+        """Keep the bounce, which that of light met before it is, too."""
+        self._bounce = bounce
+        if self._bad_emission:
+            self._note(f"bounce {bounce}, emission that the path meets")
+
+    def record_surfaces(self, scene: CompiledScene, paths: Paths, shade: Shading) -> None:
+        """Check what absorption has left of the paths, and the layers that the surfaces give."""
+        self._at = scene, shade
+        self._check(_bad(paths.throughput), "absorption in front of")
+        if not self.fault:
+            for name, layer in self._surface_layers(shade):
+                self._check(np.asarray(np.isnan(layer).any(0)), f"layer {name!r} at")
+
+    def record_scattering(self, paths: Paths, shade: Shading, left: Paths) -> None:
+        """Check the BSDF samples."""
+        self._check(_bad(left.throughput), "BSDF sample of")
+
+    def record_light(
+        self, picture: Floats, paths: Paths, contribution: Contribution, slot: Ints, arriving: Floats
+    ) -> None:
+        """Check the light."""
+        bad = _bad(arriving)
+        if not contribution.sampled:
+            self._bad_emission |= bool(bad.any())
+            return
+        lanes = np.zeros(len(paths), np.bool_)
+        lanes[contribution.lanes] = bad
+        self._check(lanes, "light sample at")
+
+    def _surface_layers(self, shade: Shading) -> Iterator[tuple[str, Floats]]:
+        """Yield the layers that surfaces give paths which meet them, by name."""
         albedo = cache(shade.albedo)
-        for name in self.layers:
-            if (name == "albedo" and bounce == 0) or name == "denoising_albedo":
+        for name in self._layers:
+            if (name == "albedo" and self._bounce == 0) or name == "denoising_albedo":
                 yield name, albedo()
             if name == "denoising_normal":
                 yield name, shade.surface.ns
 
-    def _at(self, bounce: int, surface: SurfaceInteraction, bad: Bools, what: str) -> str:
-        """Name the material of the first bad lane; of the first of all where only their sum is bad."""
+    def _check(self, bad: Bools, what: str) -> None:
+        """Note a fault where a lane (n,) of the surfaces is bad: the first one names the material."""
+        if self.fault or self._at is None or not bad.any():
+            return
+        scene, surface = self._at[0], self._at[1].surface
         lane = int(bad.argmax())
-        row, materials = int(surface.material[lane]), self.scene.materials
+        materials, row = scene.materials, int(surface.material[lane])
         kind = type(materials.groups[int(materials.group_of[row])]).__name__
-        place = shape_name(self.user_scene, surface.prim[lane : lane + 1])
-        return f"bounce {bounce}, {what} material {kind} of {place}"
+        place = shape_name(self._user_scene, surface.prim[lane : lane + 1])
+        self._note(f"bounce {self._bounce}, {what} material {kind} of {place}")
+
+    def _note(self, fault: str) -> None:
+        self.fault = self.fault or fault
 
 
-def _bad(paths: Paths) -> Bools:
-    return np.asarray(~np.isfinite(paths.throughput).all(0))
+def _bad(values: Floats) -> Bools:
+    """Return which columns (n,) of values (3, n) are not finite."""
+    return np.asarray(~np.isfinite(values).all(0))

@@ -64,7 +64,7 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
     if not (cos > 0).all():
         lost = np.flatnonzero(~(cos > 0))
         throughput[:, lost] *= f4(0) * cos.take(lost)  # NaN stays, so that it reaches the picture
-    return Paths(
+    left = Paths(
         slot=paths.slot,
         pixel=paths.pixel,
         sample=paths.sample,
@@ -80,6 +80,9 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         met_rough=paths.met_rough,
         recorder=paths.recorder,
     )
+    if paths.recorder is not None:
+        paths.recorder.record_scattering(paths, shade, left)
+    return left
 
 
 def _after(scattered: Bytes, specular: Bools) -> Bytes:

@@ -93,7 +93,7 @@ def as_shared(paths: Paths) -> Paths:
         roulette_scale=paths.roulette_scale * highest(paths.throughput),
         scattered=None,
         met_rough=None,
-        recorder=None,
+        recorder=None if paths.recorder is None else paths.recorder.of_shared(),
     )
 
 

@@ -1,0 +1,69 @@
+"""What travels with paths and looks on: the base of recorders."""
+
+from __future__ import annotations
+
+from ..arrays.state import Contribution, Hits, Paths
+from ..arrays.vec import Floats, Ints
+from ..compile.scene import CompiledScene
+from ..stages.shade import Shading
+
+
+class PathRecorder:
+    """Is told of each step of the paths that carry it (`Paths.recorder`), whatever their integrator.
+
+    Each method does nothing by itself.
+
+    Attributes
+    ----------
+    needs_directions
+        Whether contributions of light samples must have their directions.
+    """
+
+    needs_directions = False
+
+    def branched(self, ways: int) -> None:
+        """Note that each path goes on in several ways."""
+
+    def of_shared(self) -> PathRecorder | None:
+        """Return what looks on where paths begin anew at points that pixels share; None for nothing."""
+        return None
+
+    def record_hits(
+        self,
+        bounce: int,
+        scene: CompiledScene,
+        paths: Paths,
+        hits: Hits,
+        kept: Ints,
+        kept_paths: Paths,
+        kept_hits: Hits,
+    ) -> None:
+        """Record what paths meet next, after the light that they meet there.
+
+        Parameters
+        ----------
+        paths, hits
+            All paths.
+        kept
+            (k,) those that go on.
+        kept_paths, kept_hits
+            The same as records, as they will be shaded.
+        """
+
+    def record_surfaces(self, scene: CompiledScene, paths: Paths, shade: Shading) -> None:
+        """Record the surfaces that paths have met, which are ready to shade."""
+
+    def record_scattering(self, paths: Paths, shade: Shading, left: Paths) -> None:
+        """Record how `paths` leave their surfaces, before any of them ends."""
+
+    def clamped(self, paths: Paths, contribution: Contribution, slot: Ints, arriving: Floats) -> Floats:
+        """Return light `arriving` (3, k) at slots (k,) as it is to be added."""
+        return arriving
+
+    def record_light(
+        self, picture: Floats, paths: Paths, contribution: Contribution, slot: Ints, arriving: Floats
+    ) -> None:
+        """Record light `arriving` (3, k) that has been added to slots (k,) of the `picture` (3, n)."""
+
+    def record_background(self, slot: Ints, color: Floats) -> None:
+        """Record a background (3, 1) that has been added to slots (k,)."""

@@ -1,0 +1,71 @@
+"""The steps that integrators are made of, beside the stages: they add light to the radiance of a wave."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..aovs.recorder import add_to_slots
+from ..arrays.state import Contribution, Hits, Paths
+from ..arrays.vec import Floats, Ints, take
+from ..compile.scene import CompiledScene
+from ..sampling.sampler import Sampler
+from ..stages.alpha import alpha_pass_through
+from ..stages.background import show_background
+from ..stages.caught_shadow import off_catchers
+from ..stages.compact import compact, scattering_lanes
+from ..stages.interaction import interaction
+from ..stages.intersect import intersect
+from ..stages.medium import absorb
+from ..stages.normal_mapping import perturb_normals
+from ..stages.shade import Shading, emitted, mis_weighted, shading, without_caustics
+
+
+def intersect_and_compact(
+    scene: CompiledScene,
+    paths: Paths,
+    sampler: Sampler,
+    bounce: int,
+    L: Floats,
+    mis: bool,
+    keep: Callable[[CompiledScene, Paths, Hits, Contribution], Ints] = scattering_lanes,
+) -> tuple[Paths, Hits]:
+    """Follow paths to their next surfaces, add the light that they meet to L, and keep some of them.
+
+    With `mis` the light is weighted against light sampling. `keep` returns the lanes of the paths that
+    scatter; the others end here.
+    """
+    hits, left = intersect(scene, paths), paths.exclude_prim
+    paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce)
+    emission = without_caustics(scene, paths, left, hits, emitted(scene, paths, hits))
+    if bounce == 0:
+        emission = show_background(scene, L, paths, hits, emission)
+    accumulate(L, paths, mis_weighted(scene, paths, emission) if mis else emission)
+    lanes = keep(scene, paths, hits, emission)
+    if bounce == 0:
+        lanes = off_catchers(scene, hits, lanes)
+    kept = compact(scene, paths, hits, lanes)
+    if paths.recorder is not None:
+        paths.recorder.record_hits(bounce, scene, paths, hits, lanes, *kept)
+    return kept
+
+
+def prepare_shading(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
+    """Weaken the paths by the matter they came through, and make their surfaces ready to shade."""
+    surface = interaction(scene, paths, hits)
+    perturb_normals(scene, surface)
+    absorb(scene, paths.throughput, hits, surface)
+    shade = shading(scene, surface)
+    if paths.recorder is not None:
+        paths.recorder.record_surfaces(scene, paths, shade)
+    return shade
+
+
+def accumulate(L: Floats, paths: Paths, contribution: Contribution) -> None:
+    """Add a contribution, times the throughput of its paths, to the slots of L."""
+    slot = take(paths.slot, contribution.lanes)
+    arriving = take(paths.throughput, contribution.lanes) * contribution.radiance
+    if paths.recorder is not None:
+        arriving = paths.recorder.clamped(paths, contribution, slot, arriving)
+    add_to_slots(L, slot, arriving)
+    if paths.recorder is not None:
+        paths.recorder.record_light(L, paths, contribution, slot, arriving)
