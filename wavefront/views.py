@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any
+from typing import Any, Unpack
 
 from numpy.typing import ArrayLike
 
@@ -13,13 +13,14 @@ from .core.errors import SceneError, iterable
 from .image import Image
 from .io.to_scene import as_scene, choose_camera
 from .session import Session
-from .settings import whole_number
+from .settings import RenderSettings, refuse, takes_settings, whole_number
 
 MOST_VIEWS = 1_000_000  # on a turntable
 
 
+@takes_settings
 def render_many(
-    scene: Any, cameras: Iterable[Camera], spp: int | None = None, **settings: Any
+    scene: Any, cameras: Iterable[Camera], spp: int | None = None, **settings: Unpack[RenderSettings]
 ) -> Iterator[Image]:
     """Render a scene from several cameras, one after the other.
 
@@ -32,8 +33,7 @@ def render_many(
         As for `render`.
     cameras
         What sees the scene.
-    **settings
-        The other settings of `render`; an unknown one is an error.
+    {settings}
 
     Yields
     ------
@@ -58,7 +58,9 @@ def render_many(
     first = next(views, None)
     if first is None:
         raise SceneError("cameras is empty; render_many needs at least one")
-    with Session(scene, spp, camera=first, **settings) as session:
+    refuse(settings, {"camera": "render_many takes cameras"})
+    settings["camera"] = first
+    with Session(scene, spp, **settings) as session:
         yield session.run()
         for camera in views:
             session.set_camera(camera, settings.get("size"))

@@ -476,7 +476,7 @@ def test_sigterm_ends_the_program_and_leaves_nothing(obj, fast):
     code = (
         "import os, signal, sys\n"
         "from wavefront import cli\n"
-        "from wavefront import files\n"
+        "from wavefront.core import files\n"
         "files.OPEN_FILES = '/no/such/folder'\n"
         "def end(handle):\n"
         f"    assert any(name.endswith('.tmp') for name in os.listdir({str(output.parent)!r}))\n"

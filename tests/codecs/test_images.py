@@ -350,7 +350,7 @@ def test_a_killed_process_leaves_nothing_behind(tmp_path, signal):
         pytest.skip("no files without names here")
     code = (
         "import os, signal, sys, numpy as np\n"
-        "from wavefront import files\n"
+        "from wavefront.core import files\n"
         "from wavefront.codecs.images import write_image\n"
         f"files.os.fsync = lambda handle: os.kill(os.getpid(), signal.{signal})\n"
         "write_image(sys.argv[1], np.ones((4, 4, 3)))\n"

@@ -325,5 +325,5 @@ def test_nothing_to_guide() -> None:
 
 
 def test_only_full_can_be_guided() -> None:
-    with pytest.raises(wf.SceneError, match="guide is True; with integrator='naive' it must be False"):
+    with pytest.raises(wf.SceneError, match="guide=True does not go with integrator='naive': only"):
         wf.render(lamp_at_the_ceiling(), 1, guide=True, integrator="naive")

@@ -157,7 +157,7 @@ def chosen(scene: wf.Scene, **settings: Any) -> choice.Choice:
     compiled = compile_scene(scene, scene.accelerators.maker("numpy"), mis=True)
     assert scene.camera is not None
     options, view = Settings(**settings), compiled.view(scene.camera)
-    table = choice.learn_guide(options, compiled, view) if options.guide else None
+    table = choice.learn_guide(options, compiled, view) if options.values["guide"] else None
 
     def run(jobs: list[TrialJob]) -> list[TrialPart]:
         return [job.trace(compiled, SobolSampler, table) for job in jobs]

@@ -24,6 +24,7 @@ import scenes
 import wavefront as wf
 from wavefront import cli
 from wavefront.core import files
+from wavefront.film import checkpoint
 from wavefront.film.checkpoint_file import MAGIC, PRELUDE, VERSION, read_header
 from wavefront.sampling.sampler import IndependentSampler
 from wavefront.scheduling.scheduler import FIRST_WAVE, Scheduler
@@ -342,7 +343,7 @@ def test_paths_are_checked_before_work(tmp_path: Path) -> None:
 
 def test_another_version_is_a_warning(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of this package or of NumPy."""
-    monkeypatch.setitem(wf.checkpoint.VERSIONS, "numpy", "1.0")
+    monkeypatch.setitem(checkpoint.VERSIONS, "numpy", "1.0")
     wf.render(scene(), 2, checkpoint=tmp_path / "a")
     monkeypatch.undo()
     with pytest.warns(UserWarning, match=r"a is of numpy 1\.0, now .*: bits of the picture may differ"):

@@ -114,9 +114,12 @@ def test_later_samples_are_the_others_of_a_longer_render() -> None:
         ({"samples": range(0, 8, 2)}, r"samples is range\(0, 8, 2\)"),
         ({"samples": range(4, 4)}, r"samples is range\(4, 4\)"),
         ({"samples": range(-1, 4)}, r"samples is range\(-1, 4\)"),
-        ({"samples": range(4), "spp": 4}, r"samples is range\(0, 4\); then spp must not be given"),
-        ({"samples": range(4), "noise": 0.1}, "then noise must not be given"),
-        ({"samples": range(4), "seconds": 1}, "then seconds must not be given"),
+        (
+            {"samples": range(4), "spp": 4},
+            r"samples=range\(0, 4\) does not go with spp=4: samples",
+        ),
+        ({"samples": range(4), "noise": 0.1}, "does not go with noise=0.1: samples"),
+        ({"samples": range(4), "seconds": 1}, "does not go with seconds=1.0: samples"),
         ({"samples": range(2**32)}, f"it must end at {2**26} at most"),
     ],
 )

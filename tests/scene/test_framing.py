@@ -156,8 +156,14 @@ def test_the_default_is_three_quarter() -> None:
     [
         ({"view": "fronl"}, "view is 'fronl'; .* one of three_quarter, front, back, .*did you mean 'front'"),
         ({"view": (0, 0, 0)}, r"view is \[0.0, 0.0, 0.0\]; it must not be zero"),
-        ({"view": "top", "camera": wf.Camera.look_at((0, 0, 9), (0, 0, 0))}, "view is 'top'; with a camera"),
-        ({"fov": 20, "camera": wf.Camera.look_at((0, 0, 9), (0, 0, 0))}, "fov is 20.*; with a camera"),
+        (
+            {"view": "top", "camera": wf.Camera.look_at((0, 0, 9), (0, 0, 0))},
+            "view='top' does not go with camera=<Camera",
+        ),
+        (
+            {"fov": 20, "camera": wf.Camera.look_at((0, 0, 9), (0, 0, 0))},
+            "fov=20.0 does not go with camera=<Camera",
+        ),
         ({"fov": 0}, "fov"),
         ({"up": "Q"}, "up is 'Q'"),
     ],

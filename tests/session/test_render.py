@@ -185,7 +185,7 @@ BAD = [
         r"spp is 67108864; it must be a whole number from 1 to 33554432",
     ),
     *(
-        ({"branches": 2, "integrator": name}, rf"branches is 2; with integrator='{name}' it must be 1")
+        ({"branches": 2, "integrator": name}, rf"branches=2 does not go with integrator='{name}': only")
         for name in ("naive", "direct_simple", "direct_mis")
     ),
 ]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
-from test_interrupt import children, end_of, runs, script, wait_for
+from scripts import children, end_of, runs, script, wait_for
 
 import wavefront as wf
 from wavefront.scheduling import pool

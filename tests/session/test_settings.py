@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import inspect
 import re
-from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,35 +13,49 @@ import pytest
 import wavefront as wf
 from wavefront import cli
 from wavefront.film.aov_names import LAYERS
-from wavefront.settings import Settings
-
-DECLARED = {each.name: each for each in fields(Settings) if each.metadata}
+from wavefront.settings import SETTINGS, Settings
 
 
 def described(docstring: str) -> dict[str, str]:
     """Return the text of each parameter in a numpydoc docstring, without line breaks."""
-    section = inspect.cleandoc(docstring).split("Parameters\n----------\n")[1].split("\n\nReturns\n")[0]
+    section = inspect.cleandoc(docstring).split("Parameters\n----------\n")[1]
+    section = re.split(r"\n\n\w+\n---", section)[0]
     found = re.finditer(r"^(\w+)\n((?:    .*\n?)+)", section, re.MULTILINE)
     return {match[1]: " ".join(match[2].split()) for match in found}
 
 
-@pytest.mark.parametrize("function", [wf.render, wf.Session.__init__], ids=["render", "Session"])
-def test_signatures_follow_the_declaration(function: Any) -> None:
-    """Names in the same order, types and defaults."""
-    parameters = dict(inspect.signature(function).parameters)
-    del parameters["scene"]
-    parameters.pop("self", None)
-    assert list(parameters) == list(DECLARED)
-    for name, parameter in parameters.items():
-        assert parameter.default == DECLARED[name].default, name
-        assert parameter.annotation == DECLARED[name].type, name
+TAKERS = [wf.render, wf.Session, wf.render_many, wf.write_dataset, wf.view]
 
 
-def test_the_documentation_of_render_follows_the_declaration() -> None:
-    """Word for word."""
-    texts = described(wf.render.__doc__ or "")
-    del texts["scene"]
-    assert texts == {name: each.metadata["text"] for name, each in DECLARED.items()}
+@pytest.mark.parametrize("function", TAKERS, ids=lambda function: function.__name__)
+def test_signatures_show_every_setting(function: Any) -> None:
+    """Names in the same order, types and defaults; the parameters of the function itself come first."""
+    parameters = inspect.signature(function).parameters
+    assert [name for name in parameters if name in SETTINGS] == list(SETTINGS)
+    for name, setting in SETTINGS.items():
+        assert parameters[name].default == setting.default, name
+        assert parameters[name].annotation == setting.type, name
+    assert all(each.kind is not inspect.Parameter.VAR_KEYWORD for each in parameters.values())
+
+
+@pytest.mark.parametrize("function", TAKERS, ids=lambda function: function.__name__)
+def test_the_documentation_describes_every_setting(function: Any) -> None:
+    """Word for word, but where the function has a parameter of its own for it."""
+    texts = described(function.__doc__ or "")
+    own = {"spp"} if function is wf.view else set()
+    assert {name: texts[name] for name in SETTINGS if name not in own} == {
+        name: setting.text for name, setting in SETTINGS.items() if name not in own
+    }
+    assert "{settings}" not in (function.__doc__ or "")
+
+
+def test_no_setting_is_listed_anywhere_else() -> None:
+    """The package has one place with the names of all settings, the declaration."""
+    package = Path(wf.__file__).parent
+    words = {path: set(re.findall(r"\w+", path.read_text("utf-8"))) for path in package.rglob("*.py")}
+    rare = set(SETTINGS) - {"size", "up", "filter", "seed", "camera", "material", "samples"}  # common words
+    lists = [path.stem for path, found in words.items() if len(rare & found) > 0.7 * len(rare)]
+    assert lists == ["declaration"]
 
 
 def options() -> dict[str, argparse.Action]:
@@ -53,23 +67,23 @@ def options() -> dict[str, argparse.Action]:
 def test_options_follow_the_declaration() -> None:
     """Help, defaults and choices; those without an option have none."""
     found = options()
-    for name, each in DECLARED.items():
-        if each.metadata["option"] is None:
+    for name, each in SETTINGS.items():
+        if each.option is None:
             assert name not in found
             continue
-        assert found[name].help == each.metadata["option"]
+        assert found[name].help == each.option
         assert found[name].default == each.default
-        assert found[name].choices is each.metadata["choices"]
-        flag = each.metadata["flag"] or name
+        assert found[name].choices is each.choices
+        flag = each.flag or name
         negated = ["--no-" + flag] if name == "ground" else []
         assert found[name].option_strings == ["--" + flag.replace("_", "-"), *negated]
 
 
-@pytest.mark.parametrize("name", [name for name, each in DECLARED.items() if each.metadata["choices"]])
+@pytest.mark.parametrize("name", [name for name, each in SETTINGS.items() if each.choices])
 def test_choices_are_described(name: str) -> None:
     """Each built-in name stands in the text."""
-    for choice in ("processes", "threads") if name == "executor" else DECLARED[name].metadata["choices"]:
-        assert f'"{choice}"' in DECLARED[name].metadata["text"]
+    for choice in ("processes", "threads") if name == "executor" else SETTINGS[name].choices:
+        assert f'"{choice}"' in SETTINGS[name].text
 
 
 def test_checks_are_those_of_the_declaration() -> None:
@@ -77,13 +91,13 @@ def test_checks_are_those_of_the_declaration() -> None:
     for call in (wf.render, wf.Session):
         with pytest.raises(wf.SceneError, match=r"max_bounces is -1; .* from 0 to 65536"):
             call("no such file", max_bounces=-1)
-        with pytest.raises(wf.SceneError, match="branches is 2; with integrator='naive' it must be 1"):
+        with pytest.raises(wf.SceneError, match="branches=2 does not go with integrator='naive': only"):
             call("no such file", branches=2, integrator="naive")
 
 
 def test_settings_are_kept_as_they_are_checked() -> None:
     """Sizes and counts as ints, and what follows from several of them."""
-    assert Settings(size=(8.0, 6.0)).size == (8, 6)  # type: ignore[arg-type]
+    assert Settings(size=(8.0, 6.0)).values["size"] == (8, 6)  # type: ignore[arg-type]
     assert Settings().max_spp == Settings().target_spp == 100
     assert Settings(noise=0.1).max_spp == 2**16
     assert Settings(noise=0.1).target_spp is None
@@ -92,11 +106,15 @@ def test_settings_are_kept_as_they_are_checked() -> None:
 
 def test_layers_are_chosen_by_name() -> None:
     """One name or several, each once, in the order of the table; "all" is all without keys."""
-    assert Settings().aovs == ()
-    assert Settings(aovs="depth").aovs == ("depth",)
-    assert Settings(aovs=["coverage", "albedo", "depth", "albedo"]).aovs == ("depth", "albedo", "coverage")
-    assert Settings(aovs="all").aovs == tuple(LAYERS)
-    assert Settings(aovs=("all", "light_groups")).aovs == (*LAYERS, "light_groups")
+    assert Settings().values["aovs"] == ()
+    assert Settings(aovs="depth").values["aovs"] == ("depth",)
+    assert Settings(aovs=["coverage", "albedo", "depth", "albedo"]).values["aovs"] == (
+        "depth",
+        "albedo",
+        "coverage",
+    )
+    assert Settings(aovs="all").values["aovs"] == tuple(LAYERS)
+    assert Settings(aovs=("all", "light_groups")).values["aovs"] == (*LAYERS, "light_groups")
 
 
 def test_unknown_layers_are_an_error_that_lists_what_there_is() -> None:

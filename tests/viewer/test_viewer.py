@@ -963,8 +963,8 @@ def test_workers_give_way_to_the_page() -> None:
 def test_a_viewer_refuses_what_it_cannot_do() -> None:
     """Before any work."""
     refused = [
-        ({"checkpoint": "file"}, "view: checkpoint is 'file'"),
-        ({"samples": range(3)}, "view: samples is"),
+        ({"checkpoint": "file"}, "checkpoint is 'file'; it is for a picture of one view"),
+        ({"samples": range(3)}, "samples is range"),
         ({"port": 70000}, "port is 70000; it must be a whole number from 0 to 65535"),
         ({"spp": 0}, "spp is 0"),
         ({"token": ""}, "token is ''"),

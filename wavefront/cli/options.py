@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from dataclasses import Field, fields
 from typing import Any
 
 from ..codecs.display import Display
@@ -13,7 +12,8 @@ from ..core.progress import Progress
 from ..io.to_scene import as_scene
 from ..materials import Material, MaterialLike
 from ..scene import Scene
-from ..settings import AUTO, Settings
+from ..settings import AUTO, SETTINGS
+from ..settings.declaration import Setting
 from . import arguments
 
 TYPES: dict[str, Callable[[str], Any]] = {"int": int, "float": float, "str": str}
@@ -44,16 +44,14 @@ METAVARS = {
 }
 # settings that the command line uses itself, for its own camera and where it reads a scene
 OWN_OPTIONS = ("size", "view", "fov", "material", "smooth")
-RENDER_OPTIONS = [
-    each.name for each in fields(Settings) if each.metadata.get("option") and each.name not in OWN_OPTIONS
-]
+RENDER_OPTIONS = [name for name, each in SETTINGS.items() if each.option and name not in OWN_OPTIONS]
 
 
 def add_settings(command: argparse.ArgumentParser) -> None:
     """Add an option for each setting that has one."""
-    for each in fields(Settings):
-        if each.metadata.get("option"):
-            _add_setting(command, each)
+    for name, each in SETTINGS.items():
+        if each.option:
+            _add_setting(command, name, each)
     command.add_argument(
         "--color",
         type=arguments.color_value,
@@ -97,19 +95,19 @@ def display_of(options: argparse.Namespace) -> Display:
     return Display(options.gamma, options.exposure, options.tone, options.white_balance)
 
 
-def _add_setting(command: argparse.ArgumentParser, setting: Field[Any]) -> None:
+def _add_setting(command: argparse.ArgumentParser, name: str, setting: Setting) -> None:
     """Add the option of a setting that has one."""
-    how: dict[str, Any] = {"help": setting.metadata["option"], "default": setting.default}
-    flag = setting.metadata["flag"] or setting.name
-    if str(setting.type) == "bool | str" and setting.default == AUTO and setting.name not in PARSERS:
+    how: dict[str, Any] = {"help": setting.option, "default": setting.default}
+    flag = setting.flag or name
+    if setting.type == "bool | str" and setting.default == AUTO and name not in PARSERS:
         command.add_argument(f"--{flag}", f"--no-{flag}", action=arguments.Flag, **how)
         return
-    if str(setting.type).startswith("bool") and setting.name not in PARSERS:
+    if setting.type.startswith("bool") and name not in PARSERS:
         how["action"] = "store_true"
-    elif setting.metadata["flag"]:
-        how.update(action=arguments.Several, dest=setting.name, metavar="NAME")
+    elif setting.flag:
+        how.update(action=arguments.Several, dest=name, metavar="NAME")
     else:
-        how["type"] = PARSERS.get(setting.name) or TYPES[str(setting.type).split(" ")[0]]
-        how["choices"] = setting.metadata["choices"]
-        how["metavar"] = METAVARS.get(setting.name)
+        how["type"] = PARSERS.get(name) or TYPES[setting.type.split(" ")[0]]
+        how["choices"] = setting.choices
+        how["metavar"] = METAVARS.get(name)
     command.add_argument("--" + flag.replace("_", "-"), **how)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from difflib import get_close_matches
 from functools import wraps
 from typing import ParamSpec, TypeVar
@@ -140,21 +140,34 @@ def suggests_keywords(function: Callable[P, R]) -> Callable[P, R]:
     """
     code = function.__code__
     known = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
-    makes = function.__name__ == "__init__"
 
     @wraps(function)
     def checked(*args: P.args, **kwargs: P.kwargs) -> R:
-        for name in kwargs:
-            if name not in known:
-                elsewhere = getattr(args[0], "given_elsewhere", {}) if args else {}
-                hint = did_you_mean(name, known)
-                if name in elsewhere and (makes or not hint):
-                    hint = f"; write {elsewhere[name]}"
-                title = type(args[0]).__name__ if makes else function.__qualname__
-                raise TypeError(f"{title}() got an unexpected keyword argument {name!r}{hint}")
+        check_keywords(function, known, args, kwargs)
         return function(*args, **kwargs)
 
     return checked
+
+
+def check_keywords(
+    function: Callable[..., object], known: Collection[str], args: Sequence[object], names: Iterable[str]
+) -> None:
+    """Check the names of keyword arguments, given those that are known and the positional arguments.
+
+    Raises
+    ------
+    TypeError
+        If one is unknown, as in Python.
+    """
+    for name in names:
+        if name not in known:
+            makes = function.__name__ == "__init__"
+            elsewhere = getattr(args[0], "given_elsewhere", {}) if args else {}
+            hint = did_you_mean(name, known)
+            if name in elsewhere and (makes or not hint):
+                hint = f"; write {elsewhere[name]}"
+            title = type(args[0]).__name__ if makes else function.__qualname__
+            raise TypeError(f"{title}() got an unexpected keyword argument {name!r}{hint}")
 
 
 def _plain(name: str) -> str:

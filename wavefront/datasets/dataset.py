@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, Unpack
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from ..film.identity import differences
 from ..io.to_scene import as_scene
 from ..scene import Scene
 from ..session import Session
+from ..settings import RenderSettings, refuse, takes_settings
 from .annotated import AnnotatedObject, annotated_objects
 from .bop import BopLayout
 from .coco import CocoLayout
@@ -28,6 +29,8 @@ from .view import DatasetView, camera_matrices, view_name
 FORMATS = ("coco", "bop")
 LAYERS_NEEDED = ("depth", "normal", "shape_id")
 LAYERS_FOLDER, VIEWS_FOLDER = "layers", "views"
+GOES_ON = "write_dataset goes on with views that are missing"
+REFUSED = {"checkpoint": GOES_ON, "samples": GOES_ON, "camera": "write_dataset takes cameras"}
 
 
 class Layout(Protocol):
@@ -43,6 +46,7 @@ class Layout(Protocol):
         """Write the files that describe all views."""
 
 
+@takes_settings
 def write_dataset(
     folder: str | os.PathLike[str],
     scene: Any,
@@ -57,7 +61,7 @@ def write_dataset(
     exposure: float = 0.0,
     tone: str = "none",
     white_balance: WhiteBalance | None = None,
-    **settings: Any,
+    **settings: Unpack[RenderSettings],
 ) -> int:
     """Render views of a scene with annotations of its objects, as a data set for machine learning.
 
@@ -83,9 +87,7 @@ def write_dataset(
         deeper than 6.55 m what is needed.
     gamma, exposure, tone, white_balance
         Of the png files, as for `Image.save`.
-    **settings
-        The other settings of `render`; an unknown one is an error. `aovs` adds layers to those that are
-        needed. `checkpoint` and `samples` are not taken.
+    {settings}
 
     Returns
     -------
@@ -109,11 +111,7 @@ def write_dataset(
     >>> wf.write_dataset("balls", scene, cameras, spp=1, format=("coco", "bop"))
     3
     """
-    for name in ("checkpoint", "samples"):
-        if settings.get(name) is not None:
-            raise SceneError(
-                f"{name} is {settings[name]!r}; write_dataset goes on with views that are missing"
-            )
+    refuse(settings, REFUSED)
     subject = as_scene(scene, settings.pop("material", None), settings.get("progress"))
     root = Path(path_name(folder))
     chosen = _chosen_formats(format)
@@ -127,6 +125,7 @@ def write_dataset(
         )
     views = _checked_cameras(cameras, settings.pop("size", None), layouts)
     display = Display(gamma, exposure, tone, white_balance)
+    settings["camera"] = views[0]
     settings["aovs"] = (*chosen_layers("aovs", settings.get("aovs", ())), *LAYERS_NEEDED)
     about = {
         "format": sorted(chosen),
@@ -140,7 +139,7 @@ def write_dataset(
         "seconds": settings.get("seconds"),
     }
     writer = _Writer(root, subject, annotated, layouts, display, about)
-    return writer.write(views, Session(subject, spp, camera=views[0], **settings))
+    return writer.write(views, Session(subject, spp, **settings))
 
 
 class _Writer:

@@ -19,6 +19,7 @@ from ..integrators.tuning import BLOCKS, MOST_TILES, JobsRunner, Trial, guide_pa
 from ..sampling.sampler import make_sampler
 from ..sampling.tiles import SIDE, STRIDE
 from ..settings import AUTO, Settings
+from ..settings.combinations import left_out
 from ..stages.reuse import can_reuse, shares_all
 
 LEAST_PIXELS = 192 * 192  # of pictures that get a trial; smaller ones take no longer than a moment
@@ -44,8 +45,8 @@ def learn_guide(settings: Settings, scene: CompiledScene, camera: Camera) -> Gui
     camera
         In the unit of the compiled scene.
     """
-    sampler = make_sampler(settings.sampler, settings.pilot_seed(), camera.film[0])
-    return train(scene, camera, sampler, settings.max_bounces)
+    sampler = make_sampler(settings.values["sampler"], settings.pilot_seed(), camera.film[0])
+    return train(scene, camera, sampler, settings.values["max_bounces"])
 
 
 def choose(
@@ -62,12 +63,13 @@ def choose(
     run
         Does the jobs of trials.
     """
-    asked = Choice(1 if settings.branches == AUTO else int(settings.branches), settings.reuse is True)
+    branches = settings.values["branches"]
+    asked = Choice(1 if branches == AUTO else int(branches), settings.values["reuse"] is True)
     if not settings.is_full:
         return asked
     whole = camera.cropped((0, 0, *camera.film))  # a window is a part of the same picture
     trial = partial(_trial, settings, scene, whole, run)
-    if settings.guide == AUTO and has_guide:
+    if settings.values["guide"] == AUTO and has_guide:
         return _choose_guide(settings, asked, trial)
     if _tries_something(settings, scene, whole):
         tiles, may_reuse = tiles_for(whole.size), _may_reuse(settings, whole) and can_reuse(scene)
@@ -85,7 +87,7 @@ def choose(
 
 def _choose_guide(settings: Settings, asked: Choice, trial: Callable[[bool, int], Trial]) -> Choice:
     """Return whether a guide is used, and how many branches go with that."""
-    fixed = None if settings.branches == AUTO and not asked.reuse else asked.branches
+    fixed = None if settings.values["branches"] == AUTO and not asked.reuse else asked.branches
     guided, plain = (trial(each, GUIDE_TILES) for each in (True, False))
     pays = guide_pays(guided, plain, fixed)
     found = guided if pays else plain
@@ -102,13 +104,14 @@ def _trial(
     reuse: bool = False,
 ) -> Trial:
     seeds = tuple(settings.pilot_seed(number) for number in range(1, BLOCKS + 1))
-    bounces = settings.max_bounces
+    bounces = settings.values["max_bounces"]
     return run_trial(scene, camera, seeds, bounces, run, guided=guided, tiles=tiles, reuse=reuse)
 
 
 def _tries_something(settings: Settings, scene: CompiledScene, camera: Camera) -> bool:
     """Return whether branches or re-use are "auto" and can bring anything."""
-    if settings.branches != AUTO or settings.reuse is True or settings.max_bounces < 2:
+    values = settings.values
+    if values["branches"] != AUTO or values["reuse"] is True or values["max_bounces"] < 2:
         return False
     if camera.size[0] * camera.size[1] < LEAST_PIXELS:
         return False
@@ -118,6 +121,5 @@ def _tries_something(settings: Settings, scene: CompiledScene, camera: Camera) -
 
 def _may_reuse(settings: Settings, camera: Camera) -> bool:
     """Return whether settings and size of a picture allow that its pixels share paths by themselves."""
-    plain = settings.clamp is None and settings.noise is None and not settings.caustics
-    told_apart = "light_groups" in settings.aovs
-    return settings.reuse == AUTO and plain and not told_apart and min(camera.size) >= SIDE * STRIDE
+    free = settings.values["reuse"] == AUTO and not left_out(settings.values, "reuse")
+    return free and min(camera.size) >= SIDE * STRIDE

@@ -46,7 +46,7 @@ NO_DENOISER = (
 
 def caustics_hint(settings: Settings, prepared: PreparedScene) -> str | None:
     """Return what paths from lights would bring; None if that is little, or if they are traced."""
-    if settings.caustics or not settings.is_full or settings.max_bounces < 2:
+    if settings.values["caustics"] or not settings.is_full or settings.values["max_bounces"] < 2:
         return None
     compiled = prepared.compiled
     lights, materials = compiled.lights, compiled.materials.groups
@@ -117,7 +117,7 @@ class Hints:
         if (image.metadata["rare"] or 0) > MUCH_RARE:
             yield RARE_PATHS
         many = self._prepared.compiled.triangles >= MANY_TRIANGLES
-        if self._settings.accel == AUTO and many and not installed():
+        if self._settings.values["accel"] == AUTO and many and not installed():
             yield NO_EMBREE
-        if self._settings.denoise and image.metadata.get("denoiser") == "nonlocal_means":
+        if self._settings.values["denoise"] and image.metadata.get("denoiser") == "nonlocal_means":
             yield NO_DENOISER

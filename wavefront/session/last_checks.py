@@ -32,11 +32,11 @@ def check_last_image(image: Image, plan: Plan, loop: RenderLoop, surfaces: int) 
     settings, accumulator = plan.settings, loop.accumulator
     time_up = loop.stopped or loop.scheduler.time_up
     if time_up:
-        check_first_samples(image, settings.seconds, surfaces)
+        check_first_samples(image, settings.values["seconds"], surfaces)
     accumulator.bad.report(image, lambda pixel, sample: _cause_of_bad_sample(plan, loop, pixel, sample))
-    if settings.clamp is not None:
-        warn_of_clamped_light(image, settings.clamp)
-    if settings.background is None and is_black_or_white(image):
+    if settings.values["clamp"] is not None:
+        warn_of_clamped_light(image, settings.values["clamp"])
+    if settings.values["background"] is None and is_black_or_white(image):
         from .diagnosis import warn_of_black_or_white  # here, as most pictures do without
 
         warn_of_black_or_white(
@@ -44,11 +44,11 @@ def check_last_image(image: Image, plan: Plan, loop: RenderLoop, surfaces: int) 
             plan.scene.lighted,
             plan.scene.compiled,
             loop.view.camera,
-            INTEGRATORS.label(settings.integrator),
-            settings.max_bounces,
+            INTEGRATORS.label(settings.values["integrator"]),
+            settings.values["max_bounces"],
         )
-    if settings.noise is not None and (time_up or accumulator.film.count.max() == settings.max_spp):
-        warn_of_noise(image, settings.noise)
+    if settings.values["noise"] is not None and (time_up or accumulator.film.count.max() == settings.max_spp):
+        warn_of_noise(image, settings.values["noise"])
 
 
 def _cause_of_bad_sample(plan: Plan, loop: RenderLoop, pixel: int, sample: int) -> str:

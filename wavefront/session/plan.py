@@ -38,16 +38,16 @@ class Plan:
 
 def trained_guide(settings: Settings, scene: PreparedScene, camera: Camera) -> GuideTable | None:
     """Return the table that may guide the paths that a camera sees; None if none is asked for."""
-    if not settings.guide or not settings.is_full:
+    if not settings.values["guide"] or not settings.is_full:
         return None
-    with phase("learning where light comes from", settings.progress), single_threaded_blas:
+    with phase("learning where light comes from", settings.values["progress"]), single_threaded_blas:
         return learn_guide(settings, scene.compiled, scene.compiled.view(camera))
 
 
 def with_choice(plan: Plan, camera: Camera, run: JobsRunner) -> Plan:
     """Return a plan with a choice of how the paths that a camera sees go on; `run` does trials' jobs."""
     compiled, has_guide = plan.scene.compiled, plan.tracer.table is not None
-    with phase("trying what pays", plan.settings.progress), single_threaded_blas:
+    with phase("trying what pays", plan.settings.values["progress"]), single_threaded_blas:
         choice = choose(plan.settings, compiled, compiled.view(camera), has_guide, run)
     hint = caustics_hint(plan.settings, plan.scene) or choice.hint
     return replace(plan, choice=replace(choice, hint=hint))
@@ -58,16 +58,16 @@ def make_plan(settings: Settings, scene: PreparedScene, camera: Camera, table: G
     tracer = Tracer(
         scene.compiled,
         settings.sampler_maker(),
-        settings.seed,
-        FILTERS.find(settings.filter),
-        INTEGRATORS.find(settings.integrator),
-        settings.max_bounces,
+        settings.values["seed"],
+        FILTERS.find(settings.values["filter"]),
+        INTEGRATORS.find(settings.values["integrator"]),
+        settings.values["max_bounces"],
         settings.sampled_layers,
         table,
-        settings.clamp,
+        settings.values["clamp"],
     )
     executor = settings.executor_for(camera.size)
-    if settings.executor is None and needs_pickling(executor) and not can_be_sent(tracer):
+    if settings.values["executor"] is None and needs_pickling(executor) and not can_be_sent(tracer):
         executor = "threads"
     budget = settings.budget(camera.size, executor, tracer.recorded_layers)
     return Plan(settings, scene, tracer, executor, budget)

@@ -47,15 +47,16 @@ class PreparedScene:
 
     def __init__(self, scene: Scene, settings: Settings, framed: Camera | None) -> None:
         self.scene = scene
-        self.preset, up = choose_preset(scene, settings.lighting), scene.vertical(settings.up)
-        chosen = settings.lighting == AUTO and self.preset is not None
-        self.ground = choose_ground(settings.ground, chosen, framed, settings.background, up)
+        values = settings.values
+        self.preset, up = choose_preset(scene, values["lighting"]), scene.vertical(values["up"])
+        chosen = values["lighting"] == AUTO and self.preset is not None
+        self.ground = choose_ground(values["ground"], chosen, framed, values["background"], up)
         self.lighted = lighted(scene, self.preset, ground=self.ground, up=up, camera=framed)
-        warn_of_unseen_lights(self.lighted, settings.integrator)
+        warn_of_unseen_lights(self.lighted, values["integrator"])
         self._geometries: list[Geometry] = []
         self._fingerprint: str | None = None
-        with phase("building the scene", settings.progress):
-            make_accelerator = scene.accelerators.maker(settings.accel)
+        with phase("building the scene", settings.values["progress"]):
+            make_accelerator = scene.accelerators.maker(settings.values["accel"])
 
             def make(geometry: Geometry) -> Accelerator:
                 self._geometries.append(geometry)
@@ -64,10 +65,10 @@ class PreparedScene:
             compiled = compile_scene(
                 self.lighted,
                 make,
-                settings.light_sampler,
-                most_copies(settings.accel),
-                mis=INTEGRATORS.find(settings.integrator) in WITH_MIS,
-                caustics=settings.caustics,
+                settings.values["light_sampler"],
+                most_copies(settings.values["accel"]),
+                mis=INTEGRATORS.find(settings.values["integrator"]) in WITH_MIS,
+                caustics=settings.values["caustics"],
             )
         self.compiled = replace(
             compiled, background=settings.background_color, roulette_after=settings.roulette_after

@@ -13,26 +13,14 @@ from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..core.errors import SaveError, SceneError, warn_caller
 from ..core.fingerprint import fingerprint
-from ..core.registry import Registry
 from ..film.checkpoint import Checkpoint, check_identity, other_versions, read_checkpoint
 from ..film.checkpoint_file import contents_of
-from ..film.identity import CAUSTICS, CODE, SCENE
+from ..film.identity import CODE, SCENE
 from ..film.picture_sums import PictureSums
-from ..integrators import INTEGRATORS
-from ..lights.samplers import LIGHT_SAMPLERS
-from ..sampling.filters import FILTERS
-from ..sampling.sampler import SAMPLERS
 from ..scheduling.accumulator import Accumulator
-from ..settings import Settings
+from ..settings import SETTINGS, Settings
 from .choice import Choice
 
-NAMED: dict[str, Registry[Any]] = {
-    "integrator": INTEGRATORS,
-    "sampler": SAMPLERS,
-    "filter": FILTERS,
-    "light_sampler": LIGHT_SAMPLERS,
-}
-PLAIN = ("max_bounces", "seed", "guide", "clamp", "noise")
 WRITING_SHARE = 0.05  # of the time that writing may take, on a slow disk; the interval is then longer
 
 
@@ -72,19 +60,17 @@ def render_identity(
     layers
         The sampled layers.
     """
-    names, codes = {}, {}
-    for name, table in NAMED.items():
-        value = getattr(settings, name)
-        names[name] = table.label(value)
-        codes[CODE + name] = fingerprint(f"the {name}", table.find(value))
+    given: Any = settings.values
+    codes = {
+        CODE + name: fingerprint(f"the {name}", each.choices.find(given[name]))
+        for name, each in SETTINGS.items()
+        if each.identity and each.choices is not None
+    }
     return {
         "size": list(camera.size),
-        **{name: getattr(settings, name) for name in PLAIN},
         "branches": choice.branches,
         "reuse": choice.reuse,
-        CAUSTICS: settings.caustics,
-        "roulette": settings.roulette,
-        **names,
+        **settings.labels(),
         "accelerator": accelerator,
         "aovs": list(layers),
         **codes,

@@ -5,40 +5,32 @@ from __future__ import annotations
 import os
 import shlex
 import time
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from ..accel.registry import AcceleratorMaker
 from ..aovs.boxes import silhouettes
 from ..camera import Camera, check_camera, image_size
 from ..core.errors import RenderError, SaveError, SceneError, warn_caller
-from ..core.progress import Progress
-from ..core.suggestions import suggests_keywords
 from ..film.checkpoint import Checkpoint
 from ..image import Image
-from ..integrators import Integrator
 from ..integrators.tuning_job import TrialJob, TrialPart
 from ..io.to_scene import as_scene, choose_camera
-from ..lights.samplers import LightSamplerMaker
-from ..materials import MaterialLike
-from ..sampling.filters import Filter
-from ..sampling.sampler import SamplerMaker
 from ..scheduling.accumulator import Accumulator, check_picture_memory
 from ..scheduling.blas import reserve_buffers
-from ..scheduling.executors import ExecutorLike, shares_scene
+from ..scheduling.executors import shares_scene
 from ..scheduling.interrupt import InterruptHandler
 from ..scheduling.loop import PassSplitter, doubling, undivided
 from ..scheduling.pool import WorkerPool
 from ..scheduling.shared import STOP, Stopped
 from ..scheduling.tracing import WaveMonitor, trace_any_job
-from ..settings import Settings
+from ..settings import RenderSettings, Settings, describes_settings, takes_settings
 from .final_checks import LONG_PATH, interrupted, render_error, setup_errors, warn_of_long_paths
 from .hints import Hints
 from .last_checks import check_last_image
@@ -50,6 +42,7 @@ from .view_render import ViewRender, new_accumulator
 SNAPSHOT_INTERVAL = 1.0  # seconds between two pictures of a long pass
 
 
+@describes_settings
 class Session:
     """A render that can be watched, stopped and pointed at another view.
 
@@ -66,14 +59,9 @@ class Session:
 
     Parameters
     ----------
-    scene, spp, camera, size, view, fov, material, smooth, up, lighting, ground, background
+    scene
         As for `render`.
-    integrator, max_bounces, roulette, seed, samples, sampler, accel, filter, light_sampler, branches, guide
-        As for `render`.
-    reuse, workers, executor, noise, seconds, clamp, caustics, wave_size, max_memory, strict, aovs, denoise
-        As for `render`.
-    progress, checkpoint, checkpoint_interval
-        As for `render`.
+    {settings}
 
     Raises
     ------
@@ -95,92 +83,13 @@ class Session:
     4
     """
 
-    @suggests_keywords
-    def __init__(
-        self,
-        scene: Any,
-        spp: int | None = None,
-        *,
-        camera: Camera | None = None,
-        size: tuple[int, int] | None = None,
-        view: str | ArrayLike | None = None,
-        fov: float | None = None,
-        material: MaterialLike | None = None,
-        smooth: bool | float | str = "auto",
-        up: ArrayLike = "auto",
-        lighting: str | None = "auto",
-        ground: bool | str = "auto",
-        background: str | ArrayLike | None = None,
-        integrator: str | Integrator = "full",
-        max_bounces: int = 12,
-        roulette: bool | int = 2,
-        seed: int = 0,
-        samples: range | None = None,
-        sampler: str | SamplerMaker = "sobol",
-        accel: str | AcceleratorMaker = "auto",
-        workers: int | None = None,
-        executor: str | ExecutorLike | None = None,
-        noise: float | None = None,
-        seconds: float | None = None,
-        filter: str | Filter = "box",
-        light_sampler: str | LightSamplerMaker = "spatial",
-        branches: int | str = "auto",
-        guide: bool | str = False,
-        reuse: bool | str = "auto",
-        clamp: float | None = None,
-        caustics: bool = False,
-        wave_size: int | None = None,
-        checkpoint: str | os.PathLike[str] | None = None,
-        checkpoint_interval: float = 60,
-        max_memory: int | str | None = None,
-        strict: bool = False,
-        aovs: str | Sequence[str] = (),
-        denoise: bool = False,
-        progress: Progress = None,
-    ) -> None:
+    @takes_settings
+    def __init__(self, scene: Any, spp: int | None = None, **settings: Unpack[RenderSettings]) -> None:
         begin = time.perf_counter()
         self._in_block = self._closed = self._once = self._stopped = self._dropped = False
         self.command: dict[str, Any] | None = None  # of the command line, for checkpoints
         self._use = SoleUse()
-        self._settings = Settings(
-            spp=spp,
-            camera=camera,
-            size=size,
-            view=view,
-            fov=fov,
-            material=material,
-            smooth=smooth,
-            up=up,
-            lighting=lighting,
-            ground=ground,
-            background=background,
-            integrator=integrator,
-            max_bounces=max_bounces,
-            roulette=roulette,
-            seed=seed,
-            samples=samples,
-            sampler=sampler,
-            accel=accel,
-            workers=workers,
-            executor=executor,
-            noise=noise,
-            seconds=seconds,
-            filter=filter,
-            light_sampler=light_sampler,
-            branches=branches,
-            guide=guide,
-            reuse=reuse,
-            clamp=clamp,
-            caustics=caustics,
-            wave_size=wave_size,
-            checkpoint=checkpoint,
-            checkpoint_interval=checkpoint_interval,
-            max_memory=max_memory,
-            strict=strict,
-            aovs=aovs,
-            denoise=denoise,
-            progress=progress,
-        )
+        self._settings = Settings(spp=spp, **settings)
         with setup_errors():
             self._set_up(scene, begin)
 
@@ -188,13 +97,14 @@ class Session:
         """Compile the scene and begin the first picture."""
         settings = self._settings
         reserve_buffers(1)
-        scene = as_scene(subject, settings.material, settings.progress, settings.smooth)
+        values = settings.values
+        scene = as_scene(subject, values["material"], values["progress"], values["smooth"])
         camera, framed = choose_camera(
-            scene, settings.camera, settings.size, settings.up, settings.view, settings.fov
+            scene, values["camera"], values["size"], values["up"], values["view"], values["fov"]
         )
-        check_picture_memory(*camera.size, settings.caustics)
+        check_picture_memory(*camera.size, values["caustics"])
         # before work, for what takes least; again when the memory of the scene is known
-        settings.budget(camera.size, settings.executor or "threads")
+        settings.budget(camera.size, values["executor"] or "threads")
         self._scene = PreparedScene(scene, settings, camera if framed else None)
         self._hints = Hints(settings, self._scene)
         self._plan = make_plan(settings, self._scene, camera, trained_guide(settings, self._scene, camera))
@@ -204,7 +114,7 @@ class Session:
                 self._pool.start()  # before there are sums, of which forked processes would keep old copies
                 with ThreadPoolExecutor(1) as aside:
                     sums = aside.submit(
-                        new_accumulator, camera, self._plan.tracer.recorded_layers, settings.caustics
+                        new_accumulator, camera, self._plan.tracer.recorded_layers, values["caustics"]
                     )
                     self._plan = with_choice(self._plan, camera, self._run_trial)
                 self._begin_picture(camera, sums.result(), begin)
@@ -222,7 +132,7 @@ class Session:
             self._plan.budget.workers,
             self._plan.executor,
             self._monitor.stop,
-            self._settings.strict,
+            self._settings.values["strict"],
         )
         if self._in_block:
             self._pool.__enter__()
@@ -374,11 +284,14 @@ class Session:
             )
         check_camera("camera", camera)
         size = None if size is None else image_size(size)
-        camera, _ = choose_camera(self._scene.scene, camera, size, settings.up, settings.view, settings.fov)
+        values = settings.values
+        camera, _ = choose_camera(
+            self._scene.scene, camera, size, values["up"], values["view"], values["fov"]
+        )
         self._scene.compiled.view(camera)  # checks its distance
         executor = settings.executor_for(camera.size)
         budget = settings.budget(camera.size, executor, self._plan.tracer.recorded_layers)
-        accumulator = new_accumulator(camera, self._plan.tracer.recorded_layers, settings.caustics)
+        accumulator = new_accumulator(camera, self._plan.tracer.recorded_layers, settings.values["caustics"])
         with self.interrupt_handler, self._use:
             self._render.discard_sweeps()
             self._stopped = self._dropped = False  # a stop from now on is one of the new picture
@@ -498,10 +411,10 @@ class Session:
         """Write the checkpoint when it is due, and warn once of paths that do not end."""
         if self._render.file is not None:
             self._render.file.write_if_due(self._make_checkpoint)
-        long = self._settings.max_bounces > LONG_PATH and self._monitor.surfaces.value > LONG_PATH
+        long = self._settings.values["max_bounces"] > LONG_PATH and self._monitor.surfaces.value > LONG_PATH
         if long and not self._warned:
             self._warned = True
-            warn_of_long_paths(self._settings.max_bounces)
+            warn_of_long_paths(self._settings.values["max_bounces"])
 
     def _end(self) -> Image | None:
         """Return the last picture when the loop is over, or raise what ended it; None if there is none."""
@@ -531,8 +444,8 @@ class Session:
             raise RenderError(f"the checkpoint was not written: {not_written}", image) from not_written
         if not render.accumulator.samples:
             return None
-        image = image.denoise() if settings.denoise else image
-        if not (self._interrupted or self._stopped) and settings.progress in (None, True):
+        image = image.denoise() if settings.values["denoise"] else image
+        if not (self._interrupted or self._stopped) and settings.values["progress"] in (None, True):
             self.tell_hints(image)
         return image
 
@@ -550,9 +463,9 @@ class Session:
 
     def _how_to_go_on(self) -> str:
         """Return what a message says of the checkpoint; "" where none is kept."""
-        if self._settings.checkpoint is None:
+        if self._settings.values["checkpoint"] is None:
             return ""
-        path = os.fspath(self._settings.checkpoint)
+        path = os.fspath(self._settings.values["checkpoint"])
         how = "the same call" if self.command is None else f"wavefront resume {shlex.quote(path)}"
         return f"; {path} holds it, and {how} goes on from there"
 

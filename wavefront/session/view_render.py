@@ -18,9 +18,6 @@ from ..compile.scene import CompiledScene
 from ..film.aov_names import BOXES, geometric_names
 from ..film.checkpoint import Checkpoint
 from ..image import Image
-from ..integrators import INTEGRATORS
-from ..sampling.filters import FILTERS
-from ..sampling.sampler import SAMPLERS
 from ..scheduling.accumulator import Accumulator
 from ..scheduling.adaptive import Pass
 from ..scheduling.executors import EXECUTORS, waves_per_job
@@ -66,11 +63,11 @@ class ViewRender:
         self._boxes: list[dict[str, Any]] | None = None
         self._sweeps: Generator[bool] | None = None
         self.file: CheckpointFile | None = None
-        if settings.samples is not None or settings.checkpoint is not None:
+        if settings.values["samples"] is not None or settings.values["checkpoint"] is not None:
             accumulator.sums.identity = self.identity()
         begun = None
-        if settings.checkpoint is not None:
-            self.file = CheckpointFile(settings.checkpoint, settings.checkpoint_interval)
+        if settings.values["checkpoint"] is not None:
+            self.file = CheckpointFile(settings.values["checkpoint"], settings.values["checkpoint_interval"])
             earlier = self.file.resume(accumulator, settings)
             if earlier is not None:
                 begin -= earlier.state["seconds"]
@@ -78,7 +75,7 @@ class ViewRender:
                     begun = Pass(earlier.pixels, earlier.state["first"], settings.max_spp)
         scheduler = Scheduler(
             begin,
-            settings.seconds,
+            settings.values["seconds"],
             plan.budget.wave_size,
             plan.budget.workers,
             choice.branches,
@@ -91,9 +88,9 @@ class ViewRender:
             accumulator,
             scheduler,
             spp=settings.max_spp,
-            noise=settings.noise,
-            seconds=settings.seconds,
-            progress=settings.progress,
+            noise=settings.values["noise"],
+            seconds=settings.values["seconds"],
+            progress=settings.values["progress"],
             begun=begun,
         )
 
@@ -148,7 +145,7 @@ class ViewRender:
             Whether sums that are not merged may be freed while the picture is made from them, as nothing
             else needs them.
         """
-        keep_sums, metadata = self._plan.settings.samples is not None, self.metadata(cut_short)
+        keep_sums, metadata = self._plan.settings.values["samples"] is not None, self.metadata(cut_short)
         if free_sums and not keep_sums:
             image = self.accumulator.last_image(metadata)
         else:
@@ -177,7 +174,7 @@ class ViewRender:
     def checkpoint(self, command: dict[str, Any] | None) -> Checkpoint:
         """Return the render so far, with the command that goes on with it."""
         loop, accumulator = self.loop, self.accumulator
-        step = loop.step if self._plan.settings.noise is not None else None
+        step = loop.step if self._plan.settings.values["noise"] is not None else None
         state = {
             **accumulator.state(),
             "seconds": loop.scheduler.spent,
@@ -195,23 +192,15 @@ class ViewRender:
         return {
             "lighting": plan.scene.preset,
             "ground": plan.scene.ground,
-            "background": _background_label(settings.background),
-            "integrator": INTEGRATORS.label(settings.integrator),
-            "max_bounces": settings.max_bounces,
-            "roulette": settings.roulette,
-            "seed": settings.seed,
-            "sampler": SAMPLERS.label(settings.sampler),
+            "background": _background_label(settings.values["background"]),
+            **settings.labels(),
             "sample_ranges": [[first, first + most]],
             "film": list(self.camera.film),
             "window": list(self.camera.window),
-            "filter": FILTERS.label(settings.filter),
             "branches": plan.choice.branches,
-            "guide": settings.guide,
             "guided": plan.choice.guided,
             "reuse": plan.choice.reuse,
             "hint": plan.choice.hint,
-            "clamp": settings.clamp,
-            "caustics": settings.caustics,
             "accelerator": plan.scene.compiled.accelerator.name,
             "workers": plan.budget.workers,
             "executor": EXECUTORS.label(plan.executor),
@@ -224,7 +213,7 @@ class ViewRender:
     def _geometric_layers(self, compiled: CompiledScene) -> dict[str, NDArray[Any]]:
         """Return the geometric layers that are asked for; the first time, trace them and the boxes."""
         if self._geometric is None:
-            aovs, given = self._plan.settings.aovs, (compiled, self.camera, self._plan.scene.shapes)
+            aovs, given = self._plan.settings.values["aovs"], (compiled, self.camera, self._plan.scene.shapes)
             if BOXES in aovs:
                 self._boxes = object_boxes(*given)
             names = geometric_names(aovs)

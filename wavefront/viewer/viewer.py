@@ -8,7 +8,7 @@ import threading
 import webbrowser
 from importlib.util import find_spec
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, Unpack
 
 from ..camera import Camera
 from ..codecs.tone import TONES
@@ -19,7 +19,7 @@ from ..scene import Scene
 from ..scheduling.executors import choose_executor, needs_pickling, worker_count
 from ..session import Session
 from ..session.notebook import in_kernel
-from ..settings import DEFAULT_SPP
+from ..settings import DEFAULT_SPP, RenderSettings, refuse, takes_settings
 from .guard import token_of
 from .priority import giving_way
 from .refiner import FIRST_DIVISOR, Refiner, ViewerFrame
@@ -30,7 +30,7 @@ from .viewpoint import Viewpoint
 WAVE_SIZE = 1 << 15
 POLL = 0.5  # seconds
 FRAME = "100%", 600  # width and height of the page in a notebook
-REFUSED = ("checkpoint", "samples", "progress")  # settings that make no sense for views that change
+REFUSED = dict.fromkeys(("checkpoint", "samples", "progress"), "it is for a picture of one view")
 
 
 class Viewer:
@@ -194,6 +194,7 @@ class Viewer:
             self._page.say(f"stopped: {error}")
 
 
+@takes_settings
 def view(
     scene: Any,
     spp: int | None = None,
@@ -204,7 +205,7 @@ def view(
     tone: str = "none",
     open_browser: bool = True,
     block: bool | None = None,
-    **settings: Any,
+    **settings: Unpack[RenderSettings],
 ) -> Viewer:
     """Show a scene on a page in the browser, where one can move around while the picture refines.
 
@@ -231,9 +232,7 @@ def view(
     block
         True waits for Ctrl-C, and closes the viewer then. None does so in scripts, whose end would close the
         viewer, and returns at once in notebooks and at a prompt.
-    **settings
-        The other settings of `render`, but for `checkpoint`, `samples` and `progress`. The page has
-        the shape of its window; pictures have about as many pixels as `size`, or the camera, has.
+    {settings}
 
     Returns
     -------
@@ -254,9 +253,7 @@ def view(
     ...     image = viewer.wait_for_picture()
     """
     _check_viser()
-    given = [name for name in REFUSED if settings.get(name) is not None]
-    if given:
-        raise SceneError(f"view: {given[0]} is {settings[given[0]]!r}; it is for a picture of one view")
+    refuse(settings, REFUSED)
     if not isinstance(port, int) or not 0 <= port < 2**16:
         raise SceneError(f"port is {port!r}; it must be a whole number from 0 to 65535")
     if spp is None and settings.get("noise") is None and settings.get("seconds") is None:
@@ -278,7 +275,7 @@ def view(
 
 
 def _opened(
-    scene: Scene, spp: int | None, host: str, port: int, token: str, tone: str, settings: dict[str, Any]
+    scene: Scene, spp: int | None, host: str, port: int, token: str, tone: str, settings: RenderSettings
 ) -> Viewer:
     """Return a viewer of a scene with settings of `Session`."""
     up = scene.vertical(settings.get("up", "auto"))
@@ -287,13 +284,8 @@ def _opened(
     viewpoint = Viewpoint.of(camera, scene.bounds, up)
     aovs = settings.pop("aovs", ())
     wanted = (*((aovs,) if isinstance(aovs, str) else aovs), *VIEWER_LAYERS)
-    settings = {
-        **settings,
-        "camera": viewpoint.camera,
-        "size": tuple(max(1, side // FIRST_DIVISOR) for side in viewpoint.camera.film),
-        "aovs": wanted,
-        "progress": False,
-    }
+    width, height = (max(1, side // FIRST_DIVISOR) for side in viewpoint.camera.film)
+    settings |= {"camera": viewpoint.camera, "size": (width, height), "aovs": wanted, "progress": False}
     if settings.get("wave_size") is None:
         settings["wave_size"] = WAVE_SIZE
     if settings.get("executor") is None:

@@ -1,0 +1,18 @@
+"""The settings of a render: their declaration, their checks, and which of them go together."""
+
+from .checks import AUTO, refuse, whole_number
+from .declaration import SETTINGS, RenderSettings
+from .settings import DEFAULT_SPP, Settings
+from .signature import describes_settings, takes_settings
+
+__all__ = [
+    "AUTO",
+    "DEFAULT_SPP",
+    "SETTINGS",
+    "RenderSettings",
+    "Settings",
+    "describes_settings",
+    "refuse",
+    "takes_settings",
+    "whole_number",
+]

@@ -1,0 +1,168 @@
+"""Checks of single settings: each takes a name and a value, and returns the value as it is kept."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from ..camera import upward
+from ..codecs.image_data import TRANSPARENT
+from ..colors import rgb
+from ..compile.scene import ROULETTE_AFTER
+from ..core.errors import SceneError, in_brief, number, warn_caller
+from ..core.files import check_target
+from ..core.progress import Progress
+from ..core.registry import Registry
+from ..scene.lighting import check_lighting
+from ..scene.scene import view_direction
+
+AUTO = "auto"
+
+# called with the name and the value of a setting; returns the value as it is kept
+SettingCheck: TypeAlias = Callable[[str, Any], Any]
+
+
+def one_of_table(choices: Registry[Any]) -> SettingCheck:
+    """Return a check that something is a name in a table, or a thing of its kind."""
+
+    def check(name: str, value: Any) -> Any:
+        choices.find(value, name)
+        return value
+
+    return check
+
+
+def optional(check: SettingCheck) -> SettingCheck:
+    """Return a check that lets None pass."""
+    return lambda name, value: None if value is None else check(name, value)
+
+
+def whole_number(low: int, high: int) -> SettingCheck:
+    """Return a check for integers from `low` to `high`."""
+
+    def check(name: str, value: Any) -> int:
+        whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+        if not whole or not low <= value <= high:
+            raise SceneError(f"{name} is {in_brief(value)}; it must be a whole number from {low} to {high}")
+        return int(value)
+
+    return check
+
+
+def auto_or(check: SettingCheck) -> SettingCheck:
+    """Return a check that lets "auto" pass."""
+
+    def check_other(name: str, value: Any) -> Any:
+        try:
+            return value if isinstance(value, str) and value == AUTO else check(name, value)
+        except SceneError as error:
+            raise SceneError(f"{error}, or {AUTO!r}") from None
+
+    return check_other
+
+
+def check_flag(name: str, value: Any) -> bool:
+    """Check that something is True or False."""
+    if not isinstance(value, bool | np.bool_):
+        raise SceneError(f"{name} is {in_brief(value)}; it must be True or False")
+    return bool(value)
+
+
+def above_zero(name: str, value: Any) -> float:
+    """Check that a number is positive and finite."""
+    return number(name, value, lambda x: x > 0, "above 0")
+
+
+def check_noise(name: str, value: Any) -> float:
+    """Check that a relative error is positive, and warn if it is no less than the picture."""
+    found = above_zero(name, value)
+    if found >= 1:
+        warn_caller(
+            f"{name} is {found:g}, a relative error of {100 * found:g} %; {found:g} % is {found / 100:g}"
+        )
+    return found
+
+
+def check_progress(name: str, value: Any) -> Progress:
+    """Check that something is True, False, None or can be called."""
+    if not (value is None or isinstance(value, bool) or callable(value)):
+        raise SceneError(f"{name} is {in_brief(value)}; it must be True, False, None or a function")
+    return value
+
+
+def check_samples(name: str, value: Any) -> range | None:
+    """Check that something is a range of consecutive numbers from 0 on, or None."""
+    if value is None:
+        return None
+    if not isinstance(value, range) or value.step != 1 or not value or value.start < 0:
+        raise SceneError(
+            f"{name} is {in_brief(value)}; it must be a range of consecutive samples, "
+            "such as range(64, 128); spp is their number"
+        )
+    return value
+
+
+def check_background(name: str, value: Any) -> Any:
+    """Check a background: "transparent", or a color, which becomes (3, 1)."""
+    if value is None or (isinstance(value, str) and value == TRANSPARENT):
+        return value
+    try:
+        return rgb(name, value)
+    except SceneError as error:
+        raise SceneError(f"{error}, or {TRANSPARENT!r}" if isinstance(value, str) else f"{error}") from None
+
+
+def check_roulette(name: str, value: Any) -> int | bool:
+    """Check that something is False, or how many scattering events roulette spares."""
+    if isinstance(value, bool | np.bool_):
+        if value:
+            raise SceneError(
+                f"{name} is True; it must be False or a whole number, by default {ROULETTE_AFTER}"
+            )
+        return False
+    try:
+        return int(whole_number(0, 2**16)(name, value))
+    except SceneError as error:
+        raise SceneError(f"{error}, or False") from None
+
+
+def check_view(name: str, value: Any) -> Any:
+    """Check the name of a view, or a direction."""
+    view_direction(name, value)
+    return value
+
+
+def check_up(name: str, value: Any) -> Any:
+    """Check what is up: a vector, the name of an axis, or "auto"."""
+    return value if isinstance(value, str) and value == AUTO else upward(name, value)
+
+
+def check_checkpoint(name: str, value: Any) -> str | None:
+    """Check that a checkpoint can be written to a path, or that there is none."""
+    if value is None:
+        return None
+    if not isinstance(value, str | os.PathLike):
+        raise SceneError(f"{name} is {value!r}; it must be a path, such as 'out.wfck'")
+    return str(check_target(value))
+
+
+def check_preset(name: str, value: Any) -> str | None:
+    """Check the name of a preset."""
+    check_lighting(value)
+    return value
+
+
+def refuse(given: Mapping[str, Any], reasons: Mapping[str, str]) -> None:
+    """Check that settings are not among those that were given, and say why they must not be.
+
+    Raises
+    ------
+    SceneError
+        If one is.
+    """
+    for name, why in reasons.items():
+        if given.get(name) is not None:
+            raise SceneError(f"{name} is {in_brief(given[name])}; {why}")

@@ -1,0 +1,169 @@
+"""The settings of a render, checked, and what follows from them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Unpack
+
+import numpy as np
+
+from ..arrays.vec import Floats, f4
+from ..core.errors import SceneError
+from ..film.aov_names import CLAMPED, GUIDES, chosen_layers, sampled_names
+from ..film.exact_sum import MAX_TERMS
+from ..integrators import INTEGRATORS, li_full
+from ..integrators.tuning import MOST_WAYS
+from ..sampling.sampler import SAMPLERS, SamplerMaker, make_sampler
+from ..scheduling.budget import Budget, make_budget
+from ..scheduling.executors import ExecutorLike, choose_executor, worker_count
+from ..stages.reuse import SHARED_WAYS
+from .checks import whole_number
+from .combinations import check_combinations
+from .declaration import SETTINGS, AllSettings
+
+DEFAULT_SPP = 100
+MAX_BRANCH_SAMPLES = 2**32  # a sample's index is 32 bits of its address, and each branch has one
+PILOT = 0x5EED_0F_9417D  # the seed of the pilot is that of the picture XOR this
+MAX_SPP_FOR_NOISE = 2**16  # where only `noise` was given
+
+
+class Settings:
+    """The settings of a render, checked, and what follows from them.
+
+    Parameters
+    ----------
+    **given
+        Those that were given.
+
+    Attributes
+    ----------
+    values
+        All settings by name, checked.
+    max_spp
+        The most samples that a pixel may get.
+    worker_count
+        How many waves are traced at once.
+    memory_limit
+        Bytes; None for what there is.
+
+    Raises
+    ------
+    SceneError
+        If one is malformed, or two of them exclude each other.
+    """
+
+    def __init__(self, **given: Unpack[AllSettings]) -> None:
+        found: Any = {
+            name: each.checked(name, given.get(name, each.default)) for name, each in SETTINGS.items()
+        }
+        self.values: AllSettings = found
+        if self.values["denoise"]:
+            self.values["aovs"] = chosen_layers("aovs", (*self.values["aovs"], *GUIDES))
+        check_combinations(self.values)
+        self.max_spp = self._most_samples()
+        memory = self.values["max_memory"]
+        self.memory_limit = None if memory is None else int(memory)
+        self.worker_count = worker_count(self.values["workers"], self.values["executor"])
+        make_sampler(self.values["sampler"], self.values["seed"])
+        self.executor_for((0, 0))
+
+    def labels(self) -> dict[str, Any]:
+        """Return the settings that renders of the same samples have in common; functions by their names."""
+        given: Any = self.values
+        return {
+            name: given[name] if each.choices is None else each.choices.label(given[name])
+            for name, each in SETTINGS.items()
+            if each.identity
+        }
+
+    @property
+    def first_sample(self) -> int:
+        """Index of the first sample of every pixel."""
+        return 0 if self.values["samples"] is None else self.values["samples"].start
+
+    @property
+    def background_color(self) -> Floats | None:
+        """What camera rays that miss show, (3, 1), black where it is transparent; None: the environment."""
+        if self.values["background"] is None:
+            return None
+        return (
+            np.zeros((3, 1), f4)
+            if isinstance(self.values["background"], str)
+            else np.asarray(self.values["background"], f4)
+        )
+
+    @property
+    def roulette_after(self) -> float:
+        """Scattering events before Russian roulette may end paths; infinite where it may not."""
+        roulette = self.values["roulette"]
+        return np.inf if roulette is False else roulette
+
+    @property
+    def sampled_layers(self) -> tuple[str, ...]:
+        """The sampled layers that are asked for; a background gives alpha, a clamp what it removes."""
+        wanted = (
+            self.values["aovs"]
+            if self.values["background"] is None
+            else chosen_layers("aovs", [*self.values["aovs"], "alpha"])
+        )
+        return (*sampled_names(wanted), *(() if self.values["clamp"] is None else (CLAMPED,)))
+
+    @property
+    def target_spp(self) -> int | None:
+        """Samples that every pixel gets; None where noise or time decides."""
+        return self.max_spp if self.values["noise"] is None and self.values["seconds"] is None else None
+
+    @property
+    def is_full(self) -> bool:
+        """Whether the integrator is the one whose paths can branch, be guided and be shared."""
+        return INTEGRATORS.find(self.values["integrator"]) is li_full
+
+    @property
+    def most_branches(self) -> int:
+        """The most branches that a path may have."""
+        return MOST_WAYS if isinstance(self.values["branches"], str) else self.values["branches"]
+
+    def sampler_maker(self) -> SamplerMaker:
+        """Return what makes the sampler of a picture, given a seed and how many pixels wide it is."""
+        return SAMPLERS.find(self.values["sampler"])
+
+    def pilot_seed(self, number: int = 0) -> int:
+        """Return the seed of the pilot or of a block of the trial, whose numbers are their own."""
+        return (self.values["seed"] ^ PILOT) + number
+
+    def executor_for(self, size: tuple[int, int]) -> str | ExecutorLike:
+        """Return the executor for a picture of a size (width, height)."""
+        branches = self.values["branches"] if isinstance(self.values["branches"], int) else 1
+        paths = size[0] * size[1] * self.max_spp * branches
+        return choose_executor(self.values["executor"], self.worker_count, paths)
+
+    def budget(
+        self, size: tuple[int, int], executor: str | ExecutorLike, layers: Sequence[str] = ()
+    ) -> Budget:
+        """Return the workers, and the largest wave, for a picture of a size (width, height) with layers."""
+        processes = executor != "threads"
+        return make_budget(
+            self.memory_limit,
+            size,
+            self.worker_count,
+            self.values["wave_size"],
+            processes,
+            layers,
+            self.values["caustics"],
+        )
+
+    def _most_samples(self) -> int:
+        ways = self.most_branches * (SHARED_WAYS if self.values["reuse"] is True else 1)
+        most = min(MAX_TERMS, MAX_BRANCH_SAMPLES // ways)
+        if self.values["samples"] is not None:
+            return self._chosen_samples(self.values["samples"], most)
+        if self.values["spp"] is not None:
+            return int(whole_number(1, most)("spp", self.values["spp"]))
+        if self.values["seconds"] is not None:
+            return most
+        return DEFAULT_SPP if self.values["noise"] is None else MAX_SPP_FOR_NOISE
+
+    def _chosen_samples(self, samples: range, most: int) -> int:
+        if samples.stop > most:
+            raise SceneError(f"samples is {samples!r}; it must end at {most} at most")
+        return len(samples)
