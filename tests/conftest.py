@@ -3,6 +3,7 @@
 import os
 import signal
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, Phase, settings
@@ -32,10 +33,14 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "deterministic"))
 
 
 def pytest_configure() -> None:
-    """Have Ctrl-C stop this process and its children, which the tests of Ctrl-C need.
+    """Let programs import modules of tests, and have Ctrl-C stop this process and its children.
 
-    A shell that starts the tests in the background has them ignore it.
+    A shell that starts the tests in the background has them ignore Ctrl-C.
     """
+    paths = str(Path(__file__).parent), os.environ.get("PYTHONPATH")
+    os.environ["PYTHONPATH"] = os.pathsep.join(
+        filter(None, paths)
+    )  # modules of tests, for the programs they run
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 

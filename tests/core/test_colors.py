@@ -14,7 +14,7 @@ import wavefront as wf
 from wavefront import cli
 from wavefront.colors import colormaps
 from wavefront.materials import NAMED_MATERIALS
-from wavefront.settings import Settings
+from wavefront.settings import SETTINGS, Settings
 
 ORANGE = [1, 0.2462013, 0]  # ((136/255 + 0.055)/1.055)^2.4 of #ff8800
 CORNERS, FACES = [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]
@@ -33,7 +33,7 @@ CORNERS, FACES = [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]
         lambda color: wf.PointLights([(0, 0, 0)], color).intensities,
         lambda color: wf.DirectionalLight((0, 0, 1), color).irradiance,
         lambda color: wf.VertexColors(times=color).times,
-        lambda color: Settings(background=color).background,
+        lambda color: Settings(background=color).values["background"],
         lambda color: wf.Mesh(CORNERS, FACES, colors=[color] * 3).colors[2, :3],  # type: ignore[index]
     ],
 )
@@ -138,11 +138,7 @@ def test_materials_by_name(name: str) -> None:
     assert wf.Sphere((0, 0, 0), 1, material=name.upper()).material.name == name
     table = (Path(__file__).parents[2] / "docs" / "materials.md").read_text("utf-8").partition("by name")[2]
     assert name in table.partition("\n## ")[0]
-    assert name in str(next(each.metadata["option"] for each in _settings() if each.name == "material"))
-
-
-def _settings() -> Any:
-    return Settings.__dataclass_fields__.values()
+    assert name in str(SETTINGS["material"].option)
 
 
 def test_named_materials_take_a_color() -> None:

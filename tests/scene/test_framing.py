@@ -14,6 +14,7 @@ import wavefront as wf
 from wavefront.cli import main
 from wavefront.scene.scene import VIEWS
 
+CAMERA = wf.Camera.look_at((0, 0, 9), (0, 0, 0))
 SIZES = [(64, 64), (96, 40), (40, 96), (160, 16), (16, 160)]
 FAST: dict[str, Any] = {"spp": 1, "size": (8, 8), "progress": False}
 
@@ -157,11 +158,11 @@ def test_the_default_is_three_quarter() -> None:
         ({"view": "fronl"}, "view is 'fronl'; .* one of three_quarter, front, back, .*did you mean 'front'"),
         ({"view": (0, 0, 0)}, r"view is \[0.0, 0.0, 0.0\]; it must not be zero"),
         (
-            {"view": "top", "camera": wf.Camera.look_at((0, 0, 9), (0, 0, 0))},
+            {"view": "top", "camera": CAMERA},
             "view='top' does not go with camera=<Camera",
         ),
         (
-            {"fov": 20, "camera": wf.Camera.look_at((0, 0, 9), (0, 0, 0))},
+            {"fov": 20, "camera": CAMERA},
             "fov=20.0 does not go with camera=<Camera",
         ),
         ({"fov": 0}, "fov"),

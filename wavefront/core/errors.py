@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from .counted import counted
 from .suggestions import did_you_mean
 
-PACKAGE = os.path.join(os.path.dirname(__file__), "")
+PACKAGE = os.path.join(os.path.dirname(os.path.dirname(__file__)), "")
 MOST_LETTERS = 120  # of a value in a message
 BEGIN, END = 1500, 500  # letters at both ends of a message that is kept where it is longer
 
