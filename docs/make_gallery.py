@@ -22,25 +22,25 @@ ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 CARD, QUALITY = (480, 320), 86
 PICTURES = {  # size, samples per pixel, whether it is denoised, whether it has a card
-    "terrace": (1920, 32, True, True),
+    "terrace": (1920, 48, True, True),
     "interior": (1200, 24, True, True),
     "scan": (1200, 24, True, True),
     "fruit": (1200, 14, True, True),
     "photograph": (1200, 14, True, True),
-    "caustics": (1200, 16, True, True),
+    "caustics": (1200, 32, True, True),
     "cornell_box": (1200, 32, True, True),
-    "course_spheres": (1200, 16, True, True),
-    "spheres": (1200, 10, True, True),
-    "molecule": (1200, 10, True, True),
-    "cuboids": (1200, 10, True, True),
-    "gltf_scene": (1200, 14, True, True),
-    "depth_of_field": (1200, 14, True, True),
-    "environment": (1200, 14, True, True),
-    "own_material": (1200, 12, True, True),
-    "material_sheet": (1200, 14, True, False),
-    "layers": (267, 24, False, False),
+    "course_spheres": (1200, 32, True, True),
+    "spheres": (1200, 24, True, True),
+    "molecule": (1200, 32, True, True),
+    "cuboids": (1200, 24, True, True),
+    "gltf_scene": (1200, 40, True, True),
+    "depth_of_field": (1200, 64, True, True),
+    "environment": (1200, 64, True, True),
+    "own_material": (1200, 64, True, True),
+    "material_sheet": (1200, 40, True, False),
+    "layers": (297, 64, False, False),
     "estimators": (300, 32, False, False),
-    "default_look": (1200, 12, True, False),
+    "default_look": (1200, 32, True, False),
 }
 render = wf.render
 
