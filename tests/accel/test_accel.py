@@ -244,58 +244,6 @@ def test_occluded_leaves_out_the_distance_itself() -> None:
     assert accelerator.occluded(origin, direction, distance, nothing(2)).tolist() == [False, True]
 
 
-@pytest.mark.parametrize("ends", ["inside", "outside", "both"])
-@pytest.mark.parametrize("things", ["box and lamp", "ball", "nine boxes"])
-def test_shadow_rays_in_a_room_have_the_answer_of_all_triangles(things: str, ends: str) -> None:
-    """From and to points on walls, in the room, and on things in it; with ends outside the walls block."""
-    rng = np.random.default_rng(0)
-    turn = trimesh.transformations.rotation_matrix(0.4, (1, 2, 3))
-    room = trimesh.creation.box((2, 2, 2)).triangles
-    lamp = np.array([[(-0.3, 0.99, -0.2), (0.3, 0.99, -0.2), (0.3, 0.99, 0.2)]])
-    box = trimesh.creation.box((0.5, 1, 0.6)).triangles
-    small = trimesh.creation.box((0.1, 0.1, 0.1)).triangles
-    places = rng.uniform(-0.4, 0.4, (9, 1, 1, 3))
-    inner = {"box and lamp": [box, lamp], "ball": [], "nine boxes": list(small + places)}[things]
-    triangles = trimesh.transform_points(np.concatenate([room, *inner]).reshape(-1, 3), turn).reshape(
-        -1, 3, 3
-    )
-    balls = ([(0.2, 0.1, 0)], [0.4]) if things == "ball" else ((), ())
-    accelerator = NumpyAccelerator(geometry(triangles, *balls))
-    found = accelerator._room
-    assert found is not None
-    assert found.walls == 12
-    assert len(found.things) == (2 if things == "box and lamp" else 1)
-    n = 20_000
-    prim, onto = rng.integers(0, np.where(rng.random((2, n)) < 0.7, 12, len(triangles)))
-    start, end = (
-        trimesh.triangles.barycentric_to_points(triangles[at], rng.dirichlet((1, 1, 1), n))
-        for at in (prim, onto)
-    )
-    normals, _ = trimesh.triangles.normals(triangles)
-    flat = np.abs(((end - start) * normals[prim]).sum(1)) < 1e-3  # no ray leaves a surface like that
-    within = flat | (rng.random(n) < 0.5)
-    end[within] = rng.uniform(-0.99, 0.99, (n, 3))[within] @ turn[:3, :3].T
-    away = {"inside": np.zeros(n, bool), "outside": np.ones(n, bool), "both": rng.random(n) < 0.5}[ends]
-    end[away] *= 3 / np.abs(end[away] @ turn[:3, :3]).max(1, keepdims=True)
-    rays = start.T.astype(f4), (end - start).T.astype(f4), prim
-    distance = np.full(n, 0.999, f4)
-    if ends == "inside":
-        unclear = found.unclear(*rays[:2], distance)
-        assert unclear is not None
-        assert 0.05 < unclear.size / n < 0.9
-    blocked = accelerator.occluded(*rays[:2], distance, prim)
-    accelerator._room = None
-    assert np.array_equal(blocked, accelerator.occluded(*rays[:2], distance, prim))
-    assert 0.02 < blocked.mean() < (1 if ends == "outside" else 0.9)
-    wall = prim < 12
-    assert blocked[wall & away].mean() > 0.5 if away.any() else blocked.mean() < 0.5
-
-
-def test_open_scenes_have_no_room() -> None:
-    crossing = [[(-1, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 0.2, -1), (0, 0.2, 1), (0, 0.5, 0)]]
-    assert NumpyAccelerator(geometry(crossing))._room is None
-
-
 # --- special rays and triangles -------------------------------------------------------------------
 
 

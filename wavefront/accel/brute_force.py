@@ -36,10 +36,6 @@ class Polygons:
     prim: Ints  # (m,) triangles, of quadrilaterals the first one
     parallelograms: bool
 
-    def where(self, mask: Bools) -> Polygons:
-        """Return those at which a mask (m,) is true."""
-        return Polygons(self.corners.compress(mask, 1), self.prim.compress(mask), self.parallelograms)
-
 
 @record
 class EdgeMatrix:
@@ -90,25 +86,24 @@ class BruteForceTriangles:
         diagonal: Floats | None,
         ball: Ball,
     ) -> None:
-        self.polygons = [each for each in polygons if each.prim.size]
-        self._table, self._partner, self._diagonal, self._ball = table, partner, diagonal, ball
+        polygons = [each for each in polygons if each.prim.size]
+        self._table, self._partner, self._diagonal = table, partner, diagonal
         self._matrices, begin = [], 0
-        self.planes: list[PolygonPlanes] = []  # of each kind
-        side_rows = []
+        plane_parts, side_rows = [], []
         away = table.deviation
-        for kind in self.polygons:
+        for kind in polygons:
             corner, prim = kind.corners, kind.prim
             deviation = np.zeros(prim.size) if away is None else away.take(prim)
             rows = triangle.edge_rows(corner, ball.center, ball.radius).reshape(-1, 6)
             self._matrices.append(EdgeMatrix(rows, slice(begin, begin + prim.size), kind.parallelograms))
             side_rows.append(triangle.side_rows(corner, ball.center, ball.radius, deviation))
-            self.planes.append(triangle.polygon_planes(table, prim, corner, ball.center, deviation))
+            plane_parts.append(triangle.polygon_planes(table, prim, corner, ball.center, deviation))
             begin += prim.size
         self._count = begin
         self._rows = sum(len(matrix.rows) for matrix in self._matrices)
         self._number = np.arange(1, begin + 1, dtype=np.uint8)[:, None]  # there are at most `SMALL` triangles
         # Index 0 is for no polygon.
-        self._prim = np.concatenate([[-1], *(kind.prim for kind in self.polygons)])
+        self._prim = np.concatenate([[-1], *(kind.prim for kind in polygons)])
         self._prim_or_first = np.maximum(self._prim, 0)  # index 0 has t = NaN, a miss
         self._plane = np.full((4, begin + 1), np.nan)
         self._plane[:, 1:] = table.plane.take(self._prim[1:], 1)
@@ -119,7 +114,7 @@ class BruteForceTriangles:
         if begin:
             self._side_rows = np.concatenate(side_rows)
             self._planes = PolygonPlanes(
-                *(np.concatenate(parts, -1) for parts in zip(*self.planes, strict=True))
+                *(np.concatenate(parts, -1) for parts in zip(*plane_parts, strict=True))
             )
 
     @classmethod
@@ -152,11 +147,6 @@ class BruteForceTriangles:
             Polygons(triangles.take(single, 0).transpose(1, 0, 2), single, False),
         ]
         return cls(table, polygons, partner, diagonal, ball)
-
-    def only(self, masks: list[Bools]) -> BruteForceTriangles:
-        """Return those of the polygons at which the mask (m,) of their kind is true."""
-        some = [kind.where(mask) for kind, mask in zip(self.polygons, masks, strict=True)]
-        return BruteForceTriangles(self._table, some, self._partner, self._diagonal, self._ball)
 
     def find_hits(self, batch: RayBatch, found: HitAccumulator) -> None:
         """Add all hits to `found`; those of a quadrilateral as hits of its first triangle."""

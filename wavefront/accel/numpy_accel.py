@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays.record import record
-from ..arrays.state import SoA
 from ..arrays.vec import Bools, Floats, Ints, f4
 from . import triangle
 from .base import Geometry, Intersections
@@ -16,22 +14,11 @@ from .duplicates import that_can_be_hit
 from .exact import TrianglePrimitives
 from .hits import AnyHit, ClosestHit, unpack_prim, unpack_t
 from .primitives import CurvedPrimitives
-from .room import Room
 from .search import PrimitiveList, PrimitiveTree
 
 BATCH = 1 << 16  # rays traced at a time without a tree
 SMALL = 128  # up to this number of primitives, all are tested without a tree
 LARGE, HUGE = 1 << 17, 1 << 19  # between these numbers of primitives, smaller leaves are faster
-
-
-@record
-class ShadowBatch(SoA):
-    """Shadow rays that are traced at a time."""
-
-    origin: Floats  # (3, n)
-    direction: Floats  # (3, n)
-    exclude_prim: Ints  # (n,)
-    distance: Floats  # (n,)
 
 
 def leaf_size_for(primitives: int) -> int:
@@ -73,9 +60,6 @@ class NumpyAccelerator:
             for kind in geometry.curved:
                 self._curved.append(self._search_curved(kind, first, leaf_size))
                 first += len(kind)
-            self._room: Room | None = None
-            if isinstance(self._triangles, BruteForceTriangles):
-                self._room = Room.of(self._triangles, self._table, geometry.curved, self._ball)
         trees = self._triangles.tree, *(search.tree for search in self._curved)
         self._batch = _batch_size(sum(len(tree.leaves) for tree in trees if tree))
 
@@ -114,30 +98,19 @@ class NumpyAccelerator:
 
     def occluded(self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints) -> Bools:
         """Return a mask (n,) of the rays that hit anything with 0 < t < `distance` (n,)."""
-        blocked, room = np.zeros(origin.shape[1], bool), self._room
-        for at in range(0, blocked.size, self._batch):
+        n = origin.shape[1]
+        blocked = np.zeros(n, bool)
+        for at in range(0, n, self._batch):
             part = slice(at, at + self._batch)
-            rays = ShadowBatch(origin[:, part], direction[:, part], exclude_prim[part], distance[part])
+            rays = origin[:, part], direction[:, part], exclude_prim[part]
             with np.errstate(all="ignore"):
-                unclear = room.unclear(rays.origin, rays.direction, rays.distance) if room else None
-                if room is None or unclear is None:
-                    blocked[part] = self._occluded(self._triangles, rays)
-                elif unclear.size:
-                    blocked[at + unclear] = self._occluded(room.contents, rays.take(unclear))
+                batch = prepare(*rays, self._ball, distance[part])
+                found = AnyHit(batch, self._ball, distance[part])
+                self._triangles.find_blocked(batch, found)
+                for curved in self._curved:
+                    curved.find_hits(batch, found)
+            blocked[part] = found.blocked
         return blocked
-
-    def _occluded(
-        self,
-        triangles: BruteForceTriangles | PrimitiveTree,
-        rays: ShadowBatch,
-    ) -> Bools:
-        """Return which rays of a batch some triangles, or curved primitives, block."""
-        batch = prepare(rays.origin, rays.direction, rays.exclude_prim, self._ball, rays.distance)
-        found = AnyHit(batch, self._ball, rays.distance)
-        triangles.find_blocked(batch, found)
-        for curved in self._curved:
-            curved.find_hits(batch, found)
-        return found.blocked
 
     def _unpack(self, batch: RayBatch, packed: Codes, hits: Intersections, part: slice) -> None:
         """Write packed hits (n,), and barycentrics of triangles, to the slice `part` of `hits`."""
