@@ -85,7 +85,7 @@ class RenderSettings(TypedDict, total=False):
         Camera | None,
         Setting(
             None,
-            "What sees the scene, in place of the scene's own camera. Without either the scene is framed.",
+            "The camera, in place of the scene's own. A scene without either is framed.",
             check=check_camera,
         ),
     ]
@@ -93,7 +93,7 @@ class RenderSettings(TypedDict, total=False):
         tuple[int, int] | None,
         Setting(
             None,
-            "(width, height) in pixels, in place of the camera's; by default (512, 512).",
+            "(width, height) in pixels, in place of the camera's; (512, 512) by default.",
             option="WIDTHxHEIGHT in pixels (default: the camera's, or 512x512)",
             check=optional(lambda name, value: image_size(value)),
         ),
@@ -102,10 +102,10 @@ class RenderSettings(TypedDict, total=False):
         str | ArrayLike | None,
         Setting(
             None,
-            "From where a scene is framed, in place of the scene's own camera: "
-            '"three_quarter", "front", "back", "left", "right", "top", "bottom", "iso", or (3,) from its '
-            'middle to the camera. Without a camera it is "three_quarter", which is 35° to the right of the '
-            "front and 22° above. Not with `camera`.",
+            "The direction from which a scene is framed, in place of the scene's own camera: "
+            '"three_quarter", "front", "back", "left", "right", "top", "bottom", "iso", or a vector (3,) '
+            "from the middle of the scene to the camera. A scene without a camera is seen from "
+            '"three_quarter": 35° to the right of the front and 22° above it. Not with `camera`.',
             option=f"from where the scene is framed: {', '.join(VIEWS)} (default: {FRAMING_VIEW}, "
             "where the file has no camera)",
             check=optional(check_view),
@@ -115,8 +115,8 @@ class RenderSettings(TypedDict, total=False):
         float | None,
         Setting(
             None,
-            "Vertical field of view of the camera that frames a scene, degrees; by default 40. Not with "
-            "another camera.",
+            "Vertical field of view, in degrees, of the camera that frames a scene; 40 by default. Not "
+            "with another camera.",
             option=f"vertical field of view, degrees (default: {FRAMING_FOV:g})",
             check=optional(lambda name, value: field_of_view(value)),
         ),
@@ -125,9 +125,9 @@ class RenderSettings(TypedDict, total=False):
         MaterialLike | None,
         Setting(
             None,
-            "What bare meshes are made of: those of files and of trimesh, where it replaces what they "
-            "say, (vertices, faces), and shapes that were given no material. A material, or the name of "
-            'one, such as "gold".',
+            "The material of bare meshes: those of files and of trimesh, whose own material it replaces, "
+            "(vertices, faces), and shapes that were given no material. A material, or the name of one, "
+            'such as "gold".',
             option=f"material in place of the file's: {', '.join(NAMED_MATERIALS)}",
         ),
     ]
@@ -135,11 +135,11 @@ class RenderSettings(TypedDict, total=False):
         bool | float | str,
         Setting(
             AUTO,
-            "Normals of bare meshes: True averages those of the faces around each vertex, False shows the "
-            "facets, and a crease angle in degrees averages only over faces that are within it of each "
-            'other. These replace the normals that a mesh has. "auto" keeps them, and computes those of '
-            "files and trimesh objects that have none by a crease angle of 30°, but for glTF, whose facets "
-            "are flat then: docs/formats.md says why. (vertices, faces) and `Mesh` stay as they are.",
+            "Vertex normals of bare meshes. True averages the normals of the faces around each vertex; "
+            "False shows the facets. A crease angle in degrees averages only faces that are within this "
+            'angle of each other. These replace the normals that a mesh has. "auto" keeps them. For files '
+            "and trimesh objects that have none, it takes a crease angle of 30°, but glTF then has flat "
+            "facets: docs/formats.md says why. (vertices, faces) and `Mesh` stay as they are.",
             option="normals of meshes: yes, no, a crease angle in degrees, or auto (default), which is 30 "
             "where the file has none",
             check=check_smooth,
@@ -149,9 +149,9 @@ class RenderSettings(TypedDict, total=False):
         ArrayLike,
         Setting(
             AUTO,
-            'What is up in the scene: a vector (3,), or the name of an axis, such as "z". "auto" goes by '
-            "the file: z for STL and 3MF, what a DAE says, else y. It turns the camera that frames a scene "
-            "without one, and the `lighting` and the `ground`.",
+            'The direction that is up in the scene: a vector (3,), or the name of an axis, such as "z". '
+            '"auto" takes it from the file: z for STL and 3MF, what a DAE says, else y. It turns the '
+            "camera that frames a scene, the `lighting` and the `ground`.",
             option="what is up in the scene, or an axis such as z (default: by the file; z for stl and 3mf)",
             check=check_up,
         ),
@@ -160,9 +160,9 @@ class RenderSettings(TypedDict, total=False):
         str | None,
         Setting(
             "auto",
-            '"studio", "softbox", "three_point", "cloudy" or "even": adds the light of that name, which '
-            '`studio` describes, to the scene\'s own. "auto" adds "studio" where nothing shines, and '
-            "nothing elsewhere; None adds nothing.",
+            '"studio", "softbox", "three_point", "cloudy" or "even": adds the light of that name to the '
+            'scene\'s own lights; `studio` describes them. "auto" adds "studio" to a scene without light, '
+            "and nothing to others. None adds nothing.",
             option=f"light to add: {', '.join(LIGHTINGS)}, none, "
             f"or auto, which is {DEFAULT} where nothing shines",
             check=check_preset,
@@ -172,10 +172,10 @@ class RenderSettings(TypedDict, total=False):
         bool | str,
         Setting(
             AUTO,
-            "Adds a level ground under the scene that catches its shadow and fades into the background. "
-            "It belongs to the picture alone: the scene, its bounds and the numbers of its shapes stay. "
-            '"auto" adds it where the light is chosen by itself and the camera is framed, unless that looks '
-            "from below or a `background` is asked for.",
+            "Adds a level ground under the scene. It catches the shadow and fades into the background. It "
+            "belongs to the picture alone: the scene, its bounds and the numbers of its shapes stay. "
+            '"auto" adds it where both light and camera are chosen automatically, unless the camera looks '
+            "from below or a `background` is given.",
             option="add a ground that catches the shadow, or leave it out (default: where light and camera "
             "are chosen by themselves)",
             check=auto_or(check_flag),
@@ -185,8 +185,8 @@ class RenderSettings(TypedDict, total=False):
         str | ArrayLike | None,
         Setting(
             None,
-            '"transparent" or a color: replaces what the camera sees directly of the environment; its '
-            "light stays, and so do its reflections. Either gives the layer `alpha`. Colors of a "
+            '"transparent" or a color. It replaces the environment where the camera sees it directly; its '
+            "light and its reflections stay. The picture then has the AOV `alpha`. Colors of a "
             "transparent picture are premultiplied by alpha.",
             option="transparent, or a color in place of the visible environment: a name such as white, "
             "#rrggbb, or linear R,G,B",
@@ -197,8 +197,8 @@ class RenderSettings(TypedDict, total=False):
         str | Integrator,
         Setting(
             "full",
-            '"full", "direct_mis", "direct_simple" or "naive". This and the other settings that take names '
-            "also take a thing of your own, such as a function; docs/extending.md has an example of each.",
+            '"full", "direct_mis", "direct_simple" or "naive". All settings that take names also take an '
+            "object of your own, such as a function; docs/extending.md has an example of each.",
             option="estimator of light",
             choices=INTEGRATORS,
             identity=True,
@@ -208,7 +208,8 @@ class RenderSettings(TypedDict, total=False):
         int,
         Setting(
             12,
-            "Scattering events along a path: 0 shows only light seen directly, 1 direct light.",
+            "The most scattering events along a path: 0 shows only light seen directly, 1 also direct "
+            "light on surfaces.",
             option="scattering events along a path",
             check=whole_number(0, 2**16),
             identity=True,
@@ -218,9 +219,9 @@ class RenderSettings(TypedDict, total=False):
         bool | int,
         Setting(
             ROULETTE_AFTER,
-            "Scattering events of a path before Russian roulette may end it, by chance and without a change "
-            "of the mean; False never ends a path so, which takes longer, mostly for less noise than that "
-            "is worth.",
+            "The number of scattering events before Russian roulette may end a path. The mean of the "
+            "picture does not change. False means no roulette: that takes longer, and the noise is only a "
+            "little lower.",
             option="scattering events before Russian roulette may end a path, or no",
             check=check_roulette,
             identity=True,
@@ -240,8 +241,8 @@ class RenderSettings(TypedDict, total=False):
         Setting(
             None,
             "The samples to render, as a range of their numbers, in place of `spp`: range(0, 64) on one "
-            "machine and range(64, 128) on another. `Image.merge` makes one picture of them, which is that "
-            "of all 128, bit for bit. Not with `noise` or `seconds`.",
+            "machine and range(64, 128) on another. `Image.merge` makes one picture of them. It has the "
+            "same bits as all 128 samples rendered at once. Not with `noise` or `seconds`.",
             option="FIRST:END, samples to render in place of --spp, such as 64:128; "
             "`wavefront merge` joins the pictures",
             check=check_samples,
@@ -251,7 +252,7 @@ class RenderSettings(TypedDict, total=False):
         str | SamplerMaker,
         Setting(
             "sobol",
-            '"sobol"; "bluenoise", whose error at few samples is even to the eye; or "independent".',
+            '"sobol"; "bluenoise", whose error looks even at few samples; or "independent".',
             option="source of random numbers",
             choices=SAMPLERS,
             identity=True,
@@ -261,7 +262,8 @@ class RenderSettings(TypedDict, total=False):
         str | AcceleratorMaker,
         Setting(
             "auto",
-            'Ray queries by "numpy", by "embree" (`pip install embreex`), or "auto".',
+            'Ray queries by "numpy" or by "embree" (`pip install embreex`). "auto" takes Embree where it '
+            "is installed.",
             option="ray queries: auto, numpy or embree",
             choices=ACCELERATORS,
         ),
@@ -270,8 +272,8 @@ class RenderSettings(TypedDict, total=False):
         int | None,
         Setting(
             None,
-            "How many waves are traced at once; by default one per core, or per worker of an executor or "
-            "cluster that is given.",
+            "The number of waves that are traced at once. The default is one per core, or one per worker "
+            "of the executor or cluster that is given.",
             option="waves traced at once (default: one per core)",
         ),
     ]
@@ -279,10 +281,10 @@ class RenderSettings(TypedDict, total=False):
         str | ExecutorLike | None,
         Setting(
             None,
-            'What workers are: "processes", "threads", "spawn" or "forkserver", which are processes that '
-            "share no memory with this one; or a `concurrent.futures.Executor`, a function that returns one, "
-            "or a `dask.distributed.Client`. By default processes, which are faster, when there is work for "
-            "more than a moment, and threads otherwise. The picture is the same. docs/scale.md tells more.",
+            'The kind of workers: "processes", "threads", "spawn" or "forkserver" (processes that share '
+            "no memory with this one); a `concurrent.futures.Executor`, a function that returns one, or a "
+            "`dask.distributed.Client`. By default a longer render takes processes, which are faster, and "
+            "a short one threads. The picture is the same. docs/scale.md tells more.",
             option="what workers are (default: the faster here)",
             choices=EXECUTORS,
         ),
@@ -291,10 +293,10 @@ class RenderSettings(TypedDict, total=False):
         float | None,
         Setting(
             None,
-            "Go on until the estimated relative error of the picture is no more than this: 0.02 means "
-            "2 %. It is the root of the relative MSE that `compare` would find against a converged picture. "
-            "Noisy parts get more samples than calm ones, and every pixel at least 32. When `spp` or "
-            "`seconds` end the render above it, a warning says so.",
+            "Render until the estimated relative error of the picture is at most this: 0.02 means 2 %. It "
+            "is the root of the relative MSE that `compare` would find against a converged picture. Noisy "
+            "pixels get more samples than others, and every pixel at least 32. A warning says when `spp` "
+            "or `seconds` end the render before that.",
             option="go on to this relative error, such as 0.02",
             check=optional(check_noise),
             identity=True,
@@ -304,9 +306,9 @@ class RenderSettings(TypedDict, total=False):
         float | None,
         Setting(
             None,
-            "Go on until this time is used, scene setup included; waves that are still under way a tenth "
-            "later are discarded. Every pixel gets its first sample all the same, unless a wave of them "
-            "takes over three seconds. With `noise` as well, whichever comes first.",
+            "Render until this time is used, scene setup included. Waves that need more than a tenth "
+            "longer are discarded. Every pixel still gets its first sample, unless a wave of first "
+            "samples takes over three seconds. With `noise`, the render ends at whichever comes first.",
             option="go on until this time is used",
             check=optional(above_zero),
         ),
@@ -315,8 +317,9 @@ class RenderSettings(TypedDict, total=False):
         str | Filter,
         Setting(
             "box",
-            'How the samples of a pixel are spread: "box" (evenly over the pixel), "tent" (radius 1 '
-            'pixel) or "gaussian" (σ 0.5 pixels, cut off at 1.5 from the center).',
+            'The reconstruction filter, by which samples of a pixel are spread: "box" (evenly over the '
+            'pixel), "tent" (radius 1 pixel) or "gaussian" (σ 0.5 pixels, cut off at 1.5 from the '
+            "center).",
             option="spread of samples over a pixel",
             choices=FILTERS,
             identity=True,
@@ -326,8 +329,8 @@ class RenderSettings(TypedDict, total=False):
         str | LightSamplerMaker,
         Setting(
             "spatial",
-            'How one light of many is chosen at a point: "spatial" weighs what each brings there, "power" '
-            'its power alone, "uniform" nothing.',
+            'How one light is chosen among many at a point: "spatial" weighs each light by what it brings '
+            'there, "power" by its power alone, "uniform" all alike.',
             option="how one light of many is chosen",
             choices=LIGHT_SAMPLERS,
             identity=True,
@@ -337,10 +340,10 @@ class RenderSettings(TypedDict, total=False):
         int | str,
         Setting(
             AUTO,
-            "In how many ways the path of a sample goes on from the first surface, at most 64; only "
-            '"full" has any. Two to four make a sample dearer, but less noisy by more where most of the '
-            'noise is in indirect light, as in a room. "auto" finds out by a short trial whether they pay: '
-            "docs/choices.md tells how. In pictures of less than 192x192 pixels it is one.",
+            "The number of ways in which a path goes on from its first surface (splitting), at most 64; "
+            'only for "full". With two to four, a sample takes longer, but has less noise where most '
+            'noise is in indirect light, as in a room. "auto" finds out by a short tuning run whether '
+            "that pays: docs/choices.md tells how. Pictures of less than 192x192 pixels have one branch.",
             option="ways a path goes on from its first surface, or auto (default), which tries what pays",
             check=auto_or(whole_number(1, MAX_BRANCHES)),
         ),
@@ -349,11 +352,11 @@ class RenderSettings(TypedDict, total=False):
         bool | str,
         Setting(
             False,
-            "Learn from a pilot of 262144 paths where light comes from, and choose directions by that; "
-            'only "full" can be guided. It takes a second or two, and pays where light comes through '
-            "narrow openings or several reflections: docs/guiding.md has figures. The pilot depends on the "
-            'scene, the camera and the seed alone. "auto" guides only where a short trial with it and '
-            'without it says that it pays; `metadata["guided"]` says what it found.',
+            "Path guiding: learn from a training pass of 262144 paths where light comes from, and choose "
+            'directions by that; only for "full". The training takes a second or two. Guiding pays where '
+            "light comes through narrow openings or after several reflections: docs/guiding.md has "
+            'figures. What is learned depends on the scene, the camera and the seed alone. "auto" guides '
+            'only where a short tuning run says that it pays; `metadata["guided"]` says what it found.',
             option="learn where light comes from, for scenes with much indirect light",
             check=auto_or(check_flag),
             identity=True,
@@ -364,11 +367,11 @@ class RenderSettings(TypedDict, total=False):
         Setting(
             AUTO,
             "Share paths among pixels: what a path finds from its second surface on counts for sixteen "
-            'pixels that lie a little apart; only "full" does so. It pays where most of the noise is in '
-            "indirect light between matte surfaces. The errors of these pixels depend on each other then: "
-            'docs/reuse.md has figures. "auto" shares where a short trial says that it pays, beside gloss '
-            "and glass only where light is hard to find: docs/choices.md tells how. It never does with "
-            "`branches`, `clamp`, `noise`, `caustics` or light groups.",
+            'pixels that lie a little apart; only for "full". It pays where most noise is in indirect '
+            "light between matte surfaces. The errors of such pixels depend on each other: docs/reuse.md "
+            'has figures. "auto" shares paths where a short tuning run says that it pays; with glossy '
+            "materials or glass only where light is hard to find: docs/choices.md tells how, and has a "
+            "table of the settings that do not go with it.",
             check=auto_or(check_flag),
             option="share paths among pixels: yes, no, or auto (default), which tries whether it pays",
         ),
@@ -377,11 +380,11 @@ class RenderSettings(TypedDict, total=False):
         float | None,
         Setting(
             None,
-            "The most that a path may find as indirect light at once, as radiance, the mean of its "
-            "channels; what is brighter is scaled down. It removes fireflies, and with them light: the "
-            'picture gets too dark. The layer "clamped" holds what was removed, `metadata["clamped"]` says '
-            "how much of all light that is, and a warning does above 2 %. Light seen directly, and that of "
-            "lights on the first rough surface, is not clamped.",
+            "The most that a path may find as indirect light at once: a radiance, as the mean of its "
+            "channels. Brighter contributions are scaled down. This removes fireflies, but light as well: "
+            'the picture is biased, too dark. The AOV "clamped" holds what was removed, '
+            '`metadata["clamped"]` says what part of all light that is, and above 2 % a warning does. '
+            "Light seen directly, and light from lights on the first rough surface, is not clamped.",
             option="most indirect light that a path finds at once; removes fireflies, and some light",
             check=optional(above_zero),
             identity=True,
@@ -391,10 +394,10 @@ class RenderSettings(TypedDict, total=False):
         bool,
         Setting(
             False,
-            "Trace paths from the lights as well, one for each sample, which find the light that smooth "
-            "glass and mirrors send on: caustics. Without it paths find that light by chance, and that of "
-            'points, spots and directional lights never. Only "full" has it, and it does not go with '
-            "`reuse`, `noise`, another filter or light groups: docs/caustics.md has figures.",
+            "Light tracing: one path from the lights for each sample, beside that from the camera. These "
+            "paths find caustics, the light that smooth glass and mirrors send on. Without them that "
+            "light is found by chance, and that of point, spot and directional lights never. Only for "
+            '"full", and not with every setting: docs/choices.md has a table, docs/caustics.md figures.',
             option="trace paths from lights for caustics of smooth glass and mirrors",
             check=check_flag,
             identity=True,
@@ -404,8 +407,8 @@ class RenderSettings(TypedDict, total=False):
         int | None,
         Setting(
             None,
-            "The most paths that are traced together by one worker; by default what suits their number "
-            "and speed, at most 131 072. The picture does not depend on it.",
+            "The most paths that one worker traces together, at most 2^24. The default suits their number "
+            "and speed, and is at most 131 072. The picture does not depend on it.",
             check=optional(whole_number(1, 2**24)),
         ),
     ]
@@ -413,9 +416,10 @@ class RenderSettings(TypedDict, total=False):
         str | os.PathLike[str] | None,
         Setting(
             None,
-            "A file that keeps the render: it is written every `checkpoint_interval` seconds, at Ctrl-C "
-            "and at the end. The same call goes on from it, with the same bits as without a break; with "
-            "more `spp` it goes on further. The file of another scene or of other settings is refused.",
+            "A file that keeps the state of the render. It is written every `checkpoint_interval` "
+            "seconds, at Ctrl-C and at the end. The same call goes on from it, with the same bits as "
+            "without a break; with more `spp` it goes on further. The file of another scene or of other "
+            "settings is refused.",
             option="file that keeps the render, from which the same command goes on",
             check=check_checkpoint,
         ),
@@ -433,10 +437,10 @@ class RenderSettings(TypedDict, total=False):
         int | str | None,
         Setting(
             None,
-            "The most memory that this program and its workers may use together, with what it uses "
-            'already: a number of bytes, or a size such as "2GB" or "800MiB". It sizes waves, and the '
-            "number of workers where not all of them fit. The picture does not depend on it. A render that "
-            "needs more is refused before it begins.",
+            "The most memory that this program and its workers may use together, including what it "
+            'already uses: a number of bytes, or a size such as "2GB" or "800MiB". It limits the size of '
+            "waves and the number of workers. The picture does not depend on it. A render that needs more "
+            "is refused before it begins.",
             option="memory to use at most, such as 2GB",
             check=optional(memory_size),
         ),
@@ -454,11 +458,11 @@ class RenderSettings(TypedDict, total=False):
         str | Sequence[str],
         Setting(
             (),
-            'Layers beside the picture, by name: "position", "depth", "distance", "normal", '
-            '"normal_geometric", "uv", "shape_id", "instance_id", "material_id", "alpha", "albedo", '
-            '"direct", "indirect", "denoising_albedo", "denoising_normal", "light_groups", "coverage", '
-            '"boxes", or "all" for all but the last three. docs/layers.md says what each holds, and what it '
-            "costs.",
+            'AOVs, the layers of the image beside the picture, by name: "position", "depth", "distance", '
+            '"normal", "normal_geometric", "uv", "shape_id", "instance_id", "material_id", "alpha", '
+            '"albedo", "direct", "indirect", "denoising_albedo", "denoising_normal", "light_groups", '
+            '"coverage", "boxes", or "all" for all but the last three. docs/layers.md says what each '
+            "holds, and what it costs.",
             option="layer to render beside the picture, or all; can be given several times",
             flag="aov",
             check=chosen_layers,
@@ -468,8 +472,8 @@ class RenderSettings(TypedDict, total=False):
         bool,
         Setting(
             False,
-            "Removes most of the noise of the last picture, as `Image.denoise` does, along edges and "
-            'textures that the layers "denoising_albedo" and "denoising_normal" show, which it adds. '
+            "Removes most of the noise of the last picture, as `Image.denoise` does. Edges and textures "
+            'are kept by the AOVs "denoising_albedo" and "denoising_normal", which are added. '
             "`image.noisy` is the picture before.",
             option="remove noise from the picture",
             check=check_flag,
@@ -479,10 +483,10 @@ class RenderSettings(TypedDict, total=False):
         Progress,
         Setting(
             None,
-            "By default a bar appears when a render takes over two seconds; in a notebook the picture "
-            "appears in its place, and refines. False shows neither; a function is called with how much is "
-            "done and how much there is at most: samples, or seconds where `seconds` is given. While a "
-            "wave takes long it is called every second.",
+            "None shows a bar when a render takes over two seconds; in a notebook it shows the picture "
+            "while it refines. False shows neither. A function is called with how much is done and how "
+            "much there is at most: samples, or seconds where `seconds` is given. During a long wave it "
+            "is called every second.",
             check=check_progress,
         ),
     ]
