@@ -16,13 +16,12 @@ import wavefront as wf
 from wavefront import cli
 from wavefront.cli import (
     command_line,
-    completion_command,
     doctor_command,
     render_command,
-    self_test,
-    turntable_command,
+    view_commands,
 )
 from wavefront.cli.doctor_command import EXTRAS
+from wavefront.cli.options import joined
 
 ROOT = Path(__file__).parents[2]
 DOCUMENT = (ROOT / "docs" / "command_line.md").read_text("utf-8")
@@ -60,7 +59,7 @@ def test_help_has_examples_that_are_valid(name: str) -> None:
     for example in examples:
         program, *words = shlex.split(example.split(" > ")[0])
         assert (program, words[0]) == ("wavefront", name)
-        cli.parser().parse_args(command_line.joined(words))
+        cli.parser().parse_args(joined(words))
     assert f"| `{name}` |" in DOCUMENT
 
 
@@ -127,7 +126,7 @@ def test_renders_that_fail_in_any_command_give_2(mesh, monkeypatch, capsys, erro
     def fail(*args: object, **settings: object) -> None:
         raise error
 
-    monkeypatch.setattr(turntable_command, "save_animation", fail)
+    monkeypatch.setattr(view_commands, "save_animation", fail)
     assert cli.main(["turntable", str(mesh), "-o", str(mesh.with_suffix(".gif")), *FAST]) == 2
     text = "two lines" if str(error) else "out of memory"
     assert capsys.readouterr().err == f"wavefront: error: {text}\n"
@@ -137,7 +136,7 @@ def test_ctrl_c_in_any_command_gives_130(mesh, monkeypatch, capsys) -> None:
     def stop(*args: object, **settings: object) -> None:
         raise wf.Interrupted("stopped by Ctrl-C")
 
-    monkeypatch.setattr(turntable_command, "save_animation", stop)
+    monkeypatch.setattr(view_commands, "save_animation", stop)
     assert cli.main(["turntable", str(mesh), "-o", str(mesh.with_suffix(".gif")), *FAST]) == 130
     assert capsys.readouterr().err == "wavefront: stopped by Ctrl-C\n"
 
@@ -272,7 +271,7 @@ def test_completion_prints_a_script(shell: str, tmp_path: Path) -> None:
 
 
 def test_completion_says_what_it_needs(monkeypatch, capsys) -> None:
-    monkeypatch.setattr(completion_command, "find_spec", lambda name: None)
+    monkeypatch.setattr(command_line, "find_spec", lambda name: None)
     assert cli.main(["completion", "bash"]) == 2
     assert capsys.readouterr().err == "wavefront: error: completion needs pip install shtab\n"
 
@@ -292,19 +291,19 @@ def test_doctor_says_what_is_there_and_tests_it() -> None:
 
 
 def test_the_room_is_as_described() -> None:
-    scene = self_test.timed_room()
+    scene = doctor_command.timed_room()
     (mesh,) = (shape for shape in scene.shapes if shape.name == "mesh")
-    assert f" {len(mesh.faces)} triangles" in self_test.ROOM
+    assert f" {len(mesh.faces)} triangles" in doctor_command.ROOM
     width, height = scene.camera.size
-    assert f" {width}x{height} pixels" in self_test.ROOM
+    assert f" {width}x{height} pixels" in doctor_command.ROOM
     assert sum(shape.emission is not None for shape in scene.shapes) == 1
 
 
 def test_doctor_gives_1_when_a_test_fails(monkeypatch, capsys) -> None:
     gray = wf.Diffuse(0.99)
-    monkeypatch.setattr(self_test, "Diffuse", lambda reflectance: gray)
-    assert not self_test.check_furnace().passed
-    monkeypatch.setattr(self_test, "measure_speeds", lambda seconds, workers: [])
+    monkeypatch.setattr(doctor_command, "Diffuse", lambda reflectance: gray)
+    assert not doctor_command.check_furnace().passed
+    monkeypatch.setattr(doctor_command, "measure_speeds", lambda seconds, workers: [])
     assert cli.main(["doctor"]) == 1
     assert "  FAILED  furnace: a white sphere" in capsys.readouterr().out
 

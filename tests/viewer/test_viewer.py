@@ -29,7 +29,7 @@ import pytest
 from scenes import cornell_box
 
 import wavefront as wf
-from wavefront.cli import main, view_command
+from wavefront.cli import main, view_commands
 from wavefront.viewer import background_denoiser as denoiser_module
 from wavefront.viewer import page as page_module
 from wavefront.viewer import refiner as module
@@ -1058,7 +1058,7 @@ def test_the_command_has_a_token_unless_told(monkeypatch: pytest.MonkeyPatch, tm
     mesh = tmp_path / "triangle.obj"
     mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     tokens: list[Any] = []
-    monkeypatch.setattr(view_command, "view", lambda scene, **settings: tokens.append(settings["token"]))
+    monkeypatch.setattr(view_commands, "view", lambda scene, **settings: tokens.append(settings["token"]))
     for words in ([], ["--token", "mine"], ["--no-token"]):
         assert main(["view", str(mesh), *words]) == 0
     assert tokens == [True, "mine", False]

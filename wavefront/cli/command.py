@@ -6,8 +6,9 @@ import argparse
 import os
 from typing import Any, NoReturn
 
+from ..core.errors import SceneError
 from ..core.suggestions import did_you_mean, meant
-from .status import ERROR
+from .messages import ERROR
 
 COMMAND = "command"  # the name of the first word in messages
 SCENE_FILE = "obj, ply, stl, off, glb, gltf, dae or 3mf file"
@@ -28,6 +29,15 @@ class Parser(argparse.ArgumentParser):
             hint = f"; did you mean --{found.replace('_', '-')}?" if found and unknown[0][0] == "-" else ""
             self.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
         return options, []
+
+    def _get_value(self, action: argparse.Action, arg_string: str) -> Any:
+        """Read a value; the message of a check stays as it is."""
+        try:
+            return super()._get_value(action, arg_string)
+        except argparse.ArgumentError as error:
+            if isinstance(error.__context__, SceneError):
+                error.message = str(error.__context__)
+            raise
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         """Refuse a value that is none of the choices."""
@@ -52,19 +62,7 @@ class Help(argparse.ArgumentDefaultsHelpFormatter, argparse.RawDescriptionHelpFo
 
 
 def add_command(commands: Any, name: str, what: str, examples: list[str]) -> argparse.ArgumentParser:
-    """Add a command to those of a parser.
-
-    Parameters
-    ----------
-    commands
-        The parser's commands.
-    name
-        Of the command.
-    what
-        What it does, for the help of the program and of the command.
-    examples
-        Command lines, which end its help.
-    """
+    """Add a command to those of a parser: what it does, and command lines that end its help."""
     lines = "\n".join(f"  {example}" for example in examples)
     command: argparse.ArgumentParser = commands.add_parser(
         name,
@@ -75,8 +73,3 @@ def add_command(commands: Any, name: str, what: str, examples: list[str]) -> arg
         allow_abbrev=False,  # an option of a later version would change what an abbreviation means
     )
     return command
-
-
-def add_scene(command: argparse.ArgumentParser) -> None:
-    """Add the argument for one scene file."""
-    command.add_argument("scene", help=SCENE_FILE)

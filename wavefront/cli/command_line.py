@@ -1,4 +1,4 @@
-"""The command line: options, signals and the exit status."""
+"""The command line: its commands, their completion in a shell, signals and the exit status."""
 
 from __future__ import annotations
 
@@ -11,24 +11,31 @@ import threading
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from importlib.util import find_spec
 from typing import Any
 
 from ..core.errors import RenderError, SceneError
 from ..scheduling.interrupt import SIGNALS
 from ..version import VERSION
-from .arguments import joined
-from .command import COMMAND, Parser
-from .compare_command import add_compare_command
-from .completion_command import add_completion_command
-from .dataset_command import add_dataset_command
+from .command import COMMAND, Parser, add_command
 from .doctor_command import add_doctor_command
 from .info_command import add_info_command
-from .messages import print_error, print_note, print_warning
-from .render_command import add_render_command
-from .resume_command import add_resume_commands
-from .status import ERROR, HUNG_UP, INTERRUPTED, TERMINATED
-from .turntable_command import add_turntable_command
-from .view_command import add_view_command
+from .messages import (
+    ERROR,
+    HUNG_UP,
+    INTERRUPTED,
+    TERMINATED,
+    print_error,
+    print_note,
+    print_warning,
+)
+from .options import joined
+from .picture_commands import add_compare_command, add_merge_command
+from .render_command import add_render_command, add_resume_command
+from .view_commands import add_dataset_command, add_turntable_command, add_view_command
+
+SHELLS = ("bash", "zsh")
+FILES = ("scene", "scenes", "output", "checkpoint", "pictures", "picture", "reference")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -116,9 +123,47 @@ def parser() -> argparse.ArgumentParser:
     add_turntable_command(commands)
     add_view_command(commands)
     add_dataset_command(commands)
-    add_resume_commands(commands, top)
+    add_resume_command(commands, top)
+    add_merge_command(commands)
     add_info_command(commands)
     add_compare_command(commands)
     add_doctor_command(commands)
     add_completion_command(commands, top)
     return top
+
+
+def add_completion_command(commands: Any, parser: argparse.ArgumentParser) -> None:
+    """Add the command to those of a parser, whose completion it prints."""
+    command = add_command(
+        commands,
+        "completion",
+        "print a script that completes commands and options in a shell (needs pip install shtab)",
+        [
+            "wavefront completion bash > ~/.local/share/bash-completion/completions/wavefront",
+            "wavefront completion zsh > ~/.zfunc/_wavefront",
+        ],
+    )
+    command.add_argument("shell", choices=SHELLS, help="the shell")
+    command.set_defaults(run=lambda options: _print_script(parser, options.shell))
+
+
+def _print_script(parser: argparse.ArgumentParser, shell: str) -> int:
+    """Print the script for a shell; return the exit status."""
+    if find_spec("shtab") is None:
+        raise SceneError("completion needs pip install shtab")
+    import shtab
+
+    for action in _actions(parser):
+        if action.dest in FILES:
+            action.complete = shtab.FILE  # type: ignore[attr-defined]
+    print(shtab.complete(parser, shell))
+    return 0
+
+
+def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
+    """Yield the arguments of a parser and of its commands."""
+    for action in parser._actions:
+        yield action
+        if isinstance(action, argparse._SubParsersAction):
+            for command in action.choices.values():
+                yield from _actions(command)

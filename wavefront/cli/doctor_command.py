@@ -1,4 +1,4 @@
-"""`wavefront doctor`."""
+"""`wavefront doctor`: what is installed, whether pictures are right, and how fast they are."""
 
 from __future__ import annotations
 
@@ -7,22 +7,45 @@ import math
 import os
 import platform
 import sys
+import time
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+import numpy as np
+
+from ..accel.embree import installed
 from ..arrays.record import record
+from ..arrays.vec import Doubles, Ints
+from ..bsdfs import Dielectric, Diffuse
+from ..camera import Camera
 from ..core.counted import counted
 from ..core.memory import available_memory
+from ..lights import Environment
+from ..render import render
+from ..scene import Scene
 from ..scheduling.executors import worker_count
 from ..scheduling.machine import describe_machine
+from ..session import Session
+from ..shapes import Mesh, Rectangle, Sphere
 from ..version import VERSION
 from .command import add_command
-from .status import FAULT
+from .messages import FAULT
 
 SECONDS = 10.0
 CHECKS_TAKE = 2.0  # seconds, about; the rest is for speed
 REQUIRED = ("numpy", "imageio", "trimesh", "OpenEXR", "tqdm", "threadpoolctl", "pycollada")
+
+SIZE = (128, 128)
+FURNACE_SPP = 64
+MOST_SPP = 1 << 16  # more than there is time for
+STANDARD_ERRORS = 5  # by which the mean of a right picture differs in one of two million tests
+ROUNDING = 1e-5  # relative, of sums of float32 along a path
+RINGS, SIDES = 32, 64  # of the mesh that rays are timed with
+ROOM = (  # what `timed_room` returns
+    f"a room with a mesh of {2 * RINGS * SIDES} triangles, a sphere of glass and one light, "
+    f"in {SIZE[0]}x{SIZE[1]} pixels"
+)
 
 
 @record
@@ -31,6 +54,15 @@ class Extra:
 
     packages: tuple[str, ...]
     brings: str
+
+
+@record
+class CheckResult:
+    """What a test found."""
+
+    name: str
+    passed: bool
+    text: str
 
 
 EXTRAS = {
@@ -63,8 +95,6 @@ def _doctor(options: argparse.Namespace) -> int:
         print(line, flush=True)
     if not options.seconds > 0:
         return 0
-    from .self_test import ROOM, check_furnace, check_workers, measure_speeds
-
     print("Test", flush=True)
     workers = worker_count(None)
     results = [check_furnace(), check_workers()]
@@ -123,3 +153,85 @@ def _version(package: str) -> str | None:
         return version(package)
     except PackageNotFoundError:
         return None
+
+
+def check_furnace() -> CheckResult:
+    """Render a white sphere in white light, which must not be seen: its radiance is that of the light."""
+    scene = Scene(
+        [Sphere((0, 0, 0), 1, material=Diffuse(1.0))],
+        [Environment(1.0)],
+        Camera.look_at((0, 0, 4), (0, 0, 0), fov=20, size=(64, 64)),
+    )
+    image = render(scene, FURNACE_SPP, seed=1, progress=False)
+    assert image.standard_error is not None
+    mean = float(image.rgb.mean(dtype=np.float64))
+    # the channels of a gray picture have the same samples
+    error = float(np.sqrt(np.square(image.standard_error[..., 0], dtype=np.float64).sum()))
+    error /= image.standard_error[..., 0].size
+    passed = abs(mean - 1) <= STANDARD_ERRORS * error + ROUNDING
+    return CheckResult(
+        "furnace", passed, f"a white sphere in light of radiance 1 has {mean:.6f} ± {error:.6f}"
+    )
+
+
+def check_workers() -> CheckResult:
+    """Render one picture with one worker and with two, which must have the same bits."""
+    scene = timed_room()
+    one, two = (render(scene, 4, size=(64, 64), workers=n, progress=False) for n in (1, 2))
+    return CheckResult(
+        "workers", bool(np.array_equal(one.rgb, two.rgb)), "one worker and two give the same bits"
+    )
+
+
+def measure_speeds(seconds: float, workers: int) -> list[CheckResult]:
+    """Measure rays per second with each accelerator that is installed, for some seconds in all."""
+    accelerators = ["numpy", *(["embree"] if installed() else [])]
+    return [_measure_speed(name, seconds / len(accelerators), workers) for name in accelerators]
+
+
+def _measure_speed(accelerator: str, seconds: float, workers: int) -> CheckResult:
+    """Render for some seconds, counted from the first picture: its workers have started and are warm."""
+    with Session(timed_room(), MOST_SPP, accel=accelerator, workers=workers, progress=False) as session:
+        first = last = next(session)
+        begin, passed = time.perf_counter(), 0.0
+        while passed < seconds and (image := next(session, None)) is not None:
+            last, passed = image, time.perf_counter() - begin
+    rays, samples = (
+        (last.metadata[name] - first.metadata[name]) / passed / 1e6 for name in ("rays", "samples")
+    )
+    text = (
+        f"{rays:.2f} million rays per second, {samples:.2f} million samples per second "
+        f"({counted(workers, 'worker')}, in {passed:.1f} s)"
+    )
+    return CheckResult(f"speed, {accelerator}", bool(np.isfinite(last.rgb).all()), text)
+
+
+def timed_room() -> Scene:
+    """Return a room with a ball of triangles and one of glass."""
+    vertices, faces = _ball(RINGS, SIDES)
+    white, red = Diffuse(0.75), Diffuse((0.7, 0.2, 0.1))
+    walls = [
+        Rectangle((-2, -1, -2), (0, 0, 4), (4, 0, 0), material=white),
+        Rectangle((-2, -1, -2), (4, 0, 0), (0, 3, 0), material=white),
+        Rectangle((-2, -1, -2), (0, 3, 0), (0, 0, 4), material=red),
+    ]
+    light = Rectangle((-0.5, 1.9, -0.5), (1, 0, 0), (0, 0, 1), emission=12.0)
+    balls = [
+        Mesh(vertices - (0.8, 0, 0), faces, material=white),
+        Sphere((0.9, -0.3, 0.4), 0.7, material=Dielectric(1.5)),
+    ]
+    return Scene(
+        [*walls, light, *balls], camera=Camera.look_at((1, 0.6, 5.5), (0, 0.1, 0), fov=40, size=SIZE)
+    )
+
+
+def _ball(rings: int, sides: int) -> tuple[Doubles, Ints]:
+    """Return the vertices (n, 3) and faces (m, 3) of a unit ball of latitudes and longitudes."""
+    latitude = np.linspace(0.01, np.pi - 0.01, rings + 1)[:, None]
+    longitude = np.linspace(0, 2 * np.pi, sides, endpoint=False)[None]
+    x, y, z = np.sin(latitude) * np.cos(longitude), np.cos(latitude), np.sin(latitude) * np.sin(longitude)
+    vertices = np.stack([x, np.broadcast_to(y, x.shape), z], -1).reshape(-1, 3)
+    row, column = (each.ravel() for each in np.mgrid[:rings, :sides])
+    a, b = row * sides + column, row * sides + (column + 1) % sides
+    faces = np.concatenate([np.stack([a, b, a + sides], 1), np.stack([b, b + sides, a + sides], 1)])
+    return vertices, faces

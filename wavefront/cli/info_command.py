@@ -20,7 +20,7 @@ from ..scene.scene import FRAMING_VIEW, Scene
 from ..shapes import Instance, Mesh, Shape
 from ..textures.base import BaseTexture
 from ..textures.image import Texture
-from .command import add_command, add_scene
+from .command import SCENE_FILE, add_command
 
 _PACKAGE = BaseTexture.__module__.partition(".")[0] + "."
 
@@ -33,7 +33,7 @@ def add_info_command(commands: Any) -> None:
         "say what a scene file holds: shapes, sizes, materials, textures, lights, and what is wrong with it",
         ["wavefront info scene.glb"],
     )
-    add_scene(command)
+    command.add_argument("scene", help=SCENE_FILE)
     command.add_argument("--quiet", action="store_true", help="do not say that a large file is being read")
     command.set_defaults(run=_info)
 

@@ -1,10 +1,19 @@
-"""Messages of the command line, a line each. One that cannot be shown is lost, and ends nothing."""
+"""What the command line says, a line each, and its exit statuses.
+
+A message that cannot be shown is lost, and ends nothing.
+"""
 
 from __future__ import annotations
 
 import sys
 from contextlib import suppress
 from typing import TextIO
+
+FAULT = 1  # `doctor` found one
+ERROR = 2  # as argparse has it
+HUNG_UP = 129  # 128 + SIGHUP
+INTERRUPTED = 130  # 128 + SIGINT, as shells report it
+TERMINATED = 143  # 128 + SIGTERM
 
 
 def print_error(error: BaseException | str) -> None:

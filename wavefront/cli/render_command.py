@@ -1,33 +1,33 @@
-"""`wavefront render`."""
+"""`wavefront render`, and `wavefront resume`, which goes on with one."""
 
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..camera import Camera
+from ..codecs.display import Display
 from ..codecs.images import check_display, check_writable
 from ..core.errors import Interrupted, RenderError, SaveError, SceneError
+from ..film.checkpoint_file import contents_of, read_header
 from ..image import Image
 from ..io.to_scene import SIZE
 from ..render import finish
 from ..scene.scene import AUTO, FRAMING_FOV, Scene
 from ..session import Session
 from ..viewer import view
-from . import arguments
 from .command import PICTURE_FILE, SCENE_FILE, add_command
-from .messages import print_done, print_error, print_note
-from .options import add_display, add_settings, display_of, read_scene, setting_values
-from .outputs import output_paths
-from .rescue import save_elsewhere
-from .status import ERROR, INTERRUPTED
+from .messages import ERROR, INTERRUPTED, print_done, print_error, print_note
+from .options import add_display, add_settings, display_values, read_scene, setting_values, vector
+from .outputs import output_paths, save_elsewhere
 
 
 def add_render_command(commands: Any) -> None:
-    """Add the command and its options to a parser's commands."""
+    """Add the command and its options to those of a parser."""
     command = add_command(
         commands,
         "render",
@@ -49,7 +49,7 @@ def add_render_command(commands: Any) -> None:
         "or a path with {} in the place of that name",
     )
     add_settings(command)
-    where: dict[str, Any] = {"type": arguments.vector, "metavar": "X,Y,Z"}
+    where: dict[str, Any] = {"type": vector, "metavar": "X,Y,Z"}
     command.add_argument("--origin", **where, help="camera position; replaces the file's camera")
     command.add_argument(
         "--target", **where, help="point that the camera looks at (default: the scene's middle)"
@@ -66,6 +66,18 @@ def add_render_command(commands: Any) -> None:
     command.set_defaults(run=_render)
 
 
+def add_resume_command(commands: Any, parser: argparse.ArgumentParser) -> None:
+    """Add the command to those of a parser, which reads the command that began the render."""
+    command = add_command(
+        commands,
+        "resume",
+        "go on with a render that wavefront render --checkpoint began",
+        ["wavefront resume out.wfck"],
+    )
+    command.add_argument("checkpoint", help="the file that --checkpoint named")
+    command.set_defaults(run=lambda options: _resume(options.checkpoint, parser))
+
+
 def _render(options: argparse.Namespace) -> int:
     """Render all scenes; return the worst exit status."""
     if options.show:
@@ -73,9 +85,10 @@ def _render(options: argparse.Namespace) -> int:
     paths = output_paths(options.scenes, options.output)
     if len(paths) > 1 and options.checkpoint is not None:
         raise SceneError(f"--checkpoint is for one scene; there are {len(paths)}")
+    display = Display(**display_values(options))
     for path in paths:
         check_writable(path)
-        check_display(path, display_of(options), options.bits)
+        check_display(path, display, options.bits)
     worst = 0
     for scene, path in zip(options.scenes, paths, strict=True):
         try:
@@ -137,15 +150,8 @@ def _save(image: Image, output: str, options: argparse.Namespace) -> int:
     def save(path: str | Path) -> None:
         if Path(path).suffix.lower() != Path(output).suffix.lower():
             image.save(path)  # it may not be able to hold what the options ask for
-            return
-        image.save(
-            path,
-            options.gamma,
-            options.exposure,
-            options.tone,
-            options.white_balance,
-            bits=options.bits,
-        )
+        else:
+            image.save(path, **display_values(options), bits=options.bits)
 
     try:
         save(output)
@@ -186,3 +192,21 @@ def _summary(image: Image, path: str) -> str:
         f"estimated error {'unknown' if np.isnan(noise) else f'{noise:.2%}'}"
         f"{' before denoising' if 'denoiser' in image.metadata else ''}"
     )
+
+
+def _resume(path: str, parser: argparse.ArgumentParser) -> int:
+    """Give the command that began a render once more; return the exit status."""
+    with contents_of(path):
+        command = read_header(path)["command"]
+        if command is None:
+            raise SceneError(f"{path}: was not begun by wavefront render; call render(checkpoint=...) again")
+        arguments, folder = command["arguments"], os.fspath(command["folder"])
+        if not all(isinstance(each, str) for each in arguments):
+            raise TypeError("an argument is no text")
+    options = parser.parse_args(arguments)
+    options.arguments, options.folder = arguments, folder
+    options.scenes = [os.path.join(options.folder, each) for each in options.scenes]
+    options.output = os.path.join(options.folder, options.output)
+    options.checkpoint = path
+    status: int = options.run(options)
+    return status
