@@ -21,7 +21,7 @@ from ..shapes.smoothing import AUTO, check_smooth
 from . import trimesh_objects, trimesh_view
 from .joining import join
 from .placing import place_meshes, place_shapes
-from .readers import Wish, read
+from .readers import LoadOptions, read
 from .sources import LoadLimits, PathLike, checked_limits, folders
 
 T = TypeVar("T")
@@ -73,13 +73,13 @@ def load(
     1
     """
     with _reading(path, progress):
-        wish = Wish(
+        options = LoadOptions(
             strict,
             limits=checked_limits(limits),
             search_paths=folders(search_paths),
             smooth=check_smooth("smooth", smooth),
         )
-        name, contents = path_name(path), read(path, wish)
+        name, contents = path_name(path), read(path, options)
         placed = place_shapes(name, contents.raws, contents.places, strict)
         shapes = _some(name, [*placed, *contents.shapes])
         return Scene(shapes, contents.lights, contents.camera, up=contents.up)
@@ -145,10 +145,10 @@ def load_meshes(
     smooth: bool | float | str = AUTO,
 ) -> list[Mesh]:
     """Read the meshes of a file, one for each material and node; arguments as for `load`."""
-    wish = Wish(
+    options = LoadOptions(
         strict, materials, checked_limits(limits), folders(search_paths), check_smooth("smooth", smooth)
     )
-    name, contents = path_name(path), read(path, wish)
+    name, contents = path_name(path), read(path, options)
     placed = place_meshes(name, contents.raws, contents.places, strict)
     return _some(name, [*placed, *(_as_mesh(name, shape) for shape in contents.shapes)])
 

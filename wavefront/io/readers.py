@@ -25,7 +25,7 @@ from .sources import LoadLimits, PathLike, SceneFiles
 
 
 @dataclass(frozen=True)
-class Wish:
+class LoadOptions:
     """Options of reading a file."""
 
     strict: bool = False  # refuse files that need a repair or have unsupported properties
@@ -35,7 +35,7 @@ class Wish:
     smooth: bool | float | str = AUTO  # normals, as for `load`
 
 
-def read(path: PathLike, wish: Wish) -> Contents:
+def read(path: PathLike, options: LoadOptions) -> Contents:
     """Read a file of any supported format.
 
     Raises
@@ -46,14 +46,14 @@ def read(path: PathLike, wish: Wish) -> Contents:
     name = os.fspath(path)
     kind = extension_of(name, READERS)
     parse = READERS.find(kind, f"{name}: extension")
-    files = SceneFiles(path, wish.search_paths, wish.limits)
+    files = SceneFiles(path, options.search_paths, options.limits)
     data = files.read(path)
     if kind in PLAIN:
         _refuse(name, data)
-    contents = parse(files, data, wish)
-    contents.smooth(wish.smooth)
-    wish.limits.check_meshes(name, len(contents.raws))
-    wish.limits.check_triangles(name, sum(len(raw.faces) for raw in contents.raws))
+    contents = parse(files, data, options)
+    contents.smooth(options.smooth)
+    options.limits.check_meshes(name, len(contents.raws))
+    options.limits.check_triangles(name, sum(len(raw.faces) for raw in contents.raws))
     return contents
 
 
@@ -65,25 +65,25 @@ def _refuse(name: str, data: bytes) -> None:
         raise SceneError(f"{name}: is an archive; unpack it first")
 
 
-def _read_gltf(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
+def _read_gltf(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
     document = gltf.Document(files, data)
     with document.inside("the file"):
         found = gltf.contents(document)
         specs = GltfMaterials(document)
         for raw, number in found.raws:
             # without a material, the mesh gets the default material, as in memory
-            if wish.materials and not assign_material(raw, None if number is None else specs.spec(number)):
+            if options.materials and not assign_material(raw, None if number is None else specs.spec(number)):
                 document.lose("vertex colors", f"mesh {raw.name!r}")
-    if document.lost and wish.materials:
+    if document.lost and options.materials:
         listed = ", ".join(f"{what} ({where})" for what, where in document.lost.items())
-        warn(f"{document.name}: not honored: {listed}", wish.strict)
+        warn(f"{document.name}: not honored: {listed}", options.strict)
     raws = [raw for raw, _ in found.raws]
     return Contents(raws, found.places, found.lights, found.camera, flat=True)
 
 
-def _read_obj(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
-    name, strict, materials = os.fspath(files.scene), wish.strict, wish.materials
-    parsed = obj.parse(name, decode_text(data), strict, wish.limits)
+def _read_obj(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
+    name, strict, materials = os.fspath(files.scene), options.strict, options.materials
+    parsed = obj.parse(name, decode_text(data), strict, options.limits)
     if parsed.ignored:
         listed = ", ".join(f"{keyword} (line {line})" for keyword, line in parsed.ignored.items())
         warn(f"{name}: not honored: {listed}", strict)
@@ -117,37 +117,39 @@ def _libraries(files: SceneFiles, libraries: list[str], strict: bool) -> dict[st
     return specs
 
 
-def _read_ply(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
+def _read_ply(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
     name = os.fspath(files.scene)
-    found, claimed = ply.parse(files, data, wish.strict, wish.materials)
-    contents = trimesh_objects.read(found, name, wish.strict)
+    found, claimed = ply.parse(files, data, options.strict, options.materials)
+    contents = trimesh_objects.read(found, name, options.strict)
     faces = sum(len(raw.faces) for raw in contents.raws)
     if faces < claimed:
         raise SceneError(f"{name}: claims {counted(claimed, 'row')} of face; {faces} can be read")
-    points = cloud_of_trimesh(name, found, wish.strict) if not faces else None
+    points = cloud_of_trimesh(name, found, options.strict) if not faces else None
     return contents if points is None else replace(contents, shapes=[points])
 
 
-def _read_stl(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
-    contents = Contents.once(stl.parse(os.fspath(files.scene), data, wish.strict))
+def _read_stl(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
+    contents = Contents.once(stl.parse(os.fspath(files.scene), data, options.strict))
     contents.up = "z"
     return contents
 
 
-def _read_off(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
+def _read_off(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
     name = os.fspath(files.scene)
-    return trimesh_objects.read(off.parse(name, data, wish.strict, wish.materials), name, wish.strict)
+    return trimesh_objects.read(
+        off.parse(name, data, options.strict, options.materials), name, options.strict
+    )
 
 
-def _read_dae(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
-    found, up = dae.parse(files, data, wish.strict, wish.materials)
-    contents = trimesh_objects.read(found, os.fspath(files.scene), wish.strict)
+def _read_dae(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
+    found, up = dae.parse(files, data, options.strict, options.materials)
+    contents = trimesh_objects.read(found, os.fspath(files.scene), options.strict)
     contents.up = up
     return contents
 
 
-def _read_3mf(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
-    contents = threemf.parse(files, data, wish.strict, wish.materials)
+def _read_3mf(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
+    contents = threemf.parse(files, data, options.strict, options.materials)
     contents.up = "z"
     return contents
 
@@ -155,7 +157,7 @@ def _read_3mf(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
 def _from_scene(load: Callable[[str, bytes], Scene]) -> Reader:
     """Return a reader that gives what `load`, a user's own function, makes of a file."""
 
-    def read_scene(files: SceneFiles, data: bytes, wish: Wish) -> Contents:
+    def read_scene(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
         name = os.fspath(files.scene)
         scene = load(name, data)
         if not isinstance(scene, Scene):
@@ -165,7 +167,7 @@ def _from_scene(load: Callable[[str, bytes], Scene]) -> Reader:
     return read_scene
 
 
-Reader: TypeAlias = Callable[[SceneFiles, bytes, Wish], Contents]
+Reader: TypeAlias = Callable[[SceneFiles, bytes, LoadOptions], Contents]
 READERS: Registry[Reader] = Registry(
     "extension",
     "a function of (path, data) that returns a wf.Scene",
