@@ -611,7 +611,7 @@ def test_memory_counts_them(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
     ids=["nothing smooth", "rough glass", "light all around", "a sun"],
 )
-def test_scenes_without_casters_or_placed_lights_cost_nothing(
+def test_scenes_without_specular_surfaces_or_placed_lights_cost_nothing(
     arguments: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No light path is traced, and all is as without them."""

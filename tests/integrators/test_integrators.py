@@ -150,7 +150,7 @@ def test_no_number_is_used_twice(
     assert {dimension for _, dimension in given[-1].given} == decisions - left_out.get(
         integrator, {Dimension.ROULETTE}
     ) - (set() if "guide" in options else {Dimension.GUIDE, Dimension.GUIDE_DIRECTION}) - (
-        set() if "caustics" in options else {Dimension.CASTER, Dimension.CASTER_POINT}
+        set() if "caustics" in options else {Dimension.SPECULAR_SURFACE, Dimension.SPECULAR_POINT}
     )
 
 

@@ -17,8 +17,8 @@ from significance import ALPHA, smallest_p
 
 import wavefront as wf
 from wavefront.arrays.vec import f4
-from wavefront.compile.casters import Casters
 from wavefront.compile.scene import CompiledScene, compile_scene
+from wavefront.compile.specular_surfaces import SpecularSurfaces
 from wavefront.integrators import li_full
 from wavefront.integrators.light_tracing import Splats, trace_light
 from wavefront.sampling.sampler import Sampler, SobolSampler
@@ -128,10 +128,10 @@ def assert_same_light(
 # --- Scenes ---------------------------------------------------------------------------------------
 
 
-def world(*casters: wf.Shape, lights=(PANEL,), others=(), camera=CAMERA, floor=WHITE) -> wf.Scene:
+def world(*specular: wf.Shape, lights=(PANEL,), others=(), camera=CAMERA, floor=WHITE) -> wf.Scene:
     """Return a floor, lights with surfaces above it, and what is between."""
     ground = wf.Rectangle((-2, 0, 2), (4, 0, 0), (0, 0, -4), material=floor)
-    return wf.Scene([ground, *casters, *lights], others, camera)
+    return wf.Scene([ground, *specular, *lights], others, camera)
 
 
 def ball(material=GLASS, center=(0, 0.8, 0), radius=0.75, **kw) -> wf.Sphere:
@@ -167,7 +167,7 @@ def textured(**kw) -> wf.Texture:
 
 
 def instances() -> wf.Scene:
-    """Glass and diffuse instances, which are no casters, beside glass that is one."""
+    """Glass and diffuse instances, which do not count as specular surfaces, beside glass that does."""
     clear, white = icosphere(1, center=(0, 0, 0), radius=1), icosphere(1, WHITE, center=(0, 0, 0), radius=1)
     return world(
         ball(),
@@ -256,7 +256,7 @@ CASES = {
         ),
         max_error=0.06,
     ),
-    # casters
+    # specular surfaces
     "smooth mesh": Case(lambda: world(icosphere(3, smooth=True))),
     "flat mesh": Case(lambda: world(icosphere(1))),
     "mirrors": Case(lambda: world(ball(wf.Mirror(0.9), (1.2, 1, -0.8)), wall(wf.Mirror((0.9, 0.5, 0.7))))),
@@ -351,8 +351,12 @@ CASES = {
             icosphere(1, COPPER, (-1, 0.5, 0.6), 0.5, smooth=True),
         )
     ),
-    "alpha before the caster": Case(lambda: world(ball(), sheet(wf.Material(WHITE, alpha=0.4), 2.2)), spp=40),
-    "alpha after the caster": Case(lambda: world(sheet(y=1.7), sheet(wf.Material(WHITE, alpha=0.4), 0.6))),
+    "alpha before the specular surface": Case(
+        lambda: world(ball(), sheet(wf.Material(WHITE, alpha=0.4), 2.2)), spp=40
+    ),
+    "alpha after the specular surface": Case(
+        lambda: world(sheet(y=1.7), sheet(wf.Material(WHITE, alpha=0.4), 0.6))
+    ),
     "alpha before the camera": Case(
         lambda: world(
             ball(),
@@ -413,7 +417,7 @@ def test_means_with_less_noise(name: str) -> None:
 
 # --- Closed forms ---------------------------------------------------------------------------------
 
-ALBEDO = 0.1  # of what is lit, so that hardly any light comes back to the caster
+ALBEDO = 0.1  # of what is lit, so that hardly any light comes back to the specular surface
 
 
 def looks_at(x: float, y: float, z: float, height: float) -> wf.Camera:
@@ -479,14 +483,14 @@ def test_point_light_through_a_slab() -> None:
 # --- Where light paths begin ----------------------------------------------------------------------
 
 
-def casters_of(scene: wf.Scene, most_copies: int = 0) -> tuple[CompiledScene, Casters]:
+def specular_surfaces_of(scene: wf.Scene, most_copies: int = 0) -> tuple[CompiledScene, SpecularSurfaces]:
     compiled = Tracer.of(scene, most_copies=most_copies).scene
-    assert compiled.casters is not None
-    return compiled, compiled.casters
+    assert compiled.specular_surfaces is not None
+    return compiled, compiled.specular_surfaces
 
 
 def mixed() -> wf.Scene:
-    """Casters of all kinds among others; the first and the last curved primitives are no casters."""
+    """Specular surfaces of all kinds among others; the first and the last curved primitive are others."""
     clear = icosphere(0, center=(0, 0, 0), radius=1)
     return world(
         wf.Cylinders([(-1, 0.2, 0.5)], [(1, 0.2, 0.5)], 0.15, material=GLASS),
@@ -502,22 +506,22 @@ def mixed() -> wf.Scene:
     )
 
 
-def test_points_on_casters_are_even() -> None:
+def test_points_on_specular_surfaces_are_even() -> None:
     """Counts per primitive go by area, and the moments within each are those of even points."""
-    _, casters = casters_of(mixed())
+    _, specular = specular_surfaces_of(mixed())
     n = 1 << 18
     rng = np.random.default_rng(1)
-    points = casters.sample(rng.random(n), rng.random((2, n)).astype(f4))
-    flat = len(casters.corners)
+    points = specular.sample(rng.random(n), rng.random((2, n)).astype(f4))
+    flat = len(specular.corners)
     assert flat == 80
-    assert casters.prim.size == flat + 3
-    a, b, c = casters.corners.astype(float).transpose(1, 0, 2)
+    assert specular.prim.size == flat + 3
+    a, b, c = specular.corners.astype(float).transpose(1, 0, 2)
     area = np.append(
-        np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2, 4 * np.pi * casters.radii.astype(float) ** 2
+        np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2, 4 * np.pi * specular.radii.astype(float) ** 2
     )
-    assert casters.area == pytest.approx(area.sum())
-    which = np.searchsorted(casters.prim, points.prim)
-    assert (casters.prim.take(which) == points.prim).all()
+    assert specular.area == pytest.approx(area.sum())
+    which = np.searchsorted(specular.prim, points.prim)
+    assert (specular.prim.take(which) == points.prim).all()
     counts = np.bincount(which, minlength=area.size)
     assert stats.chisquare(counts, area / area.sum() * n).pvalue > 1e-3
 
@@ -533,19 +537,19 @@ def test_points_on_casters_are_even() -> None:
     np.testing.assert_allclose((weights**2).mean(1), 1 / 6, atol=4 * 0.2 / np.sqrt(m))
 
     ball_of = which[~on] - flat
-    away = (points.point[:, ~on] - casters.centers.take(ball_of, 1)) / casters.radii.take(ball_of)
+    away = (points.point[:, ~on] - specular.centers.take(ball_of, 1)) / specular.radii.take(ball_of)
     np.testing.assert_allclose((away**2).sum(0), 1, atol=1e-5)
     for k in range(3):
         assert stats.kstest(away[k], stats.uniform(-1, 2).cdf).pvalue > 1e-3
 
 
-def test_ids_of_casters_are_those_of_hits() -> None:
-    """A ray that meets a caster finds its id, and its material has delta lobes alone; so in all scenes."""
+def test_ids_of_specular_surfaces_are_those_of_hits() -> None:
+    """A ray that meets one finds its id, and its material has delta lobes alone; so in all scenes."""
     for most_copies in (0, 1000):
-        compiled, casters = casters_of(mixed(), most_copies)
+        compiled, specular = specular_surfaces_of(mixed(), most_copies)
         rng = np.random.default_rng(2)
         n = 4096
-        points = casters.sample(rng.random(n), rng.random((2, n)).astype(f4))
+        points = specular.sample(rng.random(n), rng.random((2, n)).astype(f4))
         away = rng.normal(size=(3, n))
         away = (away / np.linalg.norm(away, axis=0)).astype(f4)
         nothing = np.full(n, -1)
@@ -554,26 +558,26 @@ def test_ids_of_casters_are_those_of_hits() -> None:
         # a point within 1e-3 of an edge may be seen through a neighbor
         assert met.mean() > 0.9
         assert (hits.prim[met] == points.prim[met]).mean() > 0.9
-        assert casters.includes(points.prim).all()
+        assert specular.includes(points.prim).all()
 
 
 def test_includes() -> None:
-    compiled, casters = casters_of(mixed())
+    compiled, specular = specular_surfaces_of(mixed())
     ids = np.arange(-1, 10_000)
-    included = ids[casters.includes(ids)]
-    assert included.tolist() == casters.prim.tolist()
+    included = ids[specular.includes(ids)]
+    assert included.tolist() == specular.prim.tolist()
     assert compiled.instances is not None
     specular = np.array([bsdf.specular for bsdf in compiled.materials.groups])
-    rows, _ = compiled.instances.locate(casters.prim)
+    rows, _ = compiled.instances.locate(specular.prim)
     assert specular[compiled.materials.group_of.take(compiled.material_of.take(rows))].all()
     assert (compiled.light_of.take(rows) < 0).all()
 
 
-def test_scenes_without_casters_have_none() -> None:
+def test_scenes_without_specular_surfaces_have_none() -> None:
     rough = world(ball(wf.Dielectric(1.5, roughness=0.4)), ball(wf.Mirror(1), (0, 2, 0), 0.3, emission=1.0))
-    assert Tracer.of(rough).scene.casters is None
-    assert Tracer.of(world(ball(), lights=[])).scene.casters is None
-    assert Tracer.of(world(ball()), caustics=False).scene.casters is None
+    assert Tracer.of(rough).scene.specular_surfaces is None
+    assert Tracer.of(world(ball(), lights=[])).scene.specular_surfaces is None
+    assert Tracer.of(world(ball()), caustics=False).scene.specular_surfaces is None
 
 
 # --- Connections to the camera --------------------------------------------------------------------
@@ -662,12 +666,12 @@ def test_sky_light_stays_as_it_is(background) -> None:
     """Light without a place is found by paths from the camera, with the same bits."""
     ground = wf.Rectangle((-2, 0, 2), (4, 0, 0), (0, 0, -4), material=WHITE)
     scene = wf.Scene([ball(), wall(wf.Mirror(0.9)), ground], [wf.Environment(NOISE)], CAMERA)
-    assert Tracer.of(scene).scene.casters is None  # there are no light paths without another light
+    assert Tracer.of(scene).scene.specular_surfaces is None  # there are no light paths without another light
     hidden = [box((-1, 3, -1), (1, 4, 1), WHITE), wf.Sphere((0, 3.5, 0), 0.2, emission=1.0)]
     scene = wf.Scene([*scene.shapes, *hidden], scene.lights, CAMERA)
     split, plain = (Tracer.of(scene, caustics) for caustics in (True, False))
     split.scene.background = plain.scene.background = background
-    assert split.scene.casters is not None
+    assert split.scene.specular_surfaces is not None
     np.testing.assert_array_equal(split.eye(1, 8, 7), plain.eye(1, 8, 7))
     assert not len(split.splats(1, 8, 7))
 
@@ -679,7 +683,7 @@ def test_caustics_need_two_bounces(max_bounces: int) -> None:
     np.testing.assert_array_equal(split.eye(1, 8, max_bounces), plain.eye(1, 8, max_bounces))
 
 
-def test_casters_in_the_dark() -> None:
+def test_specular_surfaces_in_the_dark() -> None:
     """No light path gets anywhere, and nothing fails."""
     traced = Tracer.of(world(ball(), box((-1, 0.01, -1), (1, 1.8, 1), WHITE)))
     assert not len(traced.splats(1, 8, 7))

@@ -16,7 +16,6 @@ from ..lights.samplers import LightSamplerMaker
 from ..scene import Scene
 from ..shapes import Shape
 from ..shapes.attributes import Corners, corner_values
-from .casters import Casters, find_casters
 from .curved import CurvedTable
 from .geometry import compute_corner_normals, gather_triangles, same_as_next
 from .instances import InstanceTable, own_frame, place_instances, sort_shapes
@@ -37,6 +36,7 @@ from .materials import (
 from .morton import MortonGrid
 from .scale import check_distance, check_lights, length_factor, scaled_shapes
 from .shape_numbers import ShapeNumbers, number_shapes
+from .specular_surfaces import SpecularSurfaces, find_specular_surfaces
 
 ROULETTE_AFTER = 2  # scattering events, by default
 LARGE = 20_000  # triangles; from here on the order of rays matters more than sorting them costs
@@ -77,7 +77,7 @@ class CompiledScene:
     background: Floats | None = None  # (3, 1) what camera rays that miss show; None for the environment
     backdrop: InfiniteLight | None = None  # what they show of the environment; None for all of its light
     roulette_after: float = ROULETTE_AFTER  # scattering events before Russian roulette may end paths
-    casters: Casters | None = None  # where light paths begin; None where none are traced
+    specular_surfaces: SpecularSurfaces | None = None  # where light paths begin; None where none are traced
 
     @property
     def interpolates(self) -> bool:
@@ -167,10 +167,10 @@ def compile_scene(
         parts = np.split(triangles[once:], ends[:-1])
         built = [make_accelerator(Geometry(part, (), weights)) for part in parts]
         accelerator = InstanceAccelerator(accelerator, built, placements)
-    casters, groups_of = None, group_materials(user_materials)
+    specular, groups_of = None, group_materials(user_materials)
     if caustics and len(lights) > int(environment >= 0):  # one is not at infinity
         whole = np.append(np.arange(once), np.arange(len(triangles), len(material_of)))
-        casters = find_casters(
+        specular = find_specular_surfaces(
             triangles[:once], table_of_curved, material_of.take(whole), light_of.take(whole), groups_of
         )
     return CompiledScene(
@@ -196,6 +196,6 @@ def compile_scene(
         backdrop=find_backdrop(scene, scale, center),
         instances=table,
         shadow_catchers=find_shadow_catchers(user_materials),
-        casters=casters,
+        specular_surfaces=specular,
         places=MortonGrid.over((high - low) / 2) if len(triangles) >= LARGE else None,
     )

@@ -1,13 +1,14 @@
-"""Paths from lights: the light that comes by smooth glass and mirrors, as in caustics.
+"""Light tracing: paths from lights, for light that comes by smooth glass and mirrors, as in caustics.
 
 A path from the camera meets a small light behind glass or in a mirror by chance only, and a point light
 never. So paths are traced from the lights, too, where they are asked for. Each begins at a point on a
-caster (compile/casters.py), where light samples find what arrives, and goes on by BSDF samples. From each
-surface on its way that does not scatter by delta lobes alone, it is connected to the camera, which adds to
-whatever pixel sees that surface.
+specular surface (compile/specular_surfaces.py). Light samples find what arrives there, and BSDF samples
+carry it on. At each surface on its way that does not scatter by delta lobes alone, the path is connected to
+the camera, and adds to whatever pixel sees that surface.
 
 Paths from the camera leave out just this light: that of delta lights and of surfaces that shine, which a
-caster sends on by a delta lobe, and which leaves the first surface that the camera sees by another lobe.
+specular surface sends on by a delta lobe, and which leaves the first surface that the camera sees by
+another lobe.
 
 A BSDF is a function of the direction to the camera and that to the light, in this order, also where
 light comes along (E. Veach, thesis 1997, §5.2 and §5.3).
@@ -26,8 +27,8 @@ from ..arrays.record import record
 from ..arrays.state import Hits, Paths, Rays, SoA, SurfaceInteraction, Words
 from ..arrays.vec import Bools, Doubles, Floats, Ints, broadcast, dot, f4, highest, length, take
 from ..camera import Camera
-from ..compile.casters import CasterPoints, Casters
 from ..compile.scene import CompiledScene
+from ..compile.specular_surfaces import SpecularPoints, SpecularSurfaces
 from ..lights import LightSample
 from ..sampling.sampler import Dimension, Sampler
 from ..stages.alpha import alpha_pass_through
@@ -61,7 +62,7 @@ def trace_light(
     Parameters
     ----------
     scene
-        With casters.
+        With specular surfaces.
     camera
         In the unit of the compiled scene.
     pixel, sample
@@ -69,10 +70,10 @@ def trace_light(
     max_bounces
         The most scattering events of a path, at least 0.
     """
-    assert scene.casters is not None
+    assert scene.specular_surfaces is not None
     if max_bounces < 2 or scene.lights.choice is None:
         return _nothing()
-    paths, hits, flux = _begin(scene, scene.casters, camera, sampler, pixel, sample)
+    paths, hits, flux = _begin(scene, scene.specular_surfaces, camera, sampler, pixel, sample)
     found = []
     for bounce in range(max_bounces - 1):
         shade = _prepared(scene, paths, hits)
@@ -100,18 +101,23 @@ def _nothing() -> Splats:
 
 
 def _begin(
-    scene: CompiledScene, casters: Casters, camera: Camera, sampler: Sampler, pixel: Words, sample: Words
+    scene: CompiledScene,
+    specular: SpecularSurfaces,
+    camera: Camera,
+    sampler: Sampler,
+    pixel: Words,
+    sample: Words,
 ) -> tuple[Paths, Hits, Floats]:
-    """Return paths that come from lights and have hit casters, and the flux (3, n) of each slot.
+    """Return paths that come from lights and have hit specular surfaces, and the flux (3, n) of each slot.
 
     The paths of one sample of all pixels follow each other in one sequence of random numbers, so that they
-    are spread evenly over casters and lights.
+    are spread evenly over specular surfaces and lights.
     """
     width, height = camera.film
     address = (np.uint32(width * height % 2**32) + sample).astype(np.uint32), camera.address(pixel)
-    choice = sampler.draw_2d(*address, 0, Dimension.CASTER).astype(np.float64)
-    start = casters.sample(
-        choice[0] + choice[1] * LOWER_BITS, sampler.draw_2d(*address, 0, Dimension.CASTER_POINT)
+    choice = sampler.draw_2d(*address, 0, Dimension.SPECULAR_SURFACE).astype(np.float64)
+    start = specular.sample(
+        choice[0] + choice[1] * LOWER_BITS, sampler.draw_2d(*address, 0, Dimension.SPECULAR_POINT)
     )
     u_choice = sampler.draw_1d(*address, 0, Dimension.LIGHT)
     light, number = scene.lights.sample_li(
@@ -121,13 +127,13 @@ def _begin(
     lanes = np.flatnonzero((light.pdf > 0) & placed)
     paths, hits = _arriving(scene, start.take(lanes), light.take(lanes), address, lanes)
     paths, hits = compact(scene, paths, hits, np.arange(lanes.size))
-    return _lit(scene, casters, paths, hits, light, number, pixel.size)
+    return _lit(scene, specular, paths, hits, light, number, pixel.size)
 
 
 def _arriving(
-    scene: CompiledScene, start: CasterPoints, light: LightSample, address: tuple[Words, Words], lanes: Ints
+    scene: CompiledScene, start: SpecularPoints, light: LightSample, address: tuple[Words, Words], lanes: Ints
 ) -> tuple[Paths, Hits]:
-    """Return paths (k,) that have come from lights to points of casters, and their hits there."""
+    """Return paths (k,) that have come from lights to points of specular surfaces, and their hits there."""
     n = lanes.size
     paths = Paths(
         slot=lanes,
@@ -151,7 +157,7 @@ def _arriving(
 
 def _lit(
     scene: CompiledScene,
-    casters: Casters,
+    specular: SpecularSurfaces,
     paths: Paths,
     hits: Hits,
     light: LightSample,
@@ -167,21 +173,21 @@ def _lit(
     arriving = arriving * _transmittance(scene, rays)
     cos = dot(surface.ng, light.wi)
     flux = np.zeros((3, slots), f4)
-    arriving = arriving * (cos * f4(casters.area) / light.pdf)
+    arriving = arriving * (cos * f4(specular.area) / light.pdf)
     flux[:, paths.slot] = arriving if scene.opacities is None else arriving * scene.opacities.at(surface)
     lanes = np.flatnonzero(highest(take(flux, paths.slot)) != 0)
-    lanes = lanes.compress(_first(scene, casters, rays.take(lanes)))
+    lanes = lanes.compress(_first(scene, specular, rays.take(lanes)))
     return paths.take(lanes), hits.take(lanes), flux
 
 
-def _first(scene: CompiledScene, casters: Casters, rays: ShadowRays) -> Bools:
-    """Return whether light along rays (k) hits the casters that they start from, (k,).
+def _first(scene: CompiledScene, specular: SpecularSurfaces, rays: ShadowRays) -> Bools:
+    """Return whether light along rays (k) hits the specular surfaces that they start from, (k,).
 
     Points are drawn on all faces, but of those that overlap in a plane only the first is ever hit.
     """
     away, nothing = NEARBY * rays.error, broadcast(np.intp(-1), len(rays))
     found = scene.accelerator.closest(rays.origin + rays.direction * away, -rays.direction, nothing)
-    return ~((found.t < 2 * away) & (found.prim < casters.found_as.take(rays.exclude_prim)))
+    return ~((found.t < 2 * away) & (found.prim < specular.found_as.take(rays.exclude_prim)))
 
 
 def _transmittance(scene: CompiledScene, rays: ShadowRays) -> Floats:
@@ -212,7 +218,7 @@ def _absorb(
 def _scatter(
     scene: CompiledScene, paths: Paths, hits: Hits, shade: Shading, sampler: Sampler, bounce: int
 ) -> Paths:
-    """Return the paths in new directions; at casters, where they begin, by delta lobes."""
+    """Return the paths in new directions; at specular surfaces, where they begin, by delta lobes."""
     left, surface = bounce_sample(paths, shade, sampler, bounce), shade.surface
     # Radiance is divided by η² where it is refracted; flux is not.
     throughput = left.throughput * left.roulette_scale

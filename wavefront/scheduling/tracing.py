@@ -136,7 +136,7 @@ def _trace_wave(tracer: Tracer, monitor: WaveMonitor, job: Job) -> WaveResult:
     if recorder is not None:
         finite &= recorder.finish(integrator, radiance)
     splats = None
-    if scene.casters is not None:
+    if scene.specular_surfaces is not None:
         splats = trace_light(
             scene, camera, sampler, np.tile(job.pixels, n), _samples(job), tracer.max_bounces
         )

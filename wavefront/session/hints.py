@@ -20,9 +20,10 @@ from ..shapes import Instance
 from .prepared_scene import PreparedScene
 
 LONG = 10.0  # seconds of a render, from which on hints are shown
-SMALL = 0.01  # solid angle of a lamp at a caster, sr; from about 0.015 on light paths save a third at most
-MUCH = 0.1  # part of the light at a caster
-MOST_PAIRS = 1 << 17  # of casters and lights that are looked at
+# Solid angle of a lamp at a specular surface, sr; from about 0.015 on, light tracing saves a third at most
+SMALL = 0.01
+MUCH = 0.1  # part of the light at a specular surface
+MOST_PAIRS = 1 << 17  # of specular surfaces and lights that are looked at
 MANY_TRIANGLES = 1000  # from which on Embree saves time that matters
 
 LOST_CAUSTICS = (
@@ -54,17 +55,17 @@ def caustics_hint(settings: Settings, prepared: PreparedScene) -> str | None:
         return None
     if (lights.delta_of & lights.chosen_from).any():
         return LOST_CAUSTICS
-    casters = caster_boxes(prepared.lighted) * compiled.scale
-    casters[:, :2] -= compiled.center
+    specular = specular_boxes(prepared.lighted) * compiled.scale
+    specular[:, :2] -= compiled.center
     kinds = [kind for kind in lights.kinds if not isinstance(kind, InfiniteLight)]
     records = (light.record(compiled.center) for light in prepared.lighted.lights)
     kinds += [
         record for record in records if isinstance(record, InfiniteLight)
     ]  # all their light, not a part
-    return RARE_CAUSTICS if lit_by_small_lamps(casters, IrradianceOf(kinds, 1.0)) else None
+    return RARE_CAUSTICS if lit_by_small_lamps(specular, IrradianceOf(kinds, 1.0)) else None
 
 
-def caster_boxes(scene: Scene) -> NDArray[np.float64]:
+def specular_boxes(scene: Scene) -> NDArray[np.float64]:
     """Return the lower and upper corner (n, 2, 3) of each shape of smooth glass or mirror, scene units."""
     boxes = [
         shape.bounds

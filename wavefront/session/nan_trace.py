@@ -53,7 +53,7 @@ def first_fault(user_scene: Scene, tracer: Tracer, view: View, pixels: Words, sa
 
 def _fault_of_light(tracer: Tracer, camera: Camera, pixels: Words, samples: Words) -> str:
     """Return where a path from a light brings a value that is not finite; "" where none does."""
-    if tracer.scene.casters is None:
+    if tracer.scene.specular_surfaces is None:
         return ""
     sampler = tracer.sampler(camera.film[0])
     for scatterings in range(2, tracer.max_bounces + 1):

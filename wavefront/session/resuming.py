@@ -34,7 +34,7 @@ def scene_fingerprint(compiled: CompiledScene, geometries: Sequence[Geometry]) -
     """
     parts = {each.name: getattr(compiled, each.name) for each in fields(compiled)}
     accelerator = parts.pop("accelerator")
-    del parts["casters"]  # they follow from the rest, and the setting is compared by itself
+    del parts["specular_surfaces"]  # they follow from the rest, and the setting is compared by itself
     del parts["roulette_after"]  # a setting, which is compared by itself
     placements = accelerator.placements if isinstance(accelerator, InstanceAccelerator) else None
     return fingerprint("the scene", {**parts, "geometries": list(geometries), "placements": placements})

@@ -44,7 +44,7 @@ def generate(
         pdf=broadcast(f4(1), n),
         specular=broadcast(np.True_, n),
         roulette_scale=broadcast(f4(1), n),
-        left_rough=None if scene.casters is None else broadcast(np.False_, n),
+        left_rough=None if scene.specular_surfaces is None else broadcast(np.False_, n),
     )
 
 

@@ -1,4 +1,4 @@
-"""Casters: surfaces that light leaves by delta lobes alone, such as smooth glass and mirrors.
+"""Specular surfaces: those that light leaves by delta lobes alone, such as smooth glass and mirrors.
 
 Light paths (integrators/light_tracing.py) begin at points on them, which are drawn evenly by area.
 """
@@ -18,8 +18,8 @@ from .materials import MaterialTable
 
 
 @record
-class CasterPoints(SoA):
-    """Points on casters."""
+class SpecularPoints(SoA):
+    """Points on specular surfaces."""
 
     point: Floats  # (3, n) scene units
     prim: Ints  # (n,) primitive id
@@ -28,8 +28,8 @@ class CasterPoints(SoA):
 
 
 @record
-class Casters:
-    """The casters of a scene: its triangles and spheres whose materials have only delta lobes."""
+class SpecularSurfaces:
+    """The specular surfaces of a scene: its triangles and spheres whose materials have only delta lobes."""
 
     of_prim: Bools  # (m + k + 1,) whether each primitive id is one; False at the end, for others and a miss
     # (m + k,) the lowest primitive id that a ray may find where it hits each primitive: that of the first
@@ -42,7 +42,7 @@ class Casters:
     cumulative: Doubles  # (c,) sums of areas, scene units²
 
     def includes(self, prim: Ints) -> Bools:
-        """Return whether primitives are casters, (n,), given their ids (n,); -1 is no primitive."""
+        """Return whether primitives are specular surfaces, (n,), given their ids (n,); -1 is no primitive."""
         return self.of_prim.take(np.minimum(prim, self.of_prim.size - 1))
 
     @property
@@ -50,7 +50,7 @@ class Casters:
         """Their area, scene units²."""
         return float(self.cumulative[-1])
 
-    def sample(self, u_choice: Floats, u: Floats) -> CasterPoints:
+    def sample(self, u_choice: Floats, u: Floats) -> SpecularPoints:
         """Draw points evenly by area, with u_choice (n,) and u (2, n) in [0, 1)."""
         which = self.cumulative.searchsorted(u_choice * self.cumulative[-1], side="right")
         which = np.minimum(which, self.prim.size - 1)
@@ -63,15 +63,15 @@ class Casters:
         ball = which.take(round_) - len(self.corners)
         directions = uniform_sphere(u[:, round_])
         point[:, round_] = self.centers.take(ball, 1) + directions * self.radii.take(ball)
-        return CasterPoints(point, self.prim.take(which), *weights)
+        return SpecularPoints(point, self.prim.take(which), *weights)
 
 
-def find_casters(
+def find_specular_surfaces(
     triangles: Floats, curved: CurvedTable, material_of: Ints, light_of: Ints, materials: MaterialTable
-) -> Casters | None:
-    """Return the casters of a scene; None if it has none.
+) -> SpecularSurfaces | None:
+    """Return the specular surfaces of a scene; None if it has none.
 
-    Cylinders, capsules and instances that share their arrays are no casters, nor are spheres that shine: no
+    Cylinders, capsules and instances that share their arrays do not count, nor do spheres that shine: no
     light sample tells whether a point on such a sphere is lit from the other side of the same sphere.
 
     Parameters
@@ -101,7 +101,7 @@ def find_casters(
     found_as = np.arange(of_prim.size - 1)
     found_as[find_quads(triangles) + 1] -= 1
     prim = np.append(flat, ball + len(triangles))
-    return Casters(of_prim, found_as, prim, corners, centers, radii, cumulative)
+    return SpecularSurfaces(of_prim, found_as, prim, corners, centers, radii, cumulative)
 
 
 def _spheres_among(curved: CurvedTable) -> Bools:
