@@ -15,7 +15,7 @@ from wavefront.integrators import shared_paths
 from wavefront.integrators import training as pilot
 from wavefront.sampling.sampler import SobolSampler
 from wavefront.sampling.tiles import WaveTiles, others_in_tile, place_in_tiles, whole_tiles
-from wavefront.scheduling.jobs import View, split_jobs
+from wavefront.scheduling.jobs import CameraJob, split_jobs
 from wavefront.stages.generate import generate
 from wavefront.stages.shade import evaluate
 
@@ -101,7 +101,7 @@ def test_jobs_have_whole_tiles(wave: int, window: tuple[int, int, int, int] | No
     pixels = np.random.default_rng(0).permutation(camera.size[0] * camera.size[1])[:700]
     pixels = np.sort(pixels).astype(np.uint32)
     tile, _ = place_in_tiles(camera.address(pixels), 47)
-    jobs = list(split_jobs(View(camera, reuse=True), pixels, 2, 7, lambda left: wave))
+    jobs = list(split_jobs(CameraJob(camera, reuse=True), pixels, 2, 7, lambda left: wave))
     seen = np.zeros(700, int)
     for job in jobs:
         at = np.searchsorted(pixels, job.pixels)

@@ -14,7 +14,7 @@ from wavefront.film.film import Film
 from wavefront.scheduling import adaptive, scheduler, tracing
 from wavefront.scheduling import jobs as jobs_module
 from wavefront.scheduling.adaptive import MIN_SPP, next_stop, passes
-from wavefront.scheduling.jobs import Job, JobResult, View, split_jobs
+from wavefront.scheduling.jobs import CameraJob, Job, JobResult, split_jobs
 from wavefront.scheduling.scheduler import Scheduler
 from wavefront.session import final_checks as outcome
 from wavefront.session import session
@@ -38,7 +38,7 @@ def shiny(size: tuple[int, int] = (16, 12)) -> wf.Scene:
     return wf.Scene([scenes.floor(), *balls], [wf.Environment((0.3, 0.4, 0.5))], camera)
 
 
-VIEW = View(lit().camera)
+VIEW = CameraJob(lit().camera)
 SCENES = {"lit": lit, "shiny": shiny}
 
 # --- Noise ----------------------------------------------------------------------------------------
@@ -274,7 +274,7 @@ def test_jobs_of_a_cluster_have_several_waves() -> None:
 def test_waves_of_a_job_are_its_samples_in_order(wave_size: int, whole_tiles: bool) -> None:
     """Each pixel's samples come one after the other, and every one of them once."""
     camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), size=(20, 5))
-    job = Job(View(camera, reuse=whole_tiles), np.arange(100, dtype=np.uint32), 7, 3, wave_size)
+    job = Job(CameraJob(camera, reuse=whole_tiles), np.arange(100, dtype=np.uint32), 7, 3, wave_size)
     samples = np.full(100, 7)
     for wave in job.waves():
         assert wave.lanes <= wave_size or whole_tiles

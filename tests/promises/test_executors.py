@@ -235,7 +235,7 @@ def test_a_stop_stays_for_work_that_begins_late(tmp_path: Path) -> None:
 
 def test_the_deadline_is_that_of_the_clock_of_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two machines count from different moments."""
-    view = jobs.View(None, time.perf_counter() + 100)  # type: ignore[arg-type]
+    view = jobs.CameraJob(None, time.perf_counter() + 100)  # type: ignore[arg-type]
     pickled = pickle.dumps(view)
     assert pickle.loads(pickled).deadline == view.deadline
     monkeypatch.setattr(platform, "node", lambda: "another")

@@ -26,7 +26,7 @@ DEPTH_SHARE = 1 / 2  # of the samples so far, so that the pixels of a render tha
 
 
 @record
-class View:
+class CameraJob:
     """What all jobs of one picture have in common.
 
     It travels with each job, so that workers that have been started can trace another view.
@@ -61,11 +61,11 @@ class View:
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the time that is left as well: the clocks of two machines differ."""
         values = [getattr(self, each.name) for each in fields(self)]
-        return _received_view, (values, self.deadline - time.perf_counter(), platform.node())
+        return _received, (values, self.deadline - time.perf_counter(), platform.node())
 
 
-def _received_view(values: list[Any], left: float, machine: str) -> View:
-    view = View(*values)
+def _received(values: list[Any], left: float, machine: str) -> CameraJob:
+    view = CameraJob(*values)
     if machine != platform.node():
         view.deadline = time.perf_counter() + left
     return view
@@ -75,7 +75,7 @@ def _received_view(values: list[Any], left: float, machine: str) -> View:
 class Job:
     """A block of samples: some pixels × consecutive samples."""
 
-    view: View
+    view: CameraJob
     pixels: Words  # (k,) row-major indices, rising
     first_sample: int  # counted from that of the view
     samples: int
@@ -135,7 +135,7 @@ JobResult: TypeAlias = list[WaveResult]  # of each wave
 
 
 def split_jobs(
-    view: View,
+    view: CameraJob,
     pixels: Words,
     first: int,
     last: int,

@@ -11,7 +11,7 @@ from ..core.errors import RenderError
 from ..core.progress import Bar, Progress
 from .accumulator import Accumulator
 from .adaptive import Pass, passes, unfinished
-from .jobs import Job, JobResult, View, split_jobs
+from .jobs import CameraJob, Job, JobResult, split_jobs
 from .pool import WorkerPool
 from .scheduler import Scheduler
 from .shared import SharedInt, Stopped
@@ -49,7 +49,7 @@ class RenderLoop:
 
     def __init__(
         self,
-        view: View,
+        view: CameraJob,
         accumulator: Accumulator,
         scheduler: Scheduler,
         *,

@@ -15,14 +15,14 @@ from ..compile.scene import CompiledScene
 from ..integrators.light_tracing import trace_light
 from ..integrators.registry import integrator_for
 from ..scene import Scene
-from ..scheduling.jobs import View
+from ..scheduling.jobs import CameraJob
 from ..scheduling.tracing import Tracer
 from ..stages.generate import generate
 from ..stages.shade import Shading
 from .diagnosis import shape_name
 
 
-def first_fault(user_scene: Scene, tracer: Tracer, view: View, pixels: Words, sample: int) -> str:
+def first_fault(user_scene: Scene, tracer: Tracer, view: CameraJob, pixels: Words, sample: int) -> str:
     """Return the bounce and the material where a path first gets a value that is not finite.
 
     Bounce 0 is at the first surface that the camera sees. The text is empty if no step of the integrators of

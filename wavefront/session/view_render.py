@@ -21,7 +21,7 @@ from ..image import Image
 from ..scheduling.accumulator import Accumulator
 from ..scheduling.adaptive import Pass
 from ..scheduling.executors import EXECUTORS, waves_per_job
-from ..scheduling.jobs import Job, JobResult, View
+from ..scheduling.jobs import CameraJob, Job, JobResult
 from ..scheduling.loop import PassSplitter, RenderLoop
 from ..scheduling.pool import WorkerPool
 from ..scheduling.scheduler import Scheduler
@@ -82,7 +82,7 @@ class ViewRender:
             waves_per_job(plan.executor),
         )
         self.loop = RenderLoop(
-            View(
+            CameraJob(
                 view, scheduler.deadline, settings.first_sample, choice.branches, choice.reuse, choice.guided
             ),
             accumulator,
