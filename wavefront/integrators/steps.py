@@ -11,13 +11,13 @@ from ..compile.scene import CompiledScene
 from ..sampling.sampler import Sampler
 from ..stages.alpha import alpha_pass_through
 from ..stages.background import show_background
-from ..stages.caught_shadow import off_catchers
 from ..stages.compact import compact, scattering_lanes
 from ..stages.interaction import interaction
 from ..stages.intersect import intersect
 from ..stages.medium import absorb
 from ..stages.normal_mapping import perturb_normals
 from ..stages.shade import Shading, emitted, mis_weighted, shading, without_caustics
+from ..stages.shadow_catcher import off_catchers
 
 
 def intersect_and_compact(

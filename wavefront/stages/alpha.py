@@ -17,10 +17,10 @@ from ..arrays.vec import Floats, Ints, f4
 from ..compile.scene import CompiledScene
 from ..core.errors import RenderError
 from ..sampling.sampler import Dimension, Sampler, numbers_of
-from .caught_shadow import catcher_lanes, shadow_opacity
 from .interaction import interaction
 from .intersect import intersect
 from .medium import absorb
+from .shadow_catcher import catcher_lanes, shadow_opacity
 from .transmittance import continue_behind
 
 COVERING = f4(0.5)  # opacity from which on a surface hides what is behind it, where nothing is random
