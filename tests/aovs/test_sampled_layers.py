@@ -351,7 +351,7 @@ def test_sums_merge_and_restore() -> None:
     films[0].sums.merge(films[1].sums)
     assert set(one.arrays()) == {
         "alpha.counts", "albedo.sums", "albedo.squares",
-        "direct.high", "direct.low", "direct.squares", "indirect.squares",
+        "direct.sums.high", "direct.sums.low", "direct.squares", "indirect.squares",
     }  # fmt: skip
     for name in names:
         a = one.estimate(name, whole.sums, whole.count)

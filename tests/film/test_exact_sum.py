@@ -28,7 +28,7 @@ def column(values: list[float]) -> np.ndarray:
 
 
 def bits(sums: ExactSums) -> tuple[bytes, ...]:
-    return sums._high.tobytes(), sums._low.tobytes()
+    return sums.high.tobytes(), sums.low.tobytes()
 
 
 @given(lists, st.randoms(use_true_random=False))

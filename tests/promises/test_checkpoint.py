@@ -485,11 +485,9 @@ def test_wrong_contents_with_a_right_checksum_are_refused(header: bytes, tmp_pat
 @pytest.mark.parametrize(
     ("key", "value"),
     [
-        *((key, 5) for key in ("size", "layers", "identity", "metadata", "state", "command", "wavefront")),
-        ("size", [24.5, 18]),
-        ("size", [24]),
-        ("size", [10**9, 10**9]),
-        ("layers", ["no such layer"]),
+        *((key, 5) for key in ("identity", "metadata", "state", "command", "wavefront")),
+        *(("identity", {"size": size, "aovs": []}) for size in (5, [24.5, 18], [24], [10**9, 10**9])),
+        *(("identity", {"size": [24, 18], "aovs": aovs}) for aovs in (5, ["no such layer"], [[]])),
         ("metadata", {}),
         ("metadata", {"sample_ranges": 5}),
         ("metadata", {"sample_ranges": []}),
@@ -513,6 +511,9 @@ def test_each_wrong_part_of_a_header_is_refused(tmp_path: Path, key: str, value:
             continue
         with pytest.raises(wf.SceneError, match=r"a\.wfck: "):
             wf.render(scene(), 2, checkpoint=path, progress=False)
+        if key == "identity":
+            with pytest.raises(wf.SceneError, match=r"a\.wfck: "):
+                wf.Image.load(path)
 
 
 def test_nothing_of_a_file_is_unpickled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

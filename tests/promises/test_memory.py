@@ -5,7 +5,6 @@ from __future__ import annotations
 import subprocess
 import sys
 
-import numpy as np
 import pytest
 import scenes
 
@@ -13,8 +12,9 @@ import wavefront as wf
 from wavefront.core.memory import available_memory, check_memory
 from wavefront.film.film import Film
 from wavefront.film.picture_sums import PictureSums
+from wavefront.film.sums import bytes_per_pixel
 from wavefront.image.image import film_image
-from wavefront.scheduling.accumulator import FILM_BYTES, PICTURE_BYTES, Accumulator
+from wavefront.scheduling.accumulator import PICTURE_BYTES, Accumulator
 from wavefront.session import prepared_scene
 
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of Linux")
@@ -80,9 +80,9 @@ def test_memory_that_is_there_is_not_refused() -> None:
 def test_the_film_is_as_large_as_is_checked() -> None:
     """A pixel of it, and of the picture."""
     film = Film(100, 100)
-    arrays = [film.count, film.squares, film.batches, *vars(film.sums).values()]
-    size = sum(each.nbytes for each in arrays if isinstance(each, np.ndarray))
-    assert size == pytest.approx(FILM_BYTES * 10_000, rel=0.01)
+    size = sum(each.nbytes for each in film.arrays().values())
+    assert size == pytest.approx(176 * 10_000, rel=0.01)
+    assert bytes_per_pixel(lambda pixels: Film(pixels, 1)) == 176
     image = film_image(PictureSums(film, None, {}), {}, keep_sums=False)
     assert image.rgb.nbytes + image.variance.nbytes + image.standard_error.nbytes < PICTURE_BYTES * 10_000
 

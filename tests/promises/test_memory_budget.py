@@ -69,7 +69,7 @@ def test_memory_sizes_waves_first_and_then_workers(monkeypatch: pytest.MonkeyPat
     for megabytes in range(2000, 300, -20):
         found = make_budget(megabytes * MEGABYTE, (640, 480), 4, None, processes=True)
         used = found.workers * (PROCESS_BYTES + found.wave_size * LANE_BYTES)
-        assert 100 * MEGABYTE + picture_memory(640, 480) + used <= megabytes * MEGABYTE
+        assert 100 * MEGABYTE + picture_memory((640, 480)) + used <= megabytes * MEGABYTE
         assert found.workers <= before.workers
         assert found.workers < before.workers or found.wave_size <= before.wave_size
         before = found
@@ -94,7 +94,7 @@ def test_what_cannot_fit_is_refused_with_the_figures() -> None:
 def test_layers_count(monkeypatch: pytest.MonkeyPatch) -> None:
     """They leave less memory for waves."""
     monkeypatch.setattr(budget, "resident_memory", lambda: 100 * MEGABYTE)
-    limit = 100 * MEGABYTE + picture_memory(640, 480) + PROCESS_BYTES + 40 * MEGABYTE
+    limit = 100 * MEGABYTE + picture_memory((640, 480)) + PROCESS_BYTES + 40 * MEGABYTE
     plain, layered = (
         make_budget(limit, (640, 480), 1, None, True, layers) for layers in ((), ("direct", "indirect"))
     )
@@ -106,7 +106,7 @@ def test_layers_count(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_least_memory_that_is_named_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     """And one byte less is not."""
     monkeypatch.setattr(budget, "resident_memory", lambda: 0)
-    least = picture_memory(64, 64) + THREAD_BYTES + LEAST_WAVE * LANE_BYTES
+    least = picture_memory((64, 64)) + THREAD_BYTES + LEAST_WAVE * LANE_BYTES
     found = make_budget(least, (64, 64), 8, None, processes=False)
     assert (found.workers, found.wave_size) == (1, LEAST_WAVE)
     with pytest.raises(wf.SceneError, match="are needed"):
@@ -121,7 +121,7 @@ def test_no_bit_depends_on_the_budget(executor: str) -> None:
     free = wf.render(scene, workers=1, **options)
     fixed = PROCESS_BYTES if executor == "processes" else THREAD_BYTES
     for room in (1, 2, 3.5, 6):
-        spare = resident_memory() + picture_memory(64, 48) + 5 * MEGABYTE
+        spare = resident_memory() + picture_memory((64, 48)) + 5 * MEGABYTE
         image = wf.render(scene, workers=3, max_memory=int(spare + room * fixed + 30 * MEGABYTE), **options)
         found.add(image.metadata["workers"])
         assert image.rgb.tobytes() == free.rgb.tobytes()
@@ -188,7 +188,7 @@ def test_without_memory_for_a_few_paths_there_is_an_error() -> None:
 
 def test_a_session_sizes_each_picture() -> None:
     """A larger picture leaves less memory for waves; what cannot fit is refused, and the other goes on."""
-    limit = resident_memory() + picture_memory(64, 64) + 2 * PROCESS_BYTES + 60 * MEGABYTE
+    limit = resident_memory() + picture_memory((64, 64)) + 2 * PROCESS_BYTES + 60 * MEGABYTE
     with wf.Session(
         scenes.everything(), 2, size=(64, 64), workers=2, max_memory=limit, progress=False
     ) as session:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +22,7 @@ from .aov_samples import (
 )
 from .exact_sum import ExactSums
 from .film import CHUNK, add_in_order, chunks, pixel_span
+from .sums import Sums
 
 UNIT = 2.0**-FRACTION_BITS
 LARGEST_NARROW = NARROW_TERMS << FRACTION_BITS
@@ -36,144 +36,101 @@ class LayerEstimate:
     standard_error: Floats  # (pixels, c) of `mean`; NaN for fewer than two samples
 
 
-def layer_bytes(name: str) -> int:
-    """Return the bytes that a sampled layer takes for each pixel, its mean and error included.
-
-    They are those of up to 127 samples.
-    """
-    kind, channels = name.partition(".")[0], layer_of(name).channels
-    sums = 4 if kind in COUNTED else 8 if kind in BOUNDED else 4 if kind == "indirect" else 20
-    return channels * (sums + 8)
-
-
-class CountSums:
+class CountSums(Sums):
     """Numbers of samples of n pixels that have a property. Memory is 4 bytes for each pixel."""
 
+    counts: NDArray[np.int32]  # (1, n)
+
     def __init__(self, pixels: int) -> None:
-        self._counts = np.zeros((1, pixels), np.int32)
+        self.counts = np.zeros((1, pixels), np.int32)
 
     def add(self, lanes: Lanes, counts: Ints) -> None:
         """Add numbers (k,) of other samples."""
-        self._counts[0, lanes] += counts
-
-    def merge(self, other: CountSums) -> None:
-        """Add the numbers of other samples."""
-        self._counts += other._counts
+        self.counts[0, lanes] += counts
 
     def totals(self, part: slice) -> tuple[Doubles, Doubles]:
         """Return the sums of the samples and of their squares, each (1, k): a sample is 0 or 1."""
-        counts = self._counts[:, part].astype(np.float64)
+        counts = self.counts[:, part].astype(np.float64)
         return counts, counts
 
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return the arrays by name."""
-        return {"counts": self._counts}
 
-    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Take over arrays that `arrays` returned."""
-        self._counts = arrays["counts"]
-
-
-class FixedPointSums:
+class FixedPointSums(Sums):
     """Sums, and sums of squares, of values in [-1, 1], in units of 2^-24, for c channels of n pixels.
 
     They are exact, so their bits depend neither on the order of the samples nor on partial sums. Memory is
     8 bytes for each channel and pixel up to 127 samples, and 16 after that.
     """
 
+    sums: FixedPoint  # (c, n)
+    squares: FixedPoint  # (c, n)
+
     def __init__(self, shape: tuple[int, int]) -> None:
-        self._sums: FixedPoint = np.zeros(shape, np.int32)
-        self._squares: FixedPoint = np.zeros(shape, np.int32)
+        self.sums = np.zeros(shape, np.int32)
+        self.squares = np.zeros(shape, np.int32)
+
+    def _widen(self) -> None:
+        self.sums, self.squares = self.sums.astype(np.int64), self.squares.astype(np.int64)
 
     def add(self, lanes: Lanes, samples: FixedPointSamples, most: int) -> None:
         """Add sums over samples of some pixels, of which none then has more than `most` samples."""
-        if most > NARROW_TERMS and self._sums.dtype == np.int32:
-            self._sums, self._squares = self._sums.astype(np.int64), self._squares.astype(np.int64)
-        self._sums[:, lanes] += samples.sums
-        self._squares[:, lanes] += samples.squares
+        if most > NARROW_TERMS and self.sums.dtype == np.int32:
+            self._widen()
+        self.sums[:, lanes] += samples.sums
+        self.squares[:, lanes] += samples.squares
 
     def merge(self, other: FixedPointSums) -> None:
         """Add the sums of other samples."""
-        both = self._sums.astype(np.int64) + other._sums, self._squares.astype(np.int64) + other._squares
-        wide = any(np.abs(sums).max(initial=0) > LARGEST_NARROW for sums in both)
-        self._sums, self._squares = both if wide else (sums.astype(np.int32) for sums in both)
+        self._widen()
+        super().merge(other)
+        if max(np.abs(sums).max(initial=0) for sums in (self.sums, self.squares)) <= LARGEST_NARROW:
+            self.sums, self.squares = self.sums.astype(np.int32), self.squares.astype(np.int32)
 
     def totals(self, part: slice) -> tuple[Doubles, Doubles]:
         """Return the sums of the samples and of their squares, each (c, k)."""
-        sums, squares = self._sums[:, part].astype(np.float64), self._squares[:, part].astype(np.float64)
+        sums, squares = self.sums[:, part].astype(np.float64), self.squares[:, part].astype(np.float64)
         return sums * UNIT, squares * UNIT
 
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return the arrays by name."""
-        return {"sums": self._sums, "squares": self._squares}
 
-    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Take over arrays that `arrays` returned."""
-        self._sums, self._squares = arrays["sums"], arrays["squares"]
+class SquareSums(Sums):
+    """Sums of squares of radiance, (3, n), added in the order of the samples; 12 bytes for each pixel.
 
+    The last bits of merged ones depend on which samples are in which part.
+    """
 
-class SquareSums:
-    """Sums of squares of radiance, (3, n), added in the order of the samples; 12 bytes for each pixel."""
+    squares: Floats  # (3, n)
 
     def __init__(self, pixels: int) -> None:
-        self._squares = np.zeros((3, pixels), f4)
+        self.squares = np.zeros((3, pixels), f4)
 
     def add(self, lanes: Lanes, radiance: Floats) -> None:
         """Add samples (3, samples, k)."""
-        squares = self._squares[:, lanes]  # a view of a slice, else a copy
+        squares = self.squares[:, lanes]  # a view of a slice, else a copy
         with np.errstate(over="ignore"):
             add_in_order(squares, np.square(radiance))
         if not isinstance(lanes, slice):
-            self._squares[:, lanes] = squares
-
-    def merge(self, other: SquareSums) -> None:
-        """Add the sums of other samples; the last bits depend on which samples are in which part."""
-        self._squares += other._squares
-
-    def total(self, part: slice) -> Doubles:
-        """Return the sums, (3, k)."""
-        return self._squares[:, part].astype(np.float64)
-
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return the array by name."""
-        return {"squares": self._squares}
-
-    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Take over the array that `arrays` returned."""
-        self._squares = arrays["squares"]
+            self.squares[:, lanes] = squares
 
 
-class RadianceSums:
+class RadianceSums(SquareSums):
     """Exact sums of radiance, and sums of squares; 60 bytes for each pixel."""
 
+    sums: ExactSums
+
     def __init__(self, pixels: int) -> None:
-        self._sums, self._squares = ExactSums((3, pixels)), SquareSums(pixels)
+        super().__init__(pixels)
+        self.sums = ExactSums((3, pixels))
 
     def add(self, lanes: Lanes, radiance: Floats) -> None:
         """Add samples (3, samples, k)."""
-        self._sums.add(lanes, radiance.astype(np.float64))
-        self._squares.add(lanes, radiance)
-
-    def merge(self, other: RadianceSums) -> None:
-        """Add the sums of other samples."""
-        self._sums.merge(other._sums)
-        self._squares.merge(other._squares)
+        self.sums.add(lanes, radiance.astype(np.float64))
+        super().add(lanes, radiance)
 
     def totals(self, part: slice) -> tuple[Doubles, Doubles]:
         """Return the sums of the samples and of their squares, each (3, k)."""
-        return self._sums.value(part), self._squares.total(part)
-
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return the arrays by name."""
-        return {**self._sums.arrays(), **self._squares.arrays()}
-
-    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Take over arrays that `arrays` returned."""
-        self._sums.restore(arrays)
-        self._squares.restore(arrays)
+        return self.sums.value(part), self.squares[:, part].astype(np.float64)
 
 
-class LayerSums:
+class LayerSums(Sums):
     """Sums of the samples of some layers.
 
     Like those of the `Film` they do not depend on the division of a render into jobs. The means do not
@@ -188,23 +145,26 @@ class LayerSums:
         Their number.
     """
 
+    counts: dict[str, CountSums]
+    bounded: dict[str, FixedPointSums]
+    radiance: dict[str, RadianceSums]
+    indirect: SquareSums | None  # its sums are those of the picture less those of "direct"
+
     def __init__(self, names: Iterable[str], pixels: int) -> None:
-        self._names = tuple(names)
+        self.names = tuple(names)
         self._pixels = pixels
-        self._counts: dict[str, CountSums] = {}
-        self._bounded: dict[str, FixedPointSums] = {}
-        self._radiance: dict[str, RadianceSums] = {}
-        self._indirect = SquareSums(pixels) if "indirect" in self._names else None
-        for name in self._names:
+        self.counts, self.bounded, self.radiance = {}, {}, {}
+        self.indirect = SquareSums(pixels) if "indirect" in self.names else None
+        for name in self.names:
             kind = name.partition(".")[0]
             if kind in COUNTED:
-                self._counts[name] = CountSums(pixels)
+                self.counts[name] = CountSums(pixels)
             elif kind in BOUNDED:
-                self._bounded[name] = FixedPointSums((layer_of(name).channels, pixels))
+                self.bounded[name] = FixedPointSums((layer_of(name).channels, pixels))
             elif kind != "indirect":
-                self._radiance[name] = RadianceSums(pixels)
-        if self._indirect is not None and "direct" not in self._radiance:
-            self._radiance["direct"] = RadianceSums(pixels)
+                self.radiance[name] = RadianceSums(pixels)
+        if self.indirect is not None and "direct" not in self.radiance:
+            self.radiance["direct"] = RadianceSums(pixels)
 
     def add(self, pixels: Words, samples: LayerSamples, radiance: Floats, most: int) -> None:
         """Add samples.
@@ -219,22 +179,17 @@ class LayerSums:
             No pixel has more samples than this afterwards.
         """
         lanes = pixel_span(pixels)
-        for name, counts in self._counts.items():
+        for name, counts in self.counts.items():
             counts.add(lanes, samples.counts[name])
-        for name, bounded in self._bounded.items():
+        for name, bounded in self.bounded.items():
             bounded.add(lanes, samples.bounded[name], most)
         for start in range(0, pixels.size, CHUNK):
             part = slice(start, start + CHUNK)
             lanes = pixel_span(pixels[part])
-            for name, sums in self._radiance.items():
+            for name, sums in self.radiance.items():
                 sums.add(lanes, samples.radiance[name][:, :, part])
-            if self._indirect is not None:
-                self._indirect.add(lanes, radiance[:, :, part] - samples.radiance["direct"][:, :, part])
-
-    def merge(self, other: LayerSums) -> None:
-        """Add the sums of other samples of the same layers."""
-        for name, part in self._parts().items():
-            part.merge(other._parts()[name])
+            if self.indirect is not None:
+                self.indirect.add(lanes, radiance[:, :, part] - samples.radiance["direct"][:, :, part])
 
     def estimate(self, name: str, picture: ExactSums, count: Ints) -> LayerEstimate:
         """Return a layer from its sums, those of the picture, and the samples of each pixel (pixels,)."""
@@ -254,33 +209,9 @@ class LayerSums:
     def _totals(self, name: str, picture: ExactSums, part: slice) -> tuple[Doubles, Doubles]:
         """Return the sums of the samples of a layer and of their squares, each (c, k)."""
         if name == "indirect":
-            assert self._indirect is not None
-            return picture.value(part) - self._radiance["direct"].totals(part)[0], self._indirect.total(part)
-        if name in self._counts:
-            return self._counts[name].totals(part)
-        return (
-            self._bounded[name].totals(part) if name in self._bounded else self._radiance[name].totals(part)
-        )
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The layers."""
-        return self._names
-
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return all sums as arrays by name, such as "albedo.squares"."""
-        return {
-            f"{name}.{kind}": array
-            for name, part in self._parts().items()
-            for kind, array in part.arrays().items()
-        }
-
-    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Take over arrays that `arrays` of sums of the same layers and pixels returned."""
-        for name, part in self._parts().items():
-            part.restore({kind: arrays[f"{name}.{kind}"] for kind in part.arrays()})
-
-    def _parts(self) -> dict[str, Any]:
-        """Return all sums by the name of their layer."""
-        indirect = {} if self._indirect is None else {"indirect": self._indirect}
-        return {**self._counts, **self._bounded, **self._radiance, **indirect}
+            assert self.indirect is not None
+            direct, _ = self.radiance["direct"].totals(part)
+            return picture.value(part) - direct, self.indirect.squares[:, part].astype(np.float64)
+        if name in self.counts:
+            return self.counts[name].totals(part)
+        return self.bounded[name].totals(part) if name in self.bounded else self.radiance[name].totals(part)

@@ -17,14 +17,13 @@ from ..core.files import check_size
 from ..version import VERSION
 from . import checkpoint_file
 from .identity import differences
-from .picture_sums import PictureSums, empty_sums
+from .picture_sums import PictureSums, identified_sums
 
 PIXELS = "pixels"  # the array of those of the pass
 VERSIONS = {"wavefront": VERSION, "numpy": np.__version__}
 
 FORM: dict[str, type | tuple[type, ...]] = {  # of a header
     **dict.fromkeys((*VERSIONS, "python"), str),
-    **dict.fromkeys(("size", "layers"), list),
     **dict.fromkeys(("identity", "metadata", "state"), dict),
     "command": (dict, type(None)),
 }
@@ -53,8 +52,6 @@ class Checkpoint:
         header = {
             **VERSIONS,
             "python": platform.python_version(),
-            "size": list(self.sums.film.size),
-            "layers": self.sums.layer_names,
             "identity": self.sums.identity,
             "metadata": self.metadata,
             "state": self.state,
@@ -68,9 +65,9 @@ class Checkpoint:
 
 def sums_of(header: Mapping[str, Any]) -> PictureSums:
     """Return sums for the samples of a checkpoint with a header."""
-    width, height = (index(side) for side in header["size"])
+    width, height = (index(side) for side in header["identity"]["size"])
     check_size(height, width)
-    return empty_sums((width, height), header["layers"], header["identity"])
+    return identified_sums(header["identity"])
 
 
 def read_checkpoint(path: str | os.PathLike[str], make_sums: SumsMaker = sums_of) -> Checkpoint:
@@ -95,8 +92,6 @@ def read_checkpoint(path: str | os.PathLike[str], make_sums: SumsMaker = sums_of
             if not isinstance(header[key], kind):
                 raise TypeError(f"{key} is {in_brief(header[key])}")
         made.append(make_sums(header))
-        if header["size"] != list(made[0].film.size) or header["layers"] != made[0].layer_names:
-            raise ValueError("its size or layers are not those of its identity")
         return made[0].arrays()
 
     header, arrays = checkpoint_file.read(path, places)

@@ -10,11 +10,10 @@ Source: J. Demmel and H. D. Nguyen, "Parallel Reproducible Summation", IEEE Tran
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from ..arrays.vec import Doubles, Lanes
+from .sums import Sums
 
 WIDTH = 26  # bits of a bin
 MAX_TERMS = 1 << 26  # the sum of more terms may leave the binade of its bin
@@ -27,11 +26,11 @@ _LAST_BIT = np.int64(1)
 _EXPONENT, _HALF = np.int64(0x7FF << 52), np.int64(1 << 51)  # fields of a float64
 
 
-class ExactSums:
+class ExactSums(Sums):
     """Sums (c, n), one for each channel and pixel, that start at 0.
 
     The terms of a sum are rounded to multiples of a unit of a bin, and the bin follows from the largest
-    term. `_high` sums these multiples, and `_low` the rest, rounded to multiples of the unit of the bin
+    term. `high` sums these multiples, and `low` the rest, rounded to multiples of the unit of the bin
     below: the rounding error of a term is at most 2^-26 times the largest. Both are offset by a zero of
     1.5 · 2^52 units, so that an addition rounds a term by itself. Memory is 16 bytes for each sum.
 
@@ -43,14 +42,17 @@ class ExactSums:
         A power of two: how many times `MAX_TERMS` a sum may have. Terms are rounded as many times more.
     """
 
+    high: Doubles  # (c, n)
+    low: Doubles  # (c, n)
+
     def __init__(self, shape: tuple[int, int], more_terms: int = 1) -> None:
         self._more_terms = more_terms
-        self._high = np.full(shape, _ZEROS[0])
-        self._low = self._high / _BIN
+        self.high = np.full(shape, _ZEROS[0])
+        self.low = self.high / _BIN
 
     def value(self, lanes: Lanes = slice(None)) -> Doubles:
         """Return the sums of some columns, (c, k), rounded to float64."""
-        _, high, low = _without_offset(self._high[:, lanes], self._low[:, lanes])
+        _, high, low = _without_offset(self.high[:, lanes], self.low[:, lanes])
         return np.asarray(high + low)
 
     def add(self, lanes: Lanes, terms: Doubles) -> None:
@@ -64,43 +66,35 @@ class ExactSums:
         # rounding would depend on the sum before it.
         bits = rest.view(np.int64)
         bits |= _LAST_BIT
-        for sums in (self._high, self._low):
+        for sums in (self.high, self.low):
             before = sums[:, None, lanes]
             rounded = rest + before
             rounded -= before
             rest -= rounded
             sums[:, lanes] += _total(rounded)  # exact in any order: all are multiples of one unit
 
-    def arrays(self) -> dict[str, Doubles]:
-        """Return the two levels of the sums, (c, n) each, by name."""
-        return {"high": self._high, "low": self._low}
-
-    def restore(self, arrays: Mapping[str, Doubles]) -> None:
-        """Set the sums to those of which `arrays` returned these."""
-        self._high, self._low = arrays["high"], arrays["low"]
-
     def merge(self, other: ExactSums) -> None:
         """Add the sums of other terms; the result is as if those terms had been added here."""
-        zero, *parts = _without_offset(self._high, self._low)
-        other_zero, *other_parts = _without_offset(other._high, other._low)
+        zero, *parts = _without_offset(self.high, self.low)
+        other_zero, *other_parts = _without_offset(other.high, other.low)
         common = np.maximum(zero, other_zero)
         high, low = _raised(zero, common, *parts)
         other_high, other_low = _raised(other_zero, common, *other_parts)
-        self._high, self._low = high + other_high + common, low + other_low + common / _BIN
+        self.high, self.low = high + other_high + common, low + other_low + common / _BIN
 
     def _raise_bins(self, lanes: Lanes, terms: Doubles) -> None:
         """Raise the bins of those columns where a term reaches the limit."""
         largest = np.abs(terms).max(1) if terms.shape[1] > 1 or terms.min() < 0 else terms[:, 0]
-        beyond = largest * (_TERM_TO_ZERO * self._more_terms) > self._high[:, lanes]
+        beyond = largest * (_TERM_TO_ZERO * self._more_terms) > self.high[:, lanes]
         if not beyond.any():
             return
         channel, column = np.nonzero(beyond)
         sums = channel, column + (lanes.start or 0) if isinstance(lanes, slice) else lanes[column]
-        zero, high, low = _without_offset(self._high[sums], self._low[sums])
+        zero, high, low = _without_offset(self.high[sums], self.low[sums])
         reach = largest[beyond] * self._more_terms
         new_zero = np.maximum(zero, _ZEROS.take(_LIMITS.searchsorted(reach, side="right")))
         high, low = _raised(zero, new_zero, high, low)
-        self._high[sums], self._low[sums] = high + new_zero, low + new_zero / _BIN
+        self.high[sums], self.low[sums] = high + new_zero, low + new_zero / _BIN
 
 
 def _total(terms: Doubles) -> Doubles:

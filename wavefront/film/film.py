@@ -13,6 +13,7 @@ from ..arrays.state import Words
 from ..arrays.vec import ALL, Doubles, Floats, Ints, Lanes, distinct, take
 from .exact_sum import ExactSums
 from .light_sums import LightSums
+from .sums import Sums
 
 BATCHES = 8  # at most
 WHOLE_BATCH = 4  # samples; batches are at least this long if a pixel has two of them
@@ -21,12 +22,11 @@ LEAST_FOR_RARE = 16  # samples of every pixel, so that it has four batches
 MUCH_RARE = 0.6  # part of the squared error that rests on few samples, from where on it is too small
 OUTLIERS = 1e-3  # fraction of the pixels whose error is limited to that of the worst other pixel
 NONE = np.zeros(0, np.intp)
-LIGHT = "light."  # before the names of the arrays of light paths
 TINY = 1e-180  # its power of 1.5 is above 0
 CHUNK = 8192  # pixels, or samples, that are added together: few enough for the cache
 
 
-class Film:
+class Film(Sums):
     """Sums of samples per pixel, and the sums that the error estimate needs.
 
     The sums are exact (`ExactSums`), so the picture depends neither on the division of a render
@@ -61,17 +61,25 @@ class Film:
         Sums over light paths; None where there are none.
     """
 
+    count: Ints
+    dropped: Ints
+    sums: ExactSums  # of samples
+    squares: Doubles  # (3, pixels) sum of squared samples
+    batches: Floats  # (BATCHES, 3, pixels) sums of full batches
+    lengths: Ints  # (BATCHES,) samples of each batch; all 0: they are `batch_size`, as those of one render
+    light: LightSums | None
+
     def __init__(self, width: int, height: int, light_paths: bool = False) -> None:
         pixels = width * height
         self.size = width, height
         self.count = np.zeros(pixels, np.int64)
         self.dropped = np.zeros(0, np.int32)
-        self.sums = ExactSums((3, pixels))  # of samples
-        self.squares = np.zeros((3, pixels))  # sum of squared samples
-        self.batches = np.zeros((BATCHES, 3, pixels), np.float32)  # sums of full batches
+        self.sums = ExactSums((3, pixels))
+        self.squares = np.zeros((3, pixels))
+        self.batches = np.zeros((BATCHES, 3, pixels), np.float32)
         self.batches.fill(0)  # takes the memory now, so that a render that lacks it does not fail late
         self.light = LightSums(pixels) if light_paths else None
-        self.lengths: Ints | None = None  # samples of each batch; None: `batch_size` of them in all
+        self.lengths = np.zeros(BATCHES, np.int64)
 
     def release_errors(self) -> None:
         """Free the sums of variances and errors, 120 bytes per pixel; nothing can be added after that."""
@@ -143,28 +151,11 @@ class Film:
             pair = self.batches[2 * half : 2 * half + 2, :, lanes]
             self.batches[half][:, lanes] = pair[0] + pair[1]
 
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return all that the film holds, as arrays by name."""
-        lengths = np.zeros(0, np.int64) if self.lengths is None else self.lengths
-        light = {} if self.light is None else self.light.arrays()
-        return {
-            "count": self.count,
-            "dropped": self.dropped,
-            **self.sums.arrays(),
-            "squares": self.squares,
-            "batches": self.batches,
-            "lengths": lengths,
-            **{LIGHT + name: array for name, array in light.items()},
-        }
-
-    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Become the film of which `arrays` returned these; they are not copied."""
-        self.count, self.dropped = arrays["count"], arrays["dropped"]
-        self.squares, self.batches = arrays["squares"], arrays["batches"]
-        self.sums.restore(arrays)
-        self.lengths = arrays["lengths"] if arrays["lengths"].size else None
-        if self.light is not None:
-            self.light.restore({name: arrays[LIGHT + name] for name in self.light.arrays()})
+    def restore(self, arrays: Mapping[str, NDArray[Any]], prefix: str = "") -> None:
+        """Become the film of which `arrays` returned these, each after `prefix`; they are not copied."""
+        found = arrays.get(f"{prefix}dropped", NONE)
+        self.dropped = np.zeros(self.count.size if found.size else 0, np.int32)
+        super().restore(arrays, prefix)
 
     def merge(self, other: Film) -> None:
         """Add the samples of another film.
@@ -177,26 +168,19 @@ class Film:
         count = int(self.count[0] + other.count[0])
         size = batch_size(count)
         joined = _joined([*self._all_batches(), *other._all_batches()], size)
-        self.count = self.count + other.count
-        if self.dropped.size and other.dropped.size:
-            self.dropped = self.dropped + other.dropped
-        elif other.dropped.size:
-            self.dropped = other.dropped.copy()
-        self.sums.merge(other.sums)
-        self.squares = self.squares + other.squares
-        self.batches = np.zeros_like(self.batches)
+        super().merge(other)
+        self.batches, self.lengths = np.zeros_like(self.batches), np.zeros_like(self.lengths)
         for number, (batch, _) in enumerate(joined):
             self.batches[number] = batch
         lengths = [length for _, length in joined]
-        self.lengths = None if lengths == [size] * (count // size) else np.array(lengths)
-        if self.light is not None and other.light is not None:
-            self.light.merge(other.light)
+        if lengths != [size] * (count // size):
+            self.lengths[: len(lengths)] = lengths
 
     def _all_batches(self) -> Iterator[tuple[Doubles, int]]:
         """Yield the sums (3, pixels) and lengths of consecutive batches, which hold all samples."""
         count = int(self.count[0])
         size = batch_size(count)
-        lengths = [size] * (count // size) if self.lengths is None else self.lengths.tolist()
+        lengths = self.lengths[self.lengths > 0].tolist() or [size] * (count // size)
         rest = self.sums.value()
         for batch, length in zip(self.batches, lengths, strict=False):
             rest -= batch
@@ -238,8 +222,9 @@ class Film:
 
     def _scatter_of_batches(self, span: slice) -> Doubles:
         """Estimate the variance of the mean of all samples, (3, k)."""
-        if self.lengths is not None:
-            return _unequal_error(self.batches[: self.lengths.size, :, span], self.lengths, self.count[0])
+        lengths = self.lengths[self.lengths > 0]
+        if lengths.size:
+            return _unequal_error(self.batches[: lengths.size, :, span], lengths, self.count[0])
         counts = self.count[span]
         error = np.full((3, counts.size), np.nan)
         for count in distinct(counts[counts > 1]):
@@ -257,9 +242,10 @@ class Film:
         They are scaled so that their squares add up to `_scatter_of_batches`. Batches that a pixel does not
         have, and all of a pixel of which samples were dropped, are 0.
         """
-        if self.lengths is not None:
-            samples = self.lengths.astype(np.float64)[:, None, None]
-            means = self.batches[: self.lengths.size, :, span] / samples
+        lengths = self.lengths[self.lengths > 0]
+        if lengths.size:
+            samples = lengths.astype(np.float64)[:, None, None]
+            means = self.batches[: lengths.size, :, span] / samples
             mean = (means * samples).sum(0) / samples.sum()
             found = (means - mean) * np.sqrt(samples / ((samples.size - 1) * self.count[0]))
         else:

@@ -6,22 +6,19 @@ in which paths are traced.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays.state import Words
 from ..arrays.vec import Doubles, Floats, Ints
 from .exact_sum import ExactSums
+from .sums import Sums
 
 BATCHES = 4  # sample s belongs to the batch s mod 4
 MORE_TERMS = 64  # a pixel has 2^32 splats at most: those of all pixels may fall on one
 AT_ONCE = 1 << 16  # sums of one size that are added to together, times the terms of each
 
 
-class LightSums:
+class LightSums(Sums):
     """Sums over light paths, for each pixel.
 
     The light paths of one sample of all pixels are stratified together, so their scatter does not give the
@@ -39,11 +36,16 @@ class LightSums:
     ----------
     paths
         How many light paths were traced of each batch, (BATCHES,).
+    batches
+        The sums of each batch, by its number as text.
     """
+
+    paths: Ints
+    batches: dict[str, ExactSums]
 
     def __init__(self, pixels: int) -> None:
         self.paths = np.zeros(BATCHES, np.int64)
-        self.sums = tuple(ExactSums((3, pixels), MORE_TERMS) for _ in range(BATCHES))
+        self.batches = {str(batch): ExactSums((3, pixels), MORE_TERMS) for batch in range(BATCHES)}
 
     def add(self, sample: int, paths: int, pixel: Words, radiance: Floats) -> None:
         """Add what some more light paths of a sample bring to pixels.
@@ -71,11 +73,11 @@ class LightSums:
                     number = np.arange(size)[:, None]
                     real = number < count.take(lanes)
                     at = order.take(first.take(lanes) + np.where(real, number, 0))
-                    self.sums[batch].add(found.take(lanes), terms[:, at] * real)
+                    self.batches[str(batch)].add(found.take(lanes), terms[:, at] * real)
 
     def mean(self, span: slice = slice(None)) -> Doubles:
         """Return what light paths bring to pixels, (3, k)."""
-        total = sum(sums.value(span) for sums in self.sums)
+        total = sum(sums.value(span) for sums in self.batches.values())
         return np.asarray(total / max(int(self.paths.sum()), 1))
 
     def squared_error(self, span: slice = slice(None)) -> Doubles:
@@ -87,29 +89,8 @@ class LightSums:
         scatter = np.zeros_like(mean)
         for batch in used:
             paths = float(self.paths[batch])
-            scatter += np.square(self.sums[batch].value(span) / paths - mean) * (paths / total)
+            scatter += np.square(self.batches[str(batch)].value(span) / paths - mean) * (paths / total)
         return scatter / max(used.size - 1, 1)
-
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return all sums as arrays by name."""
-        batches = {
-            f"{batch}.{name}": array
-            for batch, sums in enumerate(self.sums)
-            for name, array in sums.arrays().items()
-        }
-        return {"paths": self.paths, **batches}
-
-    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Become the sums of which `arrays` returned these; they are not copied."""
-        self.paths = arrays["paths"]
-        for batch, sums in enumerate(self.sums):
-            sums.restore({name: arrays[f"{batch}.{name}"] for name in sums.arrays()})
-
-    def merge(self, other: LightSums) -> None:
-        """Add the sums of other light paths; the result is that of all of them at once."""
-        self.paths = self.paths + other.paths
-        for mine, others in zip(self.sums, other.sums, strict=True):
-            mine.merge(others)
 
 
 def _groups(ordered: Ints) -> tuple[Ints, Ints, Ints]:

@@ -16,80 +16,38 @@ from .aov_sums import LayerSums
 from .film import Film
 from .identity import CAUSTICS, differences
 from .samples import sample_ranges
+from .sums import Sums
 
-FILM, LAYER = "film.", "layer."  # before the names of arrays
 ADDED = ("seconds", "spp", "samples", "rays", "bad_samples")  # metadata of parts that add up
 
 
 @record
-class PictureSums:
+class PictureSums(Sums):
     """Sums of the samples of a picture and its layers."""
 
     film: Film
     layers: LayerSums | None
     identity: dict[str, Any]  # of the render, see film/identity.py
 
-    @property
-    def layer_names(self) -> list[str]:
-        """The sampled layers."""
-        return [] if self.layers is None else list(self.layers.names)
 
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return all sums as arrays by name."""
-        layers = {} if self.layers is None else self.layers.arrays()
-        return {
-            **{FILM + name: array for name, array in self.film.arrays().items()},
-            **{LAYER + name: array for name, array in layers.items()},
-        }
-
-    @property
-    def info(self) -> dict[str, Any]:
-        """What `restored_sums` needs beside the arrays."""
-        return {"identity": self.identity, "layers": self.layer_names}
-
-    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Become the sums of which `arrays` returned these; they are not copied.
-
-        Raises
-        ------
-        SceneError
-            If one is missing, or is of another shape or kind.
-        """
-        for name, mine in self.arrays().items():
-            found = arrays.get(name)
-            wrong = found is None or found.dtype.kind != mine.dtype.kind
-            if found is None or wrong or (mine.dtype.kind == "f" and found.dtype != mine.dtype):
-                raise SceneError(
-                    f"the sums of the samples are incomplete: {name!r} is missing or of another type"
-                )
-            if found.shape != mine.shape and not self._may_vary(name, found):
-                raise SceneError(f"the sums {name!r} have shape {found.shape}; it must be {mine.shape}")
-        self.film.restore(_part(arrays, FILM))
-        if self.layers is not None:
-            self.layers.restore(_part(arrays, LAYER))
-
-    def _may_vary(self, name: str, found: NDArray[Any]) -> bool:
-        """Return whether an array may have this shape, too."""
-        return name == FILM + "lengths" or (
-            name == FILM + "dropped" and found.shape in ((0,), self.film.count.shape)
-        )
-
-
-def _part(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArray[Any]]:
-    return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
-
-
-def empty_sums(size: Sequence[int], layers: Sequence[str], identity: dict[str, Any]) -> PictureSums:
+def empty_sums(size: Sequence[int], layers: Sequence[str] = (), light_paths: bool = False) -> PictureSums:
     """Return the sums of no samples for a picture of a size (width, height)."""
     width, height = size
-    film = Film(width, height, identity.get(CAUSTICS, False))
-    return PictureSums(film, LayerSums(layers, width * height) if layers else None, identity)
+    film = Film(width, height, light_paths)
+    return PictureSums(film, LayerSums(layers, width * height) if layers else None, {})
+
+
+def identified_sums(identity: dict[str, Any]) -> PictureSums:
+    """Return the sums of no samples for the picture of a render with an identity."""
+    sums = empty_sums(identity["size"], identity["aovs"], identity.get(CAUSTICS, False))
+    sums.identity = identity
+    return sums
 
 
 def restored_sums(
-    name: str, shape: Sequence[int], info: Any, arrays: Mapping[str, NDArray[Any]]
+    name: str, shape: Sequence[int], identity: Any, arrays: Mapping[str, NDArray[Any]]
 ) -> PictureSums | None:
-    """Return the sums of a picture (H, W, 3) in the file `name` from their `info` and arrays.
+    """Return the sums of a picture (H, W, 3) in the file `name` from the identity of its render and arrays.
 
     None if the file has none.
 
@@ -101,7 +59,9 @@ def restored_sums(
     if not arrays:
         return None
     try:
-        sums = empty_sums((shape[1], shape[0]), info["layers"], dict(info["identity"]))
+        if identity["size"] != [shape[1], shape[0]]:
+            raise SceneError(f"they are of a picture of size {identity['size']}")
+        sums = identified_sums(identity)
         sums.restore(arrays)
     except (SceneError, TypeError, KeyError, ValueError) as error:
         raise SceneError(f"{name}: the sums of its samples are damaged: {error}") from error
@@ -128,9 +88,7 @@ def merged_sums(a: PictureSums | None, b: PictureSums | None) -> PictureSums:
     if found:
         raise SceneError(f"pictures of different renders cannot be merged: {', '.join(found)}")
     merged = deepcopy(a)
-    merged.film.merge(b.film)
-    if merged.layers is not None and b.layers is not None:
-        merged.layers.merge(b.layers)
+    merged.merge(b)
     return merged
 
 

@@ -535,7 +535,7 @@ class Image:
             layers=layers,
             errors=errors,
             names=found.info.get("names"),
-            sums=restored_sums(os.fspath(path), found.rgb.shape, found.info.get("sums"), sums),
+            sums=restored_sums(os.fspath(path), found.rgb.shape, found.info.get("identity"), sums),
             scatter=restored_scatter(os.fspath(path), found.rgb.shape, scatter),
         )
 
@@ -756,7 +756,9 @@ class Image:
         kept = scatter_arrays(self.scatter)
         if self.sums is None:
             return ImageData(self.rgb, arrays, info, kept)
-        return ImageData(self.rgb, arrays, {**info, "sums": self.sums.info}, {**self.sums.arrays(), **kept})
+        return ImageData(
+            self.rgb, arrays, {**info, "identity": self.sums.identity}, {**self.sums.arrays(), **kept}
+        )
 
     def _codes(self, display: Display, bits: int) -> NDArray[Any]:
         return display.codes(display.adjusted(self._data()), bits)

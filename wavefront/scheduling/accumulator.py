@@ -11,40 +11,57 @@ from ..arrays.vec import Bytes
 from ..core.counted import counted
 from ..core.errors import RenderError, warn_caller
 from ..core.memory import check_memory
-from ..film.aov_sums import LayerSums, layer_bytes
+from ..film.aov_names import layer_of
 from ..film.film import Film
 from ..film.light_sums import LightSums
-from ..film.picture_sums import PictureSums
+from ..film.picture_sums import empty_sums
+from ..film.sums import bytes_per_pixel
 from ..image.image import Image, film_image, last_film_image
 from ..integrators.light_tracing import Splats
 from .jobs import Job, JobResult, WaveResult
 
 MAX_BAD_SAMPLES = 1e-4  # part of all samples that may be lost to NaN before it is an error
-FILM_BYTES = 176  # of a pixel of the film
-LIGHT_BYTES = 192  # of the sums over light paths, for each pixel
 PICTURE_BYTES = 96  # of a pixel of the picture, and of what is needed to make it
+LAYER_BYTES = 8  # of a pixel and channel of a layer and its error
 SPARE_BYTES = 16 << 20
 
 
-def picture_memory(width: int, height: int, layers: Sequence[str] = (), light_paths: bool = False) -> int:
-    """Return how many bytes a film, sampled layers, and the picture that is made of them need."""
-    film = FILM_BYTES + (LIGHT_BYTES if light_paths else 0)
-    return (film + PICTURE_BYTES + sum(map(layer_bytes, layers))) * width * height + SPARE_BYTES
+def picture_memory(size: Sequence[int], layers: Sequence[str] = (), light_paths: bool = False) -> int:
+    """Return how many bytes the sums of samples, and the picture of them, need.
+
+    Parameters
+    ----------
+    size
+        (width, height)
+    layers
+        The sampled layers, those with a key by it, such as "light_groups.sun"; of up to 127 samples.
+    light_paths
+        Whether there are light paths, too.
+    """
+    sums = bytes_per_pixel(lambda pixels: empty_sums((pixels, 1), layers, light_paths))
+    picture = PICTURE_BYTES + LAYER_BYTES * sum(layer_of(name).channels for name in layers)
+    return (sums + picture) * size[0] * size[1] + SPARE_BYTES
 
 
-def check_picture_memory(width: int, height: int, light_paths: bool = False) -> None:
-    """Check that there is memory for a film and the picture, or raise a SceneError."""
-    memory = picture_memory(width, height, light_paths=light_paths)
-    check_memory(f"a picture of {width}x{height} pixels", memory)
+def check_picture_memory(size: Sequence[int], layers: Sequence[str] = (), light_paths: bool = False) -> None:
+    """Check that there is the memory of `picture_memory`, or raise a SceneError."""
+    having = f" with {counted(len(layers), 'layer')}" if layers else ""
+    memory = picture_memory(size, layers, light_paths)
+    check_memory(f"a picture of {size[0]}x{size[1]} pixels{having}", memory)
 
 
 class Accumulator:
     """Sums over all jobs that are done.
 
+    Parameters
+    ----------
+    size, layers, light_paths
+        As for `picture_memory`.
+
     Raises
     ------
     SceneError
-        If there is not enough memory for the film and the picture.
+        If there is not enough memory for the sums and the picture.
 
     Attributes
     ----------
@@ -56,28 +73,12 @@ class Accumulator:
         Queries of the accelerator.
     """
 
-    def __init__(self, width: int, height: int, light_paths: bool = False) -> None:
-        pixels = width * height
-        check_picture_memory(width, height, light_paths)
-        self.sums = PictureSums(Film(width, height, light_paths), None, {})
+    def __init__(self, size: Sequence[int], layers: Sequence[str] = (), light_paths: bool = False) -> None:
+        check_picture_memory(size, layers, light_paths)
+        self.sums = empty_sums(size, layers, light_paths)
         self.bad, self.rays = BadSamples(), 0
         # for the picture so far when memory has run out
-        self._reserve: Bytes | None = np.empty(PICTURE_BYTES * pixels + SPARE_BYTES, np.uint8)
-
-    def add_layers(self, names: Sequence[str]) -> None:
-        """Sum up sampled layers, those with a key by it, such as "light_groups.sun".
-
-        Raises
-        ------
-        SceneError
-            If there is not enough memory for them.
-        """
-        if not names:
-            return
-        width, height = self.film.size
-        memory = sum(map(layer_bytes, names)) * width * height
-        check_memory(f"{counted(len(names), 'layer')} of {width}x{height} pixels", memory)
-        self.sums.layers = LayerSums(names, width * height)
+        self._reserve: Bytes | None = np.empty(PICTURE_BYTES * size[0] * size[1] + SPARE_BYTES, np.uint8)
 
     @property
     def film(self) -> Film:

@@ -59,7 +59,7 @@ def make_budget(
     if max_memory is None:
         return Budget(workers, wave_size or default_wave_size(workers))
     fixed = PROCESS_BYTES if processes else THREAD_BYTES
-    in_use, picture = resident_memory(), picture_memory(*size, layers, light_paths)
+    in_use, picture = resident_memory(), picture_memory(size, layers, light_paths)
     worker = fixed + min(LEAST_WAVE, wave_size or LEAST_WAVE) * LANE_BYTES
     left = max_memory - in_use - picture
     if left < worker:

@@ -37,7 +37,7 @@ from .last_checks import check_last_image
 from .plan import make_plan, trained_guide, with_choice
 from .prepared_scene import PreparedScene
 from .sole_use import SoleUse
-from .view_render import ViewRender, new_accumulator
+from .view_render import ViewRender
 
 SNAPSHOT_INTERVAL = 1.0  # seconds between two pictures of a long pass
 
@@ -102,7 +102,7 @@ class Session:
         camera, framed = choose_camera(
             scene, values["camera"], values["size"], values["up"], values["view"], values["fov"]
         )
-        check_picture_memory(*camera.size, values["caustics"])
+        check_picture_memory(camera.size, light_paths=values["caustics"])
         # before work, for what takes least; again when the memory of the scene is known
         settings.budget(camera.size, values["executor"] or "threads")
         self._scene = PreparedScene(scene, settings, camera if framed else None)
@@ -114,7 +114,7 @@ class Session:
                 self._pool.start()  # before there are sums, of which forked processes would keep old copies
                 with ThreadPoolExecutor(1) as aside:
                     sums = aside.submit(
-                        new_accumulator, camera, self._plan.tracer.recorded_layers, values["caustics"]
+                        Accumulator, camera.size, self._plan.tracer.recorded_layers, values["caustics"]
                     )
                     self._plan = with_choice(self._plan, camera, self._run_trial)
                 self._begin_picture(camera, sums.result(), begin)
@@ -291,7 +291,7 @@ class Session:
         self._scene.compiled.view(camera)  # checks its distance
         executor = settings.executor_for(camera.size)
         budget = settings.budget(camera.size, executor, self._plan.tracer.recorded_layers)
-        accumulator = new_accumulator(camera, self._plan.tracer.recorded_layers, settings.values["caustics"])
+        accumulator = Accumulator(camera.size, self._plan.tracer.recorded_layers, values["caustics"])
         with self.interrupt_handler, self._use:
             self._render.discard_sweeps()
             self._stopped = self._dropped = False  # a stop from now on is one of the new picture

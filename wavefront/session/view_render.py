@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator
 from copy import deepcopy
 from dataclasses import replace
 from typing import Any
@@ -228,19 +228,6 @@ class ViewRender:
                 image.names[IDS[name]] = self._plan.scene.shapes.names(IDS[name])
         if self._boxes is not None:
             image.metadata[BOXES] = deepcopy(self._boxes)
-
-
-def new_accumulator(camera: Camera, layers: Sequence[str], light_paths: bool) -> Accumulator:
-    """Return sums for the picture of a camera, its sampled layers, and light paths.
-
-    Raises
-    ------
-    SceneError
-        If there is not enough memory for them.
-    """
-    accumulator = Accumulator(*camera.size, light_paths)
-    accumulator.add_layers(layers)
-    return accumulator
 
 
 def _background_label(background: Any) -> Any:

@@ -1,0 +1,90 @@
+"""What all sums of samples have in common: fields that files keep, and that merging adds up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from inspect import get_annotations
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.errors import SceneError
+
+
+class Sums:
+    """Sums whose fields are the attributes that the body of the class annotates.
+
+    A field is an array, other sums, a dictionary of sums by name, or None. An array without elements stands
+    for one of zeros.
+    """
+
+    __slots__ = ()
+    FIELDS: ClassVar[tuple[str, ...]] = ()
+
+    def __init_subclass__(cls) -> None:
+        cls.FIELDS = tuple(dict.fromkeys((*cls.FIELDS, *get_annotations(cls))))
+
+    def _own(self) -> dict[str, NDArray[Any]]:
+        """Return the arrays among the fields, by name."""
+        fields = {name: getattr(self, name) for name in self.FIELDS}
+        return {name: value for name, value in fields.items() if isinstance(value, np.ndarray)}
+
+    def _parts(self) -> dict[str, Sums]:
+        """Return the sums among the fields: by name, those of a dictionary by its keys."""
+        found: dict[str, Any] = {}
+        for name in self.FIELDS:
+            value = getattr(self, name)
+            found |= value if isinstance(value, dict) else {name: value}
+        return {name: value for name, value in found.items() if isinstance(value, Sums)}
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return all sums as arrays by name: "squares", and those of a part as "part.squares"."""
+        parts = {
+            f"{part}.{name}": array
+            for part, sums in self._parts().items()
+            for name, array in sums.arrays().items()
+        }
+        return {**self._own(), **parts}
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]], prefix: str = "") -> None:
+        """Become the sums of which `arrays` returned these, each after `prefix`; they are not copied.
+
+        Raises
+        ------
+        SceneError
+            If one is missing, or is of another shape or kind.
+        """
+        for name, mine in self._own().items():
+            found = arrays.get(prefix + name)
+            if (
+                found is None
+                or found.dtype.kind != mine.dtype.kind
+                or (mine.dtype.kind == "f" and found.dtype != mine.dtype)
+            ):
+                raise SceneError(
+                    f"the sums of the samples are incomplete: {prefix + name!r} is missing or of another type"
+                )
+            if found.shape != mine.shape:
+                raise SceneError(
+                    f"the sums {prefix + name!r} have shape {found.shape}; it must be {mine.shape}"
+                )
+            setattr(self, name, found)
+        for name, part in self._parts().items():
+            part.restore(arrays, f"{prefix}{name}.")
+
+    def merge(self, other: Self) -> None:
+        """Add the sums of other samples."""
+        others = other._own()
+        for name, mine in self._own().items():
+            if others[name].size:
+                setattr(self, name, mine + others[name] if mine.size else others[name].copy())
+        parts = other._parts()
+        for name, part in self._parts().items():
+            part.merge(parts[name])
+
+
+def bytes_per_pixel(make: Callable[[int], Sums]) -> int:
+    """Return how many bytes each pixel takes of the sums that `make` returns for a number of pixels."""
+    one, two = (sum(array.nbytes for array in make(pixels).arrays().values()) for pixels in (1, 2))
+    return two - one
