@@ -14,10 +14,8 @@ import numpy as np
 
 from ..arrays.state import Hits, Rays, SurfaceInteraction
 from ..arrays.vec import Bools, Ints, dot, f4
-from ..bsdfs import Bsdf
 from ..camera import Camera
 from ..compile.instances import sort_shapes
-from ..compile.scene import CompiledScene
 from ..core.errors import warn_caller
 from ..image import Image
 from ..lights import LightSample
@@ -25,29 +23,21 @@ from ..scene import Scene
 from ..shapes import Instance, Shape
 from ..stages.interaction import interaction, origin_above
 from ..stages.intersect import intersect, shadow_rays, visible
+from .prepared_scene import PreparedScene
 
 GRID = 16  # rays across the picture and down
 SAMPLES = 16  # light samples at each visible point
 
 
 def warn_of_black_or_white(
-    image: Image, scene: Scene, compiled: CompiledScene, view: Camera, integrator: str, max_bounces: int
+    image: Image, scene: PreparedScene, view: Camera, integrator: str, max_bounces: int
 ) -> None:
-    """Warn of a picture that `is_black_or_white`, with the likely cause.
+    """Warn of a picture that is black or white all over, with the likely cause.
 
-    Parameters
-    ----------
-    image
-        The picture.
-    scene, compiled
-        Its scene, as the user made it and as it was rendered.
-    view
-        The camera, in the units of `compiled`.
-    integrator, max_bounces
-        Settings of the render.
+    `view` is the camera in the units of the compiled scene.
     """
     brightest, darkest = float(image.rgb.max()), float(image.rgb.min())
-    sight = Sight(scene, compiled, view, integrator, max_bounces)
+    sight = Sight(scene, view, integrator, max_bounces)
     if darkest > 1:
         warn_caller(f"the picture is white: {sight.why_white(darkest)}")
     elif brightest > 0:
@@ -63,10 +53,8 @@ def warn_of_black_or_white(
 class Sight:
     """The part of a scene that a camera sees, by a grid of rays."""
 
-    def __init__(
-        self, scene: Scene, compiled: CompiledScene, view: Camera, integrator: str, max_bounces: int
-    ) -> None:
-        self._scene, self._compiled, self._view = scene, compiled, view
+    def __init__(self, scene: PreparedScene, view: Camera, integrator: str, max_bounces: int) -> None:
+        self._scene, self._compiled, self._view = scene.lighted, scene.compiled, view
         self._integrator, self._max_bounces = integrator, max_bounces
 
     @property
@@ -89,11 +77,15 @@ class Sight:
             return f"the camera sees no shape; {self._where_the_scene_is()}"
         if self._max_bounces == 0:
             return "max_bounces=0 shows lights alone, and the camera sees none that shines towards it"
-        if all(bsdf.black for bsdf in self._materials_seen()):
+        materials = self._compiled.materials
+        groups = np.unique(materials.group_of.take(self._seen.material))
+        if all(materials.groups[group].black for group in groups):
             return "the materials of all that the camera sees reflect nothing"
         found = self._why_no_light_arrives()
-        if found is None and self._around.back_facing.all() and len(self._around) == GRID * GRID:
-            found = f"the camera is inside {self._name(self._around.prim)}, where no light gets in"
+        if found is None and self._is_enclosed:
+            found = (
+                f"the camera is inside {shape_name(self._scene, self._around.prim)}, where no light gets in"
+            )
         return found or self._why_it_is_not_found()
 
     def why_white(self, darkest: float) -> str:
@@ -103,7 +95,9 @@ class Sight:
         if not len(self._seen):
             return f"the camera sees no shape, only light from all around that is above 1; {fix}"
         if shines.all():
-            return f"the camera sees nothing but {self._name(self._seen.prim)}, which shines; {fix}"
+            return (
+                f"the camera sees nothing but {shape_name(self._scene, self._seen.prim)}, which shines; {fix}"
+            )
         return f"its darkest pixel is {darkest:.3g}, and 1 is white; {fix}"
 
     # --- Visible surfaces -----------------------------------------------------------------------------
@@ -137,13 +131,13 @@ class Sight:
         rays = Rays(self._rays.origin[:, :1].repeat(n, 1), direction, np.full(n, -1, np.intp))
         return self._surface(rays, intersect(self._compiled, rays))
 
+    @property
+    def _is_enclosed(self) -> bool:
+        return bool(self._around.back_facing.all()) and len(self._around) == GRID * GRID
+
     def _surface(self, rays: Rays, hits: Hits) -> SurfaceInteraction:
         found = hits.found
         return interaction(self._compiled, rays.take(found), hits.take(found))
-
-    def _materials_seen(self) -> list[Bsdf]:
-        materials = self._compiled.materials
-        return [materials.groups[group] for group in np.unique(materials.group_of.take(self._seen.material))]
 
     def _where_the_scene_is(self) -> str:
         backward = self._view.rotation[:, 2]
@@ -151,9 +145,6 @@ class Sight:
         if float(middle @ backward) > 0:
             return "the middle of the scene is behind it: look the other way"
         return "it looks past the scene"
-
-    def _name(self, prims: Ints) -> str:
-        return shape_name(self._scene, prims)
 
     # --- Light at surfaces ----------------------------------------------------------------------------
 
@@ -170,9 +161,12 @@ class Sight:
             rays = shadow_rays(self._seen, origin_above(self._seen), light, np.flatnonzero(lanes))
             if visible(self._compiled, rays).any():
                 return None
-            blockers.append(self._first_met(rays))
+            hits = intersect(self._compiled, rays)
+            blockers.append(hits.prim.take(hits.found))
         if not shining:
-            return f"the lights shine away from all that the camera sees; {self._how_to_turn_lights()}"
+            hints = (light.hint for light in self._scene.lights if light.hint is not None)
+            how = next(hints, "reverse their faces, or give them two_sided=True")
+            return f"the lights shine away from all that the camera sees; {how}"
         if not facing:
             return "the camera sees only the sides of surfaces that are turned away from the lights"
         return self._why_it_is_blocked(np.concatenate(blockers))
@@ -186,27 +180,16 @@ class Sight:
             light, _ = self._compiled.lights.sample_li(origin_above(self._seen), u[0], u[1:])
             yield light, (light.pdf > 0) & (light.radiance > 0).any(0)
 
-    def _first_met(self, rays: Rays) -> Ints:
-        """Return the primitives that rays meet first."""
-        hits = intersect(self._compiled, rays)
-        return hits.prim.take(hits.found)
-
     def _transmissive(self, rows: Ints) -> Bools:
         materials = self._compiled.materials
         clear = np.array([bsdf.transmissive for bsdf in materials.groups], np.bool_)
         return clear.take(materials.group_of.take(rows))
 
-    def _how_to_turn_lights(self) -> str:
-        hints = [light.hint for light in self._scene.lights if light.hint is not None]
-        if hints:
-            return hints[0]
-        return "reverse their faces, or give them two_sided=True"
-
     def _why_it_is_blocked(self, prims: Ints) -> str:
-        name = self._name(prims)
+        name = shape_name(self._scene, prims)
         through = self._transmissive(self._compiled.material_of.take(prims))
         if not through.any():
-            if self._around.back_facing.all() and len(self._around) == GRID * GRID:
+            if self._is_enclosed:
                 return f"the camera is inside {name}, where no light gets in"
             return f"all that the camera sees is in the shadow of {name}"
         if self._compiled.lights.delta_of.all():

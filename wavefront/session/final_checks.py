@@ -10,8 +10,10 @@ import numpy as np
 from ..core.counted import counted
 from ..core.errors import Interrupted, RenderError, warn_caller
 from ..image import Image
-from ..integrators import Integrator
-from ..scene import Scene
+from ..integrators import INTEGRATORS
+from ..sampling.tiles import others_in_tile
+from ..scheduling.loop import RenderLoop
+from .plan import Plan
 
 LONG_PATH = 1000  # surfaces along a path, after which it will hardly end by itself
 FEWEST_PIXELS = 256  # smaller pictures are measurements and are not checked for being black or white
@@ -42,26 +44,73 @@ def interrupted(image: Image, spp: int | None, go_on: str = "") -> Interrupted:
     return Interrupted(f"interrupted: the picture so far has {there} per pixel{go_on}", image)
 
 
-def is_black_or_white(image: Image) -> bool:
+def render_error(failure: Exception, image: Image) -> RenderError:
+    """Return the error that says why a render could not go on, with the picture so far."""
+    message = str(failure)
+    if isinstance(failure, MemoryError):
+        message = f"out of memory: {failure}; use fewer workers, a smaller wave_size or a smaller picture"
+    return RenderError(message, image if image.metadata["samples"] else None)
+
+
+def warn_of_long_paths(max_bounces: int) -> None:
+    """Warn that paths have met more than `LONG_PATH` surfaces."""
+    warn_caller(
+        f"paths have met more than {LONG_PATH} surfaces, and may meet max_bounces={max_bounces}: "
+        "the scene is closed, and its materials absorb next to nothing, so hardly any path ends "
+        "before. Lower max_bounces or the reflectance"
+    )
+
+
+def check_last_image(image: Image, plan: Plan, loop: RenderLoop, surfaces: int) -> None:
+    """Warn of what is wrong with the last picture.
+
+    Parameters
+    ----------
+    image
+        The picture.
+    plan, loop
+        How it was rendered.
+    surfaces
+        How many surfaces the longest path under way has met.
+
+    Raises
+    ------
+    RenderError
+        If there is no picture, or too many samples are not finite.
+    """
+    values, accumulator = plan.settings.values, loop.accumulator
+    time_up = loop.stopped or loop.scheduler.time_up
+    if time_up:
+        _check_first_samples(image, values["seconds"], surfaces)
+    accumulator.bad.report(image, lambda pixel, sample: _cause_of_bad_sample(plan, loop, pixel, sample))
+    found = image.metadata
+    if values["clamp"] is not None and found["clamped"] > MUCH_LIGHT:
+        warn_caller(
+            f"clamp={values['clamp']:g} removed {100 * found['clamped']:.1f} % of the light, so the picture "
+            'is too dark: raise it; the layer "clamped" shows where'
+        )
+    if values["background"] is None and _is_black_or_white(image):
+        from .diagnosis import warn_of_black_or_white  # here, as most pictures do without
+
+        integrator = INTEGRATORS.label(values["integrator"])
+        warn_of_black_or_white(image, plan.scene, loop.view.camera, integrator, values["max_bounces"])
+    ended = time_up or accumulator.film.count.max() == plan.settings.max_spp
+    if values["noise"] is not None and ended and not found["noise"] <= values["noise"]:
+        noise = "unknown" if np.isnan(found["noise"]) else f"{found['noise']:.4g}"
+        warn_caller(
+            f"noise={values['noise']:.4g} was not reached: it is {noise} after "
+            f"{counted(found['spp'], 'sample', form='.4g')} per pixel in {found['seconds']:.3g} s"
+        )
+
+
+def _is_black_or_white(image: Image) -> bool:
     """Return whether every pixel is black or almost, or every pixel is above 1."""
     if image.rgb.shape[0] * image.rgb.shape[1] < FEWEST_PIXELS:
         return False
     return bool(image.rgb.max() < DIM or image.rgb.min() > 1)
 
 
-def render_error(failure: Exception, image: Image) -> RenderError:
-    """Return the error that says why a render could not go on, with the picture so far."""
-    message = str(failure)
-    if isinstance(failure, MemoryError):
-        message = f"out of memory: {failure}; use fewer workers, a smaller wave_size or a smaller picture"
-    return RenderError(message, _picture_so_far(image))
-
-
-def _picture_so_far(image: Image) -> Image | None:
-    return image if image.metadata["samples"] else None
-
-
-def check_first_samples(image: Image, seconds: float | None, surfaces: int) -> None:
+def _check_first_samples(image: Image, seconds: float | None, surfaces: int) -> None:
     """Warn of pixels without a sample when the time was up, or raise if there is nothing else.
 
     `surfaces` is how many a path under way had met.
@@ -82,42 +131,12 @@ def check_first_samples(image: Image, seconds: float | None, surfaces: int) -> N
         warn_caller(f"{black}: {why}")
 
 
-def warn_of_clamped_light(image: Image, clamp: float) -> None:
-    """Warn where a clamp has darkened the picture by more than `MUCH_LIGHT`."""
-    part = image.metadata["clamped"]
-    if part > MUCH_LIGHT:
-        warn_caller(
-            f"clamp={clamp:g} removed {100 * part:.1f} % of the light, so the picture is too dark: "
-            'raise it; the layer "clamped" shows where'
-        )
+def _cause_of_bad_sample(plan: Plan, loop: RenderLoop, pixel: int, sample: int) -> str:
+    """Return in which bounce, and at which material, a sample that is not finite became so."""
+    from .nan_trace import first_fault  # here, as most pictures do without
 
-
-def warn_of_noise(image: Image, asked: float) -> None:
-    """Warn when samples or time ran out above the noise that was asked for."""
-    found = image.metadata
-    if found["noise"] <= asked:
-        return
-    noise = "unknown" if np.isnan(found["noise"]) else f"{found['noise']:.4g}"
-    warn_caller(
-        f"noise={asked:.4g} was not reached: it is {noise} after "
-        f"{counted(found['spp'], 'sample', form='.4g')} per pixel in {found['seconds']:.3g} s"
-    )
-
-
-def warn_of_long_paths(max_bounces: int) -> None:
-    """Warn that paths have met more than `LONG_PATH` surfaces."""
-    warn_caller(
-        f"paths have met more than {LONG_PATH} surfaces, and may meet max_bounces={max_bounces}: "
-        "the scene is closed, and its materials absorb next to nothing, so hardly any path ends "
-        "before. Lower max_bounces or the reflectance"
-    )
-
-
-def warn_of_unseen_lights(scene: Scene, integrator: str | Integrator) -> None:
-    """Warn of lights that an integrator cannot find."""
-    if integrator != "naive":
-        return
-    unseen = [light for light in scene.lights if light.delta]
-    if unseen:
-        kinds = ", ".join(sorted({type(light).__name__ for light in unseen}))
-        warn_caller(f"the naive integrator cannot find lights without size ({kinds})")
+    camera, pixels = loop.view.camera, np.array([pixel], np.uint32)
+    if plan.choice.reuse:
+        every = camera.address(np.arange(camera.size[0] * camera.size[1], dtype=np.uint32))
+        pixels = np.append(pixels, others_in_tile(every, pixel, camera.film[0]).astype(np.uint32))
+    return first_fault(plan.scene.lighted, plan.tracer, loop.view, pixels, sample)

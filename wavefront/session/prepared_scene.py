@@ -8,12 +8,12 @@ from ..accel import Accelerator, Geometry, most_copies
 from ..aovs.geometric import ShapeTable
 from ..camera import Camera
 from ..compile.scene import compile_scene
+from ..core.errors import warn_caller
 from ..core.progress import phase
 from ..integrators import INTEGRATORS, WITH_MIS
 from ..scene import Scene
 from ..scene.lighting import choose_ground, choose_preset, lighted
 from ..settings import AUTO, Settings
-from .final_checks import warn_of_unseen_lights
 from .resuming import scene_fingerprint
 
 
@@ -52,7 +52,8 @@ class PreparedScene:
         chosen = values["lighting"] == AUTO and self.preset is not None
         self.ground = choose_ground(values["ground"], chosen, framed, values["background"], up)
         self.lighted = lighted(scene, self.preset, ground=self.ground, up=up, camera=framed)
-        warn_of_unseen_lights(self.lighted, values["integrator"])
+        if values["integrator"] == "naive":
+            _warn_of_unseen_lights(self.lighted)
         self._geometries: list[Geometry] = []
         self._fingerprint: str | None = None
         with phase("building the scene", settings.values["progress"]):
@@ -86,3 +87,10 @@ class PreparedScene:
         if self._fingerprint is None:
             self._fingerprint = scene_fingerprint(self.compiled, self._geometries)
         return self._fingerprint
+
+
+def _warn_of_unseen_lights(scene: Scene) -> None:
+    """Warn of lights that the naive integrator cannot find."""
+    kinds = ", ".join(sorted({type(light).__name__ for light in scene.lights if light.delta}))
+    if kinds:
+        warn_caller(f"the naive integrator cannot find lights without size ({kinds})")

@@ -31,9 +31,15 @@ from ..scheduling.pool import WorkerPool
 from ..scheduling.shared import STOP, Stopped
 from ..scheduling.tracing import WaveMonitor, trace_any_job
 from ..settings import RenderSettings, Settings, describes_settings, takes_settings
-from .final_checks import LONG_PATH, interrupted, render_error, setup_errors, warn_of_long_paths
+from .final_checks import (
+    LONG_PATH,
+    check_last_image,
+    interrupted,
+    render_error,
+    setup_errors,
+    warn_of_long_paths,
+)
 from .hints import Hints
-from .last_checks import check_last_image
 from .plan import make_plan, trained_guide, with_choice
 from .prepared_scene import PreparedScene
 from .sole_use import SoleUse
