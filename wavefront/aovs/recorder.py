@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ..arrays.record import record
-from ..arrays.state import BEFORE, JUST_ONCE, NOT_YET, Contribution, Hits, Paths
+from ..arrays.state import BounceDepth, Contribution, Hits, Paths
 from ..arrays.vec import Bools, Bytes, Floats, Ints, broadcast, f4, put, take
 from ..compile.scene import CompiledScene
 from ..core.errors import SceneError
@@ -79,7 +79,7 @@ class SampleRecorder(PathRecorder):
         """Have paths that start at the camera carry the recorder."""
         paths.recorder = self
         if "direct" in self._light or CLAMPED in self._light:
-            paths.scattered = broadcast(np.uint8(NOT_YET), len(paths))
+            paths.depth = broadcast(np.uint8(BounceDepth.CAMERA), len(paths))
         if any(name in self._values for name in FEATURES):
             paths.met_rough = np.zeros(len(paths), np.bool_)
 
@@ -176,11 +176,11 @@ class SampleRecorder(PathRecorder):
 
         A path of several branches is clamped like one of a sample of its own. What is not finite stays so.
         """
-        if self._clamp is None or paths.scattered is None:
+        if self._clamp is None or paths.depth is None:
             return arriving
         limit, (x, y, z) = f4(self._clamp * self._share), arriving * f4(1 / 3)
         mean = x + y + z
-        bright = (mean > limit) & (mean < np.inf) & ~_is_direct(paths.scattered, contribution)
+        bright = (mean > limit) & (mean < np.inf) & ~_is_direct(paths.depth, contribution)
         lanes = np.flatnonzero(bright)
         if not lanes.size:
             return arriving
@@ -198,8 +198,12 @@ class SampleRecorder(PathRecorder):
             self._picture = picture
         if self._picture is not picture:
             self._picture = np.empty(0, f4)  # no integrator returns this
-        if "direct" in self._light and paths.scattered is not None and (paths.scattered != BEFORE).any():
-            self._add("direct", np.flatnonzero(_is_direct(paths.scattered, contribution)), slot, arriving)
+        if (
+            "direct" in self._light
+            and paths.depth is not None
+            and (paths.depth != BounceDepth.INDIRECT).any()
+        ):
+            self._add("direct", np.flatnonzero(_is_direct(paths.depth, contribution)), slot, arriving)
         if self._groups is not None:
             group = self._groups.of_light.take(contribution.light)
             for number, name in enumerate(self._groups.names):
@@ -335,10 +339,10 @@ def recorded_layers(wanted: Sequence[str], scene: CompiledScene) -> tuple[str, .
     return tuple(names)
 
 
-def _is_direct(scattered: Bytes, contribution: Contribution) -> Bools:
+def _is_direct(depth: Bytes, contribution: Contribution) -> Bools:
     """Return a mask (k,) of the contributions that count for the layer "direct"."""
-    at = take(scattered, contribution.lanes)
-    return at == NOT_YET if contribution.sampled else at <= JUST_ONCE
+    at = take(depth, contribution.lanes)
+    return at == BounceDepth.CAMERA if contribution.sampled else at <= BounceDepth.DIRECT
 
 
 def add_to_slots(rows: Floats, slot: Ints, values: Floats) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields
+from enum import IntEnum
 from functools import cache
 from typing import Any, Self
 
@@ -19,10 +20,13 @@ from .vec import Bools, Bytes, Floats, Ints, Lanes, take
 
 Words = NDArray[np.uint32]
 
-# Scattering that is not specular, along a path:
-NOT_YET = 0  # none so far
-JUST_ONCE = 1  # the last scattering, and none before
-BEFORE = 2  # one that is not the last, or several
+
+class BounceDepth(IntEnum):
+    """How deep a path is, counted by its scattering that is not specular."""
+
+    CAMERA = 0  # none so far: light that it meets is seen directly
+    DIRECT = 1  # the last scattering, and none before: light that it meets is direct
+    INDIRECT = 2  # one that is not the last, or several
 
 
 @cache
@@ -110,7 +114,7 @@ class Paths(Rays):
     # (n,) the path has left its first surface by a lobe that is not a delta lobe; None without light paths
     left_rough: Bools | None = None
     # for layers (aovs/recorder.py); None unless they are asked for
-    scattered: Bytes | None = None  # (n,) NOT_YET, JUST_ONCE or BEFORE: its scattering that is not specular
+    depth: Bytes | None = None  # (n,) a `BounceDepth`
     met_rough: Bools | None = None  # (n,) the path has met a surface that is not specular
     recorder: Any = None  # the `PathRecorder` of the wave
 

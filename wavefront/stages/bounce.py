@@ -6,13 +6,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays.state import BEFORE, JUST_ONCE, NOT_YET, Paths
+from ..arrays.state import BounceDepth, Paths
 from ..arrays.vec import Bools, Bytes, Floats, Ints, broadcast, f4, normalize, signs, take
 from ..bsdfs import BsdfSample, sampled
 from ..sampling.sampler import Dimension, Sampler
 from .guidance import mix_with_guide
 from .interaction import LIFT, offset_origin
 from .shade import Shading
+
+# (3, 2) the depth after a scattering, by the depth before it and by whether it is specular
+DEPTH_AFTER = np.array(
+    [
+        [BounceDepth.DIRECT, BounceDepth.CAMERA],
+        [BounceDepth.INDIRECT, BounceDepth.INDIRECT],
+        [BounceDepth.INDIRECT, BounceDepth.INDIRECT],
+    ],
+    np.uint8,
+)
 
 
 def branch(paths: Paths, shade: Shading, sampler: Sampler, bounce: int, ways: int) -> Paths:
@@ -76,7 +86,7 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         specular=specular,
         roulette_scale=roulette_scale,
         left_rough=~specular if bounce == 0 and paths.left_rough is not None else paths.left_rough,
-        scattered=None if paths.scattered is None else _after(paths.scattered, specular),
+        depth=None if paths.depth is None else _after(paths.depth, specular),
         met_rough=paths.met_rough,
         recorder=paths.recorder,
     )
@@ -85,14 +95,12 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
     return left
 
 
-def _after(scattered: Bytes, specular: Bools) -> Bytes:
-    """Return `Paths.scattered` (n,) after another scattering, which is specular (n,) or not."""
-    n = scattered.size
-    if n and not (scattered.strides[0] or specular.strides[0]):  # alike on all lanes
-        return broadcast(_after(scattered[:1].copy(), specular[:1].copy())[0], n)
-    after = np.multiply(scattered != NOT_YET, BEFORE, dtype=np.uint8)
-    after |= np.multiply((scattered == NOT_YET) & ~specular, JUST_ONCE, dtype=np.uint8)
-    return after
+def _after(depth: Bytes, specular: Bools) -> Bytes:
+    """Return `Paths.depth` (n,) after another scattering, which is specular (n,) or not."""
+    n = depth.size
+    if n and not (depth.strides[0] or specular.strides[0]):  # alike on all lanes
+        return broadcast(_after(depth[:1].copy(), specular[:1].copy())[0], n)
+    return DEPTH_AFTER[depth, specular.view(np.uint8)]
 
 
 def _strayed(shade: Shading, wi: Floats, cos: Floats) -> Ints:

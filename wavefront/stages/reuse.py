@@ -91,7 +91,7 @@ def as_shared(paths: Paths) -> Paths:
         slot=np.arange(n),
         throughput=np.ones((3, n), f4),
         roulette_scale=paths.roulette_scale * highest(paths.throughput),
-        scattered=None,
+        depth=None,
         met_rough=None,
         recorder=None if paths.recorder is None else paths.recorder.of_shared(),
     )
