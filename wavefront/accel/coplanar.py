@@ -150,30 +150,64 @@ def _without_parts(member: Ints, start: Ints, before: list[Keys]) -> tuple[Ints,
 
 def _overlapping_in_runs(triangles: Floats, face: Ints, plane: Doubles, start: Ints) -> Iterator[Ints]:
     """Yield pairs (2, p) of faces (r,) that overlap, of the runs that begin at `start`."""
+    if not face.size:
+        return
     count = np.diff(start, append=face.size)
     corners, across = _flattened(triangles, face, plane, start, count)
-    two = start.compress(count == 2)
-    for part in spans(two.size, AT_ONCE):
-        yield face.take(_that_overlap(triangles, face, corners, two[part], two[part] + 1))
-    more = np.flatnonzero(np.repeat(count > 2, count))
-    if not more.size:
-        return
-    face, corners, across = face.take(more), corners.take(more, 0), across.take(more, 1)
-    count = count.compress(count > 2)
     low, high = _extent(*corners.transpose(1, 2, 0))
     run: HalfInts = np.repeat(np.arange(count.size, dtype=np.int32), count)
-    strips = _Strips(low, high, run, np.cumsum(count) - count, count)
-    dense = _beyond_budget(strips.pairs_of_runs(count.size), DENSE * face.size + BUDGET)
+    box, strip, first, following = _in_strips(low, high, run, start, count)
+    pairs = np.asarray(np.bincount(run.take(box), following, count.size), np.float64)
+    dense = _beyond_budget(pairs, DENSE * face.size + BUDGET)
     some = np.flatnonzero(dense.take(run[1:]) & (run[1:] == run[:-1]))
     yield np.stack([face.take(some), face.take(some + 1)])
-    for first, second in strips.pairs(dense):
-        bottom = np.maximum(low[1].take(first), low[1].take(second))
-        meet = bottom < np.minimum(high[1].take(first), high[1].take(second))
-        bottom = np.maximum(across[0].take(first), across[0].take(second))
-        top = np.minimum(across[1].take(first), across[1].take(second))
+    following[dense.take(run.take(box))] = 0
+    ends = np.cumsum(following)
+    shift = np.arange(1, box.size + 1) + following - ends  # from a number of a pair to its second place
+    for part in spans(int(ends[-1]), AT_ONCE):
+        number = np.arange(part.start, part.stop)
+        at = np.searchsorted(ends, number, "right")
+        one, other = box.take(at), box.take(number + shift.take(at))
+        # two boxes may share several strips: the lowest counts
+        meet = np.maximum(first.take(one), first.take(other)) == strip.take(at)
+        bottom = np.maximum(low[1].take(one), low[1].take(other))
+        meet &= bottom < np.minimum(high[1].take(one), high[1].take(other))
+        bottom = np.maximum(across[0].take(one), across[0].take(other))
+        top = np.minimum(across[1].take(one), across[1].take(other))
         meet &= bottom - top <= FLATNESS * (np.abs(bottom) + np.abs(top))
-        first, second = first.compress(meet), second.compress(meet)
-        yield face.take(_that_overlap(triangles, face, corners, first, second))
+        yield face.take(_that_overlap(triangles, face, corners, one.compress(meet), other.compress(meet)))
+
+
+def _in_strips(
+    low: Floats, high: Floats, run: HalfInts, start: Ints, count: Ints
+) -> tuple[HalfInts, HalfInts, HalfInts, Ints]:
+    """Sort boxes (2, r) of runs in strips along the first axis, as high as the boxes are on average.
+
+    Returns columns (q,), one for each strip that a box is in: the box, the strip, and how many of those that
+    follow in the strip overlap the box along the first axis; and the first strip (r,) of each box.
+    """
+    left, bottom = np.minimum.reduceat(low, start, 1)
+    extent = np.maximum.reduceat(high[1], start) - bottom
+    size = np.add.reduceat(high[1] - low[1], start, dtype=np.float64) / count
+    height = np.maximum(size, extent / np.maximum(count // 16, 1)).astype(f4) + f4(1e-30)
+    first, last = (
+        ((edge - bottom.take(run)) / height.take(run)).astype(np.int32) for edge in (low[1], high[1])
+    )
+    strips = np.maximum.reduceat(last, start) + 1
+    base = (np.cumsum(strips) - strips).astype(np.int32).take(run)
+    first, last = first + base, last + base
+    copies = last - first + 1
+    box: HalfInts = np.repeat(np.arange(run.size, dtype=np.int32), copies)
+    strip = np.arange(box.size, dtype=np.int32)
+    strip += np.repeat(first - (np.cumsum(copies) - copies).astype(np.int32), copies)
+    begin, end = (
+        (edge - left.take(run)).view(np.uint32).take(box) | strip.astype(np.uint64) << np.uint64(32)
+        for edge in (low[0], high[0])
+    )  # the bits of floats that are not negative sort like the floats
+    order = np.argsort(begin)
+    begin, end = begin.take(order), end.take(order)
+    following = np.searchsorted(begin, end) - np.arange(1, begin.size + 1)
+    return box.take(order), strip.take(order), first, np.maximum(following, 0)
 
 
 def _flattened(
@@ -219,65 +253,6 @@ def _that_overlap(triangles: Floats, face: Ints, corners: Floats, first: Ints, s
         solid = (triangles.take(each, 0).transpose(1, 2, 0) for each in face.take(pair))
         pair = pair.compress(_coplanar(*solid), 1)
     return pair
-
-
-class _Strips:
-    """Boxes in strips along the first axis, as high as the boxes are on average, sorted in each strip."""
-
-    def __init__(self, low: Floats, high: Floats, run: HalfInts, start: Ints, count: Ints) -> None:
-        left, bottom = np.minimum.reduceat(low[0], start), np.minimum.reduceat(low[1], start)
-        size = np.add.reduceat(high[1] - low[1], start, dtype=np.float64) / count
-        extent = np.maximum.reduceat(high[1], start) - bottom
-        height = np.maximum(size, extent / np.maximum(count // 16, 1)).astype(f4)
-        height += f4(1e-30)
-        first, last = (
-            ((edge - bottom.take(run)) / height.take(run)).astype(np.int32) for edge in (low[1], high[1])
-        )
-        strips = np.maximum.reduceat(last, start) + 1
-        strips = np.cumsum(strips) - strips
-        first += strips.take(run).astype(np.int32)
-        last += strips.take(run).astype(np.int32)
-        copies = last - first + 1
-        box = np.repeat(np.arange(run.size, dtype=np.int32), copies)
-        strip = np.arange(box.size, dtype=np.int32)
-        strip += np.repeat(first - (np.cumsum(copies) - copies).astype(np.int32), copies)
-        del copies, last
-        begin, end = (
-            (edge - left.take(run)).view(np.uint32).take(box) | strip.astype(np.uint64) << np.uint64(32)
-            for edge in (low[0], high[0])
-        )  # the bits of floats that are not negative sort like the floats
-        order = np.argsort(begin)
-        self._box, self._strip = box.take(order), strip.take(order)
-        del box, strip
-        self._first, self._run = first, run
-        begin, end = begin.take(order), end.take(order)
-        del order
-        following = np.searchsorted(begin, end)
-        following -= np.arange(1, begin.size + 1)
-        self._following = np.maximum(following, 0, out=following)
-
-    def pairs_of_runs(self, runs: int) -> Doubles:
-        """Return how many pairs of boxes of each run overlap along the first axis and share a strip."""
-        return np.asarray(np.bincount(self._run.take(self._box), self._following, runs), np.float64)
-
-    def pairs(self, skipped: Bools) -> Iterator[tuple[Ints, Ints]]:
-        """Yield these pairs once each, boxes (p,) and boxes (p,), but for those of skipped runs (runs,)."""
-        following = np.where(skipped.take(self._run.take(self._box)), 0, self._following)
-        entry = np.flatnonzero(following)
-        following = following.take(entry)
-        total = np.cumsum(following)
-        ends = np.searchsorted(total, np.arange(AT_ONCE, total[-1] + AT_ONCE, AT_ONCE)) if total.size else ()
-        at = 0
-        for end in np.unique(np.minimum(np.add(ends, 1), entry.size)).tolist():
-            some, times = entry[at:end], following[at:end]
-            first = np.repeat(some, times)
-            second = first + 1 + np.arange(first.size) - np.repeat(np.cumsum(times) - times, times)
-            strip = self._strip.take(first)
-            one, other = self._box.take(first), self._box.take(second)
-            # two boxes may share several strips: the lowest counts
-            lowest = np.maximum(self._first.take(one), self._first.take(other)) == strip
-            yield one.compress(lowest), other.compress(lowest)
-            at = end
 
 
 def _apart(one: Doubles, other: Doubles) -> Bools:
