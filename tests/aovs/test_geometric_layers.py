@@ -54,8 +54,8 @@ def film_points(camera: wf.Camera) -> np.ndarray:
 def exact_rays(camera: wf.Camera) -> tuple[np.ndarray, np.ndarray]:
     """Return origins and unit directions (h, w, 3) in float64, of perspective cameras without a shift."""
     film = film_points(camera)
-    pitch = 2 * np.tan(np.radians(camera.fov) / 2) / camera.film[1]
-    x, y = (film - np.array(camera.film) / 2).transpose(2, 0, 1) * pitch
+    pitch = 2 * np.tan(np.radians(camera.fov) / 2) / camera.resolution[1]
+    x, y = (film - np.array(camera.resolution) / 2).transpose(2, 0, 1) * pitch
     direction = np.stack([x, -y, np.full_like(x, -1)], -1) @ camera.rotation.T
     direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
     return np.broadcast_to(camera.origin, direction.shape), direction

@@ -57,7 +57,7 @@ def test_opengls_matrices_project_as_the_camera_does(name: str) -> None:
     view = np.linalg.inv(camera.to_matrix())
     clip = np.column_stack([points, np.ones(50)]) @ (camera.projection_matrix(0.5, 20) @ view).T
     x, y, z = clip[:, :3].T / clip[:, 3]
-    width, height = camera.film
+    width, height = camera.resolution
     pixels, depth = camera.project(points)
     assert np.allclose(np.stack([(x + 1) / 2 * width, (1 - y) / 2 * height], 1), pixels, rtol=0, atol=1e-9)
     assert (np.diff(z[np.argsort(depth)]) > 0).all()

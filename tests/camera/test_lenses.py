@@ -279,7 +279,7 @@ def test_a_window_is_cut_from_the_picture(kind: str, sampler: str) -> None:
 def test_cropped_and_resized() -> None:
     """A window can be taken later; resizing gives the whole picture."""
     camera = CROPPED["pinhole"]().cropped((5, 3, 14, 16))
-    assert (camera.size, camera.film) == ((9, 13), (23, 17))
+    assert (camera.size, camera.resolution) == ((9, 13), (23, 17))
     assert camera.resized((40, 30)).size == (40, 30)
 
 

@@ -54,7 +54,7 @@ def test_points_on_rays_are_seen_where_the_rays_begin(name: str) -> None:
     """All over the film, near and far; the depth is along the axis, of a panorama along the ray."""
     camera = CAMERAS[name]
     rng = np.random.default_rng(3)
-    film = rng.uniform(0.01, 0.99, (500, 2)) * camera.film
+    film = rng.uniform(0.01, 0.99, (500, 2)) * camera.resolution
     origin, direction = camera.rays(*film.T.astype(f4), np.zeros(3))
     far = rng.uniform(0.5, 50, 500)
     points = origin.T.astype(float) + direction.T.astype(float) * far[:, None]

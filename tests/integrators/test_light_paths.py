@@ -65,7 +65,7 @@ class Tracer:
         return width * height
 
     def sampler(self, seed: int) -> Sampler:
-        return SobolSampler(seed, self.camera.film[0])
+        return SobolSampler(seed, self.camera.resolution[0])
 
     def lanes(self, first: int, last: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the pixel and the sample of each path of the samples from first to before last."""
@@ -599,8 +599,8 @@ def some_rays(camera: wf.Camera, n: int = 4000):
     """Return film points, the numbers of lens points, and the camera's rays through them."""
     rng = np.random.default_rng(3)
     margin = 0.02  # of a panorama's height: at its poles one point is seen in all columns
-    x = (rng.random(n) * camera.film[0]).astype(f4)
-    y = (rng.uniform(margin, 1 - margin, n) * camera.film[1]).astype(f4)
+    x = (rng.random(n) * camera.resolution[0]).astype(f4)
+    y = (rng.uniform(margin, 1 - margin, n) * camera.resolution[1]).astype(f4)
     lens = rng.random((2, n)).astype(f4) if camera.uses_lens else None
     return x, y, lens, *camera.rays(x, y, CENTER, lens), rng.uniform(0.5, 6, n).astype(f4)
 

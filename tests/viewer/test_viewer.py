@@ -83,7 +83,7 @@ class Scripted:
         self.started = True
 
     def set_camera(self, camera: wf.Camera, size: tuple[int, int] | None = None) -> None:
-        self.views.append((camera, size or camera.film))
+        self.views.append((camera, size or camera.resolution))
         self._left, self._stopped = self.pictures, False
 
     def __iter__(self) -> Scripted:
@@ -284,7 +284,7 @@ def test_code_of_a_camera_makes_it_again() -> None:
             assert (
                 getattr(copied.projection, part) == getattr(each.camera.projection, part) or part == "focus"
             )
-        assert copied.film == (64, 48)
+        assert copied.resolution == (64, 48)
     assert "1.23457" in view.code
     assert "aperture" not in view.code
 
@@ -564,7 +564,7 @@ def test_a_page_moves_the_camera(viewer: wf.Viewer) -> None:
     assert "127.0.0.1" in viewer.url
     client = Client(viewer)
     client.look(position=(1.0, 0.5, 3.0), image_width=48)
-    assert eventually(lambda: viewer.camera.film == (48, 48))
+    assert eventually(lambda: viewer.camera.resolution == (48, 48))
     image = viewer.wait_for_picture(SOON)
     assert viewer.image is image
     expected = wf.render(BALL, 4, camera=viewer.camera, progress=False)
@@ -590,7 +590,7 @@ def test_views_that_a_page_has_before_it_takes_ours_are_not_shown(
     client._looked = True
     for z in (-5.0, 3.0):
         client.look(position=(0.0, 0, z), image_width=48)
-    assert eventually(lambda: viewer.camera.film == (48, 48))
+    assert eventually(lambda: viewer.camera.resolution == (48, 48))
     assert viewer.camera.origin.tolist() == [0, 0, 5]
     before = viewer.camera
     clock.now += page_module.ARRIVAL
@@ -649,7 +649,7 @@ def test_what_a_page_says_is_checked(viewer: wf.Viewer) -> None:
     time.sleep(0.2)
     assert viewer.camera is before
     client.look(image_width=48)
-    assert eventually(lambda: viewer.camera.film == (48, 48))
+    assert eventually(lambda: viewer.camera.resolution == (48, 48))
     client.socket.close()
 
 
@@ -732,7 +732,7 @@ def test_what_is_no_message_changes_and_prints_nothing(
     for data in (b"", b"\xc1", b"\x91" * 10_000, "text"):
         client.socket.send(data)
     client.look(image_width=48)
-    assert eventually(lambda: viewer.camera.film == (48, 48))
+    assert eventually(lambda: viewer.camera.resolution == (48, 48))
     for data in (b"\x00\xff" * 100, b"GET\r\n\r\n", b"POST / HTTP/1.1\r\n\r\n", b"GET / HTTP/1.1\r\n\r\n"):
         where = urlsplit(viewer.url)
         with socket.create_connection((where.hostname, where.port), timeout=SOON) as raw:

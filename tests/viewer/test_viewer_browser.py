@@ -74,7 +74,7 @@ def page(viewer: wf.Viewer, browser: Any) -> Any:
     page = browser.new_context(viewport=SIZE, permissions=["clipboard-read", "clipboard-write"]).new_page()
     page.goto(viewer.url)
     page.get_by_text("spp").wait_for(timeout=1000 * SOON)
-    assert eventually(lambda: viewer.camera.film == (320, 240))
+    assert eventually(lambda: viewer.camera.resolution == (320, 240))
     viewer.wait_for_picture(SOON)
     page.get_by_text(f"{SPP} of {SPP} spp").wait_for(timeout=1000 * SOON)
     return page
@@ -210,7 +210,7 @@ def test_buttons_save_the_picture_and_copy_the_camera(page: Any, viewer: wf.View
     page.get_by_text("copy camera as code").click()
     page.get_by_text("copied").wait_for(timeout=1000 * SOON)
     camera = eval(page.evaluate("navigator.clipboard.readText()"), {"wf": wf})
-    assert camera.film == viewer.camera.film
+    assert camera.resolution == viewer.camera.resolution
     for part in ("origin", "rotation"):
         assert (getattr(camera, part) == getattr(viewer.camera, part)).all()
 

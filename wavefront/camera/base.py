@@ -45,7 +45,7 @@ class Camera:
         (3, 3) columns: right, up and backward in world space.
     projection
         The map from film points to rays.
-    film
+    resolution
         (width, height) in pixels of the whole picture.
     window
         (x0, y0, x1, y1) in pixels of the whole picture: the part that is rendered, without column
@@ -76,15 +76,15 @@ class Camera:
         self.origin = finite_array("Camera origin", origin, (3,))
         self.rotation = rotation_matrix("Camera rotation", rotation)
         self.projection = projection
-        self.film = image_size(size)
-        projection.check(self.film)
-        self.window = _window(crop, self.film)
+        self.resolution = image_size(size)
+        projection.check(self.resolution)
+        self.window = _window(crop, self.resolution)
 
     def __repr__(self) -> str:
         """Name the projection, where the camera stands and where it looks, and the size."""
         ahead = brief(-self.rotation[:, 2] + 0.0)
         size = f"{self.size[0]} × {self.size[1]}"
-        crop = "" if self.size == self.film else f" of {self.film[0]} × {self.film[1]}"
+        crop = "" if self.size == self.resolution else f" of {self.resolution[0]} × {self.resolution[1]}"
         return f"<Camera: {self.projection!r} at {brief(self.origin)} towards {ahead}, {size}{crop}>"
 
     # --- Constructors ---------------------------------------------------------------------------
@@ -312,7 +312,7 @@ class Camera:
 
     def cropped(self, crop: Window) -> Camera:
         """Return the same camera that renders only the window (x0, y0, x1, y1) of the whole picture."""
-        return Camera(self.origin, self.rotation, self.projection, self.film, crop)
+        return Camera(self.origin, self.rotation, self.projection, self.resolution, crop)
 
     def scaled(self, factor: float) -> Camera:
         """Return the same camera in a scene whose lengths were multiplied by `factor`."""
@@ -337,7 +337,7 @@ class Camera:
         SceneError
             If the camera is no perspective one, or `pixel_centers` is something else.
         """
-        k = self._perspective().matrix(self.film)
+        k = self._perspective().matrix(self.resolution)
         k[:2, 2] -= _to_film(pixel_centers)
         return k
 
@@ -385,7 +385,7 @@ class Camera:
         near = number("near", near, lambda x: x > 0, "above 0")
         far = number("far", far, lambda x: x > near, f"above near, which is {near:g}")
         (fx, skew, cx), (_, fy, cy), _ = self.intrinsics("half").tolist()
-        width, height = self.film
+        width, height = self.resolution
         return np.array(
             [
                 [2 * fx / width, -2 * skew / width, 1 - 2 * cx / width, 0],
@@ -423,10 +423,10 @@ class Camera:
 
     def address(self, pixel: Words) -> Words:
         """Return the row-major index (n,) in the whole picture of pixels (n,) of the window."""
-        if self.size == self.film:
+        if self.size == self.resolution:
             return pixel
         x0, y0, _, _ = self.window
-        width, whole = np.uint32(self.size[0]), np.uint32(self.film[0])
+        width, whole = np.uint32(self.size[0]), np.uint32(self.resolution[0])
         row = pixel // width
         return ((row + np.uint32(y0)) * whole + (pixel - row * width + np.uint32(x0))).astype(np.uint32)
 
@@ -444,7 +444,7 @@ class Camera:
         lens
             (2, n) numbers in [0, 1) that select the point on the lens; None for its center.
         """
-        offset, direction = self.projection.rays(x, y, self.film, lens)
+        offset, direction = self.projection.rays(x, y, self.resolution, lens)
         eye = column(self.origin - center)
         towards = normalize(self._turned(direction))
         origin = np.repeat(eye, len(x), 1) if offset is None else eye + self._turned(offset)
@@ -471,21 +471,22 @@ class Camera:
         importance
             (n,) area of the film, pixels², for each area across the ray at the point, scene units².
         """
-        film, project = self.film, self.projection.project
+        resolution, project = self.resolution, self.projection.project
         away = points.astype(np.float64) + (center - self.origin)[:, None]
         at = np.stack([away[0] * x + away[1] * y + away[2] * z for x, y, z in self.rotation.T])
-        x, y = np.nan_to_num(project(at, film)[0]).astype(f4)
-        offset, _ = self.projection.rays(x, y, film, lens)
+        x, y = np.nan_to_num(project(at, resolution)[0]).astype(f4)
+        offset, _ = self.projection.rays(x, y, resolution, lens)
         start = np.zeros_like(at) if offset is None else offset.astype(np.float64)
         with np.errstate(divide="ignore", invalid="ignore"):
-            pixels, _ = project(self.projection.in_focus(at, start), film)
+            pixels, _ = project(self.projection.in_focus(at, start), resolution)
             step = STEP * np.sqrt(((start - at) ** 2).sum(0))
             moves = []
             for across in _across(start - at):
                 ends = [at + across * (step * sign) for sign in (1, -1)]
-                ahead, behind = (project(self.projection.in_focus(end, start), film)[0] for end in ends)
+                ahead, behind = (project(self.projection.in_focus(end, start), resolution)[0] for end in ends)
                 moved = ahead - behind
-                moved[0] -= film[0] * np.rint(moved[0] / film[0])  # both ends of a panorama are one place
+                width = resolution[0]
+                moved[0] -= width * np.rint(moved[0] / width)  # both ends of a panorama are one place
                 moves.append(moved / (2 * step))
             importance = np.abs(moves[0][0] * moves[1][1] - moves[0][1] * moves[1][0])
         eye = column(self.origin - center) + self._turned(start.astype(f4))
@@ -522,7 +523,7 @@ class Camera:
         """
         to_film = _to_film(pixel_centers)
         away = finite_array("points", points, (None, 3)) - self.origin
-        pixels, depth = self.projection.project((away @ self.rotation).T, self.film)
+        pixels, depth = self.projection.project((away @ self.rotation).T, self.resolution)
         return np.ascontiguousarray(pixels.T) - to_film, depth
 
     def _turned(self, v: Floats) -> Floats:
@@ -665,7 +666,7 @@ def image_size(size: tuple[int, int]) -> tuple[int, int]:
     return int(width), int(height)
 
 
-def _window(crop: Window | None, film: tuple[int, int]) -> Window:
+def _window(crop: Window | None, resolution: tuple[int, int]) -> Window:
     """Return the window that is rendered.
 
     Raises
@@ -673,7 +674,7 @@ def _window(crop: Window | None, film: tuple[int, int]) -> Window:
     SceneError
         If it is not four whole numbers, is empty, or leaves the picture.
     """
-    width, height = film
+    width, height = resolution
     if crop is None:
         return 0, 0, width, height
     try:

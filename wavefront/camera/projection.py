@@ -33,14 +33,14 @@ class Projection(Parametrized, ABC):
         return self
 
     @abstractmethod
-    def rays(self, x: Floats, y: Floats, film: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
+    def rays(self, x: Floats, y: Floats, size: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
         """Return the origins and directions of rays in camera space.
 
         Parameters
         ----------
         x, y
             (n,) film position in pixels.
-        film
+        size
             (width, height) of the whole picture in pixels.
         lens
             (2, n) numbers in [0, 1) that select the point on the lens; None for its center.
@@ -54,20 +54,20 @@ class Projection(Parametrized, ABC):
         """
 
     @abstractmethod
-    def project(self, points: Doubles, film: Size) -> tuple[Doubles, Doubles]:
+    def project(self, points: Doubles, size: Size) -> tuple[Doubles, Doubles]:
         """Return the film positions of points, the inverse of `rays` through the center of the lens.
 
         Parameters
         ----------
         points
             (3, n) in camera space, scene units.
-        film
+        size
             (width, height) of the whole picture in pixels.
 
         Returns
         -------
         pixels
-            (2, n) film position in pixels; NaN where a point cannot be seen, whatever the film's size.
+            (2, n) film position in pixels; NaN where a point cannot be seen by a picture of any size.
         depth
             (n,) scene units.
         """
@@ -80,7 +80,7 @@ class Projection(Parametrized, ABC):
         """
         return points
 
-    def check(self, film: Size) -> None:
+    def check(self, size: Size) -> None:
         """Check that every point of the film has a ray.
 
         Raises
@@ -150,9 +150,9 @@ class Perspective(Projection):
         lens.aperture, lens.focus = self.aperture * factor, self.focus * factor
         return lens
 
-    def rays(self, x: Floats, y: Floats, film: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
+    def rays(self, x: Floats, y: Floats, size: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
         """Return rays through the film, or from lens points to the points in focus."""
-        width, height = film
+        width, height = size
         sin, cos = sin_cos(np.float64(np.radians(self.fov) / 2))
         pitch = 2 * (sin / cos) / height
         direction = np.empty((3, len(x)), f4)
@@ -160,7 +160,7 @@ class Perspective(Projection):
         np.multiply(f4(height * (0.5 + self.shift[1])) - y, f4(pitch), out=direction[1])
         direction[2] = -1
         if self.skew != 0 or self.distortion is not None:
-            direction[0], direction[1] = self._undistorted(x.astype(np.float64), y.astype(np.float64), film)
+            direction[0], direction[1] = self._undistorted(x.astype(np.float64), y.astype(np.float64), size)
         if lens is None or not self.uses_lens:
             return None, direction
         offset = np.zeros_like(direction)
@@ -168,7 +168,7 @@ class Perspective(Projection):
         direction[:2] -= offset[:2] * f4(1 / self.focus)
         return offset, direction
 
-    def project(self, points: Doubles, film: Size) -> tuple[Doubles, Doubles]:
+    def project(self, points: Doubles, size: Size) -> tuple[Doubles, Doubles]:
         """Return perspective projections with distortion, and depths."""
         depth = -points[2]
         ahead = np.where(depth > 0, depth, np.nan)
@@ -176,7 +176,7 @@ class Perspective(Projection):
         if self.distortion is not None:
             seen = self.distortion.invertible(x, y)
             x, y = self.distortion.apply(np.where(seen, x, np.nan), np.where(seen, y, np.nan))
-        middle, focal = self._intrinsics(film)
+        middle, focal = self._intrinsics(size)
         return np.stack([(x + self.skew * y) * focal[0] + middle[0], y * focal[1] + middle[1]]), depth
 
     def in_focus(self, points: Doubles, offset: Doubles) -> Doubles:
@@ -186,37 +186,37 @@ class Perspective(Projection):
         ahead = np.where(points[2] < 0, -points[2], np.nan)
         return np.asarray(offset + (points - offset) * (self.focus / ahead))
 
-    def matrix(self, film: Size) -> Doubles:
+    def matrix(self, size: Size) -> Doubles:
         """Return the intrinsic matrix (3, 3), in pixels with centers at .5; distortion is no part of it."""
-        (cx, cy), (fx, fy) = self._intrinsics(film)
+        (cx, cy), (fx, fy) = self._intrinsics(size)
         return np.array([[fx, self.skew * fx, cx], [0, fy, cy], [0, 0, 1]])
 
-    def check(self, film: Size) -> None:
+    def check(self, size: Size) -> None:
         """Check that the distortion is invertible at a grid of film points."""
         if self.distortion is None:
             return
-        width, height = film
+        width, height = size
         at = np.stack(np.meshgrid(np.linspace(0, width, GRID), np.linspace(0, height, GRID))).reshape(2, -1)
-        x, y = self._seen(at[0], at[1], film)
+        x, y = self._seen(at[0], at[1], size)
         self.distortion.check(x, y, lambda k: f"the film point ({at[0, k]:.4g}, {at[1, k]:.4g})")
 
-    def _intrinsics(self, film: Size) -> tuple[tuple[float, float], tuple[float, float]]:
+    def _intrinsics(self, size: Size) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return the film point on the axis, and the focal lengths, (x, y) in pixels."""
-        width, height = film
+        width, height = size
         sin, cos = sin_cos(np.float64(np.radians(self.fov) / 2))
         focal = float(height / 2 * cos / sin)
         middle = width * (0.5 - self.shift[0]), height * (0.5 + self.shift[1])
         return middle, (focal / self.pixel_aspect, focal)
 
-    def _seen(self, x: Doubles, y: Doubles, film: Size) -> tuple[Doubles, Doubles]:
+    def _seen(self, x: Doubles, y: Doubles, size: Size) -> tuple[Doubles, Doubles]:
         """Convert film points in pixels to distorted points of the plane at distance 1, y down."""
-        middle, focal = self._intrinsics(film)
+        middle, focal = self._intrinsics(size)
         down = (y - middle[1]) / focal[1]
         return (x - middle[0]) / focal[0] - self.skew * down, down
 
-    def _undistorted(self, x: Doubles, y: Doubles, film: Size) -> tuple[Doubles, Doubles]:
+    def _undistorted(self, x: Doubles, y: Doubles, size: Size) -> tuple[Doubles, Doubles]:
         """Convert film points in pixels to points of the plane at distance 1, y up, without distortion."""
-        right, down = self._seen(x, y, film)
+        right, down = self._seen(x, y, size)
         if self.distortion is not None:
             right, down = self.distortion.undo(right, down)
         return right, -down
@@ -243,18 +243,18 @@ class Orthographic(Projection):
         """Return the film for a scene whose lengths were multiplied by `factor`."""
         return Orthographic(self.height * factor)
 
-    def rays(self, x: Floats, y: Floats, film: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
+    def rays(self, x: Floats, y: Floats, size: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
         """Return rays that start on the film, along the view axis."""
-        width, height = film
+        width, height = size
         pitch = f4(self.height / height)
         offset = np.zeros((3, len(x)), f4)
         np.multiply(x - f4(width / 2), pitch, out=offset[0])
         np.multiply(f4(height / 2) - y, pitch, out=offset[1])
         return offset, column((0, 0, -1))
 
-    def project(self, points: Doubles, film: Size) -> tuple[Doubles, Doubles]:
+    def project(self, points: Doubles, size: Size) -> tuple[Doubles, Doubles]:
         """Return parallel projections, and depths."""
-        width, height = film
+        width, height = size
         depth, pitch = -points[2], self.height / height
         x, y = np.where(depth >= 0, points[:2], np.nan)
         return np.stack([x / pitch + width / 2, height / 2 - y / pitch]), depth
@@ -266,9 +266,9 @@ class Panorama(Projection):
     It is the mapping of `wf.Environment`: the render of a camera that looks along +z is an environment.
     """
 
-    def rays(self, x: Floats, y: Floats, film: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
+    def rays(self, x: Floats, y: Floats, size: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
         """Return directions by longitude, to the right, and latitude, up."""
-        width, height = film
+        width, height = size
         sin, cos = sin_cos_turns((x - f4(width / 2)) * f4(1 / width))  # of the longitude
         height_up, level = sin_cos_turns((f4(height / 2) - y) * f4(0.5 / height))  # of the latitude
         direction = np.empty((3, len(x)), f4)
@@ -277,9 +277,9 @@ class Panorama(Projection):
         np.multiply(cos, -level, out=direction[2])
         return None, direction
 
-    def project(self, points: Doubles, film: Size) -> tuple[Doubles, Doubles]:
+    def project(self, points: Doubles, size: Size) -> tuple[Doubles, Doubles]:
         """Return longitude and latitude in pixels, and distances as depths."""
-        width, height = film
+        width, height = size
         x, y, z = points
         distance = np.sqrt(x * x + y * y + z * z)
         somewhere = np.where(distance > 0, 1, np.nan)

@@ -113,7 +113,7 @@ def _begin(
     The paths of one sample of all pixels follow each other in one sequence of random numbers, so that they
     are spread evenly over specular surfaces and lights.
     """
-    width, height = camera.film
+    width, height = camera.resolution
     address = (np.uint32(width * height % 2**32) + sample).astype(np.uint32), camera.address(pixel)
     choice = sampler.draw_2d(*address, 0, Dimension.SPECULAR_SURFACE).astype(np.float64)
     start = specular.sample(

@@ -64,7 +64,7 @@ class TrialJob:
             Guides paths if they are to be guided.
         """
         table = table if self.guided else None
-        samplers = tuple(make_sampler(seed, self.camera.film[0]) for seed in self.seeds)
+        samplers = tuple(make_sampler(seed, self.camera.resolution[0]) for seed in self.seeds)
         return _trace(scene, self.camera, samplers, self.max_bounces, table, self.pixels, self.reuse)
 
     def __str__(self) -> str:
@@ -156,7 +156,7 @@ def _blocks(scene: CompiledScene, camera: Camera, samplers: tuple[Sampler, ...],
 
 def _elsewhere(pixel: Words, camera: Camera, times: int) -> Words:
     """Return addresses (n,) of random numbers for pixels (n,) that no pixel of the picture has."""
-    return pixel + np.uint32(times * camera.film[0] * camera.film[1] % 2**32)
+    return pixel + np.uint32(times * camera.resolution[0] * camera.resolution[1] % 2**32)
 
 
 class RayCounter:

@@ -48,7 +48,7 @@ class CameraJob:
         if pixels.size <= width:
             yield pixels
             return
-        order, cuts = whole_tiles(self.camera.address(pixels), self.camera.film[0])
+        order, cuts = whole_tiles(self.camera.address(pixels), self.camera.resolution[0])
         start = 0
         while start < pixels.size:
             fitting = int(np.searchsorted(cuts, start + width, side="right"))

@@ -123,7 +123,7 @@ def _trace_wave(tracer: Tracer, monitor: WaveMonitor, job: Job) -> WaveResult:
         deadline = max(deadline, begin + FIRST_SAMPLE_TIMEOUT)
     accelerator = MonitoredAccelerator(tracer.scene.accelerator, monitor, deadline)
     scene = replace(tracer.scene, accelerator=accelerator)
-    sampler = tracer.sampler(camera.film[0])
+    sampler = tracer.sampler(camera.resolution[0])
     paths = generate(scene, camera, sampler, np.tile(job.pixels, n), _samples(job), tracer.filter)
     recorder = SampleRecorder(tracer.layers, scene, k * n, tracer.clamp) if tracer.layers else None
     if recorder is not None:

@@ -45,7 +45,7 @@ def learn_guide(settings: Settings, scene: CompiledScene, camera: Camera) -> Gui
     camera
         In the unit of the compiled scene.
     """
-    sampler = make_sampler(settings.values["sampler"], settings.pilot_seed(), camera.film[0])
+    sampler = make_sampler(settings.values["sampler"], settings.pilot_seed(), camera.resolution[0])
     return train(scene, camera, sampler, settings.values["max_bounces"])
 
 
@@ -67,7 +67,7 @@ def choose(
     asked = Choice(1 if branches == AUTO else int(branches), settings.values["reuse"] is True)
     if not settings.is_full:
         return asked
-    whole = camera.cropped((0, 0, *camera.film))  # a window is a part of the same picture
+    whole = camera.cropped((0, 0, *camera.resolution))  # a window is a part of the same picture
     trial = partial(_trial, settings, scene, whole, run)
     if settings.values["guide"] == AUTO and has_guide:
         return _choose_guide(settings, asked, trial)

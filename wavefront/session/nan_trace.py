@@ -40,7 +40,7 @@ def first_fault(user_scene: Scene, tracer: Tracer, view: CameraJob, pixels: Word
         Its number.
     """
     camera = view.camera
-    sampler = tracer.sampler(camera.film[0])
+    sampler = tracer.sampler(camera.resolution[0])
     samples = np.full(pixels.size, sample, np.uint32)
     paths = generate(tracer.scene, camera, sampler, pixels, samples, tracer.filter)
     recorder = paths.recorder = FaultRecorder(user_scene, tracer.layers)
@@ -55,7 +55,7 @@ def _fault_of_light(tracer: Tracer, camera: Camera, pixels: Words, samples: Word
     """Return where a path from a light brings a value that is not finite; "" where none does."""
     if tracer.scene.specular_surfaces is None:
         return ""
-    sampler = tracer.sampler(camera.film[0])
+    sampler = tracer.sampler(camera.resolution[0])
     for scatterings in range(2, tracer.max_bounces + 1):
         splats = trace_light(tracer.scene, camera, sampler, pixels, samples, scatterings)
         if not np.isfinite(splats.radiance).all():

@@ -195,7 +195,7 @@ class ViewRender:
             "background": _background_label(settings.values["background"]),
             **settings.labels(),
             "sample_ranges": [[first, first + most]],
-            "film": list(self.camera.film),
+            "film": list(self.camera.resolution),
             "window": list(self.camera.window),
             "branches": plan.choice.branches,
             "guided": plan.choice.guided,

@@ -57,6 +57,6 @@ def center_rays(scene: CompiledScene, camera: Camera, pixel: Words) -> Rays:
 
 def _corners(camera: Camera, address: Words) -> tuple[Floats, Floats]:
     """Return the film points (n,), (n,) of the upper left corners of pixels (n,) of the whole picture."""
-    width = np.uint32(camera.film[0])
+    width = np.uint32(camera.resolution[0])
     row = address // width
     return (address - row * width).astype(f4), row.astype(f4)

@@ -318,7 +318,7 @@ class Page:
 
     def _send(self, codes: NDArray[np.uint8], frame: ViewerFrame, image: Image) -> None:
         """Send a picture, unless the page would stretch it, and the line about it."""
-        if not self._sized or not _same_shape(frame.camera.film, self.viewpoint.size):
+        if not self._sized or not _same_shape(frame.camera.resolution, self.viewpoint.size):
             return
         last = frame.final and (image is frame.image or image.spp == frame.image.spp)
         kind = {"format": "png"} if last else {"format": "jpeg", "jpeg_quality": QUALITY}
@@ -332,7 +332,8 @@ class Page:
         self._state.content = _line(
             f"{width} × {height} · {frame.image.spp}{of} spp{error}{self._about(frame, image)}"
         )
-        if (width, height) == frame.camera.film:  # not with the first picture of a view, which is in a hurry
+        # not with the first picture of a view, which is in a hurry
+        if (width, height) == frame.camera.resolution:
             self._copy.content = self._copy_button()
         self._server.flush()  # viser would wait for more messages
 

@@ -113,8 +113,8 @@ class Refiner:
 
     def _render(self, camera: Camera, change: int) -> None:
         """Show pictures of a view until it is done or another one is wanted."""
-        size = self._small(camera.film)
-        if size != camera.film:
+        size = self._small(camera.resolution)
+        if size != camera.resolution:
             self._show_first(camera, size)
         self._looked_at.wait(PATIENCE)
         self.refine()

@@ -284,7 +284,7 @@ def _opened(
     viewpoint = Viewpoint.of(camera, scene.bounds, up)
     aovs = settings.pop("aovs", ())
     wanted = (*((aovs,) if isinstance(aovs, str) else aovs), *VIEWER_LAYERS)
-    width, height = (max(1, side // FIRST_DIVISOR) for side in viewpoint.camera.film)
+    width, height = (max(1, side // FIRST_DIVISOR) for side in viewpoint.camera.resolution)
     settings |= {"camera": viewpoint.camera, "size": (width, height), "aovs": wanted, "progress": False}
     if settings.get("wave_size") is None:
         settings["wave_size"] = WAVE_SIZE

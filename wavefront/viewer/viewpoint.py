@@ -111,8 +111,8 @@ class Viewpoint:
             round(float(np.clip(lens.fov, *FOV)), FOV_DIGITS),
             lens.aperture,
             lens.focus if lens.aperture > 0 else float(f"{distance:.3g}"),  # where the page's slider begins
-            camera.film,
-            camera.film[0] * camera.film[1],
+            camera.resolution,
+            camera.resolution[0] * camera.resolution[1],
         )
 
     def moved(self, origin: Any, target: Any, up: Any) -> Viewpoint:
