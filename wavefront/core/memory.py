@@ -35,26 +35,21 @@ def address_space_left() -> float:
 
 def available_memory() -> float:
     """Return the number of bytes that can still be allocated; infinite where it is unknown."""
-    return min(address_space_left(), _free_memory())
-
-
-def _free_memory() -> float:
-    """Return how many bytes the machine can provide without swapping."""
-    try:
-        lines = Path("/proc/meminfo").read_text().splitlines()
-    except OSError:
-        return math.inf
-    found = (line.split() for line in lines if line.startswith("MemAvailable:"))
-    return next((1024 * int(words[1]) for words in found), math.inf)
+    return min(address_space_left(), _bytes_in("/proc/meminfo", "MemAvailable:", math.inf))
 
 
 def resident_memory() -> int:
     """Return how many bytes of memory this process uses now; a guess where the system does not say."""
+    return int(_bytes_in("/proc/self/smaps_rollup", "Pss:", UNKNOWN_RESIDENT))
+
+
+def _bytes_in(path: str, name: str, unknown: float) -> float:
+    """Return the number of bytes that a file of Linux has, in kB, beside a name."""
     try:
-        lines = Path("/proc/self/smaps_rollup").read_text().splitlines()
+        lines = Path(path).read_text().splitlines()
     except OSError:
-        return UNKNOWN_RESIDENT
-    return next((1024 * int(line.split()[1]) for line in lines if line.startswith("Pss:")), UNKNOWN_RESIDENT)
+        return unknown
+    return next((1024 * int(line.split()[1]) for line in lines if line.startswith(name)), unknown)
 
 
 def memory_size(name: str, value: Any) -> int:

@@ -8,9 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays.vec import Bytes
-from ..core.counted import counted
 from ..core.errors import RenderError, warn_caller
-from ..core.memory import check_memory
 from ..film.aov_names import layer_of
 from ..film.film import Film
 from ..film.light_sums import LightSums
@@ -43,25 +41,13 @@ def picture_memory(size: Sequence[int], layers: Sequence[str] = (), light_paths:
     return (sums + picture) * size[0] * size[1] + SPARE_BYTES
 
 
-def check_picture_memory(size: Sequence[int], layers: Sequence[str] = (), light_paths: bool = False) -> None:
-    """Check that there is the memory of `picture_memory`, or raise a SceneError."""
-    having = f" with {counted(len(layers), 'layer')}" if layers else ""
-    memory = picture_memory(size, layers, light_paths)
-    check_memory(f"a picture of {size[0]}x{size[1]} pixels{having}", memory)
-
-
 class Accumulator:
-    """Sums over all jobs that are done.
+    """Sums over all jobs that are done; `make_budget` checks before that there is memory for them.
 
     Parameters
     ----------
     size, layers, light_paths
         As for `picture_memory`.
-
-    Raises
-    ------
-    SceneError
-        If there is not enough memory for the sums and the picture.
 
     Attributes
     ----------
@@ -74,7 +60,6 @@ class Accumulator:
     """
 
     def __init__(self, size: Sequence[int], layers: Sequence[str] = (), light_paths: bool = False) -> None:
-        check_picture_memory(size, layers, light_paths)
         self.sums = empty_sums(size, layers, light_paths)
         self.bad, self.rays = BadSamples(), 0
         # for the picture so far when memory has run out

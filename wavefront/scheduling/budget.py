@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..arrays.record import record
+from ..core.counted import counted
 from ..core.errors import SceneError
-from ..core.memory import megabytes, resident_memory
+from ..core.memory import check_memory, megabytes, resident_memory
 from .accumulator import picture_memory
 from .scheduler import SMALL_WAVE, default_wave_size
 
@@ -40,26 +41,26 @@ def make_budget(
     ----------
     max_memory
         Bytes that this process, with what it uses already, and its workers may use; None for any.
-    size
-        (width, height) of the picture, for which no memory is in use yet.
+    size, layers, light_paths
+        As for `picture_memory`, of a picture for which no memory is in use yet.
     workers, wave_size
         The most of each; a `wave_size` of None stands for what suits so many workers.
     processes
         Whether workers are processes.
-    layers
-        The sampled layers of the picture.
-    light_paths
-        Whether paths from lights are summed up, too.
 
     Raises
     ------
     SceneError
-        If even one worker with a small wave needs more than `max_memory`.
+        If the picture needs more memory than is available, or even one worker with a small wave needs more
+        than `max_memory`.
     """
+    picture = picture_memory(size, layers, light_paths)
+    having = f" with {counted(len(layers), 'layer')}" if layers else ""
+    check_memory(f"a picture of {size[0]}x{size[1]} pixels{having}", picture)
     if max_memory is None:
         return Budget(workers, wave_size or default_wave_size(workers))
     fixed = PROCESS_BYTES if processes else THREAD_BYTES
-    in_use, picture = resident_memory(), picture_memory(size, layers, light_paths)
+    in_use = resident_memory()
     worker = fixed + min(LEAST_WAVE, wave_size or LEAST_WAVE) * LANE_BYTES
     left = max_memory - in_use - picture
     if left < worker:

@@ -139,14 +139,12 @@ class RenderLoop:
         given: deque[Job] = deque()  # to the pool; their results have not come yet
 
         def remember(jobs: Iterator[Job]) -> Iterator[Job]:
-            while True:
-                try:
-                    given.append(next(jobs))
-                except StopIteration:
-                    return
-                except MemoryError as error:  # no further jobs would come
-                    raise RenderError(f"out of memory: {error}") from error
-                yield given[-1]
+            try:
+                for job in jobs:
+                    given.append(job)
+                    yield job
+            except MemoryError as error:  # no further jobs would come
+                raise RenderError(f"out of memory: {error}") from error
 
         while True:
             try:

@@ -22,7 +22,7 @@ from ..film.checkpoint import Checkpoint
 from ..image import Image
 from ..integrators.tuning_job import TrialJob, TrialPart
 from ..io.to_scene import as_scene, choose_camera
-from ..scheduling.accumulator import Accumulator, check_picture_memory
+from ..scheduling.accumulator import Accumulator
 from ..scheduling.blas import reserve_buffers
 from ..scheduling.executors import shares_scene
 from ..scheduling.interrupt import InterruptHandler
@@ -108,7 +108,6 @@ class Session:
         camera, framed = choose_camera(
             scene, values["camera"], values["size"], values["up"], values["view"], values["fov"]
         )
-        check_picture_memory(camera.size, light_paths=values["caustics"])
         # before work, for what takes least; again when the memory of the scene is known
         settings.budget(camera.size, values["executor"] or "threads")
         self._scene = PreparedScene(scene, settings, camera if framed else None)
