@@ -61,12 +61,7 @@ BLACK = {
         {},
         "the camera sees only the sides of surfaces that are turned away from the lights",
     ),
-    "camera inside": (
-        [BALL, SHELL, EMITTER],
-        [],
-        {},
-        "the camera is inside 'shell', where no light gets in",
-    ),
+    "camera inside": ([BALL, SHELL, EMITTER], [], {}, "the camera is inside 'shell', where no light gets in"),
     "camera inside, light around": (
         [BALL, SHELL],
         [wf.Environment(1)],

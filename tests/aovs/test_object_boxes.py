@@ -91,7 +91,6 @@ def test_masks_by_name_and_by_id() -> None:
 
 @pytest.mark.parametrize("crop", [None, (7, 5, 40, 33)])
 def test_motion_leads_to_what_the_other_camera_sees(crop) -> None:
-    """Where nothing hides it, the position there is the same."""
     other = wf.Camera.look_at((0.5, 1.2, 5.5), (0, 0, 0), fov=42, size=(60, 40), crop=crop)
     shapes = [wf.Sphere((0, 0, 0), 1), wf.Rectangle((-1.5, -1, -4), (0, 0, 6), (4, 0, 0))]
     scene = wf.Scene(shapes, [SKY])

@@ -85,7 +85,6 @@ def test_parts_sum_to_the_picture(integrator: str) -> None:
 
 
 def test_layers_that_are_not_asked_for_are_not_made() -> None:
-    """Only those that are, with their errors."""
     plain = render(room(8), 2)
     assert plain.layers == plain.light_groups == plain.coverage == {}
     image = render(room(8), 2, aovs="indirect")
@@ -124,7 +123,6 @@ def test_direct_light_is_that_of_direct_mis(integrator: str) -> None:
 
 
 def test_branches_change_no_layer() -> None:
-    """Up to noise: here indirect light and the guide behind glass."""
     one = render(room(16), 256, aovs=EVERYTHING, seed=1)
     three = render(room(16), 128, aovs=EVERYTHING, seed=2, branches=3)
     for name in ("direct", "indirect", "denoising_albedo", "denoising_normal", "light_groups.sky"):
@@ -181,7 +179,6 @@ def test_albedo_of_mirrors_is_their_tint_and_of_lights_and_misses_0() -> None:
 
 
 def test_guides_go_through_glass() -> None:
-    """To what is behind it, or what it reflects, which here are alike."""
     shell = wf.Sphere((0, 0, 0), 20, material=wf.Diffuse((0.3, 0.6, 0.2)))
     ball = wf.Sphere((0, 0, 0), 1, material=wf.Dielectric(1.5))
     camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), fov=20, size=(8, 8))
@@ -192,7 +189,6 @@ def test_guides_go_through_glass() -> None:
 
 @pytest.mark.parametrize("opacity", [1.0, 0.3])
 def test_alpha_of_a_disk_is_its_area(opacity: float) -> None:
-    """Filtered like the picture; what is partly there counts as much."""
     material = wf.Material(wf.Diffuse(0.5), alpha=opacity)
     disk = wf.Disk((0, 0, 0), (0, 0, 1), 0.7, material=material)
     camera = wf.Camera.look_at((0, 0, 5), (0, 0, 0), fov=2 * np.degrees(np.arctan(1 / 5)), size=(16, 16))
@@ -281,7 +277,6 @@ def assert_same_bits(a: wf.Image, b: wf.Image) -> None:
 
 @pytest.mark.parametrize("branches", [1, 2])
 def test_bits_depend_on_neither_workers_nor_waves(branches: int) -> None:
-    """For threads, processes and waves of odd sizes."""
     options = {"aovs": EVERYTHING, "branches": branches, "progress": False, "accel": "numpy"}
     one = wf.render(room(12), 13, workers=1, **options)
     for workers, wave, executor in (
@@ -398,7 +393,6 @@ def into_two(scene, paths, sampler, max_bounces):
 
 
 def test_own_integrators_give_layers() -> None:
-    """If they are made of stages, even where they shade no surface."""
     image = render(room(), 4, integrator=only_emission, aovs=EVERYTHING)
     full = render(room(), 4, aovs=EVERYTHING)
     for name in ("alpha", "albedo"):
@@ -419,7 +413,6 @@ def test_own_integrators_give_layers() -> None:
     ],
 )
 def test_what_an_integrator_cannot_give_is_an_error(integrator, layer: str, message: str) -> None:
-    """It names the integrator, the layer and what is missing."""
     with pytest.raises(wf.SceneError, match=message):
         render(room(8), 1, integrator=integrator, aovs=layer)
 
@@ -472,7 +465,6 @@ class Faulty(Plain):
 
 
 def test_samples_that_are_not_finite_count_in_no_layer() -> None:
-    """They are dropped in all layers alike, as in the picture."""
     scene = plane_of(Faulty())
     scene.camera = scene.camera.resized((32, 32))
     with pytest.raises(wf.RenderError) as caught:
@@ -522,7 +514,6 @@ def test_paths_may_end_at_the_first_primitive() -> None:
     ],
 )
 def test_groups_are_names(make, message: str) -> None:
-    """Anything else is an error."""
     with pytest.raises(wf.SceneError, match=message):
         make()
 

@@ -402,7 +402,6 @@ def test_clear_base(thin):
 
 
 def test_clear_coat():
-    """KHR_materials_clearcoat, darkened for both directions."""
     base = Principled(COLOR, 0.5, 0.5)
     bsdf = Principled(COLOR, 0.5, 0.5, clearcoat=0.8, clearcoat_roughness=0.4)
     wo, wi = pairs()

@@ -37,11 +37,7 @@ EXAMPLES = {
         {"reflectance": 0.7, "sigma": 0.0},
         {"reflectance": (1, 0.5, 0.1), "sigma": 1.0, "energy_preserving": True},
     ],
-    ThinDielectric: [
-        {},
-        {"ior": 1.7, "roughness": 0.3, "transmittance": (1, 0.5, 0)},
-        {"roughness": 1.0},
-    ],
+    ThinDielectric: [{}, {"ior": 1.7, "roughness": 0.3, "transmittance": (1, 0.5, 0)}, {"roughness": 1.0}],
     Principled: [
         {},
         {"base_color": (0.9, 0.5, 0.1), "metallic": 1.0, "roughness": 0.3},

@@ -74,7 +74,6 @@ def test_albedo_is_what_samples_scatter(bsdf: wf.Bsdf) -> None:
 
 
 def test_the_layer_shows_it() -> None:
-    """A pane of tinted glass, seen from in front."""
     glass = wf.Dielectric(1.5, reflectance=(0.9, 0.3, 0.1), transmittance=(0.2, 0.6, 1))
     pane = wf.Rectangle((-2, -2, 0), (4, 0, 0), (0, 4, 0), material=glass)
     camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), fov=2, size=(4, 4))

@@ -51,7 +51,6 @@ def test_wrong_shapes_are_named(spoiled: str, message: str, alone: bool) -> None
 
 
 def test_the_default_sampling_does_not_hide_it() -> None:
-    """An f of (n,) would render gray by the naive integrator."""
 
     class Phong(wf.Bsdf):
         def f(self, wo, wi):

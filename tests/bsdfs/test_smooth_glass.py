@@ -61,7 +61,6 @@ def test_every_clear_material_keeps_its_light(name, integrator):
 
 
 def test_rough_glass_loses_no_more_than_on_a_sphere():
-    """It loses what meets a facet twice, on both alike."""
     glass = wf.Dielectric(1.5, 0.1)
     facets, sphere = furnace(ball(2, glass), spp=8), furnace(wf.Sphere((0, 0, 0), 1, material=glass), spp=8)
     assert facets.error + sphere.error < 6e-4

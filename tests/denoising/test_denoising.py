@@ -55,7 +55,6 @@ def denoiser(request):
 
 
 def test_error_and_mean(denoiser) -> None:
-    """A quarter of the error at most; the mean stays."""
     image, exact = scene_like()
     found = image.denoise(denoiser)
     assert relative_mse(found, exact) < 0.25 * relative_mse(image, exact)
@@ -66,7 +65,6 @@ def test_error_and_mean(denoiser) -> None:
 
 
 def test_guides_help(denoiser) -> None:
-    """Without them textures blur."""
     image, exact = scene_like()
     alone = wf.Image(image.rgb, standard_error=image.standard_error).denoise(denoiser)
     assert relative_mse(image.denoise(denoiser), exact) < 0.8 * relative_mse(alone, exact)
@@ -99,7 +97,6 @@ def again(image, path):
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 9), (2, 3), (70, 5)])
 def test_small_pictures(denoiser, size) -> None:
-    """Are denoised too."""
     image, _ = scene_like(size)
     found = image.denoise(denoiser)
     assert found.rgb.shape == image.rgb.shape
@@ -122,7 +119,6 @@ def test_values_that_are_not_finite(denoiser) -> None:
 
 
 def test_black_and_flat_pictures(denoiser) -> None:
-    """Stay as they are."""
     for value in (0.0, 0.5):
         flat = wf.Image(
             np.full((20, 20, 3), value, np.float32), standard_error=np.zeros((20, 20, 3), np.float32)
@@ -140,7 +136,6 @@ def test_without_errors(denoiser) -> None:
 
 
 def test_rows_do_not_depend_on_each_other(monkeypatch) -> None:
-    """Non-local means filter some rows at a time."""
     image, _ = scene_like()
     whole = image.denoise("nonlocal_means").rgb
     monkeypatch.setattr("wavefront.denoising.nonlocal_means.ROWS", 5)
@@ -148,7 +143,6 @@ def test_rows_do_not_depend_on_each_other(monkeypatch) -> None:
 
 
 def test_holes() -> None:
-    """Take the mean of the nearest finite pixels."""
     values = np.arange(24, dtype=np.float32).reshape(4, 2, 3)
     values[1, 0, 2] = np.nan
     filled = without_holes(values)
@@ -209,7 +203,6 @@ def test_error_at_16_samples(name, tmp_path) -> None:
 
 
 def test_session() -> None:
-    """Its last picture is that of render; those before are noisy."""
     settings = {"size": (16, 12), "lighting": "even", "progress": False, "denoise": True}
     with wf.Session(wf.Sphere((0, 0, 0), 1), 4, **settings) as session:
         images = list(session)
@@ -218,7 +211,6 @@ def test_session() -> None:
 
 
 def test_command(tmp_path, capsys) -> None:
-    """--denoise writes both pictures into an exr."""
     path = tmp_path / "ball.ply"
     path.write_text(
         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
@@ -234,7 +226,6 @@ def test_command(tmp_path, capsys) -> None:
 
 
 def test_merging_denoised_pictures() -> None:
-    """Merges the noisy ones."""
     settings = {"size": (8, 6), "lighting": "even", "progress": False}
     ball = wf.Sphere((0, 0, 0), 1)
     one, other = (wf.render(ball, samples=part, denoise=True, **settings) for part in (range(4), range(4, 8)))

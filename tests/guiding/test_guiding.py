@@ -98,7 +98,6 @@ def test_solid_angles_of_bins_are_those_of_their_triangles() -> None:
 
 
 def test_bins_have_eight_neighbors_that_differ() -> None:
-    """But for the corners of the square, which are one direction."""
     near = neighbors(8)
     for number in range(64):
         row, column = divmod(number, 8)
@@ -283,7 +282,6 @@ def test_guided_pictures_do_not_depend_on_workers_or_waves(options: dict[str, ob
 
 
 def test_another_view_is_what_a_render_of_it_is() -> None:
-    """The guide of a session is trained anew for each camera."""
     scene = lamp_at_the_ceiling()
     other = wf.Camera.look_at((1, 1, 4.5), (2, 1.2, 0), fov=50, size=(16, 16))
     with wf.Session(scene, 4, guide=True, progress=False) as session:
@@ -318,7 +316,6 @@ def test_the_pilot_holds_blas_to_one_thread(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_nothing_to_guide() -> None:
-    """Where no path scatters, guiding changes nothing."""
     scene = [wf.Sphere((0, 0, 0), 1, material=wf.Mirror()), wf.Environment(1)]
     one, other = (wf.render(scene, 4, size=(16, 16), guide=guide, progress=False) for guide in (True, False))
     assert np.array_equal(one.rgb, other.rgb)

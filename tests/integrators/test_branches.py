@@ -22,7 +22,6 @@ def shade_and_sun(size: tuple[int, int] = (8, 8)) -> wf.Scene:
 @pytest.mark.parametrize("branches", [2, 5])
 @pytest.mark.parametrize("sampler", ["sobol", "bluenoise", "independent"])
 def test_branches_keep_the_mean(sampler: str, branches: int) -> None:
-    """Light of up to eight bounces, with a mirror, glass and caustics."""
     options = {"max_bounces": 8, "sampler": sampler}
     usual = repeat(scenes.room(), 64, **options)
     other = repeat(scenes.room(), 32, branches=branches, first_seed=100, **options)
@@ -62,7 +61,6 @@ def test_branches_take_noise_off_indirect_light() -> None:
     "cut", [{"wave_size": 1}, {"wave_size": 50}, {"wave_size": 64, "workers": 3}, {"workers": 2}]
 )
 def test_waves_and_workers_change_no_bit(cut: dict) -> None:
-    """Numbers go by path and branch, and light is added in one order."""
     scene = scenes.everything((7, 5))
     whole = render(scene, 3, branches=3)
     assert render(scene, 3, branches=3, **cut).rgb.tobytes() == whole.rgb.tobytes()

@@ -58,11 +58,7 @@ def scene(material: Any = GLASS, lights: Any = None, **camera: Any) -> wf.Scene:
 def arrays(image: wf.Image) -> dict[str, np.ndarray]:
     """Return all arrays of a picture by name."""
     found = {name: getattr(image, name) for name in ("rgb", "variance", "standard_error", "counts")}
-    return {
-        **found,
-        **image.layers,
-        **{f"error of {name}": error for name, error in image.errors.items()},
-    }
+    return {**found, **image.layers, **{f"error of {name}": error for name, error in image.errors.items()}}
 
 
 def digest(image: wf.Image) -> dict[str, str]:
@@ -122,7 +118,6 @@ def test_no_bit_depends_on_workers_executor_or_waves(settings: dict[str, Any]) -
 
 
 def test_light_paths_change_the_picture() -> None:
-    """And the seed changes them, so that the tests of bits can fail."""
     plain, seeded = (
         wf.render(scene(), 8, **{**EVERY, **other}) for other in ({"caustics": False}, {"seed": 1})
     )
@@ -132,7 +127,6 @@ def test_light_paths_change_the_picture() -> None:
 
 
 def test_no_bit_depends_on_embree_where_numpy_traces(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whether it is installed."""
     expected = digest(wf.render(scene(), 8, **EVERY, accel="numpy"))
     for module in ("embreex", "embreex.rtcore_scene", "embreex.mesh_construction"):
         monkeypatch.setitem(sys.modules, module, None)
@@ -143,7 +137,6 @@ def test_no_bit_depends_on_embree_where_numpy_traces(monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_no_bit_depends_on_a_lack_of_memory(workers: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where light paths find none, waves are halved."""
     trace, tried = tracing.trace_light, []
 
     def limited(*given: Any) -> Any:
@@ -159,7 +152,6 @@ def test_no_bit_depends_on_a_lack_of_memory(workers: int, monkeypatch: pytest.Mo
 
 
 def test_sessions_show_the_pictures_of_fewer_samples() -> None:
-    """And set_camera those of another view."""
     other = wf.Camera.look_at((1, 2, 5), (0, 0.7, 0), fov=40, size=(20, 14))
     with wf.Session(scene(), 8, **EVERY) as session:
         found = {image.spp: digest(image) for image in session}
@@ -172,7 +164,6 @@ def test_sessions_show_the_pictures_of_fewer_samples() -> None:
 
 
 def test_views_are_single_renders() -> None:
-    """One after the other, with the same workers."""
     cameras = wf.turntable(scene(), 3, size=(16, 12))
     for camera, image in zip(cameras, wf.render_many(scene(), cameras, 4, **EVERY), strict=True):
         assert digest(image) == digest(wf.render(scene(), 4, camera=camera, **EVERY))
@@ -220,7 +211,6 @@ def test_parts_merge_to_the_whole(kept: str, tmp_path: Path) -> None:
 
 
 def test_parts_of_equal_length_have_the_errors_of_the_whole() -> None:
-    """But for rounding."""
     merged, image = part(0, 16).merge(part(16, 32)), wf.render(scene(), 32, **EVERY)
     assert digest(merged)["rgb"] == digest(image)["rgb"]
     np.testing.assert_allclose(merged.standard_error, image.standard_error, rtol=1e-3, atol=1e-6)
@@ -228,7 +218,6 @@ def test_parts_of_equal_length_have_the_errors_of_the_whole() -> None:
 
 
 def test_films_with_light_paths_are_restored_from_their_arrays() -> None:
-    """And take as much memory as is counted for them."""
     films = [Film(3, 2, light_paths) for light_paths in (True, True, False)]
     films[0].add(np.arange(6, dtype=np.uint32), np.ones((3, 2, 6), f4))
     films[0].light.add(0, 12, np.array([1, 4, 1], np.uint32), np.full((3, 3), 2, f4))
@@ -259,7 +248,6 @@ def test_files_without_caustics_are_as_before(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("before", [False, True])
 def test_files_of_the_other_kind_are_refused(before: bool, tmp_path: Path) -> None:
-    """By the name of the setting alone."""
     path, words = tmp_path / "a.wfck", f"caustics was {before} and is {not before}"
     image = part(0, 2, caustics=before, checkpoint=path)
     with pytest.raises(wf.SceneError, match=rf"a\.wfck: is the checkpoint of another render: {words};"):
@@ -270,7 +258,6 @@ def test_files_of_the_other_kind_are_refused(before: bool, tmp_path: Path) -> No
 
 @pytest.mark.parametrize("name", ["paths", "0.high", "3.low"])
 def test_damaged_sums_are_named(name: str, tmp_path: Path) -> None:
-    """Where an array of them is missing, or too short."""
     part(0, 2).save(tmp_path / "a.npz")
     with np.load(tmp_path / "a.npz") as archive:
         found = dict(archive)
@@ -308,7 +295,6 @@ def own_filter(u: Any) -> Any:
     ],
 )
 def test_what_does_not_go_with_it_is_refused_before_work(settings: dict[str, Any], message: str) -> None:
-    """With the name, the value and what it must be."""
     for call in (wf.render, wf.Session):
         with pytest.raises(wf.SceneError) as caught:
             call("no such file", **{"caustics": True, **settings})
@@ -316,7 +302,6 @@ def test_what_does_not_go_with_it_is_refused_before_work(settings: dict[str, Any
 
 
 def test_the_metadata_tell_of_it() -> None:
-    """Numbers of NumPy count as True and False."""
     for given_value in (True, np.True_, False):
         image = wf.render(scene(), 1, caustics=given_value, progress=False)
         assert image.metadata["caustics"] is bool(given_value)
@@ -336,16 +321,13 @@ def test_the_metadata_tell_of_it() -> None:
         ({"lights": [wf.Environment(1), wf.PointLight((0, 2.5, 0), 0)]}, {}, False),
     ],
 )
-def test_a_hint_tells_where_light_is_missing(
-    arguments: dict[str, Any], settings: dict[str, Any], missing: bool
-) -> None:
+def test_a_hint_tells_where_light_is_missing(arguments, settings, missing):
     """Where there are lights that no path can meet beside smooth glass or mirrors."""
     hint = wf.render(scene(**arguments), 1, progress=False, **settings).metadata["hint"]
     assert (hint is not None and "caustics=True adds it" in hint) == missing
 
 
 def test_re_use_is_never_chosen_with_it() -> None:
-    """In a picture that is large enough for a trial."""
     camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), size=(512, 512))
     assert _may_reuse(Settings(), camera)
     assert not _may_reuse(Settings(caustics=True), camera)
@@ -420,7 +402,6 @@ def spoiled_scene(kind: type[SpoiledLights]) -> wf.Scene:
 
 
 def test_splats_that_are_not_finite_are_dropped_counted_and_named() -> None:
-    """Not lost in silence; those of other paths stay."""
     with pytest.raises(wf.RenderError, match="samples were not finite and were dropped; first: ") as caught:
         wf.render(spoiled_scene(SeldomSpoiledLights), 8, caustics=True, **ALONE)
     assert "of the path from the light" in str(caught.value)
@@ -439,7 +420,6 @@ def test_splats_that_are_not_finite_are_dropped_counted_and_named() -> None:
 
 
 def test_direct_light_is_as_without_and_the_rest_is_indirect() -> None:
-    """Also in the errors of these layers."""
     found, plain = (wf.render(scene(), 8, **{**EVERY, "caustics": each}) for each in (True, False))
     for name in set(arrays(plain)) - {"rgb", "variance", "standard_error", "indirect", "error of indirect"}:
         assert digest(found)[name] == digest(plain)[name], name
@@ -453,7 +433,6 @@ def test_direct_light_is_as_without_and_the_rest_is_indirect() -> None:
 
 
 def test_indirect_light_needs_no_other_layer() -> None:
-    """Nor does the picture need the layer."""
     image = wf.render(scene(), 8, caustics=True, aovs="indirect", progress=False)
     assert digest(image)["indirect"] == whole()["indirect"]
     assert digest(wf.render(scene(), 8, caustics=True, progress=False))["rgb"] == whole()["rgb"]
@@ -472,7 +451,6 @@ def test_a_clamp_leaves_light_paths_alone() -> None:
 
 
 def test_denoising_starts_from_the_whole_picture() -> None:
-    """`noisy` is what there is without it."""
     image = wf.render(scene(), 8, caustics=True, denoise=True, progress=False)
     assert image.layers["noisy"].tobytes() == wf.render(scene(), 8, **EVERY).rgb.tobytes()
     assert np.isfinite(image.rgb).all()
@@ -511,10 +489,7 @@ def test_sums_are_those_of_each_pixel(found: list[tuple[int, float]]) -> None:
 
 
 @given(splats, st.randoms(use_true_random=False), st.integers(0, 60))
-def test_no_bit_of_sums_depends_on_order_or_parts(
-    found: list[tuple[int, float]], shuffler: Any, cut: int
-) -> None:
-    """In one go, in two, or merged."""
+def test_no_bit_of_sums_depends_on_order_or_parts(found, shuffler, cut):
     shuffled = list(found)
     shuffler.shuffle(shuffled)
     expected = bits(summed(found, 14))
@@ -609,10 +584,7 @@ def test_memory_counts_them(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
     ids=["nothing smooth", "rough glass", "light all around", "a sun"],
 )
-def test_scenes_without_specular_surfaces_or_placed_lights_cost_nothing(
-    arguments: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """No light path is traced, and all is as without them."""
+def test_scenes_without_specular_surfaces_or_placed_lights_cost_nothing(arguments, monkeypatch):
     monkeypatch.delattr(tracing, "trace_light")
     subject = scene(**arguments)
     found, plain = (wf.render(subject, 4, **{**EVERY, "caustics": each, **ALONE}) for each in (True, False))
@@ -677,10 +649,7 @@ newmtl lamp\nKd 0 0 0\nKe 90 90 90
 """
 
 
-def test_the_command_line_renders_resumes_and_merges(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """As the function does."""
+def test_the_command_line_renders_resumes_and_merges(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path("s.obj").write_text(GLASS_BOX)
     Path("m.mtl").write_text(MATERIALS)

@@ -54,7 +54,6 @@ def test_contributions_are_limited() -> None:
 
 
 def test_colors_stay() -> None:
-    """Contributions are scaled: every channel loses the same part."""
     room = wf.Scene(
         [wf.Sphere((0, 0, 0), 1, material=wf.Diffuse((0.8, 0.4, 0.2)))],
         wf.Environment((4, 2, 1)),
@@ -82,7 +81,6 @@ def test_metadata_say_how_much_light_is_missing() -> None:
 
 
 def test_the_bits_do_not_depend_on_workers_or_waves() -> None:
-    """Nor does what the metadata say."""
     whole = render(0.3)
     for settings in ({"wave_size": 70}, {"wave_size": 1000, "workers": 2, "executor": "threads"}):
         other = wf.render(caustic(), 16, clamp=0.3, lighting=None, **settings)
@@ -92,7 +90,6 @@ def test_the_bits_do_not_depend_on_workers_or_waves() -> None:
 
 
 def test_merged_and_resumed_pictures_know_the_light_that_is_missing(tmp_path: Path) -> None:
-    """Also from files; another clamp is another render."""
     whole = render(0.3)
     parts = [wf.render(caustic(), clamp=0.3, lighting=None, samples=r) for r in (range(6), range(6, 16))]
     parts[0].save(tmp_path / "part.npz")
@@ -108,7 +105,6 @@ def test_merged_and_resumed_pictures_know_the_light_that_is_missing(tmp_path: Pa
 
 
 def test_branches_are_clamped_like_samples_of_their_own() -> None:
-    """So the picture gets as dark as without branches."""
     box = cornell_box((16, 16))
     one, four = (
         wf.render(box, spp, branches=ways, seed=ways, clamp=0.1, workers=1, executor="threads")
@@ -137,7 +133,6 @@ def test_what_is_not_finite_is_not_hidden() -> None:
 
 
 def test_an_integrator_must_add_light_by_the_functions_that_clamp() -> None:
-    """Else the clamp would do nothing in silence."""
 
     def constant(scene: Any, paths: Any, sampler: Any, max_bounces: int) -> Any:
         return np.ones((3, len(paths)), np.float32)
@@ -148,6 +143,5 @@ def test_an_integrator_must_add_light_by_the_functions_that_clamp() -> None:
 
 @pytest.mark.parametrize("value", [0, -1, np.nan, "much"])
 def test_other_values_are_refused(value: Any) -> None:
-    """Before any work."""
     with pytest.raises(wf.SceneError, match=r"^clamp (is|must)"):
         wf.render("no such file", clamp=value)

@@ -2,7 +2,6 @@
 
 from functools import cache
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 import pytest
@@ -62,7 +61,6 @@ def test_roulette_changes_nothing_but_noise(integrator: str, after: int) -> None
 
 
 def test_full_has_a_tenth_of_the_variance_of_naive() -> None:
-    """On the Cornell box at equal spp."""
     variance = {}
     for integrator in scenes.INDIRECT:
         runs = repeat(scenes.cornell_box(), 64, runs=8, integrator=integrator)
@@ -72,7 +70,6 @@ def test_full_has_a_tenth_of_the_variance_of_naive() -> None:
 
 @pytest.mark.parametrize("integrator", scenes.SAMPLING_LIGHTS)
 def test_no_bounce_shows_only_lights(integrator: str) -> None:
-    """Nothing is lit, but the lights and the environment are seen."""
     image = render(scenes.everything((33, 25)), 1, integrator=integrator, max_bounces=0)
     seen = np.unique(image.rgb.reshape(-1, 3).round(5), axis=0)
     lights = np.array([[0, 0, 0], [0.2, 0.3, 0.5], [0.5, 1, 2], [3, 2.5, 2]])
@@ -125,9 +122,7 @@ class Once(Sampler):
         ("full", {"caustics": True}),
     ],
 )
-def test_no_number_is_used_twice(
-    integrator: str, options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_number_is_used_twice(integrator, options, monkeypatch):
     """Not by two decisions, bounces or branches: the means of many scenes would not show it."""
     given: list[Once] = []
 

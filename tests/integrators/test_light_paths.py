@@ -51,9 +51,7 @@ class Tracer:
     camera: wf.Camera
 
     @classmethod
-    def of(
-        cls, scene: wf.Scene, caustics: bool = True, accel: str = "numpy", most_copies: int = 0
-    ) -> "Tracer":
+    def of(cls, scene, caustics=True, accel="numpy", most_copies=0):
         compiled = compile_scene(
             scene, scene.accelerators.maker(accel), most_copies=most_copies, mis=True, caustics=caustics
         )
@@ -99,9 +97,7 @@ def parts(picture: np.ndarray) -> np.ndarray:
     return picture.reshape(PARTS, height // PARTS, PARTS, width // PARTS, 3).mean((1, 3))
 
 
-def assert_same_light(
-    name: str, scene: wf.Scene, spp: int, max_error: float, max_bounces: int, accel: str = "numpy"
-) -> None:
+def assert_same_light(name, scene, spp, max_error, max_bounces, accel="numpy"):
     """Compare the means of the whole picture and of its parts, run by run with the same seed.
 
     `max_error` bounds the standard error relative to the light that light paths find.
@@ -138,9 +134,7 @@ def ball(material=GLASS, center=(0, 0.8, 0), radius=0.75, **kw) -> wf.Sphere:
     return wf.Sphere(center, radius, material=material, **kw)
 
 
-def icosphere(
-    subdivisions: int, material=GLASS, center=(0, 0.8, 0), radius=0.75, smooth=False, **kw
-) -> wf.Mesh:
+def icosphere(subdivisions, material=GLASS, center=(0, 0.8, 0), radius=0.75, smooth=False, **kw):
     mesh = trimesh.creation.icosphere(subdivisions, radius)
     away = np.asarray(mesh.vertices)
     normals = away / radius if smooth else None
@@ -684,13 +678,11 @@ def test_caustics_need_two_bounces(max_bounces: int) -> None:
 
 
 def test_specular_surfaces_in_the_dark() -> None:
-    """No light path gets anywhere, and nothing fails."""
     traced = Tracer.of(world(ball(), box((-1, 0.01, -1), (1, 1.8, 1), WHITE)))
     assert not len(traced.splats(1, 8, 7))
 
 
 def test_shadow_catchers_show_no_caustics() -> None:
-    """Nor do they where an instance makes a mesh a catcher."""
     floor = wf.Rectangle((-2, 0, 2), (4, 0, 0), (0, 0, -4), material=WHITE)
     placed_floor = wf.Instance(floor, np.eye(4), material=wf.ShadowCatcher())
     again = wf.Instance(floor, placed(1, 0, -3, 0), material=wf.ShadowCatcher())

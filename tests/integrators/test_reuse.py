@@ -1,7 +1,6 @@
 """Paths shared among pixels: the same means, less noise, the same bits however a render is cut."""
 
 import importlib.util
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -42,7 +41,6 @@ def test_tiles_divide_a_picture() -> None:
 
 
 def test_tiles_do_not_depend_on_the_width_of_the_picture() -> None:
-    """Pixels that share paths in one picture do so in a wider one."""
     narrow, wide = (
         place_in_tiles(np.arange(width * 56, dtype=np.uint32), width)[0].reshape(56, width)[:, :56]
         for width in (59, 203)
@@ -218,9 +216,7 @@ SCENES = [matte_corner, smooth, veiled, blended, divided]
 @pytest.mark.parametrize(
     ("spp", "error"), [(16, 0.015), pytest.param(1024, 0.001, marks=pytest.mark.slow)], ids=["quick", "slow"]
 )
-def test_sharing_keeps_the_mean(
-    build: Callable[[], wf.Scene], spp: int, error: float, close_tiles: None
-) -> None:
+def test_sharing_keeps_the_mean(build, spp, error, close_tiles):
     """Pure colors, smooth shading, alpha, textures, mixed lobes, media and instances."""
     options = {"max_bounces": 5}
     plain = repeat(build(), spp, **options)
@@ -229,19 +225,14 @@ def test_sharing_keeps_the_mean(
 
 
 @pytest.mark.parametrize("options", [{"branches": 3}, {"guide": True}], ids=str)
-def test_branches_and_guides_go_with_it(
-    options: dict, close_tiles: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_branches_and_guides_go_with_it(options, close_tiles, monkeypatch):
     monkeypatch.setattr(pilot, "PATHS", 1 << 13)
     plain = repeat(scenes.room(), 32)
     shared = repeat(scenes.room(), 8, reuse=True, first_seed=100, **options)
     assert_same_images(plain, shared, 0.01)
 
 
-def test_paths_that_go_on_from_a_shared_point_are_independent(
-    close_tiles: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Two of them have the mean of one, and less noise."""
+def test_paths_that_go_on_from_a_shared_point_are_independent(close_tiles, monkeypatch):
     runs = []
     for ways in (1, 2):
         monkeypatch.setattr(shared_paths, "SHARED_WAYS", ways)
@@ -288,10 +279,7 @@ def balcony() -> wf.Scene:
 
 
 @pytest.mark.parametrize("build", [matte_corner, balcony])
-def test_lambertian_surfaces_are_evaluated_alike(
-    build: Callable[[], wf.Scene], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """By their cosines alone, or as any BSDF."""
+def test_lambertian_surfaces_are_evaluated_alike(build, monkeypatch):
     quick = render(build(), 4, reuse=True).rgb
     monkeypatch.setattr(wf.Diffuse, "lambertian", False)
     monkeypatch.setattr(wf.Diffuse, "view_independent", True)
@@ -309,7 +297,6 @@ def test_no_light_is_lost_or_won(close_tiles: None) -> None:
 
 
 def test_noise_falls() -> None:
-    """By more than a third of the variance, where light is indirect."""
     scene = scenes.cornell_box((56, 56))
     plain, shared = (render(scene, 16, reuse=reuse) for reuse in (False, True))
     assert shared.metadata["noise"] < 0.8 * plain.metadata["noise"]
@@ -332,7 +319,6 @@ def test_waves_and_workers_change_no_bit(cut: dict) -> None:
 
 
 def test_pixels_that_need_more_samples_share_them_in_any_wave() -> None:
-    """Adaptive passes leave gaps in the tiles."""
     scene = scenes.room((33, 25))
     options = {"reuse": True, "noise": 0.12, "max_bounces": 3}
     whole = render(scene, 64, **options)
@@ -351,7 +337,6 @@ def test_parts_of_the_samples_make_the_whole() -> None:
 
 @pytest.mark.parametrize("noise", [None, 0.122])
 def test_sessions_go_on_with_the_same_bits(noise: float | None, tmp_path) -> None:
-    """From a checkpoint that was written in the middle of a pass."""
     scene, path = scenes.room((33, 25)), tmp_path / "render.wfck"
     options = {"reuse": True, "wave_size": 2000, "noise": noise, "max_bounces": 3}
     whole = render(scene, 64, **options)

@@ -277,7 +277,6 @@ def test_the_first_of_all_points_is_shared() -> None:
 
 @pytest.mark.parametrize(("albedo", "there"), [(0.0, False), (1.0, True), (0.5, True)])
 def test_black_first_points_take_no_part(albedo: float, there: bool) -> None:
-    """Their paths end; those of white points go on as all others do."""
     n = 4
     up, zero = np.repeat(f4([[0], [0], [1]]), n, 1), np.zeros(n, f4)
     lane = np.zeros(n, np.intp)

@@ -22,7 +22,6 @@ def lit_floor(*lights, extra=()) -> wf.Scene:
 @pytest.mark.parametrize("integrator", SAMPLING)
 @pytest.mark.parametrize("degrees", [0, 60])
 def test_parallel_light(integrator: str, degrees: float) -> None:
-    """E·cosθ, whatever the length of the direction."""
     theta = np.radians(degrees)
     light = wf.DirectionalLight((7 * np.sin(theta), -7 * np.cos(theta), 0), 3.0)
     mean = measure(lit_floor(light), 4, integrator=integrator, max_bounces=1)
@@ -52,7 +51,6 @@ def test_radiance_times_projected_solid_angle(angle: float) -> None:
 
 
 def test_a_disk_is_seen_and_parallel_light_is_not() -> None:
-    """By the camera, and in a mirror."""
     for angle, seen in ((0, False), (3, True)):
         light = wf.DirectionalLight((0, -1, 0), 1.0, angle=angle)
         radiance = 1 / (np.pi * np.sin(np.radians(1.5)) ** 2) if seen else 0
@@ -94,7 +92,6 @@ def test_it_comes_from_infinitely_far() -> None:
 
 
 def test_naive_and_full_agree_about_a_wide_sun() -> None:
-    """Among shapes that shade one another."""
     shapes = [
         floor(half=2.0),
         wf.Sphere((0, 0.5, 0), 0.5),
@@ -130,13 +127,11 @@ BAD = {
 
 @pytest.mark.parametrize("name", BAD)
 def test_bad_arguments_are_named(name: str) -> None:
-    """What, which element, the value and the limit."""
     change, message = BAD[name]
     with pytest.raises(wf.SceneError, match=message):
         wf.DirectionalLight(**{"direction": (0, -1, 0), "irradiance": 1.0, **change})
 
 
 def test_any_length_of_direction() -> None:
-    """Tiny and huge vectors have a direction, too."""
     for size in (1e-300, 1e300):
         assert wf.DirectionalLight((0, -size, 0), 1.0).direction.tolist() == [0, -1, 0]

@@ -78,7 +78,6 @@ def test_quarters_of_a_light(integrator: str) -> None:
 
 
 def test_colors_stay_where_they_are() -> None:
-    """Each channel by itself, against lights of one color."""
     whole = repeat(lit(area_light(texture(QUARTERS))), 64, max_bounces=1)
     parts = [
         wf.Rectangle(
@@ -150,7 +149,6 @@ def test_the_mean_of_a_face(seed: int, width: int, height: int) -> None:
 
 
 def test_the_mean_of_many_faces() -> None:
-    """Faces are looked up block by block; each gets its own."""
     n = 20_000
     corners = RNG.random((n, 1, 3)) + 0.01 * RNG.random((n, 3, 3))
     values = RNG.random(n)
@@ -200,7 +198,6 @@ def test_light_samples_follow_the_texture() -> None:
 
 
 def test_both_sides_are_seen() -> None:
-    """From above and from below, evenly or by a texture."""
     for emission in (3.0, texture(np.full((2, 2), 3.0))):
         for both in (False, True):
             scene = wf.Scene([area_light(emission, two_sided=both)])
@@ -215,12 +212,7 @@ def test_a_light_lights_on_both_sides(integrator: str, shape: str) -> None:
     """A floor that it faces, and one that it looks away from, with the same closed form."""
     emission = texture(np.ones((2, 2))) if shape == "texture" else 1.0
     up = wf.Rectangle(
-        (LOW[0], Y, LOW[1]),
-        (0, 0, 1.1),
-        (1.1, 0, 0),
-        material=BLACK,
-        emission=emission,
-        two_sided=True,
+        (LOW[0], Y, LOW[1]), (0, 0, 1.1), (1.1, 0, 0), material=BLACK, emission=emission, two_sided=True
     )
     if shape == "triangles":
         up = wf.Mesh(up.vertices, up.faces[::-1], material=BLACK, emission=1.0, two_sided=True)
@@ -264,11 +256,9 @@ def test_the_contract(kind: type) -> None:
 
 
 @pytest.mark.parametrize(
-    ("one", "both"),
-    [(TriangleLights, TwoSidedTriangleLights), (RectangleLights, TwoSidedRectangleLights)],
+    ("one", "both"), [(TriangleLights, TwoSidedTriangleLights), (RectangleLights, TwoSidedRectangleLights)]
 )
 def test_power_doubles(one: type, both: type) -> None:
-    """And the estimate of what it brings behind is that of before."""
     assert lights(both).power(1.0) == pytest.approx(2 * lights(one).power(1.0))
     normal = lights(one).normal[:, :1].astype(float)
     record = lights(one)
@@ -319,13 +309,11 @@ def test_estimators_agree() -> None:
 
 @pytest.mark.parametrize("cut", [{"wave_size": 1}, {"wave_size": 50, "workers": 3}])
 def test_waves_and_workers_change_no_bit(cut: dict) -> None:
-    """Whatever is traced together."""
     whole = render(gallery((6, 5)), 3).rgb
     assert render(gallery((6, 5)), 3, **cut).rgb.tobytes() == whole.tobytes()
 
 
 def test_what_shines_evenly_pays_nothing() -> None:
-    """No table, and rectangles stay rectangles."""
     scene = compiled(floor(), area_light(2.0))
     assert scene.lights.varies is None
     assert [type(kind) for kind in scene.lights.kinds] == [RectangleLights]
@@ -333,7 +321,6 @@ def test_what_shines_evenly_pays_nothing() -> None:
 
 
 def test_dark_lights_take_no_part() -> None:
-    """A table with dark lights chooses as one without them."""
     record = lights(TriangleLights)
     dark = TriangleLights.concatenate([record.take(np.array([0])), record])
     dark.radiance[:, 0] = 0
@@ -379,7 +366,6 @@ def test_gltf(tmp_path, both: bool) -> None:
 
 
 def test_gltf_without_a_factor_is_dark(tmp_path) -> None:
-    """The factor is black by default."""
     build = Builder()
     build.material(emissiveTexture=build.image(CODES))
     (mesh,) = wf.load(build.gltf(tmp_path / "a.gltf"), strict=True).shapes
@@ -405,7 +391,6 @@ def test_mtl(tmp_path, lines: str, factor: float | None) -> None:
 
 
 def test_one_mesh_keeps_its_emission(tmp_path) -> None:
-    """`load_mesh` too."""
     build = Builder()
     build.material(emissiveFactor=[1, 1, 1], emissiveTexture=build.image(CODES), doubleSided=True)
     mesh = wf.load_mesh(build.gltf(tmp_path / "a.gltf"))
@@ -456,7 +441,6 @@ def test_a_material_may_shine_by_a_texture() -> None:
 
 
 def test_instances_shine_by_the_material_they_have() -> None:
-    """One of two instances of a mesh has a material that shines."""
     mesh = wf.Rectangle((-1, 0, 0), (1, 0, 0), (0, 1, 0))
     there, here = np.eye(4), np.eye(4)
     there[0, 3] = 1.5

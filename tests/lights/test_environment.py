@@ -65,7 +65,6 @@ def sun_map(height: int = 64) -> np.ndarray:
 
 
 def test_layout() -> None:
-    """Top row up, middle +z, left half +x: as in OpenEXR and Mitsuba."""
     picture = np.zeros((4, 8, 3))
     picture[1:3, 3:5, 0] = 1  # the middle
     picture[1:3, 1:3, 1] = 1  # a quarter of the way from the left
@@ -79,7 +78,6 @@ def test_layout() -> None:
 
 @pytest.mark.parametrize("filter", ["nearest", "bilinear"])
 def test_every_pixel_is_seen_in_its_direction(filter: str) -> None:
-    """At the centers of the pixels both filters give the pixel."""
     picture = noise()
     longitude = (0.5 - (np.arange(16) + 0.5) / 16) * 2 * np.pi
     theta = (np.arange(8) + 0.5)[:, None] / 8 * np.pi
@@ -89,7 +87,6 @@ def test_every_pixel_is_seen_in_its_direction(filter: str) -> None:
 
 
 def test_bilinear_wraps_around() -> None:
-    """The seam lies between the last column and the first."""
     picture = np.zeros((2, 4, 3))
     picture[:, 0], picture[:, 3] = 1, 3
     assert le(wf.Environment(picture), (0, 0, -1)) == pytest.approx(2)
@@ -97,7 +94,6 @@ def test_bilinear_wraps_around() -> None:
 
 @given(strategies.rotations(), strategies.unit_vectors())
 def test_transform_turns_the_environment(rotation: np.ndarray, w: np.ndarray) -> None:
-    """What was seen along w is seen along the turned w."""
     picture = cosine_map(8) + np.arange(3)
     plain = wf.Environment(picture).record(ORIGIN)
     turned = wf.Environment(picture, transform=rotation).record(ORIGIN)
@@ -149,7 +145,6 @@ def test_one_bright_pixel_makes_no_fireflies() -> None:
 
 
 def test_a_constant_picture_is_a_constant() -> None:
-    """The same radiance everywhere, and the same light on a floor."""
     picture = np.broadcast_to([0.25, 0.5, 2.0], (3, 5, 3))
     same, plain = wf.Environment(picture), wf.Environment((0.25, 0.5, 2.0))
     w = np.random.default_rng(0).normal(size=(3, 500)).astype(f4)
@@ -199,10 +194,7 @@ def test_sampling_keeps_the_contract(filter: str, transform) -> None:
     testing.check_light(environment, points=[HERE], samples=100_000)
 
 
-SUNS = [
-    wf.DirectionalLight((1, -1, 0.2), 1.0, angle=30),
-    wf.DirectionalLight((0.9, -1, 0.3), 0.5, angle=20),
-]
+SUNS = [wf.DirectionalLight((1, -1, 0.2), 1.0, angle=30), wf.DirectionalLight((0.9, -1, 0.3), 0.5, angle=20)]
 
 
 @pytest.mark.parametrize("suns", [[], SUNS])
@@ -239,7 +231,6 @@ def test_what_shines_can_be_drawn(filter: str) -> None:
 
 
 def test_environment_and_suns_make_one_sky() -> None:
-    """The light on a floor is the sum of theirs, whoever looks for it."""
     sky = wf.Environment(cosine_map(64))
     suns = [wf.DirectionalLight((0.2, -1, 0), 1.0, angle=20), wf.DirectionalLight((0, -1, 1), 2.0, angle=40)]
     expected = [
@@ -253,7 +244,6 @@ def test_environment_and_suns_make_one_sky() -> None:
 
 
 def test_a_sky_keeps_the_contract() -> None:
-    """Also where a sun and the environment overlap."""
     lights = [wf.Environment(noise(2, 4)), SUNS[0]]
     testing.check_light(
         EnvironmentSum.of([light.record(ORIGIN) for light in lights]), points=[HERE], samples=200_000
@@ -261,7 +251,6 @@ def test_a_sky_keeps_the_contract() -> None:
 
 
 def test_a_dark_part_of_a_sky() -> None:
-    """A sun of no light does no harm, nor do two."""
     dark = wf.DirectionalLight((0, -1, 0), 0.0, angle=5)
     assert_mean(measure(lit_floor(wf.Environment(1.0), dark), 64, max_bounces=1), ALBEDO, 0.01)
     assert measure(lit_floor(dark, dark), 4, max_bounces=1).value == 0
@@ -272,7 +261,6 @@ def test_a_dark_part_of_a_sky() -> None:
 
 @pytest.mark.parametrize("name", ["sky.exr", "sky.hdr", "sky.npy", "sky.png"])
 def test_files(tmp_path, name: str) -> None:
-    """exr, hdr and npy hold radiance; png holds sRGB."""
     picture = noise(4, 8).astype(f4)
     write_image(tmp_path / name, picture, Display(gamma="srgb"))
     tolerance = {"sky.hdr": 0.01, "sky.png": 0.01}.get(name, 1e-6)
@@ -301,7 +289,6 @@ def test_gray_and_alpha() -> None:
 
 
 def test_the_array_is_copied() -> None:
-    """Writing to it later changes nothing."""
     picture = np.ones((2, 4, 3), f4)
     environment = wf.Environment(picture)
     picture[:] = 7
@@ -352,14 +339,12 @@ BAD = {
 
 @pytest.mark.parametrize("name", BAD)
 def test_bad_arguments_are_named(name: str) -> None:
-    """What, where, the value and the limit."""
     arguments, message = BAD[name]
     with pytest.raises(wf.SceneError, match=message):
         wf.Environment(**arguments)
 
 
 def test_a_bright_environment_over_a_black_floor() -> None:
-    """It is seen directly, by the camera that it surrounds."""
     camera = wf.Camera.look_at((0, 1, 0), (0, 2, 1), fov=20, size=(SIDE, SIDE))
     scene = wf.Scene([floor(BLACK)], [wf.Environment(np.full((2, 4, 3), 3.0))], camera)
     assert (render(scene, 1).rgb == 3).all()

@@ -75,7 +75,6 @@ def test_flat_and_empty_extents(extent: tuple[float, float, float]) -> None:
 
 
 def test_unknown_choice() -> None:
-    """The message names the value and what is allowed."""
     with pytest.raises(
         wf.SceneError, match=r"light_sampler is 'best'; it must be one of spatial, power, uniform"
     ):

@@ -207,7 +207,6 @@ def test_pictures_have_the_mean_of_other_samplers(monkeypatch: pytest.MonkeyPatc
 
 
 def test_lights_say_where_they_are() -> None:
-    """Middle, direction and size of each kind; a sky is nowhere."""
     up = np.array([[[0.0, 1, 0], [0, 1, 3], [3, 1, 0]]])
     one_sided, two_sided = (
         kind.from_triangles(up, np.ones((3, 1), f4)).emitters()

@@ -54,7 +54,6 @@ def test_lights_keep_their_contract(name: str) -> None:
 
 @pytest.mark.parametrize("name", LIGHTS)
 def test_light_columns_do_not_depend_on_their_neighbors(name: str) -> None:
-    """One point alone gets the same bits."""
     make, points = LIGHTS[name]
     light = make().take(np.zeros(64, np.intp))
     point = np.repeat(np.array(points[:1], f4).T, 64, 1)
@@ -152,7 +151,6 @@ ONE_SIDED = {
 @pytest.mark.parametrize("panel", ONE_SIDED.values(), ids=ONE_SIDED)
 @pytest.mark.parametrize("integrator", scenes.ALL)
 def test_a_mesh_shines_from_its_front_only(integrator: str, panel: wf.Mesh) -> None:
-    """Seen from behind it is black, and it lights nothing there."""
     below = wf.Camera.look_at((0, 0.1, 0), (0, 1, 0), (1, 0, 0), fov=1e-3, size=(2, 2))
     above = wf.Camera.look_at((0, 3, 0), (0, 1, 0), (1, 0, 0), fov=1e-3, size=(2, 2))
     roof = wf.Rectangle((-5, 2, -5), (10, 0, 0), (0, 0, 10))  # faces down, onto the back of the panel
@@ -275,7 +273,6 @@ def test_shadow_rays_end_before_the_light() -> None:
 
 
 def test_compiled_environment_is_found_by_escaping_rays() -> None:
-    """Its number is the last of the table."""
     scene = wf.Scene([scenes.floor()], [wf.Environment(0.5), wf.PointLight((0, 1, 0), 1)])
     made = compile_scene(scene, lambda geometry: make_accelerator(geometry, "numpy"))
     assert made.light_of[-1] == 1

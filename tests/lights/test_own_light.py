@@ -81,7 +81,6 @@ def test_a_line_lights_a_floor(integrator):
 @by_light_samples
 @pytest.mark.parametrize("accel", ["numpy", "embree"])
 def test_a_line_without_length_is_a_point_light(integrator, accel):
-    """But for rounding, in a scene with other lights and with shadows."""
     if accel == "embree":
         pytest.importorskip("embreex")
     lamp = wf.Rectangle((-1, 3, -1), (2, 0, 0), (0, 0, 2), emission=(1, 2, 3))
@@ -94,7 +93,6 @@ def test_a_line_without_length_is_a_point_light(integrator, accel):
 
 
 def test_lines_are_joined_and_sampled_beside_others():
-    """The light of several is the sum of the light of each."""
     lights = [
         line(),
         line((1, 1, 1), (0, 1, 0)),
@@ -159,7 +157,6 @@ def test_the_tree_draws_lines_by_its_probabilities(monkeypatch):
 
 
 def test_lights_that_say_where_they_are_have_less_noise(monkeypatch):
-    """In a tree; the mean is the same, beside a sky, which is nowhere."""
     monkeypatch.setattr(samplers, "MOST_IN_GRID", 100)
     variances, means = [], []
     for kind in (example("LineLight"), Nowhere):
@@ -243,7 +240,6 @@ def test_a_panel_shines_as_one_with_vertex_colors(integrator):
 
 @everywhere
 def test_a_panel_is_seen_as_one_with_vertex_colors(integrator):
-    """From below, and from above, where it is black, in a mirror."""
     mirror = wf.Rectangle((-3, 0, 3), (6, 0, 0), (0, 0, -6), material=wf.Mirror(0.8))
     panel, light = gradient()
     for eye in ((0.5, 0.2, 0.1), (0.5, 3, 3)):
@@ -257,7 +253,6 @@ def test_a_panel_is_seen_as_one_with_vertex_colors(integrator):
 
 
 def test_attributes_that_the_light_reads_are_there():
-    """Texture coordinates, which no material of the scene needs."""
 
     class ByCoordinates(example("GradientLight")):
         reads = ("uv",)

@@ -24,7 +24,6 @@ def scene(*lights: wf.Light, size: float = 1) -> wf.Scene:
 
 @pytest.mark.parametrize("sampler", ["spatial", "power", "uniform"])
 def test_they_are_the_same_as_single_lights(sampler: str) -> None:
-    """Bit for bit, and so are groups of both kinds together."""
     single = [wf.PointLight(p, i) for p, i in zip(POSITIONS, COLORS, strict=True)]
     others = [wf.PointLight((0, 3, 0), 1, group="lamp"), wf.Environment(0.1)]
     many = wf.PointLights(POSITIONS, COLORS)
@@ -39,13 +38,11 @@ def test_they_are_the_same_as_single_lights(sampler: str) -> None:
 
 @pytest.mark.parametrize("intensities", [2, (2, 2, 2), [[2], [2], [2]], np.full((3, 3), 2)])
 def test_intensities_can_be_shared(intensities: Any) -> None:
-    """One number, a color, or one of them for each position."""
     expected = wf.render(scene(*(wf.PointLight(p, 2) for p in POSITIONS)), 2)
     assert np.array_equal(wf.render(scene(wf.PointLights(POSITIONS, intensities)), 2).rgb, expected.rgb)
 
 
 def test_scenes_of_extreme_size() -> None:
-    """Lengths are scaled, and intensities with them."""
     size = 2.0**40
     near = wf.render(scene(wf.PointLights(POSITIONS, COLORS)), 2)
     far = wf.render(scene(wf.PointLights(POSITIONS * size, COLORS * size**2), size=size), 2)
@@ -70,13 +67,11 @@ def test_scenes_of_extreme_size() -> None:
     ],
 )
 def test_malformed_arguments_are_errors(positions: Any, intensities: Any, message: str) -> None:
-    """Which name the argument, the element and the limit."""
     with pytest.raises(wf.SceneError, match=message):
         wf.render(scene(wf.PointLights(positions, intensities)), 1)
 
 
 def test_a_million_is_set_up_quickly() -> None:
-    """In CPU time; a million `PointLight`s take a minute."""
     places = np.random.default_rng(0).uniform((-3, 1, -3), (3, 7, 3), (10**6, 3))
     begin = time.process_time()
     image = wf.render(scene(wf.PointLights(places, 1e-5)), 1, workers=1, executor="threads")

@@ -34,7 +34,6 @@ def test_rectangles_keep_their_contract(point: list[float]) -> None:
 
 
 def test_nothing_is_sampled_behind_a_rectangle() -> None:
-    """Above a light that faces down there is no light."""
     light = RectangleLights.from_pairs(corners(wf.Rectangle((-1, 1, -1), (2, 0, 0), (0, 0, 2)))[:1], WHITE)
     point = np.array([[0.0, 0.0], [1.1, 30.0], [0.0, 0.0]], f4)
     assert not light.sample_li(point, np.full((2, 2), 0.5, f4)).pdf.any()
@@ -52,7 +51,6 @@ def test_pairs_are_found() -> None:
 
 @pytest.mark.parametrize("edge_v", [(0.001, 1, 0), (-0.5, 1, 0)], ids=["barely skewed", "skewed"])
 def test_parallelograms_are_not_rectangles(edge_v: tuple[float, float, float]) -> None:
-    """A skewed pair stays two triangles."""
     assert pairs(corners(wf.Rectangle((0, 0, 0), (1, 0, 0), edge_v))) == []
 
 
@@ -81,7 +79,6 @@ def test_a_lit_floor_is_exact_under_a_parallelogram_too() -> None:
 
 
 def test_triangles_of_two_meshes_make_no_rectangle() -> None:
-    """Each light belongs to one mesh, even where two meshes touch."""
     triangles = corners(wf.Rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)))
     assert first_of_pairs(triangles, np.array([0, 1])).size == 0
     halves = [wf.Mesh(part, [(0, 1, 2)], emission=1.0) for part in triangles]
@@ -90,7 +87,6 @@ def test_triangles_of_two_meshes_make_no_rectangle() -> None:
 
 
 def test_meshes_that_shine_alike_become_one_record() -> None:
-    """From one side or both, and each with the radiance of its mesh."""
     panels = [
         wf.Rectangle((3 * k, 0, 0), (1, 0, 0), (0, 1, 0), emission=k + 1.0, two_sided=k == 1)
         for k in range(3)

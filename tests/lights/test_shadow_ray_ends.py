@@ -42,7 +42,6 @@ def test_shadow_rays_reach_the_light(name: str) -> None:
 
 
 def test_lights_at_infinity_are_blocked_from_anywhere() -> None:
-    """The ray has no end."""
     sun = wf.DirectionalLight((0, -1, 0), 3)
     assert floor_below(sun) > 0
     assert floor_below(sun, sheet(300.0)) == 0

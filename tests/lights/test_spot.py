@@ -53,7 +53,6 @@ def test_falloff_is_that_of_gltf(degrees: float, outer: float, blend: float) -> 
 
 
 def test_narrow_cones_are_full_on_the_axis() -> None:
-    """Even one of a thousandth of a degree."""
     for angle in (1e-3, 0.1, 180):
         light = wf.SpotLight((0, 0, 0), 3.0, direction=(0, -1, 0), angle=angle, blend=1)
         assert intensity(light, 0) == pytest.approx(3)
@@ -62,7 +61,6 @@ def test_narrow_cones_are_full_on_the_axis() -> None:
 
 
 def test_a_hard_edge() -> None:
-    """Without blend the light is full up to the edge."""
     light = wf.SpotLight((0, 0, 0), 1.0, direction=(0, -1, 0), angle=60, blend=0)
     assert [intensity(light, a) for a in (0, 29.99, 30.01)] == pytest.approx([1, 1, 0], abs=1e-6)
 
@@ -70,7 +68,6 @@ def test_a_hard_edge() -> None:
 @pytest.mark.parametrize("blend", [0.0, 0.3, 1.0])
 @pytest.mark.parametrize("angle", [10.0, 90.0, 180.0])
 def test_power_is_the_integral_of_the_intensity(angle: float, blend: float) -> None:
-    """By quadrature over the cone."""
     light = wf.SpotLight((0, 0, 0), (1.0, 2.0, 6.0), direction=(0, -1, 0), angle=angle, blend=blend)
     n = 4000
     theta = np.radians(angle / 2) * (np.arange(n) + 0.5) / n
@@ -98,7 +95,6 @@ def test_no_place_is_thought_darker_than_it_is(angle: float, blend: float, seed:
 
 
 def test_many_lights_of_all_kinds() -> None:
-    """Each is chosen by its power, and all add up."""
     lights = [
         wf.PointLight((0, 2, 0), 4.0),
         wf.SpotLight((0, 2, 0), 4.0, direction=(0, -1, 0)),
@@ -123,7 +119,6 @@ def test_a_spot_is_a_round_patch() -> None:
 
 
 def test_sampling_keeps_the_contract() -> None:
-    """Where it shines and where it does not."""
     light = wf.SpotLight((0.1, 5, 0.2), (1.0, 2.0, 3.0), target=(0, 0, 0), angle=50)
     testing.check_light(light, samples=1000)
 
@@ -146,7 +141,6 @@ BAD = {
 
 @pytest.mark.parametrize("name", BAD)
 def test_bad_arguments_are_named(name: str) -> None:
-    """What, which element, the value and the limit."""
     change, message = BAD[name]
     arguments = {"position": (0, 1, 0), "intensity": 1.0, "target": (0, 0, 0), **change}
     with pytest.raises(wf.SceneError, match=message):

@@ -48,7 +48,6 @@ def test_clear_and_absorbing_glass_side_by_side() -> None:
 
 
 def test_a_texture_cannot_absorb() -> None:
-    """The message says why."""
     with pytest.raises(
         wf.SceneError, match="Medium absorption must be a color, not a texture: it belongs to"
     ):
@@ -70,13 +69,11 @@ def test_the_interior_is_there_whatever_the_bsdf(bsdf: wf.Bsdf) -> None:
 
 
 def test_thin_sheets_may_enclose_a_medium() -> None:
-    """As a soap bubble encloses smoke; roulette adds a little noise."""
     sheet = filled(wf.ThinDielectric(1.0), ABSORPTION)
     assert through(sheet, 0.5) == pytest.approx(np.exp(-ABSORPTION * 0.5), rel=0.02)
 
 
 def test_a_scene_without_media_skips_the_stage() -> None:
-    """A medium that absorbs nothing is none."""
     for material in (wf.Diffuse(), filled(wf.Dielectric(), 0.0)):
         scene = wf.Scene([wf.Sphere((0, 0, 0), 1, material=material)], [wf.Environment(1.0)])
         assert compile_scene(scene, lambda geometry: make_accelerator(geometry, "numpy")).absorption is None

@@ -58,7 +58,6 @@ def before_a_wall(alpha: float) -> wf.Scene:
 
 @pytest.mark.parametrize(("integrator", "accel"), PAIRS)
 def test_a_sheet_before_a_wall(integrator: str, accel: str) -> None:
-    """The part alpha of the sheet, and of the wall what is left."""
     for alpha in (0.0, 0.3, 1.0):
         mean = measure(before_a_wall(alpha), 1024, integrator=integrator, accel=accel, max_bounces=1)
         unseen = 10 / (64 * 1024)  # numbers may be spread so evenly that the batches show no difference
@@ -87,7 +86,6 @@ def test_a_sphere_is_passed_twice() -> None:
 
 
 def test_what_is_not_there_is_no_event() -> None:
-    """Fifty sheets before a light and no bounce allowed."""
     sheets = [veil(0.0, y) for y in np.linspace(0.1, 1.9, 50)]
     scene = wf.Scene([*sheets, AREA_LIGHT], camera=probe((0, 2, 0), HERE))
     for integrator in ALL:
@@ -115,7 +113,6 @@ def test_shadow_of_sheets(integrator: str, accel: str) -> None:
 
 @pytest.mark.parametrize("integrator", ["naive", "full"])
 def test_shadow_of_a_sphere(integrator: str) -> None:
-    """Light crosses it twice."""
     ball = wf.Sphere((0, 1, 0), 0.7, material=wf.Material(BLACK, alpha=0.3))
     area_light = panel((-0.3, -0.3), (0.3, 0.3), 2.0)
     whole = polygon_irradiance([(-0.3, 2, -0.3), (-0.3, 2, 0.3), (0.3, 2, 0.3), (0.3, 2, -0.3)])
@@ -134,7 +131,6 @@ def test_half_of_a_light_through_a_cut_out(integrator: str) -> None:
 
 
 def test_a_wall_behind_a_veil_still_hides() -> None:
-    """Whichever comes first."""
     for y in (0.5, 1.5):
         scene = lit(veil(0.3, 1.0), veil(1.0, y))
         assert not render(scene, 16, max_bounces=1, integrator="direct_simple").rgb.any()
@@ -204,7 +200,6 @@ def leaves(size: tuple[int, int] = (16, 8)) -> wf.Scene:
 
 
 def test_estimators_agree() -> None:
-    """All light through leaves, by chance and by light samples."""
     naive = repeat(leaves(), 32, integrator="naive", max_bounces=4)
     full = repeat(leaves(), 8, integrator="full", max_bounces=4, first_seed=100)
     assert_same_images(naive, full, 0.02)
@@ -283,7 +278,6 @@ def test_gltf(tmp_path, mode: str, factor: float, clear: float) -> None:
     ("lines", "clear"), [("d 0.3", 0.7), ("Tr 0.3", 0.3), ("map_d t.png", 0.6), ("d 0.5\nmap_d t.png", 0.8)]
 )
 def test_mtl(tmp_path, lines: str, clear: float) -> None:
-    """The number, the image, or both multiplied."""
     iio.imwrite(tmp_path / "t.png", np.full((2, 2), 102, np.uint8))
     (tmp_path / "s.mtl").write_text(f"newmtl m\nKd 0.5 0.5 0.5\n{lines}\n")
     text = "mtllib s.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n"
@@ -320,7 +314,6 @@ def test_mtl(tmp_path, lines: str, clear: float) -> None:
     ],
 )
 def test_complaints(make, message: str) -> None:
-    """Name, value and limit."""
     with pytest.raises(wf.SceneError, match=message):
         make()
 

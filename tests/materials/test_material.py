@@ -46,7 +46,6 @@ def test_a_bare_bsdf_is_taken_wherever_a_material_is(shape) -> None:
 
 
 def test_render_takes_both() -> None:
-    """For what has no material of its own."""
     ball = wf.Sphere((0, 0, 0), 1)
     options: dict[str, Any] = {"camera": CAMERA, "size": (8, 8)}
     bare = render(ball, 2, material=wf.Diffuse(0.2), **options).rgb

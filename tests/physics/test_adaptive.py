@@ -66,7 +66,6 @@ def test_noise_is_the_true_error(name: str) -> None:
 
 
 def test_noisy_parts_get_more_samples() -> None:
-    """The black sky gets the least; every tile is treated as one."""
     image = render(lit(), None, noise=0.04)
     assert len(np.unique(image.counts)) >= 3
     assert image.counts[:, 0].min() == MIN_SPP
@@ -76,7 +75,6 @@ def test_noisy_parts_get_more_samples() -> None:
 
 @pytest.mark.parametrize("cut", [{"workers": 3}, {"wave_size": 100}, {"wave_size": 3000, "workers": 2}])
 def test_noise_gives_the_same_bits(cut: dict) -> None:
-    """Whatever the workers and the wave size."""
     expected = render(lit(), None, noise=0.08)
     image = render(lit(), None, noise=0.08, **cut)
     assert image.metadata["samples"] == expected.metadata["samples"]
@@ -97,7 +95,6 @@ def test_samples_are_a_bound() -> None:
 
 @pytest.mark.parametrize("limit", [{"spp": 40}, {"spp": None, "seconds": 0.5}], ids=["samples", "time"])
 def test_noise_that_is_not_reached_is_told(limit: dict) -> None:
-    """Once, with what was asked for and what there is."""
     with pytest.warns(UserWarning, match="noise") as caught:
         image = render(lit(), noise=1e-4, **limit)
     found = image.metadata
@@ -189,9 +186,7 @@ class Machine:
 @pytest.mark.parametrize("workers", [1, 4])
 @pytest.mark.parametrize("per_path", [5e-7, 8e-6, 3e-5])
 @pytest.mark.parametrize("seconds", [3.0, 20.0])
-def test_time_is_used_and_kept(
-    seconds: float, per_path: float, workers: int, slower: float, monkeypatch
-) -> None:
+def test_time_is_used_and_kept(seconds, per_path, workers, slower, monkeypatch):
     """Within 10 %, on fast and slow machines and where speed changes on the way."""
     machine = Machine(per_path, 2e-3, workers)
     monkeypatch.setattr(scheduler.time, "perf_counter", lambda: machine.now)
@@ -255,7 +250,6 @@ def test_jobs_are_deep_where_that_does_no_harm() -> None:
 
 
 def test_jobs_of_a_cluster_have_several_waves() -> None:
-    """Fewer at the end, and where paths are slow."""
     jobs: dict[float, list[Job]] = {1e-6: [], 1e-5: []}
     for per_path, done in jobs.items():
         clock = Scheduler(0.0, None, None, 2, waves_per_job=4)
@@ -287,14 +281,12 @@ def test_waves_of_a_job_are_its_samples_in_order(wave_size: int, whole_tiles: bo
 
 
 def test_nobody_waits_for_a_large_wave() -> None:
-    """Where paths are slow waves take about a second, or are small."""
     assert wave_sizes(1e-6, None, 2).max() * 1.2e-5 > scheduler.MAX_JOB_SECONDS
     assert wave_sizes(1.2e-5, None, 2).max() * 1.2e-5 <= scheduler.MAX_JOB_SECONDS
     assert wave_sizes(1e-4, None, 2).max() <= scheduler.SMALL_WAVE
 
 
 def test_every_pixel_gets_a_sample(monkeypatch) -> None:
-    """Even where there was no time for it."""
     machine = Machine(1e-3, 1e-3, 2)
     monkeypatch.setattr(scheduler.time, "perf_counter", lambda: machine.now)
     assert (machine.run(500_000, 0.5) == 1).all()
@@ -361,7 +353,6 @@ def test_samples_of_waves_that_time_ends_are_discarded(monkeypatch) -> None:
 
 
 def test_pixels_without_a_sample_are_told(monkeypatch) -> None:
-    """They are black."""
     first_is_done = threading.Event()
 
     def endless_after_the_first(tracer: tracing.Tracer, monitor: tracing.WaveMonitor, job: Job) -> JobResult:
@@ -415,7 +406,6 @@ def test_progress_goes_on_within_a_wave() -> None:
 @pytest.mark.parametrize("name", ["noise", "seconds"])
 @pytest.mark.parametrize("value", [0, -1, np.nan, np.inf, "much"])
 def test_bad_limits_are_named(name: str, value) -> None:
-    """Before any work."""
     with pytest.raises(wf.SceneError, match=f"{name} (is|must be)"):
         wf.render(None, **{name: value})
 
@@ -434,7 +424,6 @@ def test_progress_counts_samples_or_seconds() -> None:
 
 
 def test_ctrl_c_in_an_adaptive_pass_gives_the_picture_so_far() -> None:
-    """What was traced counts, and the counts say how much that is."""
     size = 24 * 16
 
     def stop(done: float, total: float) -> None:

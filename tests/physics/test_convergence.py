@@ -23,8 +23,7 @@ def converged() -> np.ndarray:
 def errors(sampler: str, spp: int, exact: np.ndarray) -> np.ndarray:
     """Squared error per pixel, the mean of four seeds, (H, W)."""
     return np.mean(
-        [((render(sampler, spp, seed).astype(float) - exact) ** 2).mean(2) for seed in range(4)],
-        axis=0,
+        [((render(sampler, spp, seed).astype(float) - exact) ** 2).mean(2) for seed in range(4)], axis=0
     )
 
 

@@ -102,7 +102,6 @@ def test_pictures(name: str, options: dict[str, Any]) -> None:
 @techniques
 @pytest.mark.parametrize("case", [case for case in CASES if "full" in case.integrators], ids=str)
 def test_every_case(case: Case, options: dict[str, Any], close_tiles: None) -> None:
-    """The probe of each scene measures its known light."""
     spp = 4 * case.spp
     unseen = 10 / (64 * spp * case.expected)  # see test_reference.py
     chosen = {"max_bounces": 4, **case.options, **options}
@@ -177,7 +176,6 @@ def test_pictures_by_default(name: str) -> None:
     ],
 )
 def test_the_trial_keeps_means(name: str, due: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Some of the cases, quickly; the trial has taken place."""
     trials, run_trial = [], choice.run_trial
     monkeypatch.setattr(choice, "run_trial", lambda *a, **k: trials.append(1) or run_trial(*a, **k))
     (case,) = (case for case in CASES if case.name == name)

@@ -40,7 +40,6 @@ def test_triangle_light(case: Case, integrator: str) -> None:
 
 @pytest.mark.parametrize(**each(scenes.INDIRECT_CASES))
 def test_indirect_light(case: Case, integrator: str) -> None:
-    """Closed rooms, where the light is a geometric series."""
     assert_mean(run(case, integrator), case.expected, case.max_error)
 
 
@@ -155,7 +154,6 @@ TRIANGLE_FACING_ORIGIN = {
 @pytest.mark.parametrize("sampler", SAMPLERS)
 @pytest.mark.parametrize("name", MOMENTS)
 def test_moments_of_warps(name: str, sampler: str) -> None:
-    """Means of cosines and squares over hemisphere, sphere and disk."""
     value, expected = MOMENTS[name]
     batches = value(numbers(sampler, 1 << 13)).reshape(64, -1).mean(1, dtype=np.float64)
     assert_mean(Mean.of(batches), expected, 0.002)

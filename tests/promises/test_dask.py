@@ -56,7 +56,6 @@ def test_a_cluster_gives_the_same_bits(client: Any, expected: bytes) -> None:
 
 
 def test_light_paths_come_from_a_cluster(client: Any, expected: bytes) -> None:
-    """Which reach pixels of other tasks."""
     images = [
         wf.render(scenes.everything(), 8, caustics=True, **settings, **QUIET)
         for settings in ({"executor": client}, {"workers": 1, "executor": "threads"})
@@ -66,7 +65,6 @@ def test_light_paths_come_from_a_cluster(client: Any, expected: bytes) -> None:
 
 
 def test_a_task_has_several_waves(client: Any, expected: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Since Dask spends milliseconds on each."""
     jobs: list[Any] = []
     submit = RemoteWorkers.submit
     monkeypatch.setattr(RemoteWorkers, "submit", lambda *given: jobs.append(given[1]) or submit(*given))
@@ -78,14 +76,12 @@ def test_a_task_has_several_waves(client: Any, expected: bytes, monkeypatch: pyt
 
 
 def test_pictures_come_while_a_cluster_renders(client: Any) -> None:
-    """After each pass."""
     with wf.Session(scenes.everything(), 8, executor=client, **QUIET) as session:
         images = list(session)
     assert [image.spp for image in images if image.spp in (1, 2, 4, 8)] == [1, 2, 4, 8]
 
 
 def test_nothing_stays_on_the_cluster(client: Any) -> None:
-    """But the scene, for ten seconds, in the processes that had jobs."""
     wf.render(scenes.everything(), 1, executor=client, **QUIET)
     end = time.monotonic() + 30
     while any(client.who_has().values()) and time.monotonic() < end:
@@ -117,10 +113,7 @@ def test_a_stop_ends_jobs_on_the_cluster(client: Any) -> None:
     assert client.submit(abs, -1).result() == 1
 
 
-def test_a_result_that_is_lost_before_it_is_fetched_is_an_error(
-    client: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """After some trials; nobody waits forever."""
+def test_a_result_that_is_lost_before_it_is_fetched_is_an_error(client, monkeypatch):
 
     async def lost(*given: Any, **options: Any) -> None:
         raise RuntimeError("lost with its inputs")
@@ -136,7 +129,6 @@ def test_a_result_that_is_lost_before_it_is_fetched_is_an_error(
 @pytest.mark.slow
 @pytest.mark.filterwarnings("default")  # of Dask, about the worker
 def test_a_worker_that_is_killed_in_the_middle_costs_its_jobs_alone(client: Any) -> None:
-    """The same bits come out."""
     room = scenes.everything()
     alone = wf.render(room, 64, workers=1, executor="threads", **QUIET)
     (pid, *_), killed = list(client.run(os.getpid).values()), []
@@ -155,7 +147,6 @@ def test_a_worker_that_is_killed_in_the_middle_costs_its_jobs_alone(client: Any)
 @pytest.mark.slow
 @pytest.mark.filterwarnings("default")
 def test_all_workers_may_be_lost(client: Any) -> None:
-    """With all copies of the work, as long as others come."""
     killed = []
 
     def jobs() -> Iterator[int]:
@@ -174,7 +165,6 @@ def test_all_workers_may_be_lost(client: Any) -> None:
 
 @pytest.mark.slow
 def test_two_threads_of_a_worker_share_the_scene(expected: bytes) -> None:
-    """And a cluster in this process needs none but its own."""
     settings = {"processes": False, "dashboard_address": ":0"}
     with (
         distributed.LocalCluster(n_workers=1, threads_per_worker=2, **settings) as cluster,
@@ -186,13 +176,11 @@ def test_two_threads_of_a_worker_share_the_scene(expected: bytes) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2, 3, 8])
 def test_any_number_of_jobs_at_once_gives_the_same_bits(client: Any, expected: bytes, workers: int) -> None:
-    """More than the cluster has threads, or fewer."""
     image = wf.render(scenes.everything(), 8, workers=workers, executor=client, **QUIET)
     assert image.rgb.tobytes() == expected
 
 
 def test_a_closed_client_is_an_error() -> None:
-    """Before any work, and by its name."""
     cluster = {"n_workers": 1, "processes": False, "dashboard_address": ":0"}
     with distributed.LocalCluster(**cluster) as here, distributed.Client(here) as client:
         client.close()

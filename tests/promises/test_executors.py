@@ -66,7 +66,6 @@ def folders(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 
 
 def test_workers_that_are_spawned(expected: bytes, folders: Path) -> None:
-    """They are sent the scene; nothing is left."""
     image = wf.render(scenes.everything(), 8, workers=2, executor="spawn", **QUIET)
     assert image.rgb.tobytes() == expected
     assert (image.metadata["executor"], image.metadata["workers"]) == ("spawn", 2)
@@ -93,7 +92,6 @@ def test_an_executor_of_the_user_goes_on_after_the_render(expected: bytes, folde
 
 @needs_fork
 def test_a_function_that_makes_pools_of_processes(expected: bytes) -> None:
-    """They end with the render."""
     image = wf.render(scenes.everything(), 8, workers=2, executor=pools_of("fork"), **QUIET)
     assert image.rgb.tobytes() == expected
     assert not multiprocessing.active_children()
@@ -166,7 +164,6 @@ def payload_of(folder: Path, work: Callable[[Any], Any]) -> Payload:
 
 
 def test_a_process_reads_the_work_once(tmp_path: Path) -> None:
-    """From the file; later jobs need neither."""
     payload = payload_of(tmp_path, abs)
     assert payload.data is not None
     (tmp_path / "work").write_bytes(payload.data)
@@ -179,7 +176,6 @@ def test_a_process_reads_the_work_once(tmp_path: Path) -> None:
 
 
 def test_a_process_forgets_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With the thread that sees to it."""
     monkeypatch.setattr(delivery, "KEEP", 0.1)
     kept = delivery._KeptWork()
     monkeypatch.setattr(delivery, "_kept", kept)
@@ -192,11 +188,7 @@ def test_a_process_forgets_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 @needs_fork
-def test_workers_that_cannot_read_the_file_are_sent_the_scene(
-    expected: bytes, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """As those on other machines."""
-
+def test_workers_that_cannot_read_the_file_are_sent_the_scene(expected, monkeypatch):
     def first(self: remote.FileDelivery, payload: Payload) -> Payload:
         return Payload(payload.token, payload.machine, "/no/such/file", None)
 
@@ -221,7 +213,6 @@ def test_a_published_integer_is_the_same_in_all_places(tmp_path: Path) -> None:
 
 
 def test_a_stop_stays_for_work_that_begins_late(tmp_path: Path) -> None:
-    """Though the flag is used again for other workers."""
     shared = SharedInt()
     shared.publish(str(tmp_path / "shared"))
     other = SharedInt.attach(str(tmp_path / "shared"))
@@ -234,7 +225,6 @@ def test_a_stop_stays_for_work_that_begins_late(tmp_path: Path) -> None:
 
 
 def test_the_deadline_is_that_of_the_clock_of_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two machines count from different moments."""
     view = jobs.CameraJob(None, time.perf_counter() + 100)  # type: ignore[arg-type]
     pickled = pickle.dumps(view)
     assert pickle.loads(pickled).deadline == view.deadline
@@ -255,14 +245,12 @@ class Unpicklable:
 
 
 def test_a_scene_that_cannot_be_pickled_is_named(folders: Path) -> None:
-    """With what to do."""
     with pytest.raises(wf.SceneError, match=r"cannot be sent to workers.*lock.*use executor='threads'"):
         wf.render(scenes.everything(), 1, executor="spawn", filter=Unpicklable(), **QUIET)
     assert not list(folders.iterdir())
 
 
 def test_where_processes_are_spawned_such_a_scene_has_threads(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By default; other scenes have processes."""
     monkeypatch.setattr(executors, "_forks", lambda: False)
     monkeypatch.setattr(executors, "MIN_PATHS_TO_SPAWN", 1)
     options = {"workers": 2, **QUIET}
@@ -301,7 +289,6 @@ def test_a_script_is_not_run_again(tmp_path: Path) -> None:
 
 
 def test_without_cloudpickle_classes_of_a_script_are_named(tmp_path: Path) -> None:
-    """With what to install."""
     done = run_script(tmp_path, "spawn", "import sys\nsys.modules['cloudpickle'] = None\n")
     assert "Mine is defined in the script itself: pip install cloudpickle" in done.stderr
 
@@ -344,7 +331,6 @@ def ball(material: wf.Bsdf) -> list[Any]:
     ],
 )
 def test_a_lost_worker_costs_its_jobs_alone(executor: Any, tmp_path: Path) -> None:
-    """Others do them."""
     options = {"size": (32, 32), "workers": 2, **QUIET}
     image = wf.render(ball(Deadly(tmp_path / "dead")), 4, executor=executor, **options)
     assert (tmp_path / "dead").exists()
@@ -378,7 +364,6 @@ class Failing(Gray):
 
 @needs_fork
 def test_a_job_that_fails_everywhere_is_named() -> None:
-    """With its error, after it was tried elsewhere."""
     message = r"samples 0 to 0 of \d+ pixels from 0 on failed 3 times, at last by: ZeroDivisionError: no such"
     with pytest.raises(wf.RenderError, match=message) as caught, forked() as pool:
         wf.render(ball(Failing()), 1, size=(8, 8), executor=pool, **QUIET)
@@ -394,7 +379,6 @@ def fail_once(path: str, job: int) -> int:
 
 @needs_fork
 def test_a_job_that_fails_once_is_done_again(tmp_path: Path) -> None:
-    """And results stay in order."""
     work = partial(fail_once, str(tmp_path / "failed"))
     with forked() as pool, WorkerPool(work, 2, pool) as workers:
         assert list(workers.run(range(10))) == [(job, job) for job in range(10)]
@@ -406,7 +390,6 @@ def test_a_job_that_fails_once_is_done_again(tmp_path: Path) -> None:
 
 @needs_fork
 def test_workers_of_other_versions_are_noticed(monkeypatch: pytest.MonkeyPatch, expected: bytes) -> None:
-    """With one warning, or an error if strict."""
     elsewhere = {**machine.describe_machine(), "NumPy": "1.0", "CPU features": "AVX9"}
     monkeypatch.setattr(remote, "describe_machine", lambda: elsewhere)
     differs = rf"a worker differs from this machine: NumPy {np.__version__} in place of 1\.0, a CPU .*AVX9"
@@ -420,7 +403,6 @@ def test_workers_of_other_versions_are_noticed(monkeypatch: pytest.MonkeyPatch, 
 
 
 def test_this_machine_does_not_differ_from_itself() -> None:
-    """A description names the versions."""
     here = machine.describe_machine()
     assert here["wavefront"] == wf.__version__
     assert machine.machine_differences(here) == ()
@@ -431,7 +413,6 @@ def test_this_machine_does_not_differ_from_itself() -> None:
 
 @pytest.mark.slow
 def test_workers_on_another_processor_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Such as one without the newest instructions."""
     features = machine.describe_machine()["CPU features"].split()
     if features == [machine.NONE]:
         pytest.skip("NumPy uses no instructions here that can be turned off")
@@ -444,7 +425,6 @@ def test_workers_on_another_processor_are_noticed(monkeypatch: pytest.MonkeyPatc
 
 
 def test_an_executor_says_how_many_workers_it_has() -> None:
-    """Unless they are given."""
     with ThreadPoolExecutor(5) as pool:
         assert worker_count(None, pool) == 5
         assert worker_count(2, pool) == 2
@@ -452,6 +432,5 @@ def test_an_executor_says_how_many_workers_it_has() -> None:
 
 
 def test_what_is_no_executor_is_named() -> None:
-    """With what would be one."""
     with pytest.raises(wf.SceneError, match="executor is 3; it must be one of processes, threads"):
         wf.render(scenes.everything(), 1, executor=3)  # type: ignore[arg-type]

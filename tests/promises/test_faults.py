@@ -96,7 +96,6 @@ def test_a_bsdf_sample_is_named(integrator: str, branches: int) -> None:
 
 
 def test_a_fault_of_a_shared_point_is_named() -> None:
-    """By the random numbers of the paths that go on from there."""
     material = SpoiledMatte(0.5)
     material.part = 0.005
     scene = wf.Scene(
@@ -113,19 +112,16 @@ def test_a_fault_of_a_shared_point_is_named() -> None:
 
 @pytest.mark.parametrize("integrator", ["full", "direct_mis", "direct_simple"])
 def test_a_light_sample_is_named(integrator: str) -> None:
-    """By the material at which it was taken."""
     found = first_fault(room(SpoiledValue(0.5), light=[wf.PointLight((0, 3, 0), 10)]), integrator=integrator)
     assert found == "pixel 0, sample 0, bounce 1, light sample at material SpoiledValue of 'wall'"
 
 
 def test_a_fault_of_a_light_is_named_by_where_it_shines() -> None:
-    """The material is sound, but the place is right."""
     scene = room(wf.Diffuse(0.5), light=[SpoiledLight(column((0, 0.6, 0.8)))])
     assert first_fault(scene) == "pixel 0, sample 0, bounce 1, light sample at material Diffuse of 'wall'"
 
 
 def test_the_first_surface_is_bounce_0() -> None:
-    """And instances have no name of their own."""
     scene = room(wf.Diffuse(0.5), mirror=Spoiled(0.5))
     assert first_fault(scene) == "pixel 0, sample 0, bounce 0, BSDF sample of material Spoiled of 'mirror'"
     box = wf.Mesh([[9, 9, 0], [9, 9, 1], [9, 8, 0]], [[0, 1, 2]])
@@ -134,7 +130,6 @@ def test_the_first_surface_is_bounce_0() -> None:
 
 
 def test_a_few_are_a_warning_with_the_picture() -> None:
-    """And the samples are dropped and counted."""
     material = Spoiled(0.5)
     material.part = 3e-5
     with pytest.warns(UserWarning, match=r"first: pixel \d+, sample \d+, bounce 1, BSDF sample of .* 'wall'"):
@@ -248,7 +243,6 @@ def test_a_layer_that_is_not_finite_is_dropped_counted_and_named(layer: str, val
 
 
 def test_the_search_for_a_fault_asks_for_an_albedo_once() -> None:
-    """Also where two layers hold it."""
     asked = []
 
     class Counting(Spoiled):
@@ -262,7 +256,6 @@ def test_the_search_for_a_fault_asks_for_an_albedo_once() -> None:
 
 
 def test_a_normal_that_is_not_finite_is_dropped() -> None:
-    """Although nothing is shaded there, so that the picture is finite."""
     scene = wall_of(wf.Diffuse(0.5))
 
     def spoil(surface: Any) -> None:
@@ -314,7 +307,6 @@ def test_dropped_samples_leave_the_bits_to_no_division(cut: dict[str, Any], tmp_
 
 
 def test_a_film_takes_memory_for_dropped_samples_only_if_there_are_any() -> None:
-    """And files whose sums have them for other pixels are refused."""
     film, pixels = Film(3, 2), np.arange(6, dtype=np.uint32)
     film.add(pixels, np.ones((3, 4, 6), f4))
     assert not film.dropped.size

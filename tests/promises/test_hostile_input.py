@@ -172,10 +172,7 @@ CASES: dict[str, dict[str, tuple[Write, str]]] = {
             binary(PLY.format("binary_little_endian", 3, 1).encode() + PLY_BODY[:-4] + b"\3\0\0\0", "a.ply"),
             r"a\.ply: .*index|a\.ply.*must be in",
         ),
-        "gltf": (
-            gltf(lambda json: json["accessors"][0].update(count=2)),
-            r"a\.gltf: .*(index|indices|3)",
-        ),
+        "gltf": (gltf(lambda json: json["accessors"][0].update(count=2)), r"a\.gltf: .*(index|indices|3)"),
         "off": (text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n", "a.off"), r"a\.off.* 3"),
     },
     "short lines": {
@@ -378,7 +375,6 @@ REPAIRED = ("vertices", "zero area", "missing texture")  # rows where a file may
 @pytest.mark.skipif(sys.platform != "linux", reason="memory limits as Linux has them")
 @pytest.mark.parametrize("row", CASES)
 def test_files(row: str, outcomes: dict[str, list[str]]) -> None:
-    """Each file gives the expected error, or the right mesh."""
     import re
 
     for case, (_, expected) in CASES[row].items():
@@ -391,7 +387,6 @@ def test_files(row: str, outcomes: dict[str, list[str]]) -> None:
 
 
 def test_repairs_are_counted(tmp_path: Path) -> None:
-    """A warning in place of the error of `strict`."""
     path = text(FACE + "f 1 1 2\nv nan 0 0\nf 1 2 4\n")(tmp_path)
     with pytest.warns(UserWarning, match="face") as found:
         (shape,) = wf.load(path).shapes
@@ -416,14 +411,12 @@ def test_faces_without_area_are_in_no_table_of_lights(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("make", [lambda: wf.Scene([]), lambda: wf.Mesh(np.zeros((0, 3)), [])])
 def test_an_empty_scene(make: Callable[[], Any]) -> None:
-    """There is nothing to render."""
     with pytest.raises(wf.SceneError, match=r"no shapes|no faces|must have shape|nothing|empty"):
         render(make(), 1)
 
 
 @pytest.mark.parametrize("accel", ["numpy", "embree", "brute_force"])
 def test_ties_go_to_the_lowest_primitive(accel: str) -> None:
-    """Duplicate and coplanar faces: the first of them is seen."""
     if accel not in ACCELERATORS:
         pytest.skip(f"no accelerator {accel!r}")
     if accel == "embree":
@@ -546,7 +539,6 @@ def test_bad_arguments(bad: dict[str, Any]) -> None:
     ],
 )
 def test_out_of_range(make: Callable[[], object]) -> None:
-    """And other things with numbers that make no sense."""
     with pytest.raises(ValueError, match="must be"):
         make()
 

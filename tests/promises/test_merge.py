@@ -32,7 +32,6 @@ def lognormal(spp: int) -> np.ndarray:
 
 @given(st.integers(2, 200), st.data())
 def test_films_of_any_parts_merge_to_the_film_of_all(spp: int, data: st.DataObject) -> None:
-    """The picture has the same bits; estimates of its error agree."""
     samples, cuts = lognormal(spp), sorted(data.draw(st.sets(st.integers(1, spp - 1), max_size=5)))
     whole = film_of(samples)
     first, *others = [film_of(part) for part in np.split(samples, cuts, axis=1)]
@@ -74,7 +73,6 @@ def test_errors_of_parts_that_are_not_aligned_are_those_of_the_mean() -> None:
 
 
 def test_a_film_is_restored_from_its_arrays() -> None:
-    """It goes on as if nothing had been."""
     samples = lognormal(50)
     whole, copy = film_of(samples), Film(3, 2)
     copy.restore({name: array.copy() for name, array in film_of(samples[:, :21]).arrays().items()})
@@ -90,7 +88,6 @@ SCENE = wf.Scene(
 
 
 def test_the_first_samples_are_those_of_a_render_of_as_many() -> None:
-    """Bit for bit, with any waves."""
     whole = wf.render(SCENE, 8)
     part = wf.render(SCENE, samples=range(8), wave_size=50, workers=2, executor="threads")
     assert part.rgb.tobytes() == whole.rgb.tobytes()
@@ -114,17 +111,13 @@ def test_later_samples_are_the_others_of_a_longer_render() -> None:
         ({"samples": range(0, 8, 2)}, r"samples is range\(0, 8, 2\)"),
         ({"samples": range(4, 4)}, r"samples is range\(4, 4\)"),
         ({"samples": range(-1, 4)}, r"samples is range\(-1, 4\)"),
-        (
-            {"samples": range(4), "spp": 4},
-            r"samples=range\(0, 4\) does not go with spp=4: samples",
-        ),
+        ({"samples": range(4), "spp": 4}, r"samples=range\(0, 4\) does not go with spp=4: samples"),
         ({"samples": range(4), "noise": 0.1}, "does not go with noise=0.1: samples"),
         ({"samples": range(4), "seconds": 1}, "does not go with seconds=1.0: samples"),
         ({"samples": range(2**32)}, f"it must end at {2**26} at most"),
     ],
 )
 def test_ranges_that_make_no_picture_are_errors(options: dict[str, Any], message: str) -> None:
-    """Before any work."""
     with pytest.raises(wf.SceneError, match=message):
         wf.render("no such file", **options)
 
@@ -136,7 +129,6 @@ LAYERS = ("alpha", "albedo", "direct", "indirect", "light_groups", "coverage", "
 
 @pytest.mark.parametrize("cuts", [(8,), (1,), (5, 11), (3, 4, 13), (2, 4, 6, 8, 10, 12, 14)])
 def test_pictures_of_any_parts_merge_to_one_render(cuts: tuple[int, ...]) -> None:
-    """Bit for bit, sampled layers too; in any order of merging."""
     whole = wf.render(SCENE, 16, aovs=LAYERS)
     parts = [
         wf.render(SCENE, samples=range(first, end), aovs=LAYERS, wave_size=70 + first)
@@ -159,7 +151,6 @@ def test_pictures_of_any_parts_merge_to_one_render(cuts: tuple[int, ...]) -> Non
 
 
 def test_merging_changes_neither_picture() -> None:
-    """They can be merged again with others."""
     a, b, c = (wf.render(SCENE, samples=range(first, first + 4)) for first in (0, 4, 8))
     before = a.rgb.copy(), a.sums.film.count.copy()  # type: ignore[union-attr]
     once = a.merge(b).merge(c)
@@ -171,7 +162,6 @@ def test_merging_changes_neither_picture() -> None:
 
 
 def test_npz_files_carry_the_sums(tmp_path: Path) -> None:
-    """Of the picture and of its layers, also of merged ones."""
     paths = [tmp_path / f"{number}.npz" for number in range(3)]
     for first, path in zip((0, 3, 6), paths, strict=True):
         wf.render(SCENE, samples=range(first, first + 3), aovs=LAYERS).save(path)
@@ -183,7 +173,6 @@ def test_npz_files_carry_the_sums(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_merged_is_an_error() -> None:
-    """The message says why."""
     part, later = wf.render(SCENE, samples=range(4)), range(4, 8)
     for other, message in [
         (wf.render(SCENE, 8), r"pictures without the sums .*render with samples=range\(...\)"),
@@ -199,7 +188,6 @@ def test_what_cannot_be_merged_is_an_error() -> None:
 
 
 def test_a_part_that_was_stopped_cannot_be_merged() -> None:
-    """Its pixels have different numbers of samples."""
 
     def stop(done: float, total: float) -> None:
         if done > 200:
@@ -212,7 +200,6 @@ def test_a_part_that_was_stopped_cannot_be_merged() -> None:
 
 
 def test_sums_that_were_damaged_are_an_error(tmp_path: Path) -> None:
-    """As those of a file that somebody else has written."""
     wf.render(SCENE, samples=range(4)).save(tmp_path / "a.npz")
     with np.load(tmp_path / "a.npz") as archive:
         arrays = dict(archive)
@@ -226,10 +213,7 @@ def test_sums_that_were_damaged_are_an_error(tmp_path: Path) -> None:
             wf.Image.load(tmp_path / "b.npz")
 
 
-def test_the_command_line_renders_parts_and_merges_them(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
-) -> None:
-    """Equal to one render of all samples."""
+def test_the_command_line_renders_parts_and_merges_them(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "t.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     options = ["--size", "12x8", "--lighting", "studio", "--quiet"]

@@ -44,7 +44,6 @@ def run(work: Callable[[int], int], jobs: range, workers: int, executor: str) ->
 @pytest.mark.parametrize("executor", EXECUTORS)
 @pytest.mark.parametrize("workers", [1, 2, 3, 8])
 def test_results_come_in_order(workers: int, executor: str) -> None:
-    """However long each piece takes."""
 
     def work(job: int) -> int:
         time.sleep(0.003 * (job % 3))
@@ -55,7 +54,6 @@ def test_results_come_in_order(workers: int, executor: str) -> None:
 
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_several_runs_share_the_workers(executor: str) -> None:
-    """The second starts none anew."""
     with WorkerPool(lambda k: (k, os.getpid(), threading.get_ident()), 2, executor) as pool:
         seen = [{result[1:] for _, result in pool.run(range(20))} for _ in range(2)]
     assert len(seen[0] | seen[1]) <= 2
@@ -78,7 +76,6 @@ def test_few_pieces_are_taken_ahead(executor: str) -> None:
 
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_an_error_in_a_piece_reaches_the_caller(executor: str) -> None:
-    """As it was raised."""
 
     def work(job: int) -> int:
         if job == 3:
@@ -91,7 +88,6 @@ def test_an_error_in_a_piece_reaches_the_caller(executor: str) -> None:
 
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_no_worker_is_left(executor: str) -> None:
-    """Neither after the end nor after an early stop."""
     before = threading.active_count()
     run(abs, range(10), 3, executor)
     with WorkerPool(abs, 3, executor) as pool:
@@ -102,7 +98,6 @@ def test_no_worker_is_left(executor: str) -> None:
 
 @processes
 def test_processes_are_processes() -> None:
-    """As many as asked for, and none of them this one."""
     all_have_one = multiprocessing.get_context("fork").Barrier(3)
     with WorkerPool(lambda k: all_have_one.wait(HANGS) >= 0 and os.getpid(), 3, "processes") as pool:
         pids = {pid for _, pid in pool.run(range(3))}
@@ -112,7 +107,6 @@ def test_processes_are_processes() -> None:
 
 @processes
 def test_pieces_of_a_process_that_dies_are_done_again(tmp_path: Path) -> None:
-    """By new ones; nothing is missing."""
 
     def work(job: int) -> int:
         if job in (4, 11):
@@ -128,7 +122,6 @@ def test_pieces_of_a_process_that_dies_are_done_again(tmp_path: Path) -> None:
 
 @processes
 def test_processes_that_die_again_and_again_are_an_error() -> None:
-    """It names the piece."""
 
     def work(job: int) -> int:
         if job == 5:
@@ -142,7 +135,6 @@ def test_processes_that_die_again_and_again_are_an_error() -> None:
 
 @processes
 def test_ctrl_c_reaches_the_parent_alone() -> None:
-    """A terminal sends it to all; workers finish what they do."""
 
     def work(job: int) -> int:
         os.kill(os.getpid(), signal.SIGINT)
@@ -153,7 +145,6 @@ def test_ctrl_c_reaches_the_parent_alone() -> None:
 
 @processes
 def test_workers_end_with_their_parent(tmp_path: Path) -> None:
-    """Even if it is killed."""
     script = (
         "import os, sys, time\n"
         "from wavefront.scheduling.pool import WorkerPool\n"
@@ -186,21 +177,18 @@ def _runs(pid: int) -> bool:
 
 
 def test_default_is_one_worker_per_core() -> None:
-    """Of those that this process may use."""
     assert 1 <= worker_count(None) <= (os.cpu_count() or 1)
     assert worker_count(5) == 5
 
 
 @pytest.mark.parametrize("workers", [0, -1, 1.5, True, "2"])
 def test_bad_worker_counts_are_named(workers: object) -> None:
-    """With the value and the limit."""
     with pytest.raises(wf.SceneError, match=f"workers is {workers!r}.*at least 1"):
         worker_count(workers)
 
 
 @processes
 def test_a_process_that_is_killed_while_it_writes_is_no_obstacle() -> None:
-    """The reader would wait for the rest of the result for ever."""
 
     def work(job: int) -> int:
         def send_half(connection: Connection, message: bytes) -> None:
@@ -238,10 +226,7 @@ def test_a_stop_ends_a_run(executor: str) -> None:
     assert found == [(0, 0)]
 
 
-def test_a_pool_that_is_closed_while_its_idle_workers_end_leaves_no_thread(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Nor is it closed before the thread that ends them is over."""
+def test_a_pool_that_is_closed_while_its_idle_workers_end_leaves_no_thread(monkeypatch):
     monkeypatch.setattr(pool_module, "IDLE_TIMEOUT", 0.01)
     before = set(threading.enumerate())
     pool = WorkerPool(abs, 1, "threads")
@@ -352,7 +337,6 @@ def test_a_thread_that_gets_no_core_computes(monkeypatch: pytest.MonkeyPatch) ->
 
 @processes
 def test_other_threads_are_watched_once_for_a_picture(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It takes a moment each time."""
     calls: list[bool] = []
     monkeypatch.setattr(executors, "_other_threads_compute", lambda: calls.append(True) or True)
     scene = [wf.Sphere((0, 0, 0), 1), wf.Environment(1)]
@@ -363,13 +347,11 @@ def test_other_threads_are_watched_once_for_a_picture(monkeypatch: pytest.Monkey
 
 
 def test_without_a_global_lock_threads_are_as_fast(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As in the free-threaded builds of Python."""
     monkeypatch.setattr(sys, "_is_gil_enabled", lambda: False, raising=False)
     assert choose_executor(None, 2, MIN_PATHS) == "threads"
 
 
 def test_where_processes_are_not_forked_they_need_more_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For spawned ones begin with imports."""
     monkeypatch.setattr(sys, "platform", "darwin")
     assert choose_executor(None, 2, MIN_PATHS) == "threads"
     assert choose_executor(None, 2, MIN_PATHS_TO_SPAWN) == "processes"
@@ -420,7 +402,6 @@ def test_a_working_folder_that_is_gone(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_a_daemon_has_threads() -> None:
-    """multiprocessing allows it no children."""
     daemon = multiprocessing.current_process()
     daemon._config["daemon"] = True  # type: ignore[attr-defined]
     try:
@@ -433,7 +414,6 @@ def test_a_daemon_has_threads() -> None:
 
 
 def test_unknown_executors_are_named() -> None:
-    """With what there is."""
     with pytest.raises(
         wf.SceneError, match="executor is 'dask'; it must be one of processes, threads, spawn"
     ):
@@ -446,7 +426,6 @@ def test_unknown_executors_are_named() -> None:
 @pytest.mark.parametrize("accel", ["numpy", "auto"])
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_the_executor_changes_no_bit(executor: str, accel: str) -> None:
-    """And is named in the picture."""
     options = {"accel": accel, "progress": False, "wave_size": 500}
     image = wf.render(scenes.everything(), 8, workers=2, executor=executor, **options)
     alone = wf.render(scenes.everything(), 8, workers=1, executor="threads", **options)

@@ -70,7 +70,6 @@ def test_arrays_that_are_none(name: str, value: object) -> None:
 
 
 def test_masks_of_nothing_are_no_matter() -> None:
-    """Libraries return masked arrays of good numbers."""
     mesh = wf.Mesh(np.ma.masked_array(VERTICES), FACES)
     assert type(mesh.vertices) is np.ndarray
 
@@ -89,7 +88,6 @@ def test_a_mesh_has_its_own_arrays(attribute: str, dtype: type) -> None:
 
 
 def test_spheres_have_their_own_arrays() -> None:
-    """As meshes have."""
     centers, radii = VERTICES.copy(), np.ones(3)
     spheres = wf.Spheres(centers, radii)
     centers *= 5
@@ -113,7 +111,6 @@ def test_a_list_may_be_there_twice() -> None:
 @pytest.mark.parametrize("load", [wf.load, wf.load_mesh, wf.Image.load])
 @pytest.mark.parametrize("path", [None, 5, b"scene.obj"])
 def test_paths_that_are_none(load: Callable, path: object) -> None:
-    """Not even the line of progress knows what to say."""
     with pytest.raises(wf.SceneError, match=r"path is .*; it must be text or a path"):
         load(path)
 
@@ -128,7 +125,6 @@ def test_noise_without_a_limit(noise: float) -> None:
 
 @pytest.mark.parametrize("size", [(True, True), (8, True), (np.True_, 8)])
 def test_sizes_that_are_truth_values(size: Any) -> None:
-    """They were one pixel."""
     with pytest.raises(wf.SceneError, match=r"size is .*whole numbers"):
         wf.Camera.look_at((0, 0, 3), (0, 0, 0), size=size)
 
@@ -141,7 +137,6 @@ def test_pictures_without_pixels(rgb: Any) -> None:
 
 
 def test_a_comparison_is_a_line() -> None:
-    """`print` shows the table."""
     gray = np.full((32, 32, 3), 0.5, np.float32)
     text = repr(wf.compare(1.1 * gray, gray))
     assert text.startswith("<Comparison: relative MSE 0.009")
@@ -151,7 +146,6 @@ def test_a_comparison_is_a_line() -> None:
 
 @pytest.mark.parametrize("name", ["position", "target", "fov"])
 def test_a_camera_is_made_by_look_at(name: str) -> None:
-    """The constructor takes what nobody has at hand."""
     with pytest.raises(TypeError, match=rf"'{name}'; write wf.Camera.look_at\(origin, target"):
         wf.Camera(**{name: (0, 0, 3)})  # type: ignore[arg-type, call-arg]
     with pytest.raises(TypeError, match="did you mean 'origin'"):
@@ -160,7 +154,6 @@ def test_a_camera_is_made_by_look_at(name: str) -> None:
 
 @pytest.mark.parametrize("command", ["render", "turntable", "dataset"])
 def test_options_have_no_abbreviations(command: str, capsys: pytest.CaptureFixture) -> None:
-    """A later option would change what they mean."""
     with pytest.raises(SystemExit):
         command_line.main([command, "scene.obj", "-o", "out", "--sp", "4"])
     assert "unrecognized arguments: --sp 4; did you mean --spp?" in capsys.readouterr().err

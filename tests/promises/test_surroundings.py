@@ -90,14 +90,12 @@ def test_blas_is_held_to_one_thread_by_any_thread() -> None:
 )
 @pytest.mark.parametrize("executor", NAMES)
 def test_a_render_in_a_worker_process(method: str, executor: str, expected: bytes) -> None:
-    """Which has workers of its own."""
     with ProcessPoolExecutor(1, multiprocessing.get_context(method)) as pool:
         assert pool.submit(bits, executor).result() == expected
 
 
 @pytest.mark.parametrize("executor", NAMES)
 def test_a_render_in_asyncio(executor: str, expected: bytes) -> None:
-    """In a thread, while the loop goes on, and in the loop itself."""
     begun, turned = threading.Event(), threading.Event()
 
     def wait_for_a_turn(done: int, total: int) -> None:
@@ -116,9 +114,7 @@ def test_a_render_in_asyncio(executor: str, expected: bytes) -> None:
 
 
 @pytest.mark.parametrize("executor", [None, "threads", pytest.param("spawn", marks=pytest.mark.slow)])
-def test_beside_threads_of_blas(
-    executor: str | None, expected: bytes, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_beside_threads_of_blas(executor, expected, monkeypatch):
     """That multiply all the while: a fork would wait for them forever, so by default there is none."""
     monkeypatch.setattr(executors, "MIN_PATHS", 1)
     over, begun = threading.Event(), threading.Semaphore(0)

@@ -22,11 +22,7 @@ Doubles = np.ndarray
 ROOMS = ("wavefront.sampling.", "wavefront.bsdfs.", "wavefront.lights.", "wavefront.guiding.")
 ALONE = ("wavefront.arrays.vec", "wavefront.arrays.frame", "wavefront.sampling.filters")
 # functions that read the bits of float32 numbers, and what they compute
-OF_BITS = {
-    "log": np.log,
-    "exp": np.exp,
-    "signs": lambda x: np.copysign(1.0, x),
-}
+OF_BITS = {"log": np.log, "exp": np.exp, "signs": lambda x: np.copysign(1.0, x)}
 ROUNDING = 2e-6  # constants such as 1/π, and tables, are float32
 KINK = 0.02  # by which one-sided derivatives may differ where the map is smooth
 LARGEST_BOUND = 0.02  # of the error of a derivative, relative
@@ -125,12 +121,7 @@ def _area(slopes: list[Doubles]) -> float:
     return float(np.linalg.norm(np.cross(a, b)))
 
 
-def assert_density(
-    sample: Callable[[Doubles], Doubles],
-    u: tuple[float, ...],
-    density: float,
-    rounding: float = ROUNDING,
-) -> None:
+def assert_density(sample, u, density, rounding=ROUNDING):
     """Assert density × |∂w/∂u| = 1 at u."""
     area, bound = jacobian(sample, u)
     assert abs(float(density) * area - 1) <= bound + rounding, (density, 1 / area, bound)

@@ -48,10 +48,7 @@ class ByValue(Bsdf):
 
 
 MATTE = st.one_of(st.builds(Diffuse, color), st.builds(OrenNayar, color, st.floats(0, 1)))
-SHINY = st.one_of(
-    st.builds(Conductor, color, st.floats(0.5, 5), rough),
-    st.builds(Dielectric, index, rough),
-)
+SHINY = st.one_of(st.builds(Conductor, color, st.floats(0.5, 5), rough), st.builds(Dielectric, index, rough))
 KINDS = {
     Diffuse: st.builds(Diffuse, color),
     ShadowCatcher: st.builds(ShadowCatcher, color),
@@ -159,9 +156,7 @@ def preimages(bsdf: Bsdf, wo: np.ndarray, wi: np.ndarray, inside: bool) -> list[
     return kept
 
 
-def density_by_differentiation(
-    bsdf: Bsdf, wo: np.ndarray, wi: np.ndarray, inside: bool
-) -> tuple[float, float]:
+def density_by_differentiation(bsdf, wo, wi, inside):
     """Return the density at wi (3, 1) and a bound on its error."""
     third = (np.arange(CHOICES) + 0.5) / CHOICES
     total, bound = 0.0, 0.0
@@ -205,9 +200,7 @@ def test_density_of_directions(kind: type[Bsdf], data: st.DataObject, z: float, 
 @kinds
 @some
 @given(data=st.data(), z=cosines, inside=st.booleans(), u=cubes)
-def test_samples_keep_their_promises(
-    kind: type[Bsdf], data: st.DataObject, z: float, inside: bool, u
-) -> None:
+def test_samples_keep_their_promises(kind, data, z, inside, u):
     """In float32, as in a render: the density at the sample is the one returned; weight = f·cos/pdf."""
     bsdf, wo = data.draw(KINDS[kind]), toward(z).astype(f4)
     sample = sampled(bsdf, wo, columns(*u).astype(f4)[: bsdf.dimensions], inside)
@@ -232,9 +225,7 @@ def test_samples_keep_their_promises(
 @kinds
 @few
 @given(data=st.data(), z=cosines, inside=st.booleans())
-def test_densities_integrate_to_the_chance_of_a_sample(
-    kind: type[Bsdf], data: st.DataObject, z: float, inside: bool
-) -> None:
+def test_densities_integrate_to_the_chance_of_a_sample(kind, data, z, inside):
     """Over the sphere, by the midpoint rule; delta lobes and directions to the wrong side are left out."""
     bsdf, wo = data.draw(KINDS[kind]), toward(z).astype(f4)
     rows = 256
@@ -257,9 +248,7 @@ def test_densities_integrate_to_the_chance_of_a_sample(
 @kinds
 @some
 @given(data=st.data(), z=cosines, inside=st.booleans(), u=cubes)
-def test_delta_lobes_have_their_chance(
-    kind: type[Bsdf], data: st.DataObject, z: float, inside: bool, u
-) -> None:
+def test_delta_lobes_have_their_chance(kind, data, z, inside, u):
     """The part of the numbers u[2] that lead to a delta lobe is the probability returned with it."""
     bsdf, wo = data.draw(KINDS[kind]), toward(z)
     third = (np.arange(CHOICES) + 0.5) / CHOICES

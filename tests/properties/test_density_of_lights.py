@@ -108,7 +108,6 @@ kinds = pytest.mark.parametrize("kind", KINDS)
 
 
 def test_every_light_is_here() -> None:
-    """Those of `KINDS`, a sum of others, and those that no ray meets."""
     checked = {
         *("TriangleLights", "TwoSidedTriangleLights", "TexturedTriangleLights", "RectangleLights"),
         *("TwoSidedTexturedTriangleLights", "TwoSidedRectangleLights", "SphereLights", "SunLight"),
@@ -204,7 +203,6 @@ def test_sums_of_lights_at_infinity(first, second, share: float, u: tuple[float,
     first=triangles(), second=spheres(), place=places, choice=st.floats(0.01, 0.99), u=points_of_the_square
 )
 def test_tables_of_lights(first, second, place, choice: float, u: tuple[float, float]) -> None:
-    """The density of a light times the chance of its choice."""
     parts = [first, second, PointLightRecord(f4([[1], [2], [1]]), RADIANCE)]
     table, point = LightTable(parts, 2.0, "power"), columns(*place).astype(f4)
     sample, light = table.sample_li(point, f4([choice]), columns(*u).astype(f4))

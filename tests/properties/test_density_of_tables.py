@@ -171,7 +171,6 @@ def test_light_trees(count: int, seed: int, place, u: float) -> None:
     u=inner,
 )
 def test_halved_light_samplers(first: np.ndarray, second: np.ndarray, u: float) -> None:
-    """Each of two samplers of different lights takes half."""
     parts = [
         SubsetLightSampler(WeightedLightSampler(weights), np.array(chosen), 7)
         for weights, chosen in ((first, (0, 2, 3)), (second, (1, 4, 5, 6)))

@@ -19,10 +19,7 @@ SQUARE = {
     "uniform_disk": EMPTY,
     "uniform_triangle": EMPTY,
 }
-LINE = {
-    "tent": st.tuples(st.floats(0.25, 4)),
-    "gaussian": st.tuples(st.floats(0.2, 2), st.floats(0.5, 3)),
-}
+LINE = {"tent": st.tuples(st.floats(0.25, 4)), "gaussian": st.tuples(st.floats(0.2, 2), st.floats(0.5, 3))}
 WITHOUT_POINT = ("uniform_cone_pdf",)  # constant densities, which take no point
 
 

@@ -169,7 +169,6 @@ def test_points_lie_in_cells_with_weight(weights, u):
 
 @given(weights=grids)
 def test_the_density_integrates_to_one(weights):
-    """The mean over the centers of the cells is the integral."""
     plane = Distribution2D(weights)
     height, width = weights.shape
     x, y = (part.ravel() for part in np.meshgrid(even(width), even(height)))

@@ -58,7 +58,6 @@ def test_an_edge_is_blurred_by_the_filter(name: str, up: tuple[float, float, flo
 
 
 def test_each_filter_is_its_own_picture() -> None:
-    """Box is the default; the others differ from it."""
     scene = edge((0, 1, 0))
     pictures = {name: render(scene, 16, filter=name).rgb.tobytes() for name in FILTERS}
     assert pictures["box"] == render(scene, 16).rgb.tobytes()
@@ -67,6 +66,5 @@ def test_each_filter_is_its_own_picture() -> None:
 
 
 def test_unknown_filters_are_named() -> None:
-    """With what there is."""
     with pytest.raises(wf.SceneError, match="filter is 'lanczos'; it must be one of box, tent, gaussian"):
         render(edge((0, 1, 0)), 1, filter="lanczos")

@@ -304,7 +304,6 @@ def test_numbers_are_stratified(name, seed, pixel, bounce, dim, m):
 
 
 def test_unscrambled_points_are_sobols():
-    """The core without hashes against SciPy's Sobol sequence."""
     index = np.arange(4096, dtype=np.uint32)
     ours = np.stack([module._reverse(index), module._reverse(module._pascal(index))]) / 2.0**32
     # SciPy walks the sequence in Gray-code order.
@@ -422,7 +421,6 @@ def test_half_of_the_squares_are_turned():
 
 
 def test_blue_noise_keeps_the_error_of_a_pixel():
-    """Pixel by pixel it is as good as Sobol's."""
     for n in (16, 64, 100):
         assert rms_error(BlueNoiseSampler(1, 16), n) < 1.15 * rms_error(SobolSampler(1), n)
 

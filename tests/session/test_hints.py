@@ -61,14 +61,12 @@ def long_ago(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 @pytest.mark.filterwarnings("ignore:the picture is black")
 def test_small_lamps_by_glass_get_a_hint(things: list[Any], settings: dict[str, Any], rare: bool) -> None:
-    """Paths from the camera find their caustics as bright dots."""
     hint = render(things, progress=False, **settings).metadata["hint"]
     assert hint == (hints.RARE_CAUSTICS if rare else None)
 
 
 @pytest.mark.parametrize("factor", [1e-12, 1e12])
 def test_the_size_of_the_scene_does_not_matter(factor: float) -> None:
-    """In scenes that are compiled in another unit of length either."""
     ball = wf.Sphere((0, 0.7 * factor, 0), 0.6 * factor, material=wf.Dielectric(1.5))
     for radius, hint in ((0.1, hints.RARE_CAUSTICS), (1.5, None)):
         lamp = wf.Sphere((0, 3.5 * factor, 0), radius * factor, emission=2)
@@ -78,7 +76,6 @@ def test_the_size_of_the_scene_does_not_matter(factor: float) -> None:
 
 @pytest.mark.usefixtures("long_ago")
 def test_a_long_render_ends_with_the_hint(capsys: pytest.CaptureFixture) -> None:
-    """In one line, and once in a session."""
     render([FLOOR, GLASS, LAMP])
     assert told(capsys) == [f"hint: {hints.RARE_CAUSTICS}"]
     with wf.Session([FLOOR, GLASS, LAMP], 2, camera=CAMERA, workers=1) as session:
@@ -91,7 +88,6 @@ def test_a_long_render_ends_with_the_hint(capsys: pytest.CaptureFixture) -> None
 
 
 def test_short_renders_say_nothing(capsys: pytest.CaptureFixture) -> None:
-    """They take less than ten seconds."""
     assert hints.LONG == 10
     render([FLOOR, GLASS, LAMP])
     assert told(capsys) == []
@@ -100,7 +96,6 @@ def test_short_renders_say_nothing(capsys: pytest.CaptureFixture) -> None:
 @pytest.mark.usefixtures("long_ago")
 @pytest.mark.parametrize("progress", [False, lambda done, total: None])
 def test_quiet_renders_say_nothing(progress: Any, capsys: pytest.CaptureFixture) -> None:
-    """A function shows progress in its own way."""
     assert render([FLOOR, GLASS, LAMP], progress=progress).metadata["hint"] == hints.RARE_CAUSTICS
     assert capsys.readouterr().err == ""
 
@@ -108,7 +103,6 @@ def test_quiet_renders_say_nothing(progress: Any, capsys: pytest.CaptureFixture)
 @pytest.mark.usefixtures("long_ago")
 @pytest.mark.parametrize("stream", [None, "closed"])
 def test_hints_never_end_a_render(stream: str | None, monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
-    """Where nothing can be written."""
     file = (tmp_path / "stderr").open("w")
     file.close()
     monkeypatch.setattr("sys.stderr", file if stream else None)
@@ -125,14 +119,7 @@ def test_hints_never_end_a_render(stream: str | None, monkeypatch: pytest.Monkey
         (3, False, {"accel": "numpy"}, False),
     ],
 )
-def test_a_missing_embree_is_told(
-    subdivisions: int,
-    there: bool,
-    settings: dict[str, Any],
-    said: bool,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture,
-) -> None:
+def test_a_missing_embree_is_told(subdivisions, there, settings, said, monkeypatch, capsys):
     """Where there are so many triangles that it matters, and the choice was left to the package."""
     monkeypatch.setattr(hints, "installed", lambda: there)
     monkeypatch.setattr(registry, "installed", lambda: False)
@@ -143,19 +130,13 @@ def test_a_missing_embree_is_told(
 
 @pytest.mark.usefixtures("long_ago")
 @pytest.mark.parametrize("denoise", [True, False])
-def test_a_missing_denoiser_is_told(
-    denoise: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
-) -> None:
-    """Where it was asked for."""
+def test_a_missing_denoiser_is_told(denoise, monkeypatch, capsys):
     monkeypatch.setattr(denoisers, "find_spec", lambda name: None)
     render([FLOOR, MATTE, SKY], denoise=denoise)
     assert told(capsys) == ([f"hint: {hints.NO_DENOISER}"] if denoise else [])
 
 
-def test_errors_that_rest_on_few_samples_are_told(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
-) -> None:
-    """Only where they are much of the error."""
+def test_errors_that_rest_on_few_samples_are_told(monkeypatch, capsys):
     monkeypatch.setattr(hints, "LONG", 0.0)
     for much in (0.99, -1.0):
         monkeypatch.setattr(hints, "MUCH_RARE", much)

@@ -34,7 +34,6 @@ def picture(html: str) -> np.ndarray:
 
 
 def test_an_image_shows_its_picture_and_facts() -> None:
-    """Size, samples, error, time and layers."""
     image = wf.render(BALL, 4, size=(24, 16), aovs=("depth", "normal"), progress=False)
     html = image._repr_html_()
     assert (picture(html) == image.to_uint8()).all()
@@ -43,7 +42,6 @@ def test_an_image_shows_its_picture_and_facts() -> None:
 
 
 def test_an_image_that_was_not_rendered_shows_what_it_has() -> None:
-    """And names of layers are escaped."""
     image = wf.Image(np.zeros((2, 3, 3), np.float32), layers={"a<b": np.zeros((2, 3), np.float32)})
     html = image._repr_html_()
     assert "3 × 2 · 0 spp · layers: a&lt;b" in html
@@ -71,13 +69,11 @@ def test_a_scene_shows_counts_bounds_materials_and_lights() -> None:
 
 
 def test_a_scene_with_many_materials_shows_the_first() -> None:
-    """And how many more there are."""
     shapes = [wf.Sphere((k, 0, 0), 0.4, material=wf.Diffuse(0.5)) for k in range(25)]
     assert "and 5 more" in wf.Scene(shapes)._repr_html_()
 
 
 def test_a_material_shows_a_ball_of_it() -> None:
-    """A bare BSDF too; red where it is red."""
     for material in (wf.Diffuse((0.8, 0.1, 0.1)), wf.Material(wf.Diffuse((0.8, 0.1, 0.1)))):
         html = material._repr_html_()
         shown = picture(html)
@@ -88,7 +84,6 @@ def test_a_material_shows_a_ball_of_it() -> None:
 
 
 def test_a_ball_is_rendered_again_only_when_its_material_changed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A change of a parameter counts."""
     calls: list[Any] = []
     ball = sys.modules["wavefront.material_ball"]
     monkeypatch.setattr(ball, "_rendered", lambda material: calls.append(material) or b"png")
@@ -101,7 +96,6 @@ def test_a_ball_is_rendered_again_only_when_its_material_changed(monkeypatch: py
 
 
 def test_a_material_that_cannot_be_rendered_shows_its_text() -> None:
-    """No error from what only looks."""
 
     class Broken(wf.Bsdf):
         def f(self, wo: Any, wi: Any) -> Any:
@@ -157,14 +151,12 @@ def kernel(monkeypatch: pytest.MonkeyPatch) -> tuple[ZMQInteractiveShell, list[A
 
 
 def test_there_is_no_kernel_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither without IPython nor in its terminal."""
     assert not in_kernel()
     monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: object()))
     assert not in_kernel()
 
 
 def test_pictures_refine_unless_something_else_shows_progress(kernel: Any) -> None:
-    """By default and with True."""
     assert in_kernel()
     assert shows_pictures(None)
     assert shows_pictures(True)
@@ -173,7 +165,6 @@ def test_pictures_refine_unless_something_else_shows_progress(kernel: Any) -> No
 
 
 def test_a_render_in_a_kernel_shows_better_and_better_pictures(kernel: Any) -> None:
-    """The last one is the result, with the bits of a render elsewhere."""
     _, shown = kernel
     image = wf.render(BALL, 16, size=(16, 16))
     assert [each.spp for each in shown] == [1, 2, 4, 8, 16]
@@ -185,7 +176,6 @@ def test_a_render_in_a_kernel_shows_better_and_better_pictures(kernel: Any) -> N
 
 
 def test_a_quick_render_shows_nothing(kernel: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its result is enough."""
     monkeypatch.setattr(module, "DELAY", 60)
     wf.render(BALL, 4, size=(16, 16))
     assert kernel[1] == []
@@ -193,7 +183,6 @@ def test_a_quick_render_shows_nothing(kernel: Any, monkeypatch: pytest.MonkeyPat
 
 @pytest.mark.parametrize("how", ["result", "error", "neither"])
 def test_the_last_picture_is_not_shown_twice(kernel: Any, how: str) -> None:
-    """When the cell shows it, the one that refined disappears."""
     shell, shown = kernel
     image = wf.render(BALL, 2, size=(16, 16))
     (cell_ended,) = shell.callbacks
@@ -204,7 +193,6 @@ def test_the_last_picture_is_not_shown_twice(kernel: Any, how: str) -> None:
 
 
 def test_an_interrupt_keeps_the_picture(kernel: Any) -> None:
-    """It is shown, and the error has it."""
     _, shown = kernel
     with wf.Session(BALL, 64, size=(16, 16), progress=False) as session:
 
@@ -219,7 +207,6 @@ def test_an_interrupt_keeps_the_picture(kernel: Any) -> None:
 
 
 def test_a_long_render_ends_with_hints(kernel: Any, monkeypatch: Any, capsys: Any) -> None:
-    """Below the picture, though there is no bar."""
     monkeypatch.setattr(hints, "LONG", 0.0)
     ball = wf.Sphere((0, 0, 0), 1, material=wf.Dielectric(1.5))
     wf.render(
@@ -277,7 +264,6 @@ def executed(cells: list[str], folder: Path) -> tuple[list[list[dict]], list[lis
 
 @pytest.mark.filterwarnings("default")  # of the client that runs the notebook
 def test_a_notebook_shows_the_picture_refining_in_place(tmp_path: Path) -> None:
-    """In one output of the cell, which ends with the right picture."""
     (outputs,), (updates,) = executed([REFINE.format(spp=300)], tmp_path)
     pictures = [output for output in outputs if output["output_type"] == "display_data"]
     assert len(pictures) == 1, outputs
@@ -293,7 +279,6 @@ def test_a_notebook_shows_the_picture_refining_in_place(tmp_path: Path) -> None:
 @pytest.mark.filterwarnings("default")
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_notebook_keeps_the_picture_of_an_interrupted_render(tmp_path: Path, workers: int) -> None:
-    """Once, with one line about it; the kernel goes on."""
     cells = [REFINE.format(spp=8), INTERRUPT.format(workers=workers), AFTER]
     (_, stopped, after), _ = executed(cells, tmp_path)
     assert after == []

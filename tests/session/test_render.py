@@ -39,7 +39,6 @@ def whole(integrator: str, sampler: str) -> bytes:
 @pytest.mark.parametrize("integrator", scenes.ALL)
 @pytest.mark.parametrize("cut", [{"wave_size": 7}, {"wave_size": 64, "workers": 2}, {"wave_size": 4096}])
 def test_waves_change_no_bit(integrator: str, sampler: str, cut: dict) -> None:
-    """Nor does any other number of paths that are traced together."""
     image = render(scenes.everything(), SPP, integrator=integrator, sampler=sampler, **cut)
     assert image.rgb.tobytes() == whole(integrator, sampler)
 
@@ -47,7 +46,6 @@ def test_waves_change_no_bit(integrator: str, sampler: str, cut: dict) -> None:
 @pytest.mark.filterwarnings("ignore:the naive integrator")
 @pytest.mark.parametrize("integrator", scenes.ALL)
 def test_lone_paths_change_no_bit(integrator: str) -> None:
-    """Waves of a single path."""
     scene = scenes.everything((5, 4))
     whole = render(scene, 3, integrator=integrator)
     assert render(scene, 3, integrator=integrator, wave_size=1).rgb.tobytes() == whole.rgb.tobytes()
@@ -90,7 +88,6 @@ def test_a_mesh_has_the_same_bits_in_any_wave_on_any_worker(wave_size: int | Non
 
 
 def test_seeds_change_the_picture() -> None:
-    """And only they."""
     first, again, other = (render(small(), 4, seed=seed).rgb for seed in (1, 1, 2))
     assert first.tobytes() == again.tobytes()
     assert first.tobytes() != other.tobytes()
@@ -230,7 +227,6 @@ def test_an_error_of_the_size_of_the_picture_is_doubted() -> None:
 
 @pytest.mark.parametrize(("scene", "message"), BAD_SCENES, ids=range(len(BAD_SCENES)))
 def test_bad_scenes_are_named(scene, message: str) -> None:
-    """Whatever was given in place of a scene."""
     with pytest.raises(wf.SceneError, match=message):
         wf.render(scene, 1, progress=False)
 
@@ -259,7 +255,6 @@ TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float), np.array([[0, 1, 
     ],
 )
 def test_what_can_be_rendered(subject) -> None:
-    """Everything that a user may hold; it is framed, and lit."""
     image = render(subject, 2, size=(6, 5), lighting="even")
     assert image.rgb.shape == (5, 6, 3)
     assert image.rgb.max() == pytest.approx(1)
@@ -267,7 +262,6 @@ def test_what_can_be_rendered(subject) -> None:
 
 
 def test_a_path_can_be_rendered(tmp_path) -> None:
-    """A string or a Path."""
     (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     for path in (tmp_path / "a.obj", str(tmp_path / "a.obj")):
         assert render(path, 1, size=(6, 5)).rgb.shape == (5, 6, 3)
@@ -277,7 +271,6 @@ def test_a_path_can_be_rendered(tmp_path) -> None:
 
 
 def test_the_result_tells_how_it_was_made() -> None:
-    """Settings, accelerator, time and version."""
     image = render(small(), 3, integrator="naive", max_bounces=4, seed=9, sampler="independent", workers=2)
     assert image.spp == 3
     wanted = {
@@ -296,19 +289,16 @@ def test_the_result_tells_how_it_was_made() -> None:
 
 
 def test_numpy_integers_are_whole_numbers() -> None:
-    """As they come out of arrays."""
     assert render(small(), np.int64(2), max_bounces=np.uint8(3), seed=np.int32(5)).spp == 2
 
 
 def test_progress_is_reported() -> None:
-    """Samples done and in all, to the last."""
     calls = []
     render(small(), 4, wave_size=12, progress=lambda done, total: calls.append((done, total)))
     assert calls == [(12, 48), (24, 48), (36, 48), (48, 48)]
 
 
 def test_a_camera_inside_things_is_fine() -> None:
-    """In glass, and in the middle of a mesh: a finite picture."""
     glass = wf.Sphere((0, 0, 0), 1, material=wf.Dielectric(1.5))
     solid = scenes.box((-3, -3, -3), (3, 3, 3), wf.Diffuse(0.5))
     camera = wf.Camera.look_at((0.1, 0.2, 0.3), (1, 0, 0), size=(6, 6))
@@ -318,7 +308,6 @@ def test_a_camera_inside_things_is_fine() -> None:
 
 
 def test_a_point_light_on_a_surface_is_fine() -> None:
-    """A distance of zero divides nothing."""
     scene = wf.Scene([scenes.floor()], [wf.PointLight((0, 0, 0), 1)], scenes.probe((0, 0, 0), (0, 1, 0)))
     assert np.isfinite(render(scene, 4).rgb).all()
 

@@ -83,7 +83,6 @@ def test_each_picture_is_that_of_a_shorter_render() -> None:
 
 
 def test_long_passes_show_pictures_in_between(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At a count that all pixels have."""
     monkeypatch.setattr(module, "SNAPSHOT_INTERVAL", 0.0)
     with wf.Session(everything(), 16, workers=1, wave_size=200, **QUIET) as session:
         images = list(session)
@@ -93,7 +92,6 @@ def test_long_passes_show_pictures_in_between(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_noise_gives_a_picture_at_each_decision() -> None:
-    """Among others; the last one is that of render."""
     options = {"noise": 0.05, "workers": 1, **QUIET}
     with wf.Session(everything(), 128, **options) as session, pytest.warns(UserWarning, match="not reached"):
         images = list(session)
@@ -104,7 +102,6 @@ def test_noise_gives_a_picture_at_each_decision() -> None:
 
 @pytest.mark.usefixtures("no_estimates")
 def test_time_ends_a_session() -> None:
-    """As it ends a render."""
     with wf.Session(everything(), seconds=0.3, workers=1, **QUIET) as session:
         images = list(session)
     assert images[-1].counts.min() >= 1
@@ -112,7 +109,6 @@ def test_time_ends_a_session() -> None:
 
 
 def test_run_goes_on_where_a_loop_was_left() -> None:
-    """A loop does, too."""
     plain = wf.render(everything(), 16, **QUIET)
     for finish in (lambda session: session.run(), lambda session: list(session)[-1]):
         with wf.Session(everything(), 16, **QUIET) as session:
@@ -141,9 +137,7 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("patient")
 @pytest.mark.parametrize("executor", EXECUTORS)
 @pytest.mark.parametrize("sampler", ["sobol", "bluenoise"])
-def test_another_camera_compiles_nothing_and_starts_no_worker(
-    executor: str, sampler: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_camera_compiles_nothing_and_starts_no_worker(executor, sampler, monkeypatch):
     """Its picture is that of a render, also in another size, and when the first one was not finished."""
     options = {"sampler": sampler, "workers": 2, "executor": executor, "wave_size": 300, **QUIET}
     plain = [wf.render(everything(), 6, camera=view(x, size), **options) for x, size in VIEWS]
@@ -175,7 +169,6 @@ VIEWS = [(0.4, (20, 15)), (-0.4, (12, 10)), (0.0, (24, 8))]
 
 
 def test_the_camera_may_be_left_to_the_scene() -> None:
-    """None is the camera of the scene, or one that frames it."""
     with wf.Session(wf.Sphere((0, 0, 0), 1), 2, size=(8, 6), lighting="even", **QUIET) as session:
         first = session.run()
         session.set_camera(None, (8, 6))
@@ -183,7 +176,6 @@ def test_the_camera_may_be_left_to_the_scene() -> None:
 
 
 def test_bad_cameras_leave_the_session_as_it_is() -> None:
-    """And say what is wrong."""
     with wf.Session(everything(), 4, **QUIET) as session:
         next(session)
         with pytest.raises(wf.SceneError, match=r"camera must be a wf\.Camera"):
@@ -214,7 +206,6 @@ def test_time_begins_anew_with_another_camera(monkeypatch: pytest.MonkeyPatch) -
 @pytest.mark.usefixtures("patient")
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_stop_in_the_loop_ends_it(executor: str) -> None:
-    """Another camera begins anew, with the same workers."""
     options = {"workers": 2, "executor": executor, "wave_size": 300, **QUIET}
     seen = []
     with wf.Session(everything(), 100_000, **options) as session:
@@ -230,7 +221,6 @@ def test_stop_in_the_loop_ends_it(executor: str) -> None:
 
 
 def test_stop_from_another_thread_gives_the_picture_so_far() -> None:
-    """It is the last one, and says that it was cut short."""
     begun = threading.Event()
     options = {**QUIET, "progress": lambda done, most: begun.set() if done else None}
     with wf.Session(everything(), 10_000_000, workers=2, wave_size=2000, **options) as session:
@@ -249,7 +239,6 @@ def test_stop_from_another_thread_gives_the_picture_so_far() -> None:
 
 
 def test_stop_before_there_is_a_picture() -> None:
-    """A loop has no rounds; run has nothing to return."""
     with wf.Session(everything(), 4, **QUIET) as session:
         session.stop()
         assert list(session) == []
@@ -260,7 +249,6 @@ def test_stop_before_there_is_a_picture() -> None:
 
 
 def test_drop_ends_a_render_without_a_picture(monkeypatch: pytest.MonkeyPatch) -> None:
-    """From another thread; another view follows."""
     with wf.Session(everything(), 10_000_000, workers=2, wave_size=2000, **QUIET) as session:
         images = [next(session)]
         monkeypatch.setattr(ViewRender, "last_image", None)  # is not called
@@ -275,7 +263,6 @@ def test_drop_ends_a_render_without_a_picture(monkeypatch: pytest.MonkeyPatch) -
 
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_workers_can_be_started_before_there_is_work(executor: str) -> None:
-    """They are those that render then."""
     with wf.Session(everything(), 4, workers=2, executor=executor, **QUIET) as session:
         session.start_workers()
         workers = {each.pid for each in multiprocessing.active_children()}
@@ -286,7 +273,6 @@ def test_workers_can_be_started_before_there_is_work(executor: str) -> None:
 
 
 def test_geometric_layers_end_when_the_session_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Before the next rays, as waves do."""
     with wf.Session(everything(), 4, aovs="depth", **QUIET) as session:
         layers, rays = view_render.geometric_layers, []
 
@@ -343,7 +329,6 @@ def test_idle_workers_end_and_start_again(executor: str, monkeypatch: pytest.Mon
 
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_workers_stay_within_a_block(executor: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """However long the loop looks at a picture."""
     monkeypatch.setattr(pool, "IDLE_TIMEOUT", 0.05)
     options = {"workers": 2, "executor": executor, "wave_size": 300, **QUIET}
     session = wf.Session(everything(), 100_000, **options)
@@ -415,7 +400,6 @@ def test_a_second_thread_gets_an_error(executor: str) -> None:
 
 
 def test_a_function_of_progress_cannot_use_its_session() -> None:
-    """It is called within."""
     session = wf.Session(scenes.everything(), 4, progress=lambda done, total: session.run())
     with session, pytest.raises(wf.RenderError, match="in use by the caller of this function"):
         session.run()

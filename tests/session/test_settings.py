@@ -65,7 +65,6 @@ def options() -> dict[str, argparse.Action]:
 
 
 def test_options_follow_the_declaration() -> None:
-    """Help, defaults and choices; those without an option have none."""
     found = options()
     for name, each in SETTINGS.items():
         if each.option is None:
@@ -81,13 +80,11 @@ def test_options_follow_the_declaration() -> None:
 
 @pytest.mark.parametrize("name", [name for name, each in SETTINGS.items() if each.choices])
 def test_choices_are_described(name: str) -> None:
-    """Each built-in name stands in the text."""
     for choice in ("processes", "threads") if name == "executor" else SETTINGS[name].choices:
         assert f'"{choice}"' in SETTINGS[name].text
 
 
 def test_checks_are_those_of_the_declaration() -> None:
-    """Sessions and renders make the same checks, before any work."""
     for call in (wf.render, wf.Session):
         with pytest.raises(wf.SceneError, match=r"max_bounces is -1; .* from 0 to 65536"):
             call("no such file", max_bounces=-1)
@@ -96,7 +93,6 @@ def test_checks_are_those_of_the_declaration() -> None:
 
 
 def test_settings_are_kept_as_they_are_checked() -> None:
-    """Sizes and counts as ints, and what follows from several of them."""
     assert Settings(size=(8.0, 6.0)).values["size"] == (8, 6)  # type: ignore[arg-type]
     assert Settings().max_spp == Settings().target_spp == 100
     assert Settings(noise=0.1).max_spp == 2**16
@@ -118,7 +114,6 @@ def test_layers_are_chosen_by_name() -> None:
 
 
 def test_unknown_layers_are_an_error_that_lists_what_there_is() -> None:
-    """With a suggestion."""
     with pytest.raises(
         wf.SceneError, match=r"aovs has 'dept'; there are position, depth, .*coverage, boxes, and"
     ) as e:
@@ -131,14 +126,12 @@ def test_unknown_layers_are_an_error_that_lists_what_there_is() -> None:
 
 
 def test_the_option_of_layers_can_be_given_several_times() -> None:
-    """Each time with one name."""
     read = cli.parser().parse_args(["render", "scene.obj", "--aov", "depth", "--aov", "albedo"])
     assert read.aovs == ("depth", "albedo")
     assert cli.parser().parse_args(["render", "scene.obj"]).aovs == ()
 
 
 def test_the_option_of_reuse_takes_yes_no_and_auto(capsys: pytest.CaptureFixture[str]) -> None:
-    """Anything else is an error that names them."""
     for text, value in (("yes", True), ("no", False), ("auto", "auto")):
         assert cli.parser().parse_args(["render", "scene.obj", "--reuse", text]).reuse == value
     with pytest.raises(SystemExit):

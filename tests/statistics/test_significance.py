@@ -62,7 +62,6 @@ def levels(found):
 
 
 def test_tail_of_student() -> None:
-    """Agrees with SciPy."""
     rng = np.random.default_rng(0)
     t, freedom = np.exp(rng.uniform(-6, 6, 5000)), np.exp(rng.uniform(0, 12, 5000))
     expected = 2 * stats.t.sf(t, freedom)
@@ -74,7 +73,6 @@ def test_tail_of_student() -> None:
 
 
 def test_correction() -> None:
-    """Is that of independent tests."""
     assert sidak(0.01, 1) == pytest.approx(0.01)
     assert sidak(1e-20, 1000) == pytest.approx(1e-17)
     assert sidak(0.5, 2) == pytest.approx(0.75)
@@ -109,7 +107,6 @@ def test_p_of_the_mean_is_uniform() -> None:
 
 @pytest.mark.parametrize(("field", "where"), [("p_pixels", 3), ("p_blocks", 8), ("p_mean", SIZE)])
 def test_differences_are_found(field, where) -> None:
-    """A square of pixels is brighter in one of the pictures."""
     rng = np.random.default_rng(2)
     a, b = noisy(rng, gaussian, 64), noisy(rng, gaussian, 64)
     by = {3: 4.0, 8: 0.2, SIZE: 0.04}[where]
@@ -121,14 +118,12 @@ def test_differences_are_found(field, where) -> None:
 
 
 def test_rounding_is_no_difference() -> None:
-    """Of pixels without noise."""
     a, b = flat(0.5), flat(0.5 * (1 + 3e-7))
     assert levels(wf.compare(a, b)) == (1, 1, 1, 1)
     assert wf.compare(a, flat(0.51)).p_pixels < 1e-3
 
 
 def test_pictures_that_share_samples_are_refused() -> None:
-    """Other measures remain."""
     scene = wf.Scene([wf.Sphere((0, 0, 0), 1)], [wf.Environment(1)])
     a, same, more = (render(scene, spp, size=(8, 8)) for spp in (4, 4, 8))
     other = render(scene, 4, size=(8, 8), seed=1)
@@ -164,13 +159,11 @@ def test_pictures_that_share_samples_are_refused() -> None:
     ],
 )
 def test_shared_samples(a, b, shared) -> None:
-    """By seed, sampler and ranges."""
     assert shared_samples(a, b) == shared
     assert shared_samples(b, a) == shared
 
 
 def test_reasons() -> None:
-    """Say what is missing."""
     image = noisy(np.random.default_rng(0), gaussian)
     assert "b has no standard error" in wf.compare(image, image.rgb).p_absent
     assert "a has no standard error" in wf.compare(image.rgb, image).p_absent
@@ -191,7 +184,6 @@ def room(*shapes, size=(32, 32)) -> wf.Scene:
 
 @pytest.mark.parametrize("sampler", ["sobol", "independent"])
 def test_one_percent_of_brightness(sampler) -> None:
-    """Is found in a converged picture."""
     a, b = (render(room(size=(16, 16)), 512, sampler=sampler, seed=seed) for seed in (1, 2))
     assert wf.compare(a, b).p_value > 1e-3
     assert wf.compare(a * 1.01, b).p_value < 1e-3
