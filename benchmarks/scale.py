@@ -35,7 +35,7 @@ from distributed import Client, LocalCluster
 
 import wavefront as wf
 from wavefront.film.film import Film
-from wavefront.scheduling.delivery import pack
+from wavefront.scheduling.payload import pack
 from wavefront.scheduling.jobs import WaveResult
 from wavefront.scheduling.pool import WorkerPool
 

@@ -15,7 +15,7 @@ import pytest
 import scenes
 
 import wavefront as wf
-from wavefront.scheduling import delivery
+from wavefront.scheduling import payload as payloads
 from wavefront.scheduling.dask import ClusterTasks
 from wavefront.scheduling.pool import WorkerPool
 from wavefront.scheduling.remote import RemoteWorkers
@@ -41,7 +41,7 @@ def expected() -> bytes:
 
 def tokens(client: Any) -> dict[str, list[str]]:
     """Return what each worker keeps."""
-    return client.run(lambda: list(delivery._kept._entries))
+    return client.run(lambda: list(payloads._kept._entries))
 
 
 def test_a_cluster_gives_the_same_bits(client: Any, expected: bytes) -> None:

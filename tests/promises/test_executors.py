@@ -24,9 +24,10 @@ import pytest
 import scenes
 
 import wavefront as wf
-from wavefront.scheduling import delivery, executors, jobs, machine, remote
-from wavefront.scheduling.delivery import Payload, do_job, pack
+from wavefront.scheduling import executors, jobs, machine, remote
+from wavefront.scheduling import payload as payloads
 from wavefront.scheduling.executors import worker_count
+from wavefront.scheduling.payload import Payload, do_job, pack
 from wavefront.scheduling.pool import WorkerPool
 from wavefront.scheduling.shared import STOP, SharedInt
 from wavefront.scheduling.workers import StoppableWork
@@ -176,9 +177,9 @@ def test_a_process_reads_the_work_once(tmp_path: Path) -> None:
 
 
 def test_a_process_forgets_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(delivery, "KEEP", 0.1)
-    kept = delivery._KeptWork()
-    monkeypatch.setattr(delivery, "_kept", kept)
+    monkeypatch.setattr(payloads, "KEEP", 0.1)
+    kept = payloads._KeptWork()
+    monkeypatch.setattr(payloads, "_kept", kept)
     assert do_job(payload_of(tmp_path, abs), -1).result == 1
     sweeper = kept._sweeper
     assert sweeper is not None

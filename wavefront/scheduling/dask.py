@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from typing import Any, Protocol, runtime_checkable
 
 from ..core.errors import RenderError, SceneError
-from .delivery import Payload
+from .payload import Payload
 from .remote import RemoteWorkers
 from .shared import SharedInt
 from .workers import END_TIMEOUT, StoppableWork, all_done

@@ -12,8 +12,8 @@ from dataclasses import replace
 from typing import Any, Protocol
 
 from ..core.errors import RenderError, warn_caller
-from .delivery import Payload, Reply, do_job, pack
 from .machine import describe_machine
+from .payload import Payload, Reply, do_job, pack
 from .workers import JobFailed, StoppableWork, TaskPool, submit_to
 
 

@@ -13,8 +13,8 @@ from ..integrators.tuning import JobsRunner
 from ..sampling.filters import FILTERS
 from ..scheduling.blas import single_threaded_blas
 from ..scheduling.budget import Budget
-from ..scheduling.delivery import can_be_sent
 from ..scheduling.executors import ExecutorLike, needs_pickling
+from ..scheduling.payload import can_be_sent
 from ..scheduling.tracing import Tracer
 from ..settings import Settings
 from .choice import Choice, choose, learn_guide
