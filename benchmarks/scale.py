@@ -35,8 +35,8 @@ from distributed import Client, LocalCluster
 
 import wavefront as wf
 from wavefront.film.film import Film
-from wavefront.scheduling.payload import pack
 from wavefront.scheduling.jobs import WaveResult
+from wavefront.scheduling.payload import pack
 from wavefront.scheduling.pool import WorkerPool
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "examples"))

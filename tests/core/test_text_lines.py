@@ -6,7 +6,7 @@ import pytest
 
 from wavefront.core.errors import SceneError
 from wavefront.io import obj, stl
-from wavefront.io.lines import NUMBER, check_lines
+from wavefront.io.text_lines import NUMBER, check_lines
 
 
 def test_lines_that_differ_only_in_their_digits_are_checked_once():

@@ -12,10 +12,10 @@ from io import BytesIO
 from typing import Any
 
 from ..core.errors import SceneError
-from .markup import check_expanded, look_through, total
 from .repair import warn
 from .sources import SceneFiles
 from .trimesh_loading import Images, by_trimesh
+from .xml_checks import check_expanded, look_through, total
 
 LOST = ("instance_controller", "instance_light", "instance_camera", "lines", "linestrips", "animation")
 PRIMITIVES = ("triangles", "polylist", "polygons", "tristrips", "trifans")

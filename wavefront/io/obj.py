@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.errors import SceneError
-from .lines import NUMBER, check_lines, words
 from .repair import RawMesh, Table, warn
 from .sources import LoadLimits
+from .text_lines import NUMBER, check_lines, words
 from .trimesh_import import import_trimesh
 from .trimesh_loading import geometries
 

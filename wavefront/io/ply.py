@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..core.counted import counted
 from ..core.errors import SceneError
-from .headers import SIZES, TYPES, Element, check_ply, ply_textures, unread
+from .ply_header import SIZES, TYPES, Element, check_ply, ply_textures, unread
 from .repair import warn
 from .sources import SceneFiles
 from .trimesh_import import import_trimesh

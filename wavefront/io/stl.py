@@ -9,8 +9,8 @@ import numpy as np
 from ..core.counted import counted
 from ..core.errors import SceneError
 from ..core.files import decode_text
-from .lines import NUMBER, check_lines, words
 from .repair import RawMesh, warn, wide
+from .text_lines import NUMBER, check_lines, words
 from .trimesh_loading import geometries
 
 COLORS = (b"COLOR=", b"MATERIAL=")  # keywords that Materialize Magics writes into the header

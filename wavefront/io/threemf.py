@@ -22,10 +22,10 @@ from ..materials import Material
 from ..shapes.transform import IDENTITY, Matrix
 from .appearance import MaterialSpec, assign_material
 from .contents import Contents
-from .markup import check_expanded, look_through
 from .placing import Places
 from .repair import RawMesh, Table, warn
 from .sources import SceneFiles
+from .xml_checks import check_expanded, look_through
 
 MAX_MEMBERS = 2**12
 XML_BYTES = 4  # of memory for each byte of a member
