@@ -33,7 +33,7 @@ from wavefront.cli import main, view_commands
 from wavefront.viewer import background_denoiser as denoiser_module
 from wavefront.viewer import page as page_module
 from wavefront.viewer import refiner as module
-from wavefront.viewer.front import Front, asked_first
+from wavefront.viewer.first_paint import FirstPaint, asked_first
 from wavefront.viewer.guard import Guard, is_message, is_own_address, token_of
 from wavefront.viewer.page import Page
 from wavefront.viewer.refiner import Refiner, ViewerFrame
@@ -919,7 +919,7 @@ def test_servers_of_others_are_left_as_they_are() -> None:
     from websockets.asyncio import server
 
     async def answers() -> tuple[bytes, bytes]:
-        with asked_first(Front(Guard("127.0.0.1", ""), lambda: b"jpg", lambda: None)):
+        with asked_first(FirstPaint(Guard("127.0.0.1", ""), lambda: b"jpg", lambda: None)):
             plain = server.serve(lambda socket: None, "127.0.0.1", 0)  # type: ignore[arg-type, return-value]
             own = server.serve(
                 lambda socket: None,  # type: ignore[arg-type, return-value]

@@ -19,7 +19,7 @@ from ..codecs.tone import TONES
 from ..core.errors import SceneError, one_of
 from ..image import Image
 from .background_denoiser import BackgroundDenoiser, is_quick
-from .front import Front, asked_first
+from .first_paint import FirstPaint, asked_first
 from .guard import Guard, take_values
 from .refiner import ViewerFrame
 from .shown import CHOICES, shown_codes
@@ -93,7 +93,9 @@ class Page:
         self._arrived: set[int] = set()  # pages that have taken the view
         self._sent: tuple[ViewerFrame | None, float] = None, 0.0  # the newest one that was sent, and when
         guard = Guard(host, token)
-        self._server = _serve(host, port, Front(guard, self._picture, lambda: self._begin_at(self.viewpoint)))
+        self._server = _serve(
+            host, port, FirstPaint(guard, self._picture, lambda: self._begin_at(self.viewpoint))
+        )
         take_values(self._server)
         where = f":{self._server.get_port()}/{guard.query}"
         self.url = f"http://{_address(host)}{where}"
@@ -355,8 +357,8 @@ def _line(text: str) -> str:
     return f'<div style="{LINE}">{escape(text)}</div>'
 
 
-def _serve(host: str, port: int, front: Front) -> Any:
-    """Start a server of viser that asks `front` first."""
+def _serve(host: str, port: int, first_paint: FirstPaint) -> Any:
+    """Start a server of viser that asks `first_paint` first."""
     import viser
 
     try:
@@ -365,7 +367,7 @@ def _serve(host: str, port: int, front: Front) -> Any:
             free.bind(address)
     except (OSError, UnicodeError) as error:
         raise SceneError(f"the viewer cannot listen at host {host!r}: {error}") from error
-    with _silence(), asked_first(front):
+    with _silence(), asked_first(first_paint):
         return viser.ViserServer(host, port, verbose=False)
 
 

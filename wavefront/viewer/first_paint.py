@@ -74,7 +74,7 @@ HEAD = """<head>
     </script>"""
 
 
-class Front:
+class FirstPaint:
     """Answers the requests of a page that loads: with the page, and with the newest picture.
 
     The scripts of viser take a second or so until they show their first picture. Until then the page has this
@@ -138,8 +138,8 @@ class Front:
 
 
 @contextmanager
-def asked_first(front: Front) -> Iterator[None]:
-    """Let servers of viser that are started meanwhile ask `front` first, and hear nothing but its messages.
+def asked_first(first_paint: FirstPaint) -> Iterator[None]:
+    """Let servers of viser that start meanwhile ask `first_paint` first, and hear only its messages.
 
     The server of `websockets` takes all that is needed as parameters: a function that answers requests, a
     class of connections, a limit and a logger. Viser calls it with its own ones, and has no parameters for
@@ -168,7 +168,7 @@ def asked_first(front: Front) -> Iterator[None]:
 
         async def answer(connection: Any, request: Any) -> Any:
             assert process_request is not None
-            return await front.answer(request) or process_request(connection, request)
+            return await first_paint.answer(request) or process_request(connection, request)
 
         ours: dict[str, Any] = {
             "process_request": answer,
