@@ -177,21 +177,21 @@ def test_the_index_lists_every_document():
     assert documents - pages == {"index.md"}
 
 
-def test_the_rooms_of_the_architecture_are_the_layers():
+def test_the_packages_of_the_architecture_are_the_layers():
     """The table has every module and folder, in the order in which imports may point."""
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"][
         "contracts"
     ]
     layers = [re.findall(r"wavefront\.(\w+)", layer) for layer in reversed(contracts[0]["layers"])]
     level = {name: number for number, layer in enumerate(layers) for name in layer}
-    table = (ROOT / "docs" / "architecture.md").read_text("utf-8").partition("## Rooms")[2]
+    table = (ROOT / "docs" / "architecture.md").read_text("utf-8").partition("## Packages")[2]
     rows = [
         re.findall(r"`(\w+)(?:\.py|/)`", row) for row in re.findall(r"^\| (`.*?) \|", table, re.MULTILINE)
     ]
-    rooms = [[level[name] for name in row] for row in rows if row and row[0] in level]
+    packages = [[level[name] for name in row] for row in rows if row and row[0] in level]
     modules = {path.stem for path in (ROOT / "wavefront").iterdir() if path.suffix in (".py", "")}
     assert {name for row in rows for name in row} >= modules - {"__init__", "__pycache__"}
-    for below, above in pairwise(rooms):
+    for below, above in pairwise(packages):
         assert max(below) <= min(above)
 
 
