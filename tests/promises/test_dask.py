@@ -15,11 +15,11 @@ import pytest
 import scenes
 
 import wavefront as wf
+from wavefront.core.shared import STOP, SharedInt, Stopped
 from wavefront.scheduling import payload as payloads
 from wavefront.scheduling.dask import ClusterTasks
 from wavefront.scheduling.pool import WorkerPool
 from wavefront.scheduling.remote import RemoteWorkers
-from wavefront.scheduling.shared import STOP, SharedInt, Stopped
 
 distributed = pytest.importorskip("distributed")
 QUIET = {"progress": False, "wave_size": 500}

@@ -24,12 +24,12 @@ import pytest
 import scenes
 
 import wavefront as wf
+from wavefront.core.shared import STOP, SharedInt
 from wavefront.scheduling import executors, jobs, machine, remote
 from wavefront.scheduling import payload as payloads
 from wavefront.scheduling.executors import worker_count
 from wavefront.scheduling.payload import Payload, do_job, pack
 from wavefront.scheduling.pool import WorkerPool
-from wavefront.scheduling.shared import STOP, SharedInt
 from wavefront.scheduling.workers import StoppableWork
 
 needs_fork = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs fork")

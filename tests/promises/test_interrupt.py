@@ -14,8 +14,8 @@ import scenes
 from scripts import ENDLESS, children, end_of, runs, script, wait_for
 
 import wavefront as wf
-from wavefront.scheduling.interrupt import InterruptHandler
-from wavefront.scheduling.shared import AT_ONCE, STOP, SharedInt
+from wavefront.core.interrupt import InterruptHandler
+from wavefront.core.shared import AT_ONCE, STOP, SharedInt
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="signals and processes of Linux")
 EXECUTORS = ["processes", "threads"]

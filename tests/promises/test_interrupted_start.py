@@ -11,9 +11,9 @@ import threading
 
 import pytest
 
-from wavefront.scheduling.interrupt import InterruptHandler, deferred_signals
+from wavefront.core.interrupt import InterruptHandler, deferred_signals
+from wavefront.core.shared import STOP, SharedInt
 from wavefront.scheduling.processes import ProcessPool
-from wavefront.scheduling.shared import STOP, SharedInt
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="signals and processes of Linux")
 SOON = 2.0  # seconds to the prompt
@@ -123,21 +123,21 @@ def test_ctrl_c_at_two_hundred_moments(executor: str, accel: str) -> None:
 
 
 def test_signals_wait_for_the_end_of_a_block() -> None:
-    """Handlers of the program come back, and the second signal of a kind waits no longer."""
-    done: list[str] = []
+    """Handlers of the program come back; the second signal of a kind waits where that is asked for."""
+    done: list[tuple[int, bool]] = []
 
-    def begin(presses: int) -> None:
-        with deferred_signals():
+    def begin(presses: int, also_the_second: bool) -> None:
+        with deferred_signals(also_the_second):
             for _ in range(presses):
                 signal.raise_signal(signal.SIGINT)
-            done.append(f"after {presses}")
-        done.append("went on")
+            done.append((presses, also_the_second))
+        pytest.fail("went on")
 
-    for presses in (1, 2):
+    for presses, also_the_second in ((1, False), (2, False), (2, True)):
         with pytest.raises(KeyboardInterrupt):
-            begin(presses)
+            begin(presses, also_the_second)
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    assert done == ["after 1"]
+    assert done == [(1, False), (2, True)]
 
 
 def test_a_handler_that_sets_a_flag_need_not_wait() -> None:

@@ -22,12 +22,12 @@ import scenes
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import wavefront as wf
+from wavefront.core.shared import AT_ONCE, STOP, SharedInt, Stopped
 from wavefront.scheduling import executors
 from wavefront.scheduling import pool as pool_module
 from wavefront.scheduling.executors import MIN_PATHS, MIN_PATHS_TO_SPAWN, choose_executor, worker_count
 from wavefront.scheduling.pool import WorkerPool
 from wavefront.scheduling.processes import ProcessPool
-from wavefront.scheduling.shared import AT_ONCE, STOP, SharedInt, Stopped
 from wavefront.scheduling.workers import all_done
 
 LINUX = sys.platform.startswith("linux")

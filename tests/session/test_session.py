@@ -17,8 +17,8 @@ import scenes
 from scripts import children, end_of, runs, script, wait_for
 
 import wavefront as wf
+from wavefront.core.shared import SharedInt
 from wavefront.scheduling import pool
-from wavefront.scheduling.shared import SharedInt
 from wavefront.session import prepared_scene, view_render
 from wavefront.session import session as module
 from wavefront.session.view_render import ViewRender

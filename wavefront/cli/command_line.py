@@ -5,26 +5,22 @@ from __future__ import annotations
 import argparse
 import io
 import os
-import signal
 import sys
-import threading
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import Any
 
 from ..core.errors import RenderError, SceneError
-from ..scheduling.interrupt import SIGNALS
+from ..core.interrupt import endings_as_ctrl_c
 from ..version import VERSION
 from .command import COMMAND, Parser, add_command
 from .doctor_command import add_doctor_command
 from .info_command import add_info_command
 from .messages import (
     ERROR,
-    HUNG_UP,
     INTERRUPTED,
-    TERMINATED,
+    SIGNALED,
     print_error,
     print_note,
     print_warning,
@@ -44,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="backslashreplace")
     words = joined(sys.argv[1:] if arguments is None else arguments)
     options = parser().parse_args(words, argparse.Namespace(arguments=words, folder=os.getcwd()))
-    with _endings_as_ctrl_c() as ending, warnings.catch_warnings():
+    with endings_as_ctrl_c() as endings, warnings.catch_warnings():
         warnings.simplefilter("always", UserWarning)
         warnings.showwarning = lambda message, *_: print_warning(message)
         try:
@@ -56,56 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if str(stop):
                 print_note(stop)
             status = INTERRUPTED
-    return ending.status if status == INTERRUPTED else status
-
-
-class _Ending:
-    """What to do at SIGTERM and SIGHUP: the same as at Ctrl-C, which keeps the picture.
-
-    A second SIGTERM ends the program at once. SIGHUP, which says that the terminal was closed, may come from
-    the system and from the shell, and beside SIGTERM: it counts once.
-
-    Attributes
-    ----------
-    status
-        The exit status, if one of them interrupts the program.
-    """
-
-    status = INTERRUPTED
-
-    def __init__(self) -> None:
-        ends = {number: signal.getsignal(number) for number in SIGNALS if number != signal.SIGINT}
-        self.before = {number: handler for number, handler in ends.items() if handler != signal.SIG_IGN}
-
-    def handle(self, number: int, frame: Any) -> None:
-        """Handle the signal."""
-        self.status = TERMINATED if number == signal.SIGTERM else HUNG_UP
-        for each in self.before:
-            if each != signal.SIGTERM:
-                signal.signal(each, signal.SIG_IGN)
-            elif each == number:
-                signal.signal(each, signal.SIG_DFL)
-        signal.raise_signal(signal.SIGINT)
-
-
-@contextmanager
-def _endings_as_ctrl_c() -> Iterator[_Ending]:
-    """Handle SIGTERM and SIGHUP as Ctrl-C, but for one that is ignored, as `nohup` has it."""
-    ending = _Ending()
-    if threading.current_thread() is not threading.main_thread():  # only that one may set handlers
-        yield ending
-        return
-    handler: Any = ending.handle
-    if not callable(signal.getsignal(signal.SIGINT)):  # ignored, as in the background of a script
-        handler = signal.default_int_handler
-        ending.status = TERMINATED  # if anything interrupts
-    for number in ending.before:
-        signal.signal(number, handler)
-    try:
-        yield ending
-    finally:
-        for number, before in ending.before.items():
-            signal.signal(number, before)
+    return SIGNALED + endings[-1] if status == INTERRUPTED and endings else status
 
 
 def parser() -> argparse.ArgumentParser:

@@ -11,9 +11,8 @@ from typing import TextIO
 
 FAULT = 1  # `doctor` found one
 ERROR = 2  # as argparse has it
-HUNG_UP = 129  # 128 + SIGHUP
-INTERRUPTED = 130  # 128 + SIGINT, as shells report it
-TERMINATED = 143  # 128 + SIGTERM
+SIGNALED = 128  # plus the number of a signal that ended the program, as shells report it
+INTERRUPTED = 130  # by SIGINT
 
 
 def print_error(error: BaseException | str) -> None:

@@ -13,9 +13,10 @@ import numpy as np
 
 from ..codecs.images import decode_codes
 from ..core.errors import SceneError
+from ..core.interrupt import repeated_ctrl_c
 from .repair import warn
 from .sources import SceneFiles
-from .trimesh_import import ctrl_c_is_kept, import_trimesh
+from .trimesh_import import import_trimesh
 
 
 class Images:
@@ -98,7 +99,7 @@ def geometries(name: str, kind: str, data: bytes) -> list[dict[str, Any]]:
 def typed_errors(name: str, kind: str) -> Iterator[None]:
     """Convert any error of a loader but MemoryError to a SceneError; silence NumPy's warnings."""
     try:
-        with np.errstate(all="ignore"), ctrl_c_is_kept(wait=False):
+        with np.errstate(all="ignore"), repeated_ctrl_c():  # some of them swallow it
             yield
     except (MemoryError, SceneError):
         raise

@@ -10,8 +10,8 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from ..core.counted import counted
+from ..core.interrupt import deferred_signals
 from ..core.memory import address_space_left
-from .interrupt import deferred_signals
 
 # Bytes of address space: OpenBLAS takes 32 MB for each call at a time, and a thread its stack.
 BUFFER = 64 << 20

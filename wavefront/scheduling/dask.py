@@ -8,9 +8,9 @@ from contextlib import contextmanager, suppress
 from typing import Any, Protocol, runtime_checkable
 
 from ..core.errors import RenderError, SceneError
+from ..core.shared import SharedInt
 from .payload import Payload
 from .remote import RemoteWorkers
-from .shared import SharedInt
 from .workers import END_TIMEOUT, StoppableWork, all_done
 
 

@@ -9,12 +9,12 @@ from typing import TypeAlias
 
 from ..core.errors import RenderError
 from ..core.progress import Bar, Progress
+from ..core.shared import SharedInt, Stopped
 from .accumulator import Accumulator
 from .adaptive import Pass, passes, unfinished
 from .jobs import CameraJob, Job, JobResult, split_jobs
 from .pool import WorkerPool
 from .scheduler import Scheduler
-from .shared import SharedInt, Stopped
 
 PassSplitter: TypeAlias = Callable[[Pass], Iterable[Pass]]
 

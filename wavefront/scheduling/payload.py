@@ -22,10 +22,10 @@ from typing import Any
 
 from ..arrays.record import record
 from ..core.errors import SceneError
+from ..core.shared import SharedInt, Stopped
 from .blas import single_threaded_blas
 from .heap import prepare_heap
 from .machine import machine_differences
-from .shared import SharedInt, Stopped
 
 KEEP = 10.0  # seconds from the last job until a process forgets the work
 

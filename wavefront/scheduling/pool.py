@@ -15,10 +15,10 @@ from typing import Any, Generic, Self, TypeVar
 
 from ..arrays.record import record
 from ..core.errors import RenderError
+from ..core.interrupt import deferred_signals
+from ..core.shared import AT_ONCE, STOP, SharedInt, Stopped
 from .blas import single_threaded_blas
 from .executors import EXECUTORS, ExecutorLike
-from .interrupt import deferred_signals
-from .shared import AT_ONCE, STOP, SharedInt, Stopped
 from .workers import JobFailed, StoppableWork, Workers, all_done
 
 Job = TypeVar("Job")

@@ -24,10 +24,10 @@ from multiprocessing.queues import SimpleQueue
 from types import ModuleType
 from typing import Any
 
+from ..core.interrupt import SIGNALS
+from ..core.shared import AT_ONCE, SharedInt
 from .heap import prepare_heap
-from .interrupt import SIGNALS
 from .remote import RemoteWorkers
-from .shared import AT_ONCE, SharedInt
 from .workers import POLL_INTERVAL, LocalWorkers, StoppableWork, all_done
 
 END_TIMEOUT = 1.0  # seconds that processes have to end by themselves

@@ -16,6 +16,7 @@ from ..arrays.state import Words
 from ..arrays.vec import Bools, Floats, Ints, broadcast
 from ..compile.scene import CompiledScene
 from ..core.errors import SceneError
+from ..core.shared import SharedInt, Stopped
 from ..guiding import GuideTable
 from ..integrators import Integrator, integrator_for
 from ..integrators.light_tracing import trace_light
@@ -24,7 +25,6 @@ from ..sampling.filters import Filter
 from ..sampling.sampler import Sampler, SamplerMaker
 from ..stages.generate import generate
 from .jobs import Job, JobResult, WaveResult
-from .shared import SharedInt, Stopped
 
 FIRST_SAMPLE_TIMEOUT = 3.0  # seconds that a wave of first samples may take even if the time is up
 

@@ -11,7 +11,7 @@ from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExec
 from concurrent.futures import wait as wait_for_futures
 from typing import Any, Protocol, TypeAlias
 
-from .shared import AT_ONCE, SharedInt, Stopped
+from ..core.shared import AT_ONCE, SharedInt, Stopped
 
 POLL_INTERVAL = 0.02  # seconds between two checks whether workers have ended
 END_TIMEOUT = 1.0  # seconds that jobs in the user's own executor have to end

@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from ..aovs.boxes import silhouettes
 from ..camera import Camera, check_camera, image_size
 from ..core.errors import RenderError, SaveError, SceneError, warn_caller
+from ..core.interrupt import InterruptHandler
+from ..core.shared import STOP, Stopped
 from ..film.checkpoint import Checkpoint
 from ..image import Image
 from ..integrators.tuning_job import TrialJob, TrialPart
@@ -25,10 +27,8 @@ from ..io.to_scene import as_scene, choose_camera
 from ..scheduling.accumulator import Accumulator
 from ..scheduling.blas import reserve_buffers
 from ..scheduling.executors import shares_scene
-from ..scheduling.interrupt import InterruptHandler
 from ..scheduling.loop import PassSplitter, doubling, undivided
 from ..scheduling.pool import WorkerPool
-from ..scheduling.shared import STOP, Stopped
 from ..scheduling.tracing import WaveMonitor, trace_any_job
 from ..settings import RenderSettings, Settings, describes_settings, takes_settings
 from .final_checks import (
