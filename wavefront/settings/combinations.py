@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,6 @@ from ..core.errors import SceneError, in_brief
 from ..integrators import INTEGRATORS, li_full
 from ..sampling.filters import FILTERS, box
 from .checks import AUTO
-from .declaration import AllSettings
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,7 @@ EXCLUSIONS = (
 )
 
 # When something is asked for, given all settings; what is not here is asked for where it is not None.
-ASKED: dict[str, Callable[[AllSettings], bool]] = {
+ASKED: dict[str, Callable[[Mapping[str, Any]], bool]] = {
     "reuse": lambda values: values["reuse"] is True,
     "guide": lambda values: values["guide"] is True,
     "caustics": lambda values: values["caustics"],
@@ -65,13 +64,12 @@ SHOWN: dict[str, Callable[[Any], object]] = {
 }
 
 
-def asked_for(values: AllSettings, name: str) -> bool:
+def asked_for(values: Mapping[str, Any], name: str) -> bool:
     """Return whether something of the table is asked for."""
-    given: Any = values
-    return ASKED[name](values) if name in ASKED else given[name] is not None
+    return ASKED[name](values) if name in ASKED else values[name] is not None
 
 
-def check_combinations(values: AllSettings) -> None:
+def check_combinations(values: Mapping[str, Any]) -> None:
     """Check that settings, each of which is right by itself, go together.
 
     Raises
@@ -85,7 +83,7 @@ def check_combinations(values: AllSettings) -> None:
             raise SceneError(f"{pair}: {each.why}")
 
 
-def left_out(values: AllSettings, name: str) -> bool:
+def left_out(values: Mapping[str, Any], name: str) -> bool:
     """Return whether "auto" must leave a setting out, because of what is asked for."""
     return any(each.one == name and asked_for(values, each.other) for each in _both_ways())
 
@@ -98,14 +96,30 @@ def _both_ways() -> Iterator[Exclusion]:
             yield Exclusion(each.other, each.one, each.why)
 
 
-def _in_words(values: AllSettings, name: str) -> str:
-    given: Any = values
+def _in_words(values: Mapping[str, Any], name: str) -> str:
     setting = SETTING_OF.get(name, name)
-    return f"{setting}={in_brief(SHOWN.get(setting, lambda value: value)(given[setting]))}"
+    return f"{setting}={in_brief(SHOWN.get(setting, lambda value: value)(values[setting]))}"
+
+
+def told(name: str) -> str:
+    """Return what the documentation of a setting says of those that do not go with it; nothing is ""."""
+    refused = [each.other for each in _both_ways() if each.refused and each.one == name]
+    unchosen = [each.other for each in EXCLUSIONS if not each.refused and each.one == name]
+    return "".join(
+        f" {sentence} {_listed(others)}."
+        for sentence, others in (("Not with", refused), ('"auto" leaves it out with', unchosen))
+        if others
+    )
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Return names of the table as a list in words."""
+    words = [name if " " in name else f"`{name}`" for name in names]
+    return " or ".join([*filter(None, [", ".join(words[:-1])]), words[-1]])
 
 
 def table() -> str:
-    """Return the table as Markdown, for docs/choices.md."""
+    """Return the table as Markdown: docs/choices.md has it."""
     rows = []
     for each in EXCLUSIONS:
         what = "refused" if each.refused else 'left out by "auto"'

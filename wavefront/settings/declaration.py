@@ -48,6 +48,7 @@ from .checks import (
     optional,
     whole_number,
 )
+from .combinations import told
 
 MAX_BRANCHES = 64
 
@@ -57,7 +58,7 @@ class Setting:
     """What is declared of a setting, beside its name."""
 
     default: Any  # its value where none is given
-    text: str  # what it means, for documentation
+    text: str  # what it means, for documentation; what does not go with it is added from the table of that
     option: str | None = None  # the help text of its command-line option; None where it has none
     check: SettingCheck | None = None  # checks a value that was given, and returns it as it is kept
     choices: Registry[Any] | None = None  # the table of its names
@@ -105,7 +106,7 @@ class RenderSettings(TypedDict, total=False):
             "The direction from which a scene is framed, in place of the scene's own camera: "
             '"three_quarter", "front", "back", "left", "right", "top", "bottom", "iso", or a vector (3,) '
             "from the middle of the scene to the camera. A scene without a camera is seen from "
-            '"three_quarter": 35° to the right of the front and 22° above it. Not with `camera`.',
+            '"three_quarter": 35° to the right of the front and 22° above it.',
             option=f"from where the scene is framed: {', '.join(VIEWS)} (default: {FRAMING_VIEW}, "
             "where the file has no camera)",
             check=optional(check_view),
@@ -115,8 +116,7 @@ class RenderSettings(TypedDict, total=False):
         float | None,
         Setting(
             None,
-            "Vertical field of view, in degrees, of the camera that frames a scene; 40 by default. Not "
-            "with another camera.",
+            "Vertical field of view, in degrees, of the camera that frames a scene; 40 by default.",
             option=f"vertical field of view, degrees (default: {FRAMING_FOV:g})",
             check=optional(lambda name, value: field_of_view(value)),
         ),
@@ -242,7 +242,7 @@ class RenderSettings(TypedDict, total=False):
             None,
             "The samples to render, as a range of their numbers, in place of `spp`: range(0, 64) on one "
             "machine and range(64, 128) on another. `Image.merge` makes one picture of them. It has the "
-            "same bits as all 128 samples rendered at once. Not with `noise` or `seconds`.",
+            "same bits as all 128 samples rendered at once.",
             option="FIRST:END, samples to render in place of --spp, such as 64:128; "
             "`wavefront merge` joins the pictures",
             check=check_samples,
@@ -370,8 +370,7 @@ class RenderSettings(TypedDict, total=False):
             'pixels that lie a little apart; only for "full". It pays where most noise is in indirect '
             "light between matte surfaces. The errors of such pixels depend on each other: docs/reuse.md "
             'has figures. "auto" shares paths where a short tuning run says that it pays; with glossy '
-            "materials or glass only where light is hard to find: docs/choices.md tells how, and has a "
-            "table of the settings that do not go with it.",
+            "materials or glass only where light is hard to find: docs/choices.md tells how.",
             check=auto_or(check_flag),
             option="share paths among pixels: yes, no, or auto (default), which tries whether it pays",
         ),
@@ -510,7 +509,11 @@ def _declared() -> dict[str, Setting]:
     """Return what is declared of each setting, by name."""
     hints = get_type_hints(AllSettings, include_extras=True)
     declared = {
-        name: replace(get_args(hint)[1], type=_as_written(AllSettings.__annotations__[name]))
+        name: replace(
+            get_args(hint)[1],
+            text=get_args(hint)[1].text + told(name),
+            type=_as_written(AllSettings.__annotations__[name]),
+        )
         for name, hint in hints.items()
     }
     return {"spp": declared.pop("spp"), **declared}
