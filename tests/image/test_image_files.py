@@ -11,6 +11,7 @@ import sys
 import time
 import tracemalloc
 import zipfile
+import zlib
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from pictures import HEIGHT, WIDTH, with_everything
 from PIL import Image as PillowImage
 
 import wavefront as wf
-from wavefront.codecs import png16, png_jpeg
+from wavefront.codecs import png_jpeg
 from wavefront.codecs.image_data import from_named
 from wavefront.film.aov_names import LAYERS
 
@@ -283,21 +284,34 @@ def filtered(rows, kinds):
     return b"".join(out)
 
 
+def png(codes, pixels, interlaced=0):
+    """Return a png of codes (H, W, 3 or 4), whose filtered rows are `pixels`, in two pieces."""
+    height, width, channels = codes.shape
+    header = struct.pack(">IIBBBBB", width, height, 16, {3: 2, 4: 6}[channels], 0, 0, interlaced)
+    packed = zlib.compress(pixels)
+    pieces = (b"IHDR", header), (b"IDAT", packed[:50]), (b"IDAT", packed[50:]), (b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
+        for name, body in pieces
+    )
+
+
 @pytest.mark.parametrize("channels", [3, 4])
 def test_every_filter_of_a_png_is_read(channels):
-    import zlib
-
     codes = np.random.default_rng(0).integers(0, 65536, (12, 9, channels), np.uint16)
     codes[4:8] = codes[3] // 2 + 7  # smooth parts, so that predictions meet
-    data = png16.encode(codes, ())
     rows = codes.astype(">u2").view(np.uint8).reshape(12, 9, -1)
-    pixels = zlib.compress(filtered(rows, [4, 3, 2, 1, 0, 4, 4, 3, 1, 2, 3, 4]))
-    at = data.index(b"IDAT") - 4
-    other = data[:at] + png16._chunk(b"IDAT", pixels[:50]) + png16._chunk(b"IDAT", pixels[50:])
-    other += png16._chunk(b"IEND", b"")
-    for each in (data, other):
-        assert png16.reads(each)
+    other = png(codes, filtered(rows, [4, 3, 2, 1, 0, 4, 4, 3, 1, 2, 3, 4]))
+    for each in (png_jpeg.encode(codes, ".png", "srgb"), other):
         assert (png_jpeg.decode(each) == codes).all()
+
+
+def test_an_interlaced_png_of_16_bits_is_read():
+    codes = np.random.default_rng(0).integers(0, 65536, (13, 9, 3), np.uint16)
+    steps = [(0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2)]
+    rows = (row for x, y, dx, dy in steps for row in codes[y::dy, x::dx])
+    pixels = b"".join(b"\0" + row.astype(">u2").tobytes() for row in rows)
+    assert (png_jpeg.decode(png(codes, pixels, interlaced=1)) == codes).all()
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 8), (8, 1), (33, 20)])

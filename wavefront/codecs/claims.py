@@ -46,15 +46,16 @@ def _check_png(data: bytes, budget: Budget) -> None:
     width, height = int.from_bytes(header[:4], "big"), int.from_bytes(header[4:8], "big")
     budget.check_size(height, width)
     item, channels = (2 if header[8] == 16 else 1), max(PNG_CHANNELS[header[9]], 4 * (header[9] == PALETTE))
-    # 16 bits of several channels are unfiltered as words of 16 bits for each byte
-    copies = 6 if item == 2 and channels > 1 else 2
+    copies = 4 if item == 2 and channels > 1 else 2  # 16 bits of several channels are decoded in two halves
     budget.charge(f"a picture of {width} × {height} pixels", height * width * channels * item * copies)
     bits, interlaced = header[8] * PNG_CHANNELS[header[9]], header[12] == 1
     need = sum(rows * (1 + (columns * bits + 7) // 8) for columns, rows in _passes(width, height, interlaced))
-    pixels = (content for name, content, _ in png_chunks(data) if name == b"IDAT")
-    there = _inflated(pixels, need)
+    pixels = [(content, check) for name, content, check in _png_chunks(data) if name == b"IDAT"]
+    there = _inflated((content for content, _ in pixels), need)
     if there < need:
         raise SceneError(f"ends early: {width} × {height} pixels take {need} bytes; {there} are there")
+    if item == 2 and any(zlib.crc32(content, zlib.crc32(b"IDAT")) != check for content, check in pixels):
+        raise SceneError("the checksum of a chunk b'IDAT' is wrong")
 
 
 def _passes(width: int, height: int, interlaced: bool) -> Iterator[tuple[int, int]]:
@@ -65,7 +66,7 @@ def _passes(width: int, height: int, interlaced: bool) -> Iterator[tuple[int, in
             yield columns, rows
 
 
-def png_chunks(data: bytes) -> Iterator[tuple[bytes, memoryview, int]]:
+def _png_chunks(data: bytes) -> Iterator[tuple[bytes, memoryview, int]]:
     """Yield the name, the content and the checksum of each chunk of a png."""
     view, at = memoryview(data), len(PNG)
     while at + 8 <= len(data):

@@ -1,5 +1,7 @@
 """Radiance .hdr pictures: shared-exponent RGBE with run-length coding.
 
+Neither imageio nor Pillow has this format without a library that it downloads. OpenImageIO (a wheel of 8 MB)
+reads files by name alone, not those within an archive or a glb, and rounds what it writes down.
 Source: G. Ward, "Real Pixels", Graphics Gems II, 1991; the Radiance file-format notes.
 """
 

@@ -112,8 +112,8 @@ def write_image(
 def read_image(path: str | os.PathLike[str]) -> Floats:
     """Return the pixels of an image file, (H, W, C) float32, top row first.
 
-    8- and 16-bit values are scaled to [0, 1] and not decoded from sRGB (interlaced pngs with 16 bits per
-    color channel are read at 8). exr, hdr, npy and npz values are returned unchanged.
+    8- and 16-bit values are scaled to [0, 1] and not decoded from sRGB. exr, hdr, npy and npz values are
+    returned unchanged.
 
     Raises
     ------
