@@ -2,28 +2,28 @@ r"""
 1. Rays and what they meet
 ==========================
 
-We build a path tracer in NumPy, in about a hundred lines. Its scene has balls only, so one formula finds
+We build a path tracer in NumPy, in about a hundred lines. Its scene has spheres only, so one formula finds
 what a ray meets. A ray starts at a point :math:`\mathbf o` and has a unit direction :math:`\mathbf d`. Its
 points are
 
 .. math:: \mathbf x(t) = \mathbf o + t\,\mathbf d, \qquad t > 0 .
 
-A point lies on a ball with center :math:`\mathbf c` and radius :math:`r` if :math:`\lvert\mathbf x -
+A point lies on a sphere with center :math:`\mathbf c` and radius :math:`r` if :math:`\lvert\mathbf x -
 \mathbf c\rvert^2 = r^2`. With :math:`\mathbf a = \mathbf o - \mathbf c` this is a quadratic equation for
 :math:`t`,
 
 .. math:: t^2 + 2\,(\mathbf a\cdot\mathbf d)\,t + \lvert\mathbf a\rvert^2 - r^2 = 0,
    \qquad t = -b \pm\sqrt{b^2 - c}, \quad b = \mathbf a\cdot\mathbf d,\; c = \lvert\mathbf a\rvert^2 - r^2 .
 
-The ray misses the ball if :math:`b^2 < c`. Otherwise the smaller positive solution is the hit.
+The ray misses the sphere if :math:`b^2 < c`. Otherwise the smaller positive solution is the hit.
 """
 
 # %%
 # The scene
 # ---------
 #
-# A matte, a mirror and a glass ball of radius 10 stand in a room. The floor, the ceiling and the walls are
-# balls of radius 925 to 990: so large that they look flat. The last ball is the lamp.
+# A matte, a mirror and a glass sphere of radius 10 stand in a room. The floor, the ceiling and the walls are
+# spheres of radius 925 to 990: so large that they look flat. The last sphere is the lamp.
 
 import imageio.v3 as iio
 import numpy as np
@@ -40,8 +40,8 @@ EYE, TARGET, FIELD = np.array([0.0, 8, 55]), np.array([0.0, 5, 0]), np.radians(6
 # Camera
 # ------
 #
-# Each pixel sends a ray through a random point of itself, so that the mean of many rays is free of jagged
-# edges. All rays are computed at once: an array has a row for each ray, and no loop runs over pixels.
+# Each pixel sends a ray through a random point of the pixel. The mean of many such rays has no jagged edges.
+# All rays are computed at once: an array has a row for each ray, and no loop runs over pixels.
 
 
 def dot(a, b):
@@ -64,11 +64,11 @@ def camera_rays(width, height, rng):
 
 
 # %%
-# The nearest ball
+# The nearest sphere
 # ----------------
 #
-# Arrays of all rays by all ten balls: ``@`` multiplies each direction with each center. Distances below 1e-4
-# do not count: a ray that starts on a ball must not meet the same place again because of rounding.
+# Arrays of all rays by all ten spheres: ``@`` multiplies each direction with each center. Distances below
+# 1e-4 do not count: a ray that starts on a sphere must not meet the same place again because of rounding.
 
 
 def intersect(origin, direction):
@@ -88,7 +88,8 @@ def normal_at(point, which):
 
 
 # %%
-# A picture needs no light yet: near is bright, and a normal is a color.
+# These pictures need no light: the first shows the distance, where near is bright; the second shows each
+# normal as a color.
 
 width, height = 160, 120
 origin, direction = camera_rays(width, height, np.random.default_rng(0))
@@ -102,15 +103,15 @@ iio.imwrite("2_normal.png", (127.5 + 127.5 * normal).astype(np.uint8).repeat(2, 
 # In the library
 # --------------
 #
-# The stages ``generate`` (``stages/generate.py``) and ``intersect`` (``stages/intersect.py``). A tree of
-# boxes, a bounding volume hierarchy, takes the place of asking all balls, and a bound on the rounding error
-# takes the place of 1e-4.
+# The stages ``generate`` (``stages/generate.py``) and ``intersect`` (``stages/intersect.py``). A bounding
+# volume hierarchy, which is a tree of boxes, replaces the test of all spheres. A bound on the rounding error
+# replaces 1e-4.
 #
 # Exercises
 # ---------
 #
-# 1. Set ``FIELD`` to 30 degrees. *Expect* the balls at more than twice the size.
+# 1. Set ``FIELD`` to 30 degrees. *Expect* the spheres at more than twice the size.
 # 2. Replace 1e-4 by 0 and render step 2. *Expect* black dots on lit surfaces: half of the shadow rays meet
 #    the surface from which they start.
 # 3. How many additions and multiplications does a picture of a million pixels take here? *Expect* about 3·10⁸
-#    for ten balls, and 10⁴ times as many for a mesh of 100 000 triangles: the reason for trees.
+#    for ten spheres, and 10⁴ times as many for a mesh of 100 000 triangles: the reason for trees.

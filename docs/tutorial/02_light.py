@@ -6,10 +6,11 @@ A point light of intensity :math:`I` (watts per steradian) at distance :math:`d`
 
 .. math:: E = \frac{I}{d^2}\,\cos\theta
 
-to a surface whose normal makes the angle :math:`\theta` with the direction to the light: slanted light is
-spread over more surface. A matte surface of reflectance :math:`\rho` sends :math:`L = \frac{\rho}{\pi} E`
-in all directions. The :math:`\pi` makes sure that no more light leaves than arrives, as the next step
-shows. Where another ball is between the surface and the light there is a shadow: a *shadow ray* tests it.
+to a surface whose normal makes the angle :math:`\theta` with the direction to the light: light that arrives
+at an angle is spread over more surface. A matte surface of reflectance :math:`\rho` sends :math:`L =
+\frac{\rho}{\pi} E` in all directions. The :math:`\pi` makes sure that no more light leaves than arrives, as
+the next step shows. Where another sphere is between the surface and the light there is a shadow: a *shadow
+ray* tests it.
 """
 
 import imageio.v3 as iio
@@ -37,7 +38,7 @@ def point_light(point, normal, color):
 # -----
 #
 # The result is radiance, which is linear: twice the light is twice the number. A display is not linear. A
-# code of half the largest value shines with about a fifth of the full brightness, as brightness is about
+# code of half the largest value gives about a fifth of the full brightness, because the brightness is about
 #
 # .. math:: \text{brightness} = \text{code}^{2.2},\qquad\text{so we store}\qquad \text{code} = L^{1/2.2} .
 
@@ -65,13 +66,13 @@ iio.imwrite("2_encoded.png", picture(radiance, width, height).repeat(2, 0).repea
 # --------------
 #
 # ``wf.PointLight``, the shadow rays of ``stages/intersect.py``, and ``image.save(..., gamma=2.2)``, which is
-# the default. ``codecs/encoding.py`` has the codes, and ``tone="agx"`` a curve that keeps bright parts from
-# being cut off.
+# the default. ``codecs/encoding.py`` has the codes. ``tone="agx"`` is a tone curve that keeps bright parts
+# from being cut off.
 #
 # Exercises
 # ---------
 #
-# 1. Leave out ``seen``. *Expect* no shadows, and light on the floor below the balls.
+# 1. Leave out ``seen``. *Expect* no shadows, and light on the floor below the spheres.
 # 2. Divide by the distance in place of its square. *Expect* white almost everywhere: it is about fifty times
 #    as bright.
-# 3. Which code has a surface of half the radiance of white? *Expect* 186 of 255, and not 128.
+# 3. A surface has half the radiance of white. Which code does it get? *Expect* 186 of 255, not 128.

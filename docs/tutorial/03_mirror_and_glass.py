@@ -17,8 +17,8 @@ to be symmetric for reflection, :math:`f(\omega_o,\omega_i)=f(\omega_i,\omega_o)
 :math:`\pi`, so a part :math:`\rho` of the light is scattered.
 
 **Mirror.** All light of one direction goes to one other direction, :math:`\omega_r =
-2\,(\omega_o\cdot\mathbf n)\,\mathbf n - \omega_o`. No ordinary function can say so. It takes a Dirac delta,
-which is zero but at one direction and has the integral 1:
+2\,(\omega_o\cdot\mathbf n)\,\mathbf n - \omega_o`. No ordinary function describes this. It takes a Dirac
+delta, which is zero except in one direction and has the integral 1:
 
 .. math:: f(\omega_o,\omega_i) = \rho\;\frac{\delta(\omega_i - \omega_r)}{\cos\theta_i} .
 
@@ -91,8 +91,8 @@ for number, bounces in ((1, 1), (2, 6)):
     iio.imwrite(f"{number}_bounces_{bounces}.png", picture(light, width, height).repeat(3, 0).repeat(3, 1))
 
 # %%
-# One bounce on the left: the mirror shows the room, and the other balls in it, if they are not matte, are
-# black. Six on the right: light needs two to cross the glass ball.
+# On the left one bounce: the mirror shows the room, and in it spheres that are not matte are black. On the
+# right six bounces: light needs two of them to cross the glass sphere.
 #
 # In the library
 # --------------
@@ -105,8 +105,8 @@ for number, bounces in ((1, 1), (2, 6)):
 # ---------
 #
 # 1. Leave out the division by :math:`\cos\theta_i` in the formula of the mirror, that is, multiply its color
-#    by the cosine. *Expect* a mirror ball that gets black towards its rim.
-# 2. Set the index of the glass to 1. *Expect* the ball to vanish, but for its shadow.
-# 3. Why is the shadow of the glass ball as black as that of the matte ball? *Expect* a flaw of the method: a
-#    shadow ray goes straight and stops at the glass. Light that the glass refracts is a caustic, which steps
-#    5 and 8 find.
+#    by the cosine. *Expect* a mirror sphere that gets black towards its rim.
+# 2. Set the index of the glass to 1. *Expect* the sphere to vanish, except for its shadow.
+# 3. Why is the shadow of the glass sphere as black as that of the matte sphere? *Expect* a flaw of the
+#    method: a shadow ray goes straight and stops at the glass. Light that the glass refracts is a caustic,
+#    which steps 5 and 8 find.

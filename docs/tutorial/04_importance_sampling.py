@@ -8,10 +8,10 @@ directions :math:`\omega_1,\dots,\omega_n` at random with a density :math:`p`, a
 .. math:: \int g(\omega)\,\mathrm d\omega \;\approx\; \frac1n\sum_{k=1}^n \frac{g(\omega_k)}{p(\omega_k)},
    \qquad g = f\,L_i\cos\theta .
 
-Its expected value is the integral, for any :math:`p` that is positive where :math:`g` is not zero. Its
-error falls as :math:`1/\sqrt n`: a hundred times the samples leave a tenth of the noise. How large the
-error is depends on :math:`p`: the closer :math:`p` is to a multiple of :math:`g`, the less :math:`g/p`
-varies. This is *importance sampling*.
+Its expected value is the integral, for any :math:`p` that is positive where :math:`g` is not zero. Its error
+falls as :math:`1/\sqrt n`: a hundred times the samples leave a tenth of the noise. The error also depends on
+:math:`p`: the closer :math:`p` is to a multiple of :math:`g`, the less :math:`g/p` varies. To choose such a
+:math:`p` is called *importance sampling*.
 
 Two densities for a matte surface, whose :math:`f=\rho/\pi` is constant:
 
@@ -141,8 +141,8 @@ for name, estimator in (("uniform", with_uniform), ("cosine", with_cosine)):
 # ---------
 #
 # 1. Forget the :math:`2\pi` of the uniform density: use :math:`p=1`. *Expect* indirect light that is 6.3
-#    times as bright. A wrong density never shows as noise, but as a wrong mean.
+#    times as bright. A wrong density does not show as noise, but as a wrong mean.
 # 2. How many uniform paths have the noise of 100 cosine-weighted ones? *Expect* about the ratio of the
 #    variances above, times 100.
-# 3. Draw :math:`z=u_2` but divide by :math:`\cos\theta/\pi`. *Expect* a picture without any warning in its
-#    noise, of another material: one whose :math:`f` is :math:`\rho/(2\pi\cos\theta)`.
+# 3. Draw :math:`z=u_2` but divide by :math:`\cos\theta/\pi`. *Expect* a picture whose noise looks normal, of
+#    another material: one whose :math:`f` is :math:`\rho/(2\pi\cos\theta)`.

@@ -2,10 +2,10 @@ r"""
 5. A lamp with a size: the naive estimator
 ==========================================
 
-A point light is an idealization. Let the lamp be a ball that shines with the radiance :math:`L_e`. Of
-radius :math:`r` and intensity :math:`I` it has :math:`L_e = I/(\pi r^2)`. Now light is simply found: a path
-goes from the camera from surface to surface, and where it meets the lamp it adds what the lamp sends back
-along it. After :math:`k` reflections a path carries the *throughput*
+A point light is an idealization. Let the lamp be a sphere of radius :math:`r` that emits the radiance
+:math:`L_e`. If its intensity is :math:`I`, then :math:`L_e = I/(\pi r^2)`. Now a path can find the light by
+itself: it starts at the camera and goes from surface to surface. Where it meets the lamp, it adds the
+radiance that the lamp sends back along the path. After :math:`k` reflections a path carries the *throughput*
 
 .. math:: T_k = \prod_{j=1}^{k}\frac{f_j\cos\theta_j}{p_j},
    \qquad L = \sum_k T_k\,L_e(x_k) .
@@ -76,9 +76,9 @@ pictures = [picture(render(naive, width, height, n), width, height) for n in (10
 iio.imwrite("1_naive.png", np.concatenate(pictures, 1).repeat(4, 0).repeat(4, 1))
 
 # %%
-# 10 and 100 paths for each pixel. The result is right, and bad: of the directions at a point on the floor,
-# about one in 140 leads to the lamp. Most paths find nothing, a few find everything. The same number of paths
-# had much less noise in step 4, as each of them asked the lamp at every point.
+# 10 and 100 paths for each pixel. The result is unbiased, but noisy: of the directions at a point on the
+# floor, about one in 140 leads to the lamp. Most paths find nothing, and a few find all the light. The same
+# number of paths had much less noise in step 4, because each path added the light of the lamp at every point.
 #
 # In the library
 # --------------

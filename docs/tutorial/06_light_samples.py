@@ -1,16 +1,16 @@
 r"""
-6. Asking the lamp: light samples
-=================================
+6. Light samples (next event estimation)
+========================================
 
-Instead of waiting until a path meets the lamp, we choose a direction among those that lead to it. From a
-point at the distance :math:`d` the lamp fills a cone with the half angle :math:`\theta_{\max}`,
-:math:`\sin\theta_{\max}=r/d`. All its directions with equal density:
+We do not wait until a path meets the lamp. We choose a direction among those that lead to it. From a point at
+the distance :math:`d` the lamp fills a cone with the half angle :math:`\theta_{\max}`, where
+:math:`\sin\theta_{\max}=r/d`. All directions of the cone get the same density:
 
 .. math:: p = \frac{1}{2\pi\,(1-\cos\theta_{\max})}, \qquad
    \cos\theta = 1 - u_2\,(1-\cos\theta_{\max}), \quad \varphi = 2\pi u_1 .
 
 The estimate is :math:`f\,L_e\cos\theta/p` if nothing is in between, else 0. This is the light that comes
-straight from the lamp, *direct light*.
+straight from the lamp: *direct light*.
 """
 
 import imageio.v3 as iio
@@ -56,9 +56,9 @@ def light_sample(point, normal, color, rng):
 
 
 # %%
-# At the first matte point the path takes a light sample and ends. Mirrors and glass take none, as no random
-# direction is the one that they reflect. After them, and from the camera, the lamp counts where the path
-# meets it.
+# At the first matte point the path takes a light sample and ends. Mirrors and glass take none, because a
+# random direction is never the one that they reflect. After a mirror or glass, and from the camera, the lamp
+# counts where the path meets it.
 
 
 def direct_simple(origin, direction, rng, bounces=5):

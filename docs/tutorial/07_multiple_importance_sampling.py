@@ -2,8 +2,8 @@ r"""
 7. Multiple importance sampling
 ===============================
 
-Both ways of step 5 and 6 have the same expected value. Directions of the BSDF are good where the lamp is
-large and near or the surface is shiny. Light samples are good where the lamp is small. *Multiple importance
+The estimators of steps 5 and 6 have the same expected value. BSDF samples are good where the lamp is large
+and near, or where the surface is shiny. Light samples are good where the lamp is small. *Multiple importance
 sampling* takes one sample of each, and gives each a weight for its direction :math:`\omega`. With the
 densities :math:`p` of the technique that drew it and :math:`q` of the other one, the power heuristic (Veach
 and Guibas 1995) is
@@ -11,9 +11,8 @@ and Guibas 1995) is
 .. math:: w_p(\omega) = \frac{p(\omega)^2}{p(\omega)^2 + q(\omega)^2} ,
    \qquad w_p + w_q = 1 .
 
-Since the weights of a direction add up to 1, the sum of both estimates still has the right mean. Where a
-technique draws a direction rarely, its sample would count much, which is the noise; there its weight is
-small.
+Since the weights of a direction add up to 1, the sum of both estimates still has the correct mean. A sample
+counts much where its technique rarely draws it, and that is the cause of noise; there its weight is small.
 """
 
 import imageio.v3 as iio
@@ -100,5 +99,5 @@ wf.render(scene, 16, integrator="direct_mis").save("4_both.png", tone="agx")
 # ---------
 #
 # 1. Use the balance heuristic :math:`p/(p+q)`. *Expect* the same mean and slightly more noise.
-# 2. Give both samples the weight 1. *Expect* direct light that is twice as bright. Weights of 1/2 are right
-#    again, and noisier than either technique where it is good.
+# 2. Give both samples the weight 1. *Expect* direct light that is twice as bright. Weights of 1/2 give the
+#    correct mean again, but more noise than either technique has where it is good.

@@ -2,18 +2,18 @@ r"""
 8. The full estimator
 =====================
 
-Light samples with their weights at *every* matte point, and the direction of the BSDF as the next step of
-the path: all light, direct and indirect. Two more things make it quick.
+The path takes a weighted light sample at *every* matte point, and then follows the direction of its BSDF
+sample. This finds all light, direct and indirect. Two techniques make it fast.
 
 **Russian roulette.** Most paths carry next to nothing after a few reflections. Each goes on with a
-probability :math:`q`, and its throughput is divided by :math:`q`. The expected value stays:
+probability :math:`q`, and its throughput is divided by :math:`q`. The expected value stays the same:
 
 .. math:: q\cdot\frac{T}{q} + (1-q)\cdot 0 = T .
 
-With the largest channel of :math:`T` as :math:`q`, the paths that go on all carry about the same.
+If :math:`q` is the largest channel of :math:`T`, all paths that go on carry about the same.
 
 **Compaction.** Paths that have ended are removed from the arrays, so that no work is done for them.
-``slot`` remembers to which row of the result each path belongs.
+``slot`` holds the row of the result that each path belongs to.
 """
 
 import time
@@ -81,9 +81,9 @@ iio.imwrite("1_naive_and_full.png", pair.repeat(4, 0).repeat(4, 1))
 print(f"mean of naive {first.mean():.3f}, of full {second.mean():.3f}")
 
 # %%
-# Both have the same mean. The bright dots on the floor are light that the glass ball gathers, a *caustic*. No
-# light sample finds it, since the shadow ray stops at the glass, so it is left to paths that meet the lamp by
-# chance.
+# Both have the same mean. The bright dots on the floor are light that the glass sphere focuses: a
+# *caustic*. No light sample finds it, because the shadow ray stops at the glass. Only paths that meet the
+# lamp by chance do.
 #
 # In the library
 # --------------
@@ -95,7 +95,7 @@ print(f"mean of naive {first.mean():.3f}, of full {second.mean():.3f}")
 # .. image:: /docs/naive_vs_full.jpg
 #    :alt: The Cornell box by naive and by full, rendered in the same time
 #
-# With ``caustics=True`` paths from the lamps find the caustics.
+# With ``caustics=True`` paths from the lamps find the caustics. This is called light tracing.
 #
 # Exercises
 # ---------

@@ -2,8 +2,8 @@ r"""
 9. The same room by the library
 ===============================
 
-All steps in one file are at the end of this page. The library computes the same integrals. The scene is
-built from the same arrays, and both agree:
+The library computes the same integrals. Here it renders the same scene, built from the same arrays, and both
+agree. The end of this page has all steps in one file.
 """
 
 import tracer
@@ -11,12 +11,12 @@ import tracer
 import wavefront as wf
 
 MATERIALS = {tracer.MIRROR: lambda color: wf.Mirror(color), tracer.GLASS: lambda color: wf.Dielectric(1.5)}
-balls = []
+spheres = []
 for k, (center, radius) in enumerate(zip(tracer.CENTER, tracer.RADIUS, strict=True)):
     material = MATERIALS.get(tracer.KIND[k], wf.Diffuse)(tracer.COLOR[k])
     emission = tracer.EMISSION[k] if k == tracer.LAMP else None
-    balls.append(wf.Sphere(center, radius, material=material, emission=emission))
-scene = wf.Scene(balls, camera=wf.Camera.look_at(tracer.EYE, tracer.TARGET, fov=60, size=(64, 48)))
+    spheres.append(wf.Sphere(center, radius, material=material, emission=emission))
+scene = wf.Scene(spheres, camera=wf.Camera.look_at(tracer.EYE, tracer.TARGET, fov=60, size=(64, 48)))
 
 image = wf.render(scene, 64, max_bounces=5)
 ours = tracer.render(tracer.full, 64, 48, 64)
@@ -38,8 +38,8 @@ better.save("2_caustics_and_denoised.png")
 #
 #    * - step
 #      - here
-#      - stage of the library
-#      - what it has more
+#      - in the library
+#      - what the library adds
 #    * - 1
 #      - ``camera_rays``
 #      - ``stages/generate.py``
@@ -93,10 +93,10 @@ better.save("2_caustics_and_denoised.png")
 # ---------
 #
 # 1. Render with ``noise=0.05`` in place of a number of samples. *Expect* far more than 64 samples, most of
-#    them where the glass ball gathers light: ``image.counts`` shows where.
+#    them where the glass sphere focuses light: ``image.counts`` shows where.
 # 2. Add a mesh: ``wf.load_mesh("part.stl")`` placed by ``wf.Instance``. *Expect* the time to grow much more
 #    slowly than the number of triangles.
-# 3. Write a BSDF of your own, and let ``wf.testing.check_bsdf`` prove it: see the page on materials.
+# 3. Write a BSDF of your own, and test it by ``wf.testing.check_bsdf``: see the page on materials.
 #
 # The whole tracer
 # ----------------

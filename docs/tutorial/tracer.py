@@ -1,12 +1,12 @@
 """The path tracer of the tutorial: what its steps build, in one file.
 
 Arrays have a row for each ray. The scene is that of a first ray tracing course: a matte, a mirror and a glass
-ball of radius 10 in a room whose floor, ceiling and walls are balls so large that they look flat.
+sphere of radius 10 in a room whose floor, ceiling and walls are spheres so large that they look flat.
 """
 
 import numpy as np
 
-# ----- step 1: rays and balls -----
+# ----- step 1: rays and spheres -----
 FAR = 1000.0
 ROOM = [(0, -FAR, 0), (0, FAR, 0), (-FAR, 0, 0), (FAR, 0, 0), (0, 0, -FAR), (0, 0, FAR)]
 CENTER = np.array(
