@@ -105,7 +105,7 @@ def test_the_page_has_the_table() -> None:
 
 def test_help_says_what_a_setting_does_not_go_with() -> None:
     """At the end of its text, from the table."""
-    assert SETTINGS["samples"].text.endswith(" bit for bit. Not with `spp`, `noise` or `seconds`.")
+    assert SETTINGS["samples"].text.endswith(". Not with `spp`, `noise` or `seconds`.")
     assert " ".join((wf.render.__doc__ or "").split()).count(" Not with `camera`. ") == 2
 
 

@@ -396,7 +396,7 @@ class RenderSettings(TypedDict, total=False):
             "Light tracing: one path from the lights for each sample, beside that from the camera. These "
             "paths find caustics, the light that smooth glass and mirrors send on. Without them that "
             "light is found by chance, and that of point, spot and directional lights never. Only for "
-            '"full", and not with every setting: docs/choices.md has a table, docs/caustics.md figures.',
+            '"full"; docs/caustics.md has figures.',
             option="trace paths from lights for caustics of smooth glass and mirrors",
             check=check_flag,
             identity=True,
