@@ -74,6 +74,7 @@ from .shapes import (
     Sphere,
     Spheres,
 )
+from .statistics import RegionMean
 from .textures.base import BaseTexture
 from .textures.image import Texture
 from .textures.normal_map import BumpMap, NormalMap
@@ -88,7 +89,6 @@ if TYPE_CHECKING:
     from .io.foreign import from_open3d, from_pyvista
     from .io.load import from_trimesh, load, load_mesh
     from .io.sources import LoadLimits
-    from .statistics import RegionMean
     from .viewer import Viewer, view
     from .views import render_many, turntable
 
@@ -96,24 +96,16 @@ __version__ = VERSION
 register_preview(ball_png)
 
 _LATER = {  # what many programs do without is imported when they ask for it
-    "Comparison": ".image.comparison",
-    "compare": ".image.comparison",
-    "from_open3d": ".io.foreign",
-    "from_pyvista": ".io.foreign",
-    "from_trimesh": ".io.load",
-    "interpolate_cameras": ".camera.moves",
-    "LoadLimits": ".io.sources",
-    "load": ".io.load",
-    "load_mesh": ".io.load",
-    "orbit": ".camera.moves",
-    "render_many": ".views",
-    "RegionMean": ".statistics",
-    "save_animation": ".animation",
-    "testing": ".testing",
-    "turntable": ".views",
-    "write_dataset": ".datasets",
-    "view": ".viewer",
-    "Viewer": ".viewer",
+    ".animation": ("save_animation",),
+    ".camera.moves": ("interpolate_cameras", "orbit"),
+    ".datasets": ("write_dataset",),
+    ".image.comparison": ("Comparison", "compare"),
+    ".io.foreign": ("from_open3d", "from_pyvista"),
+    ".io.load": ("from_trimesh", "load", "load_mesh"),
+    ".io.sources": ("LoadLimits",),
+    ".testing": ("testing",),
+    ".viewer": ("Viewer", "view"),
+    ".views": ("render_many", "turntable"),
 }
 
 __all__ = [
@@ -210,11 +202,12 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _LATER:
-        hint = did_you_mean(name, __all__) if not name.startswith("_") else ""
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}{hint}")
-    module = import_module(_LATER[name], __name__)
-    return module if name == "testing" else getattr(module, name)
+    for module, names in _LATER.items():
+        if name in names:
+            found = import_module(module, __name__)
+            return found if name == "testing" else getattr(found, name)
+    hint = did_you_mean(name, __all__) if not name.startswith("_") else ""
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}{hint}")
 
 
 def __dir__() -> list[str]:
