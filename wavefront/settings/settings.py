@@ -43,8 +43,6 @@ class Settings:
         The most samples that a pixel may get.
     worker_count
         How many waves are traced at once.
-    memory_limit
-        Bytes; None for what there is.
 
     Raises
     ------
@@ -61,8 +59,6 @@ class Settings:
             self.values["aovs"] = chosen_layers("aovs", (*self.values["aovs"], *GUIDES))
         check_combinations(self.values)
         self.max_spp = self._most_samples()
-        memory = self.values["max_memory"]
-        self.memory_limit = None if memory is None else int(memory)
         self.worker_count = worker_count(self.values["workers"], self.values["executor"])
         make_sampler(self.values["sampler"], self.values["seed"])
         self.executor_for((0, 0))
@@ -141,9 +137,9 @@ class Settings:
         self, size: tuple[int, int], executor: str | ExecutorLike, layers: Sequence[str] = ()
     ) -> Budget:
         """Return the workers, and the largest wave, for a picture of a size (width, height) with layers."""
-        processes = executor != "threads"
+        most, processes = self.values["max_memory"], executor != "threads"
         return make_budget(
-            self.memory_limit,
+            None if most is None else int(most),
             size,
             self.worker_count,
             self.values["wave_size"],
