@@ -76,7 +76,7 @@ def turntable(
     view: str | ArrayLike | None = None,
     fov: float | None = None,
 ) -> list[Camera]:
-    """Return n cameras on a circle around the middle of a scene, at equal angles.
+    """Return n cameras on a circle around the middle of a scene, at equal angles: a turntable.
 
     The first is the scene's camera, or one that frames it with room for a whole turn.
 

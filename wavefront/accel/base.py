@@ -12,9 +12,9 @@ from .primitives import CurvedPrimitives
 
 @record
 class Geometry:
-    """What rays can hit, in float32 relative to the scene's center.
+    """The geometry that rays can hit, in float32 relative to the scene's center.
 
-    Primitive ids count the triangles first, then the curved primitives of each kind.
+    Primitive ids number the triangles first, then the curved primitives of each kind.
 
     Examples
     --------
@@ -55,7 +55,7 @@ class Intersections:
 
 
 class Accelerator(Protocol):
-    """Answers ray queries. Results do not depend on the size of a batch or the order of its rays.
+    """The interface of ray queries. Results do not depend on the size of a batch or the order of its rays.
 
     Examples
     --------
@@ -71,7 +71,7 @@ class Accelerator(Protocol):
 
     @abstractmethod
     def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
-        """Return the nearest hits with t > 0 of rays (3, n); of equal distances, the lowest primitive id.
+        """Return the nearest hits of rays (3, n) with t > 0; at equal t the lowest primitive id.
 
         `exclude_prim` (n,) is the primitive that each ray starts on, -1 for none. A ray does not hit the
         triangle that it starts on, and hits a sphere or another curved primitive that it starts on only on
@@ -80,4 +80,4 @@ class Accelerator(Protocol):
 
     @abstractmethod
     def occluded(self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints) -> Bools:
-        """Return a mask (n,) of the rays that hit anything with 0 < t < `distance` (n,)."""
+        """Return a mask (n,): which rays hit anything at 0 < t < `distance` (n,)."""

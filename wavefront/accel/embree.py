@@ -79,7 +79,7 @@ class EmbreeAccelerator:
         return hits
 
     def occluded(self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints) -> Bools:
-        """Return a mask (n,) of the rays that hit anything with 0 < t < `distance` (n,)."""
+        """Return a mask (n,): which rays hit anything at 0 < t < `distance` (n,)."""
         blocked = self._occluded_by_triangle(origin, direction, distance, exclude_prim)
         if self._curved is not None:
             blocked |= self._curved.occluded(origin, direction, distance, self._exclude_curved(exclude_prim))

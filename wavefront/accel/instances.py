@@ -62,7 +62,7 @@ class InstanceAccelerator:
         self._instance = tree.prim[:, 0]
 
     def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
-        """Return the nearest hits with t > 0 of rays (3, n); of equal distances, the lowest primitive id."""
+        """Return the nearest hits of rays (3, n) with t > 0; at equal t the lowest primitive id."""
         hits = self._single.closest(origin, direction, self._exclude_single(exclude_prim))
         excluded = self._exclude_instanced(exclude_prim)
         for lane, instance in self._rounds(origin, direction, hits.t):
@@ -75,7 +75,7 @@ class InstanceAccelerator:
         return hits
 
     def occluded(self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints) -> Bools:
-        """Return a mask (n,) of the rays that hit anything with 0 < t < `distance` (n,)."""
+        """Return a mask (n,): which rays hit anything at 0 < t < `distance` (n,)."""
         blocked = self._single.occluded(origin, direction, distance, self._exclude_single(exclude_prim))
         excluded = self._exclude_instanced(exclude_prim)
         t_far = np.where(blocked, f4(-1), distance)

@@ -82,7 +82,7 @@ class NumpyAccelerator:
         return PrimitiveTree(kind, ids, self._ball, first, leaf_size or leaf_size_for(ids.size))
 
     def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
-        """Return the nearest hits with t > 0 of rays (3, n); of equal distances, the lowest primitive id."""
+        """Return the nearest hits of rays (3, n) with t > 0; at equal t the lowest primitive id."""
         n = origin.shape[1]
         hits = Intersections(np.empty(n, f4), np.empty(n, np.intp), np.empty(n, f4), np.empty(n, f4))
         for at in range(0, n, self._batch):
@@ -97,7 +97,7 @@ class NumpyAccelerator:
         return hits
 
     def occluded(self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints) -> Bools:
-        """Return a mask (n,) of the rays that hit anything with 0 < t < `distance` (n,)."""
+        """Return a mask (n,): which rays hit anything at 0 < t < `distance` (n,)."""
         n = origin.shape[1]
         blocked = np.zeros(n, bool)
         for at in range(0, n, self._batch):

@@ -50,9 +50,9 @@ class BsdfSample:
 
 
 class Bsdf(Parametrized, ABC):
-    """How a surface scatters light. A `Material` holds one, and everything else about the surface.
+    """The scattering function (BSDF) of a surface. A `Material` has one, and all else about the surface.
 
-    A subclass gives `f`; it may give a `sample_f` and its `pdf` that follow `f` more closely than
+    A subclass defines `f`. It may also define `sample_f` and `pdf`, which should follow `f` more closely than
     the cosine-weighted ones here. Parameters are attributes: constants of shape (3, 1) or (1,),
     or `BaseTexture` ones, which `bind` replaces by their values at the hit points.
 
@@ -86,17 +86,17 @@ class Bsdf(Parametrized, ABC):
 
     @property
     def view_independent(self) -> bool:
-        """True if no method reads wo, which is then not computed."""
+        """True if no method uses wo, which is then not computed."""
         return False
 
     @property
     def lambertian(self) -> bool:
-        """True if f is albedo/π and the pdf cosθ/π above the surface, so that cosines tell both."""
+        """True if f is albedo/π and the pdf is cosθ/π above the surface; then both follow from cosines."""
         return False
 
     @property
     def black(self) -> bool:
-        """True if it scatters nothing: paths end on it."""
+        """True if the surface scatters nothing: paths end on it."""
         return False
 
     def bind(self, surface: SurfaceInteraction) -> Self:
@@ -110,10 +110,10 @@ class Bsdf(Parametrized, ABC):
         return bound
 
     def albedo(self, wo: Floats) -> Floats:
-        """Part of the light from `wo` that is scattered, per channel: (3, n), or (3, 1) for all alike.
+        """Fraction of the light from `wo` that is scattered, per channel: (3, n), or (3, 1) if all are equal.
 
-        Light that is refracted counts without the change of its radiance by the index. The layers `albedo`
-        and `denoising_albedo` show the albedo. Here it is the mean weight of 16 samples.
+        The change of radiance by refraction does not count. The AOVs `albedo` and `denoising_albedo` show the
+        albedo. Here it is the mean weight of 16 samples.
         """
         total = np.zeros_like(wo)
         for u in ALBEDO_NUMBERS:

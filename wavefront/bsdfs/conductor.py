@@ -37,20 +37,19 @@ SPELLINGS = {"aluminium": "aluminum", "chrome": "chromium"}
 
 
 class Conductor(JointBsdf):
-    """A metal, by its complex refractive index η + ik: a mirror, or a rough (GGX) surface.
+    """A metal, by its complex refractive index η + ik: smooth, or rough (GGX).
 
-    Light that meets the rough surface more than once is not followed, so a rough metal is darker
-    than a smooth one. The loss with F = 1, seen along the normal: 1 % at roughness 0.32, 8 % at
-    0.5, 31 % at 0.71, 69 % at 1.
+    Only single scattering is simulated, so a rough metal is darker than a smooth one. The loss with F = 1,
+    seen along the normal: 1 % at roughness 0.32, 8 % at 0.5, 31 % at 0.71, 69 % at 1.
 
     Parameters
     ----------
     eta
-        Real part per channel, more than 0 and at most 1e6: a number, three numbers, or a texture.
+        Real part η per channel, more than 0 and at most 1e6: a number, three numbers, or a texture.
     k
         Imaginary part (extinction) per channel, in [0, 1e6].
     roughness
-        In [0, 1]; α = roughness². 0, like anything with α < 0.001, is a perfect mirror.
+        In [0, 1]; α = roughness². Below α = 0.001 it is a perfect mirror.
 
     Raises
     ------
@@ -103,7 +102,7 @@ class Conductor(JointBsdf):
         return fresnel_conductor(cos, self.eta, self.k) * value, pdf
 
     def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
-        """Return reflections at the normal or at visible microfacets; no sample below the surface."""
+        """Return reflections at the normal, or at visible microfacets; no sample below the surface."""
         n = wo.shape[1]
         if self.specular:
             weight = fresnel_conductor(wo[2], self.eta, self.k)

@@ -48,19 +48,19 @@ INDICES = {
 
 
 class Dielectric(RefractiveBsdf):
-    """A clear boundary that reflects and refracts; the shape's inside has index `ior`.
+    """Glass, water and other clear dielectrics: a boundary that reflects and refracts.
 
     Parameters
     ----------
     ior
-        Refractive index of the inside relative to the outside, from 1e-6 to 1e6. Below 1 the outside
+        Refractive index of the shape's inside relative to the outside, from 1e-6 to 1e6. Below 1 the outside
         is the denser medium (a bubble in water: 1/1.33). At 1 light passes straight through.
     roughness
-        In [0, 1]; α = roughness² (GGX). 0, like anything with α < 0.001, is perfectly smooth, and
-        so is an index within 0.001 of 1. Light that meets the rough surface more than once is not
-        followed. For index 1.5 seen along the normal that loses 0.1 % from outside and 1 % from
-        inside at roughness 0.32, 1 % and 7 % at 0.5, 3 % and 25 % at 0.71, 11 % and 58 % at 1.
-        A whole ball in even light loses 0.06 % at 0.1, 4 % at 0.32, 18 % at 0.5, 41 % at 0.71, 65 % at 1.
+        In [0, 1]; α = roughness² (GGX). Below α = 0.001 it is perfectly smooth, and so is an index
+        within 0.001 of 1. Only single scattering is simulated. For index 1.5, seen along the normal, that
+        loses 0.1 % from outside and 1 % from inside at roughness 0.32, 1 % and 7 % at 0.5, 3 % and 25 % at
+        0.71, 11 % and 58 % at 1. A whole sphere in uniform light loses 0.06 % at 0.1, 4 % at 0.32, 18 % at
+        0.5, 41 % at 0.71, 65 % at 1.
     reflectance, transmittance
         Tints of the reflected and of the refracted light per channel, in [0, 1]. 1 is physical.
 

@@ -14,12 +14,12 @@ from .base import Bsdf, BsdfSample
 
 
 class Diffuse(Bsdf):
-    """A diffuse surface, equally bright from all directions: f = reflectance/π.
+    """A diffuse (Lambertian) surface, equally bright from all directions: f = reflectance/π.
 
     Parameters
     ----------
     reflectance
-        Part of the light that is reflected, per channel, in [0, 1]: a number, three numbers,
+        Fraction of the light that is reflected, per channel, in [0, 1]: a number, three numbers,
         or a texture.
 
     Raises
@@ -51,7 +51,7 @@ class Diffuse(Bsdf):
 
     @property
     def black(self) -> bool:
-        """True if the reflectance is 0, as it often is of lights."""
+        """True if the reflectance is 0, as is common for lights."""
         return (
             self.view_independent
             and not isinstance(self.reflectance, BaseTexture)

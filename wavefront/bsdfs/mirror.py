@@ -12,12 +12,12 @@ from .base import Bsdf, BsdfSample
 
 
 class Mirror(Bsdf):
-    """A mirror that reflects the same part of the light at every angle.
+    """An ideal mirror, which reflects the same fraction of the light at every angle.
 
     Parameters
     ----------
     reflectance
-        Part of the light that is reflected, per channel, in [0, 1]: a number, three numbers,
+        Fraction of the light that is reflected, per channel, in [0, 1]: a number, three numbers,
         or a texture.
 
     Raises

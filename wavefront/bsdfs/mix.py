@@ -31,12 +31,12 @@ class Mix(JointBsdf):
     first, second
         The BSDFs; either may itself be a `Mix`.
     weight
-        Part of the second, in [0, 1]: a number or a texture.
+        Fraction of the second, in [0, 1]: a number or a texture.
 
     Raises
     ------
     SceneError
-        If the weight is outside [0, 1], or something else than a `Bsdf` is given.
+        If the weight is outside [0, 1], or `first` or `second` is not a `Bsdf`.
 
     Examples
     --------

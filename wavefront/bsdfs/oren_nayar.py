@@ -22,21 +22,21 @@ LEAST_LOSS = f4(1e-7)
 
 
 class OrenNayar(Bsdf):
-    """A surface of matte facets, flatter in brightness towards its edges than `Diffuse`.
+    """A rough diffuse surface, such as clay or plaster: it looks flatter than `Diffuse`.
 
-    By default the qualitative model of M. Oren and S. Nayar 1994, "Generalization of Lambert's
-    Reflectance Model", eq. 30, which ignores light that bounces between facets: it reflects less
-    than `reflectance` (with sigma 0.5 at normal incidence 78 %). With `energy_preserving` the
-    EON model of J. Portsmouth, P. Kutz and S. Hill 2025, "EON: A Practical Energy-Preserving Rough
-    Diffuse BRDF", JCGT 14(1), which reflects all light where `reflectance` is 1.
+    The default is the qualitative model of M. Oren and S. Nayar 1994, "Generalization of Lambert's
+    Reflectance Model", eq. 30, which ignores light that bounces between facets: it reflects less than
+    `reflectance` (with sigma 0.5 at normal incidence 78 %). With `energy_preserving` it is the EON model of
+    J. Portsmouth, P. Kutz and S. Hill 2025, "EON: A Practical Energy-Preserving Rough Diffuse BRDF", JCGT
+    14(1), which reflects all light where `reflectance` is 1.
 
     Parameters
     ----------
     reflectance
         Albedo of a facet per channel, in [0, 1]: a number, three numbers, or a texture.
     sigma
-        Standard deviation of the facets' slope angles, radians, in [0, π/2]. 0 is `Diffuse`. For
-        the energy-preserving model its roughness, in [0, 1].
+        Standard deviation of the facets' slope angles, radians, in [0, π/2]. 0 is `Diffuse`. For the EON
+        model, its roughness, in [0, 1].
     energy_preserving
         Use the EON model.
 

@@ -35,18 +35,18 @@ class Chances(NamedTuple):
 
 
 class Principled(JointBsdf):
-    """Metal, plastic, glass, cloth and varnish by a few intuitive parameters.
+    """The principled material: metal, plastic, glass, cloth and varnish by a few intuitive parameters.
 
     With only `base_color`, `metallic` and `roughness` this is the metallic-roughness material of
     the glTF 2.0 specification, appendix B: mix(dielectric, metal, metallic) with Schlick's Fresnel,
     GGX with α = roughness², height-correlated Smith shadowing and a Lambertian base. The others
     follow glTF's extensions KHR_materials_ior, _specular, _transmission, _clearcoat and _sheen, except that
 
-    - the diffuse base gets the light that the gloss does not reflect, by the albedo of the gloss, so that a
-      white surface reflects all light and no more; the appendix's mix by Fresnel in the half vector,
-      which reflects up to 1.9 times the light at grazing angles, comes with `conserve_energy=False`;
-    - where light is transmitted, Fresnel's equations replace Schlick's approximation, which knows
-      no total internal reflection;
+    - the diffuse base gets the light that the specular lobe does not reflect, by the albedo of this lobe, so
+      that a white surface reflects all light and no more. `conserve_energy=False` takes the appendix's mix by
+      Fresnel in the half vector, which reflects up to 1.9 times the light at grazing angles;
+    - where light is transmitted, Fresnel's equations replace Schlick's approximation, which has no total
+      internal reflection;
     - the base under a clear coat is darkened for both directions, which keeps it reciprocal.
 
     Parameters
@@ -60,9 +60,9 @@ class Principled(JointBsdf):
     ior
         Refractive index, from 1e-6 to 1e6; where light is transmitted at least 0.001 away from 1.
     transmission
-        Part of the base that transmits light instead of scattering it diffusely, in [0, 1].
+        Fraction of the base that transmits light instead of scattering it diffusely, in [0, 1].
     thin
-        The surface is a sheet of its own, which does not bend light (glTF without a volume).
+        The surface is a thin sheet, which does not refract light (glTF without a volume).
     clearcoat, clearcoat_roughness
         Strength of a clear varnish of index 1.5, and its roughness, in [0, 1].
     sheen, sheen_color, sheen_roughness
@@ -71,7 +71,7 @@ class Principled(JointBsdf):
         Strength, in [0, 1], and tint, at least 0, of the dielectric's reflection along the normal, which
         the tint raises to at most 1.
     conserve_energy
-        Layer the gloss over the diffuse base without a gain of energy. False follows glTF's appendix
+        Layer the specular lobe over the diffuse base without a gain of energy. False follows glTF's appendix
         exactly.
 
     Raises

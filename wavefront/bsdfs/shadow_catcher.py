@@ -6,9 +6,9 @@ from .diffuse import Diffuse
 
 
 class ShadowCatcher(Diffuse):
-    """A surface that the camera sees only where shadows fall on it, for objects composed onto photographs.
+    """A shadow catcher: the camera sees only the shadows on it. For objects composed onto photographs.
 
-    Where it is in full light, the camera looks through it at the background; where all light is blocked it is
+    Where it is in full light, the camera sees the background through it; where all light is blocked it is
     black and opaque. Its opacity is 1 − the ratio of the light that arrives to the light that would arrive if
     nothing were in the way, as in the shadow matte of Arnold and the shadow catcher of Blender's Cycles.
     Only direct light counts, by its luminance, so the shadow has no color. To rays that have been scattered,
@@ -17,7 +17,7 @@ class ShadowCatcher(Diffuse):
     Parameters
     ----------
     reflectance
-        As of `Diffuse`, for the light that it sends onto objects.
+        As for `Diffuse`; for the light that it reflects onto objects.
 
     Notes
     -----

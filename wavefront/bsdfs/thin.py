@@ -13,19 +13,18 @@ from .refractive import RefractiveBsdf
 
 
 class ThinDielectric(RefractiveBsdf):
-    """A sheet of clear material without thickness: it reflects, and lets light straight through.
+    """A thin sheet of clear material, such as a window pane: it reflects and transmits without refraction.
 
-    All reflections between its two faces are summed: with R of one face it reflects 2R/(1 + R)
-    (Hecht, *Optics*, §9.6, without interference). Seen alike from both sides. A rough sheet
-    scatters what it lets through as widely as what it reflects, as glTF's
-    KHR_materials_transmission has it.
+    All reflections between its two faces are summed: with R of one face it reflects 2R/(1 + R) (Hecht,
+    *Optics*, §9.6, without interference). It looks the same from both sides. A rough sheet scatters
+    transmitted light as widely as reflected light, as in glTF's KHR_materials_transmission.
 
     Parameters
     ----------
     ior
         Refractive index of the material relative to what surrounds it, from 1e-6 to 1e6.
     roughness
-        In [0, 1]; α = roughness² (GGX). 0, like anything with α < 0.001, is perfectly smooth.
+        In [0, 1]; α = roughness² (GGX). Below α = 0.001 it is perfectly smooth.
     reflectance, transmittance
         Tints of the reflected and of the transmitted light per channel, in [0, 1].
 

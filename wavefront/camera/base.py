@@ -44,12 +44,12 @@ class Camera:
     rotation
         (3, 3) columns: right, up and backward in world space.
     projection
-        The map from film points to rays.
+        The map from points of the film to rays.
     resolution
         (width, height) in pixels of the whole picture.
     window
-        (x0, y0, x1, y1) in pixels of the whole picture: the part that is rendered, without column
-        x1 and row y1.
+        (x0, y0, x1, y1) in pixels of the whole picture: the part that is rendered. Column x1 and row y1 are
+        not part of it.
 
     Examples
     --------
@@ -117,15 +117,15 @@ class Camera:
         size
             (width, height) in pixels.
         aperture
-            Diameter of the lens, scene units; 0 is a pinhole, with everything sharp.
+            Diameter of the lens, scene units. With 0 (a pinhole) everything is sharp.
         focus
-            Distance of the sharp plane along the view axis, scene units; the target's by default.
+            Distance of the plane in focus along the view axis, scene units; by default that of the target.
         shift
-            Moves the film (right, up) in its plane, as fractions of the picture's width and
-            height: the view moves without a change of perspective.
+            Lens shift: moves the film (right, up) in its plane, as fractions of the picture's width and
+            height. The view moves without a change of perspective.
         crop
-            (x0, y0, x1, y1) in pixels from the left and the top: renders only that window, with the same
-            pixels as in the whole picture, but for their noise where `reuse` or `caustics` is on.
+            (x0, y0, x1, y1) in pixels from the left and the top: only this window is rendered. Its pixels are
+            the same as in the whole picture, except for their noise where `reuse` or `caustics` is on.
 
         Raises
         ------
@@ -165,7 +165,7 @@ class Camera:
         fov, size, aperture, focus, shift, crop
             As for `look_at`; with an aperture, `focus` must be given.
         convention
-            What the axes of camera space mean. "opengl", as in glTF and Blender: x right, y up,
+            The axes of camera space. "opengl", as in glTF and Blender: x right, y up,
             looking along -z. "opencv": x right, y down, looking along +z.
 
         Raises
@@ -207,14 +207,15 @@ class Camera:
         K
             (3, 3) intrinsics [[fx, s, cx], [0, fy, cy], [0, 0, 1]] in pixels.
         R, t
-            Rotation (3, 3) and translation, (3,) or (3, 1), from world to camera space; or both in one
-            matrix (4, 4) or (3, 4), the extrinsics, as `R` alone.
+            Rotation (3, 3) and translation, (3,) or (3, 1), from world to camera space; or `R` alone as one
+            matrix (4, 4) or (3, 4) of both, the extrinsics.
         size
             (width, height) in pixels; it must be given.
         distortion
-            Of the lens, OpenCV's (k1, k2, p1, p2), with k3, or with k3, k4, k5, k6 (Brown and Conrady).
+            Distortion coefficients of the lens as in OpenCV: (k1, k2, p1, p2), also with k3, or with k3, k4,
+            k5, k6 (Brown and Conrady).
         pixel_centers
-            Where K has the centers of pixels. "integer", as OpenCV, ROS and BOP: the upper left center is
+            Where the centers of pixels are in K. "integer", as OpenCV, ROS and BOP: the upper left center is
             (0, 0), and a principal point in the middle is ((width - 1)/2, (height - 1)/2). "half", as COLMAP
             and instant-ngp: the upper left center is (0.5, 0.5), and the middle (width/2, height/2).
         aperture, focus, crop
@@ -293,8 +294,8 @@ class Camera:
         origin, up, size, crop
             As for `look_at`. Pixels are square where the width is twice the height.
         target
-            (3,) the point in the middle of the picture. Without one the camera looks along +z,
-            and the picture can be used as an `Environment` as it is.
+            (3,) the point in the middle of the picture. By default the camera looks along +z; then the
+            picture can be used as an `Environment`.
 
         Raises
         ------
@@ -325,7 +326,7 @@ class Camera:
     # --- Matrices -------------------------------------------------------------------------------
 
     def intrinsics(self, pixel_centers: PixelCenters = "integer") -> NDArray[np.float64]:
-        """Return the matrix K (3, 3) of `from_intrinsics`, of the whole picture; distortion is no part of it.
+        """Return the matrix K (3, 3) of `from_intrinsics`, for the whole picture and without distortion.
 
         Parameters
         ----------
@@ -335,7 +336,7 @@ class Camera:
         Raises
         ------
         SceneError
-            If the camera is no perspective one, or `pixel_centers` is something else.
+            If the camera is not a perspective camera, or `pixel_centers` is something else.
         """
         k = self._perspective().matrix(self.resolution)
         k[:2, 2] -= _to_film(pixel_centers)
@@ -369,8 +370,8 @@ class Camera:
     def projection_matrix(self, near: float = 0.01, far: float = 1000) -> NDArray[np.float64]:
         """Return OpenGL's projection matrix (4, 4), from camera space ("opengl") to clip coordinates.
 
-        Divided by their fourth component, x from -1 to 1 is the picture from left to right, y from bottom to
-        top, and z the range from `near` to `far`. Lens distortion is no part of it.
+        After division by the fourth component, x from -1 to 1 is the picture from left to right, y from
+        bottom to top, and z the range from `near` to `far`. Lens distortion is not included.
 
         Parameters
         ----------
@@ -380,7 +381,7 @@ class Camera:
         Raises
         ------
         SceneError
-            If the camera is no perspective one, or the depths are out of range.
+            If the camera is not a perspective camera, or the depths are out of range.
         """
         near = number("near", near, lambda x: x > 0, "above 0")
         far = number("far", far, lambda x: x > near, f"above near, which is {near:g}")
@@ -453,7 +454,7 @@ class Camera:
     def connections(
         self, points: Floats, center: NDArray[np.float64], lens: Floats | None = None
     ) -> tuple[Floats, Doubles, Doubles]:
-        """Return where rays to the camera end, at which film points they arrive, and how much counts there.
+        """Connect points to the camera: return where rays end, their film points, and their importance.
 
         Parameters
         ----------

@@ -16,12 +16,12 @@ from .base import Camera, upward
 
 
 def orbit(camera: Camera, center: ArrayLike, degrees: float, up: ArrayLike = "y") -> Camera:
-    """Return a camera that was turned around a vertical line.
+    """Return the camera turned around a vertical line.
 
     Parameters
     ----------
     camera
-        Where it was.
+        The camera to turn.
     center
         (3,) a point of the line, scene units.
     degrees

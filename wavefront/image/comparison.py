@@ -29,7 +29,7 @@ Picture: TypeAlias = Image | ArrayLike | str | os.PathLike[str]
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Difference of picture a from the reference b, over linear values of all pixels and channels.
+    """The difference of picture a from the reference b, over the linear values of all pixels and channels.
 
     `print` shows it as a table.
 
@@ -91,20 +91,19 @@ class Comparison:
 def compare(a: Picture, b: Picture) -> Comparison:
     """Measure the difference of picture `a` from the reference `b`.
 
-    Relative MSE divides by the reference, so dark parts count as much as bright ones; ε limits the weight of
-    black pixels. Its root is the error that `render(noise=...)` limits. Source: F.
-    Rousselle, C. Knaus and M. Zwicker, Adaptive Sampling and Reconstruction using Greedy Error
-    Minimization, 2011, there with a fixed ε for pictures in [0, 1].
+    The relative MSE divides by the reference, so dark parts count as much as bright ones; ε limits the weight
+    of black pixels. Its root is the error that `render(noise=...)` limits. Source: F. Rousselle, C. Knaus and
+    M. Zwicker, Adaptive Sampling and Reconstruction using Greedy Error Minimization, 2011, there with a fixed
+    ε for pictures in [0, 1].
 
-    The p-values say whether two noisy pictures are the same up to noise. Each is the chance that two pictures
-    that differ by noise alone differ as much as these two do, in the pixel, the block or the channel of the
-    mean that is the least likely one; it is corrected for their number, so a picture of any size has one
-    in a hundred below 0.01. They need two rendered pictures with at least two samples per pixel and their
-    standard errors, that share no samples: with the same seed and sampler the samples must not overlap.
-    Otherwise they are None, and `p_absent` says why. Of pictures with `reuse=True`, whose pixels share noise,
-    those of blocks and of the mean take the errors of their tiles from batches of samples; where a file does
-    not keep these (exr), they take the worst case, and find less. Sources are in
-    `wavefront/statistics/significance.py`.
+    The p-values say whether two noisy pictures are the same up to noise. Each is the probability that two
+    pictures that differ by noise alone differ as much as these two do, in the least likely pixel, block or
+    channel of the mean. It is corrected for their number: for any size of picture, one in a hundred is below
+    0.01. They need two rendered pictures with standard errors and at least two samples per pixel, which share
+    no samples: with the same seed and sampler the samples must not overlap. Otherwise they are None, and
+    `p_absent` says why. Of pictures with `reuse=True`, whose pixels share noise, those of blocks and of the
+    mean take the errors of their tiles from batches of samples; where a file does not keep these (exr), they
+    take the worst case, and find less. Sources are in `wavefront/statistics/significance.py`.
 
     FLIP needs `pip install flip-evaluator`. For two pictures of 8 bits it is LDR-FLIP, else
     HDR-FLIP (P. Andersson et al., FLIP, 2020, and Visualizing Errors in Rendered High Dynamic Range

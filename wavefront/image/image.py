@@ -53,34 +53,33 @@ class Image:
     rgb
         (H, W, 3) float32 linear radiance; row 0 is the top.
     spp
-        Samples per pixel; the rounded mean where pixels differ.
+        Samples per pixel; the rounded mean where pixels have different numbers.
     metadata
         Settings and results of the render: lighting (the preset that was added, or None), ground (whether one
-        was added), background ("transparent", a color, or None for the environment), integrator,
-        max_bounces, seed, sampler, sample_ranges (the half-open ranges [first, end] of the samples that some
-        pixel has), film (width and height of the whole picture), window (the part [x0, y0, x1, y1] of it that
-        this one is), filter, branches, guide, guided, reuse and hint (how paths went on, and what may pay
-        besides: docs/choices.md), accelerator, workers, executor, seconds (wall time), spp (mean
-        over pixels), samples, rays, bad_samples, interrupted, version (of this package), numpy, noise
-        (estimated relative error of the picture before denoising), rare (the part of the square of noise that
-        rests on few samples, see docs/convergence.md; None below sixteen samples), clamp and clamped (the
-        part of the light that it removed), caustics, boxes if they were asked for, and of a denoised picture
-        denoiser.
+        was added), background ("transparent", a color, or None for the environment), integrator, max_bounces,
+        seed, sampler, sample_ranges (the half-open ranges [first, end] of the samples that some pixel has),
+        film (width and height of the whole picture), window (the part [x0, y0, x1, y1] of it that this one
+        is), filter, branches, guide, guided, reuse and hint (what was chosen, and what else may pay:
+        docs/choices.md), accelerator, workers, executor, seconds (wall time), spp (mean over pixels),
+        samples, rays, bad_samples, interrupted, version (of this package), numpy, noise (estimated relative
+        error of the picture before denoising), rare (the part of the squared error that comes from few
+        samples, see docs/convergence.md; None below sixteen samples), clamp and clamped (the part of the
+        light that it removed), caustics, boxes if they were asked for, and of a denoised picture denoiser.
     counts
         (H, W) int64 samples of each pixel, without those that were not finite.
     variance
         (H, W, 3) float32 estimated variance of one sample; NaN where there are fewer than two.
     standard_error
         (H, W, 3) float32 estimated standard error of `rgb`, from the scatter of 2 to 8 batches of samples. It
-        includes most of the gain of stratified sampling. NaN where there are fewer than two samples.
-        It is the error of each pixel alone. Where paths are shared (`metadata["reuse"]`) pixels depend on
-        each other, and a mean over pixels errs by more than the root of the sum of squares says: `mean`
-        gives the error of a region.
+        includes most of the gain of stratified sampling. NaN where there are fewer than two samples. It is
+        the error of each pixel alone. Pixels that share paths (`metadata["reuse"]`) are correlated, so that
+        the error of a mean over pixels is larger than the errors of pixels suggest: `mean` gives the error of
+        a region.
     layers
-        The other layers by name, (H, W) or (H, W, channels): see `layers.LAYERS`. Each is an attribute as
-        well: `image.depth` is `image.layers["depth"]`.
+        The AOVs by name, (H, W) or (H, W, channels): see docs/layers.md. Each is an attribute as well:
+        `image.depth` is `image.layers["depth"]`.
     errors
-        Estimated standard error of each sampled layer, of its shape.
+        Estimated standard error of each sampled AOV, of the same shape.
     names
         For "shape", "instance" and "material" the name of each id of the layers `shape_id`, `instance_id`
         and `material_id`.
@@ -88,8 +87,8 @@ class Image:
         The sums of the samples, for `merge`. Only pictures of `render(samples=...)`, of checkpoints and of
         npz files of these have them.
     scatter
-        What `mean` and `wf.compare` need of a picture whose pixels share paths; else nothing. npz files have
-        it, exr files do not.
+        What `mean` and `wf.compare` need where pixels share paths; otherwise empty. npz files have it, exr
+        files do not.
 
     `counts`, `variance` and `standard_error` are None in an image that was not rendered, `standard_error`
     also in one that was denoised.
@@ -97,7 +96,7 @@ class Image:
     Raises
     ------
     SceneError
-        If `rgb` has no pixels, or is no array of three axes.
+        If `rgb` has no pixels, or is not an array of three axes.
 
     Examples
     --------
@@ -143,7 +142,7 @@ class Image:
 
     @property
     def coverage(self) -> dict[str, NDArray[np.float32]]:
-        """The part (H, W) of each pixel that shapes cover, by their name; empty if it was not asked for."""
+        """The fraction (H, W) of each pixel that shapes cover, by name; empty without `aovs="coverage"`."""
         return self._keyed("coverage")
 
     def _keyed(self, kind: str) -> dict[str, NDArray[np.float32]]:
@@ -172,19 +171,19 @@ class Image:
         return found
 
     def mask(self, which: int | str, kind: str = "shape") -> NDArray[np.bool_]:
-        """Return the pixels (H, W) whose center ray meets something, by the layer of its ids.
+        """Return a mask (H, W): the pixels whose center ray meets an object, by its id or name.
 
         Parameters
         ----------
         which
-            An id, or a name: of several things of that name, the pixels of all.
+            An id, or a name. If several objects have this name, their pixels are joined.
         kind
             "shape", "instance" or "material".
 
         Raises
         ------
         SceneError
-            If there is no such thing, or the layer `shape_id`, `instance_id` or `material_id` is missing.
+            If there is no such id or name, or the AOV `shape_id`, `instance_id` or `material_id` is missing.
         """
         names = self.names.get(one_of("kind", kind, ("shape", "instance", "material")))
         ids = self.layers.get(f"{kind}_id")
@@ -198,10 +197,10 @@ class Image:
         return np.isin(ids, chosen)
 
     def mean(self, region: Any = None, kind: str = "shape") -> RegionMean:
-        """Return the mean of a region and its standard error, also where pixels depend on each other.
+        """Return the mean of a region and its standard error, also where pixels share paths.
 
-        Pixels of pictures that share paths depend on each other within tiles; the error then comes from the
-        scatter of batches of samples over the pixels of each tile. Other pixels are independent.
+        Pixels that share paths are correlated within tiles. Then the error comes from the scatter of batches
+        of samples over the pixels of each tile. Other pixels are independent.
 
         Parameters
         ----------
@@ -214,7 +213,7 @@ class Image:
         Returns
         -------
         RegionMean
-            With `value` (3,), `standard_error` (3,), None where it is not known, and `interval`.
+            With `value` (3,), `standard_error` (3,), which is None if it is not known, and `interval`.
 
         Raises
         ------
@@ -289,14 +288,14 @@ class Image:
     def motion(self, camera: Camera) -> NDArray[np.float32]:
         """Return the optical flow to a picture of the same scene by another camera, (H, W, 2) in pixels.
 
-        What is seen in the middle of pixel [y, x] is seen by the other camera at (x + dx, y + dy), in
-        columns and rows of the picture that it renders. It may be hidden there, or outside. NaN where this
-        picture shows nothing, or the point is behind the other camera.
+        The point in the middle of pixel [y, x] is at (x + dx, y + dy) in the picture of the other camera, in
+        columns and rows. It may be hidden there, or outside of the picture. NaN where this picture shows
+        nothing, or where the point is behind the other camera.
 
         Parameters
         ----------
         camera
-            The other camera. This picture must have the layer `position`.
+            The other camera. This picture must have the AOV `position`.
 
         Raises
         ------
@@ -404,7 +403,7 @@ class Image:
     def denoise(self, denoiser: str = "auto") -> Image:
         """Return the picture without most of its noise.
 
-        Only `rgb` is denoised; all layers stay as they are, and `noisy` is the picture before. The layers
+        Only `rgb` is denoised; AOVs stay as they are, and `noisy` is the picture before. The AOVs
         `denoising_albedo` and `denoising_normal`, which `render(denoise=True)` adds, guide the denoiser
         along edges and textures. Pixels that are not finite are filled. The standard error of the result is
         not known. A picture that was denoised is denoised anew from the noisy one.
@@ -412,8 +411,8 @@ class Image:
         Parameters
         ----------
         denoiser
-            "oidn": Intel Open Image Denoise, through pyoidn (`pip install pyoidn`). "nonlocal_means": a
-            filter of this package, slower and less good; it needs nothing. "auto": "oidn" if it is
+            "oidn": Intel Open Image Denoise, by pyoidn (`pip install pyoidn`). "nonlocal_means": a filter of
+            this package, slower and not as good, which needs no other package. "auto": "oidn" if it is
             installed. `metadata["denoiser"]` says which it was.
 
         Raises
@@ -460,14 +459,14 @@ class Image:
         )
 
     def merge(self, other: Image) -> Image:
-        """Return the picture of the samples of two pictures of one scene, which share none.
+        """Merge two pictures of one scene that have different samples.
 
-        It is that of one render of all these samples, bit for bit; so are sampled layers. `variance` and
-        `standard_error` may differ from those of one render in how their sums are rounded; where the
-        samples of a part do not fill whole batches (of `film.batch_size`), the error is estimated from
-        batches of other lengths. Layers that are not sampled are those of this picture. In the metadata
-        counts and seconds are added, and `sample_ranges` are joined; the rest is that of this picture.
-        Of denoised pictures the noisy ones are merged.
+        The result is the picture of one render of all these samples, bit for bit, and so are sampled AOVs.
+        `variance` and `standard_error` may differ from those of one render in how their sums are rounded;
+        where the samples of a part do not fill whole batches (of `film.batch_size`), the error is estimated
+        from batches of other lengths. AOVs that are not sampled are those of this picture. In the metadata,
+        counts and seconds are added, and `sample_ranges` are joined; the rest is that of this picture. If a
+        picture was denoised, the noisy one is merged.
 
         Parameters
         ----------
@@ -501,8 +500,8 @@ class Image:
         exr and npz files of `save` give the same image again: rgb, layers, errors, names and metadata, bit
         for bit. png and jpg files are decoded by the gamma that they record, as files of `save` do, and by
         the sRGB curve if they record none. exr, hdr, npy and npz are linear. The last of two or four channels
-        becomes the layer "alpha"; colors of a png are multiplied by it. One channel of color becomes three.
-        A checkpoint gives the picture so far.
+        becomes the layer "alpha", and colors of a png are multiplied by it. One channel of color becomes
+        three. A checkpoint gives the picture so far.
 
         Parameters
         ----------
@@ -542,10 +541,10 @@ class Image:
     def outlined(
         self, color: ArrayLike = 0.0, width: float = 2.0, *, crease: float = 40.0, jump: float = 0.01
     ) -> Image:
-        """Return the picture with lines where one thing ends in front of another, and along sharp edges.
+        """Return the picture with lines along outlines of objects and along sharp edges.
 
-        The picture must have the layers `shape_id`, `normal` and `depth`: render it with
-        aovs=("shape_id", "normal", "depth"). Its layers stay as they are, except that the lines cover a
+        The picture must have the AOVs `shape_id`, `normal` and `depth`: render it with
+        aovs=("shape_id", "normal", "depth"). AOVs stay as they are, except that the lines cover a
         transparent background.
 
         Parameters
@@ -555,11 +554,11 @@ class Image:
         width
             Of the lines, pixels, above 0 and at most 100.
         crease
-            Degrees, above 0 and at most 180: there is a line where the normal turns by more from one pixel to
-            the next.
+            Degrees, above 0 and at most 180: a line is drawn where the normal turns by more than this from
+            one pixel to the next.
         jump
-            Above 0: there is a line where the depth changes by more than this part of itself from one pixel
-            to the next, and not as evenly as on a slanting surface.
+            Above 0: a line is drawn where the depth changes by more than this fraction of itself from one
+            pixel to the next, and not as uniformly as on a slanted surface.
 
         Raises
         ------
@@ -600,7 +599,7 @@ class Image:
         tone: str = "none",
         white_balance: WhiteBalance | None = None,
     ) -> NDArray[np.uint8]:
-        """Return the picture as codes for display, the same that `save` writes into a png.
+        """Return the picture as 8-bit codes for display, the same that `save` writes into a png.
 
         Parameters
         ----------
@@ -612,8 +611,8 @@ class Image:
             The curve that maps radiance above 1 into the range of a display: "none", "reinhard", "aces" or
             "agx" (`codecs/tone.py` names their sources).
         white_balance
-            Color temperature of the light, 1667 to 25000 K, or the linear RGB of something gray in the
-            picture. It is made neutral after the exposure. 6504 K changes nothing.
+            Color temperature of the light, 1667 to 25000 K, or the linear RGB of a gray object in the
+            picture. This color is made neutral after the exposure. 6504 K changes nothing.
 
         Returns
         -------
@@ -680,7 +679,7 @@ class Image:
     ) -> None:
         """Write the picture by its extension: png or jpg for display; exr, hdr, npy and npz linear.
 
-        exr and npz hold everything: layers, errors, counts, names and metadata, and npz the sums for `merge`.
+        exr and npz hold everything: AOVs, errors, counts, names and metadata; npz also the sums for `merge`.
         Where exposure or white balance change rgb, they hold only rgb and the alpha of a transparent
         background, since the rest belongs to the picture before. A transparent background gives a png an
         alpha channel; hdr, npy and jpg have none, so it is black there. `docs/formats.md` has the names of
@@ -715,15 +714,15 @@ class Image:
         write_image(path, self._data(), Display(gamma, exposure, tone, white_balance), bits)
 
     def plot(self, name: str = "rgb", axes: Any = None) -> Any:
-        """Plot the picture or a layer with matplotlib.
+        """Plot the picture or an AOV with matplotlib.
 
-        Layers of one number per pixel are shown in false color with a color bar, ids in distinct colors with
+        AOVs of one number per pixel are shown in false color with a color bar, ids in distinct colors with
         a legend of their names, colors as `to_uint8` shows them, normals and positions as colors.
 
         Parameters
         ----------
         name
-            "rgb", "luminance" (of rgb), a layer, or "counts", "variance" or "standard_error".
+            "rgb", "luminance" (of rgb), an AOV, or "counts", "variance" or "standard_error".
         axes
             Axes of matplotlib to draw into; by default those of a new figure.
 

@@ -22,7 +22,7 @@ from .steps import accumulate, intersect_and_compact, prepare_shading
 
 
 def li_naive(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: int) -> Floats:
-    """Follow BSDF samples only; light is found by chance."""
+    """Follow BSDF samples only; paths find light by chance."""
     L = np.zeros((3, len(paths)), f4)
     for bounce in range(max_bounces + 1):
         paths, hits = intersect_and_compact(scene, paths, sampler, bounce, L, mis=False)
@@ -35,7 +35,7 @@ def li_naive(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: 
 
 
 def li_direct_simple(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: int) -> Floats:
-    """Emission and one light sample at the first surface that is not specular."""
+    """Estimate emission, and direct light at the first surface that is not specular, by one light sample."""
     L = np.zeros((3, len(paths)), f4)
     for bounce in range(max_bounces + 1):
         paths, hits = intersect_and_compact(scene, paths, sampler, bounce, L, mis=False)
@@ -49,7 +49,7 @@ def li_direct_simple(scene: CompiledScene, paths: Paths, sampler: Sampler, max_b
 
 
 def li_direct_mis(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: int) -> Floats:
-    """Emission at the first surface that is not specular, and direct light by two samples.
+    """Estimate emission, and direct light at the first surface that is not specular, by two samples.
 
     One sample comes from the lights and one from the BSDF, weighted by the power heuristic.
     """
@@ -73,9 +73,9 @@ def li_full(
     branches: int = 1,
     table: GuideTable | None = None,
 ) -> Floats:
-    """Direct light by two samples at every bounce, and with it all indirect light.
+    """Estimate direct light by two samples at every bounce, and so all indirect light.
 
-    From its first surface each path goes on in so many `branches`. A `table` guides directions.
+    Each path splits into `branches` paths at its first surface. A `table` guides directions.
     """
     L = np.zeros((3, len(paths)), f4)
     for bounce in range(max_bounces + 1):

@@ -21,7 +21,7 @@ Integrator: TypeAlias = Callable[[CompiledScene, Paths, Sampler, int], Floats]
 def integrator_for(
     integrator: Integrator, branches: int, reuse: bool, table: GuideTable | None
 ) -> Integrator:
-    """Return an integrator whose paths branch, are shared among pixels, and are guided, as asked for."""
+    """Return an integrator with the given branches, sharing of paths, and guide."""
     if reuse:
         return partial(li_reuse, branches=branches, table=table)
     if branches == 1 and table is None:

@@ -31,9 +31,9 @@ def li_reuse(
     branches: int = 1,
     table: GuideTable | None = None,
 ) -> Floats:
-    """Estimate what `li_full` does; pixels share what their paths find after their second points.
+    """Estimate the same as `li_full`, with paths that pixels share from their second points on.
 
-    Direct light at the first points, and emission that paths meet at their second ones, stay each path's own.
+    Direct light at the first points, and emission that paths meet at their second points, are not shared.
     """
     if not can_reuse(scene):
         return li_full(scene, paths, sampler, max_bounces, branches, table)

@@ -50,7 +50,7 @@ def intersect_and_compact(
 
 
 def prepare_shading(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
-    """Weaken the paths by the matter they came through, and make their surfaces ready to shade."""
+    """Apply absorption along the paths, and prepare their surfaces for shading."""
     surface = interaction(scene, paths, hits)
     perturb_normals(scene, surface)
     absorb(scene, paths.throughput, hits, surface)

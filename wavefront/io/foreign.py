@@ -24,10 +24,10 @@ LINE = 0.0025  # radius of lines, in parts of the diagonal of all
 def from_pyvista(data: Any, *, smooth: bool | float | str = AUTO) -> Scene:
     """Convert an object of PyVista to a scene: `PolyData`, or a grid, whose surface is taken.
 
-    Taken are points, faces, the point data "Normals", the active texture coordinates, and colors: the first
-    array of bytes (n, 3) or (n, 4) of the point data, or else of the cell data, which are sRGB. Data without
-    faces become spheres or capsules of a radius that a warning states. Scalars are not shown; colors of them
-    are `shape.colors = wf.srgb(cmap(scalars))`.
+    It takes points, faces, the point data "Normals", the active texture coordinates, and colors: the first
+    array of bytes (n, 3) or (n, 4) of the point data, or else of the cell data, as sRGB. Data without faces
+    become spheres or capsules of a radius that a warning states. Scalars are not shown; to color by
+    them, set `shape.colors = wf.srgb(cmap(scalars))`.
 
     Parameters
     ----------

@@ -25,9 +25,10 @@ SCHEMES = ("http:", "https:", "file:", "ftp:")
 
 @dataclass(frozen=True)
 class LoadLimits:
-    """How much a scene file may ask for. A file of a few bytes can claim any size.
+    """Limits of what a scene file may ask for. A file of a few bytes can claim any size.
 
-    Each is a whole number of at least 1. A larger one lets larger files load, a smaller one protects better.
+    Each limit is a whole number of at least 1. Larger limits accept larger files; smaller ones protect
+    better.
 
     Parameters
     ----------
@@ -44,8 +45,8 @@ class LoadLimits:
     unpacked_bytes
         Size of the unpacked members of a 3mf file, the only archive that is read.
     memory_bytes
-        Memory that may be taken for all arrays and images, whatever the size of the files, in bytes; 128 for
-        each byte of the files are added. It is compared with what headers claim, before it is taken.
+        Memory for all arrays and images, in bytes; 128 bytes for each byte of the files are added. It is
+        compared with what headers claim, before any is allocated.
 
     Raises
     ------

@@ -24,7 +24,7 @@ from ..shapes import Shape
 
 @record
 class LightSample(SoA):
-    """Light arriving at a point from one sampled direction. A pdf of 0 means no sample.
+    """The light that arrives at a point from one sampled direction. A pdf of 0 means no sample.
 
     Examples
     --------
@@ -47,7 +47,7 @@ class LightSample(SoA):
 
 @record
 class Emitters(SoA):
-    """Where k lights are and where they shine to, for the choice of one among very many.
+    """Positions and directions of k lights, for the choice of one among very many.
 
     Examples
     --------
@@ -63,7 +63,7 @@ class Emitters(SoA):
 
 
 class Light(ABC):
-    """What shines in a scene beside the shapes with an emission: an element of `Scene(lights=...)`.
+    """Base class of lights: an element of `Scene(lights=...)`. Shapes with an emission need none.
 
     Examples
     --------
@@ -85,16 +85,16 @@ class Light(ABC):
 
     @property
     def delta(self) -> bool:
-        """Whether no ray can meet the light, so that light samples alone find it."""
+        """Whether the light is a delta light: no ray can meet it, so only light samples find it."""
         return self.record(np.zeros(3)).delta
 
     @property
     def bounds(self) -> NDArray[np.float64] | None:
-        """Lower and upper corner (2, 3) of where the light is, scene units; None if it is nowhere."""
+        """Lower and upper corner (2, 3) of the light, scene units; None if it has no position."""
         return None
 
     def scaled(self, factor: float) -> Light:
-        """Return the light for a scene whose lengths were multiplied by `factor`, with equal irradiance.
+        """Return the light for a scene whose lengths were multiplied by `factor`, with the same irradiance.
 
         Only scenes of extreme size are scaled.
 
@@ -109,7 +109,7 @@ class Light(ABC):
 
 
 class LightRecord(SoA, Light):
-    """The lights of one kind in a scene, k of them; a light that is its own record holds one.
+    """The k lights of one kind in a scene. A light that is its own record holds one.
 
     A subclass is a dataclass. Each field is an array with a column per light, or a value that the
     lights share.
@@ -158,12 +158,12 @@ class LightRecord(SoA, Light):
     def irradiance(
         self, center: NDArray[np.float64], radius: float, scene_radius: float
     ) -> NDArray[np.float64]:
-        """Estimate what each light brings to balls of space, W/m²; it guides the choice of a light.
+        """Estimate the irradiance by each light in spheres of space, W/m²; it guides the choice of a light.
 
         Parameters
         ----------
         center
-            (3, c) centers of the balls.
+            (3, c) centers of the spheres.
         radius
             Their radius, scene units.
         scene_radius
@@ -171,23 +171,23 @@ class LightRecord(SoA, Light):
 
         Returns
         -------
-        (c, k) irradiance, the mean of the channels. Here: that of a light which shines on the whole
-        scene alike.
+        (c, k) irradiance, the mean of the channels. Here: that of a light which illuminates the whole
+        scene equally.
         """
         broadcast = self.power(scene_radius) / (4 * np.pi * max(scene_radius, 1e-30) ** 2)
         return np.broadcast_to(broadcast, (center.shape[1], len(broadcast)))
 
     def emitters(self) -> Emitters | None:
-        """Return where the lights are, for the choice among more than 65 536; None if they are nowhere.
+        """Return the positions of the lights, for the choice among more than 65 536; None if they have none.
 
-        Lights that are nowhere are chosen by power, with half of the samples together. A wrong place makes
-        noise, but no error of the mean.
+        Lights without a position are chosen by power; together they get half of the samples. A wrong position
+        causes noise, but no error of the mean.
         """
         return None
 
 
 class DeltaLight(LightRecord):
-    """Lights without a surface, such as points and parallel rays, which no ray can meet.
+    """Base class of delta lights: lights without a surface, such as points, which no ray can meet.
 
     Examples
     --------

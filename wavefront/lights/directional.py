@@ -108,21 +108,21 @@ def _angle(name: str, value: float) -> float:
 
 
 class DirectionalLight(Parametrized, Light):
-    """Light from one direction, infinitely far away, such as the sun's.
+    """A directional light, infinitely far away, such as the sun.
 
     Parameters
     ----------
     direction
-        (3,) in which the light travels, of any length.
+        (3,) the direction in which the light travels, of any length.
     irradiance
-        W·m⁻² on a surface that faces the light, one number or three; where it comes in at the
-        angle θ it gives irradiance·cosθ.
+        W·m⁻² on a surface that faces the light, one number or three. A surface at the angle θ gets
+        irradiance·cosθ.
     angle
-        Angular diameter in degrees, the sun's is 0.53. With 0 the rays are parallel, shadows are
-        sharp and the light itself is never seen, not even in a mirror. With more it is a disk of
-        the sky of radiance irradiance/(π·sin²(angle/2)), which is seen where rays leave the scene.
+        Angular diameter in degrees; that of the sun is 0.53. With 0 the rays are parallel, shadows are sharp,
+        and the light itself is never seen, not even in a mirror. Otherwise the light is a disk in the sky of
+        radiance irradiance/(π·sin²(angle/2)), which is seen where rays leave the scene.
     group
-        Name of the layer of radiance that the light counts for, with `aovs="light_groups"`.
+        Name of the light group, for `aovs="light_groups"`.
 
     Raises
     ------

@@ -56,40 +56,41 @@ class ConstantEnvironment(InfiniteLight):
 
 
 class Environment(Parametrized, Light):
-    """Light that arrives from infinitely far away, wherever a ray leaves the scene.
+    """An environment: light from infinitely far away, seen wherever a ray leaves the scene.
 
     Parameters
     ----------
     radiance
-        W·sr⁻¹·m⁻²: a color (a number, three, or a name such as "white") for the same from all around;
-        or an image, a file (exr, hdr, npy, png, jpg) or an array (H, W, 3), top row first. Pictures of
-        8 and 16 bits are decoded from sRGB and count from 0 to 1; all others are linear. Alpha is not used.
+        W·sr⁻¹·m⁻²: a color (a number, three, or a name such as "white"), which is the same from all
+        directions; or an image, a file (exr, hdr, npy, png, jpg) or an array (H, W, 3), top row first.
+        Pictures of 8 and 16 bits are decoded from sRGB and count from 0 to 1; all others are linear. Alpha is
+        not used.
     transform
-        (3, 3) rotation to world space from the environment's.
+        (3, 3) rotation from the environment's space to world space.
     filter
         "bilinear" between the centers of the image's pixels, or "nearest".
     group
-        Name of the layer of radiance that the light counts for, with `aovs="light_groups"`.
+        Name of the light group, for `aovs="light_groups"`.
     backdrop
-        What the camera sees directly in place of the light, as `radiance`; None shows the light. Mirrors and
-        glass show the light in any case.
+        What the camera sees directly in place of the light, given as `radiance` is; None shows the light.
+        Mirrors and glass always show the light.
 
     Attributes
     ----------
     radiance
         (3, 1) W·sr⁻¹·m⁻²; of an image, the mean over all directions.
     backdrop
-        What the camera sees in its place, an `Environment`; None if it sees the light.
+        What the camera sees directly, an `Environment`; None if that is the light itself.
 
     Notes
     -----
-    An image shows all directions by longitude and latitude, seen from within: its top row is +y,
+    An image shows all directions by longitude and latitude, seen from inside: its top row is +y,
     its middle is +z, its left half is +x and its right half -x. That is how OpenEXR defines such
     an image, and how Mitsuba 3 and `Camera.panorama` lay it out. In Blender the middle is +x, with
     z up; for a scene that it exported with y up, the same view takes the transform
     [[0, 0, 1], [0, 1, 0], [-1, 0, 0]].
 
-    Directions are drawn by the image's luminance, which takes about 28 bytes of memory a pixel.
+    Directions are sampled by the luminance of the image. That takes about 28 bytes of memory for each pixel.
 
     Raises
     ------

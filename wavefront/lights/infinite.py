@@ -17,7 +17,7 @@ from .base import LightRecord, LightSample
 
 
 class InfiniteLight(LightRecord):
-    """A light that rays meet where they leave the scene. A record holds one, shared by all lanes.
+    """Base class of lights that rays meet where they leave the scene. All lanes share one.
 
     Examples
     --------

@@ -91,7 +91,7 @@ class LightAtPoint(Parametrized, Light):
 
 
 class PointLight(LightAtPoint):
-    """A point that emits equally in all directions.
+    """A point light, which emits equally in all directions.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class PointLight(LightAtPoint):
     intensity
         W/sr, one number or three; at distance d it gives irradiance I·cosθ/d².
     group
-        Name of the layer of radiance that the light counts for, with `aovs="light_groups"`.
+        Name of the light group, for `aovs="light_groups"`.
 
     Raises
     ------
@@ -156,9 +156,9 @@ def intensities_of(name: str, value: ArrayLike) -> NDArray[np.float64]:
 
 
 class PointLights(Parametrized, Light):
-    """Many points that emit equally in all directions, as one light.
+    """Many point lights as one object, given by arrays.
 
-    A million of them are set up in two seconds. They count as lights of their own where one is chosen.
+    A million of them are set up in two seconds. Each counts as a light of its own where one is chosen.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ class PointLights(Parametrized, Light):
     intensities
         W/sr: one number, a color (3,), a number for each point (n, 1), or a color for each (n, 3).
     group
-        Name of the layer of radiance that the lights count for, with `aovs="light_groups"`.
+        Name of the light group, for `aovs="light_groups"`.
 
     Raises
     ------

@@ -21,7 +21,7 @@ BY_POWER = 0.05  # part of the probability that is proportional to power, so tha
 
 
 class LightSampler(Protocol):
-    """Chooses a light for each point.
+    """Base class of light samplers, which choose a light for each point.
 
     Examples
     --------

@@ -83,7 +83,7 @@ def _blend(name: str, value: float) -> float:
 
 
 class SpotLight(LightAtPoint):
-    """A point that emits into a cone.
+    """A spot light: a point that emits into a cone.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class SpotLight(LightAtPoint):
         Part of the cone's angle, from the edge inwards, in which the light falls off: 0 is a hard
         edge, with 1 it falls off from the axis on.
     group
-        Name of the layer of radiance that the light counts for, with `aovs="light_groups"`.
+        Name of the light group, for `aovs="light_groups"`.
 
     Notes
     -----

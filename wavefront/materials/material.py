@@ -69,26 +69,26 @@ class Material(Parametrized):
     bsdf
         How the surface scatters light.
     alpha
-        The fraction of the light that meets the surface, in [0, 1]: a number, or a `Texture` of one
-        channel. The rest goes straight on as if there were nothing, and so do shadow rays. None: all.
+        Opacity: the fraction of the light that meets the surface, in [0, 1]: a number, or a `Texture` of one
+        channel. The rest passes as if there were no surface, and so do shadow rays. None: opaque.
     alpha_cutoff
         If given, the surface is opaque where alpha is at least this, and absent elsewhere.
     normal_map
         A `NormalMap` or `BumpMap`, which perturbs the shading normals.
     emission
-        Radiance that shapes of this material send, W·sr⁻¹·m⁻², at least 0: a number, three numbers, or
-        a texture. The emission of a shape goes before it.
+        Radiance that shapes of this material emit, W·sr⁻¹·m⁻², at least 0: a number, three numbers, or
+        a texture. A shape's own emission replaces it.
     group
-        Name of the layer of radiance that the emission counts for, with `aovs="light_groups"`.
+        Name of the light group of the emission, for `aovs="light_groups"`.
     interior
         The `Medium` behind the surface. A ray that meets the surface from its back side has crossed it.
     name
-        What `Image.names` calls the material; readers of files give that of the file.
+        The name of the material in `Image.names`; materials of files have that of the file.
 
     Attributes
     ----------
     opacity
-        What alpha and its cutoff come to: an `Opacity`, None where the surface is opaque everywhere.
+        Alpha and its cutoff as an `Opacity`; None if the surface is opaque everywhere.
 
     Raises
     ------
@@ -142,11 +142,11 @@ class Material(Parametrized):
         Parameters
         ----------
         name
-            In capitals or not; docs/materials.md lists all. Metals and clear materials have measured
-            constants, all others are made for their look.
+            In upper or lower case; docs/materials.md lists all. Metals and clear materials have measured
+            constants. All others were chosen by eye.
         color
-            In place of the usual one, as of `Diffuse`; metals and mirrors have their own. Of clear materials
-            it is the tint of what goes through their surface.
+            The color in place of the usual one, as for `Diffuse`. Metals and mirrors have their own. For
+            clear materials it is the tint of the light that passes their surface.
 
         Raises
         ------

@@ -64,9 +64,9 @@ def numbers_of(dimension: Dimension) -> range:
 
 
 class Sampler(ABC):
-    """Uniform numbers by address.
+    """Base class of samplers: uniform numbers by address.
 
-    A sampler has no state: its numbers depend only on the seed and the address, and those of a lane do not
+    A sampler has no state. Its numbers depend only on the seed and the address. The numbers of a lane do not
     depend on the other lanes.
 
     Parameters

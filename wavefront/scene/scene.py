@@ -49,16 +49,16 @@ class Scene:
         as `Rectangle` return; shapes with an emission are lights. Objects of trimesh are converted.
     lights
         `PointLight`, `SpotLight`, `DirectionalLight` and `Environment` objects, or any `Light`; at most one
-        `Environment`. A scene without any light is rendered in the light of a studio: see `render`.
+        `Environment`. A scene without light is lit as in a studio: see `render`.
     camera
         Without a camera, `render` uses `framing_camera`.
     up
-        What is up, for that camera, for ready-made light and for the ground: (3,), or the name of an axis.
-        None is y. `load` sets it to z for the formats that have z up.
+        The up direction for that camera, for ready-made light and for the ground: (3,), or the name of an
+        axis. None is y. `load` sets it to z for formats that have z up.
 
     Notes
     -----
-    All of it may be changed between renders. Values that are assigned or added to the lists are checked as
+    Everything may be changed between renders. Values that are assigned or added to the lists are checked as
     in the constructor. The accelerator of a render is kept with the scene, and is used again as long as no
     vertex and no sphere has moved.
 
@@ -132,7 +132,7 @@ class Scene:
 
     @property
     def up(self) -> NDArray[np.float64] | None:
-        """What is up, (3,) of any length; None means y."""
+        """The up direction, (3,) of any length; None means y."""
         return self._up
 
     @up.setter
@@ -140,7 +140,7 @@ class Scene:
         self._up = None if up is None else upward("up", up)
 
     def vertical(self, up: ArrayLike = AUTO) -> NDArray[np.float64]:
-        """Return what is up, (3,) of any length: a vector, an axis by its name, or "auto", the scene's."""
+        """Return the up direction (3,), of any length, given a vector, the name of an axis, or "auto"."""
         if isinstance(up, str) and up == AUTO:
             return upward("up", "y") if self.up is None else self.up
         return upward("up", up)
@@ -198,7 +198,7 @@ class Scene:
         direction: ArrayLike = FRAMING_VIEW,
         turning: bool = False,
     ) -> Camera:
-        """Return a camera that sees the whole scene, which fills 85 % of the picture's width or height.
+        """Return a camera that frames the scene: it fills 85 % of the picture's width or height.
 
         Parameters
         ----------
@@ -210,11 +210,11 @@ class Scene:
             Up direction of the picture: (3,), or the name of an axis; "auto" is that of the scene. With "y"
             the front is the side of +z, with "z" that of -y.
         direction
-            From where it looks: "three_quarter" (35° to the right of the front and 22° above), "front",
+            The view: "three_quarter" (35° to the right of the front and 22° above), "front",
             "back", "left", "right", "top", "bottom" or "iso"; or (3,) from the center of the scene to the
             camera, of any length.
         turning
-            Leaves room for a whole turn of the scene about the vertical through its center, as for
+            Leave space for a whole turn of the scene about the vertical through its center, as for
             `turntable`.
 
         Raises

@@ -50,11 +50,11 @@ SNAPSHOT_INTERVAL = 1.0  # seconds between two pictures of a long pass
 
 @describes_settings
 class Session:
-    """A render that can be watched, stopped and pointed at another view.
+    """A render that can be watched, stopped and given another camera.
 
-    Iteration goes on with the render and yields the picture so far after each pass: at 1, 2, 4, 8 ... samples
-    per pixel, or where `noise` decides anew, and at least about once a second where the passes over all
-    pixels take no longer. The last picture is that of `render`, bit for bit. While the caller looks at a
+    Iteration continues the render and yields the picture so far after each pass: at 1, 2, 4, 8 ... samples
+    per pixel, or where `noise` chooses pixels again, and at least about once a second where a pass over all
+    pixels takes no longer. The last picture is that of `render`, bit for bit. While the caller looks at a
     picture, workers go on with the next few waves.
 
     As a context manager the session keeps its workers until the end of the block, and leaves no
@@ -74,7 +74,7 @@ class Session:
     SceneError
         If an argument or the scene is malformed.
     Interrupted
-        After Ctrl-C while a picture is waited for.
+        After Ctrl-C while the session renders.
     RenderError
         If the render cannot go on.
 
@@ -262,13 +262,13 @@ class Session:
     def set_camera(self, camera: Camera | None, size: tuple[int, int] | None = None) -> None:
         """Begin another picture of the same scene, without compiling it again.
 
-        What was rendered so far is dropped. Workers that have been started go on with the new picture, and
-        `seconds` count from now on.
+        The picture so far is dropped. Workers that have been started continue with the new picture, and
+        `seconds` are counted from now on.
 
         Parameters
         ----------
         camera
-            What sees the scene; None for the scene's own camera, or one that frames it.
+            The camera; None for the scene's own camera, or one that frames it.
         size
             (width, height) in pixels, in place of the camera's.
 
@@ -316,7 +316,7 @@ class Session:
             self._begin_picture(camera, accumulator, begin)
 
     def stop(self) -> None:
-        """End the render: the loop ends, with the picture so far where one is waited for.
+        """End the render: the loop over the session ends with the picture so far.
 
         It can be called from another thread, and from a function that is given as `progress`.
         """
@@ -358,7 +358,7 @@ class Session:
         """Return what another render must have in common with this one so that its samples are the same.
 
         These are settings, and fingerprints of the scene, the camera and functions of your own. `spp` and
-        `seconds` are no part of it.
+        `seconds` are not part of it.
 
         Raises
         ------
@@ -375,12 +375,12 @@ class Session:
         Parameters
         ----------
         camera
-            What sees the scene; None for the camera of the picture.
+            The camera; None for that of the picture.
         """
         return silhouettes(self._scene.compiled, self._render.camera if camera is None else camera)
 
     def tell_hints(self, image: Image) -> None:
-        """Write what may help to stderr if the picture took over ten seconds: a line each, once in a session.
+        """Write hints to stderr if the picture took over ten seconds: one line each, once in a session.
 
         A render does so by itself where it shows its progress.
 

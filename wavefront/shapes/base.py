@@ -63,7 +63,7 @@ class Shape(ABC):
 
     @property
     def material(self) -> Material:
-        """What the surface is made of. Assigning a `Bsdf` wraps it, None brings the default back."""
+        """The material of the surface. An assigned `Bsdf` is wrapped; None restores the default."""
         return self.default_material if self._material is None else self._material
 
     @material.setter
@@ -91,13 +91,13 @@ class Shape(ABC):
         """Lower and upper corner, (2, 3), scene units."""
 
     def hull(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return balls, centers (n, 3) and radii (n,), whose convex hull holds the shape, closely."""
+        """Return spheres, centers (n, 3) and radii (n,), whose convex hull contains the shape, closely."""
         corners = np.stack(np.meshgrid(*self.bounds.T), -1).reshape(-1, 3)
         return corners, np.zeros(len(corners))
 
     @abstractmethod
     def transformed(self, matrix: ArrayLike) -> Self:
-        """Return a copy that is placed by an affine matrix; the shape itself stays.
+        """Return a copy that is transformed by an affine matrix; the shape itself does not change.
 
         Parameters
         ----------
@@ -132,7 +132,7 @@ class Shape(ABC):
         return self.transformed(translation(f"{self.name}: offset", offset))
 
     def rotated(self, axis: ArrayLike, degrees: float, about: ArrayLike = (0, 0, 0)) -> Self:
-        """Return a copy that is turned about an axis, counter-clockwise for who looks against the axis.
+        """Return a copy that is rotated about an axis, counter-clockwise as seen against the axis.
 
         Parameters
         ----------
@@ -167,7 +167,7 @@ class Shape(ABC):
         Raises
         ------
         SceneError
-            If a factor is 0 or not finite, or the shape takes one alone.
+            If a factor is 0 or not finite, or the shape takes only one factor.
 
         Examples
         --------

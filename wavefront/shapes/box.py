@@ -24,7 +24,7 @@ def Box(
     emission: Color | None = None,
     name: str = "box",
 ) -> Mesh:
-    """Return a box along the axes as a mesh of twelve triangles; its outside is the front.
+    """Return an axis-aligned box as a mesh of twelve triangles; its outside is the front.
 
     Parameters
     ----------
@@ -78,11 +78,11 @@ def Plane(
     material: MaterialLike | None = None,
     name: str = "plane",
 ) -> Mesh:
-    """Return a large square in place of an infinite plane, which framing cameras do not try to show.
+    """Return a large square in place of an infinite plane. It is not framed by the camera.
 
-    Boxes around all shapes, by which rays find them, have to be finite. What the square lacks is a strip at
-    the horizon: seen from a height h above it, its edge lies atan(2h / size) below the horizon, 0.6° for
-    h = 1 and a size of 200. A plane of a size of 1e4 or more costs precision: positions are float32.
+    A plane cannot be infinite, because ray queries need finite bounding boxes. The difference is a strip at
+    the horizon: seen from a height h above it, the edge of the square lies atan(2h / size) below the horizon,
+    0.6° for h = 1 and a size of 200. A plane of a size of 1e4 or more costs precision: positions are float32.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ def Disk(
     two_sided: bool = False,
     name: str = "disk",
 ) -> Mesh:
-    """Return a disk as a mesh: a regular polygon with exactly the area of the disk.
+    """Return a disk as a mesh: a regular polygon of the same area.
 
     Parameters
     ----------

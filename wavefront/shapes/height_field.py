@@ -24,20 +24,20 @@ def HeightField(
     material: MaterialLike | None = None,
     name: str = "height field",
 ) -> Mesh:
-    """Return heights over a grid as a mesh: terrain, or a function of two variables.
+    """Return a height field over a grid as a mesh: terrain, or a function of two variables.
 
     Parameters
     ----------
     z
-        (rows, columns) heights, scene units, at least 2 of each. Where one is NaN there is a hole.
+        (rows, columns) heights, scene units, at least 2 rows and columns. NaN makes a hole.
     x, y
-        Places of the columns (columns,) and of the rows (rows,), scene units, strictly rising or falling. By
-        default 0, 1, 2, ..., or an image's pixels seen from above.
+        Positions of the columns (columns,) and of the rows (rows,), scene units, strictly increasing or
+        decreasing. By default 0, 1, 2, ..., like the pixels of an image that is seen from above.
     up
-        "y", as the rest of this package has it by default: a point is (x, z, -y); or "z": it is (x, y, z),
-        which `render(up="z")` shows upright.
+        "y", the default of this package: a point is (x, z, -y). Or "z": a point is (x, y, z), which
+        `render(up="z")` shows upright.
     smooth
-        Shading normals from the slopes; False shows facets.
+        True computes shading normals from the slopes; False shows facets.
     colors
         (rows, columns, 3) or (rows, columns, 4), as `colors` of `Mesh`: `wf.srgb(cmap(z))`.
     material, name

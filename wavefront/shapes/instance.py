@@ -41,7 +41,7 @@ def _invertible(name: str, value: ArrayLike) -> NDArray[np.float64]:
 class Instance(Shape):
     """A mesh placed by an affine transform: moved, rotated, scaled, mirrored or sheared.
 
-    Many instances of a mesh store its arrays once and build its tree once.
+    For many instances of one mesh, its arrays are stored once and its tree is built once.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class Instance(Shape):
         material: MaterialLike | None = None,
         name: str | None = None,
     ) -> list[Instance]:
-        """Return instances of one mesh, much faster than by single calls.
+        """Return many instances of one mesh, much faster than by single calls.
 
         Parameters
         ----------

@@ -79,7 +79,7 @@ def _check_float32(name: str, rows: NDArray[np.float64]) -> None:
 
 
 class Mesh(ColoredShape):
-    """Triangles that share vertices.
+    """A triangle mesh.
 
     Parameters
     ----------
@@ -93,30 +93,30 @@ class Mesh(ColoredShape):
     uvs, uvs1
         (n, 2) texture coordinates, and a second set of them.
     tangents
-        (n, 4) axes of red in normal maps: unit vectors perpendicular to the normals, and 1 or -1 if green is
-        normal × tangent or its opposite, as in glTF. By default both axes follow from the texture
-        coordinates, as for bump maps. Tangents need normals.
+        (n, 4) tangents, the axes of red in normal maps: unit vectors perpendicular to the normals, and 1 or
+        -1 if green is normal × tangent or its opposite, as in glTF. By default both axes follow from the
+        texture coordinates, as for bump maps. Tangents need normals.
     colors
         (n, 3) RGB, or (n, 4) with opacity. Floats are linear, in [0, 1]; uint8 and uint16, as trimesh
         gives them, are decoded from sRGB, except the opacity. A given material shows them by a parameter
         `VertexColors`.
     material
-        What the surface is made of: a `Material` or a `Bsdf`. By default a `Diffuse` that shows the
-        `colors`, or is gray.
+        The material of the surface: a `Material` or a `Bsdf`. By default a `Diffuse` that shows the `colors`,
+        or is gray.
     emission
-        Radiance that leaves the front side, W·sr⁻¹·m⁻²: one number or three, or a `Texture` or
+        Emitted radiance of the front side, W·sr⁻¹·m⁻²: one number or three, or a `Texture` or
         `VertexColors`, at least 0. By default that of the material, if it has one.
     two_sided
         Whether the emission leaves the back side as well.
     name
         Used in messages.
     smooth
-        Computes the normals: True averages those of all faces around a vertex, a crease angle in degrees only
-        those that are within it of a face, and "auto" is what files get, 30°. Vertices in one place count as
-        one, and those on creases are split, so that there may be more of them than were given. Not with
-        `normals`.
+        Computes the normals. True averages those of all faces around a vertex. A crease angle in degrees
+        averages only faces that are within this angle of each other. "auto" is the angle for files, 30°.
+        Vertices at one position count as one. Vertices on creases are split, so that the mesh may have more
+        of them. Not with `normals`.
 
-    Arrays are copied: what is done to them afterwards does not change the mesh.
+    Arrays are copied: later changes to them do not change the mesh.
 
     Raises
     ------
@@ -280,7 +280,7 @@ class Mesh(ColoredShape):
         return np.stack([rows.min(1), rows.max(1)])
 
     def hull(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the vertices that faces use, as balls without a size."""
+        """Return the vertices that faces use, as spheres of radius 0."""
         used = np.zeros(len(self.vertices), np.bool_)
         used[self.faces] = True
         points = self.vertices[used]

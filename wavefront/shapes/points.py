@@ -66,7 +66,7 @@ def Points(
 def Edges(
     lines: Any, radius: ArrayLike, *, material: MaterialLike | None = None, name: str = "edges"
 ) -> Capsules:
-    """Return a capsule for each edge of a mesh, or each piece of lines.
+    """Return a capsule for each edge of a mesh, or for each segment of lines.
 
     Parameters
     ----------

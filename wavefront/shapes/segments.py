@@ -92,7 +92,7 @@ class SegmentArray(PrimitiveArray):
 
 
 class Cylinders(SegmentArray):
-    """Cylinders, given by arrays of the centers of their ends.
+    """Cylinders, given by arrays of the centers of their two ends.
 
     Parameters
     ----------
@@ -105,8 +105,8 @@ class Cylinders(SegmentArray):
     caps
         Whether the ends are closed. An open cylinder is a tube without thickness.
     material
-        What all surfaces are made of: a `Material` or a `Bsdf`. By default a `Diffuse` that shows the
-        `colors`, or is gray. The outside is the front. Cylinders cannot shine.
+        The material of all of them: a `Material` or a `Bsdf`. By default a `Diffuse` that shows the `colors`,
+        or is gray. The outside is the front. Cylinders cannot emit light.
     name
         Used in messages.
 
@@ -177,9 +177,9 @@ class Cylinders(SegmentArray):
 
 
 class Capsules(SegmentArray):
-    """Cylinders with half spheres at their ends, given by arrays of the ends of their axes.
+    """Capsules: cylinders with half spheres at both ends, given by arrays of the ends of their axes.
 
-    Capsules that share an end make a smooth joint there.
+    Capsules that share an end join smoothly.
 
     Parameters
     ----------
@@ -191,8 +191,8 @@ class Capsules(SegmentArray):
     colors
         (n, 3) RGB, or (n, 4) with opacity, one row per capsule, as of `Spheres`.
     material
-        What all surfaces are made of: a `Material` or a `Bsdf`. By default a `Diffuse` that shows the
-        `colors`, or is gray. The outside is the front. Capsules cannot shine.
+        The material of all of them: a `Material` or a `Bsdf`. By default a `Diffuse` that shows the `colors`,
+        or is gray. The outside is the front. Capsules cannot emit light.
     name
         Used in messages.
 

@@ -44,10 +44,10 @@ class Sphere(SphereEmission):
     radius
         Scene units, above 0.
     material
-        What the surface is made of: a `Material` or a `Bsdf`. Its outside is the front.
+        The material of the surface: a `Material` or a `Bsdf`. The outside is the front.
     emission
-        Radiance W·sr⁻¹·m⁻²: a color, at least 0, or a texture; it leaves the surface on both sides. By
-        default that of the material, if it has one.
+        Emitted radiance, W·sr⁻¹·m⁻²: a color, at least 0, or a texture. It leaves the surface on both sides.
+        By default that of the material, if it has one.
     name
         Used in messages.
 

@@ -30,8 +30,8 @@ class Spheres(SphereEmission, PrimitiveArray):
         (n, 3) RGB, or (n, 4) with opacity, one row per sphere. Floats are linear, in [0, 1]; uint8 and uint16
         are decoded from sRGB. A given material shows them by a parameter `VertexColors`.
     material
-        What all surfaces are made of: a `Material` or a `Bsdf`. By default a `Diffuse` that shows the
-        `colors`, or is gray. The outside is the front.
+        The material of all of them: a `Material` or a `Bsdf`. By default a `Diffuse` that shows the `colors`,
+        or is gray. The outside is the front.
     emission
         Radiance W·sr⁻¹·m⁻² of all spheres: a color, at least 0, or a texture, such as `VertexColors()` for
         the `colors`; it leaves the surfaces on both sides. By default that of the material, if it has one.

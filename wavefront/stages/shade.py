@@ -185,7 +185,7 @@ def _groups_anywhere(materials: MaterialTable, surface: SurfaceInteraction) -> I
 def direct(
     scene: CompiledScene, paths: Paths, shade: Shading, sampler: Sampler, bounce: int, mis: bool
 ) -> Contribution:
-    """Return the light that one sampled light sends to each point and on along wo.
+    """Return direct light: what one sampled light sends to each point and on along wo.
 
     With `mis` it is weighted by the power heuristic against BSDF sampling. Surfaces that have
     only delta lobes get none.

@@ -35,14 +35,14 @@ class RegionMean:
     error_absent: str = ""  # the reason why there is no standard error
 
     def interval(self, confidence: float = 0.95) -> tuple[Doubles, Doubles]:
-        """Return the lower and the upper limit, (3,) each, between which the converged mean is.
+        """Return the confidence interval of the converged mean: lower and upper limit, (3,) each.
 
-        They are those of Student's t distribution.
+        It is that of Student's t distribution.
 
         Parameters
         ----------
         confidence
-            The chance that it is between them, above 0 and below 1.
+            The probability that it contains the converged mean, above 0 and below 1.
 
         Raises
         ------

@@ -28,7 +28,7 @@ class BaseTexture(ABC):
     scalar: bool | None = None
 
     def limits(self) -> tuple[float, ...]:
-        """Return the least and the greatest value, or () where they are not known."""
+        """Return the smallest and the largest value, or () where they are not known."""
         return ()
 
     @abstractmethod

@@ -29,7 +29,7 @@ CHUNK = 1 << 20  # texels that are read at a time
 
 
 class Texture(BaseTexture):
-    """An image on a surface, for any material parameter that is a color or a number.
+    """An image texture, for any material parameter that is a color or a number.
 
     The top row of the image lies at v = 1, its left column at u = 0. The value is
     `offset` + `scale` · texel.
@@ -43,7 +43,7 @@ class Texture(BaseTexture):
         Decode 8- and 16-bit colors from sRGB. False for data such as roughness. Alpha is never
         decoded, and float images are linear already.
     wrap
-        The continuation outside [0, 1]: "repeat", "mirror" or "clamp"; two of them for u and v.
+        How the image continues outside [0, 1]: "repeat", "mirror" or "clamp"; or two of them, for u and v.
     filter
         "bilinear" between texel centers, or "nearest".
     transform

@@ -49,7 +49,7 @@ MAX_HEIGHT = float(np.finfo(f4).max)  # of a bump map, scene units
 
 
 class NormalMap(BaseNormalMap):
-    """An image of normals, for `Material(normal_map=...)`.
+    """A normal map: an image of normals, for `Material(normal_map=...)`.
 
     Red, green and blue from 0 to 1 are components from -1 to 1 along u, along v and along the
     shading normal, as in glTF: green points up in the image. The `tangents` of a mesh, if it has any,
@@ -110,9 +110,9 @@ class NormalMap(BaseNormalMap):
 
 
 class BumpMap(BaseNormalMap):
-    """An image of heights, for `Material(normal_map=...)`.
+    """A bump map: an image of heights, for `Material(normal_map=...)`.
 
-    The normals become those of a surface that is displaced by these heights; the surface itself does not
+    The normals become those of a surface that is displaced by these heights. The surface itself does not
     change. Source: J. Blinn 1978, "Simulation of Wrinkled Surfaces", in the form of M. Mikkelsen 2010, "Bump
     Mapping Unparametrized Surfaces on the GPU", eq. 4.
 

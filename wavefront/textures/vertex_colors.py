@@ -13,9 +13,9 @@ from .parameter import Color, color, scalar
 
 
 class VertexColors(BaseTexture):
-    """The `colors` of the shape, for any material parameter that is a color or a number.
+    """Vertex colors: the `colors` of the shape, for any material parameter that is a color or a number.
 
-    Those of a mesh are interpolated; `Spheres`, `Cylinders` and `Capsules` have one for each primitive. A
+    Colors of a mesh are interpolated; `Spheres`, `Cylinders` and `Capsules` have one for each primitive. A
     shape without colors, and a `Sphere`, is opaque white.
 
     Parameters

@@ -52,7 +52,7 @@ class Page:
     host, port
         Where it listens; if the port is taken, at one of the next ones.
     token
-        What the address of the page must have; "" for none.
+        The token that the address of the page must have; "" for none.
     viewpoint
         The first view.
     most_spp

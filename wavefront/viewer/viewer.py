@@ -45,9 +45,9 @@ class Viewer:
     viewpoint
         The first view.
     host, port
-        Where the page listens.
+        Host and port of the server.
     token
-        What the address of the page must have; "" for none.
+        The token that the address of the page must have; "" for none.
     tone
         The first tone curve.
     spp
@@ -56,9 +56,9 @@ class Viewer:
     Attributes
     ----------
     url
-        Where the page is, with its token.
+        The address of the page, with its token.
     elsewhere
-        The address for other machines, if it listens for them; else None.
+        The address for other machines, if the server listens for them; else None.
 
     Examples
     --------
@@ -207,7 +207,7 @@ def view(
     block: bool | None = None,
     **settings: Unpack[RenderSettings],
 ) -> Viewer:
-    """Show a scene on a page in the browser, where one can move around while the picture refines.
+    """Show a scene in the browser, where you can move around while the picture refines.
 
     It needs viser: `pip install viser`, the extra `viewer`.
 
