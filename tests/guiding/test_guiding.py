@@ -302,7 +302,7 @@ def test_branches_can_be_guided() -> None:
 
 
 def test_the_pilot_holds_blas_to_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With more they wait for each other: on a busy machine the pilot took five times as long."""
+    """With more they wait for each other: on a busy machine the training took five times as long."""
     threads = []
 
     def spy(*arguments: object) -> GuideTable | None:

@@ -143,7 +143,7 @@ def _about_extras() -> Iterator[str]:
 
 def _about_settings() -> Iterator[str]:
     yield "Settings"
-    yield "  --branches, --reuse: auto; a short trial finds out what pays, in 192x192 pixels or more"
+    yield "  --branches, --reuse: auto; a short tuning run finds out what pays, in 192x192 pixels or more"
     yield "  --guide: off; may pay where light is hard to find, as image.metadata['hint'] says then"
     yield "  --caustics: off; paths from lights find what smooth glass and mirrors send on"
 

@@ -1,4 +1,4 @@
-"""The pilot of path guiding: paths under a seed of their own, from which the tables are learned.
+"""The training pass of path guiding: paths under a seed of their own, from which the tables are learned.
 
 The tables depend on the scene, the camera, the seed and the number of bounces alone. The random numbers
 of the picture are others, so it stays unbiased, and it does not depend on workers or waves.
@@ -46,14 +46,14 @@ class Vertices(SoA):
 
 
 def train(scene: CompiledScene, camera: Camera, sampler: Sampler, max_bounces: int) -> GuideTable | None:
-    """Trace the pilot and return the table; None if its paths met nothing that can be guided.
+    """Trace the training pass and return the table; None if its paths met nothing that can be guided.
 
     Parameters
     ----------
     camera
         In the unit of the compiled scene.
     sampler
-        Of the pilot: its seed must not be that of the picture.
+        Of the training pass: its seed must not be that of the picture.
     """
     rounds: list[Records] = []
     table: GuideTable | None = None
