@@ -1,7 +1,7 @@
 """Furnaces: scenes whose right answer is known, measured against it.
 
 Prints a table and writes a strip of the four pictures, each divided by its exact value and shown
-at half brightness: a renderer that is right shows one even gray.
+at half brightness: a correct renderer shows one uniform gray.
 
 python examples/furnace.py [out.png] [--spp 64] [--size 16]
 """

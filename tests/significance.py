@@ -15,7 +15,7 @@ from scipy import stats
 
 import wavefront as wf
 
-ALPHA = 1e-4  # chance that a right estimator fails one test
+ALPHA = 1e-4  # probability that a correct estimator fails one test
 ROUNDING = 1e-5  # relative; what float32 may do to a mean that has no noise
 SIDE = 8  # 8 × 8 pixels are 64 batches
 

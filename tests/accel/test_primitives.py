@@ -439,7 +439,7 @@ def test_clouds_and_paths_in_place_of_shapes_get_a_hint(cloud: bool, maker: str)
 def test_cylinders_cannot_shine() -> None:
     glow = wf.Material(wf.Diffuse(0), emission=1)
     shape = wf.Cylinders([(0, 0, 0)], [(0, 1, 0)], 0.1, material=glow, name="rod")
-    with pytest.raises(wf.SceneError, match="rod: a Cylinders cannot shine"):
+    with pytest.raises(wf.SceneError, match="rod: a Cylinders cannot emit light"):
         wf.render(wf.Scene(shape), 1, size=(8, 8))
 
 

@@ -1,6 +1,6 @@
 """The setting caustics: the same bits however a picture is made, honest errors, and clear refusals.
 
-What light paths find is the subject of test_light_paths.py.
+What paths from lights find is the subject of test_light_paths.py.
 """
 
 from __future__ import annotations
@@ -232,7 +232,7 @@ def test_films_with_light_paths_are_restored_from_their_arrays() -> None:
 
 
 def test_files_without_caustics_are_as_before(tmp_path: Path) -> None:
-    """No array is of light paths, and the scene has the same fingerprint."""
+    """No array is of paths from lights, and the scene has the same fingerprint."""
     image = part(0, 2, caustics=False, checkpoint=tmp_path / "a.wfck")
     image.save(tmp_path / "a.npz")
     header = read_header(tmp_path / "a.wfck")
@@ -372,7 +372,7 @@ def test_the_variance_of_a_sample_has_its_part_of_the_light_paths() -> None:
 
 @dataclass(eq=False)
 class SpoiledLights(PointLightRecord):
-    """Points whose light is not finite at one place of the glass, which only light paths ask for."""
+    """Points whose light is not finite at one place of the glass, which only paths from lights ask for."""
 
     part = 1.0
 
@@ -518,7 +518,7 @@ def test_many_splats_of_one_pixel_are_summed() -> None:
 
 @pytest.mark.parametrize("value", [1.0, 4095.9, 8191.9, 1e18, 3e38])
 def test_a_pixel_may_have_four_billion_splats(value: float) -> None:
-    """Where a small piece of glass is far away, all light paths fall on a few pixels of a large picture."""
+    """All paths from lights fall on a few pixels where a small piece of glass is far away."""
     sums = LightSums(1)
     sums.add(0, 1, np.zeros(1, np.uint32), np.full((3, 1), value, f4))
     for _ in range(31):
@@ -603,7 +603,7 @@ def test_short_paths_have_no_caustics(max_bounces: int) -> None:
 
 
 def test_a_window_has_the_light_of_the_whole_picture() -> None:
-    """By light paths of its own: not the same bits, but the same expectation."""
+    """By paths from lights of its own: not the same bits, but the same expectation."""
     window, spp = (6, 7, 18, 16), 8
 
     def light(seed: int, **camera: Any) -> Any:

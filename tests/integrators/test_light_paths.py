@@ -40,12 +40,12 @@ TILT = wf.NormalMap(np.full((2, 2, 3), (0.8, 0.5, 0.9), f4))
 PARTS = 2  # of the picture, along each side
 RUNS = 8
 
-# --- Means of eye paths and light paths against plain paths ----------------------------------------
+# --- Means of eye paths and paths from lights against plain paths ----------------------------------------
 
 
 @dataclass(frozen=True)
 class Tracer:
-    """A scene compiled with or without light paths."""
+    """A scene compiled with or without paths from lights."""
 
     scene: CompiledScene
     camera: wf.Camera
@@ -81,7 +81,7 @@ class Tracer:
         return trace_light(self.scene, self.camera, self.sampler(seed), *self.lanes(0, spp), max_bounces)
 
     def light(self, seed: int, spp: int, max_bounces: int) -> np.ndarray:
-        """Return the picture (H, W, 3) of light paths."""
+        """Return the picture (H, W, 3) of paths from lights."""
         splats = self.splats(seed, spp, max_bounces)
         return self.picture(splats.pixel, splats.radiance) / (spp * self.pixels)
 
@@ -100,7 +100,7 @@ def parts(picture: np.ndarray) -> np.ndarray:
 def assert_same_light(name, scene, spp, max_error, max_bounces, accel="numpy"):
     """Compare the means of the whole picture and of its parts, run by run with the same seed.
 
-    `max_error` bounds the standard error relative to the light that light paths find.
+    `max_error` bounds the standard error relative to the light that paths from lights find.
     """
     split, plain = Tracer.of(scene, accel=accel), Tracer.of(scene, caustics=False, accel=accel)
     off, found = np.empty((RUNS, PARTS, PARTS, 3)), 0.0
@@ -194,7 +194,7 @@ class Case:
 
     build: Callable[[], wf.Scene]
     spp: int = 20
-    max_error: float = 0.035  # bound on the standard error relative to the light that light paths find
+    max_error: float = 0.035  # bound on the standard error relative to the light that paths from lights find
     max_bounces: int = 7
 
 
@@ -425,7 +425,7 @@ def ground(y: float = 0) -> wf.Mesh:
 
 
 def assert_light(scene: wf.Scene, expected, max_bounces: int, max_error: float = 0.01) -> None:
-    """Compare the mean of light paths with its exact value (3,)."""
+    """Compare the mean of paths from lights with its exact value (3,)."""
     traced = Tracer.of(scene)
     found = np.stack([traced.light(seed, 8192, max_bounces).mean((0, 1)) for seed in range(8)])
     expected = np.broadcast_to(expected, 3)
@@ -474,7 +474,7 @@ def test_point_light_through_a_slab() -> None:
     assert_light(scene, ALBEDO / np.pi * irradiance * (1 - fresnel(0, 2.0)) ** 2, max_bounces=3)
 
 
-# --- Where light paths begin ----------------------------------------------------------------------
+# --- Where paths from lights begin ----------------------------------------------------------------------
 
 
 def specular_surfaces_of(scene: wf.Scene, most_copies: int = 0) -> tuple[CompiledScene, SpecularSurfaces]:
@@ -660,7 +660,7 @@ def test_sky_light_stays_as_it_is(background) -> None:
     """Light without a place is found by paths from the camera, with the same bits."""
     ground = wf.Rectangle((-2, 0, 2), (4, 0, 0), (0, 0, -4), material=WHITE)
     scene = wf.Scene([ball(), wall(wf.Mirror(0.9)), ground], [wf.Environment(NOISE)], CAMERA)
-    assert Tracer.of(scene).scene.specular_surfaces is None  # there are no light paths without another light
+    assert Tracer.of(scene).scene.specular_surfaces is None  # no light tracing without another light
     hidden = [box((-1, 3, -1), (1, 4, 1), WHITE), wf.Sphere((0, 3.5, 0), 0.2, emission=1.0)]
     scene = wf.Scene([*scene.shapes, *hidden], scene.lights, CAMERA)
     split, plain = (Tracer.of(scene, caustics) for caustics in (True, False))

@@ -383,9 +383,9 @@ def test_mistakes_of_a_light_are_named():
 def test_mistakes_of_a_shape_are_named():
     panel, light = gradient()
     refused([floor()], [light], "GradientLight: its shape 'rectangle' is not in the scene")
-    refused([floor(), panel], [light, light], "GradientLight: its shape shines already")
+    refused([floor(), panel], [light, light], "GradientLight: its shape is a light already")
     panel.emission = 1.0
-    refused([floor(), panel], [light], "GradientLight: its shape shines already")
+    refused([floor(), panel], [light], "GradientLight: its shape is a light already")
     panel.emission, panel.material = None, wf.Material(wf.Diffuse(0.5), alpha=0.5)
     refused([floor(), panel], [light], "must be opaque; its material has an alpha")
     placed = wf.Instance(gradient()[0], np.eye(4))

@@ -309,7 +309,7 @@ def test_mtl(tmp_path, lines: str, clear: float) -> None:
             lambda: render(
                 wf.Scene([wf.Sphere(HERE, 1, material=wf.Material(BLACK, alpha=0.5), emission=1.0)]), 1
             ),
-            "sphere: a sphere that shines must be all there; its material has an alpha",
+            "sphere: an emitting sphere must be opaque; its material has an alpha",
         ),
     ],
 )

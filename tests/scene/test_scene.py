@@ -78,7 +78,7 @@ BAD = [
     (wf.Scene, {}, {"shapes": [wf.Sphere((0, 0, 0), 1), "ball"]}, r"shapes\[1\] is 'ball'; it must be one of wf.Mesh, wf.Rectangle, wf.Disk, wf.Sphere, wf.Spheres, wf.Cylinders, wf.Capsules, wf.Instance"),
     (wf.Scene, {}, {"shapes": ["a.obj"]}, r"; wf.load\(path\) reads a file as a scene$"),
     (wf.Scene, {}, {"shapes": [wf.PointLight((0, 0, 0), 1)]}, r"; lights are given as lights="),
-    (wf.Scene, {"shapes": wf.Sphere((0, 0, 0), 1)}, {"lights": wf.Sphere((0, 0, 0), 1)}, r"; shapes that shine belong to the shapes$"),
+    (wf.Scene, {"shapes": wf.Sphere((0, 0, 0), 1)}, {"lights": wf.Sphere((0, 0, 0), 1)}, r"; emitting shapes belong to the shapes$"),
     (wf.Scene, {"shapes": wf.Sphere((0, 0, 0), 1)}, {"lights": wf.Camera.look_at((0, 0, 5), (0, 0, 0))}, r"; a camera is given as camera="),
     (wf.Scene, {}, {"shapes": 5}, r"shapes must be a list of wf.Mesh, wf.Rectangle, wf.Disk, wf.Sphere, .*, got 5"),
     (wf.Scene, {}, {"shapes": None}, r"shapes must be a list of wf.Mesh, .*, got None"),

@@ -111,7 +111,7 @@ class Paths(Rays):
     specular: Bools  # (n,) the last direction is of a delta lobe or the camera: light sampling cannot find it
     roulette_scale: Floats  # (n,) throughput times this decides about roulette: see `stages.compact.roulette`
     prev_vertex: Floats | None = None  # (3, n) where the paths last scattered; None where that is `origin`
-    # (n,) the path has left its first surface by a lobe that is not a delta lobe; None without light paths
+    # (n,) the path has left its first surface by a lobe that is not a delta lobe; None without light tracing
     left_rough: Bools | None = None
     # for layers (aovs/recorder.py); None unless they are asked for
     depth: Bytes | None = None  # (n,) a `BounceDepth`

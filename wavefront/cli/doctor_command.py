@@ -1,4 +1,4 @@
-"""`wavefront doctor`: what is installed, whether pictures are right, and how fast they are."""
+"""`wavefront doctor`: what is installed, whether pictures are correct, and how fast they are."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ REQUIRED = ("numpy", "imageio", "trimesh", "OpenEXR", "tqdm", "threadpoolctl", "
 SIZE = (128, 128)
 FURNACE_SPP = 64
 MOST_SPP = 1 << 16  # more than there is time for
-STANDARD_ERRORS = 5  # by which the mean of a right picture differs in one of two million tests
+STANDARD_ERRORS = 5  # by which the mean of a correct picture differs in one of two million tests
 ROUNDING = 1e-5  # relative, of sums of float32 along a path
 RINGS, SIDES = 32, 64  # of the mesh that rays are timed with
 ROOM = (  # what `timed_room` returns

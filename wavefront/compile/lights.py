@@ -80,7 +80,7 @@ def gather_lights(
     Raises
     ------
     SceneError
-        If a light is malformed, or a shape cannot shine as it should.
+        If a light is malformed, or a shape cannot emit light as it should.
     """
     traced: list[Mesh | CurvedShape] = [*meshes, *curved]
     first_row, primitives = _first_rows(traced)
@@ -146,7 +146,7 @@ def _lights_of_primitives(parts: Sequence[Part], primitives: int) -> tuple[Ints,
     for record, rows in parts:
         if rows is not None:
             if (light_of[rows] >= 0).any():
-                raise SceneError(f"{type(record).__name__}: its shape shines already")
+                raise SceneError(f"{type(record).__name__}: its shape is a light already")
             light_of[rows] = count + np.arange(len(record))
         count += len(record)
     return light_of, count
@@ -187,12 +187,10 @@ def _sphere_lights(
     for shape in emitting:
         if not isinstance(shape, Sphere | Spheres):
             raise SceneError(
-                f"{shape.name}: a {type(shape).__name__} cannot shine; a wf.Sphere or a wf.Mesh can"
+                f"{shape.name}: a {type(shape).__name__} cannot emit light; a wf.Sphere or a wf.Mesh can"
             )
         if shape.material.opacity is not None:
-            raise SceneError(
-                f"{shape.name}: a sphere that shines must be all there; its material has an alpha"
-            )
+            raise SceneError(f"{shape.name}: an emitting sphere must be opaque; its material has an alpha")
     if not emitting:
         return []
     rows = [first_row[id(shape)] + np.arange(shape.count) for shape in emitting]
@@ -223,7 +221,7 @@ def _lights_of_spheres(shape: Any, center: NDArray[np.float64]) -> SphereLights:
 def _area_lights(meshes: Sequence[Mesh], vertices: Sequence[NDArray[np.float64]]) -> list[Part]:
     """Return the emitting rectangles and triangles of all meshes, a record for each kind.
 
-    Only what shines evenly is taken for rectangles, as their points have no barycentric weights.
+    Only uniform emission is taken for rectangles, as their points have no barycentric weights.
     With each record come its faces: (2, k) for rectangles, (k,) for triangles.
     """
     emitting = [number for number, mesh in enumerate(meshes) if mesh.emission is not None]
@@ -264,7 +262,7 @@ def _area_lights(meshes: Sequence[Mesh], vertices: Sequence[NDArray[np.float64]]
 
 
 def _textured_emissions(meshes: Sequence[Mesh]) -> tuple[tuple[Floats | BaseTexture, ...], Ints]:
-    """Return the distinct emissions of meshes that do not shine evenly, and their numbers, -1 for none."""
+    """Return the distinct emissions of meshes that are not uniform, and their numbers, -1 for none."""
     return _distinct_emissions(
         [
             mesh.emission if mesh.emission is not None and has_textured_emission(mesh) else None

@@ -77,7 +77,7 @@ class CompiledScene:
     background: Floats | None = None  # (3, 1) what camera rays that miss show; None for the environment
     backdrop: InfiniteLight | None = None  # what they show of the environment; None for all of its light
     roulette_after: float = ROULETTE_AFTER  # scattering events before Russian roulette may end paths
-    specular_surfaces: SpecularSurfaces | None = None  # where light paths begin; None where none are traced
+    specular_surfaces: SpecularSurfaces | None = None  # for light tracing; None without it
 
     @property
     def interpolates(self) -> bool:
@@ -125,8 +125,8 @@ def compile_scene(
     ------
     SceneError
         If an emitting shape has no area, an emitting sphere has an alpha or a textured emission, a shape
-        cannot shine, a light is malformed, too far away or too strong for the scene's size, or the choice
-        is unknown.
+        cannot emit light, a light is malformed, too far away or too strong for the scene's size, or the
+        choice is unknown.
     """
     scene.check()
     low, high = scene.bounds

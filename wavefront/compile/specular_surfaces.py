@@ -1,6 +1,6 @@
 """Specular surfaces: those that light leaves by delta lobes alone, such as smooth glass and mirrors.
 
-Light paths (integrators/light_tracing.py) begin at points on them, which are drawn evenly by area.
+Paths from lights (integrators/light_tracing.py) begin at points on them, which are drawn uniformly by area.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class SpecularSurfaces:
         return float(self.cumulative[-1])
 
     def sample(self, u_choice: Floats, u: Floats) -> SpecularPoints:
-        """Draw points evenly by area, with u_choice (n,) and u (2, n) in [0, 1)."""
+        """Draw points uniformly by area, with u_choice (n,) and u (2, n) in [0, 1)."""
         which = self.cumulative.searchsorted(u_choice * self.cumulative[-1], side="right")
         which = np.minimum(which, self.prim.size - 1)
         flat = np.flatnonzero(which < len(self.corners))

@@ -47,17 +47,17 @@ LOWER_BITS = 2.0**-24  # of a number drawn: how far apart two of them are
 
 @record
 class Splats(SoA):
-    """What light paths add to pixels, which may repeat."""
+    """What paths from lights add to pixels, which may repeat."""
 
-    path: Ints  # (k,) number of the light path
+    path: Ints  # (k,) number of the path
     pixel: Words  # (k,) row-major index within the camera's window
-    radiance: Floats  # (3, k) times the number of light paths
+    radiance: Floats  # (3, k) times the number of paths
 
 
 def trace_light(
     scene: CompiledScene, camera: Camera, sampler: Sampler, pixel: Words, sample: Words, max_bounces: int
 ) -> Splats:
-    """Trace a light path for each pair of pixel and sample; they reach any pixels.
+    """Trace a path from a light for each pair of pixel and sample; they reach any pixels.
 
     Parameters
     ----------

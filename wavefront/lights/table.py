@@ -198,5 +198,5 @@ class LightTable:
 
 
 def _radiance(kind: LightRecord, wi: Floats, surface: SurfaceInteraction | None) -> Floats:
-    """Return the radiance of lights; those that shine evenly need not take a surface."""
+    """Return the radiance of lights; those of uniform emission need not take a surface."""
     return kind.le(wi) if surface is None else kind.le(wi, surface)

@@ -57,7 +57,7 @@ class Medium(Parametrized):
         if factor == 1 or not self.absorption.any():
             return self
         other = copy(self)
-        # no float32 is so large that it would make a light path of length 0 a NaN
+        # no float32 is so large that it would make a path of length 0 a NaN
         per_unit = self.absorption.astype(np.float64) / factor
         other.absorption = np.minimum(per_unit, np.finfo(f4).max).astype(f4)
         return other

@@ -51,7 +51,7 @@ class Dimension(IntEnum):
     OPACITY = 7  # 1-D: whether the path hits a surface with alpha; repeats along the ray, up to 2²⁰
     GUIDE = 2**20  # 1-D: whether the direction comes from the guide's table
     GUIDE_DIRECTION = 2**20 + 1  # 2-D: direction from the table
-    SPECULAR_SURFACE = 2**20 + 2  # 2-D: which primitive a light path begins at
+    SPECULAR_SURFACE = 2**20 + 2  # 2-D: which primitive a path from a light begins at
     SPECULAR_POINT = 2**20 + 3  # 2-D: where on it
 
 

@@ -407,7 +407,7 @@ class Lights(CheckedList[Light]):
         """Return where shapes and cameras belong."""
         if isinstance(item, Camera):
             return "; a camera is given as camera=..."
-        return "; shapes that shine belong to the shapes" if isinstance(item, Shape) else ""
+        return "; emitting shapes belong to the shapes" if isinstance(item, Shape) else ""
 
 
 def _check_environments(lights: Sequence[Light]) -> None:

@@ -34,7 +34,7 @@ def picture_memory(size: Sequence[int], layers: Sequence[str] = (), light_paths:
     layers
         The sampled layers, those with a key by it, such as "light_groups.sun"; of up to 127 samples.
     light_paths
-        Whether there are light paths, too.
+        Whether there are paths from lights, too.
     """
     sums = bytes_per_pixel(lambda pixels: empty_sums((pixels, 1), layers, light_paths))
     picture = PICTURE_BYTES + LAYER_BYTES * sum(layer_of(name).channels for name in layers)
@@ -91,7 +91,7 @@ class Accumulator:
         self.rays += result.rays
 
     def _add_splats(self, sums: LightSums, wave: Job, splats: Splats) -> None:
-        """Add what the light paths of a wave bring, sample by sample."""
+        """Add what the paths from lights of a wave bring, sample by sample."""
         first, number = wave.view.first_sample + wave.first_sample, splats.path // wave.pixels.size
         for sample in range(wave.samples):
             some = splats.take(np.flatnonzero(number == sample))

@@ -128,7 +128,7 @@ class WaveResult:
     rays: int  # queries of the accelerator
     seconds: float  # that it took its worker
     layers: LayerSamples | None = None  # None where no sampled layer is asked for
-    splats: Splats | None = None  # of as many light paths; None where none are traced
+    splats: Splats | None = None  # of as many paths from lights; None where none are traced
 
 
 JobResult: TypeAlias = list[WaveResult]  # of each wave

@@ -70,7 +70,7 @@ def asked_for(values: Mapping[str, Any], name: str) -> bool:
 
 
 def check_combinations(values: Mapping[str, Any]) -> None:
-    """Check that settings, each of which is right by itself, go together.
+    """Check that settings, each of which is valid by itself, go together.
 
     Raises
     ------

@@ -128,7 +128,7 @@ def mis_weighted(scene: CompiledScene, paths: Paths, emission: Contribution) -> 
 def without_caustics(
     scene: CompiledScene, paths: Paths, left: Ints, hits: Hits, emission: Contribution
 ) -> Contribution:
-    """Return emission but for that which light paths find (integrators/light_tracing.py).
+    """Return emission but for that which paths from lights find (integrators/light_tracing.py).
 
     Parameters
     ----------
