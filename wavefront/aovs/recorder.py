@@ -244,7 +244,7 @@ class SampleRecorder(PathRecorder):
         Raises
         ------
         SceneError
-            If the integrator is not made of the stages that tell of the layers.
+            If the integrator does not use the stages that record the layers.
         """
         self._check(integrator, radiance)
         self._shade_awaited()

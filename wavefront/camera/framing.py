@@ -1,6 +1,6 @@
 """Where a camera of a given direction stands so that things fill its picture.
 
-Things are balls, points for the most part: a picture holds what their convex hull holds.
+Objects are spheres, mostly points: a picture contains what their convex hull contains.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ..arrays.elementary import sin_cos_turns
 from ..arrays.vec import Doubles
 
-FILL = 0.85  # of the picture's width or height, whichever things fill first
+FILL = 0.85  # of the picture's width or height, whichever objects fill first
 STEPS = 8  # of Newton's method; it ends where no other ball touches the edge, mostly after three
-LEVELS = 256  # of the profile of things that turn
+LEVELS = 256  # of the profile of objects that turn
 SIDES = 32  # of the polygons about its circles
 
 Balls = tuple[Doubles, Doubles]  # centers (n, 3) and radii (n,)

@@ -11,20 +11,20 @@ T = TypeVar("T")
 
 
 class Registry(Mapping[str, T], Generic[T]):
-    """Things of one kind by name.
+    """Objects of one kind by name.
 
-    A setting of this kind takes a name in the table, or a thing of this kind in place of a name.
+    A setting of this kind takes a name in the table, or an object of this kind in place of a name.
 
     Parameters
     ----------
     setting
         The name of the setting, for messages.
     expected
-        What a thing of this kind is, for messages.
+        What an object of this kind is, for messages.
     entries
         The built-in ones, by name.
     accepts
-        Returns True for a thing of this kind; by default for everything that can be called.
+        Returns True for an object of this kind; by default for everything that can be called.
     adapt
         Turns a thing that a user gives into an entry of the table; by default it is one already.
     """
@@ -58,7 +58,7 @@ class Registry(Mapping[str, T], Generic[T]):
         Parameters
         ----------
         value
-            A name in the table, or a thing of this kind.
+            A name in the table, or an object of this kind.
         setting
             What the message calls the setting, in place of the table's own word.
 

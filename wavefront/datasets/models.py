@@ -112,7 +112,7 @@ def diameter(points: Doubles) -> float:
 
 
 def _blocks(points: Doubles, size: int) -> list[Doubles]:
-    """Return points (n, 3) divided into blocks of neighbors, of at most so many."""
+    """Return points (n, 3) divided into blocks of neighbors, each of at most a number of points."""
     if len(points) <= size:
         return [points]
     middle = len(points) // 2

@@ -67,7 +67,7 @@ class GuideTable:
 
 
 def _inverted(edges: Floats, start: Ints, u: Floats, items: int) -> tuple[Ints, Floats]:
-    """Return which of so many items has its part of [0, 1) around each u (n,), and where u is in it, (n,)."""
+    """Return the item whose part of [0, 1) holds each u (n,), and the position of u in this part, (n,)."""
     at, step = start.copy(), items // 2
     while step:  # bisection: `items` is a power of two
         at += (u >= edges.take(at + step)) * np.intp(step)

@@ -138,7 +138,7 @@ def from_open3d(data: Any, *, smooth: bool | float | str = AUTO) -> Scene:
 
 
 def _corners(data: Any) -> Any:
-    """Return the triangles (m, 3) of PolyData, whose faces are rows of a count and so many indices."""
+    """Return the triangles (m, 3) of PolyData, whose faces are rows of a count and the indices."""
     flat = np.asarray(data.faces, np.intp).ravel()
     if flat.size % 4 or (flat[::4] != 3).any():
         flat = np.asarray(data.triangulate().faces, np.intp).ravel()
@@ -146,7 +146,7 @@ def _corners(data: Any) -> Any:
 
 
 def _segments(lines: Any) -> Any:
-    """Return the pieces (k, 2) of polylines, which are rows of a count and so many indices."""
+    """Return the pieces (k, 2) of polylines, which are rows of a count and the indices."""
     pieces, at = [np.zeros((0, 2), np.intp)], 0
     while at < lines.size:
         row = lines[at + 1 : at + 1 + lines[at]]

@@ -40,7 +40,7 @@ KNOWN = frozenset(
         "texture_transform",
     )
 ) | {"EXT_mesh_gpu_instancing"}
-IMAGES = 4  # all images of a file may have so many times the pixels of the largest
+IMAGES = 4  # all images of a file may have this many times the pixels of the largest
 BESIDE = frozenset(  # extensions that may occur with specular-glossiness; the others exclude it
     ("KHR_materials_pbrSpecularGlossiness", "KHR_materials_emissive_strength", "KHR_texture_transform")
 )

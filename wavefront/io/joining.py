@@ -22,7 +22,7 @@ def join(
     """Return one mesh with the triangles of all meshes.
 
     Where only some of them have normals, the others get those of their facets. What else only some have per
-    vertex is left out; the render tells of what a material reads.
+    vertex is left out; the render warns of what a material reads.
 
     Raises
     ------

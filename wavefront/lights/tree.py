@@ -148,7 +148,7 @@ def _interval(upto: Floats, child: Ints) -> tuple[Floats, Floats]:
 
 
 def _packed(sums: Doubles, width: int) -> Floats:
-    """Return the fields of children, so many to a node, (nodes, FIELDS * width); 0 where there is none."""
+    """Return the fields of the children of each node, (nodes, FIELDS * width); 0 where there is none."""
     fields = np.zeros((FIELDS, sums.shape[1]), f4)
     used = np.flatnonzero(sums[0])
     power, mean = sums[0].take(used), sums[1:8].take(used, 1) / sums[0].take(used)

@@ -29,7 +29,7 @@ def place_in_tiles(pixel: Words, width: int) -> tuple[Ints, Ints]:
     Parameters
     ----------
     pixel
-        (n,) row-major indices in a picture so many pixels wide.
+        (n,) row-major indices in a picture of this width.
     """
     block = SIDE * STRIDE
     number = pixel.astype(np.intp)

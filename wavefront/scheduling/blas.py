@@ -74,7 +74,7 @@ single_threaded_blas = _SingleThreadedBlas()
 
 
 def reserve_buffers(threads: int) -> None:
-    """Have OpenBLAS take the memory now that so many threads need at a time.
+    """Have OpenBLAS take the memory now that a number of threads needs at a time.
 
     It ends the process when it finds none, so it should not look for it when waves have taken the rest.
     Nothing is done where the address space has no limit: there the memory is always found.

@@ -44,7 +44,7 @@ def make_budget(
     size, layers, light_paths
         As for `picture_memory`, of a picture for which no memory is in use yet.
     workers, wave_size
-        The most of each; a `wave_size` of None stands for what suits so many workers.
+        The most of each; a `wave_size` of None stands for what suits the workers.
     processes
         Whether workers are processes.
 

@@ -158,7 +158,7 @@ def _workers_in(executor: str | ExecutorLike | None) -> int | None:
 
 
 def choose_executor(executor: str | ExecutorLike | None, workers: int, paths: int) -> str | ExecutorLike:
-    """Return what was asked for, else "threads" or "processes", whichever is faster for so many paths.
+    """Return what was asked for, else "threads" or "processes", whichever is faster for these paths.
 
     Warns where it were processes, but the system has no semaphores for them.
 

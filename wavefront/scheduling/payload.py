@@ -145,7 +145,7 @@ def _load(payload: Payload) -> _Entry:
 def pack(work: Any, folder: str) -> bytes:
     """Pickle work, and publish its shared integers as files in a folder.
 
-    Things that the user's script defines are pickled with their code, where cloudpickle is installed.
+    Objects that the user's script defines are pickled with their code, where cloudpickle is installed.
 
     Raises
     ------
@@ -192,7 +192,7 @@ def _pickler_class() -> Any:
 
 
 class _PicklerByName(pickle.Pickler):
-    """Refuses things of the user's script, which other processes do not find by their name."""
+    """Refuses objects of the user's script, which other processes do not find by their name."""
 
     dispatch_table = copyreg.dispatch_table
 

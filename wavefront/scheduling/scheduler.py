@@ -21,7 +21,7 @@ SMOOTHING = 0.3  # weight of the latest wave in what a path is expected to cost
 
 
 def default_wave_size(workers: int) -> int:
-    """Return the lanes of the largest wave that suits so many workers."""
+    """Return the lanes of the largest wave that suits a number of workers."""
     return min(max(LANES_AT_ONCE // workers, SMALL_WAVE), LARGE_WAVE)
 
 
@@ -35,7 +35,7 @@ class Scheduler:
     seconds
         Time that it may take; None for any.
     wave_size
-        Lanes of the largest wave; None for what suits so many workers.
+        Lanes of the largest wave; None for what suits the number of workers.
     workers
         Waves that are traced at once.
     branches
@@ -96,7 +96,7 @@ class Scheduler:
         return min(largest, short, max(self._least, int(left * SHARE / self._workers)))
 
     def halve(self, paths: int) -> bool:
-        """Have no more waves of so many paths, for which there was no memory; False if they are small."""
+        """Have no more waves of this size, for which there was no memory; False if they are small."""
         if paths <= SMALLEST_WAVE:
             return False
         self._largest = max(1, min(self._largest, paths // 2))

@@ -76,7 +76,7 @@ class Tracer:
         return recorded_layers(self.layers, self.scene)
 
     def sampler(self, width: int) -> Sampler:
-        """Return the sampler of a picture so many pixels wide."""
+        """Return the sampler of a picture of this width, pixels."""
         return self.make_sampler(self.seed, width)
 
 

@@ -33,7 +33,7 @@ class Workers(Protocol):
     replaceable: bool
 
     def submit(self, job: Any, attempt: int = 0) -> Future[Any]:
-        """Give a job, which has failed so many times, to the first worker that is free."""
+        """Give a job to the first worker that is free; `attempt` says how often it has failed."""
 
     def result(self, future: Future[Any]) -> Any:
         """Return the result of a job that is done, or raise JobFailed."""

@@ -382,7 +382,7 @@ class Session:
     def tell_hints(self, image: Image) -> None:
         """Write hints to stderr if the picture took over ten seconds: one line each, once in a session.
 
-        A render does so by itself where it shows its progress.
+        `render` does so where it shows its progress.
 
         Parameters
         ----------

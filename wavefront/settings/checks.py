@@ -26,7 +26,7 @@ SettingCheck: TypeAlias = Callable[[str, Any], Any]
 
 
 def one_of_table(choices: Registry[Any]) -> SettingCheck:
-    """Return a check that something is a name in a table, or a thing of its kind."""
+    """Return a check that something is a name in a table, or an object of its kind."""
 
     def check(name: str, value: Any) -> Any:
         choices.find(value, name)

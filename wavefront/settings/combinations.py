@@ -32,7 +32,7 @@ EXCLUSIONS = (
     Exclusion("reuse", "branches", "paths that go on in several ways gain less from being shared", False),
     Exclusion("reuse", "noise", "pixels are rendered for different times then, and tiles break up", False),
     Exclusion("caustics", "reuse", "shared paths find the light of caustics a second time"),
-    Exclusion("caustics", "noise", f"{ANY_PIXEL}, so no pixel can be ended by itself"),
+    Exclusion("caustics", "noise", f"{ANY_PIXEL}, so no pixel can stop alone"),
     Exclusion("caustics", "filter", f"{ANY_PIXEL}, and are added as the box filter does"),
     Exclusion("caustics", "light groups", f"{ANY_PIXEL}, and layers are sums of the pixel's own paths"),
     Exclusion("guide", "another integrator", ONLY_FULL),

@@ -16,7 +16,7 @@ from .mesh import Mesh, positions
 from .segments import Capsules
 from .spheres import Spheres
 
-NEIGHBOR = 4  # of a square grid a point has so many neighbors at the same distance
+NEIGHBOR = 4  # a point of a square grid has as many neighbors at the same distance
 MOST_DISTANCES, LEAST_POINTS = 1 << 22, 64  # that are looked at to choose a radius
 
 

@@ -135,7 +135,7 @@ class Viewpoint:
         )
 
     def resized(self, width: Any, height: Any) -> Viewpoint:
-        """Return this one for a page of so many pixels: its shape, and not more pixels than allowed.
+        """Return this one for a page of a size in pixels: its shape, and not more pixels than allowed.
 
         Raises
         ------
