@@ -199,7 +199,7 @@ class RenderSettings(TypedDict, total=False):
             "full",
             '"full", "direct_mis", "direct_simple" or "naive". All settings that take names also take an '
             "object of your own, such as a function; docs/extending.md has an example of each.",
-            option="estimator of light",
+            option="light transport algorithm",
             choices=INTEGRATORS,
             identity=True,
         ),
@@ -320,7 +320,7 @@ class RenderSettings(TypedDict, total=False):
             'The reconstruction filter, by which samples of a pixel are spread: "box" (evenly over the '
             'pixel), "tent" (radius 1 pixel) or "gaussian" (σ 0.5 pixels, cut off at 1.5 from the '
             "center).",
-            option="spread of samples over a pixel",
+            option="reconstruction filter",
             choices=FILTERS,
             identity=True,
         ),
