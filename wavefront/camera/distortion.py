@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.vec import Doubles
-from ..core.counted import counted
 from ..core.errors import SceneError
+from ..core.plural import plural
 
 NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 COUNTS = (4, 5, 8, 12, 14)  # of OpenCV's coefficients; those after the eighth must be 0
@@ -45,7 +45,7 @@ class Distortion:
             raise SceneError(f"distortion must be numeric, got {coefficients!r}") from error
         if given.size not in COUNTS:
             raise SceneError(
-                f"distortion has {counted(given.size, 'number')}; it must have 4, 5 or 8: {', '.join(NAMES)}"
+                f"distortion has {plural(given.size, 'number')}; it must have 4, 5 or 8: {', '.join(NAMES)}"
             )
         if not np.isfinite(given).all():
             raise SceneError(f"distortion is {given.tolist()}; it must be finite")

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from ..arrays.elementary import arctan2, sin_cos
 from ..arrays.vec import Doubles
-from ..core.counted import counted
 from ..core.errors import SceneError, finite_array, number
+from ..core.plural import plural
 from .base import Camera, upward
 
 
@@ -76,7 +76,7 @@ def interpolate_cameras(cameras: Sequence[Camera], n: int) -> list[Camera]:
     array([0.5, 0. , 4. ])
     """
     if len(cameras) < 2 or n < 2:
-        raise SceneError(f"{counted(n, 'camera')} between {len(cameras)}; both numbers must be at least 2")
+        raise SceneError(f"{plural(n, 'camera')} between {len(cameras)}; both numbers must be at least 2")
     places = np.array([camera.origin for camera in cameras])
     # beyond both ends the path goes straight on
     ends = 2 * places[:1] - places[1:2], 2 * places[-1:] - places[-2:-1]

@@ -19,8 +19,8 @@ from ..arrays.record import record
 from ..arrays.vec import Doubles, Ints
 from ..bsdfs import Dielectric, Diffuse
 from ..camera import Camera
-from ..core.counted import counted
 from ..core.memory import available_memory
+from ..core.plural import plural
 from ..lights import Environment
 from ..render import render
 from ..scene import Scene
@@ -125,8 +125,7 @@ def _about_machine() -> Iterator[str]:
     yield f"  CPU: {machine['architecture']}; NumPy uses {machine['CPU features']}"
     found = [each for each in threadpool_info() if each.get("user_api") == "blas"]
     names = [
-        f"{each['internal_api']} {each['version']}, {counted(each['num_threads'], 'thread')}"
-        for each in found
+        f"{each['internal_api']} {each['version']}, {plural(each['num_threads'], 'thread')}" for each in found
     ]
     yield f"  BLAS: {'; '.join(names) or 'none found'}"
 
@@ -201,7 +200,7 @@ def _measure_speed(accelerator: str, seconds: float, workers: int) -> CheckResul
     )
     text = (
         f"{rays:.2f} million rays per second, {samples:.2f} million samples per second "
-        f"({counted(workers, 'worker')}, in {passed:.1f} s)"
+        f"({plural(workers, 'worker')}, in {passed:.1f} s)"
     )
     return CheckResult(f"speed, {accelerator}", bool(np.isfinite(last.rgb).all()), text)
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from ..arrays.vec import Doubles
-from ..core.counted import counted
 from ..core.parameter import brief
+from ..core.plural import plural
 from ..io.load import load
 from ..materials import Material
 from ..scene.lighting import DEFAULT
@@ -53,8 +53,8 @@ def _lines(path: str, scene: Scene, messages: list[str]) -> Iterator[str]:
     meshes = _distinct(shape.mesh if isinstance(shape, Instance) else shape for shape in scene.shapes)
     low, high = scene.bounds
     yield (
-        f"{path}: {counted(len(scene.shapes), 'shape')}, {counted(_triangles(scene.shapes), 'triangle')}, "
-        f"{counted(len(scene.lights), 'light')}"
+        f"{path}: {plural(len(scene.shapes), 'shape')}, {plural(_triangles(scene.shapes), 'triangle')}, "
+        f"{plural(len(scene.lights), 'light')}"
     )
     yield f"size: file {_bytes(os.path.getsize(path))}, meshes {_bytes(_mesh_bytes(meshes))} in memory"
     yield f"bounds: {_triple(low)} to {_triple(high)}, {_triple(high - low)} across"
@@ -78,7 +78,7 @@ def _lines(path: str, scene: Scene, messages: list[str]) -> Iterator[str]:
     textures = _distinct(texture for material in materials for texture in _textures(material, set()))
     yield "textures:" if textures else "textures: none"
     for texture in textures:
-        yield f"  {texture!r}, {counted(texture.channels, 'channel')}, {'sRGB' if texture.srgb else 'linear'}"
+        yield f"  {texture!r}, {plural(texture.channels, 'channel')}, {'sRGB' if texture.srgb else 'linear'}"
     yield f"warnings: {len(messages)}" if messages else "warnings: none"
     yield from (f"  {message}" for message in messages)
 

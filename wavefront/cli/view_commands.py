@@ -9,7 +9,7 @@ from ..animation import check_animation, save_animation
 from ..camera import Camera
 from ..codecs.display import Display
 from ..codecs.tone import TONES
-from ..core.counted import counted
+from ..core.plural import plural
 from ..core.progress import Progress
 from ..datasets import write_dataset
 from ..datasets.dataset import FORMATS
@@ -60,7 +60,7 @@ def _turntable(options: argparse.Namespace) -> int:
     scene, cameras, settings = _series(options, options.frames)
     images = render_many(scene, cameras, **settings)
     written = save_animation(options.output, images, fps=options.fps, **display)
-    print_done(f"{options.output}: {counted(written, 'picture')}")
+    print_done(f"{options.output}: {plural(written, 'picture')}")
     return 0
 
 
@@ -116,7 +116,7 @@ def _dataset(options: argparse.Namespace) -> int:
     )
     earlier = len(cameras) - rendered
     before = f", {earlier} of them there before" if earlier else ""
-    print_done(f"{options.output}: {counted(len(cameras), 'view')}{before}")
+    print_done(f"{options.output}: {plural(len(cameras), 'view')}{before}")
     return 0
 
 

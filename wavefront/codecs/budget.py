@@ -6,9 +6,9 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from ..core.counted import counted
 from ..core.errors import SceneError
 from ..core.files import MAX_PIXELS, check_size
+from ..core.plural import plural
 
 MEMORY_BYTES = 2**31  # that files of any size may take
 PER_BYTE = 128  # bytes of memory that each byte of the files may take beyond that
@@ -20,7 +20,7 @@ def in_memory(path: str | os.PathLike[str]) -> Iterator[None]:
     try:
         yield
     except MemoryError as error:
-        has = f"has {counted(os.path.getsize(path), 'byte')}, and what it holds"
+        has = f"has {plural(os.path.getsize(path), 'byte')}, and what it holds"
         raise SceneError(f"{os.fspath(path)}: {has} does not fit in memory: {error}") from error
 
 
@@ -67,6 +67,6 @@ class Budget:
         if self._charged > self._most:
             so_far = "" if self._charged == size else f", which makes {self._charged} in all"
             raise SceneError(
-                f"{what} takes {counted(size, 'byte')} of memory{so_far}; "
+                f"{what} takes {plural(size, 'byte')} of memory{so_far}; "
                 f"the limit is {self._most} for files of this size (LoadLimits.memory_bytes)"
             )

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.vec import Floats
-from ..core.counted import counted
 from ..core.errors import SaveError, SceneError, as_array, warn_caller
 from ..core.files import check_target, extension_of, read_bytes, write_bytes
+from ..core.plural import plural
 from ..core.registry import Registry
 from . import exr, npz
 from . import hdr as rgbe
@@ -233,7 +233,7 @@ def _finite(path: str | os.PathLike[str], picture: ImageData) -> ImageData:
     bad = int(np.count_nonzero(~np.isfinite(picture.rgb).all(axis=2)))
     if not bad:
         return picture
-    found = counted(bad, "pixel is", "pixels are")
+    found = plural(bad, "pixel is", "pixels are")
     warn_caller(f"{os.fspath(path)}: {found} not finite; NaN is written as 0")
     return picture.with_rgb(np.nan_to_num(picture.rgb, nan=0.0))
 

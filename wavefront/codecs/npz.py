@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.counted import counted
 from ..core.errors import SceneError
+from ..core.plural import plural
 from .archive import checked_members
 from .budget import Budget
 from .image_data import ImageData, from_json, from_named, to_json
@@ -62,7 +62,7 @@ def decode(data: bytes, budget: Budget | None = None) -> ImageData:
         if len(shapes.get("rgb", ())) > 1:
             budget.check_size(*shapes["rgb"][:2])
         claimed = sum(member.file_size for member in members.values())
-        budget.charge(f"the content of {counted(len(members), 'array')}", claimed)
+        budget.charge(f"the content of {plural(len(members), 'array')}", claimed)
         arrays = {name: _read(archive, member) for name, member in members.items()}
     text = arrays.pop(METADATA, np.array("{}"))
     if text.dtype.kind != "U" or text.ndim:

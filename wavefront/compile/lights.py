@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.vec import Floats, Ints, f4
-from ..core.counted import counted
 from ..core.errors import SceneError
+from ..core.plural import plural
 from ..lights import (
     Environment,
     EnvironmentSum,
@@ -173,7 +173,7 @@ def _rows_of(
     faces = primitive_count(shape)
     if len(record) not in (1, faces):
         raise SceneError(
-            f"{name}: record has {counted(len(record), 'column')}; "
+            f"{name}: record has {plural(len(record), 'column')}; "
             f"it must have 1, or {faces}, one for each face"
         )
     return first_row[id(same[0])] + np.arange(faces)
@@ -302,6 +302,6 @@ def _with_area(meshes: Sequence[Mesh], mesh_of: Ints, triangles: NDArray[np.floa
     dark = mesh_of[~np.isin(mesh_of, mesh_of[shining])]
     if dark.size:
         mesh = meshes[dark[0]]
-        faces = counted(len(mesh.faces), "face has", "faces have")
+        faces = plural(len(mesh.faces), "face has", "faces have")
         raise SceneError(f"{mesh.name}: a light must have an area; its {faces} none")
     return shining

@@ -11,8 +11,8 @@ from ..arrays.record import record
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Bools, Floats, Ints, f4
 from ..bsdfs import Bsdf
-from ..core.counted import counted
 from ..core.errors import SceneError, warn_caller
+from ..core.plural import plural
 from ..materials import Material, Opacity
 from ..shapes import CurvedShape, Instance, Mesh, Shape
 from ..shapes.attributes import ATTRIBUTES
@@ -192,7 +192,7 @@ def attributes_read(shapes: Sequence[Shape]) -> list[str]:
             if isinstance(mesh, Mesh) and ATTRIBUTES[name].given(mesh) is None:
                 lacking.setdefault(ATTRIBUTES[name].title, {})[id(mesh)] = shape.name
     for title, names in lacking.items():
-        found = counted(
+        found = plural(
             len(names),
             f"mesh lacks the {title} that its material reads",
             f"meshes lack the {title} that their materials read",

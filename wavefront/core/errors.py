@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .counted import counted
+from .plural import plural
 from .suggestions import did_you_mean
 
 PACKAGE = os.path.join(os.path.dirname(os.path.dirname(__file__)), "")
@@ -184,7 +184,7 @@ def as_array(name: str, value: Any) -> NDArray[Any]:
         raise SceneError(f"{name} must {wanted}, got {in_brief(value)}") from error
     ma = sys.modules.get("numpy.ma")  # whoever has masked values has imported it
     if ma is not None and ma.is_masked(array):
-        masked = counted(int(ma.count_masked(array)), "masked value")
+        masked = plural(int(ma.count_masked(array)), "masked value")
         raise SceneError(f"{name} has {masked}; leave their rows out, or give them numbers with filled(...)")
     if array.dtype.kind == "c":
         raise SceneError(f"{name} must be real numbers, got {array.dtype}")

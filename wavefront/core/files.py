@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import IO, Any
 
-from .counted import counted
 from .errors import SaveError, SceneError
+from .plural import plural
 
 MAX_BYTES = 2**31  # larger files are refused before they are read
 MAX_PIXELS = 2**27  # 16384 × 8192; larger images are refused before they are decoded
@@ -54,7 +54,7 @@ def check_regular(path: str | os.PathLike[str], limit: float = math.inf) -> None
     if not stat.S_ISREG(info.st_mode):
         raise SceneError(f"{name}: is a device or pipe; only regular files are read")
     if info.st_size > limit:
-        raise SceneError(f"{name}: has {counted(info.st_size, 'byte')}; the limit is {limit}")
+        raise SceneError(f"{name}: has {plural(info.st_size, 'byte')}; the limit is {limit}")
 
 
 def decode_text(data: bytes) -> str:

@@ -26,9 +26,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.counted import counted
 from ..core.errors import SceneError, printable
 from ..core.files import check_regular, write_chunks
+from ..core.plural import plural
 
 MAGIC = b"\x93WFCK\r\n\n"
 VERSION = 1
@@ -159,7 +159,7 @@ def _header(file: BufferedReader, name: str) -> dict[str, Any]:
     if prelude[: len(MAGIC)] != MAGIC:
         raise SceneError(f"{name}: is not a checkpoint of wavefront, or its first bytes are damaged")
     if len(prelude) < PRELUDE.size:
-        raise SceneError(f"{name}: is truncated after {counted(len(prelude), 'byte')}; it {DAMAGED}")
+        raise SceneError(f"{name}: is truncated after {plural(len(prelude), 'byte')}; it {DAMAGED}")
     _, version, length = PRELUDE.unpack(prelude)
     if version != VERSION:
         raise SceneError(f"{name}: has version {version} of the format; this program reads {VERSION}")
@@ -170,7 +170,7 @@ def _header(file: BufferedReader, name: str) -> dict[str, Any]:
     size = file.tell() + sum(_size(kind, shape, name) + DIGEST for _, kind, shape in header["arrays"])
     found = os.fstat(file.fileno()).st_size
     if found != size:
-        raise SceneError(f"{name}: has {counted(found, 'byte')} and should have {size}; it {DAMAGED}")
+        raise SceneError(f"{name}: has {plural(found, 'byte')} and should have {size}; it {DAMAGED}")
     return header
 
 

@@ -14,8 +14,8 @@ from ..arrays.vec import Doubles, Ints
 from ..codecs.encoding import codes_to_linear
 from ..codecs.images import three_channels
 from ..codecs.png_jpeg import EXTENSIONS
-from ..core.counted import counted
 from ..core.errors import SceneError, as_array
+from ..core.plural import plural
 from ..film.film import EPSILON, batch_size
 from ..film.samples import shared_samples
 from ..sampling.tiles import MEMBERS
@@ -194,7 +194,7 @@ def _pixels(name: str, picture: Image | ArrayLike) -> Doubles:
     bad = np.argwhere(~np.isfinite(colors))
     if len(bad):
         y, x, _ = bad[0]
-        found = counted(len(bad), "value that is", "values that are")
+        found = plural(len(bad), "value that is", "values that are")
         raise SceneError(f"{name} has {found} not finite, the first at x={x}, y={y}")
     return colors
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.counted import counted
+from ..core.plural import plural
 from ..shapes import Points, Spheres
 from ..shapes.points import usual_radius
 from .repair import Table, warn
@@ -24,12 +24,12 @@ def cloud(name: str, points: Table, colors: Any, strict: bool) -> Spheres | None
     if not sound.any():
         return None
     if not sound.all():
-        lost = counted(int((~sound).sum()), "point")
+        lost = plural(int((~sound).sum()), "point")
         warn(f"{name}: dropped {lost} not finite, first: point {np.argmin(sound)}", strict)
     places = points[sound]
     radius = usual_radius(places)
     warn(
-        f"{name}: has no faces; {counted(len(places), 'point')} become spheres of radius {radius:.3g} "
+        f"{name}: has no faces; {plural(len(places), 'point')} become spheres of radius {radius:.3g} "
         "(wf.Points takes another)",
         strict,
     )

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from ..colors import srgb
-from ..core.counted import counted
 from ..core.errors import SceneError, warn_caller
+from ..core.plural import plural
 from ..scene import Scene
 from ..shapes import Capsules, Shape
 from ..shapes.points import point_colors
@@ -193,7 +193,7 @@ def _capsules(name: str, points: Table, segments: Any, colors: Table | None) -> 
         raise SceneError(f"{name}: has no lines")
     radius = LINE * float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
     warn_caller(
-        f"{name}: has no faces; {counted(len(segments), 'line')} become capsules of radius {radius:.3g} "
+        f"{name}: has no faces; {plural(len(segments), 'line')} become capsules of radius {radius:.3g} "
         "(wf.Capsules takes another)"
     )
     linear = None if colors is None else srgb(np.clip(colors, 0, 1))

@@ -19,8 +19,8 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.counted import counted
 from ..core.errors import SceneError, printable
+from ..core.plural import plural
 from ..shapes.transform import Matrix
 from .sources import MAX_TRIANGLES, SceneFiles
 
@@ -142,9 +142,7 @@ class Document:
                 raise SceneError(f"{self.name}: {where} has no data")
             claimed = self.count(where, item, "byteLength")
             if len(data) < claimed:
-                raise SceneError(
-                    f"{self.name}: {where} has {counted(len(data), 'byte')}; it claims {claimed}"
-                )
+                raise SceneError(f"{self.name}: {where} has {plural(len(data), 'byte')}; it claims {claimed}")
             self._buffers[index] = data
         return self._buffers[index]
 
@@ -204,7 +202,7 @@ class Document:
         stride = stride or size
         start += self.count(where, item, "byteOffset")
         if count and start + (count - 1) * stride + size > end:
-            elements = counted(count, "element")
+            elements = plural(count, "element")
             raise SceneError(f"{self.name}: {where} has {elements}, which its buffer view cannot hold")
         if not count:
             return np.zeros((0, width), kind)
@@ -249,7 +247,7 @@ def table(rows: list[Any], width: int, where: Callable[[int], str]) -> Matrix:
         if np.isfinite(array).all():
             return array
     row = next(i for i, value in enumerate(rows) if not _is_row(value, width))
-    raise SceneError(f"{where(row)} is {shown(rows[row])}; it must be {counted(width, 'finite number')}")
+    raise SceneError(f"{where(row)} is {shown(rows[row])}; it must be {plural(width, 'finite number')}")
 
 
 def _is_row(value: Any, width: int) -> bool:
@@ -276,18 +274,18 @@ def _normalized(values: NDArray[Any]) -> NDArray[Any]:
 def _chunks(name: str, data: bytes) -> tuple[bytes, bytes | None]:
     """Split a .glb into its JSON and its binary chunk."""
     if len(data) < 20:
-        raise SceneError(f"{name}: ends early: {counted(len(data), 'byte')}")
+        raise SceneError(f"{name}: ends early: {plural(len(data), 'byte')}")
     version, length = struct.unpack_from("<II", data, 4)
     if version != 2:
         raise SceneError(f"{name}: is glTF version {version}; only version 2 is read")
     if length > len(data):
-        raise SceneError(f"{name}: claims {counted(length, 'byte')}; it has {len(data)}")
+        raise SceneError(f"{name}: claims {plural(length, 'byte')}; it has {len(data)}")
     parts: dict[bytes, bytes] = {}
     at = 12
     while at + 8 <= length:
         size, kind = struct.unpack_from("<I4s", data, at)
         if at + 8 + size > length:
-            raise SceneError(f"{name}: a chunk claims {counted(size, 'byte')}; {length - at - 8} are there")
+            raise SceneError(f"{name}: a chunk claims {plural(size, 'byte')}; {length - at - 8} are there")
         parts.setdefault(kind, data[at + 8 : at + 8 + size])
         at += 8 + size
     if b"JSON" not in parts:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.counted import counted
 from ..core.errors import SceneError
+from ..core.plural import plural
 from .gltf_document import Document
 from .repair import Faces, RawMesh, Table, wide
 
@@ -104,13 +104,13 @@ def attribute(
         listed = " or ".join(map(str, allowed))
         raise SceneError(f"{where} has {key} with {values.shape[1]} components; it must have {listed}")
     if count is not None and len(values) != count:
-        raise SceneError(f"{where} has {len(values)} of {key}; it has {counted(count, 'vertex', 'vertices')}")
+        raise SceneError(f"{where} has {len(values)} of {key}; it has {plural(count, 'vertex', 'vertices')}")
     return values
 
 
 def _triangles(where: str, indices: NDArray[Any], mode: int, count: int) -> Faces:
     """Return faces (m, 3) of a list, strip or fan of triangles over `count` vertices."""
-    there = counted(len(indices), "index", "indices")
+    there = plural(len(indices), "index", "indices")
     if mode == TRIANGLES:
         if len(indices) % 3:
             raise SceneError(f"{where} has {there}; triangles need a multiple of 3")

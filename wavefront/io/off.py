@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..core.counted import counted
 from ..core.errors import SceneError
 from ..core.files import decode_text
+from ..core.plural import plural
 from .repair import warn
 from .trimesh_loading import by_trimesh
 
@@ -32,8 +32,8 @@ def parse(name: str, data: bytes, strict: bool, materials: bool) -> Any:
         del rows[0]
     (vertices, faces), rows = _counts(name, rows), rows[1:]
     if len(rows) < vertices + faces:
-        claimed = f"{counted(vertices, 'vertex', 'vertices')} and {counted(faces, 'face')}"
-        raise SceneError(f"{name}: claims {claimed}; {counted(len(rows), 'line is', 'lines are')} there")
+        claimed = f"{plural(vertices, 'vertex', 'vertices')} and {plural(faces, 'face')}"
+        raise SceneError(f"{name}: claims {claimed}; {plural(len(rows), 'line is', 'lines are')} there")
     for number, words in rows[:vertices]:
         if len(words) < 3 or not all(map(_is_number, words[:3])):
             raise SceneError(f"{name} line {number}: vertex is {' '.join(words)!r}; it must be 3 numbers")

@@ -15,8 +15,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.counted import counted
 from ..core.errors import SceneError
+from ..core.plural import plural
 from .ply_header import SIZES, TYPES, Element, check_ply, ply_textures, unread
 from .repair import warn
 from .sources import SceneFiles
@@ -131,7 +131,7 @@ def _split(name: str, lists: list[NDArray[np.int64]]) -> NDArray[np.int64]:
     short = next((i for i, corners in enumerate(lists) if len(corners) < 3), None)
     if short is not None:
         raise SceneError(
-            f"{name}: face {short} has {counted(len(lists[short]), 'corner')}; it needs at least 3"
+            f"{name}: face {short} has {plural(len(lists[short]), 'corner')}; it needs at least 3"
         )
     return np.asarray(import_trimesh().geometry.triangulate_quads(lists), np.int64)
 

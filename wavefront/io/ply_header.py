@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-from ..core.counted import counted
 from ..core.errors import SceneError
+from ..core.plural import plural
 
 TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
@@ -54,7 +54,7 @@ def check_ply(name: str, data: bytes) -> list[Element]:
         need += element.count * (2 * element.words if text else element.size)
         if need > there + 1:
             raise SceneError(
-                f"{name}: claims {counted(element.count, 'row')} of {element.name}, "
+                f"{name}: claims {plural(element.count, 'row')} of {element.name}, "
                 f"at least {need} bytes; {there} are there"
             )
     if text:
@@ -112,7 +112,7 @@ def _check_lines(name: str, elements: list[Element], body: str, first: int) -> N
     for element in elements:
         rows = lines[at : at + element.count]
         if len(rows) < element.count:
-            claimed = f"{counted(element.count, 'row')} of {element.name}"
+            claimed = f"{plural(element.count, 'row')} of {element.name}"
             raise SceneError(f"{name}: claims {claimed}; {len(rows)} are there")
         if element.lists < 2:
             for number, words in rows:
@@ -132,7 +132,7 @@ def _check_words(name: str, element: Element, number: int, words: list[str]) -> 
             raise SceneError(f"{name} line {number}: {' '.join(indices)!r} are not whole numbers")
     if len(words) != need:
         raise SceneError(
-            f"{name} line {number}: {element.name} has {counted(len(words), 'word')}; it must have {need}"
+            f"{name} line {number}: {element.name} has {plural(len(words), 'word')}; it must have {need}"
         )
 
 

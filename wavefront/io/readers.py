@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeAlias
 
-from ..core.counted import counted
 from ..core.errors import SceneError
 from ..core.files import decode_text, extension_of
+from ..core.plural import plural
 from ..core.registry import Registry
 from ..scene import Scene
 from ..shapes.smoothing import AUTO
@@ -123,7 +123,7 @@ def _read_ply(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
     contents = trimesh_objects.read(found, name, options.strict)
     faces = sum(len(raw.faces) for raw in contents.raws)
     if faces < claimed:
-        raise SceneError(f"{name}: claims {counted(claimed, 'row')} of face; {faces} can be read")
+        raise SceneError(f"{name}: claims {plural(claimed, 'row')} of face; {faces} can be read")
     points = cloud_of_trimesh(name, found, options.strict) if not faces else None
     return contents if points is None else replace(contents, shapes=[points])
 

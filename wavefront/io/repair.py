@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.vec import FLOAT32_MAX, cross, spans
-from ..core.counted import counted
 from ..core.errors import SceneError, printable, warn_caller
+from ..core.plural import plural
 from ..materials import Material
 from ..shapes import Mesh
 from ..textures.parameter import Color
@@ -138,13 +138,13 @@ def _report(label: str, raw: RawMesh, bad: NDArray[np.bool_], what: str, strict:
         return
     first = f"face {found[0]}" if raw.lines is None else f"line {raw.lines[found[0]]}"
     warn(
-        f"{label}: {'has' if strict else 'dropped'} {counted(len(found), 'face')} {what}, first: {first}",
+        f"{label}: {'has' if strict else 'dropped'} {plural(len(found), 'face')} {what}, first: {first}",
         strict,
     )
 
 
 def _warn_of_vertices(label: str, bad: Any, what: str, state: str, strict: bool) -> None:
-    found = counted(int(bad.sum()), f"{what} is", f"{what}s are")
+    found = plural(int(bad.sum()), f"{what} is", f"{what}s are")
     warn(f"{label}: {found} {state}, first: vertex {bad.argmax()}", strict)
 
 

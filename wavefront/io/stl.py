@@ -6,9 +6,9 @@ from functools import partial
 
 import numpy as np
 
-from ..core.counted import counted
 from ..core.errors import SceneError
 from ..core.files import decode_text
+from ..core.plural import plural
 from .repair import RawMesh, warn, wide
 from .text_lines import NUMBER, check_lines, words
 from .trimesh_loading import geometries
@@ -35,8 +35,8 @@ def parse(name: str, data: bytes, strict: bool = False) -> list[RawMesh]:
     if data.lstrip()[:5].lower() == b"solid":
         return _text(name, decode_text(data))
     if len(data) < 84:
-        raise SceneError(f"{name}: has {counted(len(data), 'byte')}; a binary STL has at least 84")
-    raise SceneError(f"{name}: claims {counted(count, 'face')}, {84 + 50 * count} bytes; it has {len(data)}")
+        raise SceneError(f"{name}: has {plural(len(data), 'byte')}; a binary STL has at least 84")
+    raise SceneError(f"{name}: claims {plural(count, 'face')}, {84 + 50 * count} bytes; it has {len(data)}")
 
 
 def _binary(name: str, data: bytes, strict: bool) -> list[RawMesh]:
@@ -68,7 +68,7 @@ def _text(name: str, text: str) -> list[RawMesh]:
     raws = []
     for title, vertices in solids:
         if len(vertices) % 3:
-            has = f"has {counted(len(vertices), 'vertex', 'vertices')}; facets need a multiple of 3"
+            has = f"has {plural(len(vertices), 'vertex', 'vertices')}; facets need a multiple of 3"
             raise SceneError(f"{name}: solid {title!r} {has}")
         written = "\n".join(["solid", *(lines[at] for at in vertices), "endsolid"]).encode()
         for mesh in geometries(name, "stl", written):

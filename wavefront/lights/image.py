@@ -17,9 +17,9 @@ from ..arrays.vec import INV_PI, INV_TWO_PI, Floats, f4, luminance
 from ..codecs.budget import Budget
 from ..codecs.encoding import codes_to_linear
 from ..codecs.images import COLOR_BYTES, read_codes
-from ..core.counted import counted
 from ..core.errors import SceneError, as_array, warn_caller
 from ..core.files import check_size
+from ..core.plural import plural
 from ..sampling.discrete import Distribution2D
 from ..textures.image import Texture
 from .base import LightSample
@@ -173,7 +173,7 @@ def environment_pixels(source: Any) -> Floats:
     if codes.shape[2] in (2, 4):
         clear = int((pixels[..., -1] != 1).sum())
         if clear:
-            found = counted(clear, "pixel is", "pixels are")
+            found = plural(clear, "pixel is", "pixels are")
             warn_caller(f"{name}: {found} transparent; alpha is not used")
         pixels = pixels[..., :-1]
     pixels = np.array(np.broadcast_to(pixels, (*pixels.shape[:2], 3)))
@@ -186,7 +186,7 @@ def _check_finite(name: str, pixels: Floats) -> None:
     if len(bad):
         row, column = bad[0]
         raise SceneError(
-            f"{name}: {counted(len(bad), 'pixel is', 'pixels are')} not finite in float32, "
+            f"{name}: {plural(len(bad), 'pixel is', 'pixels are')} not finite in float32, "
             f"first: row {row}, column {column}, {pixels[row, column].tolist()}"
         )
 
@@ -196,7 +196,7 @@ def _without_negative(name: str, pixels: Floats) -> Floats:
     if len(bad):
         row, column = bad[0]
         warn_caller(
-            f"{name}: {counted(len(bad), 'negative pixel counts', 'negative pixels count')} as 0, "
+            f"{name}: {plural(len(bad), 'negative pixel counts', 'negative pixels count')} as 0, "
             f"first: row {row}, column {column}, {pixels[row, column].tolist()}"
         )
     return np.maximum(pixels, f4(0))

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.vec import BELOW_ONE, Floats, Ints, f4
-from ..core.counted import counted
 from ..core.errors import SceneError
+from ..core.plural import plural
 
 _LARGE = 1 << 19  # tables of more items get fewer cells per item, to save memory
 
@@ -20,7 +20,7 @@ def _checked(name: str, weights: ArrayLike, ndim: int) -> NDArray[np.float64]:
     array = np.asarray(weights, np.float64)
     if array.ndim != ndim or not array.size:
         raise SceneError(
-            f"{name} must have {counted(ndim, 'dimension')} and at least one item, got shape {array.shape}"
+            f"{name} must have {plural(ndim, 'dimension')} and at least one item, got shape {array.shape}"
         )
     bad = np.argwhere(~(np.isfinite(array) & (array >= 0)))
     if len(bad):

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera import Camera
-from ..core.counted import counted
 from ..core.html import table_html
 from ..core.parameter import brief
+from ..core.plural import plural
 from ..lights import Light
 from ..shapes import Instance, Mesh, PrimitiveArray, Shape
 
@@ -53,7 +53,7 @@ def _counts(shapes: Sequence[Shape], lights: Sequence[Light]) -> list[str]:
         "curved primitive": sum(_curved(shape) for shape in bare),
         "light": len(lights) + sum(shape.emission is not None for shape in shapes),
     }
-    return [counted(count, kind) for kind, count in counts.items() if count or kind in ("shape", "light")]
+    return [plural(count, kind) for kind, count in counts.items() if count or kind in ("shape", "light")]
 
 
 def _curved(shape: Shape) -> int:

@@ -14,8 +14,8 @@ from ..accel import AcceleratorCache
 from ..arrays.elementary import sin_cos
 from ..camera import Camera, check_camera, field_of_view, image_size, upward
 from ..camera.framing import FILL, Balls, fitting_offset, turned_balls
-from ..core.counted import counted
 from ..core.errors import SceneError, finite_array, in_brief
+from ..core.plural import plural
 from ..core.suggestions import did_you_mean, suggests_keywords
 from ..lights import Environment, Light
 from ..shapes import Instance, Mesh, PrimitiveArray, Shape
@@ -95,7 +95,7 @@ class Scene:
     def __repr__(self) -> str:
         """Return the numbers of shapes and lights."""
         return (
-            f"<Scene: {counted(len(self.shapes), 'shape')}, {counted(len(self.lights), 'light')}, "
+            f"<Scene: {plural(len(self.shapes), 'shape')}, {plural(len(self.lights), 'light')}, "
             f"camera={self.camera is not None}>"
         )
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from ..core.counted import counted
 from ..core.interrupt import deferred_signals
 from ..core.memory import address_space_left, megabytes
+from ..core.plural import plural
 
 # Bytes of address space: OpenBLAS takes 32 MB for each call at a time, and a thread its stack.
 BUFFER = 64 << 20
@@ -88,7 +88,7 @@ def reserve_buffers(threads: int) -> None:
     if left == math.inf:
         return
     if left < threads * BUFFER:
-        raise MemoryError(f"BLAS needs {megabytes(threads * BUFFER)} for {counted(threads, 'thread')}")
+        raise MemoryError(f"BLAS needs {megabytes(threads * BUFFER)} for {plural(threads, 'thread')}")
     together = threading.Barrier(threads)
     matrix = np.ones((LARGE, LARGE))
 

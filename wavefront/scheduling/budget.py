@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..arrays.record import record
-from ..core.counted import counted
 from ..core.errors import SceneError
 from ..core.memory import check_memory, megabytes, resident_memory
+from ..core.plural import plural
 from .accumulator import picture_memory
 from .scheduler import SMALL_WAVE, default_wave_size
 
@@ -55,7 +55,7 @@ def make_budget(
         than `max_memory`.
     """
     picture = picture_memory(size, layers, light_paths)
-    having = f" with {counted(len(layers), 'layer')}" if layers else ""
+    having = f" with {plural(len(layers), 'layer')}" if layers else ""
     check_memory(f"a picture of {size[0]}x{size[1]} pixels{having}", picture)
     if max_memory is None:
         return Budget(workers, wave_size or default_wave_size(workers))

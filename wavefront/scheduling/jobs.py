@@ -15,7 +15,7 @@ from ..arrays.record import record
 from ..arrays.state import Words
 from ..arrays.vec import Floats, Ints
 from ..camera import Camera
-from ..core.counted import counted
+from ..core.plural import plural
 from ..film.aov_samples import LayerSamples
 from ..integrators.light_tracing import Splats
 from ..sampling.tiles import whole_tiles
@@ -116,7 +116,7 @@ class Job:
     def __str__(self) -> str:
         """Name the block in an error message."""
         first, last = (self.view.first_sample + each for each in (self.first_sample, self.end - 1))
-        return f"samples {first} to {last} of {counted(self.pixels.size, 'pixel')} from {self.pixels[0]} on"
+        return f"samples {first} to {last} of {plural(self.pixels.size, 'pixel')} from {self.pixels[0]} on"
 
 
 @record

@@ -7,8 +7,8 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from ..core.counted import counted
 from ..core.errors import Interrupted, RenderError, warn_caller
+from ..core.plural import plural
 from ..image import Image
 from ..integrators import INTEGRATORS
 from ..sampling.tiles import others_in_tile
@@ -40,7 +40,7 @@ def interrupted(image: Image, spp: int | None, go_on: str = "") -> Interrupted:
     if not image.metadata["samples"]:
         return Interrupted("interrupted: there is no picture yet")
     found = image.metadata["spp"]
-    there = f"{found:.4g} of " + counted(spp, "sample") if spp else counted(found, "sample", form=".4g")
+    there = f"{found:.4g} of " + plural(spp, "sample") if spp else plural(found, "sample", form=".4g")
     return Interrupted(f"interrupted: the picture so far has {there} per pixel{go_on}", image)
 
 
@@ -99,7 +99,7 @@ def check_last_image(image: Image, plan: Plan, loop: RenderLoop, surfaces: int) 
         noise = "unknown" if np.isnan(found["noise"]) else f"{found['noise']:.4g}"
         warn_caller(
             f"noise={values['noise']:.4g} was not reached: it is {noise} after "
-            f"{counted(found['spp'], 'sample', form='.4g')} per pixel in {found['seconds']:.3g} s"
+            f"{plural(found['spp'], 'sample', form='.4g')} per pixel in {found['seconds']:.3g} s"
         )
 
 
@@ -125,7 +125,7 @@ def _check_first_samples(image: Image, seconds: float | None, surfaces: int) -> 
         raise RenderError(f"there is no picture: {why}")
     if without:
         of = f"of {image.counts.size}"
-        black = counted(
+        black = plural(
             without, f"pixel {of} has no sample and is black", f"pixels {of} have no sample and are black"
         )
         warn_caller(f"{black}: {why}")

@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays.vec import f4
 from ..bsdfs import Diffuse
 from ..colors import named_rows, srgb_to_linear, warn_of_colormap
-from ..core.counted import counted
 from ..core.errors import SceneError, finite_array
+from ..core.plural import plural
 from ..materials import Material
 from ..textures.vertex_colors import VertexColors
 from .base import Checked, Shape
@@ -29,7 +29,7 @@ def linear_colors(name: str, values: ArrayLike | None) -> NDArray[np.float64] | 
         array[:, :3] = srgb_to_linear(array[:, :3].astype(f4) / f4(most))
         array[:, 3:] /= most
     if array.shape[1] not in (3, 4):
-        raise SceneError(f"{name} has {counted(array.shape[1], 'number')} per vertex; it must have 3 or 4")
+        raise SceneError(f"{name} has {plural(array.shape[1], 'number')} per vertex; it must have 3 or 4")
     bad = np.argwhere((array < 0) | (array > 1))
     if len(bad):
         i, j = bad[0]

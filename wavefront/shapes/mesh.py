@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.vec import FLOAT32_MAX, cross, spans
-from ..core.counted import counted
 from ..core.errors import SceneError, as_array, finite_array, warn_caller
+from ..core.plural import plural
 from ..core.suggestions import suggests_keywords
 from ..materials import Material, MaterialLike
 from ..textures.parameter import Color, color
@@ -175,8 +175,8 @@ class Mesh(ColoredShape):
 
     def __repr__(self) -> str:
         """Return the name and the size of the mesh."""
-        vertices = counted(len(self.vertices), "vertex", "vertices")
-        return f"<Mesh {self.name!r}: {vertices}, {counted(len(self.faces), 'face')}>"
+        vertices = plural(len(self.vertices), "vertex", "vertices")
+        return f"<Mesh {self.name!r}: {vertices}, {plural(len(self.faces), 'face')}>"
 
     @property
     def emission(self) -> Any:
@@ -211,7 +211,7 @@ class Mesh(ColoredShape):
             if values is not None and len(values) != count:
                 raise SceneError(
                     f"{self.name}: {name} must have a row for each of "
-                    f"{counted(count, 'vertex', 'vertices')}, got {len(values)}"
+                    f"{plural(count, 'vertex', 'vertices')}, got {len(values)}"
                 )
         if self.tangents is not None and self.normals is None:
             raise SceneError(f"{self.name}: has tangents without normals; pass both")
@@ -256,7 +256,7 @@ class Mesh(ColoredShape):
         flat = _faces_of_zero_area(self.vertices, self.faces)
         if flat.size:
             warn_caller(
-                f"{self.name}: dropped {counted(flat.size, 'face')} of zero area, first: face {flat[0]}"
+                f"{self.name}: dropped {plural(flat.size, 'face')} of zero area, first: face {flat[0]}"
             )
 
     def transformed(self, matrix: ArrayLike) -> Self:

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.elementary import sin_cos_turns
 from ..arrays.frame import Frame
-from ..core.counted import counted
 from ..core.errors import SceneError
+from ..core.plural import plural
 from ..core.suggestions import suggests_keywords
 from ..materials import MaterialLike
 from .arrays import PrimitiveArray
@@ -63,7 +63,7 @@ class SegmentArray(PrimitiveArray):
             If there is no primitive, or an array does not have one row for each.
         """
         if len(self.starts) != len(self.ends):
-            starts, ends = counted(len(self.starts), "start"), counted(len(self.ends), "end")
+            starts, ends = plural(len(self.starts), "start"), plural(len(self.ends), "end")
             raise SceneError(f"{self.name}: has {starts} and {ends}")
         super().check()
 

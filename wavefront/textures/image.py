@@ -15,9 +15,9 @@ from ..arrays.vec import Floats, Ints, f4, luminance
 from ..codecs.budget import Budget
 from ..codecs.images import read_codes
 from ..colors import srgb_to_linear
-from ..core.counted import counted
 from ..core.errors import SceneError, as_array, finite_array, one_of
 from ..core.files import MAX_PIXELS, check_size
+from ..core.plural import plural
 from ..core.suggestions import suggests_keywords
 from .base import BaseTexture
 
@@ -232,7 +232,7 @@ def _codes(source: Any, max_pixels: int) -> tuple[NDArray[Any], str]:
     if len(bad):
         row, column, _ = bad[0]
         raise SceneError(
-            f"texture {name!r} has {counted(len(bad), 'value that is', 'values that are')} not finite, "
+            f"texture {name!r} has {plural(len(bad), 'value that is', 'values that are')} not finite, "
             f"first: row {row}, column {column}"
         )
     return codes, name

@@ -3,7 +3,7 @@
 import pytest
 
 import wavefront as wf
-from wavefront.core.counted import counted
+from wavefront.core.plural import plural
 
 
 @pytest.mark.parametrize(
@@ -19,7 +19,7 @@ from wavefront.core.counted import counted
     ],
 )
 def test_one_takes_no_plural(arguments, text):
-    assert counted(*arguments) == text
+    assert plural(*arguments) == text
 
 
 def test_scenes_and_meshes_count_in_words():
