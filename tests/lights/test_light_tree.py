@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wavefront as wf
-from wavefront.arrays.record import record
+from wavefront.arrays.soa import soa
 from wavefront.arrays.vec import Floats, f4
 from wavefront.lights import (
     LightTable,
@@ -128,7 +128,7 @@ def test_very_many_lights_are_chosen_by_a_tree() -> None:
     assert chance[1:].tolist() == [0.5, 0.5]
 
 
-@record
+@soa
 class Dish(LightRecord):
     """Triangles that are chosen by a tree, as one light."""
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import Protocol
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Bools, Floats, Ints
 from .primitives import CurvedPrimitives
 
 
-@record
+@soa
 class Geometry:
     """The geometry that rays can hit, in float32 relative to the scene's center.
 
@@ -36,7 +36,7 @@ class Geometry:
         return len(self.triangles) + sum(map(len, self.curved))
 
 
-@record
+@soa
 class Intersections:
     """The nearest hit of each ray.
 

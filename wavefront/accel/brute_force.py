@@ -14,7 +14,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Bools, Bytes, Floats, Ints, f4
 from . import triangle
 from .base import Geometry
@@ -28,7 +28,7 @@ from .triangle import PolygonPlanes, TriangleTable, least_adjacent_product, leas
 CHUNK = 1 << 19  # elements of one product
 
 
-@record
+@soa
 class Polygons:
     """Flat polygons of one kind."""
 
@@ -37,7 +37,7 @@ class Polygons:
     parallelograms: bool
 
 
-@record
+@soa
 class EdgeMatrix:
     """Polygons of one kind as a matrix."""
 

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Floats, Ints, f4
 
 EMPTY = f4(3e38)  # an empty box, which no ray meets, extends from EMPTY to -EMPTY
@@ -22,7 +22,7 @@ SAMPLE = 1 << 13  # of the primitives of larger segments, from which their split
 MAX_BINS = 16  # splits tried per node and axis
 
 
-@record
+@soa
 class Tree:
     """A tree with `width` children per node. A child code c >= 0 is inner node c, c < 0 is leaf -1 - c."""
 

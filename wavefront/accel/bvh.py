@@ -20,7 +20,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import TINY, Bools, Doubles, Floats, Ints, f4, spans
 from .build import build_tree, stable_order
 from .triangle import ROUNDOFF
@@ -59,7 +59,7 @@ def flat_true(mask: Bools) -> Ints:
     return mask.reshape(-1).nonzero()[0]
 
 
-@record
+@soa
 class Ball:
     """A bounding ball of all primitives."""
 
@@ -184,7 +184,7 @@ def _with_one(name: str, points: Floats) -> Floats:
     return out
 
 
-@record
+@soa
 class Bvh:
     """A tree as matrices. Lengths are in units of the ball's radius, positions relative to its center."""
 
@@ -410,7 +410,7 @@ def trace(
         slot, lane, near = slot.take(rest), lane.take(rest), near.take(rest)
 
 
-@record
+@soa
 class _Lines:
     """The lines of n rays in units of the ball's radius, about its center, and one that meets nothing."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Bools, Doubles, Floats, Ints, f4, length
 from ..shapes import Capsules
 from .primitives import first_hit
@@ -12,7 +12,7 @@ from .segment import SegmentPrimitives
 from .sphere import sphere_roots
 
 
-@record
+@soa
 class CapsulePrimitives(SegmentPrimitives):
     """k capsules: all points that are within the radius of a segment."""
 

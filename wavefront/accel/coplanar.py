@@ -16,7 +16,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Bools, Doubles, Floats, Ints, cross, dot, f4, length, spans
 from .duplicates import FACTORS, Keys, repeated
 from .triangle import AXES, ROUNDOFF, TriangleTable
@@ -36,7 +36,7 @@ NONE: Ints = np.zeros(0, np.intp)
 HalfInts = NDArray[np.int32]  # numbers of faces, in half the memory of `Ints`
 
 
-@record
+@soa
 class Overlaps:
     """The faces that overlap others, (k,) columns in ascending order of the faces."""
 

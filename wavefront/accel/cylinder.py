@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Bools, Doubles, Floats, Ints, f4, length
 from ..shapes import Cylinders
 from .primitives import first_hit
 from .segment import Cut, SegmentPrimitives
 
 
-@record
+@soa
 class CylinderPrimitives(SegmentPrimitives):
     """k cylinders."""
 

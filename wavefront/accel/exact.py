@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Floats, Ints, Lanes
 from . import triangle
 from .bvh import Ball, RayBatch
@@ -15,7 +15,7 @@ from .primitives import Primitives
 from .triangle import TriangleTable
 
 
-@record
+@soa
 class TrianglePrimitives(Primitives):
     """m triangles."""
 

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Bools, Doubles, Floats, Ints, f4
 from .base import Accelerator, Intersections
 from .build import build_tree
@@ -26,7 +26,7 @@ PAIRS = 1 << 20  # pairs held at a time; a batch that has more is halved
 ROUNDING = f4(1e-6)  # bound of the relative error of distances to boxes
 
 
-@record
+@soa
 class Placements:
     """The transforms and bounding boxes of the instances, one column each."""
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.elementary import arctan2
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import SoA
 from ..arrays.vec import Bools, Doubles, Floats, Ints, cross, dot, f4, highest, length
 from .bvh import PAIRS, Ball, quadric_rows
@@ -27,7 +27,7 @@ ROUNDED = f4(2**-21)
 LEAST_SLOPE = 1e-6  # 1 − (n·axis)² below which a surface counts as perpendicular to the axis
 
 
-@record
+@soa
 class Cut(SoA):
     """Rays and the segments that they may hit, k pairs."""
 
@@ -37,7 +37,7 @@ class Cut(SoA):
     leave: Doubles  # (k,) where the line leaves it
 
 
-@record
+@soa
 class SegmentPrimitives(CurvedPrimitives):
     """k primitives of one radius about a segment each."""
 

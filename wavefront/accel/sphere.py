@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Bools, Doubles, Floats, Ints, f4, normalize
 from ..shapes import Sphere, Spheres
 from ..shapes.attributes import sphere_dpduv, sphere_uv
@@ -17,7 +17,7 @@ from .primitives import CurvedPrimitives
 from .triangle import ROUNDOFF
 
 
-@record
+@soa
 class SpherePrimitives(CurvedPrimitives):
     """k spheres."""
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Bools, Doubles, Floats, Ints, cross, f4, spans
 
 ROUNDOFF = 2.0**-24  # half an ulp of float32
@@ -23,7 +23,7 @@ LEAST_EXTENT = 1e-30  # added to the extent of points, so that no row is infinit
 AXES = np.array([[1, 2, 0], [2, 0, 1], [0, 1, 2]])
 
 
-@record
+@soa
 class TriangleTable:
     """Float64 data of the exact tests, one column per triangle (m)."""
 

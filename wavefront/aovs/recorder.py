@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import BounceDepth, Contribution, Hits, Paths
 from ..arrays.vec import Bools, Bytes, Floats, Ints, broadcast, f4, put, take
 from ..compile.scene import CompiledScene
@@ -27,7 +27,7 @@ FEATURES = ("denoising_albedo", "denoising_normal")
 OF_LIGHT = ("direct", "indirect", "light_groups", CLAMPED)
 
 
-@record
+@soa
 class AwaitedSurfaces:
     """Surfaces that paths have met, and that nobody has shaded yet."""
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .record import record
+from .soa import soa
 from .vec import Floats, Lanes, column, f4, signs, take
 
 
-@record
+@soa
 class Frame:
     """Right-handed orthonormal frames, one per column.
 

@@ -1,4 +1,4 @@
-"""The records that the stages pass on: structures of arrays with one column per path.
+"""What the stages pass on: structures of arrays with one column per path.
 
 Each field is declared once, with its shape and unit; `take`, `concatenate` and `len` are derived.
 """
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .frame import Frame
-from .record import record
+from .soa import soa
 from .vec import Bools, Bytes, Floats, Ints, Lanes, take
 
 Words = NDArray[np.uint32]
@@ -90,7 +90,7 @@ def _joined(values: Sequence[Any]) -> Any:
     return np.concatenate(arrays, axis=-1)
 
 
-@record
+@soa
 class Rays(SoA):
     """Rays for an accelerator."""
 
@@ -99,7 +99,7 @@ class Rays(SoA):
     exclude_prim: Ints  # (n,) primitive that the ray starts on, -1 for none
 
 
-@record
+@soa
 class Paths(Rays):
     """Paths: the current ray, throughput and random-number address of each."""
 
@@ -119,7 +119,7 @@ class Paths(Rays):
     recorder: Any = None  # the `PathRecorder` of the wave
 
 
-@record
+@soa
 class Hits(SoA):
     """The nearest hit of each ray."""
 
@@ -135,7 +135,7 @@ class Hits(SoA):
         return np.flatnonzero(self.prim >= 0)
 
 
-@record
+@soa
 class SurfaceInteraction(SoA):
     """The surface geometry at hit points. Normals are on the side that the ray came from."""
 
@@ -161,7 +161,7 @@ class SurfaceInteraction(SoA):
         return Frame.from_normal(self.ns)
 
 
-@record
+@soa
 class Contribution(SoA):
     """Light that arrives at the camera along some paths: emission that they met, or direct light.
 

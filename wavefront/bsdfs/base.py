@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Bools, Floats, broadcast
 from ..core.errors import SceneError
@@ -29,7 +29,7 @@ ALBEDO_NUMBERS = ((0.5 + np.arange(16)[:, None] * 1.2207440846057596 ** -np.aran
 )
 
 
-@record
+@soa
 class BsdfSample:
     """One sampled direction per column. A zero weight means that there is no sample.
 

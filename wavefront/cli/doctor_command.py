@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..accel.embree import installed
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Doubles, Ints
 from ..bsdfs import Dielectric, Diffuse
 from ..camera import Camera
@@ -48,7 +48,7 @@ ROOM = (  # what `timed_room` returns
 )
 
 
-@record
+@soa
 class Extra:
     """An extra of the package: what it installs and what that brings."""
 
@@ -56,7 +56,7 @@ class Extra:
     brings: str
 
 
-@record
+@soa
 class CheckResult:
     """What a test found."""
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..accel import KINDS, CurvedPrimitives, kind_of
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import ALL, Floats, Ints, Lanes, f4, put, take
 from ..shapes import CurvedShape
 
@@ -19,7 +19,7 @@ def order_by_kind(shapes: Sequence[CurvedShape]) -> list[int]:
     return sorted(range(len(shapes)), key=kinds.__getitem__)
 
 
-@record
+@soa
 class CurvedTable:
     """All curved primitives, numbered from 0 on."""
 

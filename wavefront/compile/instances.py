@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..accel import Placements
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import SoA
 from ..arrays.vec import Doubles, Floats, Ints, f4
 from ..core.errors import SceneError
@@ -21,7 +21,7 @@ SKEW = 1e3  # instances whose scales along two axes have a larger ratio become m
 BOX_ROOM = 2.0**-20  # margin of boxes on all sides, relative to their size and distance from the center
 
 
-@record
+@soa
 class InstanceTable(SoA):
     """Data of instances for shading.
 

@@ -6,14 +6,14 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Floats, Ints
 from ..film.aov_names import group_name
 from ..lights import EnvironmentSum, InfiniteLight, Light
 from ..shapes import CurvedShape, Mesh
 
 
-@record
+@soa
 class LightGroups:
     """The group of each light of a scene, and of the parts of its environment."""
 

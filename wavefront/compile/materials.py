@@ -7,7 +7,7 @@ from copy import copy
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Bools, Floats, Ints, f4
 from ..bsdfs import Bsdf
@@ -20,7 +20,7 @@ from ..textures.base import BaseTexture
 from ..textures.normal_map import BaseNormalMap
 
 
-@record
+@soa
 class ParameterTable(BaseTexture):
     """The values of one parameter for the BSDFs of many materials, one column per material."""
 
@@ -31,7 +31,7 @@ class ParameterTable(BaseTexture):
         return self.table.take(surface.material, -1)
 
 
-@record
+@soa
 class MaterialTable:
     """The materials of a scene: BSDFs, gathered into groups that are shaded together, and normal maps."""
 
@@ -41,7 +41,7 @@ class MaterialTable:
     normal_maps: tuple[BaseNormalMap, ...]
 
 
-@record
+@soa
 class Opacities:
     """The opacities of a scene's surfaces (alpha)."""
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Floats, f4
 
 BITS = 5  # along each axis: codes have 15 bits, and NumPy sorts integers of 16 bits by radix
@@ -19,7 +19,7 @@ _SPREAD = np.array(
 )
 
 
-@record
+@soa
 class MortonGrid:
     """A cubic grid of 2^BITS cells along each axis."""
 

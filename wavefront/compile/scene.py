@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..accel import Accelerator, Geometry, InstanceAccelerator
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Bools, Floats, Ints
 from ..camera import Camera
 from ..lights import InfiniteLight, LightTable
@@ -42,7 +42,7 @@ ROULETTE_AFTER = 2  # scattering events, by default
 LARGE = 20_000  # triangles; from here on the order of rays matters more than sorting them costs
 
 
-@record
+@soa
 class CompiledScene:
     """A scene as flat arrays, relative to its center. Triangles come first, then curved primitives.
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import Hits
 from ..arrays.vec import Ints
 from ..shapes import CurvedShape, Instance, Mesh
@@ -14,7 +14,7 @@ from ..shapes import CurvedShape, Instance, Mesh
 SINGLE_COLUMNS = 2  # of the `InstanceTable`, for what is not instanced
 
 
-@record
+@soa
 class ShapeNumbers:
     """The positions of shapes in `Scene.shapes`, by rows of the scene's tables.
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..accel.quads import find_quads
 from ..accel.sphere import SpherePrimitives
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import SoA
 from ..arrays.vec import Bools, Doubles, Floats, Ints, f4, interpolate
 from ..sampling.warp import uniform_sphere, uniform_triangle
@@ -17,7 +17,7 @@ from .curved import CurvedTable
 from .materials import MaterialTable
 
 
-@record
+@soa
 class SpecularPoints(SoA):
     """Points on specular surfaces."""
 
@@ -27,7 +27,7 @@ class SpecularPoints(SoA):
     b2: Floats  # (n,) and of the third
 
 
-@record
+@soa
 class SpecularSurfaces:
     """The specular surfaces of a scene: its triangles and spheres whose materials have only delta lobes."""
 

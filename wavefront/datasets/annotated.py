@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Doubles
 from ..core.errors import SceneError
 from ..core.suggestions import did_you_mean
@@ -15,7 +15,7 @@ from ..shapes import Instance, Shape
 RIGID = 1e-6  # largest element of MᵀM − 1 of a matrix that neither scales nor shears
 
 
-@record
+@soa
 class AnnotatedObject:
     """One shape that is annotated."""
 

@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..camera import Camera, Perspective
 from ..codecs.display import Display
 from ..image import Image
@@ -19,7 +19,7 @@ Silhouettes: TypeAlias = Callable[[Camera | None], Iterator[tuple[int, Mask]]]
 NEAREST = 1e-5  # of the near clipping plane, in depths of the far one
 
 
-@record
+@soa
 class DatasetView:
     """A rendered view."""
 

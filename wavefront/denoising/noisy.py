@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Doubles, Floats
 from ..film.aov_names import GUIDES
 
 
-@record
+@soa
 class Guide:
     """A layer that shows the edges of the picture, with less noise."""
 
@@ -21,7 +21,7 @@ class Guide:
     squared_error: Floats  # (H, W, 3)
 
 
-@record
+@soa
 class NoisyPicture:
     """A picture and its guides."""
 

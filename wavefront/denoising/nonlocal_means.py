@@ -15,7 +15,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..arrays.elementary import exp
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Doubles, Floats
 from .noisy import Guide, NoisyPicture
 
@@ -44,7 +44,7 @@ def nonlocal_means(picture: NoisyPicture) -> Floats:
     return np.ascontiguousarray(np.moveaxis(denoised, 0, 2), np.float32)
 
 
-@record
+@soa
 class _Noisy:
     """Values with their variance."""
 

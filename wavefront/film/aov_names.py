@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..core.errors import SceneError
 from ..core.suggestions import did_you_mean
 
 
-@record
+@soa
 class Layer:
     """One layer."""
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Floats, Ints, f4
 
 FRACTION_BITS = 24  # of fixed-point numbers
@@ -21,7 +21,7 @@ BOUNDED = ("albedo", "denoising_albedo", "denoising_normal")  # layers whose sam
 FixedPoint = NDArray[np.int32] | NDArray[np.int64]
 
 
-@record
+@soa
 class FixedPointSamples:
     """Sums over some samples of each pixel."""
 
@@ -29,7 +29,7 @@ class FixedPointSamples:
     squares: FixedPoint  # (c, k) of the squared samples, each rounded down to a multiple of 2^-24
 
 
-@record
+@soa
 class LayerSamples:
     """The sampled layers of a wave: samples of k pixels."""
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import Words
 from ..arrays.vec import Doubles, Floats, Ints, Lanes, f4
 from .aov_names import layer_of
@@ -28,7 +28,7 @@ UNIT = 2.0**-FRACTION_BITS
 LARGEST_NARROW = NARROW_TERMS << FRACTION_BITS
 
 
-@record
+@soa
 class LayerEstimate:
     """What the samples of a layer come to."""
 

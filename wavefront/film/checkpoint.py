@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..core.errors import SceneError, in_brief
 from ..core.files import check_size
 from ..version import VERSION
@@ -31,7 +31,7 @@ FORM: dict[str, type | tuple[type, ...]] = {  # of a header
 SumsMaker = Callable[[Mapping[str, Any]], PictureSums]  # of the header
 
 
-@record
+@soa
 class Checkpoint:
     """A render that was begun."""
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import Words
 from ..arrays.vec import ALL, Doubles, Floats, Ints, Lanes, distinct, take
 from .exact_sum import ExactSums
@@ -327,7 +327,7 @@ class Film(Sums):
         return Estimates(mean, variance, error, float(np.sqrt(relative.mean())), self.rare_part(relative))
 
 
-@record
+@soa
 class Estimates:
     """What the samples on a film come to."""
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..core.errors import SceneError
 from .aov_sums import LayerSums
 from .film import Film
@@ -21,7 +21,7 @@ from .sums import Sums
 ADDED = ("seconds", "spp", "samples", "rays", "bad_samples")  # metadata of parts that add up
 
 
-@record
+@soa
 class PictureSums(Sums):
     """Sums of the samples of a picture and its layers."""
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Floats, Ints, f4
 
 OUTLYING = 0.002  # part of the points, along each axis and side, that the grid leaves outside
 MARGIN = 0.01  # of the grid's extent, on each side
 
 
-@record
+@soa
 class GuideCells:
     """A cubic grid times the six axes, of which a normal belongs to the nearest.
 

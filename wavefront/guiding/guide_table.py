@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Doubles, Floats, Ints, f4
 from .cells import GuideCells
 from .octahedral import bins_of, directions_at
@@ -12,7 +12,7 @@ from .octahedral import bins_of, directions_at
 INSIDE = f4(1e-5)  # the least distance of a sampled direction from the edges of its bin, of the bin's side
 
 
-@record
+@soa
 class GuideTable:
     """Densities over directions, piecewise constant over bins of the octahedral square.
 

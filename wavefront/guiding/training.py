@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import SoA
 from ..arrays.vec import Doubles, Floats, Ints
 from .cells import GuideCells
@@ -30,7 +30,7 @@ SHARES = (0.0, 0.15, 0.3, 0.45, 0.6, 0.75)  # that are compared
 SHARE_PRIOR = 200.0  # records that the comparison over all cells counts for
 
 
-@record
+@soa
 class Records(SoA):
     """What paths found, a column for each direction that one took."""
 

@@ -23,7 +23,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import Hits, Paths, Rays, SoA, SurfaceInteraction, Words
 from ..arrays.vec import Bools, Doubles, Floats, Ints, broadcast, dot, f4, highest, length, take
 from ..camera import Camera
@@ -45,7 +45,7 @@ NEARBY = f4(16)  # error bounds within which another surface is at the same plac
 LOWER_BITS = 2.0**-24  # of a number drawn: how far apart two of them are
 
 
-@record
+@soa
 class Splats(SoA):
     """What paths from lights add to pixels, which may repeat."""
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..aovs.path_recorder import PathRecorder
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import Contribution, Paths, SoA, Words
 from ..arrays.vec import Floats, Ints, highest, take
 from ..camera import Camera
@@ -29,7 +29,7 @@ WAVE = 1 << 16
 GOLDEN = np.uint64(0x9E3779B1)  # 2³² divided by the golden ratio spreads few paths over many pixels
 
 
-@record
+@soa
 class Vertices(SoA):
     """Where some paths scattered, and in which directions they left."""
 

@@ -21,7 +21,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Doubles, Ints
 from ..camera import Camera
 from ..compile.scene import CompiledScene
@@ -58,7 +58,7 @@ BLUR = 4  # standard deviation of the blur, pixels
 BLUR_WEIGHTS = np.array([math.exp(-((distance / (2 * BLUR)) ** 2)) for distance in range(SIDE * STRIDE)])
 
 
-@record
+@soa
 class Reused:
     """What sharing paths among pixels brings."""
 
@@ -69,7 +69,7 @@ class Reused:
     evaluations: float  # connections that were looked at, whether or not they needed a ray
 
 
-@record
+@soa
 class Trial:
     """What a trial has found."""
 

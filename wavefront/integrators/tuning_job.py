@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..accel import Accelerator, Intersections
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import Paths, Words
 from ..arrays.vec import ALL, Bools, Doubles, Floats, Ints, f4
 from ..camera import Camera
@@ -28,7 +28,7 @@ from .steps import accumulate, intersect_and_compact, prepare_shading
 SAMPLES = 4  # of each pixel in each block; stratified, as those of a picture are
 
 
-@record
+@soa
 class TrialPart:
     """What the paths of some pixels have found."""
 
@@ -42,7 +42,7 @@ class TrialPart:
     evaluations: int  # of BSDFs, for these
 
 
-@record
+@soa
 class TrialJob:
     """Some tiles of a trial, which are traced together."""
 

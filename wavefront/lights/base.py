@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import SoA, SurfaceInteraction
 from ..arrays.vec import Bools, Doubles, Floats, Ints, f4
 from ..core.errors import SceneError, finite_array
@@ -22,7 +22,7 @@ from ..film.aov_names import DEFAULT_GROUP
 from ..shapes import Shape
 
 
-@record
+@soa
 class LightSample(SoA):
     """The light that arrives at a point from one sampled direction. A pdf of 0 means no sample.
 
@@ -45,7 +45,7 @@ class LightSample(SoA):
     b2: Floats | None = None  # (n,) barycentric weight of its third vertex
 
 
-@record
+@soa
 class Emitters(SoA):
     """Positions and directions of k lights, for the choice of one among very many.
 

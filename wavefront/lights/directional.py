@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.elementary import sin_cos
 from ..arrays.frame import Frame
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import TWO_PI, Floats, column, dot, f4
 from ..colors import rgb
@@ -24,7 +24,7 @@ from .infinite import InfiniteLight, at_infinity, facing_irradiance, through_sce
 MIN_ANGLE = 0.01  # degrees; float32 directions cannot tell a smaller disk's edge to a percent
 
 
-@record
+@soa
 class DirectionalLights(DeltaLight):
     """k lights whose rays are parallel."""
 
@@ -47,7 +47,7 @@ class DirectionalLights(DeltaLight):
         return facing_irradiance(self, center)
 
 
-@record
+@soa
 class SunLight(InfiniteLight):
     """A disk of constant radiance at infinity, sampled uniformly in solid angle."""
 

@@ -10,7 +10,7 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import INV_FOUR_PI, Floats, f4
 from ..codecs.budget import in_memory
@@ -25,7 +25,7 @@ from .image import ImageEnvironment, environment_pixels
 from .infinite import InfiniteLight, at_infinity, through_scene
 
 
-@record
+@soa
 class ConstantEnvironment(InfiniteLight):
     """The same radiance from every direction."""
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.elementary import arctan2, sin_cos, sin_cos_turns
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import INV_PI, INV_TWO_PI, Floats, f4, luminance
 from ..codecs.budget import Budget
@@ -28,7 +28,7 @@ from .infinite import InfiniteLight, at_infinity, through_scene, turned
 LEAST_SHARE = 1e-3  # of the light of an image that is worth light samples
 
 
-@record
+@soa
 class ImageEnvironment(InfiniteLight):
     """Radiance from a latitude–longitude image, sampled texel by texel.
 

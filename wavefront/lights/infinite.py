@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Floats, Lanes, column, f4
 from ..sampling.discrete import Discrete
@@ -58,7 +58,7 @@ class InfiniteLight(LightRecord):
         return self
 
 
-@record
+@soa
 class EnvironmentSum(InfiniteLight):
     """The sum of several lights at infinity, sampled one at a time by their power.
 

@@ -7,7 +7,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Floats, dot, f4, positive
 from .base import Emitters, LightRecord
@@ -16,7 +16,7 @@ LEAST_SQUARE = f4(1e-35)  # added to squared distances before their root, so tha
 EDGE_ON = f4(1e-14)  # taken off cosines that are divided by; smaller ones count as those of a dark side
 
 
-@record
+@soa
 class PlanarLights(LightRecord):
     """k flat lights that emit from their front side, given by a corner and two edges."""
 

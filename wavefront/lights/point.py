@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import FLOAT32_MAX, Floats, dot, f4
 from ..colors import rgb
 from ..core.errors import SceneError, as_array, finite_array
@@ -18,7 +18,7 @@ from ..film.aov_names import DEFAULT_GROUP, group_name
 from .base import DeltaLight, Emitters, Light, LightSample, position
 
 
-@record
+@soa
 class PointLightRecord(DeltaLight):
     """k points that emit equally in all directions."""
 

@@ -8,7 +8,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Bools, Floats, Ints, dot, f4, put
 from ..sampling.spherical import SphericalRectangle
 from ..shapes.fans import are_fans, disjoint_pairs
@@ -22,7 +22,7 @@ ON = f4(1e-5)  # height, in widths, of points on the rectangle itself
 SQUARE = 1e-6  # how far, relative to its sides, a pair of triangles may be from a rectangle
 
 
-@record
+@soa
 class RectangleLights(PlanarLights):
     """k rectangles, with perpendicular edges, that emit from their front side."""
 
@@ -101,7 +101,7 @@ class RectangleLights(PlanarLights):
         return SphericalRectangle.of(some.corner - point.take(lanes, 1), some.edge_u, some.edge_v, dtype)
 
 
-@record
+@soa
 class TwoSidedRectangleLights(TwoSided, RectangleLights):
     """k rectangles that emit from both sides."""
 

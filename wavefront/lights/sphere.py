@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.frame import Frame
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import INV_FOUR_PI, TWO_PI, Bools, Floats, dot, f4
 from ..sampling.warp import uniform_cone, uniform_sphere
 from .base import Emitters, LightRecord, LightSample
 
 
-@record
+@soa
 class SphereLights(LightRecord):
     """k spheres that emit on both sides."""
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.elementary import arccos, arcsin, sin_cos, sin_cos_turns
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Floats, dot, f4
 from ..core.errors import SceneError, finite_array, number
 from ..core.parameter import Parameter
@@ -17,7 +17,7 @@ from .directional import unit
 from .point import LightAtPoint
 
 
-@record
+@soa
 class SpotLights(DeltaLight):
     """k points that each emit into a cone."""
 

@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Bools, Floats, Ints, cross, f4, interpolate, normalize
 from ..materials.alpha import Opacity
@@ -22,7 +22,7 @@ MOST_SAMPLES = 1 << 18  # points of a mesh that are looked up, if possible
 LEAST, MOST = 4, 32  # parts that an edge of a face is cut into
 
 
-@record
+@soa
 class TexturedTriangleLights(TriangleLights):
     """k triangles that emit from their front side, some of them by a texture or less where alpha is below 1.
 
@@ -67,7 +67,7 @@ class TexturedTriangleLights(TriangleLights):
         return radiance_by_source(self.emissions, self.source, wi, surface, self.sides == 2)
 
 
-@record
+@soa
 class TwoSidedTexturedTriangleLights(TwoSided, TexturedTriangleLights):
     """k triangles that emit from both sides, some of them by a texture."""
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays.elementary import sin_cos_turns
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Bools, Floats, Ints, f4, spans
 from ..shapes.attributes import sphere_uv
@@ -20,7 +20,7 @@ LEAST_DIRECTIONS, MOST_DIRECTIONS = 64, 4096  # in which a texture is looked up 
 GOLDEN = (5**0.5 - 1) / 2  # of a turn, between two directions
 
 
-@record
+@soa
 class TexturedSphereLights(SphereLights):
     """k spheres, some of which emit by a texture; it is looked up at the sampled point."""
 

@@ -7,14 +7,14 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Floats, cross, dot, f4
 from ..sampling.warp import uniform_triangle
 from .base import LightSample
 from .planar import LEAST_SQUARE, PlanarLights, TwoSided, area_pdf
 
 
-@record
+@soa
 class TriangleLights(PlanarLights):
     """k triangles that emit from their front side, sampled uniformly by area."""
 
@@ -70,6 +70,6 @@ class TriangleLights(PlanarLights):
         return t * t / (np.where(meets, cos_light, f4(1)) * self.area)
 
 
-@record
+@soa
 class TwoSidedTriangleLights(TwoSided, TriangleLights):
     """k triangles that emit from both sides."""

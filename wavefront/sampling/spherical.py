@@ -7,11 +7,11 @@ from typing import Self
 import numpy as np
 
 from ..arrays.elementary import arctan2, sin_cos
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Floats, cross, dot, f4, normalize
 
 
-@record
+@soa
 class SphericalRectangle:
     """Rectangles, each seen from one point, sampled uniformly in solid angle.
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import Words
 from ..arrays.vec import Ints
 
@@ -64,7 +64,7 @@ def others_in_tile(pixel: Words, one: int, width: int) -> Ints:
     return same[same != one]
 
 
-@record
+@soa
 class WaveTiles:
     """The tiles of the paths of a wave: those of one tile and one sample belong together.
 

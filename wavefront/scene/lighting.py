@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.elementary import sin_cos_turns
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Doubles
 from ..bsdfs import Diffuse
 from ..camera import Camera, upward
@@ -32,7 +32,7 @@ GROUND_GAP = 1e-4  # distance of the ground from the scene, relative to the scen
 OWN_LIGHT_GROUND = 0.4  # albedo of the ground where no preset is used
 
 
-@record
+@soa
 class SoftBox:
     """A bright rectangle with soft edges, infinitely far away."""
 
@@ -59,7 +59,7 @@ class SoftBox:
         return part[:, :, None] * np.array(self.radiance)
 
 
-@record
+@soa
 class Preset:
     """A gradient from bottom to top, and soft boxes."""
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import Words
 from ..arrays.vec import Ints, distinct
 from ..film.film import MUCH_RARE, Film
@@ -16,7 +16,7 @@ MOST_RARE = 0.9  # part of the squared error, from where on it counts as this pa
 TILE = 8  # pixels; decisions are made for squares of this side
 
 
-@record
+@soa
 class Pass:
     """Samples to take before the next decision."""
 

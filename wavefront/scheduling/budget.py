@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..core.errors import SceneError
 from ..core.memory import check_memory, megabytes, resident_memory
 from ..core.plural import plural
@@ -18,7 +18,7 @@ GOOD_WAVE = 1 << 14  # lanes; there are fewer workers rather than smaller waves
 LEAST_WAVE = 1 << 10  # lanes; with less memory than such a wave needs there is no render
 
 
-@record
+@soa
 class Budget:
     """What is traced at once."""
 

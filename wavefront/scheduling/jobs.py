@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import Words
 from ..arrays.vec import Floats, Ints
 from ..camera import Camera
@@ -25,7 +25,7 @@ DEPTH_SHARE = 1 / 2  # of the samples so far, so that the pixels of a render tha
 # and of those left, so that all workers end at about the same time
 
 
-@record
+@soa
 class CameraJob:
     """What all jobs of one picture have in common.
 
@@ -71,7 +71,7 @@ def _received(values: list[Any], left: float, machine: str) -> CameraJob:
     return view
 
 
-@record
+@soa
 class Job:
     """A block of samples: some pixels × consecutive samples."""
 
@@ -119,7 +119,7 @@ class Job:
         return f"samples {first} to {last} of {plural(self.pixels.size, 'pixel')} from {self.pixels[0]} on"
 
 
-@record
+@soa
 class WaveResult:
     """What a wave of a job returns."""
 

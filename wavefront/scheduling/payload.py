@@ -20,7 +20,7 @@ from contextlib import contextmanager
 from itertools import count
 from typing import Any
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..core.errors import SceneError
 from ..core.shared import SharedInt, Stopped
 from .blas import single_threaded_blas
@@ -30,7 +30,7 @@ from .machine import machine_differences
 KEEP = 10.0  # seconds from the last job until a process forgets the work
 
 
-@record
+@soa
 class Payload:
     """Work, or where to read it."""
 
@@ -40,7 +40,7 @@ class Payload:
     data: bytes | None  # the work, pickled; None where the file has it
 
 
-@record
+@soa
 class Reply:
     """What a worker answers to a job."""
 
@@ -76,7 +76,7 @@ def _reply(work: Callable[[Any], Any], job: Any, differing: tuple[str, ...]) -> 
         single_threaded_blas.release()
 
 
-@record
+@soa
 class _Entry:
     work: Callable[[Any], Any]
     differences: tuple[str, ...]

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Generic, Self, TypeVar
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..core.errors import RenderError
 from ..core.interrupt import deferred_signals
 from ..core.shared import AT_ONCE, STOP, SharedInt, Stopped
@@ -30,7 +30,7 @@ CANCEL_TIMEOUT = 1.0  # seconds that jobs have to end when they are canceled
 IDLE_TIMEOUT = 10.0  # seconds after which idle workers end where no context keeps them
 
 
-@record
+@soa
 class _Submitted(Generic[Job, Result]):
     """A job that was given to workers."""
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..accel.base import Accelerator, Intersections
 from ..aovs.recorder import SampleRecorder, recorded_layers
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import Words
 from ..arrays.vec import Bools, Floats, Ints, broadcast
 from ..compile.scene import CompiledScene
@@ -56,7 +56,7 @@ class WaveMonitor:
             raise Stopped
 
 
-@record
+@soa
 class Tracer:
     """How jobs are traced: what all views of a session have in common."""
 

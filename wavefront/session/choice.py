@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
@@ -27,7 +27,7 @@ GUIDE_HINT = "most light is hard to find here: guide=True may pay (docs/guiding.
 GUIDE_TILES = MOST_TILES // 2  # whatever the size of the picture: the pilot takes longer anyway
 
 
-@record
+@soa
 class Choice:
     """How paths go on."""
 

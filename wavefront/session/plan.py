@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..camera import Camera
 from ..core.progress import phase
 from ..guiding import GuideTable
@@ -24,7 +24,7 @@ from .prepared_scene import PreparedScene
 NO_CHOICE = Choice()
 
 
-@record
+@soa
 class Plan:
     """How the view of a session is rendered; other views may be rendered in the same way."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import Hits, Rays, SurfaceInteraction
 from ..arrays.vec import Bools, Floats, Ints, f4, positive, take
 from ..compile.scene import CompiledScene
@@ -13,7 +13,7 @@ from ..lights import LightSample
 TARGET_ERROR = f4(2**-20)  # rounding of a sampled point on a light, relative to its distance
 
 
-@record
+@soa
 class ShadowRays(Rays):
     """Rays from points towards sampled points on lights."""
 

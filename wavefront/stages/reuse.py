@@ -22,7 +22,7 @@ from typing import Self
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import Hits, Paths, SoA
 from ..arrays.vec import ALL, INV_PI, TINY, Bools, Floats, Ints, dot, f4, highest, positive, spans, take
 from ..compile.scene import CompiledScene
@@ -37,7 +37,7 @@ TILES_AT_ONCE = (1 << 15) // MEMBERS  # whose first points are connected togethe
 GRAZING = f4(1 / 16)  # cosine to interpolated normals below which they may have been bent towards the viewer
 
 
-@record
+@soa
 class SharedPoints(SoA):
     """Second points y of paths, and the light that leaves them."""
 
@@ -169,7 +169,7 @@ def _arriving(
     return arriving, lost
 
 
-@record
+@soa
 class FirstPoints:
     """First points of t tiles as a grid, so that each shared point stands beside those of its tile.
 
@@ -241,7 +241,7 @@ class FirstPoints:
         return offset_origin(surface, cos.reshape(-1)).reshape(shape)
 
 
-@record
+@soa
 class Connections:
     """Connections of the first points of t tiles to one shared point each; all is 0 where there is none."""
 

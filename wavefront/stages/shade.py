@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays.frame import Frame
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.state import Contribution, Hits, Paths, SurfaceInteraction
 from ..arrays.vec import ALL, Floats, Ints, Lanes, broadcast, column, dot, f4, highest, take
 from ..bsdfs import Bsdf, albedo_of, evaluated
@@ -25,7 +25,7 @@ from .transmittance import transmittance_along
 UP = column((0, 0, 1))
 
 
-@record
+@soa
 class Guidance:
     """The table that guides the lanes which light samples reach, and its part in each direction."""
 
@@ -39,7 +39,7 @@ class Guidance:
         return pdf + share * (self.table.pdf(take(self.row, lanes), direction) - pdf)
 
 
-@record
+@soa
 class Shading:
     """Surfaces prepared for shading: local frames, and the lanes of each group of materials."""
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Doubles, Floats, Ints, distinct
 from ..core.errors import SceneError
 from ..film.film import Film, batch_size, chunks
@@ -25,7 +25,7 @@ NAMES = {"deviations": (np.int8, 4), "tile": (np.int32, 2), "level": (np.uint8, 
 PREFIX = "scatter."  # before the names of arrays in files
 
 
-@record
+@soa
 class Scatter:
     """How the batches of pixels that share paths scatter.
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..arrays.vec import Doubles, Ints
 from . import Scatter, sums_by_label
 from .student_t import log_gamma, t_tail
@@ -23,7 +23,7 @@ ROUNDING = 1e-5  # relative difference of two means that is left to float32
 TINY = 1e-300
 
 
-@record
+@soa
 class Estimate:
     """Means with their errors."""
 
@@ -36,7 +36,7 @@ class Estimate:
     sharing: int = 1  # where it is not: pixels in a group whose errors may depend on each other
 
 
-@record
+@soa
 class Significance:
     """p-values: chances that pictures which differ by noise alone differ by as much as these do."""
 

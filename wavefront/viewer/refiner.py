@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from ..arrays.record import record
+from ..arrays.soa import soa
 from ..camera import Camera
 from ..image import Image
 from ..session import Session
@@ -17,7 +17,7 @@ LEAST_SIDE = 16  # pixels of the first picture of a view
 PATIENCE = 2.0  # seconds that the first view waits in lower resolution for somebody to look at it
 
 
-@record
+@soa
 class ViewerFrame:
     """A picture of a view."""
 
