@@ -14,6 +14,9 @@ import sys
 import threading
 import time
 import warnings
+import zipfile
+import zlib
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +27,9 @@ import scenes
 import wavefront as wf
 from wavefront import cli
 from wavefront.core import files
+from wavefront.core.npz import npz_chunks
 from wavefront.film import checkpoint
-from wavefront.film.checkpoint_file import MAGIC, PRELUDE, VERSION, read_header
+from wavefront.film.checkpoint import HEADER, read_header
 from wavefront.sampling.sampler import IndependentSampler
 from wavefront.scheduling.scheduler import FIRST_WAVE, Scheduler
 
@@ -409,13 +413,15 @@ def test_truncation_is_noticed(content: bytes, tmp_path: Path) -> None:
 
 def test_a_damaged_file_is_neither_used_nor_replaced(content: bytes, tmp_path: Path) -> None:
     """By a render that should go on from it."""
-    damaged = content[:-1] + bytes([content[-1] ^ 1])
-    (tmp_path / "a").write_bytes(damaged)
     camera = wf.Camera.look_at((0, 1, 5), (0, 0, 0), size=(3, 2))
     settings: dict[str, Any] = {"noise": 0.9, "aovs": ("alpha", "albedo", "direct")}
-    with pytest.raises(wf.SceneError, match=r"a: the array .* is damaged: delete it"):
-        wf.render(scene(), 4, camera=camera, checkpoint=tmp_path / "a", **settings)
-    assert (tmp_path / "a").read_bytes() == damaged
+    for place in (-1, len(content) // 2):
+        damaged = bytearray(content)
+        damaged[place] ^= 1
+        (tmp_path / "a").write_bytes(damaged)
+        with pytest.raises(wf.SceneError, match=r"a: is damaged: delete it"):
+            wf.render(scene(), 4, camera=camera, checkpoint=tmp_path / "a", **settings)
+        assert (tmp_path / "a").read_bytes() == damaged
 
 
 # --- Faults -------------------------------------------------------------------------------------------
@@ -444,35 +450,85 @@ def test_a_file_is_on_the_disk_before_it_takes_its_place(
     assert steps == ["file", "replace", "folder"]
 
 
-def signed(header: bytes) -> bytes:
-    """Return a file with any header, and its right checksum."""
-    start = PRELUDE.pack(MAGIC, VERSION, len(header)) + header
-    return start + hashlib.sha256(start).digest()
+def npy(array: np.ndarray) -> bytes:
+    """Return an array as a file."""
+    whole = BytesIO()
+    np.save(whole, array)
+    return whole.getvalue()
 
 
-HEADERS = {
-    "empty": b"{}",
-    "a list": b"[]",
-    "a number": b"1",
-    "no JSON": b"[",
-    "deep": b"[" * 100_000,
-    "a long number": b"9" * 5000,
-    "no keys": b'{"arrays": []}',
-    "a huge array": b'{"arrays": [["a", "<f8", [1' + b"0" * 30 + b"]]]}",
-    "arrays are a number": b'{"arrays": 5}',
-    "array of two": b'{"arrays": [["a", "<f8"]]}',
-    "array of a number": b'{"arrays": [7]}',
-    "kind is a list": b'{"arrays": [["a", [], [1]]]}',
-    "size is text": b'{"arrays": [], "size": ["a", "b"], "layers": [], "identity": {}}',
-    "not unicode": b"\xff\xfe\xff",
+def archive(files: list[tuple[str, bytes]], method: int = zipfile.ZIP_STORED) -> bytes:
+    """Return a checkpoint with any files in it, and the right checksum."""
+    whole = BytesIO()
+    with warnings.catch_warnings(), zipfile.ZipFile(whole, "w", method) as packed:
+        warnings.simplefilter("ignore")  # that a name is there twice
+        packed.comment = b"\0\0\0\0"
+        for name, content in files:
+            packed.writestr(f"{name}.npy", content)
+    return with_checksum(whole.getvalue())
+
+
+def with_checksum(whole: bytes) -> bytes:
+    """Return a file with the right checksum at its end."""
+    return whole[:-4] + zlib.crc32(whole[:-4]).to_bytes(4, "little")
+
+
+def text(value: str) -> tuple[str, bytes]:
+    """Return a text as the header."""
+    return HEADER, npy(np.array(value))
+
+
+FORM = {
+    **dict.fromkeys(("wavefront", "numpy", "python"), "1"),
+    "identity": {"size": [1, 1], "aovs": []},
+    **{name: {} for name in ("metadata", "state")},
+    "command": None,
+}
+GOOD = text(json.dumps(FORM))
+COUNT = "sums.film.count"
+NPY = b"\x93NUMPY\x01\x00"  # and 2 bytes of length
+CLAIMS = [
+    b"{'descr': '<i8', 'fortran_order': False, 'shape': (%d,)}" % 10**30,
+    b"{'descr': '<i8', 'fortran_order': False, 'shape': (-1,-1)}",
+    b"{'descr': '|O', 'fortran_order': False, 'shape': (1,)}",
+    b"{'descr': '<i8', 'fortran_order': True, 'shape': (1,)}",
+    b"{'descr': [('a', '<i8')], 'fortran_order': False, 'shape': (1,)}",
+    b"{'descr': 7, 'fortran_order': False, 'shape': (1,)}",
+    b"[]",
+    b"{",
+    b"('",
+    b"__import__('os')",
+]
+CONTENTS = {
+    "no sums": [GOOD],
+    "no array": [GOOD, (COUNT, b"")],
+    "no header": [GOOD, (COUNT, b"12345678")],
+    "header without an end": [GOOD, (COUNT, NPY + b"\xff\xff{")],
+    **{
+        f"array {number}": [GOOD, (COUNT, NPY + len(claims).to_bytes(2, "little") + claims + b"1" * 8)]
+        for number, claims in enumerate(CLAIMS)
+    },
+    "two of one name": [GOOD, GOOD],
+    "empty": [text("{}")],
+    "a list": [text("[]")],
+    "a number": [text("1")],
+    "no JSON": [text("[")],
+    "deep": [text("[" * 100_000)],
+    "a long number": [text("9" * 5000)],
+}
+FILES = {
+    **{name: archive(files) for name, files in CONTENTS.items()},
+    "compressed": archive([GOOD, (COUNT, bytes(1000))], zipfile.ZIP_DEFLATED),
+    "no archive": with_checksum(b"PK\3\4" + bytes(26) + b"checkpoint.npy" + bytes(100)),
+    "a later version": with_checksum(archive([GOOD]).replace(b"PK\1\2\x14\3\x14", b"PK\1\2\x14\3\xff")),
 }
 
 
-@pytest.mark.parametrize("header", HEADERS.values(), ids=HEADERS)
-def test_wrong_contents_with_a_right_checksum_are_refused(header: bytes, tmp_path: Path) -> None:
+@pytest.mark.parametrize("whole", FILES.values(), ids=FILES)
+def test_wrong_contents_with_a_right_checksum_are_refused(whole: bytes, tmp_path: Path) -> None:
     """By everything that reads checkpoints, with the name of the file."""
     path = tmp_path / "a.wfck"
-    path.write_bytes(signed(header))
+    path.write_bytes(whole)
     for read in (
         lambda: wf.Image.load(path),
         lambda: wf.render(scene(), 2, checkpoint=path, progress=False),
@@ -488,6 +544,7 @@ def test_wrong_contents_with_a_right_checksum_are_refused(header: bytes, tmp_pat
         *((key, 5) for key in ("identity", "metadata", "state", "command", "wavefront")),
         *(("identity", {"size": size, "aovs": []}) for size in (5, [24.5, 18], [24], [10**9, 10**9])),
         *(("identity", {"size": [24, 18], "aovs": aovs}) for aovs in (5, ["no such layer"], [[]])),
+        ("identity", {"size": [16384, 8192], "aovs": []}),  # for which there would be no memory
         ("metadata", {}),
         ("metadata", {"sample_ranges": 5}),
         ("metadata", {"sample_ranges": []}),
@@ -499,13 +556,12 @@ def test_each_wrong_part_of_a_header_is_refused(tmp_path: Path, key: str, value:
     """By a render; its picture is not begun anew in silence."""
     path = tmp_path / "a.wfck"
     wf.render(scene(), 1, checkpoint=path, progress=False)
-    content = path.read_bytes()
-    _, _, length = PRELUDE.unpack(content[: PRELUDE.size])
-    end = PRELUDE.size + length
-    header = json.loads(content[PRELUDE.size : end])
+    with np.load(path) as file:
+        arrays = dict(file)
+    header = json.loads(str(arrays[HEADER]))
     assert key in header
     for changed in (header, header | {key: value}):
-        path.write_bytes(signed(json.dumps(changed).encode()) + content[end + 32 :])
+        path.write_bytes(b"".join(npz_chunks({**arrays, HEADER: np.array(json.dumps(changed))})))
         if changed is header:
             wf.render(scene(), 1, checkpoint=path, progress=False)
             continue
@@ -514,6 +570,17 @@ def test_each_wrong_part_of_a_header_is_refused(tmp_path: Path, key: str, value:
         if key == "identity":
             with pytest.raises(wf.SceneError, match=r"a\.wfck: "):
                 wf.Image.load(path)
+
+
+def test_a_checkpoint_is_an_archive_of_numpy(tmp_path: Path) -> None:
+    """Which other programs read, too: the mean of the samples is in its sums."""
+    image = wf.render(scene(), 4, checkpoint=tmp_path / "a.wfck")
+    with np.load(tmp_path / "a.wfck") as file:
+        assert (file["sums.film.count"] == 4).all()
+        batches = file["sums.film.batches"].sum(0).T.reshape(image.shape)
+        assert json.loads(str(file["checkpoint"]))["identity"]["size"] == list(SIZE)
+    np.testing.assert_allclose(batches / 4, image.rgb, rtol=1e-5)
+    assert zipfile.ZipFile(tmp_path / "a.wfck").testzip() is None
 
 
 def test_nothing_of_a_file_is_unpickled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -686,7 +753,7 @@ def test_a_full_disk_is_not_status_0(
     """The picture is saved where there is space for it."""
     monkeypatch.chdir(tmp_path)
     command[command.index("240")], command[-1] = "4", "3600"
-    monkeypatch.setattr("wavefront.film.checkpoint_file.write", refuse)
+    monkeypatch.setattr("wavefront.film.checkpoint.write_chunks", refuse)
     assert cli.main(command) == 2
     assert "error: the checkpoint was not written: no space" in capsys.readouterr().err
     assert (tmp_path / "out.npy").exists()

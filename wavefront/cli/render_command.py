@@ -13,7 +13,7 @@ from ..camera import Camera
 from ..codecs.display import Display
 from ..codecs.images import check_display, check_writable
 from ..core.errors import Interrupted, RenderError, SaveError, SceneError
-from ..film.checkpoint_file import contents_of, read_header
+from ..film.checkpoint import contents_of, read_header
 from ..image import Image
 from ..io.to_scene import SIZE
 from ..render import finish

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.errors import SceneError
+from ..core.npz import KINDS, MAX_HEADER, METADATA, SUMS, npz_chunks
 from ..core.plural import plural
 from .archive import checked_members
 from .budget import Budget
@@ -19,26 +20,13 @@ from .image_data import ImageData, from_json, from_named, to_json
 if TYPE_CHECKING:
     import zipfile
 
-METADATA = "metadata"  # the array of text
-SUMS = "sums."  # before the names of arrays that only merging reads
 MAX_ARRAYS = 2**12
-MAX_HEADER = 2**14  # bytes of an array's header
-KINDS = "fiubU"  # of NumPy types that are read
 
 
 def encode(picture: ImageData) -> bytes:
     """Return an npz file of all arrays of a picture, not compressed: noise hardly shrinks, and takes long."""
-    import zipfile  # imported here to keep `import wavefront` quick
-
-    buffer = BytesIO()
-    arrays = {**picture.named(), **{SUMS + name: values for name, values in picture.sums.items()}}
-    with zipfile.ZipFile(buffer, "w") as archive:
-        for name, values in {**arrays, METADATA: np.array(to_json(picture.info))}.items():
-            # with a fixed date: the same picture gives the same bytes
-            member = zipfile.ZipInfo(f"{name}.npy")
-            with archive.open(member, "w", force_zip64=True) as file:
-                np.lib.format.write_array(file, np.asanyarray(values), allow_pickle=False)
-    return buffer.getvalue()
+    sums = {SUMS + name: values for name, values in picture.sums.items()}
+    return b"".join(npz_chunks({**picture.named(), **sums, METADATA: np.array(to_json(picture.info))}))
 
 
 def decode(data: bytes, budget: Budget | None = None) -> ImageData:

@@ -18,6 +18,8 @@ from .identity import CAUSTICS, differences
 from .samples import sample_ranges
 from .sums import Sums
 
+# errors of values of JSON of another form: a list in place of a number, text in place of a list
+MALFORMED = (TypeError, KeyError, AttributeError, IndexError, ValueError, OverflowError, RecursionError)
 ADDED = ("seconds", "spp", "samples", "rays", "bad_samples")  # metadata of parts that add up
 
 
@@ -63,7 +65,7 @@ def restored_sums(
             raise SceneError(f"they are of a picture of size {identity['size']}")
         sums = identified_sums(identity)
         sums.restore(arrays)
-    except (SceneError, TypeError, KeyError, ValueError) as error:
+    except (SceneError, *MALFORMED) as error:
         raise SceneError(f"{name}: the sums of its samples are damaged: {error}") from error
     return sums
 

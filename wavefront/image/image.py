@@ -24,8 +24,7 @@ from ..core.errors import SceneError, as_array, number, one_of
 from ..core.html import picture_html
 from ..core.suggestions import did_you_mean
 from ..film.aov_names import BOXES, CLAMPED, GIVEN_LAYERS, LAYERS, NOISY, is_radiance
-from ..film.checkpoint import read_checkpoint
-from ..film.checkpoint_file import contents_of, is_checkpoint
+from ..film.checkpoint import contents_of, is_checkpoint, read_checkpoint
 from ..film.film import Film, batch_size, chunks
 from ..film.light_sums import LightSums
 from ..film.picture_sums import PictureSums, merged_metadata, merged_sums, restored_sums

@@ -13,8 +13,7 @@ from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..core.errors import SaveError, SceneError, warn_caller
 from ..core.fingerprint import fingerprint
-from ..film.checkpoint import Checkpoint, check_identity, other_versions, read_checkpoint
-from ..film.checkpoint_file import contents_of
+from ..film.checkpoint import Checkpoint, check_identity, contents_of, other_versions, read_checkpoint
 from ..film.identity import CODE, SCENE
 from ..film.picture_sums import PictureSums
 from ..scheduling.accumulator import Accumulator
