@@ -322,7 +322,7 @@ def test_the_metadata_tell_of_it() -> None:
 def test_a_hint_tells_where_light_is_missing(arguments, settings, missing):
     """Where there are lights that no path can meet beside smooth glass or mirrors."""
     hint = wf.render(scene(**arguments), 1, progress=False, **settings).metadata["hint"]
-    assert (hint is not None and "caustics=True adds it" in hint) == missing
+    assert (hint is not None and "caustics=True adds them" in hint) == missing
 
 
 def test_re_use_is_never_chosen_with_it() -> None:

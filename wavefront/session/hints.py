@@ -27,20 +27,20 @@ MOST_PAIRS = 1 << 17  # of specular surfaces and lights that are looked at
 MANY_TRIANGLES = 1000  # from which on Embree saves time that matters
 
 LOST_CAUSTICS = (
-    "the light that smooth glass and mirrors send on from points, spots and directional lights is missing: "
-    "caustics=True adds it (docs/caustics.md)"
+    "caustics of point, spot and directional lights by smooth glass and mirrors are missing: "
+    "caustics=True adds them (docs/caustics.md)"
 )
 RARE_CAUSTICS = (
-    "the light that smooth glass and mirrors send on from small lamps is found seldom, as bright dots: "
-    "caustics=True finds it (docs/caustics.md)"
+    "caustics of small lamps by smooth glass and mirrors are found rarely, as fireflies: "
+    "caustics=True finds them (docs/caustics.md)"
 )
 RARE_PATHS = (
-    "much of the noise rests on few bright samples, so errors look smaller than they are: more samples, "
+    "much of the noise comes from few bright samples, so errors are underestimated: more samples, "
     "larger lamps, guide=True or caustics=True help (docs/convergence.md#rare-paths)"
 )
 NO_EMBREE = "Embree is not installed: with `pip install embreex` meshes render two to four times as fast"
 NO_DENOISER = (
-    "Open Image Denoise is not installed: with `pip install pyoidn` denoise=True is quicker and removes more "
+    "Open Image Denoise is not installed: with `pip install pyoidn` denoise=True is faster and removes more "
     "noise"
 )
 
