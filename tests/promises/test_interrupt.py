@@ -129,8 +129,8 @@ except wf.Interrupted as stop:
 @pytest.mark.parametrize("module", ["xxhash", "scipy"])
 def test_ctrl_c_while_trimesh_is_imported(tmp_path: Path, module: str) -> None:
     """It catches BaseException about imports that are optional; no half of it stays behind."""
-    scene = tmp_path / "triangle.obj"
-    scene.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    scene = tmp_path / "triangle.off"
+    scene.write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
     body = f"""
 import signal
 class Presses:
