@@ -212,6 +212,18 @@ def test_presses_are_counted() -> None:
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+def test_other_workers_are_stopped_in_the_same_context() -> None:
+    """A session that begins another picture may need other workers, which have a stop flag of their own."""
+    first, second, third = SharedInt(), SharedInt(), SharedInt()
+    with suppress(KeyboardInterrupt), InterruptHandler(first) as handler:
+        handler.watch(second)
+        signal.raise_signal(signal.SIGINT)
+        handler.watch(third)
+        assert (first.value, second.value, third.value, handler.pressed) == (0, STOP, STOP, True)
+    handler.watch(first)
+    assert (first.value, handler.pressed) == (0, False)
+
+
 def test_a_press_is_not_lost() -> None:
     """When nothing is raised for it within the context, the outermost exit raises."""
     handler = InterruptHandler(SharedInt())

@@ -42,6 +42,12 @@ class InterruptHandler:
         self._depth = 0  # of contexts since then
         self._answered = True  # with an exception, each first Ctrl-C
 
+    def watch(self, stop: SharedInt) -> None:
+        """Set another stop flag from now on, and at once if Ctrl-C was pressed in this context."""
+        self._stop, self.pressed = stop, not self._answered
+        if self.pressed:
+            stop.rise_to(STOP)
+
     def __enter__(self) -> Self:
         """Install the handler."""
         in_main_thread = threading.current_thread() is threading.main_thread()

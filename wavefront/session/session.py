@@ -19,7 +19,7 @@ from ..aovs.boxes import silhouettes
 from ..camera import Camera, check_camera, image_size
 from ..core.errors import RenderError, SaveError, SceneError, warn_caller
 from ..core.interrupt import InterruptHandler
-from ..core.shared import STOP, Stopped
+from ..core.shared import STOP, SharedInt, Stopped
 from ..film.checkpoint import Checkpoint
 from ..image import Image
 from ..integrators.tuning_job import TrialJob, TrialPart
@@ -94,6 +94,7 @@ class Session:
         begin = time.perf_counter()
         self._in_block = self._closed = self._once = self._stopped = self._dropped = False
         self.command: dict[str, Any] | None = None  # of the command line, for checkpoints
+        self.interrupt_handler = InterruptHandler(SharedInt())
         self._use = SoleUse()
         self._settings = Settings(spp=spp, **settings)
         with setup_errors():
@@ -131,7 +132,7 @@ class Session:
     def _make_pool(self) -> None:
         """Make a pool of workers, which start with the first job if not before."""
         self._monitor = WaveMonitor()
-        self.interrupt_handler = InterruptHandler(self._monitor.stop)
+        self.interrupt_handler.watch(self._monitor.stop)
         self._pool = WorkerPool[Any, Any](  # of two kinds of jobs, each with its own kind of results
             partial(trace_any_job, self._plan.tracer, self._monitor),
             self._plan.budget.workers,
