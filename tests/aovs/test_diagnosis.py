@@ -30,7 +30,12 @@ def upside_down(mesh: wf.Mesh) -> wf.Mesh:
 
 
 BLACK = {
-    "no light": ([BALL], [], {"lighting": None}, "nothing in the scene shines; lighting='studio' lights it"),
+    "no light": (
+        [BALL],
+        [],
+        {"lighting": None},
+        "nothing in the scene emits light; lighting='studio' lights it",
+    ),
     "looks away": (
         [BALL, EMITTER],
         [],
@@ -47,13 +52,13 @@ BLACK = {
         [BALL, FLOOR, upside_down(PANEL)],
         [],
         {},
-        "the lights shine away from all that the camera sees; reverse their faces, or .* two_sided=True",
+        "the lights point away from all that the camera sees; reverse their faces, or .* two_sided=True",
     ),
     "cone misses": (
         [BALL],
         [wf.SpotLight((0, 3, 3), 100, target=(0, 9, 3), angle=30)],
         {},
-        "the lights shine away from all that the camera sees; direct the SpotLight, or widen its cone",
+        "the lights point away from all that the camera sees; direct the SpotLight, or widen its cone",
     ),
     "other side": (
         [wf.Rectangle((-3, -3, 0), (6, 0, 0), (0, 6, 0))],
@@ -123,7 +128,7 @@ WHITE = {
     "inside a light": (
         [BALL, wf.Sphere((0, 0, 5), 0.5, emission=4.0, name="sun")],
         [],
-        "the camera sees nothing but 'sun', which shines; save.*exposure=-3. shows",
+        "the camera sees nothing but 'sun', which emits light; save.*exposure=-3. shows",
     ),
     "looks past": (
         [wf.Sphere((0, 0, 9), 1)],
@@ -168,5 +173,5 @@ def test_shapes_of_instances_are_no_obstacle() -> None:
     places = [np.eye(4) for _ in range(3)]
     for number, place in enumerate(places):
         place[0, 3] = 2.0 * number - 2
-    with pytest.warns(UserWarning, match="the lights shine away"):
+    with pytest.warns(UserWarning, match="the lights point away"):
         render([*(wf.Instance(tile, place) for place in places), mesh], accel="numpy")

@@ -37,20 +37,20 @@ def warn_of_black_or_white(
     `view` is the camera in the units of the compiled scene.
     """
     brightest, darkest = float(image.rgb.max()), float(image.rgb.min())
-    sight = Sight(scene, view, integrator, max_bounces)
+    probe = VisibilityProbe(scene, view, integrator, max_bounces)
     if darkest > 1:
-        warn_caller(f"the picture is white: {sight.why_white(darkest)}")
+        warn_caller(f"the picture is white: {probe.why_white(darkest)}")
     elif brightest > 0:
         stops = int(np.ceil(np.log2(0.5 / brightest)))
         warn_caller(
             f"the picture is almost black: its brightest pixel is {brightest:.2g}, and 1 is white; "
             f"save(..., exposure={stops}) shows it, or lights {2**stops} times as bright"
         )
-    elif not sight.lights_are_off:
-        warn_caller(f"the picture is black: {sight.why_black()}")
+    elif not probe.lights_are_off:
+        warn_caller(f"the picture is black: {probe.why_black()}")
 
 
-class Sight:
+class VisibilityProbe:
     """The part of a scene that a camera sees, by a grid of rays."""
 
     def __init__(self, scene: PreparedScene, view: Camera, integrator: str, max_bounces: int) -> None:
@@ -72,11 +72,11 @@ class Sight:
     def why_black(self) -> str:
         """Return the likely cause of a black picture."""
         if not len(self._compiled.lights):
-            return "nothing in the scene shines; lighting='studio' lights it"
+            return "nothing in the scene emits light; lighting='studio' lights it"
         if not len(self._seen):
             return f"the camera sees no shape; {self._where_the_scene_is()}"
         if self._max_bounces == 0:
-            return "max_bounces=0 shows lights alone, and the camera sees none that shines towards it"
+            return "max_bounces=0 shows lights alone, and the camera sees none from its bright side"
         materials = self._compiled.materials
         groups = np.unique(materials.group_of.take(self._seen.material))
         if all(materials.groups[group].black for group in groups):
@@ -91,13 +91,12 @@ class Sight:
     def why_white(self, darkest: float) -> str:
         """Return the likely cause of a white picture."""
         fix = f"save(..., exposure={-int(np.ceil(np.log2(darkest)))}) shows what is below"
-        shines = self._compiled.emissive.take(self._hits.prim)
+        emits = self._compiled.emissive.take(self._hits.prim)
         if not len(self._seen):
             return f"the camera sees no shape, only light from all around that is above 1; {fix}"
-        if shines.all():
-            return (
-                f"the camera sees nothing but {shape_name(self._scene, self._seen.prim)}, which shines; {fix}"
-            )
+        if emits.all():
+            name = shape_name(self._scene, self._seen.prim)
+            return f"the camera sees nothing but {name}, which emits light; {fix}"
         return f"its darkest pixel is {darkest:.3g}, and 1 is white; {fix}"
 
     # --- Visible surfaces -----------------------------------------------------------------------------
@@ -166,7 +165,7 @@ class Sight:
         if not shining:
             hints = (light.hint for light in self._scene.lights if light.hint is not None)
             how = next(hints, "reverse their faces, or give them two_sided=True")
-            return f"the lights shine away from all that the camera sees; {how}"
+            return f"the lights point away from all that the camera sees; {how}"
         if not facing:
             return "the camera sees only the sides of surfaces that are turned away from the lights"
         return self._why_it_is_blocked(np.concatenate(blockers))
@@ -202,7 +201,7 @@ class Sight:
                 f"light comes through {name} alone, which integrator={self._integrator!r} does not follow; "
                 "integrator='full' does"
             )
-        return f"light comes through {name} alone, too seldom to be found by so few samples"
+        return f"light comes through {name} alone, and too few samples find it"
 
     def _why_it_is_not_found(self) -> str:
         """Return why light that exists does not reach the camera."""
