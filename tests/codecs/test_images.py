@@ -14,9 +14,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wavefront.codecs import claims
 from wavefront.codecs import hdr as rgbe
 from wavefront.codecs import png_jpeg as coded
+from wavefront.codecs import size_check
 from wavefront.codecs.display import Display
 from wavefront.codecs.encoding import linear_to_srgb, srgb_to_linear, to_codes
 from wavefront.codecs.images import check_writable, read_image, write_image
@@ -548,7 +548,7 @@ def test_a_small_png_that_claims_much_costs_little(tmp_path):
 
 def test_no_more_of_a_png_is_inflated_than_it_needs():
     pieces = [memoryview(zlib.compress(bytes(30_000_000)))]
-    assert 1000 <= claims._inflated(pieces, 1000) <= claims.CHUNK
+    assert 1000 <= size_check._inflated(pieces, 1000) <= size_check.CHUNK
 
 
 def _jpg(height, width=40):

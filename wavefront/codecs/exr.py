@@ -135,7 +135,7 @@ def _channels(data: bytes, budget: Budget) -> dict[str, Callable[[], NDArray[Any
     import OpenEXR
 
     claimed = OpenEXR.File(BytesIO(data), header_only=True).parts
-    size = _check_claims(claimed, len(data), budget)
+    size = _check_header(claimed, len(data), budget)
     # OpenEXR decodes all parts, and leaves out those that it cannot decode.
     with _LOCK, redirect_stdout(_OneThread(sys.stdout)):  # it prints warnings of parts
         parts = OpenEXR.File(BytesIO(data), separate_channels=True).parts
@@ -170,7 +170,7 @@ def _pixels(name: str, values: NDArray[Any], size: tuple[int, int]) -> NDArray[A
     return values
 
 
-def _check_claims(parts: list[Any], size: int, budget: Budget) -> tuple[int, int]:
+def _check_header(parts: list[Any], size: int, budget: Budget) -> tuple[int, int]:
     """Check the headers of all parts, and return (height, width) of the first one."""
     import OpenEXR
 

@@ -51,12 +51,12 @@ def decode(data: bytes, budget: Budget | None = None) -> Floats:
     budget = budget or Budget.of(data)
     budget.check_size(height, width)
     rows = np.frombuffer(data, np.uint8, offset=head.end())
-    is_flat = _check_claims(rows, height, width)
+    is_flat = _check_header(rows, height, width)
     budget.charge(f"a picture of {width} × {height} pixels", PIXEL_BYTES * height * width)
     return from_rgbe(rows.reshape(height, width, 4) if is_flat else _scanlines(rows, height, width))
 
 
-def _check_claims(data: Bytes, height: int, width: int) -> bool:
+def _check_header(data: Bytes, height: int, width: int) -> bool:
     """Check that rows of pixels can be there; return whether they are stored without run-length coding."""
     if not 8 <= width < 32768 or len(data) < 4 or tuple(data[:2]) != (2, 2) or data[2] & 128:
         if len(data) != 4 * height * width:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..core.errors import SaveError, SceneError
 from .budget import Budget
-from .claims import JPG, PNG, check_claims
+from .size_check import JPG, PNG, check_header
 
 Gamma = float | str  # an exponent, or "srgb" for the exact sRGB curve
 
@@ -67,7 +67,7 @@ def decode(data: bytes, budget: Budget | None = None) -> NDArray[Any]:
     SceneError
         If the file claims more than it holds, ends early, or holds other kinds of numbers.
     """
-    check_claims(data, budget or Budget.of(data))
+    check_header(data, budget or Budget.of(data))
     codes = _decode(data)
     if data.startswith(JPG) and _ends_early(data, codes):
         raise SceneError("ends early: its last pixels are missing")

@@ -21,7 +21,7 @@ JPG_PIXELS_PER_BYTE = 512  # at most: a block of 8 × 8 pixels takes at least a 
 CHUNK = 2**18  # bytes that are inflated at once
 
 
-def check_claims(data: bytes, budget: Budget) -> None:
+def check_header(data: bytes, budget: Budget) -> None:
     """Check that a png or jpg can hold the picture that its header claims, before it is decoded.
 
     The memory for this check does not depend on the size that the header claims.
