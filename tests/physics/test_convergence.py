@@ -16,8 +16,8 @@ SIZE = 32
 
 @pytest.fixture(scope="module")
 def converged() -> np.ndarray:
-    """The Cornell box at 4096 spp."""
-    return wf.render(cornell_box(SIZE), 4096, max_bounces=7, seed=99, accel="numpy", progress=False).rgb
+    """The Cornell box at 1024 spp."""
+    return wf.render(cornell_box(SIZE), 1024, max_bounces=7, seed=99, accel="numpy", progress=False).rgb
 
 
 def errors(sampler: str, spp: int, exact: np.ndarray) -> np.ndarray:
@@ -45,7 +45,7 @@ def test_sobol_is_steeper_where_the_picture_is_smooth() -> None:
     light = wf.Rectangle((-1, 2, -1), (2, 0, 0), (0, 0, 2), emission=1.0)
     camera = wf.Camera.look_at((0, 1.5, 2.5), (0, 0, 0), fov=30, size=(16, 16))
     scene = wf.Scene([floor, light], camera=camera)
-    exact = wf.render(scene, 1 << 14, max_bounces=1, seed=7, accel="numpy", progress=False).rgb
+    exact = wf.render(scene, 1 << 12, max_bounces=1, seed=7, accel="numpy", progress=False).rgb
     slope = {}
     for sampler in ("sobol", "independent"):
         error = [

@@ -24,13 +24,10 @@ import pytest
 import scenes
 
 import wavefront as wf
-from wavefront.core.shared import STOP, SharedInt
 from wavefront.scheduling import executors, jobs, machine, remote
-from wavefront.scheduling import payload as payloads
 from wavefront.scheduling.executors import worker_count
-from wavefront.scheduling.payload import Payload, do_job, pack
+from wavefront.scheduling.payload import Payload
 from wavefront.scheduling.pool import WorkerPool
-from wavefront.scheduling.workers import StoppableWork
 
 needs_fork = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs fork")
 QUIET = {"progress": False, "wave_size": 500}
@@ -159,35 +156,6 @@ def test_pictures_come_while_it_renders() -> None:
 # --- The scene is sent once -----------------------------------------------------------------------
 
 
-def payload_of(folder: Path, work: Callable[[Any], Any]) -> Payload:
-    data = pack(StoppableWork(work, SharedInt()), str(folder))
-    return Payload(os.urandom(8).hex(), machine.describe_machine(), str(folder / "work"), data)
-
-
-def test_a_process_reads_the_work_once(tmp_path: Path) -> None:
-    payload = payload_of(tmp_path, abs)
-    assert payload.data is not None
-    (tmp_path / "work").write_bytes(payload.data)
-    payload.data = None
-    assert do_job(payload, -1).result == 1
-    (tmp_path / "work").unlink()
-    assert do_job(payload, -2).result == 2
-    payload.token = "another"
-    assert do_job(payload, -1).missing
-
-
-def test_a_process_forgets_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(payloads, "KEEP", 0.1)
-    kept = payloads._KeptWork()
-    monkeypatch.setattr(payloads, "_kept", kept)
-    assert do_job(payload_of(tmp_path, abs), -1).result == 1
-    sweeper = kept._sweeper
-    assert sweeper is not None
-    sweeper.join(10)
-    assert not sweeper.is_alive()
-    assert not kept._entries
-
-
 @needs_fork
 def test_workers_that_cannot_read_the_file_are_sent_the_scene(expected, monkeypatch):
     def first(self: remote.FileDelivery, payload: Payload) -> Payload:
@@ -197,32 +165,6 @@ def test_workers_that_cannot_read_the_file_are_sent_the_scene(expected, monkeypa
     with forked() as pool:
         image = wf.render(scenes.everything(), 8, executor=pool, **QUIET)
     assert image.rgb.tobytes() == expected
-
-
-def test_a_published_integer_is_the_same_in_all_places(tmp_path: Path) -> None:
-    """Also after its file is gone; without a file there is one that nobody else writes."""
-    shared = SharedInt()
-    shared.rise_to(STOP)
-    path = str(tmp_path / "shared")
-    shared.publish(path)
-    other = SharedInt.attach(path)
-    assert other.value == STOP
-    os.unlink(path)
-    other.rise_to(7)
-    assert shared.value == 7
-    assert SharedInt.attach(path).value == 0
-
-
-def test_a_stop_stays_for_work_that_begins_late(tmp_path: Path) -> None:
-    shared = SharedInt()
-    shared.publish(str(tmp_path / "shared"))
-    other = SharedInt.attach(str(tmp_path / "shared"))
-    shared.leave_stopped()
-    assert (shared.value, other.value) == (0, STOP)
-    shared.rise_to(STOP)
-    shared.leave_stopped()
-    shared.reset()
-    assert (shared.value, other.value) == (0, STOP)
 
 
 def test_the_deadline_is_that_of_the_clock_of_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -401,15 +343,6 @@ def test_workers_of_other_versions_are_noticed(monkeypatch: pytest.MonkeyPatch, 
         assert image.rgb.tobytes() == expected
         with pytest.raises(wf.RenderError, match=rf"{differs}.*with strict=True"):
             wf.render(scenes.everything(), 8, executor=pool, strict=True, **QUIET)
-
-
-def test_this_machine_does_not_differ_from_itself() -> None:
-    here = machine.describe_machine()
-    assert here["wavefront"] == wf.__version__
-    assert machine.machine_differences(here) == ()
-    assert machine.machine_differences({**here, "wavefront": "0"}) == (
-        f"wavefront {wf.__version__} in place of 0",
-    )
 
 
 @pytest.mark.slow

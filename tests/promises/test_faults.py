@@ -14,8 +14,6 @@ from significance import render
 import wavefront as wf
 from wavefront.arrays.vec import column, f4
 from wavefront.bsdfs import BsdfSample
-from wavefront.film.film import Film
-from wavefront.film.picture_sums import PictureSums
 from wavefront.integrators import li_full
 
 
@@ -223,8 +221,7 @@ def wall_of(material: Any) -> wf.Scene:
     return wf.Scene([wall], [wf.Environment(1)], camera)
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("layer", ["albedo", "denoising_albedo"])
+@pytest.mark.parametrize(("layer", "value"), [("albedo", np.nan), ("denoising_albedo", -np.inf)])
 def test_a_layer_that_is_not_finite_is_dropped_counted_and_named(layer: str, value: float) -> None:
     """With its sample, in the picture, too, whose radiance is finite; the mean is that of the others."""
     material = SpoiledAlbedo(0.5)
@@ -240,19 +237,6 @@ def test_a_layer_that_is_not_finite_is_dropped_counted_and_named(layer: str, val
     assert (image.layers[layer][there] == 0.5).all()
     assert not image.layers[layer][~there].any()
     assert (image.rgb[there] > 0).all()
-
-
-def test_the_search_for_a_fault_asks_for_an_albedo_once() -> None:
-    asked = []
-
-    class Counting(Spoiled):
-        def albedo(self, wo: Any) -> Any:
-            asked.append(wo.shape[1])
-            return super().albedo(wo)
-
-    with pytest.raises(wf.RenderError, match="bounce 0, BSDF sample of material Counting of 'wall'"):
-        render(wall_of(Counting(0.5)), 4, aovs=("albedo", "denoising_albedo"), executor="threads")
-    assert asked.count(1) == 1  # the path that is traced again is alone
 
 
 def test_a_normal_that_is_not_finite_is_dropped() -> None:
@@ -304,19 +288,3 @@ def test_dropped_samples_leave_the_bits_to_no_division(cut: dict[str, Any], tmp_
         assert image.metadata["bad_samples"] == 3
         for name in options["aovs"]:
             assert image.layers[name].tobytes() == whole.layers[name].tobytes()
-
-
-def test_a_film_takes_memory_for_dropped_samples_only_if_there_are_any() -> None:
-    film, pixels = Film(3, 2), np.arange(6, dtype=np.uint32)
-    film.add(pixels, np.ones((3, 4, 6), f4))
-    assert not film.dropped.size
-    samples = np.ones((3, 2, 6), f4)
-    samples[:, 1, 5] = 0
-    film.add(pixels, samples, dropped=np.array([11]))
-    assert film.dropped.tolist() == [0, 0, 0, 0, 0, 1]
-    assert film.used().tolist() == [6, 6, 6, 6, 6, 5]
-    assert (film.mean() == 1).all()
-    sums = PictureSums(film, None, {})
-    arrays = sums.arrays()
-    with pytest.raises(wf.SceneError, match=r"'film.dropped' have shape \(5,\); it must be \(6,\)"):
-        sums.restore({**arrays, "film.dropped": film.dropped[1:]})

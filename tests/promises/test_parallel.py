@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import multiprocessing
 import os
 import signal
@@ -16,7 +15,6 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import scenes
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -24,7 +22,6 @@ from threadpoolctl import threadpool_info, threadpool_limits
 import wavefront as wf
 from wavefront.core.shared import AT_ONCE, STOP, SharedInt, Stopped
 from wavefront.scheduling import executors
-from wavefront.scheduling import pool as pool_module
 from wavefront.scheduling.executors import MIN_PATHS, MIN_PATHS_TO_SPAWN, choose_executor, worker_count
 from wavefront.scheduling.pool import WorkerPool
 from wavefront.scheduling.processes import ProcessPool
@@ -94,15 +91,6 @@ def test_no_worker_is_left(executor: str) -> None:
         next(pool.run(range(10)))
     assert threading.active_count() == before
     assert not multiprocessing.active_children()
-
-
-@processes
-def test_processes_are_processes() -> None:
-    all_have_one = multiprocessing.get_context("fork").Barrier(3)
-    with WorkerPool(lambda k: all_have_one.wait(HANGS) >= 0 and os.getpid(), 3, "processes") as pool:
-        pids = {pid for _, pid in pool.run(range(3))}
-    assert len(pids) == 3
-    assert os.getpid() not in pids
 
 
 @processes
@@ -226,32 +214,6 @@ def test_a_stop_ends_a_run(executor: str) -> None:
     assert found == [(0, 0)]
 
 
-def test_a_pool_that_is_closed_while_its_idle_workers_end_leaves_no_thread(monkeypatch):
-    monkeypatch.setattr(pool_module, "IDLE_TIMEOUT", 0.01)
-    before = set(threading.enumerate())
-    pool = WorkerPool(abs, 1, "threads")
-
-    class Slow:
-        """The lock of the pool, after which the thread that ends idle workers goes on late."""
-
-        def __init__(self, lock: Any) -> None:
-            self.lock = lock
-
-        def __enter__(self) -> None:
-            self.lock.acquire()
-
-        def __exit__(self, *error: object) -> None:
-            self.lock.release()
-            if threading.current_thread() is not threading.main_thread():
-                time.sleep(0.2)
-
-    pool._lock = Slow(pool._lock)  # type: ignore[assignment]
-    assert list(pool.run([-1])) == [(-1, 1)]
-    assert eventually(lambda: pool._workers is None)
-    pool.close()
-    assert set(threading.enumerate()) <= before
-
-
 def blas_threads() -> set[int]:
     return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
 
@@ -314,36 +276,6 @@ def test_a_thread_that_computes_keeps_processes_away(computes: bool, monkeypatch
     finally:
         end.set()
         thread.join()
-
-
-@processes
-def test_a_thread_that_gets_no_core_computes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As on a machine where other programs have all of them: no time is counted, but it could go on."""
-    monkeypatch.setattr(executors, "_seconds", lambda clocks: {})
-    end = threading.Event()
-
-    def other() -> None:
-        while not end.is_set():
-            hashlib.pbkdf2_hmac("sha256", b"", b"", 100_000)  # without Python's lock
-
-    thread = threading.Thread(target=other)
-    thread.start()
-    try:
-        assert eventually(executors._other_threads_compute)
-    finally:
-        end.set()
-        thread.join()
-
-
-@processes
-def test_other_threads_are_watched_once_for_a_picture(monkeypatch: pytest.MonkeyPatch) -> None:
-    calls: list[bool] = []
-    monkeypatch.setattr(executors, "_other_threads_compute", lambda: calls.append(True) or True)
-    scene = [wf.Sphere((0, 0, 0), 1), wf.Environment(1)]
-    with wf.Session(scene, MIN_PATHS // 64, size=(8, 8), workers=2, progress=False) as session:
-        assert len(calls) == 1
-        session.set_camera(wf.Camera.look_at((0, 0, 5), (0, 0, 0), fov=30, size=(8, 8)))
-        assert len(calls) == 2
 
 
 def test_without_a_global_lock_threads_are_as_fast(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -432,53 +364,6 @@ def test_the_executor_changes_no_bit(executor: str, accel: str) -> None:
     assert image.rgb.tobytes() == alone.rgb.tobytes()
     assert image.metadata["executor"] == executor
     assert image.metadata["rays"] == alone.metadata["rays"]
-
-
-@processes
-def test_ctrl_c_stops_processes() -> None:
-    """The picture so far is the same as with threads, and no process is left."""
-
-    def stop(done: int, total: int) -> None:
-        if done >= 4 * 300:
-            raise KeyboardInterrupt
-
-    pictures = []
-    for executor in ("processes", "threads"):
-        with pytest.raises(wf.Interrupted) as caught:
-            wf.render(scenes.everything(), 64, wave_size=300, workers=2, executor=executor, progress=stop)
-        pictures.append(np.asarray(caught.value.image).tobytes())
-    assert pictures[0] == pictures[1]
-    assert not multiprocessing.active_children()
-
-
-@processes
-def test_a_queue_of_results_is_closed_by_two_threads_at_once() -> None:
-    """As when stopped workers are killed while the pool shuts down: no file is closed twice."""
-    from wavefront.scheduling.processes import _Context
-
-    interval = sys.getswitchinterval()
-    failures: list[OSError] = []
-
-    def attempt(close: Callable[[], None]) -> None:
-        try:
-            close()
-        except OSError as error:
-            failures.append(error)
-
-    sys.setswitchinterval(1e-6)
-    try:
-        for _ in range(300):
-            queue = _Context("fork").SimpleQueue()
-            threads = [
-                threading.Thread(target=attempt, args=(close,)) for close in (queue.close, queue.close_writer)
-            ]
-            for thread in threads:
-                thread.start()
-            for thread in threads:
-                thread.join()
-    finally:
-        sys.setswitchinterval(interval)
-    assert failures == []
 
 
 @processes

@@ -35,31 +35,18 @@ def whole(integrator: str, sampler: str) -> bytes:
 
 
 @pytest.mark.filterwarnings("ignore:the naive integrator")
-@pytest.mark.parametrize("sampler", SAMPLERS)
-@pytest.mark.parametrize("integrator", scenes.ALL)
-@pytest.mark.parametrize("cut", [{"wave_size": 7}, {"wave_size": 64, "workers": 2}, {"wave_size": 4096}])
-def test_waves_change_no_bit(integrator: str, sampler: str, cut: dict) -> None:
-    image = render(scenes.everything(), SPP, integrator=integrator, sampler=sampler, **cut)
-    assert image.rgb.tobytes() == whole(integrator, sampler)
-
-
-@pytest.mark.filterwarnings("ignore:the naive integrator")
-@pytest.mark.parametrize("integrator", scenes.ALL)
-def test_lone_paths_change_no_bit(integrator: str) -> None:
-    scene = scenes.everything((5, 4))
-    whole = render(scene, 3, integrator=integrator)
-    assert render(scene, 3, integrator=integrator, wave_size=1).rgb.tobytes() == whole.rgb.tobytes()
-
-
-@pytest.mark.parametrize("workers", [1, 2, 3, 8])
-@pytest.mark.parametrize("sampler", SAMPLERS)
-def test_workers_change_no_bit(workers: int, sampler: str) -> None:
+@pytest.mark.parametrize(
+    ("integrator", "sampler"),
+    [*((integrator, "sobol") for integrator in scenes.ALL), *(("full", sampler) for sampler in SAMPLERS)],
+)
+def test_waves_and_workers_change_no_bit(integrator: str, sampler: str) -> None:
     """Results are added in the order of the work, not of its completion."""
-    image = render(scenes.everything(), SPP, sampler=sampler, workers=workers, wave_size=50)
-    assert image.rgb.tobytes() == whole("full", sampler)
+    cuts = [{"wave_size": 7}, {"wave_size": 64, "workers": 2}, {"wave_size": 50, "workers": 8}]
+    for cut in cuts if sampler == "sobol" else cuts[1:2]:
+        image = render(scenes.everything(), SPP, integrator=integrator, sampler=sampler, **cut)
+        assert image.rgb.tobytes() == whole(integrator, sampler)
 
 
-@cache
 def many_triangles() -> wf.Scene:
     """5 120 triangles of glass and metal in a lit room of quadrilaterals."""
     ball = trimesh.creation.icosphere(subdivisions=4)
@@ -72,19 +59,13 @@ def many_triangles() -> wf.Scene:
     return wf.Scene([glass, metal, light, floor], [wf.Environment(0.1)], camera=camera)
 
 
-@cache
-def many_triangles_whole() -> bytes:
-    return render(many_triangles(), 2, accel="numpy").rgb.tobytes()
-
-
-@pytest.mark.parametrize("workers", [1, 2, 3, 8])
-@pytest.mark.parametrize("wave_size", [1, 7, 64, 4096, None])
-def test_a_mesh_has_the_same_bits_in_any_wave_on_any_worker(wave_size: int | None, workers: int) -> None:
+def test_a_mesh_has_the_same_bits_in_any_wave_on_any_worker() -> None:
     """The tree sorts rays into blocks, and none of them sees its neighbors."""
-    cut = {} if wave_size is None else {"wave_size": wave_size}
-    executor = "processes" if workers == 2 and sys.platform == "linux" else "threads"
-    image = render(many_triangles(), 2, accel="numpy", workers=workers, executor=executor, **cut)
-    assert image.rgb.tobytes() == many_triangles_whole()
+    expected = render(many_triangles(), 2, accel="numpy").rgb.tobytes()
+    for workers, wave_size in ((1, 1), (1, 7), (2, 64), (3, 4096), (8, 50)):
+        executor = "processes" if workers == 2 and sys.platform == "linux" else "threads"
+        cut = {"workers": workers, "executor": executor, "wave_size": wave_size}
+        assert render(many_triangles(), 2, accel="numpy", **cut).rgb.tobytes() == expected
 
 
 def test_seeds_change_the_picture() -> None:
@@ -101,45 +82,6 @@ def test_more_samples_go_on_where_fewer_stopped() -> None:
 
 
 # --- Scale ----------------------------------------------------------------------------------------
-
-
-def moved(scene: wf.Scene, scale: float, shift: np.ndarray) -> wf.Scene:
-    """The same scene, larger and elsewhere."""
-    shapes = []
-    for shape in scene.shapes:
-        more = {
-            "material": shape.material,
-            "emission": None if shape.emission is None else shape.emission[:, 0],
-        }
-        if isinstance(shape, wf.Sphere):
-            shapes.append(wf.Sphere(shape.center * scale + shift, shape.radius * scale, **more))
-        else:
-            vertices = shape.vertices * scale + shift
-            shapes.append(wf.Mesh(vertices, shape.faces, normals=shape.normals, uvs=shape.uvs, **more))
-    lights = [
-        wf.PointLight(light.position * scale + shift, light.intensity[:, 0] * scale**2)
-        if isinstance(light, wf.PointLight)
-        else light
-        for light in scene.lights
-    ]
-    camera = scene.camera
-    eye = camera.origin * scale + shift
-    ahead = -camera.rotation[:, 2] * scale
-    return wf.Scene(shapes, lights, wf.Camera.look_at(eye, eye + ahead, fov=camera.fov, size=camera.size))
-
-
-@pytest.mark.parametrize("integrator", ["direct_simple", "full"])
-@pytest.mark.parametrize(
-    ("scale", "shift"), [(1e6, 0), (1e-6, 0), (1.0, 2e5), (1e6, 2e11), (1e-6, 0.2), (3e-3, -7.0)]
-)
-def test_scale_and_place_change_nothing(scale: float, shift: float, integrator: str) -> None:
-    """A million times larger or smaller, and 1e5 of its own size away, a scene looks the same."""
-    scene = scenes.everything((16, 12))
-    plain = render(scene, 16, integrator=integrator).rgb
-    far = render(moved(scene, scale, np.array([1, -0.7, 0.4]) * shift), 16, integrator=integrator).rgb
-    assert far.mean() == pytest.approx(plain.mean(), rel=1e-2)
-    different = np.abs(far - plain).max(2) > 1e-3 * plain.max(2)
-    assert different.mean() < 0.1  # a path that takes another turn changes its pixel
 
 
 # --- Input ----------------------------------------------------------------------------------------
@@ -345,17 +287,12 @@ def faulty(part: float, value: float = np.nan, method: str = "sample_f") -> wf.S
     return wf.Scene([floor], [sky], scenes.probe((0, 0, 0), (0.1, 1, 0)))
 
 
-FAULTS = [
-    ("naive", "sample_f"),
-    ("full", "sample_f"),
-    ("direct_simple", "f"),
-    ("direct_mis", "f"),
-    ("full", "f"),
-]
+FAULTS = [("naive", "sample_f"), ("direct_simple", "f"), ("direct_mis", "f"), ("full", "f")]
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-@pytest.mark.parametrize(("integrator", "method"), FAULTS)
+@pytest.mark.parametrize(
+    ("integrator", "method", "value"), [("full", "sample_f", np.nan), ("full", "f", np.inf)]
+)
 def test_a_few_bad_samples_are_counted(integrator: str, method: str, value: float) -> None:
     """Dropped with a warning that names the first; the picture is finite."""
     with pytest.warns(
