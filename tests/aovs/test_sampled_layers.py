@@ -13,9 +13,6 @@ import wavefront as wf
 from wavefront.accel import numpy_accel
 from wavefront.bsdfs import ALL, albedo_of
 from wavefront.film.aov_names import LAYERS
-from wavefront.film.aov_samples import LayerSamples, fixed_point
-from wavefront.film.aov_sums import LayerSums
-from wavefront.film.film import Film
 from wavefront.integrators import accumulate, intersect_and_compact
 from wavefront.stages.intersect import intersect
 from wavefront.stages.shade import emitted
@@ -314,45 +311,6 @@ def test_bits_stay_in_adaptive_renders_and_sessions() -> None:
     with wf.Session(room(12), 600, workers=2, wave_size=900, **options) as session:
         *_, last = session
     assert_same_bits(one, last)
-
-
-def samples_of(rng: np.random.Generator, samples: int, pixels: int) -> tuple[LayerSamples, np.ndarray]:
-    """Return made-up samples, and their radiance (3, samples, pixels)."""
-    direct = (rng.random((3, samples, pixels)) ** 8 * 1000).astype(np.float32)
-    albedo = rng.random((3, samples * pixels), np.float32)
-    bounded = {"albedo": fixed_point(albedo, samples, np.zeros(0, np.intp))}
-    counts = {"alpha": rng.integers(0, samples + 1, pixels, np.int32)}
-    return LayerSamples(counts, bounded, {"direct": direct}), direct * np.float32(1.5)
-
-
-def test_sums_merge_and_restore() -> None:
-    """Two halves are as good as one: means are equal, and the errors up to rounding; arrays restore both."""
-    names, pixels = ("alpha", "albedo", "direct", "indirect"), 40
-    one, halves, films = LayerSums(names, pixels), [], []
-    whole, every = Film(pixels, 1), np.arange(pixels, dtype=np.uint32)
-    rng = np.random.default_rng(5)
-    for samples in (100, 60):
-        half, film = LayerSums(names, pixels), Film(pixels, 1)
-        layers, radiance = samples_of(rng, samples, pixels)
-        half.add(every, layers, radiance, most=samples)
-        film.add(every, radiance)
-        one.add(every, layers, radiance, most=160)
-        whole.add(every, radiance)
-        restored = LayerSums(names, pixels)
-        restored.restore({name: array.copy() for name, array in half.arrays().items()})
-        halves.append(restored)
-        films.append(film)
-    halves[0].merge(halves[1])
-    films[0].sums.merge(films[1].sums)
-    assert set(one.arrays()) == {
-        "alpha.counts", "albedo.sums", "albedo.squares",
-        "direct.sums.high", "direct.sums.low", "direct.squares", "indirect.squares",
-    }  # fmt: skip
-    for name in names:
-        a = one.estimate(name, whole.sums, whole.count)
-        b = halves[0].estimate(name, films[0].sums, whole.count)
-        np.testing.assert_array_equal(a.mean, b.mean, err_msg=name)
-        np.testing.assert_allclose(a.standard_error, b.standard_error, rtol=1e-4, err_msg=name)
 
 
 def test_many_samples_do_not_overflow() -> None:

