@@ -342,8 +342,7 @@ def test_workers_stay_within_a_block(executor: str, monkeypatch: pytest.MonkeyPa
 
 
 @needs_fork
-@pytest.mark.parametrize("where", ["waiting", "looking"])
-@pytest.mark.parametrize("executor", ["processes", "threads"])
+@pytest.mark.parametrize(("executor", "where"), [("processes", "waiting"), ("threads", "looking")])
 def test_ctrl_c_leaves_nothing(executor: str, where: str) -> None:
     """While a picture is waited for, with the picture so far; in the loop's body it is Python's own."""
     body = f"""
