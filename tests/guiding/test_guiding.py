@@ -329,8 +329,3 @@ def test_nothing_to_guide() -> None:
     scene = [wf.Sphere((0, 0, 0), 1, material=wf.Mirror()), wf.Environment(1)]
     one, other = (wf.render(scene, 4, size=(16, 16), guide=guide, progress=False) for guide in (True, False))
     assert np.array_equal(one.rgb, other.rgb)
-
-
-def test_only_full_can_be_guided() -> None:
-    with pytest.raises(wf.SceneError, match="guide=True does not go with integrator='naive': only"):
-        wf.render(lamp_at_the_ceiling(), 1, guide=True, integrator="naive")

@@ -25,14 +25,9 @@ import wavefront as wf
 from wavefront import cli
 from wavefront.accel.embree import installed
 from wavefront.arrays.vec import f4
-from wavefront.film.film import Film
 from wavefront.film.light_sums import LightSums
 from wavefront.lights.point import PointLightRecord
-from wavefront.scheduling import budget, tracing
-from wavefront.scheduling.accumulator import picture_memory
-from wavefront.scheduling.budget import LANE_BYTES, PROCESS_BYTES, make_budget
-from wavefront.session.choice import _may_reuse
-from wavefront.settings import Settings
+from wavefront.scheduling import tracing
 
 SIZE = (24, 18)
 PIXELS = SIZE[0] * SIZE[1]
@@ -216,20 +211,6 @@ def test_parts_of_equal_length_have_the_errors_of_the_whole() -> None:
     np.testing.assert_allclose(merged.variance, image.variance, rtol=1e-4, atol=1e-7)
 
 
-def test_films_with_light_paths_are_restored_from_their_arrays() -> None:
-    films = [Film(3, 2, light_paths) for light_paths in (True, True, False)]
-    films[0].add(np.arange(6, dtype=np.uint32), np.ones((3, 2, 6), f4))
-    films[0].light.add(0, 12, np.array([1, 4, 1], np.uint32), np.full((3, 3), 2, f4))
-    films[1].restore({name: array.copy() for name, array in films[0].arrays().items()})
-    for name, array in films[0].arrays().items():
-        assert films[1].arrays()[name].tobytes() == array.tobytes(), name
-    assert films[1].light.paths.tolist() == [12, 0, 0, 0]
-    assert (films[1].mean()[:, 1] == 1 + 2 * 2 / 12).all()
-    large, plain = (Film(100, 80, light_paths) for light_paths in (True, False))
-    bytes_of = [sum(array.nbytes for array in film.arrays().values()) for film in (large, plain)]
-    assert bytes_of[0] - bytes_of[1] == 192 * 8000 + 32  # and the numbers of paths
-
-
 def test_files_without_caustics_are_as_before(tmp_path: Path) -> None:
     """No array is of paths from lights, and the scene has the same fingerprint."""
     image = part(0, 2, caustics=False, checkpoint=tmp_path / "a.wfck")
@@ -271,34 +252,6 @@ def test_damaged_sums_are_named(name: str, tmp_path: Path) -> None:
 # --- What is refused ----------------------------------------------------------------------------------
 
 
-def own_filter(u: Any) -> Any:
-    """Return points of a filter."""
-    return u
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"caustics": "yes"}, "caustics is 'yes'; it must be True or False"),
-        ({"caustics": None}, "caustics is None; it must be True or False"),
-        ({"caustics": 1}, "caustics is 1; it must be True or False"),
-        ({"integrator": "naive"}, "caustics=True does not go with integrator='naive': only"),
-        ({"integrator": "direct_mis"}, "caustics=True does not go with integrator='direct_mis': only"),
-        ({"reuse": True}, "caustics=True does not go with reuse=True: shared"),
-        ({"noise": 0.1}, "caustics=True does not go with noise=0.1: paths"),
-        ({"filter": "tent"}, "caustics=True does not go with filter='tent': paths"),
-        ({"filter": "gaussian"}, "caustics=True does not go with filter='gaussian': paths"),
-        ({"filter": own_filter}, "caustics=True does not go with filter='own_filter': paths"),
-        ({"aovs": ("depth", "light_groups")}, "caustics=True does not go with aovs='light_groups': paths"),
-    ],
-)
-def test_what_does_not_go_with_it_is_refused_before_work(settings: dict[str, Any], message: str) -> None:
-    for call in (wf.render, wf.Session):
-        with pytest.raises(wf.SceneError) as caught:
-            call("no such file", **{"caustics": True, **settings})
-        assert str(caught.value).startswith(message)
-
-
 def test_the_metadata_tell_of_it() -> None:
     for given_value in (True, np.True_, False):
         image = wf.render(scene(), 1, caustics=given_value, progress=False)
@@ -323,12 +276,6 @@ def test_a_hint_tells_where_light_is_missing(arguments, settings, missing):
     """Where there are lights that no path can meet beside smooth glass or mirrors."""
     hint = wf.render(scene(**arguments), 1, progress=False, **settings).metadata["hint"]
     assert (hint is not None and "caustics=True adds them" in hint) == missing
-
-
-def test_re_use_is_never_chosen_with_it() -> None:
-    camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), size=(512, 512))
-    assert _may_reuse(Settings(), camera)
-    assert not _may_reuse(Settings(caustics=True), camera)
 
 
 # --- Errors -------------------------------------------------------------------------------------------
@@ -556,20 +503,6 @@ def test_errors_are_those_of_the_scatter_of_batches() -> None:
 
 
 # --- Memory, windows, and scenes without caustics -----------------------------------------------------
-
-
-def test_memory_counts_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    """192 bytes for each pixel, which leave less for waves."""
-    assert picture_memory((64, 48), light_paths=True) - picture_memory((64, 48)) == 192 * 64 * 48
-    monkeypatch.setattr(budget, "resident_memory", lambda: 0)
-    limit = picture_memory((400, 300)) + PROCESS_BYTES + 50_000_000
-    plain, lit = (make_budget(limit, (400, 300), 1, None, True, (), each) for each in (False, True))
-    assert plain.wave_size - lit.wave_size == pytest.approx(192 * 400 * 300 / LANE_BYTES, abs=1)
-    least = Settings(max_memory=limit, caustics=True).budget((400, 300), "processes")
-    assert least.wave_size == lit.wave_size
-    need = f"{picture_memory((4096, 2048), (), True) / 1e6:,.0f} MB are for a picture of 4096x2048 pixels"
-    with pytest.raises(wf.SceneError, match=need):
-        wf.render(scene(), 1, size=(4096, 2048), max_memory="1GB", caustics=True)
 
 
 @pytest.mark.parametrize(

@@ -560,9 +560,9 @@ def test_includes() -> None:
     included = ids[specular.includes(ids)]
     assert included.tolist() == specular.prim.tolist()
     assert compiled.instances is not None
-    specular = np.array([bsdf.specular for bsdf in compiled.materials.groups])
+    delta_alone = np.array([bsdf.specular for bsdf in compiled.materials.groups])
     rows, _ = compiled.instances.locate(specular.prim)
-    assert specular[compiled.materials.group_of.take(compiled.material_of.take(rows))].all()
+    assert delta_alone[compiled.materials.group_of.take(compiled.material_of.take(rows))].all()
     assert (compiled.light_of.take(rows) < 0).all()
 
 

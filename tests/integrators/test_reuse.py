@@ -286,15 +286,6 @@ def test_nothing_to_share() -> None:
         assert one.rgb.tobytes() == other.rgb.tobytes()
 
 
-def test_only_full_can_share() -> None:
-    with pytest.raises(wf.SceneError, match="reuse=True does not go with integrator='naive': only"):
-        wf.render(scenes.room(), 1, reuse=True, integrator="naive")
-    with pytest.raises(wf.SceneError, match="reuse=True does not go with aovs='light_groups': a group"):
-        wf.render(scenes.room(), 1, reuse=True, aovs="light_groups")
-    with pytest.raises(wf.SceneError, match=r"reuse=True does not go with clamp=2\.0: a clamp"):
-        wf.render(scenes.room(), 1, reuse=True, clamp=2)
-
-
 # --- Errors of regions, and comparisons -----------------------------------------------------------
 
 

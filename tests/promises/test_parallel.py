@@ -10,22 +10,19 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 import pytest
 import scenes
-from threadpoolctl import threadpool_info, threadpool_limits
+from threadpoolctl import threadpool_limits
 
 import wavefront as wf
-from wavefront.core.shared import AT_ONCE, STOP, SharedInt, Stopped
+from wavefront.core.shared import STOP, SharedInt, Stopped
 from wavefront.scheduling import executors
 from wavefront.scheduling.executors import MIN_PATHS, MIN_PATHS_TO_SPAWN, choose_executor, worker_count
 from wavefront.scheduling.pool import WorkerPool
-from wavefront.scheduling.processes import ProcessPool
-from wavefront.scheduling.workers import all_done
 
 LINUX = sys.platform.startswith("linux")
 EXECUTORS = ["threads", pytest.param("processes", marks=pytest.mark.skipif(not LINUX, reason="needs fork"))]
@@ -169,12 +166,6 @@ def test_default_is_one_worker_per_core() -> None:
     assert worker_count(5) == 5
 
 
-@pytest.mark.parametrize("workers", [0, -1, 1.5, True, "2"])
-def test_bad_worker_counts_are_named(workers: object) -> None:
-    with pytest.raises(wf.SceneError, match=f"workers is {workers!r}.*at least 1"):
-        worker_count(workers)
-
-
 @processes
 def test_a_process_that_is_killed_while_it_writes_is_no_obstacle() -> None:
 
@@ -212,24 +203,6 @@ def test_a_stop_ends_a_run(executor: str) -> None:
         with pytest.raises(Stopped):
             list(results)
     assert found == [(0, 0)]
-
-
-def blas_threads() -> set[int]:
-    return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
-
-
-def test_overlapping_workers_share_the_limit_of_blas() -> None:
-    """It stays until the last of them has ended, and then all is as before, in whatever order they end."""
-    with threadpool_limits(2, "blas"):
-        first, second = WorkerPool(abs, 1, "threads"), WorkerPool(abs, 1, "threads")
-        for pool in (first, second):
-            pool.__enter__()
-            assert list(pool.run([-1])) == [(-1, 1)]  # workers start with the first job
-        assert blas_threads() == {1}
-        first.__exit__(None, None, None)
-        assert blas_threads() == {1}
-        second.__exit__(None, None, None)
-        assert blas_threads() == {2}
 
 
 # --- which executor -------------------------------------------------------------------------------
@@ -345,13 +318,6 @@ def test_a_daemon_has_threads() -> None:
         del daemon._config["daemon"]  # type: ignore[attr-defined]
 
 
-def test_unknown_executors_are_named() -> None:
-    with pytest.raises(
-        wf.SceneError, match="executor is 'dask'; it must be one of processes, threads, spawn"
-    ):
-        wf.render(scenes.everything(), 1, executor="dask")
-
-
 # --- pictures -------------------------------------------------------------------------------------
 
 
@@ -364,18 +330,3 @@ def test_the_executor_changes_no_bit(executor: str, accel: str) -> None:
     assert image.rgb.tobytes() == alone.rgb.tobytes()
     assert image.metadata["executor"] == executor
     assert image.metadata["rays"] == alone.metadata["rays"]
-
-
-@processes
-def test_killed_processes_with_jobs_that_wait_are_collected() -> None:
-    """All futures end, the thread of the pool goes on to its end, and no process is left in any state."""
-    stop = SharedInt()
-    pool = ProcessPool("fork", 1, stop)
-    futures = [pool.submit(time.sleep, 30) for _ in range(8)]
-    pids = [process.pid for process in pool._context.processes]
-    stop.rise_to(AT_ONCE)
-    assert not all_done(futures, 0, stop)
-    pool.shutdown(futures)
-    assert all(isinstance(future.exception(HANGS), BrokenExecutor) for future in futures)
-    assert pids
-    assert not any(Path(f"/proc/{pid}").exists() for pid in pids)

@@ -10,8 +10,6 @@ import trimesh
 from significance import render
 
 import wavefront as wf
-from wavefront.arrays.vec import f4
-from wavefront.bsdfs import BsdfSample
 from wavefront.sampling.sampler import SAMPLERS
 from wavefront.session import prepared_scene, session
 
@@ -74,13 +72,6 @@ def test_seeds_change_the_picture() -> None:
     assert first.tobytes() != other.tobytes()
 
 
-def test_more_samples_go_on_where_fewer_stopped() -> None:
-    """The first samples are the same ones: the mean of 8 is made of the mean of 4 and the rest."""
-    four, eight = (render(small(), spp).rgb * spp for spp in (4, 8))
-    assert (eight >= four - 1e-5).all()
-    assert (eight <= four + 4 + 1e-5).all()
-
-
 # --- Scale ----------------------------------------------------------------------------------------
 
 
@@ -96,7 +87,7 @@ BAD = [
     ({"camera": [[0.0] * 99] * 2}, r"camera must be a wf.Camera, got .{121}; wf.Camera.look_at"),
     *(
         ({name: "yes"}, rf"{name} is 'yes'; it must be True or False")
-        for name in ("ground", "denoise", "strict")
+        for name in ("ground", "denoise", "strict", "caustics")
     ),
     ({"progress": "yes"}, r"progress is 'yes'; it must be True, False, None or a function"),
     ({"seconds": "30"}, r"seconds must be a number, got '30'"),
@@ -240,81 +231,12 @@ def test_progress_is_reported() -> None:
     assert calls == [(12, 48), (24, 48), (36, 48), (48, 48)]
 
 
-def test_a_camera_inside_things_is_fine() -> None:
-    glass = wf.Sphere((0, 0, 0), 1, material=wf.Dielectric(1.5))
-    solid = scenes.box((-3, -3, -3), (3, 3, 3), wf.Diffuse(0.5))
-    camera = wf.Camera.look_at((0.1, 0.2, 0.3), (1, 0, 0), size=(6, 6))
-    light = wf.PointLight((2, 2, 2), 5)
-    for shapes in ([glass], [solid], [glass, solid]):
-        assert np.isfinite(render(wf.Scene(shapes, [light, wf.Environment()], camera), 4).rgb).all()
-
-
 def test_a_point_light_on_a_surface_is_fine() -> None:
     scene = wf.Scene([scenes.floor()], [wf.PointLight((0, 0, 0), 1)], scenes.probe((0, 0, 0), (0, 1, 0)))
     assert np.isfinite(render(scene, 4).rgb).all()
 
 
 # --- Warnings and faults --------------------------------------------------------------------------
-
-
-class Faulty(wf.Diffuse):
-    """A material whose samples are not finite in a part of the lanes."""
-
-    def __init__(self, part: float, value: float = np.nan, method: str = "sample_f") -> None:
-        super().__init__(0.5)
-        self.part, self.value, self.method = part, value, method
-
-    def sample_f(self, wo, u) -> BsdfSample:
-        """Draw as Diffuse does, and spoil some weights."""
-        sample = super().sample_f(wo, u)
-        if self.method == "sample_f":
-            sample.weight = np.where(u[0] < self.part, f4(self.value), sample.weight).astype(f4)
-        return sample
-
-    def f(self, wo, wi):
-        """Evaluate as Diffuse does, and spoil some values."""
-        value = super().f(wo, wi)
-        if self.method == "f":
-            turn = np.arctan2(wi[1], wi[0]) / (2 * np.pi) % 1
-            value = np.where(turn < self.part, f4(self.value), value).astype(f4)
-        return value
-
-
-def faulty(part: float, value: float = np.nan, method: str = "sample_f") -> wf.Scene:
-    """A floor of it under a bright half of the sky, which both kinds of samples are drawn for."""
-    floor = scenes.floor(Faulty(part, value, method))
-    sky = wf.DirectionalLight((0, -1, 0), np.pi, angle=180)
-    return wf.Scene([floor], [sky], scenes.probe((0, 0, 0), (0.1, 1, 0)))
-
-
-FAULTS = [("naive", "sample_f"), ("direct_simple", "f"), ("direct_mis", "f"), ("full", "f")]
-
-
-@pytest.mark.parametrize(
-    ("integrator", "method", "value"), [("full", "sample_f", np.nan), ("full", "f", np.inf)]
-)
-def test_a_few_bad_samples_are_counted(integrator: str, method: str, value: float) -> None:
-    """Dropped with a warning that names the first; the picture is finite."""
-    with pytest.warns(
-        UserWarning,
-        match=r"\d+ of 262144 samples were not finite .* first: pixel \d+, sample \d+, bounce 0, "
-        r"(BSDF sample of|light sample at) material Faulty of 'floor'",
-    ):
-        image = render(faulty(2e-5, value, method), 4096, integrator=integrator)
-    assert 1 <= image.metadata["bad_samples"] <= 26
-    assert np.isfinite(image.rgb).all()
-    assert image.rgb == pytest.approx(0.5, abs=0.05)
-
-
-@pytest.mark.parametrize(("integrator", "method"), FAULTS)
-def test_many_bad_samples_are_an_error(integrator: str, method: str) -> None:
-    """More than 1e-4 of all; the picture is the mean of the others, which is right here."""
-    with pytest.raises(wf.RenderError, match=r"samples were not finite") as caught:
-        render(faulty(0.1, np.nan, method), 64, integrator=integrator)
-    image = caught.value.image
-    assert image.rgb == pytest.approx(0.5, abs=0.05)
-    assert image.rgb.mean() == pytest.approx(0.5, abs=0.002)
-    assert image.metadata["bad_samples"] > 0
 
 
 def test_naive_warns_of_point_lights() -> None:
