@@ -74,7 +74,7 @@ def aimed_rays(triangles: np.ndarray, n: int, seed: int) -> tuple[np.ndarray, np
 
 def check_batches(accelerator: Accelerator, size: int) -> None:
     """The same bits, `size` rays at a time."""
-    n = 300 if size == 1 else 9000
+    n = min(9000, 300 * size)
     origin, direction = random_rays(n, 6)
     origin[:, ::5] = 0  # through vertices too
     exclude_prim = np.random.default_rng(7).integers(-1, 37, n)

@@ -25,7 +25,7 @@ PLACES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.3]])
 FACES = [[0, 1, 2], [0, 2, 3]]
 UP = np.tile([0.0, 0.0, 1.0], (4, 1))
 LEANING = np.array([[0, 0, 1], [0, 0.5, 1], [0, 0, -1], [1, 0, 0.0]])
-TINY = [1e-10, 1e-19, 1e-30, 1e-38, 1e-42, 1e-46, 1e-200, 0.0]
+TINY = [1e-10, 1e-30, 1e-42, 1e-200, 0.0]
 
 
 def quad(material, vertices=PLACES, uvs=PLACES[:, :2], **arguments):
@@ -34,9 +34,9 @@ def quad(material, vertices=PLACES, uvs=PLACES[:, :2], **arguments):
 
 def check(*shapes, size=1.0):
     """Render shapes around the origin in two lights, by light and BSDF samples."""
-    camera = wf.Camera.look_at((0.6 * size, 0.7 * size, 2 * size), (0.5 * size, 0.5 * size, 0), size=(12, 12))
+    camera = wf.Camera.look_at((0.6 * size, 0.7 * size, 2 * size), (0.5 * size, 0.5 * size, 0), size=(8, 8))
     for light in (wf.Environment(1.0), wf.PointLight((size, size, size), size * size)):
-        image = render(wf.Scene(list(shapes), [light], camera), 4)
+        image = render(wf.Scene(list(shapes), [light], camera), 2)
         assert np.isfinite(image.rgb).all()
         assert image.metadata["bad_samples"] == 0
 
@@ -81,7 +81,7 @@ def test_texture_coordinates_beyond_float32_are_named():
 @pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS)
 def test_normals_and_tangents_of_any_length(material):
     """Only their directions count; of those without a length, the face's."""
-    for size in (0.0, 1e-300, 1e-30, 1e30, 1e39, 1e200, 1e308):
+    for size in (0.0, 1e-300, 1e-30, 1e39, 1e308):
         check(quad(material, normals=LEANING * size))
         tangents = np.tile([size, 0, 0, 1], (4, 1))
         check(quad(material, normals=UP, tangents=tangents))

@@ -128,13 +128,11 @@ AVX512 = (
 )
 AVX = (*AVX512, "X86_V3", "AVX2", "FMA3", "F16C", "AVX")
 MACHINES: dict[str, Callable[[], dict[str, str]]] = {
-    "AVX2": lambda: machine(*AVX512),
-    "SSE": lambda: machine(*AVX),
+    "AVX2, and another BLAS kernel": lambda: {**machine(*AVX512), "OPENBLAS_CORETYPE": "Nehalem"},
     "SSE, and no FMA in the C library": lambda: {
         **machine(*AVX),
         "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX2_Usable,-FMA_Usable",
     },
-    "another BLAS kernel": lambda: {"OPENBLAS_CORETYPE": "Nehalem"},
 }
 
 

@@ -96,14 +96,6 @@ def test_render_writes_the_picture_and_says_so(obj, fast, capsys):
     assert err == ""
 
 
-def test_module_runs_as_a_program(obj, fast):
-    output, options = fast
-    command = [sys.executable, "-m", "wavefront", "render", obj, *options, "--integrator", "direct_mis"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert output.exists()
-
-
 def test_same_options_same_bytes(obj, fast):
     output, options = fast
     main(["render", obj, *options, "--workers", "1"])
@@ -202,30 +194,11 @@ def test_the_camera_of_the_file_is_used_and_resized(gltf, tmp_path, capsys):
     assert "camera: in the file" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--target", "0,0,0"], "--target needs --origin"),
-        (["--origin", "0,1,0", "--direction", "0,0,1"], "--view is for scenes that are framed"),
-        (["--origin", "0,1,0", "--target", "0,1,0"], "must differ"),
-        (["--origin", "0,1"], "is not X,Y,Z"),
-        (["--origin", "nan,1,0"], "finite"),
-        (["--origin", "0,1,3", "--fov", "0"], "not above 0 and below 180"),
-        (["--fov", "180"], "not above 0 and below 180"),
-        (["--fov", "0"], "not above 0 and below 180"),
-    ],
-)
-def test_wrong_cameras(obj, fast, capsys, no_render, options, message):
-    assert message in error_of(capsys, ["render", obj, *fast[1], *options])
-
-
-def test_fov_does_not_silently_yield_to_the_camera_of_the_file(gltf, fast, capsys, no_render):
-    assert "has a camera of its own" in error_of(capsys, ["render", gltf, *fast[1], "--fov", "20"])
-
-
-def test_what_frames_a_scene_does_not_silently_yield_either(gltf, fast, capsys, no_render):
-    found = error_of(capsys, ["render", gltf, *fast[1], "--up", "0,0,1"])
-    assert f"--up needs --origin or --view: {gltf} has a camera of its own" in found
+@pytest.mark.parametrize("option", [["--fov", "20"], ["--up", "0,0,1"]])
+def test_what_frames_a_scene_does_not_yield_to_the_camera_of_the_file(gltf, fast, capsys, no_render, option):
+    found = error_of(capsys, ["render", gltf, *fast[1], *option])
+    assert f"{option[0]} needs " in found
+    assert f"{gltf} has a camera of its own" in found
 
 
 @pytest.mark.parametrize("option", ["--view", "--direction"])
@@ -239,7 +212,7 @@ def test_a_view_frames_a_file_with_a_camera(gltf, fast, option):
     np.testing.assert_array_equal(picture, expected.rgb)
 
 
-@pytest.mark.parametrize("up", ["z", "0,0,1", "-Z"])
+@pytest.mark.parametrize("up", ["0,0,1", "-Z"])
 def test_up_and_direction_frame_a_scene(obj, fast, up):
     output, options = fast
     assert main(["render", obj, *options, "--up", up, "--direction", "-1,-2,1"]) == 0
@@ -250,12 +223,6 @@ def test_up_and_direction_frame_a_scene(obj, fast, up):
     )
     expected = wf.render(scene, int(options[options.index("--spp") + 1]), progress=False)
     np.testing.assert_array_equal(np.load(output), expected.rgb)
-
-
-def test_up_must_be_an_axis(obj, fast, capsys, no_render):
-    assert "it must be a vector, or one of x, y, z" in error_of(
-        capsys, ["render", obj, *fast[1], "--up", "q"]
-    )
 
 
 # --- Output ----------------------------------------------------------------------------------------
@@ -293,6 +260,14 @@ def test_tone_white_balance_and_bits_reach_the_file(obj, tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
+        (["--target", "0,0,0"], "--target needs --origin"),
+        (["--origin", "0,1,0", "--direction", "0,0,1"], "--view is for scenes that are framed"),
+        (["--origin", "0,1,0", "--target", "0,1,0"], "must differ"),
+        (["--origin", "0,1"], "is not X,Y,Z"),
+        (["--origin", "nan,1,0"], "finite"),
+        (["--origin", "0,1,3", "--fov", "0"], "not above 0 and below 180"),
+        (["--fov", "180"], "not above 0 and below 180"),
+        (["--up", "q"], "it must be a vector, or one of x, y, z"),
         (["--tone", "filmic"], "invalid choice: 'filmic'"),
         (["--white-balance", "100"], "white_balance is 100.0; it must be 1667 to 25000 kelvin"),
         (["--white-balance", "1,0,1"], "each component must be above 0"),
@@ -496,23 +471,9 @@ def test_sigterm_ends_the_program_and_leaves_nothing(obj, fast):
 def test_names_that_cannot_be_printed_are_no_error(obj, tmp_path):
     """Such as those in another encoding than the terminal's."""
     output = os.fsencode(tmp_path) + b"/\xff\xe5.npy"
-    command = [
-        sys.executable,
-        "-m",
-        "wavefront",
-        "render",
-        obj,
-        "-o",
-        output,
-        "--spp",
-        "1",
-        "--size",
-        "8x6",
-        "--quiet",
-    ]
-    for encoding in ("utf-8:strict", "ascii:strict"):
-        done = subprocess.run(
-            command, capture_output=True, env={**os.environ, "PYTHONIOENCODING": encoding}, timeout=60
-        )
-        assert (done.returncode, done.stderr) == (0, b"")
-        assert os.path.exists(output)
+    command = [sys.executable, "-m", "wavefront", "render", obj, "-o", output]
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii:strict"}
+    options = ["--spp", "1", "--size", "8x6", "--quiet"]
+    done = subprocess.run([*command, *options], capture_output=True, env=environment, timeout=60)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert os.path.exists(output)

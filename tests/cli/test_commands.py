@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import imageio.v3 as iio
 import numpy as np
@@ -30,10 +31,27 @@ FAST = ["--spp", "1", "--size", "16x12", "--lighting", "even", "--quiet"]
 FOR_DEVELOPERS = {"test", "dev", "docs", "bench"}
 
 
-def run(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+def program(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     """Run the program as a user does."""
     command = [sys.executable, "-m", "wavefront", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=cwd)
+
+
+@pytest.fixture
+def run(monkeypatch, capsys):
+    """Run a command in this process, in the folder of the meshes."""
+
+    def run_command(*arguments: object, cwd: Path | None = None) -> SimpleNamespace:
+        if cwd is not None:
+            monkeypatch.chdir(cwd)
+        try:
+            status = cli.main([str(each) for each in arguments])
+        except SystemExit as stop:  # argparse
+            status = stop.code
+        out, err = capsys.readouterr()
+        return SimpleNamespace(returncode=status, stdout=out, stderr=err)
+
+    return run_command
 
 
 def commands() -> dict[str, object]:
@@ -63,7 +81,7 @@ def test_help_has_examples_that_are_valid(name: str) -> None:
     assert f"| `{name}` |" in DOCUMENT
 
 
-def test_help_and_the_document_name_the_exit_codes() -> None:
+def test_help_and_the_document_name_the_exit_codes(run) -> None:
     done = run("--help")
     assert done.returncode == 0
     for code in ("0", "1", "2", "129", "130", "143"):
@@ -81,25 +99,20 @@ def check_error(status: int, out: str, err: str, message: str) -> None:
     assert err.count("\n") == 1
 
 
+def test_the_program_runs_and_fails_as_its_commands(mesh: Path) -> None:
+    """In a process of its own."""
+    assert program("render", mesh, "-o", mesh.with_name("a.png"), *FAST).returncode == 0
+    done = program("render", mesh, "--spp", "0", "--quiet", cwd=mesh.parent)
+    check_error(done.returncode, done.stdout, done.stderr, "spp is 0")
+    assert sorted(path.name for path in mesh.parent.iterdir()) == ["a.png", "mesh.obj"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         ([], "the following arguments are required: command; see wavefront --help"),
-        (["render", "mesh.obj", "--bogus"], "unrecognized arguments: --bogus"),
-        (["render", "mesh.obj", "--spp", "0", "--quiet"], "spp is 0"),
-        (["info", "no.obj"], "no.obj: there is no such file"),
-    ],
-)
-def test_errors_are_one_line_and_give_2(mesh: Path, arguments: list[str], message: str) -> None:
-    done = run(*arguments, cwd=mesh.parent)
-    check_error(done.returncode, done.stdout, done.stderr, message)
-    assert [path.name for path in mesh.parent.iterdir()] == ["mesh.obj"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
         (["rendr"], "invalid choice: 'rendr'"),
+        (["render", "mesh.obj", "--bogus"], "unrecognized arguments: --bogus"),
         (["render", "no.obj"], "no.obj: there is no such file"),
         (["render", "mesh.obj", "-o", "no/out.png"], "no/out.png: the folder"),
         (["turntable", "mesh.obj", "--frames", "0", "--quiet"], "'0' is not a whole number from 1 on"),
@@ -111,40 +124,33 @@ def test_errors_are_one_line_and_give_2(mesh: Path, arguments: list[str], messag
         (["completion", "cmd"], "invalid choice: 'cmd'"),
     ],
 )
-def test_errors_of_every_command(mesh, monkeypatch, capsys, arguments, message) -> None:
-    monkeypatch.chdir(mesh.parent)
-    try:
-        status = cli.main(arguments)
-    except SystemExit as stop:  # argparse
-        status = stop.code
-    check_error(status, *capsys.readouterr(), message)
+def test_errors_are_one_line_and_give_2(mesh, run, arguments, message) -> None:
+    done = run(*arguments, cwd=mesh.parent)
+    check_error(done.returncode, done.stdout, done.stderr, message)
     assert [path.name for path in mesh.parent.iterdir()] == ["mesh.obj"]
 
 
-@pytest.mark.parametrize("error", [wf.RenderError("two\nlines"), MemoryError()])
-def test_renders_that_fail_in_any_command_give_2(mesh, monkeypatch, capsys, error) -> None:
+@pytest.mark.parametrize(
+    ("error", "status", "text"),
+    [
+        (wf.RenderError("two\nlines"), 2, "error: two lines"),
+        (MemoryError(), 2, "error: out of memory"),
+        (wf.Interrupted("stopped by Ctrl-C"), 130, "stopped by Ctrl-C"),
+    ],
+)
+def test_how_renders_fail_in_any_command(mesh, monkeypatch, capsys, error, status, text) -> None:
     def fail(*args: object, **settings: object) -> None:
         raise error
 
     monkeypatch.setattr(view_commands, "save_animation", fail)
-    assert cli.main(["turntable", str(mesh), "-o", str(mesh.with_suffix(".gif")), *FAST]) == 2
-    text = "two lines" if str(error) else "out of memory"
-    assert capsys.readouterr().err == f"wavefront: error: {text}\n"
-
-
-def test_ctrl_c_in_any_command_gives_130(mesh, monkeypatch, capsys) -> None:
-    def stop(*args: object, **settings: object) -> None:
-        raise wf.Interrupted("stopped by Ctrl-C")
-
-    monkeypatch.setattr(view_commands, "save_animation", stop)
-    assert cli.main(["turntable", str(mesh), "-o", str(mesh.with_suffix(".gif")), *FAST]) == 130
-    assert capsys.readouterr().err == "wavefront: stopped by Ctrl-C\n"
+    assert cli.main(["turntable", str(mesh), "-o", str(mesh.with_suffix(".gif")), *FAST]) == status
+    assert capsys.readouterr().err == f"wavefront: {text}\n"
 
 
 # --- Several scenes -------------------------------------------------------------------------------
 
 
-def test_several_scenes_are_rendered_into_a_folder(mesh: Path) -> None:
+def test_several_scenes_are_rendered_into_a_folder(mesh: Path, run) -> None:
     """It is made; each picture is that of the scene alone."""
     other = shutil.copy(mesh, mesh.with_name("other.obj"))
     done = run("render", mesh.name, "other.obj", "-o", "out/", *FAST, cwd=mesh.parent)
@@ -209,7 +215,7 @@ def test_a_scene_is_shown_with_the_options_of_a_render(mesh: Path, monkeypatch, 
 # --- Other commands -------------------------------------------------------------------------------
 
 
-def test_info_names_sizes_textures_and_warnings(mesh: Path, capsys) -> None:
+def test_info_names_sizes_textures_and_warnings(mesh: Path, run, capsys) -> None:
     iio.imwrite(mesh.with_name("wood.png"), np.full((3, 5, 3), 128, np.uint8))
     mesh.with_name("mesh.mtl").write_text("newmtl wood\nmap_Kd wood.png\n")
     uv = "vt 0 0\nvt 1 0\nvt 0 1\n"
@@ -231,7 +237,7 @@ def test_info_names_sizes_textures_and_warnings(mesh: Path, capsys) -> None:
     assert capsys.readouterr().out.splitlines()[-1] == "warnings: none"
 
 
-def test_compare_shows_p_values(mesh: Path) -> None:
+def test_compare_shows_p_values(mesh: Path, run) -> None:
     for seed in ("1", "2"):
         options = [*FAST, "--spp", "8", "--seed", seed, "-o", str(mesh.with_name(f"{seed}.npz"))]
         assert cli.main(["render", str(mesh), *options]) == 0
@@ -243,19 +249,17 @@ def test_compare_shows_p_values(mesh: Path) -> None:
     assert mesh.with_name("d.exr").exists()
 
 
-def test_dataset_writes_views_and_goes_on(mesh: Path, monkeypatch, capsys) -> None:
+def test_dataset_writes_views_and_goes_on(mesh: Path, run) -> None:
     words = ["dataset", mesh.name, "-o", "set", "--views", "2", "--format", "coco", "--format", "bop", *FAST]
     done = run(*words, cwd=mesh.parent)
     assert (done.returncode, done.stderr, done.stdout) == (0, "", "set: 2 views\n")
     assert (mesh.parent / "set" / "annotations.json").exists()
     assert (mesh.parent / "set" / "train" / "000000" / "scene_gt.json").exists()
-    monkeypatch.chdir(mesh.parent)
-    assert cli.main(words) == 0
-    assert capsys.readouterr().out == "set: 2 views, 2 of them there before\n"
+    assert run(*words).stdout == "set: 2 views, 2 of them there before\n"
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh"])
-def test_completion_prints_a_script(shell: str, tmp_path: Path) -> None:
+def test_completion_prints_a_script(shell: str, run, tmp_path: Path) -> None:
     done = run("completion", shell)
     assert (done.returncode, done.stderr) == (0, "")
     assert "turntable" in done.stdout
@@ -279,7 +283,7 @@ def test_completion_says_what_it_needs(monkeypatch, capsys) -> None:
 # --- Doctor ---------------------------------------------------------------------------------------
 
 
-def test_doctor_says_what_is_there_and_tests_it() -> None:
+def test_doctor_says_what_is_there_and_tests_it(run) -> None:
     done = run("doctor", "--seconds", "1")
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith(f"wavefront {wf.__version__}, Python {sys.version.split()[0]}")

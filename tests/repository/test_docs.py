@@ -34,14 +34,20 @@ def blocks():
 
 @pytest.fixture
 def few_samples(tmp_path, monkeypatch):
-    """Let `wf.render` take one sample per pixel, in an empty folder."""
-    render = wf.render
+    """Let renders take one sample per pixel, of few pixels by default, in an empty folder."""
+    render, render_many = wf.render, wf.render_many
 
     def quick(scene, spp=MOST_SPP, noise=None, **options):
         few = {} if "samples" in options else {"spp": min(spp, MOST_SPP)}
+        if "camera" not in options and getattr(scene, "camera", None) is None:
+            few["size"] = options.pop("size", (96, 64))
         return render(scene, **few, progress=False, **options)
 
+    def quick_many(scene, cameras, spp=MOST_SPP, **options):
+        return render_many(scene, cameras, min(spp, MOST_SPP), progress=False, **options)
+
     monkeypatch.setattr(wf, "render", quick)
+    monkeypatch.setattr(wf, "render_many", quick_many)
     monkeypatch.chdir(tmp_path)
 
 

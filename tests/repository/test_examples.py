@@ -2,7 +2,7 @@
 
 import importlib.util
 import re
-import subprocess
+import runpy
 import sys
 from pathlib import Path
 
@@ -39,14 +39,21 @@ SHAPES = {  # the picture of --size 24, (height, width)
 }
 
 
-def run(name, folder, *options):
+@pytest.fixture
+def run(tmp_path, monkeypatch, capsys):
     """Run an example in an empty folder; return what it prints, and its picture (H, W, 3) in [0, 1]."""
-    output = folder / f"{name}.png"
-    command = [sys.executable, str(EXAMPLES / f"{name}.py"), str(output), *options]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder, timeout=120)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.splitlines()[-1] == f"wrote {output}"
-    return done.stdout, iio.imread(output) / 255
+
+    def run_example(name, *options):
+        output = tmp_path / f"{name}.png"
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.syspath_prepend(EXAMPLES)  # some import others
+        monkeypatch.setattr(sys, "argv", [name, str(output), *options])
+        runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
+        printed = capsys.readouterr().out
+        assert printed.splitlines()[-1] == f"wrote {output}"
+        return printed, iio.imread(output) / 255
+
+    return run_example
 
 
 def load(name):
@@ -69,8 +76,8 @@ def test_the_overview_lists_all_examples():
 
 
 @pytest.mark.parametrize("name", [name for name in SHAPES if name != "furnace"])
-def test_example_writes_a_picture(name, tmp_path):
-    _, picture = run(name, tmp_path, "--spp", "4", "--size", "24")
+def test_example_writes_a_picture(name, run):
+    _, picture = run(name, "--spp", "2", "--size", "24")
     assert picture.shape == (*SHAPES[name], 3)
     assert picture.std() > 0.05
     assert 0.01 < picture.mean() < 0.9
@@ -91,8 +98,8 @@ def test_scenes_of_scientists_are_short(name):
     assert len([line for line in code.splitlines() if line.strip()]) <= 20
 
 
-def test_furnace_prints_numbers_within_their_errors(tmp_path):
-    out, picture = run("furnace", tmp_path, "--spp", "16", "--size", "8")
+def test_furnace_prints_numbers_within_their_errors(run):
+    out, picture = run("furnace", "--spp", "16", "--size", "8")
     rows = re.findall(r"^(\D.*?)\s+([\d.]+)\s+([\d.]+)\s+([\d.]+)\s+([+-][\d.]+)%$", out, re.MULTILINE)
     assert [float(exact) for _, exact, *_ in rows] == [2, 5, 1, 1, 1]
     for name, exact, mean, error, off in rows:
@@ -126,15 +133,15 @@ def test_course_spheres_show_matte_mirror_and_glass():
     assert rgb[height // 3, width - 2, 2] > rgb[height // 3, width - 2, 0]  # blue wall on the right
 
 
-def test_own_material_is_proved_and_shines_back(tmp_path):
-    out, picture = run("own_material", tmp_path, "--spp", "4", "--size", "48")
+def test_own_material_is_proved_and_shines_back(run):
+    out, picture = run("own_material", "--spp", "4", "--size", "48")
     assert "FAIL" not in out
     assert "chi-square" in out
     left, right = picture[:, :24].max(), picture[:, 24:].max()
     assert right > 1.3 * left
 
 
-def test_estimators_agree_where_they_estimate_the_same(tmp_path):
+def test_estimators_agree_where_they_estimate_the_same(run):
     module = load("estimators")
     assert list(module.ESTIMATORS) == ["naive", "direct_simple", "direct_mis", "full"]
     results = module.compare(module.courtyard(32), 32)
@@ -147,7 +154,7 @@ def test_estimators_agree_where_they_estimate_the_same(tmp_path):
     variance = {name: variance for name, (_, variance) in results.items()}
     assert variance["full"] < variance["naive"]
     assert variance["direct_mis"] < variance["direct_simple"] / 2
-    out, _ = run("estimators", tmp_path, "--spp", "2", "--size", "16")
+    out, _ = run("estimators", "--spp", "2", "--size", "16")
     assert [line.split()[0] for line in out.splitlines()[1:5]] == list(module.ESTIMATORS)
 
 

@@ -197,7 +197,7 @@ def test_a_mirrored_instance_keeps_its_front():
 
 # --- Exactness ------------------------------------------------------------------------------------
 
-FAR = [(scale, shift) for scale in (1e-3, 1.0, 1e3) for shift in (0.0, 100 * scale, 1e4 * scale, -3e3)]
+FAR = [(1.0, 0.0), (1e-3, 10.0), (1e3, 1e5), (1.0, -3e3), (1e-3, -3e3), (1e3, 1e7)]
 
 
 @pytest.mark.parametrize("accel", NAMES)
@@ -229,14 +229,14 @@ def scene_vertices(mesh: wf.Mesh, matrix: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("accel", NAMES)
-@pytest.mark.parametrize(("scale", "shift"), [(1e-3, 0), (1e3, 0), (1, 300), (1, -2e4), (1e-3, 30)])
+@pytest.mark.parametrize(("scale", "shift"), [(1e3, 0), (1, -2e4), (1e-3, 30)])
 @pytest.mark.filterwarnings("ignore:the picture is black")
 def test_light_does_not_leak_in(accel, scale, shift):
     """Inside a closed instance it stays dark, however often paths bounce off its wall."""
     mesh = bumpy(smooth=True, material=wf.Diffuse(1))
     matrix = at(shift, 0.4 * shift, shift, scale, (1, 2, 3))
     middle = (np.append(mesh.bounds.mean(0), 1) @ matrix.T)[:3]
-    camera = wf.Camera.look_at(middle, middle + np.array([0.3, 0, 1]) * scale, fov=120, size=(24, 24))
+    camera = wf.Camera.look_at(middle, middle + np.array([0.3, 0, 1]) * scale, fov=120, size=(16, 16))
     scene = wf.Scene(placed(mesh, [matrix, at(0, 5, 0)]), [wf.Environment(1e4)], camera)
     image = render(scene, 16, accel=accel, max_bounces=20)
     assert image.rgb.max() == 0
@@ -513,7 +513,7 @@ def test_bright_lone_and_skewed_meshes_are_not_shared():
         assert compiled(shapes).instances is None
     assert compiled(placed(bumpy(), MATRICES[:3])).instances is not None
     for shapes in cases:
-        camera = wf.Scene(shapes).framing_camera(size=(24, 24))
+        camera = wf.Scene(shapes).framing_camera(size=(12, 12))
         a, b = (render(wf.Scene(some, SKY, camera), 2) for some in (shapes, alone(shapes)))
         assert a.rgb.tobytes() == b.rgb.tobytes()
 
@@ -637,7 +637,7 @@ def test_a_scene_in_memory_looks_like_its_file(tmp_path):
     forest().export(tmp_path / "a.glb")
     held = trimesh.load(tmp_path / "a.glb")
     assert sum(isinstance(shape, wf.Instance) for shape in wf.from_trimesh(held).shapes) == 5
-    a, b = (render(scene, 1, max_bounces=1).rgb for scene in (held, tmp_path / "a.glb"))
+    a, b = (render(scene, 1, max_bounces=1, size=(48, 36)).rgb for scene in (held, tmp_path / "a.glb"))
     assert a.tobytes() == b.tobytes()
 
 
