@@ -233,20 +233,6 @@ def test_ties_of_halves_with_others_go_to_the_lowest_id() -> None:
     np.testing.assert_array_equal(prim, np.where(origin[1] > origin[0], 1, 0))
 
 
-@pytest.mark.parametrize("size", [1, 7, 64])
-def test_rays_at_corners_have_the_same_bits_in_any_batch(size: int) -> None:
-    """Where the filter is unsure, and the diagonal begins."""
-    triangles = np.concatenate([box((1, 0.8, 1.2), 2), trapezoids(4, 1)]).astype(f4)
-    accelerator = make_accelerator(geometry(triangles), "numpy")
-    origin, direction = aimed_rays(triangles.astype(float), 600, 1)
-    whole = accelerator.closest(origin, direction, nothing(600))
-    for at in range(0, 600, size):
-        part = slice(at, at + size)
-        hits = accelerator.closest(origin[:, part], direction[:, part], nothing(600)[part])
-        for name in ("t", "prim", "b1", "b2"):
-            np.testing.assert_array_equal(getattr(hits, name), getattr(whole, name)[part])
-
-
 @pytest.mark.parametrize("length", [1e-12, 1.0, 1e12, 1e25])
 def test_rays_are_blocked_however_long_their_directions(length: float) -> None:
     """The last one's length is not a float32. Some end before the square, some beyond, and one behind."""

@@ -7,7 +7,6 @@ import subprocess
 import sys
 import tracemalloc
 import zlib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from hypothesis import strategies as st
 
 from wavefront.codecs import hdr as rgbe
 from wavefront.codecs import png_jpeg as coded
-from wavefront.codecs import size_check
 from wavefront.codecs.display import Display
 from wavefront.codecs.encoding import linear_to_srgb, srgb_to_linear, to_codes
 from wavefront.codecs.images import check_writable, read_image, write_image
@@ -33,31 +31,12 @@ def picture():
     return rgb
 
 
-@pytest.mark.parametrize("extension", ["exr", "npy"])
-def test_float_formats_are_exact(tmp_path, picture, extension):
-    path = tmp_path / f"a.{extension}"
-    write_image(path, picture)
-    assert np.array_equal(read_image(path), picture)
-    assert read_image(path).dtype == np.float32
-
-
 def test_hdr_is_within_its_precision(tmp_path, picture):
     write_image(tmp_path / "a.hdr", picture)
     found = read_image(tmp_path / "a.hdr")
     assert found.shape == picture.shape
     # half a step of an 8-bit mantissa of the largest channel, which is at least 128 steps
     assert (np.abs(found - picture) <= picture.max(axis=2, keepdims=True) / 255).all()
-
-
-@pytest.mark.parametrize("gamma", [2.2, 1.0, "srgb"])
-def test_png_decodes_to_what_was_written(tmp_path, picture, gamma):
-    write_image(tmp_path / "a.png", picture, Display(gamma))
-    coded = read_image(tmp_path / "a.png")
-    linear = srgb_to_linear(coded) if gamma == "srgb" else coded**gamma
-    clipped = np.minimum(picture, 1)
-    again = linear_to_srgb(clipped) if gamma == "srgb" else clipped ** (1 / gamma)
-    assert np.abs(coded - again).max() <= 0.5001 / 255
-    assert np.abs(linear - clipped).max() < 0.01
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 7), (7, 1), (40, 31)])
@@ -73,21 +52,6 @@ def test_png_keeps_every_code(shape):
     flat = coded.encode(even, ".png", 2.2)
     assert np.array_equal(iio.imread(flat, extension=".png"), even)
     assert len(flat) < 120 + noise.size / 50
-
-
-def test_jpg_is_close(tmp_path):
-    flat = np.full((16, 16, 3), [0.8, 0.4, 0.1], np.float32)
-    for extension in ("jpg", "jpeg"):
-        write_image(tmp_path / f"a.{extension}", flat, Display(gamma=1))
-        assert np.abs(read_image(tmp_path / f"a.{extension}") - flat).max() < 3 / 255
-
-
-def test_exposure_counts_stops_in_every_format(tmp_path, picture):
-    for extension in ("exr", "npy"):
-        write_image(tmp_path / f"a.{extension}", picture, Display(exposure=-2))
-        assert np.array_equal(read_image(tmp_path / f"a.{extension}"), picture / 4)
-    write_image(tmp_path / "a.png", picture / 4, Display(exposure=1, gamma=1))
-    assert np.abs(read_image(tmp_path / "a.png") - picture / 2).max() <= 0.5001 / 255
 
 
 def test_srgb_curve_is_the_standard_one():
@@ -341,8 +305,7 @@ def test_what_encoders_refuse_is_a_save_error(tmp_path):
 
 
 @posix
-@pytest.mark.parametrize("signal", ["SIGTERM", "SIGKILL"])
-def test_a_killed_process_leaves_nothing_behind(tmp_path, signal):
+def test_a_killed_process_leaves_nothing_behind(tmp_path):
     """Where the system has files without names."""
     try:
         os.close(os.open(tmp_path, os.O_WRONLY | os.O_TMPFILE))
@@ -352,7 +315,7 @@ def test_a_killed_process_leaves_nothing_behind(tmp_path, signal):
         "import os, signal, sys, numpy as np\n"
         "from wavefront.core import files\n"
         "from wavefront.codecs.images import write_image\n"
-        f"files.os.fsync = lambda handle: os.kill(os.getpid(), signal.{signal})\n"
+        "files.os.fsync = lambda handle: os.kill(os.getpid(), signal.SIGKILL)\n"
         "write_image(sys.argv[1], np.ones((4, 4, 3)))\n"
     )
     done = subprocess.run([sys.executable, "-c", code, tmp_path / "a.npy"], check=False, timeout=60)
@@ -448,17 +411,8 @@ def test_npy_with_objects_is_refused(tmp_path):
         read_image(tmp_path / "a.npy")
 
 
-@pytest.mark.parametrize("width", [1, 7, 8, 127, 128, 129, 300])
-def test_hdr_round_trip_at_every_width(width):
-    values = np.random.default_rng(width).integers(0, 3, (3, width, 4), np.uint8)
-    values[..., 3] = 128
-    values[1, :, :3] = 7  # one long run
-    pixels = rgbe.from_rgbe(values)
-    assert np.array_equal(rgbe.decode(rgbe.encode(pixels)), pixels)
-
-
 @settings(max_examples=50, deadline=None)
-@given(st.integers(8, 400), st.integers(0, 2**32 - 1), st.integers(1, 40))
+@given(st.integers(1, 400), st.integers(0, 2**32 - 1), st.integers(1, 40))
 def test_hdr_coding_loses_nothing(width, seed, run):
     rng = np.random.default_rng(seed)
     mantissa = rng.integers(128, 256, (2, -(-width // run), 4), np.uint8).repeat(run, 1)[:, :width]
@@ -484,13 +438,6 @@ def test_hdr_range():
     assert found[0, 1, 0] == pytest.approx(1e30, rel=0.01)
     assert found[0, 2, 0] == 0
     assert np.isfinite(found).all()
-
-
-def test_paths_may_be_strings_or_not_ascii(tmp_path, picture):
-    path = str(tmp_path / "ünïcode 図.png")
-    write_image(path, picture)
-    assert read_image(path).shape == picture.shape
-    assert Path(path).exists()
 
 
 # --- Files that claim more than they hold ------------------------------------------------------------
@@ -544,11 +491,6 @@ def test_a_small_png_that_claims_much_costs_little(tmp_path):
         peak = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         assert peak < 4_000_000
-
-
-def test_no_more_of_a_png_is_inflated_than_it_needs():
-    pieces = [memoryview(zlib.compress(bytes(30_000_000)))]
-    assert 1000 <= size_check._inflated(pieces, 1000) <= size_check.CHUNK
 
 
 def _jpg(height, width=40):

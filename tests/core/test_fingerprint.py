@@ -15,8 +15,6 @@ import pytest
 import wavefront as wf
 from wavefront.core.fingerprint import fingerprint
 
-FACTOR = 2.0
-
 
 def of(thing: Any) -> str:
     """Return the fingerprint of a thing."""

@@ -482,8 +482,3 @@ def test_setting_up_takes_under_a_twentieth_of_the_time(
     print(f"set-up {spent:.2f} s of {whole:.1f} s: {spent / whole:.1%}")
     assert spent < 0.05 * whole
     assert len(COCO(tmp_path / "annotations.json").imgs) == 200
-
-
-def test_unknown_settings_are_errors(tmp_path: Path) -> None:
-    with pytest.raises(TypeError, match=r"sede.*did you mean 'seed'"):
-        wf.write_dataset(tmp_path / "set", BALLS, [START], 1, sede=3)

@@ -3,13 +3,11 @@
 import os
 import struct
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
-import wavefront as wf
 from wavefront.bsdfs.dielectric import Dielectric
 from wavefront.bsdfs.diffuse import Diffuse
 from wavefront.bsdfs.mirror import Mirror
@@ -20,8 +18,6 @@ from wavefront.lights import Environment
 from wavefront.render import render
 from wavefront.scene import Scene
 from wavefront.textures.vertex_colors import VertexColors
-
-DATA = Path(__file__).parents[3] / "shared" / "data"
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 
@@ -51,12 +47,6 @@ def test_triangle(write):
     assert mesh.normals is None
     assert mesh.uvs is None
     assert mesh.material.bsdf.reflectance.ravel() == pytest.approx([0.5] * 3)
-
-
-def test_load_gives_a_scene(write):
-    text = f"mtllib s.mtl\n{SQUARE}usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\nusemtl a\nf 1 2 4\n"
-    scene = load(write(text, s_mtl="newmtl a\nnewmtl b\n"))
-    assert [(shape.name, len(shape.faces)) for shape in scene.shapes] == [("a", 2), ("b", 1)]
 
 
 @pytest.mark.parametrize(
@@ -497,20 +487,6 @@ def test_a_library_in_a_folder_below(write, tmp_path):
 # ---- PLY, STL, in memory ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("extension", ["ply", "stl", "glb", "obj"])
-def test_a_file_equals_the_object_in_memory(tmp_path, extension):
-    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.7)
-    path = tmp_path / f"ball.{extension}"
-    ball.export(path)
-    (mesh,) = load_meshes(path)
-    (again,) = from_trimesh(trimesh.load(path, process=False)).shapes
-    assert np.array_equal(soup(mesh), soup(again))
-    for a, b in ((mesh.normals, again.normals), (mesh.uvs, again.uvs)):
-        assert (a is None) == (b is None)
-        assert a is None or np.array_equal(soup(mesh, a), soup(again, b))
-    assert soup(mesh) == pytest.approx(ball.triangles, abs=1e-6)
-
-
 # ---- vertex colors ---------------------------------------------------------------------------
 
 CODES = np.array([[255, 0, 0], [0, 188, 0], [0, 0, 100], [10, 11, 12]])
@@ -612,23 +588,6 @@ def test_obj_colors_that_are_wanting_or_too_large_are_announced(write):
     assert mesh.colors[3].tolist() == [1, 1, 1, 1]
 
 
-@pytest.mark.parametrize("extension", ["ply", "obj"])
-@pytest.mark.parametrize("by", [trimesh.load, trimesh.load_mesh, trimesh.load_scene])
-def test_vertex_colors_in_memory_render_as_their_file(tmp_path, extension, by):
-    ball = trimesh.creation.icosphere(subdivisions=1)
-    ball.visual.vertex_colors = np.random.default_rng(0).integers(0, 256, (42, 3), np.uint8)
-    path = tmp_path / f"ball.{extension}"
-    ball.export(path)
-    camera = Camera.look_at((0, 0, 5), (0, 0, 0), fov=25, size=(8, 8))
-    pictures = [
-        render(Scene(scene.shapes, [Environment(1.0)], camera), 2, workers=1, progress=False).rgb
-        for scene in (load(path), from_trimesh(by(path, process=False)), from_trimesh(ball))
-    ]
-    assert np.ptp(pictures[0], axis=(0, 1)).min() > 0.1
-    assert np.array_equal(pictures[0], pictures[1])
-    assert pictures[0] == pytest.approx(pictures[2], abs=1e-3)
-
-
 def textured_ply(write, *comments):
     lines = ["ply", "format ascii 1.0", *(f"comment TextureFile {c}" for c in comments), "element vertex 4"]
     lines += [*(f"property float {x}" for x in "xyzst"), "element face 2"]
@@ -677,30 +636,6 @@ def test_objects_in_memory_render_as_their_file(write, tmp_path, make, least):
     assert np.array_equal(a, b)
     assert a.max() > 0.4
     assert np.ptp(a, axis=(0, 1)).min() >= least
-
-
-def test_a_material_made_in_memory_renders_as_its_obj(tmp_path):
-    from PIL import Image
-
-    image = Image.fromarray(np.random.default_rng(0).integers(0, 256, (4, 4, 3), np.uint8))
-    corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
-    plane = trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False)
-    material = trimesh.visual.material.SimpleMaterial(
-        image,
-        diffuse=[200, 101, 77, 255],
-        ambient=[0, 0, 0, 255],
-        specular=[99, 200, 255, 255],
-        glossiness=321.0,
-    )
-    plane.visual = trimesh.visual.TextureVisuals(uv=plane.vertices[:, :2], material=material)
-    plane.export(tmp_path / "a.obj")
-    camera = Camera.look_at((0.5, 0.5, 3), (0.5, 0.5, 0), fov=25, size=(8, 8))
-    a, b = (
-        render(Scene(scene.shapes, [Environment(1.0)], camera), 2, workers=1, progress=False).rgb
-        for scene in (load(tmp_path / "a.obj"), from_trimesh(plane))
-    )
-    assert np.array_equal(a, b)
-    assert np.ptp(a, axis=(0, 1)).min() > 0.05
 
 
 def test_textures_of_ply(write, tmp_path):
@@ -784,56 +719,11 @@ def test_face_colors_that_do_not_count_are_named(write, rows, faces, extra):
     assert (mesh.colors is not None) == ("red" in extra)
 
 
-def test_face_colors_in_memory_render_as_their_file(tmp_path):
-    ball = trimesh.creation.icosphere(subdivisions=1)
-    ball.apply_scale(0.75)
-    ball.vertices = ball.vertices.astype(np.float32)
-    ball.visual.face_colors = np.random.default_rng(0).integers(0, 256, (80, 3), np.uint8)
-    path = tmp_path / "ball.ply"
-    path.write_bytes(ball.export(file_type="ply"))
-    camera = Camera.look_at((0, 0, 5), (0, 0, 0), fov=20, size=(8, 8))
-    pictures = [
-        render(Scene(scene.shapes, [Environment(1.0)], camera), 2, workers=1, progress=False).rgb
-        for scene in (load(path), from_trimesh(trimesh.load(path, process=False)), from_trimesh(ball))
-    ]
-    assert np.ptp(pictures[0], axis=(0, 1)).min() > 0.1
-    assert np.array_equal(pictures[0], pictures[1])
-    assert np.array_equal(pictures[0], pictures[2])
-
-
 def test_load_mesh_keeps_colors_and_the_second_uvs(write):
     mesh = load_mesh(write(obj_with_colors() + "f 1 2 3\nf 1 3 4\n"))
     assert mesh.colors[:, :3] == pytest.approx(LINEAR, rel=1e-5)
     assert isinstance(mesh.material.bsdf.reflectance, VertexColors)
     assert load_mesh(write(obj_with_colors() + "f 1 2 3\n"), Diffuse(0.5)).colors is not None
-
-
-def test_a_scene_in_memory_equals_its_file(tmp_path):
-    scene = trimesh.Scene()
-    turn = trimesh.transformations.rotation_matrix(0.3, [1, 2, 3], [0, 0, 1])
-    mirror = np.diag([-1.0, 1, 2, 1])
-    box = trimesh.creation.box()
-    scene.add_geometry(box, node_name="a", geom_name="box", transform=turn)
-    scene.add_geometry(box, node_name="b", geom_name="box", transform=mirror)
-    scene.add_geometry(trimesh.creation.icosphere(1), node_name="c", geom_name="ball")
-    scene.export(tmp_path / "s.glb")
-    found = load_meshes(tmp_path / "s.glb")
-    again, direct = (
-        [shape.to_mesh() if isinstance(shape, wf.Instance) else shape for shape in from_trimesh(held).shapes]
-        for held in (trimesh.load(tmp_path / "s.glb"), scene)
-    )
-    assert len(found) == len(again) == len(direct) == 3
-    for a, b, c in zip(found, again, direct, strict=True):
-        assert np.array_equal(soup(a), soup(b))
-        assert soup(a) == pytest.approx(soup(c), abs=1e-6)
-
-
-def test_a_reflected_instance_keeps_its_front():
-    scene = trimesh.Scene()
-    scene.add_geometry(trimesh.creation.box(), transform=np.diag([-1.0, 1, 1, 1]))
-    (mesh,) = from_trimesh(scene).shapes
-    a, b, c = soup(mesh).transpose(1, 0, 2)
-    assert (np.cross(b - a, c - a) * (a + b + c)).sum(axis=1).min() > 0
 
 
 def test_from_trimesh_takes_normals_that_are_there():
@@ -1071,12 +961,6 @@ def test_damaged_stl(write, data, message):
         load_meshes(write(data, "a.stl"))
 
 
-@pytest.mark.parametrize("extension", ["glb", "gltf"])
-def test_damaged_gltf(write, extension):
-    with pytest.raises(SceneError, match=rf"a\.{extension}"):
-        load_meshes(write(b"glTF" + bytes(10), f"a.{extension}"))
-
-
 # ---- load_mesh --------------------------------------------------------------------------------
 
 
@@ -1138,35 +1022,6 @@ def test_load_mesh_refuses_transforms(write, transform, message):
 
 
 # ---- real files -------------------------------------------------------------------------------
-
-REAL = {
-    "cow.obj": 5804,
-    "suzanne.obj": 968,
-    "teapot.obj": 6320,
-    "rocker-arm.obj": 20088,
-    "bunny.obj": 2000,
-    "fuze.obj": 1000,
-    "cornell/walls.obj": 6,
-    "cornell/sphere1.obj": 1088,
-    "BoxTextured.glb": 12,
-    "Duck.glb": 4212,
-}
-
-
-@pytest.mark.skipif(not DATA.is_dir(), reason="the real files are not here")
-@pytest.mark.parametrize("name", REAL)
-@pytest.mark.filterwarnings("ignore:.*(not honored|is missing)")
-def test_real_files_equal_what_trimesh_holds(name):
-    found = load_meshes(DATA / name)
-    assert sum(len(mesh.faces) for mesh in found) == REAL[name]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)
-        held = trimesh.load(DATA / name, process=False)
-    for a, b in zip(found, from_trimesh(held).shapes, strict=True):
-        assert np.array_equal(soup(a), soup(b))
-        for x, y in ((a.normals, b.normals), (a.uvs, b.uvs)):
-            assert (x is None) == (y is None)
-            assert x is None or np.array_equal(soup(a, x), soup(b, y))
 
 
 def test_load_mesh_keeps_normals_that_only_some_parts_have(write):

@@ -4,7 +4,6 @@ import inspect
 import json
 import time
 import warnings
-from pathlib import Path
 from types import SimpleNamespace
 
 import imageio.v3 as iio
@@ -14,7 +13,7 @@ import trimesh
 from gltf_builder import TRIANGLE, Builder
 
 from wavefront import Camera, Scene, render
-from wavefront.bsdfs import Dielectric, Diffuse, Principled, ThinDielectric
+from wavefront.bsdfs import Dielectric, Diffuse, ThinDielectric
 from wavefront.codecs.encoding import srgb_to_linear
 from wavefront.core.errors import SceneError
 from wavefront.io import appearance, gltf_document, placing
@@ -26,8 +25,6 @@ from wavefront.shapes import Instance, Mesh
 from wavefront.textures.image import Texture
 from wavefront.textures.normal_map import NormalMap
 from wavefront.textures.vertex_colors import VertexColors
-
-DATA = Path(__file__).parents[3] / "shared" / "data"
 
 
 @pytest.fixture
@@ -82,13 +79,6 @@ def test_an_external_buffer_with_a_space_in_its_name(build, path):
 def test_index_types(build, path, kind):
     build.mesh(indices=np.array([2, 0, 1], kind))
     assert np.array_equal(soup(load_meshes(build.gltf(path))[0])[0], TRIANGLE[[2, 0, 1]])
-
-
-@pytest.mark.parametrize(("mode", "expected"), [(5, [[0, 1, 2], [2, 1, 3]]), (6, [[0, 1, 2], [0, 2, 3]])])
-def test_strips_and_fans(build, path, mode, expected):
-    corners = np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
-    build.mesh({"POSITION": corners}, np.arange(4, dtype=np.uint16), mode=mode).gltf(path)
-    assert np.array_equal(soup(load_meshes(path)[0]), corners[expected])
 
 
 def test_triangles_without_an_area_join_strips(build, path):
@@ -912,15 +902,6 @@ def test_a_volume_over_a_distance_below_float32_is_no_division_by_zero(build, pa
     assert (green, blue) == (0, 0)
 
 
-def test_everything_else_is_principled(build, path):
-    group = {"metallicFactor": 0.25, "roughnessFactor": 0.75, "baseColorFactor": [1, 0.5, 0, 1]}
-    (mesh,) = load_meshes(build.material(pbrMetallicRoughness=group).gltf(path))
-    assert type(mesh.material.bsdf) is Principled
-    assert mesh.material.bsdf.metallic == pytest.approx([0.25])
-    assert mesh.material.bsdf.roughness == pytest.approx([0.75])
-    assert mesh.material.bsdf.base_color.ravel() == pytest.approx([1, 0.5, 0])
-
-
 def test_what_principled_refuses_is_named(build, path, monkeypatch):
     def refuse(**parameters):
         raise SceneError("Principled ior is 1")
@@ -1410,45 +1391,6 @@ def test_damaged_base64_and_short_buffers(build, path):
 # ---- in memory equals the file --------------------------------------------------------------------
 
 
-def same(a, b):
-    if isinstance(a, Texture):
-        points = np.random.default_rng(0).random((2, 100), np.float32)
-        return isinstance(b, Texture) and np.array_equal(a.lookup(points), b.lookup(points))
-    return np.array_equal(np.asarray(a), np.asarray(b))
-
-
-@pytest.mark.filterwarnings("ignore:.*not honored")
-def test_a_textured_object_in_memory_equals_its_file(tmp_path):
-    from PIL import Image
-
-    codes = np.random.default_rng(0).integers(0, 256, (8, 8, 3), np.uint8)
-    plane = trimesh.Trimesh(
-        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]], process=False
-    )
-    material = trimesh.visual.material.PBRMaterial(
-        baseColorTexture=Image.fromarray(codes),
-        baseColorFactor=[255, 51, 0, 255],
-        metallicFactor=0.0,
-        roughnessFactor=1.0,
-        emissiveFactor=[1.0, 0.0, 0.5],
-        normalTexture=Image.fromarray(codes[::-1]),
-        emissiveTexture=Image.fromarray(codes[::-1].copy()),
-        doubleSided=True,
-    )
-    plane.visual = trimesh.visual.TextureVisuals(uv=plane.vertices[:, :2], material=material)
-    plane.export(tmp_path / "a.glb")
-    (mesh,) = load_meshes(tmp_path / "a.glb")
-    for other in (plane, trimesh.load(tmp_path / "a.glb")):
-        (held,) = from_trimesh(other).shapes
-        assert np.array_equal(soup(mesh), soup(held))
-        assert np.array_equal(soup(mesh, mesh.uvs), soup(held, held.uvs))
-        assert same(mesh.emission, held.emission)
-        assert mesh.two_sided
-        assert held.two_sided
-        assert same(mesh.material.bsdf.base_color, held.material.bsdf.base_color)
-        assert same(mesh.material.normal_map.texture, held.material.normal_map.texture)
-
-
 @pytest.mark.parametrize("dressed", [False, True], ids=["plain", "material"])
 def test_vertex_colors_in_memory_equal_their_glb(tmp_path, dressed):
     plane = trimesh.Trimesh(TRIANGLE, [[0, 1, 2]], process=False)
@@ -1473,21 +1415,3 @@ def base(mesh):
     """The base color of a mesh's material."""
     (key,) = vars(mesh.material.bsdf).keys() & {"base_color", "reflectance"}
     return getattr(mesh.material.bsdf, key)
-
-
-@pytest.mark.skipif(not DATA.is_dir(), reason="the real files are not here")
-@pytest.mark.parametrize("name", ["BoxTextured.glb", "Duck.glb", "fuze.obj"])
-@pytest.mark.filterwarnings("ignore:.*not honored")
-def test_textures_of_real_files(name):
-    scene = load(DATA / name)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)
-        held = trimesh.load(DATA / name, process=False)
-    for a, b in zip(scene.shapes, from_trimesh(held).shapes, strict=True):
-        (key,) = vars(a.material.bsdf).keys() & {"base_color", "reflectance"}
-        assert isinstance(getattr(a.material.bsdf, key), Texture)
-        assert same(getattr(a.material.bsdf, key), getattr(b.material.bsdf, key))
-    if name == "Duck.glb":
-        # the camera hangs below a node that scales by 0.01
-        assert scene.camera.origin == pytest.approx([4.00113, 4.63264, -4.31078], rel=1e-5)
-        assert scene.camera.size == (768, 512)

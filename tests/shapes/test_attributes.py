@@ -1,21 +1,14 @@
 """Vertex colors, texture coordinates and textures: from the mesh to the picture."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-import trimesh
 from significance import render
 
 import wavefront as wf
 from wavefront.accel import make_accelerator
-from wavefront.arrays.state import Rays
 from wavefront.compile.scene import compile_scene
-from wavefront.stages.interaction import interaction
-from wavefront.stages.intersect import intersect
 from wavefront.textures.base import BaseTexture
 
-DATA = Path(__file__).parents[3] / "shared" / "data"
 SQUARE = {"vertices": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "faces": [[0, 1, 2], [0, 2, 3]]}
 CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
 N = 8  # pixels along a side of the picture of the unit square
@@ -59,70 +52,6 @@ def test_a_textured_patch_in_even_light_shows_its_texels():
     c = codes / 255
     expected = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
     assert image == pytest.approx(expected, rel=1e-4, abs=1e-7)
-
-
-@pytest.mark.skipif(not (DATA / "BoxTextured.glb").exists(), reason="the real file is not here")
-def test_a_patch_of_a_real_file_shows_its_texture():
-    """The front of the box, in even light without its gloss, is the image, the right way up."""
-    held = trimesh.load_scene(DATA / "BoxTextured.glb")
-    matrix, name = held.graph[held.graph.nodes_geometry[0]]
-    box = held.geometry[name].apply_transform(matrix)
-    front = np.flatnonzero(box.vertex_normals[:, 2] > 0.9)
-    place, uv = box.vertices[front, :2], box.visual.uv[front]
-    to_uv = np.linalg.lstsq(np.column_stack([place, np.ones(4)]), uv, rcond=None)[0]
-    size = 256
-    along = (np.arange(size) + 0.5) / size - 0.5
-    x, y = np.meshgrid(along, along[::-1])
-    u, v = (np.stack([x, y, np.ones_like(x)], -1) @ to_uv).transpose(2, 0, 1)
-    codes = np.asarray(box.visual.material.baseColorTexture.convert("RGB")) / 255
-    height, width = codes.shape[:2]
-    column, row = np.floor(u % 1 * width).astype(int), np.floor((1 - v) % 1 * height).astype(int)
-    code = codes[row, column]
-    expected = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
-
-    (mesh,) = wf.load(DATA / "BoxTextured.glb").shapes
-    mesh.material = wf.Diffuse(mesh.material.bsdf.base_color)
-    camera = wf.Camera.orthographic((0, 0, 2), (0, 0, 0), height=1, size=(size, size))
-    scene = wf.Scene(mesh, [wf.Environment(1.0)], camera)
-    found = render(scene, 4, integrator="naive", max_bounces=1).rgb
-
-    def blocks(image):  # jitter in the pixel and the filter blur by a texel
-        return image.reshape(16, 16, 16, 16, 3).mean((1, 3))
-
-    assert np.ptp(blocks(expected), axis=(0, 1)).max() > 0.2
-    assert blocks(found) == pytest.approx(blocks(expected), abs=0.02)
-    assert found.mean((0, 1)) == pytest.approx(expected.mean((0, 1)), rel=2e-3)
-
-
-@pytest.mark.skipif(not DATA.is_dir(), reason="the real files are not here")
-@pytest.mark.filterwarnings("ignore:.*not honored", "ignore::DeprecationWarning")
-@pytest.mark.parametrize("name", ["fuze.obj", "BoxTextured.glb", "Duck.glb"])
-def test_faces_of_real_files_have_the_colors_of_their_image(name):
-    """In the middle of each face, as trimesh places it and as Pillow decodes it."""
-    (held,) = trimesh.load_scene(DATA / name, process=False).dump()
-    material = held.visual.material
-    image = getattr(material, "baseColorTexture", None) or material.image
-    codes = np.asarray(image.convert("RGB")) / 255
-    u, v = held.visual.uv[held.faces].mean(1).T % 1
-    code = codes[((1 - v) * len(codes)).astype(int), (u * len(codes[0])).astype(int)]
-    expected = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
-
-    (mesh,) = wf.load(DATA / name).shapes
-    scene = compile_scene(
-        wf.Scene(mesh, [wf.Environment(1.0)]), lambda parts: make_accelerator(parts, "numpy")
-    )
-    middles, normals = held.triangles_center, held.face_normals
-    origin = (
-        middles + normals * 1e-3 * np.linalg.norm(np.ptp(held.bounds, axis=0)) / 2 - scene.center
-    ).T.astype(np.float32)
-    rays = Rays(origin, np.ascontiguousarray(-normals.T, np.float32), np.full(len(middles), -1))
-    surface = interaction(scene, rays, intersect(scene, rays))
-    (key,) = vars(mesh.material.bsdf).keys() & {"base_color", "reflectance"}
-    found = getattr(mesh.material.bsdf, key).at(surface).T
-    off = np.abs(found - expected).max(1)
-    assert np.quantile(off, 0.75) < 0.05  # near an edge in the image, the texel and the mean of four differ
-    assert found.mean(0) == pytest.approx(expected.mean(0), rel=0.02)
-    assert np.quantile(np.abs(found - expected[::-1]).max(1), 0.75) > 0.1
 
 
 # ---- vertex colors -----------------------------------------------------------------------------

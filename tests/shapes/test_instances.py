@@ -533,16 +533,6 @@ def test_few_triangles_are_not_shared_for_embree(monkeypatch):
         assert (scene.instances is not None) == shared
 
 
-def test_tables_hold_a_mesh_once():
-    scene = compiled(mixture())
-    once = 2 + len(bumpy().faces) + len(knot().faces)
-    assert scene.triangles == scene.normals.shape[1] == once
-    assert len(scene.material_of) == once + 1
-    row, place = scene.instances.locate(np.array([-1, 0, 1, 2, 3, 322, 323]))
-    assert row.tolist() == [-1, 0, 1, once, 2, 321, 2]
-    assert place.tolist() == [0, 0, 0, 1, 2, 2, 3]
-
-
 # --- The shape ------------------------------------------------------------------------------------
 
 TRIANGLE = wf.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], name="tri")
@@ -632,15 +622,6 @@ def test_nodes_that_share_a_mesh_become_instances(tmp_path):
     assert (np.abs(a - b).max(2) > 1e-3).mean() < 0.01
 
 
-def test_a_scene_in_memory_looks_like_its_file(tmp_path):
-    """Bit for bit."""
-    forest().export(tmp_path / "a.glb")
-    held = trimesh.load(tmp_path / "a.glb")
-    assert sum(isinstance(shape, wf.Instance) for shape in wf.from_trimesh(held).shapes) == 5
-    a, b = (render(scene, 1, max_bounces=1, size=(48, 36)).rgb for scene in (held, tmp_path / "a.glb"))
-    assert a.tobytes() == b.tobytes()
-
-
 def test_a_node_that_flattens_is_no_instance(tmp_path):
     """Its mesh is flat, but the scene is still read, and as before."""
     scene = forest()
@@ -701,7 +682,7 @@ def test_a_wrong_one_of_many_transforms_is_named(change, message):
         wf.Instance.many(mesh, change(np.tile(np.eye(4), (3, 1, 1))))
 
 
-@pytest.mark.parametrize("power", range(-300, 301, 50))
+@pytest.mark.parametrize("power", [-300, 0, 300])
 def test_what_can_be_placed_is_decided_as_for_one(power):
     """Near the limit of the ratio of stretches, and at any scale."""
     mesh = wf.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], name="leaf")

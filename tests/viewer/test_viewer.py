@@ -26,7 +26,6 @@ from urllib.parse import urlsplit
 import imageio.v3 as iio
 import numpy as np
 import pytest
-from scenes import cornell_box
 
 import wavefront as wf
 from wavefront.cli import main, view_commands
@@ -300,20 +299,6 @@ def test_a_viewpoint_is_that_of_the_scenes_camera(scale: float) -> None:
     assert np.abs(view.surroundings.to_page(view.target)).max() < 1e-5
     origin, target = map(view.surroundings.to_page, (view.origin, view.target))
     assert view.moved(origin, target, view.up).origin == pytest.approx(view.origin, abs=1e-5 * scale)
-
-
-def test_a_field_of_view_has_few_digits() -> None:
-    """It is shown and copied, too; those of files have sixteen."""
-    view = viewpoint(wf.Camera.look_at((0, 0, 5), (0, 0, 0), fov=37.8491654365455, size=(64, 48)))
-    assert view.fov == 37.8492
-    assert "fov=37.8492, " in view.code
-
-
-def test_a_focus_that_has_no_effect_has_few_digits() -> None:
-    """It is only where a slider begins; that of a lens that is open is kept."""
-    assert viewpoint(wf.Camera.look_at((0, 0, 5.123456), (0, 0, 0), size=(64, 48))).focus == 5.12
-    lens = wf.Camera.look_at((0, 0, 5.123456), (0, 0, 0), size=(64, 48), aperture=0.1, focus=4.98765)
-    assert viewpoint(lens).focus == 4.98765
 
 
 def test_a_rolled_camera_keeps_its_roll() -> None:
@@ -1040,17 +1025,6 @@ def test_the_command_ends_at_ctrl_c(tmp_path: Path) -> None:
         process.communicate()
     assert process.returncode == 0, output + errors
     assert "Traceback" not in errors
-
-
-def test_views_are_rendered_as_by_default() -> None:
-    """Also where a trial decides that pixels share paths."""
-    box = cornell_box((224, 224))
-    settings: dict[str, Any] = {"workers": 1, "executor": "threads"}
-    with wf.view(box, spp=1, open_browser=False, block=False, **settings) as viewer:
-        image = viewer.wait_for_picture(SOON)
-        same = wf.render(box, 1, camera=viewer.camera, progress=False, **settings)
-    assert image.metadata["reuse"] is True
-    assert image.rgb.tobytes() == same.rgb.tobytes()
 
 
 def test_the_command_has_a_token_unless_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

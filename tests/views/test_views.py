@@ -133,11 +133,6 @@ def test_the_scene_is_compiled_once(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(calls) == 1
 
 
-def test_unknown_settings_are_errors() -> None:
-    with pytest.raises(TypeError, match=r"sede.*did you mean 'seed'"):
-        next(wf.render_many(SCENE, [look(1, 1, 1)], 1, sede=3))
-
-
 # --- Files ----------------------------------------------------------------------------------------
 
 

@@ -66,6 +66,7 @@ class SaveError(SceneError, OSError):
     """
 
     def __new__(cls, *args: Any) -> SaveError:
+        """Make one as OSError does."""
         return OSError.__new__(cls, *args)  # that of ValueError, which comes first, refuses an OSError
 
 

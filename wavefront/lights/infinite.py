@@ -135,7 +135,7 @@ def through_scene(irradiance: NDArray[np.float64], scene_radius: float) -> NDArr
 
 
 def facing_irradiance(light: LightRecord, center: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What lights from one direction bring to surfaces that face them, (c, k), at c places."""
+    """Return what lights from one direction bring to surfaces that face them, (c, k), at c places."""
     irradiance = light.power(1.0) / np.pi
     return np.broadcast_to(irradiance, (center.shape[1], len(irradiance)))
 

@@ -79,7 +79,7 @@ def unfinished(film: Film, step: Pass) -> Iterator[Pass]:
 
 
 def next_stop(samples: int) -> int:
-    """Number of samples at the decision after that at `samples`: powers of two and halfway between."""
+    """Return the samples at the decision after that at `samples`: powers of two and halfway between."""
     if samples < MIN_SPP:
         return MIN_SPP
     power = 1 << (samples.bit_length() - 1)
@@ -87,7 +87,7 @@ def next_stop(samples: int) -> int:
 
 
 def _tiles(width: int, height: int) -> Ints:
-    """Number of the tile of each pixel, (pixels,)."""
+    """Return the number of the tile of each pixel, (pixels,)."""
     across = -(-width // TILE)
     rows, columns = np.arange(height) // TILE, np.arange(width) // TILE
     return (rows[:, None] * across + columns).reshape(-1)

@@ -67,6 +67,7 @@ class StoppableWork:
         self._work, self.stop = work, stop
 
     def __call__(self, job: Any) -> Any:
+        """Do a job, or raise `Stopped`."""
         if self.stop.value:
             raise Stopped
         return self._work(job)

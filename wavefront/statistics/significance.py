@@ -1,4 +1,4 @@
-"""Significance tests: do two noisy pictures show the same picture?
+"""Significance tests: whether two noisy pictures show the same picture.
 
 Each channel of each pixel, of each block of pixels and of the whole picture is tested by itself. The
 smallest p-value of a level is corrected for the number of tests by Šidák's inequality (Z. Šidák,
