@@ -140,7 +140,6 @@ def test_instances_are_kept_too(built: list[str]) -> None:
 
 
 def test_old_ones_are_gone_before_new_ones_are_built(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Memory does not hold both."""
     subject = scene()
     look(subject)
     _, ((_, accelerator),) = subject.accelerators._kept["numpy"]

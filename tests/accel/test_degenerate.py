@@ -70,9 +70,7 @@ def test_large_texture_coordinates(material):
 
 
 def test_texture_coordinates_beyond_float32_are_named():
-    with pytest.raises(
-        wf.SceneError, match=r"mesh: uvs\[1\]\[0\] is 1e\+39; its size must be at most 3.4e\+38"
-    ):
+    with pytest.raises(wf.SceneError, match=r"mesh: uvs\[1\]\[0\] is 1e\+39"):
         quad(wf.Diffuse(0.5), uvs=PLACES[:, :2] * 1e39)
     with pytest.raises(wf.SceneError, match=r"mesh: uvs1\[1\]\[0\] is -1e\+300; its size must be at most"):
         quad(wf.Diffuse(0.5), uvs1=PLACES[:, :2] * -1e300)

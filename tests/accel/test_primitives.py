@@ -395,10 +395,7 @@ def test_a_hundred_thousand_are_set_up_in_a_second() -> None:
     [
         (lambda: wf.Spheres([(0, 0, 0)], 0), r"spheres: radii is 0; it must be above 0"),
         (lambda: wf.Spheres([(0, 0, 0)] * 2, [1, -1]), r"spheres: radii\[1\] is -1; it must be above 0"),
-        (
-            lambda: wf.Spheres([(0, 0, 0)] * 3, [1, 1]),
-            r"one number, or one for each of 3, got 2",
-        ),
+        (lambda: wf.Spheres([(0, 0, 0)] * 3, [1, 1]), r"one number, or one for each of 3, got 2"),
         (lambda: wf.Spheres(np.zeros((0, 3)), 1), r"spheres: is empty"),
         (lambda: wf.Spheres([(0, 0)], 1), r"spheres: centers must have shape"),
         (lambda: wf.Spheres([(0, 0, 0)], 1, [(2, 0, 0)]), r"colors\[0\]\[0\] is 2"),

@@ -66,7 +66,6 @@ def test_the_faces_of_a_box_are_found(seed: int) -> None:
     ids=["bent", "dented", "three in a line", "no first half", "folded"],
 )
 def test_others_are_not(bent: list) -> None:
-    """They stay two triangles."""
     assert find_quads(fan(np.array(bent)).astype(f4)).size == 0
 
 
@@ -79,13 +78,11 @@ def test_a_strip_is_paired_once() -> None:
 
 
 def test_a_triangle_between_quadrilaterals_stays_alone() -> None:
-    """Pairs begin anywhere."""
     triangles = np.concatenate([fan(SQUARE), SQUARE[None, :3] + 5, fan(SQUARE + 9)])
     np.testing.assert_array_equal(find_quads(triangles.astype(f4)), [0, 3])
 
 
 def test_parallelograms_are_told_from_others() -> None:
-    """By more than rounding."""
     quads = np.array([SQUARE, SQUARE + 0.1, SQUARE * (1, 1, 0) * 0.3 + 1, SQUARE, SQUARE], f4)
     quads[3, 2] += (0.2, 0.1, 0)
     quads[4, 1, 0] = 0.5
@@ -196,7 +193,6 @@ def test_triangles_look_alike_by_material_and_light_where_nothing_varies() -> No
 
 
 def test_neither_half_is_hit_by_a_ray_that_leaves_the_other() -> None:
-    """They are one plane."""
     accelerator = make_accelerator(geometry(fan(SQUARE, SQUARE + np.array((0, 0, 1)))), "numpy")
     origin = np.array([[0.7, 0.3, -1], [0.3, 0.7, -1]], f4).T.copy()
     direction = np.array([[0, 0, 1.0]] * 2, f4).T.copy()
@@ -246,7 +242,6 @@ def test_rays_are_blocked_however_long_their_directions(length: float) -> None:
 
 
 def test_a_bad_ray_does_not_disturb_others() -> None:
-    """Its batch's bounds are no numbers."""
     accelerator = make_accelerator(geometry(fan(SQUARE)), "numpy")
     origin = np.tile(np.array([[0.3], [0.4], [0.5]], f4), 3)
     direction = np.tile(np.array([[0], [0], [-1]], f4), 3)

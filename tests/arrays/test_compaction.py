@@ -73,7 +73,6 @@ def test_take_takes_every_field(kind: type, n: int, data) -> None:
 
 @given(kinds, st.integers(2, 12), st.data())
 def test_concatenate_undoes_cutting(kind: type, n: int, data) -> None:
-    """Two halves make the whole again."""
     whole, cut = record(kind, n), data.draw(st.integers(1, n - 1))
     halves = whole.take(np.arange(cut)), whole.take(np.arange(cut, n))
     assert same(kind.concatenate(halves), whole)
@@ -141,7 +140,6 @@ def test_compact_of_all_lanes_copies_nothing() -> None:
 
 
 def test_all_paths_are_kept_without_a_copy() -> None:
-    """Others are gathered."""
     paths = record(Paths, 5)
     assert stage.select(paths, np.arange(5)) is paths
     assert same(stage.select(paths, np.array([1, 4])), paths.take(np.array([1, 4])))
@@ -190,7 +188,6 @@ def test_what_is_alike_stays_so() -> None:
 
 
 def test_absent_fields_stay_absent() -> None:
-    """None is neither taken nor joined."""
     surface = record(SurfaceInteraction, 4, absent=("uv",))
     assert len(surface) == 4
     assert surface.take(np.array([2, 2])).uv is None
@@ -198,7 +195,6 @@ def test_absent_fields_stay_absent() -> None:
 
 
 def test_found_are_the_lanes_that_hit() -> None:
-    """A miss has no primitive."""
     hits = record(Hits, 4)
     hits.prim = np.array([3, -1, 0, -1])
     assert hits.found.tolist() == [0, 2]
@@ -290,7 +286,6 @@ def test_roulette_is_a_setting() -> None:
 
 
 def test_a_checkpoint_of_another_roulette_is_refused(tmp_path) -> None:
-    """Its samples would be others."""
     scene, options = [wf.Sphere((0, 0, 0), 1), wf.Environment(1)], {"size": (8, 8), "progress": False}
     wf.render(scene, 2, checkpoint=tmp_path / "a.wfck", **options)
     assert wf.render(scene, 4, checkpoint=tmp_path / "a.wfck", roulette=2, **options).spp == 4

@@ -25,7 +25,6 @@ def test_axes_are_orthonormal(z: np.ndarray) -> None:
 
 @given(strategies.unit_vectors())
 def test_axes_are_right_handed(z: np.ndarray) -> None:
-    """x × y = z."""
     frame = Frame.from_normal(z)
     assert cross(frame.x, frame.y) == pytest.approx(z, abs=CLOSE)
 
@@ -54,7 +53,6 @@ def test_columns_do_not_depend_on_their_neighbors(z: np.ndarray, data) -> None:
 
 @given(strategies.vectors(7))
 def test_normalize(v: np.ndarray) -> None:
-    """Unit length and the same direction."""
     unit = normalize(v)
     assert length(unit) == pytest.approx(1, abs=1e-6)
     assert dot(unit, v) == pytest.approx(length(v), rel=1e-6)

@@ -75,7 +75,6 @@ def test_every_pixel_sees_its_own_place() -> None:
 
 
 def test_resized_keeps_the_view() -> None:
-    """Only the film changes."""
     camera = wf.Camera.look_at((0, 0, 1), (0, 0, 0), fov=33, size=(4, 4)).resized((7, 5))
     assert (camera.size, camera.fov) == ((7, 5), 33)
 
@@ -145,6 +144,5 @@ def test_the_fourth_argument_is_the_field_of_view() -> None:
 
 
 def test_up_may_name_an_axis() -> None:
-    """The same camera, bit for bit."""
     named, given = (wf.Camera.look_at((3, 2, 1), (0, 0, 0), up) for up in ("z", (0, 0, 1)))
     assert named.rotation.tobytes() == given.rotation.tobytes()

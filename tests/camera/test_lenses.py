@@ -126,7 +126,6 @@ def test_panorama_directions() -> None:
 
 @given(st.floats(0, 64, width=32), st.floats(0, 48, width=32), st.sampled_from(["wide", "flat", "round"]))
 def test_directions_are_unit(x: float, y: float, kind: str) -> None:
-    """Whatever the projection."""
     cameras = {
         "wide": wf.Camera.look_at((0, 0, 0), (1, 2, 3), fov=170, size=(64, 48), aperture=0.3),
         "flat": wf.Camera.orthographic((0, 0, 0), (1, 2, 3), height=9, size=(64, 48)),
@@ -155,7 +154,6 @@ def test_rays_of_one_film_point_meet_in_the_plane_of_focus() -> None:
 
 
 def test_focus_is_the_target_by_default() -> None:
-    """Measured along the axis to it."""
     lens = wf.Camera.look_at((1, 2, 2), (0, 0, 0), aperture=0.1).projection
     assert isinstance(lens, Perspective)
     assert lens.focus == 3

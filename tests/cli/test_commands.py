@@ -100,7 +100,6 @@ def check_error(status: int, out: str, err: str, message: str) -> None:
 
 
 def test_the_program_runs_and_fails_as_its_commands(mesh: Path) -> None:
-    """In a process of its own."""
     assert program("render", mesh, "-o", mesh.with_name("a.png"), *FAST).returncode == 0
     done = program("render", mesh, "--spp", "0", "--quiet", cwd=mesh.parent)
     check_error(done.returncode, done.stdout, done.stderr, "spp is 0")

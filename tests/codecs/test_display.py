@@ -192,7 +192,6 @@ def test_show_uses_the_viewer_of_the_system(image, monkeypatch):
 
 
 def test_show_in_a_notebook(image, monkeypatch):
-    """IPython shows what it is given."""
     import sys
     from types import ModuleType
 

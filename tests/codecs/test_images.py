@@ -261,7 +261,6 @@ def test_what_is_no_path_is_refused(picture, path):
 
 @posix
 def test_a_folder_that_cannot_be_read_is_written_to(tmp_path, picture, monkeypatch):
-    """As one of permissions -wx."""
     open_file = os.open
 
     def refuse(path, flags, *args, **kwargs):
@@ -287,8 +286,6 @@ def test_a_read_only_file_system_is_a_save_error(tmp_path, picture, monkeypatch)
 
 @posix
 def test_files_without_names_that_cannot_be_named_do_not_matter(tmp_path, picture, monkeypatch):
-    """A security module may forbid it."""
-
     def refuse(*args, **kwargs):
         raise PermissionError(1, "Operation not permitted")
 
@@ -534,7 +531,6 @@ def _exr(parts, path):
 
 
 def test_all_parts_and_channels_of_an_exr_count(tmp_path, monkeypatch):
-    """The library decodes them all."""
     path = tmp_path / "a.exr"
     small, flat = np.ones((4, 4), "f4"), np.zeros((300, 400), "f4")
     monkeypatch.setattr("wavefront.codecs.exr.MAX_VALUES", 1_000_000)

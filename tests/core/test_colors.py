@@ -46,7 +46,6 @@ def test_colors_are_written_as_names_and_digits(taken: Any) -> None:
 
 @pytest.mark.parametrize("color", ["rde", "#ff", "#gg0000", "", "#ff8800ff"])
 def test_unknown_colors_are_an_error(color: str) -> None:
-    """With the nearest names."""
     with pytest.raises(wf.SceneError, match=r'Diffuse reflectance is .*"red", "#rgb" or "#rrggbb"'):
         wf.Diffuse(color)
     with pytest.raises(wf.SceneError, match=r"nearest names are 'steelblue', .*'slateblue'"):
@@ -66,7 +65,6 @@ def test_a_background_and_an_environment_by_name() -> None:
 
 
 def test_srgb_decodes_numbers_codes_and_names() -> None:
-    """Any shape; opacity stays."""
     half = ((0.5 + 0.055) / 1.055) ** 2.4
     assert wf.srgb(1, 0.5, 0) == pytest.approx([1, half, 0])
     assert wf.srgb(0.5) == pytest.approx([half] * 3)
@@ -156,7 +154,6 @@ def test_named_materials_take_a_color() -> None:
 
 
 def test_named_dielectrics() -> None:
-    """Refractive indices at the yellow line."""
     for name, index in (("water", 1.333), ("diamond", 2.4173), ("BK7", 1.5168), ("fused silica", 1.45846)):
         assert wf.Dielectric.named(name).ior == pytest.approx(index, abs=5e-5)
     tinted = wf.Dielectric.named("Water", 0.2, transmittance=(0.5, 1, 1))

@@ -93,7 +93,6 @@ def test_functions_are_known_by_what_they_compute() -> None:
 
 
 def test_classes_are_known_by_their_methods_and_bases() -> None:
-    """Also where a method calls itself."""
     source = "class A:\n    k = 1\n    def f(self):\n        return self.f() or A\nclass C(A):\n    pass"
     assert of_source(source, "C") == of_source(source, "C")
     assert of_source(source, "C") != of_source(source.replace("k = 1", "k = 2"), "C")
@@ -118,9 +117,7 @@ def test_what_cannot_be_compared_is_refused(part: str, tmp_path: Path) -> None:
     texture = Stripes()
     with open(tmp_path / "file", "w") as file:
         texture.extra = {"lock": threading.Lock(), "file": file, "generator": (x for x in "ab")}[part]  # type: ignore[attr-defined]
-        with pytest.raises(
-            wf.SceneError, match=r"the scene\.reflectance\.extra is a .*, which cannot be compared"
-        ):
+        with pytest.raises(wf.SceneError, match=r"the scene\.reflectance\.extra is a .*"):
             of(wf.Diffuse(texture))
 
 
@@ -137,7 +134,6 @@ def test_what_contains_itself_has_a_fingerprint() -> None:
 
 
 def test_another_process_has_the_same_fingerprints() -> None:
-    """With another seed of Python's hashes."""
     code = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"
         "import numpy as np, wavefront as wf, test_fingerprint as t\n"

@@ -81,7 +81,6 @@ def test_names_of_files_are_printable(tmp_path: Path) -> None:
 
 
 def test_names_of_gltf_are_printable(tmp_path: Path) -> None:
-    """Of nodes, meshes and materials."""
     import trimesh
 
     box = trimesh.creation.box()

@@ -43,7 +43,6 @@ def test_a_bar_appears_after_a_while(progress, monkeypatch, capsys) -> None:
 
 
 def test_a_bar_of_time_counts_seconds(capsys) -> None:
-    """Up to the time there is."""
     with Bar(None, 1000, 10.0) as bar:
         bar.advance(100, 4.2)
         assert "4/10 s" in capsys.readouterr().err
@@ -66,7 +65,6 @@ def test_a_bar_may_be_disabled_by_the_environment(monkeypatch, capsys) -> None:
 
 @pytest.mark.parametrize("seconds", [None, 20.0])
 def test_a_bar_shows_how_far_paths_are(seconds, capsys) -> None:
-    """While nothing is done, every second."""
     with Bar(None, 1000, seconds) as bar:
         bar.wait(100, DELAY - 0.5)
         assert capsys.readouterr().err == ""
@@ -106,7 +104,6 @@ def test_a_long_phase_shows_its_title(progress, monkeypatch, capsys) -> None:
 
 
 def test_a_long_phase_is_shown_when_it_fails(monkeypatch, capsys) -> None:
-    """An error passes through."""
     monkeypatch.setattr(module, "DELAY", 0.001)
 
     def fail() -> None:

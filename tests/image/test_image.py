@@ -84,7 +84,6 @@ def chunks(data):
 
 
 def test_pngs_and_jpgs_say_their_gamma(tmp_path, image):
-    """As other programs read it."""
     from PIL import Image
 
     expected = {2.2: 45455, 1.8: 55556, 1.0: 100000, "srgb": 45455}
@@ -116,7 +115,6 @@ def test_files_without_gamma_are_srgb(tmp_path):
 
 
 def test_damaged_exif_is_passed_over(tmp_path, image):
-    """Cameras and editors leave it behind."""
     image.save(tmp_path / "a.jpg", "srgb")
     data = (tmp_path / "a.jpg").read_bytes()
     at = data.index(b"Exif\0\0") + 6
@@ -173,7 +171,6 @@ def test_gray_and_alpha_become_three_channels(tmp_path):
 
 
 def test_shape_and_indexing(image):
-    """Are those of the array."""
     assert image.shape == (16, 16, 3)
     assert (image[3, 7] == image.rgb[3, 7]).all()
     assert image[3, 7].shape == (3,)
@@ -204,7 +201,6 @@ def picture(seed, **more) -> wf.Image:
 
 
 def test_difference() -> None:
-    """Has the error of independent pictures."""
     a, b = picture(1), picture(2)
     found = a - b
     assert (found.rgb == a.rgb - b.rgb).all()
@@ -216,7 +212,6 @@ def test_difference() -> None:
 
 
 def test_difference_of_renders_is_noise() -> None:
-    """Of the estimated size."""
     scene = wf.Scene([wf.Sphere((0, 0, 0), 1)], [wf.Environment(1), wf.PointLight((2, 2, 2), 9)])
     camera = wf.Camera.look_at((0, 0, 1.9), (0, 0, 0), size=(16, 16))
     a, b = (render(scene, 64, seed=seed, camera=camera, sampler="independent") for seed in (1, 2))
@@ -250,13 +245,11 @@ def test_multiple() -> None:
 
 @pytest.mark.parametrize("factor", [(1, 2), np.nan, np.ones((3, 5, 3)), (1, 2, np.inf)])
 def test_wrong_factors(factor) -> None:
-    """Are named."""
     with pytest.raises(wf.SceneError, match="number or an rgb triple"):
         picture(1) * factor
 
 
 def test_wrong_operands() -> None:
-    """Sizes and types."""
     with pytest.raises(wf.SceneError, match="5x3 and 2x2"):
         picture(1) - wf.Image(np.zeros((2, 2, 3), np.float32))
     for wrong in ("2", None, picture(2)):

@@ -148,7 +148,6 @@ def test_an_exr_in_the_api_of_openexr(tmp_path):
 
 
 def test_an_exr_without_a_transparent_background_has_no_plain_alpha(tmp_path):
-    """Viewers would composite it."""
     import OpenEXR
 
     with_everything("white").save(tmp_path / "a.exr")
@@ -351,9 +350,7 @@ def test_bits_and_tones_that_a_format_cannot_hold(tmp_path):
         with pytest.raises(wf.SaveError, match=message):
             image.save(tmp_path / name, bits=bits)
     for extension in ("exr", "hdr", "npy", "npz"):
-        with pytest.raises(
-            wf.SaveError, match=rf"tone='agx' is for \.png.*; \.{extension} holds linear values"
-        ):
+        with pytest.raises(wf.SaveError, match=rf"a\.{extension}: tone='agx' is for \.png"):
             image.save(tmp_path / f"a.{extension}", tone="agx")
     assert not list(tmp_path.iterdir())
 

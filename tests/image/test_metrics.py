@@ -32,7 +32,6 @@ def test_numbers_by_hand() -> None:
 
 
 def test_relative_mse_does_not_depend_on_exposure() -> None:
-    """Nor does PSNR."""
     a, b = noisy(1), noisy(2)
     plain, bright = wf.compare(a, b), wf.compare(a * 1000, b * 1000)
     assert bright.relative_mse == pytest.approx(plain.relative_mse, rel=1e-5)
@@ -41,7 +40,6 @@ def test_relative_mse_does_not_depend_on_exposure() -> None:
 
 
 def test_equal_pictures() -> None:
-    """Have no difference, black ones too."""
     for picture in (noisy(), np.zeros((3, 4, 3))):
         found = wf.compare(picture, picture)
         assert (found.relative_mse, found.rmse, found.psnr) == (0, 0, np.inf)
@@ -51,7 +49,6 @@ def test_equal_pictures() -> None:
 
 @pytest.mark.parametrize("extension", ["exr", "npy"])
 def test_files_images_and_arrays_are_the_same(tmp_path, extension: str) -> None:
-    """A linear file loses nothing."""
     a, b = noisy(1), noisy(2)
     path = tmp_path / f"a.{extension}"
     write_image(path, a)
@@ -99,7 +96,6 @@ def test_without_flip(monkeypatch) -> None:
     ],
 )
 def test_complaints(a, b, message: str) -> None:
-    """Name what is wrong."""
     with pytest.raises(wf.SceneError, match=message):
         wf.compare(a, b)
 

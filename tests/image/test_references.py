@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scenes import cornell_box
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 import references
 from references import Converged, References, hash_of
 

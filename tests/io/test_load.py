@@ -158,10 +158,7 @@ def test_file_names(tmp_path, name):
         (SQUARE + "f 1/1 /1 2/1 3/1\n", r"line 5: f holds '/1'"),
         (SQUARE + "f 99999999999999999999 2 3\n", r"line 5: f holds '99999999999999999999'"),
         (SQUARE + f"f {-(2**63)} 2 3\n", r"scene\.obj line 5: f uses v -9223372036854775808; it must be in"),
-        (
-            SQUARE + f"f 1 2 3 {-(2**63)}\n",
-            r"scene\.obj line 5: f uses v -9223372036854775808; it must be in",
-        ),
+        (SQUARE + f"f 1 2 3 {-(2**63)}\n", r"scene\.obj line 5: f uses v -9223372036854775808"),
         (SQUARE + f"f 1/{-(2**63)} 2/1 3/1\nvt 0 0\n", r"line 5: f uses vt -9223372036854775808; it must"),
         (SQUARE + f"f {2**63 - 1} 2 3\n", r"line 5: f uses v 9223372036854775807; it must be in"),
         (SQUARE + f"f -0{2**63} 2 3\n", r"line 5: f uses v -9223372036854775808"),
@@ -266,9 +263,7 @@ def test_not_finite_normals_and_uvs_are_announced(write):
 
 def test_uvs_beyond_all_textures_are_announced(write):
     path = write(SQUARE + "vt 1e38 0\nvt 0 0\nvt 1 -1e30\nf 1/1 2/2 3/3\n")
-    with pytest.warns(
-        UserWarning, match=r"2 uvs are beyond ±16777216 and set to 0, first: vertex 0"
-    ) as record:
+    with pytest.warns(UserWarning, match=r"2 uvs are beyond ±16777216") as record:
         (mesh,) = load_meshes(path)
     assert len(record) == 1
     assert not mesh.uvs.any()
@@ -770,10 +765,7 @@ def test_ply(write):
     ("data", "message"),
     [
         (ply(1, "0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n"), r"a\.ply"),
-        (
-            ply(10**12, "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"),
-            r"claims 1000000000000 rows of face, at least",
-        ),
+        (ply(10**12, "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"), r"claims 1000000000000 rows of face, at least"),
         (ply(1, "0 0 0\n1 0"), r"a\.ply: claims"),
         (ply(1, "0 0 0\n1 0\n0 1 0\n3 0 1 2\n"), r"a\.ply line 11: vertex has 2 words; it must have 3"),
         (ply(1, "0 0 0\n1 0 0 5\n0 1 0\n3 0 1 2\n"), r"a\.ply line 11: vertex has 4 words; it must have 3"),
@@ -890,11 +882,7 @@ def test_stl(write):
     [
         (b"COLOR=\xff\x00\x00\xff", [0, 0], "COLOR= in the header"),
         (b"exported", [0, 0x801F], r"colors of facets \(facet 1\)"),
-        (
-            b"COLOR=abcd,MATERIAL=abcdefghijkl",
-            [3, 0],
-            r"COLOR= .*, MATERIAL= .*, colors of facets \(facet 0\)",
-        ),
+        (b"COLOR=abcd,MATERIAL=abcdefghijkl", [3, 0], r"COLOR= .*, MATERIAL= .*, colors of facets"),
     ],
 )
 def test_colors_of_stl_are_named_once(write, header, extra, named):
@@ -943,10 +931,7 @@ def test_a_binary_stl_may_say_solid(write):
         (b"\0" * 50, r"a\.stl: has 50 bytes"),
         ("solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n", r"a\.stl: ends early"),
         (stl(0, []), r"a\.stl: has no faces"),
-        (
-            "solid a\nvertex 0 0 0\nvertex 1 0\nvertex 0 1 0\nendsolid\n",
-            r"a\.stl line 3: vertex is '1 0'; it must be 3",
-        ),
+        ("solid a\nvertex 0 0 0\nvertex 1 0\nvertex 0 1 0\nendsolid\n", r"a\.stl line 3: vertex is '1 0'"),
         (
             "solid a\nvertex 0 0 0\nvertex 1 0 x\nvertex 0 1 0\nendsolid\n",
             r"a\.stl line 3: vertex is '1 0 x'",

@@ -71,17 +71,11 @@ def test_what_is_not_read_of_off_is_named(write, data, named):
         (OFF.replace("OFF", "4OFF"), r"a\.off: begins with '4OFF'"),
         (OFF.replace("OFF", "OFF BINARY"), r"a\.off line 1: counts are 'BINARY'"),
         (OFF.replace("4 2 0", "4 -2 0"), r"a\.off line 2: counts are '4 -2 0'; they must be whole numbers"),
-        (
-            OFF.replace("4 2 0", f"4 {10**15} 0"),
-            r"a\.off: claims 4 vertices and 1000000000000000 faces; 6 lines",
-        ),
+        (OFF.replace("4 2 0", f"4 {10**15} 0"), r"a\.off: claims 4 vertices and 1000000000000000 faces"),
         (OFF.replace("1 1 0", "1 1"), r"a\.off line 5: vertex is '1 1'; it must be 3 numbers"),
         (OFF.replace("1 1 0", "1 x 0"), r"a\.off line 5: vertex is '1 x 0'"),
         (OFF.replace("3 0 1 2", "3 0 1"), r"a\.off line 8: face is '3 0 1'; it must be a count"),
-        (
-            OFF.replace("3 0 1 2", "2 0 1"),
-            r"a\.off line 8: face is '2 0 1'; it must be a count of at least 3",
-        ),
+        (OFF.replace("3 0 1 2", "2 0 1"), r"a\.off line 8: face is '2 0 1'"),
         (OFF.replace("3 0 1 2", "3 0 1 4"), r"a\.off line 8: face uses vertex 4; it must be in \[0, 3\]"),
         (OFF.replace("3 0 1 2", "3 0 1 -1"), r"a\.off line 8: face uses vertex -1"),
         ("OFF\n0 0 0\n", r"a\.off: has no faces"),
@@ -330,7 +324,6 @@ def test_colors_of_3mf(write, own, first, second, colors):
 
 
 def test_clear_colors_of_3mf_are_named(write):
-    """They are taken as opaque."""
     content = model(COLORS.replace("FFFF", "FF80") + f'<object id="1" pid="5" pindex="1">{MESH}</object>')
     with pytest.warns(UserWarning, match="not honored: opacity of colors"):
         (found,) = load_meshes(write(package(content), "a.3mf"))
@@ -441,7 +434,6 @@ PART = model(
     ],
 )
 def test_the_members_of_3mf_that_are_read_are_those_that_are_checked(write, members, message):
-    """Whatever their names."""
     with pytest.raises(SceneError, match=rf"a\.3mf: .*{message}"):
         load_meshes(write(zipped(members), "a.3mf"))
 
@@ -470,7 +462,6 @@ def test_members_of_one_name_are_refused(write):
 
 @pytest.mark.parametrize("name", ["a.dae", "a.3mf"])
 def test_unknown_encodings_are_refused(write, name):
-    """In XML's first line."""
     text = '<?xml version="1.0" encoding="foo"?><COLLADA/>'
     data = text if name == "a.dae" else zipped([("3D/3dmodel.model", text)])
     with pytest.raises(SceneError, match=rf"{name}: .*unknown encoding: foo"):

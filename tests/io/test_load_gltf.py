@@ -389,10 +389,7 @@ def test_the_camera_of_a_file_that_trimesh_read_is_named(build, path):
     ("camera", "message"),
     [
         ({"type": "perspective"}, r"a\.gltf: cameras\[0\]: yfov is \[None\]"),
-        (
-            {"type": "perspective", "perspective": {"yfov": -1}},
-            r"cameras\[0\]: yfov is -1; it must be above 0",
-        ),
+        ({"type": "perspective", "perspective": {"yfov": -1}}, r"cameras\[0\]: yfov is -1"),
         ({"type": "perspective", "perspective": {"yfov": 4}}, r"a\.gltf: cameras\[0\]: .*fov is 229"),
         ({"type": "fisheye"}, r"cameras\[0\]: type is 'fisheye'; it must be 'perspective' or 'orthographic'"),
     ],
@@ -701,9 +698,7 @@ def test_the_texture_of_a_thickness_is_named(build, path):
     volume = {"thicknessFactor": 1, "thicknessTexture": build.image(np.zeros((1, 1, 3), np.uint8))}
     extensions = {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": volume}
     build.material(extensions=extensions).gltf(path)
-    with pytest.warns(
-        UserWarning, match=r"not honored: thicknessTexture \(light goes .* encloses\) \(mat"
-    ) as record:
+    with pytest.warns(UserWarning, match=r"not honored: thicknessTexture") as record:
         load(path)
     assert len(record) == 1
 
@@ -853,10 +848,7 @@ def test_what_specular_glossiness_excludes_is_named(build, path):
     ("group", "message"),
     [
         ({"glossinessFactor": 2}, r"a\.gltf: materials\[0\]\.glossinessFactor is 2; it must be in \[0, 1\]"),
-        (
-            {"specularFactor": [1, 1]},
-            r"a\.gltf: materials\[0\]\.specularFactor is \[1, 1\]; it must be 3 finite",
-        ),
+        ({"specularFactor": [1, 1]}, r"a\.gltf: materials\[0\]\.specularFactor is \[1, 1\]"),
         ({"diffuseTexture": 3}, r"a\.gltf: materials\[0\]\.diffuseTexture is 3; it must be an object"),
         (7, r"a\.gltf: materials\[0\] is malformed: AttributeError"),
     ],
@@ -937,7 +929,6 @@ def test_directional_lights(build, path):
 
 
 def test_a_cone_that_opens_inwards_is_an_error(build, path):
-    """The message gives both angles."""
     b = build.mesh()
     punctual(b, type="spot", spot={"innerConeAngle": 0.7, "outerConeAngle": 0.6})
     with pytest.raises(SceneError, match=r"light 0: cone angles are 0\.7 and 0\.6; 0 <= inner <= outer"):
@@ -1135,9 +1126,7 @@ def test_vertex_colors_out_of_range_are_clamped(build, path):
     beyond = np.float32([[2, 0, 0], [0, -1, 0], [0, 0, 0]])
     build.mesh({"POSITION": TRIANGLE, "COLOR_0": beyond})
     build.gltf(path)
-    with pytest.warns(
-        UserWarning, match=r"2 vertex colors are outside \[0, 1\] and clamped, first: vertex 0"
-    ):
+    with pytest.warns(UserWarning, match=r"2 vertex colors are outside \[0, 1\]"):
         (mesh,) = load_meshes(path)
     assert mesh.colors.tolist() == [[1, 0, 0, 1], [0, 0, 0, 1], [0, 0, 0, 1]]
     with pytest.raises(SceneError, match="outside"):
@@ -1215,18 +1204,12 @@ def broken(**changes):
         (broken(nodes__0=None), r"nodes\[0\] is not an object"),
         (broken(accessors__0__count=4), r"accessors\[0\] has 4 elements, which its buffer view cannot hold"),
         (broken(accessors__0__count=10**15), r"accessors\[0\] has 1000000000000000 elements; the limit is"),
-        (
-            broken(accessors__0__count=-3),
-            r"a\.gltf: accessors\[0\]\.count is -3; it must be a whole number, at least 0",
-        ),
+        (broken(accessors__0__count=-3), r"a\.gltf: accessors\[0\]\.count is -3"),
         (broken(accessors__0__type="VEC2"), r"has POSITION with 2 components; it must have 3"),
         (broken(accessors__0__type="VEC9"), r"accessors\[0\] is 'VEC9' of 5126, which glTF does not have"),
         (broken(accessors__0__componentType=9), r"accessors\[0\] is 'VEC3' of 9"),
         (broken(accessors__1__componentType=5126, accessors__1__count=1), r"indices of type float32"),
-        (
-            broken(bufferViews__0__byteLength=10**9),
-            r"bufferViews\[0\] ends at byte 1000000000; its buffer has",
-        ),
+        (broken(bufferViews__0__byteLength=10**9), r"bufferViews\[0\] ends at byte 1000000000"),
         (broken(bufferViews__0__buffer=2), r"buffers\[2\] does not exist"),
         (broken(meshes__0__primitives__0__material=0), r"materials\[0\] does not exist"),
         (broken(meshes__0__primitives__0__attributes={}), r"'mesh0' has no POSITION"),
@@ -1266,14 +1249,8 @@ def test_too_few_indices(build, path, indices, mode, message):
 @pytest.mark.parametrize(
     ("material", "message"),
     [
-        (
-            {"pbrMetallicRoughness": {"metallicFactor": 2}},
-            r"materials\[0\]\.metallicFactor is 2; it must be in \[0, 1\]",
-        ),
-        (
-            {"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1]}},
-            r"baseColorFactor is \[1, 1, 1\]; it must be 4",
-        ),
+        ({"pbrMetallicRoughness": {"metallicFactor": 2}}, r"materials\[0\]\.metallicFactor is 2"),
+        ({"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1]}}, r"baseColorFactor is \[1, 1, 1\]"),
         ({"pbrMetallicRoughness": {"baseColorFactor": [2, 1, 1, 1]}}, r"baseColorFactor is .* in \[0, 1\]"),
         ({"emissiveFactor": [-1, 0, 0]}, r"emissiveFactor"),
         ({"alphaMode": "GLASS"}, r"alphaMode is 'GLASS'; it must be OPAQUE, MASK or BLEND"),
@@ -1360,9 +1337,7 @@ def test_how_many_pixels_the_images_have_is_limited(build, path):
         extensions={"KHR_materials_clearcoat": {"clearcoatFactor": 1, "clearcoatTexture": {"index": 4}}},
     ).gltf(path)  # fmt: skip
     load(path, limits=LoadLimits(pixels=20))
-    with pytest.raises(
-        SceneError, match=r"images\[\d\] brings the images to 80 pixels in all; the limit is 76"
-    ):
+    with pytest.raises(SceneError, match=r"images\[\d\] brings the images to 80 pixels in all"):
         load(path, limits=LoadLimits(pixels=19))
     with pytest.raises(SceneError, match=r"images\[\d\]: image has 4 × 4 pixels; the limit is 15"):
         load(path, limits=LoadLimits(pixels=15))

@@ -130,7 +130,6 @@ def test_bad_views_are_named(options, message) -> None:
 
 
 def test_up_does_not_turn_a_camera_that_is_given() -> None:
-    """But ready-made light."""
     scene = wf.Scene(wf.Mesh(*TRIANGLE), LIGHT, wf.Camera.look_at((0, 0, 5), (0, 0, 0), size=(6, 5)))
     np.testing.assert_array_equal(render(scene, 1, up="z").rgb, render(scene, 1).rgb)
     scene.lights = []
@@ -162,9 +161,7 @@ def test_add() -> None:
     scene = wf.Scene(wf.Sphere((0, 0, 0), 1))
     assert scene.add(trimesh.creation.box(), wf.Environment()).add(wf.PointLight((0, 0, 3), 1)) is scene
     assert (len(scene.shapes), len(scene.lights)) == (2, 2)
-    with pytest.raises(
-        wf.SceneError, match=r"shapes\[1\] is 'ball'; it must be one of wf.Mesh, wf.Rectangle"
-    ):
+    with pytest.raises(wf.SceneError, match=r"shapes\[1\] is 'ball'"):
         scene.add(wf.Sphere((2, 0, 0), 1), "ball")
     with pytest.raises(wf.SceneError, match="more than one Environment"):
         scene.add(wf.Sphere((2, 0, 0), 1), wf.Environment(2))
@@ -204,7 +201,6 @@ def test_a_lone_light_may_be_assigned() -> None:
 
 
 def test_scenes_survive_copies_and_pickles() -> None:
-    """Their lists are lists that check."""
     import copy
     import pickle
 

@@ -56,7 +56,6 @@ def test_a_camera_sees_points_where_trimesh_says(held, focal):
 
 
 def test_a_camera_without_a_transform_sees_the_whole_scene(held):
-    """It keeps its lens and size."""
     held.camera = cameras.Camera(resolution=(40, 30), fov=(60, 45))
     with pytest.warns(UserWarning, match="trimesh object: its camera has no transform; it is placed to see"):
         scene = from_trimesh(held)

@@ -145,7 +145,6 @@ def test_views_have_names(view: str, y_up: tuple, z_up: tuple) -> None:
 
 
 def test_the_default_is_three_quarter() -> None:
-    """35° about and 22° above."""
     x, y, z = wf.Scene(box(1, 2, 3)).framing_camera().rotation[:, 2]
     assert np.degrees([np.arctan2(x, z), np.arcsin(y)]) == pytest.approx([35, 22], abs=0.05)
     pictures = [wf.render(box(1, 2, 3), **FAST, view=each).rgb for each in (None, "three_quarter")]
@@ -157,14 +156,8 @@ def test_the_default_is_three_quarter() -> None:
     [
         ({"view": "fronl"}, "view is 'fronl'; .* one of three_quarter, front, back, .*did you mean 'front'"),
         ({"view": (0, 0, 0)}, r"view is \[0.0, 0.0, 0.0\]; it must not be zero"),
-        (
-            {"view": "top", "camera": CAMERA},
-            "view='top' does not go with camera=<Camera",
-        ),
-        (
-            {"fov": 20, "camera": CAMERA},
-            "fov=20.0 does not go with camera=<Camera",
-        ),
+        ({"view": "top", "camera": CAMERA}, "view='top' does not go with camera=<Camera"),
+        ({"fov": 20, "camera": CAMERA}, "fov=20.0 does not go with camera=<Camera"),
         ({"fov": 0}, "fov"),
         ({"up": "Q"}, "up is 'Q'"),
     ],
@@ -186,7 +179,6 @@ def test_a_view_counts_more_than_the_camera_of_the_scene() -> None:
 
 
 def test_a_session_frames_again() -> None:
-    """After another camera."""
     scene = box(1, 2, 3)
     with wf.Session(scene, 1, view="left", size=(8, 8), progress=False) as session:
         first = session.run().rgb

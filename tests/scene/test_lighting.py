@@ -207,7 +207,6 @@ def test_up_turns_the_light() -> None:
 
 
 def test_a_z_up_mesh_looks_as_the_same_mesh_with_y_up() -> None:
-    """By default, and on the ground."""
     y_up = cube()
     z_up = wf.Mesh(y_up.vertices @ Z_UP.T, y_up.faces)
     for ground in (False, True):

@@ -168,7 +168,6 @@ def test_primitives_know_their_material_and_light() -> None:
 
 
 def test_positions_are_relative_to_the_center() -> None:
-    """Subtracted before anything becomes float32."""
     near = wf.Mesh(**TRIANGLE), wf.Sphere((0.25, 0.5, 0), 0.125)
     far = (
         wf.Mesh(np.array(TRIANGLE["vertices"]) + 2.0**40, TRIANGLE["faces"]),

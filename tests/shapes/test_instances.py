@@ -651,7 +651,6 @@ def test_twenty_million_triangles_fit(accel):
 
 
 def test_many_instances_are_those_made_one_by_one():
-    """With the same material and name."""
     mesh = wf.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], name="leaf")
     transforms = np.tile(np.eye(4), (3, 1, 1))
     transforms[:, :3] += np.random.default_rng(0).random((3, 3, 4))
@@ -676,7 +675,6 @@ def test_many_instances_are_those_made_one_by_one():
     ],
 )
 def test_a_wrong_one_of_many_transforms_is_named(change, message):
-    """As when it stands alone."""
     mesh = wf.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], name="leaf")
     with pytest.raises(wf.SceneError, match=message):
         wf.Instance.many(mesh, change(np.tile(np.eye(4), (3, 1, 1))))

@@ -107,7 +107,6 @@ def test_a_turned_capsule_is_what_a_mesh_is_that_is_placed() -> None:
     ],
 )
 def test_transforms_that_change_the_shape_are_refused(transform: np.ndarray, message: str) -> None:
-    """With the numbers."""
     for shape in (
         wf.Sphere((0, 0, 0), 1),
         wf.Spheres([(0, 0, 0)], 1),

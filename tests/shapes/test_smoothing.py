@@ -130,7 +130,6 @@ def test_many_faces_at_one_place_are_not_many_squared(monkeypatch: pytest.Monkey
 
 
 def test_opposite_faces_keep_their_normals() -> None:
-    """Their average would be zero."""
     vertices = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], float)
     mesh = wf.Mesh(vertices, [(0, 1, 2), (0, 2, 1)], smooth=True)
     assert mesh.normals is None

@@ -363,7 +363,6 @@ def test_a_matte_tilted_patch_loses_what_lies_below():
 
 @pytest.mark.parametrize(("degrees", "left"), [(0, 0.99), (15, 0.99), (30, 0.97), (45, 0.55)])
 def test_a_rough_metal_loses_what_docs_say(degrees, left):
-    """The numbers of docs/materials.md."""
     angle = np.radians(degrees)
     code = [0.5 + 0.5 * np.sin(angle), 0.5, 0.5 + 0.5 * np.cos(angle)]
     white = wf.Principled(1.0, metallic=1.0, roughness=0.3)
@@ -476,14 +475,8 @@ def test_every_integrator_sees_the_same_normal_map():
             lambda: wf.Mix(wf.Diffuse(0.5), wf.Material(wf.Mirror(), normal_map=STEEP)),
             "Mix second must be a Bsdf such as",
         ),
-        (
-            lambda: wf.NormalMap(np.ones((1, 1, 3)), 1e10),
-            r"NormalMap strength is 1\d+\.0; it must be finite, and at",
-        ),
-        (
-            lambda: wf.BumpMap(np.ones((1, 1)), -1e39),
-            r"BumpMap height is -1e\+39; it must be finite, and at most",
-        ),
+        (lambda: wf.NormalMap(np.ones((1, 1, 3)), 1e10), r"NormalMap strength is 1\d+\.0"),
+        (lambda: wf.BumpMap(np.ones((1, 1)), -1e39), r"BumpMap height is -1e\+39"),
         (lambda: square(tangents=[[1, 0, 0, 1]] * 4), "mesh: has tangents without normals"),
         (
             lambda: square(normals=[[0, 0, 1]] * 4, tangents=[[1, 0, 0]] * 4),

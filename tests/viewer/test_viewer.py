@@ -229,7 +229,6 @@ def test_first_pictures_are_larger_where_they_are_quick(monkeypatch: pytest.Monk
 
 @pytest.mark.usefixtures("steady")
 def test_an_error_ends_a_view_and_not_the_viewer() -> None:
-    """The next view is rendered."""
     session = Scripted()
     watched = Watched(session)
     error = wf.SceneError("too far away")
@@ -309,7 +308,6 @@ def test_a_rolled_camera_keeps_its_roll() -> None:
 
 
 def test_a_picture_has_the_shape_of_the_page_and_not_more_pixels_than_allowed() -> None:
-    """Small pages get small pictures."""
     view = viewpoint(CAMERA.resized((400, 300)))
     assert view.resized(1600, 900).size == (462, 260)
     assert view.resized(200, 100).size == (200, 100)
@@ -340,7 +338,6 @@ def test_places_that_are_none_are_refused(origin: Any, target: Any, up: Any) -> 
 
 @pytest.mark.parametrize("size", [(0, 10), (10, 10**9), (NAN, 10), ("wide", 10), (None, 10), (-5, 10)])
 def test_sizes_that_are_none_are_refused(size: Any) -> None:
-    """They come from the page."""
     with pytest.raises(wf.SceneError, match=r"^page (width|height)"):
         viewpoint().resized(*size)
 
@@ -349,7 +346,6 @@ def test_sizes_that_are_none_are_refused(size: Any) -> None:
     "lens", [{"fov": 179}, {"fov": NAN}, {"aperture": -1}, {"aperture": 1e9}, {"focus": 0}, {"focus": "near"}]
 )
 def test_lenses_that_are_none_are_refused(lens: Any) -> None:
-    """With the limits."""
     with pytest.raises(wf.SceneError, match=r"must be (from|a number)"):
         viewpoint().with_lens(**lens)
 
@@ -358,7 +354,6 @@ def test_lenses_that_are_none_are_refused(lens: Any) -> None:
 
 
 def test_layers_are_shown_as_colors() -> None:
-    """Each choice; exposure changes radiance alone."""
     image = wf.render(BALL, 4, camera=CAMERA, aovs=VIEWER_LAYERS, progress=False)
     shown = {choice: shown_codes(image, choice, 0) for choice in CHOICES if choice != "denoised"}
     for codes in shown.values():
@@ -379,7 +374,6 @@ def test_layers_are_shown_as_colors() -> None:
 
 
 def test_a_transparent_background_is_gray() -> None:
-    """Pages have no alpha."""
     image = wf.render(BALL, 4, camera=CAMERA, aovs=VIEWER_LAYERS, background="transparent", progress=False)
     assert shown_codes(image, "rgb", 0)[0, 0].tolist() == [217, 217, 217]
 
@@ -946,7 +940,6 @@ def test_workers_give_way_to_the_page() -> None:
 
 
 def test_a_viewer_refuses_what_it_cannot_do() -> None:
-    """Before any work."""
     refused = [
         ({"checkpoint": "file"}, "checkpoint is 'file'; it is for a picture of one view"),
         ({"samples": range(3)}, "samples is range"),
@@ -975,7 +968,6 @@ def test_a_viewer_takes_the_samples_that_render_takes(capsys: pytest.CaptureFixt
 
 
 def test_a_viewer_that_is_closed_says_so() -> None:
-    """It can be closed twice."""
     viewer = wf.view(BALL, 4, size=(16, 16), port=0, open_browser=False, block=False)
     assert repr(viewer) == f"<Viewer at {viewer.url}>"
     viewer.close()

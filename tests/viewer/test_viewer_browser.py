@@ -168,7 +168,6 @@ def test_a_drag_changes_the_view_and_the_picture_restarts(page: Any, viewer: wf.
 
 
 def test_the_wheel_zooms_and_the_right_button_pans(page: Any, viewer: wf.Viewer) -> None:
-    """The distance changes; the target moves."""
     distance = np.linalg.norm(viewer.camera.origin - (1, 0, 0))
     page.mouse.move(300, 450)
     page.mouse.wheel(0, -400)
@@ -216,7 +215,6 @@ def test_buttons_save_the_picture_and_copy_the_camera(page: Any, viewer: wf.View
 
 
 def test_a_page_that_is_left_does_not_end_the_viewer(page: Any, viewer: wf.Viewer, browser: Any) -> None:
-    """Another one can be opened."""
     page.close()
     again = browser.new_page(viewport=SIZE)
     again.goto(viewer.url)
