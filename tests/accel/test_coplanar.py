@@ -163,19 +163,6 @@ def pairs_tested(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return tested
 
 
-def test_a_pile_of_faces_is_no_plane(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of a thousand triangles above each other those of different heights are not even compared."""
-    tested = pairs_tested(monkeypatch)
-    pile = scattered(1000, 6)
-    pile[:, :, 2] = np.arange(1000)[:, None] // 2 * 1e-4
-    corners = pile.astype(f4)
-    plane = triangle.triangle_table(corners, False).plane
-    found = coplanar.find_overlaps(corners, np.arange(1000), plane)
-    assert found is not None
-    assert (found.face // 2 == found.face[found.group] // 2).all()
-    assert sum(tested) <= coplanar.SHIFTS * 500
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_very_many_pairs_of_faces_do_not_take_for_ever(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Beyond a budget all faces of a plane count as overlapping, and the first is hit still."""

@@ -78,16 +78,6 @@ def test_concatenate_undoes_cutting(kind: type, n: int, data) -> None:
     assert same(kind.concatenate(halves), whole)
 
 
-def test_what_is_alike_in_all_records_stays_so() -> None:
-    """One value for all lanes, which costs nothing to gather; two values are written out."""
-    first, second = record(Paths, 3), record(Paths, 2)
-    first.roulette_scale, second.roulette_scale = broadcast(f4(1), 3), broadcast(f4(1), 2)
-    first.pdf, second.pdf = broadcast(f4(1), 3), broadcast(f4(2), 2)
-    joined = Paths.concatenate([first, second])
-    assert joined.roulette_scale.strides == (0,)
-    assert (joined.roulette_scale.tolist(), joined.pdf.tolist()) == ([1] * 5, [1, 1, 1, 2, 2])
-
-
 MIRROR, GREY, GLASS, GOLD = (
     wf.Mirror(),
     wf.Diffuse(0.5),
@@ -127,22 +117,6 @@ def test_compact_keeps_paths_and_hits_together(materials: tuple[wf.Bsdf, ...], n
     assert (np.diff(group * n + kept_paths.slot) > 0).all()
     specular = [materials[prim].specular for prim in kept_hits.prim]
     assert specular == sorted(specular)
-
-
-def test_compact_of_all_lanes_copies_nothing() -> None:
-    """Where all hit one group of materials, paths and hits stay what they are."""
-    paths, hits = record(Paths, 4), record(Hits, 4)
-    hits.prim = np.array([0, 1, 1, 0])
-    assert stage.compact(balls(GREY, wf.Diffuse(0.1)), paths, hits, hits.found) == (paths, hits)
-    hits.prim = np.array([1, 1, 1, 1])
-    kept, _ = stage.compact(balls(GREY, MIRROR), paths, hits, hits.found)
-    assert kept is paths
-
-
-def test_all_paths_are_kept_without_a_copy() -> None:
-    paths = record(Paths, 5)
-    assert stage.select(paths, np.arange(5)) is paths
-    assert same(stage.select(paths, np.array([1, 4])), paths.take(np.array([1, 4])))
 
 
 def test_light_is_sampled_only_where_it_can_be_scattered() -> None:
@@ -192,12 +166,6 @@ def test_absent_fields_stay_absent() -> None:
     assert len(surface) == 4
     assert surface.take(np.array([2, 2])).uv is None
     assert SurfaceInteraction.concatenate([surface, surface]).uv is None
-
-
-def test_found_are_the_lanes_that_hit() -> None:
-    hits = record(Hits, 4)
-    hits.prim = np.array([3, -1, 0, -1])
-    assert hits.found.tolist() == [0, 2]
 
 
 def carrying(throughput: float, roulette_scale: float, n: int) -> Paths:

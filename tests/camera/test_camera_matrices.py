@@ -40,16 +40,6 @@ def test_the_matrices_are_those_that_a_camera_was_made_of() -> None:
 
 
 @pytest.mark.parametrize("name", CAMERAS)
-def test_opencvs_matrices_project_as_the_camera_does(name: str) -> None:
-    camera = CAMERAS[name]
-    points = points_before(camera)
-    seen = np.column_stack([points, np.ones(50)]) @ (camera.intrinsics() @ camera.extrinsics()[:3]).T
-    pixels, depth = camera.project(points, "integer")
-    assert np.allclose(seen[:, :2] / seen[:, 2:], pixels, rtol=0, atol=1e-9)
-    assert np.allclose(seen[:, 2], depth)
-
-
-@pytest.mark.parametrize("name", CAMERAS)
 def test_opengls_matrices_project_as_the_camera_does(name: str) -> None:
     """Clip space is the picture; the planes of near and far are its faces."""
     camera = CAMERAS[name]

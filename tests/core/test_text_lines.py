@@ -5,19 +5,8 @@ import time
 import pytest
 
 from wavefront.core.errors import SceneError
-from wavefront.io import obj, stl
-from wavefront.io.text_lines import NUMBER, check_lines
-
-
-def test_lines_that_differ_only_in_their_digits_are_checked_once():
-    seen = []
-
-    def check(number, line):
-        seen.append((number, line))
-        return len(line)
-
-    assert check_lines(["v 1 2", "v 3 0", "", "v 10 2", "v -1 2", "v 9 9"], check) == [5, 5, 0, 6, 6, 5]
-    assert seen == [(1, "v 1 2"), (3, ""), (4, "v 10 2"), (5, "v -1 2")]
+from wavefront.io import obj
+from wavefront.io.text_lines import NUMBER
 
 
 @pytest.mark.parametrize(
@@ -47,26 +36,6 @@ def test_one_wide_line_does_not_widen_all_lines():
     assert raw.vertices.tolist() == [[0, 0, 0], [0, 0, 0], [1, 1, 1]]
     assert raw.uvs.tolist() == [[0, 0], [0, 0], [1, 1]]
     assert raw.normals.tolist() == [[0, 0, 1], [0, 0, 1], [1, 1, 1]]
-
-
-def test_materials_keep_the_forms_of_their_faces():
-    text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 1 0\nf 1 2 3\nusemtl a\nf 1/1 2/1 3/1\nusemtl\nf -1 -2 -3\n"
-    plain, textured = obj.parse("a.obj", text).raws
-    assert (plain.name, plain.uvs, plain.lines.tolist()) == ("", None, [5, 9])
-    assert (textured.name, textured.uvs.tolist(), textured.lines.tolist()) == ("a", [[1, 0]] * 3, [7])
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("solid0\nvertex 0 0 0\n", "a.stl line 1: 'solid0' is not STL"),
-        ("solid a\nvertex 0 0 0_1\n", "a.stl line 2: vertex is '0 0 0_1'; it must be 3 numbers"),
-    ],
-)
-def test_damaged_lines_of_stl(text, message):
-    with pytest.raises(SceneError) as error:
-        stl.parse("a.stl", text.encode())
-    assert str(error.value) == message
 
 
 @pytest.mark.parametrize("blank", ["\x0b", "\x0c", "\x85", "\u2003"])

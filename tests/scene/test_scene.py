@@ -10,7 +10,6 @@ from wavefront.accel import make_accelerator
 from wavefront.arrays.vec import f4
 from wavefront.compile.materials import group_materials
 from wavefront.compile.scene import compile_scene
-from wavefront.materials import as_material
 
 NAN, INF = np.nan, np.inf
 TRIANGLE = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}
@@ -118,13 +117,6 @@ def test_a_light_must_have_an_area() -> None:
     assert len(compiled(mixed).lights) == 1
 
 
-def test_a_scene_without_light_is_dark() -> None:
-    """Light is added before, where it is wanted; see scene/lighting.py."""
-    scene = compiled(wf.Sphere(**BALL))
-    assert len(scene.lights) == 0
-    assert scene.light_of[-1] == -1
-
-
 def test_a_dark_light_is_still_a_light() -> None:
     """Emission 0 gives black, without a warning and without a division by its power."""
     camera = wf.Camera.look_at((0, 0, 5), (0, 0, 0), size=(4, 4))
@@ -138,18 +130,6 @@ def test_bounds_hold_what_faces_use() -> None:
     mesh = wf.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1e6, 0, 0]], [[0, 1, 2]])
     ball = wf.Sphere((5, 5, 5), 2)
     assert wf.Scene([mesh, ball]).bounds.tolist() == [[0, 0, 0], [7, 7, 7]]
-
-
-def test_framing_camera_sees_everything() -> None:
-    """Every vertex is inside the picture, whatever its shape."""
-    scene = wf.Scene([wf.Mesh(**TRIANGLE), wf.Sphere((3, 1, -2), 0.5)])
-    for size in ((64, 64), (20, 90), (90, 20)):
-        camera = scene.framing_camera(size=size)
-        local = (scene.shapes[0].vertices - camera.origin) @ camera.rotation
-        reach = np.tan(np.radians(camera.fov) / 2)
-        assert (local[:, 2] < 0).all()
-        assert (np.abs(local[:, 1] / local[:, 2]) <= reach).all()
-        assert (np.abs(local[:, 0] / local[:, 2]) <= reach * size[0] / size[1]).all()
 
 
 def test_primitives_know_their_material_and_light() -> None:
@@ -177,23 +157,6 @@ def test_positions_are_relative_to_the_center() -> None:
     assert a.curved.kinds[0].centers.any()
     assert (a.curved.kinds[0].centers == b.curved.kinds[0].centers).all()
     assert (a.center + 2.0**40 == b.center).all()
-
-
-def test_plain_colors_are_one_group() -> None:
-    """Materials that differ in constants only are shaded together, each with its own values."""
-    materials = [
-        wf.Diffuse(0.1),
-        wf.Mirror(0.9),
-        wf.Diffuse((0.2, 0.3, 0.4)),
-        wf.Dielectric(1.5),
-        wf.Dielectric(1.3),
-        wf.Principled((0.1, 0.2, 0.9), roughness=0.3),
-        wf.Material(wf.Principled(0.5, metallic=1.0), emission=2.0),
-        wf.Principled(0.5, clearcoat=1.0),  # with a lobe that the others lack
-    ]
-    grouped = group_materials([as_material("", material) for material in materials])
-    assert grouped.group_of.tolist() == [0, 3, 0, 4, 4, 1, 1, 2]
-    assert len(grouped.groups) == 5
 
 
 PAIRS = [
@@ -297,22 +260,3 @@ def test_paths_end_on_black_lights(monkeypatch: pytest.MonkeyPatch) -> None:
         assert bool(shaded) is not black
     assert pictures[0].tobytes() == pictures[1].tobytes()
     assert pictures[0].max() > 1
-
-
-def test_which_lights_are_black() -> None:
-    """Surfaces of a material that says so; one derived from `Diffuse` need not be, whatever its reflectance."""
-
-    class Glitter(wf.Diffuse):
-        pass
-
-    black, gray = wf.Diffuse(0), wf.Diffuse((0, 0.1, 0))
-    painted = wf.Diffuse(wf.Texture(np.zeros((1, 1, 3))))
-
-    def found(*materials: wf.Bsdf):
-        area_lights = [wf.Rectangle(**SQUARE, material=m, emission=1) for m in materials]
-        return compiled(
-            *area_lights, wf.Sphere(**BALL, material=black), lights=[wf.Environment()]
-        ).nonscattering_lights
-
-    assert found(gray, black, Glitter(0), Ink()).tolist() == [False, True, False, True, False]
-    assert found(gray, painted, Glitter(0)) is None

@@ -12,7 +12,7 @@ from significance import render
 from trimesh.transformations import euler_matrix, translation_matrix
 
 import wavefront as wf
-from wavefront.accel import InstanceAccelerator, Intersections, make_accelerator, most_copies
+from wavefront.accel import InstanceAccelerator, Intersections, make_accelerator
 from wavefront.accel import instances as queries
 from wavefront.accel import registry as choose
 from wavefront.accel.embree import installed
@@ -516,21 +516,6 @@ def test_bright_lone_and_skewed_meshes_are_not_shared():
         camera = wf.Scene(shapes).framing_camera(size=(12, 12))
         a, b = (render(wf.Scene(some, SKY, camera), 2) for some in (shapes, alone(shapes)))
         assert a.rgb.tobytes() == b.rgb.tobytes()
-
-
-def test_few_triangles_are_not_shared_for_embree(monkeypatch):
-    """It takes one mesh faster than many; NumPy does not."""
-    monkeypatch.setattr(choose, "COPIES", 960)
-    assert most_copies("numpy") == 0
-    assert most_copies("embree") == 960
-    assert most_copies("auto") == (960 if installed() else 0)
-    for count, shared in ((3, False), (4, True)):
-        scene = compile_scene(
-            wf.Scene(placed(bumpy(), MATRICES[:count]), SKY),
-            lambda geometry: make_accelerator(geometry, "numpy"),
-            most_copies=most_copies("embree"),
-        )
-        assert (scene.instances is not None) == shared
 
 
 # --- The shape ------------------------------------------------------------------------------------

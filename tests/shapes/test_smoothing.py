@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import wavefront as wf
 from wavefront.cli import main
 from wavefront.shapes import smoothing
-from wavefront.shapes.smoothing import crease_normals, same_rows
+from wavefront.shapes.smoothing import crease_normals
 
 FAST: dict[str, Any] = {"spp": 2, "size": (12, 12), "progress": False}
 BALL = trimesh.creation.icosphere(3)
@@ -133,14 +133,6 @@ def test_opposite_faces_keep_their_normals() -> None:
     vertices = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], float)
     mesh = wf.Mesh(vertices, [(0, 1, 2), (0, 2, 1)], smooth=True)
     assert mesh.normals is None
-
-
-def test_rows_are_the_same() -> None:
-    rows = np.array([[1, 2], [0.0, 3], [1, 2], [-0.0, 3], [1, 3]])
-    number = same_rows(rows)
-    assert number[0] == number[2]
-    assert number[1] == number[3]
-    assert len(set(number.tolist())) == 3
 
 
 @pytest.mark.parametrize("value", ["yes", -1, 181, np.nan, (30,), None])

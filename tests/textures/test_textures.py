@@ -6,10 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wavefront.bsdfs.diffuse import Diffuse
 from wavefront.codecs.encoding import srgb_to_linear
 from wavefront.core.errors import SceneError
-from wavefront.textures.base import BaseTexture
 from wavefront.textures.image import Texture
 
 WRAPS = ("repeat", "mirror", "clamp")
@@ -137,11 +135,6 @@ def test_a_lookup_does_not_depend_on_its_neighbors():
     assert np.array_equal(whole, np.concatenate(pieces, axis=1))
 
 
-def test_an_8_bit_array_is_shared_not_copied():
-    codes = np.zeros((64, 64, 4), np.uint8)
-    assert np.shares_memory(Texture(codes, channel=3)._texels, codes)
-
-
 def test_from_a_file(tmp_path):
     codes = np.random.default_rng(0).integers(0, 256, (3, 4, 3), np.uint8)
     iio.imwrite(tmp_path / "a.png", codes)
@@ -149,19 +142,6 @@ def test_from_a_file(tmp_path):
     texture = Texture(tmp_path / "a.png")
     assert np.array_equal(texture.lookup(points), Texture(codes).lookup(points))
     assert repr(texture) == "<Texture 'a.png': 4 × 3>"
-
-
-def test_a_material_takes_it():
-    class SurfaceInteraction:
-        uv = np.full((2, 5), 0.5, np.float32)
-
-    texture = Texture(np.full((1, 1, 3), 0.25, np.float32))
-    assert isinstance(texture, BaseTexture)
-    bound = Diffuse(texture).bind(SurfaceInteraction())
-    assert np.array_equal(bound.reflectance, np.full((3, 5), 0.25, np.float32))
-    SurfaceInteraction.uv = None
-    with pytest.raises(SceneError, match="'array': the surface has no texture coordinates"):
-        Diffuse(texture).bind(SurfaceInteraction())
 
 
 @pytest.mark.parametrize(
