@@ -1,4 +1,4 @@
-"""Geometric layers: closed forms at every pixel, the ids of the user's shapes, and all cameras."""
+"""Geometric AOVs: closed forms at every pixel, the ids of the user's shapes, and all cameras."""
 
 import numpy as np
 import pytest
@@ -41,7 +41,7 @@ CAMERAS = {
 
 
 def layers(shapes, camera, names=GEOMETRIC, **settings) -> wf.Image:
-    """Return a picture of one sample with layers."""
+    """Return a picture of one sample with AOVs."""
     return wf.render(wf.Scene(shapes, [SKY], camera), spp=1, aovs=names, **settings)
 
 

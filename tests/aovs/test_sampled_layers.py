@@ -1,4 +1,4 @@
-"""Sampled layers: what they hold, that they sum to the picture, and that their bits stay."""
+"""Sampled AOVs: what they hold, that they sum to the picture, and that their bits stay."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from significance import ALPHA, render
 import wavefront as wf
 from wavefront.accel import numpy_accel
 from wavefront.bsdfs import ALL, albedo_of
-from wavefront.film.aov_names import LAYERS
+from wavefront.film.aov_names import AOVS
 from wavefront.integrators import accumulate, intersect_and_compact
 from wavefront.stages.intersect import intersect
 from wavefront.stages.shade import emitted
 
-SAMPLED = tuple(name for name, layer in LAYERS.items() if layer.sampled)
+SAMPLED = tuple(name for name, layer in AOVS.items() if layer.sampled)
 EVERYTHING = (*SAMPLED, "light_groups", "coverage")
 INTEGRATORS = ("naive", "direct_simple", "direct_mis", "full")
 
@@ -93,7 +93,7 @@ def test_layers_that_are_not_asked_for_are_not_made() -> None:
 
 
 def same_mean(a: wf.Image, b: wf.Image, name: str, other: str) -> float:
-    """p-value, Šidák-corrected, of two layers of independent pictures having one mean in blocks of pixels."""
+    """p-value, Šidák-corrected, of two AOVs of independent pictures having one mean in blocks of pixels."""
 
     def summary(image: wf.Image, layer: str) -> tuple[np.ndarray, np.ndarray]:
         mean = image.rgb if layer == "rgb" else image.layers[layer]
@@ -126,7 +126,7 @@ def test_branches_change_no_layer() -> None:
         assert same_mean(one, three, name, name) > ALPHA, name
 
 
-# --- What the layers hold ----------------------------------------------------------------------------
+# --- What the AOVs hold ----------------------------------------------------------------------------
 
 
 def test_albedo_of_a_textured_plane_is_the_texture() -> None:
@@ -232,7 +232,7 @@ def test_coverage_tells_shapes_apart_by_their_names() -> None:
 
 
 def test_errors_are_those_of_the_samples() -> None:
-    """The standard error of a layer predicts the scatter between seeds."""
+    """The standard error of an AOV predicts the scatter between seeds."""
     runs = [render(room(6), 16, aovs=SAMPLED, seed=seed, sampler="independent") for seed in range(24)]
     for name in SAMPLED:
         layers = np.stack([run.layers[name] for run in runs]).astype(np.float64)
@@ -262,7 +262,7 @@ def test_albedo_is_about_the_scattered_part(kind: type[wf.Bsdf]) -> None:
 
 
 def assert_same_bits(a: wf.Image, b: wf.Image) -> None:
-    """Compare the picture, the layers and their errors."""
+    """Compare the picture, the AOVs and their errors."""
     assert list(a.layers) == list(b.layers)
     assert list(a.errors) == list(b.errors)
     np.testing.assert_array_equal(a.rgb, b.rgb)
@@ -477,7 +477,7 @@ def test_groups_are_names(make, message: str) -> None:
 
 
 def test_groups_of_the_sky_are_told_apart() -> None:
-    """An environment and a sun are one light for the samples, and two layers."""
+    """An environment and a sun are one light for the samples, and two AOVs."""
     lights = [
         wf.Environment((1, 0, 0), group="red"),
         wf.DirectionalLight((1, 2, 3), (0, 2, 1), angle=90, group="other"),

@@ -76,7 +76,7 @@ def test_sums_are_restored_from_their_arrays() -> None:
 
 
 @pytest.mark.parametrize(
-    ("layers", "light_paths", "size"),
+    ("layers", "light_tracing", "size"),
     [
         ((), False, 0),
         ((), True, 192),
@@ -88,12 +88,12 @@ def test_sums_are_restored_from_their_arrays() -> None:
     ],
 )
 def test_the_memory_of_a_pixel_is_that_of_the_arrays(
-    layers: tuple[str, ...], light_paths: bool, size: int
+    layers: tuple[str, ...], light_tracing: bool, size: int
 ) -> None:
-    """Which render budgets count, with what the picture and its layers take."""
-    assert bytes_per_pixel(lambda pixels: empty_sums((pixels, 1), layers, light_paths)) == 176 + size
+    """Which render budgets count, with what the picture and its AOVs take."""
+    assert bytes_per_pixel(lambda pixels: empty_sums((pixels, 1), layers, light_tracing)) == 176 + size
     channels = sum(1 if name == "alpha" else 3 for name in layers)
-    more = picture_memory((20, 10), layers, light_paths) - picture_memory((20, 10))
+    more = picture_memory((20, 10), layers, light_tracing) - picture_memory((20, 10))
     assert more == (size + 8 * channels) * 200
-    sums = empty_sums((20, 10), layers, light_paths)
+    sums = empty_sums((20, 10), layers, light_tracing)
     assert sum(array.nbytes for array in sums.arrays().values()) == pytest.approx((176 + size) * 200, abs=96)

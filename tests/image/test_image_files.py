@@ -21,7 +21,7 @@ from PIL import Image as PillowImage
 import wavefront as wf
 from wavefront.codecs import png_jpeg
 from wavefront.codecs.image_data import from_named
-from wavefront.film.aov_names import LAYERS
+from wavefront.film.aov_names import AOVS
 
 
 def arrays_of(image):
@@ -69,7 +69,7 @@ def test_a_rendered_image_comes_back(tmp_path, extension, background):
     image = wf.render(
         scene, 4, size=(9, 6), noise=0.5, aovs=("all", "light_groups"), background=background, progress=False
     )
-    assert {*LAYERS, "light_groups.sky"} <= image.layers.keys()
+    assert {*AOVS, "light_groups.sky"} <= image.layers.keys()
     image.save(tmp_path / f"a.{extension}")
     assert_same(wf.Image.load(tmp_path / f"a.{extension}"), image)
     image.save(tmp_path / "a.png")

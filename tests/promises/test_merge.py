@@ -115,14 +115,14 @@ def test_ranges_that_make_no_picture_are_errors(options: dict[str, Any], message
 
 # --- Pictures -----------------------------------------------------------------------------------------
 
-LAYERS = ("alpha", "albedo", "direct", "indirect", "light_groups", "coverage", "depth")
+AOVS = ("alpha", "albedo", "direct", "indirect", "light_groups", "coverage", "depth")
 
 
 @pytest.mark.parametrize("cuts", [(8,), (1,), (5, 11), (3, 4, 13), (2, 4, 6, 8, 10, 12, 14)])
 def test_pictures_of_any_parts_merge_to_one_render(cuts: tuple[int, ...]) -> None:
-    whole = wf.render(SCENE, 16, aovs=LAYERS)
+    whole = wf.render(SCENE, 16, aovs=AOVS)
     parts = [
-        wf.render(SCENE, samples=range(first, end), aovs=LAYERS, wave_size=70 + first)
+        wf.render(SCENE, samples=range(first, end), aovs=AOVS, wave_size=70 + first)
         for first, end in pairwise((0, *cuts, 16))
     ]
     merged = reduce(wf.Image.merge, parts)
@@ -155,10 +155,10 @@ def test_merging_changes_neither_picture() -> None:
 def test_npz_files_carry_the_sums(tmp_path: Path) -> None:
     paths = [tmp_path / f"{number}.npz" for number in range(3)]
     for first, path in zip((0, 3, 6), paths, strict=True):
-        wf.render(SCENE, samples=range(first, first + 3), aovs=LAYERS).save(path)
+        wf.render(SCENE, samples=range(first, first + 3), aovs=AOVS).save(path)
     wf.Image.load(paths[0]).merge(wf.Image.load(paths[2])).save(paths[0])
     merged = wf.Image.load(paths[0]).merge(wf.Image.load(paths[1]))
-    whole = wf.render(SCENE, 9, aovs=LAYERS)
+    whole = wf.render(SCENE, 9, aovs=AOVS)
     assert merged.rgb.tobytes() == whole.rgb.tobytes()
     assert all(merged.layers[name].tobytes() == layer.tobytes() for name, layer in whole.layers.items())
 

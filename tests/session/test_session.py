@@ -274,14 +274,14 @@ def test_workers_can_be_started_before_there_is_work(executor: str) -> None:
 
 def test_geometric_layers_end_when_the_session_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
     with wf.Session(everything(), 4, aovs="depth", **QUIET) as session:
-        layers, rays = view_render.geometric_layers, []
+        layers, rays = view_render.geometric_aovs, []
 
-        def stopped_layers(scene: Any, *rest: Any) -> Any:
+        def stopped_aovs(scene: Any, *rest: Any) -> Any:
             session.drop()
             rays.append(scene.accelerator)
             return layers(scene, *rest)
 
-        monkeypatch.setattr(view_render, "geometric_layers", stopped_layers)
+        monkeypatch.setattr(view_render, "geometric_aovs", stopped_aovs)
         assert list(session) == []
         assert [accelerator.rays for accelerator in rays] == [0]
 

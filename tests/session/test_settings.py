@@ -12,7 +12,7 @@ import pytest
 
 import wavefront as wf
 from wavefront import cli
-from wavefront.film.aov_names import LAYERS
+from wavefront.film.aov_names import AOVS
 from wavefront.settings import SETTINGS, Settings
 
 
@@ -109,8 +109,8 @@ def test_layers_are_chosen_by_name() -> None:
         "albedo",
         "coverage",
     )
-    assert Settings(aovs="all").values["aovs"] == tuple(LAYERS)
-    assert Settings(aovs=("all", "light_groups")).values["aovs"] == (*LAYERS, "light_groups")
+    assert Settings(aovs="all").values["aovs"] == tuple(AOVS)
+    assert Settings(aovs=("all", "light_groups")).values["aovs"] == (*AOVS, "light_groups")
 
 
 def test_unknown_layers_are_an_error_that_lists_what_there_is() -> None:

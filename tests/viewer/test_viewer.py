@@ -36,7 +36,7 @@ from wavefront.viewer.first_paint import FirstPaint, asked_first
 from wavefront.viewer.guard import Guard, is_message, is_own_address, token_of
 from wavefront.viewer.page import Page
 from wavefront.viewer.refiner import Refiner, ViewerFrame
-from wavefront.viewer.shown import CHOICES, VIEWER_LAYERS, shown_codes
+from wavefront.viewer.shown import CHOICES, VIEWER_AOVS, shown_codes
 from wavefront.viewer.viewpoint import Viewpoint
 
 viser = pytest.importorskip("viser")
@@ -250,7 +250,7 @@ def test_an_error_ends_a_view_and_not_the_viewer() -> None:
 
 def test_the_last_picture_is_that_of_render() -> None:
     """Bit for bit, also after other views that were left early, and with the layers of a page."""
-    session = wf.Session(BALL, 16, camera=CAMERA, workers=2, aovs=VIEWER_LAYERS, progress=False)
+    session = wf.Session(BALL, 16, camera=CAMERA, workers=2, aovs=VIEWER_AOVS, progress=False)
     watched = Watched(session)
     for z in (3, 4, 5):
         watched.refiner.look(wf.Camera.look_at((0, 1, z), (0, 0, 0), size=(64, 48)))
@@ -354,7 +354,7 @@ def test_lenses_that_are_none_are_refused(lens: Any) -> None:
 
 
 def test_layers_are_shown_as_colors() -> None:
-    image = wf.render(BALL, 4, camera=CAMERA, aovs=VIEWER_LAYERS, progress=False)
+    image = wf.render(BALL, 4, camera=CAMERA, aovs=VIEWER_AOVS, progress=False)
     shown = {choice: shown_codes(image, choice, 0) for choice in CHOICES if choice != "denoised"}
     for codes in shown.values():
         assert codes.shape == (48, 64, 3)
@@ -374,7 +374,7 @@ def test_layers_are_shown_as_colors() -> None:
 
 
 def test_a_transparent_background_is_gray() -> None:
-    image = wf.render(BALL, 4, camera=CAMERA, aovs=VIEWER_LAYERS, background="transparent", progress=False)
+    image = wf.render(BALL, 4, camera=CAMERA, aovs=VIEWER_AOVS, background="transparent", progress=False)
     assert shown_codes(image, "rgb", 0)[0, 0].tolist() == [217, 217, 217]
 
 
@@ -777,7 +777,7 @@ def test_other_pictures_do_not_wait(sent: Any, monkeypatch: pytest.MonkeyPatch) 
 
 def looks(seed: int = 0) -> wf.Image:
     """Return a noisy picture with the layers of a page."""
-    settings: dict[str, Any] = {"seed": seed, "aovs": VIEWER_LAYERS, "progress": False}
+    settings: dict[str, Any] = {"seed": seed, "aovs": VIEWER_AOVS, "progress": False}
     return wf.render(BALL, 4, camera=CAMERA.resized((16, 12)), **settings)
 
 

@@ -1,6 +1,6 @@
 """Objects in a picture: boxes of what is seen of each shape and of the whole shape, and its silhouette.
 
-The rays of the geometric layers go on behind each surface, so one pass finds all shapes that each pixel's
+The rays of the geometric AOVs go on behind each surface, so one pass finds all shapes that each pixel's
 center covers, whatever hides them.
 """
 
@@ -28,7 +28,7 @@ def object_boxes(scene: CompiledScene, camera: Camera, shapes: ShapeTable) -> li
     Parameters
     ----------
     scene, camera, shapes
-        As for `geometric_layers`.
+        As for `geometric_aovs`.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def silhouettes(scene: CompiledScene, camera: Camera) -> Iterator[tuple[int, NDA
     Parameters
     ----------
     scene, camera
-        As for `geometric_layers`.
+        As for `geometric_aovs`.
     """
     width, height = camera.size
     view = scene.view(camera)

@@ -1,4 +1,4 @@
-"""The geometric layers of a picture: what the ray through the center of each pixel and of the lens meets.
+"""The geometric AOVs of a picture: what the ray through the center of each pixel and of the lens meets.
 
 Nothing in them is random or filtered. A surface with alpha is met where its opacity is at least 0.5.
 """
@@ -16,7 +16,7 @@ from ..arrays.vec import Doubles, Ints, distinct, dot, f4, length
 from ..camera import Camera
 from ..compile.materials import material_parts
 from ..compile.scene import CompiledScene
-from ..film.aov_names import LAYERS
+from ..film.aov_names import AOVS
 from ..materials import Material
 from ..shapes import Instance, Mesh, Shape
 from ..stages.alpha import covering_hits
@@ -30,7 +30,7 @@ NORMALS = ("normal", "normal_geometric")
 
 
 class ShapeTable:
-    """The numbers and names of shapes, instances and materials, as the layers have them.
+    """The numbers and names of shapes, instances and materials, as the AOVs have them.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class ShapeTable:
         return numbers[id(material)]
 
     def ids(self, name: str, shape: Ints) -> NDArray[np.int32]:
-        """Return the ids of a layer for the numbers of shapes (n,)."""
+        """Return the ids of an AOV for the numbers of shapes (n,)."""
         if name == "shape_id":
             return shape.astype(np.int32)
         return (self.instance_of if name == "instance_id" else self.material_of).take(shape)
@@ -79,10 +79,10 @@ class ShapeTable:
         return dict(enumerate(named))
 
 
-def geometric_layers(
+def geometric_aovs(
     scene: CompiledScene, camera: Camera, shapes: ShapeTable, names: Sequence[str]
 ) -> dict[str, NDArray[Any]]:
-    """Return geometric layers of a picture by name, (height, width) or (height, width, channels).
+    """Return geometric AOVs of a picture by name, (height, width) or (height, width, channels).
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def geometric_layers(
     shapes
         Those of the scene.
     names
-        The layers that are asked for.
+        The AOVs that are asked for.
     """
     width, height = camera.size
     layers = {name: _empty(name, width * height) for name in names}
@@ -116,10 +116,10 @@ def geometric_layers(
 
 
 def _empty(name: str, pixels: int) -> NDArray[Any]:
-    """Return a layer without any hit."""
+    """Return an AOV without any hit."""
     if name in IDS:
         return np.full(pixels, -1, np.int32)
-    channels = LAYERS[name].channels
+    channels = AOVS[name].channels
     return np.full(pixels if channels == 1 else (pixels, channels), np.nan, f4)
 
 
@@ -140,7 +140,7 @@ def _found(
     moved: Rays,
     hits: Hits,
 ) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield the layers of rays that hit something: (n,) or (n, channels)."""
+    """Yield the AOVs of rays that hit something: (n,) or (n, channels)."""
     shape = scene.shape_numbers.of(hits)
     for name in IDS:
         if name in names:

@@ -1,7 +1,7 @@
-"""The recorder of a wave: takes from the stages what the sampled layers of its samples need.
+"""The recorder of a wave: takes from the stages what the sampled AOVs of its samples need.
 
-A recorder travels with the paths (`Paths.recorder`), so integrators need not know which layers are asked for,
-and integrators of a user's own give the same layers if they are made of the same stages.
+A recorder travels with the paths (`Paths.recorder`), so integrators need not know which AOVs are asked for,
+and integrators of a user's own give the same AOVs if they are made of the same stages.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from ..arrays.state import BounceDepth, Contribution, Hits, Paths
 from ..arrays.vec import Bools, Bytes, Floats, Ints, broadcast, f4, put, take
 from ..compile.scene import CompiledScene
 from ..core.errors import SceneError
-from ..film.aov_names import CLAMPED, KEYED_LAYERS, LAYERS
-from ..film.aov_samples import BOUNDED, FixedPointSamples, LayerSamples, fixed_point
+from ..film.aov_names import AOVS, CLAMPED, KEYED_AOVS
+from ..film.aov_samples import BOUNDED, AovSamples, FixedPointSamples, fixed_point
 from ..stages.compact import compact
 from ..stages.interaction import interaction
 from ..stages.normal_mapping import perturb_normals
@@ -38,12 +38,12 @@ class AwaitedSurfaces:
 
 
 class SampleRecorder(PathRecorder):
-    """Records the sampled layers of one wave.
+    """Records the sampled AOVs of one wave.
 
     Parameters
     ----------
     wanted
-        The layers that are asked for.
+        The AOVs that are asked for.
     scene
         What is rendered.
     n
@@ -56,7 +56,7 @@ class SampleRecorder(PathRecorder):
         self, wanted: Sequence[str], scene: CompiledScene, n: int, clamp: float | None = None
     ) -> None:
         self._wanted = tuple(wanted)
-        self._values = {name: np.zeros((LAYERS[name].channels, n), f4) for name in BOUNDED if name in wanted}
+        self._values = {name: np.zeros((AOVS[name].channels, n), f4) for name in BOUNDED if name in wanted}
         self._covered = np.zeros(n, np.bool_) if "alpha" in wanted else None
         self._coverage = Coverage(scene, n) if "coverage" in wanted else None
         self._light: dict[str, Floats] = {}
@@ -137,7 +137,7 @@ class SampleRecorder(PathRecorder):
         self._record_features(paths, lanes, shade, shade.albedo() if albedo is None else albedo)
 
     def _needs_surfaces(self, paths: Paths, first: bool) -> bool:
-        """Return whether a layer needs the next surfaces of the paths."""
+        """Return whether an AOV needs the next surfaces of the paths."""
         if first and "albedo" in self._values:
             return True
         return paths.met_rough is not None and not paths.met_rough.all()
@@ -232,7 +232,7 @@ class SampleRecorder(PathRecorder):
     # --- The result -----------------------------------------------------------------------------------
 
     def finish(self, integrator: object, radiance: Floats) -> Bools:
-        """Record what is left, and return a mask (n,) of the slots whose layers are all finite.
+        """Record what is left, and return a mask (n,) of the slots whose AOVs are all finite.
 
         Parameters
         ----------
@@ -244,7 +244,7 @@ class SampleRecorder(PathRecorder):
         Raises
         ------
         SceneError
-            If the integrator does not use the stages that record the layers.
+            If the integrator does not use the stages that record the AOVs.
         """
         self._check(integrator, radiance)
         self._shade_awaited()
@@ -254,8 +254,8 @@ class SampleRecorder(PathRecorder):
                 finite &= np.isfinite(row)
         return finite
 
-    def result(self, samples: int, dropped: Ints) -> LayerSamples:
-        """Return the layers, after `finish`.
+    def result(self, samples: int, dropped: Ints) -> AovSamples:
+        """Return the AOVs, after `finish`.
 
         Parameters
         ----------
@@ -273,10 +273,10 @@ class SampleRecorder(PathRecorder):
             counts["alpha"] = self._covered.reshape(samples, -1).sum(0, dtype=np.int32)
         if self._coverage is not None:
             counts.update(self._coverage.counts(samples, dropped))
-        return LayerSamples(counts, self._bounded(samples, dropped), light)
+        return AovSamples(counts, self._bounded(samples, dropped), light)
 
     def _bounded(self, samples: int, dropped: Ints) -> dict[str, FixedPointSamples]:
-        """Return the layers with values in [-1, 1]."""
+        """Return the AOVs with values in [-1, 1]."""
         bounded: dict[str, FixedPointSamples] = {}
         for name, values in self._values.items():
             if name == "denoising_albedo" and self._all_rough and "albedo" in bounded:
@@ -323,24 +323,24 @@ class Coverage:
         self._seen[take(paths.slot, found)] = self._of_shape.take(scene.shape_numbers.of(hits.take(found)))
 
     def counts(self, samples: int, dropped: Ints) -> Iterator[tuple[str, Ints]]:
-        """Yield each layer, and how many samples of each pixel (k,) see a shape of that name."""
+        """Yield each AOV, and how many samples of each pixel (k,) see a shape of that name."""
         self._seen[dropped] = -1
         seen = self._seen.reshape(samples, -1)
         for number, name in enumerate(self._names):
             yield f"coverage.{name}", (seen == number).sum(0, dtype=np.int32)
 
 
-def recorded_layers(wanted: Sequence[str], scene: CompiledScene) -> tuple[str, ...]:
-    """Return the layers that recorders of a scene return, those with a key by it."""
+def recorded_aovs(wanted: Sequence[str], scene: CompiledScene) -> tuple[str, ...]:
+    """Return the AOVs that recorders of a scene return, those with a key by it."""
     names: list[str] = []
     for name in wanted:
         keys = scene.light_groups.names if name == "light_groups" else dict.fromkeys(scene.shape_names)
-        names += [f"{name}.{key}" for key in keys] if name in KEYED_LAYERS else [name]
+        names += [f"{name}.{key}" for key in keys] if name in KEYED_AOVS else [name]
     return tuple(names)
 
 
 def _is_direct(depth: Bytes, contribution: Contribution) -> Bools:
-    """Return a mask (k,) of the contributions that count for the layer "direct"."""
+    """Return a mask (k,) of the contributions that count for the AOV "direct"."""
     at = take(depth, contribution.lanes)
     return at == BounceDepth.CAMERA if contribution.sampled else at <= BounceDepth.DIRECT
 

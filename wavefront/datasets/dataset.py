@@ -15,7 +15,7 @@ from ..codecs.png_jpeg import Gamma
 from ..codecs.white_balance import WhiteBalance
 from ..core.errors import SceneError, iterable, number, one_of
 from ..core.files import make_folder, path_name, read_json, write_json
-from ..film.aov_names import chosen_layers
+from ..film.aov_names import chosen_aovs
 from ..film.identity import differences
 from ..io.to_scene import as_scene
 from ..scene import Scene
@@ -27,8 +27,8 @@ from .coco import CocoLayout
 from .view import DatasetView, camera_matrices, view_name
 
 FORMATS = ("coco", "bop")
-LAYERS_NEEDED = ("depth", "normal", "shape_id")
-LAYERS_FOLDER, VIEWS_FOLDER = "layers", "views"
+AOVS_NEEDED = ("depth", "normal", "shape_id")
+AOVS_FOLDER, VIEWS_FOLDER = "layers", "views"
 GOES_ON = "write_dataset goes on with views that are missing"
 REFUSED = {"checkpoint": GOES_ON, "samples": GOES_ON, "camera": "write_dataset takes cameras"}
 
@@ -126,7 +126,7 @@ def write_dataset(
     views = _checked_cameras(cameras, settings.pop("size", None), layouts)
     display = Display(gamma, exposure, tone, white_balance)
     settings["camera"] = views[0]
-    settings["aovs"] = (*chosen_layers("aovs", settings.get("aovs", ())), *LAYERS_NEEDED)
+    settings["aovs"] = (*chosen_aovs("aovs", settings.get("aovs", ())), *AOVS_NEEDED)
     about = {
         "format": sorted(chosen),
         "objects": [[item.shape, item.name] for item in annotated.values()],
@@ -159,7 +159,7 @@ class _Writer:
 
     def write(self, cameras: Sequence[Camera], session: Session) -> int:
         """Write the data set; return how many views were rendered."""
-        for each in (self._root, self._root / LAYERS_FOLDER, self._root / VIEWS_FOLDER):
+        for each in (self._root, self._root / AOVS_FOLDER, self._root / VIEWS_FOLDER):
             make_folder(each)
         records, rendered = {}, 0
         with session:
@@ -208,7 +208,7 @@ class _Writer:
         """Render a view and write its files, its record as the last one."""
         image = session.run()
         view = DatasetView(at, camera, image, self._objects, self._display, session.silhouettes)
-        image.save(self._root / LAYERS_FOLDER / f"{view.name}.exr")
+        image.save(self._root / AOVS_FOLDER / f"{view.name}.exr")
         record = {
             "identity": identity,
             "camera": camera_matrices(camera, self._farthest(camera)),

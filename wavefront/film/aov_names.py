@@ -1,7 +1,7 @@
-"""The layers of a picture besides `rgb`: their names, kinds and meanings.
+"""The AOVs of a picture besides `rgb`: their names, kinds and meanings.
 
 A geometric layer comes from one ray through the center of each pixel and the center of the lens. It is not
-filtered and has no error; where the ray meets nothing it is NaN, or -1 in ids. A sampled layer is a
+filtered and has no error; where the ray meets nothing it is NaN, or -1 in ids. A sampled AOV is a
 filtered mean over the samples of the pixel, as `rgb` is, and has a standard error.
 """
 
@@ -16,7 +16,7 @@ from ..core.suggestions import did_you_mean
 
 
 @soa
-class Layer:
+class Aov:
     """One layer."""
 
     channels: int
@@ -24,15 +24,15 @@ class Layer:
     text: str  # what it holds, and its unit
 
 
-def _geometric(channels: int, text: str) -> Layer:
-    return Layer(channels, False, text)
+def _geometric(channels: int, text: str) -> Aov:
+    return Aov(channels, False, text)
 
 
-def _sampled(channels: int, text: str) -> Layer:
-    return Layer(channels, True, text)
+def _sampled(channels: int, text: str) -> Aov:
+    return Aov(channels, True, text)
 
 
-LAYERS: dict[str, Layer] = {
+AOVS: dict[str, Aov] = {
     "position": _geometric(3, "point that the ray meets, scene units"),
     "depth": _geometric(1, "distance along the camera's axis, scene units"),
     "distance": _geometric(1, "distance along the ray, scene units"),
@@ -50,16 +50,16 @@ LAYERS: dict[str, Layer] = {
     "denoising_normal": _sampled(3, "shading normal there, world"),
 }
 
-KEYED_LAYERS: dict[str, Layer] = {  # one layer for each key, named "light_groups.KEY" and "coverage.KEY"
+KEYED_AOVS: dict[str, Aov] = {  # one AOV for each key, named "light_groups.KEY" and "coverage.KEY"
     "light_groups": _sampled(3, "radiance by the group of the light that it comes from"),
     "coverage": _sampled(1, "part of the pixel that each shape covers, by the name of the shape"),
 }
 CLAMPED = "clamped"
-GIVEN_LAYERS: dict[str, Layer] = {  # layers that a setting gives, beside those that are asked for
+GIVEN_AOVS: dict[str, Aov] = {  # AOVs that a setting gives, beside those that are asked for
     CLAMPED: _sampled(3, "radiance that the setting `clamp` removed"),
 }
 BOXES = "boxes"  # of objects: no array, but `Image.boxes`
-ALL_LAYERS = "all"  # stands for all of `LAYERS`, and for nothing else
+ALL_AOVS = "all"  # stands for all of `AOVS`, and for nothing else
 
 DEFAULT_GROUP = "default"  # of lights and emitting materials
 
@@ -78,57 +78,57 @@ def group_name(name: str, value: Any) -> str:
 
 
 def sampled_names(chosen: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of the sampled layers among those that were chosen."""
-    return tuple(name for name in chosen if name != BOXES and layer_of(name).sampled)
+    """Return the names of the sampled AOVs among those that were chosen."""
+    return tuple(name for name in chosen if name != BOXES and aov_of(name).sampled)
 
 
 def geometric_names(chosen: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of the geometric layers among those that were chosen."""
-    return tuple(name for name in chosen if name != BOXES and not layer_of(name).sampled)
+    """Return the names of the geometric AOVs among those that were chosen."""
+    return tuple(name for name in chosen if name != BOXES and not aov_of(name).sampled)
 
 
-def layer_of(name: str) -> Layer:
-    """Return a layer by its name, that of a layer with a key such as "light_groups.sun"."""
-    return {**LAYERS, **KEYED_LAYERS, **GIVEN_LAYERS}[name.partition(".")[0]]
+def aov_of(name: str) -> Aov:
+    """Return an AOV by its name, that of an AOV with a key such as "light_groups.sun"."""
+    return {**AOVS, **KEYED_AOVS, **GIVEN_AOVS}[name.partition(".")[0]]
 
 
-def chosen_layers(name: str, value: Any) -> tuple[str, ...]:
-    """Return the names of the layers that were asked for, each once, in the order of the tables.
+def chosen_aovs(name: str, value: Any) -> tuple[str, ...]:
+    """Return the names of the AOVs that were asked for, each once, in the order of the tables.
 
     Parameters
     ----------
     name
         What the value is called in errors.
     value
-        A name, or several: of `LAYERS`, of `KEYED_LAYERS`, "boxes" or "all".
+        A name, or several: of `AOVS`, of `KEYED_AOVS`, "boxes" or "all".
 
     Raises
     ------
     SceneError
         If one is unknown. The message lists all of them.
     """
-    known = (*LAYERS, *KEYED_LAYERS, BOXES)
+    known = (*AOVS, *KEYED_AOVS, BOXES)
     chosen = [value] if isinstance(value, str) else list(value) if isinstance(value, Iterable) else None
     if chosen is None:
         raise SceneError(f"{name} is {value!r}; it must be the name of a layer, or several names")
     for each in chosen:
-        if not isinstance(each, str) or each not in (*known, ALL_LAYERS):
+        if not isinstance(each, str) or each not in (*known, ALL_AOVS):
             raise SceneError(
-                f"{name} has {each!r}; there are {', '.join(known)}, and {ALL_LAYERS!r} for all but "
-                f"{', '.join((*KEYED_LAYERS, BOXES))}{did_you_mean(each, known)}"
+                f"{name} has {each!r}; there are {', '.join(known)}, and {ALL_AOVS!r} for all but "
+                f"{', '.join((*KEYED_AOVS, BOXES))}{did_you_mean(each, known)}"
             )
-    wanted = {*chosen, *(LAYERS if ALL_LAYERS in chosen else ())}
+    wanted = {*chosen, *(AOVS if ALL_AOVS in chosen else ())}
     return tuple(each for each in known if each in wanted)
 
 
-GUIDES = "denoising_albedo", "denoising_normal"  # the layers that guide denoisers
-NOISY = "noisy"  # the layer that holds `rgb` as it was before denoising
-# what the names of layers that hold radiance begin with
+GUIDES = "denoising_albedo", "denoising_normal"  # the AOVs that guide denoisers
+NOISY = "noisy"  # the AOV that holds `rgb` as it was before denoising
+# what the names of AOVs that hold radiance begin with
 RADIANCE = (NOISY, "direct", "indirect", "light_groups.", CLAMPED)
 
 
 def is_radiance(name: str) -> bool:
-    """Return whether a layer holds radiance, as `rgb` does."""
+    """Return whether an AOV holds radiance, as `rgb` does."""
     return name.startswith(RADIANCE)
 
 

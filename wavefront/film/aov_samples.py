@@ -1,7 +1,7 @@
-"""The sampled layers of one wave, as its worker returns them.
+"""The sampled AOVs of one wave, as its worker returns them.
 
-Layers with values in [-1, 1] are rounded to multiples of 2^-24, so that their sums are exact in any order,
-and the worker adds up the samples of each pixel. Layers of radiance are returned sample by sample.
+AOVs with values in [-1, 1] are rounded to multiples of 2^-24, so that their sums are exact in any order,
+and the worker adds up the samples of each pixel. AOVs of radiance are returned sample by sample.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ class FixedPointSamples:
 
 
 @soa
-class LayerSamples:
-    """The sampled layers of a wave: samples of k pixels."""
+class AovSamples:
+    """The sampled AOVs of a wave: samples of k pixels."""
 
     counts: dict[str, Ints]  # (k,) how many samples of each pixel are 1: "alpha", and "coverage.NAME"
     bounded: dict[str, FixedPointSamples]

@@ -1,4 +1,4 @@
-"""Sums of the sampled layers of a picture, and what they come to."""
+"""Sums of the sampled AOVs of a picture, and what they come to."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 from ..arrays.soa import soa
 from ..arrays.state import Words
 from ..arrays.vec import Doubles, Floats, Ints, Lanes, f4
-from .aov_names import layer_of
+from .aov_names import aov_of
 from .aov_samples import (
     BOUNDED,
     COUNTED,
     FRACTION_BITS,
     NARROW_TERMS,
+    AovSamples,
     FixedPoint,
     FixedPointSamples,
-    LayerSamples,
 )
 from .exact_sum import ExactSums
 from .film import CHUNK, add_in_order, chunks, pixel_span
@@ -29,8 +29,8 @@ LARGEST_NARROW = NARROW_TERMS << FRACTION_BITS
 
 
 @soa
-class LayerEstimate:
-    """What the samples of a layer come to."""
+class AovEstimate:
+    """What the samples of an AOV come to."""
 
     mean: Floats  # (pixels, c)
     standard_error: Floats  # (pixels, c) of `mean`; NaN for fewer than two samples
@@ -130,17 +130,17 @@ class RadianceSums(SquareSums):
         return self.sums.value(part), self.squares[:, part].astype(np.float64)
 
 
-class LayerSums(Sums):
-    """Sums of the samples of some layers.
+class AovSums(Sums):
+    """Sums of the samples of some AOVs.
 
     Like those of the `Film` they do not depend on the division of a render into jobs. The means do not
-    depend on the division of samples between two sums that are merged either; errors of layers of radiance
+    depend on the division of samples between two sums that are merged either; errors of AOVs of radiance
     may then differ by their rounding.
 
     Parameters
     ----------
     names
-        Sampled layers, those with a key by it, such as "light_groups.sun".
+        Sampled AOVs, those with a key by it, such as "light_groups.sun".
     pixels
         Their number.
     """
@@ -160,13 +160,13 @@ class LayerSums(Sums):
             if kind in COUNTED:
                 self.counts[name] = CountSums(pixels)
             elif kind in BOUNDED:
-                self.bounded[name] = FixedPointSums((layer_of(name).channels, pixels))
+                self.bounded[name] = FixedPointSums((aov_of(name).channels, pixels))
             elif kind != "indirect":
                 self.radiance[name] = RadianceSums(pixels)
         if self.indirect is not None and "direct" not in self.radiance:
             self.radiance["direct"] = RadianceSums(pixels)
 
-    def add(self, pixels: Words, samples: LayerSamples, radiance: Floats, most: int) -> None:
+    def add(self, pixels: Words, samples: AovSamples, radiance: Floats, most: int) -> None:
         """Add samples.
 
         Parameters
@@ -191,10 +191,10 @@ class LayerSums(Sums):
             if self.indirect is not None:
                 self.indirect.add(lanes, radiance[:, :, part] - samples.radiance["direct"][:, :, part])
 
-    def estimate(self, name: str, picture: ExactSums, count: Ints) -> LayerEstimate:
-        """Return a layer from its sums, those of the picture, and the samples of each pixel (pixels,)."""
-        shape = self._pixels, layer_of(name).channels
-        out = LayerEstimate(np.empty(shape, f4), np.empty(shape, f4))
+    def estimate(self, name: str, picture: ExactSums, count: Ints) -> AovEstimate:
+        """Return an AOV from its sums, those of the picture, and the samples of each pixel (pixels,)."""
+        shape = self._pixels, aov_of(name).channels
+        out = AovEstimate(np.empty(shape, f4), np.empty(shape, f4))
         for part in chunks(self._pixels):
             sums, squares = self._totals(name, picture, part)
             n = np.maximum(count[part], 1)
@@ -207,7 +207,7 @@ class LayerSums(Sums):
         return out
 
     def _totals(self, name: str, picture: ExactSums, part: slice) -> tuple[Doubles, Doubles]:
-        """Return the sums of the samples of a layer and of their squares, each (c, k)."""
+        """Return the sums of the samples of an AOV and of their squares, each (c, k)."""
         if name == "indirect":
             assert self.indirect is not None
             direct, _ = self.radiance["direct"].totals(part)

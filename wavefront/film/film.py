@@ -48,7 +48,7 @@ class Film(Sums):
     ----------
     width, height
         Of the picture, pixels.
-    light_paths
+    light_tracing
         Whether there are light paths, too, whose light adds to the mean.
 
     Attributes
@@ -69,7 +69,7 @@ class Film(Sums):
     lengths: Ints  # (BATCHES,) samples of each batch; all 0: they are `batch_size`, as those of one render
     light: LightSums | None
 
-    def __init__(self, width: int, height: int, light_paths: bool = False) -> None:
+    def __init__(self, width: int, height: int, light_tracing: bool = False) -> None:
         pixels = width * height
         self.size = width, height
         self.count = np.zeros(pixels, np.int64)
@@ -78,7 +78,7 @@ class Film(Sums):
         self.squares = np.zeros((3, pixels))
         self.batches = np.zeros((BATCHES, 3, pixels), np.float32)
         self.batches.fill(0)  # takes the memory now, so that a render that lacks it does not fail late
-        self.light = LightSums(pixels) if light_paths else None
+        self.light = LightSums(pixels) if light_tracing else None
         self.lengths = np.zeros(BATCHES, np.int64)
 
     def release_errors(self) -> None:

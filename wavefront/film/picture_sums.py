@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..arrays.soa import soa
 from ..core.errors import SceneError
-from .aov_sums import LayerSums
+from .aov_sums import AovSums
 from .film import Film
 from .identity import CAUSTICS, differences
 from .samples import sample_ranges
@@ -25,18 +25,18 @@ ADDED = ("seconds", "spp", "samples", "rays", "bad_samples")  # metadata of part
 
 @soa
 class PictureSums(Sums):
-    """Sums of the samples of a picture and its layers."""
+    """Sums of the samples of a picture and its AOVs."""
 
     film: Film
-    layers: LayerSums | None
+    layers: AovSums | None
     identity: dict[str, Any]  # of the render, see film/identity.py
 
 
-def empty_sums(size: Sequence[int], layers: Sequence[str] = (), light_paths: bool = False) -> PictureSums:
+def empty_sums(size: Sequence[int], layers: Sequence[str] = (), light_tracing: bool = False) -> PictureSums:
     """Return the sums of no samples for a picture of a size (width, height)."""
     width, height = size
-    film = Film(width, height, light_paths)
-    return PictureSums(film, LayerSums(layers, width * height) if layers else None, {})
+    film = Film(width, height, light_tracing)
+    return PictureSums(film, AovSums(layers, width * height) if layers else None, {})
 
 
 def identified_sums(identity: dict[str, Any]) -> PictureSums:

@@ -23,7 +23,7 @@ from ..colors import rgb
 from ..core.errors import SceneError, as_array, number, one_of
 from ..core.html import picture_html
 from ..core.suggestions import did_you_mean
-from ..film.aov_names import BOXES, CLAMPED, GIVEN_LAYERS, LAYERS, NOISY, is_radiance
+from ..film.aov_names import AOVS, BOXES, CLAMPED, GIVEN_AOVS, NOISY, is_radiance
 from ..film.checkpoint import contents_of, is_checkpoint, read_checkpoint
 from ..film.film import Film, batch_size, chunks
 from ..film.light_sums import LightSums
@@ -152,12 +152,12 @@ class Image:
 
     def __getattr__(self, name: str) -> NDArray[Any]:
         """Return a layer by its name."""
-        if name in LAYERS or name in GIVEN_LAYERS:
+        if name in AOVS or name in GIVEN_AOVS:
             if name in self.__dict__.get("layers", ()):
                 return self.layers[name]
             setting = "clamp=" if name == CLAMPED else f"aovs=({name!r},)"
             raise AttributeError(f"the image has no layer {name!r}; render it with {setting}")
-        known = () if name.startswith("_") else (*LAYERS, *GIVEN_LAYERS, *vars(self), *dir(type(self)))
+        known = () if name.startswith("_") else (*AOVS, *GIVEN_AOVS, *vars(self), *dir(type(self)))
         hint = did_you_mean(name, [other for other in known if not other.startswith("_")])
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{hint}")
 
@@ -740,7 +740,7 @@ class Image:
         from . import plot
 
         arrays = {**self._data().named(), "luminance": luminance(np.moveaxis(self.rgb, -1, 0))}
-        if name in LAYERS and name not in arrays:
+        if name in AOVS and name not in arrays:
             raise SceneError(f"plot: the image has no layer {name!r}; render it with aovs=({name!r},)")
         values = arrays[one_of("layer", name, arrays)]
         table = self.names.get(name.removesuffix("_id"), {}) if name.endswith("_id") else None
@@ -787,7 +787,7 @@ def film_image(sums: PictureSums, metadata: Mapping[str, Any], keep_sums: bool) 
     """
     image = _film_rgb(sums.film, metadata)
     image.sums = sums if keep_sums else None
-    _add_layers(image, sums)
+    _add_aovs(image, sums)
     return image
 
 
@@ -809,7 +809,7 @@ def last_film_image(sums: PictureSums, metadata: Mapping[str, Any]) -> Image:
     """Return the picture as `film_image` does; the film is left without what its errors were made of."""
     image = _film_rgb(sums.film, metadata)
     sums.film.release_errors()
-    _add_layers(image, sums)
+    _add_aovs(image, sums)
     return image
 
 
@@ -843,7 +843,7 @@ def _as_arrays(value: Any) -> Any:
     return value
 
 
-def _add_layers(image: Image, sums: PictureSums) -> None:
+def _add_aovs(image: Image, sums: PictureSums) -> None:
     """Add the sampled layers to a picture."""
     if sums.layers is None:
         return

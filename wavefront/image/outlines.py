@@ -1,4 +1,4 @@
-"""Outlines: lines along the edges that the layers of a picture show."""
+"""Outlines: lines along the edges that the AOVs of a picture show."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def outline_coverage(
     Parameters
     ----------
     shape_id, normal, depth
-        Layers of a picture, (H, W), (H, W, 3) and (H, W); -1 and NaN where there is nothing.
+        AOVs of a picture, (H, W), (H, W, 3) and (H, W); -1 and NaN where there is nothing.
     width, crease, jump
         As for `Image.outlined`.
     """

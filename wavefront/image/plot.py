@@ -1,4 +1,4 @@
-"""Layers of a picture drawn with matplotlib, which is optional."""
+"""AOVs of a picture drawn with matplotlib, which is optional."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from ..film.aov_names import components
 STEPS = 1.2207440846 ** -np.arange(1.0, 4)  # fill a cube evenly: M. Roberts, Quasirandom Sequences, 2018
 DARKEST = 0.15
 MOST_NAMES = 20  # in a legend: those of the largest areas
-FILL = 0.85  # gray where a layer has no value
+FILL = 0.85  # gray where an AOV has no value
 
 
 def draw(name: str, values: NDArray[Any], names: Mapping[int, str] | None, axes: Any) -> Any:
-    """Draw a layer, and return the axes.
+    """Draw an AOV, and return the axes.
 
     Parameters
     ----------
     name
-        Of the layer; the title.
+        Of the AOV; the title.
     values
         (H, W) or (H, W, c). Codes of uint8 are drawn as they are.
     names
-        Of ids, if the layer holds ids.
+        Of ids, if the AOV holds ids.
     axes
         Axes of matplotlib, or None for new ones.
     """
@@ -42,7 +42,7 @@ def draw(name: str, values: NDArray[Any], names: Mapping[int, str] | None, axes:
         picture = axes.imshow(values, cmap="viridis", interpolation="nearest")
         axes.figure.colorbar(picture, ax=axes)
     else:
-        axes.imshow(layer_colors(name, values), interpolation="nearest")
+        axes.imshow(aov_colors(name, values), interpolation="nearest")
     return axes
 
 
@@ -54,8 +54,8 @@ def _pyplot() -> Any:
     return pyplot
 
 
-def layer_colors(name: str, values: NDArray[Any]) -> NDArray[Any]:
-    """Return the components (H, W, c) of a layer as colors (H, W, 3), uint8 or in [0, 1]."""
+def aov_colors(name: str, values: NDArray[Any]) -> NDArray[Any]:
+    """Return the components (H, W, c) of an AOV as colors (H, W, 3), uint8 or in [0, 1]."""
     if values.dtype == np.uint8:
         return values
     kind = "".join(components(name, values.shape[2]))

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays.vec import Bytes
 from ..core.errors import RenderError, warn_caller
-from ..film.aov_names import layer_of
+from ..film.aov_names import aov_of
 from ..film.film import Film
 from ..film.light_sums import LightSums
 from ..film.picture_sums import empty_sums
@@ -20,11 +20,11 @@ from .jobs import Job, JobResult, WaveResult
 
 MAX_BAD_SAMPLES = 1e-4  # part of all samples that may be lost to NaN before it is an error
 PICTURE_BYTES = 96  # of a pixel of the picture, and of what is needed to make it
-LAYER_BYTES = 8  # of a pixel and channel of a layer and its error
+AOV_BYTES = 8  # of a pixel and channel of an AOV and its error
 SPARE_BYTES = 16 << 20
 
 
-def picture_memory(size: Sequence[int], layers: Sequence[str] = (), light_paths: bool = False) -> int:
+def picture_memory(size: Sequence[int], layers: Sequence[str] = (), light_tracing: bool = False) -> int:
     """Return how many bytes the sums of samples, and the picture of them, need.
 
     Parameters
@@ -32,12 +32,12 @@ def picture_memory(size: Sequence[int], layers: Sequence[str] = (), light_paths:
     size
         (width, height)
     layers
-        The sampled layers, those with a key by it, such as "light_groups.sun"; of up to 127 samples.
-    light_paths
+        The sampled AOVs, those with a key by it, such as "light_groups.sun"; of up to 127 samples.
+    light_tracing
         Whether there are paths from lights, too.
     """
-    sums = bytes_per_pixel(lambda pixels: empty_sums((pixels, 1), layers, light_paths))
-    picture = PICTURE_BYTES + LAYER_BYTES * sum(layer_of(name).channels for name in layers)
+    sums = bytes_per_pixel(lambda pixels: empty_sums((pixels, 1), layers, light_tracing))
+    picture = PICTURE_BYTES + AOV_BYTES * sum(aov_of(name).channels for name in layers)
     return (sums + picture) * size[0] * size[1] + SPARE_BYTES
 
 
@@ -46,21 +46,21 @@ class Accumulator:
 
     Parameters
     ----------
-    size, layers, light_paths
+    size, layers, light_tracing
         As for `picture_memory`.
 
     Attributes
     ----------
     sums
-        The sums of their samples, and of their sampled layers.
+        The sums of their samples, and of their sampled AOVs.
     bad
         Those of them that were not finite.
     rays
         Queries of the accelerator.
     """
 
-    def __init__(self, size: Sequence[int], layers: Sequence[str] = (), light_paths: bool = False) -> None:
-        self.sums = empty_sums(size, layers, light_paths)
+    def __init__(self, size: Sequence[int], layers: Sequence[str] = (), light_tracing: bool = False) -> None:
+        self.sums = empty_sums(size, layers, light_tracing)
         self.bad, self.rays = BadSamples(), 0
         # for the picture so far when memory has run out
         self._reserve: Bytes | None = np.empty(PICTURE_BYTES * size[0] * size[1] + SPARE_BYTES, np.uint8)

@@ -33,7 +33,7 @@ def make_budget(
     wave_size: int | None,
     processes: bool,
     layers: Sequence[str] = (),
-    light_paths: bool = False,
+    light_tracing: bool = False,
 ) -> Budget:
     """Return how many workers trace waves of how many lanes.
 
@@ -41,7 +41,7 @@ def make_budget(
     ----------
     max_memory
         Bytes that this process, with what it uses already, and its workers may use; None for any.
-    size, layers, light_paths
+    size, layers, light_tracing
         As for `picture_memory`, of a picture for which no memory is in use yet.
     workers, wave_size
         The most of each; a `wave_size` of None stands for what suits the workers.
@@ -54,7 +54,7 @@ def make_budget(
         If the picture needs more memory than is available, or even one worker with a small wave needs more
         than `max_memory`.
     """
-    picture = picture_memory(size, layers, light_paths)
+    picture = picture_memory(size, layers, light_tracing)
     having = f" with {plural(len(layers), 'layer')}" if layers else ""
     check_memory(f"a picture of {size[0]}x{size[1]} pixels{having}", picture)
     if max_memory is None:

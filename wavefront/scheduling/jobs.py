@@ -16,7 +16,7 @@ from ..arrays.state import Words
 from ..arrays.vec import Floats, Ints
 from ..camera import Camera
 from ..core.plural import plural
-from ..film.aov_samples import LayerSamples
+from ..film.aov_samples import AovSamples
 from ..integrators.light_tracing import Splats
 from ..sampling.tiles import whole_tiles
 
@@ -127,7 +127,7 @@ class WaveResult:
     bad: Ints  # lanes whose radiance was not finite; it is 0 there
     rays: int  # queries of the accelerator
     seconds: float  # that it took its worker
-    layers: LayerSamples | None = None  # None where no sampled layer is asked for
+    layers: AovSamples | None = None  # None where no sampled AOV is asked for
     splats: Splats | None = None  # of as many paths from lights; None where none are traced
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..accel.base import Accelerator, Intersections
-from ..aovs.recorder import SampleRecorder, recorded_layers
+from ..aovs.recorder import SampleRecorder, recorded_aovs
 from ..arrays.soa import soa
 from ..arrays.state import Words
 from ..arrays.vec import Bools, Floats, Ints, broadcast
@@ -71,9 +71,9 @@ class Tracer:
     clamp: float | None = None  # the limit of indirect light that a path finds at once
 
     @property
-    def recorded_layers(self) -> tuple[str, ...]:
-        """The layers that jobs return, those with a key by it."""
-        return recorded_layers(self.layers, self.scene)
+    def recorded_aovs(self) -> tuple[str, ...]:
+        """The AOVs that jobs return, those with a key by it."""
+        return recorded_aovs(self.layers, self.scene)
 
     def sampler(self, width: int) -> Sampler:
         """Return the sampler of a picture of this width, pixels."""

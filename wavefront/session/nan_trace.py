@@ -100,11 +100,11 @@ class FaultRecorder(PathRecorder):
             self._note(f"bounce {bounce}, emission that the path meets")
 
     def record_surfaces(self, scene: CompiledScene, paths: Paths, shade: Shading) -> None:
-        """Check what absorption has left of the paths, and the layers that the surfaces give."""
+        """Check what absorption has left of the paths, and the AOVs that the surfaces give."""
         self._at = scene, shade
         self._check(_bad(paths.throughput), "absorption in front of")
         if not self.fault:
-            for name, layer in self._surface_layers(shade):
+            for name, layer in self._surface_aovs(shade):
                 self._check(np.asarray(np.isnan(layer).any(0)), f"layer {name!r} at")
 
     def record_scattering(self, paths: Paths, shade: Shading, left: Paths) -> None:
@@ -123,8 +123,8 @@ class FaultRecorder(PathRecorder):
         lanes[contribution.lanes] = bad
         self._check(lanes, "light sample at")
 
-    def _surface_layers(self, shade: Shading) -> Iterator[tuple[str, Floats]]:
-        """Yield the layers that surfaces give paths which meet them, by name."""
+    def _surface_aovs(self, shade: Shading) -> Iterator[tuple[str, Floats]]:
+        """Yield the AOVs that surfaces give paths which meet them, by name."""
         albedo = cache(shade.albedo)
         for name in self._layers:
             if (name == "albedo" and self._bounce == 0) or name == "denoising_albedo":

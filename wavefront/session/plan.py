@@ -62,12 +62,12 @@ def make_plan(settings: Settings, scene: PreparedScene, camera: Camera, table: G
         FILTERS.find(settings.values["filter"]),
         INTEGRATORS.find(settings.values["integrator"]),
         settings.values["max_bounces"],
-        settings.sampled_layers,
+        settings.sampled_aovs,
         table,
         settings.values["clamp"],
     )
     executor = settings.executor_for(camera.size)
     if settings.values["executor"] is None and needs_pickling(executor) and not can_be_sent(tracer):
         executor = "threads"
-    budget = settings.budget(camera.size, executor, tracer.recorded_layers)
+    budget = settings.budget(camera.size, executor, tracer.recorded_aovs)
     return Plan(settings, scene, tracer, executor, budget)

@@ -57,7 +57,7 @@ def render_identity(
     camera
         In the unit of the compiled scene.
     layers
-        The sampled layers.
+        The sampled AOVs.
     """
     given: Any = settings.values
     codes = {

@@ -120,7 +120,7 @@ class Session:
                 self._pool.start()  # before there are sums, of which forked processes would keep old copies
                 with ThreadPoolExecutor(1) as aside:
                     sums = aside.submit(
-                        Accumulator, camera.size, self._plan.tracer.recorded_layers, values["caustics"]
+                        Accumulator, camera.size, self._plan.tracer.recorded_aovs, values["caustics"]
                     )
                     self._plan = with_choice(self._plan, camera, self._run_trial)
                 self._begin_picture(camera, sums.result(), begin)
@@ -296,8 +296,8 @@ class Session:
         )
         self._scene.compiled.view(camera)  # checks its distance
         executor = settings.executor_for(camera.size)
-        budget = settings.budget(camera.size, executor, self._plan.tracer.recorded_layers)
-        accumulator = Accumulator(camera.size, self._plan.tracer.recorded_layers, values["caustics"])
+        budget = settings.budget(camera.size, executor, self._plan.tracer.recorded_aovs)
+        accumulator = Accumulator(camera.size, self._plan.tracer.recorded_aovs, values["caustics"])
         with self.interrupt_handler, self._use:
             self._render.discard_sweeps()
             self._stopped = self._dropped = False  # a stop from now on is one of the new picture
@@ -371,7 +371,7 @@ class Session:
     def silhouettes(self, camera: Camera | None = None) -> Iterator[tuple[int, NDArray[np.bool_]]]:
         """Yield the id of each shape and the pixels (height, width) that it would cover if it were alone.
 
-        Ids and rays are those of the layer `shape_id`. Shapes that would cover no pixel are left out.
+        Ids and rays are those of the AOV `shape_id`. Shapes that would cover no pixel are left out.
 
         Parameters
         ----------

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..aovs.boxes import object_boxes
-from ..aovs.geometric import IDS, geometric_layers
+from ..aovs.geometric import IDS, geometric_aovs
 from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..film.aov_names import BOXES, geometric_names
@@ -32,7 +32,7 @@ from .resuming import CheckpointFile, render_identity
 
 
 class ViewRender:
-    """The render of one view: its loop, its picture so far, its layers and its checkpoint.
+    """The render of one view: its loop, its picture so far, its AOVs and its checkpoint.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class ViewRender:
     camera
         What sees the scene.
     accumulator
-        Sums for the picture and its layers.
+        Sums for the picture and its AOVs.
     begin
         When it was asked for, by `time.perf_counter`.
 
@@ -103,13 +103,13 @@ class ViewRender:
     ) -> Generator[bool]:
         """Return the sweeps of the loop that was begun, or begin it.
 
-        The geometric layers are made while workers trace the first jobs, and stopped as these are.
+        The geometric AOVs are made while workers trace the first jobs, and stopped as these are.
         """
         compiled = self._plan.scene.compiled
         stoppable = MonitoredAccelerator(compiled.accelerator, monitor, math.inf)
 
         def done() -> None:
-            self._geometric_layers(replace(compiled, accelerator=stoppable))
+            self._geometric_aovs(replace(compiled, accelerator=stoppable))
             wave_done()
 
         if self._sweeps is None:
@@ -130,8 +130,8 @@ class ViewRender:
             Whether the render ends before its time.
         """
         image = self.accumulator.image(self.metadata(cut_short))
-        layers = self._geometric_layers(self._plan.scene.compiled)
-        self._add_layers(image, {name: layer.copy() for name, layer in layers.items()})
+        layers = self._geometric_aovs(self._plan.scene.compiled)
+        self._add_aovs(image, {name: layer.copy() for name, layer in layers.items()})
         return image
 
     def last_image(self, cut_short: bool, free_sums: bool) -> Image:
@@ -150,7 +150,7 @@ class ViewRender:
             image = self.accumulator.last_image(metadata)
         else:
             image = self.accumulator.image(metadata, keep_sums)
-        self._add_layers(image, self._geometric_layers(self._plan.scene.compiled))
+        self._add_aovs(image, self._geometric_aovs(self._plan.scene.compiled))
         return image
 
     def identity(self) -> dict[str, Any]:
@@ -168,7 +168,7 @@ class ViewRender:
             plan.scene.fingerprint(),
             plan.scene.compiled.accelerator.name,
             self._view,
-            plan.tracer.recorded_layers,
+            plan.tracer.recorded_aovs,
         )
 
     def checkpoint(self, command: dict[str, Any] | None) -> Checkpoint:
@@ -210,18 +210,18 @@ class ViewRender:
             "numpy": np.__version__,
         }
 
-    def _geometric_layers(self, compiled: CompiledScene) -> dict[str, NDArray[Any]]:
-        """Return the geometric layers that are asked for; the first time, trace them and the boxes."""
+    def _geometric_aovs(self, compiled: CompiledScene) -> dict[str, NDArray[Any]]:
+        """Return the geometric AOVs that are asked for; the first time, trace them and the boxes."""
         if self._geometric is None:
             aovs, given = self._plan.settings.values["aovs"], (compiled, self.camera, self._plan.scene.shapes)
             if BOXES in aovs:
                 self._boxes = object_boxes(*given)
             names = geometric_names(aovs)
-            self._geometric = geometric_layers(*given, names) if names else {}
+            self._geometric = geometric_aovs(*given, names) if names else {}
         return self._geometric
 
-    def _add_layers(self, image: Image, geometric: dict[str, NDArray[Any]]) -> None:
-        """Give a picture its geometric layers and boxes."""
+    def _add_aovs(self, image: Image, geometric: dict[str, NDArray[Any]]) -> None:
+        """Give a picture its geometric AOVs and boxes."""
         for name, layer in geometric.items():
             image.layers[name] = layer
             if name in IDS:

@@ -19,7 +19,7 @@ from ..compile.scene import ROULETTE_AFTER
 from ..core.memory import memory_size
 from ..core.progress import Progress
 from ..core.registry import Registry
-from ..film.aov_names import chosen_layers
+from ..film.aov_names import chosen_aovs
 from ..integrators import INTEGRATORS, Integrator
 from ..lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
 from ..materials import NAMED_MATERIALS, MaterialLike
@@ -464,7 +464,7 @@ class RenderSettings(TypedDict, total=False):
             "holds, and what it costs.",
             option="layer to render beside the picture, or all; can be given several times",
             flag="aov",
-            check=chosen_layers,
+            check=chosen_aovs,
         ),
     ]
     denoise: Annotated[

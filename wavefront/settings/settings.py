@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays.vec import Floats, f4
 from ..core.errors import SceneError
-from ..film.aov_names import CLAMPED, GUIDES, chosen_layers, sampled_names
+from ..film.aov_names import CLAMPED, GUIDES, chosen_aovs, sampled_names
 from ..film.exact_sum import MAX_TERMS
 from ..integrators import INTEGRATORS, li_full
 from ..integrators.tuning import MOST_WAYS
@@ -56,7 +56,7 @@ class Settings:
         }
         self.values: AllSettings = found
         if self.values["denoise"]:
-            self.values["aovs"] = chosen_layers("aovs", (*self.values["aovs"], *GUIDES))
+            self.values["aovs"] = chosen_aovs("aovs", (*self.values["aovs"], *GUIDES))
         check_combinations(self.values)
         self.max_spp = self._most_samples()
         self.worker_count = worker_count(self.values["workers"], self.values["executor"])
@@ -95,12 +95,12 @@ class Settings:
         return np.inf if roulette is False else roulette
 
     @property
-    def sampled_layers(self) -> tuple[str, ...]:
+    def sampled_aovs(self) -> tuple[str, ...]:
         """The sampled layers that are asked for; a background gives alpha, a clamp what it removes."""
         wanted = (
             self.values["aovs"]
             if self.values["background"] is None
-            else chosen_layers("aovs", [*self.values["aovs"], "alpha"])
+            else chosen_aovs("aovs", [*self.values["aovs"], "alpha"])
         )
         return (*sampled_names(wanted), *(() if self.values["clamp"] is None else (CLAMPED,)))
 

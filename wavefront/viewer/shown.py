@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..arrays.vec import Floats
 from ..film.aov_names import GUIDES
 from ..image import Image
-from ..image.plot import id_colors, layer_colors
+from ..image.plot import aov_colors, id_colors
 
 BACKDROP = 0.85  # gray behind what is transparent
 
@@ -23,7 +23,7 @@ CHOICES = {  # what the page lists, and the layers that it needs
     "denoised": GUIDES,
 }
 RADIANCE = ("rgb", "denoised")
-VIEWER_LAYERS = tuple(name for names in CHOICES.values() for name in names)
+VIEWER_AOVS = tuple(name for names in CHOICES.values() for name in names)
 
 
 def shown_codes(image: Image, choice: str, exposure: float, tone: str = "none") -> NDArray[np.uint8]:
@@ -32,7 +32,7 @@ def shown_codes(image: Image, choice: str, exposure: float, tone: str = "none") 
     Parameters
     ----------
     image
-        A picture with all `VIEWER_LAYERS`; to be shown as "denoised" it must have been denoised.
+        A picture with all `VIEWER_AOVS`; to be shown as "denoised" it must have been denoised.
     choice
         A key of `CHOICES`.
     exposure, tone
@@ -45,7 +45,7 @@ def shown_codes(image: Image, choice: str, exposure: float, tone: str = "none") 
     if choice == "depth":
         colors: NDArray[Any] = np.repeat(_near_is_bright(values)[..., None], 3, axis=2)
     else:
-        colors = id_colors(values) if choice == "ids" else layer_colors(name, values)
+        colors = id_colors(values) if choice == "ids" else aov_colors(name, values)
     return colors if colors.dtype == np.uint8 else np.rint(colors * 255).astype(np.uint8)
 
 

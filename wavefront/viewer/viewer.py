@@ -23,7 +23,7 @@ from ..settings import DEFAULT_SPP, RenderSettings, refuse, takes_settings
 from .guard import token_of
 from .priority import giving_way
 from .refiner import FIRST_DIVISOR, Refiner, ViewerFrame
-from .shown import VIEWER_LAYERS
+from .shown import VIEWER_AOVS
 from .viewpoint import Viewpoint
 
 # Paths: a movement waits for less of a smaller wave, and one of half the size costs 10 % more.
@@ -283,7 +283,7 @@ def _opened(
     camera, _ = choose_camera(scene, settings.get("camera"), settings.get("size"), up, *framing)
     viewpoint = Viewpoint.of(camera, scene.bounds, up)
     aovs = settings.pop("aovs", ())
-    wanted = (*((aovs,) if isinstance(aovs, str) else aovs), *VIEWER_LAYERS)
+    wanted = (*((aovs,) if isinstance(aovs, str) else aovs), *VIEWER_AOVS)
     width, height = (max(1, side // FIRST_DIVISOR) for side in viewpoint.camera.resolution)
     settings |= {"camera": viewpoint.camera, "size": (width, height), "aovs": wanted, "progress": False}
     if settings.get("wave_size") is None:
