@@ -9,6 +9,7 @@ import threading
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import pytest
 import scenes
 from scripts import ENDLESS, children, end_of, runs, script, wait_for
@@ -151,16 +152,19 @@ print(len(wf.load({str(scene)!r}).shapes), signal.getsignal(signal.SIGINT) is si
 
 
 def test_ctrl_c_within_a_loader_of_trimesh(tmp_path: Path) -> None:
-    """That of STL goes on after any error in the text of the header."""
-    scene = tmp_path / "triangle.stl"
-    scene.write_bytes(bytes(80) + (1).to_bytes(4, "little") + bytes(50))
+    """That of PLY goes on after any error in its texture."""
+    scene, header = tmp_path / "triangle.ply", "ply\nformat ascii 1.0\ncomment TextureFile a.png\n"
+    header += "element vertex 3\n" + "".join(f"property float {name}\n" for name in ("x", "y", "z", "s", "t"))
+    header += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    scene.write_text(header + "0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n3 0 1 2\n")
+    wf.Image(np.full((4, 4, 3), 0.5)).save(tmp_path / "a.png")
     body = f"""
 import signal
-import trimesh.exchange.stl as loader
+import trimesh.exchange.ply as loader
 def pressed(*given, **named):
     print("pressed", flush=True)
     signal.raise_signal(signal.SIGINT)
-loader.util.decode_text = pressed
+loader.util.wrap_as_stream = pressed
 try:
     wf.load({str(scene)!r})
     print("went on")

@@ -13,7 +13,7 @@ from .appearance import MaterialSpec, assign_material, is_faint
 from .contents import Contents
 from .placing import Places
 from .repair import RawMesh, warn, with_face_colors
-from .trimesh_import import import_trimesh
+from .trimesh_loading import import_trimesh
 
 if TYPE_CHECKING:
     import trimesh
