@@ -61,6 +61,7 @@ class Film(Sums):
         Sums over light paths; None where there are none.
     """
 
+    JOINED = ("batches", "lengths")
     count: Ints
     dropped: Ints
     sums: ExactSums  # of samples

@@ -21,6 +21,7 @@ class Sums:
 
     __slots__ = ()
     FIELDS: ClassVar[tuple[str, ...]] = ()
+    JOINED: ClassVar[tuple[str, ...]] = ()  # fields that do not add up: `merge` of the class joins them
 
     def __init_subclass__(cls) -> None:
         cls.FIELDS = tuple(dict.fromkeys((*cls.FIELDS, *get_annotations(cls))))
@@ -77,7 +78,7 @@ class Sums:
         """Add the sums of other samples."""
         others = other._own()
         for name, mine in self._own().items():
-            if others[name].size:
+            if others[name].size and name not in self.JOINED:
                 setattr(self, name, mine + others[name] if mine.size else others[name].copy())
         parts = other._parts()
         for name, part in self._parts().items():
