@@ -17,7 +17,7 @@ from unittest.mock import patch
 import numpy as np
 
 import wavefront as wf
-from wavefront.scheduling import adaptive as stopping
+from wavefront.scheduling import jobs
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "examples"))
 from cornell_box import cornell_box
@@ -43,7 +43,7 @@ def blocks(rgb: np.ndarray) -> np.ndarray:
 
 def measure(scene: wf.Scene, noise: float, seeds: int, tile: int) -> tuple[np.ndarray, float]:
     """Return block means of renders with several seeds (seeds, n, n), and their mean spp."""
-    with patch.object(stopping, "TILE", tile):
+    with patch.object(jobs, "SQUARE", tile):
         images = [wf.render(scene, noise=noise, seed=seed, progress=False) for seed in range(seeds)]
     return np.stack([blocks(image.rgb) for image in images]), float(np.mean([i.spp for i in images]))
 
@@ -58,7 +58,7 @@ def main() -> None:
     for name, scene in (("cornell", cornell_box(SIZE)), ("glass", glass_and_metal())):
         converged = blocks(wf.render(scene, options.reference_spp, seed=2**40, progress=False).rgb)
         for noise in (0.1, 0.05):
-            for tile in (stopping.TILE, 1):
+            for tile in (jobs.SQUARE, 1):
                 means, spp = measure(scene, noise, options.seeds, tile)
                 overall = means.mean((1, 2)) / converged.mean() - 1
                 local = means / converged - 1

@@ -39,7 +39,7 @@ class Mean:
         return f"{self.value:.6g} ± {self.error:.2g}"
 
 
-def render(scene: wf.Scene, spp: int, **options) -> wf.Image:
+def render(scene: wf.Scene, spp: int | None = None, **options) -> wf.Image:
     """Render on one thread with the accelerator that is always there."""
     return wf.render(scene, spp, **{"workers": 1, "progress": False, "accel": "numpy", **options})
 

@@ -193,9 +193,10 @@ def test_the_part_of_rare_samples() -> None:
 
 def test_noise_goes_on_where_rare_samples_bring_the_light() -> None:
     """Although the estimated error is what was asked for; not where many samples make it up."""
+    square_of = np.zeros(1024, np.intp)
     for film, goes_on in ((rare(0.001), True), (rare(0.5), False)):
         asked = 1.01 * film.noise()
-        steps = passes(film, 1 << 20, asked, Pass(np.arange(1024, dtype=np.uint32), 48, 64))
+        steps = passes(film, 1 << 20, asked, square_of, Pass(np.arange(1024, dtype=np.uint32), 48, 64))
         next(steps)
         assert (next(steps, None) is not None) is goes_on
 

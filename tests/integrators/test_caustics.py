@@ -18,8 +18,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scenes
 from hypothesis import given
 from hypothesis import strategies as st
+from significance import assert_same_images, repeat
 
 import wavefront as wf
 from wavefront import cli
@@ -276,6 +278,28 @@ def test_a_hint_tells_where_light_is_missing(arguments, settings, missing):
     """Where there are lights that no path can meet beside smooth glass or mirrors."""
     hint = wf.render(scene(**arguments), 1, progress=False, **settings).metadata["hint"]
     assert (hint is not None and "caustics=True adds them" in hint) == missing
+
+
+def test_shared_paths_leave_out_the_same_light(close_tiles: None) -> None:
+    """A lamp in a glass ball lights a room: what paths from lights find at second points counts once."""
+    options: dict[str, Any] = {"caustics": True, "max_bounces": 5, "accel": "auto"}
+    room = scenes.cornell_box((16, 16))
+    ball, lamp = wf.Sphere((0, 0, 0), 0.5, material=GLASS), wf.Sphere((0, 0, 0), 0.25, emission=5)
+    room.shapes = [*room.shapes[:5], ball, lamp]
+    alone = repeat(room, 16, **options)
+    shared = repeat(room, 8, reuse=True, first_seed=100, **options)
+    assert_same_images(alone, shared, 0.01)
+
+
+def test_noise_ends_all_pixels_together() -> None:
+    """The picture is that of as many samples, and its error is what was asked for."""
+    image = wf.render(scene(), noise=0.05, caustics=True, **ALONE)
+    assert image.metadata["noise"] <= 0.05
+    assert image.spp > 32
+    assert (image.counts == image.spp).all()
+    whole = wf.render(scene(), image.spp, caustics=True, **ALONE)
+    assert whole.rgb.tobytes() == image.rgb.tobytes()
+    assert whole.standard_error.tobytes() == image.standard_error.tobytes()
 
 
 # --- Errors -------------------------------------------------------------------------------------------

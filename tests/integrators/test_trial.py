@@ -170,8 +170,7 @@ def chosen(scene: wf.Scene, **settings: Any) -> choice.Choice:
     [
         {"reuse": False},
         {"clamp": 2},
-        {"noise": 0.1},
-        {"aovs": "light_groups"},
+        {"caustics": True},
         {"branches": 1},
         {"branches": 3},
         {"max_bounces": 1},
@@ -191,7 +190,7 @@ def test_paths_are_not_shared_with_some_settings(
         return pays
 
     monkeypatch.setattr(choice, "_trial", trial)
-    for without in ({}, {"denoise": True}):
+    for without in ({}, {"denoise": True}, {"noise": 0.1}, {"aovs": "light_groups"}):
         assert chosen(cornell_box(SIZE), **without).reuse
         assert tried.pop()
     assert not chosen(cornell_box(SIZE), **settings).reuse

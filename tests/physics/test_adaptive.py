@@ -11,9 +11,9 @@ from significance import render
 import wavefront as wf
 from wavefront.arrays.vec import f4
 from wavefront.film.film import Film
-from wavefront.scheduling import adaptive, scheduler, tracing
+from wavefront.scheduling import scheduler, tracing
 from wavefront.scheduling.adaptive import MIN_SPP, next_stop, passes
-from wavefront.scheduling.jobs import CameraJob, Job, JobResult, split_jobs
+from wavefront.scheduling.jobs import SQUARE, CameraJob, Job, JobResult, split_jobs
 from wavefront.scheduling.scheduler import Scheduler
 from wavefront.session import final_checks as outcome
 from wavefront.session import session
@@ -119,30 +119,30 @@ def test_pieces_go_on_where_pixels_stopped() -> None:
         assert (image.standard_error[there] == plain.standard_error[there]).all()
 
 
-def adaptive_means(runs: int) -> np.ndarray:
-    """Mean of pictures with mean 1, sampled adaptively: (runs,).
+def adaptive_means(runs: int, side: int) -> np.ndarray:
+    """Mean of pictures with mean 1, sampled adaptively by squares of a side: (runs,).
 
     Half of the light comes from one sample in twenty, so a pixel that has not met one looks done.
     """
     rng = np.random.default_rng(0)
-    means = []
+    means, row = [], np.arange(32) // side
+    square_of = (row[:, None] * 32 + row).ravel()
     for _ in range(runs):
         film = Film(32, 32)
-        for step in passes(film, 1024, 0.15):
+        for step in passes(film, 1024, 0.15, square_of):
             bright = rng.random((1, step.last - step.first, step.pixels.size), np.float32) < 0.05
             film.add(step.pixels, (f4(0.5) + f4(10) * bright).repeat(3, 0))
         means.append(film.mean().mean())
     return np.array(means)
 
 
-def test_adaptive_sampling_has_no_bias_worth_mentioning(monkeypatch) -> None:
+def test_adaptive_sampling_has_no_bias_worth_mentioning() -> None:
     """Below 0.2 % of the mean; deciding pixel by pixel would have much more, and this would see it."""
-    means = adaptive_means(40)
+    means = adaptive_means(40, SQUARE)
     error = means.std(ddof=1) / len(means) ** 0.5
     assert error < 0.0008
     assert abs(means.mean() - 1) < 0.002
-    monkeypatch.setattr(adaptive, "TILE", 1)
-    assert adaptive_means(2).mean() < 0.95
+    assert adaptive_means(2, 1).mean() < 0.95
 
 
 # --- Time -----------------------------------------------------------------------------------------

@@ -53,6 +53,7 @@ TECHNIQUES = {
     "guided, four branches": {**PLAIN, "guide": True, "branches": 4},
     "re-used": {**PLAIN, "reuse": True},
     "caustics": {**PLAIN, "caustics": True},
+    "caustics, re-used": {**PLAIN, "caustics": True, "reuse": True},
 }
 CASES = [*scenes.DIRECT_CASES, *scenes.TRIANGLE_CASES, *scenes.INDIRECT_CASES, *scenes.SPECULAR_CASES]
 techniques = pytest.mark.parametrize("options", TECHNIQUES.values(), ids=list(TECHNIQUES))

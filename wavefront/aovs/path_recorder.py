@@ -24,9 +24,13 @@ class PathRecorder:
     def branched(self, ways: int) -> None:
         """Note that each path goes on in several ways."""
 
-    def of_shared(self) -> PathRecorder | None:
-        """Return what looks on where paths begin anew at points that pixels share; None for nothing."""
+    def of_shared(self, count: int) -> PathRecorder | None:
+        """Return what looks on where paths begin anew at so many shared points; None for nothing."""
         return None
+
+    def parts_of_shared(self) -> list[tuple[Floats, Floats]]:
+        """Return parts of the light, (3, n) of the samples, and (3, count) of the shared points."""
+        return []
 
     def record_hits(
         self,

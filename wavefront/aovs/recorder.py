@@ -55,7 +55,7 @@ class SampleRecorder(PathRecorder):
     def __init__(
         self, wanted: Sequence[str], scene: CompiledScene, n: int, clamp: float | None = None
     ) -> None:
-        self._wanted = tuple(wanted)
+        self._wanted, self._scene = tuple(wanted), scene
         self._values = {name: np.zeros((AOVS[name].channels, n), f4) for name in BOUNDED if name in wanted}
         self._covered = np.zeros(n, np.bool_) if "alpha" in wanted else None
         self._coverage = Coverage(scene, n) if "coverage" in wanted else None
@@ -74,6 +74,7 @@ class SampleRecorder(PathRecorder):
         self._all_rough = True  # no first surface is specular
         self._picture: Floats | None = None  # to which all light has been added
         self._share = 1.0  # part of a sample that each path is
+        self._shared: SampleRecorder | None = None  # of the paths from shared points
 
     def prepare(self, paths: Paths) -> None:
         """Have paths that start at the camera carry the recorder."""
@@ -86,6 +87,18 @@ class SampleRecorder(PathRecorder):
     def branched(self, ways: int) -> None:
         """Note that each path goes on in several ways."""
         self._share /= ways
+
+    def of_shared(self, count: int) -> SampleRecorder | None:
+        """Return what divides the light of so many shared points among the groups of lights."""
+        if self._groups is not None:
+            self._shared = SampleRecorder(("light_groups",), self._scene, count)
+        return self._shared
+
+    def parts_of_shared(self) -> list[tuple[Floats, Floats]]:
+        """Return the light of each group, of the samples and of the shared points."""
+        if self._shared is None:
+            return []
+        return [(self._light[name], light) for name, light in self._shared._light.items()]
 
     # --- Surfaces -------------------------------------------------------------------------------------
 

@@ -55,8 +55,10 @@ def li_reuse(
     begun, hits, light = as_shared(paths.take(lanes)), hits.take(lanes), np.zeros((3, lanes.size), f4)
     ways = [(way, hits) for way in copies(begun, SHARED_WAYS)]
     follow(scene, ways, sampler, max_bounces, light, branches, table)
-    light *= f4(1 / SHARED_WAYS)
-    add_shared(scene, L, first, shade, points, light, tiles, branches)
+    sums = [(L, light), *([] if first.recorder is None else first.recorder.parts_of_shared())]
+    for _, found in sums:
+        found *= f4(1 / SHARED_WAYS)
+    add_shared(scene, sums, first, shade, points, tiles, branches)
     return L
 
 

@@ -117,7 +117,7 @@ def _trace(
     again = counter.rays - after
     tile, member = np.divmod(np.arange(n), MEMBERS)
     tiles = WaveTiles(tile, member, n // MEMBERS)
-    add_shared(scene, together, first, shade, points, light, tiles, 1)
+    add_shared(scene, [(together, light)], first, shade, points, tiles, 1)
     ways, shared = _means(L, len(samplers), pixel.size), _means(together, len(samplers), pixel.size)
     connections, evaluations = counter.rays - after - again, MEMBERS * len(shade.lit().surface)
     return TrialPart(ways, shared, met, before, after - before, again, connections, evaluations)

@@ -57,6 +57,11 @@ def cell_shifts(block_x: Ints, block_y: Ints, member: Ints) -> tuple[Ints, Ints]
     return (h % STRIDE).astype(np.intp), (h // STRIDE % STRIDE).astype(np.intp)
 
 
+def block_of(pixel: Words, width: int) -> Ints:
+    """Return the number of the block of each pixel (n,), which has whole tiles; arguments as above."""
+    return place_in_tiles(pixel, width)[0] // STRIDE**2
+
+
 def others_in_tile(pixel: Words, one: int, width: int) -> Ints:
     """Return which of pixels (n,) share the tile of pixel[one], without that one; arguments as above."""
     tile, _ = place_in_tiles(pixel, width)

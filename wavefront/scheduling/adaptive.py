@@ -13,7 +13,6 @@ from ..film.film import MUCH_RARE, Film
 
 MIN_SPP = 32  # before anything is decided by an error estimate
 MOST_RARE = 0.9  # part of the squared error, from where on it counts as this part
-TILE = 8  # pixels; decisions are made for squares of this side
 
 
 @soa
@@ -25,31 +24,42 @@ class Pass:
     last: int  # one past that of the last
 
 
-def passes(film: Film, spp: int, noise: float | None, begun: Pass | None = None) -> Iterator[Pass]:
+def passes(
+    film: Film, spp: int, noise: float | None, square_of: Ints, begun: Pass | None = None
+) -> Iterator[Pass]:
     """Yield what is to be done, one pass after the other; each decides by what is on the film then.
 
     Without `noise` there is one pass. With it there are more while the estimated error of the
-    picture is above `noise`, at 32, 48, 64, 96, 128 ... samples, for those tiles of 8 × 8 pixels
+    picture is above `noise`, at 32, 48, 64, 96, 128 ... samples, for those squares of pixels
     whose own error is above it. A decision depends on the film alone, never on timing, so the
     picture is the same for any number of workers and any wave size.
 
-    A tile, not a pixel, is the unit, because samples that decide when to stop are no longer
+    A square, not a pixel, is the unit, because samples that decide when to stop are no longer
     unbiased: a pixel that has not yet found its bright samples would look done. In the
-    estimate of a tile no pixel weighs much. Measured (benchmarks/adaptive_bias.py) the means of a
-    Cornell box and of glass and metal are off by less than 0.1 %, and blocks of 8 × 8 pixels by 0.3 %;
-    with decisions per pixel by up to 0.6 %, and blocks by 2 %.
+    estimate of a square no pixel weighs much. Measured (benchmarks/adaptive_bias.py), with squares of 8 × 8
+    pixels, the means of a Cornell box and of glass and metal are off by less than 0.1 %, and squares by
+    0.3 %; with decisions per pixel by up to 0.6 %, and squares by 2 %.
+
+    Where light is traced from the lights, too, all pixels get equally many samples: each of them brings a
+    path that may reach any pixel.
 
     Where more than `MUCH_RARE` of the squared error rests on few samples, most pixels have not met what makes
     the error, and the estimate is too small. The render goes on then until the estimate is as much smaller.
 
-    A render that goes on from a checkpoint begins with the pass that was `begun`.
+    Parameters
+    ----------
+    square_of
+        (pixels,) number of the square of each pixel.
+    begun
+        The pass with which a render begins that goes on from a checkpoint.
     """
     pixels = np.arange(film.count.size, dtype=np.uint32)
     if noise is None:
         yield Pass(pixels, 0, spp)
         return
-    tile_of = _tiles(*film.size)
-    sizes = np.bincount(tile_of)
+    if film.light is not None:
+        square_of = np.zeros_like(square_of)
+    sizes = np.maximum(np.bincount(square_of), 1)  # a window of a picture may have none of a square
     first = 0
     if begun is not None:
         pixels, first = begun.pixels, begun.first
@@ -62,8 +72,8 @@ def passes(film: Film, spp: int, noise: float | None, begun: Pass | None = None)
         limit = noise * noise * _trust(film.rare_part(error))
         if error.mean() <= limit:
             return
-        noisy = np.bincount(tile_of, error) / sizes > limit
-        pixels = pixels[noisy[tile_of[pixels]]]
+        noisy = np.bincount(square_of, error) / sizes > limit
+        pixels = pixels[noisy[square_of[pixels]]]
 
 
 def _trust(rare: float | None) -> float:
@@ -84,10 +94,3 @@ def next_stop(samples: int) -> int:
         return MIN_SPP
     power = 1 << (samples.bit_length() - 1)
     return power * 3 // 2 if samples < power * 3 // 2 else power * 2
-
-
-def _tiles(width: int, height: int) -> Ints:
-    """Return the number of the tile of each pixel, (pixels,)."""
-    across = -(-width // TILE)
-    rows, columns = np.arange(height) // TILE, np.arange(width) // TILE
-    return (rows[:, None] * across + columns).reshape(-1)

@@ -18,11 +18,12 @@ from ..camera import Camera
 from ..core.plural import plural
 from ..film.aov_samples import AovSamples
 from ..integrators.light_tracing import Splats
-from ..sampling.tiles import whole_tiles
+from ..sampling.tiles import block_of, whole_tiles
 
 DEEPEST = 8  # samples of a pixel that a job should have: the more, the less it costs to send and add sums
 DEPTH_SHARE = 1 / 2  # of the samples so far, so that the pixels of a render that is ended differ by no more,
 # and of those left, so that all workers end at about the same time
+SQUARE = 8  # pixels on each side of a square whose pixels get the same number of samples
 
 
 @soa
@@ -57,6 +58,17 @@ class CameraJob:
                 end = int(cuts[fitting])
             yield pixels.take(np.sort(order[start:end]))
             start = end
+
+    def squares(self) -> Ints:
+        """Return the number of the square of each pixel, (pixels,): all pixels of one get samples together.
+
+        Their side is `SQUARE` pixels. Where pixels share paths they are blocks of whole tiles.
+        """
+        width, height = self.camera.size
+        pixels = np.arange(width * height, dtype=np.uint32)
+        if self.reuse:
+            return block_of(self.camera.address(pixels), self.camera.resolution[0])
+        return pixels // width // SQUARE * np.intp(-(-width // SQUARE)) + pixels % width // SQUARE
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the time that is left as well: the clocks of two machines differ."""

@@ -103,7 +103,7 @@ class RenderLoop:
                 film = self.accumulator.film
                 if film.count.any():  # those of an earlier part of the render
                     bar.advance(self.accumulator.samples, self.scheduler.elapsed)
-                for step in passes(film, self.spp, self._noise, self.step):
+                for step in passes(film, self.spp, self._noise, self.view.squares(), self.step):
                     self.step = step
                     if step.first:
                         yield True

@@ -79,7 +79,7 @@ class FaultRecorder(PathRecorder):
         self._bad_emission = False
         self._at: tuple[CompiledScene, Shading] | None = None  # the surfaces that are shaded
 
-    def of_shared(self) -> FaultRecorder:
+    def of_shared(self, count: int) -> FaultRecorder:
         """Go on at the second surfaces, from which paths begin anew."""
         self._bounce = 1
         return self

@@ -28,12 +28,9 @@ ONLY_FULL = "only the paths of integrator='full' go on from surface to surface w
 GIVEN = "samples are given by their numbers"
 EXCLUSIONS = (
     Exclusion("reuse", "clamp", f"a clamp limits what one path finds, and {ONE_PATH}"),
-    Exclusion("reuse", "light groups", f"a group is told by the path that found it, and {ONE_PATH}"),
+    Exclusion("reuse", "caustics", "the trial does not see the noise of paths from lights", False),
     Exclusion("reuse", "branches", "paths that go on in several ways gain less from being shared", False),
-    Exclusion("reuse", "noise", "pixels are rendered for different times then, and tiles break up", False),
-    Exclusion("caustics", "reuse", "shared paths find the light of caustics a second time"),
-    Exclusion("caustics", "noise", f"{ANY_PIXEL}, so no pixel can stop alone"),
-    Exclusion("caustics", "filter", f"{ANY_PIXEL}, and are added as the box filter does"),
+    Exclusion("caustics", "filter", f"{ANY_PIXEL}, and filters draw points but cannot be evaluated at those"),
     Exclusion("caustics", "light groups", f"{ANY_PIXEL}, and layers are sums of the pixel's own paths"),
     Exclusion("guide", "another integrator", ONLY_FULL),
     Exclusion("reuse", "another integrator", ONLY_FULL),

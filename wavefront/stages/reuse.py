@@ -17,6 +17,7 @@ Workshop on Rendering 2002; E. Veach and L. Guibas, "Optimally Combining Samplin
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Self
 
@@ -93,66 +94,75 @@ def as_shared(paths: Paths) -> Paths:
         roulette_scale=paths.roulette_scale * highest(paths.throughput),
         depth=None,
         met_rough=None,
-        recorder=None if paths.recorder is None else paths.recorder.of_shared(),
+        recorder=None if paths.recorder is None else paths.recorder.of_shared(n),
     )
 
 
 def add_shared(
     scene: CompiledScene,
-    L: Floats,
+    sums: Sequence[tuple[Floats, Floats]],
     paths: Paths,
     shade: Shading,
     points: SharedPoints,
-    light: Floats,
     tiles: WaveTiles,
     branches: int,
 ) -> None:
-    """Add to the slots of L what their first points receive from the shared points of their tiles.
+    """Add to all slots what their first points receive from the shared points of their tiles.
 
     Parameters
     ----------
+    sums
+        The radiance of each slot, (3, n), and that which leaves each of k shared points, (3, k). After the
+        first pair come those of parts of it.
     paths, shade
         The first surfaces of the wave's paths.
-    points, light
-        k shared points, and the radiance (3, k) that leaves them.
     """
     lit = shade.lit()
     if not lit.groups or not len(points):
         return
     slot = paths.slot[: len(lit.surface)]
     lane_in = tiles.grid(slot)
-    shining = highest(light) != 0  # NaN counts: it must reach the picture
+    lights = [light for _, light in sums]
+    shining = highest(lights[0]) != 0  # NaN counts: it must reach the picture
     number_in = [
         tiles.grid(points.slot, np.flatnonzero(shining & (points.way == way))) for way in range(branches)
     ]
     albedo = lit.albedo() if all(bsdf.lambertian for _, bsdf in lit.groups) else None
-    received = np.zeros((3, slot.size), f4)
+    received = [np.zeros((3, slot.size), f4) for _ in sums]
     for some in spans(tiles.count, TILES_AT_ONCE):
         first = FirstPoints.of(scene, lit, albedo, lane_in[:, some])
         if first is None:
             continue
-        arriving, lost = _arriving(scene, first, points, light, [numbers[:, some] for numbers in number_in])
+        found, lost = _arriving(scene, first, points, lights, [numbers[:, some] for numbers in number_in])
         for number in lost:  # they stay the path's own
-            L[:, points.slot.take(number)] += take(points.throughput, number) * take(light, number)
+            for L, light in sums:
+                L[:, points.slot.take(number)] += take(points.throughput, number) * take(light, number)
         cells = np.flatnonzero(first.present)
-        received[:, lane_in[:, some].reshape(-1).take(cells)] = arriving.reshape(3, -1).take(cells, 1)
-    L[:, slot] += paths.throughput[:, : slot.size] * received
+        lanes = lane_in[:, some].reshape(-1).take(cells)
+        for values, arriving in zip(received, found, strict=True):
+            values[:, lanes] = arriving.reshape(3, -1).take(cells, 1)
+    for (L, _), values in zip(sums, received, strict=True):
+        L[:, slot] += paths.throughput[:, : slot.size] * values
 
 
 def _arriving(
-    scene: CompiledScene, first: FirstPoints, points: SharedPoints, light: Floats, number_in: list[Ints]
-) -> tuple[Floats, list[Ints]]:
+    scene: CompiledScene,
+    first: FirstPoints,
+    points: SharedPoints,
+    lights: Sequence[Floats],
+    number_in: list[Ints],
+) -> tuple[list[Floats], list[Ints]]:
     """Return what the first points of t tiles receive, (3, members, t), and the shared points left out.
 
     Parameters
     ----------
-    points, light
-        As of `add_shared`.
+    lights
+        Radiances (3, k) that leave the points; the first points receive each by itself.
     number_in
         For each branch, which of the points (members, t) each path has found; -1 for none. Those that
         rounding keeps from all first points are left out.
     """
-    arriving = np.zeros((3, *first.present.shape), f4)
+    arriving = [np.zeros((3, *first.present.shape), f4) for _ in lights]
     lost = []
     for numbers in number_in:
         rows = [(member, number) for member, number in enumerate(numbers) if (number >= 0).any()]
@@ -162,10 +172,13 @@ def _arriving(
             total = _sum(connections.pdf * connections.geometry)
             found = total > 0
             part = connections.geometry / (np.where(found, total, f4(1)) * f4(len(number_in)))
-            arriving += connections.f * part * take(light, number)[:, None]
+            weight = connections.f * part
+            for values, light in zip(arriving, lights, strict=True):
+                values += weight * take(light, number)[:, None]
             lost.append(number.compress((number >= 0) & ~found))
     if first.albedo is not None:
-        arriving *= first.albedo
+        for values in arriving:
+            values *= first.albedo
     return arriving, lost
 
 

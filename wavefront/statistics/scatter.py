@@ -8,20 +8,19 @@ the squared error of the tile's part. The squared errors of tiles add up, and so
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import count
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.soa import soa
-from ..arrays.vec import Doubles, Floats, Ints, distinct
+from ..arrays.vec import Doubles, Floats, Ints
 from ..core.errors import SceneError
-from ..film.film import Film, batch_size, chunks
+from ..film.film import Film, chunks
 from ..sampling.tiles import place_in_tiles
 
 UNIT = 127  # deviations are whole multiples of this part of the standard error
-NAMES = {"deviations": (np.int8, 4), "tile": (np.int32, 2), "level": (np.uint8, 2)}  # types and dimensions
+NAMES = {"deviations": (np.int8, 4), "tile": (np.int32, 2)}  # types and dimensions
 PREFIX = "scatter."  # before the names of arrays in files
 
 
@@ -34,14 +33,13 @@ class Scatter:
 
     deviations: NDArray[np.int8]  # (H, W, batches, 3) times the pixel's standard error / UNIT; see above
     tile: NDArray[np.int32]  # (H, W) pixels of different tiles are independent
-    level: NDArray[np.uint8]  # (H, W) logarithm to base 2 of the samples of a batch
 
     def rescaled(self, factor: Floats) -> Scatter:
         """Return the same scatter where standard errors are 1 / factor (H, W, 3) times as large."""
         scaled = np.empty_like(self.deviations)
         for row, other, by in zip(scaled, self.deviations, factor, strict=True):
             row[:] = _whole(other * by[:, None])
-        return Scatter(scaled, self.tile, self.level)
+        return Scatter(scaled, self.tile)
 
 
 def _whole(values: Any) -> NDArray[np.int8]:
@@ -74,26 +72,14 @@ def film_scatter(
         (np.arange(height, dtype=np.int64) + corner[1]) * whole[0], np.arange(width) + corner[0]
     )
     tile, _ = place_in_tiles(pixel.ravel().astype(np.uint32), whole[0])
-    level = np.empty(film.count.size, np.uint8)
-    for samples in distinct(film.count):
-        level[film.count == samples] = batch_size(int(samples)).bit_length() - 1
     shape = height, width
-    return (
-        Scatter(
-            deviations.reshape(*shape, batches, 3),
-            tile.astype(np.int32).reshape(shape),
-            level.reshape(shape),
-        ),
-    )
+    return (Scatter(deviations.reshape(*shape, batches, 3), tile.astype(np.int32).reshape(shape)),)
 
 
 def sums_by_label(
     standard_error: Floats, freedom: Doubles, scatter: Sequence[Scatter], label: Ints, labels: int
 ) -> tuple[Doubles, Doubles]:
     """Estimate the variance of sums over the pixels of each label, and how well it is known.
-
-    Where batches of the pixels of a tile have different lengths, their samples overlap in part. The
-    correlation of two means is then at most the root of the ratio of the lengths, which is what is taken.
 
     Parameters
     ----------
@@ -123,7 +109,7 @@ def sums_by_label(
         part = each.deviations.reshape(-1, *each.deviations.shape[2:])[some] / np.float64(UNIT)
         own -= np.square(part).sum(1)
         part *= error[:, None]
-        shared, tile = _by_tile(part, each.tile.ravel()[some], each.level.ravel()[some], where)
+        shared, tile = _by_tile(part, each.tile.ravel()[some], where)
         _add_to(variance, tile, shared[0])
         _add_to(spread, tile, shared[1])
     alone = np.square(error) * np.where(own > ROUNDING, own, 0)
@@ -135,38 +121,25 @@ def sums_by_label(
 ROUNDING = 0.05  # part of a squared error that the rounding of deviations may leave over
 
 
-def _by_tile(
-    part: Doubles, tile: NDArray[np.int32], level: NDArray[np.uint8], label: Ints
-) -> tuple[tuple[Doubles, Doubles], Ints]:
+def _by_tile(part: Doubles, tile: NDArray[np.int32], label: Ints) -> tuple[tuple[Doubles, Doubles], Ints]:
     """Return variance and spread (m, 3) of the sums over pixels of one tile and label, and labels (m,).
+
+    All pixels of a tile have equally many samples.
 
     Parameters
     ----------
     part
         (k, batches, 3) deviations of pixels.
     """
-    key = np.stack([label, tile.astype(np.intp), level.astype(np.intp)])
-    order = np.lexsort(key[::-1])
-    key = key[:, order]
-    new = np.append(True, (key[:, 1:] != key[:, :-1]).any(0)) if order.size else np.zeros(0, np.bool_)
-    first = np.flatnonzero(new)
-    if not first.size:
+    order = np.lexsort((tile, label))
+    key = np.stack([label, tile.astype(np.intp)])[:, order]
+    first = np.flatnonzero(np.append(True, (key[:, 1:] != key[:, :-1]).any(0)))
+    if not order.size:
         return (np.zeros((0, 3)), np.zeros((0, 3))), np.zeros(0, np.intp)
     sums = np.add.reduceat(part[order], first, axis=0)
-    key = key[:, first]
-    own = np.square(sums).sum(1)
-    batches = (sums != 0).any(2).sum(1)
-    total = own.copy()
-    for step in count(1):  # pairs of levels of one tile and label
-        same = (key[:2, step:] == key[:2, :-step]).all(0)
-        if not same.any():
-            break
-        ratio = np.exp2(-(key[2, step:] - key[2, :-step]) / 2)[:, None]
-        total[step:] += np.where(same[:, None], 2 * ratio * np.sqrt(own[step:] * own[:-step]), 0)
-    starts = np.flatnonzero(np.append(True, (key[:2, 1:] != key[:2, :-1]).any(0)))
-    variance = np.add.reduceat(total, starts, axis=0)
-    freedom = np.maximum(np.minimum.reduceat(batches, starts) - 1, 1)[:, None]
-    return (variance, np.square(variance) / freedom), key[0, starts]
+    variance = np.square(sums).sum(1)
+    freedom = np.maximum((sums != 0).any(2).sum(1) - 1, 1)[:, None]
+    return (variance, np.square(variance) / freedom), key[0, first]
 
 
 def _add_to(sums: Doubles, label: Ints, values: Doubles) -> None:
