@@ -107,7 +107,7 @@ class RenderSettings(TypedDict, total=False):
             '"three_quarter", "front", "back", "left", "right", "top", "bottom", "iso", or a vector (3,) '
             "from the middle of the scene to the camera. A scene without a camera is seen from "
             '"three_quarter": 35° to the right of the front and 22° above it.',
-            option=f"from where the scene is framed: {', '.join(VIEWS)} (default: {FRAMING_VIEW}, "
+            option=f"direction from which the scene is framed: {', '.join(VIEWS)} (default: {FRAMING_VIEW}, "
             "where the file has no camera)",
             check=optional(check_view),
         ),
@@ -140,8 +140,8 @@ class RenderSettings(TypedDict, total=False):
             'angle of each other. These replace the normals that a mesh has. "auto" keeps them. For files '
             "and trimesh objects that have none, it takes a crease angle of 30°, but glTF then has flat "
             "facets: docs/formats.md says why. (vertices, faces) and `Mesh` stay as they are.",
-            option="normals of meshes: yes, no, a crease angle in degrees, or auto (default), which is 30 "
-            "where the file has none",
+            option="normals of meshes: yes, no, a crease angle in degrees, or auto: those of the file, or an "
+            "angle of 30 where it has none",
             check=check_smooth,
         ),
     ]
@@ -152,7 +152,7 @@ class RenderSettings(TypedDict, total=False):
             'The direction that is up in the scene: a vector (3,), or the name of an axis, such as "z". '
             '"auto" takes it from the file: z for STL and 3MF, what a DAE says, else y. It turns the '
             "camera that frames a scene, the `lighting` and the `ground`.",
-            option="what is up in the scene, or an axis such as z (default: by the file; z for stl and 3mf)",
+            option="up direction of the scene, an axis such as z, or auto: by the file, z for stl and 3mf",
             check=check_up,
         ),
     ]
@@ -164,7 +164,7 @@ class RenderSettings(TypedDict, total=False):
             'scene\'s own lights; `studio` describes them. "auto" adds "studio" to a scene without light, '
             "and nothing to others. None adds nothing.",
             option=f"light to add: {', '.join(LIGHTINGS)}, none, "
-            f"or auto, which is {DEFAULT} where nothing shines",
+            f"or auto: {DEFAULT} for a scene without light",
             check=check_preset,
         ),
     ]
@@ -176,8 +176,8 @@ class RenderSettings(TypedDict, total=False):
             "belongs to the picture alone: the scene, its bounds and the numbers of its shapes stay. "
             '"auto" adds it where both light and camera are chosen automatically, unless the camera looks '
             "from below or a `background` is given.",
-            option="add a ground that catches the shadow, or leave it out (default: where light and camera "
-            "are chosen by themselves)",
+            option="add a ground that catches the shadow, or leave it out; auto: where light and camera are "
+            "chosen automatically",
             check=auto_or(check_flag),
         ),
     ]
@@ -285,7 +285,7 @@ class RenderSettings(TypedDict, total=False):
             "no memory with this one); a `concurrent.futures.Executor`, a function that returns one, or a "
             "`dask.distributed.Client`. By default a longer render takes processes, which are faster, and "
             "a short one threads. The picture is the same. docs/scale.md tells more.",
-            option="what workers are (default: the faster here)",
+            option="kind of workers (default: the faster here)",
             choices=EXECUTORS,
         ),
     ]
@@ -297,7 +297,7 @@ class RenderSettings(TypedDict, total=False):
             "is the root of the relative MSE that `compare` would find against a converged picture. Noisy "
             "pixels get more samples than others, and every pixel at least 32. A warning says when `spp` "
             "or `seconds` end the render before that.",
-            option="go on to this relative error, such as 0.02",
+            option="render until this relative error, such as 0.02",
             check=optional(check_noise),
             identity=True,
         ),
@@ -309,7 +309,7 @@ class RenderSettings(TypedDict, total=False):
             "Render until this time is used, scene setup included. Waves that need more than a tenth "
             "longer are discarded. Every pixel still gets its first sample, unless a wave of first "
             "samples takes over three seconds. With `noise`, the render ends at whichever comes first.",
-            option="go on until this time is used",
+            option="render until this time is used",
             check=optional(above_zero),
         ),
     ]
@@ -331,7 +331,7 @@ class RenderSettings(TypedDict, total=False):
             "spatial",
             'How one light is chosen among many at a point: "spatial" weighs each light by what it brings '
             'there, "power" by its power alone, "uniform" all alike.',
-            option="how one light of many is chosen",
+            option="how one light is chosen among many",
             choices=LIGHT_SAMPLERS,
             identity=True,
         ),
@@ -344,7 +344,7 @@ class RenderSettings(TypedDict, total=False):
             'only for "full". With two to four, a sample takes longer, but has less noise where most '
             'noise is in indirect light, as in a room. "auto" finds out by a short tuning run whether '
             "that pays: docs/choices.md tells how. Pictures of less than 192x192 pixels have one branch.",
-            option="ways a path goes on from its first surface, or auto (default), which tries what pays",
+            option="ways in which a path goes on from its first surface; auto: a tuning run finds what pays",
             check=auto_or(whole_number(1, MAX_BRANCHES)),
         ),
     ]
@@ -357,7 +357,7 @@ class RenderSettings(TypedDict, total=False):
             "light comes through narrow openings or after several reflections: docs/guiding.md has "
             'figures. What is learned depends on the scene, the camera and the seed alone. "auto" guides '
             'only where a short tuning run says that it pays; `metadata["guided"]` says what it found.',
-            option="learn where light comes from, for scenes with much indirect light",
+            option="path guiding: learn where light comes from, for scenes with much indirect light",
             check=auto_or(check_flag),
             identity=True,
         ),
@@ -372,7 +372,7 @@ class RenderSettings(TypedDict, total=False):
             'has figures. "auto" shares paths where a short tuning run says that it pays; with glossy '
             "materials or glass only where light is hard to find: docs/choices.md tells how.",
             check=auto_or(check_flag),
-            option="share paths among pixels: yes, no, or auto (default), which tries whether it pays",
+            option="share paths among pixels: yes, no, or auto: a tuning run finds whether it pays",
         ),
     ]
     clamp: Annotated[
@@ -384,7 +384,7 @@ class RenderSettings(TypedDict, total=False):
             'the picture is biased, too dark. The AOV "clamped" holds what was removed, '
             '`metadata["clamped"]` says what part of all light that is, and above 2 % a warning does. '
             "Light seen directly, and light from lights on the first rough surface, is not clamped.",
-            option="most indirect light that a path finds at once; removes fireflies, and some light",
+            option="most indirect radiance that a path finds at once; removes fireflies, and some light",
             check=optional(above_zero),
             identity=True,
         ),
@@ -397,7 +397,7 @@ class RenderSettings(TypedDict, total=False):
             "paths find caustics, the light that smooth glass and mirrors send on. Without them that "
             "light is found by chance, and that of point, spot and directional lights never. Only for "
             '"full"; docs/caustics.md has figures.',
-            option="trace paths from lights for caustics of smooth glass and mirrors",
+            option="light tracing: paths from lights, for caustics of smooth glass and mirrors",
             check=check_flag,
             identity=True,
         ),
@@ -419,7 +419,7 @@ class RenderSettings(TypedDict, total=False):
             "seconds, at Ctrl-C and at the end. The same call goes on from it, with the same bits as "
             "without a break; with more `spp` it goes on further. The file of another scene or of other "
             "settings is refused.",
-            option="file that keeps the render, from which the same command goes on",
+            option="file that keeps the state of the render, from which the same command goes on",
             check=check_checkpoint,
         ),
     ]
@@ -440,7 +440,7 @@ class RenderSettings(TypedDict, total=False):
             'already uses: a number of bytes, or a size such as "2GB" or "800MiB". It limits the size of '
             "waves and the number of workers. The picture does not depend on it. A render that needs more "
             "is refused before it begins.",
-            option="memory to use at most, such as 2GB",
+            option="most memory to use, such as 2GB",
             check=optional(memory_size),
         ),
     ]
@@ -462,7 +462,7 @@ class RenderSettings(TypedDict, total=False):
             '"albedo", "direct", "indirect", "denoising_albedo", "denoising_normal", "light_groups", '
             '"coverage", "boxes", or "all" for all but the last three. docs/layers.md says what each '
             "holds, and what it costs.",
-            option="layer to render beside the picture, or all; can be given several times",
+            option="AOV to render beside the picture, or all; can be given several times",
             flag="aov",
             check=chosen_aovs,
         ),
