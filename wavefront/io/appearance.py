@@ -10,13 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays.vec import f4
 from ..bsdfs import Bsdf, Dielectric, Diffuse, Principled, ThinDielectric
+from ..colors import srgb_to_linear
 from ..materials import Material
 from ..media import Medium
 from ..textures.image import Texture
 from ..textures.normal_map import BaseNormalMap
 from ..textures.vertex_colors import VertexColors
-from .repair import RawMesh
+from .repair import RawMesh, Table
 
 PARAMETERS = frozenset(inspect.signature(Principled).parameters)
 BASES: dict[type[Bsdf], str] = {Diffuse: "reflectance", Principled: "base_color"}
@@ -117,3 +119,10 @@ def _glass(known: dict[str, Any]) -> Bsdf:
     if known.get("thin"):
         return ThinDielectric(ior, roughness, transmittance=tint)
     return Dielectric(ior, roughness, transmittance=tint)
+
+
+def from_srgb(colors: Table) -> Table:
+    """Decode colors (n, k), rounded to 8 bits, to linear values; those outside [0, 1] are unchanged."""
+    inside = (colors >= 0) & (colors <= 1)
+    codes = np.rint(np.where(inside, colors, 0) * 255).astype(f4)
+    return np.where(inside, srgb_to_linear(codes / f4(255)), colors)

@@ -14,8 +14,8 @@ from ..core.plural import plural
 from ..core.registry import Registry
 from ..scene import Scene
 from ..shapes.smoothing import AUTO
-from . import dae, gltf, mtl, obj, off, ply, stl, threemf, trimesh_objects, visuals
-from .appearance import MaterialSpec, assign_material
+from . import dae, gltf, mtl, obj, off, ply, stl, threemf, trimesh_objects
+from .appearance import MaterialSpec, assign_material, from_srgb
 from .clouds import cloud, cloud_of_trimesh
 from .contents import Contents
 from .gltf_materials import GltfMaterials
@@ -88,12 +88,12 @@ def _read_obj(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
         listed = ", ".join(f"{keyword} (line {line})" for keyword, line in parsed.ignored.items())
         warn(f"{name}: not honored: {listed}", strict)
     if parsed.points is not None:
-        codes = None if parsed.points.shape[1] < 6 else visuals.from_srgb(parsed.points[:, 3:])
+        codes = None if parsed.points.shape[1] < 6 else from_srgb(parsed.points[:, 3:])
         points = cloud(name, parsed.points[:, :3], codes, strict)
         return Contents([], Places.once(0), shapes=[] if points is None else [points])
     specs = _libraries(files, parsed.libraries, strict) if materials else {}
     for raw in parsed.raws:
-        raw.colors = None if raw.colors is None else visuals.from_srgb(raw.colors)
+        raw.colors = None if raw.colors is None else from_srgb(raw.colors)
         if materials and not assign_material(raw, specs.get(raw.name)):
             warn(f"{name}: not honored: vertex colors (material {raw.name!r})", strict)
     absent = ", ".join(repr(raw.name) for raw in parsed.raws if raw.name and raw.name not in specs)

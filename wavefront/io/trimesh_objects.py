@@ -1,18 +1,25 @@
-"""Meshes, materials and placements of trimesh objects."""
+"""Meshes, materials and placements of trimesh objects, read as in their files."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..core.errors import SceneError
+from ..arrays.vec import f4
+from ..bsdfs import Diffuse
+from ..core.errors import SceneError, printable
+from ..materials import Material
 from ..shapes.transform import Matrix
-from . import visuals
-from .appearance import MaterialSpec, assign_material, is_faint
+from ..textures.image import Texture
+from ..textures.normal_map import NormalMap
+from . import mtl
+from .appearance import MaterialSpec, assign_material, build_material, from_srgb, is_faint
 from .contents import Contents
+from .mtl import MATTE
 from .placing import Places
-from .repair import RawMesh, warn, with_face_colors
+from .repair import RawMesh, Table, warn, with_face_colors
 from .trimesh_loading import import_trimesh
 
 if TYPE_CHECKING:
@@ -80,8 +87,8 @@ def _raw(mesh: trimesh.Trimesh, name: str, source: str) -> RawMesh:
         uvs = None
     raw = RawMesh(name, vertices, np.asarray(mesh.faces), normals)
     raw.uvs = None if uvs is None else np.asarray(uvs, np.float64)[:, :2]
-    raw.colors = visuals.vertex_colors(mesh)
-    painted = visuals.face_colors(mesh)
+    raw.colors = _vertex_colors(mesh)
+    painted = _face_colors(mesh)
     return raw if painted is None else with_face_colors(source, raw, painted)
 
 
@@ -101,16 +108,184 @@ class _Visuals:
         painted = visual.kind == "face"
         if not assign_material(raw, spec) or (painted and raw.colors is None):
             self.lost.setdefault("face colors" if painted else "vertex colors", raw.name)
-        shown = {visual.kind, "face"} if visuals.shows_face_colors(mesh) else {visual.kind}
+        shown = {visual.kind, "face"} if _shows_face_colors(mesh) else {visual.kind}
         for element in ("vertex", "face"):
-            if element not in shown and visuals.ply_has_colors(mesh, element):
+            if element not in shown and _ply_has_colors(mesh, element):
                 self.lost.setdefault(f"{element} colors", raw.name)
-        if spec is None and is_faint(raw) and not visuals.is_gltf(mesh):  # where it has no effect
+        if spec is None and is_faint(raw) and not _is_gltf(mesh):  # where it has no effect
             self.lost.setdefault("opacity of vertex colors", raw.name)
 
     def _spec(self, material: Any, bare: bool) -> MaterialSpec | None:
-        if material is None or visuals.is_blank(material):
+        if material is None or _is_blank(material):
             return None
         if id(material) not in self._specs:
-            self._specs[id(material)] = visuals.spec(material, f"trimesh material {material.name!r}", bare)
+            self._specs[id(material)] = _material_spec(material, f"trimesh material {material.name!r}", bare)
         return self._specs[id(material)]
+
+
+def _material_spec(material: Any, where: str, bare: bool) -> MaterialSpec:
+    """Return the material of a trimesh `PBRMaterial` or `SimpleMaterial`; `where` is for messages.
+
+    If `bare`, the colors and the exponent of the highlight count only if the material has its own `Kd`, `Ks`
+    or `Ns`. Otherwise those that trimesh would write into a file count.
+    """
+    if hasattr(material, "baseColorFactor"):
+        found = _pbr(material)
+    elif hasattr(material, "diffuse"):
+        found = _simple(material, where, bare)
+    else:
+        found = MaterialSpec(Material(Diffuse(MATTE)), lost=[type(material).__name__])
+    name = getattr(material, "name", None)
+    found.material.name = printable(str(name)) if name else None
+    return found
+
+
+def _vertex_colors(mesh: Any) -> Table | None:
+    """Return the vertex colors of a trimesh mesh, linear (n, 4), if it has any.
+
+    Those of glTF files are linear. All others are sRGB, as programs display them and as in PLY files.
+    """
+    visual = mesh.visual
+    if visual.kind == "vertex":
+        codes = np.asarray(visual.vertex_colors)
+        linear = _is_gltf(mesh)
+    elif "color" in getattr(visual, "vertex_attributes", {}):
+        codes = np.asarray(visual.vertex_attributes["color"])  # beside a material; only glTF has these
+        linear = True
+    else:
+        return None
+    if codes.ndim != 2 or codes.shape[1] not in (3, 4) or len(codes) != len(mesh.vertices):
+        return None
+    if linear:
+        unit = f4(np.iinfo(codes.dtype).max) if codes.dtype.kind == "u" else f4(1)
+        return (codes.astype(f4) / unit).astype(np.float64)
+    return _decoded(codes)
+
+
+def _decoded(codes: NDArray[Any]) -> Table:
+    return np.column_stack([from_srgb(codes[:, :3] / 255.0), codes[:, 3:] / 255.0])
+
+
+def _face_colors(mesh: Any) -> Table | None:
+    """Return the colors of the faces of a trimesh mesh, linear (m, 4), if the mesh shows them.
+
+    They are sRGB codes in the mesh, as those of vertices are.
+    """
+    if not _shows_face_colors(mesh):
+        return None
+    if mesh.visual.kind == "face":
+        return _decoded(np.asarray(mesh.visual.face_colors))
+    return _decoded(np.asarray(type(mesh.visual)(face_colors=_ply_face_colors(mesh)).face_colors))
+
+
+def _shows_face_colors(mesh: Any) -> bool:
+    """Return whether a trimesh mesh shows a color for each of its faces.
+
+    Of a PLY file with colors of vertices and faces, trimesh uses those of the vertices. If these are all
+    white, they are defaults of some program, and the colors of the faces count.
+    """
+    if mesh.visual.kind == "face":
+        return np.shape(mesh.visual.face_colors) == (len(mesh.faces), 4)
+    if mesh.visual.kind != "vertex" or not _ply_has_colors(mesh, "face"):
+        return False
+    white = bool((np.asarray(mesh.visual.vertex_colors) == 255).all())
+    return white and len(_ply_face_colors(mesh)) == len(mesh.faces)
+
+
+def _ply_face_colors(mesh: Any) -> NDArray[Any]:
+    """Return the colors of faces as stored in the PLY file, (m, 3 or 4)."""
+    element = mesh.metadata["_ply_raw"]["face"]
+    names = [name for name in ("red", "green", "blue", "alpha") if name in element["properties"]]
+    return np.column_stack([np.asarray(element["data"][name]) for name in names])
+
+
+def _is_gltf(mesh: Any) -> bool:
+    """Return whether trimesh read a mesh from a glTF file: it marks such meshes."""
+    return "from_gltf_primitive" in mesh.metadata
+
+
+def _ply_has_colors(mesh: Any, element: str) -> bool:
+    """Return whether the vertices or faces of a mesh's PLY file have colors.
+
+    trimesh ignores both if there are texture coordinates, and those of faces if vertices have colors.
+    """
+    raw = mesh.metadata.get("_ply_raw", {}).get(element, {})
+    return "red" in raw.get("properties", {})
+
+
+def _is_blank(material: Any) -> bool:
+    """Return whether a material is trimesh's default for a mesh with only texture coordinates."""
+    image = getattr(material, "image", None)
+    plain = getattr(material, "kwargs", None) == {} and material.name in (None, "", "material_0")
+    return (
+        plain and image is not None and max(image.size) <= 2 and not np.ptp(_pixels(image), axis=(0, 1)).any()
+    )
+
+
+def _pixels(image: Any) -> NDArray[np.uint8]:
+    """Return the stored values (H, W, C) of a PIL image."""
+    if image.mode not in ("L", "LA", "RGB", "RGBA"):
+        image = image.convert("RGBA" if "transparency" in image.info else "RGB")
+    codes = np.asarray(image)
+    return codes[:, :, None] if codes.ndim == 2 else codes
+
+
+def _pbr(material: Any) -> MaterialSpec:
+    """Read glTF's model; trimesh rounds its colors to 8 bits, and they are linear."""
+    factor = np.ones(4) if material.baseColorFactor is None else np.asarray(material.baseColorFactor) / 255.0
+    wanted: dict[str, Any] = {"base_color": factor[:3]}
+    codes = None if material.baseColorTexture is None else _pixels(material.baseColorTexture)
+    if codes is not None:
+        wanted["base_color"] = Texture(codes, scale=factor[:3])
+    alpha: Any = None
+    cutoff = None
+    if material.alphaMode == "MASK":
+        cutoff = 0.5 if material.alphaCutoff is None else float(material.alphaCutoff)
+    if material.alphaMode in ("MASK", "BLEND"):
+        alpha = float(factor[3])
+        if codes is not None and codes.shape[2] == 4:
+            alpha = Texture(codes, srgb=False, channel=3, scale=alpha)
+        if isinstance(alpha, Texture) or alpha != 1:
+            wanted |= {"alpha": alpha, "alpha_cutoff": cutoff}
+    metallic = 1.0 if material.metallicFactor is None else float(material.metallicFactor)
+    roughness = 1.0 if material.roughnessFactor is None else float(material.roughnessFactor)
+    both = None if material.metallicRoughnessTexture is None else _pixels(material.metallicRoughnessTexture)
+    if metallic:
+        wanted["metallic"] = metallic if both is None else Texture(both, False, channel=2, scale=metallic)
+    wanted["roughness"] = roughness if both is None else Texture(both, False, channel=1, scale=roughness)
+    glow = np.zeros(3) if material.emissiveFactor is None else np.asarray(material.emissiveFactor, np.float64)
+    radiance: Any = glow if glow.any() else None
+    if radiance is not None and material.emissiveTexture is not None:
+        radiance = Texture(_pixels(material.emissiveTexture), scale=glow)
+    normal_map = None
+    if material.normalTexture is not None:  # trimesh does not keep its scale
+        normal_map = NormalMap(Texture(_pixels(material.normalTexture), False))
+    made, lost = build_material(wanted, normal_map)
+    occluded = ["occlusionTexture"] if material.occlusionTexture is not None else []
+    return MaterialSpec(made, radiance, bool(material.doubleSided), occluded + lost, alpha, cutoff)
+
+
+def _simple(material: Any, where: str, bare: bool) -> MaterialSpec:
+    """Read an MTL material: trimesh keeps its lines as lists of words."""
+    entry = mtl.Entry(where, str(material.name or ""))
+    lines = {key: value for key, value in material.kwargs.items() if key != "name"}
+    if not bare:
+        for key, codes in (("kd", material.diffuse), ("ks", material.specular)):
+            lines.setdefault(key, [f"{code / 255:.8f}" for code in np.asarray(codes)[:3]])
+        lines.setdefault("ns", f"{material.glossiness:.8f}")
+    for key, value in lines.items():
+        words = value if isinstance(value, list | tuple | np.ndarray) else [value]
+        entry.lines[key.lower()] = (key, 0, " ".join(str(word) for word in words))
+    if material.image is not None:
+        entry.images["map_kd"] = _pixels(material.image)
+        entry.lines["map_kd"] = ("map_kd", 0, "image")
+    # of the other images trimesh keeps only the names, without a folder
+    gone = [key for key in entry.lines if _is_map(key) and key not in entry.images]
+    gone = [entry.lines.pop(key)[0] for key in gone]
+    found = mtl.spec(entry)
+    found.lost = [*gone, *entry.unread(), *found.lost]
+    return found
+
+
+def _is_map(key: str) -> bool:
+    return key.startswith("map_") or key in mtl.BUMP_MAPS
