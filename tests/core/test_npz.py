@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -71,3 +72,19 @@ def test_every_flipped_bit_is_noticed(tmp_path: Path) -> None:
             file.seek(0)
             with pytest.raises(wf.SceneError, match="is damaged: delete it"):
                 open_npz(file)
+
+
+def test_what_would_take_more_memory_than_the_file_is_refused(tmp_path: Path) -> None:
+    """Members that are compressed, and those that claim more bytes than there are."""
+    found = [io.BytesIO(), io.BytesIO()]
+    for whole, method in zip(found, (zipfile.ZIP_BZIP2, zipfile.ZIP_STORED), strict=True):
+        with zipfile.ZipFile(whole, "w", method) as archive:
+            archive.comment = bytes(4)
+            archive.writestr("a.npy", bytes(1000))
+    at = found[1].getvalue().index(b"PK\1\2") + 20
+    for whole, change in zip(found, (b"", (2**31).to_bytes(4, "little")), strict=True):
+        content = bytearray(whole.getvalue()[:-4])
+        content[at : at + len(change)] = change
+        (tmp_path / "a").write_bytes(content + zlib.crc32(content).to_bytes(4, "little"))
+        with open(tmp_path / "a", "rb") as file, pytest.raises(wf.SceneError, match="is damaged"):
+            open_npz(file)
