@@ -49,7 +49,7 @@ class Film(Sums):
     width, height
         Of the picture, pixels.
     light_tracing
-        Whether there are light paths, too, whose light adds to the mean.
+        Whether there is light tracing, too, whose light adds to the mean.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Film(Sums):
     dropped
         How many of them were dropped, (pixels,); empty as long as none was.
     light
-        Sums over light paths; None where there are none.
+        Sums over paths from lights; None where there are none.
     """
 
     JOINED = ("batches", "lengths")
@@ -190,7 +190,7 @@ class Film(Sums):
             yield rest, count - sum(lengths)
 
     def mean(self, span: slice = slice(None)) -> Doubles:
-        """Return the means of pixels, (3, k): of samples, and what light paths add; 0 without samples."""
+        """Return the means of pixels, (3, k): of samples, plus light tracing; 0 without samples."""
         mean = self._mean_of_samples(span)
         return mean if self.light is None else mean + self.light.mean(span)
 
@@ -200,7 +200,7 @@ class Film(Sums):
     def variance(self, span: slice = slice(None)) -> Doubles:
         """Estimate the variance of one sample of each pixel, (3, k); NaN for fewer than two.
 
-        With light paths it is that of as many samples, each with its part of the light paths.
+        With light tracing it is that of as many samples, each with its part of the paths from lights.
         """
         variance = self._variance_of_samples(span)
         return variance if self.light is None else variance + self.light.squared_error(span) * self.used(span)

@@ -1,7 +1,7 @@
-"""Sums of what light paths add to pixels.
+"""Sums of what paths from lights add to pixels.
 
-Light paths reach any pixel, any number of times. The sums are exact, so that they do not depend on the order
-in which paths are traced.
+Paths from lights reach any pixel, any number of times. The sums are exact, so that they do not depend on the
+order in which paths are traced.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ AT_ONCE = 1 << 16  # sums of one size that are added to together, times the term
 
 
 class LightSums(Sums):
-    """Sums over light paths, for each pixel.
+    """Sums over paths from lights, for each pixel.
 
-    The light paths of one sample of all pixels are stratified together, so their scatter does not give the
-    error of their mean. Samples are independent of each other: each belongs to one of `BATCHES` batches, and
-    the scatter of the batches' means gives the error.
+    The paths from lights of one sample of all pixels are stratified together, so their scatter does not give
+    the error of their mean. Samples are independent of each other: each belongs to one of `BATCHES` batches,
+    and the scatter of the batches' means gives the error.
 
     Memory is 192 bytes per pixel.
 
@@ -35,7 +35,7 @@ class LightSums(Sums):
     Attributes
     ----------
     paths
-        How many light paths were traced of each batch, (BATCHES,).
+        How many paths from lights were traced of each batch, (BATCHES,).
     batches
         The sums of each batch, by its number as text.
     """
@@ -48,7 +48,7 @@ class LightSums(Sums):
         self.batches = {str(batch): ExactSums((3, pixels), MORE_TERMS) for batch in range(BATCHES)}
 
     def add(self, sample: int, paths: int, pixel: Words, radiance: Floats) -> None:
-        """Add what some more light paths of a sample bring to pixels.
+        """Add what some more paths from lights of a sample bring to pixels.
 
         Parameters
         ----------
@@ -76,7 +76,7 @@ class LightSums(Sums):
                     self.batches[str(batch)].add(found.take(lanes), terms[:, at] * real)
 
     def mean(self, span: slice = slice(None)) -> Doubles:
-        """Return what light paths bring to pixels, (3, k)."""
+        """Return what paths from lights bring to pixels, (3, k)."""
         total = sum(sums.value(span) for sums in self.batches.values())
         return np.asarray(total / max(int(self.paths.sum()), 1))
 

@@ -859,7 +859,7 @@ def _add_aovs(image: Image, sums: PictureSums) -> None:
 
 
 def _add_light_paths(image: Image, light: LightSums) -> None:
-    """Add what light paths have found, all of it indirect light, to that layer of a picture."""
+    """Add what paths from lights have found, all of it indirect light, to that layer of a picture."""
     layer, error = (values.reshape(-1, 3) for values in (image.layers["indirect"], image.errors["indirect"]))
     for part in chunks(len(layer)):
         layer[part] += light.mean(part).T

@@ -133,10 +133,10 @@ def _check_first_samples(image: Image, seconds: float | None, surfaces: int) -> 
 
 def _cause_of_bad_sample(plan: Plan, loop: RenderLoop, pixel: int, sample: int) -> str:
     """Return in which bounce, and at which material, a sample that is not finite became so."""
-    from .nan_trace import first_fault  # here, as most pictures do without
+    from .nan_trace import first_nan  # here, as most pictures do without
 
     camera, pixels = loop.view.camera, np.array([pixel], np.uint32)
     if plan.choice.reuse:
         every = camera.address(np.arange(camera.size[0] * camera.size[1], dtype=np.uint32))
         pixels = np.append(pixels, others_in_tile(every, pixel, camera.resolution[0]).astype(np.uint32))
-    return first_fault(plan.scene.lighted, plan.tracer, loop.view, pixels, sample)
+    return first_nan(plan.scene.lighted, plan.tracer, loop.view, pixels, sample)

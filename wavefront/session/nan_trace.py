@@ -22,7 +22,7 @@ from ..stages.shade import Shading
 from .diagnosis import shape_name
 
 
-def first_fault(user_scene: Scene, tracer: Tracer, view: CameraJob, pixels: Words, sample: int) -> str:
+def first_nan(user_scene: Scene, tracer: Tracer, view: CameraJob, pixels: Words, sample: int) -> str:
     """Return the bounce and the material where a path first gets a value that is not finite.
 
     Bounce 0 is at the first surface that the camera sees. The text is empty if no step of the integrators of
@@ -43,15 +43,15 @@ def first_fault(user_scene: Scene, tracer: Tracer, view: CameraJob, pixels: Word
     sampler = tracer.sampler(camera.resolution[0])
     samples = np.full(pixels.size, sample, np.uint32)
     paths = generate(tracer.scene, camera, sampler, pixels, samples, tracer.filter)
-    recorder = paths.recorder = FaultRecorder(user_scene, tracer.layers)
+    recorder = paths.recorder = NanRecorder(user_scene, tracer.layers)
     table = tracer.table if view.guided else None
     integrator = integrator_for(tracer.integrator, view.branches, view.reuse, table)
     with np.errstate(all="ignore"):
         integrator(tracer.scene, paths, sampler, tracer.max_bounces)
-        return recorder.fault or _fault_of_light(tracer, camera, pixels, samples)
+        return recorder.place or _nan_of_light(tracer, camera, pixels, samples)
 
 
-def _fault_of_light(tracer: Tracer, camera: Camera, pixels: Words, samples: Words) -> str:
+def _nan_of_light(tracer: Tracer, camera: Camera, pixels: Words, samples: Words) -> str:
     """Return where a path from a light brings a value that is not finite; "" where none does."""
     if tracer.scene.specular_surfaces is None:
         return ""
@@ -63,23 +63,23 @@ def _fault_of_light(tracer: Tracer, camera: Camera, pixels: Words, samples: Word
     return ""
 
 
-class FaultRecorder(PathRecorder):
+class NanRecorder(PathRecorder):
     """Notes the first value along some paths that is not finite.
 
     Attributes
     ----------
-    fault
+    place
         Where it comes from; empty for none.
     """
 
     def __init__(self, user_scene: Scene, layers: tuple[str, ...]) -> None:
-        self.fault = ""
+        self.place = ""
         self._user_scene, self._layers = user_scene, layers
         self._bounce = 0
         self._bad_emission = False
         self._at: tuple[CompiledScene, Shading] | None = None  # the surfaces that are shaded
 
-    def of_shared(self, count: int) -> FaultRecorder:
+    def of_shared(self, count: int) -> NanRecorder:
         """Go on at the second surfaces, from which paths begin anew."""
         self._bounce = 1
         return self
@@ -103,7 +103,7 @@ class FaultRecorder(PathRecorder):
         """Check what absorption has left of the paths, and the AOVs that the surfaces give."""
         self._at = scene, shade
         self._check(_bad(paths.throughput), "absorption in front of")
-        if not self.fault:
+        if not self.place:
             for name, layer in self._surface_aovs(shade):
                 self._check(np.asarray(np.isnan(layer).any(0)), f"layer {name!r} at")
 
@@ -134,7 +134,7 @@ class FaultRecorder(PathRecorder):
 
     def _check(self, bad: Bools, what: str) -> None:
         """Note a fault where a lane (n,) of the surfaces is bad: the first one names the material."""
-        if self.fault or self._at is None or not bad.any():
+        if self.place or self._at is None or not bad.any():
             return
         scene, surface = self._at[0], self._at[1].surface
         lane = int(bad.argmax())
@@ -143,8 +143,8 @@ class FaultRecorder(PathRecorder):
         place = shape_name(self._user_scene, surface.prim[lane : lane + 1])
         self._note(f"bounce {self._bounce}, {what} material {kind} of {place}")
 
-    def _note(self, fault: str) -> None:
-        self.fault = self.fault or fault
+    def _note(self, place: str) -> None:
+        self.place = self.place or place
 
 
 def _bad(values: Floats) -> Bools:

@@ -28,7 +28,7 @@ ONLY_FULL = "only the paths of integrator='full' go on from surface to surface w
 GIVEN = "samples are given by their numbers"
 EXCLUSIONS = (
     Exclusion("reuse", "clamp", f"a clamp limits what one path finds, and {ONE_PATH}"),
-    Exclusion("reuse", "caustics", "the trial does not see the noise of paths from lights", False),
+    Exclusion("reuse", "caustics", "the tuning run does not see the noise of paths from lights", False),
     Exclusion("reuse", "branches", "paths that go on in several ways gain less from being shared", False),
     Exclusion("caustics", "filter", f"{ANY_PIXEL}, and filters draw points but cannot be evaluated at those"),
     Exclusion("caustics", "light groups", f"{ANY_PIXEL}, and layers are sums of the pixel's own paths"),
