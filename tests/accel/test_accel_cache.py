@@ -96,7 +96,6 @@ def test_what_has_moved_is_built_again(change: Callable[[wf.Scene], None], built
 
 @pytest.mark.parametrize("change", [repaint, shine], ids=lambda f: f.__name__)
 def test_what_has_not_moved_is_built_once(change: Callable[[wf.Scene], None], built: list[str]) -> None:
-    """Materials, lights and cameras do not matter."""
     used, fresh = scene(), scene()
     first = look(used)
     assert (look(used) == first).all()
@@ -105,20 +104,6 @@ def test_what_has_not_moved_is_built_once(change: Callable[[wf.Scene], None], bu
         subject.camera = wf.Camera.look_at((1, 2, 5), (0, 0, 0), fov=40, size=(8, 6))
     assert (look(used) == look(fresh)).all()
     assert len(built) == 2
-
-
-def test_each_engine_keeps_its_own(built: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Renders by two engines in turn build two accelerators; "auto" is one of them."""
-    monkeypatch.setattr(keep, "engine", lambda accel: "numpy" if accel == "auto" else accel)
-    monkeypatch.setattr(
-        keep,
-        "make_accelerator",
-        lambda geometry, accel: built.append(accel) or make_accelerator(geometry, "numpy"),
-    )
-    subject = scene()
-    for accel in ("numpy", "embree", "auto", "embree", "numpy"):
-        look(subject, accel)
-    assert built == ["numpy", "embree"]
 
 
 def test_instances_are_kept_too(built: list[str]) -> None:

@@ -161,11 +161,7 @@ def test_a_ray_along_the_axis_meets_the_ends() -> None:
 
 @pytest.mark.parametrize(
     ("shape", "expected"),
-    [
-        (wf.Capsules, [2, 1, 1.5, 3]),
-        (wf.Cylinders, [2, 1, 0.5, 4]),
-        (tubes, [2, 1, np.inf, np.inf]),
-    ],
+    [(wf.Capsules, [2, 1, 1.5, 3]), (wf.Cylinders, [2, 1, 0.5, 4]), (tubes, [2, 1, np.inf, np.inf])],
 )
 def test_from_outside_inside_and_on_it(shape: object, expected: list) -> None:
     primitives = kind(shape([(0, 0, 0)], [(0, 0, 1)], 1))
@@ -413,7 +409,6 @@ def test_what_is_wrong_is_named(make: object, message: str) -> None:
 
 @pytest.mark.parametrize("shape", [wf.Cylinders, wf.Capsules])
 def test_bounds_hold_the_shape_and_touch_it(shape: object) -> None:
-    """Those of one tilted body, against points of its surface."""
     axis, radius = np.array([0.6, 0, 0.8]), 0.5
     body = shape([(0, 0, 0)], [2 * axis], radius)
     turn = np.linspace(0, 2 * np.pi, 721)[:, None]

@@ -45,9 +45,6 @@ def trapezoids(count: int, seed: int) -> np.ndarray:
     return fan(*placed)
 
 
-# --- finding them ---------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_the_faces_of_a_box_are_found(seed: int) -> None:
     """Though its turned corners are not quite in one plane in float32."""
@@ -88,9 +85,6 @@ def test_parallelograms_are_told_from_others() -> None:
     quads[4, 1, 0] = 0.5
     found = corners(fan(*quads), np.arange(0, 10, 2))
     assert are_parallelograms(found, 2.0).tolist() == [True] * 3 + [False] * 2
-
-
-# --- rays -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("scale", "offset"), PLACES)
@@ -138,7 +132,6 @@ def room() -> Accelerator:
 
 @pytest.mark.parametrize("size", [1, 7, 64, 4096])
 def test_batches_have_the_same_bits(size: int) -> None:
-    """However many rays are tested at once."""
     check_batches(room(), size)
 
 

@@ -107,9 +107,6 @@ def test_the_package_takes_elementary_functions_from_here() -> None:
     assert found == ALLOWED
 
 
-# --- Pictures ------------------------------------------------------------------------------------
-
-
 def machine(*without: str) -> dict[str, str]:
     """Environment in which NumPy runs as on a processor without some groups of instructions."""
     present = {name for name in __cpu_dispatch__ if __cpu_features__.get(name)}

@@ -43,7 +43,6 @@ def test_there_and_back(z: np.ndarray, data) -> None:
 
 @given(strategies.unit_vectors(min_count=2), st.data())
 def test_columns_do_not_depend_on_their_neighbors(z: np.ndarray, data) -> None:
-    """The same bits for one column alone."""
     v = data.draw(strategies.vectors(z.shape[1]))
     k = data.draw(st.integers(0, z.shape[1] - 1))
     whole = Frame.from_normal(z).to_world(v)
@@ -59,5 +58,4 @@ def test_normalize(v: np.ndarray) -> None:
 
 
 def test_normalize_leaves_zero() -> None:
-    """There is no direction to give it."""
     assert (normalize(np.zeros((3, 2), f4)) == 0).all()

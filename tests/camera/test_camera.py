@@ -60,7 +60,6 @@ def test_origins_are_relative_to_the_center() -> None:
 
 
 def test_every_pixel_sees_its_own_place() -> None:
-    """A render agrees with the rays: colored quarters come out where they are."""
     colors = {(-1, 0): (1, 0, 0), (0, 0): (0, 1, 0), (-1, -1): (0, 0, 1), (0, -1): (1, 1, 0)}
     quarters = [
         wf.Rectangle((x, y, 0), (1, 0, 0), (0, 1, 0), material=wf.Diffuse(0), emission=c)
@@ -108,14 +107,10 @@ BAD = {
 
 @pytest.mark.parametrize("name", BAD)
 def test_bad_arguments_are_named(name: str) -> None:
-    """What, which element, the value and the limit."""
     change, message = BAD[name]
     arguments = {"origin": (1, 2, 3), "target": (0, 0, 0), **change}
     with pytest.raises(wf.SceneError, match=message):
         wf.Camera.look_at(**arguments)
-
-
-# --- Arguments as other programs have them ---------------------------------------------------------
 
 
 @pytest.mark.parametrize("fov", [np.pi / 4, 0.8, 1.2345, 3.1])
@@ -137,7 +132,6 @@ def test_degrees_are_taken_as_they_are(fov: float) -> None:
 
 
 def test_the_fourth_argument_is_the_field_of_view() -> None:
-    """And a number for what is up says how to pass it."""
     assert wf.Camera.look_at((0, 0, 5), (0, 0, 0), "y", 30).fov == 30
     with pytest.raises(wf.SceneError, match=r"Camera up is 30; .* A field of view is given by name: fov=40"):
         wf.Camera.look_at((0, 0, 5), (0, 0, 0), 30)

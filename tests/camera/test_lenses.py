@@ -29,9 +29,6 @@ def ray(camera: wf.Camera, x: float, y: float) -> np.ndarray:
     return rays(camera, x, y)[1][0]
 
 
-# --- Matrices and intrinsics ---------------------------------------------------------------------
-
-
 def test_centred_intrinsics_are_a_plain_camera() -> None:
     """fx = fy, the principal point in the middle, and y down: the same picture as look_at."""
     f = 120 / np.tan(np.radians(25))
@@ -73,9 +70,6 @@ def test_rounded_matrices_are_rotations() -> None:
     assert camera.rotation == pytest.approx(TURN, abs=1e-5)
 
 
-# --- Shift, orthographic, panorama -----------------------------------------------------------------
-
-
 def test_shift_moves_the_view_without_turning_it() -> None:
     """By a quarter of the width to the right, and half of the height up."""
     plain = wf.Camera.look_at((0, 0, 5), (0, 0, 0), fov=50, size=(40, 20))
@@ -85,7 +79,6 @@ def test_shift_moves_the_view_without_turning_it() -> None:
 
 
 def test_orthographic_rays_are_parallel() -> None:
-    """A picture 3 high and 6 wide."""
     camera = wf.Camera.orthographic((1, 2, 3), (1, 2, -7), height=3, size=(40, 20))
     origin, direction = rays(camera, [0, 40, 20], [0, 20, 10])
     assert origin == pytest.approx(np.array([[-2, 3.5, 3], [4, 0.5, 3], [1, 2, 3]]))
@@ -133,9 +126,6 @@ def test_directions_are_unit(x: float, y: float, kind: str) -> None:
     }
     direction = cameras[kind].rays(np.array([x], f4), np.array([y], f4), ORIGIN, np.full((2, 1), 0.3, f4))[1]
     assert length(direction) == pytest.approx(1, abs=1e-6)
-
-
-# --- Thin lens -------------------------------------------------------------------------------------
 
 
 def test_rays_of_one_film_point_meet_in_the_plane_of_focus() -> None:
@@ -195,15 +185,12 @@ def test_sharp_only_in_focus() -> None:
 
 
 def test_a_pinhole_needs_no_lens() -> None:
-    """Without an aperture numbers for the lens change nothing."""
     camera = wf.Camera.look_at((0, 0, 5), (0, 0, 0))
     assert not camera.uses_lens
     with_numbers = rays(camera, 3, 4, [[0.1], [0.9]])
     for ours, theirs in zip(with_numbers, rays(camera, 3, 4), strict=True):
         assert ours.tolist() == theirs.tolist()
 
-
-# --- Crop windows ----------------------------------------------------------------------------------
 
 CROPPED = {
     "pinhole": lambda **crop: wf.Camera.look_at((1, 1, 3), (0, 0, 0), size=(23, 17), **crop),
@@ -224,7 +211,6 @@ CROPPED = {
 @pytest.mark.parametrize("kind", CROPPED)
 @pytest.mark.parametrize("sampler", ["sobol", "independent"])
 def test_a_window_is_cut_from_the_picture(kind: str, sampler: str) -> None:
-    """Bit for bit, whatever the wave size."""
     shapes = [wf.Sphere((0, 0, 0), 1), wf.Rectangle((-3, -1, 3), (6, 0, 0), (0, 0, -6))]
     options = {"sampler": sampler, "max_bounces": 3, "progress": False}
 
@@ -256,8 +242,6 @@ def test_window_addresses() -> None:
     assert paths.pixel.tolist() == expected.tolist()
     assert paths.pixel.dtype == np.uint32
 
-
-# --- Errors ----------------------------------------------------------------------------------------
 
 MATRIX = np.eye(4).tolist()
 
@@ -315,7 +299,6 @@ BAD = [
 
 @pytest.mark.parametrize(("make", "message"), BAD)
 def test_bad_arguments_are_named(make, message: str) -> None:
-    """What, which element, the value and the limit."""
     with pytest.raises(wf.SceneError, match=message):
         make()
 

@@ -81,7 +81,6 @@ def test_a_panorama_sees_all_but_its_own_place() -> None:
 
 
 def test_pixels_have_their_centers_at_a_half() -> None:
-    """A small bright ball lights the pixel that it is projected into."""
     camera = wf.Camera.from_intrinsics(
         [[40, 3, 15.5], [0, 45, 12], [0, 0, 1]], np.eye(3), (0, 0, 3), (32, 24), distortion=LENSES["wide"]
     )
@@ -162,7 +161,6 @@ def test_extrinsics_are_taken_in_one_matrix() -> None:
 
 @pytest.mark.parametrize("name", LENSES)
 def test_distortion_is_undone(name: str) -> None:
-    """To a billionth of a focal length, at every point of the picture."""
     lens = Distortion(LENSES[name])
     x, y = np.stack(np.meshgrid(np.linspace(-0.5, 0.5, 101), np.linspace(-0.4, 0.4, 81))).reshape(2, -1)
     back = lens.apply(*lens.undo(x, y))
@@ -177,7 +175,6 @@ def test_distortion_is_undone(name: str) -> None:
     st.floats(0.2, 1.5),
 )
 def test_a_lens_is_refused_or_undone_everywhere(numbers: tuple, half: float) -> None:
-    """Between the points of the check, too."""
     lens = Distortion(numbers)
     grid = np.stack(np.meshgrid(np.linspace(-half, half, 65), np.linspace(-half, half, 65))).reshape(2, -1)
     try:
@@ -192,7 +189,6 @@ def test_a_lens_is_refused_or_undone_everywhere(numbers: tuple, half: float) -> 
 
 
 def test_undoing_does_not_depend_on_neighbors() -> None:
-    """The same bits alone as among others."""
     lens = Distortion(LENSES["wide"])
     x, y = np.random.default_rng(0).uniform(-0.5, 0.5, (2, 100))
     whole = np.stack(lens.undo(x, y))

@@ -124,7 +124,6 @@ def test_version_and_help(capsys):
 
 
 def test_a_scene_without_light_is_lit_without_a_warning(tmp_path, fast, capsys):
-    """The picture is that of `render`; `info` says what is added."""
     path = str(tmp_path / "dark.obj")
     (tmp_path / "dark.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     output, options = fast
@@ -159,9 +158,6 @@ def test_lighting_and_ground_are_handed_on(tmp_path, fast, capsys):
     with pytest.raises(SystemExit):
         main(["render", str(path), *options, "--lighting", "sunny"])
     assert "lighting is 'sunny'; it must be auto, None or one of studio," in capsys.readouterr().err
-
-
-# --- Cameras ---------------------------------------------------------------------------------------
 
 
 def test_camera_options_place_the_camera(obj, fast):
@@ -223,9 +219,6 @@ def test_up_and_direction_frame_a_scene(obj, fast, up):
     )
     expected = wf.render(scene, int(options[options.index("--spp") + 1]), progress=False)
     np.testing.assert_array_equal(np.load(output), expected.rgb)
-
-
-# --- Output ----------------------------------------------------------------------------------------
 
 
 def test_gamma_and_exposure_reach_the_file(obj, tmp_path):
@@ -356,7 +349,6 @@ def test_ctrl_c_while_loading_gives_130(obj, fast, monkeypatch):
 )
 @pytest.mark.parametrize("begun", [True, False])
 def test_a_render_that_stops_is_saved(obj, fast, monkeypatch, capsys, error, status, message, begun):
-    """As far as it got; the exit status tells."""
     output, options = fast
     render = render_command.render_by_command
 
@@ -367,9 +359,6 @@ def test_a_render_that_stops_is_saved(obj, fast, monkeypatch, capsys, error, sta
     assert main(["render", obj, *options]) == status
     assert message in capsys.readouterr().err
     assert output.exists() == begun
-
-
-# --- Pictures that cannot be saved where they should be ----------------------------------------------
 
 
 def saved_instead(capsys):
@@ -469,7 +458,6 @@ def test_sigterm_ends_the_program_and_leaves_nothing(obj, fast):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="names of any bytes")
 def test_names_that_cannot_be_printed_are_no_error(obj, tmp_path):
-    """Such as those in another encoding than the terminal's."""
     output = os.fsencode(tmp_path) + b"/\xff\xe5.npy"
     command = [sys.executable, "-m", "wavefront", "render", obj, "-o", output]
     environment = {**os.environ, "PYTHONIOENCODING": "ascii:strict"}

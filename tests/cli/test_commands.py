@@ -15,12 +15,7 @@ import pytest
 
 import wavefront as wf
 from wavefront import cli
-from wavefront.cli import (
-    command_line,
-    doctor_command,
-    render_command,
-    view_commands,
-)
+from wavefront.cli import command_line, doctor_command, render_command, view_commands
 from wavefront.cli.doctor_command import EXTRAS
 from wavefront.cli.options import joined
 
@@ -66,12 +61,8 @@ def mesh(tmp_path: Path) -> Path:
     return path
 
 
-# --- Help -----------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", commands())
 def test_help_has_examples_that_are_valid(name: str) -> None:
-    """The document describes the command as well."""
     examples = commands()[name].epilog.removeprefix("examples:\n").splitlines()
     assert examples
     for example in examples:
@@ -87,9 +78,6 @@ def test_help_and_the_document_name_the_exit_codes(run) -> None:
     for code in ("0", "1", "2", "129", "130", "143"):
         assert re.search(rf"\b{code}\b", " ".join(done.stdout.split()).split("Exit status:")[1])
         assert f"\n| {code} |" in DOCUMENT
-
-
-# --- Errors ---------------------------------------------------------------------------------------
 
 
 def check_error(status: int, out: str, err: str, message: str) -> None:
@@ -146,11 +134,7 @@ def test_how_renders_fail_in_any_command(mesh, monkeypatch, capsys, error, statu
     assert capsys.readouterr().err == f"wavefront: {text}\n"
 
 
-# --- Several scenes -------------------------------------------------------------------------------
-
-
 def test_several_scenes_are_rendered_into_a_folder(mesh: Path, run) -> None:
-    """It is made; each picture is that of the scene alone."""
     other = shutil.copy(mesh, mesh.with_name("other.obj"))
     done = run("render", mesh.name, "other.obj", "-o", "out/", *FAST, cwd=mesh.parent)
     assert (done.returncode, done.stderr) == (0, "")
@@ -191,7 +175,6 @@ def test_where_several_pictures_cannot_go(scenes, options, message, tmp_path, mo
 
 
 def test_a_scene_is_shown_with_the_options_of_a_render(mesh: Path, monkeypatch, capsys) -> None:
-    """In place of a picture; what the viewer does not take is refused."""
     shown = []
     monkeypatch.setattr(
         render_command, "view", lambda scene, **settings: shown.append((settings["camera"], settings))
@@ -209,9 +192,6 @@ def test_a_scene_is_shown_with_the_options_of_a_render(mesh: Path, monkeypatch, 
     assert cli.main([*words[:1], str(mesh), *words[2:], "--checkpoint", str(mesh.with_name("a.wfck"))]) == 2
     assert "--show is for one scene" in (err := capsys.readouterr().err)
     assert "checkpoint" in err
-
-
-# --- Other commands -------------------------------------------------------------------------------
 
 
 def test_info_names_sizes_textures_and_warnings(mesh: Path, run, capsys) -> None:
@@ -277,9 +257,6 @@ def test_completion_says_what_it_needs(monkeypatch, capsys) -> None:
     monkeypatch.setattr(command_line, "find_spec", lambda name: None)
     assert cli.main(["completion", "bash"]) == 2
     assert capsys.readouterr().err == "wavefront: error: completion needs pip install shtab\n"
-
-
-# --- Doctor ---------------------------------------------------------------------------------------
 
 
 def test_doctor_says_what_is_there_and_tests_it(run) -> None:

@@ -29,9 +29,6 @@ def image():
     return wf.Image(rgb)
 
 
-# --- Tone curves -------------------------------------------------------------------------------------
-
-
 def gray(values):
     return np.repeat(np.asarray(values, np.float64)[..., None], 3, axis=-1)
 
@@ -88,9 +85,6 @@ def test_agx_by_hand():
     assert AGX_IN.sum(1) == pytest.approx(1, abs=2e-4)
 
 
-# --- White balance -----------------------------------------------------------------------------------
-
-
 def test_a_gray_thing_becomes_gray_of_the_same_luminance():
     color = np.array([0.5, 0.4, 0.2])
     shown = white_balance_matrix(color) @ color
@@ -142,9 +136,6 @@ def test_kelvin():
 def test_wrong_whites_are_named(image, white, message):
     with pytest.raises(wf.SceneError, match=message):
         image.to_uint8(white_balance=white)
-
-
-# --- One set of settings -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("settings", SETTINGS)

@@ -234,7 +234,6 @@ def test_a_pipe_is_not_replaced(tmp_path, picture):
     ],
 )
 def test_names_that_cannot_be(tmp_path, picture, name, message):
-    """Are found before the render, and no untyped error comes of them afterwards."""
     (tmp_path / "loop.png").symlink_to(tmp_path / "loop.png")
     (tmp_path / "file").write_text("")
     path = f"{tmp_path}/{name}"
@@ -442,7 +441,6 @@ def test_hdr_range():
 
 @pytest.mark.parametrize(("bits", "kind", "channels"), [(8, 0, 1), (8, 2, 3), (16, 6, 4), (1, 0, 1)])
 def test_a_png_with_too_few_rows_is_an_error(tmp_path, bits, kind, channels):
-    """And not a picture that is black below."""
     width, height = 13, 24
     row = b"\0" + bytes(range(1, 1 + (width * bits * channels + 7) // 8))
     path = tmp_path / "a.png"
@@ -456,7 +454,6 @@ def test_a_png_with_too_few_rows_is_an_error(tmp_path, bits, kind, channels):
 
 @pytest.mark.parametrize(("width", "height"), [(8, 8), (13, 5), (1, 1), (3, 9)])
 def test_the_passes_of_an_interlaced_png_are_counted(tmp_path, width, height):
-    """One byte less than there must be is an error."""
     steps = [(0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2)]
     size = sum(
         len(range(y, height, dy)) * (1 + len(range(x, width, dx))) if x < width else 0

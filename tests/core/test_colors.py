@@ -107,7 +107,6 @@ def maps(monkeypatch: pytest.MonkeyPatch) -> Map:
 
 
 def test_colors_of_a_colormap_give_a_hint(maps: Map) -> None:
-    """Float colors that are its entries, with opacity or without."""
     colors = maps(np.array([0, 1, 2, 1]))
     for given in (colors, colors[:, :3], colors.astype(np.float32)):
         with pytest.warns(UserWarning, match=r"matplotlib's colormap 'three', which are sRGB.*wf\.srgb"):
@@ -140,7 +139,6 @@ def test_materials_by_name(name: str) -> None:
 
 
 def test_named_materials_take_a_color() -> None:
-    """Those that have none of their own."""
     assert wf.Material.named("plastic", "#f80").bsdf.base_color.ravel() == pytest.approx(ORANGE)  # type: ignore[attr-defined]
     assert wf.Material.named("frosted_glass").bsdf.roughness == pytest.approx(0.3)  # type: ignore[attr-defined]
     for made, message in (
@@ -166,7 +164,6 @@ def test_named_dielectrics() -> None:
 def test_the_command_line_takes_materials_and_colors(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """In place of the file's material; a color alone is matte."""
     file, out = tmp_path / "a.off", tmp_path / "a.npz"
     file.write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
     common = ["render", str(file), "-o", str(out), "--spp", "1", "--size", "16x16", "--quiet"]

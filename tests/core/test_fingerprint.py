@@ -64,12 +64,10 @@ def of_source(source: str, name: str = "f") -> str:
     ],
 )
 def test_what_differs_has_another_fingerprint(a: Any, b: Any) -> None:
-    """Values, types, shapes, what functions hold, parameters."""
     assert of(a) != of(b)
 
 
 def test_what_is_alike_has_the_same_fingerprint() -> None:
-    """Whether parts are shared or copies, and in any order of keys."""
     array = np.arange(5)
     assert of([array, array]) == of([array.copy(), array.copy()])
     assert of({"a": 1, "b": 2}) == of({"b": 2, "a": 1})
@@ -100,8 +98,6 @@ def test_classes_are_known_by_their_methods_and_bases() -> None:
 
 
 def test_values_that_are_kept_from_calls_do_not_count() -> None:
-    """A function with a cache is the same function after a call."""
-
     @lru_cache
     def square(x: int) -> int:
         return x * x
@@ -113,7 +109,6 @@ def test_values_that_are_kept_from_calls_do_not_count() -> None:
 
 @pytest.mark.parametrize("part", ["lock", "file", "generator"])
 def test_what_cannot_be_compared_is_refused(part: str, tmp_path: Path) -> None:
-    """The message names the place and the reason."""
     texture = Stripes()
     with open(tmp_path / "file", "w") as file:
         texture.extra = {"lock": threading.Lock(), "file": file, "generator": (x for x in "ab")}[part]  # type: ignore[attr-defined]

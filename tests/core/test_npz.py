@@ -47,7 +47,6 @@ def read_all(path: Path) -> dict[str, np.ndarray]:
 
 
 def test_arrays_are_read_into_their_places(tmp_path: Path) -> None:
-    """Where these have the shape and the type."""
     (tmp_path / "a").write_bytes(packed())
     for name, array in read_all(tmp_path / "a").items():
         np.testing.assert_array_equal(array, ARRAYS[name])

@@ -15,10 +15,7 @@ MATERIALS = {  # a material, and for each of its parameters a new value
     "Diffuse": (wf.Diffuse(0.8), {"reflectance": (0.1, 0.2, 0.3)}),
     "Mirror": (wf.Mirror(), {"reflectance": 0.25}),
     "Conductor": (wf.Conductor.named("gold"), {"eta": 2.0, "k": (1, 2, 3), **ROUGH}),
-    "Dielectric": (
-        wf.Dielectric(),
-        {"ior": 1.3, **ROUGH, "reflectance": 0.5, "transmittance": 0.6},
-    ),
+    "Dielectric": (wf.Dielectric(), {"ior": 1.3, **ROUGH, "reflectance": 0.5, "transmittance": 0.6}),
     "ThinDielectric": (wf.ThinDielectric(), {"ior": 1.3, **ROUGH, "reflectance": 0.5, "transmittance": 0.6}),
     "OrenNayar": (wf.OrenNayar(), {"reflectance": 0.7, "sigma": 0.1}),
     "Mix": (
@@ -113,7 +110,6 @@ def test_wrong_values_are_refused_and_change_nothing(thing, name: str, value, me
 
 
 def test_lights_change_as_they_are_assigned() -> None:
-    """An environment turns into another one, and back from an image."""
     sky = wf.Environment(0.5)
     first = seen(None, sky)
     sky.radiance = np.random.default_rng(0).random((4, 8, 3))
@@ -188,7 +184,6 @@ def test_an_own_material_is_shown() -> None:
 
 
 def test_a_large_array_is_shown_by_its_shape() -> None:
-    """Such as in the table of lights of a notebook."""
     lights = wf.PointLights(np.zeros((1000, 3)), np.ones(3))
     assert repr(lights) == "PointLights(positions=<array (1000, 3)>, intensities=(1, 1, 1))"
 
@@ -198,9 +193,6 @@ BYTES = np.full((4, 4), 200, np.uint8)
 
 def floats(value: float, **options) -> wf.Texture:
     return wf.Texture(np.full((4, 4, 3), float(value)), **options)
-
-
-# --- Textures -------------------------------------------------------------------------------------
 
 
 RANGE = r"; it must be in \[0, 1\]"
@@ -288,7 +280,6 @@ def test_arrays_of_shapes_are_converted_when_they_are_assigned() -> None:
     ],
 )
 def test_wrong_values_are_refused_when_they_are_assigned(name, value, message) -> None:
-    """And the shape keeps what it had."""
     mesh = wf.Mesh(np.eye(3), [[0, 1, 2]])
     shapes = [wf.Sphere((0, 0, 0), 1, name="ball"), mesh, wf.Instance(mesh, np.eye(4))]
     shape = next(shape for shape in shapes if name in vars(shape))

@@ -29,7 +29,6 @@ def wait_for(text: str, capsys) -> None:
 
 @pytest.mark.parametrize("progress", [None, True])
 def test_a_bar_appears_after_a_while(progress, monkeypatch, capsys) -> None:
-    """It knows of what was done before, and since when."""
     monkeypatch.setattr("tqdm.std.time", lambda: 1000.0)
     with Bar(progress, 1000, None) as bar:
         bar.advance(100, DELAY)
@@ -103,18 +102,6 @@ def test_a_long_phase_shows_its_title(progress, monkeypatch, capsys) -> None:
     assert threading.active_count() <= before + 1
 
 
-def test_a_long_phase_is_shown_when_it_fails(monkeypatch, capsys) -> None:
-    monkeypatch.setattr(module, "DELAY", 0.001)
-
-    def fail() -> None:
-        with phase("loading a.glb"):
-            wait_for("loading a.glb", capsys)
-            raise ValueError("bad")
-
-    with pytest.raises(ValueError, match="bad"):
-        fail()
-
-
 def test_short_phases_and_silent_ones_show_nothing(monkeypatch, capsys) -> None:
     """A function is not called either: it counts samples."""
     calls: list = []
@@ -133,7 +120,6 @@ def test_short_phases_and_silent_ones_show_nothing(monkeypatch, capsys) -> None:
 @pytest.mark.parametrize("load", [load, load_mesh])
 @pytest.mark.parametrize("progress", [None, False])
 def test_loading_is_a_phase(load, progress, tmp_path, monkeypatch, capsys) -> None:
-    """Only its name is shown, not the folder."""
     monkeypatch.setattr(module, "DELAY", 0.001)
     monkeypatch.setattr("tqdm.std.time", lambda: 1000.0)
     monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: 1000.0))
@@ -156,7 +142,6 @@ def test_loading_is_a_phase(load, progress, tmp_path, monkeypatch, capsys) -> No
 
 
 def test_building_a_scene_shows_a_line(monkeypatch, capsys) -> None:
-    """Where it takes long, and is not asked to be quiet."""
     compile_scene = prepared_scene.compile_scene
 
     def shown(*given, **options):

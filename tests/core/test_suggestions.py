@@ -41,7 +41,6 @@ KEYWORDS = [
     ("call", "function", "name", "known"), KEYWORDS, ids=[f"{k[1]}-{k[2]}" for k in KEYWORDS]
 )
 def test_unknown_keywords(call, function: str, name: str, known: str | None) -> None:
-    """A TypeError, as Python raises, that says more."""
     with pytest.raises(TypeError) as caught:
         call()
     hint = "" if known is None else f"; did you mean {known!r}?"
@@ -77,8 +76,6 @@ def test_attributes_of_materials_are_told_on_bsdfs(name: str) -> None:
 
 
 def test_a_bsdf_may_have_a_parameter_of_such_a_name() -> None:
-    """Of a user's own class: then it is one like any other."""
-
     class Waxed(wf.Diffuse):
         @suggests_keywords
         def __init__(self, alpha: float) -> None:
@@ -99,7 +96,6 @@ def test_errors_from_within_stay_as_they_are() -> None:
 
 
 def test_signatures_are_kept() -> None:
-    """For editors, documents and subclasses; classes can still be pickled."""
     assert list(inspect.signature(wf.Diffuse).parameters) == ["reflectance"]
     assert list(inspect.signature(wf.render).parameters)[:4] == ["scene", "spp", "camera", "size"]
     assert wf.render.__doc__.startswith("Render a picture.")
@@ -135,7 +131,6 @@ def test_metals_in_any_case(name: str) -> None:
 
 
 def test_metals() -> None:
-    """Both spellings of aluminum; a misspelled name is answered, and all are listed."""
     assert np.array_equal(wf.Conductor.named("Aluminum").k, wf.Conductor.named("aluminium").k)
     with pytest.raises(wf.SceneError, match=r"must be one of aluminum, .*titanium; did you mean 'silver'\?"):
         wf.Conductor.named("Silvr")

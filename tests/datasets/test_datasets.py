@@ -85,9 +85,6 @@ def seen_points(folder: Path, number: int) -> tuple[np.ndarray, np.ndarray]:
     return np.column_stack([points, np.ones(len(points))]), np.stack([column, row], 1)
 
 
-# --- All formats ----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("number", range(3))
 def test_every_matrix_projects_points_onto_their_pixels(folder: Path, number: int) -> None:
     """To 0.01 pixel: OpenCV's and OpenGL's, of cameras with any principal point, and of windows."""
@@ -128,9 +125,6 @@ def test_the_distortion_is_opencvs(tmp_path: Path) -> None:
     assert loaded(tmp_path / "cameras.json")["000000"]["opencv"]["distortion"][:4] == list(lens)
 
 
-# --- COCO -----------------------------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def coco(folder: Path) -> COCO:
     return COCO(folder / "annotations.json")
@@ -158,7 +152,6 @@ def test_coco_is_read_by_its_own_reader(folder: Path, coco: COCO) -> None:
 
 
 def test_boxes_and_run_lengths_of_a_mask() -> None:
-    """Run lengths go down the columns, and begin outside."""
     mask = np.array([[1, 0], [1, 0], [0, 1]], bool)
     assert mask_box(mask) == [0, 0, 2, 3]
     assert mask_box(mask[2:]) == [1, 0, 1, 1]
@@ -168,8 +161,6 @@ def test_boxes_and_run_lengths_of_a_mask() -> None:
     assert run_lengths(np.zeros((2, 2), bool)) == [4]
     assert run_lengths(np.ones((2, 2), bool)) == [0, 4]
 
-
-# --- BOP ------------------------------------------------------------------------------------------
 
 CAMERA_KEYS = {"cam_K": 9, "cam_R_w2c": 9, "cam_t_w2c": 3}
 POSE_KEYS = {"cam_R_m2c": 9, "cam_t_m2c": 3}
@@ -295,7 +286,6 @@ def test_models_keep_normals_and_colors(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["cloud", "sphere", "line", "one"])
 def test_diameters_are_those_of_all_pairs(kind: str) -> None:
-    """As a search without blocks finds them."""
     random = np.random.default_rng(3)
     points = {
         "cloud": random.random((700, 3)) * (1, 2, 3),
@@ -336,9 +326,6 @@ def test_the_depth_scale_suits_the_picture_or_is_refused(tmp_path: Path) -> None
     assert np.nanmax(depth) * 1000 == pytest.approx(65535 * camera["depth_scale"], rel=1e-6)
     with pytest.raises(wf.SceneError, match=r"depth_scale is 0.5 mm; the picture is .* it must be at least"):
         wf.write_dataset(tmp_path / "b", scene(), [far], 1, format="bop", depth_scale=0.5, progress=False)
-
-
-# --- Going on -------------------------------------------------------------------------------------
 
 
 def contents(folder: Path) -> dict[str, bytes]:

@@ -191,9 +191,6 @@ def test_to_uint8_is_what_save_writes(tmp_path, image, gamma):
         image.to_uint8(exposure=1000)
 
 
-# --- Differences and multiples ---------------------------------------------------------------------
-
-
 def picture(seed, **more) -> wf.Image:
     rng = np.random.default_rng(seed)
     rgb, error = rng.random((2, 3, 5, 3)).astype(np.float32)
@@ -220,7 +217,6 @@ def test_difference_of_renders_is_noise() -> None:
 
 
 def test_multiple() -> None:
-    """Scales errors and radiance, and nothing else."""
     ones = np.ones((3, 5, 3), np.float32)
     layers = {"direct": ones, "albedo": ones, "light_groups.lamp": ones, "depth": ones[..., 0]}
     errors = {"direct": ones, "albedo": ones, "light_groups.lamp": ones}

@@ -585,7 +585,6 @@ def test_a_full_disk_leaves_the_old_file(tmp_path, extension):
 @posix
 @pytest.mark.parametrize(("extension", "pause"), [("exr", 0.07), ("npz", 0.15)])
 def test_a_killed_process_leaves_a_whole_file(tmp_path, extension, pause):
-    """Killed at some moment while it saves again and again."""
     path = tmp_path / f"a.{extension}"
     script = FOREVER.format(folder=os.path.dirname(__file__))
     with subprocess.Popen([sys.executable, "-c", script, path], stdout=subprocess.PIPE) as process:

@@ -101,7 +101,6 @@ def test_complaints(a, b, message: str) -> None:
 
 
 def test_command(tmp_path, capsys) -> None:
-    """Prints the table and writes the difference."""
     paths = [str(tmp_path / f"{name}.exr") for name in "ab"]
     for path, picture in zip(paths, (A, B), strict=True):
         write_image(path, picture.astype(np.float32))

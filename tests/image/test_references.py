@@ -28,12 +28,7 @@ def test_a_kept_picture_is_found_again(tmp_path: Path, monkeypatch: pytest.Monke
 
 @pytest.mark.parametrize(
     "other",
-    [
-        {"size": (5, 4)},
-        {"spp": 24},
-        {"side": "wavefront numpy independent"},
-        {"max_bounces": 2},
-    ],
+    [{"size": (5, 4)}, {"spp": 24}, {"side": "wavefront numpy independent"}, {"max_bounces": 2}],
     ids=str,
 )
 def test_a_picture_of_something_else_is_not(other: dict, tmp_path: Path) -> None:

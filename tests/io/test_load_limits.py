@@ -52,7 +52,6 @@ def test_a_texture_is_found_in_a_search_path(scene: Path) -> None:
 
 
 def test_the_scene_s_own_folder_comes_first(scene: Path) -> None:
-    """And then the search paths, in their order."""
     shared, third = scene.parents[1] / "shared", scene.parents[1] / "third"
     third.mkdir()
     (third / "t.png").write_bytes(b"x")
@@ -66,7 +65,6 @@ def test_the_scene_s_own_folder_comes_first(scene: Path) -> None:
 
 
 def test_a_library_in_a_search_path_may_refer_to_images_beside_it(scene: Path) -> None:
-    """Its own folder counts first for it."""
     shared = scene.parents[1] / "shared"
     scene.with_name("s.mtl").rename(shared / "s.mtl")
     (mesh,) = load_meshes(scene, search_paths=shared, strict=True)
@@ -74,7 +72,6 @@ def test_a_library_in_a_search_path_may_refer_to_images_beside_it(scene: Path) -
 
 
 def test_a_library_below_may_refer_to_images_of_the_scene(scene: Path) -> None:
-    """The root is the folder of the scene file."""
     folder = scene.with_name("materials")
     folder.mkdir()
     scene.with_name("s.mtl").unlink()
@@ -104,7 +101,6 @@ def test_a_library_below_may_refer_to_images_of_the_scene(scene: Path) -> None:
     ],
 )
 def test_references_that_are_not_followed(scene: Path, name: str, message: str) -> None:
-    """The error names the file that refers, and the reference."""
     for paths in ((), (scene.parents[1] / "third",)):
         for each in paths:
             each.mkdir()
@@ -287,7 +283,6 @@ def test_images_of_a_scene_share_its_budget_and_are_read_once(
 
 
 def test_the_number_of_meshes_is_limited(tmp_path: Path) -> None:
-    """Of materials of an OBJ file, and of primitives of glTF."""
     path = tmp_path / "a.obj"
     library = "".join(f"newmtl m{i}\n" for i in range(5))
     (tmp_path / "s.mtl").write_text(library)
@@ -303,8 +298,6 @@ def test_the_number_of_meshes_is_limited(tmp_path: Path) -> None:
 def test_where_memory_runs_out_the_file_and_its_size_are_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In place of a bare MemoryError, wherever it is raised."""
-
     def full(*_: Any, **__: Any) -> None:
         raise MemoryError("Unable to allocate 9 GiB")
 

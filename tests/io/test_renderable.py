@@ -19,7 +19,6 @@ def obj(tmp_path):
 
 
 def test_a_size_and_a_camera_may_be_given() -> None:
-    """The size goes before the camera's; the scene keeps its own."""
     own, other = (wf.Camera.look_at((0, 0, z), (0, 0, 0), size=(8, 6)) for z in (4, 9))
     scene = wf.Scene(wf.Sphere((0, 0, 0), 1), LIGHT, own)
     assert render(scene, 1, size=(5, 3)).rgb.shape == (3, 5, 3)
@@ -68,9 +67,6 @@ def test_a_material_must_be_one() -> None:
         render(TRIANGLE, 1, material=3)
 
 
-# --- What is up -----------------------------------------------------------------------------------
-
-
 def tower() -> wf.Mesh:
     """A column along z, as a CAD program has it."""
     box = trimesh.creation.box((0.4, 0.6, 3))
@@ -106,7 +102,6 @@ def test_any_direction_is_up(up) -> None:
 
 @pytest.mark.parametrize("direction", [(1, 0, 0), (-2, 1, 0.5), (0, 1, 0), (0, -3, 0)])
 def test_a_scene_is_framed_from_any_direction(direction) -> None:
-    """Along the axis that is up, too."""
     scene = wf.Scene([tower(), wf.Sphere((3, 0, 0), 0.5)])
     camera = scene.framing_camera(direction=direction, size=(40, 20))
     assert camera.rotation[:, 2] == pytest.approx(np.array(direction) / np.linalg.norm(direction))
@@ -137,9 +132,6 @@ def test_up_does_not_turn_a_camera_that_is_given() -> None:
     assert (turned_light != light).any()
 
 
-# --- Scenes that grow -----------------------------------------------------------------------------
-
-
 def test_scenes_take_objects_of_trimesh() -> None:
     """Alone, in a list, appended and assigned; a scene of trimesh brings all of its meshes."""
     box, ball = trimesh.creation.box(), trimesh.creation.icosphere(1)
@@ -157,7 +149,6 @@ def test_scenes_take_objects_of_trimesh() -> None:
 
 
 def test_add() -> None:
-    """Shapes and lights, in a chain; what is neither changes nothing."""
     scene = wf.Scene(wf.Sphere((0, 0, 0), 1))
     assert scene.add(trimesh.creation.box(), wf.Environment()).add(wf.PointLight((0, 0, 3), 1)) is scene
     assert (len(scene.shapes), len(scene.lights)) == (2, 2)
@@ -187,7 +178,6 @@ def test_add() -> None:
     ],
 )
 def test_changes_of_a_scene_are_checked(change, message) -> None:
-    """At once, or when it is rendered."""
     scene = wf.Scene(wf.Sphere((0, 0, 0), 1), [wf.Environment()])
     with pytest.raises(wf.SceneError, match=message):
         change(scene)

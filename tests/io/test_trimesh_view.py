@@ -29,9 +29,6 @@ def white(intensity, **options):
     return {"color": [255, 255, 255, 255], "intensity": intensity, "name": "l", **options}
 
 
-# ---- cameras --------------------------------------------------------------------------------------
-
-
 def test_the_resolution_is_the_size_of_the_picture(held):
     held.camera = cameras.Camera(resolution=(320, 240), fov=(60, 45))
     held.camera_transform = translation_matrix((0, 0, 5))
@@ -70,9 +67,6 @@ def test_a_wrong_camera_is_named(held):
     held.camera_transform = np.eye(4)
     with pytest.raises(wf.SceneError, match=r"trimesh object: its camera: size is \(100000, 240\)"):
         from_trimesh(held)
-
-
-# ---- lights ---------------------------------------------------------------------------------------
 
 
 def test_point_lights(held):
@@ -155,7 +149,6 @@ def test_wrong_lights_are_named(held, light, message):
 
 
 def test_a_lit_scene_needs_no_warning(held):
-    """The light of the scene shines in the picture."""
     light = lighting.PointLight(**white(100))
     place(held, light, translation_matrix((0, 0, 5)))
     held.camera = cameras.Camera(resolution=(4, 4), fov=(10, 10))

@@ -22,7 +22,6 @@ def mesh(**options) -> wf.Mesh:
 
 
 def test_colors_are_shown_without_a_material() -> None:
-    """As by `VertexColors`; colors that come later are shown too."""
     linear = np.random.default_rng(1).random((len(BALL.vertices), 3))
     shown = picture(mesh(colors=linear, material=wf.Diffuse(wf.VertexColors())))
     assert picture(mesh(colors=linear)) == shown

@@ -98,7 +98,6 @@ def test_a_backdrop_is_what_the_camera_sees_of_an_environment(integrator: str) -
 
 
 def test_a_backdrop_may_be_an_image_and_hides_no_sun() -> None:
-    """It turns with the light, and a background replaces it, too."""
     rows = np.linspace(1, 0, 8)[:, None, None] * np.ones((8, 16, 3))
     sun = wf.DirectionalLight((0, -1, -1), 2, angle=20)
     turn = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]

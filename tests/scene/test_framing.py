@@ -109,16 +109,12 @@ def test_size_does_not_matter(factor: float) -> None:
 
 
 def test_many_instances_are_framed_by_boxes(monkeypatch) -> None:
-    """Nothing is cut, though all of it is a little smaller."""
     monkeypatch.setattr("wavefront.shapes.instance.MOST_HULL", 10)
     instances = shapes()["placed"]
     camera = wf.Scene(instances).framing_camera()
     low, high = reach(camera, np.concatenate([each.to_mesh().vertices for each in instances]))
     assert low.min() > 0.07
     assert high.max() < 0.93
-
-
-# --- Views ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -134,7 +130,6 @@ def test_many_instances_are_framed_by_boxes(monkeypatch) -> None:
     ],
 )
 def test_views_have_names(view: str, y_up: tuple, z_up: tuple) -> None:
-    """By what is up; pictures are those of the same direction."""
     scene = wf.Scene(box(1, 2, 3))
     for up, direction in (("y", y_up), ("z", z_up)):
         expected = np.array(direction) / np.linalg.norm(direction)
@@ -168,7 +163,6 @@ def test_bad_views_are_errors(settings: dict, message: str) -> None:
 
 
 def test_a_view_counts_more_than_the_camera_of_the_scene() -> None:
-    """A field of view alone does not."""
     own = wf.Camera.look_at((0, 0, 30), (0, 0, 0), size=(12, 10))
     scene = wf.Scene(box(1, 2, 3), wf.Environment(1), own)
     bare = wf.Scene(box(1, 2, 3), wf.Environment(1))
@@ -191,16 +185,12 @@ def test_a_session_frames_again() -> None:
 @pytest.mark.parametrize("up", ["y", "z"])
 @pytest.mark.parametrize("name", ["tower", "beam", "balls", "placed"])
 def test_a_turntable_cuts_nothing(name: str, up: str) -> None:
-    """And fills the picture in some view."""
     scene = wf.Scene(shapes()[name])
     found = [covered(scene, each) for each in wf.turntable(scene, 12, size=(96, 72), up=up)]
     there = np.any(found, 0)
     assert not np.concatenate([there[0], there[-1], there[:, 0], there[:, -1]]).any()
     spans = [np.ptp(np.flatnonzero(each.any(axis))) / (96, 72)[axis] for each in found for axis in (0, 1)]
     assert 0.65 < max(spans) < 0.9
-
-
-# --- What is up -----------------------------------------------------------------------------------
 
 
 def ups(mesh: trimesh.Trimesh, tmp_path: Any, kind: str) -> wf.Scene:

@@ -49,9 +49,6 @@ def around(n: int, seed: int = 1) -> np.ndarray:
     return d / np.linalg.norm(d, axis=0)
 
 
-# --- The default ----------------------------------------------------------------------------------
-
-
 def test_three_sides_of_a_cube_can_be_told_apart_and_from_the_background() -> None:
     """What an even environment shows as a hexagon."""
     scene = wf.Scene([cube()])
@@ -87,7 +84,6 @@ def test_dark_and_white_things_stand_out(albedo: float) -> None:
 
 @pytest.mark.filterwarnings("error")
 def test_no_light_is_no_reason_to_warn() -> None:
-    """The picture says how it was lit."""
     image = wf.render(ball(), 1, progress=False)
     assert (image.metadata["lighting"], image.metadata["ground"]) == ("studio", False)
 
@@ -108,9 +104,6 @@ def test_even_is_an_environment_of_one() -> None:
     own = ball()
     own.lights = [wf.Environment(1.0)]
     np.testing.assert_array_equal(render(ball(), 4, lighting="even"), render(own, 4))
-
-
-# --- What is asked for ----------------------------------------------------------------------------
 
 
 def test_a_scene_with_light_stays_as_it_is() -> None:
@@ -153,9 +146,6 @@ def test_other_names_are_refused(name) -> None:
 def test_up_is_checked(up) -> None:
     with pytest.raises(wf.SceneError, match="up"):
         wf.studio(up=up)
-
-
-# --- The presets ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", PRESETS)
@@ -229,9 +219,6 @@ def test_the_key_light_is_left_of_the_camera_that_is_given(origin) -> None:
     assert key[1] > 0
     front = camera.rotation[:, 2] if up[1] else -camera.rotation[:, 1]
     assert key @ front > 0
-
-
-# --- The ground -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", PRESETS)

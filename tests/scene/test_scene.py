@@ -92,7 +92,6 @@ BAD = [
     ("make", "good", "change", "message"), BAD, ids=[f"{b[0].__name__}-{i}" for i, b in enumerate(BAD)]
 )
 def test_bad_arguments_are_named(make, good, change, message: str) -> None:
-    """What, which element, the value and the limit; a SceneError is a ValueError."""
     with pytest.raises(wf.SceneError, match=message) as caught:
         make(**{**good, **change})
     assert isinstance(caught.value, ValueError)
@@ -102,7 +101,6 @@ def test_bad_arguments_are_named(make, good, change, message: str) -> None:
     "make", [lambda: wf.Mesh(**TRIANGLE), lambda: wf.Rectangle(**SQUARE), lambda: wf.Sphere(**BALL)]
 )
 def test_a_lone_shape_is_a_scene(make) -> None:
-    """It need not be put in a list."""
     assert len(wf.Scene(make()).shapes) == 1
 
 
@@ -126,7 +124,6 @@ def test_a_dark_light_is_still_a_light() -> None:
 
 
 def test_bounds_hold_what_faces_use() -> None:
-    """A vertex that no face uses does not move the scene."""
     mesh = wf.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1e6, 0, 0]], [[0, 1, 2]])
     ball = wf.Sphere((5, 5, 5), 2)
     assert wf.Scene([mesh, ball]).bounds.tolist() == [[0, 0, 0], [7, 7, 7]]
@@ -174,7 +171,6 @@ PAIRS = [
 
 @pytest.mark.parametrize(("red", "gray"), PAIRS, ids=lambda material: type(material).__name__)
 def test_grouping_changes_no_picture(red: wf.Bsdf, gray: wf.Bsdf) -> None:
-    """Two materials in one group look like two renders with one material each."""
     assert len(group_materials([wf.Material(red), wf.Material(gray)]).groups) == 1
     left, right = wf.Sphere((-1, 0, 0), 1), wf.Sphere((1, 0, 0), 1)
     camera = wf.Camera.look_at((0, 0, 6), (0, 0, 0), fov=30, size=(8, 4))
@@ -200,7 +196,6 @@ def test_shading_normals_are_normalized_and_zero_ones_replaced() -> None:
 
 
 def test_repr_counts() -> None:
-    """What a user sees at the prompt."""
     text = repr(wf.Scene([wf.Sphere(**BALL)], [wf.PointLight(**POINT)]))
     assert text == "<Scene: 1 shape, 1 light, camera=False>"
     assert repr(wf.Mesh(**TRIANGLE)) == "<Mesh 'mesh': 3 vertices, 1 face>"

@@ -39,9 +39,6 @@ def centers():
     return np.meshgrid(along, along[::-1])
 
 
-# ---- a patch shows the texture's own color -----------------------------------------------------
-
-
 def test_a_textured_patch_in_even_light_shows_its_texels():
     codes = np.random.default_rng(0).integers(0, 256, (N, N, 3), np.uint8)
     texture = wf.Texture(codes, filter="nearest")
@@ -52,9 +49,6 @@ def test_a_textured_patch_in_even_light_shows_its_texels():
     c = codes / 255
     expected = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
     assert image == pytest.approx(expected, rel=1e-4, abs=1e-7)
-
-
-# ---- vertex colors -----------------------------------------------------------------------------
 
 
 def test_vertex_colors_are_interpolated():
@@ -126,9 +120,6 @@ def test_bad_parameters():
         square(uvs1=[[0, 0]])
 
 
-# ---- texture coordinates ------------------------------------------------------------------------
-
-
 def test_a_texture_uses_the_second_set():
     image = np.random.default_rng(1).random((N, N, 3), np.float32)
     turned = CORNERS[:, ::-1]
@@ -161,9 +152,6 @@ def test_a_parameter_that_reads_the_unknown_is_refused():
 
     with pytest.raises(wf.SceneError, match=r"mesh: its material reads 'smell'"):
         compiled(square(material=wf.Diffuse(Odd())))
-
-
-# ---- textures of numbers as colors, and the other way round ------------------------------------
 
 
 def test_a_texture_of_numbers_serves_as_a_color():

@@ -19,7 +19,6 @@ def areas(mesh: wf.Mesh) -> np.ndarray:
 
 @given(strategies.rotations(), st.floats(1e-3, 1e3), st.integers(3, 200))
 def test_area_normal_and_center(turn: np.ndarray, radius: float, segments: int) -> None:
-    """All faces look along the normal, and their area is the disk's."""
     center = turn[0] * 10
     mesh = wf.Disk(center, 7 * turn[1], radius, segments=segments)
     vectors = areas(mesh)
@@ -83,7 +82,6 @@ BAD = {
 
 @pytest.mark.parametrize("name", BAD)
 def test_bad_arguments_are_named(name: str) -> None:
-    """What, which element, the value and the limit."""
     change, message = BAD[name]
     with pytest.raises(wf.SceneError, match=message):
         wf.Disk(**{"center": (0, 0, 0), "normal": (0, 1, 0), "radius": 1.0, **change})

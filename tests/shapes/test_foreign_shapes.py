@@ -43,7 +43,6 @@ def corners(shape: Any) -> Any:
 
 @pytest.mark.parametrize("shape", shapes(), ids=lambda shape: type(shape).__name__)
 def test_every_shape_is_placed_by_matrices(shape: Any) -> None:
-    """Moved, turned, scaled and mirrored copies; the shape itself stays."""
     before = corners(shape).copy()
     moved = shape.transformed(MATRIX)
     assert type(moved) is type(shape)
@@ -96,7 +95,6 @@ def test_normals_and_front_sides_follow() -> None:
 
 
 def test_a_box_is_a_box() -> None:
-    """Its bounds, its uvs, and a lamp of that form."""
     box = wf.Box((1, 2, 3), (2, 4, 6), emission=3)
     assert box.bounds.tolist() == [[0, 0, 0], [2, 4, 6]]
     assert box.uvs.min(0).tolist() == [0, 0]
@@ -131,7 +129,6 @@ def test_a_plane_is_a_large_square_that_is_not_framed() -> None:
 
 @pytest.mark.parametrize("up", ["y", "z"])
 def test_height_fields_rise_where_they_should(up: str) -> None:
-    """Front sides and normals point up, whichever way x and y run."""
     x, y = np.linspace(-1, 1, 5), np.linspace(0, 3, 4)
     z = 0.3 * x + 0.2 * y[:, None]
     normal = np.array([-0.3, -0.2, 1]) / np.linalg.norm([-0.3, -0.2, 1])
@@ -205,7 +202,6 @@ def test_files_of_points_become_spheres(tmp_path: Path, kind: str, colors: bool)
 
 
 def test_points_that_are_not_finite_are_dropped(tmp_path: Path) -> None:
-    """With a warning; a file of nothing else has no faces."""
     file = tmp_path / "a.ply"
     file.write_text(ply(np.vstack([GRID, [(np.nan, 0, 0)]])))
     dropped = pytest.warns(UserWarning, match="dropped 1 point not finite, first: point 120")
@@ -226,7 +222,6 @@ def test_points_choose_a_radius() -> None:
 
 
 def test_off_counts_may_follow_the_header_at_once(tmp_path: Path) -> None:
-    """Without a space, as some programs write them."""
     file = tmp_path / "a.off"
     file.write_text("\t  OFF3 1 0 # or not\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
     assert len(wf.load_mesh(file).faces) == 1
@@ -283,7 +278,6 @@ def test_meshes_of_pyvista() -> None:
 
 
 def test_points_and_lines_of_pyvista() -> None:
-    """Spheres and capsules of a stated radius."""
     none = np.zeros(0, int)
     with pytest.warns(UserWarning, match="PyVista: has no faces; 4 points become spheres of radius 0.707"):
         (cloud,) = wf.from_pyvista(poly(faces=none, point_data={"RGB": CODES})).shapes

@@ -434,7 +434,6 @@ def test_pictures_are_those_of_meshes_of_their_own(accel):
 
 
 def test_absorption_is_that_of_the_instances_material():
-    """Red glass in one place and clear glass in another, of one mesh."""
     clear, red = wf.Dielectric(1.5), wf.Material(wf.Dielectric(1.5), interior=wf.Medium((0, 3, 3)))
     mesh = bumpy(smooth=True, material=clear)
     shapes = [wf.Instance(mesh, at(-3, 0, 0)), wf.Instance(mesh, at(0, 0, 0), material=red)]
@@ -502,7 +501,6 @@ def test_normal_maps_lie_as_on_meshes_of_their_own(smooth):
 
 
 def test_bright_lone_and_skewed_meshes_are_not_shared():
-    """They are as good as meshes of their own: the same bits."""
     light = bumpy(emission=3)
     cases = [
         [wf.Instance(bumpy(), MATRICES[3])],

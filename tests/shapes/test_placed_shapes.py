@@ -50,11 +50,7 @@ POINTS, ENDS = np.array([(0, 0, 0), (1, 0, 0.5)]), np.array([(0, 1, 0), (1, 1, 1
 
 @pytest.mark.parametrize(
     "make",
-    [
-        lambda points, ends, size, colors: wf.Spheres(points, size, colors),
-        wf.Cylinders,
-        wf.Capsules,
-    ],
+    [lambda points, ends, size, colors: wf.Spheres(points, size, colors), wf.Cylinders, wf.Capsules],
     ids=["spheres", "cylinders", "capsules"],
 )
 @pytest.mark.parametrize("radii", [0.2, (0.2, 0.3)], ids=["one radius", "radii"])

@@ -104,7 +104,6 @@ def test_a_plane_stays_flat_beside_a_fillet() -> None:
 
 
 def test_what_belongs_to_vertices_goes_with_them() -> None:
-    """Colors and texture coordinates of vertices that are split."""
     box = trimesh.creation.box()
     values = np.random.default_rng(1).random((8, 4))
     mesh = wf.Mesh(box.vertices, box.faces, uvs=values[:, :2], colors=values, smooth=100)
@@ -147,9 +146,6 @@ def test_other_values_are_refused(value: Any) -> None:
             call()
 
 
-# --- Where it may be said -------------------------------------------------------------------------
-
-
 def test_meshes_from_arrays_stay_as_they_are() -> None:
     """Unless they are told; normals that are given are not computed as well."""
     given = np.array(BALL.vertices), np.array(BALL.faces)
@@ -184,7 +180,6 @@ def test_scenes_and_instances_are_told_elsewhere() -> None:
 
 @pytest.mark.parametrize("kind", ["stl", "off", "ply", "obj", "trimesh"])
 def test_auto_smooths_what_has_no_normals(tmp_path: Path, kind: str) -> None:
-    """Files and trimesh objects: balls are round, boxes keep their edges."""
     for made, degrees in ((trimesh.creation.icosphere(3), 1.5), (trimesh.creation.box(), None)):
         path = tmp_path / f"a.{kind}"
         if kind != "trimesh":

@@ -109,13 +109,12 @@ class Scripted:
 class Watched:
     """A refiner over a scripted session, and what it shows."""
 
-    def __init__(self, session: Any, seen: bool = True) -> None:
+    def __init__(self, session: Any) -> None:
         self.frames: list[ViewerFrame] = []
         self.errors: list[Exception] = []
         self.refiner = Refiner(cast(wf.Session, session), self.frames.append, self.errors.append)
         self.refiner.start()
-        if seen:
-            self.refiner.refine()
+        self.refiner.refine()
 
 
 def eventually(condition: Callable[[], object], seconds: float = SOON) -> bool:
@@ -153,25 +152,7 @@ def test_a_view_begins_small_and_refines() -> None:
 
 
 @pytest.mark.usefixtures("steady")
-def test_the_first_view_stays_small_until_somebody_looks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Workers start at once; they do not take the processor from the browser that loads the page."""
-    monkeypatch.setattr(module, "PATIENCE", SOON)
-    session = Scripted()
-    session.go.release(10)
-    watched = Watched(session, seen=False)
-    assert session.started
-    watched.refiner.look(CAMERA)
-    assert eventually(lambda: len(watched.frames) == 1)
-    time.sleep(0.1)
-    assert [size for _, size in session.views] == [(21, 16)]
-    watched.refiner.refine()
-    assert eventually(lambda: watched.frames[-1].final)
-    watched.refiner.close()
-
-
-@pytest.mark.usefixtures("steady")
 def test_a_movement_stops_a_picture_that_refines() -> None:
-    """And the next view begins small again."""
     session = Scripted(pictures=1000)
     watched = Watched(session)
     watched.refiner.look(CAMERA)
@@ -203,28 +184,6 @@ def test_a_first_picture_is_finished_and_shown_while_the_view_moves() -> None:
     watched.refiner.close()
     assert [camera for camera, _ in session.views] == [cameras[0], cameras[2], cameras[2]]
     assert watched.frames[0].camera is cameras[0]
-
-
-def test_first_pictures_are_larger_where_they_are_quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Up to the whole picture; a quarter of the width and height where they take long, and never less."""
-    session = Scripted(pictures=1)
-    session.go.release(1000)
-    camera = wf.Camera.look_at((0, 0, 5), (0, 0, 0), size=(640, 480))
-    watched = Watched(session)
-
-    def sizes(too_long: float, short: float) -> list[tuple[int, int]]:
-        monkeypatch.setattr(module, "TOO_LONG", too_long)
-        monkeypatch.setattr(module, "SHORT", short)
-        session.views.clear()
-        for _ in range(5):
-            done = len(watched.frames)
-            watched.refiner.look(camera)
-            assert eventually(lambda done=done: len(watched.frames) > done and watched.frames[-1].final)
-        return [size for _, size in session.views if size != (640, 480)]
-
-    assert sizes(0, -1) == 5 * [(160, 120)]
-    assert sizes(SOON, SOON) == [(160, 120), (320, 240)]
-    watched.refiner.close()
 
 
 @pytest.mark.usefixtures("steady")
@@ -331,7 +290,6 @@ NAN, INF = float("nan"), float("inf")
     ],
 )
 def test_places_that_are_none_are_refused(origin: Any, target: Any, up: Any) -> None:
-    """Not finite, too far away, coinciding, parallel, or no numbers."""
     with pytest.raises(wf.SceneError):
         viewpoint().moved(origin, target, up)
 
@@ -539,7 +497,6 @@ class Client:
 
 
 def test_a_page_moves_the_camera(viewer: wf.Viewer) -> None:
-    """And gets the picture of `render` with it."""
     assert "127.0.0.1" in viewer.url
     client = Client(viewer)
     client.look(position=(1.0, 0.5, 3.0), image_width=48)
@@ -646,7 +603,6 @@ def test_what_a_page_says_is_checked(viewer: wf.Viewer) -> None:
 def test_a_page_that_may_not_connect_is_refused(
     viewer: wf.Viewer, capfd: pytest.CaptureFixture[str], change: dict[str, Any], status: int
 ) -> None:
-    """Before it is sent anything, and without a word here."""
     with pytest.raises(exceptions.InvalidStatus) as refused:
         Client(viewer, **change)
     assert refused.value.response.status_code == status
@@ -749,7 +705,6 @@ def frame(spp: int, camera: wf.Camera = CAMERA, final: bool = False) -> ViewerFr
 
 
 def test_pictures_that_refine_leave_the_page_time(sent: Any) -> None:
-    """They are sent a tenth of a second apart."""
     page, frames = sent
     for number in (1, 2, 3):
         page.show(frame(page_module.FEW + number))
@@ -894,7 +849,6 @@ def test_the_page_is_that_of_viser_with_a_picture(viewer: wf.Viewer, encoding: s
 
 
 def test_servers_of_others_are_left_as_they_are() -> None:
-    """Also where they start while a viewer does."""
     from websockets.asyncio import server
 
     async def answers() -> tuple[bytes, bytes]:
@@ -958,7 +912,6 @@ def test_a_viewer_refuses_what_it_cannot_do() -> None:
 
 
 def test_a_viewer_takes_the_samples_that_render_takes(capsys: pytest.CaptureFixture[str]) -> None:
-    """As the help of the command says."""
     with wf.view(BALL, size=(16, 16), port=0, open_browser=False, block=False) as viewer:
         spp = viewer.wait_for_picture(SOON).spp
     assert spp == wf.render(BALL, size=(16, 16), progress=False).spp
@@ -985,7 +938,6 @@ print("shown", flush=True)
 
 @pytest.mark.slow
 def test_a_script_that_ends_ends_its_viewer() -> None:
-    """Without a word, while the picture refines."""
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", SCRIPT], capture_output=True, text=True, timeout=120
     )
@@ -994,7 +946,6 @@ def test_a_script_that_ends_ends_its_viewer() -> None:
 
 @pytest.mark.slow
 def test_the_command_ends_at_ctrl_c(tmp_path: Path) -> None:
-    """With 0, and nothing left; the page is there until then."""
     mesh = tmp_path / "triangle.obj"
     mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     command = [sys.executable, "-m", "wavefront", "view", str(mesh), "--no-browser", "--port", "0"]
@@ -1020,7 +971,6 @@ def test_the_command_ends_at_ctrl_c(tmp_path: Path) -> None:
 
 
 def test_the_command_has_a_token_unless_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """As `view` has: drawn, given, or none."""
     mesh = tmp_path / "triangle.obj"
     mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     tokens: list[Any] = []

@@ -109,7 +109,6 @@ def expected(viewer: wf.Viewer, **options: Any) -> wf.Image:
 
 
 def test_a_page_shows_the_picture_of_render(page: Any, viewer: wf.Viewer) -> None:
-    """The last picture has its bits, and the page shows that, scaled."""
     last = viewer.wait_for_picture(SOON)
     reference = expected(viewer)
     assert last.rgb.tobytes() == reference.rgb.tobytes()
@@ -121,7 +120,6 @@ def test_a_page_shows_the_picture_of_render(page: Any, viewer: wf.Viewer) -> Non
 
 
 def test_a_page_has_a_picture_before_its_scripts_run(viewer: wf.Viewer, browser: Any) -> None:
-    """It is seen without any script, where the scripts show theirs."""
     codes = viewer.wait_for_picture(SOON).to_uint8().astype(float)
     page = browser.new_context(viewport=SIZE, java_script_enabled=False).new_page()
     page.goto(viewer.url)
@@ -148,7 +146,6 @@ def test_a_black_picture_replaces_the_first_one_when_somebody_acts(browser: Any)
 
 
 def test_a_drag_changes_the_view_and_the_picture_restarts(page: Any, viewer: wf.Viewer) -> None:
-    """And refines again, to the picture of `render` with the new camera."""
     before, camera = shot(page), viewer.camera
     spp: list[int] = []
     show = viewer._page.show  # type: ignore[union-attr]
@@ -183,7 +180,6 @@ def test_the_wheel_zooms_and_the_right_button_pans(page: Any, viewer: wf.Viewer)
 
 
 def test_controls_change_the_lens_and_what_is_shown(page: Any, viewer: wf.Viewer) -> None:
-    """The field of view restarts the picture; exposure and layers do not."""
     bright, picture = shot(page), viewer.image
     enter(page, EXPOSURE, "-2")
     page.wait_for_timeout(500)
@@ -246,7 +242,6 @@ CONNECT = """
 
 
 def test_pages_of_other_sites_see_nothing(page: Any, viewer: wf.Viewer, browser: Any, tmp_path: Path) -> None:
-    """Not even those of another server of this machine."""
     (tmp_path / "index.html").write_text("<p>elsewhere</p>")
     (tmp_path / "favicon.ico").write_bytes(b"")
     handler = partial(SimpleHTTPRequestHandler, directory=str(tmp_path))

@@ -23,9 +23,6 @@ def flat(value: float, size: tuple[int, int] = (6, 4)) -> Image:
     return Image(np.full((size[1], size[0], 3), value, np.float32))
 
 
-# --- Cameras --------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("up", "expected"), [("y", (4, 1, 0)), ("z", (0, 1, 4)), ((1, 0, 0), (0, -4, 1))])
 def test_orbit_turns_around_the_vertical_line(up: object, expected: tuple[float, ...]) -> None:
     """Counterclockwise, seen from above; what was in the middle stays there."""
@@ -57,7 +54,6 @@ def test_turntables_start_at_the_camera_of_the_scene() -> None:
 
 @given(st.integers(0, 2**32 - 1), st.integers(2, 20))
 def test_interpolated_cameras_pass_through_the_given_ones(seed: int, parts: int) -> None:
-    """They are rigid, and turn by less than the cameras differ."""
     rng = np.random.default_rng(seed)
     given_cameras = [look(*rng.normal(size=3) * 5) for _ in range(3)]
     path = wf.interpolate_cameras(given_cameras, 2 * parts + 1)
@@ -111,9 +107,6 @@ def test_errors(call, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert not list(tmp_path.iterdir())
 
 
-# --- Renders --------------------------------------------------------------------------------------
-
-
 def test_each_view_is_what_render_gives() -> None:
     cameras = [look(0, 0, 4), look(4, 1, 0)]
     views = list(wf.render_many(SCENE, cameras, 4, seed=3, progress=False))
@@ -131,9 +124,6 @@ def test_the_scene_is_compiled_once(monkeypatch: pytest.MonkeyPatch) -> None:
     )
     assert len(list(wf.render_many(SCENE, wf.turntable(SCENE, 5, size=(8, 8)), 1, progress=False))) == 5
     assert len(calls) == 1
-
-
-# --- Files ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("extension", [".gif", ".png", ".mp4"])
