@@ -42,7 +42,7 @@ TESTS: dict[str, tuple[str, ...]] = {
         "tests/physics/test_equal_means.py",
     ),
     "wavefront/integrators/light_tracing.py": (
-        "tests/integrators/test_light_paths.py",
+        "tests/integrators/test_light_tracing.py",
         "tests/integrators/test_caustics.py",
     ),
     "wavefront/guiding/cells.py": ("tests/guiding/test_guiding.py",),

@@ -1,6 +1,6 @@
 """The setting caustics: the same bits however a picture is made, honest errors, and clear refusals.
 
-What paths from lights find is the subject of test_light_paths.py.
+What paths from lights find is the subject of test_light_tracing.py.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ def test_no_bit_depends_on_workers_executor_or_waves(settings: dict[str, Any]) -
     assert digest(wf.render(scene(), 8, **EVERY, **settings)) == whole()
 
 
-def test_light_paths_change_the_picture() -> None:
+def test_light_tracing_changes_the_picture() -> None:
     plain, seeded = (
         wf.render(scene(), 8, **{**EVERY, **other}) for other in ({"caustics": False}, {"seed": 1})
     )
@@ -324,7 +324,7 @@ def test_the_standard_error_is_honest(sampler: str) -> None:
         assert 8 * estimated.mean() == pytest.approx(variance, rel=0.1)
 
 
-def test_the_variance_of_a_sample_has_its_part_of_the_light_paths() -> None:
+def test_the_variance_of_a_sample_has_its_part_of_light_tracing() -> None:
     """So that variance / spp is the squared error of independent samples; noise is that of the whole."""
     image = wf.render(scene(), 8, caustics=True, **ALONE)
     plain = wf.render(scene(), 8, **ALONE)
@@ -407,7 +407,7 @@ def test_indirect_light_needs_no_other_layer() -> None:
     assert digest(wf.render(scene(), 8, caustics=True, progress=False))["rgb"] == whole()["rgb"]
 
 
-def test_a_clamp_leaves_light_paths_alone() -> None:
+def test_a_clamp_leaves_light_tracing_alone() -> None:
     """It limits what paths from the camera find; the picture with what it removed is that without."""
     found, plain = (
         wf.render(scene(), 8, clamp=0.3, caustics=each, aovs="indirect", progress=False)

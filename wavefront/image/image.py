@@ -853,12 +853,12 @@ def _add_aovs(image: Image, sums: PictureSums) -> None:
         image.layers[name] = _of_shape(found.mean, width, height)
         image.errors[name] = _of_shape(found.standard_error, width, height)
     if sums.film.light is not None and "indirect" in image.layers:
-        _add_light_paths(image, sums.film.light)
+        _add_light_tracing(image, sums.film.light)
     if CLAMPED in image.layers:
         image.metadata[CLAMPED] = _removed_part(image.rgb, image.layers[CLAMPED])
 
 
-def _add_light_paths(image: Image, light: LightSums) -> None:
+def _add_light_tracing(image: Image, light: LightSums) -> None:
     """Add what paths from lights have found, all of it indirect light, to that layer of a picture."""
     layer, error = (values.reshape(-1, 3) for values in (image.layers["indirect"], image.errors["indirect"]))
     for part in chunks(len(layer)):

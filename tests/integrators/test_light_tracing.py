@@ -2,7 +2,7 @@
 plain paths find.
 
 Point and directional lights, which plain paths never meet behind glass or in a mirror, are compared with
-closed forms. Printed are all differences: `pytest -s tests/integrators/test_light_paths.py`.
+closed forms. Printed are all differences: `pytest -s tests/integrators/test_light_tracing.py`.
 """
 
 from collections.abc import Callable
