@@ -54,7 +54,6 @@ def test_batches_are_few_and_not_too_few() -> None:
 
 @given(st.integers(1, 70), st.data())
 def test_cutting_changes_no_bit(count: int, data) -> None:
-    """However samples and pixels are grouped, neighbors or not."""
     samples = np.random.default_rng(count).lognormal(0, 3, (3, count, 6)).astype(f4)
     whole, pieces = filled(samples), Film(6, 1)
     groups = data.draw(st.sampled_from([((0, 2, 5), (1, 3, 4)), ((0, 1, 2), (3, 4, 5)), (range(6),)]))
@@ -70,7 +69,6 @@ def test_cutting_changes_no_bit(count: int, data) -> None:
 
 
 def test_no_scatter_is_no_error() -> None:
-    """Exactly none; and nothing can be said of a single sample."""
     film = filled(np.full((3, 100, 4), 0.1))
     assert (film.variance() < 1e-15).all()
     assert not film.squared_error().any()
@@ -144,7 +142,6 @@ def test_standard_error_is_the_scatter_across_seeds(sampler: str, spp: int, low:
 
 
 def test_metadata_says_what_was_done() -> None:
-    """Everything that is needed to do it again, and what it took."""
     image = render(lit(), 3, max_bounces=0, seed=5)
     found = image.metadata
     assert (found["spp"], found["samples"], found["rays"]) == (3, 3 * 192, 3 * 192)

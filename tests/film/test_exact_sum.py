@@ -42,7 +42,6 @@ def test_order_changes_no_bit(values: list[float], random) -> None:
 
 @given(lists, lists)
 def test_merged_sums_are_the_sum_of_all(first: list[float], second: list[float]) -> None:
-    """In either order."""
     whole = summed(column(first + second))
     for a, b in ((first, second), (second, first)):
         merged = summed(column(a))

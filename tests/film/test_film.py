@@ -26,7 +26,6 @@ def test_pixels_are_means_in_row_major_order() -> None:
 
 
 def test_float64_sums_lose_nothing() -> None:
-    """A small sample after a large one still counts."""
     film = Film(1, 1)
     film.add(pixels(0, 1), np.full((3, 1, 1), 2.0**24, f4))
     film.add(pixels(0, 1), np.ones((3, 3, 1), f4))
@@ -34,7 +33,6 @@ def test_float64_sums_lose_nothing() -> None:
 
 
 def test_image_is_data(tmp_path) -> None:
-    """Arrays, a notebook picture, and files by their extension."""
     image = wf.Image(np.full((2, 3, 3), 0.25, f4), 7, {"seed": 3})
     assert np.asarray(image) is not None
     assert (np.asarray(image) == 0.25).all()
@@ -47,7 +45,6 @@ def test_image_is_data(tmp_path) -> None:
 
 
 def test_unknown_extension_is_named(tmp_path) -> None:
-    """Before anything is written."""
     with pytest.raises(wf.SceneError, match="bmpx"):
         wf.Image(np.zeros((1, 1, 3), f4), 1).save(tmp_path / "x.bmpx")
     assert not list(tmp_path.iterdir())

@@ -60,7 +60,6 @@ def test_all_fields_add_up() -> None:
 
 
 def test_sums_are_restored_from_their_arrays() -> None:
-    """Not from others."""
     sums, arrays = Many(3), filled(7).arrays()
     sums.restore({f"x.{name}": array for name, array in arrays.items()}, "x.")
     assert all(array is arrays[name] for name, array in sums.arrays().items())

@@ -31,7 +31,6 @@ from wavefront.core.npz import npz_chunks
 from wavefront.film import checkpoint
 from wavefront.film.checkpoint import HEADER, read_header
 from wavefront.sampling.sampler import IndependentSampler
-from wavefront.scheduling.scheduler import FIRST_WAVE, Scheduler
 
 SIZE = (24, 18)
 BLOBS = [(-1.2, 0.3, 0), (1.1, -0.2, 0.4), (0, 0.9, -0.5)]
@@ -68,9 +67,8 @@ def stopped_after(number: int, path: Path, **settings: Any) -> wf.Image:
 # --- The same bits ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_render_that_is_stopped_goes_on_with_the_same_bits(tmp_path: Path, seed: int) -> None:
-    """At random moments, each part with other workers and waves."""
     rng, path, spp = random.Random(seed), tmp_path / "out.wfck", 23
     settings: dict[str, Any] = {"spp": spp, "aovs": ("alpha", "albedo", "direct", "indirect", "depth")}
     whole = wf.render(scene(), **settings)
@@ -91,15 +89,13 @@ def test_a_render_that_is_stopped_goes_on_with_the_same_bits(tmp_path: Path, see
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="workers that are forked")
-@pytest.mark.parametrize("workers", [1, 2, 3])
-def test_worker_processes_go_on_with_the_same_bits(tmp_path: Path, workers: int) -> None:
-    """As threads do."""
-    stopped_after(900, tmp_path / "a", spp=12, workers=workers, executor="processes", wave_size=400)
-    resumed = wf.render(scene(), 12, checkpoint=tmp_path / "a", workers=workers, executor="processes")
+def test_worker_processes_go_on_with_the_same_bits(tmp_path: Path) -> None:
+    stopped_after(900, tmp_path / "a", spp=12, workers=2, executor="processes", wave_size=400)
+    resumed = wf.render(scene(), 12, checkpoint=tmp_path / "a", workers=3, executor="processes")
     assert digest(resumed) == digest(wf.render(scene(), 12))
 
 
-@pytest.mark.parametrize("after", [10, 33, 40])
+@pytest.mark.parametrize("after", [10, 40])
 def test_adaptive_renders_go_on_with_the_same_decisions(tmp_path: Path, after: int) -> None:
     """Whether they are stopped before, within or after a pass over some of the pixels."""
     settings: dict[str, Any] = {"noise": 0.03, "spp": 200}
@@ -112,9 +108,8 @@ def test_adaptive_renders_go_on_with_the_same_decisions(tmp_path: Path, after: i
     assert digest(resumed) == digest(whole)
 
 
-@pytest.mark.parametrize(("before", "after"), [(40, 100), (50, 64), (32, 48)])
+@pytest.mark.parametrize(("before", "after"), [(50, 64), (32, 48)])
 def test_adaptive_renders_can_be_given_more_samples(tmp_path: Path, before: int, after: int) -> None:
-    """Also where the first limit was between two decisions."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that the noise was not reached
         wf.render(scene(), before, noise=0.02, checkpoint=tmp_path / "a")
@@ -129,7 +124,6 @@ def test_more_samples_go_on_and_equal_a_fresh_render(tmp_path: Path) -> None:
 
 
 def test_a_finished_render_returns_at_once(tmp_path: Path) -> None:
-    """No wave is traced, and the file stays."""
     path, calls = tmp_path / "a", []
     first = wf.render(scene(), 8, checkpoint=path)
     content, changed = path.read_bytes(), path.stat().st_mtime_ns
@@ -151,7 +145,6 @@ class Clock:
 
 
 def test_seconds_are_those_of_all_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same call is done at once; more seconds go on."""
     clock = Clock(monkeypatch, 0.02)
     settings: dict[str, Any] = {
         "checkpoint": tmp_path / "a",
@@ -167,20 +160,7 @@ def test_seconds_are_those_of_all_parts(tmp_path: Path, monkeypatch: pytest.Monk
     assert first.metadata["seconds"] < more.metadata["seconds"] < 1
 
 
-def test_seconds_are_used_up_when_another_wave_would_be_late(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Such a render ends a little before its time; the same call is done at once all the same."""
-    path = tmp_path / "a"
-    with monkeypatch.context() as patch:
-        patch.setattr(Scheduler, "_late", lambda scheduler, lanes: True)
-        first = wf.render(scene(), seconds=3, checkpoint=path)
-    assert first.spp == FIRST_WAVE // (SIZE[0] * SIZE[1])
-    assert digest(wf.render(scene(), seconds=3, checkpoint=path)) == digest(first)
-
-
 def test_sessions_save_what_renders_go_on_with(tmp_path: Path) -> None:
-    """After any pass; the file is a picture, too."""
     path = tmp_path / "a.wfck"
     with wf.Session(scene(), 16) as session:
         for image in session:
@@ -194,7 +174,6 @@ def test_sessions_save_what_renders_go_on_with(tmp_path: Path) -> None:
 
 
 def test_a_session_iterates_from_where_the_checkpoint_is(tmp_path: Path) -> None:
-    """And renders one view only."""
     wf.render(scene(), 6, checkpoint=tmp_path / "a")
     with wf.Session(scene(), 16, checkpoint=tmp_path / "a") as session:
         assert [image.spp for image in session] == [8, 16]
@@ -204,7 +183,6 @@ def test_a_session_iterates_from_where_the_checkpoint_is(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("how", ["break", "stop"])
 def test_a_session_that_is_left_keeps_its_render(tmp_path: Path, how: str) -> None:
-    """Whether its loop is left or it is stopped."""
     with wf.Session(scene(), 16, checkpoint=tmp_path / "a") as session:
         for image in session:
             if image.spp == 2 and how == "break":
@@ -216,7 +194,6 @@ def test_a_session_that_is_left_keeps_its_render(tmp_path: Path, how: str) -> No
 
 
 def test_parts_of_the_samples_have_checkpoints_that_merge(tmp_path: Path) -> None:
-    """As pictures do."""
     for number, samples in enumerate((range(5), range(5, 11))):
         stopped_after(700, tmp_path / str(number), samples=samples, wave_size=300)
         wf.render(scene(), samples=samples, checkpoint=tmp_path / str(number))
@@ -273,7 +250,6 @@ class Checks(wf.BaseTexture):
     ],
 )
 def test_other_settings_are_refused(tmp_path: Path, settings: dict[str, Any], message: str) -> None:
-    """Each is named, and the file stays as it is."""
     path = tmp_path / "a"
     wf.render(scene(), 8, checkpoint=path)
     content = path.read_bytes()
@@ -299,7 +275,6 @@ def test_another_scene_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["filter", "integrator", "sampler"])
 def test_other_code_of_the_users_is_refused(tmp_path: Path, name: str) -> None:
-    """Also where its name is the same."""
 
     def make(factor: float) -> Any:
         def own_filter(u: Any) -> Any:
@@ -321,7 +296,6 @@ def test_other_code_of_the_users_is_refused(tmp_path: Path, name: str) -> None:
 
 
 def test_what_cannot_be_recognized_again_is_refused(tmp_path: Path) -> None:
-    """Before work; the message says which part, and why."""
     texture = Checks(8)
     texture.lock = threading.Lock()  # type: ignore[attr-defined]
     with pytest.raises(wf.SceneError, match=r"the scene\..*\.lock is a lock, which cannot be compared"):
@@ -346,7 +320,6 @@ def test_paths_are_checked_before_work(tmp_path: Path) -> None:
 
 
 def test_another_version_is_a_warning(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of this package or of NumPy."""
     monkeypatch.setitem(checkpoint.VERSIONS, "numpy", "1.0")
     wf.render(scene(), 2, checkpoint=tmp_path / "a")
     monkeypatch.undo()
@@ -393,17 +366,13 @@ def test_flipped_bits_are_noticed(content: bytes, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_flipped_bit_of_any_byte_is_noticed(
-    content: bytes, tmp_path: Path, capsys: pytest.CaptureFixture
-) -> None:
-    """Of every byte one bit."""
+def test_a_flipped_bit_of_any_byte_is_noticed(content, tmp_path, capsys):
     check_flips(content, tmp_path / "a.wfck", list(range(len(content))))
     with capsys.disabled():
         print(f"\n{len(content)} flipped bits noticed, one of each byte")
 
 
 def test_truncation_is_noticed(content: bytes, tmp_path: Path) -> None:
-    """At any length; and so is anything that follows."""
     path = tmp_path / "a.wfck"
     lengths = [*range(0, 64), *range(64, len(content), len(content) // 200), len(content) - 1]
     for length in lengths:
@@ -412,7 +381,6 @@ def test_truncation_is_noticed(content: bytes, tmp_path: Path) -> None:
 
 
 def test_a_damaged_file_is_neither_used_nor_replaced(content: bytes, tmp_path: Path) -> None:
-    """By a render that should go on from it."""
     camera = wf.Camera.look_at((0, 1, 5), (0, 0, 0), size=(3, 2))
     settings: dict[str, Any] = {"noise": 0.9, "aovs": ("alpha", "albedo", "direct")}
     for place in (-1, len(content) // 2):
@@ -428,9 +396,7 @@ def test_a_damaged_file_is_neither_used_nor_replaced(content: bytes, tmp_path: P
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="open files of Linux")
-def test_a_file_is_on_the_disk_before_it_takes_its_place(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_is_on_the_disk_before_it_takes_its_place(tmp_path, monkeypatch):
     """A temporary file is written and flushed, renamed, and then the folder is flushed."""
     steps: list[str] = []
     flush, rename = os.fsync, os.replace
@@ -526,13 +492,9 @@ FILES = {
 
 @pytest.mark.parametrize("whole", FILES.values(), ids=FILES)
 def test_wrong_contents_with_a_right_checksum_are_refused(whole: bytes, tmp_path: Path) -> None:
-    """By everything that reads checkpoints, with the name of the file."""
     path = tmp_path / "a.wfck"
     path.write_bytes(whole)
-    for read in (
-        lambda: wf.Image.load(path),
-        lambda: wf.render(scene(), 2, checkpoint=path, progress=False),
-    ):
+    for read in (lambda: wf.Image.load(path), lambda: wf.render(scene(), 2, checkpoint=path, progress=False)):
         with pytest.raises(wf.SceneError, match=r"a\.wfck: "):
             read()
     assert cli.main(["resume", str(path)]) != 0
@@ -584,7 +546,6 @@ def test_a_checkpoint_is_an_archive_of_numpy(tmp_path: Path) -> None:
 
 
 def test_nothing_of_a_file_is_unpickled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither when a render goes on nor when a picture is loaded."""
     path, settings = tmp_path / "a", {"workers": 1, "executor": "threads"}
     wf.render(scene(), 1, checkpoint=path, **settings)
 
@@ -597,9 +558,7 @@ def test_nothing_of_a_file_is_unpickled(tmp_path: Path, monkeypatch: pytest.Monk
     assert wf.Image.load(path).spp == 2
 
 
-def test_a_full_disk_leaves_the_old_file_and_the_picture(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_leaves_the_old_file_and_the_picture(tmp_path, monkeypatch):
     """An error at the end carries the picture; before, a warning is enough, for there may be space later."""
     path = tmp_path / "a"
     wf.render(scene(), 2, checkpoint=path)
@@ -699,16 +658,12 @@ def kill_and_resume(command: list[str], folder: Path, kills: int, seed: int) -> 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 def test_kill_9_costs_no_bit(command: list[str], tmp_path: Path) -> None:
-    """At three random moments."""
     assert len(kill_and_resume(command, tmp_path, 3, seed=1)) == 3
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
-def test_kill_9_at_fifty_moments_costs_no_bit(
-    command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture
-) -> None:
-    """While scenes are set up, waves are traced and files are written."""
+def test_kill_9_at_fifty_moments_costs_no_bit(command, tmp_path, capsys):
     samples = kill_and_resume(command, tmp_path, 50, seed=2)
     with capsys.disabled():
         print(f"\n{len(samples)} kills survived, with {len(set(samples))} different numbers of samples")
@@ -719,14 +674,11 @@ def test_kill_9_at_fifty_moments_costs_no_bit(
     ("number", "status", "background"),
     [
         (signal.SIGINT, 130, False),
-        (signal.SIGTERM, 143, False),
         (signal.SIGTERM, 143, True),
         (signal.Signals.__members__.get("SIGHUP"), 129, False),
     ],
 )
-def test_signals_keep_the_render(
-    command: list[str], tmp_path: Path, number: int, status: int, background: bool
-) -> None:
+def test_signals_keep_the_render(command, tmp_path, number, status, background):
     """Ctrl-C, SIGTERM and SIGHUP write the checkpoint and the picture so far; the same command goes on.
 
     What a script starts in the background ignores Ctrl-C.
@@ -747,10 +699,7 @@ def test_signals_keep_the_render(
     assert so_far.rgb.tobytes() == kept.rgb.tobytes()
 
 
-def test_a_full_disk_is_not_status_0(
-    command: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
-) -> None:
-    """The picture is saved where there is space for it."""
+def test_a_full_disk_is_not_status_0(command, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     command[command.index("240")], command[-1] = "4", "3600"
     monkeypatch.setattr("wavefront.film.checkpoint.write_chunks", refuse)
@@ -764,10 +713,7 @@ def refuse(*args: Any) -> None:
     raise wf.SaveError("no space")
 
 
-def test_resume_gives_the_command_again(
-    command: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
-) -> None:
-    """From any folder, and where the checkpoint is now."""
+def test_resume_gives_the_command_again(command, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     command[command.index("240")] = "4"
     assert cli.main(command) == 0
@@ -787,7 +733,6 @@ def test_resume_gives_the_command_again(
 
 
 def test_an_interrupted_render_says_how_it_goes_on(tmp_path: Path) -> None:
-    """Where a checkpoint is kept, and written."""
     path = tmp_path / "ball.wfck"
 
     def press(done: float, total: float) -> None:

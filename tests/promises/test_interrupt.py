@@ -73,7 +73,6 @@ except KeyboardInterrupt as stop:
 
 
 def test_workers_that_are_stopped_are_killed() -> None:
-    """SIGSTOP keeps them from hearing of anything, even of SIGTERM."""
     body = f"""
 try:
     {ENDLESS.format(executor="processes", progress="telling")}
@@ -92,7 +91,6 @@ except wf.Interrupted:
 
 
 def test_workers_that_are_stopped_do_not_keep_a_finished_render() -> None:
-    """They are killed when there is nothing left to do."""
     body = """
 import os, signal
 def stop_one(done, total):
@@ -108,7 +106,6 @@ print(image, "left", left())
 
 
 def test_ctrl_c_while_a_scene_is_set_up() -> None:
-    """The error is the same, without a picture."""
     body = """
 def compile_scene(*_, **__):
     print("compiling", flush=True)
@@ -244,7 +241,6 @@ def test_a_press_is_not_lost() -> None:
 
 
 def test_sigterm_counts_where_it_has_pythons_handler_of_ctrl_c() -> None:
-    """As in the command, where that is ignored."""
     stop, before = SharedInt(), signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt), InterruptHandler(stop):
@@ -256,7 +252,6 @@ def test_sigterm_counts_where_it_has_pythons_handler_of_ctrl_c() -> None:
 
 
 def test_a_handler_of_the_programs_own_stays() -> None:
-    """It knows better what Ctrl-C is to do."""
     calls: list = []
     before = signal.signal(signal.SIGINT, lambda *call: calls.append(call))
     try:
@@ -269,7 +264,6 @@ def test_a_handler_of_the_programs_own_stays() -> None:
 
 
 def test_a_render_in_another_thread_has_no_handler() -> None:
-    """Python allows handlers in the main thread alone."""
     found: list = []
 
     def work() -> None:

@@ -141,7 +141,6 @@ def test_signals_wait_for_the_end_of_a_block() -> None:
 
 
 def test_a_handler_that_sets_a_flag_need_not_wait() -> None:
-    """What starts may look at the flag."""
     stop, seen = SharedInt(), []
 
     def press() -> None:
@@ -155,7 +154,6 @@ def test_a_handler_that_sets_a_flag_need_not_wait() -> None:
 
 
 def test_other_threads_defer_nothing() -> None:
-    """Python calls no handlers there, and lets nobody set any."""
 
     def work() -> None:
         with deferred_signals():
@@ -169,10 +167,7 @@ def test_other_threads_defer_nothing() -> None:
 
 
 @pytest.mark.parametrize("error", [OSError("no more processes"), KeyboardInterrupt()])
-def test_children_end_where_not_all_can_be_started(
-    error: BaseException, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Python would wait for them at its end, and they for jobs."""
+def test_children_end_where_not_all_can_be_started(error, monkeypatch):
     pool = ProcessPool("fork", 3, SharedInt())
     make = pool._context.Process
 

@@ -77,7 +77,6 @@ def mute(make: Callable[[], Any]) -> Iterator[None]:
 
 @mute_files
 def test_a_bar_that_cannot_be_shown_ends_no_render(make: Callable[[], object]) -> None:
-    """Neither do the lines of phases, in threads of their own."""
     with mute(make):
         image = wf.render(scenes.everything(), 4)
         with Bar(True, 1000, None) as bar:
@@ -91,7 +90,6 @@ def test_a_bar_that_cannot_be_shown_ends_no_render(make: Callable[[], object]) -
 
 @mute_files
 def test_a_warning_that_cannot_be_shown_is_lost(make: Callable[[], object]) -> None:
-    """But where warnings are errors it is one."""
     with mute(make), pytest.raises(UserWarning, match="beware"):
         warn_caller("beware")
     with mute(make), warnings.catch_warnings():
@@ -101,10 +99,7 @@ def test_a_warning_that_cannot_be_shown_is_lost(make: Callable[[], object]) -> N
 
 
 @mute_files
-def test_the_command_writes_its_picture(
-    make: Callable[[], object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Where standard output is lost, too."""
+def test_the_command_writes_its_picture(make, tmp_path, monkeypatch):
     scene, output = tmp_path / "triangle.obj", tmp_path / "out.png"
     scene.write_text(TRIANGLE)
     with mute(make):
@@ -116,7 +111,6 @@ def test_the_command_writes_its_picture(
 
 
 def test_an_error_of_the_programs_own_function_is_not_hidden() -> None:
-    """It may be how the program ends the render."""
 
     def report(done: float, total: float) -> None:
         raise ZeroDivisionError
@@ -126,7 +120,6 @@ def test_an_error_of_the_programs_own_function_is_not_hidden() -> None:
 
 
 def test_a_notebook_that_shows_nothing_ends_no_render(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its connection may be lost."""
 
     def fail(*given: object, **named: object) -> None:
         raise RuntimeError("no comm")
@@ -197,7 +190,6 @@ def test_a_closed_terminal_keeps_the_picture(tmp_path: Path, ignored: bool) -> N
 
 @pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="SIGHUP is of POSIX")
 def test_sighup_counts_where_it_has_pythons_handler_of_ctrl_c() -> None:
-    """As SIGTERM does."""
     before = signal.signal(signal.SIGHUP, signal.default_int_handler)
 
     def hang_up(done: float, total: float) -> None:

@@ -75,7 +75,6 @@ def test_memory_that_is_there_is_not_refused() -> None:
 
 
 def test_the_picture_so_far_is_kept_when_memory_runs_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Even if the last allocation failed."""
     monkeypatch.setattr(Accumulator, "add", fail_after(Accumulator.add, 4))
     with pytest.raises(wf.RenderError, match="out of memory: no room; use fewer workers") as caught:
         wf.render(scenes.everything(), 64, wave_size=300, workers=1, progress=False)
@@ -83,7 +82,6 @@ def test_the_picture_so_far_is_kept_when_memory_runs_out(monkeypatch: pytest.Mon
 
 
 def test_no_memory_for_the_scene_is_an_error_without_a_picture(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It has a type, too."""
     monkeypatch.setattr(prepared_scene, "compile_scene", fail_after(abs, 0))
     with pytest.raises(wf.RenderError, match="out of memory while the scene was set up: no room") as caught:
         wf.render(scenes.everything(), 1, progress=False)

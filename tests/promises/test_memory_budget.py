@@ -44,7 +44,6 @@ PEAKS = Path(__file__).parents[2] / "benchmarks" / "memory.py"
     ],
 )
 def test_sizes(value: Any, size: int) -> None:
-    """Numbers of bytes, and decimal and binary units."""
     assert memory_size("max_memory", value) == size
 
 
@@ -52,7 +51,6 @@ def test_sizes(value: Any, size: int) -> None:
     "value", [0, -1, "", "GB", "2 XB", "-1GB", "1e3MB", float("nan"), float("inf"), True, [2]]
 )
 def test_other_sizes_are_refused_before_work(value: Any) -> None:
-    """With the name, the value and examples."""
     with pytest.raises(wf.SceneError, match=r'max_memory is .*; it must be a number of bytes, or .* "2GB"'):
         wf.render("no such file", max_memory=value)
 
@@ -92,7 +90,6 @@ def test_what_cannot_fit_is_refused_with_the_figures() -> None:
 
 
 def test_layers_count(monkeypatch: pytest.MonkeyPatch) -> None:
-    """They leave less memory for waves."""
     monkeypatch.setattr(budget, "resident_memory", lambda: 100 * MEGABYTE)
     limit = 100 * MEGABYTE + picture_memory((640, 480)) + PROCESS_BYTES + 40 * MEGABYTE
     plain, layered = (
@@ -104,7 +101,6 @@ def test_layers_count(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_least_memory_that_is_named_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And one byte less is not."""
     monkeypatch.setattr(budget, "resident_memory", lambda: 0)
     least = picture_memory((64, 64)) + THREAD_BYTES + LEAST_WAVE * LANE_BYTES
     found = make_budget(least, (64, 64), 8, None, processes=False)
@@ -115,7 +111,6 @@ def test_the_least_memory_that_is_named_is_enough(monkeypatch: pytest.MonkeyPatc
 
 @pytest.mark.parametrize("executor", ["threads", "processes"])
 def test_no_bit_depends_on_the_budget(executor: str) -> None:
-    """Nor on the number of workers that fit."""
     options: dict[str, Any] = {"spp": 16, "executor": executor, "progress": False, "size": (64, 48)}
     scene, found = scenes.everything(), set()
     free = wf.render(scene, workers=1, **options)
@@ -174,7 +169,6 @@ def test_waves_stay_small_after_memory_ran_out() -> None:
 
 
 def test_without_memory_for_a_few_paths_there_is_an_error() -> None:
-    """With the picture so far, if there is any."""
     options: dict[str, Any] = {"workers": 1, "wave_size": 3000, "size": (40, 30), "progress": False}
     with pytest.raises(wf.RenderError, match="out of memory: no room") as caught:
         wf.render(scenes.everything(), 24, integrator=LimitedMemory(0), **options)
