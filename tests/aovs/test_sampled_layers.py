@@ -10,7 +10,6 @@ from scipy import stats
 from significance import ALPHA, render
 
 import wavefront as wf
-from wavefront.accel import numpy_accel
 from wavefront.bsdfs import ALL, albedo_of
 from wavefront.film.aov_names import AOVS
 from wavefront.integrators import accumulate, intersect_and_compact
@@ -284,22 +283,6 @@ def test_bits_depend_on_neither_workers_nor_waves(branches: int) -> None:
         assert_same_bits(
             one, wf.render(room(12), 13, workers=workers, wave_size=wave, executor=executor, **options)
         )
-
-
-def test_bits_do_not_depend_on_the_search(monkeypatch) -> None:
-    """One kind of accelerator searches in several ways: a list, or trees with leaves of other sizes."""
-    options = {"aovs": ("all", "light_groups", "coverage"), "workers": 1, "progress": False}
-    listed = wf.render(room(16), 8, accel="numpy", **options)
-    monkeypatch.setattr(numpy_accel, "SMALL", 0)
-    for leaf_size in (1, 4):
-        trees: list[numpy_accel.NumpyAccelerator] = []
-
-        def with_tree(geometry, leaf_size=leaf_size, trees=trees) -> numpy_accel.NumpyAccelerator:
-            trees.append(numpy_accel.NumpyAccelerator(geometry, leaf_size))
-            return trees[-1]
-
-        assert_same_bits(listed, wf.render(room(16), 8, accel=with_tree, **options))
-        assert all(tree._triangles.tree.leaves.size for tree in trees)
 
 
 def test_bits_stay_in_adaptive_renders_and_sessions() -> None:

@@ -13,9 +13,7 @@ from wavefront.arrays.vec import Floats, f4
 from wavefront.lights import (
     LightTable,
     PointLightRecord,
-    SphereLights,
     TriangleLights,
-    TwoSidedTriangleLights,
     samplers,
 )
 from wavefront.lights.base import Emitters, LightRecord, LightSample
@@ -68,17 +66,6 @@ def test_random_choices_pass_a_chi_square_test() -> None:
     pmf = np.array([choice.pmf(np.full(64, i), each) for i in range(k)], float)
     _, _, p = chi_square(np.bincount(light, minlength=k), pmf.sum(1) * (n // 64))
     assert p > 1e-3
-
-
-def test_the_estimate_knows_distance_and_direction() -> None:
-    """A near light is preferred to a far one, and one that faces the point to one that faces away."""
-    middle = np.array([[-9.0, 9, 9, 9], [0, 0, 1, 1], [0, 0, 0, 0]])
-    facing = np.array([[0.0, 0, 0, 0], [0, 0, 1, -1], [0, 0, 0, 0]])
-    choice = LightTreeSampler(Emitters(middle, facing, np.zeros(4)), np.ones(4), 10.0)
-    near_first = choice.pmf(np.arange(4), np.repeat(np.array([[-8], [0], [0]], f4), 4, 1))
-    assert near_first[0] > 0.95
-    above = choice.pmf(np.arange(4), np.repeat(np.array([[9], [4], [0]], f4), 4, 1))
-    assert above[2] > 20 * above[3] > 0
 
 
 def test_bits_do_not_depend_on_the_other_columns() -> None:
@@ -204,29 +191,3 @@ def test_pictures_have_the_mean_of_other_samplers(monkeypatch: pytest.MonkeyPatc
     assert sigma < 0.01 * by_power.mean()
     assert abs(by_tree.mean() - by_power.mean()) < 3 * sigma
     assert by_tree.std() < by_power.std()
-
-
-def test_lights_say_where_they_are() -> None:
-    up = np.array([[[0.0, 1, 0], [0, 1, 3], [3, 1, 0]]])
-    one_sided, two_sided = (
-        kind.from_triangles(up, np.ones((3, 1), f4)).emitters()
-        for kind in (TriangleLights, TwoSidedTriangleLights)
-    )
-    for found in (one_sided, two_sided):
-        assert found is not None
-        np.testing.assert_allclose(found.middle, [[1], [1], [1]], rtol=1e-6)
-        np.testing.assert_allclose(found.extent2, 4.5)
-    assert one_sided is not None
-    assert two_sided is not None
-    assert one_sided.facing.ravel().tolist() == [0, 1, 0]
-    assert not two_sided.facing.any()
-    center = np.array([1.0, 0, 0])
-    point = wf.PointLight((2, 3, 4), 1).record(center).emitters()
-    spot = wf.SpotLight((2, 3, 4), 1, direction=(0, -1, 0)).record(center).emitters()
-    sphere = SphereLights(np.array([[1], [3], [4]], f4), np.array([2], f4), np.ones((3, 1), f4)).emitters()
-    for emitters, facing, extent2 in ((point, (0, 0, 0), 0), (spot, (0, -1, 0), 0), (sphere, (0, 0, 0), 4)):
-        assert emitters is not None
-        assert emitters.middle.ravel().tolist() == [1, 3, 4]
-        assert emitters.facing.ravel().tolist() == list(facing)
-        assert emitters.extent2.tolist() == [extent2]
-    assert wf.Environment(1).record(center).emitters() is None

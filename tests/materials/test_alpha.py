@@ -8,10 +8,8 @@ from scenes import ALBEDO, ALL, BLACK, EYE, HERE, floor, panel, polygon_irradian
 from significance import SIDE, assert_mean, assert_same_images, measure, render, repeat
 
 import wavefront as wf
-from wavefront.accel import make_accelerator
 from wavefront.accel.embree import installed
 from wavefront.bsdfs import Principled
-from wavefront.compile.scene import compile_scene
 from wavefront.sampling import sampler
 
 NO_EMBREE = pytest.mark.skipif(not installed(), reason="no embreex")
@@ -231,22 +229,6 @@ def test_scale_and_place_change_nothing(scale: float, shift: float) -> None:
     camera = wf.Camera.look_at(eye, target, fov=40, size=(12, 8))
     image, plain = render(wf.Scene(moved, scene.lights, camera), 16).rgb, render(leaves((12, 8)), 16).rgb
     assert np.abs(image - plain).mean() < 1e-3 * plain.mean()
-
-
-def test_what_is_all_there_costs_nothing() -> None:
-    """Opacities of 1 leave no trace in the compiled scene, and cost no material its group."""
-    material = wf.Material(wf.Diffuse(0.5), alpha=1.0)
-    assert material.opacity is None
-    compiled = compile_scene(lit(wf.Sphere(HERE, 0.1, material=material)), numpy)
-    assert compiled.opacities is compiled.lights.varies is None
-    plain, clear = wf.Diffuse(0.5), wf.Material(wf.Diffuse(0.2), alpha=0.5)
-    balls = [wf.Sphere((x, 5, 0), 0.1, material=m) for x, m in enumerate((plain, clear, wf.Diffuse(0.1)))]
-    assert len(compile_scene(lit(*balls), numpy).materials.groups) == 1
-
-
-def numpy(geometry):
-    """The accelerator that is always there."""
-    return make_accelerator(geometry, "numpy")
 
 
 # --- From files ------------------------------------------------------------------------------------

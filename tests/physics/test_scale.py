@@ -10,7 +10,6 @@ import pytest
 import wavefront as wf
 from wavefront.accel import registry as choose
 from wavefront.compile.scale import MAX_RADIUS, MIN_RADIUS, length_factor, scaled_shapes
-from wavefront.compile.scene import compile_scene
 
 SIDE = 12
 BUMPS = np.random.default_rng(1).random((8, 8))
@@ -110,13 +109,6 @@ def test_ordinary_scenes_stay_as_they_are() -> None:
         assert np.frexp(length_factor(size))[0] == 0.5  # a power of two
 
 
-def test_what_shapes_share_is_still_shared() -> None:
-    shapes = scaled_shapes(room(2.0**50).shapes, 2.0**-50)
-    assert len({id(shape.mesh) for shape in shapes if isinstance(shape, wf.Instance)}) == 1
-    assert shapes[1].material.bsdf is shapes[2].material.bsdf
-    assert len({id(shape.material) for shape in shapes if isinstance(shape, wf.Instance)}) == 1
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -151,10 +143,3 @@ def test_a_light_too_strong_for_the_size_of_the_scene_is_refused() -> None:
         picture(wf.Scene(ball, [wf.PointLight((0, 1e-24, 0), 1)]), "numpy")
     with pytest.raises(wf.SceneError, match=r"Environment radiance is 1e\+39; it must be at most 3.4e\+38"):
         wf.Environment(1e39)
-
-
-def test_a_compiled_scene_says_its_unit() -> None:
-    scene = room(2.0**40)
-    compiled = compile_scene(scene, scene.accelerators.maker("numpy"))
-    assert compiled.scale == 2.0**-40
-    assert np.array_equal(compiled.view(scene.camera).origin, room(1.0).camera.origin)

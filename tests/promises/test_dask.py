@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
 import os
 import signal
 import time
 from collections.abc import Iterator
-from concurrent.futures import Future
 from functools import partial
 from typing import Any
 
@@ -17,7 +15,6 @@ import scenes
 import wavefront as wf
 from wavefront.core.shared import STOP, SharedInt, Stopped
 from wavefront.scheduling import payload as payloads
-from wavefront.scheduling.dask import ClusterTasks
 from wavefront.scheduling.pool import WorkerPool
 from wavefront.scheduling.remote import RemoteWorkers
 
@@ -202,16 +199,3 @@ def test_the_picture_outlives_the_cluster() -> None:
         with pytest.raises(wf.RenderError, match="Dask") as failed:
             wf.render(scenes.everything(), 100_000, executor=client, progress=end_it, wave_size=500)
     assert failed.value.image is not None
-
-
-def test_tasks_that_are_cancelled_with_their_scheduler_are_errors() -> None:
-    """Asyncio's CancelledError is none that a render knows: it is a BaseException."""
-
-    class Client:
-        async def gather(self, task: Any, **options: Any) -> None:
-            raise asyncio.CancelledError("scheduler-restart")
-
-    answer: Any = Future()
-    asyncio.run(ClusterTasks(Client(), SharedInt())._fetch(None, answer))  # type: ignore[arg-type]
-    with pytest.raises(ConnectionError, match="CancelledError: scheduler-restart"):
-        answer.result()

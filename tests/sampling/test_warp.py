@@ -33,12 +33,6 @@ def random_square(seed: int, n: int = 1_000_000) -> np.ndarray:
     return np.random.default_rng(seed).random((2, n), np.float32)
 
 
-def directions(z: np.ndarray, phi: np.ndarray) -> np.ndarray:
-    """Unit vectors (3, n) at heights z and azimuths phi, float32."""
-    radius = np.sqrt(np.maximum(0, 1 - z * z))
-    return f4(radius * np.cos(phi), radius * np.sin(phi), z)
-
-
 @dataclass
 class Case:
     """A warp of the sphere with its density as a function of direction."""

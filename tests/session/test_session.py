@@ -9,7 +9,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +18,7 @@ from scripts import children, end_of, runs, script, wait_for
 import wavefront as wf
 from wavefront.core.shared import SharedInt
 from wavefront.scheduling import pool
-from wavefront.session import prepared_scene, view_render
+from wavefront.session import prepared_scene
 from wavefront.session import session as module
 from wavefront.session.view_render import ViewRender
 
@@ -37,11 +36,6 @@ def same(a: wf.Image, b: wf.Image) -> bool:
     """Return True if all parts of two pictures have the same bits."""
     parts = ("rgb", "counts", "variance", "standard_error")
     return all(getattr(a, part).tobytes() == getattr(b, part).tobytes() for part in parts)
-
-
-def nothing_left() -> bool:
-    """Return True if there is neither a child process nor a thread of a session."""
-    return not multiprocessing.active_children() and threading.active_count() == 1
 
 
 def eventually(condition: Callable[[], bool], seconds: float = 30) -> bool:
@@ -270,20 +264,6 @@ def test_workers_can_be_started_before_there_is_work(executor: str) -> None:
         session.start_workers()
         assert session.run().spp == 4
         assert {each.pid for each in multiprocessing.active_children()} == workers
-
-
-def test_geometric_layers_end_when_the_session_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
-    with wf.Session(everything(), 4, aovs="depth", **QUIET) as session:
-        layers, rays = view_render.geometric_aovs, []
-
-        def stopped_aovs(scene: Any, *rest: Any) -> Any:
-            session.drop()
-            rays.append(scene.accelerator)
-            return layers(scene, *rest)
-
-        monkeypatch.setattr(view_render, "geometric_aovs", stopped_aovs)
-        assert list(session) == []
-        assert [accelerator.rays for accelerator in rays] == [0]
 
 
 # --- Nothing is left ------------------------------------------------------------------------------
