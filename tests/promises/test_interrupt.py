@@ -122,11 +122,17 @@ except wf.Interrupted as stop:
         assert "while the scene was set up: there is no picture yet None" in end_of(process)
 
 
+TRIANGLE = (
+    "ply\nformat ascii 1.0\n{}element vertex 3\nproperty float x\nproperty float y\nproperty float z\n{}"
+    "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0{}\n1 0 0{}\n0 1 0{}\n3 0 1 2\n"
+)
+
+
 @pytest.mark.parametrize("module", ["xxhash", pytest.param("scipy", marks=pytest.mark.slow)])
 def test_ctrl_c_while_trimesh_is_imported(tmp_path: Path, module: str) -> None:
     """It catches BaseException about imports that are optional; no half of it stays behind."""
-    scene = tmp_path / "triangle.off"
-    scene.write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    scene = tmp_path / "triangle.ply"
+    scene.write_text(TRIANGLE.format("", "", *("",) * 3))
     body = f"""
 import signal
 class Presses:
@@ -150,10 +156,9 @@ print(len(wf.load({str(scene)!r}).shapes), signal.getsignal(signal.SIGINT) is si
 
 def test_ctrl_c_within_a_loader_of_trimesh(tmp_path: Path) -> None:
     """That of PLY goes on after any error in its texture."""
-    scene, header = tmp_path / "triangle.ply", "ply\nformat ascii 1.0\ncomment TextureFile a.png\n"
-    header += "element vertex 3\n" + "".join(f"property float {name}\n" for name in ("x", "y", "z", "s", "t"))
-    header += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
-    scene.write_text(header + "0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n3 0 1 2\n")
+    scene = tmp_path / "triangle.ply"
+    uvs = "property float s\nproperty float t\n"
+    scene.write_text(TRIANGLE.format("comment TextureFile a.png\n", uvs, " 0 0", " 1 0", " 0 1"))
     wf.Image(np.full((4, 4, 3), 0.5)).save(tmp_path / "a.png")
     body = f"""
 import signal
