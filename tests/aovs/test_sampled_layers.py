@@ -345,12 +345,12 @@ def test_own_integrators_give_layers() -> None:
 @pytest.mark.parametrize(
     ("integrator", "layer", "message"),
     [
-        (without_stages, "alpha", "without_stages cannot give the layer 'alpha': .*intersect_and_compact"),
+        (without_stages, "alpha", "without_stages cannot give the AOV 'alpha': .*intersect_and_compact"),
         (without_stages, "denoising_normal", "'denoising_normal'.*intersect_and_compact"),
-        (without_stages, "direct", "without_stages cannot give the layer 'direct': .*accumulate"),
-        (doubled, "indirect", "doubled cannot give the layer 'indirect': .* the array that it returns"),
+        (without_stages, "direct", "without_stages cannot give the AOV 'direct': .*accumulate"),
+        (doubled, "indirect", "doubled cannot give the AOV 'indirect': .* the array that it returns"),
         (doubled, "light_groups", "'light_groups'"),
-        (into_two, "direct", "into_two cannot give the layer 'direct'"),
+        (into_two, "direct", "into_two cannot give the AOV 'direct'"),
     ],
 )
 def test_what_an_integrator_cannot_give_is_an_error(integrator, layer: str, message: str) -> None:

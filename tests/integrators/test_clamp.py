@@ -137,7 +137,7 @@ def test_an_integrator_must_add_light_by_the_functions_that_clamp() -> None:
     def constant(scene: Any, paths: Any, sampler: Any, max_bounces: int) -> Any:
         return np.ones((3, len(paths)), np.float32)
 
-    with pytest.raises(wf.SceneError, match="cannot give the layer 'clamped'"):
+    with pytest.raises(wf.SceneError, match="cannot give the AOV 'clamped'"):
         wf.render(caustic(), 1, lighting=None, clamp=1, integrator=constant)
 
 

@@ -230,7 +230,7 @@ def test_a_layer_that_is_not_finite_is_dropped_counted_and_named(layer: str, val
     with pytest.raises(wf.RenderError, match="not finite and were dropped") as caught:
         render(wall_of(material), 16, aovs=layer)
     text, image = str(caught.value), caught.value.image
-    assert f"bounce 0, layer {layer!r} at material SpoiledAlbedo of 'wall'" in text
+    assert f"bounce 0, AOV {layer!r} at material SpoiledAlbedo of 'wall'" in text
     assert int(text.split()[0]) == image.metadata["bad_samples"] == 16 * 256 - image.counts.sum()
     assert 0 < image.counts.sum() < 16 * 256
     there = image.counts > 0

@@ -121,7 +121,7 @@ def test_unknown_layers_are_an_error_that_lists_what_there_is() -> None:
     assert "did you mean 'depth'" in str(e.value)
     with pytest.raises(wf.SceneError, match="aovs has 3; there are"):
         Settings(aovs=[3])  # type: ignore[list-item]
-    with pytest.raises(wf.SceneError, match="aovs is 3; it must be the name of a layer, or several names"):
+    with pytest.raises(wf.SceneError, match="aovs is 3; it must be the name of an AOV, or several names"):
         Settings(aovs=3)  # type: ignore[arg-type]
 
 

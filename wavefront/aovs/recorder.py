@@ -303,12 +303,12 @@ class SampleRecorder(PathRecorder):
         for name in self._wanted:
             if name in OF_LIGHT and self._picture is not radiance:
                 raise SceneError(
-                    f"the integrator {label} cannot give the layer {name!r}: all light must be added by "
+                    f"the integrator {label} cannot give the AOV {name!r}: all light must be added by "
                     "wavefront.integrators.accumulate to the array that it returns"
                 )
             if name not in OF_LIGHT and not self._begun:
                 raise SceneError(
-                    f"the integrator {label} cannot give the layer {name!r}: its paths must find their "
+                    f"the integrator {label} cannot give the AOV {name!r}: its paths must find their "
                     "surfaces by wavefront.integrators.intersect_and_compact"
                 )
 

@@ -110,7 +110,7 @@ def chosen_aovs(name: str, value: Any) -> tuple[str, ...]:
     known = (*AOVS, *KEYED_AOVS, BOXES)
     chosen = [value] if isinstance(value, str) else list(value) if isinstance(value, Iterable) else None
     if chosen is None:
-        raise SceneError(f"{name} is {value!r}; it must be the name of a layer, or several names")
+        raise SceneError(f"{name} is {value!r}; it must be the name of an AOV, or several names")
     for each in chosen:
         if not isinstance(each, str) or each not in (*known, ALL_AOVS):
             raise SceneError(

@@ -55,7 +55,7 @@ def make_budget(
         than `max_memory`.
     """
     picture = picture_memory(size, layers, light_tracing)
-    having = f" with {plural(len(layers), 'layer')}" if layers else ""
+    having = f" with {plural(len(layers), 'AOV')}" if layers else ""
     check_memory(f"a picture of {size[0]}x{size[1]} pixels{having}", picture)
     if max_memory is None:
         return Budget(workers, wave_size or default_wave_size(workers))

@@ -87,7 +87,7 @@ def check_last_image(image: Image, plan: Plan, loop: RenderLoop, surfaces: int) 
     if values["clamp"] is not None and found["clamped"] > MUCH_LIGHT:
         warn_caller(
             f"clamp={values['clamp']:g} removed {100 * found['clamped']:.1f} % of the light, so the picture "
-            'is too dark: raise it; the layer "clamped" shows where'
+            'is too dark: raise it; the AOV "clamped" shows where'
         )
     if values["background"] is None and _is_black_or_white(image):
         from .diagnosis import warn_of_black_or_white  # here, as most pictures do without

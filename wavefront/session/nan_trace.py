@@ -105,7 +105,7 @@ class NanRecorder(PathRecorder):
         self._check(_bad(paths.throughput), "absorption in front of")
         if not self.place:
             for name, layer in self._surface_aovs(shade):
-                self._check(np.asarray(np.isnan(layer).any(0)), f"layer {name!r} at")
+                self._check(np.asarray(np.isnan(layer).any(0)), f"AOV {name!r} at")
 
     def record_scattering(self, paths: Paths, shade: Shading, left: Paths) -> None:
         """Check the BSDF samples."""

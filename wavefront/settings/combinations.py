@@ -31,7 +31,7 @@ EXCLUSIONS = (
     Exclusion("reuse", "caustics", "the tuning run does not see the noise of paths from lights", False),
     Exclusion("reuse", "branches", "paths that go on in several ways gain less from being shared", False),
     Exclusion("caustics", "filter", f"{ANY_PIXEL}, and filters draw points but cannot be evaluated at those"),
-    Exclusion("caustics", "light groups", f"{ANY_PIXEL}, and layers are sums of the pixel's own paths"),
+    Exclusion("caustics", "light groups", f"{ANY_PIXEL}, and AOVs are sums of the pixel's own paths"),
     Exclusion("guide", "another integrator", ONLY_FULL),
     Exclusion("reuse", "another integrator", ONLY_FULL),
     Exclusion("caustics", "another integrator", ONLY_FULL),
