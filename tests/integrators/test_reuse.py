@@ -319,7 +319,7 @@ def grouped(size: tuple[int, int] = (16, 16)) -> wf.Scene:
     """Light of four groups, two of them of the environment, on matte walls, a mirror and glass."""
     scene = scenes.room(size)
     shapes = [*scene.shapes[:2], *scene.shapes[3:5], *scene.shapes[6:]]  # light comes in
-    lamp = wf.Material(wf.Diffuse(0.0), emission=(6, 5, 4), group="lamp")
+    lamp = wf.Material(wf.Diffuse(0.7), emission=(6, 5, 4), group="lamp")
     lights = [
         wf.Environment((0.2, 0.3, 0.5), group="sky"),
         wf.DirectionalLight((0.3, -1, -0.5), 3, angle=30, group="sun"),
