@@ -141,10 +141,6 @@ def test_formulas_are_typeset_without_another_server():
         assert "In the library" in text or "What is where" in text, script.name
 
 
-def test_there_are_blocks_to_run():
-    assert len(list(blocks())) >= 9
-
-
 def anchors(document):
     """Return the names that GitHub gives to the headings of a document."""
     headings = HEADING.findall(document.read_text("utf-8"))

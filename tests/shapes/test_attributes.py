@@ -94,30 +94,26 @@ def test_the_checker_takes_materials_with_vertex_colors():
 
 
 @pytest.mark.parametrize(
-    ("colors", "message"),
+    ("make", "message"),
     [
-        ([[0, 0, 0]], r"mesh: colors must have a row for each of 4 vertices, got 1"),
-        ([[0, 0]] * 4, r"mesh: colors has 2 numbers per vertex; it must have 3 or 4"),
-        ([[0, 0, 0], [0, 0, 0], [0, 1.5, 0], [0, 0, 0]], r"colors\[2\]\[1\] is 1\.5; it must be in \[0, 1\]"),
-        ([[0, 0, 0, -1]] * 4, r"colors\[0\]\[3\] is -1"),
-        ([[0, np.nan, 0]] * 4, r"colors\[0\]\[1\] is nan; it must be finite"),
-        ([[0, 0, 0], [0]], r"colors must have rows of one length"),
+        (lambda: square(colors=[[0, 0, 0]]), r"mesh: colors must have a row for each of 4 vertices, got 1"),
+        (lambda: square(colors=[[0, 0]] * 4), r"colors has 2 numbers per vertex; it must have 3 or 4"),
+        (
+            lambda: square(colors=[*[[0, 0, 0]] * 2, [0, 1.5, 0], [0, 0, 0]]),
+            r"colors\[2\]\[1\] is 1\.5; it must be",
+        ),
+        (lambda: square(colors=[[0, 0, 0, -1]] * 4), r"colors\[0\]\[3\] is -1"),
+        (lambda: square(colors=[[0, np.nan, 0]] * 4), r"colors\[0\]\[1\] is nan; it must be finite"),
+        (lambda: square(colors=[[0, 0, 0], [0]]), r"colors must have rows of one length"),
+        (lambda: square(uvs1=[[0, 0]]), r"mesh: uvs1 must have a row for each of 4 vertices, got 1"),
+        (lambda: wf.VertexColors(channel=4), r"VertexColors channel is 4; it must be from 0 to 3, or None"),
+        (lambda: wf.VertexColors(2), r"VertexColors times is 2; it must be in \[0, 1\]"),
+        (lambda: wf.Texture(np.zeros((1, 1)), uv_set=2), r"uv_set is 2; it must be one of 0, 1"),
     ],
 )
-def test_bad_colors(colors, message):
+def test_bad_colors_and_coordinates(make, message):
     with pytest.raises(wf.SceneError, match=message):
-        square(colors=colors)
-
-
-def test_bad_parameters():
-    with pytest.raises(wf.SceneError, match=r"VertexColors channel is 4; it must be from 0 to 3, or None"):
-        wf.VertexColors(channel=4)
-    with pytest.raises(wf.SceneError, match=r"VertexColors times is 2; it must be in \[0, 1\]"):
-        wf.VertexColors(2)
-    with pytest.raises(wf.SceneError, match=r"uv_set is 2; it must be one of 0, 1"):
-        wf.Texture(np.zeros((1, 1)), uv_set=2)
-    with pytest.raises(wf.SceneError, match=r"mesh: uvs1 must have a row for each of 4 vertices, got 1"):
-        square(uvs1=[[0, 0]])
+        make()
 
 
 def test_a_texture_uses_the_second_set():
