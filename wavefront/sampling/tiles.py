@@ -73,7 +73,7 @@ def others_in_tile(pixel: Words, one: int, width: int) -> Ints:
 class WaveTiles:
     """The tiles of the paths of a wave: those of one tile and one sample belong together.
 
-    Pixels that a tile lacks, because they lie outside of the picture or need no samples, are not in it.
+    Pixels that a tile lacks, because they lie outside of the picture, are not in it.
     """
 
     tile: Ints  # (n,) number of the tile of each path, from 0 on
