@@ -253,7 +253,7 @@ def decide_with(seed: int) -> None:
 
     def choose_alike(settings: Settings, *where: Any) -> Choice:
         alike = copy(settings)
-        alike.seed = seed
+        alike.values = {**settings.values, "seed": seed}
         return choose(alike, *where)
 
     plan.choose = choose_alike

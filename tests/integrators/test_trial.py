@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,9 @@ from scenes import cornell_box, everything, room
 import wavefront as wf
 from wavefront.compile.scene import compile_scene
 from wavefront.integrators import tuning as trial
-from wavefront.integrators.tuning import Reused, Trial, run_trial
-from wavefront.integrators.tuning_job import TrialJob, TrialPart
-from wavefront.sampling import tiles as pixel_tiles
+from wavefront.integrators.tuning import Run, Trial, TrialJob, TrialPart
 from wavefront.sampling.sampler import IndependentSampler, SobolSampler
+from wavefront.sampling.tiles import pixels_of_tiles, place_in_tiles
 from wavefront.session import choice
 from wavefront.settings import Settings
 
@@ -59,6 +59,15 @@ def lamp_at_the_ceiling(size: tuple[int, int] = (32, 32)) -> wf.Scene:
     )
 
 
+def blurred(picture: np.ndarray, sigma: float) -> np.ndarray:
+    """Return a picture (H, W) after a Gaussian blur."""
+    away = np.arange(-28, 29)
+    kernel = np.exp(-(away**2) / (2 * sigma**2))
+    for axis in (0, 1):
+        picture = np.apply_along_axis(np.convolve, axis, picture, kernel / kernel.sum(), "same")
+    return picture
+
+
 def render(scene: wf.Scene, spp: int = 2, **settings: Any) -> wf.Image:
     """Render a scene with one thread."""
     return wf.render(scene, spp, **{"workers": 1, "executor": "threads", **settings})
@@ -84,7 +93,7 @@ def test_paths_are_shared_where_that_pays() -> None:
 @pytest.mark.parametrize("size", [SIZE, (256, 256)])
 def test_no_seed_keeps_a_matte_room_from_sharing(size: tuple[int, int]) -> None:
     """The noise of a short trial may not decide: plain paths have ten times the variance."""
-    assert [seed for seed in range(30) if not chosen(cornell_box(size), seed=seed).reuse] == []
+    assert [seed for seed in range(12) if not chosen(cornell_box(size), seed=seed).reuse] == []
 
 
 def glossy(size: tuple[int, int]) -> wf.Scene:
@@ -92,17 +101,6 @@ def glossy(size: tuple[int, int]) -> wf.Scene:
     box = cornell_box(size)
     ball = wf.Sphere((0, -0.5, 0), 0.5, material=wf.Conductor.named("gold", roughness=0.3))
     return wf.Scene([*box.shapes[:6], ball], camera=box.camera)
-
-
-@pytest.mark.parametrize("build", [room, everything, glossy, open_scene])
-@pytest.mark.parametrize("by", ["light", "trial"])
-def test_paths_are_not_shared_where_glass_and_gloss_make_the_noise(
-    build: Callable[[tuple[int, int]], wf.Scene], by: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Little light that is hard to find says so, and so would the trial."""
-    if by == "trial":
-        monkeypatch.setattr(choice, "shares_all", lambda scene: True)
-    assert not chosen(build((240, 240))).reuse
 
 
 @pytest.mark.parametrize(
@@ -122,34 +120,36 @@ def test_paths_are_shared_beside_gloss_where_light_is_hard_to_find(gloss: wf.Bsd
     assert not chosen(scene).reuse
 
 
-@pytest.mark.parametrize(
-    ("build", "variance", "gloss", "tries"),
-    [
-        (cornell_box, 0.1, 1, [True]),
-        (glossy, 0.1, 0.3, [False]),
-        (glossy, 2, 0.01, [False]),
-        (glossy, 2, 0.3, [False, True]),
-    ],
-    ids=["matte", "glossy", "seldom met", "often met, and light is rare"],
-)
-def test_sharing_is_tried_where_all_is_matte_or_light_is_rare(
-    build: Callable[[tuple[int, int]], wf.Scene],
-    variance: float,
-    gloss: float,
-    tries: list[bool],
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize("build", [room, everything, glossy, open_scene])
+@pytest.mark.parametrize("by", ["light", "trial"])
+def test_paths_are_not_shared_where_glass_and_gloss_make_the_noise(
+    build: Callable[[tuple[int, int]], wf.Scene], by: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Elsewhere rare caustics may be most of the noise, and a trial may miss them."""
-    tried: list[bool] = []
+    """Little light that is hard to find says so, and so would the trial."""
+    if by == "trial":
+        monkeypatch.setattr(choice, "RARE_LIGHT", 0)
+        monkeypatch.setattr(choice, "COMMON_GLOSS", 0)
+    assert not chosen(build((240, 240))).reuse
 
-    def trial(*args: Any) -> Trial:
-        tried.append(args[-1])
-        reused = Reused(pixels=0.1, blurred=0.1, again=0, connections=0, evaluations=0)
-        return Trial(0, variance, 1, 1, 1, gloss, reused)
 
-    monkeypatch.setattr(choice, "_trial", trial)
-    assert chosen(build(SIZE)).reuse is tries[-1]
-    assert tried == tries
+Setting = tuple[int, bool, bool]  # branches, reuse, guided
+PLAIN, SHARED = (1, False, False), (1, True, False)
+
+
+def pretend(
+    monkeypatch: pytest.MonkeyPatch, variance: dict[Setting, float], others: float = 100
+) -> list[Setting]:
+    """Have the runs of trials find some variances, at equal costs; return what is tried."""
+    tried: list[Setting] = []
+    render = Trial._render
+
+    def found(self: Trial, *setting: Any) -> Run:
+        tried.append(setting)
+        value = variance.get(setting, others)
+        return replace(render(self, *setting), variance=value, blurred=value, rays=1)
+
+    monkeypatch.setattr(Trial, "_render", found)
+    return tried
 
 
 def chosen(scene: wf.Scene, **settings: Any) -> choice.Choice:
@@ -163,6 +163,33 @@ def chosen(scene: wf.Scene, **settings: Any) -> choice.Choice:
         return [job.trace(compiled, SobolSampler, table) for job in jobs]
 
     return choice.choose(options, compiled, view, table is not None, run)
+
+
+@pytest.mark.parametrize(
+    ("build", "radius", "variance", "tries"),
+    [
+        (cornell_box, 0, 0.1, True),
+        (glossy, 0.5, 0.1, False),
+        (glossy, 0.1, 2, False),
+        (glossy, 0.5, 2, True),
+    ],
+    ids=["matte", "glossy", "seldom met", "often met, and light is rare"],
+)
+def test_sharing_is_tried_where_all_is_matte_or_light_is_rare(
+    build: Callable[[tuple[int, int]], wf.Scene],
+    radius: float,
+    variance: float,
+    tries: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Elsewhere rare caustics may be most of the noise, and a trial may miss them."""
+    tried = pretend(monkeypatch, {PLAIN: variance, SHARED: variance / 10})
+    scene = build(SIZE)
+    if radius:
+        gold = wf.Conductor.named("gold", roughness=0.3)
+        scene.shapes[-1] = wf.Sphere((0, -0.5, 0), radius, material=gold)
+    assert chosen(scene).reuse is tries
+    assert (SHARED in tried) is tries
 
 
 @pytest.mark.parametrize(
@@ -182,36 +209,51 @@ def test_paths_are_not_shared_with_some_settings(
     settings: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whatever a trial would say."""
-    pays = Trial(0, 1, 1, 1, 1, 1, Reused(pixels=0.1, blurred=0.1, again=0, connections=0, evaluations=0))
-    tried: list[bool] = []
-
-    def trial(*args: Any) -> Trial:
-        tried.append(args[-1])
-        return pays
-
-    monkeypatch.setattr(choice, "_trial", trial)
+    tried = pretend(monkeypatch, {SHARED: 0.1})
     for without in ({}, {"denoise": True}, {"noise": 0.1}, {"aovs": "light_groups"}):
         assert chosen(cornell_box(SIZE), **without).reuse
-        assert tried.pop()
+    tried.clear()
     assert not chosen(cornell_box(SIZE), **settings).reuse
-    assert not any(tried)
+    assert SHARED not in tried
+
+
+@pytest.mark.parametrize(
+    ("variance", "branches"),
+    [
+        ({1: 1.0, 2: 0.9, 4: 0.9}, 1),
+        ({1: 1.0, 2: 0.8, 4: 0.9}, 2),
+        ({1: 1.0, 2: 0.8, 4: 0.7}, 2),
+        ({1: 1.0, 2: 0.8, 4: 0.6}, 4),
+        ({1: 0.0, 2: 0.0, 4: 0.0}, 1),
+    ],
+)
+def test_branches_must_gain_enough(
+    variance: dict[int, float], branches: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Variance times rays decides; what gains less than counted rays tell the time is left."""
+    pretend(monkeypatch, {(each, False, False): value for each, value in variance.items()})
+    assert chosen(open_scene(SIZE), reuse=False).branches == branches
+
+
+@pytest.mark.parametrize(("shared", "reuse"), [(0.6, True), (0.8, False)])
+def test_sharing_must_be_better_than_branches(
+    shared: float, reuse: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where both pay the better one is taken."""
+    pretend(monkeypatch, {PLAIN: 1, (2, False, False): 0.7, SHARED: shared})
+    found = chosen(cornell_box(SIZE))
+    assert (found.reuse, found.branches) == (reuse, 1 if reuse else 2)
 
 
 def test_a_guide_goes_with_what_pays(monkeypatch: pytest.MonkeyPatch) -> None:
     """The trial is of guided paths then; without a guide there is a hint where light is hard to find."""
-    table: Any = object()
-    with_table = []
-
-    def trial(*args: Any) -> Trial:
-        with_table.append(args[4])
-        return Trial(0, 2, 1, 1, 1, 1, Reused(pixels=0.1, blurred=0.1, again=0, connections=0, evaluations=0))
-
-    monkeypatch.setattr(choice, "train", lambda *args: table)
-    monkeypatch.setattr(choice, "_trial", trial)
+    tried = pretend(monkeypatch, {(1, True, each): 0.1 for each in (False, True)})
+    monkeypatch.setattr(choice, "train", lambda *args: object())
+    monkeypatch.setattr(trial, "integrator_for", lambda integrator, *setting: integrator)
     guided, plain = (chosen(cornell_box(SIZE), guide=guide) for guide in (True, False))
     assert (guided.reuse, guided.guided, guided.hint) == (True, True, None)
     assert (plain.reuse, plain.guided, plain.hint) == (True, False, choice.GUIDE_HINT)
-    assert with_table == [True, False]
+    assert [guided for _, _, guided in tried] == [True] * 3 + [False] * 3
 
 
 @pytest.mark.parametrize(("dim", "hint"), [(False, None), (True, choice.GUIDE_HINT)])
@@ -243,7 +285,7 @@ def test_there_is_no_trial_where_it_can_bring_nothing(
     scene: wf.Scene, settings: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Small pictures, direct light, other integrators, no light, no rough surface."""
-    monkeypatch.setattr(choice, "run_trial", None)
+    monkeypatch.setattr(Trial, "run", None)
     found = chosen(scene, **settings)
     assert (found.branches, found.reuse) == (settings.get("branches", 1), settings.get("reuse", False))
 
@@ -325,40 +367,51 @@ def test_trials_do_not_depend_on_how_they_are_cut_into_waves(
     compiled = compile_scene(scene, scene.accelerators.maker(accel), mis=True)
     found = []
     for tiles in (1, 3, 64):
-        monkeypatch.setattr(trial, "WAVE", tiles)
-        view = compiled.view(scene.camera)
+        monkeypatch.setattr(trial, "TILES_AT_ONCE", tiles)
         run = partial(map, lambda job: job.trace(compiled, IndependentSampler, None))
-        found.append(run_trial(compiled, view, (1, 2), 5, run, tiles=7, reuse=True))
-    for other in found[1:]:
-        for name in ("shared", "separate", "before", "after"):
-            assert getattr(other, name) == getattr(found[0], name)
-        for name in ("pixels", "blurred", "again", "connections", "evaluations"):
-            assert getattr(other.reused, name) == getattr(found[0].reused, name)
+        trials = Trial(compiled.view(scene.camera), 1, 5, run, tiles=7)
+        found.append([trials.run(*setting) for setting in (PLAIN, (2, False, False), SHARED)])
+    for others in found[1:]:
+        for one, other in zip(found[0], others, strict=True):
+            assert (one.rays, one.met.tolist()) == (other.rays, other.met.tolist())
+            assert np.array_equal(one.variance, other.variance)
+            assert np.array_equal(one.blurred, other.blurred)
 
 
-def test_a_blur_adds_up_the_noise_that_a_tile_shares() -> None:
-    """The weights are those of the pixels of a tile in a picture that is blurred by a Gaussian."""
-    deviation = np.random.default_rng(0).normal(size=16)
-    x, y = trial._spread_tiles(cornell_box(SIZE).camera, 3)
-    x, y = (each[2:] - each[2].min() + 40 for each in (x, y))
-    picture = np.zeros((108, 108))
-    picture[y, x] = deviation
-    away = np.arange(-40, 41)
-    kernel = np.exp(-(away**2) / (2 * trial.BLUR**2))
-    for axis in (0, 1):
-        picture = np.apply_along_axis(np.convolve, axis, picture, kernel, "same")
-    found = trial._after_blur(deviation[None, None, None], x, y).sum()
-    assert found == pytest.approx(np.square(picture).sum() / np.square(kernel).sum() ** 2, rel=1e-3)
+def test_tiles_of_a_trial_are_those_of_the_picture() -> None:
+    """Each of them, once; so pixels share in the trial as they do in the picture."""
+    x, y = pixels_of_tiles(np.arange(3 * 2 * 49), 3)
+    tile, member = place_in_tiles((y * 100 + x).ravel().astype(np.uint32), 100)
+    assert np.unique(y * 100 + x).size == 3 * 2 * 28 * 28
+    assert (x.max(), y.max()) == (83, 55)
+    assert (tile.reshape(x.shape) == tile.reshape(x.shape)[:, :1]).all()
+    assert np.unique(tile).size == len(x)
+    assert (member.reshape(x.shape) == np.arange(16)).all()
 
 
-def test_sharing_costs_rays_evaluations_and_further_paths() -> None:
-    """All of them relative to the rays of plain paths; what is gained must be more."""
-    reused = Reused(pixels=0.2, blurred=0.3, again=50, connections=100, evaluations=100)
-    found = Trial(0.0, 1.0, 50, 50, 1.0, 1, reused)
-    assert found.costs_of_reuse() == pytest.approx((0.2 * 2.3, 0.3 * 2.3))
-    assert found.reuse_pays()
-    dear = Reused(pixels=0.2, blurred=0.3, again=350, connections=100, evaluations=100)
-    assert not Trial(0.0, 1.0, 50, 50, 1.0, 1, dear).reuse_pays()
+def test_variances_are_those_of_pixels_and_of_a_blurred_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of noise whose pixels are alike within tiles, in part, and of noise that they do not share."""
+    monkeypatch.setattr(trial, "OUTLIERS", 0)
+    random, size, found = np.random.default_rng(0), (280, 280), []
+    for part in (0, 0.3):
+
+        def noise(jobs: list[TrialJob], part: float = part) -> list[TrialPart]:
+            parts = []
+            for job in jobs:
+                shape = (3, trial.BLOCKS, job.pixels.size // 16, 16)
+                common = random.normal(size=(*shape[:3], 1)) * part**0.5
+                values = 3 + common + random.normal(size=shape) * (1 - part) ** 0.5
+                parts.append(TrialPart(values.reshape(*shape[:2], -1), 1, np.zeros(1, np.intp)))
+            return parts
+
+        found.append(Trial(cornell_box(size).camera, 1, 5, noise).run(*PLAIN))
+    for run in found:
+        assert run.variance == pytest.approx(1 / 9, rel=0.1)
+    x, y = pixels_of_tiles(np.arange(4900), 10)
+    picture, tiles = np.zeros((2, *size)), random.normal(size=(4900, 1))
+    picture[:, y, x] = random.normal(size=x.shape), tiles * 0.3**0.5 + random.normal(size=x.shape) * 0.7**0.5
+    plain, shared = (np.var(blurred(each, trial.BLUR)[30:-30, 30:-30]) for each in picture)
+    assert found[1].blurred / found[0].blurred == pytest.approx(shared / plain, rel=0.2)
 
 
 def test_a_guide_is_used_where_it_pays() -> None:
@@ -405,35 +458,6 @@ def test_other_integrators_have_nothing_to_decide() -> None:
         image = render(cornell_box((8, 8)), integrator=integrator, branches="auto", guide="auto")
         assert (image.metadata["branches"], image.metadata["guided"]) == (1, False)
         assert np.array_equal(image.rgb, render(cornell_box((8, 8)), integrator=integrator).rgb)
-
-
-def test_the_cost_is_variance_times_rays() -> None:
-    """The best number is near the one of the splitting formula, √(V2/V1 · c1/c2)."""
-    found = Trial(shared=1.0, separate=9.0, before=100, after=100.0, ray_cost=1.0)
-    assert found.cost(1) == 10 * 200
-    assert found.cost(3) == 4 * 400
-    assert min(range(1, 9), key=found.cost) == 3  # √9
-    assert found.best_ways() == 2  # the fewest that cost about as little
-    assert Trial(0.0, 9.0, 300, 100.0, 1.0).best_ways() == 4
-    assert Trial(1.0, 0.9, 100, 100.0, 1.0).best_ways() == 1
-    assert Trial(1.0, 1.2, 110, 100.0, 1.0).best_ways() == 1  # the gain is too small
-    assert Trial(0.0, 0.0, 100, 0.0, 1.0).best_ways() == 1
-
-
-@pytest.mark.parametrize(("before", "ways"), [(0.5, 3), (0.4, 3), (0.32, 3), (0.3, 1), (0.2, 1)])
-def test_branches_need_many_rays_before_them(before: float, ways: int) -> None:
-    """Two branches that halve the variance take 1.7 times as long in a closed room: too little is gained."""
-    assert Trial(0.0, 1.0, before, 1 - before, 1.0).best_ways() == ways
-
-
-def test_chance_does_not_make_variance_that_branches_share_less_than_none() -> None:
-    """A covariance below 0 counts as 0, and its standard error is added all the same."""
-    of_tile = np.array([-3.0, -1.0, -3.0, -1.0])
-    values = of_tile.repeat(pixel_tiles.MEMBERS)
-    error = of_tile.std(ddof=1) / 2
-    kept = np.arange(values.size)
-    assert trial._at_most(values, kept) == pytest.approx(error)
-    assert trial._at_most(values + 5, kept) == pytest.approx(3 + error)
 
 
 @pytest.mark.parametrize(

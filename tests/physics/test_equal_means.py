@@ -170,15 +170,15 @@ def test_pictures_by_default(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "due"),
     [
-        ("furnace of 0.5, 8 bounces", "shared"),
+        ("furnace of 0.5, 8 bounces", "branches 2, shared"),
         ("point light in a sphere", "shared"),
-        ("half-hidden rectangle", "branches 3"),
+        ("half-hidden rectangle", "branches 2, branches 4"),
         ("point light, offset 1.5", "branches 1"),
     ],
 )
 def test_the_trial_keeps_means(name: str, due: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    trials, run_trial = [], choice.run_trial
-    monkeypatch.setattr(choice, "run_trial", lambda *a, **k: trials.append(1) or run_trial(*a, **k))
+    trials, trial = [], choice.Trial
+    monkeypatch.setattr(choice, "Trial", lambda *a, **k: trials.append(1) or trial(*a, **k))
     (case,) = (case for case in CASES if case.name == name)
     options = {"max_bounces": 4, **case.options, "workers": 1, "accel": "numpy"}
     found, chosen = mean_by_default(case.build, 1, 6, **options)

@@ -1,278 +1,196 @@
-"""The trial before a render: what more branches, paths that pixels share, or a guide would bring.
+"""Tuning runs: an integrator on a few tiles of a picture, as choices are made by (session/choice.py).
 
-Pixels of some tiles (sampling/tiles.py) are rendered several times under seeds of their own, with two
-branches that are kept apart. The variance of a picture with N branches is shared + separate / N: the
-covariance of the two branches is what they share, and the rest lies between them. With the rays of both parts
-of the paths, counted and not timed, this gives variance times rays for every N, which is least near the
-square root of (separate / shared) · (rays before / rays of a branch). What the first branches find is shared
-among the pixels of each tile, too, and compared with the same paths alone: in each pixel, and after a blur,
-which adds up what is the same in the noise of a tile. So decisions depend on the scene, the camera and the
-settings alone.
+Each run has the same pixels and the same random numbers, which are not those of the picture, so runs with
+other settings differ by what the settings do. Errors come from blocks of samples, and costs from rays that
+are counted, not timed: they depend on the scene, the camera and the settings alone.
 
-Sources: J. Arvo and D. Kirk, Particle Transport and Image Synthesis, 1990 (splitting); E. Veach, thesis 1997,
-§10.4.2 (efficiency).
+Source: E. Veach, thesis 1997, §10.4.2 (efficiency).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
 
+from ..accel.counter import RayCounter
+from ..aovs.path_recorder import PathRecorder
 from ..arrays.soa import soa
-from ..arrays.vec import Doubles, Ints
+from ..arrays.state import Hits, Paths, Words
+from ..arrays.vec import ALL, Doubles, Ints
 from ..camera import Camera
 from ..compile.scene import CompiledScene
-from ..sampling.tiles import MEMBERS, SIDE, STRIDE, cell_shifts
-from ..stages.reuse import shared_materials
+from ..guiding import GuideTable
+from ..sampling.sampler import SamplerMaker
+from ..sampling.tiles import BLOCK_SIDE, MEMBERS, STRIDE, pixels_of_tiles
+from ..stages.generate import generate
+from ..stages.interaction import material_rows
+from .ladder import li_full
+from .registry import integrator_for
 from .training import spread
-from .tuning_job import TrialJob, TrialPart
+
+BLOCKS, SAMPLES = 4, 4  # of each pixel: blocks of samples, which are stratified as those of a picture are
+MOST_TILES = 256
+PIXELS_PER_TILE = 1024  # of the picture, as long as there are not more tiles: a quarter of a path for each
+TILES_AT_ONCE = 32  # that are traced together, at most
+LEAST_JOBS = 2  # so that two workers have something to do
+MOST_BRANCHES = 4  # more gain nothing
+BOUNCES = 6  # at most: few paths get further, and a wave of few costs as much as one of many
+OUTLIERS = 0.02  # part of the pixels, the noisiest, that do not count
+FLOOR = 0.01  # of the squared mean of all pixels, added to that of each
+# Costs relative to a ray that finds the nearest surface, which is shaded then. Few bits, for exact sums.
+SHADOW_RAY = 0.5  # of one that finds out only whether something is in its way
+SHARED_PATH = 1.5  # of evaluating BSDFs for what the other pixels of a tile have found, besides the rays
+GUIDED_RAY = 1.375  # of a ray of a guided path
+BLUR = 4  # standard deviation of the blur, pixels
+
+
+@soa
+class TrialPart:
+    """What the paths of some pixels have found."""
+
+    radiance: Doubles  # (3, BLOCKS, pixels)
+    rays: float  # weighted by what they cost
+    met: Ints  # (materials,) how many second points of paths are of each material
+
+
+@soa
+class TrialJob:
+    """Some tiles of a run, which are traced together."""
+
+    camera: Camera  # in the unit of the compiled scene
+    seed: int
+    pixels: Words  # (k,) whole tiles in turn
+    max_bounces: int
+    branches: int
+    reuse: bool
+    guided: bool
+
+    def trace(self, scene: CompiledScene, make_sampler: SamplerMaker, table: GuideTable | None) -> TrialPart:
+        """Trace the tiles; `make_sampler` is given a seed and the width of a picture."""
+        counter, points = RayCounter(scene.accelerator), SecondPoints(scene.materials.group_of.size)
+        scene, sampler = (
+            replace(scene, accelerator=counter),
+            make_sampler(self.seed, self.camera.resolution[0]),
+        )
+        count = BLOCKS * SAMPLES
+        sample = np.repeat(np.arange(count, dtype=np.uint32), self.pixels.size)
+        paths = generate(scene, self.camera, sampler, np.tile(self.pixels, count), sample)
+        paths.recorder = points
+        integrator = integrator_for(li_full, self.branches, self.reuse, table if self.guided else None)
+        L = integrator(scene, paths, sampler, self.max_bounces)
+        finite = np.where(np.isfinite(L), L, 0).reshape(3, BLOCKS, SAMPLES, self.pixels.size)
+        rays = counter.nearest + SHADOW_RAY * counter.shadow
+        rays = rays * (GUIDED_RAY if self.guided else 1) + SHARED_PATH * self.reuse * sample.size
+        return TrialPart(finite.mean(2, dtype=np.float64), rays, points.met)
+
+    def __str__(self) -> str:
+        """Name the job in an error message."""
+        return f"the trial of {self.pixels.size} pixels from {self.pixels[0]} on"
+
 
 JobsRunner: TypeAlias = Callable[[list[TrialJob]], Iterable[TrialPart]]  # in the order of the jobs
 
-BLOCKS = 4  # of independent samples
-PIXELS_PER_TILE = 2048  # of the picture: an eighth of a path for each of its pixels
-MOST_TILES = 256  # 65536 paths
-BOUNCES = 6  # of the trial's paths at most: few get further, and a wave of few costs as much as one of many
-WAVE = 32  # tiles at most that are traced together: two branches of their paths are a wave of 16384 lanes
-LEAST_JOBS = 2  # of a trial, so that two workers have something to do
-OUTLIERS = 0.01  # part of the pixels, the noisiest, that do not count
-FLOOR = 0.01  # of the squared mean of all pixels, added to that of each
-MOST_WAYS = 4  # more gain nothing
-ERRORS = 1  # standard errors, over tiles, by which more variance counts as shared than was found
-# Variance times rays must fall below this part: rays tell the cost to about a tenth, and a trial may miss the
-# few paths that find most of the light.
-GAIN = 0.85
-GUIDE_GAIN = 0.9  # variance times rays of guided paths must fall below this part
-NEAR_BEST = 1.1  # the fewest branches are taken that cost no more than this times the least
-GUIDED_RAY = 1.35  # cost of a ray of a guided path, relative to that of a plain one
-CONNECTION = 0.5  # cost of a ray that connects pixels, likewise
-EVALUATION = 0.3  # cost of evaluating the BSDF of a pixel for another one, relative to that of a ray
-RARE_LIGHT = 1.0  # relative variance of a pixel of four samples, from where on light is hard to find
-COMMON_GLOSS = 0.05  # part of the second points, from where on a trial sees enough of what a material does
-NO_WORSE = 2.0  # what re-use may cost by pixels or after a blur: few tiles may tell twice the truth
-BLUR = 4  # standard deviation of the blur, pixels
-# of a pixel for another one so many rows or columns away: the convolution of the blur with itself
-BLUR_WEIGHTS = np.array([math.exp(-((distance / (2 * BLUR)) ** 2)) for distance in range(SIDE * STRIDE)])
+
+class SecondPoints(PathRecorder):
+    """Counts the second points of paths by their materials, in `met`."""
+
+    def __init__(self, materials: int) -> None:
+        self.met = np.zeros(materials, np.intp)
+
+    def record_hits(
+        self,
+        bounce: int,
+        scene: CompiledScene,
+        paths: Paths,
+        hits: Hits,
+        kept: Ints,
+        kept_paths: Paths,
+        kept_hits: Hits,
+    ) -> None:
+        """Count those of the first bounce that go on."""
+        if bounce == 1:
+            self.met += np.bincount(material_rows(scene, kept_hits, ALL), minlength=self.met.size)
 
 
 @soa
-class Reused:
-    """What sharing paths among pixels brings."""
+class Run:
+    """What a setting has brought, without the noisiest pixels."""
 
-    pixels: float  # variance of a pixel, relative to that of the same paths alone
-    blurred: float  # and after a blur, which adds up noise that pixels share
-    again: float  # rays of the further paths from shared points
-    connections: float  # rays that connect pixels
-    evaluations: float  # connections that were looked at, whether or not they needed a ray
+    variance: float  # of a pixel of four samples, relative to the square of the mean around it
+    blurred: float  # likewise after a blur, which adds up noise that the pixels of a tile share
+    rays: float
+    met: Ints  # as of `TrialPart`
+
+    def cost(self, than: Run) -> tuple[float, float]:
+        """Return variance times rays over that of another run: of pixels, and after a blur."""
+        pairs = (self.variance, than.variance), (self.blurred, than.blurred)
+        rays = self.rays / than.rays
+        pixels, blurred = (rays * (one / other if other > 0 else 1.0) for one, other in pairs)
+        return pixels, blurred
 
 
-@soa
 class Trial:
-    """What a trial has found."""
-
-    shared: float  # relative variance of a pixel that the branches of a path share
-    separate: float  # and that between branches
-    before: float  # rays up to the first surface, and of light samples there
-    after: float  # rays of one branch of all paths
-    ray_cost: float  # cost of a ray, relative to that of a plain path
-    least_gloss: float = 1.0  # part of the second points that are of the glossy material which is met least
-    reused: Reused | None = None  # None where it was not tried
-
-    def cost(self, ways: int) -> float:
-        """Return variance times cost with so many branches."""
-        variance = self.shared + self.separate / ways
-        return variance * (self.before + self.after * ways) * self.ray_cost
-
-    def best_ways(self) -> int:
-        """Return the number of branches at which variance times rays is about least; 1 if it gains little."""
-        costs = [self.cost(ways) for ways in range(1, MOST_WAYS + 1)]
-        ways = next(ways for ways, cost in enumerate(costs, 1) if cost <= NEAR_BEST * min(costs))
-        return ways if self.cost(ways) < GAIN * self.cost(1) else 1
-
-    @property
-    def light_is_rare(self) -> bool:
-        """Whether few paths find most of the light."""
-        return self.shared + self.separate > RARE_LIGHT
-
-    @property
-    def gloss_is_common(self) -> bool:
-        """Whether paths meet all glossy materials so often that their caustics do not surprise."""
-        return self.least_gloss >= COMMON_GLOSS
-
-    def costs_of_reuse(self) -> tuple[float, float]:
-        """Return variance times cost of re-use over that of plain paths: of pixels, and after a blur."""
-        if self.reused is None:
-            return 1.0, 1.0
-        plain = self.before + self.after
-        connecting = CONNECTION * self.reused.connections + EVALUATION * self.reused.evaluations
-        cost = (plain + self.reused.again + connecting) / plain
-        return self.reused.pixels * cost, self.reused.blurred * cost
-
-    def reuse_pays(self) -> bool:
-        """Return whether re-use costs less than the best number of branches, in the mean of both."""
-        pixels, blurred = self.costs_of_reuse()
-        branches = self.cost(self.best_ways()) / self.cost(1) if self.cost(1) > 0 else 1.0
-        both = math.sqrt(pixels * blurred)
-        return both < branches and max(pixels, blurred) < NO_WORSE
-
-
-def guide_pays(guided: Trial, plain: Trial, ways: int | None) -> bool:
-    """Return whether a guide pays, with so many branches; None: with the best number for each."""
-    with_guide, without = (trial.cost(ways or trial.best_ways()) for trial in (guided, plain))
-    return with_guide < GUIDE_GAIN * without
-
-
-def tiles_for(size: tuple[int, int]) -> int:
-    """Return how many tiles the trial of a picture of a size (width, height) has."""
-    return min(size[0] * size[1] // PIXELS_PER_TILE, MOST_TILES)
-
-
-def run_trial(
-    scene: CompiledScene,
-    camera: Camera,
-    seeds: tuple[int, ...],
-    max_bounces: int,
-    run: JobsRunner,
-    *,
-    guided: bool = False,
-    tiles: int = MOST_TILES // 2,
-    reuse: bool = False,
-) -> Trial:
-    """Render some pixels several times, with random numbers that the picture does not use.
+    """The tiles of a tuning run, and the jobs that render them.
 
     Parameters
     ----------
-    scene
-        Whose trial it is.
     camera
-        In the unit of the compiled scene.
-    seeds
-        Of the samplers of each block of samples, at least two.
+        Of the whole picture, in the unit of the compiled scene.
+    seed
+        Of random numbers that the picture does not use.
     max_bounces
-        At least 2.
+        Of the picture.
     run
-        Does the jobs of the trial.
-    guided
-        Whether paths are guided.
+        Does the jobs.
     tiles
-        How many tiles of sixteen pixels.
-    reuse
-        Whether to try sharing paths among pixels.
+        How many of sixteen pixels, as far as the picture has them; None for as many as its size asks for.
     """
-    max_bounces = min(max_bounces, BOUNCES)
-    width, height = camera.size
-    x, y = _spread_tiles(camera, tiles)
-    pixel = (y % height * width + x % width).astype(np.uint32)
-    count = max(-(-tiles // WAVE), min(LEAST_JOBS, tiles))
-    places = np.array_split(pixel, count)
-    jobs = [TrialJob(camera, seeds, max_bounces, each.ravel(), guided, reuse) for each in places]
-    parts = list(run(jobs))
-    ways = np.concatenate([part.ways for part in parts], -1)
-    deviation, mean = _deviations(ways), ways.mean((1, 2))
-    of_tile = mean.reshape(3, tiles, MEMBERS).mean(-1).repeat(MEMBERS, -1)
-    scale = (np.square(of_tile) + (FLOOR * mean.mean() ** 2 or 1.0))[:, None, None]
-    alone = (np.square(deviation) / scale).mean((0, 1, 2))  # of each pixel, with one branch
-    common = (deviation[:, 0] * deviation[:, 1] / scale[:, 0]).mean((0, 1))
-    kept = _calm(alone)
-    total = math.fsum(alone.take(kept)) / kept.size
-    shared = min(_at_most(common, kept), total)
-    before, after = sum(part.before for part in parts), sum(part.after for part in parts) / 2
-    reused = None
-    if reuse:
-        together = np.concatenate([part.together for part in parts], -1)
-        reused = _reused(parts, _deviations(together), deviation[:, :1], scale, x, y)
-    return Trial(
-        shared,
-        total - shared,
-        before,
-        after,
-        GUIDED_RAY if guided else 1.0,
-        _least_gloss(scene, np.sum([part.met for part in parts], 0)),
-        reused,
-    )
 
+    def __init__(
+        self, camera: Camera, seed: int, max_bounces: int, run: JobsRunner, tiles: int | None = None
+    ) -> None:
+        self._camera, self._seed, self._bounces, self._do = camera, seed, min(max_bounces, BOUNCES), run
+        (width, height), across, down = camera.size, *(max(1, side // BLOCK_SIDE) for side in camera.size)
+        places = across * down * STRIDE**2  # of tiles that lie in the picture as a whole
+        tiles = tiles or min(width * height // PIXELS_PER_TILE, MOST_TILES)
+        number = np.arange(min(tiles, places), dtype=np.uint64)
+        x, y = pixels_of_tiles(spread(number, places).astype(np.intp), across)
+        self._x, self._y = x % width, y % height
+        self._scale: Doubles | None = None
+        self._runs: dict[tuple[int, bool, bool], Run] = {}
 
-def _spread_tiles(camera: Camera, count: int) -> tuple[Ints, Ints]:
-    """Return columns and rows (count, 16) of the pixels of tiles that are spread over a picture."""
-    width, height = camera.size
-    reach = SIDE * STRIDE - 1
-    across, down = max(1, width - reach), max(1, height - reach)
-    place = spread(np.arange(count, dtype=np.uint64), across * down).astype(np.intp)
-    member = np.arange(MEMBERS)
-    shift_x, shift_y = cell_shifts(place[:, None], np.zeros_like(place)[:, None], member)
-    y = (place // across)[:, None] + member // SIDE * STRIDE + shift_y
-    x = (place % across)[:, None] + member % SIDE * STRIDE + shift_x
-    return x, y
+    def run(self, branches: int, reuse: bool, guided: bool) -> Run:
+        """Return the run of a setting; the first one gives the brightness that noise is relative to."""
+        setting = (branches, reuse, guided)
+        if setting not in self._runs:
+            self._runs[setting] = self._render(*setting)
+        return self._runs[setting]
 
-
-def _deviations(blocks: Doubles) -> Doubles:
-    """Return how blocks (3, ways, blocks, pixels) differ from their mean; the mean square is the variance."""
-    count = blocks.shape[2]
-    return (blocks - blocks.mean(2, keepdims=True)) * math.sqrt(count / (count - 1))
-
-
-def _after_blur(deviation: Doubles, x: Ints, y: Ints) -> Doubles:
-    """Return deviations (..., pixels) times what a blur gathers of those of their tiles; it may be negative.
-
-    The mean over pixels is the variance after the blur, but for a factor. Two pixels count by the
-    convolution of the blur with itself. Columns x and rows y of the pixels are (tiles, MEMBERS).
-    """
-    of_tile = deviation.reshape(*deviation.shape[:-1], *x.shape)
-    gathered = np.zeros_like(of_tile)
-    for member in range(MEMBERS):
-        away_x, away_y = (np.abs(each - each[:, member, None]) for each in (x, y))
-        gathered += BLUR_WEIGHTS[away_x] * BLUR_WEIGHTS[away_y] * of_tile[..., member, None]
-    return (of_tile * gathered).reshape(deviation.shape)
-
-
-def _calm(variance: Doubles) -> Ints:
-    """Return the places (k,) of all variances (n,) but the greatest."""
-    return variance.argsort(kind="stable")[: variance.size - int(OUTLIERS * variance.size)]
-
-
-def _at_most(values: Doubles, kept: Ints) -> float:
-    """Return the mean of the kept values (k,) of pixels (n,), at least 0, plus `ERRORS` of its errors."""
-    which = np.zeros(values.size)
-    which[kept] = 1
-    of_tile = (values * which).reshape(-1, MEMBERS).sum(1)
-    count, mean = of_tile.size, math.fsum(of_tile) / kept.size
-    spread = math.fsum(np.square(of_tile - mean * which.reshape(-1, MEMBERS).sum(1)))
-    error = math.sqrt(spread * count / max(count - 1, 1)) / kept.size
-    return max(mean, 0.0) + ERRORS * error
-
-
-def _reused(
-    parts: list[TrialPart], together: Doubles, alone: Doubles, scale: Doubles, x: Ints, y: Ints
-) -> Reused:
-    """Return what sharing brings, given deviations (3, 1, blocks, pixels) with it and without it."""
-    return Reused(
-        _ratio(*(np.square(each) / scale for each in (together, alone))),
-        _ratio(*(_by_tile(_after_blur(each, x, y) / scale) for each in (together, alone))),
-        sum(part.again for part in parts),
-        sum(part.connections for part in parts),
-        sum(part.evaluations for part in parts),
-    )
-
-
-def _least_gloss(scene: CompiledScene, met: Ints) -> float:
-    """Return the part of the second points that are of the material met least of those that cannot be shared.
-
-    `met` (materials,) counts the points of each material. The part is 1 if all materials can be shared.
-    """
-    glossy = met[~shared_materials(scene)]
-    return float(glossy.min() / max(met.sum(), 1)) if glossy.size else 1.0
-
-
-def _by_tile(values: Doubles) -> Doubles:
-    """Return the sums (..., tiles) of values (..., pixels)."""
-    return values.reshape(*values.shape[:-1], -1, MEMBERS).sum(-1)
-
-
-def _ratio(squares: Doubles, others: Doubles) -> float:
-    """Return the mean of squares (3, ways, blocks, k) over that of others, without the greatest of each."""
-    one, base = (each.mean((0, 1, 2)) for each in (squares, others))
-    least = math.fsum(base.take(_calm(base)))
-    return math.fsum(one.take(_calm(one))) / least if least > 0 else 1.0
+    def _render(self, branches: int, reuse: bool, guided: bool) -> Run:
+        """Render the tiles with a setting."""
+        pixels = (self._y * self._camera.size[0] + self._x).astype(np.uint32)
+        parts = min(max(-(-len(pixels) // TILES_AT_ONCE), LEAST_JOBS), len(pixels))
+        jobs = [
+            TrialJob(self._camera, self._seed, each.ravel(), self._bounces, branches, reuse, guided)
+            for each in np.array_split(pixels, parts)
+        ]
+        found = list(self._do(jobs))
+        radiance = np.concatenate([part.radiance for part in found], -1).reshape(3, BLOCKS, *pixels.shape)
+        mean = radiance.mean(1, keepdims=True)
+        if self._scale is None:
+            of_tile = mean.mean(-1, keepdims=True)
+            self._scale = np.square(of_tile) + (FLOOR * mean.mean() ** 2 or 1.0)
+        deviation = (radiance - mean) * math.sqrt(BLOCKS / (BLOCKS - 1))
+        variance = (np.square(deviation) / self._scale).mean((0, 1))
+        deviation *= variance <= np.quantile(variance, 1 - OUTLIERS, method="lower")
+        gathered = np.zeros_like(deviation)
+        for member in range(MEMBERS):  # two pixels count by the convolution of the blur with itself
+            x, y = (each - each[:, member, None] for each in (self._x, self._y))
+            gathered += np.exp(-(x**2 + y**2) / (2 * BLUR) ** 2) * deviation[..., member, None]
+        pixels, blurred = (np.mean(deviation * each / self._scale) for each in (deviation, gathered))
+        rays, met = sum(part.rays for part in found), np.sum([part.met for part in found], 0)
+        return Run(float(pixels), float(blurred), rays, met)

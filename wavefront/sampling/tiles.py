@@ -21,6 +21,7 @@ from ..arrays.vec import Ints
 SIDE = 4  # cells of a block, in each direction; each has a pixel of every tile
 STRIDE = 7  # pixels of a cell, in each direction
 MEMBERS = SIDE * SIDE
+BLOCK_SIDE = SIDE * STRIDE  # pixels
 
 
 def place_in_tiles(pixel: Words, width: int) -> tuple[Ints, Ints]:
@@ -31,15 +32,14 @@ def place_in_tiles(pixel: Words, width: int) -> tuple[Ints, Ints]:
     pixel
         (n,) row-major indices in a picture of this width.
     """
-    block = SIDE * STRIDE
     number = pixel.astype(np.intp)
     y = number // width
     x = number - y * width
-    block_x, block_y = x // block, y // block
-    member = (y % block // STRIDE) * SIDE + x % block // STRIDE
+    block_x, block_y = x // BLOCK_SIDE, y // BLOCK_SIDE
+    member = (y % BLOCK_SIDE // STRIDE) * SIDE + x % BLOCK_SIDE // STRIDE
     shift_x, shift_y = cell_shifts(block_x, block_y, member)
     tile_x, tile_y = (x + shift_x) % STRIDE, (y + shift_y) % STRIDE
-    across = -(-width // block)
+    across = -(-width // BLOCK_SIDE)
     tile = ((block_y * across + block_x) * STRIDE + tile_y) * STRIDE + tile_x
     return tile, member
 
@@ -60,6 +60,19 @@ def cell_shifts(block_x: Ints, block_y: Ints, member: Ints) -> tuple[Ints, Ints]
 def block_of(pixel: Words, width: int) -> Ints:
     """Return the number of the block of each pixel (n,), which has whole tiles; arguments as above."""
     return place_in_tiles(pixel, width)[0] // STRIDE**2
+
+
+def pixels_of_tiles(place: Ints, across: int) -> tuple[Ints, Ints]:
+    """Return columns and rows (k, MEMBERS) of the pixels of tiles (k,), numbered block by block from 0 on.
+
+    `across` is the number of blocks in a row.
+    """
+    block, tile = np.divmod(place[:, None], STRIDE * STRIDE)
+    (block_y, block_x), member = np.divmod(block, across), np.arange(MEMBERS)
+    shift_x, shift_y = cell_shifts(block_x, block_y, member)
+    x = (block_x * SIDE + member % SIDE) * STRIDE + (tile % STRIDE - shift_x) % STRIDE
+    y = (block_y * SIDE + member // SIDE) * STRIDE + (tile // STRIDE - shift_y) % STRIDE
+    return x, y
 
 
 def others_in_tile(pixel: Words, one: int, width: int) -> Ints:

@@ -10,17 +10,18 @@ from typing import Any
 import numpy as np
 
 from ..accel.base import Accelerator, Intersections
+from ..accel.counter import RayCounter
 from ..aovs.recorder import SampleRecorder, recorded_aovs
 from ..arrays.soa import soa
 from ..arrays.state import Words
-from ..arrays.vec import Bools, Floats, Ints, broadcast
+from ..arrays.vec import Floats, Ints, broadcast
 from ..compile.scene import CompiledScene
 from ..core.errors import SceneError
 from ..core.shared import SharedInt, Stopped
 from ..guiding import GuideTable
 from ..integrators import Integrator, integrator_for
 from ..integrators.light_tracing import trace_light
-from ..integrators.tuning_job import TrialJob, TrialPart
+from ..integrators.tuning import TrialJob, TrialPart
 from ..sampling.filters import Filter
 from ..sampling.sampler import Sampler, SamplerMaker
 from ..stages.generate import generate
@@ -147,7 +148,8 @@ def _trace_wave(tracer: Tracer, monitor: WaveMonitor, job: Job) -> WaveResult:
     layers = None if recorder is None else recorder.result(n, bad)
     radiance[:, bad] = 0
     seconds = time.perf_counter() - begin
-    return WaveResult(radiance.reshape(3, n, k), bad, accelerator.rays, seconds, layers, splats)
+    rays = accelerator.nearest + accelerator.shadow
+    return WaveResult(radiance.reshape(3, n, k), bad, rays, seconds, layers, splats)
 
 
 def _check_radiance(integrator: Integrator, radiance: Any, lanes: int) -> None:
@@ -167,7 +169,7 @@ def _samples(job: Job) -> Words:
     return np.repeat(samples, job.pixels.size)
 
 
-class MonitoredAccelerator:
+class MonitoredAccelerator(RayCounter):
     """An accelerator for one wave: passes rays on to another one, counts them, and ends the wave in time.
 
     Every bounce of every integrator asks for the nearest surfaces, so here a wave can be ended between
@@ -175,10 +177,8 @@ class MonitoredAccelerator:
     """
 
     def __init__(self, accelerator: Accelerator, monitor: WaveMonitor, deadline: float) -> None:
-        self.name = accelerator.name
-        self.rays = 0
-        self._accelerator, self._monitor, self._deadline = accelerator, monitor, deadline
-        self._surfaces = 0
+        super().__init__(accelerator)
+        self._monitor, self._deadline, self._surfaces = monitor, deadline, 0
 
     def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
         """Find the nearest hits of rays (3, n).
@@ -190,10 +190,4 @@ class MonitoredAccelerator:
         """
         self._monitor.check(self._surfaces, self._deadline)
         self._surfaces += 1
-        self.rays += origin.shape[1]
-        return self._accelerator.closest(origin, direction, exclude_prim)
-
-    def occluded(self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints) -> Bools:
-        """Return True for each of the rays (3, n) that something blocks."""
-        self.rays += origin.shape[1]
-        return self._accelerator.occluded(origin, direction, distance, exclude_prim)
+        return super().closest(origin, direction, exclude_prim)

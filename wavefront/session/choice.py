@@ -7,24 +7,29 @@ that a picture of 64 samples that gets 64 more is the one of 128.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+import math
+from dataclasses import replace
 
 from ..arrays.soa import soa
 from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..integrators.training import train
-from ..integrators.tuning import BLOCKS, MOST_TILES, JobsRunner, Trial, guide_pays, run_trial, tiles_for
+from ..integrators.tuning import MOST_BRANCHES, JobsRunner, Trial
 from ..sampling.sampler import make_sampler
-from ..sampling.tiles import SIDE, STRIDE
+from ..sampling.tiles import BLOCK_SIDE
 from ..settings import AUTO, Settings
 from ..settings.combinations import left_out
-from ..stages.reuse import can_reuse, shares_all
+from ..stages.reuse import can_reuse, shared_materials
 
 LEAST_PIXELS = 192 * 192  # of pictures that get a trial; smaller ones take no longer than a moment
 GUIDE_HINT = "most light is hard to find here: guide=True may pay (docs/guiding.md)"
-GUIDE_TILES = MOST_TILES // 2  # whatever the size of the picture: the pilot takes longer anyway
+# Variance times rays must fall below this part: rays tell the cost to about a tenth, and a trial may miss the
+# few paths that find most of the light.
+GAIN = 0.85
+GUIDE_TILES = 128  # whatever the size of the picture: the pilot takes longer anyway
+RARE_LIGHT = 1.0  # relative variance of a pixel of four samples, from where on light is hard to find
+COMMON_GLOSS = 0.05  # part of the second points, from where on a trial sees enough of what a material does
 
 
 @soa
@@ -63,49 +68,49 @@ def choose(
     run
         Does the jobs of trials.
     """
-    branches = settings.values["branches"]
-    asked = Choice(1 if branches == AUTO else int(branches), settings.values["reuse"] is True)
-    if not settings.is_full:
-        return asked
+    branches, reuse = settings.values["branches"], settings.values["reuse"] is True
+    asked = Choice(1 if branches == AUTO else int(branches), reuse, has_guide)
     whole = camera.cropped((0, 0, *camera.resolution))  # a window is a part of the same picture
-    trial = partial(_trial, settings, scene, whole, run)
-    if settings.values["guide"] == AUTO and has_guide:
-        return _choose_guide(settings, asked, trial)
-    if _tries_something(settings, scene, whole):
-        tiles, may_reuse = tiles_for(whole.size), _may_reuse(settings, whole) and can_reuse(scene)
-        tries_reuse = may_reuse and shares_all(scene)
-        found = trial(has_guide, tiles, tries_reuse)
-        if may_reuse and not tries_reuse and found.light_is_rare and found.gloss_is_common:
-            tries_reuse = True
-            found = trial(has_guide, tiles, tries_reuse)
-        hint = GUIDE_HINT if not has_guide and found.light_is_rare else None
-        if tries_reuse and found.reuse_pays():
-            return Choice(1, True, has_guide, hint)
-        return Choice(found.best_ways(), False, has_guide, hint)
-    return Choice(asked.branches, asked.reuse, has_guide)
+    seed, bounces = settings.pilot_seed(1), settings.values["max_bounces"]
+    if settings.is_full and has_guide and settings.values["guide"] == AUTO:
+        trial = Trial(whole, seed, bounces, run, GUIDE_TILES)
+        plain, guided = (_branched(settings, trial, replace(asked, guided=each)) for each in (False, True))
+        return guided if _cost(trial, guided, plain)[0] < GAIN else plain
+    if settings.is_full and _tries_something(settings, scene, whole):
+        return _tried(settings, scene, whole, Trial(whole, seed, bounces, run), asked)
+    return asked
 
 
-def _choose_guide(settings: Settings, asked: Choice, trial: Callable[[bool, int], Trial]) -> Choice:
-    """Return whether a guide is used, and how many branches go with that."""
-    fixed = None if settings.values["branches"] == AUTO and not asked.reuse else asked.branches
-    guided, plain = (trial(each, GUIDE_TILES) for each in (True, False))
-    pays = guide_pays(guided, plain, fixed)
-    found = guided if pays else plain
-    return Choice(fixed or found.best_ways(), asked.reuse, pays)
+def _tried(settings: Settings, scene: CompiledScene, camera: Camera, trial: Trial, plain: Choice) -> Choice:
+    """Return whether pixels share paths, or else how many branches these have; `plain` is neither."""
+    found = trial.run(1, False, plain.guided)
+    light_is_rare = found.variance > RARE_LIGHT
+    plain = replace(plain, hint=GUIDE_HINT if light_is_rare and not plain.guided else None)
+    branched, shared = _branched(settings, trial, plain), replace(plain, reuse=True)
+    if not _may_reuse(settings, camera) or not can_reuse(scene):
+        return branched
+    glossy = found.met[~shared_materials(scene)]
+    if glossy.size and not (light_is_rare and glossy.min() >= COMMON_GLOSS * found.met.sum()):
+        return branched
+    pixels, blurred = _cost(trial, shared, plain)
+    return shared if math.sqrt(pixels * max(blurred, 0)) < _cost(trial, branched, plain)[0] else branched
 
 
-def _trial(
-    settings: Settings,
-    scene: CompiledScene,
-    camera: Camera,
-    run: JobsRunner,
-    guided: bool,
-    tiles: int,
-    reuse: bool = False,
-) -> Trial:
-    seeds = tuple(settings.pilot_seed(number) for number in range(1, BLOCKS + 1))
-    bounces = settings.values["max_bounces"]
-    return run_trial(scene, camera, seeds, bounces, run, guided=guided, tiles=tiles, reuse=reuse)
+def _branched(settings: Settings, trial: Trial, choice: Choice) -> Choice:
+    """Return a choice with as many branches as pay."""
+    if settings.values["branches"] == AUTO and not choice.reuse:
+        for branches in (2, MOST_BRANCHES):
+            more = replace(choice, branches=branches)
+            if _cost(trial, more, choice)[0] >= GAIN:
+                break
+            choice = more
+    return choice
+
+
+def _cost(trial: Trial, one: Choice, other: Choice) -> tuple[float, float]:
+    """Return variance times rays of a choice over that of another: of pixels, and after a blur."""
+    first, second = (trial.run(each.branches, each.reuse, each.guided) for each in (one, other))
+    return first.cost(second)
 
 
 def _tries_something(settings: Settings, scene: CompiledScene, camera: Camera) -> bool:
@@ -122,4 +127,4 @@ def _tries_something(settings: Settings, scene: CompiledScene, camera: Camera) -
 def _may_reuse(settings: Settings, camera: Camera) -> bool:
     """Return whether settings and size of a picture allow that its pixels share paths by themselves."""
     free = settings.values["reuse"] == AUTO and not left_out(settings.values, "reuse")
-    return free and min(camera.size) >= SIDE * STRIDE
+    return free and min(camera.size) >= BLOCK_SIDE

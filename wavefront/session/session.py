@@ -22,7 +22,7 @@ from ..core.interrupt import InterruptHandler
 from ..core.shared import STOP, SharedInt, Stopped
 from ..film.checkpoint import Checkpoint
 from ..image import Image
-from ..integrators.tuning_job import TrialJob, TrialPart
+from ..integrators.tuning import TrialJob, TrialPart
 from ..io.to_scene import as_scene, choose_camera
 from ..scheduling.accumulator import Accumulator
 from ..scheduling.blas import reserve_buffers

@@ -1,0 +1,25 @@
+"""Counting rays."""
+
+from __future__ import annotations
+
+from ..arrays.vec import Bools, Floats, Ints
+from .base import Accelerator, Intersections
+
+
+class RayCounter:
+    """An accelerator that counts the rays which it passes on: those to nearest surfaces and shadow rays."""
+
+    def __init__(self, accelerator: Accelerator) -> None:
+        self.name = accelerator.name
+        self.nearest, self.shadow = 0, 0
+        self._accelerator = accelerator
+
+    def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
+        """Find the nearest hits of rays (3, n)."""
+        self.nearest += origin.shape[1]
+        return self._accelerator.closest(origin, direction, exclude_prim)
+
+    def occluded(self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints) -> Bools:
+        """Return True for each of the rays (3, n) that something blocks."""
+        self.shadow += origin.shape[1]
+        return self._accelerator.occluded(origin, direction, distance, exclude_prim)
