@@ -466,14 +466,3 @@ def test_unknown_encodings_are_refused(write, name):
     data = text if name == "a.dae" else zipped([("3D/3dmodel.model", text)])
     with pytest.raises(SceneError, match=rf"{name}: .*unknown encoding: foo"):
         load_meshes(write(data, name))
-
-
-def test_an_off_file_of_many_kinds_of_polygons(write):
-    """A pentagon, a quadrilateral and a triangle side by side, 2 in area."""
-    rows = ["0 0 0", "1 0 0", "1 1 0", "0.5 1.5 0", "0 1 0", "2 0 0", "2 0.5 0", "1 0.5 0", "2 1 0"]
-    faces = ["5 0 1 2 3 4", "4 1 5 6 7", "3 7 6 8"]
-    mesh = load_mesh(write("\n".join(["OFF", f"{len(rows)} {len(faces)} 0", *rows, *faces]), "a.off"))
-    corners = mesh.vertices[mesh.faces]
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    assert len(areas) == 6
-    assert areas.sum() == pytest.approx(1.25 + 0.5 + 0.25)

@@ -1,24 +1,31 @@
-"""Wavefront OBJ.
+"""Wavefront OBJ. trimesh reads the geometry, after a check for errors that it ignores.
 
-Every line is checked, but lines that differ only in their digits only once, and all numbers of lines of one
-form are read at once.
+trimesh takes index 0 for the first vertex, counts negative indices from the end of the file and not from the
+face's own line, and drops short lines and the uvs and normals of faces of mixed forms. So every line is
+checked, and faces that it would misread are rewritten. trimesh gets only the lines of v, vt, vn and f, with
+numbers in place of the names of materials, which may contain any characters.
 """
 
 from __future__ import annotations
 
 import re
+from bisect import bisect
 from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
-from typing import NamedTuple
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..arrays.vec import Ints
 from ..core.errors import SceneError
 from .repair import RawMesh, Table, warn
 from .sources import LoadLimits
 from .text_lines import NUMBER, check_lines, words
+from .trimesh_import import import_trimesh
+from .trimesh_loading import geometries
 
 UNSEEN = ("", "o", "g")  # keywords without an effect on the look of a surface
 OFF = ("off", "0")  # values that switch a keyword off
@@ -29,7 +36,7 @@ NUMBERS = (NUMBER, ", which is not a number", "numbers", "must have")
 INDEX = r"[-+]?0{0,99}\d{1,19}"
 CORNER = re.compile(rf"{INDEX}(/({INDEX})?(/{INDEX})?)?/*", re.ASCII)
 CORNERS = (CORNER, "; a corner is v, v/vt, v//vn or v/vt/vn", "corners", "needs")
-ABSENT = np.iinfo(np.int64).min  # in place of an index that a corner does not have
+PLAIN = {"1": [0], "1/1": [0, 1], "1//1": [0, 2], "1/1/1": [0, 1, 2]}  # which of v, vt, vn a corner has
 
 
 @dataclass
@@ -51,6 +58,17 @@ class Kind(NamedTuple):
 
 
 @dataclass
+class _Class:
+    """Groups whose faces have corners of one form and number: one mesh for trimesh.
+
+    Its time grows with the square of the number of meshes.
+    """
+
+    faces: list[str] = field(default_factory=list)
+    groups: list[tuple[str, int]] = field(default_factory=list)  # material, number of faces
+
+
+@dataclass
 class _Lines:
     """The lines of a file. Lines are counted from 0."""
 
@@ -59,6 +77,7 @@ class _Lines:
     kinds: list[Kind]
     rows: dict[str, list[int]] = field(default_factory=lambda: {"v": [], "vt": [], "vn": []})  # by keyword
     groups: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))  # of f, by material
+    absent: dict[str, str] = field(default_factory=dict)  # keyword that only faces use -> message
 
 
 def parse(name: str, text: str, strict: bool = False, limits: LoadLimits | None = None) -> Obj:
@@ -91,18 +110,22 @@ def parse(name: str, text: str, strict: bool = False, limits: LoadLimits | None 
                 smooth.append(at + 1)
             elif keyword not in UNSEEN and rest not in OFF:
                 out.ignored.setdefault(keyword, at + 1)
-    tables = {keyword: _table(lines, keyword) for keyword in lines.rows}
     if not lines.groups:
-        is_colored = all(lines.kinds[at].width >= 6 for at in lines.rows["v"])
-        out.points = tables["v"][:-1, : 6 if is_colored else 3]
+        out.points = _points(lines)
         return out
     (limits or LoadLimits()).check_meshes(name, len(lines.groups))
-    face = np.array([row for group in lines.groups.values() for row in group])  # their lines
-    widths = np.array([lines.kinds[row].width for row in face.tolist()])
-    corner = _resolved(lines, face, widths, _indices(lines, face, widths), strict)
-    ends = np.cumsum([len(group) for group in lines.groups.values()])[:-1]
-    parts = np.split(face, ends), np.split(widths, ends), np.split(corner, np.cumsum(widths)[ends - 1])
-    out.raws = [_mesh(*part, tables) for part in zip(lines.groups, *parts, strict=True)]
+    added, classes = _faces(lines)
+    faces = [line for number, each in enumerate(classes) for line in (f"usemtl {number}", *each.faces)]
+    meshes = geometries(name, "obj", "\n".join(_tables(lines) + added + faces).encode())
+    for message in lines.absent.values():
+        warn(message, strict)
+    # trimesh lists the last mesh first
+    raws = {
+        raw.name: raw
+        for each, mesh in zip(classes, reversed(meshes), strict=True)
+        for raw in _raws(lines, each, mesh)
+    }
+    out.raws = [raws[material] for material in lines.groups]
     if smooth and any(raw.normals is None or not raw.normals.any(axis=1).all() for raw in out.raws):
         out.ignored["s, of faces without normals"] = smooth[0]
     return out
@@ -133,114 +156,117 @@ def _check(name: str, number: int, line: str) -> Kind:
     if len(rest) < LEAST[keyword]:
         has = f"{keyword} has {len(rest)} {what} ({line[len(keyword) :].strip()!r})"
         raise SceneError(f"{place}: {has}; it {must} at least {LEAST[keyword]}")
-    forms = {_form(word) for word in rest if keyword == "f"}
+    forms = {re.sub(r"\d+", "1", word) for word in rest if keyword == "f"}
     return Kind(keyword, len(rest), forms.pop() if len(forms) == 1 else "")
 
 
-def _form(corner: str) -> str:
-    """Return a corner of a face with 1 for every number."""
-    return re.sub(r"\d+", "1", corner)
+def _tables(lines: _Lines) -> list[str]:
+    """Return the lines of v, vt and vn, padded so that all of one keyword have the same number of words."""
+    written = []
+    for keyword, least, fill in (("v", 3, " nan"), ("vt", 2, " 0"), ("vn", 3, "")):
+        rows = lines.rows[keyword]
+        width = min(MOST[keyword], max([least, *(lines.kinds[at].width for at in rows)]))
+        written += [lines.texts[at] + fill * (width - lines.kinds[at].width) for at in rows]
+    return written
 
 
-def _table(lines: _Lines, keyword: str) -> Table:
-    """Return the numbers of all lines of v, vt or vn, and a row of zeros; columns that a line lacks are 0.
+def _points(lines: _Lines) -> Table:
+    """Return the numbers of all lines of v, (n, 3), or (n, 6) where all have colors."""
+    rows = lines.rows["v"]
+    width = 6 if rows and all(lines.kinds[at].width >= 6 for at in rows) else 3
+    return np.array([words(lines.texts[at])[1 : width + 1] for at in rows], np.float64).reshape(-1, width)
 
-    Colors that a line of v lacks are NaN.
+
+def _faces(lines: _Lines) -> tuple[list[str], list[_Class]]:
+    """Return lines that follow those of the file, and the faces from which trimesh makes meshes.
+
+    If one face of a group has a vt or a vn, all faces of the group get one: a vt of 0, and a vn of length 0
+    for a face without normals, which is flat.
     """
-    rows, fill = lines.rows[keyword], " nan" if keyword == "v" else " 0"
-    width = max([2 if keyword == "vt" else 3, *(min(lines.kinds[at].width, MOST[keyword]) for at in rows)])
-    padded = (lines.texts[at][len(keyword) :] + fill * (width - lines.kinds[at].width) for at in rows)
-    numbers = np.fromstring(" ".join(padded) + " 0" * width, sep=" ")
-    return numbers.reshape(-1, width)
+    added: list[str] = []
+    classes: dict[tuple[str, int], _Class] = defaultdict(_Class)
+    for material, group in lines.groups.items():
+        faces = [lines.texts[at] for at in group]
+        if not _is_plain(lines, group, faces):
+            faces = _rewritten(lines, group)
+            added += ["vt 0 0"] + ["vn 0 0 0"] * len(group)
+        if len({lines.kinds[at].width for at in group}) > 1:
+            faces = [triangle for face in faces for triangle in _fan(face)]
+        corners = words(faces[0])[1:]
+        same = classes[re.sub(r"\d+", "1", corners[0]), len(corners)]
+        same.faces += faces
+        same.groups.append((material, len(faces)))
+    return added, list(classes.values())
 
 
-def _indices(lines: _Lines, at: Ints, width: Ints) -> Ints:
-    """Return the indices (c, 3) of v, vt and vn, as written, of all corners of faces in lines (m,)."""
-    found = np.full((width.sum(), 3), ABSENT)
-    same: dict[tuple[str, int], tuple[list[int], list[str]]] = defaultdict(lambda: ([], []))
-    for line, begin in zip(at.tolist(), (np.cumsum(width) - width).tolist(), strict=True):
-        _, count, form = lines.kinds[line]
-        if form:
-            places, texts = same[form, count]
-            places.append(begin)
-            texts.append(lines.texts[line][1:])
-        for k, word in enumerate(() if form else words(lines.texts[line])[1:]):
-            places, texts = same[_form(word), 1]
-            places.append(begin + k)
-            texts.append(word)
-    for (form, count), (places, texts) in same.items():
-        columns = [column for column, index in enumerate(form.split("/")) if index]
-        numbers = np.fromstring(" ".join(texts).replace("/", " "), np.int64, sep=" ")
-        corners = np.add.outer(places, np.arange(count)).reshape(-1, 1)
-        found[corners, columns] = np.maximum(numbers, ABSENT + 1).reshape(len(corners), len(columns))
-    return found
-
-
-def _resolved(lines: _Lines, at: Ints, width: Ints, written: Ints, strict: bool) -> Ints:
-    """Return indices (c, 3) that count from 1, 0 for none, after a check; negative ones count back."""
-    line = np.repeat(at, width)
-    before = np.stack([np.searchsorted(rows, line) for rows in lines.rows.values()], 1)
+def _is_plain(lines: _Lines, group: list[int], faces: list[str]) -> bool:
+    """Return True if all faces have the same form, and all indices count from 1 and are in range."""
+    forms = {lines.kinds[at].form for at in group}
+    columns = PLAIN.get(forms.pop() if len(forms) == 1 else "")
+    if columns is None:
+        return False
     sizes = np.array([len(rows) for rows in lines.rows.values()])
-    index = np.where(written < 0, before + 1 + written, written)
-    given = written != ABSENT
-    for column, keyword in enumerate(lines.rows):
-        if column and not sizes[column] and given[:, column].any():
-            first = int(given[:, column].argmax())
-            message = f"f uses {keyword} {written[first, column]}; there is none, so all are left out"
-            warn(f"{lines.name} line {line[first] + 1}: {message}", strict)
-            given[:, column] = False
-    wrong = np.flatnonzero((given & ((index < 1) | (index > sizes))).ravel())
-    if wrong.size:
-        corner, column = divmod(int(wrong[0]), 3)
-        size, back = sizes[column], before[corner, column]
-        limit = f"in [1, {size}], or in [-{back}, -1] counting back" if size else "left out"
-        word = words(lines.texts[line[corner]])[1 + corner - int(np.flatnonzero(line == line[corner])[0])]
-        uses = f"f uses {list(lines.rows)[column]} {int(word.split('/')[column])}"
-        raise SceneError(f"{lines.name} line {line[corner] + 1}: {uses}; it must be {limit}")
-    return np.where(given, index, 0)
+    text = "".join(face[1:] for face in faces).replace("/", " ")
+    indices = np.fromstring(text, np.int64, sep=" ").reshape(-1, len(columns))
+    return bool(indices.min() > 0 and (indices.max(axis=0) <= sizes[columns]).all())
 
 
-def _mesh(material: str, at: Ints, width: Ints, corner: Ints, tables: dict[str, Table]) -> RawMesh:
-    """Return the mesh of faces in lines (m,) with so many corners (m,), whose indices are (c, 3).
-
-    If one corner has a vt or a vn, all get one: a vt of 0, and a vn of length 0 for a face without normals,
-    which is flat.
-    """
-    rows: dict[str, Ints] = {}
-    vertex = np.zeros(len(corner), np.int64)
-    face = np.repeat(np.arange(width.size), width)
-    for column, (keyword, table) in enumerate(tables.items()):
-        index = corner[:, column]
-        if index.any():
-            index = np.where(index > 0, index, len(table) + (face if keyword == "vn" else 0))
-            several = int(index.max()) + 1
-            pairs, vertex = _distinct(vertex * several + index)
-            of, index = np.divmod(pairs, several)
-            rows = {before: row.take(of) for before, row in rows.items()}
-            rows[keyword] = np.minimum(index, len(table)) - 1
-    values = {keyword: tables[keyword][row] for keyword, row in rows.items()}
-    count = width - 2
-    face = np.repeat(np.arange(width.size), count)
-    number = np.arange(face.size) - (np.cumsum(count) - count).take(face)  # of the triangle in its face
-    first = (np.cumsum(width) - width).take(face)
-    triangles = np.stack([first, first + number + 1, first + number + 2], 1)
-    second = (count.take(face) == 2) & (number == 1)
-    triangles[second] = np.roll(triangles[second], -1, 1)
-    if (count == 2).all():  # first all first halves, then all second halves
-        order = np.argsort(number, kind="stable")
-        triangles, face = triangles.take(order, 0), face.take(order)
-    raw = RawMesh(material, values["v"][:, :3], vertex.take(triangles), values.get("vn"))
-    raw.uvs, raw.colors = values.get("vt"), values["v"][:, 3:6] if values["v"].shape[1] > 5 else None
-    raw.lines = at.take(face) + 1
-    return raw
+def _rewritten(lines: _Lines, group: list[int]) -> list[str]:
+    """Return the faces of a group with indices from 1, and with those that `_faces` adds."""
+    faces = [[_corner(lines, at, word) for word in words(lines.texts[at])[1:]] for at in group]
+    for column, (keyword, rows) in enumerate(lines.rows.items()):
+        if any(corner[column] for face in faces for corner in face):
+            for number, face in enumerate(faces, 1):
+                for corner in face:
+                    corner[column] = corner[column] or len(rows) + (number if keyword == "vn" else 1)
+    return [
+        "f " + " ".join("/".join(str(i or "") for i in corner).rstrip("/") for corner in face)
+        for face in faces
+    ]
 
 
-def _distinct(index: Ints) -> tuple[Ints, Ints]:
-    """Return the distinct numbers (k,) of some (c,) in rising order, and the place of each in these."""
-    low, high = int(index.min()), int(index.max())
-    if high - low > 4 * index.size:
-        values, place = np.unique(index, return_inverse=True)
-        return values, place
-    there = np.zeros(high - low + 1, np.bool_)
-    there[index - low] = True
-    return np.flatnonzero(there) + low, (np.cumsum(there) - 1).take(index - low)
+def _corner(lines: _Lines, at: int, word: str) -> list[int]:
+    """Return the indices from 1 of v, vt and vn at a corner of a face in line `at`; 0 for none."""
+    corner = [0, 0, 0]
+    for column, ((keyword, rows), text) in enumerate(zip(lines.rows.items(), word.split("/"), strict=False)):
+        if not text:
+            continue
+        index, size, before = int(text), len(rows), bisect(rows, at)
+        message = f"{lines.name} line {at + 1}: f uses {keyword} {index}; "
+        if column and not size:
+            lines.absent.setdefault(keyword, message + "there is none, so all are left out")
+            continue
+        corner[column] = index if index > 0 else before + 1 + index
+        if index == 0 or not 0 < corner[column] <= size:
+            limit = f"in [1, {size}], or in [-{before}, -1] counting back" if size else "left out"
+            raise SceneError(f"{message}it must be {limit}")
+    return corner
+
+
+def _fan(face: str) -> list[str]:
+    """Return the triangles of a face as trimesh makes them; trimesh is slow at groups of mixed polygons."""
+    _, first, *others = face.split()
+    if len(others) == 3:
+        return [f"f {first} {others[0]} {others[1]}", f"f {others[1]} {others[2]} {first}"]
+    return [f"f {first} {second} {third}" for second, third in pairwise(others)]
+
+
+def _raws(lines: _Lines, same: _Class, mesh: dict[str, Any]) -> Iterator[RawMesh]:
+    """Yield the mesh of each group of a class, from the mesh of all of them."""
+    visual, normals, colors = mesh["visual"], mesh.get("vertex_normals"), mesh.get("vertex_colors")
+    uvs, begin = visual and visual.uv, 0
+    for material, count in same.groups:
+        faces, begin = mesh["faces"][begin : begin + count], begin + count
+        used: NDArray[np.intp] | slice = slice(None)
+        if len(same.groups) > 1:
+            used, inverse = np.unique(faces, return_inverse=True)
+            faces = inverse.reshape(faces.shape)
+        raw = RawMesh(material, mesh["vertices"][used], import_trimesh().geometry.triangulate_quads(faces))
+        raw.normals, raw.uvs, raw.colors = (
+            None if values is None else values[used] for values in (normals, uvs, colors)
+        )
+        group = lines.groups[material]
+        numbers, triangles = np.array(group) + 1, np.array([lines.kinds[at].width - 2 for at in group])
+        # of a mesh of quads, trimesh lists all first halves, then all second halves
+        raw.lines = np.tile(numbers, 2) if (triangles == 2).all() else np.repeat(numbers, triangles)
+        yield raw

@@ -1,20 +1,20 @@
-"""OFF."""
+"""OFF, read by trimesh after a check of its text: trimesh ignores short lines, and colors."""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
 from ..core.errors import SceneError
 from ..core.files import decode_text
 from ..core.plural import plural
-from .repair import RawMesh, warn
+from .repair import warn
+from .trimesh_loading import by_trimesh
 
 HEADERS = {"OFF": [], "COFF": ["colors of vertices"], "NOFF": ["normals"], "STOFF": ["texture coordinates"]}
 
 
-def parse(name: str, data: bytes, strict: bool, materials: bool) -> RawMesh:
-    """Return the mesh of an OFF file.
+def parse(name: str, data: bytes, strict: bool, materials: bool) -> Any:
+    """Return the trimesh scene of an OFF file.
 
     Raises
     ------
@@ -44,19 +44,9 @@ def parse(name: str, data: bytes, strict: bool, materials: bool) -> RawMesh:
         lost.append("colors of faces")
     if lost and materials:
         warn(f"{name}: not honored: {', '.join(lost)}", strict)
-    points = [words[:3] for _, words in rows[:vertices]]
-    polygons = [words[1 : int(words[0]) + 1] for _, words in rows[vertices : vertices + faces]]
-    return RawMesh("geometry_0", np.array(points, np.float64).reshape(-1, 3), _triangles(polygons))
-
-
-def _triangles(polygons: list[list[str]]) -> NDArray[np.int64]:
-    """Return the triangles (m, 3) of polygons: triangles, first and second halves of quads, then fans."""
-    wide = [polygon for polygon in polygons if len(polygon) > 4]
-    quads = [polygon for polygon in polygons if len(polygon) == 4]
-    fans = [(first, *others[k : k + 2]) for first, *others in wide for k in range(len(others) - 1)]
-    found = [polygon for polygon in polygons if len(polygon) == 3]
-    found += [[a, b, c] for a, b, c, _ in quads] + [[c, d, a] for a, _, c, d in quads]
-    return np.array([*found, *fans], np.int64).reshape(-1, 3)
+    # only the counts and the rows that they cover: trimesh would also read the lines after them
+    text = [f"OFF\n{vertices} {faces} 0", *(" ".join(words) for _, words in rows[: vertices + faces])]
+    return by_trimesh(name, "\n".join(text).encode(), "off")
 
 
 def _counts(name: str, rows: list[tuple[int, list[str]]]) -> tuple[int, int]:

@@ -20,7 +20,8 @@ from ..core.plural import plural
 from .ply_header import SIZES, TYPES, Element, check_ply, ply_textures, unread
 from .repair import warn
 from .sources import SceneFiles
-from .trimesh_loading import Images, by_trimesh, import_trimesh
+from .trimesh_import import import_trimesh
+from .trimesh_loading import Images, by_trimesh
 
 FACES = ("face", "tristrips")
 ORDERS: dict[str, Literal["little", "big"]] = {"<": "little", ">": "big"}

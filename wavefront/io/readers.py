@@ -135,7 +135,10 @@ def _read_stl(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
 
 
 def _read_off(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
-    return Contents.once([off.parse(os.fspath(files.scene), data, options.strict, options.materials)])
+    name = os.fspath(files.scene)
+    return trimesh_objects.read(
+        off.parse(name, data, options.strict, options.materials), name, options.strict
+    )
 
 
 def _read_dae(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:

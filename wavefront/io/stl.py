@@ -1,20 +1,18 @@
-"""STL: binary files and texts."""
+"""STL: binary files and texts, read by trimesh after a check of their counts."""
 
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.errors import SceneError
 from ..core.files import decode_text
 from ..core.plural import plural
 from .repair import RawMesh, warn, wide
 from .text_lines import NUMBER, check_lines, words
+from .trimesh_loading import geometries
 
-FACET = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("extra", "<u2")])
 COLORS = (b"COLOR=", b"MATERIAL=")  # keywords that Materialize Magics writes into the header
 OTHERS = ("", "facet", "outer", "endloop", "endfacet")  # lines of a text without further information
 
@@ -43,16 +41,17 @@ def parse(name: str, data: bytes, strict: bool = False) -> list[RawMesh]:
 
 def _binary(name: str, data: bytes, strict: bool) -> list[RawMesh]:
     colored = [f"{word.decode()} in the header" for word in COLORS if word in data[:80]]
-    facets = np.frombuffer(data, FACET, offset=84)
-    if facets["extra"].any():
-        colored.append(f"colors of facets (facet {int((facets['extra'] != 0).argmax())})")
+    meshes = geometries(name, "stl", data)
+    extra = [mesh["face_attributes"]["stl"] for mesh in meshes]
+    if extra and extra[0].any():
+        colored.append(f"colors of facets (facet {int((extra[0] != 0).argmax())})")
     if colored:
         warn(f"{name}: not honored: {', '.join(colored)}", strict)
-    return [_soup("", facets["vertices"])] if facets.size else []
+    return [RawMesh("", wide(mesh["vertices"]), mesh["faces"]) for mesh in meshes]
 
 
 def _text(name: str, text: str) -> list[RawMesh]:
-    """Return the solids of a text."""
+    """Check a text, and read its vertices by trimesh, which must not see the names of solids."""
     lines = [line.strip() for line in text.replace("\t", " ").split("\n")]
     solids: list[tuple[str, list[int]]] = []  # name, lines of the vertices
     inside = False
@@ -71,16 +70,11 @@ def _text(name: str, text: str) -> list[RawMesh]:
         if len(vertices) % 3:
             has = f"has {plural(len(vertices), 'vertex', 'vertices')}; facets need a multiple of 3"
             raise SceneError(f"{name}: solid {title!r} {has}")
-        if vertices:
-            raws.append(_soup(title, np.fromstring(" ".join(lines[at][6:] for at in vertices), sep=" ")))
-            raws[-1].lines = np.array(vertices[::3]) + 1
+        written = "\n".join(["solid", *(lines[at] for at in vertices), "endsolid"]).encode()
+        for mesh in geometries(name, "stl", written):
+            numbers = np.array(vertices[::3]) + 1
+            raws.append(RawMesh(title, mesh["vertices"], mesh["faces"], lines=numbers))
     return raws
-
-
-def _soup(name: str, numbers: NDArray[Any]) -> RawMesh:
-    """Return the mesh of triangles, each with three vertices of its own."""
-    vertices = wide(numbers.reshape(-1, 3))
-    return RawMesh(name, vertices, np.arange(len(vertices)).reshape(-1, 3))
 
 
 def _check(name: str, number: int, line: str) -> str:

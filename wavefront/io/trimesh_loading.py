@@ -1,12 +1,10 @@
-"""Loading files by trimesh: errors become SceneErrors; images are read only from the file's own folder.
-
-trimesh catches BaseException about optional imports, so a KeyboardInterrupt that is raised there would
-vanish, and leave a module half imported.
-"""
+"""Loading files by trimesh: errors become SceneErrors; images are read only from the file's own folder."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from io import BytesIO
 from typing import Any
 from urllib.parse import unquote
@@ -15,16 +13,10 @@ import numpy as np
 
 from ..codecs.images import decode_codes
 from ..core.errors import SceneError
-from ..core.interrupt import deferred_signals, repeated_ctrl_c
+from ..core.interrupt import repeated_ctrl_c
 from .repair import warn
 from .sources import SceneFiles
-
-
-def import_trimesh() -> Any:
-    """Return the module trimesh. A Ctrl-C that comes while it is imported raises afterwards."""
-    with deferred_signals(also_the_second=True):
-        import trimesh
-    return trimesh
+from .trimesh_import import import_trimesh
 
 
 class Images:
@@ -83,13 +75,32 @@ def by_trimesh(name: str, data: bytes, kind: str, images: Any = None, skip_mater
     """
     trimesh = import_trimesh()
     options: dict[str, Any] = {"skip_materials": True} if skip_materials else {}
+    with typed_errors(name, kind):
+        if kind == "dae":
+            return _unprocessed(trimesh.exchange.dae.load_collada(BytesIO(data), images))
+        return trimesh.load_scene(BytesIO(data), file_type=kind, process=False, resolver=images, **options)
+
+
+def geometries(name: str, kind: str, data: bytes) -> list[dict[str, Any]]:
+    """Return the meshes that trimesh's loader reads; a trimesh object would round their colors to 8 bits.
+
+    Raises
+    ------
+    SceneError
+        For any error of the loader but MemoryError.
+    """
+    mesh_loaders = import_trimesh().exchange.load.mesh_loaders
+    with typed_errors(name, kind):
+        found = mesh_loaders[kind](BytesIO(data))
+    return list(found["geometry"].values()) if "geometry" in found else [found]
+
+
+@contextmanager
+def typed_errors(name: str, kind: str) -> Iterator[None]:
+    """Convert any error of a loader but MemoryError to a SceneError; silence NumPy's warnings."""
     try:
-        with np.errstate(all="ignore"), repeated_ctrl_c():  # some loaders swallow it
-            if kind == "dae":
-                return _unprocessed(trimesh.exchange.dae.load_collada(BytesIO(data), images))
-            return trimesh.load_scene(
-                BytesIO(data), file_type=kind, process=False, resolver=images, **options
-            )
+        with np.errstate(all="ignore"), repeated_ctrl_c():  # some of them swallow it
+            yield
     except (MemoryError, SceneError):
         raise
     except Exception as error:

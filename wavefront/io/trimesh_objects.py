@@ -20,7 +20,7 @@ from .contents import Contents
 from .mtl import MATTE
 from .placing import Places
 from .repair import RawMesh, Table, warn, with_face_colors
-from .trimesh_loading import import_trimesh
+from .trimesh_import import import_trimesh
 
 if TYPE_CHECKING:
     import trimesh
