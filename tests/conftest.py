@@ -38,9 +38,8 @@ def pytest_configure() -> None:
     A shell that starts the tests in the background has them ignore Ctrl-C.
     """
     paths = str(Path(__file__).parent), os.environ.get("PYTHONPATH")
-    os.environ["PYTHONPATH"] = os.pathsep.join(
-        filter(None, paths)
-    )  # modules of tests, for the programs they run
+    # modules of tests, for the programs that they run
+    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, paths))
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -51,6 +50,7 @@ def close_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
     from wavefront.sampling import tiles as pixel_tiles
 
     monkeypatch.setattr(pixel_tiles, "STRIDE", 1)
+    monkeypatch.setattr(pixel_tiles, "BLOCK_SIDE", pixel_tiles.SIDE)
 
 
 @pytest.fixture

@@ -160,7 +160,7 @@ def test_light_from_shared_points(seed: int, guided: bool, branches: int, screen
     numbers[0, 2, 1] = -1  # the path that is not there
     if branches == 2:
         numbers[1, 2, 1] = -1
-    arriving, lost = _arriving(scene, first, points, light, [each.copy() for each in numbers])
+    (arriving,), lost = _arriving(scene, first, points, [light], [each.copy() for each in numbers])
     due, left = np.zeros((3, MEMBERS, TILES)), set()
     for branch in range(branches):
         for tile in range(TILES):
@@ -237,16 +237,16 @@ def test_what_nobody_reaches_stays_with_its_path(monkeypatch: pytest.MonkeyPatch
     def first_of(scene, lit, albedo, lane_in):
         return SimpleNamespace(present=lane_in >= 0)
 
-    def arriving(scene, first, points, light, numbers):
+    def arriving(scene, first, points, lights, numbers):
         asked.extend(sorted(int(each) for each in np.unique(numbers) if each >= 0))
-        return arrived[:, :, : first.present.shape[1]], [np.array([1])]
+        return [arrived[:, :, : first.present.shape[1]]], [np.array([1])]
 
     monkeypatch.setattr(reuse.FirstPoints, "of", first_of)
     monkeypatch.setattr(reuse, "_arriving", arriving)
     asked: list[int] = []
     L = np.ones((3, 2), f4)
     shade = SimpleNamespace(lit=lambda: lit)
-    add_shared(OPEN, L, paths, shade, points, light, tiles, 1)
+    add_shared(OPEN, [(L, light)], paths, shade, points, tiles, 1)
     due = np.ones((3, 2))
     due[:, 1] += points.throughput[:, 1] * light[:, 1]
     grid = tiles.grid(paths.slot)
@@ -257,7 +257,7 @@ def test_what_nobody_reaches_stays_with_its_path(monkeypatch: pytest.MonkeyPatch
     assert asked == [0, 1]
     light[:, 0] = 0
     asked.clear()
-    add_shared(OPEN, L, paths, shade, points, light, tiles, 1)
+    add_shared(OPEN, [(L, light)], paths, shade, points, tiles, 1)
     assert asked == [1]
 
 
@@ -269,7 +269,7 @@ def test_the_first_of_all_points_is_shared() -> None:
     first.normal[:] = f4([[0], [0], [1]])
     numbers = np.full((MEMBERS, TILES), -1)
     numbers[1, 0] = 0
-    arriving, lost = _arriving(OPEN, first, points, np.ones((3, len(points)), f4), [numbers])
+    (arriving,), lost = _arriving(OPEN, first, points, [np.ones((3, len(points)), f4)], [numbers])
     assert (arriving[:, :, 0] > 0).all()
     assert not arriving[:, :, 1].any()
     assert not any(each.size for each in lost)

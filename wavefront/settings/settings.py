@@ -125,7 +125,7 @@ class Settings:
 
     def pilot_seed(self, number: int = 0) -> int:
         """Return the seed of the pilot or of a block of the trial, whose numbers are their own."""
-        return (self.values["seed"] ^ PILOT) + number
+        return (int(self.values["seed"]) ^ PILOT) + number
 
     def executor_for(self, size: tuple[int, int]) -> str | ExecutorLike:
         """Return the executor for a picture of a size (width, height)."""
