@@ -9,6 +9,7 @@ Source: E. Veach, thesis 1997, §10.4.2 (efficiency).
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -25,7 +26,7 @@ from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..sampling.sampler import SamplerMaker
-from ..sampling.tiles import BLOCK_SIDE, MEMBERS, STRIDE, pixels_of_tiles
+from ..sampling.tiles import BLOCK_SIDE, STRIDE, pixels_of_tiles
 from ..stages.generate import generate
 from ..stages.interaction import material_rows
 from .ladder import li_full
@@ -39,13 +40,11 @@ TILES_AT_ONCE = 32  # that are traced together, at most
 LEAST_JOBS = 2  # so that two workers have something to do
 MOST_BRANCHES = 4  # more gain nothing
 BOUNCES = 6  # at most: few paths get further, and a wave of few costs as much as one of many
-OUTLIERS = 0.02  # part of the pixels, the noisiest, that do not count
 FLOOR = 0.01  # of the squared mean of all pixels, added to that of each
 # Costs relative to a ray that finds the nearest surface, which is shaded then. Few bits, for exact sums.
 SHADOW_RAY = 0.5  # of one that finds out only whether something is in its way
 SHARED_PATH = 1.5  # of evaluating BSDFs for what the other pixels of a tile have found, besides the rays
 GUIDED_RAY = 1.375  # of a ray of a guided path
-BLUR = 4  # standard deviation of the blur, pixels
 
 
 @soa
@@ -118,19 +117,21 @@ class SecondPoints(PathRecorder):
 
 @soa
 class Run:
-    """What a setting has brought, without the noisiest pixels."""
+    """What a setting has brought."""
 
-    variance: float  # of a pixel of four samples, relative to the square of the mean around it
-    blurred: float  # likewise after a blur, which adds up noise that the pixels of a tile share
+    variance: Doubles  # of pixels of four samples, relative to the squared mean around each, rising
     rays: float
     met: Ints  # as of `TrialPart`
 
-    def cost(self, than: Run) -> tuple[float, float]:
-        """Return variance times rays over that of another run: of pixels, and after a blur."""
-        pairs = (self.variance, than.variance), (self.blurred, than.blurred)
-        rays = self.rays / than.rays
-        pixels, blurred = (rays * (one / other if other > 0 else 1.0) for one, other in pairs)
-        return pixels, blurred
+    def mean_variance(self, outliers: float) -> float:
+        """Return the mean variance of the pixels without this part of them, the noisiest."""
+        kept = self.variance[: self.variance.size - int(outliers * self.variance.size)]
+        return math.fsum(kept) / kept.size
+
+    def cost(self, than: Run, outliers: float) -> float:
+        """Return variance times rays over that of another run; 1 where that has no variance."""
+        least = than.mean_variance(outliers) * than.rays
+        return self.mean_variance(outliers) * self.rays / least if least > 0 else 1.0
 
 
 class Trial:
@@ -154,12 +155,17 @@ class Trial:
         self, camera: Camera, seed: int, max_bounces: int, run: JobsRunner, tiles: int | None = None
     ) -> None:
         self._camera, self._seed, self._bounces, self._do = camera, seed, min(max_bounces, BOUNCES), run
-        (width, height), across, down = camera.size, *(max(1, side // BLOCK_SIDE) for side in camera.size)
-        places = across * down * STRIDE**2  # of tiles that lie in the picture as a whole
+        width, height = camera.size
+        across, down = (-(-side // BLOCK_SIDE) for side in camera.size)
         tiles = tiles or min(width * height // PIXELS_PER_TILE, MOST_TILES)
+        places = across * down * STRIDE**2
         number = np.arange(min(tiles, places), dtype=np.uint64)
-        x, y = pixels_of_tiles(spread(number, places).astype(np.intp), across)
-        self._x, self._y = x % width, y % height
+        columns, rows = pixels_of_tiles(spread(number, places).astype(np.intp), across)
+        of_tiles = [
+            (y * width + x)[(x < width) & (y < height)].astype(np.uint32)
+            for x, y in zip(columns, rows, strict=True)
+        ]
+        self._tiles = [pixels for pixels in of_tiles if pixels.size]
         self._scale: Doubles | None = None
         self._runs: dict[tuple[int, bool, bool], Run] = {}
 
@@ -172,25 +178,20 @@ class Trial:
 
     def _render(self, branches: int, reuse: bool, guided: bool) -> Run:
         """Render the tiles with a setting."""
-        pixels = (self._y * self._camera.size[0] + self._x).astype(np.uint32)
-        parts = min(max(-(-len(pixels) // TILES_AT_ONCE), LEAST_JOBS), len(pixels))
+        parts = min(max(-(-len(self._tiles) // TILES_AT_ONCE), LEAST_JOBS), len(self._tiles))
+        cuts = np.linspace(0, len(self._tiles), parts + 1).astype(int)
         jobs = [
-            TrialJob(self._camera, self._seed, each.ravel(), self._bounces, branches, reuse, guided)
-            for each in np.array_split(pixels, parts)
+            TrialJob(self._camera, self._seed, pixels, self._bounces, branches, reuse, guided)
+            for pixels in (np.concatenate(self._tiles[i:j]) for i, j in itertools.pairwise(cuts))
         ]
         found = list(self._do(jobs))
-        radiance = np.concatenate([part.radiance for part in found], -1).reshape(3, BLOCKS, *pixels.shape)
+        radiance = np.concatenate([part.radiance for part in found], -1)
         mean = radiance.mean(1, keepdims=True)
         if self._scale is None:
-            of_tile = mean.mean(-1, keepdims=True)
-            self._scale = np.square(of_tile) + (FLOOR * mean.mean() ** 2 or 1.0)
+            sizes = np.array([pixels.size for pixels in self._tiles])
+            sums = np.add.reduceat(mean, np.cumsum(sizes) - sizes, axis=-1)
+            self._scale = np.square(sums / sizes).repeat(sizes, -1) + (FLOOR * mean.mean() ** 2 or 1.0)
         deviation = (radiance - mean) * math.sqrt(BLOCKS / (BLOCKS - 1))
         variance = (np.square(deviation) / self._scale).mean((0, 1))
-        deviation *= variance <= np.quantile(variance, 1 - OUTLIERS, method="lower")
-        gathered = np.zeros_like(deviation)
-        for member in range(MEMBERS):  # two pixels count by the convolution of the blur with itself
-            x, y = (each - each[:, member, None] for each in (self._x, self._y))
-            gathered += np.exp(-(x**2 + y**2) / (2 * BLUR) ** 2) * deviation[..., member, None]
-        pixels, blurred = (np.mean(deviation * each / self._scale) for each in (deviation, gathered))
         rays, met = sum(part.rays for part in found), np.sum([part.met for part in found], 0)
-        return Run(float(pixels), float(blurred), rays, met)
+        return Run(np.sort(variance, axis=None), rays, met)

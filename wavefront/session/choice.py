@@ -7,7 +7,6 @@ that a picture of 64 samples that gets 64 more is the one of 128.
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 from ..arrays.soa import soa
@@ -27,6 +26,8 @@ GUIDE_HINT = "most light is hard to find here: guide=True may pay (docs/guiding.
 # Variance times rays must fall below this part: rays tell the cost to about a tenth, and a trial may miss the
 # few paths that find most of the light.
 GAIN = 0.85
+OUTLIERS = 0.02  # part of the pixels, the noisiest, that do not count
+OUTLIERS_OF_SHARED = 0.005  # likewise, for re-use, which may bring most where few pixels hold the noise
 GUIDE_TILES = 128  # whatever the size of the picture: the pilot takes longer anyway
 RARE_LIGHT = 1.0  # relative variance of a pixel of four samples, from where on light is hard to find
 COMMON_GLOSS = 0.05  # part of the second points, from where on a trial sees enough of what a material does
@@ -75,7 +76,7 @@ def choose(
     if settings.is_full and has_guide and settings.values["guide"] == AUTO:
         trial = Trial(whole, seed, bounces, run, GUIDE_TILES)
         plain, guided = (_branched(settings, trial, replace(asked, guided=each)) for each in (False, True))
-        return guided if _cost(trial, guided, plain)[0] < GAIN else plain
+        return guided if _cost(trial, guided, plain) < GAIN else plain
     if settings.is_full and _tries_something(settings, scene, whole):
         return _tried(settings, scene, whole, Trial(whole, seed, bounces, run), asked)
     return asked
@@ -84,7 +85,7 @@ def choose(
 def _tried(settings: Settings, scene: CompiledScene, camera: Camera, trial: Trial, plain: Choice) -> Choice:
     """Return whether pixels share paths, or else how many branches these have; `plain` is neither."""
     found = trial.run(1, False, plain.guided)
-    light_is_rare = found.variance > RARE_LIGHT
+    light_is_rare = found.mean_variance(OUTLIERS_OF_SHARED) > RARE_LIGHT
     plain = replace(plain, hint=GUIDE_HINT if light_is_rare and not plain.guided else None)
     branched, shared = _branched(settings, trial, plain), replace(plain, reuse=True)
     if not _may_reuse(settings, camera) or not can_reuse(scene):
@@ -92,8 +93,7 @@ def _tried(settings: Settings, scene: CompiledScene, camera: Camera, trial: Tria
     glossy = found.met[~shared_materials(scene)]
     if glossy.size and not (light_is_rare and glossy.min() >= COMMON_GLOSS * found.met.sum()):
         return branched
-    pixels, blurred = _cost(trial, shared, plain)
-    return shared if math.sqrt(pixels * max(blurred, 0)) < _cost(trial, branched, plain)[0] else branched
+    return shared if _cost(trial, shared, branched, OUTLIERS_OF_SHARED) < GAIN else branched
 
 
 def _branched(settings: Settings, trial: Trial, choice: Choice) -> Choice:
@@ -101,16 +101,16 @@ def _branched(settings: Settings, trial: Trial, choice: Choice) -> Choice:
     if settings.values["branches"] == AUTO and not choice.reuse:
         for branches in (2, MOST_BRANCHES):
             more = replace(choice, branches=branches)
-            if _cost(trial, more, choice)[0] >= GAIN:
+            if _cost(trial, more, choice) >= GAIN:
                 break
             choice = more
     return choice
 
 
-def _cost(trial: Trial, one: Choice, other: Choice) -> tuple[float, float]:
-    """Return variance times rays of a choice over that of another: of pixels, and after a blur."""
+def _cost(trial: Trial, one: Choice, other: Choice, outliers: float = OUTLIERS) -> float:
+    """Return variance times rays of a choice over that of another."""
     first, second = (trial.run(each.branches, each.reuse, each.guided) for each in (one, other))
-    return first.cost(second)
+    return first.cost(second, outliers)
 
 
 def _tries_something(settings: Settings, scene: CompiledScene, camera: Camera) -> bool:
