@@ -32,7 +32,6 @@ ALLOWED = {
     "sampling/warp.py": 4,
     "session/diagnosis.py": 4,
     "shapes/height_field.py": 1,
-    "statistics/scatter.py": 1,
     "statistics/significance.py": 1,
     "statistics/student_t.py": 7,
 }

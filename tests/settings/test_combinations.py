@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from scenes import cornell_box
 
 import wavefront as wf
-from wavefront.integrators import training
-from wavefront.integrators.tuning import Reused, Trial
+from wavefront.integrators import training, tuning
+from wavefront.integrators.tuning import Run, Trial
 from wavefront.session import choice
 from wavefront.settings import SETTINGS
 from wavefront.settings.combinations import EXCLUSIONS, SETTING_OF, Exclusion, table
@@ -133,9 +135,16 @@ def test_pairs_of_the_table_are_refused(each: Exclusion) -> None:
 @pytest.mark.parametrize("each", [each for each in EXCLUSIONS if each.one == "reuse"], ids=named)
 def test_auto_leaves_re_use_out(each: Exclusion, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where something else of the table is asked for, whatever a trial would say."""
-    pays = Trial(0, 1, 1, 1, 1, 1, Reused(pixels=0.1, blurred=0.1, again=0, connections=0, evaluations=0))
+
+    render = Trial._render
+
+    def pays(trial: Trial, branches: int, reuse: bool, guided: bool) -> Run:
+        variance = np.full(16, 0.1 if reuse else 1.0)
+        return replace(render(trial, branches, reuse, guided), variance=variance, rays=1)
+
     monkeypatch.setattr(choice, "LEAST_PIXELS", 1)
-    monkeypatch.setattr(choice, "_trial", lambda *args: pays)
+    monkeypatch.setattr(tuning, "PIXELS_PER_TILE", 100)
+    monkeypatch.setattr(Trial, "_render", pays)
     image = wf.render(cornell_box((28, 28)), 1, progress=False)
     assert image.metadata["reuse"] is True
     image = wf.render(cornell_box((28, 28)), 1, progress=False, **given(each.other))
