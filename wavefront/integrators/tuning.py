@@ -26,7 +26,7 @@ from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..sampling.sampler import SamplerMaker
-from ..sampling.tiles import BLOCK_SIDE, STRIDE, pixels_of_tiles
+from ..sampling.tiles import SIDE, STRIDE, pixels_of_tiles
 from ..stages.generate import generate
 from ..stages.interaction import material_rows
 from .ladder import li_full
@@ -156,7 +156,7 @@ class Trial:
     ) -> None:
         self._camera, self._seed, self._bounces, self._do = camera, seed, min(max_bounces, BOUNCES), run
         width, height = camera.size
-        across, down = (-(-side // BLOCK_SIDE) for side in camera.size)
+        across, down = (-(-side // (SIDE * STRIDE)) for side in camera.size)
         tiles = tiles or min(width * height // PIXELS_PER_TILE, MOST_TILES)
         places = across * down * STRIDE**2
         number = np.arange(min(tiles, places), dtype=np.uint64)

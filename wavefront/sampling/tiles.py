@@ -21,7 +21,6 @@ from ..arrays.vec import Ints
 SIDE = 4  # cells of a block, in each direction; each has a pixel of every tile
 STRIDE = 7  # pixels of a cell, in each direction
 MEMBERS = SIDE * SIDE
-BLOCK_SIDE = SIDE * STRIDE  # pixels
 
 
 def place_in_tiles(pixel: Words, width: int) -> tuple[Ints, Ints]:
@@ -32,14 +31,15 @@ def place_in_tiles(pixel: Words, width: int) -> tuple[Ints, Ints]:
     pixel
         (n,) row-major indices in a picture of this width.
     """
+    block = SIDE * STRIDE
     number = pixel.astype(np.intp)
     y = number // width
     x = number - y * width
-    block_x, block_y = x // BLOCK_SIDE, y // BLOCK_SIDE
-    member = (y % BLOCK_SIDE // STRIDE) * SIDE + x % BLOCK_SIDE // STRIDE
+    block_x, block_y = x // block, y // block
+    member = (y % block // STRIDE) * SIDE + x % block // STRIDE
     shift_x, shift_y = cell_shifts(block_x, block_y, member)
     tile_x, tile_y = (x + shift_x) % STRIDE, (y + shift_y) % STRIDE
-    across = -(-width // BLOCK_SIDE)
+    across = -(-width // block)
     tile = ((block_y * across + block_x) * STRIDE + tile_y) * STRIDE + tile_x
     return tile, member
 

@@ -16,7 +16,7 @@ from ..guiding import GuideTable
 from ..integrators.training import train
 from ..integrators.tuning import MOST_BRANCHES, JobsRunner, Trial
 from ..sampling.sampler import make_sampler
-from ..sampling.tiles import BLOCK_SIDE
+from ..sampling.tiles import SIDE, STRIDE
 from ..settings import AUTO, Settings
 from ..settings.combinations import left_out
 from ..stages.reuse import can_reuse, shared_materials
@@ -127,4 +127,4 @@ def _tries_something(settings: Settings, scene: CompiledScene, camera: Camera) -
 def _may_reuse(settings: Settings, camera: Camera) -> bool:
     """Return whether settings and size of a picture allow that its pixels share paths by themselves."""
     free = settings.values["reuse"] == AUTO and not left_out(settings.values, "reuse")
-    return free and min(camera.size) >= BLOCK_SIDE
+    return free and min(camera.size) >= SIDE * STRIDE
