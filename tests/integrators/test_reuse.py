@@ -158,6 +158,7 @@ SCENES = [matte_corner, smooth, veiled, blended, divided, balcony]
 @pytest.mark.parametrize(
     ("spp", "error"), [(16, 0.015), pytest.param(1024, 0.001, marks=pytest.mark.slow)], ids=["quick", "slow"]
 )
+@pytest.mark.first(4)
 def test_sharing_keeps_the_mean(build, spp, error, close_tiles):
     """Pure colors, smooth shading, alpha, textures, mixed lobes, media and instances."""
     options = {"max_bounces": 5}

@@ -82,6 +82,7 @@ def test_paths_are_shared_where_that_pays() -> None:
 
 
 @pytest.mark.parametrize("size", [SIZE, (256, 256)])
+@pytest.mark.slow
 def test_no_seed_keeps_a_matte_room_from_sharing(size: tuple[int, int]) -> None:
     """The noise of a short trial may not decide: plain paths have ten times the variance."""
     assert [seed for seed in range(12) if not chosen(cornell_box(size), seed=seed).reuse] == []
@@ -196,6 +197,7 @@ def test_sharing_is_tried_where_all_is_matte_or_light_is_rare(
     ],
     ids=str,
 )
+@pytest.mark.first(2)
 def test_paths_are_not_shared_with_some_settings(
     settings: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
