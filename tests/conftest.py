@@ -64,7 +64,6 @@ def close_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
     from wavefront.sampling import tiles as pixel_tiles
 
     monkeypatch.setattr(pixel_tiles, "STRIDE", 1)
-    monkeypatch.setattr(pixel_tiles, "BLOCK_SIDE", pixel_tiles.SIDE)
 
 
 @pytest.fixture

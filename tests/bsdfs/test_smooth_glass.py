@@ -76,6 +76,7 @@ def test_normal_mapped_glass_loses_no_light():
 
 @pytest.mark.parametrize("roughness", [0.0, 0.4])
 @pytest.mark.parametrize("kind", [wf.Dielectric, wf.ThinDielectric])
+@pytest.mark.first(2)
 def test_estimators_agree_on_tilted_clear_surfaces(kind, roughness):
     """Directions that are turned have no density: no light sample finds them, and none counts twice."""
     area_light = wf.Sphere((0, 3, 0), 1.0, material=wf.Diffuse(0.0), emission=4.0)

@@ -23,6 +23,7 @@ def shade_and_sun(size: tuple[int, int] = (8, 8)) -> wf.Scene:
     ("sampler", "branches"),
     [("sobol", 2), ("independent", 5), pytest.param("bluenoise", 5, marks=pytest.mark.slow)],
 )
+@pytest.mark.first(1)
 def test_branches_keep_the_mean(sampler: str, branches: int) -> None:
     options = {"max_bounces": 8, "sampler": sampler}
     usual = repeat(scenes.room(), 64, **options)

@@ -452,6 +452,7 @@ def test_directional_light_in_a_mirror_lights_the_floor() -> None:
 
 
 @pytest.mark.parametrize(("max_bounces", "crossings"), [(3, 1), (12, 6)])
+@pytest.mark.first(1)
 def test_directional_light_through_a_colored_slab(max_bounces: int, crossings: int) -> None:
     """Each two bounces more let light through that has been reflected twice more inside."""
     absorption, thickness = np.array([0.1, 0.7, 2.0]), 0.2

@@ -230,6 +230,7 @@ def test_parts_of_the_samples_make_the_whole() -> None:
 
 
 @pytest.mark.parametrize("noise", [None, 0.122])
+@pytest.mark.first(1)
 def test_sessions_go_on_with_the_same_bits(noise: float | None, tmp_path) -> None:
     scene, path = scenes.room((33, 25)), tmp_path / "render.wfck"
     options = {"reuse": True, "wave_size": 2000, "noise": noise, "max_bounces": 3}

@@ -227,6 +227,7 @@ def test_the_check_finds_a_radiance_that_is_not_that_of_the_point():
 
 
 @everywhere
+@pytest.mark.first(1)
 def test_a_panel_shines_as_one_with_vertex_colors(integrator):
     """On a floor, straight and by a mirror, with other lights beside it."""
     panel, light = gradient()

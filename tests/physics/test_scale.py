@@ -73,6 +73,7 @@ def accel(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> st
 
 
 @pytest.mark.parametrize("projection", ["lens", "orthographic"])
+@pytest.mark.first(2)
 def test_a_power_of_two_in_size_changes_no_bit(accel: str, projection: str) -> None:
     unit = picture(room(1.0, projection=projection), accel)
     assert unit.mean() > 0.1

@@ -43,6 +43,7 @@ for k in range(3):
 @pytest.mark.parametrize(
     ("executor", "presses"), [("processes", 1), ("threads", 1), ("threads", 2), ("processes", 3)]
 )
+@pytest.mark.first(2)
 def test_endless_waves_are_left_at_once(executor: str, presses: int) -> None:
     """After one Ctrl-C, and after more of them 10 ms apart; nothing of the render is left."""
     body = f"""
