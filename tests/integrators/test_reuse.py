@@ -410,6 +410,42 @@ def test_small_changes_are_found() -> None:
     assert max(wf.compare(1.02 * a, b).p_value for a, b in pairs) < 1e-3
 
 
+def test_the_error_of_a_mean_of_few_samples_is_not_overestimated() -> None:
+    """The squares of differences over their errors are 1 in the mean; batches of one sample would say 0.1."""
+    scene = scenes.cornell_box((28, 28))
+    for shape in scene.shapes:
+        if shape.emission is None:
+            shape.material = wf.Material(wf.Diffuse(0.6))  # so that the three channels are alike
+    images = [render(scene, 4, reuse=True, seed=seed, max_bounces=2) for seed in range(90)]
+    pairs = list(zip(images[::2], images[1::2], strict=True))
+    p = 1 - (1 - np.array([wf.compare(a, b).p_mean for a, b in pairs])) ** (1 / 3)
+    squares = stats.norm.isf(p / 2) ** 2
+    assert stats.chi2.ppf(0.01, len(p)) < squares.sum() < stats.chi2.isf(0.01, len(p))
+
+
+@pytest.mark.parametrize(("spp", "reuse"), [(16, True), (4, False)])
+def test_pictures_of_different_kinds_are_compared(spp: int, reuse: bool) -> None:
+    """With four times the samples, or without shared paths."""
+    scene = below_the_lamp(56)
+    a = render(scene, 4, reuse=True, seed=1, max_bounces=3)
+    b = render(scene, spp, reuse=reuse, seed=2, max_bounces=3)
+    assert wf.compare(a, b).p_mean > 0.01
+    assert wf.compare(1.2 * a, b).p_mean < 1e-4
+
+
+@pytest.mark.slow
+def test_power_at_four_samples() -> None:
+    """With the lamp in view, whose edges are noisy."""
+    scene, runs = scenes.cornell_box((56, 56)), 100
+    found = np.zeros(3)
+    for seed in range(0, 2 * runs, 2):
+        a, b = (render(scene, 4, reuse=True, seed=seed + k) for k in (0, 1))
+        found += [wf.compare(by * a, b).p_value < 0.01 for by in (1, 1.02, 1.03)]
+    assert found[0] <= stats.binom.isf(1e-4, runs, 0.01)
+    assert found[1] >= 0.25 * runs
+    assert found[2] >= 0.75 * runs
+
+
 @pytest.mark.slow
 def test_false_alarms_and_power() -> None:
     """Of pictures that share paths: alarms are as rare as they say, and one percent is found."""

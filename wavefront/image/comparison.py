@@ -101,9 +101,10 @@ def compare(a: Picture, b: Picture) -> Comparison:
     channel of the mean. It is corrected for their number: for any size of picture, one in a hundred is below
     0.01. They need two rendered pictures with standard errors and at least two samples per pixel, which share
     no samples: with the same seed and sampler the samples must not overlap. Otherwise they are None, and
-    `p_absent` says why. Of pictures with `reuse=True`, whose pixels share noise, those of blocks and of the
-    mean take the errors of their tiles from batches of samples; where a file does not keep these (exr), they
-    take the worst case, and find less. Sources are in `wavefront/statistics/significance.py`.
+    `p_absent` says why. Of pictures with `reuse=True`, whose pixels share noise, those of blocks take the
+    errors of their tiles from batches of samples, and that of the mean takes tiles as samples; where a file
+    does not keep them (exr), they take the worst case, and find less. Sources are in
+    `wavefront/statistics/significance.py`.
 
     FLIP needs `pip install flip-evaluator`. For two pictures of 8 bits it is LDR-FLIP, else
     HDR-FLIP (P. Andersson et al., FLIP, 2020, and Visualizing Errors in Rendered High Dynamic Range

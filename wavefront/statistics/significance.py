@@ -12,14 +12,16 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays.soa import soa
-from ..arrays.vec import Doubles, Ints
+from ..arrays.vec import Doubles, Ints, distinct
 from . import Scatter, sums_by_label
 from .student_t import log_gamma, t_tail
 
 BLOCKS = (8, 32)  # pixels along the sides of blocks
 ROUNDING = 1e-5  # relative difference of two means that is left to float32
+LEAST_TILES = 32  # that take the place of samples in a t test
 TINY = 1e-300
 
 
@@ -53,12 +55,49 @@ class Significance:
 def significance(a: Estimate, b: Estimate) -> Significance:
     """Test whether two pictures, estimates (H, W, 3), have the same mean at each of three levels."""
     blocks = [p_values(_averaged(a, side), _averaged(b, side)) for side in BLOCKS]
-    whole = max(a.mean.shape[:2])
     return Significance(
         corrected(p_values(_cautious(a), _cautious(b))),
         corrected(np.concatenate([p.ravel() for p in blocks])),
-        corrected(p_values(_averaged(a, whole), _averaged(b, whole))),
+        corrected(_p_of_mean(a, b)),
     )
+
+
+def _p_of_mean(a: Estimate, b: Estimate) -> Doubles:
+    """Return the p-values (..., 3) of the difference of the means of whole pictures.
+
+    Where pixels share paths, tiles are the samples: the differences of the sums over tiles are independent,
+    and their mean is 0 if the pictures are the same, so Student's t test needs no errors of pixels. Those
+    are too large for few samples, since they leave out what stratification gains between batches, which are
+    as short as one sample. With about as many samples in both pictures the differences are symmetric, and
+    the test is a cautious one however much their variances differ (Y. Benjamini, Is the t Test Really
+    Conservative when the Parent Distribution is Long-Tailed?, 1983).
+    """
+    tile = _common_tiles(a, b)
+    if tile is None:
+        side = max(a.mean.shape[:2])
+        return p_values(_averaged(a, side), _averaged(b, side))
+    order = np.argsort(tile.ravel(), kind="stable")
+    starts = np.flatnonzero(np.diff(tile.ravel()[order], prepend=-1))
+    first, second = (np.add.reduceat(each.mean.reshape(-1, 3)[order], starts, axis=0) for each in (a, b))
+    apart, count = first - second, len(starts)
+    rounding = ROUNDING * np.maximum(np.abs(first.mean(0)), np.abs(second.mean(0)))
+    off = np.maximum(np.abs(apart.mean(0)) - rounding, 0)
+    p = _two_sided(off, apart.var(0, ddof=1) / count, np.full(3, count - 1.0))
+    return np.where(off > 0, p, 1.0)
+
+
+def _common_tiles(a: Estimate, b: Estimate) -> NDArray[np.int32] | None:
+    """Return the tiles (H, W) of which the pixels of both pictures are independent.
+
+    None if no pixels share paths, if it is not known which ones do, if there are few tiles, or if one of the
+    pictures has more than twice as many samples as the other.
+    """
+    tiles = [each.tile for picture in (a, b) for each in picture.scatter]
+    unknown = any(each.sharing > 1 and not each.scatter for each in (a, b))
+    fewer, more = sorted(float(each.samples.sum()) for each in (a, b))
+    if not tiles or unknown or more > 2 * fewer or any((each != tiles[0]).any() for each in tiles):
+        return None
+    return tiles[0] if len(distinct(tiles[0].ravel().astype(np.intp))) >= LEAST_TILES else None
 
 
 def _cautious(picture: Estimate) -> Estimate:
