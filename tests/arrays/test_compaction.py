@@ -92,6 +92,9 @@ def balls(*materials: wf.Bsdf) -> CompiledScene:
     return compile_scene(wf.Scene(shapes, [wf.Environment()]), NumpyAccelerator)
 
 
+SPENT = ("exclude_prim", "pdf", "prev_vertex", "left_receiver")
+
+
 @given(
     st.sampled_from([(GREY,), (GREY, GREY, wf.Diffuse(0.1)), (MIRROR, GREY, GLASS, GOLD, GREY)]),
     st.integers(1, 12),
@@ -110,7 +113,7 @@ def test_compact_keeps_paths_and_hits_together(materials: tuple[wf.Bsdf, ...], n
     kept_paths, kept_hits = stage.compact(scene, paths, hits, hits.found)
     assert sorted(kept_paths.slot) == hits.found.tolist()
     expected = paths.take(kept_paths.slot)
-    spent = {name: getattr(expected, name) for name in ("exclude_prim", "pdf", "prev_vertex")}
+    spent = {name: getattr(expected, name) for name in SPENT}
     assert same(replace(kept_paths, **spent), expected)
     assert same(kept_hits, hits.take(kept_paths.slot))
     group = scene.materials.group_of.take(scene.material_of.take(kept_hits.prim))

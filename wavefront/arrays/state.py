@@ -37,7 +37,8 @@ def _names(kind: type) -> tuple[str, ...]:
 class SoA:
     """Structure of arrays: base of dataclasses of arrays with one column (last axis) per element.
 
-    A field that is not an array is shared by all elements; one that is None is absent.
+    A field that is neither an array nor such a structure is shared by all elements. One that is None is
+    absent.
     """
 
     __slots__ = ()
@@ -54,13 +55,17 @@ class SoA:
 
     def shared(self) -> list[Any]:
         """Return the values that all elements share; records are only joined where these are the same."""
-        return [value for _, value in self._values() if not isinstance(value, np.ndarray)]
+        return [value for _, value in self._values() if not isinstance(value, np.ndarray | SoA)]
 
     def take(self, index: Lanes) -> Self:
         """Return columns `index` (m,) of every field as a new record; views for a slice."""
         out = object.__new__(type(self))
         for name, value in self._values():
-            setattr(out, name, take(value, index) if isinstance(value, np.ndarray) else value)
+            if isinstance(value, np.ndarray):
+                value = take(value, index)
+            elif isinstance(value, SoA):
+                value = value.take(index)
+            setattr(out, name, value)
         return out
 
     def put(self, index: Ints, other: Self) -> None:
@@ -68,6 +73,8 @@ class SoA:
         for (_, value), (_, new) in zip(self._values(), other._values(), strict=True):
             if isinstance(value, np.ndarray):
                 value[..., index] = new
+            elif isinstance(value, SoA):
+                value.put(index, new)
 
     @classmethod
     def concatenate(cls, records: Sequence[Self]) -> Self:
@@ -81,6 +88,8 @@ class SoA:
 
 def _joined(values: Sequence[Any]) -> Any:
     """Concatenate arrays along the last axis; equal arrays from `broadcast` give one such array."""
+    if isinstance(values[0], SoA):
+        return type(values[0]).concatenate(values)
     arrays = [value for value in values if isinstance(value, np.ndarray)]
     if not arrays:
         return values[0]
@@ -111,6 +120,8 @@ class Paths(Rays):
     specular: Bools  # (n,) the last direction is of a delta lobe or the camera: light sampling cannot find it
     roulette_scale: Floats  # (n,) throughput times this decides about roulette: see `stages.compact.roulette`
     prev_vertex: Floats | None = None  # (3, n) where the paths last scattered; None where that is `origin`
+    # what lights were sampled for there (lights/base.py); None where no light of the scene takes it
+    left_receiver: Any = None
     # (n,) the path has left its first surface by a lobe that is not a delta lobe; None without light tracing
     left_rough: Bools | None = None
     # for layers (aovs/recorder.py); None unless they are asked for

@@ -1,6 +1,6 @@
 """Lights, and how one of them is chosen."""
 
-from .base import DeltaLight, Emitters, Light, LightRecord, LightSample
+from .base import DeltaLight, Emitters, Light, LightRecord, LightSample, Receiver
 from .directional import DirectionalLight, DirectionalLights, SunLight
 from .environment import ConstantEnvironment, Environment
 from .image import ImageEnvironment
@@ -31,6 +31,7 @@ __all__ = [
     "PointLight",
     "PointLightRecord",
     "PointLights",
+    "Receiver",
     "RectangleLights",
     "SphereLights",
     "SpotLight",

@@ -46,6 +46,15 @@ class LightSample(SoA):
 
 
 @soa
+class Receiver(SoA):
+    """The surfaces that lights shine on, for lights that are sampled by what arrives there."""
+
+    normal: Floats  # (3, n) unit shading normal
+    opaque: Bools  # (n,) light from behind the normal does not count
+    matte: Bools  # (n,) the BSDF is constant, and its samples are distributed by cosine
+
+
+@soa
 class Emitters(SoA):
     """Positions and directions of k lights, for the choice of one among very many.
 
@@ -126,6 +135,7 @@ class LightRecord(SoA, Light):
     delta: ClassVar[bool] = False  # no BSDF sample meets it: its samples take no MIS weight
     varies: ClassVar[bool | Bools] = False  # whether, or (k,) which lights, shine by `le(wi, surface)`
     reads: ClassVar[tuple[str, ...]] = ()  # attributes of the surface that `le` reads, such as "uv"
+    takes_receiver: ClassVar[bool] = False  # whether `lighting` is another light
 
     def record(self, center: NDArray[np.float64]) -> LightRecord:
         """Return the light relative to `center` (3,); a light that is its own record defines how."""
@@ -154,6 +164,21 @@ class LightRecord(SoA, Light):
 
         A light without power gets no samples.
         """
+
+    def lighting(self, receiver: Receiver) -> LightRecord:
+        """Return the light as it is sampled from n points at which it lights surfaces; here: as it is.
+
+        Its `sample_li` and `pdf_li` may draw directions by what arrives at each surface. A light that does so
+        says it by `takes_receiver`.
+        """
+        return self
+
+    def balance(self, receiver: Receiver) -> Floats | None:
+        """Return factors (n,) of the light's densities in the balance heuristic that suits it; else None.
+
+        Where a factor is 0, the power heuristic weighs light samples against BSDF samples.
+        """
+        return None
 
     def irradiance(
         self, center: NDArray[np.float64], radius: float, scene_radius: float

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import ALL, Floats, Ints, Lanes, f4, put, take
 from ..sampling.mis import power_heuristic
-from .base import Emitters, LightRecord, LightSample, emitters_of, sampled_li
+from .base import Emitters, LightRecord, LightSample, Receiver, emitters_of, sampled_li
 from .samplers import (
     LIGHT_SAMPLERS,
     LightSampler,
@@ -68,6 +68,7 @@ class LightTable:
         # (lights,) those with `le` by surface; None if there are none
         self.varies = varies.astype(np.bool_) if varies.any() else None
         self.reads = {name for kind in kinds for name in kind.reads}  # attributes of surfaces, for `le`
+        self.takes_receiver = any(kind.takes_receiver for kind in kinds)
         self.delta_of = np.array([kind.delta for kind in kinds], np.bool_)[self.kind_of]
         extent = np.broadcast_to(np.asarray(half_size, float), 3)
         power = np.concatenate([np.zeros(0), *(kind.power(float(np.linalg.norm(extent))) for kind in kinds)])
@@ -94,8 +95,12 @@ class LightTable:
             return SingleLightSampler()
         return make(power, half_size, IrradianceOf(self.kinds, float(np.linalg.norm(half_size))))
 
-    def sample_li(self, point: Floats, u_choice: Floats, u: Floats) -> tuple[LightSample, Ints]:
+    def sample_li(
+        self, point: Floats, u_choice: Floats, u: Floats, receiver: Receiver | None = None
+    ) -> tuple[LightSample, Ints]:
         """Choose a light for each point (3, n) with u_choice (n,) and sample it with u (2, n).
+
+        `receiver` is what the light shines on; None where that is not known.
 
         Returns
         -------
@@ -106,22 +111,47 @@ class LightTable:
         """
         assert self.choice is not None
         light, chance = self.choice.sample(point, u_choice)
-        sample = self._sample_each(light, point, u)
+        sample = self._sample_each(light, point, u, receiver)
         sample.pdf = sample.pdf * chance
         return sample, light
 
-    def pdf_li(self, light: Ints, point: Floats, wi: Floats) -> Floats:
+    def pdf_li(self, light: Ints, point: Floats, wi: Floats, receiver: Receiver | None = None) -> Floats:
         """Density with which `sample_li` draws wi (3, n) towards the lights numbered `light` (n,)."""
         if self.choice is None:
             return np.zeros(len(light), f4)
         pdf = np.empty(len(light), f4)
         for kind, rows in self._by_kind(light):
-            pdf[rows] = kind.pdf_li(take(point, rows), take(wi, rows))
+            pdf[rows] = _lighting(kind, receiver, rows).pdf_li(take(point, rows), take(wi, rows))
         return pdf * self.choice.pmf(light, point)
 
-    def mis_weight(self, light: Ints, pdf: Floats, pdf_bsdf: Floats) -> Floats:
+    def bsdf_weight(
+        self, light: Ints, pdf_bsdf: Floats, pdf: Floats, receiver: Receiver | None = None
+    ) -> Floats:
+        """Weight of BSDF samples that meet lights numbered `light` (n,), which these draw with `pdf` (n,)."""
+        weight = power_heuristic(pdf_bsdf, pdf)
+        for lanes, balanced in self._balanced(light, pdf, receiver):
+            other = pdf_bsdf.take(lanes)
+            weight[lanes] = other / (other + balanced)
+        return weight
+
+    def _balanced(self, light: Ints, pdf: Floats, receiver: Receiver | None) -> Iterator[tuple[Ints, Floats]]:
+        """Yield lanes (k,) that the balance heuristic weighs, and the light's densities in it (k,)."""
+        if receiver is None:
+            return
+        for kind, rows in self._by_kind(light):
+            factor = kind.balance(receiver.take(rows))
+            if factor is not None:
+                some = np.flatnonzero(factor)
+                lanes = some if isinstance(rows, slice) else rows.take(some)
+                yield lanes, factor.take(some) * pdf.take(lanes)
+
+    def mis_weight(
+        self, light: Ints, pdf: Floats, pdf_bsdf: Floats, receiver: Receiver | None = None
+    ) -> Floats:
         """Weight of samples of lights numbered `light` (n,) against BSDF sampling: 1 for delta lights."""
         weight = power_heuristic(pdf, pdf_bsdf)
+        for lanes, balanced in self._balanced(light, pdf, receiver):
+            weight[lanes] = balanced / (balanced + pdf_bsdf.take(lanes))
         if self.delta_of.any():
             weight[np.flatnonzero(self.delta_of.take(light))] = 1
         return weight
@@ -159,14 +189,14 @@ class LightTable:
             )
         return radiance
 
-    def _sample_each(self, light: Ints, point: Floats, u: Floats) -> LightSample:
+    def _sample_each(self, light: Ints, point: Floats, u: Floats, receiver: Receiver | None) -> LightSample:
         n = len(light)
         out = LightSample(np.empty((3, n), f4), np.empty((3, n), f4), *np.empty((3, n), f4))
         where: tuple[Ints, Floats, Floats] | None = None
         for kind, rows in self._by_kind(light):
             if isinstance(rows, slice):
-                return sampled_li(kind, point, u)
-            part = sampled_li(kind, take(point, rows), take(u, rows))
+                return sampled_li(_lighting(kind, receiver, rows), point, u)
+            part = sampled_li(_lighting(kind, receiver, rows), take(point, rows), take(u, rows))
             put(out.wi, rows, part.wi)
             put(out.radiance, rows, part.radiance)
             out.pdf[rows], out.distance[rows], out.cos_light[rows] = part.pdf, part.distance, part.cos_light
@@ -195,6 +225,13 @@ class LightTable:
             rows = np.flatnonzero(kind_of == number)
             if rows.size:
                 yield self._gathered(number, light.take(rows)), rows
+
+
+def _lighting(kind: LightRecord, receiver: Receiver | None, lanes: Lanes) -> LightRecord:
+    """Return lights as they are sampled where they light surfaces, if these are known."""
+    if receiver is None or not kind.takes_receiver:
+        return kind
+    return kind.lighting(receiver.take(lanes))
 
 
 def _radiance(kind: LightRecord, wi: Floats, surface: SurfaceInteraction | None) -> Floats:

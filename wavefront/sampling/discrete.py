@@ -31,7 +31,7 @@ def _checked(name: str, weights: ArrayLike, ndim: int) -> NDArray[np.float64]:
     return array
 
 
-class _Inversion:
+class Inversion:
     """Finds the item whose interval of [0, 1) contains u, in one of several rows of k items.
 
     A guide table gives the item at which the search starts, for each of a power of two of cells of
@@ -44,19 +44,22 @@ class _Inversion:
     ----------
     probability
         (rows, k): each row sums to 1, or is all 0 and never searched.
+    cells_per_item
+        Cells of the guide table for each item; by default 8, and 1 in large tables.
     """
 
-    def __init__(self, probability: NDArray[np.float64]) -> None:
-        rows, items = probability.shape
-        self._probability = probability.ravel()
+    def __init__(self, probability: NDArray[np.float64], cells_per_item: int | None = None) -> None:
+        rows, self.items = probability.shape
+        items = self.items
+        self._probability = probability.ravel().astype(f4)
         upto = np.cumsum(probability, axis=1)
-        self._start = (upto - probability).ravel()
+        self._start = (upto - probability).ravel().astype(f4)
         # A float32 edge that is rounded up separates float32 numbers exactly as the float64 sum does. The
         # last one of a row becomes 1 in spite of rounding errors.
         edge = rounded_up(upto)
         self._edge = edge.ravel()
-        self._sorted = (edge + np.arange(rows, dtype=np.float64)[:, None]).ravel()
-        cells_per_item = 8 if rows * items <= _LARGE else 1
+        if cells_per_item is None:
+            cells_per_item = 8 if rows * items <= _LARGE else 1
         self._cells = 1 << (cells_per_item * items - 1).bit_length()
         self._first = _first_items(edge, self._cells)
 
@@ -79,12 +82,18 @@ class _Inversion:
             flat[short] += 1
             short = short[self._edge.take(flat[short]) <= u[short]]
         if len(short):
-            target = u[short].astype(np.float64)
-            if row is not None:
-                target += row[short]
-            flat[short] = np.searchsorted(self._sorted, target, side="right")
+            flat[short] = self._searched(flat[short], u[short])
         rest = (u - self._start.take(flat)) / self._probability.take(flat)
-        return flat, np.clip(rest, 0, BELOW_ONE).astype(f4)
+        return flat, np.clip(rest, f4(0), BELOW_ONE)
+
+    def _searched(self, low: Ints, u: Floats) -> Ints:
+        """Return the items (n,) for u (n,) by bisection, from items `low` (n,) of the same rows on."""
+        high = low + (self.items - 1 - low % self.items)
+        for _ in range(self.items.bit_length()):
+            middle = (low + high) // 2
+            beyond = self._edge.take(middle) <= u
+            low, high = np.where(beyond, middle + 1, low), np.where(beyond, high, middle)
+        return high
 
 
 def rounded_up(x: NDArray[np.float64]) -> Floats:
@@ -117,7 +126,7 @@ class Discrete:
         array = _checked("weights", weights, 1)
         array = array / array.max()  # against overflow and underflow of the sum
         self.probability: NDArray[np.float64] = array / array.sum()
-        self._inversion = _Inversion(self.probability[None])
+        self._inversion = Inversion(self.probability[None])
         self._pmf = self.probability.astype(f4)
 
     def __len__(self) -> int:
@@ -163,7 +172,7 @@ class Distribution2D:
         self.shape = array.shape
         self._rows = Discrete(array.sum(axis=1))
         total = array.sum(axis=1, keepdims=True)
-        self._columns = _Inversion(np.divide(array, total, out=np.zeros_like(array), where=total > 0))
+        self._columns = Inversion(np.divide(array, total, out=np.zeros_like(array), where=total > 0))
         self._density = (array / array.mean()).astype(f4).ravel()
 
     def sample(self, u: Floats) -> tuple[Floats, Floats, Floats]:
@@ -179,8 +188,8 @@ class Distribution2D:
         height, width = self.shape
         row, _, rest_y = self._rows.sample(u[1])
         flat, rest_x = self._columns.find(u[0], row)
-        x = _within_cell(flat - row * width, rest_x, width)
-        y = _within_cell(row, rest_y, height)
+        x = within_cell(flat - row * width, rest_x, width)
+        y = within_cell(row, rest_y, height)
         return x, y, self._density.take(flat)
 
     def weights(self) -> NDArray[np.float64]:
@@ -195,7 +204,7 @@ class Distribution2D:
         return self._density.take(row * width + column)
 
 
-def _within_cell(cell: Ints, rest: Floats, cells: int) -> Floats:
+def within_cell(cell: Ints, rest: Floats, cells: int) -> Floats:
     """Return the coordinate (n,) in [0, 1) at the relative position `rest` (n,) within `cell` (n,).
 
     It stays further from the cell's border than rounding errors, so that `pdf` finds the same cell: the next

@@ -88,6 +88,7 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         left_rough=~specular if bounce == 0 and paths.left_rough is not None else paths.left_rough,
         depth=None if paths.depth is None else _after(paths.depth, specular),
         met_rough=paths.met_rough,
+        left_receiver=shade.receiver,
         recorder=paths.recorder,
     )
     if paths.recorder is not None:

@@ -27,7 +27,11 @@ def compact(scene: CompiledScene, paths: Paths, hits: Hits, lanes: Ints) -> tupl
     if ordered is lanes and lanes.size == n:
         return paths, hits
     arrived = replace(
-        paths, exclude_prim=broadcast(np.intp(-1), n), pdf=broadcast(f4(0), n), prev_vertex=None
+        paths,
+        exclude_prim=broadcast(np.intp(-1), n),
+        pdf=broadcast(f4(0), n),
+        prev_vertex=None,
+        left_receiver=None,
     )
     return arrived.take(ordered), hits.take(ordered)
 

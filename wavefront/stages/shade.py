@@ -15,8 +15,7 @@ from ..bsdfs import Bsdf, albedo_of, evaluated
 from ..compile.materials import MaterialTable
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
-from ..lights import LightSample
-from ..sampling.mis import power_heuristic
+from ..lights import LightSample, Receiver
 from ..sampling.sampler import Dimension, Sampler
 from .interaction import interaction, offset_origin, origin_above
 from .intersect import ShadowRays, shadow_rays, visible
@@ -50,6 +49,7 @@ class Shading:
     # lanes of each group that occurs, and its BSDF bound to them: slices in order, but for what `at` returns
     groups: list[tuple[Lanes, Bsdf]]
     guidance: Guidance | None = None  # of the lanes of `lit`; None where BSDFs alone choose directions
+    receiver: Receiver | None = None  # what lights are sampled for; None where no light takes it
 
     def lit(self) -> Shading:
         """Return the lanes that need light sampling; the groups after them have only delta lobes."""
@@ -60,7 +60,8 @@ class Shading:
         assert isinstance(last, slice)  # `compact` has ordered the lanes
         first = slice(last.stop)
         parts = self.surface.take(first), self.frame.take(first), self.wo[:, first], self.start[:, first]
-        return Shading(*parts, groups, self.guidance)
+        receiver = None if self.receiver is None else self.receiver.take(first)
+        return Shading(*parts, groups, self.guidance, receiver)
 
     def at(self, scene: CompiledScene, lanes: Ints) -> Shading:
         """Return the surfaces of some lanes (k,) of `lit`, in any order; a lane may occur again."""
@@ -68,7 +69,9 @@ class Shading:
         if self.surface.ns is self.surface.ng:
             surface.ns = surface.ng
         parts = surface, self.frame.take(lanes), take(self.wo, lanes), take(self.start, lanes)
-        return Shading(*parts, list(_groups_anywhere(scene.materials, surface)), self.guidance_at(lanes))
+        receiver = None if self.receiver is None else self.receiver.take(lanes)
+        groups = list(_groups_anywhere(scene.materials, surface))
+        return Shading(*parts, groups, self.guidance_at(lanes), receiver)
 
     def guidance_at(self, lanes: Ints) -> Guidance | None:
         """Return what guides some lanes (k,) of `lit`; None where nothing does."""
@@ -119,9 +122,11 @@ def mis_weighted(scene: CompiledScene, paths: Paths, emission: Contribution) -> 
         return emission
     lanes = emission.lanes.take(sampled)
     start = take(paths.origin if paths.prev_vertex is None else paths.prev_vertex, lanes)
-    pdf = scene.lights.pdf_li(emission.light.take(sampled), start, take(paths.direction, lanes))
+    receiver = None if paths.left_receiver is None else paths.left_receiver.take(lanes)
+    light = emission.light.take(sampled)
+    pdf = scene.lights.pdf_li(light, start, take(paths.direction, lanes), receiver)
     weight = np.ones(len(emission.lanes), f4)
-    weight[sampled] = power_heuristic(take(paths.pdf, lanes), pdf)
+    weight[sampled] = scene.lights.bsdf_weight(light, take(paths.pdf, lanes), pdf, receiver)
     return Contribution(emission.lanes, emission.radiance * weight, emission.light)
 
 
@@ -156,7 +161,18 @@ def shading(scene: CompiledScene, surface: SurfaceInteraction) -> Shading:
         wo = np.broadcast_to(UP, surface.wo.shape)
     else:
         wo = frame.to_local(surface.wo)
-    return Shading(surface, frame, wo, origin_above(surface), groups)
+    receiver = receiver_of(surface, groups) if scene.lights.takes_receiver else None
+    return Shading(surface, frame, wo, origin_above(surface), groups, receiver=receiver)
+
+
+def receiver_of(surface: SurfaceInteraction, groups: list[tuple[Lanes, Bsdf]]) -> Receiver:
+    """Return what lights shine on."""
+    n = len(surface)
+    opaque, matte = np.ones(n, np.bool_), np.zeros(n, np.bool_)
+    for lanes, bsdf in groups:
+        opaque[lanes] = not bsdf.transmissive
+        matte[lanes] = bsdf.view_independent
+    return Receiver(surface.ns, opaque, matte)
 
 
 def _groups(materials: MaterialTable, surface: SurfaceInteraction) -> Iterator[tuple[Lanes, Bsdf]]:
@@ -201,7 +217,7 @@ def direct(
     u_choice = broadcast(f4(0), n) if alone else sampler.draw_1d(*address, Dimension.LIGHT)
     u_point = sampler.draw_2d(*address, Dimension.LIGHT_POINT)
     # from where a reflected ray would start, so that mis_weighted finds the same densities
-    light, number = scene.lights.sample_li(shade.start, u_choice, u_point)
+    light, number = scene.lights.sample_li(shade.start, u_choice, u_point, shade.receiver)
     wi = shade.frame.to_local(light.wi)
     cos, cos_g = shade.cosines(wi, light.wi)
     f, pdf = evaluate(shade, wi)
@@ -222,7 +238,8 @@ def direct(
     if mis:
         if shade.guidance is not None:
             pdf = shade.guidance.mixed(lanes, take(light.wi, lanes), pdf)
-        scale *= scene.lights.mis_weight(number, pdf_light, pdf)
+        receiver = None if shade.receiver is None else shade.receiver.take(lanes)
+        scale *= scene.lights.mis_weight(number, pdf_light, pdf, receiver)
     arriving = f.take(lanes, 1) * radiance * scale
     directed = paths.recorder is not None and paths.recorder.needs_directions
     toward = take(light.wi, lanes) if directed else None

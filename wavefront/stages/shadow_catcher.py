@@ -9,8 +9,7 @@ import numpy as np
 from ..arrays.state import Hits, Paths, SurfaceInteraction
 from ..arrays.vec import INV_PI, Floats, Ints, dot, f4, luminance, positive, take
 from ..compile.scene import CompiledScene
-from ..lights import LightSample
-from ..sampling.mis import power_heuristic
+from ..lights import LightSample, Receiver
 from ..sampling.sampler import Dimension, Sampler
 from ..sampling.warp import cosine_hemisphere
 from .interaction import material_rows, origin_above
@@ -66,16 +65,19 @@ def _candidates(
     """
     n, environment = len(surface), int(scene.light_of[-1])
     frame = surface.frame()
+    yes = np.ones(n, np.bool_)
+    receiver = Receiver(surface.ns, yes, yes)
     for number in range(CANDIDATES if scene.lights.choice is not None else 0):
         address = paths.pixel, paths.sample, FIRST_VERTEX + number
         u_light = sampler.draw_1d(*address, Dimension.LIGHT)
         light, which = scene.lights.sample_li(
-            start, u_light, sampler.draw_2d(*address, Dimension.LIGHT_POINT)
+            start, u_light, sampler.draw_2d(*address, Dimension.LIGHT_POINT), receiver
         )
         cos = positive(dot(surface.ns, light.wi))
         sampled = light.pdf > 0
         pdf = np.where(sampled, light.pdf, f4(1))
-        weight = np.where(which == environment, power_heuristic(pdf, cos * INV_PI), f4(1))
+        weight = scene.lights.mis_weight(which, pdf, cos * INV_PI, receiver)
+        weight = np.where(which == environment, weight, f4(1))
         yield light, np.where(sampled, luminance(light.radiance) * cos * weight / pdf, f4(0))
     if environment < 0:
         return
@@ -84,7 +86,8 @@ def _candidates(
         u = sampler.draw_2d(paths.pixel, paths.sample, FIRST_VERTEX + number, Dimension.DIRECTION)
         local = cosine_hemisphere(u)
         wi = frame.to_world(local)
-        weight = power_heuristic(local[2] * INV_PI, scene.lights.pdf_li(numbers, start, wi))
+        pdf = scene.lights.pdf_li(numbers, start, wi, receiver)
+        weight = scene.lights.bsdf_weight(numbers, local[2] * INV_PI, pdf, receiver)
         radiance = scene.lights.le(numbers, wi)
         far = LightSample(wi, radiance, local[2] * INV_PI, np.full(n, np.inf, f4), np.ones(n, f4))
         yield far, luminance(radiance) * f4(np.pi) * weight

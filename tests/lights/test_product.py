@@ -1,0 +1,107 @@
+"""Light samples of environments by light times cosine: densities, means and noise."""
+
+import numpy as np
+import pytest
+from significance import assert_same_images, repeat
+
+import wavefront as wf
+from wavefront import testing
+from wavefront.arrays.vec import f4
+from wavefront.lights import LightRecord, Receiver
+from wavefront.lights.product import NO_NORMAL, CosineProduct, octahedral_bins, octahedral_normals
+
+NORMALS = [(0, 1, 0), (0, -1, 0), (1, 0, 0), (-0.6, 0.48, 0.64), (0.1, -0.2, -0.97)]
+
+
+def sky(height: int = 24, width: int = 40) -> np.ndarray:
+    """A dim sky of noise with a small sun."""
+    image = 0.2 + np.random.default_rng(5).random((height, width, 3)) ** 3
+    image[5, 11] = 20
+    return image
+
+
+def lighting(image: np.ndarray, normal: tuple[float, ...], opaque: bool = True, **options) -> LightRecord:
+    """Return an environment as it is sampled for surfaces of one normal."""
+    size = np.sqrt(np.square(normal).sum())
+    receiver = Receiver(f4(normal).reshape(3, 1) / f4(size), np.array([opaque]), np.array([True]))
+    return wf.Environment(image, **options).record(np.zeros(3)).compensated().lighting(receiver)
+
+
+@pytest.mark.parametrize("shape", [(24, 40), (5, 9), (1, 2), (70, 133)])
+def test_densities_are_one_over_the_image(shape: tuple[int, int]) -> None:
+    light = np.random.default_rng(1).random(shape) ** 4
+    light[0, 0] = 0
+    product = CosineProduct(light, None)
+    y, x = ((np.indices(shape).reshape(2, -1) + 0.5) / np.array(shape)[:, None]).astype(f4)
+    for normal in [0, 17, 130, NO_NORMAL - 1, NO_NORMAL]:
+        density = product.pdf(x, y, np.full(x.size, normal))
+        assert density.mean(dtype=float) == pytest.approx(1, rel=1e-5)
+        assert (density > 0).tolist() == (light.ravel() > 0).tolist()
+    assert density == pytest.approx((light / light.mean()).ravel(), rel=1e-4)
+
+
+@pytest.mark.parametrize("opaque", [True, False])
+@pytest.mark.parametrize("normal", NORMALS)
+def test_the_contract_holds_for_each_normal(normal: tuple[float, ...], opaque: bool) -> None:
+    turn = np.linalg.qr([[3.0, 1, 2], [-1, 4, 1], [1, -2, 5]])[0]
+    turn *= np.sign(np.linalg.det(turn))
+    testing.check_light(lighting(sky(), normal, opaque, transform=turn), points=[[0, 0, 0]], samples=60_000)
+
+
+@pytest.mark.parametrize("normal", NORMALS)
+def test_most_light_samples_are_above_the_surface(normal: tuple[float, ...]) -> None:
+    u = np.random.default_rng(0).random((2, 20_000), f4)
+    samples = lighting(np.ones((16, 32, 3)) + sky(16, 32), normal).sample_li(np.zeros((3, u.shape[1]), f4), u)
+    unit = np.array(normal) / np.linalg.norm(normal)
+    assert (unit @ samples.wi > 0).mean() > 0.9
+
+
+def test_normals_are_found_in_their_bins() -> None:
+    middle = octahedral_normals().astype(f4)
+    assert octahedral_bins(middle).tolist() == list(range(NO_NORMAL))
+    any_ = np.random.default_rng(0).normal(size=(3, 5000))
+    any_ /= np.linalg.norm(any_, axis=0)
+    near = octahedral_normals()[:, octahedral_bins(any_.astype(f4))]
+    assert (any_ * near).sum(0).min() > 0.96
+    poles = f4([[0, 0, 0, 1], [0, 0, -1, 0], [1, -1, 0, 0]])
+    assert (octahedral_bins(poles) < NO_NORMAL).all()
+
+
+def surfaces() -> wf.Scene:
+    """Matte, glossy, rough and transmitting surfaces, a panel, and two environments in one."""
+    balls = [
+        wf.Sphere((x, 0, 0), 0.5, material=material)
+        for x, material in (
+            (-1.8, wf.Diffuse(0.7)),
+            (-0.6, wf.Material.named("plastic")),
+            (0.6, wf.Conductor.named("gold", 0.4)),
+            (1.8, wf.Dielectric(1.5, roughness=0.4)),
+        )
+    ]
+    floor = wf.Rectangle((-4, -0.5, 4), (8, 0, 0), (0, 0, -8), material=wf.Diffuse(0.5))
+    camera = wf.Camera.look_at((0, 1.2, 6), (0, 0, 0), fov=30, size=(32, 16))
+    return wf.Scene([*balls, floor], [wf.Environment(sky())], camera)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"guide": True}, {"branches": 3}, {"reuse": True}, {"background": "transparent"}],
+    ids=["plain", "guided", "branches", "shared", "background"],
+)
+def test_pictures_keep_their_means(options: dict) -> None:
+    """Those of BSDF samples alone, for which light samples do not count."""
+    scene = surfaces()
+    settings = {"max_bounces": 3, "accel": "numpy"}
+    naive = {"integrator": "naive", "background": options.get("background")}
+    found = repeat(scene, 32, 16, **settings, **options)
+    assert_same_images(found, repeat(scene, 256, 16, 100, **settings, **naive), max_error=0.05)
+
+
+def test_what_nothing_hides_has_hardly_any_noise() -> None:
+    """A floor under a sky that has small bright parts and is hardly darker than the mean elsewhere."""
+    image = 0.9 + 16 * (np.random.default_rng(3).random((16, 32, 1)) < 0.01) * np.ones(3)
+    floor = wf.Rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2), material=wf.Diffuse(0.5))
+    camera = wf.Camera.look_at((0.3, 1, 0.4), (0, 0, 0), fov=20, size=(16, 16))
+    scene = wf.Scene([floor], [wf.Environment(image, filter="nearest")], camera)
+    rendered = wf.render(scene, 16, sampler="independent", max_bounces=1, accel="numpy", progress=False)
+    assert rendered.rgb.std() < 0.01 * rendered.rgb.mean()

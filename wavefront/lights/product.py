@@ -1,0 +1,171 @@
+"""Directions of an environment drawn by its light times the cosine at the surface that it lights."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays.elementary import sin_cos_turns
+from ..arrays.vec import Floats, Ints, f4
+from ..sampling.discrete import Inversion, within_cell
+
+NORMALS = 16  # squared: the normals of the table, on an octahedron
+NO_NORMAL = NORMALS * NORMALS  # number of what has none
+CELLS = 16, 32  # rows and columns at most, of parts of the image that a normal weighs as wholes
+MARGIN = 0.08  # added to cosines: a cell, and the normals of a bin, reach beyond their middles
+PLAIN = 0.02  # share of directions that are drawn by light alone
+
+
+class CosineProduct:
+    """A distribution over the texels of an image for each of many normals, and one for no normal.
+
+    A cell of the image is chosen by its light times the cosine at its middle, and a texel within it by light.
+
+    Sources: D. Cline, P. Egbert, J. Talbot and D. Cardon, Two Stage Importance Sampling for Direct Lighting,
+    EGSR 2006; Z. Cigolle et al., A Survey of Efficient Representations for Independent Unit Vectors, JCGT
+    2014 (octahedral normals).
+
+    Parameters
+    ----------
+    light
+        (H, W) part of the light of each texel; an equirectangular image, top row first.
+    rotation
+        (3, 3) to world from the image; None where they are the same.
+
+    Attributes
+    ----------
+    irradiance
+        (normals + 1,) light times cosine of each normal, where the light of the image is 1; the last, of no
+        normal, is 1.
+    """
+
+    def __init__(self, light: NDArray[np.float64], rotation: Floats | None) -> None:
+        self.shape = height, width = light.shape
+        light = light / light.sum()
+        rows, columns = min(CELLS[0], height), min(CELLS[1], width)
+        self._row_edges = np.arange(rows + 1) * height // rows
+        self._column_edges = np.arange(columns + 1) * width // columns
+        self._cell_row = np.repeat(np.arange(rows), np.diff(self._row_edges))
+        self._cell_column = np.repeat(np.arange(columns), np.diff(self._column_edges))
+        self._cells = rows, columns
+        mass, middle = self._cell_light(light)
+        if rotation is not None:
+            middle = np.stack([sum(row[k] * middle[k] for k in range(3)) for row in rotation.astype(float)])
+        self._choose_cells(mass, middle)
+        self._choose_texels(light, mass)
+
+    def _cell_light(self, light: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the light of cells (rows, columns), and their mean directions (3, rows, columns)."""
+        height, width = self.shape
+        sin_theta, cos_theta = sin_cos_turns((np.arange(height) + 0.5) / (2 * height))
+        sin_phi, cos_phi = sin_cos_turns(0.5 - (np.arange(width) + 0.5) / width)
+        mass, middle = np.zeros(self._cells), np.zeros((3, *self._cells))
+        for row, (start, stop) in enumerate(zip(self._row_edges, self._row_edges[1:], strict=False)):
+            band = light[start:stop]
+            for out, factor, level in (
+                (mass, None, None),
+                (middle[0], sin_phi, sin_theta),
+                (middle[1], None, cos_theta),
+                (middle[2], cos_phi, sin_theta),
+            ):
+                part = band if level is None else band * level[start:stop, None]
+                part = part.sum(0) if factor is None else part.sum(0) * factor
+                out[row] = np.add.reduceat(part, self._column_edges[:-1])
+        return mass, np.divide(middle, mass, out=np.zeros_like(middle), where=mass > 0)
+
+    def _choose_cells(self, mass: NDArray[np.float64], middle: NDArray[np.float64]) -> None:
+        x, y, z = octahedral_normals()[:, :, None, None]
+        cos = x * middle[0] + y * middle[1] + z * middle[2]  # (normals, rows, columns)
+        weight = mass * np.maximum((cos + MARGIN) / (1 + MARGIN), 0)
+        self.irradiance = np.append((mass * np.maximum(cos, 0)).sum((1, 2)), 1).astype(f4)
+        total = weight.sum((1, 2), keepdims=True)
+        weight = (1 - PLAIN) * np.divide(weight, total, out=np.zeros_like(weight), where=total > 0)
+        weight += (1 - weight.sum((1, 2), keepdims=True)) * mass
+        weight = np.concatenate([weight, mass[None]])
+        rows = weight.sum(2)
+        self._rows = Inversion(rows)
+        columns = np.divide(weight, rows[..., None], out=np.zeros_like(weight), where=rows[..., None] > 0)
+        self._columns = Inversion(columns.reshape(-1, self._cells[1]), 1)
+        self._chance = weight.astype(f4).ravel()
+
+    def _choose_texels(self, light: NDArray[np.float64], mass: NDArray[np.float64]) -> None:
+        height, width = self.shape
+        rows, columns = self._cells
+        of_row = np.add.reduceat(light, self._column_edges[:-1], axis=1)  # (H, columns)
+        within = np.zeros((rows, columns, np.diff(self._row_edges).max()))
+        for row, (start, stop) in enumerate(zip(self._row_edges, self._row_edges[1:], strict=False)):
+            within[row, :, : stop - start] = of_row[start:stop].T
+        self._texel_rows = Inversion(_rows_of_one(within.reshape(rows * columns, -1)), 2)
+        within = np.zeros((height, columns, np.diff(self._column_edges).max()))
+        for column, (start, stop) in enumerate(zip(self._column_edges, self._column_edges[1:], strict=False)):
+            within[:, column, : stop - start] = light[:, start:stop]
+        self._texel_columns = Inversion(_rows_of_one(within.reshape(height * columns, -1)), 2)
+        cell = mass[self._cell_row][:, self._cell_column]
+        density = np.divide(light, cell, out=np.zeros_like(light), where=cell > 0) * (height * width)
+        self._density = density.astype(f4).ravel()
+
+    def sample(self, u: Floats, normal: Ints) -> tuple[Floats, Floats, Floats]:
+        """Return points x, y (n,) in [0, 1) of the image, and their density (n,) over the unit square.
+
+        Parameters
+        ----------
+        u
+            (2, n): u[0] selects x, u[1] selects y.
+        normal
+            (n,) numbers of normals.
+        """
+        (rows, columns), (height, width) = self._cells, self.shape
+        flat, v = self._rows.find(u[1], normal)
+        row = flat - normal * rows
+        cell, x = self._columns.find(u[0], flat)
+        chance = self._chance.take(cell)
+        column = cell - flat * columns
+        of = row * columns + column
+        flat, v = self._texel_rows.find(v, of)
+        texel_row = flat - of * self._texel_rows.items + self._row_edges.take(row)
+        of = texel_row * columns + column
+        flat, x = self._texel_columns.find(x, of)
+        texel_column = flat - of * self._texel_columns.items + self._column_edges.take(column)
+        pdf = chance * self._density.take(texel_row * width + texel_column)
+        return within_cell(texel_column, x, width), within_cell(texel_row, v, height), pdf
+
+    def pdf(self, x: Floats, y: Floats, normal: Ints) -> Floats:
+        """Return the density over the unit square, (n,), at x, y (n,) in [0, 1], for normals (n,)."""
+        (rows, columns), (height, width) = self._cells, self.shape
+        column = np.clip((x * f4(width)).astype(np.intp), 0, width - 1)
+        row = np.clip((y * f4(height)).astype(np.intp), 0, height - 1)
+        cell = (normal * rows + self._cell_row.take(row)) * columns + self._cell_column.take(column)
+        return self._chance.take(cell) * self._density.take(row * width + column)
+
+
+def _rows_of_one(weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return rows that each sum to 1, or are all 0."""
+    total = weights.sum(1, keepdims=True)
+    return np.divide(weights, total, out=weights, where=total > 0)
+
+
+def octahedral_normals() -> NDArray[np.float64]:
+    """Return unit vectors (3, NORMALS²) at the middles of bins on an octahedron."""
+    middle = (np.arange(NORMALS) + 0.5) / NORMALS * 2 - 1
+    x, y = (each.ravel() for each in np.meshgrid(middle, middle, indexing="ij"))
+    z = 1 - np.abs(x) - np.abs(y)
+    fold = np.maximum(-z, 0)
+    normal = np.stack([x - np.where(x >= 0, fold, -fold), y - np.where(y >= 0, fold, -fold), z])
+    return normal / np.sqrt((normal * normal).sum(0))
+
+
+def octahedral_bins(normal: Floats) -> Ints:
+    """Return the bins (n,) of unit vectors (3, n), as `octahedral_normals` numbers them."""
+    size = np.abs(normal)
+    length = size[0] + size[1] + size[2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x, y = normal[0] / length, normal[1] / length
+        below = normal[2] < 0
+        x, y = (
+            np.where(below, np.copysign(f4(1) - np.abs(y), x), x),
+            np.where(below, np.copysign(f4(1) - np.abs(x), y), y),
+        )
+    half = f4(NORMALS / 2)
+    i = np.clip(np.nan_to_num((x + f4(1)) * half), 0, NORMALS - 1).astype(np.intp)
+    j = np.clip(np.nan_to_num((y + f4(1)) * half), 0, NORMALS - 1).astype(np.intp)
+    return i * NORMALS + j
