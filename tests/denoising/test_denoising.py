@@ -9,6 +9,7 @@ from significance import render
 
 import wavefront as wf
 from wavefront.cli import main
+from wavefront.denoising import open_image_denoise as module
 from wavefront.denoising.noisy import without_holes
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples"))
@@ -68,6 +69,24 @@ def test_guides_help(denoiser) -> None:
     image, exact = scene_like()
     alone = wf.Image(image.rgb, standard_error=image.standard_error).denoise(denoiser)
     assert relative_mse(image.denoise(denoiser), exact) < 0.8 * relative_mse(alone, exact)
+
+
+def test_networks_of_open_image_denoise(monkeypatch) -> None:
+    """A picture of few samples takes one; others, and those whose samples are not known, clean guides."""
+    pytest.importorskip("pyoidn")
+    run, taken = module._run, []
+    monkeypatch.setattr(
+        module, "_run", lambda *a, **k: (taken.append((*a[1], k.get("cleanAux"))), run(*a, **k))[1]
+    )
+    guides = {f"denoising_{name}": np.full((64, 64, 3), 0.5, np.float32) for name in ("albedo", "normal")}
+    whole = ("color", "albedo", "normal")
+    for spp, clean in ((1, False), (module.FEW - 1, False), (module.FEW, True), (0, True)):
+        taken.clear()
+        wf.Image(np.full((64, 64, 3), 0.5, np.float32), spp, layers=guides).denoise("oidn")
+        assert taken == [*([("albedo", None), ("normal", None)] if clean else []), (*whole, clean)]
+    taken.clear()
+    wf.Image(np.full((64, 64, 3), 0.5, np.float32), 64).denoise("oidn")
+    assert taken == [("color", False)]
 
 
 def test_noisy_stays(denoiser, tmp_path) -> None:

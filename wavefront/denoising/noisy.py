@@ -29,6 +29,7 @@ class NoisyPicture:
     squared_error: Floats  # (H, W, 3) estimated variance of `rgb`
     albedo: Guide | None
     normal: Guide | None
+    spp: int = 0  # samples per pixel; 0 if not known
 
 
 def noisy_picture(
@@ -36,15 +37,16 @@ def noisy_picture(
     standard_error: Floats | None,
     layers: Mapping[str, NDArray[Any]],
     errors: Mapping[str, Floats],
+    spp: int = 0,
 ) -> NoisyPicture:
-    """Return what denoisers are given for a picture (H, W, 3), its error, its layers and their errors.
+    """Return what denoisers are given for a picture (H, W, 3), its error, layers, their errors and samples.
 
     Values that are not finite are replaced by those of pixels about them. An error that is not known is
     estimated from the picture itself.
     """
     rgb = without_holes(rgb)
     albedo, normal = (_guide(layers[name], errors.get(name)) if name in layers else None for name in GUIDES)
-    return NoisyPicture(rgb, _squared_error(rgb, standard_error), albedo, normal)
+    return NoisyPicture(rgb, _squared_error(rgb, standard_error), albedo, normal, spp)
 
 
 def _guide(values: Floats, error: Floats | None) -> Guide:

@@ -12,13 +12,16 @@ from .noisy import Guide, NoisyPicture
 
 SMALLEST = 64  # pixels along a side; smaller pictures are extended, since the network sees black beyond
 LARGEST = np.float32(65504)  # radiance that the network's half floats hold
+FEW = 16  # samples per pixel; with fewer, more samples lower the error sooner than denoised guides do
 
 
 def open_image_denoise(picture: NoisyPicture) -> Floats:
     """Return the picture without its noise, (H, W, 3).
 
     Each guide is denoised by itself first, as the library's documentation recommends for noisy ones
-    (https://github.com/RenderKit/oidn, "RT": prefiltering the auxiliary images).
+    (https://github.com/RenderKit/oidn, "RT": prefiltering the auxiliary images), in its balanced quality,
+    which leaves no more error in the picture than the high one. A picture of few samples takes noisy guides
+    and one small network, in an eighth of the time.
 
     Raises
     ------
@@ -37,19 +40,23 @@ def open_image_denoise(picture: NoisyPicture) -> Floats:
         device.commit()
         guides: dict[str, Floats] = {}
         if picture.albedo is not None:
-            guides["albedo"] = _run(device, {"albedo": _values(picture.albedo, 0)})
+            guides["albedo"] = _values(picture.albedo, 0)
         if picture.normal is not None:
-            guides["normal"] = _run(device, {"normal": _values(picture.normal, -1)})
+            guides["normal"] = _values(picture.normal, -1)
+        clean = not 0 < picture.spp < FEW and bool(guides)
+        if clean:
+            balanced = {"quality": pyoidn.OIDN_QUALITY_BALANCED}
+            guides = {name: _run(device, {name: values}, **balanced) for name, values in guides.items()}
         color = np.clip(picture.rgb, 0, LARGEST)
-        return _run(device, {"color": color, **guides}, hdr=True, cleanAux=bool(guides))
+        return _run(device, {"color": color, **guides}, hdr=True, cleanAux=clean)
 
 
 def _values(guide: Guide, low: float) -> Floats:
     return np.clip(guide.values, low, 1)
 
 
-def _run(device: Any, images: dict[str, Floats], **flags: bool) -> Floats:
-    """Return the output of one filter."""
+def _run(device: Any, images: dict[str, Floats], **options: int) -> Floats:
+    """Return the output of one filter; its options are numbers or switches."""
     import pyoidn
 
     height, width = next(iter(images.values())).shape[:2]
@@ -59,8 +66,8 @@ def _run(device: Any, images: dict[str, Floats], **flags: bool) -> Floats:
     with pyoidn.Filter(device, pyoidn.OIDN_FILTER_TYPE_RT) as network:
         for name, values in (*inputs.items(), ("output", output)):
             network.set_image(name, values, pyoidn.OIDN_FORMAT_FLOAT3)
-        for name, value in flags.items():
-            network.set_bool(name, value)
+        for name, value in options.items():
+            (network.set_bool if isinstance(value, bool) else network.set_int)(name, value)
         network.commit()
         network.execute()
         error = device.get_error()

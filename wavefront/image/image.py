@@ -422,7 +422,7 @@ class Image:
         from ..denoising import denoise, noisy_picture
 
         source = self.noisy or self
-        picture = noisy_picture(source.rgb, source.standard_error, source.layers, source.errors)
+        picture = noisy_picture(source.rgb, source.standard_error, source.layers, source.errors, source.spp)
         rgb, used = denoise(picture, denoiser)
         error = {} if source.standard_error is None else {NOISY: source.standard_error}
         return Image(
