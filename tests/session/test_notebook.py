@@ -169,6 +169,26 @@ def test_a_render_in_a_kernel_shows_better_and_better_pictures(kernel: Any) -> N
     assert shown == []
 
 
+def test_the_first_pictures_are_denoised(kernel: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where that is quick; the last one is as it was rendered, and a denoiser that fails is left out."""
+    _, shown = kernel
+    monkeypatch.setattr("wavefront.denoising.is_quick", lambda: False)
+    wf.render(BALL, 16, size=(16, 16))
+    assert not any("denoiser" in each.metadata for each in shown)
+    shown.clear()
+    monkeypatch.setattr("wavefront.denoising.is_quick", lambda: True)
+    wf.render(BALL, 16, size=(16, 16))
+    assert ["denoiser" in each.metadata for each in shown] == [True] * 4 + [False]
+    shown.clear()
+    few = wf.render(BALL, 4, size=(16, 16))
+    assert shown[-1] is few
+    assert "denoiser" not in few.metadata
+    monkeypatch.setattr(wf.Image, "denoise", lambda image: 1 / 0)
+    shown.clear()
+    wf.render(BALL, 4, size=(16, 16))
+    assert [each.spp for each in shown] == [1, 2, 4]
+
+
 def test_a_quick_render_shows_nothing(kernel: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "DELAY", 60)
     wf.render(BALL, 4, size=(16, 16))

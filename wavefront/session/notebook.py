@@ -50,7 +50,7 @@ def run_shown(session: Session) -> Image:
 
 
 class LivePicture:
-    """A picture below the cell that is replaced by better ones.
+    """A picture below the cell that is replaced by better ones; the first ones are denoised.
 
     A picture that cannot be shown is left out: the render goes on.
 
@@ -68,7 +68,7 @@ class LivePicture:
         begin = time.perf_counter()
         if begin < self._next:
             return
-        self._put(image)
+        self._put(_cleaned(image))
         end = time.perf_counter()
         self._next = end + max(INTERVAL, (end - begin) / SHARE)
 
@@ -99,6 +99,15 @@ class LivePicture:
         shown = result.result, getattr(result.error_in_exec, "image", None)
         if any(each is self._last for each in shown):
             self._handle.update(HTML(""))
+
+
+def _cleaned(image: Image) -> Image:
+    """Return a picture of few samples denoised, where that is quick; others as they are."""
+    from ..denoising import FEW, is_quick
+
+    with suppress(Exception):  # of a library
+        return image.denoise() if image.spp < FEW and is_quick() else image
+    return image
 
 
 def _shell() -> Any:

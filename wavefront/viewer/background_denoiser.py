@@ -9,20 +9,15 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from importlib.util import find_spec
 from pathlib import Path
 
 from ..core.errors import RenderError
+from ..denoising import is_quick
 from ..image import Image
 from .priority import NICENESS
 from .refiner import ViewerFrame
 
 COMMAND = "from wavefront.viewer.background_denoiser import denoise_input; denoise_input()"
-
-
-def is_quick() -> bool:
-    """Return whether a picture is denoised within tenths of a second: by Open Image Denoise."""
-    return find_spec("pyoidn") is not None
 
 
 class BackgroundDenoiser:

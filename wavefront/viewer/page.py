@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from ..codecs import png_jpeg
 from ..codecs.tone import TONES
 from ..core.errors import SceneError, one_of
+from ..denoising import FEW, is_quick
 from ..image import Image
-from .background_denoiser import BackgroundDenoiser, is_quick
+from .background_denoiser import BackgroundDenoiser
 from .first_paint import FirstPaint, asked_first
 from .guard import Guard, take_values
 from .refiner import ViewerFrame
@@ -31,7 +32,6 @@ PAUSE = 0.1  # seconds between pictures that refine, so that the browser has tim
 EVERYWHERE = "0.0.0.0", "::", ""  # hosts that are reached from other machines, too
 STOPS = 6.0  # exposure, up and down
 STEPS = 200  # of a slider
-FEW = 16  # samples per pixel; with fewer, rgb is shown denoised where that is quick
 SAME_SHAPE = 0.03  # relative difference of the aspects of two pictures that are shown as the same
 COPY = (
     "const c=this.dataset.code;(navigator.clipboard?navigator.clipboard.writeText(c):Promise.reject())"
