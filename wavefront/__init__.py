@@ -46,6 +46,7 @@ from .lights import (
     LightSample,
     PointLight,
     PointLights,
+    Receiver,
     SpotLight,
 )
 from .lights.samplers import LightSampler
@@ -153,6 +154,7 @@ __all__ = [
     "PointLights",
     "Points",
     "Principled",
+    "Receiver",
     "Rectangle",
     "RegionMean",
     "RenderError",

@@ -11,7 +11,7 @@ from wavefront import testing
 from wavefront.accel.numpy_accel import NumpyAccelerator
 from wavefront.arrays.vec import f4
 from wavefront.compile.scene import compile_scene
-from wavefront.lights import LightRecord, LightTable, Receiver
+from wavefront.lights import EnvironmentSum, LightRecord, LightTable, Receiver
 from wavefront.lights.product import NO_NORMAL, CosineProduct, octahedral_bins, octahedral_normals
 
 SETTINGS: dict = {"max_bounces": 3, "accel": "numpy"}
@@ -52,6 +52,32 @@ def test_the_contract_holds_for_each_normal(normal: tuple[float, ...], opaque: b
     turn = np.linalg.qr([[3.0, 1, 2], [-1, 4, 1], [1, -2, 5]])[0]
     turn *= np.sign(np.linalg.det(turn))
     testing.check_light(lighting(sky(), normal, opaque, transform=turn), points=[[0, 0, 0]], samples=30_000)
+
+
+def test_a_sum_of_lights_at_infinity_is_sampled_for_normals() -> None:
+    """With a sun beside the sky; directions below the surface are as rare as in the sky alone."""
+    normals = np.repeat(f4(NORMALS[:2]).T, 50_000, axis=1)
+    yes = np.ones(normals.shape[1], np.bool_)
+    parts = [
+        light.record(np.zeros(3))
+        for light in (
+            wf.Environment(np.ones((16, 32, 3)) + sky(16, 32)),
+            wf.DirectionalLight((-0.2, -1, -0.1), 3, angle=8),
+        )
+    ]
+    both = EnvironmentSum.of(parts).compensated()
+    lit = both.lighting(Receiver(normals, yes, yes))
+    u = np.random.default_rng(0).random((2, yes.size), f4)
+    sample = lit.sample_li(np.zeros_like(normals), u)
+    of_sun = parts[1].pdf_li(normals, sample.wi) > 0
+    up = (sample.wi * normals).sum(0)[~of_sun] > 0
+    assert up.mean() > 0.9
+    half = np.arange(yes.size) < 50_000
+    for of, normal in ((half, NORMALS[0]), (~half, NORMALS[1])):
+        one = Receiver(f4(normal).reshape(3, 1), yes[:1], yes[:1])
+        testing.check_light(both.lighting(one), points=[[0, 0, 0]], samples=20_000)
+        alone = both.lighting(one).pdf_li(np.zeros((3, 1), f4), sample.wi[:, of])
+        assert (sample.pdf[of] == alone).all()
 
 
 @pytest.mark.parametrize("normal", NORMALS)

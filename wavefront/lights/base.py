@@ -47,7 +47,18 @@ class LightSample(SoA):
 
 @soa
 class Receiver(SoA):
-    """The surfaces that lights shine on, for lights that are sampled by what arrives there."""
+    """The surfaces that lights shine on, for lights that are sampled by what arrives there.
+
+    Examples
+    --------
+    >>> up, yes = np.array([[0], [1], [0]], np.float32), np.array([True])
+    >>> receiver = wf.Receiver(normal=up, opaque=yes, matte=yes)
+    >>> sky = wf.Environment(np.random.default_rng(0).random((8, 16, 3))).record(np.zeros(3)).compensated()
+    >>> point, u = np.zeros((3, 1), np.float32), np.full((2, 1), 0.5, np.float32)
+    >>> sample = sky.lighting(receiver).sample_li(point, u)
+    >>> bool(sample.wi[1, 0] > 0)
+    True
+    """
 
     normal: Floats  # (3, n) unit shading normal
     opaque: Bools  # (n,) light from behind the normal does not count

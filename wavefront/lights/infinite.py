@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Floats, Lanes, column, f4
 from ..sampling.discrete import Discrete
-from .base import LightRecord, LightSample
+from .base import LightRecord, LightSample, Receiver
 
 
 class InfiniteLight(LightRecord):
@@ -68,6 +68,8 @@ class EnvironmentSum(InfiniteLight):
 
     parts: tuple[InfiniteLight, ...]
     choice: Discrete
+    receiver: Receiver | None = None  # what the parts are sampled for
+    takes_receiver: ClassVar[bool] = True
 
     @classmethod
     def of(cls, parts: Sequence[InfiniteLight]) -> InfiniteLight:
@@ -89,7 +91,8 @@ class EnvironmentSum(InfiniteLight):
         for k, part in enumerate(self.parts):
             lanes = np.flatnonzero(index == k)
             if lanes.size:
-                wi[:, lanes] = part.sample_li(point.take(lanes, 1), stretched.take(lanes, 1)).wi
+                lit = part if self.receiver is None else part.lighting(self.receiver.take(lanes))
+                wi[:, lanes] = lit.sample_li(point.take(lanes, 1), stretched.take(lanes, 1)).wi
         return at_infinity(wi, self.le(wi), self.pdf_li(point, wi))
 
     def pdf_li(self, point: Floats, wi: Floats) -> Floats:
@@ -97,8 +100,13 @@ class EnvironmentSum(InfiniteLight):
         chances = self.choice.pmf(np.arange(len(self.parts)))
         pdf = np.zeros(wi.shape[1], f4)
         for part, chance in zip(self.parts, chances, strict=True):
-            pdf += chance * part.pdf_li(point, wi)
+            lit = part if self.receiver is None else part.lighting(self.receiver)
+            pdf += chance * lit.pdf_li(point, wi)
         return pdf
+
+    def lighting(self, receiver: Receiver) -> Self:
+        """Return the sum of the parts as they are sampled there."""
+        return replace(self, receiver=receiver)
 
     def le(self, wi: Floats, surface: SurfaceInteraction | None = None) -> Floats:
         """Return the sum of the parts' radiances, (3, n)."""
