@@ -49,7 +49,7 @@ from .lights import (
     Receiver,
     SpotLight,
 )
-from .lights.samplers import LightSampler
+from .lights.choice import LightSampler
 from .material_ball import ball_png
 from .materials import Material
 from .media import Medium

@@ -16,7 +16,8 @@ from .codecs.images import IMAGE_READERS, IMAGE_WRITERS
 from .core.errors import SceneError
 from .core.registry import Registry
 from .integrators import INTEGRATORS, Integrator
-from .lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
+from .lights.choice import LightSamplerMaker
+from .lights.samplers import LIGHT_SAMPLERS
 from .sampling.filters import FILTERS, Filter
 from .sampling.sampler import SAMPLERS, SamplerMaker
 from .scene import Scene

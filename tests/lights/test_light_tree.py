@@ -13,6 +13,7 @@ from wavefront.arrays.vec import Floats, f4
 from wavefront.lights import (
     LightTable,
     PointLightRecord,
+    Receiver,
     TriangleLights,
     samplers,
 )
@@ -53,6 +54,28 @@ def test_sampling_follows_the_probabilities(k: int) -> None:
         assert np.abs(observed / n - expected).max() < 4 / n
         edge, chance = choice.sample(point[:, :2], np.array([0, LARGEST], f4))
         assert ((edge >= 0) & (edge < k) & (chance > 0)).all()
+
+
+@pytest.mark.parametrize("k", [17, 4097])
+def test_surfaces_are_lit_from_above_their_horizon(k: int) -> None:
+    """Sampling follows the pmf for a normal too, which halves that of lights below the horizon at least."""
+    choice, n = tree(k), 1 << 16
+    u = ((np.arange(n) + 0.5) / n).astype(f4)
+    normal = np.array([[0.48], [0.6], [0.64]], f4)
+
+    def lit(m: int, opaque: bool) -> LightTreeSampler:
+        return choice.lighting(Receiver(np.repeat(normal, m, 1), np.full(m, opaque), np.zeros(m, np.bool_)))
+
+    point = np.repeat(np.array([[0.1], [0.2], [-0.3]], f4), n, 1)
+    light, chance = lit(n, True).sample(point, u)
+    expected = lit(k, True).pmf(np.arange(k), point[:, :k])
+    assert expected.sum(dtype=float) == pytest.approx(1, abs=1e-5)
+    assert (chance == expected[light]).all()
+    assert np.abs(np.bincount(light, minlength=k) / n - expected).max() < 4 / n
+    before = choice.pmf(np.arange(k), point[:, :k])
+    assert (lit(k, False).pmf(np.arange(k), point[:, :k]) == before).all()
+    below = (normal * (lights(k)[0].middle - point[:, :1])).sum(0) < 0
+    assert expected[below].sum() < before[below].sum() / 2
 
 
 def test_random_choices_pass_a_chi_square_test() -> None:

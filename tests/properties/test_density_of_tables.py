@@ -20,7 +20,7 @@ from jacobians import (
 
 from wavefront.guiding.cells import GuideCells
 from wavefront.guiding.guide_table import GuideTable
-from wavefront.lights import PointLightRecord, TriangleLights, samplers
+from wavefront.lights import PointLightRecord, TriangleLights, grid, samplers
 from wavefront.lights.base import Emitters
 from wavefront.lights.samplers import (
     LIGHT_SAMPLERS,
@@ -152,7 +152,7 @@ counts, number = st.integers(1, 12), st.integers(0, 2**32)
 def test_light_samplers(name: str, count: int, seed: int, place, u: float) -> None:
     kinds = lights_of(count, seed)
     power = tree_of(kinds)[1]
-    with patch.object(samplers, "MOST_CELLS", 27):
+    with patch.object(grid, "MOST_CELLS", 27):
         choice = LIGHT_SAMPLERS.find(name)(power, np.full(3, 2.0), IrradianceOf(kinds, 3.0))
     check_light_sampler(choice, place, u, 2 * count)
 

@@ -28,7 +28,7 @@ from ..lights import (
     TwoSidedTriangleLights,
     first_of_pairs,
 )
-from ..lights.samplers import LightSamplerMaker
+from ..lights.choice import LightSamplerMaker
 from ..lights.textured_emission import has_textured_emission, mean_radiance
 from ..lights.textured_sphere import mean_sphere_radiance
 from ..scene import Scene

@@ -12,7 +12,7 @@ from ..arrays.soa import soa
 from ..arrays.vec import Bools, Floats, Ints
 from ..camera import Camera
 from ..lights import InfiniteLight, LightTable
-from ..lights.samplers import LightSamplerMaker
+from ..lights.choice import LightSamplerMaker
 from ..scene import Scene
 from ..shapes import Shape
 from ..shapes.attributes import Corners, corner_values

@@ -79,7 +79,8 @@ class Emitters(SoA):
 
     middle: Doubles  # (3, k) relative to the scene's center, scene units
     facing: Doubles  # (3, k) unit normal of a surface that shines on one side, or unit axis of a spot; else 0
-    extent2: Doubles  # (k,) square of the size, such as the area of a surface
+    # (k,) square of the size, such as the area of a surface; inf of lights at infinity, along `facing`
+    extent2: Doubles
 
 
 class Light(ABC):
@@ -296,7 +297,8 @@ def emitters_of(light: LightRecord) -> Emitters:
         raise SceneError(f"{name} must return wf.Emitters or None, got {found!r}")
     middle = finite_array(f"{name}' middle", found.middle, (3, k))
     facing = finite_array(f"{name}' facing", found.facing, (3, k))
-    extent2 = finite_array(f"{name}' extent2", found.extent2, (k,))
+    extent2 = np.asarray(found.extent2, float)
+    finite_array(f"{name}' extent2", np.where(extent2 == np.inf, 0, extent2), (k,))
     if (extent2 < 0).any():
         at = int(extent2.argmin())
         raise SceneError(f"{name}' extent2[{at}] is {extent2[at]:g}; it must be at least 0")

@@ -18,7 +18,7 @@ from ..core.parameter import Parameter, Parametrized
 from ..core.suggestions import suggests_keywords
 from ..film.aov_names import DEFAULT_GROUP, group_name
 from ..sampling.warp import uniform_cone
-from .base import DeltaLight, Light, LightSample
+from .base import DeltaLight, Emitters, Light, LightSample
 from .infinite import InfiniteLight, at_infinity, facing_irradiance, through_scene, turned
 
 MIN_ANGLE = 0.01  # degrees; float32 directions cannot tell a smaller disk's edge to a percent
@@ -45,6 +45,11 @@ class DirectionalLights(DeltaLight):
     ) -> NDArray[np.float64]:
         """E, everywhere; (c, k)."""
         return facing_irradiance(self, center)
+
+    def emitters(self) -> Emitters:
+        """Return the directions."""
+        away = -self.towards.astype(np.float64)
+        return Emitters(np.zeros_like(away), away, np.full(len(self), np.inf))
 
 
 @soa

@@ -11,13 +11,8 @@ from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import ALL, Floats, Ints, Lanes, f4, put, take
 from ..sampling.mis import power_heuristic
 from .base import Emitters, LightRecord, LightSample, Receiver, emitters_of, sampled_li
-from .samplers import (
-    LIGHT_SAMPLERS,
-    LightSampler,
-    LightSamplerMaker,
-    SingleLightSampler,
-    SubsetLightSampler,
-)
+from .choice import LightSampler, LightSamplerMaker
+from .samplers import LIGHT_SAMPLERS, SingleLightSampler, SubsetLightSampler
 
 
 class IrradianceOf:
@@ -74,6 +69,7 @@ class LightTable:
         power = np.concatenate([np.zeros(0), *(kind.power(float(np.linalg.norm(extent))) for kind in kinds)])
         self.chosen_from = power != 0  # (lights,) which take part in the choice
         self.choice = self._make_choice(power, extent, choice)
+        self.takes_receiver |= getattr(self.choice, "takes_receiver", False)
 
     def __len__(self) -> int:
         """Return the number of lights."""
@@ -109,8 +105,7 @@ class LightTable:
         light
             (n,) numbers of the chosen lights.
         """
-        assert self.choice is not None
-        light, chance = self.choice.sample(point, u_choice)
+        light, chance = self._choice_for(receiver).sample(point, u_choice)
         sample = self._sample_each(light, point, u, receiver)
         sample.pdf = sample.pdf * chance
         return sample, light
@@ -122,7 +117,14 @@ class LightTable:
         pdf = np.empty(len(light), f4)
         for kind, rows in self._by_kind(light):
             pdf[rows] = _lighting(kind, receiver, rows).pdf_li(take(point, rows), take(wi, rows))
-        return pdf * self.choice.pmf(light, point)
+        return pdf * self._choice_for(receiver).pmf(light, point)
+
+    def _choice_for(self, receiver: Receiver | None) -> LightSampler:
+        """Return the light sampler, for surfaces if they are known."""
+        assert self.choice is not None
+        if receiver is None or not getattr(self.choice, "takes_receiver", False):
+            return self.choice
+        return self.choice.lighting(receiver)
 
     def bsdf_weight(
         self, light: Ints, pdf_bsdf: Floats, pdf: Floats, receiver: Receiver | None = None

@@ -11,10 +11,14 @@ wide nodes in place of binary ones, and with a smooth estimate in place of a bou
 
 from __future__ import annotations
 
+from copy import copy
+from typing import Self
+
 import numpy as np
 
 from ..arrays.vec import Doubles, Floats, Ints, f4, spans
-from .base import Emitters
+from .base import Emitters, Receiver
+from .choice import LightSampler
 
 BITS = 4  # of the number of a child: a node has 16 children; the root may have fewer
 AT_ONCE = 1 << 12  # points whose nodes are gathered together, so that they fit the cache
@@ -24,7 +28,7 @@ LEAST_EXTENT = 1e-3  # of a light, in scene radii: at this distance it seems no 
 LEAST_POWER = 1e-12  # of that of the brightest light
 
 
-class LightTreeSampler:
+class LightTreeSampler(LightSampler):
     """Probabilities by an estimate of the irradiance at each point.
 
     Parameters
@@ -41,13 +45,16 @@ class LightTreeSampler:
     Numbers u have 24 bits: of very many lights that are all improbable at a point, some are never drawn.
     """
 
+    takes_receiver = True
+    receiver: Receiver | None = None
+
     def __init__(self, emitters: Emitters, power: Doubles, scene_radius: float) -> None:
         lights = len(power)
         depth = max(1, (lights - 1).bit_length())
         slots = 1 << depth
         self.bits = [depth % BITS or BITS, *[BITS] * (-(-depth // BITS) - 1)]  # of the slot, by level
         slot = np.arange(lights) * slots // lights  # the lights are spread evenly over a full tree
-        order = _compact_order(emitters.middle / max(scene_radius, 1e-30), slot, depth)
+        order = compact_order(emitters.middle / max(scene_radius, 1e-30), slot, depth)
         self.light = np.zeros(slots, np.intp)  # of each slot
         self.light[slot] = order
         self.slot = np.empty(lights, np.intp)  # of each light
@@ -66,12 +73,18 @@ class LightTreeSampler:
             self.nodes.insert(0, _packed(sums, 1 << bits))
             sums = sums.reshape(len(sums), -1, 1 << bits).sum(2)
 
+    def lighting(self, receiver: Receiver) -> Self:
+        """Return the sampler by the irradiance of surfaces."""
+        bound = copy(self)
+        bound.receiver = receiver
+        return bound
+
     def sample(self, point: Floats, u: Floats) -> tuple[Ints, Floats]:
         """Choose a child at each level by inverting its cumulative weights."""
         n = len(u)
         light, chance = np.empty(n, np.intp), np.empty(n, f4)
         for part in spans(n, AT_ONCE):
-            light[part], chance[part] = self._sample(point[:, part], u[part])
+            light[part], chance[part] = self._sample(point[:, part], u[part], self._receiver(part))
         return self.light.take(light), chance
 
     def pmf(self, light: Ints, point: Floats) -> Floats:
@@ -79,14 +92,17 @@ class LightTreeSampler:
         n = len(light)
         slot, chance = self.slot.take(light), np.empty(n, f4)
         for part in spans(n, AT_ONCE):
-            chance[part] = self._pmf(slot[part], point[:, part])
+            chance[part] = self._pmf(slot[part], point[:, part], self._receiver(part))
         return chance
 
-    def _sample(self, point: Floats, u: Floats) -> tuple[Ints, Floats]:
+    def _receiver(self, part: slice) -> Receiver | None:
+        return None if self.receiver is None else self.receiver.take(part)
+
+    def _sample(self, point: Floats, u: Floats, receiver: Receiver | None) -> tuple[Ints, Floats]:
         n = len(u)
         node, chance = np.zeros(n, np.intp), np.ones(n, f4)
         for bits, nodes in zip(self.bits, self.nodes, strict=True):
-            upto = self._upto(nodes, node, point)
+            upto = self._upto(nodes, node, point, receiver)
             total = upto[-1]
             at = np.minimum(u * total, total * f4(1 - 2.0**-22))  # below the total: its child has a width
             child = (upto[:-1] <= at).sum(0)
@@ -96,19 +112,19 @@ class LightTreeSampler:
             node = (node << bits) + child
         return node, chance
 
-    def _pmf(self, slot: Ints, point: Floats) -> Floats:
+    def _pmf(self, slot: Ints, point: Floats, receiver: Receiver | None) -> Floats:
         chance = np.ones(len(slot), f4)
         left = sum(self.bits)
         for bits, nodes in zip(self.bits, self.nodes, strict=True):
             node = slot >> left
             left -= bits
             child = (slot >> left) & ((1 << bits) - 1)
-            upto = self._upto(nodes, node, point)
+            upto = self._upto(nodes, node, point, receiver)
             begin, end = _interval(upto, child)
             chance *= (end - begin) / upto[-1]
         return chance
 
-    def _upto(self, nodes: Floats, node: Ints, point: Floats) -> Floats:
+    def _upto(self, nodes: Floats, node: Ints, point: Floats, receiver: Receiver | None) -> Floats:
         """Return the cumulative estimates of the children of nodes (n,), (children, n)."""
         if len(nodes) == 1:
             fields = nodes.reshape(FIELDS, -1, 1)
@@ -131,6 +147,15 @@ class LightTreeSampler:
         np.sqrt(value, out=value)
         value += along
         distance = np.sqrt(distance2)
+        if receiver is not None:
+            nx, ny, nz = receiver.normal
+            above = away_x * -nx
+            above -= away_y * ny
+            above -= away_z * nz
+            above /= distance
+            # likewise for the cosine at the surface, with s from the extent alone
+            above += np.sqrt(above * above + (f4(0.25) * extent2 / distance2 + f4(LEAST_SPREAD)))
+            value *= np.where(receiver.opaque, above, f4(1))
         distance *= distance2
         value /= distance
         value *= power
@@ -162,7 +187,7 @@ def _packed(sums: Doubles, width: int) -> Floats:
     return np.ascontiguousarray(fields.reshape(FIELDS, -1, width).swapaxes(0, 1)).reshape(-1, FIELDS * width)
 
 
-def _compact_order(middle: Doubles, slot: Ints, depth: int) -> Ints:
+def compact_order(middle: Doubles, slot: Ints, depth: int) -> Ints:
     """Return the lights in the order of their slots, rising, so that those of a subtree are near each other.
 
     Each segment of a level is sorted along its longest axis, and so split in the middle. A word holds the

@@ -21,7 +21,8 @@ from ..core.progress import Progress
 from ..core.registry import Registry
 from ..film.aov_names import chosen_aovs
 from ..integrators import INTEGRATORS, Integrator
-from ..lights.samplers import LIGHT_SAMPLERS, LightSamplerMaker
+from ..lights.choice import LightSamplerMaker
+from ..lights.samplers import LIGHT_SAMPLERS
 from ..materials import NAMED_MATERIALS, MaterialLike
 from ..sampling.filters import FILTERS, Filter
 from ..sampling.sampler import SAMPLERS, SamplerMaker
