@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import json
 import subprocess
+import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import trimesh
+from mitsuba_scene import texels_of
 
 import wavefront as wf
 from wavefront.scheduling.executors import worker_count
 
 SPHERE_SUBDIVISIONS = 5  # 20 480 triangles: Cycles has no spheres
+
+
+FILES = tempfile.TemporaryDirectory()  # images of textures
 
 
 class Cycles:
@@ -44,9 +49,9 @@ class Cycles:
         """Render, and return the seconds that Cycles took."""
         return float(self._answers("again")["SECONDS"])
 
-    def picture(self) -> np.ndarray:
-        """Render, and return the picture (H, W, 3)."""
-        return wf.Image.load(self._answers("write")["PICTURE"]).rgb
+    def picture(self, spp: int | None = None) -> np.ndarray:
+        """Render, with another number of samples if given, and return the picture (H, W, 3)."""
+        return wf.Image.load(self._answers("write" if spp is None else f"write {spp}")["PICTURE"]).rgb
 
     def _answers(self, line: str) -> dict[str, str]:
         """Return what Cycles says, by its first word."""
@@ -81,7 +86,8 @@ def described(scene: wf.Scene) -> dict[str, Any]:
     }
     for light in scene.lights:
         if isinstance(light, wf.Environment):
-            found["sky"] = np.ravel(light.radiance).tolist()
+            image = light._image
+            found["sky"] = np.ravel(light.radiance).tolist() if image is None else _file(image.image)
         elif isinstance(light, wf.DirectionalLight):
             found["suns"].append(_sun(light))
         else:
@@ -112,21 +118,38 @@ def _shape(shape: wf.Mesh | wf.Sphere) -> dict[str, Any]:
         ball = trimesh.creation.icosphere(subdivisions=SPHERE_SUBDIVISIONS)
         vertices, faces, smooth = ball.vertices * shape.radius + shape.center, ball.faces, True
     else:
-        vertices, faces, smooth = shape.vertices, shape.faces, False
+        vertices, faces, smooth = shape.vertices, shape.faces, shape.normals is not None
     return {
         "vertices": np.asarray(vertices).tolist(),
         "faces": np.asarray(faces).tolist(),
         "smooth": smooth,
+        "uvs": None if getattr(shape, "uvs", None) is None else shape.uvs.tolist(),
         "look": _look(shape.material.bsdf),
         "emission": None if shape.emission is None else np.ravel(shape.emission).tolist(),
     }
 
 
+def _file(texture: wf.Texture) -> str:
+    """Write an image to a file that lives as long as this process, and return its name."""
+    path = Path(FILES.name) / f"{id(texture)}.exr"
+    wf.Image(texels_of(texture)).save(path)
+    return str(path)
+
+
 def _look(material: wf.Bsdf) -> dict[str, Any]:
     if isinstance(material, wf.Diffuse):
-        return {"type": "diffuse", "color": np.ravel(material.reflectance).tolist()}
+        color = material.reflectance
+        return {
+            "type": "diffuse",
+            "color": _file(color) if isinstance(color, wf.Texture) else np.ravel(color).tolist(),
+        }
+    if isinstance(material, wf.Dielectric) and material.specular:
+        return {"type": "glass", "ior": float(material.ior[0])}
     if isinstance(material, wf.Conductor) and (material.k >= 1000).all():  # reflects all light
         return {"type": "glossy", "roughness": float(material.roughness[0])}
+    if isinstance(material, wf.Conductor):
+        eta, k = (np.ravel(values).tolist() for values in (material.eta, material.k))
+        return {"type": "metal", "eta": eta, "k": k, "roughness": float(material.roughness[0])}
     if isinstance(material, wf.Mix):
         parts = [_look(part) for part in (material.first, material.second)]
         return {"type": "mix", "weight": float(np.ravel(material.weight)[0]), "parts": parts}

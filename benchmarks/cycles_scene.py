@@ -16,7 +16,7 @@ from mathutils import Matrix
 
 
 def shader(nodes: Any, links: Any, look: dict) -> Any:
-    """Return the node of a diffuse surface, a rough mirror that reflects all light, or a mix of both."""
+    """Return the node of a diffuse surface, glass, metal, a mirror that reflects all light, or a mix."""
     if look["type"] == "mix":
         node = nodes.new("ShaderNodeMixShader")
         node.inputs[0].default_value = look["weight"]
@@ -29,8 +29,24 @@ def shader(nodes: Any, links: Any, look: dict) -> Any:
         node.inputs["Roughness"].default_value = look["roughness"]
         node.inputs["Color"].default_value = (1, 1, 1, 1)
         return node
+    if look["type"] == "metal":
+        node = nodes.new("ShaderNodeBsdfMetallic")
+        node.distribution, node.fresnel_type = "GGX", "PHYSICAL_CONDUCTOR"
+        node.inputs["IOR"].default_value, node.inputs["Extinction"].default_value = look["eta"], look["k"]
+        node.inputs["Roughness"].default_value = look["roughness"]
+        return node
+    if look["type"] == "glass":
+        node = nodes.new("ShaderNodeBsdfGlass")
+        node.inputs["Color"].default_value = (1, 1, 1, 1)
+        node.inputs["IOR"].default_value, node.inputs["Roughness"].default_value = look["ior"], 0
+        return node
     node = nodes.new("ShaderNodeBsdfDiffuse")
-    node.inputs["Color"].default_value = (*look["color"], 1)
+    if isinstance(look["color"], str):
+        texture = nodes.new("ShaderNodeTexImage")
+        texture.image = bpy.data.images.load(look["color"])
+        links.new(texture.outputs["Color"], node.inputs["Color"])
+    else:
+        node.inputs["Color"].default_value = (*look["color"], 1)
     return node
 
 
@@ -66,6 +82,9 @@ def add_shape(shape: dict) -> None:
     mesh = bpy.data.meshes.new("shape")
     mesh.from_pydata(shape["vertices"], [], shape["faces"])
     mesh.polygons.foreach_set("use_smooth", [shape["smooth"]] * len(shape["faces"]))
+    if shape["uvs"]:
+        corners = [shape["uvs"][i] for face in shape["faces"] for i in face]
+        mesh.uv_layers.new().data.foreach_set("uv", [x for corner in corners for x in corner])
     mesh.materials.append(material(shape))
     bpy.context.scene.collection.objects.link(bpy.data.objects.new("shape", mesh))
 
@@ -79,11 +98,23 @@ def add_sun(sun: dict) -> None:
     bpy.context.scene.collection.objects.link(placed)
 
 
-def add_sky(radiance: list[float]) -> None:
-    """Surround Blender's scene by a constant environment."""
+def add_sky(sky: list[float] | str) -> None:
+    """Surround Blender's scene by a constant environment, or by the image of a file."""
     world = bpy.context.scene.world = bpy.data.worlds.new("sky")
     world.use_nodes = True
-    world.node_tree.nodes["Background"].inputs["Color"].default_value = (*radiance, 1)
+    nodes, links = world.node_tree.nodes, world.node_tree.links
+    color = nodes["Background"].inputs["Color"]
+    if not isinstance(sky, str):
+        color.default_value = (*sky, 1)
+        return
+    parts, turned = nodes.new("ShaderNodeSeparateXYZ"), nodes.new("ShaderNodeCombineXYZ")
+    links.new(nodes.new("ShaderNodeTexCoord").outputs["Generated"], parts.inputs[0])
+    for to, axis in enumerate("ZXY"):  # Blender's images have +x in their middle and +z at their top
+        links.new(parts.outputs[axis], turned.inputs[to])
+    image = nodes.new("ShaderNodeTexEnvironment")
+    image.image = bpy.data.images.load(sky)
+    links.new(turned.outputs[0], image.inputs["Vector"])
+    links.new(image.outputs["Color"], color)
 
 
 def add_camera(camera: dict) -> None:
@@ -132,9 +163,11 @@ def main() -> None:
     add_camera(job["camera"])
     settings(job)
     for seed, line in enumerate(sys.stdin):
+        action, *samples = line.split()
         bpy.context.scene.cycles.seed = seed
+        bpy.context.scene.cycles.samples = int(samples[0]) if samples else job["spp"]
         begin = time.perf_counter()
-        bpy.ops.render.render(write_still="write" in line)
+        bpy.ops.render.render(write_still=action == "write")
         print(f"PICTURE {bpy.context.scene.render.filepath}")
         print(f"SECONDS {time.perf_counter() - begin}", flush=True)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import map_coordinates
 
 import wavefront as wf
 
@@ -12,17 +13,27 @@ FAR = 1e5  # distance of a sun, in units of the scene
 
 
 def to_mitsuba(
-    mi: Any, scene: wf.Scene, max_bounces: int, sampler: str = "independent", spp: int = 16
+    mi: Any,
+    scene: wf.Scene,
+    max_bounces: int,
+    sampler: str = "independent",
+    spp: int = 16,
+    *,
+    guides: bool = False,
 ) -> Any:
     """Return the scene as Mitsuba loads it; materials and lights that have no twin raise ValueError.
+
+    With `guides` its pictures have albedo and normal, too, as channels 3 to 8.
 
     Flat meshes that look and shine alike become one: Mitsuba compiles code for each, so that a
     thousand small lights would take ten times as long, with no less noise.
     """
     camera = scene.camera or scene.framing_camera()
+    paths = {"type": "path", "max_depth": max_bounces + 1}
+    layers = {"type": "aov", "aovs": "albedo:albedo,normal:sh_normal", "paths": paths}
     description: dict[str, Any] = {
         "type": "scene",
-        "integrator": {"type": "path", "max_depth": max_bounces + 1},
+        "integrator": layers if guides else paths,
         "sensor": {
             "type": "perspective",
             "fov": camera.fov,
@@ -53,7 +64,7 @@ def _joined(shapes: list[Any]) -> list[Any]:
     """Join meshes without normals of their own that have the same material and emission."""
     groups: dict[Any, list[wf.Mesh]] = {}
     for i, shape in enumerate(shapes):
-        flat = isinstance(shape, wf.Mesh) and shape.normals is None
+        flat = isinstance(shape, wf.Mesh) and shape.normals is None and shape.uvs is None
         look = (repr(_bsdf(shape.material.bsdf)), repr(shape.emission)) if flat else i
         groups.setdefault(look, []).append(shape)
     return [meshes[0] if len(meshes) == 1 else _union(meshes) for meshes in groups.values()]
@@ -73,6 +84,31 @@ def _rgb(values: np.ndarray) -> dict[str, Any]:
     return {"type": "rgb", "value": np.ravel(values).astype(float).tolist()}
 
 
+def texels_of(texture: wf.Texture) -> np.ndarray:
+    """Return the image (H, W, 3) of a texture that was made of an array of floats."""
+    width, height = texture.size
+    return np.asarray(texture._texels, np.float32).reshape(height, width, 3)
+
+
+def _with_corners(pixels: np.ndarray) -> np.ndarray:
+    """Return an image by latitude of four times the size: Mitsuba has its first row at the very top."""
+    height, width, _ = np.multiply(pixels.shape, (4, 4, 1))
+    rows = np.clip(np.arange(height + 1) / 4 - 0.5, 0, len(pixels) - 1)
+    columns = np.arange(width) / 4 - 0.5
+    places = np.meshgrid(rows, columns, indexing="ij")
+    planes = [
+        map_coordinates(np.pad(p, ((0, 0), (1, 1)), "wrap"), [places[0], places[1] + 1], order=1)
+        for p in np.moveaxis(pixels, 2, 0)
+    ]
+    return np.ascontiguousarray(np.stack(planes, 2), np.float32)
+
+
+def _bitmap(texture: wf.Texture) -> dict[str, Any]:
+    import mitsuba as mi
+
+    return {"type": "bitmap", "bitmap": mi.Bitmap(texels_of(texture)), "raw": True}
+
+
 def _bsdf(material: wf.Bsdf) -> dict[str, Any]:
     if isinstance(material, wf.Dielectric) and material.specular:
         return {"type": "dielectric", "int_ior": float(material.ior[0]), "ext_ior": 1.0}
@@ -82,7 +118,11 @@ def _bsdf(material: wf.Bsdf) -> dict[str, Any]:
 def _reflection(material: wf.Bsdf) -> dict[str, Any]:
     """Return the twin of a material that reflects on its front side."""
     if isinstance(material, wf.Diffuse):
-        return {"type": "diffuse", "reflectance": _rgb(material.reflectance)}
+        reflectance = material.reflectance
+        return {
+            "type": "diffuse",
+            "reflectance": _bitmap(reflectance) if isinstance(reflectance, wf.Texture) else _rgb(reflectance),
+        }
     if isinstance(material, wf.Mirror):
         return {"type": "conductor", "specular_reflectance": _rgb(material.reflectance)}
     if isinstance(material, wf.Conductor):
@@ -106,13 +146,21 @@ def _mesh(mi: Any, shape: wf.Mesh, number: int) -> Any:
         properties["emitter"] = mi.load_dict({"type": "area", "radiance": _rgb(shape.emission)})
     smooth = shape.normals is not None
     mesh = mi.Mesh(
-        f"shape{number}", len(shape.vertices), len(shape.faces), has_vertex_normals=smooth, props=properties
+        f"shape{number}",
+        len(shape.vertices),
+        len(shape.faces),
+        has_vertex_normals=smooth,
+        has_vertex_texcoords=shape.uvs is not None,
+        props=properties,
     )
     parameters = mi.traverse(mesh)
     parameters["vertex_positions"] = shape.vertices.ravel().astype(np.float32)
     parameters["faces"] = shape.faces.ravel().astype(np.uint32)
     if shape.normals is not None:
         parameters["vertex_normals"] = shape.normals.ravel().astype(np.float32)
+    if shape.uvs is not None:
+        # the top row of an image is at v = 0
+        parameters["vertex_texcoords"] = (shape.uvs * (1, -1) + (0, 1)).ravel().astype(np.float32)
     parameters.update()
     return mesh
 
@@ -132,6 +180,8 @@ def _sphere(shape: wf.Sphere) -> dict[str, Any]:
 def _light(mi: Any, light: Any) -> dict[str, Any]:
     if isinstance(light, wf.PointLight):
         return {"type": "point", "position": light.position.tolist(), "intensity": _rgb(light.intensity)}
+    if isinstance(light, wf.Environment) and light._image is not None:
+        return {"type": "envmap", "bitmap": mi.Bitmap(_with_corners(texels_of(light._image.image)))}
     if isinstance(light, wf.Environment):
         return {"type": "constant", "radiance": _rgb(light.radiance)}
     if isinstance(light, wf.DirectionalLight) and light.angle > 0:
