@@ -2,12 +2,12 @@
 
 python benchmarks/equal_error.py [--scenes NAME ...] [--settings "branches=4" ...] [--size 192] [--spp 16]
 
-Scenes are those of the examples, of hard_scenes.py and many_lights.py, some of the tests, and meshes;
-`--list` prints their names. Each is rendered by one thread with several seeds, plain (`branches=1,
-reuse=False`) and with each of the given settings in turn; without `--settings` with the default ones.
-Printed are, relative to plain: variance of a pixel over the seeds, CPU time of the whole call, and gain,
-which is plain variance times CPU time over the other: 1.00 is neither sooner nor later. The gain is given
-for pixels and for the picture after a blur of 1.5 and of 4 pixels, since pixels may share their noise.
+Scenes are those of the examples, of hard_scenes.py, random_rooms.py and many_lights.py, some of the tests,
+and meshes; `--list` prints their names. Each is rendered by one thread with several seeds, plain
+(`branches=1, reuse=False`) and with each of the given settings in turn; without `--settings` with the default
+ones. Printed are, relative to plain: variance of a pixel over the seeds, CPU time of the whole call, and
+gain, which is plain variance times CPU time over the other: 1.00 is neither sooner nor later. The gain is
+given for pixels and for the picture after a blur of 1.5 and of 4 pixels, since pixels may share their noise.
 Variance is relative to the squared mean around a pixel, plus a hundredth of the picture's; the noisiest
 thousandth of the pixels count as the one next to them. What training a guide, and finding out what pays,
 takes is part of the time. What pays is found out with the first seed for all renders, since a mean over
@@ -33,6 +33,7 @@ from typing import Any
 import numpy as np
 from hard_scenes import HARD_SCENES
 from many_lights import lit
+from random_rooms import ROOMS
 from scipy.ndimage import gaussian_filter
 
 import wavefront as wf
@@ -235,7 +236,7 @@ SMALL_LAMPS: dict[str, Callable[[int], Any]] = {  # for caustics; measured where
     "lamp and tumbler": partial(gathered, "tumbler"),
     "lamp and gold ring": partial(gathered, "ring"),
 }
-ALL_SCENES = SCENES | SMALL_LAMPS
+ALL_SCENES = SCENES | ROOMS | SMALL_LAMPS
 
 
 def settings_of(text: str) -> dict[str, Any]:
