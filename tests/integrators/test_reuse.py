@@ -151,7 +151,19 @@ def balcony() -> wf.Scene:
     return wf.Scene(shapes, [wf.PointLight((0.5, -0.5, 0), 3)], camera)
 
 
-SCENES = [matte_corner, smooth, veiled, blended, divided, balcony]
+def brushed() -> wf.Scene:
+    """A floor of brushed metal, varnish beside a mirror, and an environment that BSDF samples meet."""
+    scene = scenes.cornell_box((16, 16))
+    varnish = wf.Mix(wf.Principled((0.2, 0.4, 0.8), roughness=0.4), wf.Mirror(0.9), 0.3)
+    shapes = [
+        wf.Rectangle((-1, -0.98, 1), (2, 0, 0), (0, 0, -2), material=wf.Conductor.named("gold", 0.3)),
+        wf.Rectangle((-0.98, -1, 1), (0, 0, -2), (0, 2, 0), material=wf.Principled(0.6, roughness=0.3)),
+        wf.Sphere((0.3, -0.5, 0.2), 0.4, material=varnish),
+    ]
+    return wf.Scene([*scene.shapes[:6], *shapes], [wf.Environment(0.5)], scene.camera)
+
+
+SCENES = [matte_corner, brushed, smooth, veiled, blended, divided, balcony]
 
 
 @pytest.mark.parametrize("build", SCENES)

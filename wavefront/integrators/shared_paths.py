@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
+from ..aovs.recorder import add_to_slots
+from ..arrays.soa import soa
 from ..arrays.state import Hits, Paths
-from ..arrays.vec import Floats, f4
+from ..arrays.vec import Floats, f4, highest
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..sampling.sampler import Sampler
 from ..sampling.tiles import WaveTiles
 from ..stages.bounce import bounce_sample, branch, copies
-from ..stages.compact import roulette, select
+from ..stages.compact import alive, roulette, select
+from ..stages.glossy_points import SECTIONS, GlossyPoints
 from ..stages.guidance import guide
 from ..stages.reuse import SHARED_WAYS, add_shared, as_shared, can_reuse, shared_points
-from ..stages.shade import direct
+from ..stages.shade import Shading, direct
 from .ladder import li_full
 from .steps import accumulate, intersect_and_compact, prepare_shading
 
 JOINED_AFTER = 3  # bounces: a quarter of the paths is left then
+FEW = 1 << 14  # paths that go on together sooner
 
 
 def li_reuse(
@@ -44,69 +49,99 @@ def li_reuse(
         return L
     shade = guide(prepare_shading(scene, first, hits), table)
     accumulate(L, first, direct(scene, first, shade, sampler, 0, mis=True))
-    paths = branch(first, shade, sampler, 0, ways=branches)
-    paths = select(paths, roulette(scene, paths, sampler, 0, branches))
-    paths, hits = intersect_and_compact(scene, paths, sampler, 1, L, mis=True)
-    if max_bounces == 1 or not len(paths):
-        return L
-    lanes, points = shared_points(scene, paths, hits, branches)
-    own = np.setdiff1d(np.arange(len(paths)), lanes, assume_unique=True)
-    follow(scene, [(paths.take(own), hits.take(own))], sampler, max_bounces, L, branches, table)
-    begun, hits, light = as_shared(paths.take(lanes)), hits.take(lanes), np.zeros((3, lanes.size), f4)
-    ways = [(way, hits) for way in copies(begun, SHARED_WAYS)]
-    follow(scene, ways, sampler, max_bounces, light, branches, table)
-    sums = [(L, light), *([] if first.recorder is None else first.recorder.parts_of_shared())]
-    for _, found in sums:
-        found *= f4(1 / SHARED_WAYS)
-    add_shared(scene, sums, first, shade, points, tiles, branches)
+    sharing = Sharing(scene, sampler, max_bounces, branches, table)
+    sharing.share(L, first, shade, branch(first, shade, sampler, 0, ways=branches), tiles)
     return L
 
 
-def follow(
-    scene: CompiledScene,
-    ways: Sequence[tuple[Paths, Hits]],
-    sampler: Sampler,
-    max_bounces: int,
-    L: Floats,
-    branches: int,
-    table: GuideTable | None,
-) -> None:
-    """Follow paths from their second surfaces on, and add the light that they find to L.
+Ways: TypeAlias = list[tuple[Paths, Hits]]
 
-    The ways go on one after the other, as smaller arrays fit the cache, and together once few paths are left.
 
-    Parameters
-    ----------
-    ways
-        Records of paths, and their hits on their second surfaces, which are not shaded yet.
-    L
-        (3, n) radiance of each slot.
-    branches, table
-        As for `li_full`.
-    """
-    for bounce in range(1, max_bounces):
-        leaving = [
-            _scatter(scene, paths, hits, sampler, bounce, L, branches, table)
-            for paths, hits in ways
-            if len(paths)
-        ]
-        if bounce == JOINED_AFTER and leaving:
+@soa
+class Sharing:
+    """How paths go on from the first rough surfaces; `branches` and `table` are those of `li_full`."""
+
+    scene: CompiledScene
+    sampler: Sampler
+    max_bounces: int
+    branches: int
+    table: GuideTable | None
+
+    def share(self, L: Floats, first: Paths, shade: Shading, paths: Paths, tiles: WaveTiles) -> None:
+        """Add to L, (3, n) of all slots, what first surfaces get from all but light samples.
+
+        Parameters
+        ----------
+        first, shade
+            Paths at these surfaces.
+        paths
+            Those that have left them.
+        """
+        paths = select(paths, roulette(self.scene, paths, self.sampler, 0, self.branches))
+        paths, hits = self._onward(paths, 0, L)
+        if self.max_bounces == 1 or not len(paths):
+            return
+        lanes, points, matte = shared_points(self.scene, paths, hits, self.branches)
+        g = lanes.size - matte
+        own = np.setdiff1d(np.arange(len(paths)), lanes, assume_unique=True)
+        self._follow([(paths.take(own), hits.take(own))], 1, L)
+        light = np.zeros((3, matte + SECTIONS * g), f4)
+        begun, hits = as_shared(paths.take(lanes), light.shape[1]), hits.take(lanes)
+        ways = [(way, hits.take(slice(0, matte))) for way in copies(begun.take(slice(0, matte)), SHARED_WAYS)]
+        ways = self._step(ways, 1, light)
+        some, glossy = slice(matte, lanes.size), None
+        if g:
+            glossy, more = self._glossy(begun.take(some), hits.take(some), light)
+            ways += more
+        self._follow(ways, 2, light)
+        sums = [(L, light), *([] if first.recorder is None else first.recorder.parts_of_shared())]
+        for to, found in sums:
+            found[:, :matte] *= f4(1 / SHARED_WAYS)
+            add_to_slots(to, points.slot[some], points.throughput[:, some] * found[:, lanes.size :][:, :g])
+        add_shared(self.scene, sums, first, shade, points, tiles, self.branches, glossy)
+
+    def _glossy(self, paths: Paths, hits: Hits, light: Floats) -> tuple[GlossyPoints, Ways]:
+        """Follow paths from g glossy points to their next surfaces, and return both.
+
+        What arrives there is added to the first and the last section of `light`, and what stays the path's
+        own, by delta lobes or by emission, to that between them.
+        """
+        g = len(paths)
+        shade = guide(prepare_shading(self.scene, paths, hits), self.table)
+        left = bounce_sample(paths, shade, self.sampler, 1)
+        glossy, found = GlossyPoints.of(self.scene, paths, shade, self.sampler, left.direction)
+        accumulate(light, paths, found)
+        left = replace(left, slot=left.slot + g)
+        left, hits = self._onward(select(left, np.flatnonzero(alive(left))), 1, light)
+        own, shared = np.flatnonzero(left.specular), np.flatnonzero(~left.specular)
+        begun = left.take(shared)
+        begun.slot, begun.roulette_scale = begun.slot + g, begun.roulette_scale * highest(begun.throughput)
+        begun.throughput = np.ones_like(begun.throughput)
+        return glossy, [(left.take(own), hits.take(own)), (begun, hits.take(shared))]
+
+    def _follow(self, ways: Ways, bounce: int, L: Floats) -> None:
+        """Follow paths from surfaces on that are not shaded yet, and add the light that they find to L."""
+        for at in range(bounce, self.max_bounces):
+            ways = self._step(ways, at, L)
+
+    def _step(self, ways: Ways, bounce: int, L: Floats) -> Ways:
+        """Follow paths from the surfaces of a bounce to the next ones, and add the light that they find to L.
+
+        The ways go on one after the other, as smaller arrays fit the cache, and together once few paths are
+        left.
+        """
+        leaving = [self._scatter(*way, bounce, L) for way in ways if len(way[0])]
+        if leaving and (bounce >= JOINED_AFTER or sum(map(len, leaving)) < FEW):
             leaving = [Paths.concatenate(leaving)]
-        ways = [intersect_and_compact(scene, paths, sampler, bounce + 1, L, mis=True) for paths in leaving]
+        return [self._onward(paths, bounce, L) for paths in leaving]
 
+    def _scatter(self, paths: Paths, hits: Hits, bounce: int, L: Floats) -> Paths:
+        """Add direct light to L, and return the paths that go on in new directions."""
+        shade = guide(prepare_shading(self.scene, paths, hits), self.table)
+        accumulate(L, paths, direct(self.scene, paths, shade, self.sampler, bounce, mis=True))
+        paths = bounce_sample(paths, shade, self.sampler, bounce)
+        return select(paths, roulette(self.scene, paths, self.sampler, bounce, self.branches))
 
-def _scatter(
-    scene: CompiledScene,
-    paths: Paths,
-    hits: Hits,
-    sampler: Sampler,
-    bounce: int,
-    L: Floats,
-    branches: int,
-    table: GuideTable | None,
-) -> Paths:
-    """Add direct light to L, and return the paths that go on in new directions."""
-    shade = guide(prepare_shading(scene, paths, hits), table)
-    accumulate(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
-    paths = bounce_sample(paths, shade, sampler, bounce)
-    return select(paths, roulette(scene, paths, sampler, bounce, branches))
+    def _onward(self, paths: Paths, bounce: int, L: Floats) -> tuple[Paths, Hits]:
+        """Return paths that have left the surfaces of a bounce, at their next ones."""
+        return intersect_and_compact(self.scene, paths, self.sampler, bounce + 1, L, mis=True)

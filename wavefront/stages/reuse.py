@@ -25,9 +25,24 @@ import numpy as np
 
 from ..arrays.soa import soa
 from ..arrays.state import Hits, Paths, SoA
-from ..arrays.vec import ALL, INV_PI, TINY, Bools, Floats, Ints, dot, f4, highest, positive, spans, take
+from ..arrays.vec import (
+    ALL,
+    INV_PI,
+    TINY,
+    Bools,
+    Floats,
+    Ints,
+    dot,
+    f4,
+    highest,
+    normalize,
+    positive,
+    spans,
+    take,
+)
 from ..compile.scene import CompiledScene
 from ..sampling.tiles import MEMBERS, WaveTiles
+from .glossy_points import SECTIONS, GlossyPoints, glossy_materials
 from .interaction import interaction, material_rows, offset_origin
 from .intersect import ShadowRays, visible
 from .shade import Guidance, Shading, evaluate
@@ -51,14 +66,18 @@ class SharedPoints(SoA):
     throughput: Floats  # (3, k) of the paths that found them
 
 
-def shared_points(scene: CompiledScene, paths: Paths, hits: Hits, branches: int) -> tuple[Ints, SharedPoints]:
-    """Return the lanes (k,) of paths whose second surfaces can be shared, and these points.
+def shared_points(
+    scene: CompiledScene, paths: Paths, hits: Hits, branches: int
+) -> tuple[Ints, SharedPoints, int]:
+    """Return the lanes (k,) of paths whose second surfaces can be shared, and these points, first matte ones.
 
-    They are points of view-independent materials without normal maps, which no medium separates from the
-    first ones, and which were not found by a delta lobe. Interpolated normals that the viewer sees at a
-    grazing angle depend on the viewer.
+    They are points without normal maps, which no medium separates from the first ones, and which were not
+    found by a delta lobe. Interpolated normals that the viewer sees at a grazing angle depend on the viewer.
+    The last value is how many points are matte; the others are of stages/glossy_points.py.
     """
-    shareable = shared_materials(scene).take(material_rows(scene, hits, ALL))
+    rows = material_rows(scene, hits, ALL)
+    matte = shared_materials(scene).take(rows)
+    shareable = matte | glossy_materials(scene).take(rows)
     lanes = np.flatnonzero(~paths.specular & shareable)
     surface = interaction(scene, paths.take(lanes), hits.take(lanes))
     good = np.ones(lanes.size, np.bool_)
@@ -66,10 +85,11 @@ def shared_points(scene: CompiledScene, paths: Paths, hits: Hits, branches: int)
         good &= dot(surface.ns, surface.wo) > GRAZING
     if scene.absorption is not None:
         good &= ~surface.back_facing
-    some = np.flatnonzero(good)
+    matte = matte.take(lanes)
+    some = np.concatenate([np.flatnonzero(good & matte), np.flatnonzero(good & ~matte)])
     lanes, surface = lanes.take(some), surface.take(some)
     way = (take(paths.sample, lanes) % np.uint32(branches)).astype(np.intp)
-    return lanes, SharedPoints(
+    points = SharedPoints(
         take(paths.slot, lanes),
         way,
         surface.point,
@@ -78,9 +98,10 @@ def shared_points(scene: CompiledScene, paths: Paths, hits: Hits, branches: int)
         surface.ns,
         take(paths.throughput, lanes),
     )
+    return lanes, points, int(np.count_nonzero(good & matte))
 
 
-def as_shared(paths: Paths) -> Paths:
+def as_shared(paths: Paths, columns: int | None = None) -> Paths:
     """Return paths at shared points as paths that begin there, each with a slot of its own.
 
     Their throughput is 1 from here on, also in channels that the first surface does not reflect. Russian
@@ -94,7 +115,7 @@ def as_shared(paths: Paths) -> Paths:
         roulette_scale=paths.roulette_scale * highest(paths.throughput),
         depth=None,
         met_rough=None,
-        recorder=None if paths.recorder is None else paths.recorder.of_shared(n),
+        recorder=None if paths.recorder is None else paths.recorder.of_shared(columns or n),
     )
 
 
@@ -106,14 +127,15 @@ def add_shared(
     points: SharedPoints,
     tiles: WaveTiles,
     branches: int,
+    glossy: GlossyPoints | None = None,
 ) -> None:
     """Add to all slots what their first points receive from the shared points of their tiles.
 
     Parameters
     ----------
     sums
-        The radiance of each slot, (3, n), and that which leaves each of k shared points, (3, k). After the
-        first pair come those of parts of it.
+        The radiance of each slot, (3, n), and that which leaves each of k shared points, (3, k), or arrives
+        at `glossy` ones, in columns of three sections. After the first pair come those of parts of it.
     paths, shade
         The first surfaces of the wave's paths.
     """
@@ -124,6 +146,11 @@ def add_shared(
     lane_in = tiles.grid(slot)
     lights = [light for _, light in sums]
     shining = highest(lights[0]) != 0  # NaN counts: it must reach the picture
+    matte = len(points) if glossy is None else len(points) - glossy.pdf.size
+    if glossy is not None:
+        g = glossy.pdf.size
+        shining[-SECTIONS * g : -2 * g] |= shining[-g:]
+        shining = shining[: len(points)]
     number_in = [
         tiles.grid(points.slot, np.flatnonzero(shining & (points.way == way))) for way in range(branches)
     ]
@@ -133,10 +160,12 @@ def add_shared(
         first = FirstPoints.of(scene, lit, albedo, lane_in[:, some])
         if first is None:
             continue
-        found, lost = _arriving(scene, first, points, lights, [numbers[:, some] for numbers in number_in])
-        for number in lost:  # they stay the path's own
+        numbers = [numbers[:, some] for numbers in number_in]
+        found, lost = _arriving(scene, first, points, lights, numbers, glossy)
+        for number in filter(len, lost):  # they stay the path's own
             for L, light in sums:
-                L[:, points.slot.take(number)] += take(points.throughput, number) * take(light, number)
+                own = _leaving(scene, light, number, matte, glossy)
+                L[:, points.slot.take(number)] += take(points.throughput, number) * own
         cells = np.flatnonzero(first.present)
         lanes = lane_in[:, some].reshape(-1).take(cells)
         for values, arriving in zip(received, found, strict=True):
@@ -145,12 +174,29 @@ def add_shared(
         L[:, slot] += paths.throughput[:, : slot.size] * values
 
 
+def _leaving(
+    scene: CompiledScene, light: Floats, number: Ints, k: int, glossy: GlossyPoints | None
+) -> Floats:
+    """Return the light that leaves some points, of which k are matte, towards their own paths."""
+    leaving = take(light, number)
+    some = np.flatnonzero(number >= k)
+    if glossy is not None and some.size:
+        at = number.take(some)
+        shade = glossy.toward(scene, at - k)
+        f, pdf = glossy.of_next(at - k, shade)
+        f /= np.where(pdf > 0, pdf, f4(1))
+        arriving = glossy.of_samples(scene, at - k, shade) * take(light, at)
+        leaving[:, some] = arriving + f * take(light, at + 2 * glossy.pdf.size)
+    return leaving
+
+
 def _arriving(
     scene: CompiledScene,
     first: FirstPoints,
     points: SharedPoints,
     lights: Sequence[Floats],
     number_in: list[Ints],
+    glossy: GlossyPoints | None = None,
 ) -> tuple[list[Floats], list[Ints]]:
     """Return what the first points of t tiles receive, (3, members, t), and the shared points left out.
 
@@ -173,6 +219,11 @@ def _arriving(
             found = total > 0
             part = connections.geometry / (np.where(found, total, f4(1)) * f4(len(number_in)))
             weight = connections.f * part
+            if glossy is not None:
+                _add_glossy(
+                    scene, first, points, lights, arriving, glossy, number, connections, weight, total
+                )
+                weight = weight * (number < len(points) - glossy.pdf.size)
             for values, light in zip(arriving, lights, strict=True):
                 values += weight * take(light, number)[:, None]
             lost.append(number.compress((number >= 0) & ~found))
@@ -180,6 +231,50 @@ def _arriving(
         for values in arriving:
             values *= first.albedo
     return arriving, lost
+
+
+def _add_glossy(
+    scene: CompiledScene,
+    first: FirstPoints,
+    points: SharedPoints,
+    lights: Sequence[Floats],
+    arriving: list[Floats],
+    glossy: GlossyPoints,
+    number: Ints,
+    connections: Connections,
+    weight: Floats,
+    total: Floats,
+) -> None:
+    """Add what first points receive from the glossy ones among the shared points of t tiles, as `_arriving`.
+
+    Parameters
+    ----------
+    weight, total
+        (1 or 3, members, t) and (t,) of light that leaves a point to all sides alike.
+    """
+    g, t = glossy.pdf.size, number.size
+    matte = len(points) - g
+    arrives = [highest(lights[0][:, start : start + g]) != 0 for start in (matte, matte + 2 * g)]
+    cells = np.flatnonzero((connections.geometry > 0) & (number >= matte))
+    at = number.take(cells % t) - matte
+    wo = normalize(take(first.start.reshape(3, -1), cells) - take(points.point, at + matte))
+    for by_samples, lit in zip((True, False), arrives, strict=True):
+        some = np.flatnonzero(lit.take(at))
+        if not some.size:
+            continue
+        cell, which = cells.take(some), at.take(some)
+        shade = glossy.toward(scene, which, take(wo, some))
+        part = weight.reshape(-1, t * MEMBERS).take(cell, 1)
+        if by_samples:
+            f, column = glossy.of_samples(scene, which, shade), matte
+        else:
+            (f, pdf), column = glossy.of_next(which, shade), matte + 2 * g
+            joint = np.zeros(t * MEMBERS, f4)
+            joint[cell] = (connections.pdf * connections.geometry).reshape(-1).take(cell) * pdf
+            found = _sum(joint.reshape(MEMBERS, t))
+            part *= (total / np.where(found > 0, found, f4(np.inf))).take(cell % t)
+        for values, light in zip(arriving, lights, strict=True):
+            values.reshape(3, -1)[:, cell] += part * f * take(light, which + column)
 
 
 @soa
@@ -350,7 +445,7 @@ def can_reuse(scene: CompiledScene) -> bool:
     Where surfaces with alpha and media are mixed none is: what gets through differs between channels then.
     """
     mixed = scene.opacities is not None and scene.absorption is not None
-    return not mixed and bool(shared_materials(scene).any())
+    return not mixed and bool((shared_materials(scene) | glossy_materials(scene)).any())
 
 
 def shares_all(scene: CompiledScene) -> bool:

@@ -199,12 +199,18 @@ def _groups_anywhere(materials: MaterialTable, surface: SurfaceInteraction) -> I
 
 
 def direct(
-    scene: CompiledScene, paths: Paths, shade: Shading, sampler: Sampler, bounce: int, mis: bool
+    scene: CompiledScene,
+    paths: Paths,
+    shade: Shading,
+    sampler: Sampler,
+    bounce: int,
+    mis: bool,
+    directed: bool = False,
 ) -> Contribution:
     """Return direct light: what one sampled light sends to each point and on along wo.
 
     With `mis` it is weighted by the power heuristic against BSDF sampling. Surfaces that have
-    only delta lobes get none.
+    only delta lobes get none. With `directed` it has its directions, whether a recorder needs them or not.
     """
     shade = shade.lit()
     if scene.lights.choice is None or not shade.groups:
@@ -241,7 +247,7 @@ def direct(
         receiver = None if shade.receiver is None else shade.receiver.take(lanes)
         scale *= scene.lights.mis_weight(number, pdf_light, pdf, receiver)
     arriving = f.take(lanes, 1) * radiance * scale
-    directed = paths.recorder is not None and paths.recorder.needs_directions
+    directed = directed or (paths.recorder is not None and paths.recorder.needs_directions)
     toward = take(light.wi, lanes) if directed else None
     return Contribution(lanes, arriving, number, sampled=True, wi=toward)
 
