@@ -47,7 +47,7 @@ class GlossyPoints:
 
     shade: Shading  # as the paths that found them see them
     sampled: Floats  # (3, g) world directions of light samples
-    pdf: Floats  # (g,) and their densities
+    pdf: Floats  # (g,) and their densities; any where none has found light
     light: Ints  # (g,) and the numbers of their lights
     next: Floats  # (3, g) world directions in which the paths go on; any where they end
 
@@ -66,10 +66,12 @@ class GlossyPoints:
         """
         white = replace(shade, groups=[(slice(0, len(paths)), AllOfIt())])
         found = direct(scene, paths, white, sampler, 1, mis=False, directed=True)
-        sampled, pdf, light = shade.surface.ns.copy(), np.zeros(len(paths), f4), np.zeros(len(paths), np.intp)
+        sampled, pdf, light = shade.surface.ns.copy(), np.ones(len(paths), f4), np.zeros(len(paths), np.intp)
         if found.wi is not None:
             sampled[:, found.lanes], light[found.lanes] = found.wi, found.light
-            pdf[found.lanes] = scene.lights.pdf_li(found.light, take(shade.start, found.lanes), found.wi)
+            receiver = None if shade.receiver is None else shade.receiver.take(found.lanes)
+            start = take(shade.start, found.lanes)
+            pdf[found.lanes] = scene.lights.pdf_li(found.light, start, found.wi, receiver)
         return cls(shade, sampled, pdf, light, onward), found
 
     def toward(self, scene: CompiledScene, which: Ints, wo: Floats | None = None) -> Shading:
@@ -80,7 +82,8 @@ class GlossyPoints:
     def of_samples(self, scene: CompiledScene, which: Ints, shade: Shading) -> Floats:
         """Return the BSDF of `shade` for light samples of points (k,), with their MIS weight: (3, k)."""
         f, pdf = _evaluated(shade, take(self.sampled, which))
-        return f * scene.lights.mis_weight(take(self.light, which), take(self.pdf, which), pdf)
+        light, pdf_light = take(self.light, which), take(self.pdf, which)
+        return f * scene.lights.mis_weight(light, pdf_light, pdf, shade.receiver)
 
     def of_next(self, which: Ints, shade: Shading) -> tuple[Floats, Floats]:
         """Return the BSDF of `shade` times the cosine of next directions, (3, k), and their density (k,)."""
