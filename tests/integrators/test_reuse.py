@@ -163,7 +163,7 @@ def brushed() -> wf.Scene:
     return wf.Scene([*scene.shapes[:6], *shapes], [wf.Environment(0.5)], scene.camera)
 
 
-SCENES = [matte_corner, brushed, smooth, veiled, blended, divided, balcony]
+SCENES = [matte_corner, smooth, veiled, blended, divided, balcony, brushed]
 
 
 @pytest.mark.parametrize("build", SCENES)
@@ -192,6 +192,31 @@ def test_branches_and_guides_go_with_it(options, close_tiles, monkeypatch):
     plain = repeat(scenes.room(), 32)
     shared = repeat(scenes.room(), 8, runs=10, reuse=True, first_seed=100, **options)
     assert_same_images(plain, shared, 0.01)
+
+
+def lacquered() -> wf.Scene:
+    """A glossy room in front of a shining wall, which BSDF samples and light samples find alike."""
+    materials = (
+        wf.Conductor.named("gold", 0.35),
+        wf.Principled((0.2, 0.4, 0.8), roughness=0.4),
+        wf.Mix(wf.Conductor.named("copper", 0.4), wf.Mirror(0.9), 0.3),
+    )
+    walls = scenes.cornell_box().shapes[:5]
+    for k, wall in enumerate(walls):
+        wall.material = wf.Material(materials[k % 3])
+    lamp = wf.Rectangle((-1, -1, 1), (0, 2, 0), (2, 0, 0), material=wf.Diffuse(0.5), emission=1)
+    camera = wf.Camera.look_at((0, 0, 0.95), (0.1, -0.2, -1), fov=90, size=(28, 28))
+    return wf.Scene([*walls, lamp], camera=camera)
+
+
+@pytest.mark.parametrize(
+    ("spp", "error"), [(8, 0.004), pytest.param(512, 0.0004, marks=pytest.mark.slow)], ids=["quick", "slow"]
+)
+def test_glossy_points_keep_the_mean(spp: int, error: float) -> None:
+    """Each pixel sees their BSDF from elsewhere, and weighs light samples by its own density."""
+    plain = repeat(lacquered(), spp, max_bounces=3)
+    shared = repeat(lacquered(), spp, reuse=True, first_seed=100, max_bounces=3)
+    assert_same_images(plain[:, :24, :24], shared[:, :24, :24], error)
 
 
 def test_no_light_is_lost_or_won(close_tiles: None) -> None:

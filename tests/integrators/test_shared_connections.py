@@ -237,7 +237,7 @@ def test_what_nobody_reaches_stays_with_its_path(monkeypatch: pytest.MonkeyPatch
     def first_of(scene, lit, albedo, lane_in):
         return SimpleNamespace(present=lane_in >= 0)
 
-    def arriving(scene, first, points, lights, numbers):
+    def arriving(scene, first, points, lights, numbers, glossy):
         asked.extend(sorted(int(each) for each in np.unique(numbers) if each >= 0))
         return [arrived[:, :, : first.present.shape[1]]], [np.array([1])]
 
