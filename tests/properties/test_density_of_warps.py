@@ -18,6 +18,7 @@ SQUARE = {
     "uniform_cone": st.tuples(st.floats(-6, 0.3).map(lambda x: float(np.float32(min(10.0**x, 2.0))))),
     "uniform_disk": EMPTY,
     "uniform_triangle": EMPTY,
+    "bilinear": st.tuples(st.tuples(*[st.floats(0.03125, 1, width=32)] * 4)),
 }
 LINE = {"tent": st.tuples(st.floats(0.25, 4)), "gaussian": st.tuples(st.floats(0.2, 2), st.floats(0.5, 3))}
 WITHOUT_POINT = ("uniform_cone_pdf",)  # constant densities, which take no point
@@ -78,6 +79,10 @@ def test_densities_integrate_to_one(name: str, data: st.DataObject) -> None:
     """The midpoint rule, over z and the azimuth, or over a square of the plane."""
     more = data.draw(SQUARE[name])
     _, pdf, _ = of(name)
+    if name == "bilinear":  # over the unit square alone
+        p = ((np.indices((50, 50)).reshape(2, -1) + 0.5) / 50).astype(np.float32)
+        assert pdf(p, *more).mean(dtype=float) == pytest.approx(1, abs=1e-5)
+        return
     if name in ("uniform_disk", "uniform_triangle"):
         a, b = ((np.arange(400) + 0.5) / 200 - 1 for _ in range(2))
         p = np.array(np.meshgrid(a, b)).reshape(2, -1).astype(np.float32)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeVar, dataclass_transform
 
 Structure = TypeVar("Structure")
 
 
-@dataclass_transform(eq_default=False)
+@dataclass_transform(eq_default=False, field_specifiers=(field,))
 def soa(cls: type[Structure]) -> type[Structure]:
     """Return a class as a structure of arrays: a dataclass with slots, without `__eq__` and `__repr__`.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import field, replace
 from typing import ClassVar, Self
 
 import numpy as np
@@ -9,10 +10,11 @@ from numpy.typing import NDArray
 
 from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import Floats, dot, f4, positive
-from .base import Emitters, LightRecord
+from ..arrays.vec import TINY, Floats, dot, f4, positive
+from .base import Emitters, LightRecord, Receiver
 
 LEAST_SQUARE = f4(1e-35)  # added to squared distances before their root, so that nothing is divided by 0
+LEAST_COS = f4(0.02)  # between a surface and a corner that counts; smaller ones count as this one
 EDGE_ON = f4(1e-14)  # taken off cosines that are divided by; smaller ones count as those of a dark side
 
 
@@ -26,7 +28,11 @@ class PlanarLights(LightRecord):
     normal: Floats  # (3, k) unit normal of the front side
     area: Floats  # (k,) squared scene units
     radiance: Floats  # (3, k) W·sr⁻¹·m⁻²; the mean, where the emission varies
+    # the n surfaces that they are sampled for; None where these are not known
+    receiver: Receiver | None = field(default=None, kw_only=True)
+    few: bool = field(default=True, kw_only=True)  # so few that it is worth its time to know these
 
+    takes_receiver: ClassVar[bool] = True
     sides: ClassVar[int] = 1  # number of emitting sides
     parallelograms: ClassVar[float]  # area, in parallelograms of the edges
     middle: ClassVar[int]  # the middle is corner + (edge_u + edge_v)/middle
@@ -71,6 +77,43 @@ class PlanarLights(LightRecord):
         """Return the middles; lights with one side shine to the front."""
         facing = self.normal.astype(np.float64) * (self.sides == 1)
         return Emitters(self._middle().astype(np.float64), facing, self.area.astype(np.float64))
+
+    def lighting(self, receiver: Receiver) -> Self:
+        """Return the lights as they are sampled for surfaces, by what arrives from their corners."""
+        return replace(self, receiver=receiver) if self.few else self
+
+    def _corners(self, point: Floats, near: bool = False) -> tuple[Floats, ...] | None:
+        """Return relative densities (n,) at four corners for `warp.bilinear`; None where no surface is known.
+
+        They are per area, or `near` per solid angle. Corners are `corner`, those along `edge_u`, along
+        `edge_v`, and along both; of a triangle, the last is the middle between the two before it.
+
+        Source: M. Pharr, W. Jakob and G. Humphreys, Physically Based Rendering, 4th edition, 2023, section
+        6.5.3, for cosines and solid angles.
+        """
+        if self.receiver is None:
+            return None
+        normal = self.receiver.normal
+        if not self.receiver.opaque.all():
+            normal = normal * self.receiver.opaque  # light from everywhere counts
+        corner, both = self.corner - point, f4(self.parallelograms)
+        d2, high = dot(corner, corner), dot(normal, corner)  # squared distance; cosine times distance
+        least = LEAST_COS * np.sqrt(d2)
+        high_u, high_v = dot(normal, self.edge_u), dot(normal, self.edge_v)
+        d2_u, d2_v = (f4(2) * dot(corner, edge) for edge in (self.edge_u, self.edge_v))
+        across = both * (self.edge_u + self.edge_v)
+        corners = []
+        for rise, square in (
+            (high, d2),
+            (high + high_u, d2 + (d2_u + dot(self.edge_u, self.edge_u))),
+            (high + high_v, d2 + (d2_v + dot(self.edge_v, self.edge_v))),
+            (high + both * (high_u + high_v), d2 + (both * (d2_u + d2_v) + dot(across, across))),
+        ):
+            ratio = d2 / np.maximum(square, TINY)
+            ratio = np.sqrt(ratio, out=ratio) if near else np.multiply(ratio, ratio, out=ratio)
+            ratio *= np.maximum(rise, least)
+            corners.append(ratio)
+        return tuple(corners)
 
     def _middle(self) -> Floats:
         return self.corner + (self.edge_u + self.edge_v) / self.middle

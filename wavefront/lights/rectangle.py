@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.soa import soa
-from ..arrays.vec import Bools, Floats, Ints, dot, f4, put
+from ..arrays.vec import Floats, Ints, dot, f4, put, take
 from ..sampling.spherical import SphericalRectangle
+from ..sampling.warp import bilinear, bilinear_pdf
 from ..shapes.fans import are_fans, disjoint_pairs
 from .base import LightSample
 from .planar import LEAST_SQUARE, PlanarLights, TwoSided, area_pdf
 
-NEAR = f4(2)  # squared distance, in areas, within which solid angle is sampled
+NEAR = f4(1)  # squared distance, in areas, within which solid angle is sampled
 ROOT_NEAR = np.sqrt(NEAR)
 HIGH = f4(0.25)  # height, in widths, from which float32 is enough for solid angles
 ON = f4(1e-5)  # height, in widths, of points on the rectangle itself
@@ -39,22 +40,34 @@ class RectangleLights(PlanarLights):
         return cls.from_edges(a, b - a, c - b, radiance)
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
-        """Draw a point uniformly by area, or from nearby a direction uniformly in solid angle."""
-        wi = self.edge_u * u[0]
-        wi += self.edge_v * u[1]
+        """Draw a point by area, or from nearby a direction in solid angle.
+
+        The density is uniform, or for surfaces one that is bilinear between the corners.
+        """
+        corners = self._corners(point)
+        p = u if corners is None else bilinear(u, corners)
+        wi = self.edge_u * p[0]
+        wi += self.edge_v * p[1]
         wi += self.corner
         wi -= point
         height = self._facing(self._rise(point))
         near = list(self._near(point, height))
-        for lanes, seen in near:
-            put(wi, lanes, seen.sample(u.take(lanes, 1)))
+        pdfs = []
+        for lanes, seen, warp in near:
+            some = u.take(lanes, 1)
+            if warp is not None:
+                some = bilinear(some, warp)
+            pdfs.append(seen.pdf() if warp is None else seen.pdf() * bilinear_pdf(some, warp))
+            put(wi, lanes, seen.sample(some))
         d2 = dot(wi, wi)
         distance = np.sqrt(d2 + LEAST_SQUARE)
         wi /= distance
         cos_light = height / distance
         pdf = area_pdf(d2, cos_light, self.area)
-        for lanes, seen in near:
-            pdf[lanes] = seen.pdf()
+        if corners is not None:
+            pdf *= bilinear_pdf(p, corners)
+        for (lanes, _, _), part in zip(near, pdfs, strict=True):
+            pdf[lanes] = part
         return LightSample(wi, np.broadcast_to(self.radiance, wi.shape), pdf, distance, cos_light)
 
     def pdf_li(self, point: Floats, wi: Floats) -> Floats:
@@ -63,21 +76,30 @@ class RectangleLights(PlanarLights):
         cos_light = self._facing(fall)
         t = rise / np.where(cos_light > 0, fall, f4(1))
         on_plane = wi * t - (self.corner - point)
-        meets = (cos_light > 0) & (t > 0) & _within(on_plane, self.edge_u) & _within(on_plane, self.edge_v)
+        p = np.stack([dot(on_plane, edge) / dot(edge, edge) for edge in (self.edge_u, self.edge_v)])
+        meets = (cos_light > 0) & (t > 0) & ((p >= 0) & (p <= 1)).all(0)
         pdf = area_pdf(t * t, cos_light, self.area)
-        for lanes, seen in self._near(point, self._facing(rise)):
+        corners = self._corners(point)
+        if corners is not None:
+            pdf *= bilinear_pdf(p.clip(f4(0), f4(1)), corners)
+        for lanes, seen, warp in self._near(point, np.where(meets, self._facing(rise), f4(0))):
             pdf[lanes] = seen.pdf()
+            if warp is not None:
+                pdf[lanes] *= bilinear_pdf(seen.inverse(wi.take(lanes, 1)), warp)
         return np.where(meets, pdf, f4(0))
 
     def _rise(self, point: Floats) -> Floats:
         """Height (n,) of points over the front."""
         return dot(self.normal, point) - dot(self.normal, self.corner)
 
-    def _near(self, point: Floats, height: Floats) -> Iterator[tuple[Ints, SphericalRectangle]]:
+    def _near(
+        self, point: Floats, height: Floats
+    ) -> Iterator[tuple[Ints, SphericalRectangle, tuple[Floats, ...] | None]]:
         """Yield lanes of points that get light and are close to the middle, for the rectangle's size.
 
-        With them come the rectangles as seen from there. From afar both densities are alike, and
-        sampling the area costs less. Points on the rectangle itself are none of these.
+        With them come the rectangles as seen from there, and densities at their corners. From afar both
+        densities are alike, and sampling the area costs less. Points on the rectangle itself are none of
+        these.
         """
         width = np.sqrt(self.area)
         low = np.flatnonzero((height > ON * width) & (height < ROOT_NEAR * width))
@@ -89,16 +111,21 @@ class RectangleLights(PlanarLights):
         high = height.take(near) > HIGH * (width if width.size == 1 else width.take(near))
         for lanes, dtype in ((near.compress(high), np.float32), (near.compress(~high), np.float64)):
             if lanes.size:
-                yield lanes, self._seen(point, lanes, dtype)
+                yield lanes, *self._seen(take(point, lanes), lanes, dtype)
 
     def _at(self, lanes: Ints) -> Self:
         """Return the rectangles of some lanes."""
         return self if len(self) == 1 else self.take(lanes)
 
-    def _seen(self, point: Floats, lanes: Ints, dtype: type[np.floating]) -> SphericalRectangle:
-        """Return the rectangles as seen from the points of some lanes."""
+    def _seen(
+        self, point: Floats, lanes: Ints, dtype: type[np.floating]
+    ) -> tuple[SphericalRectangle, tuple[Floats, ...] | None]:
+        """Return rectangles as seen from the points (3, k) of some lanes, and densities at their corners."""
         some = self._at(lanes)
-        return SphericalRectangle.of(some.corner - point.take(lanes, 1), some.edge_u, some.edge_v, dtype)
+        if self.receiver is not None:
+            some = some.lighting(self.receiver if len(self.receiver) == 1 else self.receiver.take(lanes))
+        seen = SphericalRectangle.of(some.corner - point, some.edge_u, some.edge_v, dtype)
+        return seen, some._corners(point, near=True)
 
 
 @soa
@@ -120,8 +147,3 @@ def first_of_pairs(triangles: NDArray[np.float64], mesh_of: Ints) -> Ints:
     same_mesh = mesh_of[:-1] == mesh_of[1:]
     rectangles = same_mesh & are_fans(triangles) & closes & square & (size_u > 0) & (size_v > 0)
     return disjoint_pairs(np.flatnonzero(rectangles))
-
-
-def _within(p: Floats, edge: Floats) -> Bools:
-    along = dot(p, edge)
-    return (along >= 0) & (along <= dot(edge, edge))

@@ -45,7 +45,7 @@ class TexturedTriangleLights(TriangleLights):
         """Build from vertices (k, 3, 3), relative to the scene's center, mean radiance (3, k) and fields."""
         even = TriangleLights.from_triangles(triangles, radiance)
         flat = even.corner, even.edge_u, even.edge_v, even.normal, even.area, even.radiance
-        return cls(*flat, prim=prim, source=source, emissions=emissions)
+        return cls(*flat, prim=prim, source=source, emissions=emissions, few=even.few)
 
     @property
     def varies(self) -> Bools:  # type: ignore[override]
@@ -53,9 +53,8 @@ class TexturedTriangleLights(TriangleLights):
         return self.source >= 0
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
-        """Pick a point uniformly by area, and say where on the triangle it is."""
-        b = self.weights(u)
-        sample = self._sample_at(point, b)
+        """Pick a point as other triangles do, and say where on the triangle it is."""
+        sample, b = self._sample_at(point, u)
         sample.prim = np.broadcast_to(self.prim, point.shape[1:])
         sample.b1, sample.b2 = b
         return sample

@@ -9,14 +9,16 @@ from numpy.typing import NDArray
 
 from ..arrays.soa import soa
 from ..arrays.vec import Floats, cross, dot, f4
-from ..sampling.warp import uniform_triangle
+from ..sampling.warp import bilinear, bilinear_pdf, uniform_triangle, uniform_triangle_inverse
 from .base import LightSample
 from .planar import LEAST_SQUARE, PlanarLights, TwoSided, area_pdf
+
+FEW = 128  # triangles at most that are sampled for surfaces; of more, each is small
 
 
 @soa
 class TriangleLights(PlanarLights):
-    """k triangles that emit from their front side, sampled uniformly by area."""
+    """k triangles that emit from their front side, sampled by area."""
 
     parallelograms: ClassVar[float] = 0.5
     middle: ClassVar[int] = 3
@@ -25,14 +27,19 @@ class TriangleLights(PlanarLights):
     def from_triangles(cls, triangles: NDArray[np.float64], radiance: Floats) -> Self:
         """Build from vertices (k, 3, 3), relative to the scene's center, and radiance (3, k) or (3, 1)."""
         a, b, c = triangles.transpose(1, 2, 0)
-        return cls.from_edges(a, b - a, c - a, radiance)
+        found = cls.from_edges(a, b - a, c - a, radiance)
+        found.few = len(triangles) <= FEW
+        return found
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
-        """Pick a point uniformly by area; its density in solid angle is d²/(A·cosθ)."""
-        return self._sample_at(point, self.weights(u))
+        """Pick a point uniformly by area, with the density d²/(A·cosθ), or for a surface by what arrives."""
+        return self._sample_at(point, u)[0]
 
-    def _sample_at(self, point: Floats, b: Floats) -> LightSample:
-        """Sample the points with barycentric weights b1, b2 (2, n)."""
+    def _sample_at(self, point: Floats, u: Floats) -> tuple[LightSample, Floats]:
+        """Return samples, and the barycentric weights b1, b2 (2, n) of their points."""
+        corners = self._corners(point)
+        p = u if corners is None else bilinear(u, corners)
+        b = uniform_triangle(p)
         wi = self.edge_u * b[0]
         wi += self.edge_v * b[1]
         wi += self.corner
@@ -42,16 +49,13 @@ class TriangleLights(PlanarLights):
         wi /= distance
         cos_light = self._facing(-dot(self.normal, wi))
         pdf = area_pdf(d2, cos_light, self.area)
+        if corners is not None:
+            pdf *= bilinear_pdf(p, corners)
         radiance = np.broadcast_to(self.radiance, wi.shape)
-        return LightSample(wi, radiance, pdf, distance, cos_light)
-
-    @staticmethod
-    def weights(u: Floats) -> Floats:
-        """Barycentric weights b1, b2 (2, n) of the points that `sample_li` picks with u (2, n)."""
-        return uniform_triangle(u)
+        return LightSample(wi, radiance, pdf, distance, cos_light), b
 
     def pdf_li(self, point: Floats, wi: Floats) -> Floats:
-        """Return d²/(A·cosθ) where the ray meets a side that shines.
+        """Return the density of `sample_li` where the ray meets a side that shines.
 
         The hit test is Möller and Trumbore 1997, "Fast, Minimum Storage Ray/Triangle Intersection".
         """
@@ -67,7 +71,12 @@ class TriangleLights(PlanarLights):
         t = dot(self.edge_v, q) * inverse
         meets = lit & (t > 0) & (b1 >= 0) & (b2 >= 0) & (b1 + b2 <= 1)
         t = np.where(meets, t, f4(0))  # elsewhere its square may be beyond float32
-        return t * t / (np.where(meets, cos_light, f4(1)) * self.area)
+        pdf = t * t / (np.where(meets, cos_light, f4(1)) * self.area)
+        corners = self._corners(point)
+        if corners is None:
+            return pdf
+        b = np.where(meets, np.stack([b1, b2]), f4(0))
+        return pdf * bilinear_pdf(uniform_triangle_inverse(b), corners)
 
 
 @soa

@@ -11,6 +11,7 @@ True
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -164,6 +165,67 @@ def uniform_triangle_inverse(b: Floats) -> Floats:
     total = b[0] + b[1]
     above = b[1] > b[0]
     return _stack(np.where(above, f4(2) * b[0], total), np.where(above, total, f4(2) * b[1]))
+
+
+def bilinear(u: Floats, corners: Sequence[Floats]) -> Floats:
+    """Return points (2, n) of the unit square, whose density is bilinear, for u (2, n).
+
+    Parameters
+    ----------
+    corners
+        Four times (n,): relative densities at (0, 0), (1, 0), (0, 1) and (1, 1), above 0.
+    """
+    left, right = corners[0] + corners[1], corners[2] + corners[3]
+    out = np.empty_like(u)
+    out[1] = _linear(u[1], left, right)
+    low, high = _across(corners, out[1])
+    out[0] = _linear(u[0], low, high)
+    return out
+
+
+def bilinear_pdf(p: Floats, corners: Sequence[Floats]) -> Floats:
+    """Return the density of `bilinear` at points p (2, n) of the square."""
+    low, high = _across(corners, p[1])
+    high -= low
+    high *= p[0]
+    high += low
+    high /= f4(0.25) * ((corners[0] + corners[1]) + (corners[2] + corners[3]))
+    return high
+
+
+def bilinear_inverse(p: Floats, corners: Sequence[Floats]) -> Floats:
+    """Return the u (2, n) that `bilinear` maps to points p (2, n)."""
+    rows = corners[0] + corners[1], corners[2] + corners[3]
+    x, y = (
+        t * (low + low + (high - low) * t) / (low + high)
+        for t, (low, high) in zip(p, (_across(corners, p[1]), rows), strict=True)
+    )
+    return _stack(x, y)
+
+
+def _across(corners: Sequence[Floats], y: Floats) -> tuple[Floats, Floats]:
+    """Return the densities of `bilinear` on the left and on the right, (n,) each, at heights y (n,)."""
+    low, high = corners[2] - corners[0], corners[3] - corners[1]
+    low *= y
+    low += corners[0]
+    high *= y
+    high += corners[1]
+    return low, high
+
+
+def _linear(u: Floats, low: Floats, high: Floats) -> Floats:
+    """Return numbers (n,) in [0, 1] whose density goes from `low` to `high` (n,), for u (n,)."""
+    square = low * low
+    root = high * high
+    root -= square
+    root *= u
+    root += square
+    np.sqrt(root, out=root)
+    root += low
+    x = low + high
+    x *= u
+    x /= root
+    return np.minimum(x, f4(1), out=x)
 
 
 def _stack(a: Floats, b: Floats) -> Floats:

@@ -1,0 +1,170 @@
+"""Light samples of rectangles and triangles by what arrives at a surface: densities, means and noise."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from significance import assert_same_images, repeat
+
+import wavefront as wf
+from wavefront import testing
+from wavefront.arrays.vec import f4
+from wavefront.lights import (
+    LightRecord,
+    Receiver,
+    RectangleLights,
+    TexturedTriangleLights,
+    TriangleLights,
+    TwoSidedRectangleLights,
+)
+
+WHITE = np.ones((3, 1), f4)
+SETTINGS: dict = {"max_bounces": 3, "accel": "numpy"}
+NORMALS = [(0, 1, 0), (1, 0, 0), (-0.6, 0.48, 0.64), (0.6, -0.64, 0.48)]
+
+
+def rectangle(kind: type[RectangleLights] = RectangleLights) -> RectangleLights:
+    """Two by two, one above the origin, shining downward."""
+    panel = wf.Rectangle((-1, 1, -1), (2, 0, 0), (0, 0, 2))
+    return kind.from_pairs(panel.vertices[panel.faces][:1], WHITE)
+
+
+def triangle() -> TriangleLights:
+    return TriangleLights.from_triangles(np.array([[[1, 2, 0], [0, 2, 0], [0.3, 2.5, 1]]]), WHITE)
+
+
+LIGHTS = {
+    "rectangle": rectangle,
+    "two sides": lambda: rectangle(TwoSidedRectangleLights),
+    "triangle": triangle,
+}
+
+
+def receiver(normal: tuple[float, ...], n: int = 1, opaque: bool = True) -> Receiver:
+    unit = f4(normal).reshape(3, 1) / f4(np.sqrt(np.square(normal).sum()))
+    return Receiver(np.repeat(unit, n, 1), np.full(n, opaque), np.full(n, True))
+
+
+@pytest.mark.parametrize("normal", NORMALS)
+@pytest.mark.parametrize(
+    "point",
+    [(0.2, 0, 0.1), (0.9, 0.97, -0.3), (3, -2, 1), (0.4, 0.5, 5)],
+    ids=["below", "close", "far", "beside"],
+)
+@pytest.mark.parametrize("name", LIGHTS)
+@pytest.mark.first(3)
+def test_the_contract_holds_for_each_normal(
+    name: str, point: tuple[float, ...], normal: tuple[float, ...]
+) -> None:
+    light: LightRecord = LIGHTS[name]().lighting(receiver(normal))
+    testing.check_light(light, points=[point], samples=40_000)
+
+
+def samples(
+    light: LightRecord, point: tuple[float, ...], n: int = 20_000
+) -> tuple[wf.LightSample, np.ndarray]:
+    at = np.repeat(f4(point).reshape(3, 1), n, 1)
+    return light.sample_li(at, np.random.default_rng(3).random((2, n), f4)), at
+
+
+@pytest.mark.parametrize("normal", NORMALS)
+@pytest.mark.parametrize("name", LIGHTS)
+def test_each_density_is_one_over_the_light(name: str, normal: tuple[float, ...]) -> None:
+    """By quadrature over points that are uniform on the area, or in solid angle, to 0.2 %."""
+    n = 300
+    u = ((np.indices((n, n)).reshape(2, -1) + 0.5) / n).astype(f4)
+    for point in [(0.2, 0, 0.1), (0.7, 0.9, -0.3), (3, -2, 1), (-1, -2, 4)]:
+        light = LIGHTS[name]()
+        at = np.repeat(f4(point).reshape(3, 1), n * n, 1)
+        plain = light.sample_li(at, u)
+        if not plain.pdf.all():
+            continue
+        density = light.lighting(receiver(normal, n * n)).pdf_li(at, plain.wi)
+        assert (density / plain.pdf).mean(dtype=float) == pytest.approx(1, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("point", "normal", "less"),
+    [
+        ((0.2, 0, 0.1), (1, 0, 0), 2),
+        ((0.2, 0, 0.1), (0.3, 1, 0.2), 1.5),
+        ((1, -2, 1.5), (0, 1, 0), 15),
+        ((3, -1, 0), (-1, 0, 0), 15),
+        ((3, 0.5, 0), (0, 1, 0), 3),
+    ],
+    ids=["near wall", "near floor", "floor", "wall", "ledge"],
+)
+def test_what_arrives_is_less_noisy(point: tuple[float, ...], normal: tuple[float, ...], less: float) -> None:
+    """Than by solid angle, or area, and has the same mean."""
+    variances, means = [], []
+    n = 20_000
+    lit = receiver(normal, n)
+    for light in (rectangle(), rectangle().lighting(lit)):
+        sample, _ = samples(light, point, n)
+        cos = (lit.normal * sample.wi).sum(0).clip(0)
+        value = np.where(sample.pdf > 0, cos / sample.pdf, 0).astype(float)
+        variances.append(value.var())
+        means.append(value.mean())
+    assert abs(means[0] - means[1]) < 4 * np.sqrt(sum(variances) / n)
+    assert variances[1] < variances[0] / less
+
+
+def test_light_from_behind_counts_for_what_transmits() -> None:
+    """Its normal has no effect."""
+    point, n = (0.2, -1, 0.1), 100
+    up, down = (
+        samples(rectangle().lighting(receiver(normal, n, opaque=False)), point, n)[0].wi
+        for normal in ((0, 1, 0), (0.6, -0.8, 0))
+    )
+    assert (up == down).all()
+
+
+def test_many_triangles_are_sampled_plainly() -> None:
+    """Small ones differ in nothing but their choice."""
+    rng = np.random.default_rng(0)
+    corners = rng.random((200, 3, 3))
+    light = TriangleLights.from_triangles(corners, WHITE)
+    assert light.lighting(receiver((0, 1, 0), 200)) is light
+    numbers = np.zeros(200, np.intp)
+    textured = TexturedTriangleLights.textured(corners, WHITE, numbers, numbers, (WHITE,))
+    assert textured.lighting(receiver((0, 1, 0), 200)) is textured
+
+
+def room() -> wf.Scene:
+    """Surfaces of several kinds under a panel, a textured one, a triangle, and close to a wall."""
+    balls = [
+        wf.Sphere((x, 0, 0), 0.5, material=material)
+        for x, material in (
+            (-1.8, wf.Diffuse(0.7)),
+            (-0.6, wf.Material.named("plastic")),
+            (0.6, wf.Conductor.named("gold", 0.4)),
+            (1.8, wf.Dielectric(1.5, roughness=0.4)),
+        )
+    ]
+    floor = wf.Rectangle((-4, -0.5, 4), (8, 0, 0), (0, 0, -8), material=wf.Diffuse(0.5))
+    wall = wf.Rectangle((-4, -0.5, -1.5), (8, 0, 0), (0, 4, 0), material=wf.Diffuse(0.5))
+    panel = wf.Rectangle((-2, 1.2, -1.4), (2, 0, 0), (0, 0, 1.2), emission=3)
+    lone = wf.Mesh([(1, 2, 1), (2.5, 1.5, 0), (2, 2.5, -1)], [(0, 2, 1)], emission=4, two_sided=True)
+    patch = wf.Rectangle((-0.5, 2.5, 1), (1.5, 0, 0), (0, 0, 1.5))
+    colors = np.array([[1, 0.2, 0.1], [0.3, 1, 0.2], [0, 0, 1], [1, 1, 1]])
+    textured = wf.Mesh(patch.vertices, patch.faces, colors=colors, emission=wf.VertexColors())
+    camera = wf.Camera.look_at((0, 1.2, 6), (0, 0.4, 0), fov=30, size=(32, 16))
+    return wf.Scene([*balls, floor, wall, panel, lone, textured], camera=camera)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"branches": 3}, {"guide": True}, {"reuse": True}],
+    ids=["plain", "branches", "guided", "shared"],
+)
+@pytest.mark.first(1)
+def test_pictures_keep_their_means(options: dict) -> None:
+    """Those of BSDF samples alone, for which light samples do not count."""
+    found = repeat(room(), 12, 12, **SETTINGS, **options)
+    assert_same_images(found, by_bsdf_samples(), max_error=0.05)
+
+
+@cache
+def by_bsdf_samples() -> list[np.ndarray]:
+    """Return pictures of the scene that no light sample has touched."""
+    return repeat(room(), 96, 12, 100, integrator="naive", **SETTINGS)
