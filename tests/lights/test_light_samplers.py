@@ -9,6 +9,7 @@ from significance import assert_same_images, repeat
 
 import wavefront as wf
 from wavefront.arrays.vec import f4
+from wavefront.core.fingerprint import fingerprint
 from wavefront.lights import LightTable, PointLightRecord, Receiver, TriangleLights, samplers
 from wavefront.lights.base import Emitters
 from wavefront.lights.choice import LightSampler
@@ -219,3 +220,15 @@ def test_unknown_choice() -> None:
         wf.SceneError, match=r"light_sampler is 'best'; it must be one of spatial, power, uniform"
     ):
         LightTable([], 1.0, "best")
+
+
+@pytest.mark.parametrize("lights", [3, 40])
+def test_tables_have_the_same_bits_each_time(lights: int) -> None:
+    """Numbers that were in their memory before leave nothing in them."""
+    points = np.random.default_rng(0).random((3, lights)).astype(f4)
+    kinds = [PointLightRecord(points, np.ones((3, lights), f4))]
+    found = set()
+    for k in range(3):
+        with patch("numpy.empty", lambda shape, dtype=float, k=k: np.full(shape, k, dtype)):
+            found.add(fingerprint("the choice", LightTable(kinds, 1.0).choice))
+    assert len(found) == 1

@@ -66,7 +66,7 @@ class SpatialLightSampler(LightSampler):
         centers = self.low[:, None] + (np.indices(self.shape).reshape(3, -1) + 0.5) * size[:, None]
         radius, count = float(np.linalg.norm(size)) / 2, centers.shape[1]
         of_group = np.empty((count, ORIENTATIONS, groups + 1), f4)
-        of_light = np.empty((count, groups, (1 << self.bits) + 1), f4)
+        of_light = np.empty((count if self.bits else 0, groups, (1 << self.bits) + 1), f4)
         for cells in spans(count, max(AT_ONCE // max(slots, ORIENTATIONS * groups), 1)):
             center = centers[:, cells]
             weight = np.zeros((center.shape[1], slots))
