@@ -120,14 +120,17 @@ def lit() -> wf.Scene:
     ("sampler", "spp", "low", "high"),
     [
         ("independent", 16, 0.93, 1.07),
-        ("sobol", 64, 0.97, 1.2),
-        ("bluenoise", 16, 0.97, 1.2),
+        ("sobol", 64, 0.97, 1.4),
+        ("bluenoise", 16, 0.97, 1.4),
         pytest.param("independent", 256, 0.93, 1.07, marks=pytest.mark.slow),
-        pytest.param("sobol", 256, 0.95, 1.2, marks=pytest.mark.slow),
+        pytest.param("sobol", 256, 0.95, 1.4, marks=pytest.mark.slow),
     ],
 )
 def test_standard_error_is_the_scatter_across_seeds(sampler: str, spp: int, low: float, high: float) -> None:
-    """On average over pixels, relative to their brightness; stratified ones are over-estimated a little."""
+    """On average over pixels, relative to their brightness.
+
+    Stratified ones are over-estimated: what stratification gains between batches is not seen.
+    """
     images = [render(lit(), spp, sampler=sampler, seed=seed, max_bounces=3) for seed in range(24)]
     runs = np.stack([image.rgb for image in images]).astype(np.float64)
     weight = 1 / (runs.mean(0) ** 2 + 0.01 * runs.mean() ** 2)

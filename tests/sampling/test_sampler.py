@@ -229,11 +229,22 @@ def test_coordinates_of_a_point_are_uncorrelated():
     assert abs(np.corrcoef(x, y)[0, 1]) < 4.5 / np.sqrt(len(x))
 
 
-@pytest.mark.parametrize("step", [(1, 0, 0, 0), (512, 0, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1), (0, 0, 1, -1)])
-def test_errors_of_sobol_pixels_and_streams_are_uncorrelated(step):
+@pytest.mark.parametrize(
+    ("bounce", "step"),
+    [
+        (2, (1, 0, 0, 0)),
+        (2, (512, 0, 0, 0)),
+        (2, (0, 0, 1, 0)),
+        (2, (0, 0, 0, 1)),
+        (2, (0, 0, 1, -1)),
+        (0, (0, 0, 0, -Dimension.LIGHT_POINT)),
+        (0, (0, 0, 0, Dimension.DIRECTION - Dimension.LIGHT_POINT)),
+    ],
+)
+def test_errors_of_sobol_pixels_and_streams_are_uncorrelated(bounce, step):
     """Sums over 16 samples of one pixel and stream say nothing about those of another."""
     sampler = SobolSampler(12)
-    address = [u4(range(20_000)).repeat(16), np.tile(u4(range(16)), 20_000), 2, 3]
+    address = [u4(range(20_000)).repeat(16), np.tile(u4(range(16)), 20_000), bounce, Dimension.LIGHT_POINT]
     here = sampler.draw_2d(*address)
     pixel, sample, bounce, dimension = address
     there = sampler.draw_2d(pixel + np.uint32(step[0]), sample, bounce + step[2], dimension + step[3])
@@ -279,6 +290,56 @@ def test_unscrambled_points_are_sobols():
     oracle = stats.qmc.Sobol(2, scramble=False, bits=32).random(4096).T
     gray = index ^ (index >> 1)
     assert (ours[:, gray] == oracle).all()
+
+
+def times(a: int, b: int) -> int:
+    """Product of two numbers of GF(4), whose bits are those of polynomials modulo w² + w + 1."""
+    product = (a if b & 1 else 0) ^ (a << 1 if b & 2 else 0)
+    return product ^ (0b111 if product & 4 else 0)
+
+
+@given(index=words)
+def test_four_coordinates_are_of_pascals_matrices_over_gf4(index):
+    """Digit i is the sum of C(j, i) a^(j − i) times digit j, for a = w, and for a = w².
+
+    Of those of w² the higher bit is added to the lower one.
+    """
+    digits = [index >> 2 * j & 3 for j in range(16)]
+    third, fourth = module._quaternary(u4([index]))
+    for base, found in ((2, third), (3, fourth)):
+        powers = [1, base, times(base, base)]
+        for i in range(16):
+            digit = 0
+            for j in range(i, 16):
+                digit ^= times(powers[(j - i) % 3], digits[j]) if i & j == i else 0
+            digit ^= digit >> 1 if base == 3 else 0
+            assert int(found[0]) >> 2 * i & 3 == digit
+
+
+@stratified
+@pytest.mark.parametrize("dimension", [Dimension.LIGHT_POINT, Dimension.DIRECTION])
+def test_first_vertex_is_stratified_together_with_the_pixel(name, dimension):
+    """Each aligned block of 4ᵐ samples has one point in each of the elementary intervals of base 4."""
+    sampler = make_sampler(name, 3, 64)
+    for m, first in ((1, 8), (2, 0), (3, 64), (4, 256)):
+        pair = [one_pixel(sampler, 70, 4**m, 0, each, first) for each in (Dimension.PIXEL, dimension)]
+        points = np.concatenate(pair)
+        for exponents in itertools.product(range(m + 1), repeat=4):
+            if sum(exponents) == m:
+                cells = (points * 4.0 ** np.array(exponents)[:, None]).astype(int)
+                assert len(np.unique(cells, axis=1).T) == 4**m
+
+
+@stratified
+@pytest.mark.parametrize("bounce", [0, 1])
+def test_points_of_a_decision_are_nets(name, bounce):
+    """Each aligned block of 2ᵐ samples has one point in each elementary interval, at any vertex."""
+    sampler = make_sampler(name, 3, 64)
+    for m, first in ((1, 6), (3, 8), (6, 128), (7, 0)):
+        points = one_pixel(sampler, 70, 2**m, bounce, Dimension.DIRECTION, first)
+        for k in range(m + 1):
+            cells = (points * [[2**k], [2 ** (m - k)]]).astype(int)
+            assert len(np.unique(cells, axis=1).T) == 2**m
 
 
 @given(word=words)

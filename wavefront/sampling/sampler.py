@@ -55,6 +55,10 @@ class Dimension(IntEnum):
     SPECULAR_POINT = 2**20 + 3  # 2-D: where on it
 
 
+# At the first vertex: decisions whose points are the last two coordinates of the points of PIXEL. What they
+# bring is added, never multiplied, so both may use the same two.
+WITH_PIXEL = (Dimension.LIGHT_POINT, Dimension.DIRECTION)
+
 REPEATED = {Dimension.OPACITY: 2**20}  # decisions that repeat, and one past the last of their numbers
 
 
@@ -139,30 +143,32 @@ class SobolSampler(Sampler):
     """Padded two-dimensional Sobol points, shuffled and Owen-scrambled per pixel and stream.
 
     Every aligned block of 2ᵐ samples of one pixel and stream is a (0, m, 2)-net, so that any number of
-    samples, up to 2³², is well distributed.
+    samples, up to 2³², is well distributed. At the first vertex, light points and directions are also
+    stratified together with the position within the pixel: 4ᵐ samples are a (0, m, 4)-net in base 4.
 
-    A stream (bounce, dimension) has `VARIANTS` shuffled and Owen-scrambled copies of the Sobol sequence. A
+    A stream (bounce, dimension) has `VARIANTS` shuffled and Owen-scrambled copies of the sequence. A
     hash of the pixel selects one of them, and a word for each coordinate that is XORed to it. An Owen
     scramble followed by an XOR has the distribution of an Owen scramble, so each pixel has the error of one
     and a distinct set of points. The scrambling itself is computed once per table, not once per path.
 
     Source: B. Burley, Practical Hash-based Owen Scrambling, JCGT 9(4), 2020 (padding, shuffling
-    and scrambling by hash); A. Owen, Randomly Permuted (t,m,s)-Nets and (t,s)-Sequences, 1995.
+    and scrambling by hash); A. Owen, Randomly Permuted (t,m,s)-Nets and (t,s)-Sequences, 1995;
+    A. Ahmed, M. Pharr, V. Ostromoukhov and H. Huang, SZ Sequences, 2025 (the four coordinates).
     """
 
     def draw_1d(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Floats:
         """Return the first coordinate of `draw_2d`, (n,)."""
         stream = _stream(self.seed, bounce, dimension)
-        word = _mix_words(pixel, stream.words[0], stream.words[1])
-        x = _points(stream, sample, word & u4(VARIANTS - 1), 1)[0]
+        word, variant = _pixel_words(stream, pixel)
+        x = _points(stream, sample, variant, 1)[0]
         x ^= word
         return _fraction(x, np.empty(len(x), f4))
 
     def draw_2d(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Floats:
         """Return points in [0, 1)², (2, n)."""
         stream = _stream(self.seed, bounce, dimension)
-        word = _mix_words(pixel, stream.words[0], stream.words[1])
-        x, y = _points(stream, sample, word & u4(VARIANTS - 1), 2)
+        word, variant = _pixel_words(stream, pixel)
+        x, y = _points(stream, sample, variant, 2)
         x ^= word
         y ^= _mix_again(word, stream.words[2])
         out = np.empty((2, len(x)), f4)
@@ -236,6 +242,7 @@ class Stream:
 
     longs: tuple[np.uint64, np.uint64]
     words: tuple[np.uint32, np.uint32, np.uint32, np.uint32]
+    leader: Stream | None = None  # the one whose points have four coordinates, of which this has the last two
 
 
 @lru_cache(maxsize=4096)
@@ -246,7 +253,8 @@ def _stream(seed: int, bounce: int, dimension: int) -> Stream:
         state = _mix64((state ^ part) + _GOLDEN & _MASK64)
     keys = [_mix64(state + i * _GOLDEN & _MASK64) for i in range(1, 5)]
     words = [half for key in keys[2:] for half in (u4(key >> 32), u4(key & 0xFFFFFFFF))]
-    return Stream((u8(keys[0]), u8(keys[1])), (words[0], words[1], words[2], words[3]))
+    leader = _stream(seed, 0, Dimension.PIXEL) if bounce == 0 and dimension in WITH_PIXEL else None
+    return Stream((u8(keys[0]), u8(keys[1])), (words[0], words[1], words[2], words[3]), leader)
 
 
 def _mix_longs(x: Longs, key: np.uint64, tweak: np.uint64) -> Longs:
@@ -292,6 +300,13 @@ def _mix_again(x: Words, key: np.uint32) -> Words:
     return x
 
 
+def _pixel_words(stream: Stream, pixel: Words) -> tuple[Words, Words]:
+    """Return what pixels (n,) XOR to the first coordinate, and which copies they read, (n,) each."""
+    word = _mix_words(pixel, *stream.words[:2])
+    first = word if stream.leader is None else _mix_words(pixel, *stream.leader.words[:2])
+    return word, first & u4(VARIANTS - 1)
+
+
 def _points(stream: Stream, sample: Words, variant: Words, coordinates: int) -> list[Words]:
     """Return points `sample` (n,) of copies `variant` (n,) of a stream's sequence.
 
@@ -331,15 +346,22 @@ def _table(stream: Stream, block: int) -> Words:
 
 
 def _sequence(stream: Stream, sample: Words, variant: Words) -> Words:
-    """Return shuffled and Owen-scrambled Sobol points as 32-bit fractions, (2, n)."""
-    counter = np.arange(3 * VARIANTS, dtype=u4)
-    seeds = _mix_words(_mix_words(counter, stream.words[3], stream.words[0]), *stream.words[1:3])
-    shuffle, scramble_x, scramble_y = seeds.reshape(3, VARIANTS).take(variant, axis=1)
+    """Return shuffled and Owen-scrambled points as 32-bit fractions, (2, n)."""
+    leader = stream.leader or stream
+    shuffle = _variant_words(leader, variant)[0]
+    _, scramble_x, scramble_y = _variant_words(stream, variant)
     index = _reverse(_owen(_reverse(sample), shuffle))
     # The first coordinate is the reversed index, so two reversals cancel.
-    x = _reverse(_owen(index, scramble_x))
-    y = _reverse(_owen(_pascal(index), scramble_y))
+    pair = (index, _pascal(index)) if leader is stream else _quaternary(index)
+    x, y = (_reverse(_owen(*each)) for each in zip(pair, (scramble_x, scramble_y), strict=True))
     return np.stack([x, y])
+
+
+def _variant_words(stream: Stream, variant: Words) -> Words:
+    """Return keys of copies `variant` (n,), (3, n): for the shuffle and for two scrambles."""
+    counter = np.arange(3 * VARIANTS, dtype=u4)
+    seeds = _mix_words(_mix_words(counter, stream.words[3], stream.words[0]), *stream.words[1:3])
+    return seeds.reshape(3, VARIANTS).take(variant, axis=1)
 
 
 def _owen(x: Words, seed: Words) -> Words:
@@ -362,10 +384,38 @@ def _pascal(index: Words) -> Words:
     The generator matrix is Pascal's triangle modulo 2: bit i of the result is the XOR of the bits
     j of the index for which i is a subset of j, a transform of five steps.
     """
-    x = index ^ (index >> u4(16))
-    for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
-        x ^= (x >> u4(shift)) & u4(mask)
+    x = _pascal_of_digits(index)
+    return x ^ (x >> u4(1)) & u4(0x55555555)
+
+
+def _pascal_of_digits(x: Words) -> Words:
+    """Return the same of digits of two bits: all steps of `_pascal` but the last."""
+    for shift, mask in ((16, 0x0000FFFF), (8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333)):
+        x = x ^ (x >> u4(shift)) & u4(mask)
     return x
+
+
+def _quaternary(index: Words) -> tuple[Words, Words]:
+    """Return the third and fourth coordinate of `index` (n,), bit-reversed.
+
+    Pairs of bits are numbers of GF(4), and the generator matrices have C(j, i) a^(j − i) for a = 0, 1, w and
+    w², so that all four coordinates are a (0, 4)-sequence in base 4 (Niederreiter 1987). The second and
+    fourth are multiplied by an invertible matrix digit by digit, so that the first two, and the last two,
+    are also (0, 2)-sequences in base 2.
+    """
+    third = _times_powers(_pascal_of_digits(_times_powers(index, 1)), 2)
+    fourth = _times_powers(_pascal_of_digits(_times_powers(index, 2)), 1)
+    return third, fourth ^ (fourth >> u4(1)) & u4(0x55555555)
+
+
+def _times_powers(x: Words, step: int) -> Words:
+    """Return x (n,) with its digit i multiplied by w^(step·i); w³ = 1."""
+    low, high = x & u4(0x55555555), x >> u4(1) & u4(0x55555555)
+    both = low ^ high
+    by_power = x, high | both << u4(1), both | low << u4(1)  # by 1, w and w² = w + 1
+    masks = 0xC30C30C3, 0x0C30C30C, 0x30C30C30  # of the digits 0, 1 and 2, and so on by threes
+    one, two, three = (by_power[i * step % 3] & u4(mask) for i, mask in enumerate(masks))
+    return one | two | three
 
 
 def _every_second_bit(x: Words) -> Words:
