@@ -49,6 +49,19 @@ def around(n: int, seed: int = 1) -> np.ndarray:
     return d / np.linalg.norm(d, axis=0)
 
 
+def test_presets_are_prepared_once_and_belong_to_their_caller() -> None:
+    """The tables of a preset are shared, the lights are not: changes to one stay with it."""
+    one, other = wf.studio()[0], wf.studio()[0]
+    tables = [light.record(np.zeros(3)).texels for light in (one, other)]
+    assert tables[0] is tables[1]
+    one.radiance, one.backdrop.radiance = 3.0, 4.0
+    one.group = "mine"
+    for light in (other, *wf.studio()):
+        assert light.radiance.max() < 1.5
+        assert light.backdrop.radiance.max() < 1
+        assert light.group != "mine"
+
+
 def test_three_sides_of_a_cube_can_be_told_apart_and_from_the_background() -> None:
     """What an even environment shows as a hexagon."""
     scene = wf.Scene([cube()])

@@ -8,6 +8,7 @@ show the boxes, too.
 from __future__ import annotations
 
 from copy import copy
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -79,6 +80,7 @@ class Preset:
         shade = levels[place] + np.diff(levels)[place] * smoothstep(step)
         return np.repeat(shade[:, :, None], 3, 2)
 
+    @cache  # noqa: B019 - presets live as long as the module
     def ground_albedo(self) -> tuple[float, float, float]:
         """Return the albedo of a level ground that is as bright as the gradient below the horizon."""
         pixels, (_, up, _) = self.pixels(), _directions()
@@ -93,6 +95,7 @@ def smoothstep(x: Doubles) -> Doubles:
     return x * x * (3 - 2 * x)
 
 
+@cache
 def _directions() -> Doubles:
     """Return the unit directions (3, H, W) of the pixels' centers."""
     level, high = sin_cos_turns((np.arange(HEIGHT) + 0.5)[:, None] / (2 * HEIGHT))
@@ -181,8 +184,15 @@ def studio(preset: str = DEFAULT, *, up: ArrayLike = "y", camera: Camera | None 
     axes = _axes(up, camera)
     if preset == "even":
         return [Environment(1.0)]
+    light = copy(_environment(preset, tuple(map(tuple, axes.tolist()))))
+    light.backdrop = copy(light.backdrop)
+    return [light]
+
+
+@lru_cache(maxsize=2)  # the tables of one take 4 MB
+def _environment(preset: str, axes: tuple[tuple[float, ...], ...]) -> Environment:
     pixels, backdrop = PRESETS[preset].pixels(), PRESETS[preset].backdrop()
-    return [Environment(pixels.astype(np.float32), transform=axes, backdrop=backdrop.astype(np.float32))]
+    return Environment(pixels.astype(np.float32), transform=axes, backdrop=backdrop.astype(np.float32))
 
 
 def check_lighting(lighting: str | None) -> None:
