@@ -125,7 +125,13 @@ def test_a_missing_embree_is_told(subdivisions, there, settings, said, monkeypat
     monkeypatch.setattr(registry, "installed", lambda: False)
     ball = trimesh.creation.icosphere(subdivisions)
     render([ball, SKY], **settings)
-    assert told(capsys) == ([f"hint: {hints.NO_EMBREE}"] if said else [])
+    hint = "`pip install embreex` meshes of 1,280 triangles render about 2 times as fast"
+    assert told(capsys) == ([f"hint: Embree is not installed: with {hint}"] if said else [])
+
+
+def test_larger_meshes_gain_more_by_embree() -> None:
+    """As measured: 2.2 to 3.2 times, 3.2 to 4.8 and 6.8 to 12.3."""
+    assert [round(hints.embree_gain(n), 1) for n in (1280, 20480, 327680)] == [2.1, 3.8, 6.7]
 
 
 @pytest.mark.usefixtures("long_ago")

@@ -38,7 +38,10 @@ RARE_PATHS = (
     "much of the noise comes from few bright samples, so errors are underestimated: more samples, "
     "larger lamps, guide=True or caustics=True help (docs/convergence.md#rare-paths)"
 )
-NO_EMBREE = "Embree is not installed: with `pip install embreex` meshes render two to four times as fast"
+NO_EMBREE = (
+    "Embree is not installed: with `pip install embreex` meshes of {:,} triangles render about {:.0f} times "
+    "as fast"
+)
 NO_DENOISER = (
     "Open Image Denoise is not installed: with `pip install pyoidn` denoise=True is faster and removes more "
     "noise"
@@ -88,6 +91,11 @@ def lit_by_small_lamps(boxes: NDArray[np.float64], lights: IrradianceOf) -> bool
     return bool(((irradiance * small).sum(1) > MUCH * irradiance.sum(1)).any())
 
 
+def embree_gain(triangles: int) -> float:
+    """Return how many times as fast Embree renders a mesh, by measurement (docs/performance.md)."""
+    return float(2 * (triangles / MANY_TRIANGLES) ** 0.21)
+
+
 class Hints:
     """The hints of a session, each of which is shown once.
 
@@ -117,8 +125,8 @@ class Hints:
             yield image.metadata["hint"]
         if (image.metadata["rare"] or 0) > MUCH_RARE:
             yield RARE_PATHS
-        many = self._prepared.compiled.triangles >= MANY_TRIANGLES
-        if self._settings.values["accel"] == AUTO and many and not installed():
-            yield NO_EMBREE
+        triangles = self._prepared.compiled.triangles
+        if self._settings.values["accel"] == AUTO and triangles >= MANY_TRIANGLES and not installed():
+            yield NO_EMBREE.format(triangles, embree_gain(triangles))
         if self._settings.values["denoise"] and image.metadata.get("denoiser") == "nonlocal_means":
             yield NO_DENOISER
