@@ -65,7 +65,7 @@ class AnyIrradiance:
 def receivers(normal: np.ndarray, n: int, opaque: bool = True) -> Receiver:
     """The same surface n times."""
     normal = np.repeat((normal / np.linalg.norm(normal)).astype(f4)[:, None], n, 1)
-    return Receiver(normal, np.full(n, opaque), np.zeros(n, np.bool_))
+    return Receiver(normal, np.full(n, opaque))
 
 
 def lit(choice: LightSampler, normal: np.ndarray | None, n: int) -> LightSampler:
@@ -108,7 +108,7 @@ def test_random_choices_pass_a_chi_square_test(factor: float, passes: bool) -> N
     rng = np.random.default_rng(5)
     point, normal = rng.uniform(-1, 1, (3, 64)).astype(f4), rng.normal(size=(3, 64)).astype(f4)
     yes = np.ones(n, np.bool_)
-    each = Receiver(normal / np.linalg.norm(normal, axis=0), yes[:64], yes[:64])
+    each = Receiver(normal / np.linalg.norm(normal, axis=0), yes[:64])
     pmf = np.array([choice.lighting(each).pmf(np.full(64, i), point) for i in range(k)], float)
     at = np.arange(n) % 64
     u = (rng.integers(0, 1 << 24, n) / (1 << 24)).astype(f4)

@@ -64,7 +64,7 @@ def test_surfaces_are_lit_from_above_their_horizon(k: int) -> None:
     normal = np.array([[0.48], [0.6], [0.64]], f4)
 
     def lit(m: int, opaque: bool) -> LightTreeSampler:
-        return choice.lighting(Receiver(np.repeat(normal, m, 1), np.full(m, opaque), np.zeros(m, np.bool_)))
+        return choice.lighting(Receiver(np.repeat(normal, m, 1), np.full(m, opaque)))
 
     point = np.repeat(np.array([[0.1], [0.2], [-0.3]], f4), n, 1)
     light, chance = lit(n, True).sample(point, u)

@@ -42,7 +42,7 @@ LIGHTS = {
 
 def receiver(normal: tuple[float, ...], n: int = 1, opaque: bool = True) -> Receiver:
     unit = f4(normal).reshape(3, 1) / f4(np.sqrt(np.square(normal).sum()))
-    return Receiver(np.repeat(unit, n, 1), np.full(n, opaque), np.full(n, True))
+    return Receiver(np.repeat(unit, n, 1), np.full(n, opaque))
 
 
 @pytest.mark.parametrize("normal", NORMALS)

@@ -8,10 +8,8 @@ from significance import assert_same_images, repeat
 
 import wavefront as wf
 from wavefront import testing
-from wavefront.accel.numpy_accel import NumpyAccelerator
 from wavefront.arrays.vec import f4
-from wavefront.compile.scene import compile_scene
-from wavefront.lights import EnvironmentSum, LightRecord, LightTable, Receiver
+from wavefront.lights import EnvironmentSum, LightRecord, Receiver
 from wavefront.lights.product import NO_NORMAL, CosineProduct, octahedral_bins, octahedral_normals
 
 SETTINGS: dict = {"max_bounces": 3, "accel": "numpy"}
@@ -28,7 +26,7 @@ def sky(height: int = 24, width: int = 40) -> np.ndarray:
 def lighting(image: np.ndarray, normal: tuple[float, ...], opaque: bool = True, **options) -> LightRecord:
     """Return an environment as it is sampled for surfaces of one normal."""
     size = np.sqrt(np.square(normal).sum())
-    receiver = Receiver(f4(normal).reshape(3, 1) / f4(size), np.array([opaque]), np.array([True]))
+    receiver = Receiver(f4(normal).reshape(3, 1) / f4(size), np.array([opaque]))
     return wf.Environment(image, **options).record(np.zeros(3)).compensated().lighting(receiver)
 
 
@@ -66,7 +64,7 @@ def test_a_sum_of_lights_at_infinity_is_sampled_for_normals() -> None:
         )
     ]
     both = EnvironmentSum.of(parts).compensated()
-    lit = both.lighting(Receiver(normals, yes, yes))
+    lit = both.lighting(Receiver(normals, yes))
     u = np.random.default_rng(0).random((2, yes.size), f4)
     sample = lit.sample_li(np.zeros_like(normals), u)
     of_sun = parts[1].pdf_li(normals, sample.wi) > 0
@@ -74,7 +72,7 @@ def test_a_sum_of_lights_at_infinity_is_sampled_for_normals() -> None:
     assert up.mean() > 0.9
     half = np.arange(yes.size) < 50_000
     for of, normal in ((half, NORMALS[0]), (~half, NORMALS[1])):
-        one = Receiver(f4(normal).reshape(3, 1), yes[:1], yes[:1])
+        one = Receiver(f4(normal).reshape(3, 1), yes[:1])
         testing.check_light(both.lighting(one), points=[[0, 0, 0]], samples=20_000)
         alone = both.lighting(one).pdf_li(np.zeros((3, 1), f4), sample.wi[:, of])
         assert (sample.pdf[of] == alone).all()
@@ -97,31 +95,6 @@ def test_normals_are_found_in_their_bins() -> None:
     assert (any_ * near).sum(0).min() > 0.96
     poles = f4([[0, 0, 0, 1], [0, 0, -1, 0], [1, -1, 0, 0]])
     assert (octahedral_bins(poles) < NO_NORMAL).all()
-
-
-@pytest.mark.parametrize("matte", [True, False])
-def test_weights_of_both_samples_sum_to_one(matte: bool) -> None:
-    """At every density, and by the balance heuristic where the surface is matte."""
-    lights = [wf.Environment(sky()).record(np.zeros(3)).compensated(), *rectangle_and_point()]
-    table = LightTable(lights, 1.0)
-    n = 300
-    rng = np.random.default_rng(2)
-    light = rng.integers(0, 2, n)
-    normal = octahedral_normals()[:, rng.integers(0, NO_NORMAL, n)].astype(f4)
-    receiver = Receiver(normal, np.full(n, True), np.full(n, matte))
-    pdf, other = (rng.random((2, n)) ** 4 * 10).astype(f4)
-    weight = table.mis_weight(light, pdf, other, receiver)
-    assert weight + table.bsdf_weight(light, other, pdf, receiver) == pytest.approx(1, abs=1e-6)
-    power = np.abs(weight - pdf**2 / (pdf**2 + other**2)) < 1e-5
-    assert power[light == 1].all()
-    assert power[light == 0].all() != matte
-
-
-def rectangle_and_point() -> list[LightRecord]:
-    """Return two lights that do not ask for a normal."""
-    panel = wf.Rectangle((-1, 2, -1), (2, 0, 0), (0, 0, 2), emission=3)
-    compiled = compile_scene(wf.Scene([panel], [wf.PointLight((0, 3, 0), 5)]), NumpyAccelerator)
-    return list(compiled.lights.kinds)
 
 
 def surfaces() -> wf.Scene:
@@ -156,13 +129,3 @@ def test_pictures_keep_their_means(options: dict) -> None:
 def by_bsdf_samples(background: str | None) -> list[np.ndarray]:
     """Return pictures of the scene that no light sample has touched."""
     return repeat(surfaces(), 128, 12, 100, integrator="naive", background=background, **SETTINGS)
-
-
-def test_what_nothing_hides_has_hardly_any_noise() -> None:
-    """A floor under a sky that has small bright parts and is hardly darker than the mean elsewhere."""
-    image = 0.9 + 16 * (np.random.default_rng(3).random((16, 32, 1)) < 0.01) * np.ones(3)
-    floor = wf.Rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2), material=wf.Diffuse(0.5))
-    camera = wf.Camera.look_at((0.3, 1, 0.4), (0, 0, 0), fov=20, size=(16, 16))
-    scene = wf.Scene([floor], [wf.Environment(image, filter="nearest")], camera)
-    rendered = wf.render(scene, 16, sampler="independent", max_bounces=1, accel="numpy", progress=False)
-    assert rendered.rgb.std() < 0.01 * rendered.rgb.mean()

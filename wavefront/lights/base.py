@@ -52,7 +52,7 @@ class Receiver(SoA):
     Examples
     --------
     >>> up, yes = np.array([[0], [1], [0]], np.float32), np.array([True])
-    >>> receiver = wf.Receiver(normal=up, opaque=yes, matte=yes)
+    >>> receiver = wf.Receiver(normal=up, opaque=yes)
     >>> sky = wf.Environment(np.random.default_rng(0).random((8, 16, 3))).record(np.zeros(3)).compensated()
     >>> point, u = np.zeros((3, 1), np.float32), np.full((2, 1), 0.5, np.float32)
     >>> sample = sky.lighting(receiver).sample_li(point, u)
@@ -62,7 +62,6 @@ class Receiver(SoA):
 
     normal: Floats  # (3, n) unit shading normal
     opaque: Bools  # (n,) light from behind the normal does not count
-    matte: Bools  # (n,) the BSDF is constant, and its samples are distributed by cosine
 
 
 @soa
@@ -184,13 +183,6 @@ class LightRecord(SoA, Light):
         says it by `takes_receiver`.
         """
         return self
-
-    def balance(self, receiver: Receiver) -> Floats | None:
-        """Return factors (n,) of the light's densities in the balance heuristic that suits it; else None.
-
-        Where a factor is 0, the power heuristic weighs light samples against BSDF samples.
-        """
-        return None
 
     def irradiance(
         self, center: NDArray[np.float64], radius: float, scene_radius: float

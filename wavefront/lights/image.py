@@ -131,24 +131,6 @@ class ImageEnvironment(InfiniteLight):
     def _drawn_for(self, n: int) -> Ints:
         return np.broadcast_to(NO_NORMAL if self.normals is None else self.normals, n)
 
-    def balance(self, receiver: Receiver) -> Floats | None:
-        """Return the irradiance that light samples are to bring matte surfaces, over that of BSDF samples.
-
-        Light samples draw from what is brighter than the mean, with a density q, and BSDF samples find the
-        rest with the density cos/π. With weights in proportion to the irradiance of each part the sum of both
-        densities is the brighter of radiance and mean times the cosine, so that a surface from which nothing
-        is hidden has hardly any noise. Where something is, two samples see it.
-
-        Source: the part of the light samples is that of MIS compensation (`compensated`); the weights are
-        those of the balance heuristic with sample counts in these proportions (E. Veach, thesis 1997,
-        §9.2.2).
-        """
-        if self.product is None:
-            return None
-        normals = np.where(receiver.opaque, octahedral_bins(receiver.normal), NO_NORMAL)
-        # the mean radiance is 1/4π where the whole light of the image is 1, and its irradiance 1/4
-        return f4(4 * self.share) * self.product.irradiance.take(normals) * receiver.matte
-
     def le(self, wi: Floats, surface: SurfaceInteraction | None = None) -> Floats:
         """Return the radiance of the image in direction wi, (3, n)."""
         return self._lookup(*self._place(wi))

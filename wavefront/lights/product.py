@@ -31,12 +31,6 @@ class CosineProduct:
         (H, W) part of the light of each texel; an equirectangular image, top row first.
     rotation
         (3, 3) to world from the image; None where they are the same.
-
-    Attributes
-    ----------
-    irradiance
-        (normals + 1,) light times cosine of each normal, where the light of the image is 1; the last, of no
-        normal, is 1.
     """
 
     def __init__(self, light: NDArray[np.float64], rotation: Floats | None) -> None:
@@ -77,7 +71,6 @@ class CosineProduct:
         x, y, z = octahedral_normals()[:, :, None, None]
         cos = x * middle[0] + y * middle[1] + z * middle[2]  # (normals, rows, columns)
         weight = mass * np.maximum((cos + MARGIN) / (1 + MARGIN), 0)
-        self.irradiance = np.append((mass * np.maximum(cos, 0)).sum((1, 2)), 1).astype(f4)
         total = weight.sum((1, 2), keepdims=True)
         weight = (1 - PLAIN) * np.divide(weight, total, out=np.zeros_like(weight), where=total > 0)
         weight += (1 - weight.sum((1, 2), keepdims=True)) * mass

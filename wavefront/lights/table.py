@@ -126,34 +126,9 @@ class LightTable:
             return self.choice
         return self.choice.lighting(receiver)
 
-    def bsdf_weight(
-        self, light: Ints, pdf_bsdf: Floats, pdf: Floats, receiver: Receiver | None = None
-    ) -> Floats:
-        """Weight of BSDF samples that meet lights numbered `light` (n,), which these draw with `pdf` (n,)."""
-        weight = power_heuristic(pdf_bsdf, pdf)
-        for lanes, balanced in self._balanced(light, pdf, receiver):
-            other = pdf_bsdf.take(lanes)
-            weight[lanes] = other / (other + balanced)
-        return weight
-
-    def _balanced(self, light: Ints, pdf: Floats, receiver: Receiver | None) -> Iterator[tuple[Ints, Floats]]:
-        """Yield lanes (k,) that the balance heuristic weighs, and the light's densities in it (k,)."""
-        if receiver is None:
-            return
-        for kind, rows in self._by_kind(light):
-            factor = kind.balance(receiver.take(rows))
-            if factor is not None:
-                some = np.flatnonzero(factor)
-                lanes = some if isinstance(rows, slice) else rows.take(some)
-                yield lanes, factor.take(some) * pdf.take(lanes)
-
-    def mis_weight(
-        self, light: Ints, pdf: Floats, pdf_bsdf: Floats, receiver: Receiver | None = None
-    ) -> Floats:
+    def mis_weight(self, light: Ints, pdf: Floats, pdf_bsdf: Floats) -> Floats:
         """Weight of samples of lights numbered `light` (n,) against BSDF sampling: 1 for delta lights."""
         weight = power_heuristic(pdf, pdf_bsdf)
-        for lanes, balanced in self._balanced(light, pdf, receiver):
-            weight[lanes] = balanced / (balanced + pdf_bsdf.take(lanes))
         if self.delta_of.any():
             weight[np.flatnonzero(self.delta_of.take(light))] = 1
         return weight

@@ -83,7 +83,7 @@ class GlossyPoints:
         """Return the BSDF of `shade` for light samples of points (k,), with their MIS weight: (3, k)."""
         f, pdf = _evaluated(shade, take(self.sampled, which))
         light, pdf_light = take(self.light, which), take(self.pdf, which)
-        return f * scene.lights.mis_weight(light, pdf_light, pdf, shade.receiver)
+        return f * scene.lights.mis_weight(light, pdf_light, pdf)
 
     def of_next(self, which: Ints, shade: Shading) -> tuple[Floats, Floats]:
         """Return the BSDF of `shade` times the cosine of next directions, (3, k), and their density (k,)."""

@@ -16,6 +16,7 @@ from ..compile.materials import MaterialTable
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..lights import LightSample, Receiver
+from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
 from .interaction import interaction, offset_origin, origin_above
 from .intersect import ShadowRays, shadow_rays, visible
@@ -126,7 +127,7 @@ def mis_weighted(scene: CompiledScene, paths: Paths, emission: Contribution) -> 
     light = emission.light.take(sampled)
     pdf = scene.lights.pdf_li(light, start, take(paths.direction, lanes), receiver)
     weight = np.ones(len(emission.lanes), f4)
-    weight[sampled] = scene.lights.bsdf_weight(light, take(paths.pdf, lanes), pdf, receiver)
+    weight[sampled] = power_heuristic(take(paths.pdf, lanes), pdf)
     return Contribution(emission.lanes, emission.radiance * weight, emission.light)
 
 
@@ -168,11 +169,10 @@ def shading(scene: CompiledScene, surface: SurfaceInteraction) -> Shading:
 def receiver_of(surface: SurfaceInteraction, groups: list[tuple[Lanes, Bsdf]]) -> Receiver:
     """Return what lights shine on."""
     n = len(surface)
-    opaque, matte = np.ones(n, np.bool_), np.zeros(n, np.bool_)
+    opaque = np.ones(n, np.bool_)
     for lanes, bsdf in groups:
         opaque[lanes] = not bsdf.transmissive
-        matte[lanes] = bsdf.view_independent
-    return Receiver(surface.ns, opaque, matte)
+    return Receiver(surface.ns, opaque)
 
 
 def _groups(materials: MaterialTable, surface: SurfaceInteraction) -> Iterator[tuple[Lanes, Bsdf]]:
@@ -244,8 +244,7 @@ def direct(
     if mis:
         if shade.guidance is not None:
             pdf = shade.guidance.mixed(lanes, take(light.wi, lanes), pdf)
-        receiver = None if shade.receiver is None else shade.receiver.take(lanes)
-        scale *= scene.lights.mis_weight(number, pdf_light, pdf, receiver)
+        scale *= scene.lights.mis_weight(number, pdf_light, pdf)
     arriving = f.take(lanes, 1) * radiance * scale
     directed = directed or (paths.recorder is not None and paths.recorder.needs_directions)
     toward = take(light.wi, lanes) if directed else None

@@ -10,6 +10,7 @@ from ..arrays.state import Hits, Paths, SurfaceInteraction
 from ..arrays.vec import INV_PI, Floats, Ints, dot, f4, luminance, positive, take
 from ..compile.scene import CompiledScene
 from ..lights import LightSample, Receiver
+from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
 from ..sampling.warp import cosine_hemisphere
 from .interaction import material_rows, origin_above
@@ -65,8 +66,7 @@ def _candidates(
     """
     n, environment = len(surface), int(scene.light_of[-1])
     frame = surface.frame()
-    yes = np.ones(n, np.bool_)
-    receiver = Receiver(surface.ns, yes, yes)
+    receiver = Receiver(surface.ns, np.ones(n, np.bool_))
     for number in range(CANDIDATES if scene.lights.choice is not None else 0):
         address = paths.pixel, paths.sample, FIRST_VERTEX + number
         u_light = sampler.draw_1d(*address, Dimension.LIGHT)
@@ -76,7 +76,7 @@ def _candidates(
         cos = positive(dot(surface.ns, light.wi))
         sampled = light.pdf > 0
         pdf = np.where(sampled, light.pdf, f4(1))
-        weight = scene.lights.mis_weight(which, pdf, cos * INV_PI, receiver)
+        weight = scene.lights.mis_weight(which, pdf, cos * INV_PI)
         weight = np.where(which == environment, weight, f4(1))
         yield light, np.where(sampled, luminance(light.radiance) * cos * weight / pdf, f4(0))
     if environment < 0:
@@ -87,7 +87,7 @@ def _candidates(
         local = cosine_hemisphere(u)
         wi = frame.to_world(local)
         pdf = scene.lights.pdf_li(numbers, start, wi, receiver)
-        weight = scene.lights.bsdf_weight(numbers, local[2] * INV_PI, pdf, receiver)
+        weight = power_heuristic(local[2] * INV_PI, pdf)
         radiance = scene.lights.le(numbers, wi)
         far = LightSample(wi, radiance, local[2] * INV_PI, np.full(n, np.inf, f4), np.ones(n, f4))
         yield far, luminance(radiance) * f4(np.pi) * weight
