@@ -15,10 +15,11 @@ from wavefront.bsdfs import (
     Mirror,
     Mix,
     OrenNayar,
+    Plastic,
     Principled,
     ThinDielectric,
 )
-from wavefront.bsdfs.microfacet import mirror_lobe, visible_normals
+from wavefront.bsdfs.microfacet import Facets
 from wavefront.testing.bsdf import check_bsdf
 
 F4 = np.float32
@@ -83,7 +84,7 @@ def test_ggx_directional_albedo(alpha, mu):
 )
 def test_visible_normals_are_visible(alpha, mu, u):
     wo = toward(mu)
-    m = visible_normals(wo, F4(alpha), np.array(u, F4).reshape(2, 1))
+    m = Facets(F4(alpha)).visible_normals(wo, np.array(u, F4).reshape(2, 1))
     assert np.isfinite(m).all()
     assert np.linalg.norm(m.astype(float)) == pytest.approx(1, abs=1e-6)
     assert m[2] >= 0
@@ -95,8 +96,8 @@ def test_mirror_lobe_is_reciprocal_and_finite(alpha, mu, nu, phi):
     wo = toward(mu)
     r = np.sqrt(1 - nu * nu)
     wi = np.array([[r * np.cos(phi)], [r * np.sin(phi)], [nu]], F4)
-    forth, pdf, cos = mirror_lobe(wo, wi, F4(alpha))
-    back, _, _ = mirror_lobe(wi, wo, F4(alpha))
+    forth, pdf, cos = Facets(F4(alpha)).mirror_lobe(wo, wi)
+    back, _, _ = Facets(F4(alpha)).mirror_lobe(wi, wo)
     assert forth == pytest.approx(back, rel=1e-5)
     assert np.isfinite(forth).all()
     assert np.isfinite(pdf).all()
@@ -263,6 +264,16 @@ def index(rng):
     return rng.choice([rng.uniform(0.5, 0.9), rng.uniform(1.1, 2.5)])
 
 
+def facets(rng, roughness):
+    """What else facets may have; two roughnesses where the checker's quadrature resolves both."""
+    return {
+        "distribution": str(rng.choice(["ggx", "beckmann"])),
+        "shadowing": str(rng.choice(["correlated", "separable"])),
+        "roughness_v": rng.choice([None, rng.uniform(0.1, 1)]) if roughness > 0.1 else None,
+        "rotation": rng.uniform(0, 360),
+    }
+
+
 # 0.05, as the checker's own quadrature is off by up to 0.04 % for glass of 0.032, along the normal, where
 # an integral of one dimension finds the density whole (above).
 ROUGHNESS = [0.0, 1e-3, 0.05, None, 1.0]
@@ -270,9 +281,19 @@ ROUGHNESS = [0.0, 1e-3, 0.05, None, 1.0]
 RANDOM = {
     Diffuse: lambda rng, roughness: Diffuse(color(rng)),
     Mirror: lambda rng, roughness: Mirror(color(rng)),
-    Conductor: lambda rng, roughness: Conductor(rng.uniform(0.1, 3, 3), rng.uniform(0, 6, 3), roughness),
+    Conductor: lambda rng, roughness: Conductor(
+        rng.uniform(0.1, 3, 3), rng.uniform(0, 6, 3), roughness, **facets(rng, roughness)
+    ),
     Dielectric: lambda rng, roughness: Dielectric(
-        index(rng), roughness, reflectance=color(rng), transmittance=color(rng)
+        index(rng), roughness, reflectance=color(rng), transmittance=color(rng), **facets(rng, roughness)
+    ),
+    Plastic: lambda rng, roughness: Plastic(
+        color(rng),
+        roughness,
+        rng.uniform(1.1, 2.5),
+        specular_reflectance=color(rng),
+        nonlinear=rng.random() < 0.5,
+        distribution=rng.choice(["ggx", "beckmann"]),
     ),
     ThinDielectric: lambda rng, roughness: ThinDielectric(
         index(rng), roughness, reflectance=color(rng), transmittance=color(rng)

@@ -5,7 +5,17 @@ import pytest
 
 from wavefront import bsdfs, testing
 from wavefront.arrays.state import SurfaceInteraction
-from wavefront.bsdfs import Conductor, Dielectric, Diffuse, Mirror, Mix, OrenNayar, Principled, ThinDielectric
+from wavefront.bsdfs import (
+    Conductor,
+    Dielectric,
+    Diffuse,
+    Mirror,
+    Mix,
+    OrenNayar,
+    Plastic,
+    Principled,
+    ThinDielectric,
+)
 from wavefront.core.errors import SceneError
 from wavefront.textures.base import BaseTexture
 
@@ -25,17 +35,27 @@ EXAMPLES = {
         {"roughness": 0.5, "transmittance": (0.2, 0.9, 1)},
         {"ior": 1 / 1.33, "roughness": 1.0},
         {"ior": 1.0, "roughness": 0.5},
+        {"roughness": 0.5, "distribution": "beckmann"},
+        {"roughness": 0.3, "roughness_v": 0.7, "rotation": 30.0, "shadowing": "separable"},
     ],
     Conductor: [
         {"eta": 2, "k": 4},
         {"eta": (0.15, 0.4, 1.4), "k": (3.5, 2.4, 1.6), "roughness": 0.04},
         {"eta": 2.0, "k": 4.0, "roughness": 0.5},
         {"eta": 0.1, "k": 8.0, "roughness": 1.0},
+        {"eta": 0.1, "k": 8.0, "roughness": 0.7, "distribution": "beckmann", "shadowing": "separable"},
+        {"eta": 2.0, "k": 4.0, "roughness": 0.8, "roughness_v": 0.3, "rotation": -20.0},
     ],
     OrenNayar: [
         {"reflectance": (1, 0.5, 0), "sigma": 0.5},
         {"reflectance": 0.7, "sigma": 0.0},
         {"reflectance": (1, 0.5, 0.1), "sigma": 1.0, "energy_preserving": True},
+    ],
+    Plastic: [
+        {"reflectance": (0.9, 0.5, 0.1)},
+        {"reflectance": 1.0, "roughness": 0.6, "nonlinear": True},
+        {"roughness": 0.6, "ior": 2, "specular_reflectance": (1, 0.5, 0), "distribution": "beckmann"},
+        {"reflectance": 0.0, "roughness": 0.2, "shadowing": "separable"},
     ],
     ThinDielectric: [{}, {"ior": 1.7, "roughness": 0.3, "transmittance": (1, 0.5, 0)}, {"roughness": 1.0}],
     Principled: [
@@ -57,6 +77,7 @@ EXAMPLES = {
             "specular": 0.5,
             "specular_color": (1, 0.9, 0.2),
         },
+        {"base_color": 1.0, "roughness": 0.3, "roughness_v": 0.6, "clearcoat": 0.5, "transmission": 0.5},
     ],
     Mix: [
         {"first": Diffuse(0.8), "second": Mirror(0.9), "weight": 0.3},
@@ -73,6 +94,8 @@ LOSSLESS = [
     Dielectric(),
     Dielectric(1 / 1.33),
     ThinDielectric(),
+    Plastic(1.0),
+    Plastic(1.0, ior=2.0, nonlinear=True),
     OrenNayar(1.0, 1.0, energy_preserving=True),
     OrenNayar(1.0, 0.2, energy_preserving=True),
     Mix(Mirror(), Dielectric(), 0.4),
@@ -238,6 +261,14 @@ BAD = {
         "eta": [(0, "more than 0"), ((1, 0, 1), "more than 0"), (1e7, "[0, 1e+06]")],
         "k": [(-1, "[0, 1e+06]")],
         "roughness": [1.1],
+        "roughness_v": [-0.2],
+        "rotation": [(np.inf, "finite")],
+        "distribution": [("phong", "ggx, beckmann")],
+        "shadowing": [("none", "correlated, separable")],
+    },
+    Plastic: {
+        "ior": [(0, "more than 0"), (1e20, "from 1e-06 to 1e+06")],
+        **{name: [2] for name in ("reflectance", "roughness", "specular_reflectance")},
     },
     OrenNayar: {"reflectance": [2], "sigma": [(1.6, "[0, π/2]")]},
     Principled: {

@@ -14,9 +14,16 @@ ROUGH = {"roughness": 0.5}
 MATERIALS = {  # a material, and for each of its parameters a new value
     "Diffuse": (wf.Diffuse(0.8), {"reflectance": (0.1, 0.2, 0.3)}),
     "Mirror": (wf.Mirror(), {"reflectance": 0.25}),
-    "Conductor": (wf.Conductor.named("gold"), {"eta": 2.0, "k": (1, 2, 3), **ROUGH}),
+    "Conductor": (
+        wf.Conductor.named("gold"),
+        {"eta": 2.0, "k": (1, 2, 3), **ROUGH, "roughness_v": 0.2, "shadowing": "separable"},
+    ),
     "Dielectric": (wf.Dielectric(), {"ior": 1.3, **ROUGH, "reflectance": 0.5, "transmittance": 0.6}),
     "ThinDielectric": (wf.ThinDielectric(), {"ior": 1.3, **ROUGH, "reflectance": 0.5, "transmittance": 0.6}),
+    "Plastic": (
+        wf.Plastic(),
+        {"reflectance": 0.3, **ROUGH, "ior": 1.8, "specular_reflectance": 0.6, "distribution": "beckmann"},
+    ),
     "OrenNayar": (wf.OrenNayar(), {"reflectance": 0.7, "sigma": 0.1}),
     "Mix": (
         wf.Mix(wf.Diffuse(0.3), wf.Diffuse(0.6)),

@@ -22,11 +22,13 @@ from wavefront.bsdfs import (
     Mirror,
     Mix,
     OrenNayar,
+    Plastic,
     Principled,
     ShadowCatcher,
     ThinDielectric,
 )
-from wavefront.bsdfs.microfacet import alpha_of, visible_normals
+from wavefront.bsdfs.microfacet import Facets, alpha_of
+from wavefront.bsdfs.rough import RoughBsdf
 from wavefront.sampling.warp import cosine_hemisphere_inverse
 
 f4 = np.float32
@@ -35,6 +37,14 @@ part = st.floats(0.05, 1)
 rough = st.floats(0.2, 1)
 color = st.tuples(part, part, part)
 index = st.floats(1.1, 2.5) | st.floats(0.4, 0.9)
+
+
+facets = {
+    "roughness_v": st.none() | rough,
+    "rotation": st.floats(0, 360),
+    "distribution": st.sampled_from(["ggx", "beckmann"]),
+    "shadowing": st.sampled_from(["correlated", "separable"]),
+}
 
 
 class ByValue(Bsdf):
@@ -54,8 +64,13 @@ KINDS = {
     ShadowCatcher: st.builds(ShadowCatcher, color),
     OrenNayar: st.builds(OrenNayar, color, st.floats(0, 1), energy_preserving=st.booleans()),
     Mirror: st.builds(Mirror, color),
-    Conductor: st.builds(Conductor, color, st.floats(0.5, 5), st.just(0.0) | rough),
-    Dielectric: st.builds(Dielectric, index, st.just(0.0) | rough, reflectance=color, transmittance=color),
+    Conductor: st.builds(Conductor, color, st.floats(0.5, 5))
+    | st.builds(Conductor, color, st.floats(0.5, 5), rough, **facets),
+    Dielectric: st.builds(Dielectric, index, reflectance=color, transmittance=color)
+    | st.builds(Dielectric, index, rough, reflectance=color, transmittance=color, **facets),
+    Plastic: st.builds(
+        Plastic, color, st.just(0.0) | st.just(0.5), distribution=st.sampled_from(["ggx", "beckmann"])
+    ),
     ThinDielectric: st.builds(
         ThinDielectric, index, st.just(0.0) | rough, reflectance=color, transmittance=color
     ),
@@ -107,13 +122,13 @@ def sampled(bsdf: Bsdf, wo: np.ndarray, u: np.ndarray, inside: bool):
     return bound_to(bsdf, wide, inside).sample_f(wide, u)
 
 
-def alphas_of(bsdf: Bsdf) -> list[float]:
-    """The roughness of all lobes of microfacets."""
+def facets_of(bsdf: Bsdf) -> list[Facets]:
+    """The facets of all lobes of a bound BSDF."""
     if isinstance(bsdf, Mix):
-        return [*alphas_of(bsdf.first), *alphas_of(bsdf.second)]
-    names = [name for name in ("roughness", "clearcoat_roughness") if name in vars(type(bsdf)) | vars(bsdf)]
-    names = names or (["roughness"] if hasattr(type(bsdf), "roughness") else [])
-    return [float(alpha_of(np.atleast_1d(getattr(bsdf, name)))[0]) for name in names]
+        return [*facets_of(bsdf.first), *facets_of(bsdf.second)]
+    found = [bsdf.facets()] if isinstance(bsdf, RoughBsdf) else []
+    coated = isinstance(bsdf, Principled)
+    return [*found, Facets(alpha_of(bsdf.clearcoat_roughness))] if coated else found
 
 
 def indices_of(bsdf: Bsdf, inside: bool) -> list[float]:
@@ -124,11 +139,15 @@ def indices_of(bsdf: Bsdf, inside: bool) -> list[float]:
     return [] if ior is None else [1.0 / float(ior[0]) if inside else float(ior[0])]
 
 
-def normal_inverse(wo: np.ndarray, m: np.ndarray, alpha: float) -> np.ndarray:
+def normal_inverse(wo: np.ndarray, m: np.ndarray, facets: Facets) -> np.ndarray:
     """The u (2, 1) that `visible_normals` maps to the normal m (3, 1)."""
-    squeezed = wo * columns(alpha, alpha, 1)
+    across = facets.alpha if facets.alpha_v is None else facets.alpha_v
+    scale = columns(float(np.ravel(facets.alpha)[0]), float(np.ravel(across)[0]), 1)
+    cos, sin = (1.0, 0.0) if facets.tangent is None else facets.tangent[:, 0].astype(float)
+    turn = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
+    squeezed = turn @ wo * scale
     squeezed /= np.linalg.norm(squeezed)
-    half = m / columns(alpha, alpha, 1)
+    half = turn @ m / scale
     half /= np.linalg.norm(half)
     cap = 2 * (squeezed * half).sum() * half - squeezed
     turn = np.arctan2(cap[1], cap[0]) / (2 * np.pi) % 1
@@ -145,7 +164,7 @@ def preimages(bsdf: Bsdf, wo: np.ndarray, wi: np.ndarray, inside: bool) -> list[
         if size < 1e-3:
             continue
         m = half * (np.copysign(1, half[2]) / size)
-        found += [normal_inverse(wo, m, alpha) for alpha in alphas_of(bsdf)]
+        found += [normal_inverse(wo, m, facets) for facets in facets_of(bound_to(bsdf, wo, inside))]
     kept: list[np.ndarray] = []
     for u in found:
         if not ((u >= 0) & (u < 1)).all():
@@ -263,8 +282,9 @@ def test_delta_lobes_have_their_chance(kind, data, z, inside, u):
 
 
 @some
-@given(alpha=st.floats(0.01, 1), z=cosines, u=st.tuples(inner, inner))
-def test_visible_normals_have_their_inverse(alpha: float, z: float, u: tuple[float, float]) -> None:
+@given(alpha=st.floats(0.01, 1), across=st.none() | st.floats(0.01, 1), z=cosines, u=st.tuples(inner, inner))
+def test_visible_normals_have_their_inverse(alpha, across, z, u):
+    facets = Facets(columns(alpha)[0], None if across is None else columns(across)[0], columns(0.6, 0.8))
     with doubles():
-        m = visible_normals(toward(z), np.float64(alpha), columns(*u))
-    np.testing.assert_allclose(normal_inverse(toward(z), m, alpha)[:, 0], u, atol=1e-6)
+        m = facets.visible_normals(toward(z), columns(*u))
+    np.testing.assert_allclose(normal_inverse(toward(z), m, facets)[:, 0], u, atol=1e-6)

@@ -7,11 +7,12 @@ from .diffuse import Diffuse
 from .mirror import Mirror
 from .mix import Mix
 from .oren_nayar import OrenNayar
+from .plastic import Plastic
 from .principled import Principled
 from .shadow_catcher import ShadowCatcher
 from .thin import ThinDielectric
 
-ALL = (Diffuse, Mirror, Dielectric, Conductor, OrenNayar, ThinDielectric, Principled, Mix)
+ALL = (Diffuse, Mirror, Dielectric, Conductor, OrenNayar, ThinDielectric, Plastic, Principled, Mix)
 
 __all__ = [
     "ALL",
@@ -23,6 +24,7 @@ __all__ = [
     "Mirror",
     "Mix",
     "OrenNayar",
+    "Plastic",
     "Principled",
     "ShadowCatcher",
     "ThinDielectric",

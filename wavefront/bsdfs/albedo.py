@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from ..arrays.vec import Floats, dot, f4
-from .microfacet import alpha_of, reflect, stretched, visible_normals
+from .microfacet import Facets, alpha_of, reflect
 
 SIZE = 32  # rows of roughness in [0, 1], and columns of the square root of the cosine in [0, 1]
 SIDE = 32  # a direction's integral takes SIDE² samples
@@ -53,11 +53,11 @@ def gloss_tables() -> tuple[Floats, Floats, Floats, Floats]:
     """Albedo of GGX with Schlick's Fresnel, as F0·A + F90·B: A, B, and their cosine-weighted means."""
 
     def row(wo: Floats, roughness: Floats, u: Floats) -> tuple[Floats, Floats]:
-        alpha = alpha_of(roughness)
-        m = visible_normals(wo, alpha, u)
+        facets = Facets(alpha_of(roughness))
+        m = facets.visible_normals(wo, u)
         wi = reflect(wo, m)
         zi = np.maximum(wi[2], f4(0))
-        so, si = stretched(wo, alpha), stretched(wi, alpha)
+        so, si = facets.stretched(wo), facets.stretched(wi)
         shown = zi * (wo[2] + so) / (wo[2] * si + zi * so)  # G2/G1
         away = f4(1) - np.minimum(dot(wo, m), f4(1))
         weight = away * away * away * away * away

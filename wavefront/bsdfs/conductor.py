@@ -11,11 +11,12 @@ from ..arrays.vec import Floats, broadcast
 from ..core.errors import one_of
 from ..core.parameter import Parameter
 from ..core.suggestions import suggests_keywords
-from ..textures.parameter import MAX_INDEX, Color, Scalar, color, scalar
-from .base import BsdfSample, JointBsdf, weigh
+from ..textures.parameter import MAX_INDEX, Color, Scalar, color
+from .base import BsdfSample, weigh
 from .fresnel import fresnel_conductor
-from .microfacet import alpha_of, is_smooth, mirror_lobe, reflect, visible_normals
+from .microfacet import reflect
 from .mirror import mirrored
+from .rough import Distribution, RoughBsdf, Shadowing
 
 # η and k of metals in linear Rec. 709 RGB: published measurements, weighted by the matching
 # functions of the three primaries (CIE 1931 2° by the fit of C. Wyman et al. 2013, JCGT 2(2), to
@@ -36,8 +37,8 @@ METALS = {
 SPELLINGS = {"aluminium": "aluminum", "chrome": "chromium"}
 
 
-class Conductor(JointBsdf):
-    """A metal, by its complex refractive index η + ik: smooth, or rough (GGX).
+class Conductor(RoughBsdf):
+    """A metal, by its complex refractive index η + ik: smooth, or rough.
 
     Only single scattering is simulated, so a rough metal is darker than a smooth one. The loss with F = 1,
     seen along the normal: 1 % at roughness 0.32, 8 % at 0.5, 31 % at 0.71, 69 % at 1.
@@ -50,6 +51,13 @@ class Conductor(JointBsdf):
         Imaginary part (extinction) per channel, in [0, 1e6].
     roughness
         In [0, 1]; α = roughness². Below α = 0.001 it is a perfect mirror.
+    roughness_v, rotation
+        Roughness across, a number or a texture. Then `roughness` is that along the direction of growing u of
+        the texture coordinates, turned by `rotation` degrees towards v. None: alike in all directions.
+    distribution
+        Of the facets' normals: "ggx", or "beckmann", whose highlights have no halo.
+    shadowing
+        "correlated" with masking by the facets' height, or "separable" (E. Heitz 2014, eqs. 98 and 99).
 
     Raises
     ------
@@ -64,18 +72,23 @@ class Conductor(JointBsdf):
 
     eta = Parameter(partial(color, high=MAX_INDEX, above_zero=True))
     k = Parameter(partial(color, high=MAX_INDEX))
-    roughness = Parameter(scalar)
 
     @suggests_keywords
-    def __init__(self, eta: Color, k: Color, roughness: Scalar = 0.0) -> None:
+    def __init__(
+        self,
+        eta: Color,
+        k: Color,
+        roughness: Scalar = 0.0,
+        *,
+        roughness_v: Scalar | None = None,
+        rotation: Scalar = 0.0,
+        distribution: Distribution = "ggx",
+        shadowing: Shadowing = "correlated",
+    ) -> None:
         self.eta = eta
         self.k = k
-        self.roughness = roughness
+        self._set_facets(roughness, roughness_v, rotation, distribution, shadowing)
         self.derive()
-
-    def derive(self) -> None:
-        """Set `specular` from the roughness."""
-        self.specular = is_smooth(self.roughness)
 
     @classmethod
     @suggests_keywords
@@ -98,7 +111,7 @@ class Conductor(JointBsdf):
         """Return F·D·G/(4·cosθo·cosθi) and the density of reflections in visible normals; 0 for a mirror."""
         if self.specular:
             return np.zeros_like(wi), np.zeros_like(wi[2])
-        value, pdf, cos = mirror_lobe(wo, wi, alpha_of(self.roughness))
+        value, pdf, cos = self.facets().mirror_lobe(wo, wi)
         return fresnel_conductor(cos, self.eta, self.k) * value, pdf
 
     def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
@@ -107,6 +120,6 @@ class Conductor(JointBsdf):
         if self.specular:
             weight = fresnel_conductor(wo[2], self.eta, self.k)
             return BsdfSample(mirrored(wo), weight, np.ones_like(wo[2]), np.ones(n, np.bool_))
-        wi = reflect(wo, visible_normals(wo, alpha_of(self.roughness), u))
+        wi = reflect(wo, self.facets().visible_normals(wo, u))
         f, pdf = self.evaluate(wo, wi)
         return BsdfSample(wi, weigh(f, wi, pdf), pdf, broadcast(np.False_, n))

@@ -15,7 +15,7 @@ from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar
 from .base import BsdfSample, weigh
 from .fresnel import fresnel_dielectric
-from .microfacet import alpha_of, is_smooth, mirror_lobe, reflect, refract, refraction_lobe, visible_normals
+from .microfacet import reflect, refract
 from .refractive import RefractiveBsdf
 
 # Closer to 1 than this, refraction bends light by less than half vectors resolve: the boundary is smooth.
@@ -56,13 +56,15 @@ class Dielectric(RefractiveBsdf):
         Refractive index of the shape's inside relative to the outside, from 1e-6 to 1e6. Below 1 the outside
         is the denser medium (a bubble in water: 1/1.33). At 1 light passes straight through.
     roughness
-        In [0, 1]; α = roughness² (GGX). Below α = 0.001 it is perfectly smooth, and so is an index
+        In [0, 1]; α = roughness². Below α = 0.001 it is perfectly smooth, and so is an index
         within 0.001 of 1. Only single scattering is simulated. For index 1.5, seen along the normal, that
         loses 0.1 % from outside and 1 % from inside at roughness 0.32, 1 % and 7 % at 0.5, 3 % and 25 % at
         0.71, 11 % and 58 % at 1. A whole sphere in uniform light loses 0.06 % at 0.1, 4 % at 0.32, 18 % at
         0.5, 41 % at 0.71, 65 % at 1.
     reflectance, transmittance
         Tints of the reflected and of the refracted light per channel, in [0, 1]. 1 is physical.
+    roughness_v, rotation, distribution, shadowing
+        As for `Conductor`.
 
     Raises
     ------
@@ -96,8 +98,9 @@ class Dielectric(RefractiveBsdf):
 
     def derive(self) -> None:
         """Set `specular`, and the relative index as seen from outside, from the parameters."""
+        super().derive()
         straight = not isinstance(self.ior, BaseTexture) and abs(self.ior[0] - 1) < LEAST_BEND
-        self.specular = is_smooth(self.roughness) or bool(straight)
+        self.specular = self.specular or bool(straight)
         self.eta = self.ior  # (n,) or (1,) index beyond / before; unbound, wo is outside
 
     def bind(self, surface: SurfaceInteraction) -> Self:
@@ -115,9 +118,9 @@ class Dielectric(RefractiveBsdf):
         """Return `f`, for radiance, and `pdf` (Walter et al. 2007, eqs. 20 and 21); 0 if smooth."""
         if self.specular:
             return np.zeros_like(wi), np.zeros_like(wi[2])
-        alpha = alpha_of(self.roughness)
-        value, density, cos = mirror_lobe(wo, wi, alpha)
-        through, through_density, through_cos, valid = refraction_lobe(wo, wi, alpha, self.eta)
+        facets = self.facets()
+        value, density, cos = facets.mirror_lobe(wo, wi)
+        through, through_density, through_cos, valid = facets.refraction_lobe(wo, wi, self.eta)
         reflected, _ = fresnel_dielectric(np.where(valid, through_cos, cos), self.eta)
         transmitted = f4(1) - reflected
         f = self.reflectance * (value * reflected) + self.transmittance * (through * transmitted)
@@ -146,7 +149,7 @@ class Dielectric(RefractiveBsdf):
         return BsdfSample(wi, weight, pdf, np.ones(len(pdf), np.bool_), eta)
 
     def _sample_rough(self, wo: Floats, u: Floats) -> BsdfSample:
-        m = visible_normals(wo, alpha_of(self.roughness), u)
+        m = self.facets().visible_normals(wo, u)
         cos = np.maximum(dot(wo, m), f4(0))
         reflected, cos_refracted = fresnel_dielectric(cos, self.eta)
         reflects = u[2] < reflected

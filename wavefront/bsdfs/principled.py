@@ -16,10 +16,11 @@ from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
 from .albedo import gloss_tables, lookup
-from .base import BsdfSample, JointBsdf, weigh
+from .base import BsdfSample, weigh
 from .dielectric import LEAST_BEND
 from .fresnel import fresnel_dielectric
-from .microfacet import alpha_of, mirror_lobe, reflect, refract, refraction_lobe, visible_normals
+from .microfacet import Facets, alpha_of, reflect, refract
+from .rough import RoughBsdf
 from .sheen import sheen_albedo, sheen_lobe
 
 COAT_F0 = 0.04
@@ -34,7 +35,7 @@ class Chances(NamedTuple):
     diffuse: Floats  # cosine-weighted
 
 
-class Principled(JointBsdf):
+class Principled(RoughBsdf):
     """The principled material: metal, plastic, glass, cloth and varnish by a few intuitive parameters.
 
     With only `base_color`, `metallic` and `roughness` this is the metallic-roughness material of
@@ -57,6 +58,8 @@ class Principled(JointBsdf):
         From 0 (dielectric) to 1 (metal).
     roughness
         In [0, 1]; α = roughness², at least 0.001: it has no delta lobe.
+    roughness_v, rotation
+        As for `Conductor`: roughness across, and the direction of both.
     ior
         Refractive index, from 1e-6 to 1e6; where light is transmitted at least 0.001 away from 1.
     transmission
@@ -90,7 +93,6 @@ class Principled(JointBsdf):
 
     base_color = Parameter(color)
     metallic = Parameter(scalar)
-    roughness = Parameter(scalar)
     ior = Parameter(refractive_index)
     transmission = Parameter(scalar)
     clearcoat = Parameter(scalar)
@@ -110,6 +112,8 @@ class Principled(JointBsdf):
         ior: Scalar = 1.5,
         transmission: Scalar = 0.0,
         *,
+        roughness_v: Scalar | None = None,
+        rotation: Scalar = 0.0,
         thin: bool = False,
         clearcoat: Scalar = 0.0,
         clearcoat_roughness: Scalar = 0.03,
@@ -122,7 +126,7 @@ class Principled(JointBsdf):
     ) -> None:
         self.base_color = base_color
         self.metallic = metallic
-        self.roughness = roughness
+        self._set_facets(roughness, roughness_v, rotation, "ggx", "correlated")
         self.ior = ior
         self.transmission = transmission
         self.thin = thin
@@ -138,6 +142,7 @@ class Principled(JointBsdf):
 
     def derive(self) -> None:
         """Set which lobes exist."""
+        self._set_tangent()
         self.transmissive = _used(self.transmission)
         self._coated = _used(self.clearcoat)
         self._cloth = _used(self.sheen)
@@ -153,7 +158,7 @@ class Principled(JointBsdf):
     def albedo(self, wo: Floats) -> Floats:
         """Return about the albedo of all lobes, layered as in `evaluate`."""
         low, high, _, _ = gloss_tables()
-        at_f0, at_f90 = (lookup(table, self.roughness, wo[2]) for table in (low, high))
+        at_f0, at_f90 = (lookup(table, self._mean_roughness(), wo[2]) for table in (low, high))
         gloss = self._dielectric(np.zeros(1, f4)) * at_f0 + self.specular_weight * at_f90
         metal = self.base_color * at_f0 + at_f90
         albedo = gloss + self.base_color * (f4(1) - gloss.max(0))
@@ -177,7 +182,7 @@ class Principled(JointBsdf):
         if self._cloth:
             f = self._under_sheen(wo, wi) * f + self._sheen(wo, wi)
         if self._coated:
-            value, density, cos = mirror_lobe(wo, wi, alpha_of(self.clearcoat_roughness))
+            value, density, cos = Facets(alpha_of(self.clearcoat_roughness)).mirror_lobe(wo, wi)
             through = self._through_coat(wo[2]) * self._through_coat(np.abs(wi[2]))
             f = f * through + value * self.clearcoat * _schlick(COAT_F0, cos)
             pdf = pdf + chances.coat * density
@@ -188,10 +193,12 @@ class Principled(JointBsdf):
         gloss, glass, coat, _ = self._chances(wo)
         facet = gloss + glass
         coated = (u[2] >= facet) & (u[2] < facet + coat)
-        alpha = alpha_of(self.roughness)
+        facets = self.facets()
         if self._coated:
-            alpha = np.where(coated, alpha_of(self.clearcoat_roughness), alpha)
-        m = visible_normals(wo, alpha, u)
+            alpha, across, varnish = facets.alpha, facets.alpha_v, alpha_of(self.clearcoat_roughness)
+            across = None if across is None else np.where(coated, varnish, across)
+            facets = facets._replace(alpha=np.where(coated, varnish, alpha), alpha_v=across)
+        m = facets.visible_normals(wo, u)
         wi = np.where(u[2] < facet + coat, reflect(wo, m), cosine_hemisphere(u))
         crosses = np.zeros(wo.shape[1], np.bool_)
         eta = None
@@ -208,8 +215,8 @@ class Principled(JointBsdf):
 
     def _base(self, wo: Floats, wi: Floats, chances: Chances) -> tuple[Floats, Floats]:
         """Metal, diffuse base, gloss and glass: value (3, n) and their part of the density (n,)."""
-        alpha = alpha_of(self.roughness)
-        value, density, cos = mirror_lobe(wo, wi, alpha)
+        facets = self.facets()
+        value, density, cos = facets.mirror_lobe(wo, wi)
         opaque = (f4(1) - self.metallic) * (f4(1) - self.transmission)
         weight = _fifth(cos)
         gloss = self._dielectric(weight)
@@ -222,16 +229,16 @@ class Principled(JointBsdf):
             return f, pdf
         clear = (f4(1) - self.metallic) * self.transmission
         reflected, _ = self._fresnel(cos)
-        through, through_density = self._through(wo, wi, alpha)
+        through, through_density = self._through(wo, wi, facets)
         f = f + (value * reflected * clear) + self.base_color * (through * clear)
         return f, pdf + chances.glass * (density * reflected + through_density)
 
-    def _through(self, wo: Floats, wi: Floats, alpha: Floats) -> tuple[Floats, Floats]:
+    def _through(self, wo: Floats, wi: Floats, facets: Facets) -> tuple[Floats, Floats]:
         """Transmission with its Fresnel factor: value (n,) and density (n,)."""
         if self.thin:
-            value, density, cos = mirror_lobe(wo, wi * np.array([[1], [1], [-1]], f4), alpha)
+            value, density, cos = facets.mirror_lobe(wo, wi * np.array([[1], [1], [-1]], f4))
         else:
-            value, density, cos, _ = refraction_lobe(wo, wi, alpha, self._eta())
+            value, density, cos, _ = facets.refraction_lobe(wo, wi, self._eta())
         passed = f4(1) - self._fresnel(cos)[0]
         return value * passed, density * passed
 
@@ -267,11 +274,16 @@ class Principled(JointBsdf):
         a, b, mean_a, mean_b = gloss_tables()
         f0 = self._dielectric(np.zeros(1, f4)).max(0)
         f90 = self.specular_weight
+        roughness = self._mean_roughness()
         passed = [
-            f4(1) - f0 * lookup(first, self.roughness, cos) - f90 * lookup(second, self.roughness, cos)
+            f4(1) - f0 * lookup(first, roughness, cos) - f90 * lookup(second, roughness, cos)
             for first, second, cos in ((a, b, wo[2]), (a, b, np.abs(wi[2])), (mean_a, mean_b, wo[2]))
         ]
         return passed[0] * passed[1] / np.maximum(passed[2], f4(1e-3))
+
+    def _mean_roughness(self) -> Floats:
+        """Return a roughness whose gloss has about the albedo of this one."""
+        return self.roughness if self.roughness_v is None else np.sqrt(self.roughness * self.roughness_v)
 
     def _dielectric(self, weight: Floats) -> Floats:
         """Schlick's reflectance of the opaque dielectric, (3, n), at weight = (1 − cosθ)⁵."""

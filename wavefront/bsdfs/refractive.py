@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from ..core.parameter import Parameter
 from ..core.suggestions import suggests_keywords
-from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
-from .base import JointBsdf
+from ..textures.parameter import Color, Scalar, color, refractive_index
+from .rough import Distribution, RoughBsdf, Shadowing
 
 
-class RefractiveBsdf(JointBsdf):
+class RefractiveBsdf(RoughBsdf):
     """A BSDF of a refractive index, a roughness, and tints of the reflected and the transmitted light."""
 
     transmissive = True
     dimensions = 3
 
     ior = Parameter(refractive_index)
-    roughness = Parameter(scalar)
     reflectance = Parameter(color)
     transmittance = Parameter(color)
 
@@ -27,9 +26,13 @@ class RefractiveBsdf(JointBsdf):
         *,
         reflectance: Color = 1.0,
         transmittance: Color = 1.0,
+        roughness_v: Scalar | None = None,
+        rotation: Scalar = 0.0,
+        distribution: Distribution = "ggx",
+        shadowing: Shadowing = "correlated",
     ) -> None:
         self.ior = ior
-        self.roughness = roughness
+        self._set_facets(roughness, roughness_v, rotation, distribution, shadowing)
         self.reflectance = reflectance
         self.transmittance = transmittance
         self.derive()

@@ -7,7 +7,7 @@ import numpy as np
 from ..arrays.vec import Floats, dot, f4
 from .base import BsdfSample, weigh
 from .fresnel import fresnel_dielectric
-from .microfacet import alpha_of, is_smooth, mirror_lobe, reflect, visible_normals
+from .microfacet import reflect
 from .mirror import mirrored
 from .refractive import RefractiveBsdf
 
@@ -24,9 +24,11 @@ class ThinDielectric(RefractiveBsdf):
     ior
         Refractive index of the material relative to what surrounds it, from 1e-6 to 1e6.
     roughness
-        In [0, 1]; α = roughness² (GGX). Below α = 0.001 it is perfectly smooth.
+        In [0, 1]; α = roughness². Below α = 0.001 it is perfectly smooth.
     reflectance, transmittance
         Tints of the reflected and of the transmitted light per channel, in [0, 1].
+    roughness_v, rotation, distribution, shadowing
+        As for `Conductor`.
 
     Raises
     ------
@@ -38,10 +40,6 @@ class ThinDielectric(RefractiveBsdf):
     >>> pane = wf.Rectangle((-1, 0, 0), (2, 0, 0), (0, 2, 0), material=wf.ThinDielectric(1.5))
     """
 
-    def derive(self) -> None:
-        """Set `specular` from the roughness."""
-        self.specular = is_smooth(self.roughness)
-
     def albedo(self, wo: Floats) -> Floats:
         """Return the tints of both sides, weighed by the reflectance of a smooth sheet."""
         return self.transmittance + (self.reflectance - self.transmittance) * self._reflected(wo[2])
@@ -52,7 +50,7 @@ class ThinDielectric(RefractiveBsdf):
             return np.zeros_like(wi), np.zeros_like(wi[2])
         upper = wi.copy()
         upper[2] = np.abs(wi[2])
-        value, density, cos = mirror_lobe(wo, upper, alpha_of(self.roughness))
+        value, density, cos = self.facets().mirror_lobe(wo, upper)
         reflected = self._reflected(cos)
         above = wi[2] > 0
         part = np.where(above, reflected, f4(1) - reflected)
@@ -63,7 +61,7 @@ class ThinDielectric(RefractiveBsdf):
         if self.specular:
             wi, cos = mirrored(wo), wo[2]
         else:
-            m = visible_normals(wo, alpha_of(self.roughness), u)
+            m = self.facets().visible_normals(wo, u)
             wi, cos = reflect(wo, m), np.maximum(dot(wo, m), f4(0))
         reflected = self._reflected(cos)
         reflects = u[2] < reflected

@@ -130,9 +130,13 @@ def _surface(wo: Floats, back_facing: Bools) -> SurfaceInteraction:
     zero, uv = np.zeros(n, f4), np.repeat(np.array([[0.3], [0.6]], f4), n, 1)
     color = np.repeat(np.array([[0.8], [0.5], [0.3], [0.6]], f4), n, 1)
     index = np.zeros(n, np.intp)
-    return SurfaceInteraction(
+    surface = SurfaceInteraction(
         np.zeros((3, n), f4), zero, normal, normal, wo, index, index, back_facing, uv, uv, color
     )
+    frame = np.zeros((6, n), f4)  # the back is seen after a turn by 180° about the tangent
+    frame[0], frame[4] = 1, np.where(back_facing, f4(-1), f4(1))
+    surface.tangent_frame = surface.tangent_frame1 = frame
+    return surface
 
 
 def _check_view(

@@ -1,0 +1,219 @@
+"""Plastics: a matte base below a clear boundary, between which light goes back and forth."""
+
+from __future__ import annotations
+
+from functools import cache, partial
+
+import numpy as np
+
+from ..arrays.vec import INV_PI, Doubles, Floats, dot, f4
+from ..core.errors import number
+from ..core.parameter import Parameter
+from ..core.suggestions import suggests_keywords
+from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
+from ..textures.base import BaseTexture
+from ..textures.parameter import MAX_INDEX, Color, Scalar, color
+from .base import BsdfSample, weigh
+from .fresnel import fresnel_dielectric
+from .microfacet import Facets, alpha_of, reflect, refract
+from .mirror import mirrored
+from .rough import Distribution, RoughBsdf, Shadowing
+
+COSINES = 64  # columns of a table: cosines in [0, 1]
+ROWS = 21  # rows of a table for textures: roughnesses in [0, 1]
+
+
+class Plastic(RoughBsdf):
+    """A plastic, by its physics: a smooth or rough clear boundary over a matte base.
+
+    Light that gets through the boundary is scattered by the base, and part of it is reflected back to the
+    base by the boundary, again and again. It is the model of Mitsuba's `plastic` and `roughplastic`. A smooth
+    plastic with `reflectance` 1 reflects all light.
+
+    Parameters
+    ----------
+    reflectance
+        Albedo of the base per channel, in [0, 1]: a number, three numbers, or a texture.
+    roughness
+        Of the boundary, in [0, 1]; α = roughness². Below α = 0.001 it is perfectly smooth.
+    ior
+        Refractive index of the inside relative to the outside, a number from 1e-6 to 1e6.
+    specular_reflectance
+        Tint of what the boundary reflects, per channel, in [0, 1]. 1 is physical.
+    nonlinear
+        The base colors light at each of its reflections, so that colors become more saturated. False: once.
+    distribution, shadowing
+        As for `Conductor`.
+
+    Raises
+    ------
+    SceneError
+        If a parameter is out of its range or not finite.
+
+    Examples
+    --------
+    >>> toy = wf.Plastic((0.8, 0.1, 0.1))
+    >>> worn = wf.Plastic((0.8, 0.1, 0.1), roughness=0.4, nonlinear=True)
+    """
+
+    dimensions = 3
+
+    reflectance = Parameter(color)
+    ior = Parameter(
+        partial(
+            number,
+            holds=lambda x: 1 / MAX_INDEX <= x <= MAX_INDEX,
+            limit=f"more than 0, from {1 / MAX_INDEX:g} to {MAX_INDEX:g}",
+        )
+    )
+    specular_reflectance = Parameter(color)
+
+    @suggests_keywords
+    def __init__(
+        self,
+        reflectance: Color = 0.5,
+        roughness: Scalar = 0.0,
+        ior: float = 1.5,
+        *,
+        specular_reflectance: Color = 1.0,
+        nonlinear: bool = False,
+        distribution: Distribution = "ggx",
+        shadowing: Shadowing = "correlated",
+    ) -> None:
+        self.reflectance = reflectance
+        self._set_facets(roughness, None, 0.0, distribution, shadowing)
+        self.ior = ior
+        self.specular_reflectance = specular_reflectance
+        self.nonlinear = nonlinear
+        self.derive()
+
+    def derive(self) -> None:
+        """Set whether the boundary is smooth, and which table it has: one roughness, or None for all."""
+        super().derive()
+        self._smooth, self.specular = self.specular, False
+        self._one = None if isinstance(self.roughness, BaseTexture) else float(self.roughness[0])
+
+    def albedo(self, wo: Floats) -> Floats:
+        """Return about the albedo of boundary and base."""
+        through, inside = self._boundary(wo[2])
+        base = self._base(inside) * ((f4(1) - inside) * through)
+        return base + self.specular_reflectance * (f4(1) - through)
+
+    def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
+        """Return `f` and `pdf` of the base and, if it is rough, the boundary."""
+        above = wi[2] > 0
+        through, inside = self._boundary(wo[2])
+        back, _ = self._boundary(np.maximum(wi[2], f4(0)))
+        index = np.full(1, self.ior, f4)
+        scale = np.where(above, INV_PI / (index * index), f4(0))
+        f = self._base(inside) * (through * back * scale)
+        chance = self._chance(through)
+        pdf = cosine_hemisphere_pdf(wi) * (f4(1) - chance)
+        if self._smooth:
+            return f, pdf
+        value, density, cos = self.facets().mirror_lobe(wo, wi)
+        reflected, _ = fresnel_dielectric(cos, index)
+        return f + self.specular_reflectance * (value * reflected), pdf + density * chance
+
+    def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
+        """Reflect at the boundary, or scatter at the base, by u[2] and about what each reflects."""
+        through, _ = self._boundary(wo[2])
+        chance = self._chance(through)
+        glossy = u[2] < chance
+        wi = mirrored(wo) if self._smooth else reflect(wo, self.facets().visible_normals(wo, u))
+        wi = np.where(glossy, wi, cosine_hemisphere(u))
+        f, pdf = self.evaluate(wo, wi)
+        weight = weigh(f, wi, pdf)
+        if not self._smooth:
+            return BsdfSample(wi, weight, pdf, np.zeros(len(pdf), np.bool_))
+        part = (f4(1) - through) / np.where(chance > 0, chance, f4(1))
+        weight = np.where(glossy, self.specular_reflectance * part, weight)
+        return BsdfSample(wi, weight, np.where(glossy, chance, pdf), glossy)
+
+    def _base(self, inside: Floats) -> Floats:
+        """Albedo of the base with all reflections between it and the boundary, (3, n)."""
+        each = self.reflectance * inside if self.nonlinear else inside
+        return self.reflectance / (f4(1) - each)
+
+    def _chance(self, through: Floats) -> Floats:
+        """Probability of reflection at the boundary, (n,), as Mitsuba chooses it."""
+        gloss = _mean(self.specular_reflectance) * (f4(1) - through)
+        base = _mean(self.reflectance) * through
+        total = gloss + base
+        return gloss / np.where(total > 0, total, f4(1))
+
+    def _boundary(self, cos: Floats) -> tuple[Floats, Floats]:
+        """Part of light from outside that gets through, and of light inside that does not; (n,)."""
+        if self._smooth:
+            reflected, _ = fresnel_dielectric(cos, np.full(1, self.ior, f4))
+            return f4(1) - reflected, np.full(1, inner_reflectance(self.ior), f4)
+        shape = self.distribution == "beckmann", self.shadowing == "separable"
+        through, inside = boundary_tables(self.ior, self._one, *shape)
+        x = np.clip(cos, f4(0), f4(1)) * f4(COSINES - 1)
+        i = np.minimum(x.astype(np.intp), COSINES - 2)
+        x = x - i.astype(f4)
+        if self._one is not None:
+            return through[0].take(i) * (f4(1) - x) + through[0].take(i + 1) * x, inside
+        y = np.clip(self.roughness, f4(0), f4(1)) * f4(ROWS - 1)
+        j = np.minimum(y.astype(np.intp), ROWS - 2)
+        y, flat, corner = y - j.astype(f4), through.ravel(), j * COSINES + i
+        low = flat.take(corner) * (f4(1) - x) + flat.take(corner + 1) * x
+        high = flat.take(corner + COSINES) * (f4(1) - x) + flat.take(corner + COSINES + 1) * x
+        return low * (f4(1) - y) + high * y, inside.take(j) * (f4(1) - y) + inside.take(j + 1) * y
+
+
+def _mean(color: Floats) -> Floats:
+    return (color[0] + color[1] + color[2]) * f4(1 / 3)
+
+
+@cache
+def inner_reflectance(ior: float) -> float:
+    """Part of diffuse light inside a smooth boundary that it reflects: 1 − (1 − F)/η², by F outside."""
+    mu = (np.arange(4096) + 0.5) / 4096
+    outside = (2 * mu * fresnel_dielectric(mu, np.full(1, ior))[0]).mean()
+    return float(1 - (1 - outside) / ior**2)
+
+
+@cache
+def boundary_tables(
+    ior: float, roughness: float | None, beckmann: bool, separable: bool
+) -> tuple[Floats, Floats]:
+    """Return what gets in through rough boundaries (r, COSINES), and what they reflect inside (r,).
+
+    Rows are one roughness, or `ROWS` from 0 to 1. As in Mitsuba 3's `roughplastic`, a mean over diffuse light
+    is that of the columns, which makes the inner reflectance 1.5 % less than the integral.
+    """
+    rows = np.linspace(0, 1, ROWS) if roughness is None else np.array([roughness])
+    through, inside = [], []
+    for row in rows:
+        facets = Facets(alpha_of(np.full(1, row, f4)), None, None, beckmann, separable)
+        through.append(_directional(facets, ior, refracted=True))
+        reflected = _directional(facets, 1 / ior, refracted=False)
+        inside.append(2 * (np.linspace(0, 1, COSINES) * reflected).mean())
+    return np.array(through, np.float32), np.array(inside, np.float32)
+
+
+def _directional(facets: Facets, eta: float, refracted: bool) -> Doubles:
+    """Integrate single scattering by a boundary over the visible normals, for each cosine, (COSINES,)."""
+    (around, parts), (along, lengths) = (np.polynomial.legendre.leggauss(side) for side in (24, 48))
+    # half a turn stands for all of it
+    u = np.stack(np.meshgrid((around + 1) / 4, (along + 1) / 2)).reshape(2, -1).astype(f4)
+    weight = (lengths[:, None] * parts / 4).ravel()
+    out = np.zeros(COSINES)
+    for k, mu in enumerate(np.maximum(np.linspace(0, 1, COSINES), 1e-6)):
+        wo = np.repeat(np.array([[np.sqrt(1 - mu * mu)], [0], [mu]], f4), u.shape[1], 1)
+        m = facets.visible_normals(wo, u)
+        cos = np.maximum(dot(wo, m), f4(0))
+        index = np.full(1, eta, f4)
+        reflected, cos_refracted = fresnel_dielectric(cos, index)
+        if refracted:
+            wi = refract(wo, m, cos, cos_refracted, index)
+            value, pdf, _, _ = facets.refraction_lobe(wo, wi, index)
+            part = (f4(1) - reflected) * index * index
+        else:
+            wi, part = reflect(wo, m), reflected
+            value, pdf, _ = facets.mirror_lobe(wo, wi)
+        each = part * np.abs(wi[2]) * value / np.where(pdf > 0, pdf, f4(1))
+        # the sum of the second is about 1: what Beckmann's approximate masking is off
+        out[k] = (each * weight).sum(dtype=float) / (facets.visible_weight(wo, m) * weight).sum(dtype=float)
+    return out

@@ -1,0 +1,92 @@
+"""The parameters that surfaces of microfacets have in common."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from ..arrays.elementary import sin_cos_turns
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import Floats, dot, f4
+from ..core.errors import one_of
+from ..core.parameter import Parameter
+from ..textures.base import BaseTexture
+from ..textures.parameter import Scalar, scalar
+from .base import JointBsdf
+from .microfacet import Facets, alpha_of, is_smooth
+
+Distribution: TypeAlias = Literal["ggx", "beckmann"]
+Shadowing: TypeAlias = Literal["correlated", "separable"]
+
+
+def roughness_across(name: str, value: Scalar | None) -> Any:
+    """Return a roughness, or None where it is that along the tangent."""
+    return None if value is None else scalar(name, value)
+
+
+class Tangent(BaseTexture):
+    """The direction along which `roughness` counts: that of growing u, turned by degrees towards v."""
+
+    def __init__(self, rotation: Any) -> None:
+        self.rotation = rotation
+        self.reads = ("tangent_frame", *(rotation.reads if isinstance(rotation, BaseTexture) else ()))
+
+    def at(self, surface: SurfaceInteraction) -> Floats:
+        """Return cosine and sine of the local azimuth, (2, n); of the x axis without coordinates."""
+        n = len(surface)
+        along = np.zeros((3, n), f4) if surface.tangent_frame is None else surface.tangent_frame[:3]
+        x, y, _ = surface.frame().to_local(along)
+        size = np.sqrt(x * x + y * y)
+        known = size > 0
+        scale = f4(1) / np.where(known, size, f4(1))
+        x, y = np.where(known, x * scale, f4(1)), y * scale
+        turned = self.rotation.at(surface) if isinstance(self.rotation, BaseTexture) else self.rotation
+        sin, cos = sin_cos_turns(turned * f4(1 / 360))
+        if surface.tangent_frame is not None:  # v may run either way around the normal
+            frame = surface.tangent_frame
+            across = np.cross(frame[:3], frame[3:], axis=0)
+            sin = np.where(dot(across, surface.ns) < 0, -sin, sin)
+        return np.stack([x * cos - y * sin, y * cos + x * sin])
+
+
+class RoughBsdf(JointBsdf):
+    """A BSDF whose surface consists of microfacets."""
+
+    roughness = Parameter(scalar)
+    roughness_v = Parameter(roughness_across)
+    rotation = Parameter(partial(scalar, holds=np.isfinite, limit="finite"))
+    distribution = Parameter(partial(one_of, choices=("ggx", "beckmann")))
+    shadowing = Parameter(partial(one_of, choices=("correlated", "separable")))
+    tangent: Any = None
+
+    def _set_facets(
+        self,
+        roughness: Scalar,
+        roughness_v: Scalar | None,
+        rotation: Scalar,
+        distribution: Distribution,
+        shadowing: Shadowing,
+    ) -> None:
+        self.roughness = roughness
+        self.roughness_v = roughness_v
+        self.rotation = rotation
+        self.distribution = distribution
+        self.shadowing = shadowing
+
+    def derive(self) -> None:
+        """Set `specular` from the roughness, and what tells its direction."""
+        across = self.roughness if self.roughness_v is None else self.roughness_v
+        self.specular = is_smooth(self.roughness) and is_smooth(across)
+        self._set_tangent()
+
+    def _set_tangent(self) -> None:
+        self.tangent = None if self.roughness_v is None else Tangent(self.rotation)
+
+    def facets(self) -> Facets:
+        """Return the microfacets; unbound, their tangent is the x axis."""
+        across = None if self.roughness_v is None else alpha_of(self.roughness_v)
+        tangent = None if isinstance(self.tangent, BaseTexture) else self.tangent
+        beckmann, separable = self.distribution == "beckmann", self.shadowing == "separable"
+        return Facets(alpha_of(self.roughness), across, tangent, beckmann, separable)
