@@ -20,7 +20,7 @@ from wavefront.core.shared import SharedInt
 from wavefront.scheduling import pool
 from wavefront.session import prepared_scene
 from wavefront.session import session as module
-from wavefront.session.view_render import ViewRender
+from wavefront.session.camera_render import CameraRender
 
 LINUX = sys.platform.startswith("linux")
 needs_fork = pytest.mark.skipif(not LINUX, reason="needs fork")
@@ -245,7 +245,7 @@ def test_stop_before_there_is_a_picture() -> None:
 def test_drop_ends_a_render_without_a_picture(monkeypatch: pytest.MonkeyPatch) -> None:
     with wf.Session(everything(), 10_000_000, workers=2, wave_size=2000, **QUIET) as session:
         images = [next(session)]
-        monkeypatch.setattr(ViewRender, "last_image", None)  # is not called
+        monkeypatch.setattr(CameraRender, "last_image", None)  # is not called
         timer = threading.Timer(0.3, session.drop)
         timer.start()
         images.extend(session)

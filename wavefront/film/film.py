@@ -153,7 +153,7 @@ class Film(Sums):
             self.batches[half][:, lanes] = pair[0] + pair[1]
 
     def restore(self, arrays: Mapping[str, NDArray[Any]], prefix: str = "") -> None:
-        """Become the film of which `arrays` returned these, each after `prefix`; they are not copied."""
+        """Take the sums from what `arrays` returned, under names that begin with `prefix`; without a copy."""
         found = arrays.get(f"{prefix}dropped", NONE)
         self.dropped = np.zeros(self.count.size if found.size else 0, np.int32)
         super().restore(arrays, prefix)

@@ -31,6 +31,7 @@ from ..scheduling.loop import PassSplitter, doubling, undivided
 from ..scheduling.pool import WorkerPool
 from ..scheduling.tracing import WaveMonitor, trace_any_job
 from ..settings import RenderSettings, Settings, describes_settings, takes_settings
+from .camera_render import CameraRender
 from .final_checks import (
     LONG_PATH,
     check_last_image,
@@ -43,7 +44,6 @@ from .hints import Hints
 from .plan import make_plan, trained_guide, with_choice
 from .prepared_scene import PreparedScene
 from .sole_use import SoleUse
-from .view_render import ViewRender
 
 SNAPSHOT_INTERVAL = 1.0  # seconds between two pictures of a long pass
 
@@ -170,7 +170,7 @@ class Session:
 
     def _begin_picture(self, camera: Camera, accumulator: Accumulator, begin: float) -> None:
         """Get ready for a picture of a view; `begin` is when it was asked for, by `time.perf_counter`."""
-        self._render = ViewRender(self._plan, camera, accumulator, begin)
+        self._render = CameraRender(self._plan, camera, accumulator, begin)
         self._last_snapshot = begin
         self._ended = self._warned = False
 

@@ -1,4 +1,4 @@
-"""The render of one view of a scene."""
+"""The render of a scene as one camera sees it."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ from .plan import Plan
 from .resuming import CheckpointFile, render_identity
 
 
-class ViewRender:
-    """The render of one view: its loop, its picture so far, its AOVs and its checkpoint.
+class CameraRender:
+    """The render of one camera: its loop, its picture so far, its AOVs and its checkpoint.
 
     Parameters
     ----------
