@@ -64,9 +64,14 @@ def render(scene: wf.Scene, spp: int = 2, **settings: Any) -> wf.Image:
     return wf.render(scene, spp, **{"workers": 1, "executor": "threads", **settings})
 
 
-def test_branches_where_the_noise_is_in_indirect_light() -> None:
-    """The picture is that of the number that was chosen."""
-    assert chosen(many_lights((320, 320)), reuse=False).branches == 1
+def test_branches_where_the_noise_is_in_light() -> None:
+    """In direct light of many lights, or in indirect light; not where edges have it. The picture is that of
+    the number that was chosen."""
+    assert chosen(many_lights((320, 320)), reuse=False).branches > 1
+    ball = wf.Sphere((0, 0, 0), 1, material=wf.Diffuse(0.3))
+    sun = wf.DirectionalLight((1, -1, -1), 3)
+    camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), fov=40, size=(320, 320))
+    assert chosen(wf.Scene([ball], [sun], camera), reuse=False).branches == 1
     image = render(open_scene(SIZE), 1)
     found = image.metadata["branches"]
     assert found > 1

@@ -14,7 +14,7 @@ from ..arrays.vec import Floats, f4
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..sampling.sampler import Sampler
-from ..stages.bounce import bounce_sample, branch
+from ..stages.bounce import bounce_sample, branch, copies
 from ..stages.compact import alive, roulette, select, specular_lanes
 from ..stages.guidance import guide
 from ..stages.shade import direct
@@ -75,7 +75,8 @@ def li_full(
 ) -> Floats:
     """Estimate direct light by two samples at every bounce, and so all indirect light.
 
-    Each path splits into `branches` paths at its first surface. A `table` guides directions.
+    Each path splits into `branches` paths at its first surface, with a light sample for each. A `table`
+    guides directions.
     """
     L = np.zeros((3, len(paths)), f4)
     for bounce in range(max_bounces + 1):
@@ -83,7 +84,11 @@ def li_full(
         if bounce == max_bounces or not len(paths):
             break
         shade = guide(prepare_shading(scene, paths, hits), table)
-        accumulate(L, paths, direct(scene, paths, shade, sampler, bounce, mis=True))
-        paths = branch(paths, shade, sampler, bounce, ways=branches if bounce == 0 else 1)
+        ways = branches if bounce == 0 else 1
+        for each in copies(paths, ways):
+            found = direct(scene, each, shade, sampler, bounce, mis=True)
+            found.radiance *= f4(1 / ways)
+            accumulate(L, paths, found)
+        paths = branch(paths, shade, sampler, bounce, ways)
         paths = select(paths, roulette(scene, paths, sampler, bounce, branches))
     return L

@@ -342,9 +342,10 @@ class RenderSettings(TypedDict, total=False):
         Setting(
             AUTO,
             "The number of ways in which a path goes on from its first surface (splitting), at most 64; "
-            'only for "full". With two to four, a sample takes longer, but has less noise where most '
-            'noise is in indirect light, as in a room. "auto" finds out by a short tuning run whether '
-            "that pays: docs/choices.md tells how. Pictures of less than 192x192 pixels have one branch.",
+            'only for "full". Each has a light sample there. With two to four, a sample takes longer, but '
+            'has less noise where most noise is in light, not at edges. "auto" finds out by a short tuning '
+            "run whether that pays: docs/choices.md tells how. Pictures of less than 192x192 pixels have one "
+            "branch.",
             option="ways in which a path goes on from its first surface; auto: a tuning run finds what pays",
             check=auto_or(whole_number(1, MAX_BRANCHES)),
         ),
