@@ -13,6 +13,7 @@ import trimesh
 from gltf_builder import TRIANGLE, Builder
 
 from wavefront import Camera, Scene, render
+from wavefront.arrays.state import SurfaceInteraction
 from wavefront.bsdfs import Dielectric, Diffuse, ThinDielectric
 from wavefront.codecs.encoding import srgb_to_linear
 from wavefront.core.errors import SceneError
@@ -421,7 +422,7 @@ class Recorder(Diffuse):
     def __init__(
         self, base_color, metallic=0, roughness=0.5, ior=1.5, transmission=0, clearcoat=0,
         clearcoat_roughness=0, sheen_color=0, sheen_roughness=0, specular=1, specular_color=1,
-        sheen=0, anisotropy=0, thin=False,
+        sheen=0, anisotropy=0, thin=False, roughness_v=None, rotation=0,
     ):  # fmt: skip
         self.given = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
         super().__init__(0.5)
@@ -675,6 +676,45 @@ def test_textured_emission(given, build):
 def test_extensions(given, extension, expected):
     found = given(extensions=extension)
     assert {k: found[k] for k in expected} == expected
+
+
+def test_anisotropy(given):
+    """α along the tangent is mix(α, 1, strength²)."""
+    group = {"anisotropyStrength": 0.6, "anisotropyRotation": np.pi / 3}
+    found = given(
+        pbrMetallicRoughness={"roughnessFactor": 0.5}, extensions={"KHR_materials_anisotropy": group}
+    )
+    assert found["roughness"] ** 2 == pytest.approx(0.25 + 0.75 * 0.36)
+    assert (found["roughness_v"], found["rotation"]) == (0.5, pytest.approx(60))
+    assert given(extensions={"KHR_materials_anisotropy": {}})["roughness_v"] is None
+
+
+def test_anisotropy_of_a_texture(given, build):
+    """Red and green are a direction in [-1, 1], blue is multiplied by the strength."""
+    info = build.image(np.uint8([[[0, 255, 102]]]))
+    group = {"anisotropyStrength": 0.5, "anisotropyRotation": np.pi / 2, "anisotropyTexture": info}
+    found = given(
+        pbrMetallicRoughness={"roughnessFactor": 0.5}, extensions={"KHR_materials_anisotropy": group}
+    )
+    one = np.zeros((3, 1), np.float32)
+    lane = np.zeros(1, np.intp)
+    surface = SurfaceInteraction(one, one[0], one, one, one, lane, lane, one[0] > 0, uv=one[:2] + 0.5)
+    assert found["rotation"].at(surface) == pytest.approx([225])
+    assert found["roughness"].at(surface) ** 2 == pytest.approx([0.25 + 0.75 * 0.04], rel=1e-6)
+    assert found["roughness_v"] == 0.5
+
+
+def test_brushed_glass(build, path):
+    extensions = {
+        "KHR_materials_transmission": {"transmissionFactor": 1},
+        "KHR_materials_anisotropy": {"anisotropyStrength": 1},
+    }
+    build.material(pbrMetallicRoughness={"metallicFactor": 0}, extensions=extensions).gltf(path)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", ".*lacks? the texture coordinates")
+        (mesh,) = load_meshes(path)
+    assert type(mesh.material.bsdf) is ThinDielectric
+    assert mesh.material.bsdf.roughness_v == 1
 
 
 @pytest.mark.parametrize(
@@ -985,7 +1025,7 @@ def lose_of_material(named, **material):
             "clearcoatNormalTexture",
             extensions={"KHR_materials_clearcoat": {"clearcoatFactor": 1, "clearcoatNormalTexture": "image"}},
         ),
-        lose_of_material("KHR_materials_anisotropy", extensions={"KHR_materials_anisotropy": {}}),
+        lose_of_material("KHR_materials_unlit", extensions={"KHR_materials_unlit": {}}),
         (lose_scene, r"further scenes \(the file\)"),
         (lose_extension, r"KHR_materials_iridescence \(the file\)"),
     ],

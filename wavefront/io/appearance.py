@@ -22,7 +22,7 @@ from .repair import RawMesh, Table
 
 PARAMETERS = frozenset(inspect.signature(Principled).parameters)
 BASES: dict[type[Bsdf], str] = {Diffuse: "reflectance", Principled: "base_color"}
-GLASS = frozenset(("base_color", "transmission", "ior", "roughness", "thin"))
+GLASS = frozenset(("base_color", "transmission", "ior", "roughness", "roughness_v", "rotation", "thin"))
 
 
 @dataclass
@@ -116,9 +116,9 @@ def _build_bsdf(wanted: dict[str, Any]) -> tuple[Bsdf, list[str]]:
 
 def _glass(known: dict[str, Any]) -> Bsdf:
     ior, roughness, tint = known.get("ior", 1.5), known.get("roughness", 0.5), known["base_color"]
-    if known.get("thin"):
-        return ThinDielectric(ior, roughness, transmittance=tint)
-    return Dielectric(ior, roughness, transmittance=tint)
+    kind = ThinDielectric if known.get("thin") else Dielectric
+    across = {name: known[name] for name in ("roughness_v", "rotation") if name in known}
+    return kind(ior, roughness, transmittance=tint, **across)
 
 
 def from_srgb(colors: Table) -> Table:

@@ -18,6 +18,7 @@ from ..textures.image import Texture
 from ..textures.normal_map import NormalMap
 from ..textures.parameter import MAX_INDEX
 from .appearance import MaterialSpec, build_material
+from .gltf_anisotropy import Direction, RoughnessAlong
 from .gltf_document import SHOWN, Document, floats, shown
 from .gltf_specular_glossiness import F0, BesideSpecular
 
@@ -28,6 +29,7 @@ KNOWN = frozenset(
     "KHR_" + name
     for name in (
         "lights_punctual",
+        "materials_anisotropy",
         "materials_clearcoat",
         "materials_emissive_strength",
         "materials_ior",
@@ -174,6 +176,7 @@ class _Reader:
         )
         self._clearcoat(extensions.get("KHR_materials_clearcoat"))
         self._sheen(extensions.get("KHR_materials_sheen"))
+        self._anisotropy(extensions.get("KHR_materials_anisotropy"))
         self._specular(extensions.get("KHR_materials_specular"))
         self._volume(extensions.get("KHR_materials_volume"))
         self._lost += [name for name in extensions if name not in KNOWN]
@@ -305,6 +308,23 @@ class _Reader:
         self._wanted["clearcoat_roughness"] = rough
         if "clearcoatNormalTexture" in group:
             self._lost.append("clearcoatNormalTexture")
+
+    def _anisotropy(self, group: dict[str, Any] | None) -> None:
+        if group is None:
+            return
+        strength = self._scalar(group, "anisotropyStrength", "anisotropyTexture", 2, 0.0)
+        if not isinstance(strength, Texture) and strength == 0:
+            return
+        where = f"{self._file}: {self._where}.anisotropyRotation"
+        degrees = np.degrees(floats(where, [group.get("anisotropyRotation", 0.0)], 1)[0])
+        vectors = self._texture(group, "anisotropyTexture", srgb=False)
+        across = self._wanted["roughness"]
+        self._wanted["roughness_v"] = across
+        self._wanted["rotation"] = float(degrees) if vectors is None else Direction(vectors, degrees)
+        if isinstance(across, Texture) or isinstance(strength, Texture):
+            self._wanted["roughness"] = RoughnessAlong(across, strength)
+        else:
+            self._wanted["roughness"] = float(np.sqrt(across**2 + (1 - across**2) * strength**2))
 
     def _sheen(self, group: dict[str, Any] | None) -> None:
         if group is None:
