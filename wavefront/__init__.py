@@ -19,6 +19,7 @@ from .bsdfs import (
     Plastic,
     Principled,
     ShadowCatcher,
+    Sides,
     ThinDielectric,
 )
 from .camera import Camera
@@ -167,6 +168,7 @@ __all__ = [
     "Session",
     "ShadowCatcher",
     "Shape",
+    "Sides",
     "Sphere",
     "Spheres",
     "SpotLight",

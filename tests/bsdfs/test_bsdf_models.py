@@ -17,6 +17,7 @@ from wavefront.bsdfs import (
     OrenNayar,
     Plastic,
     Principled,
+    Sides,
     ThinDielectric,
 )
 from wavefront.bsdfs.microfacet import Facets
@@ -322,6 +323,10 @@ RANDOM = {
 }
 
 
+RANDOM[Sides] = lambda rng, roughness: Sides(
+    RANDOM[rng.choice([Diffuse, Mirror, Conductor])](rng, roughness),
+    rng.choice([None, RANDOM[rng.choice([OrenNayar, Plastic])](rng, roughness)]),
+)
 # with the roughnesses of each; None is a random one, and the others have none
 KINDS = [(kind, r) for kind in ALL for r in ([None] if kind in (Diffuse, Mirror) else ROUGHNESS)]
 

@@ -14,6 +14,7 @@ from wavefront.bsdfs import (
     OrenNayar,
     Plastic,
     Principled,
+    Sides,
     ThinDielectric,
 )
 from wavefront.core.errors import SceneError
@@ -78,6 +79,11 @@ EXAMPLES = {
             "specular_color": (1, 0.9, 0.2),
         },
         {"base_color": 1.0, "roughness": 0.3, "roughness_v": 0.6, "clearcoat": 0.5, "transmission": 0.5},
+    ],
+    Sides: [
+        {"front": Diffuse((0.9, 0.5, 0.1))},
+        {"front": Conductor(2, 4, 0.5), "back": Mirror(0.8)},
+        {"front": Mirror(), "back": Conductor(2, 4)},
     ],
     Mix: [
         {"first": Diffuse(0.8), "second": Mirror(0.9), "weight": 0.3},
@@ -281,9 +287,14 @@ BAD = {
         },
         **{name: [-1] for name in ("roughness", "sheen", "sheen_roughness", "specular")},
     },
+    Sides: {"front": [(None, "Bsdf such as"), (Dielectric(), "not cross")], "back": [(0.5, "not cross")]},
     Mix: {"weight": [1.5], "first": [(None, "Bsdf such as")], "second": [(0.5, "Bsdf such as")]},
 }
-GOOD = {Conductor: {"eta": 1, "k": 1}, Mix: {"first": Diffuse(), "second": Diffuse()}}
+GOOD = {
+    Conductor: {"eta": 1, "k": 1},
+    Mix: {"first": Diffuse(), "second": Diffuse()},
+    Sides: {"front": Diffuse()},
+}
 
 
 @pytest.mark.parametrize("kind", BAD, ids=lambda kind: kind.__name__)
@@ -298,6 +309,28 @@ def test_bad_parameters_are_named(kind):
                 kind(**{**GOOD.get(kind, {}), name: value})
             assert part in str(caught.value)
             assert not isinstance(value, int | float) or f"{value:g}" in str(caught.value)
+
+
+def test_sides():
+    """Each side has its BSDF, and the back none by default."""
+    wo, wi = directions(500), directions(500, 2)
+    behind = np.arange(500) % 2 == 0
+    at = surface(wo)
+    at.back_facing = behind
+    metal, matte = Conductor(2, 4, 0.5), OrenNayar((0.2, 0.5, 0.7))
+    both, one = Sides(metal, matte).bind(at), Sides(metal).bind(at)
+    u = uniforms(both, 500)
+    for bsdf, other in ((both, matte), (one, None)):
+        f, pdf = metal.evaluate(wo, wi)
+        weight = metal.sample_f(wo, u).weight
+        other_f, other_pdf = (0, 0) if other is None else other.evaluate(wo, wi)
+        other_weight = 0 if other is None else other.sample_f(wo, u).weight
+        np.testing.assert_array_equal(bsdf.f(wo, wi), np.where(behind, other_f, f))
+        np.testing.assert_array_equal(bsdf.pdf(wo, wi), np.where(behind, other_pdf, pdf))
+        np.testing.assert_array_equal(bsdf.sample_f(wo, u).weight, np.where(behind, other_weight, weight))
+    assert (one.albedo(wo)[:, behind] == 0).all()
+    assert not both.specular
+    assert Sides(Mirror()).specular
 
 
 def test_bad_combinations_are_named():

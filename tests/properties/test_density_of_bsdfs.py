@@ -25,6 +25,7 @@ from wavefront.bsdfs import (
     Plastic,
     Principled,
     ShadowCatcher,
+    Sides,
     ThinDielectric,
 )
 from wavefront.bsdfs.microfacet import Facets, alpha_of
@@ -88,6 +89,7 @@ KINDS = {
         specular=st.floats(0, 1),
     ),
     ByValue: st.builds(ByValue, part),
+    Sides: st.builds(Sides, MATTE, st.none() | st.builds(Mirror, color)),
     Mix: st.builds(Mix, MATTE, SHINY | st.builds(Mirror, color), st.floats(0.1, 0.9)),
 }
 kinds = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)

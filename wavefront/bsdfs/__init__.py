@@ -10,9 +10,10 @@ from .oren_nayar import OrenNayar
 from .plastic import Plastic
 from .principled import Principled
 from .shadow_catcher import ShadowCatcher
+from .sides import Sides
 from .thin import ThinDielectric
 
-ALL = (Diffuse, Mirror, Dielectric, Conductor, OrenNayar, ThinDielectric, Plastic, Principled, Mix)
+ALL = (Diffuse, Mirror, Dielectric, Conductor, OrenNayar, ThinDielectric, Plastic, Principled, Mix, Sides)
 
 __all__ = [
     "ALL",
@@ -27,6 +28,7 @@ __all__ = [
     "Plastic",
     "Principled",
     "ShadowCatcher",
+    "Sides",
     "ThinDielectric",
     "albedo_of",
     "evaluated",
