@@ -1,9 +1,10 @@
-"""Relative MSE over time: this project beside Mitsuba 3 and Cycles, on three scenes and four hard ones.
+"""Relative MSE over time: this project beside Mitsuba 3 and Cycles, on five scenes and four hard ones.
 
 python benchmarks/error_vs_time.py [--scene NAME] [--bpy-python PATH] [--data DATA] [--out plot.png]
 
-Scenes: "cornell", "mesh" and "lights"; those of hard_scenes.py, which are "ceiling", "ajar", "window" and
-"corridor"; "hard" for these four, "all" for all. Sides: wavefront by each method of the scene, or by those
+Scenes: "cornell", "mesh", "studio", "hdri" and "lights"; those of hard_scenes.py, which are "ceiling",
+"ajar", "window" and "corridor"; "hard" for these four, "all" for all.
+Sides: wavefront by each method of the scene, or by those
 of --methods, in numpy and embree; Mitsuba `llvm_ad_rgb` and `scalar_rgb`, each with `independent` and
 `multijitter`; with `--bpy-python`, Cycles with its own path guiding on the box and the hard scenes, and with
 Open Image Denoise on the box. All draw the same shapes with as many bounces, a box filter and a worker per
@@ -54,6 +55,7 @@ from statistics import median
 from typing import Any
 
 import numpy as np
+from clean_scenes import FLOOR, SCENES, before, sky
 from hard_scenes import HARD_SCENES
 from many_lights import lit
 from references import References, relative_mse
@@ -119,6 +121,21 @@ def mesh_scene(data: Path | None, size: int) -> wf.Scene:
     ]
     camera = wf.Camera.look_at((0.6, 1.6, 4), (0.05, 0.5, 0), fov=35, size=(size, size))
     return wf.Scene(shapes, [wf.Environment((0.4, 0.45, 0.5))], camera)
+
+
+def hdri_scene(size: int) -> wf.Scene:
+    """Return a matte ball and a torus of rough gold on a floor, before a sky with a soft sun."""
+    import trimesh
+
+    torus = trimesh.creation.torus(0.5, 0.2)
+    flat = torus.vertices[:, [1, 2, 0]] + (0.75, 0.2, 0.3)  # its axis is upright
+    gold = wf.Conductor((0.143, 0.374, 1.442), (3.983, 2.386, 1.603), roughness=0.35)
+    shapes = [
+        FLOOR,
+        wf.Sphere((-0.7, 0.65, 0), 0.65, material=wf.Diffuse(0.7)),
+        wf.Mesh(flat, torus.faces, normals=torus.vertex_normals[:, [1, 2, 0]], material=gold, name="torus"),
+    ]
+    return before(size, shapes, sky())
 
 
 def ball(subdivisions: int) -> tuple[np.ndarray, np.ndarray]:
@@ -337,6 +354,8 @@ def subjects(options: argparse.Namespace) -> dict[str, Subject]:
     found = {
         "cornell": Subject(lambda: cornell_box(size), 7, spp, box, "reused", (GUIDED, DENOISED)),
         "mesh": Subject(lambda: mesh_scene(options.data, size), 7, spp, methods, "plain"),
+        "studio": Subject(partial(SCENES["mesh, studio"][0], size), 7, spp, methods, "plain"),
+        "hdri": Subject(lambda: hdri_scene(size), 7, spp, methods, "plain"),
         "lights": Subject(lambda: lit("panels", 1000, size), 3, spp, methods, "plain"),
     }
     for name, build in HARD_SCENES.items():
