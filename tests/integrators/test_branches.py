@@ -87,13 +87,13 @@ def test_noise_is_known_with_branches_too() -> None:
 
 
 def test_each_branch_has_a_light_sample() -> None:
-    """Direct light alone has less noise with branches."""
+    """Direct light alone has a quarter of the variance with four branches, where nothing else has noise."""
     panel = wf.Rectangle((-1, 2, -1), (2, 0, 0), (0, 0, 2), material=wf.Diffuse(0), emission=2)
     floor = wf.Rectangle((-2, 0, 2), (4, 0, 0), (0, 0, -4), material=wf.Diffuse(0.5))
     post = wf.Sphere((0, 0.6, 0), 0.4, material=wf.Diffuse(0.5))
-    camera = wf.Camera.look_at((0, 2, 4), (0, 0, 0), fov=30, size=(16, 16))
+    camera = wf.Camera.look_at((1, 0.5, 1.5), (0.5, 0, 0.6), fov=8, size=(8, 8))  # no edge in sight
     scene = wf.Scene([panel, floor, post], camera=camera)
     how = {"max_bounces": 1, "sampler": "independent", "reuse": False}
     one, four = (repeat(scene, 4, branches=branches, **how) for branches in (1, 4))
-    assert four.var(0).mean() < 0.45 * one.var(0).mean()
+    assert four.var(0).mean() < 0.3 * one.var(0).mean()
     assert_same_images(one, four, max_error=0.02)
