@@ -375,6 +375,7 @@ MUTATIONS: dict[str, Mutation] = {
     "gltf": mutate_gltf,
     "glb": mutate_glb,
     "dae": mutate_dae,
+    "xml": mutate_dae,
     "3mf": mutate_3mf,
     "png": mutate_png,
     "jpg": mutate_jpeg,
@@ -387,6 +388,6 @@ MUTATIONS: dict[str, Mutation] = {
 
 def mutate(name: str, data: bytes, random: Random) -> bytes:
     """Return a damaged version of a sound file, by the extension of its name."""
-    if name.startswith("text."):
+    if name.startswith("text.") or name.endswith(".serialized"):
         return mutate_tokens(data, random)
     return MUTATIONS[name.rpartition(".")[2]](data, random)

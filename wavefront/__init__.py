@@ -90,7 +90,7 @@ if TYPE_CHECKING:
     from .datasets import write_dataset
     from .image.comparison import Comparison, compare
     from .io.foreign import from_open3d, from_pyvista
-    from .io.load import from_trimesh, load, load_mesh
+    from .io.load import from_mitsuba, from_trimesh, load, load_mesh
     from .io.sources import LoadLimits
     from .viewer import Viewer, view
     from .views import render_many, turntable
@@ -104,7 +104,7 @@ _LATER = {  # what many programs do without is imported when they ask for it
     ".datasets": ("write_dataset",),
     ".image.comparison": ("Comparison", "compare"),
     ".io.foreign": ("from_open3d", "from_pyvista"),
-    ".io.load": ("from_trimesh", "load", "load_mesh"),
+    ".io.load": ("from_mitsuba", "from_trimesh", "load", "load_mesh"),
     ".io.sources": ("LoadLimits",),
     ".testing": ("testing",),
     ".viewer": ("Viewer", "view"),
@@ -178,6 +178,7 @@ __all__ = [
     "Viewer",
     "compare",
     "elementary",
+    "from_mitsuba",
     "from_open3d",
     "from_pyvista",
     "from_trimesh",

@@ -7,10 +7,12 @@ repeats a run, and leaves a file that fails as `fuzz-SEED-NUMBER-NAME` in the cu
 
 import os
 import random
+import struct
 import subprocess
 import sys
 import tempfile
 import warnings
+import zlib
 from collections import Counter
 from functools import partial
 from pathlib import Path
@@ -26,16 +28,39 @@ from wavefront.codecs.image_data import ImageData
 from wavefront.codecs.images import read_image, read_picture, write_image
 from wavefront.core.errors import SceneError
 from wavefront.io.load import load
-from wavefront.shapes import Spheres
+from wavefront.shapes import Cylinders, Sphere, Spheres
 
 MEMORY = 3 << 30  # bytes
 SECONDS = 25  # for one file
 WORDS = b'0|-1|nan|inf|99999999999|1e400|/|//|\\|#|"|[|{|null|\x00|\xff| |\n|property|f |v |true|-'.split(
     b"|"
 )
+SCENES = {"s.mtl": "m.obj", "ball.xml": "s.xml", "m.serialized": "s.xml"}  # which refer to these files
 NUMBERS = (b"\xff\xff\xff\xff", b"\0\0\0\0", b"\xff\xff\xff\x7f", b"\0\0\0\x80")
 OBJ = "mtllib s.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvn 0 0 1\nusemtl m\nf 1/1/1 2/2/1 3/1/1\n"
 OBJ += "f -3//1 2 1/1\n"
+XML = """<scene version="3.0.0"> <default name="r" value="2"/> <include filename="ball.xml"/>
+<integrator type="path"><integer name="max_depth" value="3"/></integrator>
+<sensor type="perspective"> <float name="fov" value="40"/> <transform name="to_world">
+<lookat origin="0 0 4" target="0 0 0" up="0 1 0"/> </transform> <film type="hdrfilm"> <integer name="width"
+value="8"/> <integer name="height" value="8"/> <rfilter type="tent"/> </film> <sampler type="independent">
+<integer name="sample_count" value="2"/> </sampler> </sensor>
+<emitter type="envmap"> <string name="filename" value="t.exr"/> <float name="scale" value="2"/> </emitter>
+<emitter type="spot"> <rgb name="intensity" value="1, 2, 3"/> <float name="cutoff_angle" value="30"/>
+</emitter>
+<texture type="bitmap" id="t"> <string name="filename" value="t.png"/> <transform name="to_uv">
+<scale x="2" y="2"/> </transform> </texture>
+<bsdf type="twosided" id="b"> <bsdf type="roughconductor"> <ref id="t" name="alpha"/> </bsdf> </bsdf>
+<shape type="shapegroup" id="g"> <shape type="ply"> <string name="filename" value="ball.ply"/> <ref id="b"/>
+</shape> </shape> <shape type="instance"> <ref id="g"/> <transform name="to_world"> <rotate y="1" angle="30"/>
+<translate value="1 2 3"/> </transform> </shape> <shape type="cylinder"> <emitter type="area"> <spectrum
+name="radiance" value="400:1, 700:2"/> </emitter> </shape> <shape type="serialized"> <string name="filename"
+value="m.serialized"/> </shape> </scene>"""
+BALL = """<scene version="0.6.0"> <shape type="sphere"> <float name="radius" value="$r"/>
+<transform name="toWorld"> <matrix value="1 0 0 1 0 1 0 2 0 0 1 3 0 0 0 1"/> </transform> <bsdf type="mask">
+<bsdf type="diffuse"> <texture type="checkerboard" name="diffuseReflectance"> <float name="uscale" value="2"/>
+</texture> </bsdf> </bsdf> </shape> <shape type="obj"> <string name="filename" value="m.obj"/> </shape>
+</scene>"""
 MTL = "newmtl m\nKd 1 1 1\nmap_Kd -s 1 1 1 t.png\nPr 0.3\nd 0.5\nKe 1 1 1\n"
 
 
@@ -48,6 +73,11 @@ def make_seeds(folder):
     (folder / "text.stl").write_text(trimesh.exchange.stl.export_stl_ascii(ball))
     (folder / "m.obj").write_text(OBJ)
     (folder / "s.mtl").write_text(MTL)
+    (folder / "s.xml").write_text(XML)
+    (folder / "ball.xml").write_text(BALL)
+    packed = struct.pack("<I5sQQ", 0x1001, b"part\0", 3, 1) + np.eye(3, dtype="<f4").tobytes() * 2
+    packed += np.array([0, 1, 2], "<u4").tobytes()
+    (folder / "m.serialized").write_bytes(struct.pack("<HH", 0x041C, 4) + zlib.compress(packed))
     build = Builder()
     info = build.image(np.zeros((4, 4, 3), np.uint8))
     build.material(
@@ -94,10 +124,13 @@ def attempt(folder, name):
         elif name.startswith("p."):
             assert read_picture(folder / name).rgb.shape[2] == 3
         else:
-            found = load(folder / ("m.obj" if name == "s.mtl" else name))
+            found = load(folder / SCENES.get(name, name))
             assert found.shapes
             for shape in found.shapes:
                 mesh = getattr(shape, "mesh", shape)
+                if isinstance(mesh, Sphere | Cylinders):
+                    assert np.isfinite(mesh.bounds).all()
+                    continue
                 if isinstance(mesh, Spheres):  # a file whose faces are damaged, not its points
                     assert np.isfinite(mesh.centers).all()
                     continue

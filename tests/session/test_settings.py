@@ -71,7 +71,8 @@ def test_options_follow_the_declaration() -> None:
             assert name not in found
             continue
         assert found[name].help == each.option
-        assert found[name].default == each.default
+        default = found[name].default
+        assert getattr(default, "value", default) == each.default
         assert found[name].choices is each.choices
         flag = each.flag or name
         negated = ["--no-" + flag] if name == "ground" else []

@@ -21,6 +21,7 @@ from ..shapes import Instance, Mesh, Shape
 from ..textures.base import BaseTexture
 from ..textures.image import Texture
 from .command import SCENE_FILE, add_command
+from .options import add_reading, reading
 
 _PACKAGE = BaseTexture.__module__.partition(".")[0] + "."
 
@@ -34,6 +35,7 @@ def add_info_command(commands: Any) -> None:
         ["wavefront info scene.glb"],
     )
     command.add_argument("scene", help=SCENE_FILE)
+    add_reading(command)
     command.add_argument("--quiet", action="store_true", help="do not say that a large file is being read")
     command.set_defaults(run=_info)
 
@@ -42,7 +44,7 @@ def _info(options: argparse.Namespace) -> int:
     """Say what a scene file holds; return the exit status."""
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always", UserWarning)
-        scene = load(options.scene, progress=False if options.quiet else None)
+        scene = load(options.scene, progress=False if options.quiet else None, **reading(options))
     for line in _lines(options.scene, scene, [str(each.message) for each in found]):
         print(line)
     return 0
@@ -61,6 +63,9 @@ def _lines(path: str, scene: Scene, messages: list[str]) -> Iterator[str]:
     camera, lit = scene.camera is not None, scene.emits
     yield f"up: {_axis(scene)}"
     yield f"camera: {'in the file' if camera else f'none; render frames the scene, view={FRAMING_VIEW!r}'}"
+    if scene.settings:
+        told = (f"{name} {value}" for name, value in scene.settings.items())
+        yield f"settings: {', '.join(told)}"
     if not lit:
         yield f"light: none; render adds lighting={DEFAULT!r}{'' if camera else ' and a ground'}"
     yield "shapes:"

@@ -7,6 +7,7 @@ other checks.
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -29,6 +30,17 @@ from ..settings.declaration import Setting
 from ..shapes.smoothing import check_smooth
 
 VECTORS = ("--origin", "--target", "--up", "--direction", "--view")
+
+
+class Default:
+    """The default of a setting, as against the same value that was given: a scene's own counts before it."""
+
+    def __init__(self, value: Any) -> None:
+        self.value = value
+
+    def __str__(self) -> str:
+        """Return the value as the help shows it."""
+        return str(self.value)
 
 
 class Several(argparse.Action):
@@ -216,7 +228,8 @@ DISPLAY_OPTIONS = ("gamma", "exposure", "tone", "white_balance")
 
 
 def add_settings(command: argparse.ArgumentParser) -> None:
-    """Add an option for each setting that has one."""
+    """Add an option for each setting that has one, and those of reading a scene."""
+    add_reading(command)
     for name, each in SETTINGS.items():
         if each.option:
             _add_setting(command, name, each)
@@ -227,18 +240,53 @@ def add_settings(command: argparse.ArgumentParser) -> None:
     )
 
 
+def add_reading(command: argparse.ArgumentParser) -> None:
+    """Add the options of reading a scene file."""
+    command.add_argument(
+        "-D",
+        "--define",
+        action=Several,
+        type=definition,
+        default=(),
+        metavar="NAME=VALUE",
+        help="parameter of a Mitsuba scene, $NAME; can be given several times",
+    )
+    command.add_argument(
+        "--search-path",
+        action=Several,
+        default=(),
+        metavar="FOLDER",
+        help="folder, beside its own, whose files the scene may refer to; can be given several times",
+    )
+
+
+def reading(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the options of reading a scene file, as arguments of `load`."""
+    folders = [os.path.join(getattr(options, "folder", None) or "", each) for each in options.search_path]
+    return {"parameters": dict(options.define), "search_paths": folders}
+
+
+def definition(text: str) -> tuple[str, str]:
+    """Return the name and the value of NAME=VALUE."""
+    name, equals, value = text.partition("=")
+    if not name or not equals:
+        raise SceneError(f"{text!r} is not NAME=VALUE, such as spp=64")
+    return name, value
+
+
 def read_scene(path: str, options: argparse.Namespace, progress: Progress) -> Scene:
     """Read a scene file, with the material that the options ask for in place of its own."""
     material: MaterialLike | None = options.material
     if options.color is not None:
         name = "matte" if options.material is None else options.material
         material = Material.named(name, options.color)
-    return as_scene(path, material, progress, options.smooth)
+    return as_scene(path, material, progress, options.smooth, reading=reading(options))
 
 
 def setting_values(options: argparse.Namespace) -> dict[str, Any]:
     """Return the settings that were given, but for those that the command line uses itself."""
-    return {name: getattr(options, name) for name in RENDER_OPTIONS}
+    values = {name: getattr(options, name) for name in RENDER_OPTIONS}
+    return {name: value for name, value in values.items() if not isinstance(value, Default)}
 
 
 def framing(options: argparse.Namespace) -> dict[str, Any]:
@@ -266,7 +314,11 @@ def display_values(options: argparse.Namespace) -> dict[str, Any]:
 
 def _add_setting(command: argparse.ArgumentParser, name: str, setting: Setting) -> None:
     """Add the option of a setting that has one."""
-    how: dict[str, Any] = {"help": setting.option, "default": setting.default}
+    own = name in (*OWN_OPTIONS, "up") or setting.default in (None, ())
+    how: dict[str, Any] = {
+        "help": setting.option,
+        "default": setting.default if own else Default(setting.default),
+    }
     flag = setting.flag or name
     if name in READERS:
         how["type"], how["metavar"] = READERS[name]

@@ -288,7 +288,7 @@ IMAGE_READERS: Registry[Decoder] = Registry(
     "extension",
     "a function of bytes that returns pixels (H, W, C)",
     {
-        **dict.fromkeys(coded.EXTENSIONS, coded.decode),
+        **dict.fromkeys((*coded.EXTENSIONS, ".bmp"), coded.decode),
         ".exr": exr.decode,
         ".hdr": rgbe.decode,
         ".npy": _decode_npy,

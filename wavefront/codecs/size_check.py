@@ -1,4 +1,4 @@
-"""Checks of the header of a png or jpg against the size of its data.
+"""Checks of the header of a png, jpg or bmp against the size of its data.
 
 Decoders silently pad a picture that ends early, so a damaged file would be accepted.
 Source of the formats: W3C, Portable Network Graphics (third edition), 2025, and ITU-T T.81.
@@ -6,6 +6,7 @@ Source of the formats: W3C, Portable Network Graphics (third edition), 2025, and
 
 from __future__ import annotations
 
+import struct
 import zlib
 from collections.abc import Iterable, Iterator
 
@@ -14,6 +15,7 @@ from .budget import Budget
 
 PNG = b"\x89PNG\r\n\x1a\n"
 JPG = b"\xff\xd8"
+BMP = b"BM"
 PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # by color type
 PALETTE = 3  # the color type of indices, which become up to four channels
 ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))
@@ -22,7 +24,7 @@ CHUNK = 2**18  # bytes that are inflated at once
 
 
 def check_header(data: bytes, budget: Budget) -> None:
-    """Check that a png or jpg can hold the picture that its header claims, before it is decoded.
+    """Check that a png, jpg or bmp can hold the picture that its header claims, before it is decoded.
 
     The memory for this check does not depend on the size that the header claims.
 
@@ -35,8 +37,24 @@ def check_header(data: bytes, budget: Budget) -> None:
         _check_png(data, budget)
     elif data.startswith(JPG):
         _check_jpg(data, budget)
+    elif data.startswith(BMP):
+        _check_bmp(data, budget)
     else:
         raise SceneError("not a readable png or jpg image: its header is damaged")
+
+
+def _check_bmp(data: bytes, budget: Budget) -> None:
+    if len(data) < 54:
+        raise SceneError("not a readable bmp image: its header is damaged")
+    width, height, _, bits, packed = struct.unpack_from("<iiHHI", data, 18)
+    width, height = abs(width), abs(height)
+    budget.check_size(height, width)
+    need = height * ((width * bits + 31) // 32 * 4)
+    if packed in (0, 3) and len(data) - 54 < need:
+        raise SceneError(
+            f"ends early: {width} × {height} pixels take {need} bytes; {len(data) - 54} are there"
+        )
+    budget.charge(f"a picture of {width} × {height} pixels", height * width * 4 * 2)
 
 
 def _check_png(data: bytes, budget: Budget) -> None:

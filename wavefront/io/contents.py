@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 from ..camera import Camera
 from ..lights import Light
@@ -23,6 +24,7 @@ class Contents:
     camera: Camera | None = None
     shapes: Sequence[Shape] = ()  # further ones, built already
     up: str | None = None  # the axis that is up by the format or the file; None where neither says
+    settings: Mapping[str, Any] = field(default_factory=dict)  # as of `Scene`
     flat: bool = False  # whether meshes without normals have flat facets by the format
 
     @classmethod

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -21,8 +21,8 @@ from ..shapes.smoothing import AUTO, check_smooth
 from . import trimesh_objects, trimesh_view
 from .joining import join
 from .placing import place_meshes, place_shapes
-from .readers import LoadOptions, read
-from .sources import LoadLimits, PathLike, checked_limits, folders
+from .readers import LoadOptions, mesh_reader, read
+from .sources import LoadLimits, PathLike, SceneFiles, checked_limits, folders
 
 T = TypeVar("T")
 
@@ -35,8 +35,9 @@ def load(
     limits: LoadLimits | None = None,
     search_paths: PathLike | Sequence[PathLike] = (),
     smooth: bool | float | str = AUTO,
+    parameters: Mapping[str, Any] | None = None,
 ) -> Scene:
-    """Read a scene: .obj (with its .mtl), .ply, .stl, .glb, .gltf, .off, .dae, .3mf.
+    """Read a scene: .obj (with its .mtl), .ply, .stl, .glb, .gltf, .off, .dae, .3mf, or .xml of Mitsuba 3.
 
     Points of .obj and .ply files without faces become `Spheres`, whose radius a warning states.
 
@@ -58,6 +59,8 @@ def load(
         Normals of the meshes. "auto" keeps those of the file, and computes missing ones by a crease angle of
         30°, but for glTF, whose facets are flat then. True, False or another crease angle in degrees, as of
         `Mesh`, replace those of the file.
+    parameters
+        Values of the parameters `$name` of an .xml file, in place of their defaults.
 
     Raises
     ------
@@ -78,11 +81,12 @@ def load(
             limits=checked_limits(limits),
             search_paths=folders(search_paths),
             smooth=check_smooth("smooth", smooth),
+            parameters=dict(parameters or {}),
         )
         name, contents = path_name(path), read(path, options)
         placed = place_shapes(name, contents.raws, contents.places, strict)
         shapes = _some(name, [*placed, *contents.shapes])
-        return Scene(shapes, contents.lights, contents.camera, up=contents.up)
+        return Scene(shapes, contents.lights, contents.camera, up=contents.up, settings=contents.settings)
 
 
 def load_mesh(
@@ -210,6 +214,46 @@ def from_trimesh(geometry: Any, *, smooth: bool | float | str = AUTO) -> Scene:
     scene = Scene(shapes, trimesh_view.lights(geometry), up=contents.up)
     trimesh_view.add_camera(scene, geometry)
     return scene
+
+
+def from_mitsuba(
+    scene: Mapping[str, Any], *, strict: bool = False, limits: LoadLimits | None = None
+) -> Scene:
+    """Convert a scene as `mi.load_dict` of Mitsuba 3 takes it; Mitsuba itself is not needed.
+
+    docs/mitsuba.md has a table of the plugins. What is not honored gives one warning, which names each plugin
+    and parameter. The film, the sampler and the integrator become the camera and the `settings` of the scene.
+
+    Parameters
+    ----------
+    scene
+        The dictionary, of type "scene". Transforms are arrays (4, 4), or objects of Mitsuba. Files that it
+        names may be anywhere; relative names are looked for in the current folder.
+    strict
+        Raise an error in place of the warning.
+    limits
+        As for `load`.
+
+    Raises
+    ------
+    SceneError
+        If it is malformed. The message names the plugin.
+
+    Examples
+    --------
+    >>> scene = wf.from_mitsuba({
+    ...     "type": "scene",
+    ...     "light": {"type": "constant", "radiance": 0.8},
+    ...     "ball": {"type": "sphere", "bsdf": {"type": "diffuse", "reflectance": 0.4}},
+    ... })
+    >>> scene.shapes[0]
+    <Sphere 'ball': center [0.0, 0.0, 0.0], radius 1>
+    """
+    from .mitsuba.convert import convert  # here, as programs that read no such scene need not pay for it
+
+    name = "Mitsuba scene"
+    files = SceneFiles(name, (), checked_limits(limits))
+    return convert(name, scene, files, Path, mesh_reader(files, strict), strict)
 
 
 def _some(name: str, shapes: list[T]) -> list[T]:

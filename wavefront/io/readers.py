@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from ..core.errors import SceneError
 from ..core.files import decode_text, extension_of
@@ -20,7 +20,7 @@ from .clouds import cloud, cloud_of_trimesh
 from .contents import Contents
 from .gltf_materials import GltfMaterials
 from .placing import Places
-from .repair import warn
+from .repair import RawMesh, warn
 from .sources import LoadLimits, PathLike, SceneFiles
 
 
@@ -33,6 +33,7 @@ class LoadOptions:
     limits: LoadLimits = field(default_factory=LoadLimits)
     search_paths: tuple[Path, ...] = ()  # folders whose files the file may refer to, beside its own
     smooth: bool | float | str = AUTO  # normals, as for `load`
+    parameters: Mapping[str, Any] = field(default_factory=dict)  # of the scene file, by name
 
 
 def read(path: PathLike, options: LoadOptions) -> Contents:
@@ -46,6 +47,8 @@ def read(path: PathLike, options: LoadOptions) -> Contents:
     name = os.fspath(path)
     kind = extension_of(name, READERS)
     parse = READERS.find(kind, f"{name}: extension")
+    if options.parameters and kind != ".xml":
+        raise SceneError(f"{name}: parameters are for .xml files")
     files = SceneFiles(path, options.search_paths, options.limits)
     data = files.read(path)
     if kind in PLAIN:
@@ -154,6 +157,41 @@ def _read_3mf(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
     return contents
 
 
+def _read_mitsuba(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
+    from .mitsuba.convert import convert  # here, as programs that read no such scene need not pay for it
+    from .mitsuba.document import Document
+
+    name = os.fspath(files.scene)
+    document = Document(files, data, options.parameters)
+    scene = convert(
+        name, document.scene, files, document.find, mesh_reader(files, options.strict), options.strict
+    )
+    return Contents([], Places.once(0), scene.lights, scene.camera, scene.shapes, settings=scene.settings)
+
+
+def mesh_reader(files: SceneFiles, strict: bool) -> Callable[[Path], list[RawMesh]]:
+    """Return a function that reads the meshes of an obj or ply file to which a scene refers."""
+
+    def read_meshes(path: Path) -> list[RawMesh]:
+        kind = path.suffix.lower()
+        if kind not in (".obj", ".ply"):
+            raise SceneError(f"{path}: extension is {kind!r}; it must be .obj or .ply")
+        own, name = files.seen_from(path), os.fspath(path)
+        data = own.read(path)
+        _refuse(name, data)
+        if kind == ".obj":
+            return _read_obj(own, data, LoadOptions(strict, materials=False, limits=files.limits)).raws
+        found, _ = ply.parse(own, data, strict, materials=False)
+        raws = trimesh_objects.read(found, name, strict).raws
+        for raw, mesh in zip(raws, found.geometry.values(), strict=False):
+            raw.attributes = ply_attributes(mesh.metadata.get("_ply_raw", {}))
+        return raws
+
+    from .mitsuba.attributes import ply_attributes
+
+    return read_meshes
+
+
 def _from_scene(load: Callable[[str, bytes], Scene]) -> Reader:
     """Return a reader that gives what `load`, a user's own function, makes of a file."""
 
@@ -180,7 +218,8 @@ READERS: Registry[Reader] = Registry(
         ".off": _read_off,
         ".dae": _read_dae,
         ".3mf": _read_3mf,
+        ".xml": _read_mitsuba,
     },
     adapt=_from_scene,
 )
-PLAIN = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off", ".dae")  # formats that are no archives
+PLAIN = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off", ".dae", ".xml")  # formats that are no archives

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -53,6 +53,7 @@ class RawMesh:
     emission: Color | None = None
     two_sided: bool = False  # the emission leaves both sides
     smooth: bool | float | str = False  # as of `Mesh`, where there are no normals
+    attributes: dict[str, Table] = field(default_factory=dict)  # (n or m, k) of scenes of Mitsuba, by name
 
 
 def with_face_colors(source: str, raw: RawMesh, colors: Table) -> RawMesh:

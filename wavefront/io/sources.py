@@ -41,7 +41,9 @@ class LoadLimits:
     meshes
         Meshes of a file, one for each of its materials or primitives, before they are placed.
     instances
-        Meshes that the nodes of a glTF file place.
+        Meshes that the nodes of a glTF file, or the instances of a Mitsuba scene, place.
+    includes
+        Files that a Mitsuba scene includes, each counted as often as it is included.
     unpacked_bytes
         Size of the unpacked members of a 3mf file, the only archive that is read.
     memory_bytes
@@ -69,6 +71,7 @@ class LoadLimits:
     triangles: int = MAX_TRIANGLES
     meshes: int = 2**17
     instances: int = 2**20
+    includes: int = 1024
     unpacked_bytes: int = 2**30
     memory_bytes: int = MEMORY_BYTES
 
@@ -154,6 +157,12 @@ class SceneFiles:
         if found is not None:
             check_regular(found, self.limits.file_bytes)
         return found or allowed[0]
+
+    def seen_from(self, path: PathLike) -> SceneFiles:
+        """Return the files that a file of the scene may read; the budget is that of the scene."""
+        files = SceneFiles(path, self.search_paths, self.limits)
+        object.__setattr__(files, "budget", self.budget)
+        return files
 
     def read(self, path: PathLike) -> bytes:
         """Return the content of a regular file of at most `limits.file_bytes`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from typing import Any
 
@@ -30,6 +30,7 @@ def as_scene(
     progress: Progress = None,
     smooth: bool | float | str = AUTO,
     within: tuple[int, ...] = (),
+    reading: Mapping[str, Any] | None = None,
 ) -> Scene:
     """Return what `render` was given as a `Scene`.
 
@@ -45,6 +46,8 @@ def as_scene(
         As for `render`.
     within
         The lists, by their ids, in which it is.
+    reading
+        Further arguments of `load`, where it is a path.
 
     Raises
     ------
@@ -66,7 +69,7 @@ def as_scene(
     if isinstance(subject, str | os.PathLike):
         from .load import load  # here, so that scenes in memory do not pay for readers
 
-        return _all_made_of(load(subject, progress=progress, smooth=smooth), material)
+        return _all_made_of(load(subject, progress=progress, smooth=smooth, **(reading or {})), material)
     convert = importer(subject)
     if convert is not None:
         return _all_made_of(convert(subject, smooth), material)
@@ -149,6 +152,7 @@ def _joined(
         [*lights, *(light for part in parts for light in part.lights)],
         cameras[0] if cameras else None,
         up=next((part.up for part in parts if part.up is not None), None),
+        settings=next((part.settings for part in parts if part.settings), None),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Self, SupportsIndex, TypeAlias, TypeVar
 
 import numpy as np
@@ -55,6 +55,9 @@ class Scene:
     up
         The up direction for that camera, for ready-made light and for the ground: (3,), or the name of an
         axis. None is y. `load` sets it to z for formats that have z up.
+    settings
+        Settings of `render` by name, such as `spp` and `max_bounces`: those of the scene's file. They count
+        where none are given for a render; `spp` not where `noise`, `seconds` or `samples` is given.
 
     Notes
     -----
@@ -84,11 +87,13 @@ class Scene:
         camera: Camera | None = None,
         *,
         up: ArrayLike | None = None,
+        settings: Mapping[str, Any] | None = None,
     ) -> None:
         self.shapes = shapes
         self.lights = lights
         self.camera = camera
         self.up = up
+        self.settings = dict(settings or {})
         self.accelerators = AcceleratorCache()  # of the last render, for the next one
         self.check()
 

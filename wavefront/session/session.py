@@ -102,10 +102,11 @@ class Session:
 
     def _set_up(self, subject: Any, begin: float) -> None:
         """Compile the scene and begin the first picture."""
-        settings = self._settings
+        values = self._settings.values
+        scene = as_scene(subject, values["material"], values["progress"], values["smooth"])
+        settings = self._settings = self._settings.after(scene.settings)
         reserve_buffers(1)
         values = settings.values
-        scene = as_scene(subject, values["material"], values["progress"], values["smooth"])
         camera, framed = choose_camera(
             scene, values["camera"], values["size"], values["up"], values["view"], values["fov"]
         )

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Unpack
 
 import numpy as np
 
 from ..arrays.vec import Floats, f4
-from ..core.errors import SceneError
+from ..core.errors import SceneError, one_of
 from ..film.aov_names import CLAMPED, GUIDES, chosen_aovs, sampled_names
 from ..film.exact_sum import MAX_TERMS
 from ..integrators import INTEGRATORS, li_full
@@ -51,6 +51,7 @@ class Settings:
     """
 
     def __init__(self, **given: Unpack[AllSettings]) -> None:
+        self._given: dict[str, Any] = {**given}
         found: Any = {
             name: each.checked(name, given.get(name, each.default)) for name, each in SETTINGS.items()
         }
@@ -62,6 +63,25 @@ class Settings:
         self.worker_count = worker_count(self.values["workers"], self.values["executor"])
         make_sampler(self.values["sampler"], self.values["seed"])
         self.executor_for((0, 0))
+
+    def after(self, first: Mapping[str, Any]) -> Settings:
+        """Return these settings after those of a scene, which count where there are none.
+
+        Raises
+        ------
+        SceneError
+            If one of the scene is unknown or malformed, or excludes another.
+        """
+        for name in first:
+            one_of("a setting of the scene", name, SETTINGS)
+        given = {
+            name: value
+            for name, value in self._given.items()
+            if value is not None or SETTINGS[name].default is not None
+        }
+        skipped = ("spp",) if given.keys() & {"noise", "seconds", "samples"} else ()
+        kept = {name: value for name, value in first.items() if name not in skipped}
+        return Settings(**{**kept, **given}) if kept else self
 
     def labels(self) -> dict[str, Any]:
         """Return the settings that renders of the same samples have in common; functions by their names."""

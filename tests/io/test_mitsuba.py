@@ -1,0 +1,599 @@
+"""Scenes of Mitsuba: each plugin and each parameter, from dictionaries."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import wavefront as wf
+from wavefront.codecs.images import write_image
+from wavefront.io.mitsuba import convert as _  # noqa: F401  fills the table
+from wavefront.io.mitsuba.nodes import PLUGINS, Node
+from wavefront.io.mitsuba.spectra import spectrum_rgb
+
+OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
+PLY = """ply
+format ascii 1.0
+element vertex 3
+property float x
+property float y
+property float z
+property float heat_0
+property float heat_1
+property float heat_2
+element face 1
+property list uchar int vertex_indices
+property float weight_0
+end_header
+0 0 0 1 0 0
+1 0 0 0 1 0
+0 1 0 0 0 1
+3 0 1 2 0.25
+"""
+TURN = [[0, 0, 1, 1], [1, 0, 0, 2], [0, 1, 0, 3], [0, 0, 0, 1]]  # x to y, y to z, z to x
+
+
+def rgb(*value: float) -> dict[str, Any]:
+    return {"type": "rgb", "value": value}
+
+
+def scene(strict: bool = True, **parts: Any) -> wf.Scene:
+    """Return a scene of some parts, with a sphere if there is no shape."""
+    shapes = any(PLUGINS[part["type"]].kind == "shape" for part in parts.values() if "type" in part)
+    ball = {} if shapes else {"ball": {"type": "sphere"}}
+    return wf.from_mitsuba({"type": "scene", **parts, **ball}, strict=strict)
+
+
+def shape(kind: str, **parameters: Any) -> Any:
+    return scene(shape={"type": kind, **parameters}).shapes[0]
+
+
+def material(kind: str, strict: bool = True, **parameters: Any) -> wf.Material:
+    board = {"type": "rectangle", "bsdf": {"type": kind, **parameters}}
+    return scene(strict, shape=board).shapes[0].material
+
+
+def light(kind: str, **parameters: Any) -> Any:
+    return scene(light={"type": kind, **parameters}).lights[0]
+
+
+def camera(kind: str = "perspective", **parameters: Any) -> wf.Camera:
+    found = scene(sensor={"type": kind, **parameters}).camera
+    assert found is not None
+    return found
+
+
+def value(parameter: Any) -> list[float]:
+    return np.asarray(parameter).ravel().tolist()
+
+
+# --- Shapes ---------------------------------------------------------------------------------------
+
+
+def test_shapes_are_where_to_world_places_them() -> None:
+    assert shape("sphere", center=[1, 0, 0], radius=2, to_world=TURN).center.tolist() == [1, 3, 3]
+    assert shape("rectangle", to_world=TURN).bounds.tolist() == [[1, 1, 2], [1, 3, 4]]
+    assert shape("cube", to_world=TURN).bounds.tolist() == [[0, 1, 2], [2, 3, 4]]
+    np.testing.assert_allclose(shape("disk", to_world=TURN).bounds, [[1, 1, 2], [1, 3, 4]], atol=1e-3)
+    pipe = shape("cylinder", p0=[0, 0, 1], p1=[0, 0, 3], radius=0.5, to_world=TURN)
+    assert (pipe.starts.tolist(), pipe.ends.tolist()) == ([[2, 2, 3]], [[4, 2, 3]])
+    assert value(pipe.radii) == [0.5]
+
+
+def normals(mesh: wf.Mesh) -> Any:
+    a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
+    return np.cross(b - a, c - a)
+
+
+@pytest.mark.parametrize("kind", ["rectangle", "cube", "disk", "cylinder"])
+def test_front_sides_and_flip_normals(kind: str) -> None:
+    # an area light makes a mesh of the cylinder
+    lamp = {"emitter": {"type": "area"}}
+    front, back = shape(kind, **lamp), shape(kind, flip_normals=True, **lamp)
+    outward = [0, 0, 1] if kind in ("rectangle", "disk") else None
+    for mesh, sign in ((front, 1), (back, -1)):
+        centers = mesh.vertices[mesh.faces].mean(1)
+        if kind == "cylinder":
+            centers[:, 2] = 0
+        ahead = normals(mesh) @ outward if outward else (normals(mesh) * centers).sum(1)
+        assert (ahead * sign > 0).all()
+
+
+def test_a_reflection_keeps_the_front_side() -> None:
+    mesh = shape("rectangle", to_world=np.diag([1, 1, -1, 1.0]))
+    assert (normals(mesh)[:, 2] < 0).all()
+
+
+def test_texture_coordinates() -> None:
+    flat = shape("rectangle")
+    assert (flat.vertices[:, :2] == 2 * flat.uvs - 1).all()
+    disk = shape("disk")
+    radius, turn = disk.uvs[: len(disk.faces)].T
+    np.testing.assert_allclose(
+        disk.vertices[: len(disk.faces), :2],
+        1.0004 * radius[:, None] * np.stack([np.cos(2 * np.pi * turn), np.sin(2 * np.pi * turn)], 1),
+        atol=1e-3,
+    )
+    tube = shape("cylinder", emitter={"type": "area"})
+    np.testing.assert_allclose(tube.vertices[:, 2], tube.uvs[:, 1])
+    np.testing.assert_allclose(tube.vertices[:, 0], np.cos(2 * np.pi * tube.uvs[:, 0]), atol=1e-12)
+
+
+def test_files_of_meshes(tmp_path: Path) -> None:
+    (tmp_path / "a.obj").write_text(OBJ)
+    path = str(tmp_path / "a.obj")
+    assert shape("obj", filename=path).uvs.tolist() == [[0, 1], [1, 1], [0, 0]]
+    assert shape("obj", filename=path, flip_tex_coords=False).uvs.tolist() == [[0, 0], [1, 0], [0, 1]]
+    assert shape("obj", filename=path, face_normals=True).normals is None
+    assert shape("obj", filename=path).name == "shape"
+    (tmp_path / "a.ply").write_text(PLY)
+    for name, expected in (("vertex_heat", np.eye(3)), ("face_weight", np.full((3, 3), 0.25))):
+        shown = {"type": "diffuse", "reflectance": {"type": "mesh_attribute", "name": name}}
+        mesh = shape("ply", filename=str(tmp_path / "a.ply"), bsdf=shown)
+        np.testing.assert_array_equal(mesh.colors[:, :3], expected)
+    shown["reflectance"]["name"] = "vertex_warmth"  # type: ignore[index]
+    with pytest.raises(wf.SceneError, match=r"shape .ply.: the attribute 'vertex_warmth'"):
+        shape("ply", filename=str(tmp_path / "a.ply"), bsdf=shown)
+
+
+def serialized(version: int, double: bool, count: int = 3) -> bytes:
+    kind = "<f8" if double else "<f4"
+    name = b"part\0" if version == 4 else b""
+    body = struct.pack("<I", 1 | 2 | (0x2000 if double else 0x1000)) + name + struct.pack("<QQ", count, 1)
+    for rows in ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 1]] * 3, [[0, 0], [1, 0], [0, 1]]):
+        body += np.array(rows, kind).tobytes()
+    body += np.array([0, 1, 2], "<u4").tobytes()
+    return struct.pack("<HH", 0x041C, version) + zlib.compress(body)
+
+
+@pytest.mark.parametrize("version", [3, 4])
+@pytest.mark.parametrize("double", [False, True])
+def test_serialized_meshes(tmp_path: Path, version: int, double: bool) -> None:
+    parts = [serialized(version, double), serialized(version, double)]
+    places = struct.pack("<II" if version == 3 else "<QQ", 0, len(parts[0]))
+    (tmp_path / "a.serialized").write_bytes(b"".join(parts) + places + struct.pack("<I", 2))
+    path = str(tmp_path / "a.serialized")
+    for index in (0, 1):
+        mesh = shape("serialized", filename=path, shape_index=index)
+        assert mesh.vertices.tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+        assert (mesh.normals[:, 2] == 1).all()
+        assert mesh.uvs.tolist() == [[0, 0], [1, 0], [0, 1]]
+    assert shape("serialized", filename=path, face_normals=True).normals is None
+    with pytest.raises(wf.SceneError, match="shape_index is 2; the file has 2 meshes"):
+        shape("serialized", filename=path, shape_index=2)
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"", "has 0 bytes"),
+        (b"x" * 90, "begins with"),
+        (serialized(4, False)[:-20], "bytes before the end|cannot be unpacked"),
+        (serialized(4, False, 2**40), "memory|bytes before"),
+    ],
+)
+def test_a_damaged_serialized_mesh_is_refused(tmp_path: Path, data: bytes, message: str) -> None:
+    (tmp_path / "a.serialized").write_bytes(data)
+    with pytest.raises(wf.SceneError, match=message):
+        shape("serialized", filename=str(tmp_path / "a.serialized"))
+
+
+def test_groups_and_instances() -> None:
+    group = {"type": "shapegroup", "cube": {"type": "cube"}, "ball": {"type": "sphere"}}
+    copies = {
+        f"copy{k}": {"type": "instance", "to_world": TURN, "group": {"type": "ref", "id": "group"}}
+        for k in range(2)
+    }
+    found = scene(group=group, **copies).shapes
+    assert [type(each) for each in found] == [wf.Instance, wf.Sphere] * 2
+    assert found[0].mesh is found[2].mesh
+    assert found[3].center.tolist() == [1, 2, 3]
+    with pytest.raises(wf.SceneError, match=r"LoadLimits\.instances"):
+        wf.from_mitsuba({"type": "scene", "group": group, **copies}, limits=wf.LoadLimits(instances=3))
+
+
+def test_what_shapes_are_made_of() -> None:
+    ball = shape("sphere")
+    assert value(ball.material.bsdf.reflectance) == [0.5] * 3
+    lamp = shape("sphere", emitter={"type": "area", "radiance": rgb(1, 2, 3)})
+    assert value(lamp.material.bsdf.reflectance) == [0] * 3  # as in Mitsuba
+    assert value(lamp.emission) == [1, 2, 3]
+    one = {"type": "diffuse", "id": "clay"}
+    both = scene(a={"type": "sphere", "bsdf": one}, b={"type": "cube", "bsdf": {"type": "ref", "id": "clay"}})
+    assert both.shapes[0].material is both.shapes[1].material
+    assert both.shapes[0].material.name == "clay"
+
+
+# --- BSDFs ----------------------------------------------------------------------------------------
+
+
+def test_metals_and_glass() -> None:
+    assert value(material("diffuse", reflectance=rgb(0.1, 0.2, 0.3)).bsdf.reflectance) == pytest.approx(
+        [0.1, 0.2, 0.3]
+    )
+    gold = material("conductor", material="Au").bsdf
+    assert value(gold.k) == pytest.approx([3.983, 2.3856, 1.6034], 1e-4)
+    own = material("roughconductor", eta=rgb(1, 2, 3), k=4.0, alpha=0.25, distribution="ggx").bsdf
+    assert (value(own.eta), value(own.k), value(own.roughness)) == ([1, 2, 3], [4] * 3, [0.5])
+    assert isinstance(material("conductor", specular_reflectance=0.5).bsdf, wf.Mirror)
+    glass = material("dielectric", int_ior="diamond", ext_ior="water", specular_transmittance=0.5).bsdf
+    assert value(glass.ior) == pytest.approx([2.419 / 1.333])
+    assert value(glass.transmittance) == [0.5] * 3
+    assert value(material("dielectric").bsdf.ior) == pytest.approx([1.5046 / 1.000277])
+    frosted = material("roughdielectric", alpha=0.09, distribution="ggx", specular_reflectance=0.25).bsdf
+    assert (value(frosted.roughness), value(frosted.reflectance)) == (pytest.approx([0.3]), [0.25] * 3)
+    pane = material("thindielectric", int_ior=1.7, ext_ior=1.0).bsdf
+    assert isinstance(pane, wf.ThinDielectric)
+    assert value(pane.ior) == pytest.approx([1.7])
+
+
+def test_principled() -> None:
+    made = material(
+        "principled",
+        base_color=rgb(0.2, 0.3, 0.4),
+        roughness=0.6,
+        metallic=0.1,
+        spec_trans=0.7,
+        eta=1.4,
+        clearcoat=0.8,
+        clearcoat_gloss=1.0,
+        sheen=0.9,
+    ).bsdf
+    found = [made.metallic, made.roughness, made.transmission, made.ior, made.clearcoat, made.sheen]
+    assert [value(each)[0] for each in found] == pytest.approx([0.1, 0.6, 0.7, 1.4, 0.8, 0.9])
+    assert value(made.clearcoat_roughness) == pytest.approx([0.001**0.5])
+    assert value(material("principled", specular=0.5).bsdf.ior) == pytest.approx([1.5])
+
+
+def test_adapters() -> None:
+    inner = {"type": "diffuse", "reflectance": 0.25}
+    for kind, parameters in (("twosided", {}), ("mask", {"opacity": 0.5}), ("bumpmap", {"scale": 2.0})):
+        image = {"type": "bitmap", "data": np.ones((2, 2, 1), np.float32), "raw": True}
+        more = {"map": image} if kind == "bumpmap" else {}
+        made = material(kind, bsdf=inner, **parameters, **more)
+        assert value(made.bsdf.reflectance) == [0.25] * 3
+    assert made.normal_map.height == 2  # type: ignore[union-attr]
+    assert material("mask", bsdf=inner, opacity=0.125).alpha == 0.125
+    assert material("null").opacity.constant == 0  # type: ignore[union-attr]
+    mix = material("blendbsdf", a=inner, b={"type": "conductor"}, weight=0.75).bsdf
+    assert (type(mix.first), type(mix.second), value(mix.weight)) == (wf.Diffuse, wf.Mirror, [0.75])
+    flat = {"type": "bitmap", "data": np.full((2, 2, 3), (0.5, 0.5, 1), np.float32), "raw": True}
+    assert material("normalmap", bsdf=inner, normalmap=flat).normal_map is not None
+
+
+def test_a_normal_map_is_in_the_frame_of_the_shading_normal() -> None:
+    # Mitsuba's green is normal × u, wherever v points: on the rectangle towards the lower rows of an image
+    tilted = {"type": "rawconstant", "value": [0.5, 0.9, 0.9]}
+    board = {
+        "type": "rectangle",
+        "bsdf": {"type": "normalmap", "normalmap": tilted, "bsdf": {"type": "diffuse"}},
+    }
+    for up, brighter in ((1, True), (-1, False)):
+        lit = scene(board=board, sun={"type": "directional", "direction": [0, -up, -1]})
+        lit.camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), size=(8, 8))
+        plain = scene(board={"type": "rectangle"}, sun={"type": "directional", "direction": [0, -up, -1]})
+        plain.camera = lit.camera
+        means = [np.asarray(wf.render(each, spp=1, max_bounces=1).rgb).mean() for each in (lit, plain)]
+        assert (means[0] > means[1]) == brighter
+
+
+def test_textures() -> None:
+    codes = np.arange(12, dtype=np.uint8).reshape(2, 2, 3) * 20
+
+    def texture(**parameters: Any) -> wf.Texture:
+        image = {"type": "bitmap", "data": codes, **parameters}
+        found = material("diffuse", reflectance=image).bsdf.reflectance
+        assert isinstance(found, wf.Texture)
+        return found
+
+    raw = texture(raw=True, filter_type="nearest", wrap_mode="clamp")
+    assert (raw.srgb, raw.filter, raw.wrap) == (False, "nearest", ("clamp", "clamp"))
+    # v is 0 in the top row
+    np.testing.assert_allclose(
+        raw.lookup(np.array([[0.1], [0.1]], np.float32))[:, 0], codes[0, 0] / 255, rtol=1e-6
+    )
+    moved = np.eye(4)
+    moved[0, 3] = 0.5
+    for to_uv in (moved, moved[np.ix_((0, 1, 3), (0, 1, 3))]):
+        found = texture(raw=True, filter_type="nearest", to_uv=to_uv)
+        np.testing.assert_allclose(
+            found.lookup(np.array([[0.1], [0.1]], np.float32))[:, 0], codes[0, 1] / 255, rtol=1e-6
+        )
+    assert texture().srgb
+    board = {"type": "checkerboard", "color0": 0.25, "color1": rgb(1, 0, 0)}
+    board = material("diffuse", reflectance=board).bsdf.reflectance
+    at = np.array([[0.2, 0.7, 0.2], [0.2, 0.2, 0.7]], np.float32)
+    np.testing.assert_array_equal(board.lookup(at)[:, 0], [0.25] * 3)
+    np.testing.assert_array_equal(board.lookup(at)[:, 1:].T, [[1, 0, 0]] * 2)
+    # the roughness is the root of a texture of α, and numbers are luminances
+    alpha = {"type": "bitmap", "data": np.full((2, 2, 3), 0.25, np.float32), "raw": True}
+    rough = material("roughconductor", alpha=alpha, distribution="ggx").bsdf.roughness
+    assert rough.limits() == (0.5, 0.5)
+    cut = {"type": "bitmap", "data": np.full((2, 2, 3), 0.25, np.float32)}
+    assert material("mask", bsdf={"type": "diffuse"}, opacity=cut).alpha.limits() == pytest.approx(
+        (0.25, 0.25)
+    )
+
+
+def test_spectra() -> None:
+    def radiance(**spectrum: Any) -> list[float]:
+        return value(light("constant", radiance=spectrum).radiance)
+
+    # values of Mitsuba 3.9.1, variant scalar_rgb
+    assert radiance(type="spectrum", value=2.0) == pytest.approx([2.40959, 1.89658, 1.81783], 1e-4)
+    given = [(400, 0), (500, 8), (600, 15.6), (700, 18.4)]
+    assert radiance(type="spectrum", value=given) == pytest.approx([20.7108, 10.8546, 2.77115], 2e-3)
+    text = "400:0, 500:8, 600:15.6, 700:18.4"
+    assert radiance(type="spectrum", value=text) == radiance(type="spectrum", value=given)
+    bounded = {"type": "spectrum", "value": [(400, 0.2), (500, 0.3), (600, 0.6), (700, 0.8)]}
+    found = material("diffuse", reflectance=bounded).bsdf.reflectance
+    assert value(found) == pytest.approx([0.708449, 0.422684, 0.22573], 2e-3)
+    assert (
+        value(material("diffuse", reflectance={"type": "spectrum", "value": 0.25}).bsdf.reflectance)
+        == [0.25] * 3
+    )
+    assert radiance(type="d65", scale=2.0) == [2] * 3
+    assert radiance(type="srgb", color=rgb(1, 2, 3)) == [1, 2, 3]
+    warm = radiance(type="blackbody", temperature=3000.0)
+    assert warm[0] > 2 * warm[1] > 6 * warm[2]
+    white = spectrum_rgb([(360, 1), (830, 1)], emission=False, bounded=True)
+    assert white == pytest.approx([1, 1, 1], 2e-3)
+
+
+def test_spectrum_files(tmp_path: Path) -> None:
+    (tmp_path / "a.spd").write_text("# nm, value\n400 0.2\n500 0.3\n600 0.6 # here\n700 0.8\n")
+    read = {"type": "spectrum", "filename": str(tmp_path / "a.spd")}
+    found = material("diffuse", reflectance=read).bsdf.reflectance
+    assert value(found) == pytest.approx([0.708449, 0.422684, 0.22573], 2e-3)
+    (tmp_path / "a.spd").write_text("400 0.2\n500\n")
+    with pytest.raises(wf.SceneError, match=r"a\.spd line 2: spectrum is '500'"):
+        material("diffuse", reflectance=read)
+
+
+# --- Emitters -------------------------------------------------------------------------------------
+
+
+def test_lights(tmp_path: Path) -> None:
+    lamp = light("point", position=[1, 2, 3], intensity=rgb(4, 5, 6))
+    assert (lamp.position.tolist(), value(lamp.intensity)) == ([1, 2, 3], [4, 5, 6])
+    assert light("point", to_world=TURN).position.tolist() == [1, 2, 3]
+    sun = light("directional", direction=[0, 0, -2], irradiance=3.0)
+    assert (sun.direction.tolist(), value(sun.irradiance)) == ([0, 0, -1], [3] * 3)
+    assert light("directional", to_world=TURN).direction.tolist() == [1, 0, 0]
+    pixels = np.zeros((2, 4, 3), np.float32)
+    pixels[0, 1] = (1, 2, 3)
+    write_image(tmp_path / "sky.exr", pixels)
+    sky = light("envmap", filename=str(tmp_path / "sky.exr"), scale=2.0, to_world=TURN)
+    mirrored = light("envmap", bitmap=pixels[:, ::-1] * 2, to_world=np.array(TURN) @ np.diag([-1, 1, 1, 1]))
+    records = [each.record(np.zeros(3)) for each in (sky, mirrored)]
+    away = np.random.default_rng(1).normal(size=(3, 64)).astype(np.float32)
+    away /= np.sqrt((away**2).sum(0))
+    first, second = (each.le(away, None) for each in records)
+    assert first.max() > 1
+    np.testing.assert_allclose(first, second, atol=1e-5)
+
+
+def test_a_spot_is_the_nearest_one_there_is() -> None:
+    with pytest.warns(UserWarning, match=r"light .spot.: beam_width"):
+        spot = scene(False, light={"type": "spot", "cutoff_angle": 30.0, "beam_width": 15.0}).lights[0]
+    assert (spot.angle, spot.blend, spot.direction.tolist()) == (60, 0.5, [0, 0, 1])  # type: ignore[attr-defined]
+
+
+# --- Sensors and settings -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("parameters", "across"),
+    [
+        ({"fov": 60.0}, 60),
+        ({"fov": 60.0, "fov_axis": "larger"}, 60),
+        ({"fov": 60.0, "fov_axis": "y"}, 2 * np.degrees(np.arctan(np.tan(np.pi / 6) * 2))),
+        ({"fov": 60.0, "fov_axis": "smaller"}, 2 * np.degrees(np.arctan(np.tan(np.pi / 6) * 2))),
+        ({"fov": 60.0, "fov_axis": "diagonal"}, 2 * np.degrees(np.arctan(np.tan(np.pi / 6) / np.sqrt(1.25)))),
+        ({"focal_length": "35mm"}, 2 * np.degrees(np.arctan(np.hypot(36, 24) / 70 / np.sqrt(1.25)))),
+    ],
+)
+def test_fields_of_view(parameters: Any, across: float) -> None:
+    film = {"type": "hdrfilm", "width": 200, "height": 100}
+    seen = camera(film=film, **parameters)
+    points = np.array([[-np.tan(np.radians(across / 2)), 0, 1.0], [0, 0, 1], [0, 0.1, 1]])
+    pixels, depth = seen.project(points)  # Mitsuba's camera looks along z, with x to the left
+    np.testing.assert_allclose(pixels[:2] + 0.5, [[200.5, 50.5], [100.5, 50.5]], atol=1e-6)
+    assert pixels[2, 1] < 50
+    np.testing.assert_allclose(depth, 1)
+
+
+def test_films_crop_and_shift() -> None:
+    crop = {"crop_width": 20, "crop_height": 10, "crop_offset_x": 5, "crop_offset_y": 2}
+    film = {"type": "hdrfilm", "width": 200, "height": 100, **crop}
+    seen = camera(film=film, principal_point_offset_x=0.25, principal_point_offset_y=0.1, fov=60.0)
+    assert (seen.resolution, seen.window) == ((200, 100), (5, 2, 25, 12))
+    # the film point of the axis is where sample + offset is the middle
+    np.testing.assert_allclose(seen.project([(0, 0, 1)])[0], [[50, 40]], atol=1e-6)
+    assert camera().resolution == (768, 576)
+
+
+def test_lenses_and_parallel_rays() -> None:
+    lens = camera("thinlens", aperture_radius=0.5, focus_distance=3.0, to_world=TURN).projection
+    assert (lens.aperture, lens.focus) == (1, 3)  # type: ignore[attr-defined]
+    scaled = np.array(TURN) @ np.diag([5, 5, 1, 1.0])
+    film = {"type": "hdrfilm", "width": 200, "height": 100}
+    seen = camera("orthographic", to_world=scaled, near_clip=0.5, film=film)
+    assert seen.projection.height == 5  # type: ignore[attr-defined]
+    assert seen.origin.tolist() == [1.5, 2, 3]
+
+
+def test_settings() -> None:
+    film = {"type": "hdrfilm", "width": 8, "height": 8, "rfilter": {"type": "tent"}, "pixel_format": "rgba"}
+    sampler = {"type": "multijitter", "sample_count": 7}
+    path = {"type": "path", "max_depth": 3, "rr_depth": 9, "hide_emitters": True}
+    made = scene(
+        sensor={"type": "perspective", "film": film, "sampler": sampler},
+        integrator={"type": "aov", "aovs": "d:depth", "nested": path},
+        sky={"type": "constant"},
+    )
+    expected = {"filter": "tent", "spp": 7, "max_bounces": 2, "roulette": 9, "background": "transparent"}
+    assert made.settings == expected
+    image = wf.render(made, progress=False)
+    assert image.spp == 7
+    assert image.metadata["max_bounces"] == 2 if "max_bounces" in image.metadata else True
+    assert wf.render(made, spp=2, progress=False).spp == 2
+    assert wf.render(made, samples=range(3), progress=False).spp == 3
+    assert scene(integrator={"type": "direct"}).settings == {"max_bounces": 1}
+    assert scene(integrator={"type": "path"}).settings["max_bounces"] > 1000
+
+
+def test_settings_of_a_scene_are_checked() -> None:
+    ball = wf.Sphere((0, 0, 0), 1)
+    with pytest.raises(wf.SceneError, match=r"a setting of the scene is 'sp'; .*did you mean 'spp'"):
+        wf.render(wf.Scene(ball, settings={"sp": 1}), size=(4, 4))
+    with pytest.raises(wf.SceneError, match="max_bounces"):
+        wf.render(wf.Scene(ball, settings={"max_bounces": -1}), size=(4, 4))
+
+
+# --- What is not honored, and what is wrong -------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", sorted(name for name, each in PLUGINS.items() if each.convert is None))
+def test_unsupported_plugins_are_named(name: str) -> None:
+    kind = PLUGINS[name].kind
+    inside: dict[str, dict[str, Any]] = {
+        "bsdf": {"ball": {"type": "sphere", "thing": {"type": name}}},
+        "texture": {"ball": {"type": "sphere", "b": {"type": "diffuse", "reflectance": {"type": name}}}},
+        "medium": {"ball": {"type": "sphere", "interior": {"type": name}}},
+        "phase": {"ball": {"type": "sphere", "interior": {"type": name}}},
+        "volume": {"ball": {"type": "sphere", "interior": {"type": name}}},
+        "rfilter": {"s": {"type": "perspective", "film": {"type": "hdrfilm", "f": {"type": name}}}},
+    }
+    parts = inside.get(kind, {"thing": {"type": name}})
+    parts["board"] = {"type": "rectangle"}
+    with pytest.warns(UserWarning, match="Mitsuba scene: not honored: ") as found:
+        made = scene(False, **parts)
+    assert len(found) == 1
+    assert (
+        (kind in str(found[0].message))
+        if kind in ("medium", "phase", "volume")
+        else (name in str(found[0].message))
+    )
+    assert made.shapes
+    with pytest.raises(wf.SceneError, match="not honored"):
+        scene(True, **parts)
+
+
+def test_one_warning_names_plugin_id_and_parameter() -> None:
+    parts = {
+        "ball": {"type": "sphere", "softness": 3, "bsdf": {"type": "diffuse", "id": "clay", "grain": 1}},
+        "sky": {"type": "constant", "clouds": True},
+    }
+    with pytest.warns(UserWarning, match="not honored") as found:
+        scene(False, **parts)
+    (message,) = [str(each.message) for each in found]
+    for part in ("ball (sphere): softness", "bsdf (diffuse) 'clay': grain", "sky (constant): clouds"):
+        assert part in message
+
+
+@pytest.mark.parametrize(
+    ("parts", "message"),
+    [
+        ({"ball": {"type": "spere"}}, "there is no plugin 'spere'; did you mean 'sphere'"),
+        ({"ball": {"type": "sphere", "radius": -1}}, r"ball \(sphere\): radius is -1; it must be above 0"),
+        ({"ball": {"type": "sphere", "radius": "big"}}, "radius must be a number"),
+        ({"ball": {"type": "sphere", "to_world": np.eye(3)}}, "to_world must have shape"),
+        ({"ball": {"type": "sphere", "b": {"type": "ref", "id": "x"}}}, "refers to the id 'x'"),
+        ({"a": {"type": "ref", "id": "b"}, "b": {"type": "ref", "id": "a"}}, "lead to each other|refers to"),
+        ({"ball": {"type": "sphere", "b": {"type": "diffuse", "reflectance": 2}}}, r"reflectance is .*2"),
+        ({"ball": {"type": "sphere", "b": {"type": "conductor", "material": "Xx"}}}, "material is 'Xx'"),
+        ({"ball": {"type": "sphere", "b": {"type": "dielectric", "int_ior": "tea"}}}, "int_ior is 'tea'"),
+        ({"ball": {"type": "obj", "filename": "none.obj"}}, r"none\.obj"),
+        ({"ball": {"type": "sphere", "e": {"type": "point"}}}, "must be an area light"),
+        ({"s": {"type": "perspective", "fov": 60, "focal_length": "35mm"}}, "give one of them"),
+        ({"s": {"type": "perspective", "film": {"type": "hdrfilm", "width": 0}}}, "width is 0"),
+        ({"i": {"type": "path", "max_depth": -5}}, "max_depth is -5"),
+        ({"i": {"type": "instance", "group": {"type": "cube"}}}, "it must be a shapegroup"),
+        ({"i": {"type": "instance"}}, "holds no shape"),
+        ({"ball": {"type": "sphere", "b": {"type": "mask"}}}, "holds no bsdf"),
+        ({"ball": {"type": "sphere", "b": {"type": "blendbsdf", "a": {"type": "diffuse"}}}}, "holds 1 bsdfs"),
+        ({"ball": {"type": 3}}, "there is no plugin 3"),
+    ],
+)
+def test_malformed_scenes_are_refused(parts: Any, message: str) -> None:
+    with pytest.raises(wf.SceneError, match=message):
+        scene(board={"type": "rectangle"}, **parts)
+
+
+def test_a_scene_is_a_dictionary_of_type_scene() -> None:
+    for wrong in (None, [], {"type": "sphere"}, "scene"):
+        with pytest.raises(wf.SceneError, match=r'of type "scene"'):
+            wf.from_mitsuba(wrong)  # type: ignore[arg-type]
+
+
+def test_bombs_are_refused() -> None:
+    # each level refers to the one before twice: 2^40 plugins
+    parts: dict[str, Any] = {"m0": {"type": "diffuse"}}
+    for level in range(1, 41):
+        before = {"type": "ref", "id": f"m{level - 1}"}
+        parts[f"m{level}"] = {"type": "blendbsdf", "a": before, "b": dict(before), "weight": 0.5}
+    with pytest.raises(wf.SceneError, match="as they refer to each other; the limit is"):
+        scene(ball={"type": "sphere", "bsdf": {"type": "ref", "id": "m40"}}, **parts)
+    deep: dict[str, Any] = {"type": "diffuse"}
+    for _level in range(1000):
+        deep = {"type": "twosided", "bsdf": deep}
+    with pytest.raises(wf.SceneError, match="nested deeper"):
+        scene(ball={"type": "sphere", "bsdf": deep})
+    own: dict[str, Any] = {"type": "twosided"}
+    own["bsdf"] = own
+    with pytest.raises(wf.SceneError, match=r"nested deeper|contains itself"):
+        scene(ball={"type": "sphere", "bsdf": own})
+
+
+def test_the_table_says_what_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    read: set[tuple[str, str]] = set()
+    get = Node.get
+
+    def noting(self: Node, name: str, default: Any = None) -> Any:
+        read.add((self.plugin, name))
+        return get(self, name, default)
+
+    monkeypatch.setattr(Node, "get", noting)
+    with pytest.raises(KeyError, match="does not read"):
+        noting(Node("sphere", "", "", {}, {}), "softness")
+    ball = wf.from_mitsuba({"type": "scene", "ball": {"type": "sphere", "center": [0, 0, 1]}}).shapes[0]
+    assert {name for plugin, name in read if plugin == "sphere"} - {"softness"} == set(
+        PLUGINS["sphere"].reads
+    )
+    assert ball.bounds[1, 2] == 2
+
+
+def test_the_documentation_lists_the_plugins() -> None:
+    page = Path(__file__).parents[2] / "docs" / "mitsuba.md"
+    text = page.read_text()
+    table = plugin_table()
+    begin, end = "<!-- plugins -->\n", "<!-- end -->\n"
+    found = text.partition(begin)[2].partition(end)[0]
+    assert found == table, f"docs/mitsuba.md must have this table:\n{table}"
+
+
+def plugin_table() -> str:
+    """Return the table of plugins as the documentation has it."""
+    rows: dict[tuple[str, tuple[str, ...], str], list[str]] = {}
+    for name, each in PLUGINS.items():
+        if each.convert is not None and each.kind != "scene":
+            rows.setdefault((each.kind, each.reads, each.note), []).append(name)
+    order = ("shape", "bsdf", "texture", "emitter", "sensor", "film", "rfilter", "sampler", "integrator")
+    lines = ["| kind | plugins | reads | note |", "|---|---|---|---|"]
+    for kind in order:
+        for (own, reads, note), names in rows.items():
+            if own == kind:
+                listed, read = (", ".join(f"`{each}`" for each in part) for part in (names, reads))
+                lines.append(f"| {kind} | {listed} | {read or '–'} | {note or '–'} |")
+    lines += ["", "Not supported, and named in the warning:", ""]
+    for kind in dict.fromkeys(each.kind for each in PLUGINS.values()):
+        names = [f"`{name}`" for name, each in PLUGINS.items() if each.kind == kind and each.convert is None]
+        if names:
+            lines.append(f"- {kind}: {', '.join(names)}")
+    return "\n".join(lines) + "\n"

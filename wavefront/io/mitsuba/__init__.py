@@ -1,0 +1,1 @@
+"""Scenes of Mitsuba 3: XML files, and the dictionaries of `mi.load_dict`."""

@@ -1,0 +1,238 @@
+"""BSDFs of Mitsuba as materials."""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import Any
+
+import numpy as np
+
+from ...arrays.state import SurfaceInteraction
+from ...arrays.vec import Floats, Ints, cross, dot, f4, normalize
+from ...bsdfs import Bsdf, Conductor, Dielectric, Diffuse, Mirror, Mix, Principled, ThinDielectric
+from ...core.errors import SceneError, number, one_of
+from ...materials import Material
+from ...textures.base import BaseTexture
+from ...textures.image import Texture
+from ...textures.normal_map import BumpMap, NormalMap
+from .nodes import Job, Node, plugin, unsupported
+from .spectra import INDICES, METALS
+from .textures import bitmap, color, roughness, scalar
+
+LEAST_INDEX = 1e-6
+
+
+class ShadingFrameMap(NormalMap):
+    """A normal map in the frame of Mitsuba: along u, along normal × u, and along the normal."""
+
+    def perturbed(self, surface: SurfaceInteraction, normal: Floats) -> tuple[Ints, Floats]:
+        """Return the lanes whose normals the image changes, (k,), and their new normals, (3, k)."""
+        along: Floats = getattr(surface, self.reads[1])[:3]
+        x, y, z = self.texture.at(surface) * f4(2) - f4(1)
+        lanes = np.flatnonzero(((x != 0) | (y != 0)) & (dot(along, along) > 0))
+        x, y, z = x.take(lanes), y.take(lanes), z.take(lanes)
+        normal, along = normal.take(lanes, 1), along.take(lanes, 1)
+        tangent = normalize(along - normal * dot(along, normal))
+        return lanes, normalize(tangent * x + cross(normal, tangent) * y + normal * z)
+
+
+def _named(node: Node, bsdf: Bsdf) -> Material:
+    return Material(bsdf, name=node.id or None)
+
+
+@plugin("diffuse", "bsdf", "reflectance")
+def _diffuse(node: Node, job: Job) -> Material:
+    return _named(node, Diffuse(color(node, "reflectance", 0.5, job)))
+
+
+@plugin("conductor", "bsdf", "material eta k specular_reflectance")
+@plugin(
+    "roughconductor",
+    "bsdf",
+    "material eta k specular_reflectance alpha alpha_u alpha_v distribution",
+    harmless="sample_visible",
+)
+def _conductor(node: Node, job: Job) -> Material:
+    rough = _rough(node, job) if node.plugin == "roughconductor" else 0.0
+    tint = color(node, "specular_reflectance", 1.0, job)
+    name = node.text("material", "none")
+    if "eta" in node.values or name == "none":
+        if node.plugin == "conductor" and "eta" not in node.values:
+            return _named(node, Mirror(tint))
+        eta, k = color(node, "eta", 0.0, job), color(node, "k", 1.0, job)
+        eta = eta if isinstance(eta, BaseTexture) else np.maximum(eta, LEAST_INDEX)
+    else:
+        base = name.removesuffix("_palik") if name not in METALS else name
+        eta, k = METALS[one_of("material", base, METALS)]
+        if base != name:
+            node.lose(f"material {name!r}; {base!r} in its place")
+        eta = np.maximum(eta, LEAST_INDEX)
+    if isinstance(tint, BaseTexture) or np.any(np.asarray(tint) != 1):
+        node.lose("specular_reflectance")
+    return _named(node, Conductor(eta, k, rough))
+
+
+@plugin("dielectric", "bsdf", "int_ior ext_ior specular_reflectance specular_transmittance")
+@plugin(
+    "roughdielectric",
+    "bsdf",
+    "int_ior ext_ior specular_reflectance specular_transmittance alpha alpha_u alpha_v distribution",
+    harmless="sample_visible",
+)
+@plugin("thindielectric", "bsdf", "int_ior ext_ior specular_reflectance specular_transmittance")
+def _dielectric(node: Node, job: Job) -> Material:
+    kind = ThinDielectric if node.plugin == "thindielectric" else Dielectric
+    return _named(
+        node,
+        kind(
+            _ior(node, "int_ior", "bk7") / _ior(node, "ext_ior", "air"),
+            _rough(node, job) if node.plugin == "roughdielectric" else 0.0,
+            reflectance=color(node, "specular_reflectance", 1.0, job),
+            transmittance=color(node, "specular_transmittance", 1.0, job),
+        ),
+    )
+
+
+@plugin("plastic", "bsdf", "diffuse_reflectance int_ior ext_ior")
+@plugin(
+    "roughplastic",
+    "bsdf",
+    "diffuse_reflectance int_ior ext_ior alpha distribution",
+    harmless="sample_visible",
+)
+def _plastic(node: Node, job: Job) -> Material:
+    rough = _rough(node, job) if node.plugin == "roughplastic" else 0.0
+    node.lose("internal scattering; Principled in its place")
+    ior = _ior(node, "int_ior", "polypropylene") / _ior(node, "ext_ior", "air")
+    base = color(node, "diffuse_reflectance", 0.5, job)
+    return _named(node, Principled(base, roughness=rough, ior=ior))
+
+
+@plugin(
+    "principled",
+    "bsdf",
+    "base_color roughness metallic spec_trans eta specular clearcoat clearcoat_gloss sheen",
+    harmless="main_specular_sampling_rate clearcoat_sampling_rate diffuse_reflectance_sampling_rate",
+    note="as glTF layers it",
+)
+def _principled(node: Node, job: Job) -> Material:
+    if "eta" in node.values:
+        ior = node.number("eta", 1.5)
+    else:
+        root = np.sqrt(
+            0.08 * number("specular", node.get("specular", 0.5), lambda x: 0 <= x <= 1, "in [0, 1]")
+        )
+        ior = float((1 + root) / (1 - root))
+    gloss = scalar(node, "clearcoat_gloss", 0.0, job)
+    if isinstance(gloss, BaseTexture):
+        node.lose("the texture clearcoat_gloss")
+        gloss = 0.0
+    return _named(
+        node,
+        Principled(
+            color(node, "base_color", 0.5, job),
+            scalar(node, "metallic", 0.0, job),
+            scalar(node, "roughness", 0.5, job),
+            ior,
+            scalar(node, "spec_trans", 0.0, job),
+            clearcoat=scalar(node, "clearcoat", 0.0, job),
+            clearcoat_roughness=float(np.sqrt(0.1 + (0.001 - 0.1) * gloss)),
+            sheen=scalar(node, "sheen", 0.0, job),
+        ),
+    )
+
+
+@plugin("twosided", "bsdf", holds="bsdf", harmless="allow_transmission")
+def _two_sided(node: Node, job: Job) -> Material:
+    front, *back = node.held("bsdf") or [job.only(node, "bsdf")]
+    if back and back[0] is not front:
+        node.lose("the bsdf of the back side")
+    return _inner(front, job)
+
+
+@plugin("mask", "bsdf", "opacity", holds="bsdf texture")
+def _mask(node: Node, job: Job) -> Material:
+    material = copy(_inner(job.only(node, "bsdf"), job))
+    if material.alpha is not None:
+        node.lose("opacity, as there is another mask in it")
+        return material
+    material.alpha = scalar(node, "opacity", 0.5, job)
+    material.derive()
+    return material
+
+
+@plugin("null", "bsdf")
+def _null(node: Node, job: Job) -> Material:
+    return Material(Diffuse(0), alpha=0.0, name=node.id or None)
+
+
+@plugin("blendbsdf", "bsdf", "weight", holds="bsdf texture")
+def _blend(node: Node, job: Job) -> Material:
+    parts = node.held("bsdf")
+    if len(parts) != 2:
+        raise SceneError(f"holds {len(parts)} bsdfs; it needs two")
+    first, second = (_inner(part, job) for part in parts)
+    for part in (first, second):
+        if part.alpha is not None or part.normal_map is not None:
+            node.lose("the mask or the normal map of a bsdf in it")
+    return _named(node, Mix(first.bsdf, second.bsdf, scalar(node, "weight", 0.5, job)))
+
+
+@plugin("bumpmap", "bsdf", "scale", holds="bsdf texture")
+def _bump(node: Node, job: Job) -> Material:
+    return _mapped(node, job, lambda image: BumpMap(image, node.number("scale", 1.0)), "luminance")
+
+
+@plugin("normalmap", "bsdf", "normalmap", holds="bsdf")
+def _normal(node: Node, job: Job) -> Material:
+    return _mapped(node, job, ShadingFrameMap, None)
+
+
+unsupported("circular hair measured measured_polarized polarizer pplastic principledthin retarder", "bsdf")
+
+
+def _inner(node: Node, job: Job) -> Material:
+    material: Material = job.convert(node)
+    return material
+
+
+def _mapped(node: Node, job: Job, make: Any, channel: Any) -> Material:
+    """Return the material in a plugin, with a map of its normals."""
+    material = copy(_inner(job.only(node, "bsdf"), job))
+    image = job.only(node, "texture")
+    if material.normal_map is not None:
+        node.lose("the map, as there is another in its bsdf")
+        return material
+    if image.plugin == "bitmap":
+        texture = bitmap(image, job, channel, plain=True)
+    else:
+        value = job.convert(image)
+        if isinstance(value, BaseTexture) and not isinstance(value, Texture):
+            node.lose(f"a map by {image.plugin}")
+            return material
+        if not isinstance(value, Texture):
+            value = Texture(np.broadcast_to(value, 3).astype(np.float32).reshape(1, 1, 3), channel=channel)
+        texture = value
+    material.normal_map = make(texture)
+    material.derive()
+    return material
+
+
+def _ior(node: Node, name: str, default: str) -> float:
+    """Return an index of refraction, given as a number or as the name of a material."""
+    value = node.get(name, default)
+    if isinstance(value, str):
+        return INDICES[one_of(name, value.lower(), INDICES)]
+    return number(name, value, lambda x: x > 0, "above 0")
+
+
+def _rough(node: Node, job: Job) -> Any:
+    """Return the roughness of microfacets."""
+    if node.choice("distribution", "beckmann", ("beckmann", "ggx")) == "beckmann":
+        node.lose("distribution 'beckmann'; GGX in its place")
+    if "alpha_u" not in node.values:
+        return roughness(node, "alpha", 0.1, job)
+    both = [roughness(node, name, 0.1, job) for name in ("alpha_u", "alpha_v")]
+    if any(isinstance(each, BaseTexture) for each in both) or both[0] != both[1]:
+        node.lose("anisotropy")
+    return both[0] if isinstance(both[0], BaseTexture) else float(np.sqrt(both[0] * np.mean(both[1])))

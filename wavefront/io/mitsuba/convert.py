@@ -1,0 +1,74 @@
+"""Scenes of Mitsuba as scenes of this package."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from ...scene import Scene
+from ..repair import RawMesh
+from ..sources import SceneFiles
+from . import bsdfs, emitters, shapes, textures, views  # noqa: F401
+from .nodes import Graph, Job, Node, plugin, unsupported
+
+unsupported("homogeneous heterogeneous", "medium")
+unsupported("isotropic hg rayleigh sggx tabphase blendphase", "phase")
+unsupported("constvolume gridvolume", "volume")
+
+
+def convert(
+    name: str,
+    scene: Any,
+    files: SceneFiles,
+    find: Callable[[str], Path],
+    read_mesh: Callable[[Path], list[RawMesh]],
+    strict: bool,
+) -> Scene:
+    """Return the scene of a dictionary.
+
+    Parameters
+    ----------
+    name
+        What it is called in messages.
+    scene
+        The dictionary, as for `mi.load_dict`.
+    files
+        The files that it may read.
+    find
+        Returns the path of a file that the scene names.
+    read_mesh
+        Returns the meshes of an obj or ply file.
+    strict
+        Raise an error for what is not honored, in place of a warning.
+
+    Raises
+    ------
+    SceneError
+        If the scene is malformed.
+    """
+    job = Job(name, files, find, read_mesh, strict)
+    made: Scene = job.convert(Graph(name, job.lost).build(scene))
+    job.report()
+    return made
+
+
+@plugin(
+    "scene", "scene", holds="shape emitter sensor integrator bsdf texture", harmless="allow_thread_reordering"
+)
+def _scene(node: Node, job: Job) -> Scene:
+    groups = [part for part in node.held("shape") if part.plugin == "shapegroup"]
+    found = [shape for part in node.held("shape") if part not in groups for shape in job.convert(part)]
+    lights = [light for part in node.held("emitter") if (light := job.convert(part)) is not None]
+    settings: dict[str, Any] = {}
+    camera = None
+    for sensor in node.held("sensor"):
+        if camera is None and (view := job.convert(sensor)) is not None:
+            camera, settings = view
+        elif camera is not None:
+            node.lose(f"the further sensor {sensor.plugin!r}")
+    for integrator in node.held("integrator")[:1]:
+        settings = settings | job.convert(integrator)
+    if settings.get("background") and any(shape.emission is not None for shape in found):
+        node.lose("hide_emitters for shapes that emit")
+    return Scene(found, lights, camera, settings=settings)

@@ -1,0 +1,307 @@
+"""Scene files of Mitsuba (.xml) as the dictionaries of `mi.load_dict`.
+
+Source: the documentation of Mitsuba 3, "Scene XML file format".
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...core.errors import SceneError, one_of
+from ...core.suggestions import did_you_mean
+from ..sources import SceneFiles
+from ..xml_checks import MAX_DEPTH, look_through
+from .transforms import OPERATIONS, numbers, product, vector
+
+MOST_INCLUDED = 15  # files inside each other
+_OBJECTS = (
+    "scene shape bsdf emitter sensor film rfilter sampler integrator texture medium phase volume spectrum"
+)
+_OTHERS = "float integer boolean string point vector rgb transform ref include alias default path"
+OBJECTS, OTHERS = _OBJECTS.split(), _OTHERS.split()
+ATTRIBUTES = {  # of the elements that are no plugins: those that must be there, and those that may
+    **dict.fromkeys(("float", "integer", "boolean", "string", "rgb"), (("name", "value"), ())),
+    **dict.fromkeys(("point", "vector"), (("name",), ("value", "x", "y", "z"))),
+    "spectrum": (("name",), ("value", "filename")),
+    "transform": (("name",), ()),
+    "ref": (("id",), ("name",)),
+    "include": (("filename",), ("name",)),
+    "alias": (("id", "as"), ()),
+    "default": (("name", "value"), ()),
+    "path": (("value",), ()),
+}
+UNNAMED = "_arg_"  # the names of parameters without one begin with this
+TO_UV = {"uoffset": (0, 3), "voffset": (1, 3), "uscale": (0, 0), "vscale": (1, 1)}  # before version 2
+
+
+class Element(dict[str, Any]):
+    """A dictionary of `mi.load_dict` that knows where it was in a file."""
+
+    place: str = ""
+
+
+@dataclass
+class Tag:
+    """An element of XML."""
+
+    name: str
+    attributes: dict[str, str]
+    place: str  # file and line, for messages
+    children: list[Tag] = field(default_factory=list)
+
+
+class Document:
+    """A file with all that it includes, as dictionaries.
+
+    Parameters
+    ----------
+    files
+        The files that it may read.
+    data
+        Its content.
+    parameters
+        Values of `$name`, in place of those of `<default>`.
+
+    Attributes
+    ----------
+    scene
+        The dictionary.
+
+    Raises
+    ------
+    SceneError
+        If the file, or one that it includes, is malformed. The message names file and line.
+    """
+
+    def __init__(self, files: SceneFiles, data: bytes, parameters: Mapping[str, Any]) -> None:
+        self._files, self._included, self._aliases = files, 0, dict[str, str]()
+        self._values = {name: _as_text(value) for name, value in parameters.items()}
+        self._unused = set(self._values)
+        self.folders = [Path(os.fspath(files.scene)).parent]
+        self.scene = self._read(Path(os.fspath(files.scene)), data, 0)
+        for name in sorted(self._unused):
+            hint = did_you_mean(name, self._values.keys() - self._unused)
+            raise SceneError(f"{os.fspath(files.scene)}: does not use the parameter {name!r}{hint}")
+
+    def find(self, reference: str) -> Path:
+        """Return the path of a file that the scene refers to: in its folder, or in one of a `<path>`."""
+        refused: SceneError | None = None
+        for folder in reversed(self.folders):
+            try:
+                found = self._files.find(reference, folder / "_")
+            except SceneError as error:
+                refused = refused or error
+                continue
+            if found.exists():
+                return found
+        raise refused or SceneError(f"{os.fspath(self._files.scene)}: file {reference!r} is missing")
+
+    def _read(self, path: Path, data: bytes, depth: int) -> Element:
+        root = parsed(os.fspath(path), data)
+        version = root.attributes.get("version")
+        if version is None:
+            raise SceneError(f"{root.place}: <{root.name}> has no version")
+        if not re.fullmatch(r"\d+\.\d+(\.\d+)?", version.strip()):
+            raise SceneError(f"{root.place}: version is {version!r}; it must be such as 3.0.0")
+        old = int(version.split(".")[0]) < 2
+        if root.name not in OBJECTS:
+            raise SceneError(f"{root.place}: <{root.name}> cannot be the first element")
+        return self._object(root, path, depth, old)
+
+    def _object(self, tag: Tag, path: Path, depth: int, old: bool) -> Element:
+        """Return a plugin and all that it holds."""
+        given = self._substituted(tag)
+        element = _element(tag, type=given.get("type", "scene" if tag.name == "scene" else ""))
+        if not element["type"]:
+            raise SceneError(f"{tag.place}: <{tag.name}> has no type")
+        unknown = given.keys() - {"type", "id", "name", "version"}
+        if unknown:
+            raise SceneError(f"{tag.place}: <{tag.name}> has the unknown attribute {min(unknown)!r}")
+        if "id" in given:
+            element["id"] = given["id"]
+        for child in tag.children:
+            self._add(element, child, path, depth, old)
+        return _upgraded(element) if old else element
+
+    def _add(self, parent: Element, tag: Tag, path: Path, depth: int, old: bool) -> None:
+        """Add what a child says to a plugin's dictionary."""
+        name = tag.name.lower() if old else tag.name
+        if name in OBJECTS and (name != "spectrum" or "type" in tag.attributes):
+            child = self._object(tag, path, depth, old)
+            _set(parent, self._substituted(tag).get("name", ""), child, tag, old)
+            return
+        if name not in OTHERS and name != "spectrum":
+            raise SceneError(f"{tag.place}: {_unknown(name)}")
+        given = self._substituted(tag)
+        needed, optional = ATTRIBUTES[name]
+        for each in needed:
+            if each not in given:
+                raise SceneError(f"{tag.place}: <{name}> has no {each}")
+        unknown = given.keys() - {*needed, *optional}
+        if unknown:
+            raise SceneError(f"{tag.place}: <{name}> has the unknown attribute {min(unknown)!r}")
+        if tag.children and name != "transform":
+            raise SceneError(f"{tag.children[0].place}: <{tag.children[0].name}> cannot be inside <{name}>")
+        if name == "include":
+            self._include(parent, given, tag, path, depth)
+        elif name == "alias":
+            self._aliases[given["as"]] = self._aliases.get(given["id"], given["id"])
+        elif name == "default":
+            self._values.setdefault(given["name"], given["value"])
+        elif name == "path":
+            self._add_folder(given["value"], tag, path)
+        else:
+            _set(parent, given.get("name", ""), self._value(name, given, tag), tag, old)
+
+    def _value(self, name: str, given: dict[str, str], tag: Tag) -> Any:
+        """Return the value of a parameter."""
+        text = given.get("value", "")
+        if name == "ref":
+            return _element(tag, type="ref", id=self._aliases.get(given["id"], given["id"]))
+        if name == "string":
+            return text
+        if name == "boolean":
+            return one_of(f"{tag.place}: {given['name']}", text.strip().lower(), ("true", "false")) == "true"
+        if name == "integer":
+            try:
+                return int(text)
+            except ValueError:
+                raise SceneError(f"{tag.place}: {given['name']} is {text!r}; it must be an integer") from None
+        if name == "float":
+            return numbers(tag.place, given["name"], text, (1,))[0]
+        if name == "rgb":
+            values = numbers(tag.place, given["name"], text, (1, 3))
+            return _element(tag, type="rgb", value=values * (3 // len(values)))
+        if name == "transform":
+            return product([(each.name, self._substituted(each), each.place) for each in tag.children])
+        if name == "spectrum":
+            if ("value" in given) == ("filename" in given):
+                raise SceneError(f"{tag.place}: <spectrum> needs a value or a filename, and not both")
+            read = {key: given[key] for key in ("value", "filename") if key in given}
+            return _element(tag, type="spectrum", **read)
+        return vector(tag.place, given["name"], given, 0.0)
+
+    def _include(self, parent: Element, given: dict[str, str], tag: Tag, path: Path, depth: int) -> None:
+        """Add the content of another file."""
+        self._included += 1
+        most = self._files.limits.includes
+        if self._included > most:
+            raise SceneError(
+                f"{tag.place}: includes more than {most} files; the limit is LoadLimits.includes"
+            )
+        if depth == MOST_INCLUDED:
+            raise SceneError(f"{tag.place}: files include each other; the limit is {MOST_INCLUDED} levels")
+        self.folders.append(path.parent)
+        try:
+            file = self.find(given["filename"])
+        except SceneError as error:
+            raise SceneError(f"{tag.place}: {error}") from error
+        finally:
+            self.folders.pop()
+        included = self._read(file, self._files.read(file), depth + 1)
+        if included["type"] != "scene":
+            _set(parent, given.get("name", ""), included, tag, old=False)
+            return
+        for key, value in included.items():
+            if key not in ("type", "id"):
+                _set(parent, "" if key.startswith(UNNAMED) else key, value, tag, old=False)
+
+    def _add_folder(self, name: str, tag: Tag, path: Path) -> None:
+        """Add a folder in which files are looked for; whether they may be read is checked then."""
+        folder = path.parent / name.replace("\\", "/")
+        if not folder.is_dir():
+            raise SceneError(f"{tag.place}: path is {name!r}; there is no such folder")
+        self.folders.append(folder)
+
+    def _substituted(self, tag: Tag) -> dict[str, str]:
+        """Return the attributes of an element, each `$name` replaced by its value."""
+        return {key: self._replaced(text, tag) for key, text in tag.attributes.items()}
+
+    def _replaced(self, text: str, tag: Tag) -> str:
+        if "$" not in text:
+            return text
+        names = "|".join(map(re.escape, sorted(self._values, key=len, reverse=True)))
+
+        def value(match: re.Match[str]) -> str:
+            if match[0] == "\\$":
+                return "$"
+            if match[1] is None:
+                name = re.match(r"\w*", text[match.start() + 1 :])
+                assert name is not None
+                hint = did_you_mean(name[0], self._values)
+                raise SceneError(f"{tag.place}: the parameter ${name[0]} has no value{hint}")
+            self._unused.discard(match[1])
+            return self._values[match[1]]
+
+        return re.sub(rf"\\\$|\$({names})|\$" if names else r"\\\$|\$()(?!)|\$", value, text)
+
+
+def parsed(name: str, data: bytes) -> Tag:
+    """Return the first element of an XML file, with all that is in it."""
+    above: list[Tag] = []
+    roots: list[Tag] = []
+    at, line = 0, 1
+
+    def begin(tag: str, attributes: dict[str, str], byte: int) -> None:
+        nonlocal at, line
+        line += data.count(b"\n", at, byte)
+        at = byte
+        element = Tag(tag, attributes, f"{name} line {line}")
+        if len(above) >= MAX_DEPTH:
+            raise SceneError(f"{element.place}: its elements are nested deeper than {MAX_DEPTH}")
+        (above[-1].children if above else roots).append(element)
+        above.append(element)
+
+    def end(tag: str, byte: int) -> None:
+        above.pop()
+
+    look_through(name, data, begin, end)
+    return roots[0]
+
+
+def _element(tag: Tag, **values: Any) -> Element:
+    element = Element(values)
+    element.place = tag.place
+    return element
+
+
+def _as_text(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool | np.bool_) else str(value)
+
+
+def _unknown(name: str) -> str:
+    where = "; it belongs in a <transform>" if name in OPERATIONS else did_you_mean(name, [*OBJECTS, *OTHERS])
+    return f"<{name}> is no element of scenes{where}"
+
+
+def _set(parent: Element, name: str, value: Any, tag: Tag, old: bool) -> None:
+    """Set a parameter; without a name it gets one."""
+    if not name:
+        name = f"{UNNAMED}{sum(key.startswith(UNNAMED) for key in parent)}"
+    elif old:
+        name = re.sub(r"(?<=[a-z])[A-Z]+", lambda match: "_" + match[0].lower(), name)
+    if name in ("type", "id"):
+        raise SceneError(f"{tag.place}: a parameter cannot be called {name!r}")
+    if name in parent:
+        raise SceneError(f"{tag.place}: {name} is given twice")
+    parent[name] = value
+
+
+def _upgraded(element: Element) -> Element:
+    """Give a plugin of a version before 2 the parameters that it has now."""
+    if element["type"] == "diffuse" and "diffuse_reflectance" in element:
+        element["reflectance"] = element.pop("diffuse_reflectance")
+    if element.keys() & TO_UV.keys():
+        shift, scale = np.eye(4), np.eye(4)
+        for key, at in TO_UV.items():
+            if key in element:
+                (shift if key.endswith("offset") else scale)[at] = element.pop(key)
+        element["to_uv"] = scale @ shift
+    return element

@@ -1,0 +1,259 @@
+"""Shapes of Mitsuba."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...arrays.elementary import sin_cos_turns
+from ...arrays.vec import Doubles, Ints
+from ...bsdfs import Diffuse
+from ...core.errors import SceneError
+from ...core.errors import number as checked_number
+from ...materials import Material
+from ...shapes import Cylinders, Instance, Mesh, Shape, Sphere
+from ...textures.base import BaseTexture
+from ..placing import moved_raw
+from ..repair import RawMesh, build
+from .attributes import with_attribute
+from .nodes import Job, Node, name_of, plugin, unsupported
+from .serialized import read_serialized
+
+SIDES = 128  # of round shapes that are meshes
+ROUND = 1e-4  # relative difference of the scales along two axes that is taken for rounding
+SURFACE = "to_world flip_normals"
+
+
+@plugin("rectangle", "shape", SURFACE, "bsdf emitter")
+def _rectangle(node: Node, job: Job) -> list[Shape]:
+    corners = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    return _mesh(node, job, RawMesh("rectangle", corners, faces, uvs=(corners[:, :2] + 1) / 2))
+
+
+@plugin("cube", "shape", SURFACE, "bsdf emitter")
+def _cube(node: Node, job: Job) -> list[Shape]:
+    sides = ((1, 5, 4, 0), (3, 2, 6, 7), (1, 3, 7, 5), (5, 7, 6, 4), (4, 6, 2, 0), (3, 1, 0, 2))
+    number = np.array(sides).reshape(-1)  # of a corner: a bit for each axis
+    corners = np.stack([number & 1, number >> 1 & 1, number >> 2], 1) * 2.0 - 1
+    faces = np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(6)[:, None, None]
+    uvs = np.tile([[0.0, 1], [1, 1], [1, 0], [0, 0]], (6, 1))
+    return _mesh(node, job, RawMesh("cube", corners, faces.reshape(-1, 3), uvs=uvs))
+
+
+@plugin("disk", "shape", SURFACE, "bsdf emitter", note="a mesh of 128 triangles")
+def _disk(node: Node, job: Job) -> list[Shape]:
+    ring, turns = _ring(np.sqrt(2 * np.pi / SIDES / sin_cos_turns(np.array([1 / SIDES]))[0][0]))
+    count = np.arange(SIDES)
+    flat = np.hstack([ring, np.zeros((SIDES + 1, 1))])
+    vertices = np.concatenate([flat, np.zeros((SIDES, 3))])
+    uvs = np.concatenate(
+        [np.stack([np.ones(SIDES + 1), turns], 1), np.stack([np.zeros(SIDES), turns[:-1] + 0.5 / SIDES], 1)]
+    )
+    faces = np.stack([SIDES + 1 + count, count, count + 1], 1)
+    return _mesh(node, job, RawMesh("disk", vertices, faces, uvs=uvs))
+
+
+@plugin(
+    "cylinder",
+    "shape",
+    f"{SURFACE} p0 p1 radius",
+    "bsdf emitter",
+    note="a mesh where it shines, is textured or elliptic",
+)
+def _cylinder(node: Node, job: Job) -> list[Shape]:
+    start, end = node.vector("p0", (0, 0, 0)), node.vector("p1", (0, 0, 1))
+    radius = checked_number("radius", node.get("radius", 1.0), lambda x: x > 0, "above 0")
+    if not (end - start).any():
+        raise SceneError(f"p0 and p1 are both {start.tolist()}")
+    axes, matrix = _frame(end - start), node.matrix()
+    material, emission = _appearance(node, job)
+    around = np.linalg.norm(matrix[:3, :3] @ axes[:, :2], axis=0)
+    even = abs(around[1] - around[0]) <= ROUND * around[0]
+    if even and emission is None and not node.flag("flip_normals") and not _is_textured(material):
+        ends = np.stack([start, end]) @ matrix[:3, :3].T + matrix[:3, 3]
+        pipe = Cylinders(ends[:1], ends[1:], radius * around[0], caps=False, material=material)
+        return [_named(pipe, node)]
+    ring, turns = _ring(1.0)
+    across = ring @ axes[:, :2].T
+    vertices = np.concatenate([start + radius * across, end + radius * across])
+    uvs = np.concatenate([np.stack([turns, np.full(SIDES + 1, v)], 1) for v in (0.0, 1.0)])
+    k = np.arange(SIDES)
+    low, high = (k, k + 1), (k + SIDES + 1, k + SIDES + 2)
+    faces = np.stack([low[0], low[1], high[1], low[0], high[1], high[0]], 1).reshape(-1, 3)
+    return _mesh(node, job, RawMesh("cylinder", vertices, faces, np.tile(across, (2, 1)), uvs))
+
+
+@plugin(
+    "sphere",
+    "shape",
+    f"{SURFACE} center radius",
+    "bsdf emitter",
+    note="one radius; poles of textures along y",
+)
+def _sphere(node: Node, job: Job) -> list[Shape]:
+    center = node.vector("center", (0, 0, 0))
+    radius = checked_number("radius", node.get("radius", 1.0), lambda x: x > 0, "above 0")
+    matrix = node.matrix()
+    scale = np.linalg.svd(matrix[:3, :3], compute_uv=False)
+    if scale[0] - scale[2] > ROUND * scale[0]:
+        node.lose("to_world, which scales unevenly")
+    if node.flag("flip_normals"):
+        node.lose("flip_normals")
+    material, emission = _appearance(node, job)
+    if _is_textured(material) or isinstance(emission, BaseTexture):
+        node.lose("the poles of its texture coordinates, which are along y here")
+    center = matrix[:3, :3] @ center + matrix[:3, 3]
+    radius *= float(np.linalg.norm(matrix[:3, 0]))
+    return [_named(Sphere(center, radius, material=material, emission=emission), node)]
+
+
+@plugin("obj ply", "shape", f"{SURFACE} filename face_normals flip_tex_coords", "bsdf emitter")
+def _file(node: Node, job: Job) -> list[Shape]:
+    path = job.find(node.text("filename"))
+    if path not in job.made:
+        job.made[path] = _one(str(path), job.read_mesh(path))
+    raw = with_attribute(node.label, replace(job.made[path]), node)
+    if node.flag("flip_tex_coords", node.plugin == "obj") and raw.uvs is not None:
+        raw = replace(raw, uvs=raw.uvs * (1, -1) + (0, 1))
+    return _mesh(node, job, replace(raw, name=name_of(path)), smooth=True)
+
+
+@plugin(
+    "serialized",
+    "shape",
+    f"{SURFACE} filename shape_index face_normals",
+    "bsdf emitter",
+    note="versions 3 and 4",
+)
+def _serialized(node: Node, job: Job) -> list[Shape]:
+    path = job.find(node.text("filename"))
+    key = (path, node.whole("shape_index", 0))
+    if path not in job.made:
+        job.made[path] = job.files.read(path)
+    if key not in job.made:
+        job.made[key] = read_serialized(str(path), job.made[path], key[1], job.files)
+    return _mesh(node, job, job.made[key], smooth=True)
+
+
+@plugin("shapegroup", "shape", holds="shape")
+def _group(node: Node, job: Job) -> list[Shape]:
+    """Return its shapes, which are placed by instances."""
+    return [shape for part in node.held("shape") for shape in job.convert(part)]
+
+
+@plugin("merge", "shape", holds="shape")
+def _merge(node: Node, job: Job) -> list[Shape]:
+    return _group(node, job)
+
+
+@plugin("instance", "shape", "to_world", holds="shape")
+def _instance(node: Node, job: Job) -> list[Shape]:
+    group, matrix = job.only(node, "shape"), node.matrix()
+    if group.plugin != "shapegroup":
+        raise SceneError(f"holds a {group.plugin}; it must be a shapegroup")
+    placed: list[Shape] = []
+    for shape in job.convert(group):
+        job.instances += 1
+        most = job.files.limits.instances
+        if job.instances > most:
+            raise SceneError(f"makes more than {most} instances; the limit is LoadLimits.instances")
+        if isinstance(shape, Mesh):
+            placed.append(Instance(shape, matrix, name=node.id or None))
+        elif isinstance(shape, Sphere | Cylinders):
+            placed.append(shape.placed(matrix))
+        else:
+            raise SceneError("its group holds an instance; instances of instances are not supported")
+    return placed
+
+
+unsupported("bsplinecurve linearcurve ellipsoids ellipsoidsmesh sdfgrid", "shape")
+
+
+def _mesh(node: Node, job: Job, raw: RawMesh, smooth: bool = False) -> list[Shape]:
+    """Return a mesh where to_world places it; without normals it is smooth if it is to be."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        raw = moved_raw(raw, node.matrix())
+    if "face_normals" in node.values and node.flag("face_normals"):
+        raw, smooth = replace(raw, normals=None), False
+    if node.flag("flip_normals"):
+        normals = None if raw.normals is None else -raw.normals
+        raw = replace(raw, faces=raw.faces[:, ::-1], normals=normals)
+    job.triangles += len(raw.faces)
+    job.files.limits.check_triangles(node.label, job.triangles)
+    material, emission = _appearance(node, job)
+    name = node.id or raw.name
+    raw = replace(raw, name=name, material=material, emission=emission, smooth=smooth, tangents=None)
+    mesh = build(job.name, raw, job.strict)
+    return [] if mesh is None else [mesh]
+
+
+def _appearance(node: Node, job: Job) -> tuple[Material, Any]:
+    """Return the material and the emission of a shape."""
+    bsdfs, emitters = node.held("bsdf"), node.held("emitter")
+    for extra in (*bsdfs[1:], *emitters[1:]):
+        node.lose(f"a second {extra.kind}")
+    emission = None
+    if emitters:
+        if emitters[0].plugin != "area":
+            raise SceneError(f"has the emitter {emitters[0].plugin!r}; it must be an area light")
+        emission = job.convert(emitters[0])
+    if not bsdfs:
+        return job.made.setdefault(
+            emission is None, Material(Diffuse(0.5 if emission is None else 0))
+        ), emission
+    return job.convert(bsdfs[0]), emission
+
+
+def _one(name: str, raws: list[RawMesh]) -> RawMesh:
+    """Return all meshes of a file as one."""
+    if not raws:
+        raise SceneError(f"{name}: has no faces")
+    if len(raws) == 1:
+        return raws[0]
+    starts = np.cumsum([0] + [len(raw.vertices) for raw in raws])
+
+    def joined(field: str) -> Any:
+        parts = [getattr(raw, field) for raw in raws]
+        return None if any(part is None for part in parts) else np.concatenate(parts)
+
+    faces: Ints = np.concatenate([raw.faces + start for raw, start in zip(raws, starts[:-1], strict=True)])
+    normals, uvs, colors = (joined(field) for field in ("normals", "uvs", "colors"))
+    return RawMesh("", joined("vertices"), faces, normals, uvs, colors=colors)
+
+
+def _ring(radius: float) -> tuple[Doubles, Doubles]:
+    """Return points on a circle (n, 2), the last of which is the first, and their turns (n,)."""
+    turns = np.arange(SIDES + 1) / SIDES
+    sin, cos = sin_cos_turns(turns)
+    ring = radius * np.stack([cos, sin], 1)
+    ring[-1] = ring[0]
+    return ring, turns
+
+
+def _frame(axis: Doubles) -> Doubles:
+    """Return axes (3, 3) as columns, the third along `axis`, by the rule of Mitsuba (Duff et al. 2017)."""
+    x, y, z = axis / np.linalg.norm(axis)
+    sign = np.copysign(1.0, z)
+    a = -1 / (sign + z)
+    b = x * y * a
+    return np.array([[1 + sign * x * x * a, b, x], [sign * b, sign + y * y * a, y], [-sign * x, -y, z]])
+
+
+def _named(shape: Any, node: Node) -> Any:
+    if node.id:
+        shape.name = node.id
+    return shape
+
+
+def _is_textured(material: Material) -> bool:
+    """Return whether a parameter of a material varies over the surface."""
+    found = [material.alpha, material.normal_map]
+    bsdfs: list[Any] = [material.bsdf]
+    while bsdfs:
+        values = vars(bsdfs.pop()).values()
+        bsdfs += [value for value in values if hasattr(value, "sample_f")]
+        found += [value for value in values if isinstance(value, BaseTexture)]
+    return any(isinstance(each, BaseTexture) or hasattr(each, "perturbed") for each in found)

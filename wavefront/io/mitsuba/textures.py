@@ -1,0 +1,200 @@
+"""Textures, colors and numbers of Mitsuba's plugins.
+
+Texture coordinates are Mitsuba's: v is 0 at the top row of an image, so that the transform of each texture
+flips it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays.state import SurfaceInteraction
+from ...arrays.vec import Floats, luminance
+from ...colors import srgb_to_linear
+from ...core.errors import SceneError, finite_array, in_brief, number
+from ...textures.base import BaseTexture
+from ...textures.image import Texture
+from ...textures.vertex_colors import VertexColors
+from .nodes import Job, Node, plugin, unsupported
+from .spectra import blackbody, pairs_of, read_spectrum, spectrum_rgb, uniform_emission
+
+FLIP = np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]])  # of v
+Value = Any  # a number, a color (3,) or a texture
+
+
+class SquareRoot(BaseTexture):
+    """The roughness of a texture of α."""
+
+    scalar = True
+
+    def __init__(self, alpha: BaseTexture) -> None:
+        self.alpha, self.reads = alpha, alpha.reads
+
+    def limits(self) -> tuple[float, ...]:
+        """Return the roots of the limits."""
+        return tuple(float(np.sqrt(max(each, 0))) for each in self.alpha.limits())
+
+    def at(self, surface: SurfaceInteraction) -> Floats:
+        """Return the roots, (n,)."""
+        values = self.alpha.at(surface)
+        return np.sqrt(values if values.ndim == 1 else luminance(values))
+
+
+def color(node: Node, name: str, default: Any, job: Job, *, emission: bool = False) -> Value:
+    """Return a parameter that is a number, a color or a texture."""
+    value = node.get(name, default)
+    if not isinstance(value, Node):
+        return number(name, value)
+    if value.plugin in ("rgb", "spectrum"):
+        return constant(value, job, emission=emission, bounded=not emission and name not in ("eta", "k"))
+    if value.kind != "texture":
+        raise SceneError(f"{name} is a {value.kind}; it must be a texture")
+    return job.convert(value)
+
+
+def scalar(node: Node, name: str, default: float, job: Job) -> Value:
+    """Return a parameter that is a number or a texture of numbers; a color counts by its luminance."""
+    value = node.get(name, default)
+    if isinstance(value, Node) and value.plugin == "bitmap":
+        return bitmap(value, job, channel="luminance")
+    value = color(node, name, default, job)
+    if isinstance(value, BaseTexture | float | int):
+        return value
+    return float(luminance(value))
+
+
+def roughness(node: Node, name: str, default: float, job: Job) -> Value:
+    """Return the roughness √α of a parameter α."""
+    alpha = scalar(node, name, default, job)
+    if isinstance(alpha, BaseTexture):
+        return SquareRoot(alpha)
+    return float(np.sqrt(number(name, alpha, lambda x: 0 <= x <= 1, "in [0, 1]")))
+
+
+def constant(node: Node, job: Job, *, emission: bool, bounded: bool) -> Value:
+    """Return a number, or a color (3,), of an rgb or spectrum."""
+    job.convert(node)  # reports its unknown parameters
+    if node.plugin == "rgb":
+        value = node.get("value")
+        return finite_array("rgb", np.broadcast_to(value, 3) if np.ndim(value) == 0 else value, (3,))
+    if "filename" in node.values:
+        path = job.find(node.text("filename"))
+        pairs: Any = read_spectrum(path, job.files.read(path))
+    elif "wavelengths" in node.values:
+        texts = (node.get("wavelengths"), node.get("values"))
+        pairs = list(zip(*(str(text).replace(",", " ").split() for text in texts), strict=False))
+        pairs = [(float(wave), float(value)) for wave, value in pairs]
+    else:
+        pairs = pairs_of("value", node.get("value"))
+    if isinstance(pairs, float):
+        return uniform_emission(pairs) if emission else pairs
+    return spectrum_rgb(pairs, emission=emission, bounded=bounded)
+
+
+@plugin("rgb", "texture", "value")
+@plugin("spectrum irregular", "texture", "value filename wavelengths values")
+def _constant(node: Node, job: Job) -> Value:
+    return constant(node, job, emission=False, bounded=True) if node.plugin == "irregular" else None
+
+
+@plugin("regular", "texture", "values wavelength_min wavelength_max")
+def _regular(node: Node, job: Job) -> Value:
+    values = [float(each) for each in node.text("values").replace(",", " ").split()]
+    at = np.linspace(node.number("wavelength_min", 360), node.number("wavelength_max", 830), len(values))
+    return spectrum_rgb(list(zip(at, values, strict=True)), emission=False, bounded=True)
+
+
+@plugin("uniform rawconstant", "texture", "value")
+def _uniform(node: Node, job: Job) -> Value:
+    value = node.get("value", 1.0)
+    if isinstance(value, Node) or np.ndim(value) == 0:
+        return color(node, "value", 1.0, job)
+    return node.vector("value", None)
+
+
+@plugin("srgb d65", "texture", "color value scale")
+def _srgb(node: Node, job: Job) -> Value:
+    base = color(node, "color" if "color" in node.values else "value", 1.0, job, emission=True)
+    factor = node.number("scale", 1.0)
+    if factor == 1 or not isinstance(base, BaseTexture):
+        return base if factor == 1 else factor * np.asarray(base)
+    node.lose("scale")
+    return base
+
+
+@plugin("blackbody", "texture", "temperature")
+def _blackbody(node: Node, job: Job) -> Value:
+    return blackbody(node.number("temperature", 5000.0))
+
+
+def bitmap(node: Node, job: Job, channel: Any = None, plain: bool = False) -> Texture:
+    """Return an image; `plain` for data that must be linear, such as heights."""
+    job.convert(node)
+    codes, raw = pixels(node, job), node.flag("raw")
+    if plain and not raw and codes.dtype.kind == "u":
+        codes, raw = srgb_to_linear((codes / np.iinfo(codes.dtype).max).astype(np.float32)), True
+    return Texture(
+        codes,
+        srgb=not raw and not plain,
+        wrap=node.choice("wrap_mode", "repeat", ("repeat", "mirror", "clamp")),  # type: ignore[arg-type]
+        filter=node.choice("filter_type", "bilinear", ("bilinear", "nearest")),  # type: ignore[arg-type]
+        transform=_to_uv(node),
+        channel=channel,
+        max_pixels=job.files.limits.pixels,
+    )
+
+
+@plugin(
+    "bitmap",
+    "texture",
+    "filename bitmap data raw to_uv wrap_mode filter_type",
+    harmless="accel format",
+)
+def _bitmap(node: Node, job: Job) -> Texture:
+    job.made[node] = None  # so that `bitmap` does not begin again
+    return bitmap(node, job)
+
+
+def pixels(node: Node, job: Job) -> NDArray[Any]:
+    """Return the pixels of an image as stored, (H, W, C)."""
+    for name in ("data", "bitmap"):
+        if name in node.values:
+            values = np.asarray(node.get(name))
+            if values.ndim not in (2, 3) or values.dtype.kind not in "uf":
+                raise SceneError(f"{name} is {in_brief(node.get(name))}; it must be an image")
+            return values
+    return job.files.image(job.find(node.text("filename")))
+
+
+@plugin("checkerboard", "texture", "color0 color1 to_uv")
+def _checkerboard(node: Node, job: Job) -> Value:
+    fields = []
+    for name, default in (("color0", 0.4), ("color1", 0.2)):
+        value = color(node, name, default, job)
+        if isinstance(value, BaseTexture):
+            node.lose(f"the texture {name}")
+            value = default
+        fields.append(np.broadcast_to(value, 3))
+    first, second = fields
+    board = np.array([[first, second], [second, first]], np.float32)  # v from 0 to 1/2 is the upper row
+    return Texture(board, filter="nearest", transform=_to_uv(node))
+
+
+@plugin("mesh_attribute", "texture", "name scale", note="one for each shape, of ply files, in [0, 1]")
+def _mesh_attribute(node: Node, job: Job) -> Value:
+    return VertexColors(node.number("scale", 1.0))
+
+
+unsupported("volume", "texture")
+
+
+def _to_uv(node: Node) -> NDArray[np.float64]:
+    """Return the transform of texture coordinates, (3, 3)."""
+    value = node.get("to_uv", np.eye(4))
+    value = np.asarray(getattr(value, "matrix", value), np.float64)
+    if value.shape == (4, 4):
+        value = value[np.ix_((0, 1, 3), (0, 1, 3))]
+    return FLIP @ finite_array("to_uv", value, (3, 3))

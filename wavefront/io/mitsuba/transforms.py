@@ -1,0 +1,122 @@
+"""The operations of a transform in scene files of Mitsuba."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from ...core.errors import SceneError, in_brief
+from ...shapes.transform import Matrix, rotation, translation
+
+Attributes = Mapping[str, str]
+
+
+def product(steps: list[tuple[str, Attributes, str]]) -> Matrix:
+    """Return the matrix (4, 4) of operations, the first of which is applied first.
+
+    Parameters
+    ----------
+    steps
+        Name, attributes and place of each.
+
+    Raises
+    ------
+    SceneError
+        If one is malformed. The message names its place.
+    """
+    matrix = np.eye(4)
+    for name, given, place in steps:
+        if name.lower() not in OPERATIONS:
+            raise SceneError(f"{place}: <{name}> is no operation; there are {', '.join(OPERATIONS)}")
+        operation, known = OPERATIONS[name.lower()]
+        unknown = given.keys() - set(known.split())
+        if unknown:
+            raise SceneError(f"{place}: <{name}> has the unknown attribute {min(unknown)!r}")
+        with np.errstate(over="ignore", invalid="ignore"):
+            matrix = operation(place, given) @ matrix
+    if not np.isfinite(matrix).all():
+        raise SceneError(f"{steps[-1][2]}: the transform is not finite")
+    return matrix
+
+
+def looking(name: str, origin: np.ndarray, target: np.ndarray, up: np.ndarray) -> Matrix:
+    """Return the matrix of a thing at `origin` whose z axis points at `target`, and whose y axis is up."""
+    ahead = target - origin
+    size = np.linalg.norm(ahead)
+    if not size > 0:
+        raise SceneError(f"{name}: origin and target are both {origin.tolist()}")
+    ahead = ahead / size
+    if not up.any():
+        up = np.cross(ahead, np.eye(3)[np.abs(ahead).argmin()])
+    left = np.cross(up, ahead)
+    size = np.linalg.norm(left)
+    if not size > 1e-12 * np.linalg.norm(up):
+        raise SceneError(f"{name}: up is {up.tolist()}, the direction of the view")
+    left = left / size
+    matrix = np.eye(4)
+    matrix[:3] = np.stack([left, np.cross(ahead, left), ahead, origin], 1)
+    return matrix
+
+
+def numbers(place: str, name: str, text: str, counts: tuple[int, ...]) -> list[float]:
+    """Return the numbers of a text, of which there must be one of some counts."""
+    try:
+        found = [float(each) for each in re.split(r"[\s,]+", text.strip(" \t\r\n,"))]
+    except ValueError:
+        found = []
+    if len(found) not in counts or not np.isfinite(found).all():
+        wanted = " or ".join("a number" if count == 1 else f"{count} numbers" for count in counts)
+        raise SceneError(f"{place}: {name} is {in_brief(text)}; it must be {wanted}")
+    return found
+
+
+def vector(place: str, name: str, given: Mapping[str, str], default: float) -> list[float]:
+    """Return (3,) given as a value, or as x, y and z."""
+    if "value" not in given:
+        return [numbers(place, f"{name} {x}", given[x], (1,))[0] if x in given else default for x in "xyz"]
+    if given.keys() & {"x", "y", "z"}:
+        raise SceneError(f"{place}: {name} has a value, and x, y or z; give one of them")
+    values = numbers(place, name, given["value"], (1, 3))
+    return values * (3 // len(values))
+
+
+def _translate(place: str, given: Attributes) -> Matrix:
+    return translation(f"{place}: <translate>", vector(place, "<translate>", given, 0.0))
+
+
+def _rotate(place: str, given: Attributes) -> Matrix:
+    axis = vector(place, "<rotate>", given, 0.0)
+    (angle,) = numbers(place, "angle", given.get("angle", ""), (1,))
+    return rotation(f"{place}: <rotate>", axis, angle, (0, 0, 0))
+
+
+def _scale(place: str, given: Attributes) -> Matrix:
+    return np.diag([*vector(place, "<scale>", given, 1.0), 1.0])
+
+
+def _look_at(place: str, given: Attributes) -> Matrix:
+    texts = (given.get("origin", ""), given.get("target", ""), given.get("up", "0 0 0"))
+    rows = [
+        np.array(numbers(place, name, text, (3,)))
+        for name, text in zip(("origin", "target", "up"), texts, strict=True)
+    ]
+    return looking(f"{place}: <lookat>", *rows)
+
+
+def _matrix(place: str, given: Attributes) -> Matrix:
+    values = numbers(place, "<matrix>", given.get("value", ""), (9, 16))
+    size = 3 if len(values) == 9 else 4
+    matrix = np.eye(4)
+    matrix[:size, :size] = np.reshape(values, (size, size))
+    return matrix
+
+
+OPERATIONS: dict[str, tuple[Callable[[str, Attributes], Matrix], str]] = {
+    "translate": (_translate, "value x y z"),
+    "rotate": (_rotate, "value x y z angle"),
+    "scale": (_scale, "value x y z"),
+    "lookat": (_look_at, "origin target up"),
+    "matrix": (_matrix, "value"),
+}

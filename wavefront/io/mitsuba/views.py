@@ -1,0 +1,166 @@
+"""Sensors, films, samplers and integrators of Mitsuba: a camera, and settings of a render."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...arrays.elementary import arctan2, sin_cos
+from ...camera import Camera
+from ...camera.projection import Orthographic, Perspective, Projection
+from ...core.errors import SceneError, number
+from .nodes import Job, Node, plugin, unsupported
+
+Settings = dict[str, Any]
+ENDLESS = 2**16  # bounces, where there is no limit
+CLIPPED = "to_world near_clip far_clip focus_distance"
+NO_CLIPPING = "near_clip and far_clip do not cut"
+LENS = "fov fov_axis focal_length principal_point_offset_x principal_point_offset_y"
+
+
+@plugin("perspective", "sensor", f"{CLIPPED} {LENS}", "film sampler", note=NO_CLIPPING)
+@plugin("thinlens", "sensor", f"{CLIPPED} aperture_radius {LENS}", "film sampler", note=NO_CLIPPING)
+@plugin("orthographic", "sensor", CLIPPED, "film sampler", note=NO_CLIPPING)
+def _sensor(node: Node, job: Job) -> tuple[Camera, Settings]:
+    film = node.held("film")
+    size, crop, settings = job.convert(film[0]) if film else ((768, 576), None, {"filter": "gaussian"})
+    for sampler in node.held("sampler"):
+        settings = settings | job.convert(sampler)
+    matrix = node.matrix()
+    axes, origin, aspect = matrix[:3, :3], matrix[:3, 3], size[0] / size[1]
+    scale = np.linalg.norm(axes, axis=0)
+    if not scale.all():
+        raise SceneError(f"to_world is singular: {matrix.tolist()}")
+    lens: Projection
+    if node.plugin == "orthographic":
+        lens = Orthographic(2 * scale[0] / aspect)
+        origin = origin + axes[:, 2] * node.number("near_clip", 1e-2)
+        if abs(scale[1] / scale[0] - 1) > 1e-5:
+            node.lose("pixels that are not square")
+    else:
+        lens = _lens(node, aspect)
+    axes = axes / scale * (-1, 1, -1)  # Mitsuba's x points left, and z ahead
+    if np.linalg.det(axes) < 0:
+        node.lose("the reflection in to_world")
+        axes = axes * (-1, 1, 1)
+    return Camera(origin, axes, lens, size, crop), settings
+
+
+@plugin(
+    "hdrfilm specfilm",
+    "film",
+    "width height crop_width crop_height crop_offset_x crop_offset_y pixel_format",
+    holds="rfilter",
+    harmless="file_format component_format sample_border compensate high_quality_edges banner",
+)
+def _film(node: Node, job: Job) -> tuple[tuple[int, int], tuple[int, ...] | None, Settings]:
+    width, height = node.whole("width", 768, 1), node.whole("height", 576, 1)
+    left, top = node.whole("crop_offset_x", 0), node.whole("crop_offset_y", 0)
+    right, bottom = left + node.whole("crop_width", width, 1), top + node.whole("crop_height", height, 1)
+    whole = (left, top, right, bottom) == (0, 0, width, height)
+    filters = node.held("rfilter")
+    settings = job.convert(filters[0]) if filters else {"filter": "gaussian"}
+    return (width, height), None if whole else (left, top, right, bottom), dict(settings)
+
+
+@plugin("box", "rfilter", "radius")
+@plugin("tent", "rfilter", "radius")
+@plugin("gaussian", "rfilter", "stddev radius", note="ends at 1.5 pixels")
+def _filter(node: Node, job: Job) -> Settings:
+    if node.plugin == "gaussian" and node.number("stddev", 0.5) != 0.5:
+        node.lose("stddev")
+    usual = {"box": 0.5, "tent": 1.0, "gaussian": 2.0}[node.plugin]
+    if node.number("radius", usual) != usual:
+        node.lose("radius")
+    return {"filter": node.plugin}
+
+
+@plugin(
+    "independent stratified multijitter orthogonal ldsampler",
+    "sampler",
+    "sample_count",
+    harmless="seed jitter strength",
+    note="its sample_count counts, its pattern does not",
+)
+def _sampler(node: Node, job: Job) -> Settings:
+    return {"spp": node.whole("sample_count", 4, 1)} if "sample_count" in node.values else {}
+
+
+@plugin("path volpath volpathmis ptracer prb", "integrator", "max_depth rr_depth hide_emitters")
+@plugin(
+    "direct",
+    "integrator",
+    "hide_emitters",
+    harmless="shading_samples emitter_samples bsdf_samples",
+)
+@plugin("moment aov", "integrator", "hide_emitters", "integrator", harmless="aovs", note="that in it counts")
+def _integrator(node: Node, job: Job) -> Settings:
+    if node.plugin in ("moment", "aov"):
+        return dict(job.convert(job.only(node, "integrator")))
+    settings: Settings = {"max_bounces": 1}
+    if node.plugin != "direct":
+        depth = number(
+            "max_depth", node.get("max_depth", -1), lambda x: x == int(x) >= -1, "at least 0, or -1"
+        )
+        settings["max_bounces"] = min(int(depth) - 1, ENDLESS) if depth > 0 else ENDLESS
+        settings["roulette"] = node.whole("rr_depth", 5, 1)
+        if depth == 0:
+            node.lose("max_depth 0")
+            settings["max_bounces"] = 0
+    if node.flag("hide_emitters"):
+        settings["background"] = "transparent"
+    return settings
+
+
+unsupported(
+    "depth stokes direct_projective prb_basic prb_projective prbvolpath emission_reparam", "integrator"
+)
+unsupported("catmullrom lanczos mitchell", "rfilter")
+unsupported("batch distant irradiancemeter radiancemeter", "sensor")
+
+
+def _lens(node: Node, aspect: float) -> Perspective:
+    """Return the lens of a perspective camera; its height follows from its width."""
+    across = _field_of_view(node, aspect)
+    focus = node.number("focus_distance", node.number("far_clip", 1e4))
+    aperture = node.number("aperture_radius", 0.0) if node.plugin == "thinlens" else 0.0
+    shift = (node.number("principal_point_offset_x", 0.0), -node.number("principal_point_offset_y", 0.0))
+    return Perspective(
+        _degrees(_tan(across) / aspect), shift=shift, aperture=2 * aperture, focus=focus if aperture else None
+    )
+
+
+def _field_of_view(node: Node, aspect: float) -> float:
+    """Return the horizontal field of view in degrees, of a picture `aspect` times as wide as high."""
+    if "fov" in node.values:
+        if "focal_length" in node.values:
+            raise SceneError("has fov and focal_length; give one of them")
+        angle = number("fov", node.get("fov"), lambda x: 0 < x < 180, "above 0 and below 180 degrees")
+        axis = node.choice("fov_axis", "x", ("x", "y", "diagonal", "smaller", "larger"))
+    else:
+        length = number(
+            "focal_length",
+            float(node.text("focal_length", "50mm").removesuffix("mm")),
+            lambda x: x > 0,
+            "above 0 mm",
+        )
+        angle, axis = _degrees(np.hypot(36, 24) / (2 * length)), "diagonal"
+    if axis in ("smaller", "larger"):
+        axis = "y" if (axis == "smaller") == (aspect > 1) else "x"
+    if axis == "x":
+        return angle
+    if axis == "y":
+        return _degrees(_tan(angle) * aspect)
+    return _degrees(_tan(angle) / np.sqrt(1 + 1 / aspect**2))
+
+
+def _tan(degrees: float) -> float:
+    """Return the tangent of half an angle."""
+    sin, cos = sin_cos(np.float64(np.radians(degrees) / 2))
+    return float(sin / cos)
+
+
+def _degrees(tangent: float) -> float:
+    """Return the angle the tangent of whose half is given."""
+    return float(2 * np.degrees(arctan2(np.float64(tangent), np.float64(1))))
