@@ -86,7 +86,7 @@ def test_long_passes_show_pictures_in_between(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_noise_gives_a_picture_at_each_decision() -> None:
-    options = {"noise": 0.05, "workers": 1, **QUIET}
+    options = {"noise": 0.02, "workers": 1, **QUIET}
     with wf.Session(everything(), 128, **options) as session, pytest.warns(UserWarning, match="not reached"):
         images = list(session)
     assert [image.counts.max() for image in images[:6]] == [1, 2, 4, 8, 16, 32]
