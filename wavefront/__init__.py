@@ -48,6 +48,7 @@ from .lights import (
     LightSample,
     PointLight,
     PointLights,
+    Projector,
     Receiver,
     SpotLight,
 )
@@ -157,6 +158,7 @@ __all__ = [
     "PointLights",
     "Points",
     "Principled",
+    "Projector",
     "Receiver",
     "Rectangle",
     "RegionMean",

@@ -135,6 +135,7 @@ BAD = {
     "intensity": ({"intensity": (1, -1, 1)}, r"SpotLight intensity\[1\] is -1; it must be at least 0"),
     "angle 0": ({"angle": 0}, "SpotLight angle is 0; it must be above 0 and at most 180 degrees"),
     "angle large": ({"angle": 181}, "SpotLight angle is 181"),
+    "falloff": ({"falloff": "cubic"}, "SpotLight falloff is 'cubic'; it must be one of smooth, linear"),
     "blend": ({"blend": 1.5}, r"SpotLight blend is 1.5; it must be in \[0, 1\]"),
 }
 

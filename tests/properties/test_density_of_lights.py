@@ -113,7 +113,7 @@ def test_every_light_is_here() -> None:
         *("TriangleLights", "TwoSidedTriangleLights", "TexturedTriangleLights", "RectangleLights"),
         *("TwoSidedTexturedTriangleLights", "TwoSidedRectangleLights", "SphereLights", "SunLight"),
         *("TexturedSphereLights", "ImageEnvironment", "ConstantEnvironment", "EnvironmentSum"),
-        *("DirectionalLights", "PointLightRecord", "SpotLights"),
+        *("DirectionalLights", "PointLightRecord", "SpotLights", "PicturedLights"),
     }
     bases = {"LightRecord", "InfiniteLight", "DeltaLight", "PlanarLights"}
     found = {kind.__name__ for kind in _subclasses(LightRecord) if kind.__module__.startswith("wavefront.")}
@@ -228,12 +228,13 @@ def test_lights_that_no_ray_meets(place, toward, u: tuple[float, float]) -> None
     some = [
         wf.PointLight((3, 3, 3), 2),
         wf.SpotLight((3, 3, 3), 2, target=(0, 0, 0), angle=120),
+        wf.Projector((3, 3, 3), np.ones((2, 3, 3)), target=(0, 0, 0), fov=90),
         wf.DirectionalLight(toward, 2),
     ]
     for light in some:
         record = light.record(np.zeros(3))
         sample, other = (record.sample_li(point, columns(*v).astype(f4)) for v in (u, u[::-1]))
-        assert sample.pdf[0] in ((0, 1) if isinstance(light, wf.SpotLight) else (1,))
+        assert sample.pdf[0] in ((0, 1) if isinstance(light, wf.SpotLight | wf.Projector) else (1,))
         assert (sample.wi == other.wi).all()
         assert not record.pdf_li(point, sample.wi).any()
         assert not record.le(sample.wi).any()

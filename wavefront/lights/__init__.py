@@ -6,9 +6,10 @@ from .environment import ConstantEnvironment, Environment
 from .image import ImageEnvironment
 from .infinite import EnvironmentSum, InfiniteLight
 from .point import PointLight, PointLightRecord, PointLights
+from .projector import Projector
 from .rectangle import RectangleLights, TwoSidedRectangleLights, first_of_pairs
 from .sphere import SphereLights
-from .spot import SpotLight, SpotLights
+from .spot import PicturedLights, SpotLight, SpotLights
 from .table import LightTable
 from .textured_emission import TexturedTriangleLights, TwoSidedTexturedTriangleLights
 from .textured_sphere import TexturedSphereLights
@@ -28,9 +29,11 @@ __all__ = [
     "LightRecord",
     "LightSample",
     "LightTable",
+    "PicturedLights",
     "PointLight",
     "PointLightRecord",
     "PointLights",
+    "Projector",
     "Receiver",
     "RectangleLights",
     "SphereLights",

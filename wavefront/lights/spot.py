@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from functools import partial
+from typing import Any, Literal
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.elementary import arccos, arcsin, sin_cos, sin_cos_turns
 from ..arrays.soa import soa
-from ..arrays.vec import Floats, dot, f4
-from ..core.errors import SceneError, finite_array, number
+from ..arrays.vec import Floats, dot, f4, highest
+from ..core.errors import SceneError, finite_array, number, one_of
 from ..core.parameter import Parameter
 from ..core.suggestions import suggests_keywords
 from ..film.aov_names import DEFAULT_GROUP
+from ..textures.image import Texture
+from ..textures.parameter import check_limits
 from .base import DeltaLight, Emitters, LightSample
 from .directional import unit
 from .point import LightAtPoint
@@ -26,6 +31,8 @@ class SpotLights(DeltaLight):
     outer: Floats  # (k,) 1 − cos of the angle at which the light ends
     slope: Floats  # (k,) 1/(cos of the angle at which it begins to fall − cos of where it ends)
     intensity: Floats  # (3, k) W/sr on the axis
+    # (k,) 1/(radians between both angles) where the falloff is linear in the angle, else 0
+    linear: Floats
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
         """Return the direction to the light; radiance is I·falloff/d²."""
@@ -40,9 +47,17 @@ class SpotLights(DeltaLight):
         return LightSample(wi, self.intensity * (strength / safe), pdf, distance, np.ones_like(distance))
 
     def power(self, scene_radius: float) -> NDArray[np.float64]:
-        """2πI·(h_inner + (h_outer − h_inner)/3), the integral of the falloff; h = 1 − cos."""
+        """2πI·(h_inner + (h_outer − h_inner)/3), the integral of the falloff; h = 1 − cos.
+
+        Of a linear one 2πI·(1 − (sin outer − sin inner)/(outer − inner)).
+        """
         outer = self.outer.astype(np.float64)
         solid_angle = 2 * np.pi * (outer - 2 / 3 / self.slope)
+        linear = self.linear.astype(np.float64)
+        end = arccos(1 - outer)
+        begin = end - 1 / np.where(linear > 0, linear, np.inf)
+        rise = (sin_cos_turns(end / (2 * np.pi))[0] - sin_cos_turns(begin / (2 * np.pi))[0]) * linear
+        solid_angle = np.where(linear > 0, 2 * np.pi * (1 - rise), solid_angle)
         return solid_angle * self.intensity.mean(0, dtype=np.float64)
 
     def irradiance(
@@ -56,7 +71,9 @@ class SpotLights(DeltaLight):
         nearest = angle - arcsin(np.minimum(radius / far, 1))
         nearest = np.where(distance > radius, np.maximum(nearest, 0), 0)
         ramp = np.clip((self.outer - (1 - sin_cos_turns(nearest / (2 * np.pi))[1])) * self.slope, 0, 1)
-        return self.intensity.mean(0, dtype=np.float64) * ramp**2 / np.maximum(distance, radius) ** 2
+        linear = np.clip((arccos(1 - self.outer.astype(np.float64)) - nearest) * self.linear, 0, 1)
+        falloff = np.where(self.linear > 0, linear, ramp**2)
+        return self.intensity.mean(0, dtype=np.float64) * falloff / np.maximum(distance, radius) ** 2
 
     def emitters(self) -> Emitters:
         """Return the positions; the lights shine along their axes."""
@@ -67,11 +84,98 @@ class SpotLights(DeltaLight):
         """Part (n,) of the intensity that leaves against wi (3, n).
 
         Source: glTF 2.0, KHR_lights_punctual, "Inner and Outer Cone Angles": the square of a ramp
-        in the cosine. Here 1 − cos takes the cosine's place, so that narrow cones keep their digits.
+        in the cosine. Here 1 − cos takes the cosine's place, so that narrow cones keep their digits. Or a
+        ramp in the angle, as in Mitsuba 3.
         """
         off = wi + self.axis
-        ramp = np.clip((self.outer - f4(0.5) * dot(off, off)) * self.slope, f4(0), f4(1))
-        return ramp * ramp
+        away = f4(0.5) * dot(off, off)
+        ramp = np.clip((self.outer - away) * self.slope, f4(0), f4(1))
+        if not self.linear.any():
+            return ramp * ramp
+        end, angle = (
+            f4(2) * arcsin(np.sqrt(np.minimum(each * f4(0.5), f4(1)))) for each in (self.outer, away)
+        )
+        return np.where(self.linear > 0, np.clip((end - angle) * self.linear, f4(0), f4(1)), ramp * ramp)
+
+
+@soa
+class PicturedLights(SpotLights):
+    """k spots that show a picture in a square or rectangle around the axis."""
+
+    right: Floats  # (3, k) across the axis, over the tangent of the angle to the right edge
+    up: Floats  # (3, k) the same for the upper edge
+    picture: Texture  # colors, times the intensity
+    screen: bool  # the picture alone is the light: even on a screen that faces it
+
+    def sample_li(self, point: Floats, u: Floats) -> LightSample:
+        """Return the direction to the light; radiance is that of a spot times the picture."""
+        sample = SpotLights.sample_li(self, point, u)
+        ahead = -dot(self.axis, sample.wi)
+        safe = np.where(ahead > 0, ahead, f4(1))
+        x, y = (-dot(side, sample.wi) / safe for side in (self.right, self.up))
+        seen = self.picture.lookup(np.stack([x, y]) * f4(0.5) + f4(0.5))
+        if self.screen:
+            seen = seen / (safe * safe * safe)
+        lit = (ahead > 0) & (np.abs(x) <= f4(1)) & (np.abs(y) <= f4(1)) & (highest(seen) > 0)
+        sample.radiance = sample.radiance * seen
+        sample.pdf = np.where(lit, sample.pdf, f4(0))
+        return sample
+
+    def power(self, scene_radius: float) -> NDArray[np.float64]:
+        """Return the mean of the picture times the power of a spot, or I times the area of a screen."""
+        mean = float(self.picture.mean().mean())
+        if not self.screen:
+            return SpotLights.power(self, scene_radius) * mean
+        area = 4 / np.sqrt((self.right**2).sum(0) * (self.up**2).sum(0))
+        return self.intensity.mean(0, dtype=np.float64) * area * mean
+
+    def irradiance(
+        self, center: NDArray[np.float64], radius: float, scene_radius: float
+    ) -> NDArray[np.float64]:
+        """Return that of the spot with the brightest color of the picture, to the corner of a screen."""
+        most = max(self.picture.limits())
+        if self.screen:
+            corner = 1 + 1 / (self.right**2).sum(0) + 1 / (self.up**2).sum(0)
+            most = most * corner**1.5
+        return SpotLights.irradiance(self, center, radius, scene_radius) * most
+
+
+def picture_of(name: str, value: Any) -> Texture | None:
+    """Return a picture as a texture of colors; None where there is none."""
+    if value is None:
+        return None
+    picture = value if isinstance(value, Texture) else Texture(value)
+    if picture.scalar:
+        raise SceneError(f"{name} must be a Texture of colors, got {value!r}")
+    check_limits(name, picture, lambda x: x >= 0, "at least 0")
+    return picture
+
+
+def aim(name: str, position: Any, target: ArrayLike | None, direction: ArrayLike | None) -> ArrayLike:
+    """Return a direction, given as such or by a target.
+
+    Raises
+    ------
+    SceneError
+        If not exactly one is given, or the target is the position.
+    """
+    if direction is not None and target is None:
+        return direction
+    if target is None or direction is not None:
+        raise SceneError(f"{name} needs a target or a direction, and not both")
+    toward = finite_array(f"{name} target", target, (3,)) - position
+    if not toward.any():
+        raise SceneError(f"{name} position and target are both {position.tolist()}")
+    return toward
+
+
+def sides_of(axis: NDArray[np.float64], up: NDArray[np.float64]) -> tuple[Floats, Floats]:
+    """Return unit vectors (3, 1) to the right and up, seen along an axis (3,); any where up is parallel."""
+    right = np.cross(axis, up)
+    if np.linalg.norm(right) < 1e-9:
+        right = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    right /= np.linalg.norm(right)
+    return right.astype(f4).reshape(3, 1), np.cross(right, axis).astype(f4).reshape(3, 1)
 
 
 def _angle(name: str, value: float) -> float:
@@ -98,6 +202,11 @@ class SpotLight(LightAtPoint):
     blend
         Part of the cone's angle, from the edge inwards, in which the light falls off: 0 is a hard
         edge, with 1 it falls off from the axis on.
+    falloff
+        "smooth" is that of glTF, "linear" is linear in the angle, as in Mitsuba.
+    picture, up
+        A `Texture`, or what makes one: its colors multiply the intensity, in a square around the cone. `up`
+        is the direction (3,) of its upper edge.
     group
         Name of the light group, for `aovs="light_groups"`.
 
@@ -120,6 +229,9 @@ class SpotLight(LightAtPoint):
     direction = Parameter(unit)
     angle = Parameter(_angle)
     blend = Parameter(_blend)
+    falloff = Parameter(partial(one_of, choices=("smooth", "linear")))
+    picture = Parameter(picture_of)
+    up = Parameter(unit)
 
     @suggests_keywords
     def __init__(
@@ -131,21 +243,19 @@ class SpotLight(LightAtPoint):
         direction: ArrayLike | None = None,
         angle: float = 45.0,
         blend: float = 0.15,
+        falloff: Literal["smooth", "linear"] = "smooth",
+        picture: Any = None,
+        up: ArrayLike = (0, 1, 0),
         group: str = DEFAULT_GROUP,
     ) -> None:
         self.position = position
         self.intensity = intensity
-        if (target is None) == (direction is None):
-            raise SceneError("SpotLight needs a target or a direction, and not both")
-        if target is not None:
-            aim = finite_array("SpotLight target", target, (3,)) - self.position
-            if not aim.any():
-                raise SceneError(f"SpotLight position and target are both {self.position.tolist()}")
-            self.direction = aim
-        else:
-            self.direction = direction
+        self.direction = aim("SpotLight", self.position, target, direction)
         self.angle = angle
         self.blend = blend
+        self.falloff = falloff
+        self.picture = picture
+        self.up = up
         self.group = group
 
     def record(self, center: NDArray[np.float64]) -> SpotLights:
@@ -154,10 +264,17 @@ class SpotLight(LightAtPoint):
         outer = 2 * sin_cos(np.float64(half / 2))[0] ** 2
         inner = 2 * sin_cos(np.float64(half * (1 - self.blend) / 2))[0] ** 2
         width = max(outer - inner, 1e-6 * outer)  # a hard edge is a very steep ramp
-        return SpotLights(
+        radians = max(half * self.blend, 1e-6 * half)
+        spot = (
             (self.position - center).astype(f4).reshape(3, 1),
             self.direction.astype(f4).reshape(3, 1),
             np.array([outer], f4),
             np.array([1 / width], f4),
             self.intensity.astype(f4),
+            np.array([1 / radians if self.falloff == "linear" else 0], f4),
         )
+        if self.picture is None:
+            return SpotLights(*spot)
+        wide = sin_cos(np.float64(min(half, 0.499 * np.pi)))  # half of the sky has no square around it
+        right, up = (side * f4(wide[1] / wide[0]) for side in sides_of(self.direction, self.up))
+        return PicturedLights(*spot, right, up, self.picture, screen=False)

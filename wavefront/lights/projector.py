@@ -1,0 +1,104 @@
+"""Projectors: points that show a picture."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..arrays.elementary import sin_cos
+from ..arrays.vec import f4
+from ..core.errors import SceneError, number
+from ..core.parameter import Parameter
+from ..core.suggestions import suggests_keywords
+from ..film.aov_names import DEFAULT_GROUP
+from .directional import unit
+from .point import LightAtPoint
+from .spot import PicturedLights, aim, picture_of, sides_of
+
+
+def _fov(name: str, value: float) -> float:
+    return number(name, value, lambda x: 0 < x <= 170, "above 0 and at most 170 degrees")
+
+
+class Projector(LightAtPoint):
+    """A projector: a point that throws a picture, as a `Camera` of the same view would see it.
+
+    Parameters
+    ----------
+    position
+        (3,) scene units.
+    picture
+        A `Texture` of colors, or what makes one: a file or an array. Its size gives the ratio of its sides.
+    intensity
+        W/sr of white on the axis, one number or three. A screen that faces the projector at distance d has
+        the irradiance I·color/d² everywhere.
+    target, direction
+        (3,) the point in the middle of the picture, or the direction to it: give one of them.
+    fov
+        Angle between the lower and the upper edge, degrees, above 0 and at most 170.
+    up
+        The direction (3,) of the upper edge.
+    group
+        Name of the light group, for `aovs="light_groups"`.
+
+    Raises
+    ------
+    SceneError
+        If an argument is malformed or out of range.
+
+    Examples
+    --------
+    >>> slide = np.random.default_rng(0).random((9, 16, 3))
+    >>> beam = wf.Projector((0, 2, 4), slide, 30, target=(0, 1, 0), fov=30)
+    """
+
+    hint = "direct the Projector, or widen its fov"
+    direction = Parameter(unit)
+    picture = Parameter(picture_of)
+    fov = Parameter(_fov)
+    up = Parameter(unit)
+
+    @suggests_keywords
+    def __init__(
+        self,
+        position: ArrayLike,
+        picture: Any,
+        intensity: ArrayLike = 1.0,
+        *,
+        target: ArrayLike | None = None,
+        direction: ArrayLike | None = None,
+        fov: float = 45.0,
+        up: ArrayLike = (0, 1, 0),
+        group: str = DEFAULT_GROUP,
+    ) -> None:
+        self.position = position
+        self.picture = picture
+        if self.picture is None:
+            raise SceneError("Projector picture is None; it must be a Texture, a file or an array")
+        self.intensity = intensity
+        self.direction = aim("Projector", self.position, target, direction)
+        self.fov = fov
+        self.up = up
+        self.group = group
+
+    def record(self, center: NDArray[np.float64]) -> PicturedLights:
+        """Return the light as a record of one column, relative to `center` (3,)."""
+        sin, cos = sin_cos(np.float64(np.radians(self.fov) / 2))
+        high = sin / cos
+        wide = high * self.picture.size[0] / self.picture.size[1]
+        right, up = sides_of(self.direction, self.up)
+        beyond = 1 - 0.999 / np.sqrt(1 + wide * wide + high * high)  # a cone around the picture
+        return PicturedLights(
+            (self.position - center).astype(f4).reshape(3, 1),
+            self.direction.astype(f4).reshape(3, 1),
+            np.array([beyond], f4),
+            np.full(1, 1e6, f4),
+            self.intensity.astype(f4),
+            np.zeros(1, f4),
+            right * f4(1 / wide),
+            up * f4(1 / high),
+            self.picture,
+            screen=True,
+        )
