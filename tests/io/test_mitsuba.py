@@ -55,7 +55,10 @@ def shape(kind: str, **parameters: Any) -> Any:
 
 def material(kind: str, strict: bool = True, **parameters: Any) -> wf.Material:
     board = {"type": "rectangle", "bsdf": {"type": kind, **parameters}}
-    return scene(strict, shape=board).shapes[0].material
+    found = scene(strict, shape=board).shapes[0].material
+    if isinstance(found.bsdf, wf.Sides) and found.bsdf.back is None:
+        found.bsdf = found.bsdf.front
+    return found
 
 
 def light(kind: str, **parameters: Any) -> Any:
@@ -230,6 +233,50 @@ def test_metals_and_glass() -> None:
     pane = material("thindielectric", int_ior=1.7, ext_ior=1.0).bsdf
     assert isinstance(pane, wf.ThinDielectric)
     assert value(pane.ior) == pytest.approx([1.7])
+
+
+def test_facets_and_plastics() -> None:
+    metal = material("roughconductor", alpha_u=0.25, alpha_v=0.09).bsdf
+    found = (metal.roughness, metal.roughness_v, metal.distribution, metal.shadowing)
+    assert found == (0.5, pytest.approx(0.3), "beckmann", "separable")
+    assert material("roughdielectric", alpha_u=0.25, alpha_v=0.09).bsdf.roughness_v == pytest.approx(0.3)
+    smooth = material("plastic", diffuse_reflectance=0.25, int_ior=1.9, ext_ior=1.0, nonlinear=True).bsdf
+    assert (value(smooth.reflectance), smooth.ior, smooth.nonlinear) == ([0.25] * 3, 1.9, True)
+    rough = material("roughplastic", alpha=0.25, distribution="ggx", specular_reflectance=0.5).bsdf
+    assert (rough.roughness, rough.distribution, rough.nonlinear) == (0.5, "ggx", False)
+    assert value(rough.specular_reflectance) == [0.5] * 3
+
+
+def test_backs_are_black_where_mitsuba_has_them_so() -> None:
+    clay, glass = {"type": "diffuse"}, {"type": "dielectric"}
+
+    def board(**bsdf: Any) -> wf.Bsdf:
+        return (
+            scene(board={"type": "rectangle", "bsdf": bsdf} if bsdf else {"type": "rectangle"})
+            .shapes[0]
+            .material.bsdf
+        )
+
+    assert type(board()) is wf.Sides
+    assert type(board(**clay)) is wf.Sides
+    assert type(board(type="mask", bsdf=clay)) is wf.Sides
+    assert type(board(**glass)) is wf.Dielectric
+    assert type(board(type="principled")) is wf.Principled
+    assert type(board(type="twosided", bsdf=clay)) is wf.Diffuse
+    card = board(type="twosided", a=clay, b={"type": "conductor"})
+    assert (type(card.front), type(card.back)) == (wf.Diffuse, wf.Mirror)  # type: ignore[attr-defined]
+    both = board(type="blendbsdf", a=clay, b=clay, weight=0.5)
+    assert (type(both), type(both.front)) == (wf.Sides, wf.Mix)  # type: ignore[attr-defined]
+    one = board(type="blendbsdf", a=clay, b={"type": "twosided", "bsdf": dict(clay)}, weight=0.5)
+    assert (type(one.first), type(one.second)) == (wf.Sides, wf.Diffuse)  # type: ignore[attr-defined]
+    for kind in ("sphere", "cube"):  # whose backs are not seen from outside
+        for place, expected in ((5.0, wf.Diffuse), (0.5, wf.Sides)):
+            to_world = np.eye(4)
+            to_world[2, 3] = place
+            view = {"type": "perspective", "to_world": to_world}
+            assert (
+                type(scene(view=view, body={"type": kind, "bsdf": clay}).shapes[0].material.bsdf) is expected
+            )
 
 
 def test_principled() -> None:

@@ -9,7 +9,18 @@ import numpy as np
 
 from ...arrays.state import SurfaceInteraction
 from ...arrays.vec import Floats, Ints, cross, dot, f4, normalize
-from ...bsdfs import Bsdf, Conductor, Dielectric, Diffuse, Mirror, Mix, Principled, ThinDielectric
+from ...bsdfs import (
+    Bsdf,
+    Conductor,
+    Dielectric,
+    Diffuse,
+    Mirror,
+    Mix,
+    Plastic,
+    Principled,
+    Sides,
+    ThinDielectric,
+)
 from ...core.errors import SceneError, number, one_of
 from ...materials import Material
 from ...textures.base import BaseTexture
@@ -20,6 +31,7 @@ from .spectra import INDICES, METALS
 from .textures import bitmap, color, roughness, scalar
 
 LEAST_INDEX = 1e-6
+ONE_SIDED = ("diffuse", "conductor", "roughconductor", "plastic", "roughplastic")  # the back is black
 
 
 class ShadingFrameMap(NormalMap):
@@ -53,7 +65,7 @@ def _diffuse(node: Node, job: Job) -> Material:
     harmless="sample_visible",
 )
 def _conductor(node: Node, job: Job) -> Material:
-    rough = _rough(node, job) if node.plugin == "roughconductor" else 0.0
+    facets = _facets(node, job) if node.plugin == "roughconductor" else {}
     tint = color(node, "specular_reflectance", 1.0, job)
     name = node.text("material", "none")
     if "eta" in node.values or name == "none":
@@ -69,7 +81,7 @@ def _conductor(node: Node, job: Job) -> Material:
         eta = np.maximum(eta, LEAST_INDEX)
     if isinstance(tint, BaseTexture) or np.any(np.asarray(tint) != 1):
         node.lose("specular_reflectance")
-    return _named(node, Conductor(eta, k, rough))
+    return _named(node, Conductor(eta, k, **facets))
 
 
 @plugin("dielectric", "bsdf", "int_ior ext_ior specular_reflectance specular_transmittance")
@@ -86,26 +98,31 @@ def _dielectric(node: Node, job: Job) -> Material:
         node,
         kind(
             _ior(node, "int_ior", "bk7") / _ior(node, "ext_ior", "air"),
-            _rough(node, job) if node.plugin == "roughdielectric" else 0.0,
             reflectance=color(node, "specular_reflectance", 1.0, job),
             transmittance=color(node, "specular_transmittance", 1.0, job),
+            **(_facets(node, job) if node.plugin == "roughdielectric" else {}),
         ),
     )
 
 
-@plugin("plastic", "bsdf", "diffuse_reflectance int_ior ext_ior")
+@plugin("plastic", "bsdf", "diffuse_reflectance specular_reflectance nonlinear int_ior ext_ior")
 @plugin(
     "roughplastic",
     "bsdf",
-    "diffuse_reflectance int_ior ext_ior alpha distribution",
+    "diffuse_reflectance specular_reflectance nonlinear int_ior ext_ior alpha distribution",
     harmless="sample_visible",
 )
 def _plastic(node: Node, job: Job) -> Material:
-    rough = _rough(node, job) if node.plugin == "roughplastic" else 0.0
-    node.lose("internal scattering; Principled in its place")
-    ior = _ior(node, "int_ior", "polypropylene") / _ior(node, "ext_ior", "air")
-    base = color(node, "diffuse_reflectance", 0.5, job)
-    return _named(node, Principled(base, roughness=rough, ior=ior))
+    return _named(
+        node,
+        Plastic(
+            color(node, "diffuse_reflectance", 0.5, job),
+            ior=_ior(node, "int_ior", "polypropylene") / _ior(node, "ext_ior", "air"),
+            specular_reflectance=color(node, "specular_reflectance", 1.0, job),
+            nonlinear=node.flag("nonlinear"),
+            **(_facets(node, job) if node.plugin == "roughplastic" else {}),
+        ),
+    )
 
 
 @plugin(
@@ -145,9 +162,15 @@ def _principled(node: Node, job: Job) -> Material:
 @plugin("twosided", "bsdf", holds="bsdf", harmless="allow_transmission")
 def _two_sided(node: Node, job: Job) -> Material:
     front, *back = node.held("bsdf") or [job.only(node, "bsdf")]
-    if back and back[0] is not front:
-        node.lose("the bsdf of the back side")
-    return _inner(front, job)
+    material = _inner(front, job)
+    if not back or back[0] is front:
+        return material
+    behind = _inner(back[0], job)
+    if (behind.alpha, behind.normal_map) != (None, None):
+        node.lose("the mask or the normal map of its back")
+    material = copy(material)
+    material.bsdf = Sides(material.bsdf, behind.bsdf)
+    return material
 
 
 @plugin("mask", "bsdf", "opacity", holds="bsdf texture")
@@ -175,7 +198,8 @@ def _blend(node: Node, job: Job) -> Material:
     for part in (first, second):
         if part.alpha is not None or part.normal_map is not None:
             node.lose("the mask or the normal map of a bsdf in it")
-    return _named(node, Mix(first.bsdf, second.bsdf, scalar(node, "weight", 0.5, job)))
+    one, two = [first.bsdf, second.bsdf] if is_one_sided(node) else [_sided(part, job) for part in parts]
+    return _named(node, Mix(one, two, scalar(node, "weight", 0.5, job)))
 
 
 @plugin("bumpmap", "bsdf", "scale", holds="bsdf texture")
@@ -226,13 +250,25 @@ def _ior(node: Node, name: str, default: str) -> float:
     return number(name, value, lambda x: x > 0, "above 0")
 
 
-def _rough(node: Node, job: Job) -> Any:
-    """Return the roughness of microfacets."""
-    if node.choice("distribution", "beckmann", ("beckmann", "ggx")) == "beckmann":
-        node.lose("distribution 'beckmann'; GGX in its place")
-    if "alpha_u" not in node.values:
-        return roughness(node, "alpha", 0.1, job)
-    both = [roughness(node, name, 0.1, job) for name in ("alpha_u", "alpha_v")]
-    if any(isinstance(each, BaseTexture) for each in both) or both[0] != both[1]:
-        node.lose("anisotropy")
-    return both[0] if isinstance(both[0], BaseTexture) else float(np.sqrt(both[0] * np.mean(both[1])))
+def _facets(node: Node, job: Job) -> dict[str, Any]:
+    """Return the parameters of microfacets."""
+    both = "alpha_u" in node.values or "alpha_v" in node.values
+    facets: dict[str, Any] = {
+        "roughness": roughness(node, "alpha_u" if both else "alpha", 0.1, job),
+        "distribution": node.choice("distribution", "beckmann", ("beckmann", "ggx")),
+        "shadowing": "separable",
+    }
+    return facets | ({"roughness_v": roughness(node, "alpha_v", 0.1, job)} if both else {})
+
+
+def is_one_sided(node: Node) -> bool:
+    """Return whether the back of a BSDF is black."""
+    if node.plugin in ("mask", "bumpmap", "normalmap", "blendbsdf"):
+        return all(is_one_sided(part) for part in node.held("bsdf"))
+    return node.plugin in ONE_SIDED
+
+
+def _sided(node: Node, job: Job) -> Bsdf:
+    """Return the BSDF of a plugin, whose back is black where Mitsuba has it so."""
+    bsdf = _inner(node, job).bsdf
+    return Sides(bsdf) if is_one_sided(node) else bsdf

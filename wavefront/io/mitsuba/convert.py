@@ -57,16 +57,17 @@ def convert(
     "scene", "scene", holds="shape emitter sensor integrator bsdf texture", harmless="allow_thread_reordering"
 )
 def _scene(node: Node, job: Job) -> Scene:
-    groups = [part for part in node.held("shape") if part.plugin == "shapegroup"]
-    found = [shape for part in node.held("shape") if part not in groups for shape in job.convert(part)]
-    lights = [light for part in node.held("emitter") if (light := job.convert(part)) is not None]
     settings: dict[str, Any] = {}
     camera = None
     for sensor in node.held("sensor"):
-        if camera is None and (view := job.convert(sensor)) is not None:
-            camera, settings = view
-        elif camera is not None:
+        if camera is not None:
             node.lose(f"the further sensor {sensor.plugin!r}")
+        elif (view := job.convert(sensor)) is not None:
+            camera, settings = view
+            job.eye = camera.origin
+    parts = [part for part in node.held("shape") if part.plugin != "shapegroup"]
+    found = [shape for part in parts for shape in job.convert(part)]
+    lights = [light for part in node.held("emitter") if (light := job.convert(part)) is not None]
     for integrator in node.held("integrator")[:1]:
         settings = settings | job.convert(integrator)
     if settings.get("background") and any(shape.emission is not None for shape in found):

@@ -158,6 +158,7 @@ class Job:
     strict: bool
     lost: dict[str, None] = field(default_factory=dict)
     made: dict[Any, Any] = field(default_factory=dict)  # what was converted already
+    eye: np.ndarray | None = None  # where the camera stands
     triangles: int = 0
     instances: int = 0
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from typing import Any
 
@@ -9,15 +10,17 @@ import numpy as np
 
 from ...arrays.elementary import sin_cos_turns
 from ...arrays.vec import Doubles, Ints
-from ...bsdfs import Diffuse
+from ...bsdfs import Diffuse, Sides
 from ...core.errors import SceneError
 from ...core.errors import number as checked_number
 from ...materials import Material
 from ...shapes import Cylinders, Instance, Mesh, Shape, Sphere
+from ...shapes.transform import Matrix
 from ...textures.base import BaseTexture
 from ..placing import moved_raw
 from ..repair import RawMesh, build
 from .attributes import with_attribute
+from .bsdfs import is_one_sided
 from .nodes import Job, Node, name_of, plugin, unsupported
 from .serialized import read_serialized
 
@@ -40,7 +43,9 @@ def _cube(node: Node, job: Job) -> list[Shape]:
     corners = np.stack([number & 1, number >> 1 & 1, number >> 2], 1) * 2.0 - 1
     faces = np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(6)[:, None, None]
     uvs = np.tile([[0.0, 1], [1, 1], [1, 0], [0, 0]], (6, 1))
-    return _mesh(node, job, RawMesh("cube", corners, faces.reshape(-1, 3), uvs=uvs))
+    raw, (low, high) = RawMesh("cube", corners, faces.reshape(-1, 3), uvs=uvs), _box(node.matrix())
+    outside = job.eye is None or bool(((job.eye < low) | (job.eye > high)).any())
+    return _mesh(node, job, raw, closed=outside)
 
 
 @plugin("disk", "shape", SURFACE, "bsdf emitter", note="a mesh of 128 triangles")
@@ -102,11 +107,12 @@ def _sphere(node: Node, job: Job) -> list[Shape]:
         node.lose("to_world, which scales unevenly")
     if node.flag("flip_normals"):
         node.lose("flip_normals")
-    material, emission = _appearance(node, job)
-    if _is_textured(material) or isinstance(emission, BaseTexture):
-        node.lose("the poles of its texture coordinates, which are along y here")
     center = matrix[:3, :3] @ center + matrix[:3, 3]
     radius *= float(np.linalg.norm(matrix[:3, 0]))
+    closed = job.eye is None or bool(np.linalg.norm(job.eye - center) > radius)
+    material, emission = _appearance(node, job, closed)
+    if _is_textured(material) or isinstance(emission, BaseTexture):
+        node.lose("the poles of its texture coordinates, which are along y here")
     return [_named(Sphere(center, radius, material=material, emission=emission), node)]
 
 
@@ -172,7 +178,7 @@ def _instance(node: Node, job: Job) -> list[Shape]:
 unsupported("bsplinecurve linearcurve ellipsoids ellipsoidsmesh sdfgrid", "shape")
 
 
-def _mesh(node: Node, job: Job, raw: RawMesh, smooth: bool = False) -> list[Shape]:
+def _mesh(node: Node, job: Job, raw: RawMesh, smooth: bool = False, closed: bool = False) -> list[Shape]:
     """Return a mesh where to_world places it; without normals it is smooth if it is to be."""
     with np.errstate(over="ignore", invalid="ignore"):
         raw = moved_raw(raw, node.matrix())
@@ -183,14 +189,14 @@ def _mesh(node: Node, job: Job, raw: RawMesh, smooth: bool = False) -> list[Shap
         raw = replace(raw, faces=raw.faces[:, ::-1], normals=normals)
     job.triangles += len(raw.faces)
     job.files.limits.check_triangles(node.label, job.triangles)
-    material, emission = _appearance(node, job)
+    material, emission = _appearance(node, job, closed)
     name = node.id or raw.name
     raw = replace(raw, name=name, material=material, emission=emission, smooth=smooth, tangents=None)
     mesh = build(job.name, raw, job.strict)
     return [] if mesh is None else [mesh]
 
 
-def _appearance(node: Node, job: Job) -> tuple[Material, Any]:
+def _appearance(node: Node, job: Job, closed: bool = False) -> tuple[Material, Any]:
     """Return the material and the emission of a shape."""
     bsdfs, emitters = node.held("bsdf"), node.held("emitter")
     for extra in (*bsdfs[1:], *emitters[1:]):
@@ -201,10 +207,17 @@ def _appearance(node: Node, job: Job) -> tuple[Material, Any]:
             raise SceneError(f"has the emitter {emitters[0].plugin!r}; it must be an area light")
         emission = job.convert(emitters[0])
     if not bsdfs:
-        return job.made.setdefault(
-            emission is None, Material(Diffuse(0.5 if emission is None else 0))
-        ), emission
-    return job.convert(bsdfs[0]), emission
+        material = job.made.setdefault(emission is None, Material(Diffuse(0.5 if emission is None else 0)))
+        one_sided = emission is None
+    else:
+        material, one_sided = job.convert(bsdfs[0]), is_one_sided(bsdfs[0])
+    if not one_sided or closed:
+        return material, emission
+    key = (id(material), "one-sided")
+    if key not in job.made:
+        job.made[key] = copy(material)
+        job.made[key].bsdf = Sides(material.bsdf)
+    return job.made[key], emission
 
 
 def _one(name: str, raws: list[RawMesh]) -> RawMesh:
@@ -240,6 +253,12 @@ def _frame(axis: Doubles) -> Doubles:
     a = -1 / (sign + z)
     b = x * y * a
     return np.array([[1 + sign * x * x * a, b, x], [sign * b, sign + y * y * a, y], [-sign * x, -y, z]])
+
+
+def _box(matrix: Matrix) -> tuple[Doubles, Doubles]:
+    """Return the lower and the upper corner of a cube from -1 to 1 that a matrix placed."""
+    reach = np.abs(matrix[:3, :3]).sum(1)
+    return matrix[:3, 3] - reach, matrix[:3, 3] + reach
 
 
 def _named(shape: Any, node: Node) -> Any:
