@@ -36,8 +36,8 @@ from .training import spread
 BLOCKS, SAMPLES = 4, 4  # of each pixel: blocks of samples, which are stratified as those of a picture are
 MOST_TILES = 256
 PIXELS_PER_TILE = 1024  # of the picture, as long as there are not more tiles: a quarter of a path for each
-TILES_AT_ONCE = 32  # that are traced together, at most
-LEAST_JOBS = 2  # so that two workers have something to do
+TILES_AT_ONCE = 64  # that are traced together, at most
+LEAST_JOBS = 2  # so that two workers have something to do, if there are as many
 MOST_BRANCHES = 4  # more gain nothing
 BOUNCES = 6  # at most: few paths get further, and a wave of few costs as much as one of many
 FLOOR = 0.01  # of the squared mean of all pixels, added to that of each
@@ -122,6 +122,7 @@ class Run:
     variance: Doubles  # of pixels of four samples, relative to the squared mean around each, rising
     rays: float
     met: Ints  # as of `TrialPart`
+    paths: int  # from the camera
 
     def mean_variance(self, outliers: float) -> float:
         """Return the mean variance of the pixels without this part of them, the noisiest."""
@@ -149,12 +150,21 @@ class Trial:
         Does the jobs.
     tiles
         How many of sixteen pixels, as far as the picture has them; None for as many as its size asks for.
+    workers
+        How many have something to do, up to two; more where there are many tiles.
     """
 
     def __init__(
-        self, camera: Camera, seed: int, max_bounces: int, run: JobsRunner, tiles: int | None = None
+        self,
+        camera: Camera,
+        seed: int,
+        max_bounces: int,
+        run: JobsRunner,
+        tiles: int | None = None,
+        workers: int = 1,
     ) -> None:
         self._camera, self._seed, self._bounces, self._do = camera, seed, min(max_bounces, BOUNCES), run
+        self._jobs = min(workers, LEAST_JOBS)
         width, height = camera.size
         across, down = (-(-side // (SIDE * STRIDE)) for side in camera.size)
         tiles = tiles or min(width * height // PIXELS_PER_TILE, MOST_TILES)
@@ -178,7 +188,7 @@ class Trial:
 
     def _render(self, branches: int, reuse: bool, guided: bool) -> Run:
         """Render the tiles with a setting."""
-        parts = min(max(-(-len(self._tiles) // TILES_AT_ONCE), LEAST_JOBS), len(self._tiles))
+        parts = min(max(-(-len(self._tiles) // TILES_AT_ONCE), self._jobs), len(self._tiles))
         cuts = np.linspace(0, len(self._tiles), parts + 1).astype(int)
         jobs = [
             TrialJob(self._camera, self._seed, pixels, self._bounces, branches, reuse, guided)
@@ -194,4 +204,4 @@ class Trial:
         deviation = (radiance - mean) * math.sqrt(BLOCKS / (BLOCKS - 1))
         variance = (np.square(deviation) / self._scale).mean((0, 1))
         rays, met = sum(part.rays for part in found), np.sum([part.met for part in found], 0)
-        return Run(np.sort(variance, axis=None), rays, met)
+        return Run(np.sort(variance, axis=None), rays, met, variance.size * BLOCKS * SAMPLES)

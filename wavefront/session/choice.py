@@ -14,12 +14,13 @@ from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..integrators.training import train
-from ..integrators.tuning import MOST_BRANCHES, JobsRunner, Trial
+from ..integrators.tuning import MOST_BRANCHES, JobsRunner, Run, Trial
 from ..sampling.sampler import make_sampler
 from ..sampling.tiles import SIDE, STRIDE
 from ..settings import AUTO, Settings
 from ..settings.combinations import left_out
-from ..stages.reuse import can_reuse, shared_materials
+from ..stages.glossy_points import glossy_materials
+from ..stages.reuse import can_reuse, shared_materials, shares_all
 
 LEAST_PIXELS = 192 * 192  # of pictures that get a trial; smaller ones take no longer than a moment
 GUIDE_HINT = "most light is hard to find here: guide=True may pay (docs/guiding.md)"
@@ -28,9 +29,14 @@ GUIDE_HINT = "most light is hard to find here: guide=True may pay (docs/guiding.
 GAIN = 0.85
 OUTLIERS = 0.02  # part of the pixels, the noisiest, that do not count
 OUTLIERS_OF_SHARED = 0.005  # likewise, for re-use, which may bring most where few pixels hold the noise
+GAIN_BESIDE_GLOSS = (
+    0.5  # where not all is matte and light is not rare: sharp lobes gain little, and trials miss it
+)
+CLEAR_GAIN = 0.4  # below that part, re-use is better than any number of branches, which are not tried then
 GUIDE_TILES = 128  # whatever the size of the picture: the pilot takes longer anyway
 RARE_LIGHT = 1.0  # relative variance of a pixel of four samples, from where on light is hard to find
-COMMON_GLOSS = 0.05  # part of the second points, from where on a trial sees enough of what a material does
+COMMON_GLOSS = 0.03  # part of the second points, from where on a trial sees enough of what a material does
+MOST_PATHS = 0.6  # part of the paths that must meet second points to share, where not all is matte
 
 
 @soa
@@ -56,7 +62,12 @@ def learn_guide(settings: Settings, scene: CompiledScene, camera: Camera) -> Gui
 
 
 def choose(
-    settings: Settings, scene: CompiledScene, camera: Camera, has_guide: bool, run: JobsRunner
+    settings: Settings,
+    scene: CompiledScene,
+    camera: Camera,
+    has_guide: bool,
+    run: JobsRunner,
+    workers: int = 1,
 ) -> Choice:
     """Return how the paths of a picture go on, and what else may pay; run trials where they are needed.
 
@@ -68,17 +79,19 @@ def choose(
         Whether there is something to guide them.
     run
         Does the jobs of trials.
+    workers
+        How many of them have something to do.
     """
     branches, reuse = settings.values["branches"], settings.values["reuse"] is True
     asked = Choice(1 if branches == AUTO else int(branches), reuse, has_guide)
     whole = camera.cropped((0, 0, *camera.resolution))  # a window is a part of the same picture
     seed, bounces = settings.pilot_seed(1), settings.values["max_bounces"]
     if settings.is_full and has_guide and settings.values["guide"] == AUTO:
-        trial = Trial(whole, seed, bounces, run, GUIDE_TILES)
+        trial = Trial(whole, seed, bounces, run, GUIDE_TILES, workers)
         plain, guided = (_branched(settings, trial, replace(asked, guided=each)) for each in (False, True))
         return guided if _cost(trial, guided, plain) < GAIN else plain
     if settings.is_full and _tries_something(settings, scene, whole):
-        return _tried(settings, scene, whole, Trial(whole, seed, bounces, run), asked)
+        return _tried(settings, scene, whole, Trial(whole, seed, bounces, run, workers=workers), asked)
     return asked
 
 
@@ -87,13 +100,26 @@ def _tried(settings: Settings, scene: CompiledScene, camera: Camera, trial: Tria
     found = trial.run(1, False, plain.guided)
     light_is_rare = found.mean_variance(OUTLIERS_OF_SHARED) > RARE_LIGHT
     plain = replace(plain, hint=GUIDE_HINT if light_is_rare and not plain.guided else None)
-    branched, shared = _branched(settings, trial, plain), replace(plain, reuse=True)
-    if not _may_reuse(settings, camera) or not can_reuse(scene):
-        return branched
-    glossy = found.met[~shared_materials(scene)]
-    if glossy.size and not (light_is_rare and glossy.min() >= COMMON_GLOSS * found.met.sum()):
-        return branched
-    return shared if _cost(trial, shared, branched, OUTLIERS_OF_SHARED) < GAIN else branched
+    if not _may_reuse(settings, camera) or not _may_gain(scene, found, light_is_rare):
+        return _branched(settings, trial, plain)
+    shared = replace(plain, reuse=True)
+    cost = _cost(trial, shared, plain, OUTLIERS_OF_SHARED)
+    if cost < CLEAR_GAIN:
+        return shared
+    branched = plain if light_is_rare else _branched(settings, trial, plain)
+    limit = GAIN if shares_all(scene) or light_is_rare else GAIN_BESIDE_GLOSS
+    better = _cost(trial, shared, branched, OUTLIERS_OF_SHARED) < GAIN
+    return shared if better and cost < limit else branched
+
+
+def _may_gain(scene: CompiledScene, found: Run, light_is_rare: bool) -> bool:
+    """Return whether the second points of a run of plain paths are such that sharing them may pay."""
+    if not can_reuse(scene) or shares_all(scene):
+        return can_reuse(scene)
+    kept = ~(shared_materials(scene) | glossy_materials(scene))
+    if kept.any() and not (light_is_rare and found.met[kept].min() >= COMMON_GLOSS * found.met.sum()):
+        return False
+    return bool(found.met[~kept].sum() >= MOST_PATHS * found.paths)
 
 
 def _branched(settings: Settings, trial: Trial, choice: Choice) -> Choice:

@@ -48,7 +48,8 @@ def with_choice(plan: Plan, camera: Camera, run: JobsRunner) -> Plan:
     """Return a plan with a choice of how the paths that a camera sees go on; `run` does trials' jobs."""
     compiled, has_guide = plan.scene.compiled, plan.tracer.table is not None
     with phase("trying what pays", plan.settings.values["progress"]), single_threaded_blas:
-        choice = choose(plan.settings, compiled, compiled.view(camera), has_guide, run)
+        view, workers = compiled.view(camera), plan.budget.workers
+        choice = choose(plan.settings, compiled, view, has_guide, run, workers)
     hint = caustics_hint(plan.settings, plan.scene) or choice.hint
     return replace(plan, choice=replace(choice, hint=hint))
 
