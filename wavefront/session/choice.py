@@ -36,7 +36,7 @@ CLEAR_GAIN = 0.4  # below that part, re-use is better than any number of branche
 GUIDE_TILES = 128  # whatever the size of the picture: the pilot takes longer anyway
 RARE_LIGHT = 1.0  # relative variance of a pixel of four samples, from where on light is hard to find
 COMMON_GLOSS = 0.03  # part of the second points, from where on a trial sees enough of what a material does
-MOST_PATHS = 0.6  # part of the paths that must meet second points to share, where not all is matte
+MOST_PATHS = 0.4  # part of the paths that must meet second points which can be shared
 
 
 @soa
@@ -114,12 +114,10 @@ def _tried(settings: Settings, scene: CompiledScene, camera: Camera, trial: Tria
 
 def _may_gain(scene: CompiledScene, found: Run, light_is_rare: bool) -> bool:
     """Return whether the second points of a run of plain paths are such that sharing them may pay."""
-    if not can_reuse(scene) or shares_all(scene):
-        return can_reuse(scene)
     kept = ~(shared_materials(scene) | glossy_materials(scene))
-    if kept.any() and not (light_is_rare and found.met[kept].min() >= COMMON_GLOSS * found.met.sum()):
+    if not can_reuse(scene) or found.met[~kept].sum() < MOST_PATHS * found.paths:
         return False
-    return bool(found.met[~kept].sum() >= MOST_PATHS * found.paths)
+    return not kept.any() or (light_is_rare and found.met[kept].min() >= COMMON_GLOSS * found.met.sum())
 
 
 def _branched(settings: Settings, trial: Trial, choice: Choice) -> Choice:
