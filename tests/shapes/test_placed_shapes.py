@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import wavefront as wf
+from wavefront.accel.sphere import SpherePrimitives
 
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])  # a rotation
 
@@ -42,6 +43,28 @@ def test_a_placed_sphere_is_the_sphere_at_its_place() -> None:
     assert depth[0, 0] == pytest.approx(7, abs=1e-4)
     there = wf.Sphere(placed.center, placed.radius, material=red)
     assert sees(placed).rgb.tobytes() == sees(there).rgb.tobytes()
+
+
+def test_a_sphere_turns_its_texture() -> None:
+    """A point of the turned sphere has the coordinates of that point before; derivatives turn with it."""
+    center = np.array([0.5, -1, 2])
+    other = wf.Sphere((9, 9, 9), 1)  # of the same table, without a rotation
+    plain, turned = wf.Sphere(center, 2), wf.Sphere(center, 2, transform=TURN)
+    normal = np.random.default_rng(0).normal(size=(3, 50))
+    normal /= np.linalg.norm(normal, axis=0)
+    before, after = (
+        ((matrix @ normal) * 2 + center[:, None]).astype(np.float32) for matrix in (np.eye(3), TURN)
+    )
+    one = np.ones(50, np.intp)
+    first, second = (SpherePrimitives.from_shapes([other, ball], np.zeros(3)) for ball in (plain, turned))
+    assert second.uv(one, after) == pytest.approx(first.uv(one, before), abs=1e-5)
+    expected = (TURN @ first.dpduv(one, before).reshape(2, 3, 50)).reshape(6, 50)
+    assert second.dpduv(one, after) == pytest.approx(expected, abs=2e-5)
+    assert second.uv(0 * one, after) == pytest.approx(first.uv(0 * one, after), abs=1e-6)
+    assert turned.placed(at(0, 0, 0, 3, TURN)).transform == pytest.approx(TURN @ TURN)
+    assert turned.lengths_times(2).transform is turned.transform
+    with pytest.raises(wf.SceneError, match="transform must be a rotation"):
+        wf.Sphere((0, 0, 0), 1, transform=2 * np.eye(3))
 
 
 COLORS = [(1, 0, 0), (0, 1, 0)]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.soa import soa
-from ..arrays.vec import Bools, Doubles, Floats, Ints, f4, normalize
+from ..arrays.vec import Bools, Doubles, Floats, Ints, dot, f4, normalize
 from ..shapes import Sphere, Spheres
 from ..shapes.attributes import sphere_dpduv, sphere_uv
 from .bvh import Ball
@@ -25,6 +25,8 @@ class SpherePrimitives(CurvedPrimitives):
 
     centers: Floats  # (3, k)
     radii: Floats  # (k,)
+    # (9, k) the columns of each rotation from a sphere's own space, where longitude and latitude count
+    turns: Floats | None = None
 
     def __len__(self) -> int:
         """Return the number of spheres."""
@@ -35,7 +37,13 @@ class SpherePrimitives(CurvedPrimitives):
         """Return the spheres of shapes relative to `center` (3,)."""
         centers = np.concatenate([shape.centers - center for shape in shapes])
         radii = np.concatenate([np.broadcast_to(shape.radii, shape.count) for shape in shapes])
-        return cls(np.ascontiguousarray(centers.T, f4), radii.astype(f4))
+        turns = None
+        if any(getattr(shape, "transform", None) is not None for shape in shapes):
+            given = [getattr(shape, "transform", None) for shape in shapes]
+            rows = [np.eye(3) if turn is None else turn for turn in given]
+            counts = [shape.count for shape in shapes]
+            turns = np.repeat([row.T.ravel() for row in rows], counts, 0).T.astype(f4)
+        return cls(np.ascontiguousarray(centers.T, f4), radii.astype(f4), turns)
 
     @property
     def bounds(self) -> tuple[Floats, Floats]:
@@ -65,11 +73,24 @@ class SpherePrimitives(CurvedPrimitives):
 
     def uv(self, prim: Ints, point: Floats) -> Floats:
         """Return longitude and latitude, (2, n)."""
-        return sphere_uv(normalize(point - self.centers.take(prim, 1)))
+        return sphere_uv(self._own(prim, point))
 
     def dpduv(self, prim: Ints, point: Floats) -> Floats:
         """Return the derivatives of the point by longitude and latitude, (6, n)."""
-        return sphere_dpduv(normalize(point - self.centers.take(prim, 1)), self.radii.take(prim))
+        found = sphere_dpduv(self._own(prim, point), self.radii.take(prim))
+        if self.turns is None:
+            return found
+        x, y, z = self.turns.take(prim, 1).reshape(3, 3, -1)
+        turned = [x * v[0] + y * v[1] + z * v[2] for v in (found[:3], found[3:])]
+        return np.concatenate(turned)
+
+    def _own(self, prim: Ints, point: Floats) -> Floats:
+        """Return the outward normals (3, n) in the spheres' own space."""
+        normal = normalize(point - self.centers.take(prim, 1))
+        if self.turns is None:
+            return normal
+        axes = self.turns.take(prim, 1).reshape(3, 3, -1)
+        return np.stack([dot(axis, normal) for axis in axes])
 
 
 def sphere_rows(centers: Doubles, radii: Doubles, center: Floats, radius: float) -> Floats:

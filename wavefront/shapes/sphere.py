@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.vec import FLOAT32_MAX
 from ..bsdfs import Diffuse
-from ..core.errors import SceneError, finite_array, number
+from ..core.errors import SceneError, finite_array, number, rotation_matrix
 from ..core.suggestions import suggests_keywords
 from ..materials import Material, MaterialLike
 from ..textures.parameter import Color
@@ -34,6 +34,10 @@ def _radius(name: str, value: float) -> float:
     return number(name, value, lambda x: FLOAT32_MIN <= x <= FLOAT32_MAX, limit)
 
 
+def _transform(name: str, value: ArrayLike | None) -> NDArray[np.float64] | None:
+    return None if value is None else rotation_matrix(name, value)
+
+
 class Sphere(SphereEmission):
     """A sphere, intersected exactly.
 
@@ -48,6 +52,8 @@ class Sphere(SphereEmission):
     emission
         Emitted radiance, W·sr⁻¹·m⁻²: a color, at least 0, or a texture. It leaves the surface on both sides.
         By default that of the material, if it has one.
+    transform
+        (3, 3) rotation of the sphere, whose poles are at y and -y, and whose texture begins at -z.
     name
         Used in messages.
 
@@ -64,6 +70,7 @@ class Sphere(SphereEmission):
 
     center = Checked(_center)
     radius = Checked(_radius)
+    transform = Checked(_transform)
 
     @suggests_keywords
     def __init__(
@@ -73,11 +80,13 @@ class Sphere(SphereEmission):
         *,
         material: MaterialLike | None = None,
         emission: Color | None = None,
+        transform: ArrayLike | None = None,
         name: str = "sphere",
     ) -> None:
         self.name = name
         self.center = center
         self.radius = radius
+        self.transform = transform
         self.material = material
         self._default: Material | None = None
         self.emission = emission
@@ -124,8 +133,8 @@ class Sphere(SphereEmission):
         Parameters
         ----------
         transform
-            (4, 4) affine matrix, for column vectors. Texture coordinates are those of a sphere that was
-            made there.
+            (4, 4) affine matrix, for column vectors. A sphere with a `transform` turns with it; the texture
+            coordinates of others are those of a sphere that was made there.
 
         Raises
         ------
@@ -136,6 +145,8 @@ class Sphere(SphereEmission):
         matrices, scale = similarities(f"{self.name}: transform", given)
         sphere = copy(self)
         sphere.center, sphere.radius = points_by(matrices, self.centers)[0], self.radius * float(scale[0])
+        if self.transform is not None:  # perhaps mirrored
+            vars(sphere)["transform"] = matrices[0, :3, :3] / scale[0] @ self.transform
         return sphere
 
     @property
