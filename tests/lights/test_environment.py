@@ -86,6 +86,18 @@ def test_every_pixel_is_seen_in_its_direction(filter: str) -> None:
     assert seen.T.reshape(8, 16, 3) == pytest.approx(picture, abs=2e-5)
 
 
+def test_scale_multiplies_the_radiance() -> None:
+    scale = (2, 0.5, 0)
+    picture, even = wf.Environment(noise(), scale=scale), wf.Environment((1, 2, 3), scale=scale)
+    directions = [(1, 2, 3), (-1, 0.3, 0.1)]
+    assert le(picture, *directions) == pytest.approx(le(wf.Environment(noise()), *directions) * scale)
+    assert even.radiance.ravel() == pytest.approx([2, 1, 0])
+    even.radiance = even.radiance
+    assert even.radiance.ravel() == pytest.approx([2, 1, 0])
+    with pytest.raises(wf.SceneError, match="Environment scale"):
+        wf.Environment(1, scale=-1)
+
+
 def test_bilinear_wraps_around() -> None:
     picture = np.zeros((2, 4, 3))
     picture[:, 0], picture[:, 3] = 1, 3

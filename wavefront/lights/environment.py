@@ -67,6 +67,8 @@ class Environment(Parametrized, Light):
         not used.
     transform
         (3, 3) rotation from the environment's space to world space.
+    scale
+        A color, at least 0, that multiplies this radiance.
     filter
         "bilinear" between the centers of the image's pixels, or "nearest".
     group
@@ -113,6 +115,7 @@ class Environment(Parametrized, Light):
         radiance: ArrayLike | str | os.PathLike[str] = 1.0,
         *,
         transform: ArrayLike | None = None,
+        scale: ArrayLike | str = 1.0,
         filter: Literal["bilinear", "nearest"] = "bilinear",
         group: str = DEFAULT_GROUP,
         backdrop: ArrayLike | str | os.PathLike[str] | None = None,
@@ -122,9 +125,11 @@ class Environment(Parametrized, Light):
         )
         self._filter = one_of("filter", filter, ("bilinear", "nearest"))
         self._transform = None if transform is None else rotation_matrix("Environment transform", transform)
+        self._scale = rgb("Environment scale", scale)
         self._image: ImageEnvironment | None = None
         self._radiance: Floats
         self.radiance = radiance
+        self._scale = np.ones((3, 1), f4)  # what is assigned later is what it is
         self.group = group
 
     @property
@@ -135,16 +140,19 @@ class Environment(Parametrized, Light):
     @radiance.setter
     def radiance(self, radiance: ArrayLike | str | os.PathLike[str]) -> None:
         if isinstance(radiance, str) and is_color_name(radiance):
-            self._radiance, self._image = rgb("Environment radiance", radiance), None
+            self._radiance, self._image = rgb("Environment radiance", radiance) * self._scale, None
         elif isinstance(radiance, str | os.PathLike) or (
             as_array("Environment radiance", radiance).ndim > 1
             and np.shape(radiance) != (3, 1)  # a color as it is kept
         ):
             with in_memory(radiance) if isinstance(radiance, str | os.PathLike) else nullcontext():
-                image = ImageEnvironment.of(environment_pixels(radiance), self._filter, self._transform)
+                pixels = environment_pixels(radiance)
+                if (self._scale != 1).any():
+                    pixels = pixels * self._scale.ravel()
+                image = ImageEnvironment.of(pixels, self._filter, self._transform)
             self._radiance, self._image = image.mean, image
         else:
-            self._radiance, self._image = rgb("Environment radiance", radiance), None
+            self._radiance, self._image = rgb("Environment radiance", radiance) * self._scale, None
 
     def scaled(self, factor: float) -> Self:
         """Return the light: it has no length."""
