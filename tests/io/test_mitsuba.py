@@ -357,6 +357,8 @@ def test_textures() -> None:
     at = np.array([[0.2, 0.7, 0.2], [0.2, 0.2, 0.7]], np.float32)
     np.testing.assert_array_equal(board.lookup(at)[:, 0], [0.25] * 3)
     np.testing.assert_array_equal(board.lookup(at)[:, 1:].T, [[1, 0, 0]] * 2)
+    board = material("mask", bsdf={"type": "diffuse"}, opacity={"type": "checkerboard"}).alpha
+    np.testing.assert_allclose(board.lookup(at), [0.2, 0.4, 0.4])  # as in Mitsuba
     # the roughness is the root of a texture of α, and numbers are luminances
     alpha = {"type": "bitmap", "data": np.full((2, 2, 3), 0.25, np.float32), "raw": True}
     rough = material("roughconductor", alpha=alpha, distribution="ggx").bsdf.roughness

@@ -60,10 +60,11 @@ def scalar(node: Node, name: str, default: float, job: Job) -> Value:
     value = node.get(name, default)
     if isinstance(value, Node) and value.plugin == "bitmap":
         return bitmap(value, job, channel="luminance")
+    if isinstance(value, Node) and value.plugin == "checkerboard":
+        job.convert(value)  # reports its unknown parameters
+        return _board(value, job, channel=0)
     value = color(node, name, default, job)
-    if isinstance(value, BaseTexture | float | int):
-        return value
-    return float(luminance(value))
+    return value if isinstance(value, BaseTexture | float | int) else float(luminance(value))
 
 
 def roughness(node: Node, name: str, default: float, job: Job) -> Value:
@@ -169,8 +170,15 @@ def pixels(node: Node, job: Job) -> NDArray[Any]:
     return job.files.image(job.find(node.text("filename")))
 
 
-@plugin("checkerboard", "texture", "color0 color1 to_uv")
-def _checkerboard(node: Node, job: Job) -> Value:
+@plugin(
+    "checkerboard", "texture", "color0 color1 to_uv", note="as a number the two change places, as in Mitsuba"
+)
+def _checkerboard(node: Node, job: Job) -> Texture:
+    return _board(node, job)
+
+
+def _board(node: Node, job: Job, channel: int | None = None) -> Texture:
+    """Return four fields, of colors or of numbers; v from 0 to 1/2 is the upper row."""
     fields = []
     for name, default in (("color0", 0.4), ("color1", 0.2)):
         value = color(node, name, default, job)
@@ -178,9 +186,10 @@ def _checkerboard(node: Node, job: Job) -> Value:
             node.lose(f"the texture {name}")
             value = default
         fields.append(np.broadcast_to(value, 3))
-    first, second = fields
-    board = np.array([[first, second], [second, first]], np.float32)  # v from 0 to 1/2 is the upper row
-    return Texture(board, filter="nearest", transform=_to_uv(node))
+    board = np.array([fields, fields[::-1]], np.float32)
+    if channel is not None:  # `Checkerboard::eval_1` has color0 where `eval` has color1
+        board = luminance(board[::-1].transpose(2, 0, 1))
+    return Texture(board, filter="nearest", transform=_to_uv(node), channel=channel)
 
 
 @plugin("mesh_attribute", "texture", "name scale", note="one for each shape, of ply files, in [0, 1]")
