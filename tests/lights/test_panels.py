@@ -1,4 +1,4 @@
-"""Light samples of rectangles and triangles by what arrives at a surface: densities, means and noise."""
+"""Light samples of rectangles, triangles and spheres by what arrives: densities, means and noise."""
 
 from functools import cache
 
@@ -13,6 +13,7 @@ from wavefront.lights import (
     LightRecord,
     Receiver,
     RectangleLights,
+    SphereLights,
     TexturedTriangleLights,
     TriangleLights,
     TwoSidedRectangleLights,
@@ -33,10 +34,15 @@ def triangle() -> TriangleLights:
     return TriangleLights.from_triangles(np.array([[[1, 2, 0], [0, 2, 0], [0.3, 2.5, 1]]]), WHITE)
 
 
+def sphere() -> SphereLights:
+    return SphereLights(f4([[0], [2], [0.5]]), f4([0.9]), WHITE)
+
+
 LIGHTS = {
     "rectangle": rectangle,
     "two sides": lambda: rectangle(TwoSidedRectangleLights),
     "triangle": triangle,
+    "sphere": sphere,
 }
 
 
@@ -65,6 +71,20 @@ def samples(
 ) -> tuple[wf.LightSample, np.ndarray]:
     at = np.repeat(f4(point).reshape(3, 1), n, 1)
     return light.sample_li(at, np.random.default_rng(3).random((2, n), f4)), at
+
+
+@pytest.mark.parametrize("name", LIGHTS)
+def test_densities_are_those_of_the_samples(name: str) -> None:
+    """From any point and for any normal."""
+    rng, n = np.random.default_rng(7), 20_000
+    normal = rng.normal(size=(3, n))
+    lit = Receiver(f4(normal / np.linalg.norm(normal, axis=0)), rng.random(n) < 0.8)
+    at = f4(rng.uniform(-3, 3, (3, n)))
+    light = LIGHTS[name]().lighting(lit)
+    sample = light.sample_li(at, rng.random((2, n), f4))
+    some = np.flatnonzero(sample.pdf)
+    ratio = light.pdf_li(at, sample.wi)[some] / sample.pdf[some]
+    assert (np.abs(ratio - 1) < 2e-3).mean() > 0.999
 
 
 @pytest.mark.parametrize("normal", NORMALS)
@@ -109,6 +129,19 @@ def test_what_arrives_is_less_noisy(point: tuple[float, ...], normal: tuple[floa
     assert variances[1] < variances[0] / less
 
 
+def test_a_sphere_above_the_horizon_has_no_noise() -> None:
+    """Close to the horizon; where it is partly below, or high up, it is sampled plainly."""
+    n = 20_000
+    for normal, exact in (((0.7, 0.51, 0.5), True), ((0.8, 0.1, 0.5), False), ((-0.2, 2, 0.4), False)):
+        lit = receiver(normal, n)
+        sample, at = samples(sphere().lighting(lit), (0.2, 0, 0.1), n)
+        assert (sample.pdf == samples(sphere(), (0.2, 0, 0.1), n)[0].pdf).all() != exact
+        value = (lit.normal * sample.wi).sum(0).clip(0) / sample.pdf
+        assert (value.std() < 1e-4 * value.mean()) == exact
+        ahead = sample.wi.astype(float) * sample.distance + at - sphere().center
+        assert np.linalg.norm(ahead, axis=0) == pytest.approx(0.9, abs=1e-5)
+
+
 def test_light_from_behind_counts_for_what_transmits() -> None:
     """Its normal has no effect."""
     point, n = (0.2, -1, 0.1), 100
@@ -131,7 +164,7 @@ def test_many_triangles_are_sampled_plainly() -> None:
 
 
 def room() -> wf.Scene:
-    """Surfaces of several kinds under a panel, a textured one, a triangle, and close to a wall."""
+    """Surfaces of several kinds, lit by a panel close to a wall, a textured one, a triangle and a sphere."""
     balls = [
         wf.Sphere((x, 0, 0), 0.5, material=material)
         for x, material in (
@@ -149,7 +182,8 @@ def room() -> wf.Scene:
     colors = np.array([[1, 0.2, 0.1], [0.3, 1, 0.2], [0, 0, 1], [1, 1, 1]])
     textured = wf.Mesh(patch.vertices, patch.faces, colors=colors, emission=wf.VertexColors())
     camera = wf.Camera.look_at((0, 1.2, 6), (0, 0.4, 0), fov=30, size=(32, 16))
-    return wf.Scene([*balls, floor, wall, panel, lone, textured], camera=camera)
+    lamp = wf.Sphere((2.6, 0.3, 0.6), 0.5, emission=2)
+    return wf.Scene([*balls, floor, wall, panel, lone, textured, lamp], camera=camera)
 
 
 @pytest.mark.parametrize(
