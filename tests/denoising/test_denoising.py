@@ -89,6 +89,20 @@ def test_networks_of_open_image_denoise(monkeypatch) -> None:
     assert taken == [("color", False)]
 
 
+@pytest.mark.slow
+def test_large_pictures_go_through_in_parts(monkeypatch) -> None:
+    """With the same bits, in less memory. Open Image Denoise does not divide small ones."""
+    pytest.importorskip("pyoidn")
+    noise = np.random.default_rng(0).random((1000, 1600, 3), np.float32)
+    guides = {"denoising_albedo": noise[::-1], "denoising_normal": noise[:, ::-1]}
+    image = wf.Image(noise, 4, layers=guides)
+    found = []
+    for memory in (10_000, 300):
+        monkeypatch.setattr(module, "MOST_MEMORY", memory)
+        found.append(image.denoise("oidn").rgb)
+    assert (found[0] == found[1]).all()
+
+
 def test_noisy_stays(denoiser, tmp_path) -> None:
     """With all layers and errors, in files as well; it is denoised anew, not twice."""
     image, _ = scene_like()

@@ -22,7 +22,7 @@ def picture(albedo: bool, normal: bool, noise: float = 0.1) -> NoisyPicture:
     def guide(values, amount):
         return Guide(
             (values + rng.normal(0, amount, (h, w, 3))).astype(np.float32),
-            np.full((h, w, 3), amount**2, np.float32),
+            np.full((h, w, 3), amount, np.float32),
         )
 
     tint = np.where(x > 0.5, (0.8, 0.5, 0.3), (0.75, 0.5, 0.35)) * np.ones((h, 1, 1))
@@ -32,7 +32,7 @@ def picture(albedo: bool, normal: bool, noise: float = 0.1) -> NoisyPicture:
     error[2, 3] = 0
     return NoisyPicture(
         rgb.astype(np.float32),
-        (error**2).astype(np.float32),
+        error.astype(np.float32),
         guide(tint, 0.02) if albedo else None,
         guide(up, 0.05) if normal else None,
     )

@@ -18,7 +18,12 @@ class Guide:
     """A layer that shows the edges of the picture, with less noise."""
 
     values: Floats  # (H, W, 3), finite
-    squared_error: Floats  # (H, W, 3)
+    error: Floats | None  # (H, W, 3) standard error; None or not finite where not known
+
+    @property
+    def squared_error(self) -> Floats:
+        """Return estimated variances (H, W, 3)."""
+        return _squared_error(self.values, self.error)
 
 
 @soa
@@ -26,10 +31,15 @@ class NoisyPicture:
     """A picture and its guides."""
 
     rgb: Floats  # (H, W, 3), finite
-    squared_error: Floats  # (H, W, 3) estimated variance of `rgb`
+    error: Floats | None  # (H, W, 3) standard error; None or not finite where not known
     albedo: Guide | None
     normal: Guide | None
     spp: int = 0  # samples per pixel; 0 if not known
+
+    @property
+    def squared_error(self) -> Floats:
+        """Return estimated variances of `rgb`, (H, W, 3)."""
+        return _squared_error(self.rgb, self.error)
 
 
 def noisy_picture(
@@ -44,14 +54,10 @@ def noisy_picture(
     Values that are not finite are replaced by those of pixels about them. An error that is not known is
     estimated from the picture itself.
     """
-    rgb = without_holes(rgb)
-    albedo, normal = (_guide(layers[name], errors.get(name)) if name in layers else None for name in GUIDES)
-    return NoisyPicture(rgb, _squared_error(rgb, standard_error), albedo, normal, spp)
-
-
-def _guide(values: Floats, error: Floats | None) -> Guide:
-    values = without_holes(values)
-    return Guide(values, _squared_error(values, error))
+    albedo, normal = (
+        Guide(without_holes(layers[name]), errors.get(name)) if name in layers else None for name in GUIDES
+    )
+    return NoisyPicture(without_holes(rgb), standard_error, albedo, normal, spp)
 
 
 def _squared_error(values: Floats, error: Floats | None) -> Floats:

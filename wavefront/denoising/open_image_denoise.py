@@ -12,6 +12,9 @@ from .noisy import Guide, NoisyPicture
 
 SMALLEST = 64  # pixels along a side; smaller pictures are extended, since the network sees black beyond
 LARGEST = np.float32(65504)  # radiance that the network's half floats hold
+MOST_MEMORY = (
+    800  # MB that a network takes, about; larger pictures go through it in parts, with the same bits
+)
 FEW = 16  # samples per pixel; with fewer, more samples lower the error sooner than denoised guides do
 
 
@@ -66,7 +69,7 @@ def _run(device: Any, images: dict[str, Floats], **options: int) -> Floats:
     with pyoidn.Filter(device, pyoidn.OIDN_FILTER_TYPE_RT) as network:
         for name, values in (*inputs.items(), ("output", output)):
             network.set_image(name, values, pyoidn.OIDN_FORMAT_FLOAT3)
-        for name, value in options.items():
+        for name, value in {"maxMemoryMB": MOST_MEMORY, **options}.items():
             (network.set_bool if isinstance(value, bool) else network.set_int)(name, value)
         network.commit()
         network.execute()
