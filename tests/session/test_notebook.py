@@ -183,6 +183,11 @@ def test_the_first_pictures_are_denoised(kernel: Any, monkeypatch: pytest.Monkey
     few = wf.render(BALL, 4, size=(16, 16))
     assert shown[-1] is few
     assert "denoiser" not in few.metadata
+    monkeypatch.setattr(module, "MOST_CLEANED", 16 * 16 - 1)
+    shown.clear()
+    wf.render(BALL, 4, size=(16, 16))
+    assert not any("denoiser" in each.metadata for each in shown)
+    monkeypatch.setattr(module, "MOST_CLEANED", 16 * 16)
     monkeypatch.setattr(wf.Image, "denoise", lambda image: 1 / 0)
     shown.clear()
     wf.render(BALL, 4, size=(16, 16))

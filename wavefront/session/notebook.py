@@ -16,6 +16,7 @@ from . import Session
 DELAY = 0.3  # seconds before a picture appears; of shorter renders there is only the result
 INTERVAL = 0.5  # seconds from one picture to the next, at least
 SHARE = 0.1  # of the time that showing pictures may take
+MOST_CLEANED = 1 << 20  # pixels of a picture that is denoised to be shown, within a second or two
 
 
 def shows_pictures(progress: Progress) -> bool:
@@ -106,7 +107,8 @@ def _cleaned(image: Image) -> Image:
     from ..denoising import FEW, is_quick
 
     with suppress(Exception):  # of a library
-        return image.denoise() if image.spp < FEW and is_quick() else image
+        small = image.rgb.size <= 3 * MOST_CLEANED
+        return image.denoise() if small and image.spp < FEW and is_quick() else image
     return image
 
 
