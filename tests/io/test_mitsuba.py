@@ -427,10 +427,47 @@ def test_lights(tmp_path: Path) -> None:
     np.testing.assert_allclose(first, second, atol=1e-5)
 
 
-def test_a_spot_is_the_nearest_one_there_is() -> None:
-    with pytest.warns(UserWarning, match=r"light .spot.: beam_width"):
-        spot = scene(False, light={"type": "spot", "cutoff_angle": 30.0, "beam_width": 15.0}).lights[0]
-    assert (spot.angle, spot.blend, spot.direction.tolist()) == (60, 0.5, [0, 0, 1])  # type: ignore[attr-defined]
+def test_spots_and_projectors() -> None:
+    slide = {"type": "bitmap", "data": np.ones((2, 4, 3), np.float32)}
+    spot = light("spot", cutoff_angle=30.0, beam_width=15.0, intensity=2.0, texture=slide, to_world=TURN)
+    assert (spot.angle, spot.blend, spot.falloff) == (60, 0.5, "linear")
+    assert spot.direction.tolist() == [1, 0, 0]
+    screen = {"type": "rectangle", "bsdf": {"type": "diffuse", "reflectance": 1.0}}
+    codes = np.zeros((2, 2, 3), np.float32)
+    codes[0, 0], codes[0, 1] = (1, 0, 0), (0, 1, 0)  # the upper row
+    slide = {"type": "bitmap", "data": codes, "filter_type": "nearest", "raw": True}
+    place = np.diag([-1.0, 1, -1, 1])  # looks along -z from z = 1, with x to the left
+    place[2, 3] = 1
+    view = wf.Camera.look_at((0, 0, 1), (0, 0, 0), fov=60, size=(2, 2))
+    beam = {"type": "projector", "irradiance": slide, "fov": 90.0, "scale": 2.0, "to_world": place}
+    lit = scene(screen=screen, beam=beam)
+    lit.camera = view
+    shown = np.asarray(wf.render(lit, spp=4, max_bounces=1).rgb)
+    np.testing.assert_allclose(shown, 2 * codes, atol=1e-3)  # π·scale is the irradiance of white
+    # a spot shows the same picture upside down, and mirrored
+    beam = {"type": "spot", "texture": slide, "cutoff_angle": 45.0, "beam_width": 44.0, "to_world": place}
+    lit = scene(screen=screen, beam=beam)
+    lit.camera = view
+    shown = np.asarray(wf.render(lit, spp=4, max_bounces=1).rgb)
+    np.testing.assert_array_equal(shown > 0.05, codes[::-1, ::-1] > 0)
+
+
+def test_textures_of_spheres_are_where_mitsuba_has_them() -> None:
+    codes = np.random.default_rng(4).random((8, 8, 3), np.float32)
+    image = {"type": "bitmap", "data": codes, "filter_type": "nearest", "raw": True}
+    ball = {"type": "sphere", "to_world": TURN, "bsdf": {"type": "diffuse", "reflectance": image}}
+    (body,) = scene(ball=ball).shapes
+    turn = np.array(TURN)[:3, :3]
+    for own in np.random.default_rng(5).normal(size=(6, 3)):
+        x, y, z = own / np.linalg.norm(own)
+        u, v = np.arctan2(y, x) / (2 * np.pi) % 1, np.arccos(z) / np.pi
+        normal = turn @ (x, y, z)
+        view = wf.Camera.look_at(body.center + 3 * normal, body.center, (0.1, 0.2, 0.3), 1e-3, size=(1, 1))
+        found = wf.render([body, wf.Environment(1)], spp=1, camera=view, aovs="albedo").albedo
+        np.testing.assert_allclose(found[0, 0], codes[int(v * 8), int(u * 8)], atol=1e-5)
+    shared = {"a": ball, "b": {"type": "sphere", "bsdf": ball["bsdf"]}}
+    first, second = scene(**shared).shapes
+    assert first.material is second.material
 
 
 # --- Sensors and settings -------------------------------------------------------------------------

@@ -8,11 +8,11 @@ import numpy as np
 
 from ...arrays.vec import Doubles
 from ...core.errors import SceneError
-from ...lights import DirectionalLight, Environment, PointLight, SpotLight
-from ...lights.image import environment_pixels
+from ...lights import DirectionalLight, Environment, PointLight, Projector, SpotLight
 from ...textures.base import BaseTexture
 from .nodes import Job, Node, plugin, unsupported
-from .textures import color, pixels
+from .textures import color, picture, pixels
+from .views import FIELD_OF_VIEW, vertical_fov
 
 
 @plugin("area", "emitter", "radiance")
@@ -27,18 +27,33 @@ def _point(node: Node, job: Job) -> PointLight:
     return PointLight(position, _constant(node, "intensity", job))
 
 
-@plugin("spot", "emitter", "to_world intensity cutoff_angle beam_width")
+@plugin("spot", "emitter", "to_world intensity texture cutoff_angle beam_width")
 def _spot(node: Node, job: Job) -> SpotLight:
     matrix = node.matrix()
     cutoff = node.number("cutoff_angle", 20.0)
-    beam = node.number("beam_width", cutoff * 0.75)
-    node.lose("beam_width; a smoother fall-off in its place")
     return SpotLight(
         matrix[:3, 3],
         _constant(node, "intensity", job),
         direction=matrix[:3, 2],
         angle=2 * cutoff,
-        blend=float(np.clip(1 - beam / cutoff, 0, 1)),
+        blend=float(np.clip(1 - node.number("beam_width", cutoff * 0.75) / cutoff, 0, 1)),
+        falloff="linear",
+        picture=picture(node, "texture", job) if "texture" in node.values else None,
+        up=-matrix[:3, 1],  # its first row is below
+    )
+
+
+@plugin("projector", "emitter", f"to_world irradiance scale {FIELD_OF_VIEW}")
+def _projector(node: Node, job: Job) -> Projector:
+    matrix, slide = node.matrix(), picture(node, "irradiance", job)
+    aspect = slide.size[0] / slide.size[1]
+    return Projector(
+        matrix[:3, 3],
+        slide,
+        np.pi * node.number("scale", 1.0),
+        direction=matrix[:3, 2],
+        fov=vertical_fov(node, aspect),
+        up=matrix[:3, 1],
     )
 
 
@@ -56,15 +71,14 @@ def _environment(node: Node, job: Job) -> Environment:
 
 @plugin("envmap", "emitter", "filename bitmap scale to_world", harmless="mis_compensation")
 def _environment_map(node: Node, job: Job) -> Environment:
-    image = environment_pixels(pixels(node, job)) * np.float32(node.number("scale", 1.0))
-    axes = node.matrix()[:3, :3]
+    image, axes = pixels(node, job), node.matrix()[:3, :3]
     axes = axes / np.maximum(np.linalg.norm(axes, axis=0), 1e-300)
     if np.linalg.det(axes) < 0:  # mirrored: x becomes -x
         image, axes = image[:, ::-1], axes * (-1, 1, 1)
-    return Environment(np.ascontiguousarray(image), transform=axes)
+    return Environment(np.ascontiguousarray(image), transform=axes, scale=node.number("scale", 1.0))
 
 
-unsupported("directionalarea projector sunsky timed_sunsky", "emitter")
+unsupported("directionalarea sunsky timed_sunsky", "emitter")
 
 
 def _constant(node: Node, name: str, job: Job) -> Doubles:

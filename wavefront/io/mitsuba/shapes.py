@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from copy import copy
+from copy import copy, deepcopy
 from dataclasses import replace
 from typing import Any
 
@@ -16,16 +16,18 @@ from ...core.errors import number as checked_number
 from ...materials import Material
 from ...shapes import Cylinders, Instance, Mesh, Shape, Sphere
 from ...shapes.transform import Matrix
-from ...textures.base import BaseTexture
+from ...textures.image import Texture
 from ..placing import moved_raw
 from ..repair import RawMesh, build
 from .attributes import with_attribute
 from .bsdfs import is_one_sided
 from .nodes import Job, Node, name_of, plugin, unsupported
 from .serialized import read_serialized
+from .textures import upside_down
 
 SIDES = 128  # of round shapes that are meshes
 ROUND = 1e-4  # relative difference of the scales along two axes that is taken for rounding
+POLES = np.array([[0.0, 0, -1], [-1, 0, 0], [0, 1, 0]])  # from the axes of a `Sphere` to those of Mitsuba
 SURFACE = "to_world flip_normals"
 
 
@@ -77,7 +79,7 @@ def _cylinder(node: Node, job: Job) -> list[Shape]:
     material, emission = _appearance(node, job)
     around = np.linalg.norm(matrix[:3, :3] @ axes[:, :2], axis=0)
     even = abs(around[1] - around[0]) <= ROUND * around[0]
-    if even and emission is None and not node.flag("flip_normals") and not _is_textured(material):
+    if even and emission is None and not node.flag("flip_normals") and not _textures(material, set()):
         ends = np.stack([start, end]) @ matrix[:3, :3].T + matrix[:3, 3]
         pipe = Cylinders(ends[:1], ends[1:], radius * around[0], caps=False, material=material)
         return [_named(pipe, node)]
@@ -96,7 +98,7 @@ def _cylinder(node: Node, job: Job) -> list[Shape]:
     "shape",
     f"{SURFACE} center radius",
     "bsdf emitter",
-    note="one radius; poles of textures along y",
+    note="one radius",
 )
 def _sphere(node: Node, job: Job) -> list[Shape]:
     center = node.vector("center", (0, 0, 0))
@@ -111,9 +113,16 @@ def _sphere(node: Node, job: Job) -> list[Shape]:
     radius *= float(np.linalg.norm(matrix[:3, 0]))
     closed = job.eye is None or bool(np.linalg.norm(job.eye - center) > radius)
     material, emission = _appearance(node, job, closed)
-    if _is_textured(material) or isinstance(emission, BaseTexture):
-        node.lose("the poles of its texture coordinates, which are along y here")
-    return [_named(Sphere(center, radius, material=material, emission=emission), node)]
+    turn = None
+    if _textures((material, emission), set()):
+        material, emission = _for_spheres(material, emission, job)
+        left, _, right = np.linalg.svd(matrix[:3, :3])
+        turn = left @ right @ POLES
+        if np.linalg.det(turn) < 0:
+            node.lose("the reflection of its textures")
+            turn = -turn
+    ball = Sphere(center, radius, material=material, emission=emission, transform=turn)
+    return [_named(ball, node)]
 
 
 @plugin("obj ply", "shape", f"{SURFACE} filename face_normals flip_tex_coords", "bsdf emitter")
@@ -267,12 +276,23 @@ def _named(shape: Any, node: Node) -> Any:
     return shape
 
 
-def _is_textured(material: Material) -> bool:
-    """Return whether a parameter of a material varies over the surface."""
-    found = [material.alpha, material.normal_map]
-    bsdfs: list[Any] = [material.bsdf]
-    while bsdfs:
-        values = vars(bsdfs.pop()).values()
-        bsdfs += [value for value in values if hasattr(value, "sample_f")]
-        found += [value for value in values if isinstance(value, BaseTexture)]
-    return any(isinstance(each, BaseTexture) or hasattr(each, "perturbed") for each in found)
+def _for_spheres(material: Material, emission: Any, job: Job) -> tuple[Material, Any]:
+    """Return the same with its textures turned over: v of a `Sphere` is 1 where Mitsuba's is 0."""
+    both = (material, emission)
+    key = (*map(id, both), "sphere")
+    if key not in job.made:
+        kept = {id(each): upside_down(each) for each in _textures(both, set())}
+        job.made[key] = (deepcopy(both, {**kept, **{id(kept): list(kept.values())}}), both)
+    found: tuple[Material, Any] = job.made[key][0]
+    return found
+
+
+def _textures(thing: Any, seen: set[int]) -> list[Texture]:
+    """Return the images in a material, or in a part of one."""
+    if id(thing) in seen or not (isinstance(thing, tuple) or hasattr(thing, "__dict__")):
+        return []
+    seen.add(id(thing))
+    if isinstance(thing, Texture):
+        return [thing]
+    parts = thing if isinstance(thing, tuple) else vars(thing).values()
+    return [each for part in parts for each in _textures(part, seen)]

@@ -6,6 +6,7 @@ flips it.
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -146,6 +147,27 @@ def bitmap(node: Node, job: Job, channel: Any = None, plain: bool = False) -> Te
         channel=channel,
         max_pixels=job.files.limits.pixels,
     )
+
+
+def picture(node: Node, name: str, job: Job) -> Texture:
+    """Return an image that a light shows, with its first row at the top."""
+    image = node.get(name, 1.0)
+    value = job.convert(image) if isinstance(image, Node) else image
+    if isinstance(image, Node) and image.plugin in ("rgb", "spectrum"):
+        value = constant(image, job, emission=True, bounded=False)
+    if not isinstance(value, BaseTexture):
+        return Texture(np.broadcast_to(value, (1, 1, 3)).astype(np.float32))
+    if not isinstance(value, Texture):
+        raise SceneError(f"{name} must be an image")
+    return upside_down(value)
+
+
+def upside_down(texture: Texture) -> Texture:
+    """Return a texture for coordinates whose v is 1 at the top row."""
+    other = copy(texture)
+    given = np.eye(3) if texture.transform is None else texture.transform
+    other.transform = None if np.array_equal(given, FLIP) else given @ FLIP
+    return other
 
 
 @plugin(

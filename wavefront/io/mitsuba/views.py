@@ -16,7 +16,8 @@ Settings = dict[str, Any]
 ENDLESS = 2**16  # bounces, where there is no limit
 CLIPPED = "to_world near_clip far_clip focus_distance"
 NO_CLIPPING = "near_clip and far_clip do not cut"
-LENS = "fov fov_axis focal_length principal_point_offset_x principal_point_offset_y"
+FIELD_OF_VIEW = "fov fov_axis focal_length"
+LENS = f"{FIELD_OF_VIEW} principal_point_offset_x principal_point_offset_y"
 
 
 @plugin("perspective", "sensor", f"{CLIPPED} {LENS}", "film sampler", note=NO_CLIPPING)
@@ -121,14 +122,18 @@ unsupported("batch distant irradiancemeter radiancemeter", "sensor")
 
 
 def _lens(node: Node, aspect: float) -> Perspective:
-    """Return the lens of a perspective camera; its height follows from its width."""
-    across = _field_of_view(node, aspect)
+    """Return the lens of a perspective camera."""
     focus = node.number("focus_distance", node.number("far_clip", 1e4))
     aperture = node.number("aperture_radius", 0.0) if node.plugin == "thinlens" else 0.0
     shift = (node.number("principal_point_offset_x", 0.0), -node.number("principal_point_offset_y", 0.0))
     return Perspective(
-        _degrees(_tan(across) / aspect), shift=shift, aperture=2 * aperture, focus=focus if aperture else None
+        vertical_fov(node, aspect), shift=shift, aperture=2 * aperture, focus=focus if aperture else None
     )
+
+
+def vertical_fov(node: Node, aspect: float) -> float:
+    """Return the vertical field of view in degrees, of a picture `aspect` times as wide as high."""
+    return _degrees(_tan(_field_of_view(node, aspect)) / aspect)
 
 
 def _field_of_view(node: Node, aspect: float) -> float:
