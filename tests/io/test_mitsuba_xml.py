@@ -131,6 +131,17 @@ def test_includes_aliases_and_folders(tmp_path: Path) -> None:
     assert len(mesh.faces) == 1  # type: ignore[attr-defined]
 
 
+def test_folders_of_includes_may_be_those_of_the_scene(tmp_path: Path) -> None:
+    for name in ("scene", "scene/parts", "meshes"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "meshes" / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    body = "<path value='../meshes'/><shape type='obj'><string name='filename' value='a.obj'/></shape>"
+    write(tmp_path / "scene" / "parts", body, "part.xml")
+    area = "<emitter type='area' id='lamp'/><sampler type='independent' id='s'/><bsdf type='hair' id='h'/>"
+    made = load(tmp_path / "scene", f"<include filename='parts/part.xml'/>{area}", search_paths=tmp_path)
+    assert (len(made.shapes), made.lights) == (1, [])  # what is only defined is not used
+
+
 def test_files_outside_of_the_folder_need_search_paths(tmp_path: Path) -> None:
     home, other = tmp_path / "scene", tmp_path / "common"
     home.mkdir()
@@ -175,6 +186,14 @@ def test_files_outside_of_the_folder_need_search_paths(tmp_path: Path) -> None:
         ),
         ("<include filename='none.xml'/>", "line 2: .*none.xml' is missing"),
         ("<include filename='/etc/passwd'/>", "absolute path is not followed"),
+        (
+            "<shape type='obj'><string name='filename' value='a.obj'/></shape>",
+            "line 2: obj: file 'a.obj' is miss",
+        ),
+        (
+            "<shape type='obj'><string name='filename' value='../a.obj'/></shape>",
+            "line 2: obj: refers to '../a",
+        ),
         ("<path value='none'/>", "there is no such folder"),
         ("<shape type='sphere'><ref id='x'/></shape>", r"line 2: refers to the id 'x'"),
         ("<bsdf type='diffuse' id='a'/><bsdf type='diffuse' id='a'/>", "line 2: the id 'a' is used twice"),

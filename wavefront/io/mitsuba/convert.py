@@ -53,9 +53,10 @@ def convert(
     return made
 
 
-@plugin(
-    "scene", "scene", holds="shape emitter sensor integrator bsdf texture", harmless="allow_thread_reordering"
-)
+DEFINED = "bsdf texture sampler film rfilter medium phase volume"  # for others to refer to
+
+
+@plugin("scene", "scene", "", f"shape emitter sensor integrator {DEFINED}", "allow_thread_reordering")
 def _scene(node: Node, job: Job) -> Scene:
     settings: dict[str, Any] = {}
     camera = None
@@ -67,7 +68,8 @@ def _scene(node: Node, job: Job) -> Scene:
             job.eye = camera.origin
     parts = [part for part in node.held("shape") if part.plugin != "shapegroup"]
     found = [shape for part in parts for shape in job.convert(part)]
-    lights = [light for part in node.held("emitter") if (light := job.convert(part)) is not None]
+    lamps = [part for part in node.held("emitter") if part.plugin != "area"]
+    lights = [light for part in lamps if (light := job.convert(part)) is not None]
     for integrator in node.held("integrator")[:1]:
         settings = settings | job.convert(integrator)
     if settings.get("background") and any(shape.emission is not None for shape in found):

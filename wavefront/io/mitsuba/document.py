@@ -97,11 +97,11 @@ class Document:
             try:
                 found = self._files.find(reference, folder / "_")
             except SceneError as error:
-                refused = refused or error
+                refused = refused or SceneError(str(error).removeprefix(f"{folder / '_'}: "))
                 continue
             if found.exists():
                 return found
-        raise refused or SceneError(f"{os.fspath(self._files.scene)}: file {reference!r} is missing")
+        raise refused or SceneError(f"file {reference!r} is missing")
 
     def _read(self, path: Path, data: bytes, depth: int) -> Element:
         root = parsed(os.fspath(path), data)
@@ -215,8 +215,9 @@ class Document:
 
     def _add_folder(self, name: str, tag: Tag, path: Path) -> None:
         """Add a folder in which files are looked for; whether they may be read is checked then."""
-        folder = path.parent / name.replace("\\", "/")
-        if not folder.is_dir():
+        places = [each / name.replace("\\", "/") for each in (path.parent, *reversed(self.folders))]
+        folder = next((place for place in places if place.is_dir()), None)
+        if folder is None:
             raise SceneError(f"{tag.place}: path is {name!r}; there is no such folder")
         self.folders.append(folder)
 

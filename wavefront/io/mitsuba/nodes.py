@@ -159,6 +159,7 @@ class Job:
     lost: dict[str, None] = field(default_factory=dict)
     made: dict[Any, Any] = field(default_factory=dict)  # what was converted already
     eye: np.ndarray | None = None  # where the camera stands
+    said: str = ""  # the message of an error that names its place
     triangles: int = 0
     instances: int = 0
 
@@ -196,9 +197,11 @@ class Job:
         try:
             return entry.convert(node, self)
         except SceneError as error:
-            if str(error).startswith(self.name):
+            if str(error) == self.said:
                 raise
-            raise SceneError(f"{node.label}: {error}") from error
+            placed = SceneError(f"{node.label}: {str(error).removeprefix(f'{self.name}: ')}")
+            self.said = str(placed)
+            raise placed from error
 
 
 class Graph:
