@@ -15,6 +15,7 @@ from .base import Emitters, LightRecord, Receiver
 
 LEAST_SQUARE = f4(1e-35)  # added to squared distances before their root, so that nothing is divided by 0
 LEAST_COS = f4(0.02)  # between a surface and a corner that counts; smaller ones count as this one
+NEAREST = f4(1e-6)  # squared distance to the nearest corner that counts, over that to the first
 EDGE_ON = f4(1e-14)  # taken off cosines that are divided by; smaller ones count as those of a dark side
 
 
@@ -102,6 +103,7 @@ class PlanarLights(LightRecord):
         high_u, high_v = dot(normal, self.edge_u), dot(normal, self.edge_v)
         d2_u, d2_v = (f4(2) * dot(corner, edge) for edge in (self.edge_u, self.edge_v))
         across = both * (self.edge_u + self.edge_v)
+        nearest = np.maximum(d2 * NEAREST, TINY)  # where a corner is at the point itself
         corners = []
         for rise, square in (
             (high, d2),
@@ -109,7 +111,7 @@ class PlanarLights(LightRecord):
             (high + high_v, d2 + (d2_v + dot(self.edge_v, self.edge_v))),
             (high + both * (high_u + high_v), d2 + (both * (d2_u + d2_v) + dot(across, across))),
         ):
-            ratio = d2 / np.maximum(square, TINY)
+            ratio = d2 / np.maximum(square, nearest)
             ratio = np.sqrt(ratio, out=ratio) if near else np.multiply(ratio, ratio, out=ratio)
             ratio *= np.maximum(rise, least)
             corners.append(ratio)
