@@ -44,7 +44,11 @@ def rgb(*value: float) -> dict[str, Any]:
 
 def scene(strict: bool = True, **parts: Any) -> wf.Scene:
     """Return a scene of some parts, with a sphere if there is no shape."""
-    shapes = any(PLUGINS[part["type"]].kind == "shape" for part in parts.values() if "type" in part)
+    kinds = (
+        PLUGINS.get(part.get("type")) if isinstance(part.get("type"), str) else None
+        for part in parts.values()
+    )
+    shapes = any(each is not None and each.kind == "shape" for each in kinds)
     ball = {} if shapes else {"ball": {"type": "sphere"}}
     return wf.from_mitsuba({"type": "scene", **parts, **ball}, strict=strict)
 
@@ -635,6 +639,68 @@ def test_bombs_are_refused() -> None:
     own["bsdf"] = own
     with pytest.raises(wf.SceneError, match=r"nested deeper|contains itself"):
         scene(ball={"type": "sphere", "bsdf": own})
+
+
+ODD = (
+    None,
+    -1,
+    0,
+    3,
+    1e400,
+    float("nan"),
+    "",
+    "x",
+    [],
+    [1, 2],
+    {},
+    {"type": "rgb"},
+    {"type": "ref", "id": "clay"},
+)
+ODD += (
+    {"type": "bitmap", "data": np.ones((1, 1))},
+    {"type": "spectrum", "value": [(1, 2)]},
+    True,
+    np.eye(4),
+    object(),
+)  # type: ignore[assignment]
+ODD += (
+    {"type": "checkerboard", "color0": 0.5},
+    {"type": "diffuse"},
+    "400:1, 500:2",
+    {"type": "irregular"},
+    {1: 2},
+)  # type: ignore[assignment]
+
+
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
+def test_odd_values_give_a_scene_or_a_typed_error(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    bases = [
+        {"type": name, **{each: 1.0 for each in entry.reads if each in ("fov", "value", "temperature")}}
+        for name, entry in PLUGINS.items()
+        if entry.convert is not None and entry.kind != "scene"
+    ]
+    for _turn in range(10 if seed else 1):
+        for base in bases:
+            entry = PLUGINS[base["type"]]  # type: ignore[index]
+            for name in (*entry.reads, "type", "id", "inner"):
+                part: dict[Any, Any] = {**base, name: ODD[rng.integers(len(ODD))]}
+                where: dict[str, Any] = {
+                    "bsdf": {"type": "sphere", "b": part},
+                    "texture": {"type": "sphere", "b": {"type": "diffuse", "reflectance": part}},
+                    "film": {"type": "perspective", "film": part},
+                    "rfilter": {"type": "perspective", "film": {"type": "hdrfilm", "f": part}},
+                    "sampler": {"type": "perspective", "s": part},
+                }
+                try:
+                    scene(
+                        False,
+                        clay={"type": "diffuse"},
+                        board={"type": "rectangle"},
+                        part=where.get(entry.kind, part),
+                    )
+                except (wf.SceneError, UserWarning):
+                    continue
 
 
 def test_the_table_says_what_is_read(monkeypatch: pytest.MonkeyPatch) -> None:

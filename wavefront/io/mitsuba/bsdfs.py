@@ -144,6 +144,7 @@ def _principled(node: Node, job: Job) -> Material:
     if isinstance(gloss, BaseTexture):
         node.lose("the texture clearcoat_gloss")
         gloss = 0.0
+    gloss = number("clearcoat_gloss", gloss, lambda x: 0 <= x <= 1, "in [0, 1]")
     return _named(
         node,
         Principled(

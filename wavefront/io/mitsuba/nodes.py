@@ -115,7 +115,8 @@ class Node:
 
     def flag(self, name: str, default: bool = False) -> bool:
         """Return True or False."""
-        return bool(one_of(name, self.get(name, default), (True, False)))
+        value = self.get(name, default)
+        return bool(one_of(name, bool(value) if isinstance(value, np.bool_) else value, (True, False)))
 
     def text(self, name: str, default: str | None = None) -> str:
         """Return a string."""
@@ -169,6 +170,16 @@ class Job:
             self.made[node] = self._converted(node)
         return self.made[node]
 
+    def check(self, node: Node) -> None:
+        """Note the parameters of a plugin that are not read."""
+        entry = PLUGINS[node.plugin]
+        for name, value in node.values.items():
+            if name not in entry.reads and name not in entry.harmless:
+                if not isinstance(value, Node):
+                    node.lose(name)
+                elif value.kind not in entry.holds:
+                    node.lose(f"{value.kind} {name!r}")
+
     def only(self, node: Node, kind: str) -> Node:
         """Return the first plugin of a kind that a plugin must hold."""
         held = node.held(kind)
@@ -188,12 +199,7 @@ class Job:
             made, instead = INSTEAD.get(entry.kind, (None, "left out"))
             node.lose(instead)
             return made
-        for name, value in node.values.items():
-            if name not in entry.reads and name not in entry.harmless:
-                if not isinstance(value, Node):
-                    node.lose(name)
-                elif value.kind not in entry.holds:
-                    node.lose(f"{value.kind} {name!r}")
+        self.check(node)
         try:
             return entry.convert(node, self)
         except SceneError as error:
@@ -229,7 +235,7 @@ class Graph:
         SceneError
             If it is no dictionary of a scene, names an unknown plugin, refers to nothing, or contains itself.
         """
-        if not isinstance(scene, Mapping) or scene.get("type") != "scene":
+        if not isinstance(scene, Mapping) or f"{scene.get('type')}" != "scene":
             raise SceneError(f'{self._name}: is {in_brief(scene)}; it must be a dictionary of type "scene"')
         self._register(scene, "", 0)
         return self._node(scene, self._name, "", ())
@@ -241,6 +247,12 @@ class Graph:
         if id(source) in self._seen:
             return
         self._seen.add(id(source))
+        if not all(isinstance(name, str) for name in (*source, source.get("id", ""))):
+            raise SceneError(
+                f"{self._name}: names of parameters, and ids, must be strings: {in_brief(source)}"
+            )
+        if not isinstance(source.get("type"), str):
+            raise SceneError(f"{self._name}: there is no plugin {in_brief(source.get('type'))}, of {key!r}")
         own = source.get("id", key if depth == 1 else "")
         if source.get("type") != "ref" and own and self._ids.setdefault(own, source) is not source:
             place = getattr(source, "place", "") or self._name
@@ -256,10 +268,9 @@ class Graph:
             raise SceneError(f"{place}: {source.get('id', key)!r} contains itself")
         if id(source) in self._nodes:
             return self._nodes[id(source)]
-        kind = source.get("type")
-        if not isinstance(kind, str) or kind not in PLUGINS:
-            hint = did_you_mean(kind, PLUGINS) if isinstance(kind, str) else ""
-            raise SceneError(f"{place}: there is no plugin {in_brief(kind)}{hint}")
+        kind: str = source["type"]
+        if kind not in PLUGINS:
+            raise SceneError(f"{place}: there is no plugin {in_brief(kind)}{did_you_mean(kind, PLUGINS)}")
         own = source.get("id", key)
         label = f"{place}: {kind}" if place != path else f"{path} ({kind})"
         label += f" {own!r}" if own and (place != path or "id" in source) else ""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...arrays.vec import Doubles
-from ...core.errors import SceneError, finite_array, in_brief, number
+from ...core.errors import SceneError, as_array, finite_array, in_brief, number
 from ...core.files import decode_text
 from .transforms import numbers
 
@@ -155,7 +155,8 @@ def blackbody(temperature: float) -> Doubles:
 def pairs_of(name: str, value: Any) -> float | list[tuple[float, float]]:
     """Return a number, or wavelengths with values, of a text such as "400:0.1, 700:0.8" or of a list."""
     if not isinstance(value, str):
-        return float(value) if np.ndim(value) == 0 else [tuple(each) for each in value]
+        given = as_array(name, value)
+        return number(name, value) if given.ndim == 0 else list(finite_array(name, value, (None, 2)))
     parts = value.replace(",", " ").split()
     if len(parts) == 1 and ":" not in value:
         return numbers("spectrum", name, value, (1,))[0]

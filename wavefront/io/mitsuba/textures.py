@@ -15,13 +15,15 @@ from numpy.typing import NDArray
 from ...arrays.state import SurfaceInteraction
 from ...arrays.vec import Floats, luminance
 from ...colors import srgb_to_linear
-from ...core.errors import SceneError, finite_array, in_brief, number
+from ...core.errors import SceneError, as_array, finite_array, in_brief, number
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.vertex_colors import VertexColors
 from .nodes import Job, Node, plugin, unsupported
 from .spectra import blackbody, pairs_of, read_spectrum, spectrum_rgb, uniform_emission
+from .transforms import numbers
 
+MOST_VALUES = 10_000  # of a spectrum in a text
 FLIP = np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]])  # of v
 Value = Any  # a number, a color (3,) or a texture
 
@@ -62,7 +64,7 @@ def scalar(node: Node, name: str, default: float, job: Job) -> Value:
     if isinstance(value, Node) and value.plugin == "bitmap":
         return bitmap(value, job, channel="luminance")
     if isinstance(value, Node) and value.plugin == "checkerboard":
-        job.convert(value)  # reports its unknown parameters
+        job.check(value)
         return _board(value, job, channel=0)
     value = color(node, name, default, job)
     return value if isinstance(value, BaseTexture | float | int) else float(luminance(value))
@@ -78,7 +80,7 @@ def roughness(node: Node, name: str, default: float, job: Job) -> Value:
 
 def constant(node: Node, job: Job, *, emission: bool, bounded: bool) -> Value:
     """Return a number, or a color (3,), of an rgb or spectrum."""
-    job.convert(node)  # reports its unknown parameters
+    job.check(node)
     if node.plugin == "rgb":
         value = node.get("value")
         return finite_array("rgb", np.broadcast_to(value, 3) if np.ndim(value) == 0 else value, (3,))
@@ -86,9 +88,8 @@ def constant(node: Node, job: Job, *, emission: bool, bounded: bool) -> Value:
         path = job.find(node.text("filename"))
         pairs: Any = read_spectrum(path, job.files.read(path))
     elif "wavelengths" in node.values:
-        texts = (node.get("wavelengths"), node.get("values"))
-        pairs = list(zip(*(str(text).replace(",", " ").split() for text in texts), strict=False))
-        pairs = [(float(wave), float(value)) for wave, value in pairs]
+        columns = [listed(node, name) for name in ("wavelengths", "values")]
+        pairs = list(zip(*columns, strict=False))
     else:
         pairs = pairs_of("value", node.get("value"))
     if isinstance(pairs, float):
@@ -96,15 +97,23 @@ def constant(node: Node, job: Job, *, emission: bool, bounded: bool) -> Value:
     return spectrum_rgb(pairs, emission=emission, bounded=bounded)
 
 
+def listed(node: Node, name: str) -> list[float]:
+    """Return the numbers of a parameter, given as a text or as a list."""
+    value = node.get(name, "")
+    if not isinstance(value, str):
+        return list(finite_array(name, value, (None,)))
+    return numbers("", name, value, range(1, MOST_VALUES))
+
+
 @plugin("rgb", "texture", "value")
 @plugin("spectrum irregular", "texture", "value filename wavelengths values")
 def _constant(node: Node, job: Job) -> Value:
-    return constant(node, job, emission=False, bounded=True) if node.plugin == "irregular" else None
+    return constant(node, job, emission=False, bounded=True)
 
 
 @plugin("regular", "texture", "values wavelength_min wavelength_max")
 def _regular(node: Node, job: Job) -> Value:
-    values = [float(each) for each in node.text("values").replace(",", " ").split()]
+    values = listed(node, "values")
     at = np.linspace(node.number("wavelength_min", 360), node.number("wavelength_max", 830), len(values))
     return spectrum_rgb(list(zip(at, values, strict=True)), emission=False, bounded=True)
 
@@ -134,7 +143,7 @@ def _blackbody(node: Node, job: Job) -> Value:
 
 def bitmap(node: Node, job: Job, channel: Any = None, plain: bool = False) -> Texture:
     """Return an image; `plain` for data that must be linear, such as heights."""
-    job.convert(node)
+    job.check(node)
     codes, raw = pixels(node, job), node.flag("raw")
     if plain and not raw and codes.dtype.kind == "u":
         codes, raw = srgb_to_linear((codes / np.iinfo(codes.dtype).max).astype(np.float32)), True
@@ -151,10 +160,7 @@ def bitmap(node: Node, job: Job, channel: Any = None, plain: bool = False) -> Te
 
 def picture(node: Node, name: str, job: Job) -> Texture:
     """Return an image that a light shows, with its first row at the top."""
-    image = node.get(name, 1.0)
-    value = job.convert(image) if isinstance(image, Node) else image
-    if isinstance(image, Node) and image.plugin in ("rgb", "spectrum"):
-        value = constant(image, job, emission=True, bounded=False)
+    value = color(node, name, 1.0, job, emission=True)
     if not isinstance(value, BaseTexture):
         return Texture(np.broadcast_to(value, (1, 1, 3)).astype(np.float32))
     if not isinstance(value, Texture):
@@ -177,7 +183,6 @@ def upside_down(texture: Texture) -> Texture:
     harmless="accel format",
 )
 def _bitmap(node: Node, job: Job) -> Texture:
-    job.made[node] = None  # so that `bitmap` does not begin again
     return bitmap(node, job)
 
 
@@ -225,7 +230,7 @@ unsupported("volume", "texture")
 def _to_uv(node: Node) -> NDArray[np.float64]:
     """Return the transform of texture coordinates, (3, 3)."""
     value = node.get("to_uv", np.eye(4))
-    value = np.asarray(getattr(value, "matrix", value), np.float64)
-    if value.shape == (4, 4):
-        value = value[np.ix_((0, 1, 3), (0, 1, 3))]
-    return FLIP @ finite_array("to_uv", value, (3, 3))
+    matrix = as_array("to_uv", getattr(value, "matrix", value))
+    if matrix.shape == (4, 4):
+        matrix = matrix[np.ix_((0, 1, 3), (0, 1, 3))]
+    return FLIP @ finite_array("to_uv", matrix, (3, 3))

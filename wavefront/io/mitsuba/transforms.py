@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 
@@ -60,14 +60,18 @@ def looking(name: str, origin: np.ndarray, target: np.ndarray, up: np.ndarray) -
     return matrix
 
 
-def numbers(place: str, name: str, text: str, counts: tuple[int, ...]) -> list[float]:
+def numbers(place: str, name: str, text: str, counts: Collection[int]) -> list[float]:
     """Return the numbers of a text, of which there must be one of some counts."""
     try:
         found = [float(each) for each in re.split(r"[\s,]+", text.strip(" \t\r\n,"))]
     except ValueError:
         found = []
     if len(found) not in counts or not np.isfinite(found).all():
-        wanted = " or ".join("a number" if count == 1 else f"{count} numbers" for count in counts)
+        counts = () if isinstance(counts, range) else counts
+        wanted = (
+            " or ".join("a number" if count == 1 else f"{count} numbers" for count in counts)
+            or "a list of numbers"
+        )
         raise SceneError(f"{place}: {name} is {in_brief(text)}; it must be {wanted}")
     return found
 

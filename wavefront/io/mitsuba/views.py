@@ -11,6 +11,7 @@ from ...camera import Camera
 from ...camera.projection import Orthographic, Perspective, Projection
 from ...core.errors import SceneError, number
 from .nodes import Job, Node, plugin, unsupported
+from .transforms import numbers
 
 Settings = dict[str, Any]
 ENDLESS = 2**16  # bounces, where there is no limit
@@ -144,12 +145,8 @@ def _field_of_view(node: Node, aspect: float) -> float:
         angle = number("fov", node.get("fov"), lambda x: 0 < x < 180, "above 0 and below 180 degrees")
         axis = node.choice("fov_axis", "x", ("x", "y", "diagonal", "smaller", "larger"))
     else:
-        length = number(
-            "focal_length",
-            float(node.text("focal_length", "50mm").removesuffix("mm")),
-            lambda x: x > 0,
-            "above 0 mm",
-        )
+        (length,) = numbers("", "focal_length", node.text("focal_length", "50mm").removesuffix("mm"), (1,))
+        number("focal_length", length, lambda x: x > 0, "above 0 mm")
         angle, axis = _degrees(np.hypot(36, 24) / (2 * length)), "diagonal"
     if axis in ("smaller", "larger"):
         axis = "y" if (axis == "smaller") == (aspect > 1) else "x"
