@@ -18,7 +18,10 @@ MATERIALS = {  # a material, and for each of its parameters a new value
         wf.Conductor.named("gold"),
         {"eta": 2.0, "k": (1, 2, 3), **ROUGH, "roughness_v": 0.2, "shadowing": "separable"},
     ),
-    "Dielectric": (wf.Dielectric(), {"ior": 1.3, **ROUGH, "reflectance": 0.5, "transmittance": 0.6}),
+    "Dielectric": (
+        wf.Dielectric(),
+        {"ior": (1.3, 1.4, 1.6), **ROUGH, "reflectance": 0.5, "transmittance": 0.6, "film_thickness": 300},
+    ),
     "ThinDielectric": (wf.ThinDielectric(), {"ior": 1.3, **ROUGH, "reflectance": 0.5, "transmittance": 0.6}),
     "Plastic": (
         wf.Plastic(),

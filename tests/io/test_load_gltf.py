@@ -422,7 +422,7 @@ class Recorder(Diffuse):
     def __init__(
         self, base_color, metallic=0, roughness=0.5, ior=1.5, transmission=0, clearcoat=0,
         clearcoat_roughness=0, sheen_color=0, sheen_roughness=0, specular=1, specular_color=1,
-        sheen=0, anisotropy=0, thin=False, roughness_v=None, rotation=0,
+        sheen=0, anisotropy=0, thin=False, roughness_v=None, rotation=0, film_thickness=0, film_ior=1.3,
     ):  # fmt: skip
         self.given = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
         super().__init__(0.5)
@@ -671,6 +671,11 @@ def test_textured_emission(given, build):
             {"sheen": 1, "sheen_roughness": 0.3},
         ),
         ({"KHR_materials_specular": {"specularFactor": 0.2}}, {"specular": 0.2}),
+        (
+            {"KHR_materials_iridescence": {"iridescenceFactor": 1, "iridescenceIor": 1.8}},
+            {"film_thickness": 400, "film_ior": 1.8},
+        ),
+        ({"KHR_materials_iridescence": {"iridescenceIor": 1.8}}, {"film_thickness": 0}),
     ],
 )
 def test_extensions(given, extension, expected):
@@ -702,6 +707,32 @@ def test_anisotropy_of_a_texture(given, build):
     assert found["rotation"].at(surface) == pytest.approx([225])
     assert found["roughness"].at(surface) ** 2 == pytest.approx([0.25 + 0.75 * 0.04], rel=1e-6)
     assert found["roughness_v"] == 0.5
+
+
+def test_dispersion(build, path):
+    """The spread of the indices is (ior − 1)·0.05·dispersion; and the film of a texture of thickness."""
+    info = build.image(np.uint8([[[0, 51, 0]]]))
+    extensions = {
+        "KHR_materials_transmission": {"transmissionFactor": 1},
+        "KHR_materials_volume": {"thicknessFactor": 1},
+        "KHR_materials_ior": {"ior": 1.6},
+        "KHR_materials_dispersion": {"dispersion": 2},
+        "KHR_materials_iridescence": {
+            "iridescenceFactor": 1,
+            "iridescenceThicknessMinimum": 200,
+            "iridescenceThicknessMaximum": 700,
+            "iridescenceThicknessTexture": info,
+        },
+    }
+    build.material(pbrMetallicRoughness={"metallicFactor": 0}, extensions=extensions).gltf(path)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", ".*lacks? the texture coordinates")
+        (mesh,) = load_meshes(path)
+    glass = mesh.material.bsdf
+    assert type(glass) is Dielectric
+    assert glass.ior.ravel() == pytest.approx([1.57, 1.6, 1.63])
+    assert at(glass.film_thickness, 0.5, 0.5) == pytest.approx(300)
+    assert glass.film_ior == pytest.approx(1.3)
 
 
 def test_brushed_glass(build, path):
@@ -984,7 +1015,7 @@ def lose_scene(b):
 
 
 def lose_extension(b):
-    b.json["extensionsUsed"] = ["KHR_materials_iridescence"]
+    b.json["extensionsUsed"] = ["KHR_materials_unknown"]
 
 
 def lose_skin(b):
@@ -1025,9 +1056,14 @@ def lose_of_material(named, **material):
             "clearcoatNormalTexture",
             extensions={"KHR_materials_clearcoat": {"clearcoatFactor": 1, "clearcoatNormalTexture": "image"}},
         ),
+        lose_of_material(
+            "iridescenceFactor or a texture of it .*",
+            extensions={"KHR_materials_iridescence": {"iridescenceFactor": 0.5}},
+        ),
+        lose_of_material("dispersion", extensions={"KHR_materials_dispersion": {"dispersion": 1}}),
         lose_of_material("KHR_materials_unlit", extensions={"KHR_materials_unlit": {}}),
         (lose_scene, r"further scenes \(the file\)"),
-        (lose_extension, r"KHR_materials_iridescence \(the file\)"),
+        (lose_extension, r"KHR_materials_unknown \(the file\)"),
     ],
 )
 def test_what_is_not_honored_is_named(build, path, lose, message):

@@ -166,6 +166,7 @@ class SurfaceInteraction(SoA):
     dpduv1: Floats | None = None  # (6, n) the same for uv1
     tangent_frame: Floats | None = None  # (6, n) tangent and bitangent of normal maps, of any length
     tangent_frame1: Floats | None = None  # (6, n) the same for uv1
+    throughput: Floats | None = None  # (3, n) of the paths; None unless a material is dispersive
 
     def frame(self) -> Frame:
         """Return the shading frames, z = ns."""

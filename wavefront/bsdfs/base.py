@@ -67,6 +67,7 @@ class Bsdf(Parametrized, ABC):
     """
 
     transmissive: bool = False  # light can cross the surface
+    dispersive: bool = False  # the indices of refraction of the channels differ
     catches_shadows: bool = False  # the camera sees only shadows on it
     dimensions: int = 2  # rows of u that sample_f reads
     given_elsewhere: ClassVar[dict[str, str]] = MATERIAL_ARGUMENTS  # for messages

@@ -7,16 +7,17 @@ from typing import Self
 
 import numpy as np
 
-from ..arrays.vec import Floats, broadcast
+from ..arrays.vec import Floats, broadcast, f4
 from ..core.errors import one_of
 from ..core.parameter import Parameter
 from ..core.suggestions import suggests_keywords
-from ..textures.parameter import MAX_INDEX, Color, Scalar, color
+from ..textures.parameter import MAX_INDEX, Color, Scalar, color, refractive_index
 from .base import BsdfSample, weigh
 from .fresnel import fresnel_conductor
 from .microfacet import reflect
 from .mirror import mirrored
 from .rough import Distribution, RoughBsdf, Shadowing
+from .thin_film import film_reflectance, has_film, thickness
 
 # η and k of metals in linear Rec. 709 RGB: published measurements, weighted by the matching
 # functions of the three primaries (CIE 1931 2° by the fit of C. Wyman et al. 2013, JCGT 2(2), to
@@ -58,6 +59,9 @@ class Conductor(RoughBsdf):
         Of the facets' normals: "ggx", or "beckmann", whose highlights have no halo.
     shadowing
         "correlated" with masking by the facets' height, or "separable" (E. Heitz 2014, eqs. 98 and 99).
+    film_thickness, film_ior
+        A clear film on the surface, such as an oxide or oil, whose interference colors the light: thickness
+        in nanometers, at most 1e5, 0 for none; and refractive index. See docs/materials.md.
 
     Raises
     ------
@@ -72,6 +76,8 @@ class Conductor(RoughBsdf):
 
     eta = Parameter(partial(color, high=MAX_INDEX, above_zero=True))
     k = Parameter(partial(color, high=MAX_INDEX))
+    film_thickness = Parameter(thickness)
+    film_ior = Parameter(refractive_index)
 
     @suggests_keywords
     def __init__(
@@ -84,11 +90,19 @@ class Conductor(RoughBsdf):
         rotation: Scalar = 0.0,
         distribution: Distribution = "ggx",
         shadowing: Shadowing = "correlated",
+        film_thickness: Scalar = 0.0,
+        film_ior: Scalar = 1.33,
     ) -> None:
         self.eta = eta
         self.k = k
+        self.film_thickness, self.film_ior = film_thickness, film_ior
         self._set_facets(roughness, roughness_v, rotation, distribution, shadowing)
         self.derive()
+
+    def derive(self) -> None:
+        """Set `specular` from the roughness, and whether there is a film."""
+        super().derive()
+        self.has_film = has_film(self.film_thickness)
 
     @classmethod
     @suggests_keywords
@@ -105,21 +119,27 @@ class Conductor(RoughBsdf):
 
     def albedo(self, wo: Floats) -> Floats:
         """Return the reflectance along the mirrored direction, also of rough metals."""
-        return fresnel_conductor(wo[2], self.eta, self.k)
+        return self._fresnel(wo[2])
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
         """Return F·D·G/(4·cosθo·cosθi) and the density of reflections in visible normals; 0 for a mirror."""
         if self.specular:
             return np.zeros_like(wi), np.zeros_like(wi[2])
         value, pdf, cos = self.facets().mirror_lobe(wo, wi)
-        return fresnel_conductor(cos, self.eta, self.k) * value, pdf
+        return self._fresnel(cos) * value, pdf
 
     def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
         """Return reflections at the normal, or at visible microfacets; no sample below the surface."""
         n = wo.shape[1]
         if self.specular:
-            weight = fresnel_conductor(wo[2], self.eta, self.k)
+            weight = self._fresnel(wo[2])
             return BsdfSample(mirrored(wo), weight, np.ones_like(wo[2]), np.ones(n, np.bool_))
         wi = reflect(wo, self.facets().visible_normals(wo, u))
         f, pdf = self.evaluate(wo, wi)
         return BsdfSample(wi, weigh(f, wi, pdf), pdf, broadcast(np.False_, n))
+
+    def _fresnel(self, cos: Floats) -> Floats:
+        """Return the reflectance per channel, (3, n), with that of a film."""
+        if not self.has_film:
+            return fresnel_conductor(cos, self.eta, self.k)
+        return film_reflectance(cos, self.film_thickness, self.film_ior, f4(1), self.eta, self.k)

@@ -10,13 +10,17 @@ import numpy as np
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Floats, broadcast, dot, f4
 from ..core.errors import one_of
+from ..core.parameter import Parameter
 from ..core.suggestions import suggests_keywords
 from ..textures.base import BaseTexture
-from ..textures.parameter import Color, Scalar
+from ..textures.parameter import Color, Scalar, refractive_index, refractive_indices
 from .base import BsdfSample, weigh
+from .channels import evaluate_channels, fresnel_channels, sample_channels
 from .fresnel import fresnel_dielectric
 from .microfacet import reflect, refract
 from .refractive import RefractiveBsdf
+from .rough import Distribution, Shadowing
+from .thin_film import has_film, thickness
 
 # Closer to 1 than this, refraction bends light by less than half vectors resolve: the boundary is smooth.
 LEAST_BEND = 1e-3
@@ -54,7 +58,8 @@ class Dielectric(RefractiveBsdf):
     ----------
     ior
         Refractive index of the shape's inside relative to the outside, from 1e-6 to 1e6. Below 1 the outside
-        is the denser medium (a bubble in water: 1/1.33). At 1 light passes straight through.
+        is the denser medium (a bubble in water: 1/1.33). At 1 light passes straight through. Three numbers
+        are those of red, green and blue (dispersion): each refracted path follows one channel.
     roughness
         In [0, 1]; α = roughness². Below α = 0.001 it is perfectly smooth, and so is an index
         within 0.001 of 1. Only single scattering is simulated. For index 1.5, seen along the normal, that
@@ -65,6 +70,8 @@ class Dielectric(RefractiveBsdf):
         Tints of the reflected and of the refracted light per channel, in [0, 1]. 1 is physical.
     roughness_v, rotation, distribution, shadowing
         As for `Conductor`.
+    film_thickness, film_ior
+        As for `Conductor`: a film on the outside; both indices are relative to what surrounds the shape.
 
     Raises
     ------
@@ -76,7 +83,41 @@ class Dielectric(RefractiveBsdf):
     >>> glass = wf.Dielectric(1.5)
     >>> frosted = wf.Dielectric(1.5, roughness=0.3)
     >>> lens = wf.Dielectric.named("BK7")
+    >>> prism = wf.Dielectric((1.50, 1.51, 1.53))
     """
+
+    ior = Parameter(refractive_indices)
+    film_thickness = Parameter(thickness)
+    film_ior = Parameter(refractive_index)
+    shares: Floats = np.full((3, 1), 1 / 3, f4)  # (3, n) probability to follow each channel
+    before: Floats = np.ones(1, f4)  # (n,) or (3, n) index on the side of wo; unbound, wo is outside
+
+    @suggests_keywords
+    def __init__(
+        self,
+        ior: Color = 1.5,
+        roughness: Scalar = 0.0,
+        *,
+        reflectance: Color = 1.0,
+        transmittance: Color = 1.0,
+        roughness_v: Scalar | None = None,
+        rotation: Scalar = 0.0,
+        distribution: Distribution = "ggx",
+        shadowing: Shadowing = "correlated",
+        film_thickness: Scalar = 0.0,
+        film_ior: Scalar = 1.33,
+    ) -> None:
+        self.film_thickness, self.film_ior = film_thickness, film_ior
+        super().__init__(
+            ior,
+            roughness,
+            reflectance=reflectance,
+            transmittance=transmittance,
+            roughness_v=roughness_v,
+            rotation=rotation,
+            distribution=distribution,
+            shadowing=shadowing,
+        )
 
     @classmethod
     @suggests_keywords
@@ -85,7 +126,7 @@ class Dielectric(RefractiveBsdf):
     ) -> Self:
         """Return the clear material `name` in air: one of `INDICES`, such as "water", in capitals or not.
 
-        The index is that of yellow light, for all channels: dispersion is not simulated.
+        The index is that of yellow light, for all channels: without dispersion.
 
         Raises
         ------
@@ -99,25 +140,43 @@ class Dielectric(RefractiveBsdf):
     def derive(self) -> None:
         """Set `specular`, and the relative index as seen from outside, from the parameters."""
         super().derive()
-        straight = not isinstance(self.ior, BaseTexture) and abs(self.ior[0] - 1) < LEAST_BEND
+        constant = not isinstance(self.ior, BaseTexture)
+        straight = constant and np.abs(self.ior - 1).max() < LEAST_BEND
+        self.dispersive = constant and self.ior.size == 3
+        self.has_film = has_film(self.film_thickness)
         self.specular = self.specular or bool(straight)
-        self.eta = self.ior  # (n,) or (1,) index beyond / before; unbound, wo is outside
+        self.eta = self.ior  # (n,), (1,) or (3, n) index beyond / before; unbound, wo is outside
 
     def bind(self, surface: SurfaceInteraction) -> Self:
         """Return the BSDF bound to `surface`, with `eta` inverted where `wo` is inside."""
         bound = copy(super().bind(surface))
         bound.eta = np.where(surface.back_facing, f4(1) / bound.ior, bound.ior)
+        if self.has_film:
+            bound.before = np.where(surface.back_facing, bound.ior, f4(1))
+        if self.dispersive and surface.throughput is not None:
+            total = surface.throughput[0] + surface.throughput[1] + surface.throughput[2]
+            safe = np.where(total > 0, total, f4(1))
+            bound.shares = np.where(total > 0, surface.throughput / safe, self.shares)
         return bound
+
+    @property
+    def _split(self) -> bool:
+        """Whether the channels differ by more than their tints."""
+        return self.dispersive or self.has_film
 
     def albedo(self, wo: Floats) -> Floats:
         """Return the tints of reflection and refraction, weighed by the reflectance of a smooth surface."""
-        reflected, _ = fresnel_dielectric(wo[2], self.eta)
+        reflected = (
+            fresnel_channels(self, wo[2])[0] if self._split else fresnel_dielectric(wo[2], self.eta)[0]
+        )
         return self.transmittance + (self.reflectance - self.transmittance) * reflected
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
         """Return `f`, for radiance, and `pdf` (Walter et al. 2007, eqs. 20 and 21); 0 if smooth."""
         if self.specular:
             return np.zeros_like(wi), np.zeros_like(wi[2])
+        if self._split:
+            return evaluate_channels(self, wo, wi)
         facets = self.facets()
         value, density, cos = facets.mirror_lobe(wo, wi)
         through, through_density, through_cos, valid = facets.refraction_lobe(wo, wi, self.eta)
@@ -132,6 +191,8 @@ class Dielectric(RefractiveBsdf):
         Refracted radiance is divided by η², as the light fills a cone of another solid angle
         (Veach 1997, *Robust Monte Carlo Methods for Light Transport Simulation*, §5.2).
         """
+        if self._split:
+            return sample_channels(self, wo, u)
         return self._sample_smooth(wo, u) if self.specular else self._sample_rough(wo, u)
 
     def _sample_smooth(self, wo: Floats, u: Floats) -> BsdfSample:

@@ -58,6 +58,7 @@ class Mix(JointBsdf):
     def derive(self) -> None:
         """Set the flags from those of both BSDFs."""
         self.transmissive = self.first.transmissive or self.second.transmissive
+        self.dispersive = self.first.dispersive or self.second.dispersive
         self.specular = self.first.specular and self.second.specular
 
     def bind(self, surface: SurfaceInteraction) -> Self:

@@ -22,6 +22,7 @@ from .fresnel import fresnel_dielectric
 from .microfacet import Facets, alpha_of, reflect, refract
 from .rough import RoughBsdf
 from .sheen import sheen_albedo, sheen_lobe
+from .thin_film import film_reflectance, has_film, thickness
 
 COAT_F0 = 0.04
 
@@ -73,6 +74,8 @@ class Principled(RoughBsdf):
     specular, specular_color
         Strength, in [0, 1], and tint, at least 0, of the dielectric's reflection along the normal, which
         the tint raises to at most 1.
+    film_thickness, film_ior
+        As for `Conductor`: a film below the clear coat (KHR_materials_iridescence).
     conserve_energy
         Layer the specular lobe over the diffuse base without a gain of energy. False follows glTF's appendix
         exactly.
@@ -102,6 +105,8 @@ class Principled(RoughBsdf):
     sheen_roughness = Parameter(scalar)
     specular_weight = Parameter(scalar, "specular")
     specular_color = Parameter(partial(color, high=np.inf))
+    film_thickness = Parameter(thickness)
+    film_ior = Parameter(refractive_index)
 
     @suggests_keywords
     def __init__(
@@ -122,6 +127,8 @@ class Principled(RoughBsdf):
         sheen_roughness: Scalar = 0.3,
         specular: Scalar = 1.0,
         specular_color: Color = 1.0,
+        film_thickness: Scalar = 0.0,
+        film_ior: Scalar = 1.3,
         conserve_energy: bool = True,
     ) -> None:
         self.base_color = base_color
@@ -137,6 +144,7 @@ class Principled(RoughBsdf):
         self.sheen_roughness = sheen_roughness
         self.specular_weight = specular
         self.specular_color = specular_color
+        self.film_thickness, self.film_ior = film_thickness, film_ior
         self.conserve_energy = conserve_energy
         self.derive()
 
@@ -146,6 +154,7 @@ class Principled(RoughBsdf):
         self.transmissive = _used(self.transmission)
         self._coated = _used(self.clearcoat)
         self._cloth = _used(self.sheen)
+        self.has_film = has_film(self.film_thickness)
 
     def bind(self, surface: SurfaceInteraction) -> Self:
         """Return the BSDF bound to `surface`, with the side of `wo`."""
@@ -205,7 +214,7 @@ class Principled(RoughBsdf):
         if self.transmissive:
             cos = np.maximum(dot(wo, m), f4(0))
             reflected, cos_refracted = self._fresnel(cos)
-            crosses = (u[2] >= gloss + glass * reflected) & (u[2] < facet)
+            crosses = (u[2] >= gloss + glass * _chance(reflected)) & (u[2] < facet)
             index = self._eta()
             wi = np.where(crosses, self._across(wo, wi, m, cos, cos_refracted, index), wi)
             eta = np.where(crosses, index, f4(1))
@@ -221,6 +230,8 @@ class Principled(RoughBsdf):
         weight = _fifth(cos)
         gloss = self._dielectric(weight)
         metal = self.base_color + (f4(1) - self.base_color) * weight
+        if self.has_film:
+            metal, gloss = self._film(cos, self.base_color), self._gloss_with_film(cos)
         below = self._under_gloss(wo, wi) if self.conserve_energy else f4(1) - gloss.max(0)
         diffuse = opaque * below * np.where(wi[2] > 0, INV_PI, f4(0))
         f = (metal * self.metallic + gloss * opaque) * value + self.base_color * diffuse
@@ -231,16 +242,16 @@ class Principled(RoughBsdf):
         reflected, _ = self._fresnel(cos)
         through, through_density = self._through(wo, wi, facets)
         f = f + (value * reflected * clear) + self.base_color * (through * clear)
-        return f, pdf + chances.glass * (density * reflected + through_density)
+        return f, pdf + chances.glass * (density * _chance(reflected) + through_density)
 
     def _through(self, wo: Floats, wi: Floats, facets: Facets) -> tuple[Floats, Floats]:
-        """Transmission with its Fresnel factor: value (n,) and density (n,)."""
+        """Transmission with its Fresnel factor: value (n,), with a film (3, n), and density (n,)."""
         if self.thin:
             value, density, cos = facets.mirror_lobe(wo, wi * np.array([[1], [1], [-1]], f4))
         else:
             value, density, cos, _ = facets.refraction_lobe(wo, wi, self._eta())
-        passed = f4(1) - self._fresnel(cos)[0]
-        return value * passed, density * passed
+        reflected, _ = self._fresnel(cos)
+        return value * (f4(1) - reflected), density * (f4(1) - _chance(reflected))
 
     def _across(
         self, wo: Floats, wi: Floats, m: Floats, cos: Floats, cos_refracted: Floats, eta: Floats
@@ -251,11 +262,26 @@ class Principled(RoughBsdf):
         return refract(wo, m, cos, cos_refracted, eta)
 
     def _fresnel(self, cos: Floats) -> tuple[Floats, Floats]:
-        """Exact reflectance of the clear part, and the refracted cosine, each (n,)."""
-        if not self.thin:
-            return fresnel_dielectric(cos, self._eta())
-        face, refracted = fresnel_dielectric(cos, self.ior)
-        return f4(2) * face / (f4(1) + face), refracted
+        """Exact reflectance of the clear part, with a film (3, n), and the refracted cosine, each (n,)."""
+        index = self.ior if self.thin else self._eta()
+        face, refracted = fresnel_dielectric(cos, index)
+        if self.has_film:
+            before: Any = f4(1)
+            if self.back_facing is not None:
+                before = np.where(self.back_facing, f4(1) / index, f4(1))
+            film = film_reflectance(cos, self.film_thickness, self.film_ior, before, before * index)
+            face = np.where(face < 1, np.broadcast_to(film, (3, cos.size)), f4(1))
+        return f4(2) * face / (f4(1) + face) if self.thin else face, refracted
+
+    def _film(self, cos: Floats, f0: Floats) -> Floats:
+        """Reflectance below a film, (3, n), of what reflects f0 along the normal in air."""
+        root = np.sqrt(np.minimum(f0, f4(0.9999)))
+        index = (f4(1) + root) / (f4(1) - root)
+        return film_reflectance(cos, self.film_thickness, self.film_ior, f4(1), index)
+
+    def _gloss_with_film(self, cos: Floats) -> Floats:
+        f0 = ((self.ior - f4(1)) / (self.ior + f4(1))) ** 2
+        return self._film(cos, np.minimum(self.specular_color * f0, f4(1))) * self.specular_weight
 
     def _eta(self) -> Floats:
         """Index beyond / before, (n,) or (1,); 1 for a sheet, and never quite 1 otherwise."""
@@ -271,6 +297,9 @@ class Principled(RoughBsdf):
         Source: C. Kulla and A. Conty 2017, "Revisiting Physically Based Shading at Imageworks":
         (1 − E(wo))·(1 − E(wi))/(1 − mean E), with E the albedo of the gloss.
         """
+        if self.has_film:
+            passed = [f4(1) - self._gloss_with_film(np.abs(w[2])).max(0) for w in (wo, wi)]
+            return passed[0] * passed[1]
         a, b, mean_a, mean_b = gloss_tables()
         f0 = self._dielectric(np.zeros(1, f4)).max(0)
         f90 = self.specular_weight
@@ -323,6 +352,11 @@ class Principled(RoughBsdf):
         full = np.broadcast_to
         shape = wo[2].shape
         return Chances(*(full(part * share, shape) for part in (gloss, glass, coat, diffuse)))
+
+
+def _chance(reflected: Floats) -> Floats:
+    """Return the mean of a reflectance over the channels, if it has any, (n,)."""
+    return reflected if reflected.ndim == 1 else (reflected[0] + reflected[1] + reflected[2]) * f4(1 / 3)
 
 
 def _used(parameter: Any) -> bool:

@@ -21,7 +21,7 @@ class RefractiveBsdf(RoughBsdf):
     @suggests_keywords
     def __init__(
         self,
-        ior: Scalar = 1.5,
+        ior: Color = 1.5,
         roughness: Scalar = 0.0,
         *,
         reflectance: Color = 1.0,

@@ -39,6 +39,7 @@ class MaterialTable:
     groups: tuple[Bsdf, ...]  # groups that are `specular` come last
     normal_map_of: Ints  # (materials,) the normal map of each material, -1 for none
     normal_maps: tuple[BaseNormalMap, ...]
+    dispersive: bool = False  # some group is
 
 
 @soa
@@ -77,7 +78,8 @@ def group_materials(materials: Sequence[Material]) -> MaterialTable:
     normal_maps = {id(m.normal_map): m.normal_map for m in materials if m.normal_map is not None}
     number_of = {key: number for number, key in enumerate(normal_maps)}
     normal_map_of = np.array([number_of.get(id(material.normal_map), -1) for material in materials], np.intp)
-    return MaterialTable(group_of, groups, normal_map_of, tuple(normal_maps.values()))
+    dispersive = any(bsdf.dispersive for bsdf in groups)
+    return MaterialTable(group_of, groups, normal_map_of, tuple(normal_maps.values()), dispersive)
 
 
 def absorption_table(materials: Sequence[Material]) -> Floats | None:

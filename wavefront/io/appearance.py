@@ -22,7 +22,9 @@ from .repair import RawMesh, Table
 
 PARAMETERS = frozenset(inspect.signature(Principled).parameters)
 BASES: dict[type[Bsdf], str] = {Diffuse: "reflectance", Principled: "base_color"}
-GLASS = frozenset(("base_color", "transmission", "ior", "roughness", "roughness_v", "rotation", "thin"))
+PLAIN = frozenset(("base_color", "transmission", "ior", "roughness", "thin"))
+FILM = ("film_thickness", "film_ior")
+GLASS = PLAIN.union(("roughness_v", "rotation"), FILM)
 
 
 @dataclass
@@ -103,6 +105,7 @@ def build_material(
 
 def _build_bsdf(wanted: dict[str, Any]) -> tuple[Bsdf, list[str]]:
     """Return a BSDF, and the names of the parameters that it does not honor."""
+    spread = wanted.pop("dispersion", None)
     lost = [name for name in wanted if name not in PARAMETERS]
     known = {name: value for name, value in wanted.items() if name in PARAMETERS}
     if known.keys() == {"base_color"}:
@@ -110,15 +113,21 @@ def _build_bsdf(wanted: dict[str, Any]) -> tuple[Bsdf, list[str]]:
     # for pure glass the BSDFs of glass are better: they can be smooth
     transmission = known.get("transmission", 0.0)
     if known.keys() <= GLASS and not isinstance(transmission, Texture) and transmission == 1:
-        return _glass(known), lost
+        return _glass(known, spread or 0.0, lost), lost
+    if spread is not None:
+        lost.append("dispersion")
     return Principled(**known), lost
 
 
-def _glass(known: dict[str, Any]) -> Bsdf:
+def _glass(known: dict[str, Any], spread: float, lost: list[str]) -> Bsdf:
     ior, roughness, tint = known.get("ior", 1.5), known.get("roughness", 0.5), known["base_color"]
-    kind = ThinDielectric if known.get("thin") else Dielectric
-    across = {name: known[name] for name in ("roughness_v", "rotation") if name in known}
-    return kind(ior, roughness, transmittance=tint, **across)
+    more = {name: known[name] for name in sorted(GLASS - PLAIN) if name in known}
+    if known.get("thin"):
+        lost += [name for name in FILM if more.pop(name, None) is not None]
+        return ThinDielectric(ior, roughness, transmittance=tint, **more)
+    half = (ior - 1) * 0.025 * spread  # KHR_materials_dispersion, "Implementation notes"
+    index = (max(ior - half, 1.0), ior, ior + half) if half else ior
+    return Dielectric(index, roughness, transmittance=tint, **more)
 
 
 def from_srgb(colors: Table) -> Table:

@@ -31,8 +31,10 @@ KNOWN = frozenset(
         "lights_punctual",
         "materials_anisotropy",
         "materials_clearcoat",
+        "materials_dispersion",
         "materials_emissive_strength",
         "materials_ior",
+        "materials_iridescence",
         "materials_pbrSpecularGlossiness",
         "materials_sheen",
         "materials_specular",
@@ -178,6 +180,9 @@ class _Reader:
         self._sheen(extensions.get("KHR_materials_sheen"))
         self._anisotropy(extensions.get("KHR_materials_anisotropy"))
         self._specular(extensions.get("KHR_materials_specular"))
+        self._iridescence(extensions.get("KHR_materials_iridescence"))
+        dispersion = extensions.get("KHR_materials_dispersion", {})
+        self._want("dispersion", self._number(dispersion, "dispersion", 0.0, high=np.inf), 0.0)
         self._volume(extensions.get("KHR_materials_volume"))
         self._lost += [name for name in extensions if name not in KNOWN]
 
@@ -347,6 +352,22 @@ class _Reader:
         texture = self._texture(group, "specularColorTexture", scale=factor)
         if texture is not None or (factor != 1).any():
             self._wanted["specular_color"] = factor if texture is None else texture
+
+    def _iridescence(self, group: dict[str, Any] | None) -> None:
+        if group is None:
+            return
+        factor = self._number(group, "iridescenceFactor", 0.0)
+        if factor == 0:
+            return
+        if factor < 1 or "iridescenceTexture" in group:
+            self._lost.append("iridescenceFactor or a texture of it (a film is everywhere)")
+        thick = self._number(group, "iridescenceThicknessMaximum", 400.0, high=1e5)
+        thin = self._number(group, "iridescenceThicknessMinimum", 100.0, high=1e5)
+        spread = {"srgb": False, "channel": 1, "scale": thick - thin, "offset": thin}
+        texture = self._texture(group, "iridescenceThicknessTexture", **spread)
+        self._want("film_thickness", thick if texture is None else texture, 0.0)
+        if "film_thickness" in self._wanted:
+            self._wanted["film_ior"] = self._number(group, "iridescenceIor", 1.3, high=MAX_INDEX)
 
     def _volume(self, group: dict[str, Any] | None) -> None:
         """Beer–Lambert: `attenuationColor` is the transmittance over `attenuationDistance`."""

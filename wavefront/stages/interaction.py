@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays.state import Hits, Rays, SurfaceInteraction
+from ..arrays.state import Hits, Paths, Rays, SurfaceInteraction
 from ..arrays.vec import (
     ALL,
     Floats,
@@ -45,6 +45,8 @@ def interaction(scene: CompiledScene, rays: Rays, hits: Hits) -> SurfaceInteract
     ns = ng if ns is None else face_viewer(wo, ns * side)
     prim = hits.prim if instances is None else hits.prim + instances.shift
     surface = SurfaceInteraction(point, error, ng, ns, wo, prim, material_rows(scene, hits, ALL), back_facing)
+    if scene.materials.dispersive and isinstance(rays, Paths):
+        surface.throughput = rays.throughput
     for name, corners in scene.attributes.items():
         values = _attribute(scene, name, corners, hits, point)
         if instances is not None and ATTRIBUTES[name].vectors:

@@ -111,6 +111,15 @@ def scalar(
     return np.array([number(name, value, holds, limit)], f4)
 
 
+def refractive_indices(name: str, value: Color) -> Any:
+    """Return a refractive index as by `refractive_index`, or one for each channel as (3, 1) float32."""
+    if isinstance(value, BaseTexture) or np.size(value) != 3:
+        return refractive_index(name, value)  # type: ignore[arg-type]
+    return np.concatenate(
+        [refractive_index(f"{name}[{i}]", each) for i, each in enumerate(np.ravel(value).tolist())]
+    )[:, None]
+
+
 def refractive_index(name: str, value: Scalar) -> Any:
     """Return a refractive index as (1,) float32, or a `BaseTexture` that gives numbers."""
     return scalar(

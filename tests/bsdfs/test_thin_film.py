@@ -1,0 +1,97 @@
+"""Films with interference, beside Airy's formula summed over the spectrum."""
+
+import numpy as np
+import pytest
+
+from wavefront.bsdfs import Conductor, Dielectric, Principled
+from wavefront.bsdfs.fresnel import fresnel_conductor, fresnel_dielectric
+from wavefront.bsdfs.thin_film import GAUSSIANS, SHARES, film_reflectance
+from wavefront.testing import check_bsdf
+
+F4 = np.float32
+COSINES = np.array([1, 0.8, 0.5, 0.25])
+
+
+def airy(cos, thickness, film, before, beyond):
+    """Reflectance (3, n) by complex amplitudes at 2000 wave numbers, weighed as the film's series is."""
+    wave = np.linspace(1.0e6, 3.0e6, 2000)[:, None]  # 1/m
+    weight = np.zeros((3, len(wave)))
+    for function, amplitude, center, variance in GAUSSIANS:
+        weight[function] += amplitude * np.exp(-((wave[:, 0] - center) ** 2) / (4 * variance))
+    weight = SHARES @ (weight / weight.sum(1, keepdims=True))
+    sin2 = before**2 * (1 - cos**2)
+    one, two, three = (np.sqrt(np.asarray(n, complex) ** 2 - sin2) for n in (before, film, beyond))
+    turn = np.exp(4j * np.pi * wave * thickness * 1e-9 * two)
+    total = 0
+    for a, b, c, d in (
+        (one, two, two, three),
+        (film**2 * one, before**2 * two, beyond**2 * two, film**2 * three),
+    ):
+        first, second = (a - b) / (a + b), (c - d) / (c + d)
+        total = total + np.abs((first + second * turn) / (1 + first * second * turn)) ** 2 / 2
+    return weight @ total
+
+
+@pytest.mark.parametrize(
+    ("film", "before", "beyond"),
+    [(1.33, 1, 1.5), (1.33, 1.5, 1), (1.8, 1, 1), (1.6, 1, 2 + 3j), (1.3, 1, 0.2 + 3.5j)],
+)
+@pytest.mark.parametrize("thickness", [80, 250, 400, 900])
+def test_films(film, before, beyond, thickness):
+    """With six terms of the series, the error is largest at grazing angles and on metals."""
+    cos = COSINES[COSINES > 0.75] if before > film else COSINES
+    ours = film_reflectance(
+        cos.astype(F4),
+        F4([thickness]),
+        F4([film]),
+        F4(before),
+        np.full((3, 1), np.real(beyond), F4),
+        np.imag(beyond),
+    )
+    exact = np.clip(airy(cos, thickness, film, before, beyond), 0, 1)
+    assert ours == pytest.approx(exact, abs=0.005)
+
+
+def test_a_film_of_the_index_of_its_surface_is_none():
+    cos = COSINES.astype(F4)
+    glass = film_reflectance(cos, F4([300]), F4([1.5]), F4(1), np.full((3, 1), 1.5, F4))
+    assert glass == pytest.approx(np.tile(fresnel_dielectric(cos, F4([1.5]))[0], (3, 1)), abs=1e-6)
+    eta, k = np.array([[0.2], [1], [1.4]], F4), np.array([[3.5], [2.5], [2]], F4)
+    metal = film_reflectance(cos, F4([3000]), F4([1.0]), F4(1), eta, k)
+    assert metal == pytest.approx(fresnel_conductor(cos, eta, k), abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    "bsdf",
+    [
+        Conductor((2, 1, 0.6), (3, 4, 5), 0.5, film_thickness=600.0, film_ior=1.6),
+        Conductor((2, 1, 0.6), (3, 4, 5), film_thickness=300),
+        Dielectric(1.5, 0.4, film_thickness=400, film_ior=1.8),
+        Principled((0.9, 0.5, 0.2), 0.3, 0.4, film_thickness=400),
+        Principled((0.9, 0.5, 0.2), 0, 0.4, transmission=0.6, film_thickness=400),
+        Principled((0.9, 0.5, 0.2), 0, 0.4, transmission=0.6, thin=True, film_thickness=400),
+        Principled(1.0, 0, 0.2, film_thickness=300, film_ior=1.8),
+    ],
+    ids=lambda bsdf: type(bsdf).__name__,
+)
+@pytest.mark.first(2)
+def test_contract(bsdf):
+    check_bsdf(bsdf, samples=10_000, angles=(10.0, 75.0))
+
+
+def test_smooth_glass_with_a_film_absorbs_nothing():
+    check_bsdf(
+        Dielectric(1.5, film_thickness=400, film_ior=1.3), samples=10_000, angles=(10.0, 75.0), albedo=(1, 1)
+    )
+
+
+def test_a_principled_metal_has_the_film_of_a_metal_of_its_color():
+    """Of an index without extinction, (1 + √F0)/(1 − √F0), as in KHR_materials_iridescence."""
+    rng = np.random.default_rng(0)
+    wo, wi = rng.normal(size=(2, 3, 500))
+    wo[2], wi[2] = np.abs(wo[2]), np.abs(wi[2])
+    wo, wi = ((w / np.linalg.norm(w, axis=0)).astype(F4) for w in (wo, wi))
+    root = np.sqrt(np.array([0.9, 0.5, 0.2]))
+    ours = Principled((0.9, 0.5, 0.2), 1, 0.4, film_thickness=350, film_ior=1.4)
+    known = Conductor((1 + root) / (1 - root), 0, 0.4, film_thickness=350, film_ior=1.4)
+    assert ours.f(wo, wi) == pytest.approx(known.f(wo, wi), rel=1e-4)
