@@ -89,8 +89,6 @@ class Dielectric(RefractiveBsdf):
     ior = Parameter(refractive_indices)
     film_thickness = Parameter(thickness)
     film_ior = Parameter(refractive_index)
-    shares: Floats = np.full((3, 1), 1 / 3, f4)  # (3, n) probability to follow each channel
-    before: Floats = np.ones(1, f4)  # (n,) or (3, n) index on the side of wo; unbound, wo is outside
 
     @suggests_keywords
     def __init__(
@@ -144,6 +142,8 @@ class Dielectric(RefractiveBsdf):
         straight = constant and np.abs(self.ior - 1).max() < LEAST_BEND
         self.dispersive = constant and self.ior.size == 3
         self.has_film = has_film(self.film_thickness)
+        self.shares = np.full((3, 1), 1 / 3, f4)  # (3, n) probability to follow each channel
+        self.before = np.ones(1, f4)  # (n,) or (3, n) index on the side of wo
         self.specular = self.specular or bool(straight)
         self.eta = self.ior  # (n,), (1,) or (3, n) index beyond / before; unbound, wo is outside
 
