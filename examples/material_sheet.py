@@ -25,11 +25,11 @@ def rows() -> list[list[wf.Bsdf]]:
 
 
 def diffuse() -> list[wf.Bsdf]:
-    """Return three colors of `Diffuse`, and clay ever rougher, without and with light between its facets."""
+    """Return `Diffuse`, one of them on the front alone, and clay ever rougher, without and with energy."""
     sigmas = (0.3, 0.6, 1.0)
     rough = [wf.OrenNayar(CLAY, sigma) for sigma in sigmas]
     preserving = [wf.OrenNayar(CLAY, sigma, energy_preserving=True) for sigma in sigmas]
-    return [*(wf.Diffuse(color) for color in (0.8, SKY, CLAY)), *rough, *preserving]
+    return [wf.Diffuse(0.8), wf.Diffuse(SKY), wf.Sides(wf.Diffuse(CLAY)), *rough, *preserving]
 
 
 def metal() -> list[wf.Bsdf]:
@@ -63,9 +63,9 @@ def coated() -> list[wf.Bsdf]:
 
 
 def blended() -> list[wf.Bsdf]:
-    """Return `Principled` that grows clear, the same as it grows rough, and mixes of clay and gold."""
+    """Return `Principled` that grows clear, `Plastic` that grows rough, and mixes of matte blue and gold."""
     clear = [wf.Principled((0.95, 0.7, 0.75), 0, 0.05, transmission=part) for part in (0.3, 0.65, 1.0)]
-    plastic = [wf.Principled((0.85, 0.6, 0.08), 0, roughness) for roughness in (0.1, 0.35, 0.8)]
+    plastic = [wf.Plastic((0.85, 0.6, 0.08), roughness) for roughness in (0.1, 0.35, 0.8)]
     gold = wf.Conductor.named("gold", 0.2)
     return [*clear, *plastic, *(wf.Mix(wf.Diffuse(SKY), gold, weight) for weight in (0.25, 0.5, 0.75))]
 

@@ -681,14 +681,14 @@ def test_kill_9_at_fifty_moments_costs_no_bit(command, tmp_path, capsys):
 def test_signals_keep_the_render(command, tmp_path, number, status, background):
     """Ctrl-C, SIGTERM and SIGHUP write the checkpoint and the picture so far; the same command goes on.
 
-    What a script starts in the background ignores Ctrl-C.
+    What a script starts in the background ignores Ctrl-C. These tests may run where SIGHUP is ignored.
     """
     command[command.index("240")] = "30000"
-    before = signal.getsignal(signal.SIGINT)
-    if background:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signals = {number: signal.SIG_DFL} | ({signal.SIGINT: signal.SIG_IGN} if background else {})
+    before = {each: signal.signal(each, action) for each, action in signals.items()}
     process = start(command, tmp_path)
-    signal.signal(signal.SIGINT, before)
+    for each, action in before.items():
+        signal.signal(each, action)
     wait_for(tmp_path / "out.wfck", process)
     process.send_signal(number)
     error = process.communicate()[1]

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays.vec import Doubles
+from ...arrays.elementary import exp
+from ...arrays.vec import Doubles, f4
 from ...core.errors import SceneError, as_array, finite_array, in_brief, number
 from ...core.files import decode_text
 from .transforms import numbers
@@ -147,7 +148,8 @@ def blackbody(temperature: float) -> Doubles:
     """Return the radiance (3,) of a black body of a temperature in kelvin, W·sr⁻¹·m⁻²·nm⁻¹."""
     kelvin = number("temperature", temperature, lambda x: 100 <= x <= 1e6, "from 100 to 1e6 kelvin")
     meters = (np.arange(len(X)) * STEP + FIRST) * 1e-9
-    power = PLANCK[0] / meters**5 / np.expm1(PLANCK[1] / (meters * kelvin)) * 1e-9
+    fall = exp((-PLANCK[1] / (meters * kelvin)).astype(f4)).astype(float)
+    power = PLANCK[0] / (meters * meters) ** 2 / meters * fall / (1 - fall) * 1e-9
     pairs = np.stack([meters * 1e9, power], 1)
     return spectrum_rgb(pairs, emission=True, bounded=False)  # type: ignore[arg-type]
 

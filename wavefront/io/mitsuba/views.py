@@ -147,7 +147,7 @@ def _field_of_view(node: Node, aspect: float) -> float:
     else:
         (length,) = numbers("", "focal_length", node.text("focal_length", "50mm").removesuffix("mm"), (1,))
         number("focal_length", length, lambda x: x > 0, "above 0 mm")
-        angle, axis = _degrees(np.hypot(36, 24) / (2 * length)), "diagonal"
+        angle, axis = _degrees(np.sqrt(36.0**2 + 24.0**2) / (2 * length)), "diagonal"
     if axis in ("smaller", "larger"):
         axis = "y" if (axis == "smaller") == (aspect > 1) else "x"
     if axis == "x":
