@@ -80,6 +80,25 @@ def test_gray_alpha_and_16_bit(tmp_path):
         assert np.array_equal(read_image(tmp_path / "c.png"), values / np.float32(255))
 
 
+def test_bmp_is_read_and_checked(tmp_path):
+    import imageio.v3 as iio
+
+    path, codes = tmp_path / "a.bmp", np.arange(36, dtype=np.uint8).reshape(3, 4, 3)
+    iio.imwrite(path, codes)
+    assert np.array_equal(read_image(path), codes / np.float32(255))
+    data = path.read_bytes()
+    for damaged, message in (
+        (data[:-1], "ends early: 4 × 3 pixels take 36 bytes; 35 are there"),
+        (data[:40], "header is damaged"),
+        (data[:18] + struct.pack("<ii", 2**30, 2**30) + data[26:], "the limit is"),
+    ):
+        path.write_bytes(damaged)
+        with pytest.raises(SceneError, match=message):
+            read_image(path)
+    with pytest.raises(SaveError, match="extension"):
+        write_image(path, codes / 255)
+
+
 @pytest.mark.parametrize("extension", ["png", "jpg", "hdr"])
 def test_not_finite_is_announced(tmp_path, picture, extension):
     picture[0, :3] = np.nan

@@ -518,6 +518,34 @@ def test_lenses_and_parallel_rays() -> None:
     assert seen.origin.tolist() == [1.5, 2, 3]
 
 
+def test_planes_that_would_cut_are_named() -> None:
+    board = {"type": "rectangle"}
+    for kind, near, far, lost in (
+        ("perspective", 1.0, 9.0, ""),
+        ("perspective", 6.0, 9.0, "near_clip"),
+        ("orthographic", 1.0, 4.0, "far_clip"),
+    ):
+        to_world = np.diag([-1.0, 1, -1, 1])
+        to_world[2, 3] = 5
+        if kind == "orthographic":
+            to_world[:2] *= 3
+        view = {"type": kind, "near_clip": near, "far_clip": far, "to_world": to_world}
+        if lost:
+            with pytest.raises(wf.SceneError, match=lost):
+                scene(view=view, board=board)
+        else:
+            scene(view=view, board=board)
+
+
+def test_the_first_sensor_that_there_is_counts() -> None:
+    views = {"a": {"type": "radiancemeter"}, "b": {"type": "thinlens", "aperture_radius": 0.1}}
+    with pytest.warns(UserWarning, match=r"a \(radiancemeter\): left out") as found:
+        made = scene(False, **views, c={"type": "perspective"})
+    assert made.camera is not None
+    assert made.camera.projection.aperture == 0.2  # type: ignore[attr-defined]
+    assert "the further sensor 'perspective'" in str(found[0].message)
+
+
 def test_settings() -> None:
     film = {"type": "hdrfilm", "width": 8, "height": 8, "rfilter": {"type": "tent"}, "pixel_format": "rgba"}
     sampler = {"type": "multijitter", "sample_count": 7}

@@ -9,8 +9,9 @@ from typing import Any
 from ...scene import Scene
 from ..repair import RawMesh
 from ..sources import SceneFiles
-from . import bsdfs, emitters, shapes, textures, views  # noqa: F401
+from . import bsdfs, emitters, shapes, textures  # noqa: F401  they fill the table
 from .nodes import Graph, Job, Node, plugin, unsupported
+from .views import check_clipping
 
 unsupported("homogeneous heterogeneous", "medium")
 unsupported("isotropic hg rayleigh sggx tabphase blendphase", "phase")
@@ -58,20 +59,19 @@ DEFINED = "bsdf texture sampler film rfilter medium phase volume"  # for others 
 
 @plugin("scene", "scene", "", f"shape emitter sensor integrator {DEFINED}", "allow_thread_reordering")
 def _scene(node: Node, job: Job) -> Scene:
-    settings: dict[str, Any] = {}
-    camera = None
-    for sensor in node.held("sensor"):
-        if camera is not None:
-            node.lose(f"the further sensor {sensor.plugin!r}")
-        elif (view := job.convert(sensor)) is not None:
-            camera, settings = view
-            job.eye = camera.origin
+    seen = [(sensor, view) for sensor in node.held("sensor") if (view := job.convert(sensor)) is not None]
+    for sensor, _ in seen[1:]:
+        node.lose(f"the further sensor {sensor.plugin!r}")
+    camera, settings = seen[0][1] if seen else (None, {})
+    job.eye = camera.origin if seen else None
     parts = [part for part in node.held("shape") if part.plugin != "shapegroup"]
     found = [shape for part in parts for shape in job.convert(part)]
     lamps = [part for part in node.held("emitter") if part.plugin != "area"]
     lights = [light for part in lamps if (light := job.convert(part)) is not None]
     for integrator in node.held("integrator")[:1]:
         settings = settings | job.convert(integrator)
+    if seen:
+        check_clipping(seen[0][0], camera, found)
     if settings.get("background") and any(shape.emission is not None for shape in found):
         node.lose("hide_emitters for shapes that emit")
     return Scene(found, lights, camera, settings=settings)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,13 +11,15 @@ from ...arrays.elementary import arctan2, sin_cos
 from ...camera import Camera
 from ...camera.projection import Orthographic, Perspective, Projection
 from ...core.errors import SceneError, number
+from ...shapes import Instance, Mesh, Shape
 from .nodes import Job, Node, plugin, unsupported
 from .transforms import numbers
 
 Settings = dict[str, Any]
+MOST_CHECKED = 1 << 16  # points of a shape that are compared with the planes of a sensor
 ENDLESS = 2**16  # bounces, where there is no limit
 CLIPPED = "to_world near_clip far_clip focus_distance"
-NO_CLIPPING = "near_clip and far_clip do not cut"
+NO_CLIPPING = "near_clip and far_clip do not cut; named where they would"
 FIELD_OF_VIEW = "fov fov_axis focal_length"
 LENS = f"{FIELD_OF_VIEW} principal_point_offset_x principal_point_offset_y"
 
@@ -120,6 +123,24 @@ unsupported(
 )
 unsupported("catmullrom lanczos mitchell", "rfilter")
 unsupported("batch distant irradiancemeter radiancemeter", "sensor")
+
+
+def check_clipping(node: Node, camera: Camera, shapes: Sequence[Shape]) -> None:
+    """Note if a point of a shape in the picture is not between the planes of a sensor."""
+    near, far = node.number("near_clip", 1e-2), node.number("far_clip", 1e4)
+    if node.plugin == "orthographic":
+        near, far = 0.0, far - near
+    width, height = camera.resolution
+    for shape in shapes:
+        if isinstance(shape, Instance):
+            continue
+        points = shape.vertices if isinstance(shape, Mesh) else shape.hull()[0]
+        pixels, depth = camera.project(points[:MOST_CHECKED])
+        x, y = pixels.T
+        seen = (x > 0) & (x < width) & (y > 0) & (y < height)
+        for name, beyond in (("near_clip", (depth < near) & (depth > 0)), ("far_clip", depth > far)):
+            if (seen & beyond).any():
+                node.lose(name)
 
 
 def _lens(node: Node, aspect: float) -> Perspective:
