@@ -5,7 +5,7 @@
 Needs `mitsuba` (extra `[bench]`). Mitsuba's microfacets shadow and mask independently, G1(wo)·G1(wi), as
 `shadowing="separable"` here. Differences of models: wavefront draws Beckmann's normals as GGX's, so that
 densities differ; Mitsuba's smooth plastic has a fit of the reflectance inside, which is divided out; its
-`principled` coincides only as a metal, since its matte, clear coat (GTR1) and sheen are Disney's.
+`principled` is `Disney`, with other densities, and `Principled` only as a metal.
 
 The limit holds for 99 % of the pairs. Seen from inside glass a few pairs lie at the critical angle,
 where the transmitted part goes to 0 as a square root and float32 leaves neither side many digits:
@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from wavefront.arrays.state import SurfaceInteraction
-from wavefront.bsdfs import Bsdf, Conductor, Dielectric, Diffuse, Mirror, Plastic, Principled
+from wavefront.bsdfs import Bsdf, Conductor, Dielectric, Diffuse, Disney, Mirror, Plastic, Principled
 from wavefront.bsdfs.microfacet import Facets, alpha_of
 from wavefront.bsdfs.plastic import inner_reflectance
 
@@ -184,6 +184,20 @@ def compare(pairs: int = 10_000) -> list[Row]:
         principled = {"type": "principled", "base_color": color, "metallic": 1.0, "roughness": roughness}
         ours = Principled((0.9, 0.5, 0.1), 1.0, roughness)
         rows += rough(mi, f"principled metal {roughness}", ours, principled, pairs, masked=roughness)
+    whole = {"roughness": 0.4, "metallic": 0.3, "anisotropic": 0.6, "flatness": 0.7, "sheen": 0.8}
+    whole |= {"sheen_tint": 0.4, "clearcoat": 0.9, "clearcoat_gloss": 0.3}
+    for clear in (0.0, 0.6):
+        theirs = {
+            "type": "principled",
+            "base_color": color,
+            "eta": 1.5,
+            "spec_tint": 0.5,
+            "spec_trans": clear,
+        }
+        ours = Disney((0.9, 0.5, 0.1), specular_tint=0.5, transmission=clear, **whole)
+        rows += rough(
+            mi, f"disney {clear}", ours, {**theirs, "spec_tint": 0.5, **whole}, pairs, densities=False
+        )
     for distribution in ("ggx", "beckmann"):
         for first, second in ((0.3, None), (0.6, None), (1.0, None), (0.3, 0.6)):
             shape = {"distribution": distribution, "shadowing": "separable", "roughness_v": second}

@@ -12,6 +12,7 @@ from wavefront.bsdfs import (
     Conductor,
     Dielectric,
     Diffuse,
+    Disney,
     Mirror,
     Mix,
     OrenNayar,
@@ -323,6 +324,18 @@ RANDOM = {
 }
 
 
+RANDOM[Disney] = lambda rng, roughness: Disney(
+    0.3 * color(rng),  # it may reflect more light than arrives
+    roughness,
+    rng.choice([0, rng.random()]),
+    anisotropic=rng.choice([0, rng.random()]) if roughness > 0.1 else 0,
+    ior=rng.uniform(1.1, 2),
+    transmission=rng.choice([0, rng.random()]),
+    specular_tint=0.3 * rng.random(),
+    flatness=rng.random(),
+    clearcoat=rng.choice([0, rng.random()]),
+    clearcoat_gloss=0.5 * rng.random(),
+)
 RANDOM[Sides] = lambda rng, roughness: Sides(
     RANDOM[rng.choice([Diffuse, Mirror, Conductor])](rng, roughness),
     rng.choice([None, RANDOM[rng.choice([OrenNayar, Plastic])](rng, roughness)]),

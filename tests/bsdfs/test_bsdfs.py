@@ -9,6 +9,7 @@ from wavefront.bsdfs import (
     Conductor,
     Dielectric,
     Diffuse,
+    Disney,
     Mirror,
     Mix,
     OrenNayar,
@@ -79,6 +80,12 @@ EXAMPLES = {
             "specular_color": (1, 0.9, 0.2),
         },
         {"base_color": 1.0, "roughness": 0.3, "roughness_v": 0.6, "clearcoat": 0.5, "transmission": 0.5},
+    ],
+    Disney: [
+        {"base_color": (0.3, 0.2, 0.1)},
+        {"base_color": 0.2, "roughness": 0.3, "anisotropic": 0.8, "clearcoat": 1.0, "clearcoat_gloss": 0.1},
+        {"base_color": (0.3, 0.2, 0.1), "metallic": 0.3, "transmission": 0.6, "specular_tint": 0.5},
+        {"base_color": (0.3, 0.2, 0.1), "flatness": 0.7, "sheen": 0.1, "sheen_tint": 0.5, "roughness": 0.9},
     ],
     Sides: [
         {"front": Diffuse((0.9, 0.5, 0.1))},
@@ -286,6 +293,21 @@ BAD = {
             for name in ("base_color", "metallic", "transmission", "clearcoat", "clearcoat_roughness")
         },
         **{name: [-1] for name in ("roughness", "sheen", "sheen_roughness", "specular")},
+    },
+    Disney: {
+        "ior": [(0, "more than 0")],
+        **{
+            name: [2]
+            for name in (
+                "base_color",
+                "roughness",
+                "metallic",
+                "anisotropic",
+                "transmission",
+                "specular_tint",
+            )
+        },
+        **{name: [-1] for name in ("sheen", "sheen_tint", "flatness", "clearcoat", "clearcoat_gloss")},
     },
     Sides: {"front": [(None, "Bsdf such as"), (Dielectric(), "not cross")], "back": [(0.5, "not cross")]},
     Mix: {"weight": [1.5], "first": [(None, "Bsdf such as")], "second": [(0.5, "Bsdf such as")]},

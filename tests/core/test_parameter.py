@@ -32,6 +32,17 @@ MATERIALS = {  # a material, and for each of its parameters a new value
         wf.Mix(wf.Diffuse(0.3), wf.Diffuse(0.6)),
         {"first": wf.Mirror(0.5), "second": wf.Dielectric(1.5), "weight": 0.25},
     ),
+    "Disney": (
+        wf.Disney(),
+        {
+            "base_color": 0.3,
+            "metallic": 0.2,
+            "transmission": 0.3,
+            "flatness": 0.4,
+            "clearcoat": 0.5,
+            "sheen": 0.2,
+        },
+    ),
     "Sides": (wf.Sides(wf.Diffuse(0.3)), {"front": wf.Mirror(0.5), "back": wf.Diffuse(0.2)}),
     "Material": (
         wf.Material(wf.Dielectric()),

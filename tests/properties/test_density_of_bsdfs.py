@@ -19,6 +19,7 @@ from wavefront.bsdfs import (
     Conductor,
     Dielectric,
     Diffuse,
+    Disney,
     Mirror,
     Mix,
     OrenNayar,
@@ -87,6 +88,9 @@ KINDS = {
         clearcoat_roughness=rough,
         sheen=st.just(0.0) | part,
         specular=st.floats(0, 1),
+    ),
+    Disney: st.builds(
+        Disney, color, rough, part, anisotropic=part, ior=st.floats(1.1, 2), transmission=st.just(0.0) | part
     ),
     ByValue: st.builds(ByValue, part),
     Sides: st.builds(Sides, MATTE, st.none() | st.builds(Mirror, color)),

@@ -4,6 +4,7 @@ from .base import Bsdf, BsdfSample, albedo_of, evaluated, sampled
 from .conductor import Conductor
 from .dielectric import Dielectric
 from .diffuse import Diffuse
+from .disney import Disney
 from .mirror import Mirror
 from .mix import Mix
 from .oren_nayar import OrenNayar
@@ -13,7 +14,19 @@ from .shadow_catcher import ShadowCatcher
 from .sides import Sides
 from .thin import ThinDielectric
 
-ALL = (Diffuse, Mirror, Dielectric, Conductor, OrenNayar, ThinDielectric, Plastic, Principled, Mix, Sides)
+ALL = (
+    Diffuse,
+    Mirror,
+    Dielectric,
+    Conductor,
+    OrenNayar,
+    ThinDielectric,
+    Plastic,
+    Principled,
+    Disney,
+    Mix,
+    Sides,
+)
 
 __all__ = [
     "ALL",
@@ -22,6 +35,7 @@ __all__ = [
     "Conductor",
     "Dielectric",
     "Diffuse",
+    "Disney",
     "Mirror",
     "Mix",
     "OrenNayar",
