@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -303,8 +302,3 @@ class Graph:
                 raise SceneError(f"{place}: refers to the id {in_brief(name)}, which there is not{hint}")
             source = self._ids[name]
         raise SceneError(f"{place}: references lead to each other")
-
-
-def name_of(path: str | os.PathLike[str]) -> str:
-    """Return the name of a file without its extension."""
-    return Path(path).stem

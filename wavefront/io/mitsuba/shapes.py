@@ -21,7 +21,7 @@ from ..placing import moved_raw
 from ..repair import RawMesh, build
 from .attributes import with_attribute
 from .bsdfs import is_one_sided
-from .nodes import Job, Node, name_of, plugin, unsupported
+from .nodes import Job, Node, plugin, unsupported
 from .serialized import read_serialized
 from .textures import upside_down
 
@@ -133,7 +133,7 @@ def _file(node: Node, job: Job) -> list[Shape]:
     raw = with_attribute(node.label, replace(job.made[path]), node)
     if node.flag("flip_tex_coords", node.plugin == "obj") and raw.uvs is not None:
         raw = replace(raw, uvs=raw.uvs * (1, -1) + (0, 1))
-    return _mesh(node, job, replace(raw, name=name_of(path)), smooth=True)
+    return _mesh(node, job, replace(raw, name=path.stem), smooth=True)
 
 
 @plugin(
@@ -153,15 +153,10 @@ def _serialized(node: Node, job: Job) -> list[Shape]:
     return _mesh(node, job, job.made[key], smooth=True)
 
 
-@plugin("shapegroup", "shape", holds="shape")
+@plugin("shapegroup merge", "shape", holds="shape")
 def _group(node: Node, job: Job) -> list[Shape]:
     """Return its shapes, which are placed by instances."""
     return [shape for part in node.held("shape") for shape in job.convert(part)]
-
-
-@plugin("merge", "shape", holds="shape")
-def _merge(node: Node, job: Job) -> list[Shape]:
-    return _group(node, job)
 
 
 @plugin("instance", "shape", "to_world", holds="shape")

@@ -87,30 +87,16 @@ METALS = {
     "a-C": ((2.944, 2.2271, 1.9682), (0.88746, 0.7993, 0.81529)),
     "d-C": ((2.7087, 2.3188, 2.2289), (0, 0, 0)),
 }
-INDICES = {  # of refraction (Hecht, Optics, and others), at 589 nm
-    "vacuum": 1.0,
-    "helium": 1.000036,
-    "hydrogen": 1.000132,
-    "air": 1.000277,
-    "carbon dioxide": 1.00045,
-    "water": 1.333,
-    "acetone": 1.36,
-    "ethanol": 1.361,
-    "carbon tetrachloride": 1.461,
-    "glycerol": 1.4729,
-    "benzene": 1.501,
-    "silicone oil": 1.52045,
-    "bromine": 1.661,
-    "water ice": 1.31,
-    "fused quartz": 1.458,
-    "pyrex": 1.47,
-    "acrylic glass": 1.49,
-    "polypropylene": 1.49,
-    "bk7": 1.5046,
-    "sodium chloride": 1.544,
-    "amber": 1.55,
-    "pet": 1.575,
-    "diamond": 2.419,
+# indices of refraction at 589 nm, by material (Hecht, Optics, and others)
+_INDICES = """
+vacuum 1.0, helium 1.000036, hydrogen 1.000132, air 1.000277, carbon dioxide 1.00045, water 1.333,
+acetone 1.36, ethanol 1.361, carbon tetrachloride 1.461, glycerol 1.4729, benzene 1.501,
+silicone oil 1.52045, bromine 1.661, water ice 1.31, fused quartz 1.458, pyrex 1.47, acrylic glass 1.49,
+polypropylene 1.49, bk7 1.5046, sodium chloride 1.544, amber 1.55, pet 1.575, diamond 2.419
+"""
+INDICES = {
+    name.strip(): float(index)
+    for name, _, index in (each.strip().rpartition(" ") for each in _INDICES.split(","))
 }
 
 
