@@ -265,7 +265,8 @@ def test_backs_are_black_where_mitsuba_has_them_so() -> None:
     assert type(board(**clay)) is wf.Sides
     assert type(board(type="mask", bsdf=clay)) is wf.Sides
     assert type(board(**glass)) is wf.Dielectric
-    assert type(board(type="principled")) is wf.Principled
+    assert type(board(type="principled")) is wf.Sides
+    assert type(board(type="principled", spec_trans=0.5)) is wf.Disney
     assert type(board(type="twosided", bsdf=clay)) is wf.Diffuse
     card = board(type="twosided", a=clay, b={"type": "conductor"})
     assert (type(card.front), type(card.back)) == (wf.Diffuse, wf.Mirror)  # type: ignore[attr-defined]
@@ -294,10 +295,15 @@ def test_principled() -> None:
         clearcoat=0.8,
         clearcoat_gloss=1.0,
         sheen=0.9,
+        sheen_tint=0.35,
+        anisotropic=0.45,
+        flatness=0.55,
+        spec_tint=0.65,
     ).bsdf
     found = [made.metallic, made.roughness, made.transmission, made.ior, made.clearcoat, made.sheen]
-    assert [value(each)[0] for each in found] == pytest.approx([0.1, 0.6, 0.7, 1.4, 0.8, 0.9])
-    assert value(made.clearcoat_roughness) == pytest.approx([0.001**0.5])
+    found += [made.clearcoat_gloss, made.sheen_tint, made.anisotropic, made.flatness, made.specular_tint]
+    due = [0.1, 0.6, 0.7, 1.4, 0.8, 0.9, 1, 0.35, 0.45, 0.55, 0.65]
+    assert [value(each)[0] for each in found] == pytest.approx(due)
     assert value(material("principled", specular=0.5).bsdf.ior) == pytest.approx([1.5])
 
 

@@ -28,7 +28,7 @@ class Disney(RoughBsdf):
     """Disney's principled material, with the formulas of Mitsuba 3's `principled`.
 
     `Principled` has about the same parameters with glTF's formulas, which lose and gain less energy. This one
-    is for scenes that were made for Disney's. Without transmission its back is black.
+    is for scenes that were made for Disney's.
 
     Source: B. Burley 2012, "Physically Based Shading at Disney", and 2015, "Extending the Disney BRDF to a
     BSDF with Integrated Subsurface Scattering", as implemented in Mitsuba 3.
@@ -105,7 +105,7 @@ class Disney(RoughBsdf):
     def bind(self, surface: SurfaceInteraction) -> Self:
         """Return the BSDF bound to `surface`, with the side of `wo`."""
         bound = copy(super().bind(surface))
-        bound._behind = surface.back_facing
+        bound._behind = surface.back_facing if self.transmissive else None
         return bound
 
     def facets(self) -> Facets:

@@ -14,10 +14,10 @@ from ...bsdfs import (
     Conductor,
     Dielectric,
     Diffuse,
+    Disney,
     Mirror,
     Mix,
     Plastic,
-    Principled,
     Sides,
     ThinDielectric,
 )
@@ -128,9 +128,9 @@ def _plastic(node: Node, job: Job) -> Material:
 @plugin(
     "principled",
     "bsdf",
-    "base_color roughness metallic spec_trans eta specular clearcoat clearcoat_gloss sheen",
+    "base_color roughness metallic anisotropic spec_trans eta specular spec_tint sheen sheen_tint flatness "
+    "clearcoat clearcoat_gloss",
     harmless="main_specular_sampling_rate clearcoat_sampling_rate diffuse_reflectance_sampling_rate",
-    note="as glTF layers it",
 )
 def _principled(node: Node, job: Job) -> Material:
     if "eta" in node.values:
@@ -140,22 +140,17 @@ def _principled(node: Node, job: Job) -> Material:
             0.08 * number("specular", node.get("specular", 0.5), lambda x: 0 <= x <= 1, "in [0, 1]")
         )
         ior = float((1 + root) / (1 - root))
-    gloss = scalar(node, "clearcoat_gloss", 0.0, job)
-    if isinstance(gloss, BaseTexture):
-        node.lose("the texture clearcoat_gloss")
-        gloss = 0.0
-    gloss = number("clearcoat_gloss", gloss, lambda x: 0 <= x <= 1, "in [0, 1]")
+    same = ("anisotropic", "sheen", "sheen_tint", "flatness", "clearcoat", "clearcoat_gloss")
     return _named(
         node,
-        Principled(
+        Disney(
             color(node, "base_color", 0.5, job),
-            scalar(node, "metallic", 0.0, job),
             scalar(node, "roughness", 0.5, job),
-            ior,
-            scalar(node, "spec_trans", 0.0, job),
-            clearcoat=scalar(node, "clearcoat", 0.0, job),
-            clearcoat_roughness=float(np.sqrt(0.1 + (0.001 - 0.1) * gloss)),
-            sheen=scalar(node, "sheen", 0.0, job),
+            scalar(node, "metallic", 0.0, job),
+            ior=ior,
+            transmission=scalar(node, "spec_trans", 0.0, job),
+            specular_tint=scalar(node, "spec_tint", 0.0, job),
+            **{name: scalar(node, name, 0.0, job) for name in same},
         ),
     )
 
@@ -266,6 +261,8 @@ def is_one_sided(node: Node) -> bool:
     """Return whether the back of a BSDF is black."""
     if node.plugin in ("mask", "bumpmap", "normalmap", "blendbsdf"):
         return all(is_one_sided(part) for part in node.held("bsdf"))
+    if node.plugin == "principled":
+        return node.values.get("spec_trans", 0.0) == 0.0
     return node.plugin in ONE_SIDED
 
 
