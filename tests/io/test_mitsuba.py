@@ -565,9 +565,9 @@ def test_settings() -> None:
     assert made.settings == expected
     image = wf.render(made, progress=False)
     assert image.spp == 7
-    assert image.metadata["max_bounces"] == 2 if "max_bounces" in image.metadata else True
     assert wf.render(made, spp=2, progress=False).spp == 2
     assert wf.render(made, samples=range(3), progress=False).spp == 3
+    assert wf.render([wf.PointLight((0, 3, 0), 1), made], progress=False).spp == 7
     assert scene(integrator={"type": "direct"}).settings == {"max_bounces": 1}
     assert scene(integrator={"type": "path"}).settings["max_bounces"] > 1000
 
@@ -664,6 +664,12 @@ def test_bombs_are_refused() -> None:
         parts[f"m{level}"] = {"type": "blendbsdf", "a": before, "b": dict(before), "weight": 0.5}
     with pytest.raises(wf.SceneError, match="as they refer to each other; the limit is"):
         scene(ball={"type": "sphere", "bsdf": {"type": "ref", "id": "m40"}}, **parts)
+    chain = {f"m{k}": {"type": "twosided", "b": {"type": "ref", "id": f"m{k + 1}"}} for k in range(2000)}
+    with pytest.raises(wf.SceneError, match="refer to each other over more than 128 levels"):
+        scene(**chain, m2000={"type": "diffuse"})
+    boards = {f"board{k}": {"type": "rectangle"} for k in range(3)}
+    with pytest.raises(wf.SceneError, match=r"board1 \(rectangle\): has 4 triangles; the limit is 3"):
+        wf.from_mitsuba({"type": "scene", **boards}, limits=wf.LoadLimits(triangles=3))
     deep: dict[str, Any] = {"type": "diffuse"}
     for _level in range(1000):
         deep = {"type": "twosided", "bsdf": deep}

@@ -267,6 +267,8 @@ class Graph:
             raise SceneError(f"{place}: {source.get('id', key)!r} contains itself")
         if id(source) in self._nodes:
             return self._nodes[id(source)]
+        if len(above) > MAX_DEPTH:
+            raise SceneError(f"{place}: plugins refer to each other over more than {MAX_DEPTH} levels")
         kind: str = source["type"]
         if kind not in PLUGINS:
             raise SceneError(f"{place}: there is no plugin {in_brief(kind)}{did_you_mean(kind, PLUGINS)}")

@@ -130,7 +130,7 @@ def _file(node: Node, job: Job) -> list[Shape]:
     path = job.find(node.text("filename"))
     if path not in job.made:
         job.made[path] = _one(str(path), job.read_mesh(path))
-    raw = with_attribute(node.label, replace(job.made[path]), node)
+    raw = with_attribute(job.name, replace(job.made[path]), node)
     if node.flag("flip_tex_coords", node.plugin == "obj") and raw.uvs is not None:
         raw = replace(raw, uvs=raw.uvs * (1, -1) + (0, 1))
     return _mesh(node, job, replace(raw, name=path.stem), smooth=True)
@@ -192,7 +192,7 @@ def _mesh(node: Node, job: Job, raw: RawMesh, smooth: bool = False, closed: bool
         normals = None if raw.normals is None else -raw.normals
         raw = replace(raw, faces=raw.faces[:, ::-1], normals=normals)
     job.triangles += len(raw.faces)
-    job.files.limits.check_triangles(node.label, job.triangles)
+    job.files.limits.check_triangles(job.name, job.triangles)
     material, emission = _appearance(node, job, closed)
     name = node.id or raw.name
     raw = replace(raw, name=name, material=material, emission=emission, smooth=smooth, tangents=None)
