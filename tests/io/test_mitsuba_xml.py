@@ -76,6 +76,8 @@ def test_elements_become_the_dictionary_of_load_dict(tmp_path: Path) -> None:
         ('<matrix value="0 -1 0  1 0 0  0 0 1"/>', (1, 2, 3), (-2, 1, 3)),
         # looks along z, x points to the left
         ('<lookat origin="0 0 5" target="0 0 0" up="0 1 0"/>', (1, 2, 3), (-1, 2, 2)),
+        # without up, values of Mitsuba 3.9.1
+        ('<lookat origin="1 2 3" target="2 4 5"/>', (1, 2, 3), (4, 3, 5)),
     ],
 )
 def test_transforms(tmp_path: Path, steps: str, point: Any, expected: Any) -> None:

@@ -24,6 +24,7 @@ from .bsdfs import is_one_sided
 from .nodes import Job, Node, plugin, unsupported
 from .serialized import read_serialized
 from .textures import upside_down
+from .transforms import frame
 
 SIDES = 128  # of round shapes that are meshes
 ROUND = 1e-4  # relative difference of the scales along two axes that is taken for rounding
@@ -75,7 +76,7 @@ def _cylinder(node: Node, job: Job) -> list[Shape]:
     radius = checked_number("radius", node.get("radius", 1.0), lambda x: x > 0, "above 0")
     if not (end - start).any():
         raise SceneError(f"p0 and p1 are both {start.tolist()}")
-    axes, matrix = _frame(end - start), node.matrix()
+    axes, matrix = frame(end - start), node.matrix()
     material, emission = _appearance(node, job)
     around = np.linalg.norm(matrix[:3, :3] @ axes[:, :2], axis=0)
     even = abs(around[1] - around[0]) <= ROUND * around[0]
@@ -248,15 +249,6 @@ def _ring(radius: float) -> tuple[Doubles, Doubles]:
     ring = radius * np.stack([cos, sin], 1)
     ring[-1] = ring[0]
     return ring, turns
-
-
-def _frame(axis: Doubles) -> Doubles:
-    """Return axes (3, 3) as columns, the third along `axis`, by the rule of Mitsuba (Duff et al. 2017)."""
-    x, y, z = axis / np.linalg.norm(axis)
-    sign = np.copysign(1.0, z)
-    a = -1 / (sign + z)
-    b = x * y * a
-    return np.array([[1 + sign * x * x * a, b, x], [sign * b, sign + y * y * a, y], [-sign * x, -y, z]])
 
 
 def _box(matrix: Matrix) -> tuple[Doubles, Doubles]:

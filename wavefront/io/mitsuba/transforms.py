@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 
+from ...arrays.vec import Doubles
 from ...core.errors import SceneError, in_brief
 from ...shapes.transform import Matrix, rotation, translation
 
@@ -49,7 +50,7 @@ def looking(name: str, origin: np.ndarray, target: np.ndarray, up: np.ndarray) -
         raise SceneError(f"{name}: origin and target are both {origin.tolist()}")
     ahead = ahead / size
     if not up.any():
-        up = np.cross(ahead, np.eye(3)[np.abs(ahead).argmin()])
+        up = frame(ahead)[:, 0]
     left = np.cross(up, ahead)
     size = np.linalg.norm(left)
     if not size > 1e-12 * np.linalg.norm(up):
@@ -58,6 +59,15 @@ def looking(name: str, origin: np.ndarray, target: np.ndarray, up: np.ndarray) -
     matrix = np.eye(4)
     matrix[:3] = np.stack([left, np.cross(ahead, left), ahead, origin], 1)
     return matrix
+
+
+def frame(axis: Doubles) -> Doubles:
+    """Return axes (3, 3) as columns, the third along `axis`, by the rule of Mitsuba (Duff et al. 2017)."""
+    x, y, z = axis / np.linalg.norm(axis)
+    sign = np.copysign(1.0, z)
+    a = -1 / (sign + z)
+    b = x * y * a
+    return np.array([[1 + sign * x * x * a, b, x], [sign * b, sign + y * y * a, y], [-sign * x, -y, z]])
 
 
 def numbers(place: str, name: str, text: str, counts: Collection[int]) -> list[float]:
