@@ -5,7 +5,8 @@ import pytest
 
 from wavefront.bsdfs import Conductor, Dielectric, Principled
 from wavefront.bsdfs.fresnel import fresnel_conductor, fresnel_dielectric
-from wavefront.bsdfs.thin_film import GAUSSIANS, SHARES, film_reflectance
+from wavefront.bsdfs.thin_film import GAUSSIANS, SHARES, WHITE, XYZ_TO_RGB, film_reflectance
+from wavefront.core.errors import SceneError
 from wavefront.testing import check_bsdf
 
 F4 = np.float32
@@ -50,6 +51,51 @@ def test_films(film, before, beyond, thickness):
     )
     exact = np.clip(airy(cos, thickness, film, before, beyond), 0, 1)
     assert ours == pytest.approx(exact, abs=0.005)
+
+
+def test_the_colors_are_those_of_rec_709():
+    """White is white, and luminance is that of the primaries."""
+    assert pytest.approx([1, 1, 1], abs=1e-4) == XYZ_TO_RGB @ [0.95047, 1, 1.08883]
+    luminance = [
+        [0.4124564, 0.3575761, 0.1804375],
+        [0.2126729, 0.7151522, 0.072175],
+        [0.0193339, 0.119192, 0.9503041],
+    ]
+    assert np.linalg.inv(XYZ_TO_RGB) == pytest.approx(np.array(luminance), abs=1e-5)
+
+
+@pytest.mark.parametrize("path", [200, 350, 500, 700])
+def test_gaussians_fit_the_matching_functions(path):
+    """The mean phase by the fit of C. Wyman et al. 2013 (JCGT 2(2), section 2.2) to CIE 1931."""
+    lobes = (
+        ((1.056, 599.8, 37.9, 31.0), (0.362, 442.0, 16.0, 26.7), (-0.065, 501.1, 20.4, 26.2)),
+        ((0.821, 568.8, 46.9, 40.5), (0.286, 530.9, 16.3, 31.1)),
+        ((1.217, 437.0, 11.8, 36.0), (0.681, 459.0, 26.0, 13.8)),
+    )
+    wave = np.linspace(360, 830, 2000)
+    for function, parts in enumerate(lobes):
+        weight = sum(
+            height * np.exp(-0.5 * ((wave - middle) / np.where(wave < middle, low, high)) ** 2)
+            for height, middle, low, high in parts
+        )
+        exact = (weight * np.exp(2j * np.pi * path / wave)).sum() / weight.sum()
+        ours = sum(
+            amplitude
+            * np.sqrt(2 * np.pi * variance)
+            / WHITE
+            * np.exp(2j * np.pi * path * 1e-9 * center - variance * (2 * np.pi * path * 1e-9) ** 2)
+            for number, amplitude, center, variance in GAUSSIANS
+            if number == function
+        )
+        assert abs(ours - exact) < 0.05
+
+
+@pytest.mark.parametrize("thickness", [-1, 100_001, np.nan])
+def test_bad_thicknesses_are_named(thickness):
+    with pytest.raises(SceneError, match="Conductor film_thickness"):
+        Conductor(2, 4, film_thickness=thickness)
+    assert Dielectric(film_thickness=0.5).has_film
+    assert not Dielectric(film_thickness=0).has_film
 
 
 def test_a_film_of_the_index_of_its_surface_is_none():
