@@ -64,6 +64,8 @@ TESTS: dict[str, tuple[str, ...]] = {
         "tests/aovs/test_sampled_layers.py",
         "tests/denoising/test_denoising.py",
     ),
+    "wavefront/bsdfs/channels.py": ("tests/bsdfs/test_channels.py",),
+    "wavefront/bsdfs/thin_film.py": ("tests/bsdfs/test_thin_film.py",),
     "wavefront/film/light_sums.py": ("tests/integrators/test_caustics.py",),
 }
 FORMULAS = tuple(TESTS)
@@ -76,11 +78,14 @@ DENSITIES = (
     "wavefront/bsdfs/conductor.py",
     "wavefront/bsdfs/dielectric.py",
     "wavefront/bsdfs/diffuse.py",
+    "wavefront/bsdfs/disney.py",
     "wavefront/bsdfs/microfacet.py",
     "wavefront/bsdfs/mirror.py",
     "wavefront/bsdfs/mix.py",
     "wavefront/bsdfs/oren_nayar.py",
+    "wavefront/bsdfs/plastic.py",
     "wavefront/bsdfs/principled.py",
+    "wavefront/bsdfs/sides.py",
     "wavefront/bsdfs/thin.py",
     "wavefront/guiding/guide_table.py",
     "wavefront/lights/directional.py",
