@@ -314,6 +314,11 @@ def test_adapters() -> None:
         more = {"map": image} if kind == "bumpmap" else {}
         made = material(kind, bsdf=inner, **parameters, **more)
         assert value(made.bsdf.reflectance) == [0.25] * 3
+    for off in ("use_shadowing_function", "flip_invalid_normals"):
+        switch = {off: off == "use_shadowing_function"}
+        with pytest.raises(wf.SceneError, match=off):
+            material("bumpmap", bsdf=inner, map=image, **switch)
+        material("bumpmap", bsdf=inner, map=image, **{off: not switch[off]})
     assert made.normal_map.height == 2  # type: ignore[union-attr]
     assert material("mask", bsdf=inner, opacity=0.125).alpha == 0.125
     assert material("null").opacity.constant == 0  # type: ignore[union-attr]

@@ -31,6 +31,8 @@ from .spectra import INDICES, METALS
 from .textures import bitmap, color, roughness, scalar
 
 LEAST_INDEX = 1e-6
+MAPPED = "use_shadowing_function flip_invalid_normals"
+NO_SHADOWING = "as with use_shadowing_function=false; Mitsuba's default is darker, 1 % in its test scenes"
 ONE_SIDED = ("diffuse", "conductor", "roughconductor", "plastic", "roughplastic")  # the back is black
 
 
@@ -198,12 +200,12 @@ def _blend(node: Node, job: Job) -> Material:
     return _named(node, Mix(one, two, scalar(node, "weight", 0.5, job)))
 
 
-@plugin("bumpmap", "bsdf", "scale", holds="bsdf texture")
+@plugin("bumpmap", "bsdf", f"scale {MAPPED}", holds="bsdf texture", note=NO_SHADOWING)
 def _bump(node: Node, job: Job) -> Material:
     return _mapped(node, job, lambda image: BumpMap(image, node.number("scale", 1.0)), "luminance")
 
 
-@plugin("normalmap", "bsdf", "normalmap", holds="bsdf")
+@plugin("normalmap", "bsdf", f"normalmap {MAPPED}", holds="bsdf", note=NO_SHADOWING)
 def _normal(node: Node, job: Job) -> Material:
     return _mapped(node, job, ShadingFrameMap, None)
 
@@ -218,6 +220,8 @@ def _inner(node: Node, job: Job) -> Material:
 
 def _mapped(node: Node, job: Job, make: Any, channel: Any) -> Material:
     """Return the material in a plugin, with a map of its normals."""
+    if node.flag("use_shadowing_function") or not node.flag("flip_invalid_normals", True):
+        node.lose("use_shadowing_function or flip_invalid_normals")
     material = copy(_inner(job.only(node, "bsdf"), job))
     image = job.only(node, "texture")
     if material.normal_map is not None:
