@@ -211,7 +211,7 @@ def chances(p: list[float]) -> str:
 def told(rows: list[list[str]], mi: Any, folder: Path) -> str:
     """Return the part of the page that is written here."""
     run = subprocess.run(["git", "-C", folder, "rev-parse", "HEAD"], capture_output=True, text=True)
-    kinds = [row[-1].split()[0].rstrip(":;") for row in rows]
+    kinds = [re.split("[:;,]", row[-1])[0] for row in rows]
     verdicts = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
     return f"""{START}
 {datetime.date.today()}, wavefront {wf.__version__}, Mitsuba {mi.__version__} ({mi.variant()}), mitsuba-data
