@@ -52,8 +52,8 @@ def glass() -> list[wf.Bsdf]:
 
 
 def coated() -> list[wf.Bsdf]:
-    """Return `Principled` from plastic to metal, under ever more varnish, and with ever more sheen."""
-    metallic = [wf.Principled(SKY, metallic, 0.3) for metallic in (0.0, 0.5, 1.0)]
+    """Return `Disney` from plastic to metal, `Principled` under ever more varnish and with more sheen."""
+    metallic = [wf.Disney(SKY, 0.3, metallic) for metallic in (0.0, 0.5, 1.0)]
     varnish = [wf.Principled(WINE, 0.6, 0.55, clearcoat=coat) for coat in (0.0, 0.5, 1.0)]
     velvet = [
         wf.Principled((0.05, 0.09, 0.06), 0, 0.9, sheen=sheen, sheen_color=(0.5, 0.9, 0.6))

@@ -247,6 +247,7 @@ def test_albedo_is_about_the_scattered_part(kind: type[wf.Bsdf]) -> None:
         "OrenNayar": lambda: wf.OrenNayar(0.5, 0.3, energy_preserving=True),
         "Conductor": lambda: wf.Conductor.named("gold"),
         "Mix": lambda: wf.Mix(wf.Diffuse(0.8), wf.Mirror(0.3)),
+        "Disney": lambda: wf.Disney(0.3),
         "Sides": lambda: wf.Sides(wf.Diffuse(0.5)),
     }.get(kind.__name__, kind)()
     cos = np.array([1.0, 0.8, 0.5], np.float32).repeat(4096)

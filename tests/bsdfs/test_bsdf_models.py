@@ -358,7 +358,7 @@ def check_random(kind, roughness, seed, samples):
 
 
 @pytest.mark.parametrize(("kind", "roughness"), [(k, r) for k, r in KINDS if r in (None, 1e-3)])
-@pytest.mark.first(3)
+@pytest.mark.first(2)
 def test_random_parameters(kind, roughness):
     """χ², reciprocity and energy, at grazing angles too; roughness None is a random one."""
     check_random(kind, roughness, 0, 25_000)

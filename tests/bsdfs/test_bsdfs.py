@@ -1,5 +1,8 @@
 """Every material under the one contract: what is in `bsdfs.ALL` is checked here."""
 
+from collections import Counter
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 
@@ -168,7 +171,15 @@ def test_every_material_is_public():
     assert {kind.__name__ for kind in bsdfs.ALL} <= set(bsdfs.__all__)
 
 
-@pytest.mark.parametrize(("kind", "arguments"), CASES, ids=NAMES)
+def two_of_each_kind() -> Iterator[object]:
+    """Yield all cases; those after the first two of a kind are slow."""
+    seen: Counter[type] = Counter()
+    for (kind, arguments), name in zip(CASES, NAMES, strict=True):
+        seen[kind] += 1
+        yield pytest.param(kind, arguments, id=name, marks=[pytest.mark.slow] if seen[kind] > 2 else [])
+
+
+@pytest.mark.parametrize(("kind", "arguments"), list(two_of_each_kind()))
 def test_contract(kind, arguments):
     testing.check_bsdf(kind(**arguments), samples=40_000, angles=(0.0, 60.0, 89.0))
 

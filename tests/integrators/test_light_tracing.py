@@ -396,7 +396,7 @@ QUICK = [
 
 
 @pytest.mark.parametrize("name", QUICK)
-@pytest.mark.first(6)
+@pytest.mark.first(3)
 def test_means(name: str) -> None:
     case = CASES[name]
     assert_same_light(name, case.build(), case.spp, case.max_error, case.max_bounces)

@@ -45,7 +45,7 @@ def test_densities_are_one_over_the_image(shape: tuple[int, int]) -> None:
 
 @pytest.mark.parametrize("opaque", [True, False])
 @pytest.mark.parametrize("normal", NORMALS)
-@pytest.mark.first(4)
+@pytest.mark.first(3)
 def test_the_contract_holds_for_each_normal(normal: tuple[float, ...], opaque: bool) -> None:
     turn = np.linalg.qr([[3.0, 1, 2], [-1, 4, 1], [1, -2, 5]])[0]
     turn *= np.sign(np.linalg.det(turn))
@@ -118,7 +118,7 @@ def surfaces() -> wf.Scene:
     [{}, {"reuse": True}, {"background": "transparent"}, {"branches": 3}, {"guide": True}],
     ids=["plain", "shared", "background", "branches", "guided"],
 )
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 def test_pictures_keep_their_means(options: dict) -> None:
     """Those of BSDF samples alone, for which light samples do not count."""
     found = repeat(surfaces(), 24, 12, **SETTINGS, **options)
