@@ -265,12 +265,12 @@ def test_guided_pictures_agree_with_plain_ones_and_have_less_noise() -> None:
 
 
 @pytest.fixture
-def short_pilot(monkeypatch: pytest.MonkeyPatch) -> None:
+def short_training(monkeypatch: pytest.MonkeyPatch) -> None:
     """A guide of fewer paths, where it need not be a good one."""
     monkeypatch.setattr(training, "PATHS", 1 << 13)
 
 
-@pytest.mark.usefixtures("short_pilot")
+@pytest.mark.usefixtures("short_training")
 def test_guided_pictures_do_not_depend_on_workers_or_waves() -> None:
     scene = lamp_at_the_ceiling()
     one = wf.render(scene, 4, guide=True, workers=1, progress=False)
@@ -278,7 +278,7 @@ def test_guided_pictures_do_not_depend_on_workers_or_waves() -> None:
         assert np.array_equal(wf.render(scene, 4, guide=True, progress=False, **options).rgb, one.rgb)
 
 
-@pytest.mark.usefixtures("short_pilot")
+@pytest.mark.usefixtures("short_training")
 def test_another_view_is_what_a_render_of_it_is() -> None:
     scene = lamp_at_the_ceiling()
     other = wf.Camera.look_at((1, 1, 4.5), (2, 1.2, 0), fov=50, size=(16, 16))
@@ -290,7 +290,7 @@ def test_another_view_is_what_a_render_of_it_is() -> None:
         )
 
 
-@pytest.mark.usefixtures("short_pilot")
+@pytest.mark.usefixtures("short_training")
 def test_branches_can_be_guided() -> None:
     plain = wf.render(room(), 256, branches=2, progress=False)
     guided = wf.render(room(), 256, branches=2, guide=True, seed=1, progress=False)
@@ -300,7 +300,7 @@ def test_branches_can_be_guided() -> None:
     assert abs(plain.rgb.mean(dtype=float) - guided.rgb.mean(dtype=float)) < 4 * error
 
 
-def test_the_pilot_holds_blas_to_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_training_holds_blas_to_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
     """With more they wait for each other: on a busy machine the training took five times as long."""
     threads = []
 

@@ -9,8 +9,7 @@ import scenes
 from significance import Mean, assert_same_images, render, repeat
 
 import wavefront as wf
-from wavefront.integrators import ladder, steps
-from wavefront.integrators import training as pilot
+from wavefront.integrators import ladder, steps, training
 from wavefront.sampling.sampler import Dimension, Sampler, make_sampler
 
 DIRECT_SPP = {"naive": 256, "direct_simple": 96, "direct_mis": 64, "full": 64}
@@ -137,7 +136,7 @@ def test_no_number_is_used_twice(integrator, options, monkeypatch):
         given.append(Once("sobol", seed, width))
         return given[-1]
 
-    monkeypatch.setattr(pilot, "PATHS", 1 << 13)
+    monkeypatch.setattr(training, "PATHS", 1 << 13)
     scene = scenes.everything((12, 9))
     veils = [
         wf.Rectangle((-2, -2, z), (4, 0, 0), (0, 4, 0), material=wf.Material(wf.Diffuse(0.5), alpha=0.3))

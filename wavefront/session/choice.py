@@ -33,7 +33,7 @@ GAIN_BESIDE_GLOSS = (
     0.5  # where not all is matte and light is not rare: sharp lobes gain little, and trials miss it
 )
 CLEAR_GAIN = 0.4  # below that part, re-use is better than any number of branches, which are not tried then
-GUIDE_TILES = 128  # whatever the size of the picture: the pilot takes longer anyway
+GUIDE_TILES = 128  # whatever the size of the picture: training takes longer anyway
 RARE_LIGHT = 1.0  # relative variance of a pixel of four samples, from where on light is hard to find
 COMMON_GLOSS = 0.03  # part of the second points, from where on a trial sees enough of what a material does
 MOST_PATHS = 0.4  # part of the paths that must meet second points which can be shared
@@ -57,7 +57,7 @@ def learn_guide(settings: Settings, scene: CompiledScene, camera: Camera) -> Gui
     camera
         In the unit of the compiled scene.
     """
-    sampler = make_sampler(settings.values["sampler"], settings.pilot_seed(), camera.resolution[0])
+    sampler = make_sampler(settings.values["sampler"], settings.training_seed(), camera.resolution[0])
     return train(scene, camera, sampler, settings.values["max_bounces"])
 
 
@@ -85,7 +85,7 @@ def choose(
     branches, reuse = settings.values["branches"], settings.values["reuse"] is True
     asked = Choice(1 if branches == AUTO else int(branches), reuse, has_guide)
     whole = camera.cropped((0, 0, *camera.resolution))  # a window is a part of the same picture
-    seed, bounces = settings.pilot_seed(1), settings.values["max_bounces"]
+    seed, bounces = settings.training_seed(1), settings.values["max_bounces"]
     if settings.is_full and has_guide and settings.values["guide"] == AUTO:
         trial = Trial(whole, seed, bounces, run, GUIDE_TILES, workers)
         plain, guided = (_branched(settings, trial, replace(asked, guided=each)) for each in (False, True))

@@ -23,7 +23,7 @@ from .declaration import SETTINGS, AllSettings
 
 DEFAULT_SPP = 100
 MAX_BRANCH_SAMPLES = 2**32  # a sample's index is 32 bits of its address, and each branch has one
-PILOT = 0x5EED_0F_9417D  # the seed of the pilot is that of the picture XOR this
+TRAINING = 0x5EED_0F_9417D  # the seed of a training pass is that of the picture XOR this
 MAX_SPP_FOR_NOISE = 2**16  # where only `noise` was given
 
 
@@ -143,9 +143,9 @@ class Settings:
         """Return what makes the sampler of a picture, given a seed and how many pixels wide it is."""
         return SAMPLERS.find(self.values["sampler"])
 
-    def pilot_seed(self, number: int = 0) -> int:
-        """Return the seed of the pilot or of a block of the trial, whose numbers are their own."""
-        return (int(self.values["seed"]) ^ PILOT) + number
+    def training_seed(self, number: int = 0) -> int:
+        """Return the seed of the training of a guide, or of a tuning run, whose numbers are their own."""
+        return (int(self.values["seed"]) ^ TRAINING) + number
 
     def executor_for(self, size: tuple[int, int]) -> str | ExecutorLike:
         """Return the executor for a picture of a size (width, height)."""
