@@ -87,7 +87,7 @@ def test_nothing_stays_on_the_cluster(client: Any) -> None:
 
 
 def wait_for_stop(stop: SharedInt, job: int) -> int:
-    end = time.monotonic() + 300
+    end = time.monotonic() + 40  # a job that begins after the pool has ended does not see the stop
     while job and not stop.value and time.monotonic() < end:
         time.sleep(0.01)
     if stop.value:
@@ -106,7 +106,7 @@ def test_a_stop_ends_jobs_on_the_cluster(client: Any) -> None:
         with pytest.raises(Stopped):
             list(results)
         pool.cancel()
-    assert time.monotonic() - begin < 120
+    assert time.monotonic() - begin < 30
     assert client.submit(abs, -1).result() == 1
 
 
