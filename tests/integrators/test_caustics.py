@@ -557,6 +557,7 @@ def test_short_paths_have_no_caustics(max_bounces: int) -> None:
     assert found.rgb.tobytes() == plain.rgb.tobytes()
 
 
+@pytest.mark.slow
 def test_a_window_has_the_light_of_the_whole_picture() -> None:
     """By paths from lights of its own: not the same bits, but the same expectation."""
     window, spp = (6, 7, 18, 16), 8

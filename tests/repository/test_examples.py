@@ -76,6 +76,7 @@ def test_the_overview_lists_all_examples():
 
 
 @pytest.mark.parametrize("name", [name for name in SHAPES if name != "furnace"])
+@pytest.mark.first(8)
 def test_example_writes_a_picture(name, run):
     _, picture = run(name, "--spp", "2", "--size", "24")
     assert picture.shape == (*SHAPES[name], 3)
