@@ -65,7 +65,7 @@ def camera_rays(width, height, rng):
 
 # %%
 # The nearest sphere
-# ----------------
+# ------------------
 #
 # Arrays of all rays by all ten spheres: ``@`` multiplies each direction with each center. Distances below
 # 1e-4 do not count: a ray that starts on a sphere must not meet the same place again because of rounding.

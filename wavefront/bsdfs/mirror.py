@@ -27,8 +27,9 @@ class Mirror(Bsdf):
 
     Notes
     -----
-    f(wo, wi) = ρ · δ(wi − reflect(wo)) / |cosθi|. The division cancels the cosine of the rendering equation,
-    so the mirror is as bright at every angle, and a sample has the weight f·|cosθi|/p = ρ (pbrt-v4, §9.3).
+    f(wo, wi) = ρ · δ(wi − reflect(wo)) / ``|cosθi|``. The division cancels the cosine of the rendering
+    equation, so the mirror is as bright at every angle, and a sample has the weight ``f·|cosθi|/p = ρ``
+    (pbrt-v4, §9.3).
 
     Examples
     --------
