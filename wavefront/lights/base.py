@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.soa import soa
 from ..arrays.state import SoA, SurfaceInteraction
-from ..arrays.vec import Bools, Doubles, Floats, Ints, f4
+from ..arrays.vec import Bools, Doubles, Floats, Ints, Lanes, f4
 from ..core.errors import SceneError, finite_array
 from ..film.aov_names import DEFAULT_GROUP
 from ..shapes import Shape
@@ -239,6 +239,13 @@ class DeltaLight(LightRecord):
 def position(name: str, value: ArrayLike) -> NDArray[np.float64]:
     """Return where a light stands, (3,) scene units."""
     return finite_array(name, value, (3,))
+
+
+def lit_for(light: LightRecord, receiver: Receiver | None, lanes: Lanes) -> LightRecord:
+    """Return a light as it is sampled for some of the surfaces, if these are known."""
+    if receiver is None or not light.takes_receiver:
+        return light
+    return light.lighting(receiver.take(lanes))
 
 
 def sampled_li(light: LightRecord, point: Floats, u: Floats) -> LightSample:

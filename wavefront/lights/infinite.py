@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import Floats, Lanes, column, f4
+from ..arrays.vec import ALL, Floats, Lanes, column, f4
 from ..sampling.discrete import Discrete
-from .base import LightRecord, LightSample, Receiver
+from .base import LightRecord, LightSample, Receiver, lit_for
 
 
 class InfiniteLight(LightRecord):
@@ -91,7 +91,7 @@ class EnvironmentSum(InfiniteLight):
         for k, part in enumerate(self.parts):
             lanes = np.flatnonzero(index == k)
             if lanes.size:
-                lit = part if self.receiver is None else part.lighting(self.receiver.take(lanes))
+                lit = lit_for(part, self.receiver, lanes)
                 wi[:, lanes] = lit.sample_li(point.take(lanes, 1), stretched.take(lanes, 1)).wi
         return at_infinity(wi, self.le(wi), self.pdf_li(point, wi))
 
@@ -100,8 +100,7 @@ class EnvironmentSum(InfiniteLight):
         chances = self.choice.pmf(np.arange(len(self.parts)))
         pdf = np.zeros(wi.shape[1], f4)
         for part, chance in zip(self.parts, chances, strict=True):
-            lit = part if self.receiver is None else part.lighting(self.receiver)
-            pdf += chance * lit.pdf_li(point, wi)
+            pdf += chance * lit_for(part, self.receiver, ALL).pdf_li(point, wi)
         return pdf
 
     def lighting(self, receiver: Receiver) -> Self:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import ALL, Floats, Ints, Lanes, f4, put, take
 from ..sampling.mis import power_heuristic
-from .base import Emitters, LightRecord, LightSample, Receiver, emitters_of, sampled_li
+from .base import Emitters, LightRecord, LightSample, Receiver, emitters_of, lit_for, sampled_li
 from .choice import LightSampler, LightSamplerMaker
 from .samplers import LIGHT_SAMPLERS, SingleLightSampler, SubsetLightSampler
 
@@ -116,7 +116,7 @@ class LightTable:
             return np.zeros(len(light), f4)
         pdf = np.empty(len(light), f4)
         for kind, rows in self._by_kind(light):
-            pdf[rows] = _lighting(kind, receiver, rows).pdf_li(take(point, rows), take(wi, rows))
+            pdf[rows] = lit_for(kind, receiver, rows).pdf_li(take(point, rows), take(wi, rows))
         return pdf * self._choice_for(receiver).pmf(light, point)
 
     def _choice_for(self, receiver: Receiver | None) -> LightSampler:
@@ -172,8 +172,8 @@ class LightTable:
         where: tuple[Ints, Floats, Floats] | None = None
         for kind, rows in self._by_kind(light):
             if isinstance(rows, slice):
-                return sampled_li(_lighting(kind, receiver, rows), point, u)
-            part = sampled_li(_lighting(kind, receiver, rows), take(point, rows), take(u, rows))
+                return sampled_li(lit_for(kind, receiver, rows), point, u)
+            part = sampled_li(lit_for(kind, receiver, rows), take(point, rows), take(u, rows))
             put(out.wi, rows, part.wi)
             put(out.radiance, rows, part.radiance)
             out.pdf[rows], out.distance[rows], out.cos_light[rows] = part.pdf, part.distance, part.cos_light
@@ -202,13 +202,6 @@ class LightTable:
             rows = np.flatnonzero(kind_of == number)
             if rows.size:
                 yield self._gathered(number, light.take(rows)), rows
-
-
-def _lighting(kind: LightRecord, receiver: Receiver | None, lanes: Lanes) -> LightRecord:
-    """Return lights as they are sampled where they light surfaces, if these are known."""
-    if receiver is None or not kind.takes_receiver:
-        return kind
-    return kind.lighting(receiver.take(lanes))
 
 
 def _radiance(kind: LightRecord, wi: Floats, surface: SurfaceInteraction | None) -> Floats:
