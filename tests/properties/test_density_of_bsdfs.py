@@ -253,7 +253,7 @@ def test_samples_keep_their_promises(kind, data, z, inside, u):
 def test_densities_integrate_to_the_chance_of_a_sample(kind, data, z, inside):
     """Over the sphere, by the midpoint rule; delta lobes and directions to the wrong side are left out."""
     bsdf, wo = data.draw(KINDS[kind]), toward(z).astype(f4)
-    rows = 448  # lobes of the least roughness are about ten cells wide
+    rows = 448  # so that the narrowest lobes cross several rows
     theta, phi = np.meshgrid(
         np.pi * (np.arange(rows) + 0.5) / rows, np.pi * (np.arange(2 * rows) + 0.5) / rows
     )
