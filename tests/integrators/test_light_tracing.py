@@ -444,11 +444,13 @@ def test_point_light_over_a_mirror_lights_the_ceiling_as_from_its_image() -> Non
     assert_light(scene, tint * ALBEDO / np.pi * irradiance, max_bounces=2)
 
 
-def test_directional_light_in_a_mirror_lights_the_floor() -> None:
-    mirror = wf.Rectangle((-1, 1, 0), (0, 0, 0.6), (0, 1, 0), material=wf.Mirror(0.8))
+@pytest.mark.parametrize("opacity", [1, 0.6])
+def test_directional_light_in_a_mirror_lights_the_floor(opacity: float) -> None:
+    material = wf.Material(wf.Mirror(0.8), alpha=opacity)
+    mirror = wf.Rectangle((-1, 1, 0), (0, 0, 0.6), (0, 1, 0), material=material)
     sun = wf.DirectionalLight((-1, -1, 0), 3)
     scene = wf.Scene([mirror, ground()], [sun], looks_at(0.5, 0, 0.3, 0.4))
-    assert_light(scene, 0.8 * ALBEDO / np.pi * 3 / np.sqrt(2), max_bounces=7)
+    assert_light(scene, opacity * 0.8 * ALBEDO / np.pi * 3 / np.sqrt(2), max_bounces=7)
 
 
 @pytest.mark.parametrize(("max_bounces", "crossings"), [(3, 1), (12, 6)])
