@@ -1,10 +1,14 @@
-"""Checking the lines of a text, where lines that differ only in their digits are checked once."""
+"""Numbers of a text; checks of its lines, where those that differ only in their digits are checked once."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import TypeVar
+
+import numpy as np
+
+from ..core.errors import SceneError, in_brief
 
 Result = TypeVar("Result")
 
@@ -33,3 +37,19 @@ def check_lines(lines: list[str], check: Callable[[int, str], Result]) -> list[R
     numbers = sorted(first.items(), key=lambda item: item[1])
     results = {form: check(number, lines[number - 1]) for form, number in numbers}
     return [results[form] for form in forms]
+
+
+def numbers(place: str, name: str, text: str, counts: Collection[int]) -> list[float]:
+    """Return the numbers of a text, of which there must be one of some counts."""
+    try:
+        found = [float(each) for each in re.split(r"[\s,]+", text.strip(" \t\r\n,"))]
+    except ValueError:
+        found = []
+    if len(found) not in counts or not np.isfinite(found).all():
+        counts = () if isinstance(counts, range) else counts
+        wanted = (
+            " or ".join("a number" if count == 1 else f"{count} numbers" for count in counts)
+            or "a list of numbers"
+        )
+        raise SceneError(f"{place}: {name} is {in_brief(text)}; it must be {wanted}")
+    return found

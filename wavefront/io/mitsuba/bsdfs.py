@@ -26,8 +26,8 @@ from ...materials import Material
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.normal_map import BumpMap, NormalMap
+from ..spectra import INDICES, METALS
 from .nodes import Job, Node, plugin, unsupported
-from .spectra import INDICES, METALS
 from .textures import bitmap, color, roughness, scalar
 
 LEAST_INDEX = 1e-6

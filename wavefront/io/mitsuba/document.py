@@ -17,8 +17,9 @@ import numpy as np
 from ...core.errors import SceneError, one_of
 from ...core.suggestions import did_you_mean
 from ..sources import SceneFiles
+from ..text_lines import numbers
 from ..xml_checks import MAX_DEPTH, look_through
-from .transforms import OPERATIONS, numbers, product, vector
+from .transforms import OPERATIONS, product, vector
 
 MOST_INCLUDED = 15  # files inside each other
 _OBJECTS = (

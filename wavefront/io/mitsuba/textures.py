@@ -19,9 +19,9 @@ from ...core.errors import SceneError, as_array, finite_array, in_brief, number
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.vertex_colors import VertexColors
+from ..spectra import blackbody, pairs_of, read_spectrum, spectrum_rgb, uniform_emission
+from ..text_lines import numbers
 from .nodes import Job, Node, plugin, unsupported
-from .spectra import blackbody, pairs_of, read_spectrum, spectrum_rgb, uniform_emission
-from .transforms import numbers
 
 MOST_VALUES = 10_000  # of a spectrum in a text
 FLIP = np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]])  # of v

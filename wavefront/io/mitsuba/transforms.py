@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from ...arrays.vec import Doubles
-from ...core.errors import SceneError, in_brief
+from ...core.errors import SceneError
 from ...shapes.transform import Matrix, rotation, translation
+from ..text_lines import numbers
 
 Attributes = Mapping[str, str]
 
@@ -68,22 +68,6 @@ def frame(axis: Doubles) -> Doubles:
     a = -1 / (sign + z)
     b = x * y * a
     return np.array([[1 + sign * x * x * a, b, x], [sign * b, sign + y * y * a, y], [-sign * x, -y, z]])
-
-
-def numbers(place: str, name: str, text: str, counts: Collection[int]) -> list[float]:
-    """Return the numbers of a text, of which there must be one of some counts."""
-    try:
-        found = [float(each) for each in re.split(r"[\s,]+", text.strip(" \t\r\n,"))]
-    except ValueError:
-        found = []
-    if len(found) not in counts or not np.isfinite(found).all():
-        counts = () if isinstance(counts, range) else counts
-        wanted = (
-            " or ".join("a number" if count == 1 else f"{count} numbers" for count in counts)
-            or "a list of numbers"
-        )
-        raise SceneError(f"{place}: {name} is {in_brief(text)}; it must be {wanted}")
-    return found
 
 
 def vector(place: str, name: str, given: Mapping[str, str], default: float) -> list[float]:

@@ -12,8 +12,8 @@ from ...camera import Camera
 from ...camera.projection import Orthographic, Perspective, Projection
 from ...core.errors import SceneError, number
 from ...shapes import Instance, Mesh, Shape
+from ..text_lines import numbers
 from .nodes import Job, Node, plugin, unsupported
-from .transforms import numbers
 
 Settings = dict[str, Any]
 MOST_CHECKED = 1 << 16  # points of a shape that are compared with the planes of a sensor

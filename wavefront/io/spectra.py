@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays.elementary import exp
-from ...arrays.vec import Doubles, f4
-from ...core.errors import SceneError, as_array, finite_array, in_brief, number
-from ...core.files import decode_text
-from .transforms import numbers
+from ..arrays.elementary import exp
+from ..arrays.vec import Doubles, f4
+from ..core.errors import SceneError, as_array, finite_array, in_brief, number
+from ..core.files import decode_text
+from .text_lines import numbers
 
 FIRST, STEP = 380, 5  # nm, of the tables
 # color matching functions of CIE 1931, 2 degrees, and the power of D65 relative to 560 nm (CIE 15:2018)
