@@ -440,6 +440,11 @@ def test_lights(tmp_path: Path) -> None:
     first, second = (each.le(away, None) for each in records)
     assert first.max() > 1
     np.testing.assert_allclose(first, second, atol=1e-5)
+    up = np.array([[0], [1], [0]], np.float32)
+    pixels[0], pixels[1] = (4, 2, 1), 8
+    for rows, ahead in ((1, [4, 2, 1]), (2, [8, 8, 8])):  # the last row is repeated until there are three
+        sky = light("envmap", bitmap=pixels[:rows]).record(np.zeros(3))
+        np.testing.assert_allclose(sky.le(np.hstack([up, up[[0, 2, 1]]])).T, [[4, 2, 1], ahead], rtol=1e-6)
 
 
 def test_spots_and_projectors() -> None:

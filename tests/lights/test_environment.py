@@ -47,10 +47,11 @@ def cosine_map(height: int = 128) -> np.ndarray:
     return np.broadcast_to(np.maximum(cos, 0)[:, None, None], (height, 2 * height, 3))
 
 
-def irradiance(rows: np.ndarray) -> float:
+def irradiance(rows: np.ndarray, poles: bool = False) -> float:
     """Irradiance on a floor from a map that is the same all around, rows interpolated."""
     theta = (np.arange(20_000) + 0.5) / 20_000 * np.pi / 2
-    radiance = np.interp(theta, np.pi * (np.arange(len(rows)) + 0.5) / len(rows), rows)
+    at = np.linspace(0, 1, len(rows)) if poles else (np.arange(len(rows)) + 0.5) / len(rows)
+    radiance = np.interp(theta, np.pi * at, rows)
     return float(2 * np.pi * (radiance * np.cos(theta) * np.sin(theta)).mean() * np.pi / 2)
 
 
@@ -76,14 +77,38 @@ def test_layout() -> None:
         assert seen == pytest.approx(np.array(expected, float), abs=1e-6)
 
 
-@pytest.mark.parametrize("filter", ["nearest", "bilinear"])
-def test_every_pixel_is_seen_in_its_direction(filter: str) -> None:
-    picture = noise()
+def around(theta: np.ndarray) -> np.ndarray:
+    """Directions (3, 16 n) at angles (n,) from the upper pole, through the middles of 16 columns."""
     longitude = (0.5 - (np.arange(16) + 0.5) / 16) * 2 * np.pi
-    theta = (np.arange(8) + 0.5)[:, None] / 8 * np.pi
-    wi = [np.sin(theta) * np.sin(longitude), np.cos(theta) + 0 * longitude, np.sin(theta) * np.cos(longitude)]
-    seen = wf.Environment(picture, filter=filter).record(ORIGIN).le(np.reshape(wi, (3, -1)).astype(f4))
+    level, up = np.sin(theta)[:, None], np.cos(theta)[:, None]
+    wi = [level * np.sin(longitude), up + 0 * longitude, level * np.cos(longitude)]
+    return np.reshape(wi, (3, -1)).astype(f4)
+
+
+@pytest.mark.parametrize("filter", ["nearest", "bilinear"])
+@pytest.mark.parametrize("rows", ["centers", "poles"])
+def test_every_pixel_is_seen_in_its_direction(filter: str, rows: str) -> None:
+    picture = noise()
+    theta = (np.arange(8) + 0.5) / 8 * np.pi if rows == "centers" else np.arange(8) / 7 * np.pi
+    theta = np.clip(theta, 1e-6, np.pi - 1e-6)  # at a pole itself all columns meet
+    seen = wf.Environment(picture, filter=filter, rows=rows).record(ORIGIN).le(around(theta))
     assert seen.T.reshape(8, 16, 3) == pytest.approx(picture, abs=2e-5)
+
+
+def test_rows_from_pole_to_pole() -> None:
+    """What lies between the rows, the mean over all directions, and a backdrop."""
+    picture = noise()
+    sky = wf.Environment(picture, rows="poles", backdrop=picture)
+    theta = np.linspace(1e-6, np.pi - 1e-6, 40)
+    at = np.arange(8) / 7 * np.pi
+    due = [[np.interp(theta, at, picture[:, x, k]) for x in range(16)] for k in range(3)]
+    for each in (sky, sky.backdrop):
+        assert each is not None
+        seen = each.record(ORIGIN).le(around(theta)).reshape(3, 40, 16)
+        assert seen == pytest.approx(np.transpose(due, (0, 2, 1)), abs=2e-5)
+    theta = (np.arange(7000) + 0.5) / 7000 * np.pi  # the mean over columns is that of the pixels
+    rows = np.stack([np.interp(theta, at, picture[:, :, k].mean(1)) for k in range(3)])
+    assert sky.radiance.ravel() == pytest.approx((rows * np.sin(theta)).mean(1) * np.pi / 2, rel=0.01)
 
 
 def test_scale_multiplies_the_radiance() -> None:
@@ -134,6 +159,15 @@ def test_cosine_map(integrator: str, transform) -> None:
     expected = irradiance(cosine_map()[:, 0, 0])
     assert expected == pytest.approx(2.094395, rel=1e-4)
     assert_mean(mean, expected * ALBEDO / np.pi, 0.002)
+
+
+@pytest.mark.parametrize("integrator", SAMPLING)
+def test_light_of_rows_at_the_poles(integrator: str) -> None:
+    """Few rows, most of whose light comes from the cap at the pole."""
+    rows = np.array([4.0, 1, 0.5, 0.2])
+    environment = wf.Environment(np.broadcast_to(rows[:, None, None], (4, 6, 3)), rows="poles")
+    mean = measure(lit_floor(environment), 1024, integrator=integrator, max_bounces=1)
+    assert_mean(mean, irradiance(rows, poles=True) * ALBEDO / np.pi, 0.002)
 
 
 @pytest.mark.parametrize("integrator", SAMPLING)
@@ -200,13 +234,21 @@ def test_sampling_a_small_sun_beats_chance() -> None:
 # --- Sampling --------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("rows", ["centers", "poles"])
 @pytest.mark.parametrize(("filter", "transform"), [("nearest", None), ("bilinear", turn(1.0, 0.5))])
-def test_sampling_keeps_the_contract(filter: str, transform) -> None:
+def test_sampling_keeps_the_contract(filter: str, transform, rows: str) -> None:
     """Pdf integrates to one, samples follow it, and carry the radiance that is seen."""
     picture = noise(3, 4)
     picture[1, 2] = 0  # with "nearest" it is never drawn
-    environment = wf.Environment(picture, filter=filter, transform=transform)
+    environment = wf.Environment(picture, filter=filter, transform=transform, rows=rows)
     testing.check_light(environment, points=[HERE], samples=50_000)
+
+
+def test_the_density_of_a_texel_at_a_pole_is_its_mean() -> None:
+    """Two rows of 1 and 3 share the sphere: 1.5 and 2.5 in the mean over angles."""
+    sky = wf.Environment(np.array([[[1.0] * 3], [[3.0] * 3]]), rows="poles").record(ORIGIN)
+    w = np.array([[0.6, 0.6], [0.8, -0.8], [0, 0]], f4)
+    assert sky.pdf_li(w, w) == pytest.approx([1.5 / 4 / (2 * np.pi), 2.5 / 4 / (2 * np.pi)], rel=1e-6)
 
 
 SUNS = [wf.DirectionalLight((1, -1, 0.2), 1.0, angle=30), wf.DirectionalLight((0.9, -1, 0.3), 0.5, angle=20)]
@@ -338,6 +380,11 @@ BAD = {
     "filter": (
         {"radiance": PICTURE, "filter": "cubic"},
         "filter is 'cubic'; it must be one of bilinear, nearest",
+    ),
+    "rows": ({"radiance": PICTURE, "rows": "edges"}, "rows is 'edges'; it must be one of centers, poles"),
+    "one row": (
+        {"radiance": PICTURE[:1], "rows": "poles"},
+        'Environment image has 1 row; with rows="poles" it must have at least 2',
     ),
     "negative": ({"radiance": -1.0}, "Environment radiance is -1; it must be at least 0"),
     "transform scales": (

@@ -86,7 +86,8 @@ def images(draw):
     turn = draw(st.floats(0, 6.2))
     rotation = [[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]]
     filter = draw(st.sampled_from(["nearest", "bilinear"]))
-    light = wf.Environment(np.repeat(pixels[..., None], 3, 2), transform=rotation, filter=filter)
+    rows = "poles" if len(pixels) > 1 and draw(st.booleans()) else "centers"
+    light = wf.Environment(np.repeat(pixels[..., None], 3, 2), transform=rotation, filter=filter, rows=rows)
     record = light.record(np.zeros(3))
     return record.compensated() if draw(st.booleans()) else record
 

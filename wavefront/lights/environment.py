@@ -71,6 +71,9 @@ class Environment(Parametrized, Light):
         A color, at least 0, that multiplies this radiance.
     filter
         "bilinear" between the centers of the image's pixels, or "nearest".
+    rows
+        Where the rows of an image lie: "centers", H bands of the same height from pole to pole; or "poles",
+        the first row at the upper pole and the last at the lower, as Mitsuba 3 has it.
     group
         Name of the light group, for `aovs="light_groups"`.
     backdrop
@@ -88,17 +91,17 @@ class Environment(Parametrized, Light):
     -----
     An image shows all directions by longitude and latitude, seen from inside: its top row is +y,
     its middle is +z, its left half is +x and its right half -x. That is how OpenEXR defines such
-    an image, and how Mitsuba 3 and `Camera.panorama` lay it out. In Blender the middle is +x, with
-    z up; for a scene that it exported with y up, the same view takes the transform
-    [[0, 0, 1], [0, 1, 0], [-1, 0, 0]].
+    an image, and how `Camera.panorama` and, but for `rows`, Mitsuba 3 lay it out.
+    In Blender the middle is +x, with z up; for a scene that it exported with y up, the same view takes the
+    transform [[0, 0, 1], [0, 1, 0], [-1, 0, 0]].
 
     Directions are sampled by the luminance of the image. That takes about 28 bytes of memory for each pixel.
 
     Raises
     ------
     SceneError
-        If the radiance is malformed or not finite, an image is all black, or the transform is not
-        a rotation.
+        If the radiance is malformed or not finite, an image is all black or its one row would lie at both
+        poles, or the transform is not a rotation.
 
     Examples
     --------
@@ -117,13 +120,15 @@ class Environment(Parametrized, Light):
         transform: ArrayLike | None = None,
         scale: ArrayLike | str = 1.0,
         filter: Literal["bilinear", "nearest"] = "bilinear",
+        rows: Literal["centers", "poles"] = "centers",
         group: str = DEFAULT_GROUP,
         backdrop: ArrayLike | str | os.PathLike[str] | None = None,
     ) -> None:
         self.backdrop = (
-            None if backdrop is None else Environment(backdrop, transform=transform, filter=filter)
+            None if backdrop is None else Environment(backdrop, transform=transform, filter=filter, rows=rows)
         )
         self._filter = one_of("filter", filter, ("bilinear", "nearest"))
+        self._poles = one_of("rows", rows, ("centers", "poles")) == "poles"
         self._transform = None if transform is None else rotation_matrix("Environment transform", transform)
         self._scale = rgb("Environment scale", scale)
         self._image: ImageEnvironment | None = None
@@ -149,7 +154,7 @@ class Environment(Parametrized, Light):
                 pixels = environment_pixels(radiance)
                 if (self._scale != 1).any():
                     pixels = pixels * self._scale.ravel()
-                image = ImageEnvironment.of(pixels, self._filter, self._transform)
+                image = ImageEnvironment.of(pixels, self._filter, self._transform, self._poles)
             self._radiance, self._image = image.mean, image
         else:
             self._radiance, self._image = rgb("Environment radiance", radiance) * self._scale, None

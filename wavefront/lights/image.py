@@ -44,26 +44,33 @@ class ImageEnvironment(InfiniteLight):
     step: NDArray[np.float64]  # (H,) Δcosθ from the upper edge of each row to the lower
     mean: Floats  # (3, 1) radiance, averaged over all directions
     rotation: Floats | None  # (3, 3) to world from environment; None where they are the same
+    poles: bool = False  # the first and the last row of the image lie at the poles
     share: float = 1.0  # of the light that light samples are to bring
     product: CosineProduct | None = None  # draws that share
     normals: Ints | None = None  # (n,) what it is drawn for; None for no normal in particular
     takes_receiver: ClassVar[bool] = True
 
     @classmethod
-    def of(cls, pixels: Floats, filter: str, rotation: NDArray[np.float64] | None) -> Self:
+    def of(
+        cls, pixels: Floats, filter: str, rotation: NDArray[np.float64] | None, poles: bool = False
+    ) -> Self:
         """Prepare an image (H, W, 3), finite and at least 0, top row first.
 
         Raises
         ------
         SceneError
-            If every pixel is black, or there is no such filter.
+            If every pixel is black, there is no such filter, or the one row would lie at both poles.
         """
         height = len(pixels)
+        if poles and height == 1:
+            raise SceneError('Environment image has 1 row; with rows="poles" it must have at least 2')
         image = Texture(pixels, wrap=("repeat", "clamp"), filter=filter)  # type: ignore[arg-type]
-        sin_middle, _ = sin_cos_turns((np.arange(height) + 0.5) / (2 * height))
-        sin_half, _ = sin_cos(np.float64(np.pi / (2 * height)))
+        bands = height - poles  # from pole to pole; half of one belongs to a row at a pole
+        edges = np.clip(np.arange(height + 1) - 0.5 * poles, 0, bands)
+        sin_middle, _ = sin_cos_turns((edges[:-1] + edges[1:]) / (4 * bands))
+        sin_half, _ = sin_cos(np.pi * np.diff(edges) / (2 * bands))
         step = 2 * sin_middle * sin_half  # cos of one edge − cos of the next
-        texels = pixels.astype(np.float64) if filter == "nearest" else _spread(pixels)
+        texels = pixels.astype(np.float64) if filter == "nearest" else _spread(pixels, poles)
         shares = texels * (step / (2 * pixels.shape[1]))[:, None, None]  # of the sphere
         weights = luminance(np.moveaxis(shares, -1, 0))
         if not weights.any():
@@ -72,10 +79,11 @@ class ImageEnvironment(InfiniteLight):
             image=image,
             texels=Distribution2D(weights),
             density=(1 / (2 * np.pi * height * step)).astype(f4),
-            top=sin_cos_turns(np.arange(height) / (2 * height))[1],
+            top=sin_cos_turns(edges[:-1] / (2 * bands))[1],
             step=step,
             mean=shares.sum((0, 1)).astype(f4).reshape(3, 1),
             rotation=None if rotation is None else rotation.astype(f4),
+            poles=poles,
         )
 
     def compensated(self) -> Self:
@@ -107,8 +115,7 @@ class ImageEnvironment(InfiniteLight):
         np.multiply(sin_longitude, sin, out=wi[0])
         wi[1] = cos
         np.multiply(cos_longitude, sin, out=wi[2])
-        v = arctan2(sin, wi[1]) * INV_PI
-        radiance = self._lookup(x, v)
+        radiance = self._lookup(x, self._row(arctan2(sin, wi[1]) * INV_PI))
         if self.rotation is not None:
             wi = turned(self.rotation, wi)
         return at_infinity(wi, radiance, over_square * self.density.take(row))
@@ -144,20 +151,29 @@ class ImageEnvironment(InfiniteLight):
         local = wi if self.rotation is None else turned(self.rotation.T, wi)
         x = f4(0.5) - arctan2(local[0], local[2]) * INV_TWO_PI
         level = np.sqrt(local[0] * local[0] + local[2] * local[2])
-        return x, arctan2(level, local[1]) * INV_PI
+        return x, self._row(arctan2(level, local[1]) * INV_PI)
+
+    def _row(self, v: Floats) -> Floats:
+        """Return where angles from the upper pole, over π, lie in the image, from the top, in [0, 1]."""
+        if not self.poles:
+            return v
+        height = len(self.step)
+        return (v * f4(height - 1) + f4(0.5)) / f4(height)
 
     def _lookup(self, x: Floats, y: Floats) -> Floats:
         return self.image.lookup(np.stack([x, f4(1) - y]))
 
 
-def _spread(pixels: Floats) -> NDArray[np.float64]:
+def _spread(pixels: Floats, poles: bool) -> NDArray[np.float64]:
     """Mean of the bilinear lookup within each texel: its neighbors count ⅛, itself ¾, both ways.
 
-    It is positive wherever the lookup is.
+    Half a texel at a pole has the weights of a whole one between equal rows. The mean is positive wherever
+    the lookup is.
     """
     texels = pixels.astype(np.float64)
     texels = 0.75 * texels + 0.125 * (np.roll(texels, 1, 1) + np.roll(texels, -1, 1))
-    above, below = np.vstack([texels[:1], texels[:-1]]), np.vstack([texels[1:], texels[-1:]])
+    first, last = (texels[1:2], texels[-2:-1]) if poles else (texels[:1], texels[-1:])
+    above, below = np.vstack([first, texels[:-1]]), np.vstack([texels[1:], last])
     return 0.75 * texels + 0.125 * (above + below)
 
 

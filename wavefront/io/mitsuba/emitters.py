@@ -14,6 +14,8 @@ from .nodes import Job, Node, plugin, unsupported
 from .textures import color, picture, pixels
 from .views import FIELD_OF_VIEW, vertical_fov
 
+LEAST_ROWS = 3  # of an environment map; one with fewer repeats its last
+
 
 @plugin("area", "emitter", "radiance")
 def _area(node: Node, job: Job) -> Any:
@@ -75,7 +77,9 @@ def _environment_map(node: Node, job: Job) -> Environment:
     axes = axes / np.maximum(np.linalg.norm(axes, axis=0), 1e-300)
     if np.linalg.det(axes) < 0:  # mirrored: x becomes -x
         image, axes = image[:, ::-1], axes * (-1, 1, 1)
-    return Environment(np.ascontiguousarray(image), transform=axes, scale=node.number("scale", 1.0))
+    row = np.arange(max(len(image), LEAST_ROWS))
+    image = image[np.minimum(row, len(image) - 1)]
+    return Environment(image, transform=axes, scale=node.number("scale", 1.0), rows="poles")
 
 
 unsupported("directionalarea sunsky timed_sunsky", "emitter")
