@@ -11,6 +11,7 @@ from significance import Mean, assert_mean, assert_same_images, render, repeat
 import wavefront as wf
 from wavefront.integrators import training
 from wavefront.sampling.tiles import others_in_tile, place_in_tiles
+from wavefront.stages import reuse
 
 # --- Tiles ----------------------------------------------------------------------------------------
 
@@ -217,6 +218,17 @@ def test_glossy_points_keep_the_mean(spp: int, error: float) -> None:
     plain = repeat(lacquered(), spp, max_bounces=3)
     shared = repeat(lacquered(), spp, reuse=True, first_seed=100, max_bounces=3)
     assert_same_images(plain[:, :24, :24], shared[:, :24, :24], error)
+
+
+def test_glossy_points_that_nobody_reaches_stay_with_their_paths(monkeypatch: pytest.MonkeyPatch) -> None:
+    def nothing_arrives(scene, first, points, lights, number_in, glossy):
+        left = [number.compress(number >= 0) for numbers in number_in for number in numbers]
+        return [np.zeros((3, *first.present.shape), np.float32) for _ in lights], left
+
+    plain = repeat(lacquered(), 8, max_bounces=3)
+    monkeypatch.setattr(reuse, "_arriving", nothing_arrives)
+    own = repeat(lacquered(), 8, reuse=True, first_seed=100, max_bounces=3)
+    assert_same_images(plain[:, :24, :24], own[:, :24, :24], 0.004)
 
 
 def test_no_light_is_lost_or_won(close_tiles: None) -> None:
