@@ -94,6 +94,7 @@ if TYPE_CHECKING:
     from .io.foreign import from_open3d, from_pyvista
     from .io.load import from_mitsuba, from_trimesh, load, load_mesh
     from .io.sources import LoadLimits
+    from .measuring import Measurement, grid_points, load_points, measure
     from .viewer import Viewer, view
     from .views import render_many, turntable
 
@@ -108,6 +109,7 @@ _LATER = {  # what many programs do without is imported when they ask for it
     ".io.foreign": ("from_open3d", "from_pyvista"),
     ".io.load": ("from_mitsuba", "from_trimesh", "load", "load_mesh"),
     ".io.sources": ("LoadLimits",),
+    ".measuring": ("Measurement", "grid_points", "load_points", "measure"),
     ".testing": ("testing",),
     ".viewer": ("Viewer", "view"),
     ".views": ("render_many", "turntable"),
@@ -148,6 +150,7 @@ __all__ = [
     "LightSampler",
     "LoadLimits",
     "Material",
+    "Measurement",
     "Medium",
     "Mesh",
     "Mirror",
@@ -186,10 +189,13 @@ __all__ = [
     "from_open3d",
     "from_pyvista",
     "from_trimesh",
+    "grid_points",
     "integrators",
     "interpolate_cameras",
     "load",
     "load_mesh",
+    "load_points",
+    "measure",
     "orbit",
     "register_accelerator",
     "register_executor",

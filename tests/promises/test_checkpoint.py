@@ -26,6 +26,7 @@ import scenes
 
 import wavefront as wf
 from wavefront import cli
+from wavefront.camera import Sensors
 from wavefront.core import files
 from wavefront.core.npz import npz_chunks
 from wavefront.film import checkpoint
@@ -42,6 +43,10 @@ def scene(**options: Any) -> wf.Scene:
     shapes.append(wf.Sphere((0, -50, 0), 49, material=options.get("ground", wf.Diffuse(0.5))))
     camera = wf.Camera.look_at((0, 1, options.get("distance", 5)), (0, 0, 0), size=SIZE)
     return wf.Scene(shapes, [wf.Environment((0.4, 0.6, 1.0)), wf.PointLight((2, 4, 3), 30)], camera)
+
+
+POINTS = np.random.default_rng(0).uniform((-2, -1, -1), (2, 2, 2), (SIZE[0] * SIZE[1], 3))
+VIEWS: dict[str, dict[str, Any]] = {"picture": {}, "sensors": {"camera": Sensors(POINTS, (0, 1, 0.5))}}
 
 
 def digest(image: wf.Image) -> str:
@@ -67,10 +72,12 @@ def stopped_after(number: int, path: Path, **settings: Any) -> wf.Image:
 # --- The same bits ------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("view", VIEWS)
 @pytest.mark.parametrize("seed", range(2))
-def test_a_render_that_is_stopped_goes_on_with_the_same_bits(tmp_path: Path, seed: int) -> None:
+def test_a_render_that_is_stopped_goes_on_with_the_same_bits(tmp_path: Path, seed: int, view: str) -> None:
     rng, path, spp = random.Random(seed), tmp_path / "out.wfck", 23
-    settings: dict[str, Any] = {"spp": spp, "aovs": ("alpha", "albedo", "direct", "indirect", "depth")}
+    aovs = ("direct", "indirect", *(("alpha", "albedo", "depth") if view == "picture" else ()))
+    settings: dict[str, Any] = {"spp": spp, "aovs": aovs, **VIEWS[view]}
     whole = wf.render(scene(), **settings)
     pixels = SIZE[0] * SIZE[1]
     for _ in range(2):
@@ -89,21 +96,27 @@ def test_a_render_that_is_stopped_goes_on_with_the_same_bits(tmp_path: Path, see
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="workers that are forked")
-def test_worker_processes_go_on_with_the_same_bits(tmp_path: Path) -> None:
-    stopped_after(900, tmp_path / "a", spp=12, workers=2, executor="processes", wave_size=400)
-    resumed = wf.render(scene(), 12, checkpoint=tmp_path / "a", workers=3, executor="processes")
-    assert digest(resumed) == digest(wf.render(scene(), 12))
+@pytest.mark.parametrize("view", VIEWS)
+def test_worker_processes_go_on_with_the_same_bits(tmp_path: Path, view: str) -> None:
+    camera: dict[str, Any] = VIEWS[view]
+    stopped_after(900, tmp_path / "a", spp=12, workers=2, executor="processes", wave_size=400, **camera)
+    resumed = wf.render(scene(), 12, checkpoint=tmp_path / "a", workers=3, executor="processes", **camera)
+    assert digest(resumed) == digest(wf.render(scene(), 12, **camera))
 
 
+@pytest.mark.parametrize("view", VIEWS)
 @pytest.mark.parametrize("after", [10, 40])
-def test_adaptive_renders_go_on_with_the_same_decisions(tmp_path: Path, after: int) -> None:
+@pytest.mark.filterwarnings("ignore:noise=0.07 was not reached")
+def test_adaptive_renders_go_on_with_the_same_decisions(tmp_path: Path, after: int, view: str) -> None:
     """Whether they are stopped before, within or after a pass over some of the pixels."""
-    settings: dict[str, Any] = {"noise": 0.03, "spp": 200}
+    enough = {"noise": 0.03, "spp": 200} if view == "picture" else {"noise": 0.07, "spp": 64}
+    settings: dict[str, Any] = {**enough, **VIEWS[view]}
     whole = wf.render(scene(), **settings)
     assert whole.counts is not None
     assert whole.counts.min() < whole.counts.max()
     pixels = SIZE[0] * SIZE[1]
-    stopped_after(after * pixels - 57, tmp_path / "a", wave_size=101, **settings)
+    wave_size = 101 if view == "picture" else 401
+    stopped_after(after * pixels - 57, tmp_path / "a", wave_size=wave_size, **settings)
     resumed = wf.render(scene(), checkpoint=tmp_path / "a", **settings)
     assert digest(resumed) == digest(whole)
 

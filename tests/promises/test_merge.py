@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 import wavefront as wf
 from wavefront.arrays.vec import f4
+from wavefront.camera import Sensors
 from wavefront.cli import main
 from wavefront.film.film import Film
 
@@ -118,11 +119,16 @@ def test_ranges_that_make_no_picture_are_errors(options: dict[str, Any], message
 AOVS = ("alpha", "albedo", "direct", "indirect", "light_groups", "coverage", "depth")
 
 
+@pytest.mark.parametrize("view", ["picture", "sensors"])
 @pytest.mark.parametrize("cuts", [(8,), (1,), (5, 11), (3, 4, 13), (2, 4, 6, 8, 10, 12, 14)])
-def test_pictures_of_any_parts_merge_to_one_render(cuts: tuple[int, ...]) -> None:
-    whole = wf.render(SCENE, 16, aovs=AOVS)
+def test_pictures_of_any_parts_merge_to_one_render(cuts: tuple[int, ...], view: str) -> None:
+    settings: dict[str, Any] = {"aovs": AOVS}
+    if view == "sensors":
+        points = np.random.default_rng(0).uniform(-2, 2, (50, 3))
+        settings = {"aovs": AOVS[2:5], "camera": Sensors(points, points)}
+    whole = wf.render(SCENE, 16, **settings)
     parts = [
-        wf.render(SCENE, samples=range(first, end), aovs=AOVS, wave_size=70 + first)
+        wf.render(SCENE, samples=range(first, end), wave_size=70 + first, **settings)
         for first, end in pairwise((0, *cuts, 16))
     ]
     merged = reduce(wf.Image.merge, parts)

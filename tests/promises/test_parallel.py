@@ -14,11 +14,13 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import scenes
 from threadpoolctl import threadpool_limits
 
 import wavefront as wf
+from wavefront.camera import Sensors
 from wavefront.core.shared import STOP, SharedInt, Stopped
 from wavefront.scheduling import executors
 from wavefront.scheduling.executors import MIN_PATHS, MIN_PATHS_TO_SPAWN, choose_executor, worker_count
@@ -323,8 +325,12 @@ def test_a_daemon_has_threads() -> None:
 
 @pytest.mark.parametrize("accel", ["numpy", "auto"])
 @pytest.mark.parametrize("executor", EXECUTORS)
-def test_the_executor_changes_no_bit(executor: str, accel: str) -> None:
-    options = {"accel": accel, "progress": False, "wave_size": 500}
+@pytest.mark.parametrize("kind", ["picture", "irradiance", "fluence"])
+def test_the_executor_changes_no_bit(executor: str, accel: str, kind: str) -> None:
+    options: dict[str, Any] = {"accel": accel, "progress": False, "wave_size": 500}
+    if kind != "picture":
+        points = np.random.default_rng(0).uniform(-1, 1, (63, 3))
+        options["camera"] = Sensors(points, (0, 1, 0) if kind == "irradiance" else None, kind)
     image = wf.render(scenes.everything(), 8, workers=2, executor=executor, **options)
     alone = wf.render(scenes.everything(), 8, workers=1, executor="threads", **options)
     assert image.rgb.tobytes() == alone.rgb.tobytes()

@@ -2,6 +2,7 @@
 
 from .base import Camera, check_camera, field_of_view, image_size, upward
 from .projection import Orthographic, Panorama, Perspective, Projection
+from .sensors import Sensors
 
 __all__ = [
     "Camera",
@@ -9,6 +10,7 @@ __all__ = [
     "Panorama",
     "Perspective",
     "Projection",
+    "Sensors",
     "check_camera",
     "field_of_view",
     "image_size",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from copy import copy
 from typing import Any, ClassVar, Literal
 
@@ -59,6 +60,8 @@ class Camera:
     (array([32., 24.]), np.float64(4.0))
     """
 
+    sensor: str | None = None  # what is measured at each pixel; None where pixels are parts of a picture
+    scatterings: int = 0  # of each path before it leaves the camera
     given_elsewhere: ClassVar[dict[str, str]] = dict.fromkeys(
         ("position", "location", "eye", "target", "look_at", "up", "fov"),
         "wf.Camera.look_at(origin, target, up, fov=..., size=...)",
@@ -417,6 +420,14 @@ class Camera:
             raise AttributeError(f"a camera with {type(self.projection).__name__} rays has no fov")
         return self.projection.fov
 
+    def layers(self) -> dict[str, NDArray[Any]] | None:
+        """Return the layers that the picture has from the camera itself; None where they are rendered."""
+        return None
+
+    def metadata(self) -> Mapping[str, Any]:
+        """Return what the metadata of the picture say of the camera beside its size."""
+        return {}
+
     @property
     def uses_lens(self) -> bool:
         """Whether rays start at sampled points of a lens."""
@@ -430,6 +441,25 @@ class Camera:
         width, whole = np.uint32(self.size[0]), np.uint32(self.resolution[0])
         row = pixel // width
         return ((row + np.uint32(y0)) * whole + (pixel - row * width + np.uint32(x0))).astype(np.uint32)
+
+    def pixel_rays(
+        self, pixel: Words, at: Floats, center: NDArray[np.float64], lens: Floats | None = None
+    ) -> tuple[Floats, Floats]:
+        """Return origins and unit directions (3, n) of rays through points of pixels.
+
+        Parameters
+        ----------
+        pixel
+            (n,) row-major index in the whole picture.
+        at
+            (2, n) or (2, 1) position in pixels, from the upper left corner of the pixel.
+        center, lens
+            As for `rays`.
+        """
+        width = np.uint32(self.resolution[0])
+        row = pixel // width
+        x, y = (pixel - row * width).astype(f4) + at[0], row.astype(f4) + at[1]
+        return self.rays(x, y, center, lens)
 
     def rays(
         self, x: Floats, y: Floats, center: NDArray[np.float64], lens: Floats | None = None

@@ -261,18 +261,18 @@ class Film(Sums):
             found[:, :, self.dropped[span] > 0] = 0
         return found
 
-    def relative_variance(self) -> Doubles:
+    def relative_variance(self, outliers: float = OUTLIERS) -> Doubles:
         """Estimate the squared relative error of each pixel, the mean of its channels, (pixels,).
 
         It is relative to the square of the channel plus `EPSILON` times the picture's squared mean, which
-        limits the weight of black pixels. The error of the worst `OUTLIERS` of the pixels is limited to that
+        limits the weight of black pixels. The error of the worst `outliers` of the pixels is limited to that
         of the worst other pixel, so that fireflies do not dominate the picture.
         """
         floor = self._floor()
         out = np.empty(self.count.size)
         for span in chunks(self.count.size):
             out[span] = self._relative(self.squared_error(span), span, floor)
-        return _without_outliers(out)
+        return _without_outliers(out, outliers)
 
     def rare_part(self, relative: Doubles) -> float | None:
         """Estimate the part of the squared error that rests on few samples; None below `LEAST_FOR_RARE`.
@@ -324,8 +324,9 @@ class Film(Sums):
                 variance[span] = self.variance(span).T
                 error[span] = np.sqrt(squared_error).T
             relative[span] = self._relative(squared_error, span, floor)
-        relative = _without_outliers(relative)
-        return Estimates(mean, variance, error, float(np.sqrt(relative.mean())), self.rare_part(relative))
+        worst, relative = float(np.sqrt(relative.max())), _without_outliers(relative)
+        noise = float(np.sqrt(relative.mean()))
+        return Estimates(mean, variance, error, noise, worst, self.rare_part(relative))
 
 
 @soa
@@ -336,12 +337,13 @@ class Estimates:
     variance: Floats  # (pixels, 3) of one sample; NaN for fewer than two
     standard_error: Floats  # (pixels, 3) of `mean`; NaN for fewer than two samples
     noise: float  # relative error of the picture
+    worst: float  # of its pixels
     rare: float | None  # part of its square that rests on few samples; None if that is not known
 
 
-def _without_outliers(relative: Doubles) -> Doubles:
-    """Limit the worst `OUTLIERS` of the pixels to the worst of the others."""
-    worst = relative.size - 1 - int(OUTLIERS * relative.size)
+def _without_outliers(relative: Doubles, outliers: float = OUTLIERS) -> Doubles:
+    """Limit the worst `outliers` of the pixels to the worst of the others."""
+    worst = relative.size - 1 - int(outliers * relative.size)
     return np.minimum(relative, np.partition(relative, worst)[worst])
 
 

@@ -233,7 +233,7 @@ class Image:
             self.rgb,
             self._region(region, kind),
             self.standard_error,
-            self._freedom(),
+            self.freedom(),
             self.scatter,
             self._error_absent(),
         )
@@ -263,8 +263,8 @@ class Image:
             raise SceneError("mean: the region has no pixel")
         return mask
 
-    def _freedom(self) -> NDArray[np.float64]:
-        """Return the degrees of freedom (H, W) of the standard error of each pixel."""
+    def freedom(self) -> NDArray[np.float64]:
+        """Return the degrees of freedom (H, W) with which the standard error of each pixel is known."""
         shape = self.rgb.shape[:2]
         counts = np.full(shape, self.spp) if self.counts is None else self.counts
         distinct, which = np.unique(counts, return_inverse=True)
@@ -819,6 +819,7 @@ def _film_rgb(film: Film, metadata: Mapping[str, Any]) -> Image:
     shape = height, width, 3
     estimates = film.estimates()
     error = estimates.standard_error.reshape(shape)
+    noise = estimates.worst if "sensor" in metadata else estimates.noise  # that `noise` limits
     scatter: tuple[Scatter, ...] = ()
     if metadata.get("reuse") and {"film", "window"} <= metadata.keys():
         whole, window = metadata["film"], metadata["window"]
@@ -826,7 +827,7 @@ def _film_rgb(film: Film, metadata: Mapping[str, Any]) -> Image:
     return Image(
         estimates.mean.reshape(shape),
         round(float(film.count.mean())),
-        {**metadata, "noise": estimates.noise, "rare": estimates.rare},
+        {**metadata, "noise": noise, "rare": estimates.rare},
         counts=film.used().reshape(height, width).copy(),
         variance=estimates.variance.reshape(shape),
         standard_error=error,

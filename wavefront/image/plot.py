@@ -32,7 +32,7 @@ def draw(name: str, values: NDArray[Any], names: Mapping[int, str] | None, axes:
     axes
         Axes of matplotlib, or None for new ones.
     """
-    pyplot = _pyplot()
+    pyplot = import_pyplot()
     axes = pyplot.subplots()[1] if axes is None else axes
     axes.set_title(name)
     axes.set_axis_off()
@@ -46,7 +46,14 @@ def draw(name: str, values: NDArray[Any], names: Mapping[int, str] | None, axes:
     return axes
 
 
-def _pyplot() -> Any:
+def import_pyplot() -> Any:
+    """Return matplotlib's pyplot.
+
+    Raises
+    ------
+    ImportError
+        If it is not installed. The message says how to install it.
+    """
     try:
         from matplotlib import pyplot
     except ImportError as error:

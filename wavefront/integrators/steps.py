@@ -16,6 +16,7 @@ from ..stages.interaction import interaction
 from ..stages.intersect import intersect
 from ..stages.medium import absorb
 from ..stages.normal_mapping import perturb_normals
+from ..stages.sensors import at_sensors, sensor_shading
 from ..stages.shade import Shading, emitted, mis_weighted, shading, without_caustics
 from ..stages.shadow_catcher import off_catchers
 
@@ -34,6 +35,8 @@ def intersect_and_compact(
     With `mis` the light is weighted against light sampling. `keep` returns the lanes of the paths that
     scatter; the others end here.
     """
+    if paths.receiver is not None:
+        return paths, at_sensors(paths)
     hits, left = intersect(scene, paths), paths.exclude_prim
     paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce)
     emission = without_caustics(scene, paths, left, hits, emitted(scene, paths, hits))
@@ -51,6 +54,8 @@ def intersect_and_compact(
 
 def prepare_shading(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
     """Apply absorption along the paths, and prepare their surfaces for shading."""
+    if paths.receiver is not None:
+        return sensor_shading(scene, paths)
     surface = interaction(scene, paths, hits)
     perturb_normals(scene, surface)
     absorb(scene, paths.throughput, hits, surface)

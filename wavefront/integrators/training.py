@@ -91,7 +91,7 @@ def _trace(
     pixel, sample = _addresses(camera, first, count)
     paths = generate(scene, camera, sampler, pixel, sample)
     recorder = paths.recorder = VertexRecorder()
-    L = li_full(scene, paths, sampler, max_bounces, table=table)
+    L = li_full(scene, paths, sampler, max_bounces + camera.scatterings, table=table)
     joined = Vertices.concatenate(recorder.vertices) if recorder.vertices else _none()
     light = L.sum(0).take(joined.slot) - joined.found
     good = np.flatnonzero((joined.pdf > 0) & (joined.after > 0) & np.isfinite(light))

@@ -80,7 +80,7 @@ class TrialJob:
         paths = generate(scene, self.camera, sampler, np.tile(self.pixels, count), sample)
         paths.recorder = points
         integrator = integrator_for(li_full, self.branches, self.reuse, table if self.guided else None)
-        L = integrator(scene, paths, sampler, self.max_bounces)
+        L = integrator(scene, paths, sampler, self.max_bounces + self.camera.scatterings)
         finite = np.where(np.isfinite(L), L, 0).reshape(3, BLOCKS, SAMPLES, self.pixels.size)
         rays = counter.nearest + SHADOW_RAY * counter.shadow
         rays = rays * (GUIDED_RAY if self.guided else 1) + SHARED_PATH * self.reuse * sample.size

@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays.soa import soa
 from ..arrays.state import Words
 from ..arrays.vec import Ints, distinct
-from ..film.film import MUCH_RARE, Film
+from ..film.film import MUCH_RARE, OUTLIERS, Film
 
 MIN_SPP = 32  # before anything is decided by an error estimate
 MOST_RARE = 0.9  # part of the squared error, from where on it counts as this part
@@ -25,7 +25,12 @@ class Pass:
 
 
 def passes(
-    film: Film, spp: int, noise: float | None, square_of: Ints, begun: Pass | None = None
+    film: Film,
+    spp: int,
+    noise: float | None,
+    square_of: Ints,
+    begun: Pass | None = None,
+    everywhere: bool = False,
 ) -> Iterator[Pass]:
     """Yield what is to be done, one pass after the other; each decides by what is on the film then.
 
@@ -52,6 +57,9 @@ def passes(
         (pixels,) number of the square of each pixel.
     begun
         The pass with which a render begins that goes on from a checkpoint.
+    everywhere
+        Whether each pixel must have an error of `noise` at most, not the picture: a square gets more samples
+        while one of its pixels has more.
     """
     pixels = np.arange(film.count.size, dtype=np.uint32)
     if noise is None:
@@ -67,12 +75,13 @@ def passes(
         last = min(next_stop(first), spp)
         yield Pass(pixels, first, last)
         first = last
-        error = film.relative_variance()
+        error = film.relative_variance(0 if everywhere else OUTLIERS)
         # inf where noise**2 would be an error
         limit = noise * noise * _trust(film.rare_part(error))
-        if error.mean() <= limit:
+        if (error.max() if everywhere else error.mean()) <= limit:
             return
-        noisy = np.bincount(square_of, error) / sizes > limit
+        above = np.bincount(square_of, error > limit) > 0
+        noisy = above if everywhere else np.bincount(square_of, error) / sizes > limit
         pixels = pixels[noisy[square_of[pixels]]]
 
 

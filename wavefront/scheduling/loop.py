@@ -103,7 +103,8 @@ class RenderLoop:
                 film = self.accumulator.film
                 if film.count.any():  # those of an earlier part of the render
                     bar.advance(self.accumulator.samples, self.scheduler.elapsed)
-                for step in passes(film, self.spp, self._noise, self.view.squares(), self.step):
+                squares, everywhere = self.view.squares(), self.view.camera.sensor is not None
+                for step in passes(film, self.spp, self._noise, squares, self.step, everywhere):
                     self.step = step
                     if step.first:
                         yield True

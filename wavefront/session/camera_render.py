@@ -59,7 +59,7 @@ class CameraRender:
         settings, choice, view = plan.settings, plan.choice, plan.scene.compiled.view(camera)
         self.camera, self.accumulator = camera, accumulator
         self._plan, self._view = plan, view
-        self._geometric: dict[str, NDArray[Any]] | None = None  # not made yet
+        self._geometric = camera.layers()  # None: not made yet
         self._boxes: list[dict[str, Any]] | None = None
         self._sweeps: Generator[bool] | None = None
         self.file: CheckpointFile | None = None
@@ -195,6 +195,7 @@ class CameraRender:
             "background": _background_label(settings.values["background"]),
             **settings.labels(),
             "sample_ranges": [[first, first + most]],
+            **self.camera.metadata(),
             "film": list(self.camera.resolution),
             "window": list(self.camera.window),
             "branches": plan.choice.branches,

@@ -90,7 +90,7 @@ def choose(
         trial = Trial(whole, seed, bounces, run, GUIDE_TILES, workers)
         plain, guided = (_branched(settings, trial, replace(asked, guided=each)) for each in (False, True))
         return guided if _cost(trial, guided, plain) < GAIN else plain
-    if settings.is_full and _tries_something(settings, scene, whole):
+    if camera.sensor is None and settings.is_full and _tries_something(settings, scene, whole):
         return _tried(settings, scene, whole, Trial(whole, seed, bounces, run, workers=workers), asked)
     return asked
 

@@ -89,7 +89,8 @@ def check_last_image(image: Image, plan: Plan, loop: RenderLoop, surfaces: int) 
             f"clamp={values['clamp']:g} removed {100 * found['clamped']:.1f} % of the light, so the picture "
             'is too dark: raise it; the AOV "clamped" shows where'
         )
-    if values["background"] is None and _is_black_or_white(image):
+    in_picture = loop.view.camera.sensor is None
+    if in_picture and values["background"] is None and _is_black_or_white(image):
         from .diagnosis import warn_of_black_or_white  # here, as most pictures do without
 
         integrator = INTEGRATORS.label(values["integrator"])

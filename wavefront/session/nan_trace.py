@@ -47,7 +47,7 @@ def first_nan(user_scene: Scene, tracer: Tracer, view: CameraJob, pixels: Words,
     table = tracer.table if view.guided else None
     integrator = integrator_for(tracer.integrator, view.branches, view.reuse, table)
     with np.errstate(all="ignore"):
-        integrator(tracer.scene, paths, sampler, tracer.max_bounces)
+        integrator(tracer.scene, paths, sampler, tracer.max_bounces + camera.scatterings)
         return recorder.place or _nan_of_light(tracer, camera, pixels, samples)
 
 

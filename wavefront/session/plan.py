@@ -50,7 +50,8 @@ def with_choice(plan: Plan, camera: Camera, run: JobsRunner) -> Plan:
     with phase("trying what pays", plan.settings.values["progress"]), single_threaded_blas:
         view, workers = compiled.view(camera), plan.budget.workers
         choice = choose(plan.settings, compiled, view, has_guide, run, workers)
-    hint = caustics_hint(plan.settings, plan.scene) or choice.hint
+    hint = caustics_hint(plan.settings, plan.scene) if camera.sensor is None else None
+    hint = hint or choice.hint
     return replace(plan, choice=replace(choice, hint=hint))
 
 

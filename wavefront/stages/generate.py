@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays.state import Paths, Rays, Words
-from ..arrays.vec import Floats, broadcast, f4
+from ..arrays.vec import broadcast, f4
 from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..sampling.filters import Filter, box
 from ..sampling.sampler import Dimension, Sampler
+from .sensors import receiver_of_camera
 
-HALF = f4(0.5)
+HALF = np.full((2, 1), 0.5, f4)
 
 
 def generate(
@@ -26,13 +27,11 @@ def generate(
     filter
         Distributes the samples of a pixel in and around it.
     """
-    n = len(pixel)
+    n, receiver = len(pixel), receiver_of_camera(camera)
     pixel = camera.address(pixel)
-    jitter = filter(sampler.draw_2d(pixel, sample, 0, Dimension.PIXEL))
-    column, row = _corners(camera, pixel)
-    x, y = column + jitter[0], row + jitter[1]
+    at = filter(sampler.draw_2d(pixel, sample, 0, Dimension.PIXEL))
     lens = sampler.draw_2d(pixel, sample, 0, Dimension.LENS) if camera.uses_lens else None
-    origin, direction = camera.rays(x, y, scene.center, lens)
+    origin, direction = camera.pixel_rays(pixel, at, scene.center, lens)
     return Paths(
         slot=np.arange(n),
         pixel=pixel,
@@ -43,20 +42,13 @@ def generate(
         throughput=np.ones((3, n), f4),
         pdf=broadcast(f4(1), n),
         specular=broadcast(np.True_, n),
-        roulette_scale=broadcast(f4(1), n),
+        roulette_scale=broadcast(f4(1) if receiver is None else f4(1) / receiver.total, n),
         left_rough=None if scene.specular_surfaces is None else broadcast(np.False_, n),
+        receiver=receiver,
     )
 
 
 def center_rays(scene: CompiledScene, camera: Camera, pixel: Words) -> Rays:
     """Return the rays through the centers of pixels (n,) and the center of the lens."""
-    column, row = _corners(camera, camera.address(pixel))
-    origin, direction = camera.rays(column + HALF, row + HALF, scene.center)
+    origin, direction = camera.pixel_rays(camera.address(pixel), HALF, scene.center)
     return Rays(origin, direction, np.full(len(pixel), -1, np.intp))
-
-
-def _corners(camera: Camera, address: Words) -> tuple[Floats, Floats]:
-    """Return the film points (n,), (n,) of the upper left corners of pixels (n,) of the whole picture."""
-    width = np.uint32(camera.resolution[0])
-    row = address // width
-    return (address - row * width).astype(f4), row.astype(f4)

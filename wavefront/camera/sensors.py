@@ -1,0 +1,105 @@
+"""Sensors at points: a camera each of whose pixels is a place of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import copy
+from typing import Any, NoReturn, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..arrays.state import Words
+from ..arrays.vec import Floats, f4
+from ..core.errors import SceneError, as_array, finite_array, one_of
+from .base import MAX_SIDE, Camera
+from .projection import Orthographic
+
+KINDS = ("irradiance", "fluence", "radiance")
+
+
+class Sensors(Camera):
+    """Points that measure light, a pixel each: those of a picture of `rows` rows, the last ones unused.
+
+    Parameters
+    ----------
+    points
+        (n, 3) scene units.
+    directions
+        (n, 3) or (3,) of any length: normals of sensors of irradiance, where those of radiance look to; None
+        for fluence.
+    kind
+        "irradiance", W·m⁻², "fluence", W·m⁻², or "radiance", W·sr⁻¹·m⁻².
+
+    Raises
+    ------
+    SceneError
+        If there is no point, an array is malformed, or a direction is zero or missing.
+    """
+
+    def __init__(self, points: ArrayLike, directions: ArrayLike | None, kind: str = "irradiance") -> None:
+        self.sensor = one_of("kind", kind, KINDS)
+        self.points = finite_array("points", points, (None, 3))
+        count = len(self.points)
+        if not count:
+            raise SceneError("points is empty; there must be at least one point")
+        self.directions = self._unit_directions(directions)
+        self.scatterings = int(kind != "radiance")
+        rows = -(-count // MAX_SIDE)
+        middle = (self.points.min(0) + self.points.max(0)) / 2
+        super().__init__(middle, np.eye(3), Orthographic(1), (-(-count // rows), rows))
+
+    def _unit_directions(self, directions: ArrayLike | None) -> NDArray[np.float64]:
+        """Return unit directions (n, 3)."""
+        name = "directions" if self.sensor == "radiance" else "normals"
+        shape = self.points.shape
+        if self.sensor == "fluence":
+            if directions is not None:
+                raise SceneError("normals are given; fluence counts all directions alike and has none")
+            return np.broadcast_to((0.0, 0.0, 1.0), shape)
+        if directions is None:
+            raise SceneError(f"{self.sensor} needs {name}: (n, 3), or (3,) for all points")
+        given = finite_array(name, directions, (3,) if as_array(name, directions).ndim == 1 else shape)
+        length = np.linalg.norm(given, axis=-1, keepdims=True)
+        bad = np.flatnonzero(~(length > 0))
+        if bad.size:
+            raise SceneError(f"{name}[{bad[0]}] is zero; it must have a direction")
+        return np.broadcast_to(given / length, shape)
+
+    def __repr__(self) -> str:
+        """Return what is measured, and at how many points."""
+        return f"<Sensors: {self.sensor} at {len(self.points)} points>"
+
+    def layers(self) -> dict[str, NDArray[Any]]:
+        """Return the points and directions as layers (rows, columns, 3) of the picture; NaN where none is."""
+        width, rows = self.resolution
+        spare = np.full((width * rows - len(self.points), 3), np.nan)
+        both = {"position": self.points, "normal": self.directions}
+        return {name: np.concatenate([each, spare]).reshape(rows, width, 3) for name, each in both.items()}
+
+    def metadata(self) -> Mapping[str, Any]:
+        """Return what the metadata of the picture say of the sensors."""
+        return {"sensor": self.sensor, "points": len(self.points)}
+
+    def scaled(self, factor: float) -> Self:
+        """Return the same sensors in a scene whose lengths were multiplied by `factor`."""
+        sensors = copy(self)
+        sensors.origin, sensors.points = self.origin * factor, self.points * factor
+        return sensors
+
+    def resized(self, size: tuple[int, int]) -> NoReturn:
+        """Refuse another size: there is a pixel for each point."""
+        raise SceneError(f"size is {size!r}; sensors have a pixel for each point")
+
+    def cropped(self, crop: tuple[int, int, int, int]) -> Self:
+        """Return the same sensors: there is no picture of which a window could be a part."""
+        return self
+
+    def pixel_rays(
+        self, pixel: Words, at: Floats, center: NDArray[np.float64], lens: Floats | None = None
+    ) -> tuple[Floats, Floats]:
+        """Return the points, and the directions to them from above: those of radiance as they look."""
+        index = np.minimum(pixel, len(self.points) - 1)
+        origin = (self.points.take(index, 0) - center).T.astype(f4)
+        direction = self.directions.take(index, 0).T.astype(f4)
+        return origin, direction if self.sensor == "radiance" else -direction

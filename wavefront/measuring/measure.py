@@ -1,0 +1,130 @@
+"""measure(): a render whose pixels are sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import copy
+from typing import Any, Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..camera import Sensors
+from ..core.errors import SceneError
+from ..film.aov_names import chosen_aovs
+from ..io.to_scene import as_scene
+from ..render import finish
+from ..scene import Scene
+from ..session import Session
+from ..settings import AUTO, RenderSettings, refuse, takes_settings
+from .measurement import Measurement
+
+LIFT = 2.0**-22  # of the size of scene and points together: above the rounding of both to float32
+PLACES = "sensors are at the points that are given"
+PIXELS = "each sensor is a place of its own, and no picture"
+REFUSED = dict.fromkeys(("camera", "size", "view", "fov"), PLACES) | {"background": PIXELS, "denoise": PIXELS}
+LAYERS = ("direct", "indirect", "light_groups")
+
+
+@takes_settings
+def measure(
+    scene: Any,
+    points: ArrayLike,
+    normals: ArrayLike | None = None,
+    *,
+    kind: str = "irradiance",
+    spp: int | None = None,
+    **settings: Unpack[RenderSettings],
+) -> Measurement:
+    """Measure the light that arrives at points, with its standard error.
+
+    Parameters
+    ----------
+    scene
+        As for `render`. Only its own light counts, unless `lighting` names a preset.
+    points
+        (n, 3) where the sensors are, scene units. A point on a surface is on the side that its normal points
+        to: sensors of irradiance are moved along their normals by about a millionth of the scene's size.
+        Sensors cast no shadow.
+    normals
+        (n, 3), or (3,) for all points, of any length: the normals of the plane that irradiance falls on, or,
+        for radiance, the directions in which the sensors look. None for fluence.
+    kind
+        "irradiance", ∫ L cosθ dω over the hemisphere of the normal, W·m⁻²; "fluence", ∫ L dω over all
+        directions alike, W·m⁻² (the fluence rate, also known as scalar or spherical irradiance); "radiance",
+        L from one direction, W·sr⁻¹·m⁻².
+    spp
+        Samples per point, as for `render`.
+    noise
+        Measure until the estimated relative error of every point is at most this: 0.01 means 1 %. Points with
+        less than a tenth of the mean of all points count as if they had that much.
+    max_bounces
+        The most scattering events along a path in the scene: with 0 light arrives from lights alone.
+    aovs
+        "direct", "indirect" and "light_groups", to have these parts apart.
+    {settings}
+
+    Returns
+    -------
+    Measurement
+
+    Raises
+    ------
+    SceneError
+        If an argument or the scene is malformed, or a setting is one of pictures.
+    Interrupted, RenderError
+        As for `render`. `Measurement(error.image)` is what was measured so far, if there is an image.
+
+    Examples
+    --------
+    >>> scene = wf.Scene([wf.Sphere((0, 0, 3), 0.5, emission=2)])
+    >>> found = wf.measure(scene, [(0, 0, 0), (1, 0, 0)], normals=(0, 0, 1), spp=64)
+    >>> found.value.shape, found.standard_error.shape, found.samples.tolist()
+    ((2, 3), (2, 3), [64, 64])
+    >>> low, high = found.interval(0.95)
+    >>> exact = 2 * np.pi * (0.5 / 3) ** 2
+    >>> bool(abs(found.value[0, 0] - exact) < 0.01 * exact)
+    True
+    """
+    subject = as_scene(
+        scene, settings.get("material"), settings.get("progress"), settings.get("smooth", AUTO)
+    )
+    sensors = lifted(subject, Sensors(points, normals, kind))
+    return measured(subject, sensors, spp, settings)
+
+
+def measured(scene: Scene, sensors: Sensors, spp: int | None, settings: Mapping[str, Any]) -> Measurement:
+    """Return what sensors measure in a scene, with settings of `measure`."""
+    subject = copy(scene)
+    subject.settings = {name: value for name, value in scene.settings.items() if name not in REFUSED}
+    return Measurement(finish(Session(subject, spp, **sensor_settings(settings), camera=sensors)))
+
+
+def sensor_settings(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings of a render for sensors.
+
+    Raises
+    ------
+    SceneError
+        If one of them is for pictures only.
+    """
+    for name, why in {"reuse": PIXELS, "caustics": "paths from lights reach no point"}.items():
+        if given.get(name) is True:
+            raise SceneError(f"{name} is True; {why}")
+    refuse({name: value for name, value in given.items() if value is not False}, REFUSED)
+    aovs = chosen_aovs("aovs", given.get("aovs", ()))
+    for name in aovs:
+        if name not in LAYERS:
+            raise SceneError(f"aovs has {name!r}; sensors have {', '.join(LAYERS)}")
+    lighting = given.get("lighting", AUTO)
+    fixed = {"reuse": False, "caustics": False, "denoise": False, "filter": "box", "ground": False}
+    return {**given, **fixed, "aovs": aovs, "lighting": None if lighting == AUTO else lighting}
+
+
+def lifted(scene: Scene, sensors: Sensors) -> Sensors:
+    """Return sensors of irradiance above the surfaces that they may lie on; others as they are."""
+    if sensors.sensor != "irradiance":
+        return sensors
+    places = np.concatenate([sensors.points, scene.bounds])
+    size = float(np.linalg.norm(np.ptp(places, axis=0)))
+    return Sensors(sensors.points + LIFT * size * sensors.directions, sensors.directions)

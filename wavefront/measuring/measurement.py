@@ -1,0 +1,231 @@
+"""What sensors have measured, and its error."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays.vec import Doubles
+from ..core.errors import SaveError, SceneError, number
+from ..core.files import write_bytes
+from ..image import Image
+from ..statistics.student_t import t_quantile
+
+COLORS = ("r", "g", "b")
+
+
+class Measurement:
+    """Light at points, from `measure`.
+
+    Parameters
+    ----------
+    image
+        The picture with a pixel for each sensor.
+
+    Attributes
+    ----------
+    value
+        (n, 3) mean of each channel: W·m⁻² (irradiance, fluence) or W·sr⁻¹·m⁻² (radiance).
+    standard_error
+        (n, 3) of `value`; NaN for fewer than two samples.
+    samples
+        (n,) of each point.
+    points, normals
+        (n, 3) of the sensors, scene units; what radiance has for directions are its normals.
+    kind
+        "irradiance", "fluence" or "radiance".
+    metadata
+        The settings and results of the render.
+    image
+        As given.
+
+    Raises
+    ------
+    SceneError
+        If the picture is not one of sensors.
+
+    Examples
+    --------
+    >>> scene = [wf.Plane((0, 0, 0), (0, 0, 1), material=wf.Diffuse(0)), wf.Environment(1)]
+    >>> found = wf.measure(scene, [(0, 0, 1)], kind="fluence", spp=16)
+    >>> isinstance(found, wf.Measurement), found.kind
+    (True, 'fluence')
+    >>> np.allclose(found.value, 2 * np.pi, rtol=0.02)
+    True
+    """
+
+    def __init__(self, image: Image) -> None:
+        if not isinstance(image, Image) or "sensor" not in image.metadata or "position" not in image.layers:
+            raise SceneError("is no measurement: that is an npz file, or a picture, of wf.measure")
+        self.image = image
+        self.metadata = image.metadata
+        self.kind: str = image.metadata["sensor"]
+        self._count: int = image.metadata["points"]
+        self.value = self._rows(image.rgb)
+        self.standard_error = self._rows(image.standard_error)
+        self.samples = self._rows(image.counts)
+        self.points = self._rows(image.layers["position"])
+        self.normals = self._rows(image.layers["normal"])
+
+    def __repr__(self) -> str:
+        """Return what was measured, at how many points, and the largest relative error."""
+        return (
+            f"<Measurement: {self.kind} at {self._count} points, error {self.metadata['noise']:.2%} at most>"
+        )
+
+    def _rows(self, values: Any) -> NDArray[Any]:
+        """Return the values of pixels (rows, columns, ...) as those of the points (n, ...)."""
+        return np.ascontiguousarray(values.reshape(-1, *values.shape[2:])[: self._count])
+
+    def interval(self, confidence: float = 0.95) -> tuple[Doubles, Doubles]:
+        """Return the confidence interval of each value: lower and upper limits, (n, 3) each.
+
+        It is that of Student's t distribution; its degrees of freedom are the batches of samples, of which
+        the standard error is made, less one.
+
+        Parameters
+        ----------
+        confidence
+            The probability that it contains the true value, above 0 and below 1.
+
+        Raises
+        ------
+        SceneError
+            If the confidence is out of range.
+        """
+        confidence = number("interval: confidence", confidence, lambda x: 0 < x < 1, "above 0 and below 1")
+        away = t_quantile(confidence, self._rows(self.image.freedom()))[:, None] * self.standard_error
+        return self.value - away, self.value + away
+
+    @property
+    def direct(self) -> NDArray[np.float32]:
+        """(n, 3) the part that comes straight from lights; measure with aovs="direct"."""
+        return self.part("direct")[0]
+
+    @property
+    def indirect(self) -> NDArray[np.float32]:
+        """(n, 3) the part that comes from surfaces; measure with aovs="indirect"."""
+        return self.part("indirect")[0]
+
+    def part(self, name: str) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return a part of the light and its standard error, (n, 3) each.
+
+        Parameters
+        ----------
+        name
+            "direct", "indirect", or a group of lights: "light_groups.sun".
+
+        Raises
+        ------
+        SceneError
+            If it was not asked for.
+        """
+        if name not in self.image.errors:
+            found = ", ".join(self.image.errors) or "no part"
+            raise SceneError(f"{name!r} was not measured; there is {found}: measure(aovs=...) asks for parts")
+        return self._rows(self.image.layers[name]), self._rows(self.image.errors[name])
+
+    def merge(self, other: Measurement) -> Measurement:
+        """Return the measurement of the samples of both, which `measure(samples=...)` took.
+
+        Parameters
+        ----------
+        other
+            A measurement of other samples of the same points.
+
+        Raises
+        ------
+        SceneError
+            As `Image.merge`.
+        """
+        return Measurement(self.image.merge(other.image))
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Return arrays (n,) by name, as tables have them: `pandas.DataFrame(found.columns())`.
+
+        They are x, y, z, nx, ny, nz, r, g, b, the standard errors r_error, g_error, b_error, and samples;
+        for parts that were measured also "direct.r" and so on.
+        """
+        axes = ("x", "y", "z")
+        tables = [(axes, self.points), (tuple(f"n{each}" for each in axes), self.normals)]
+        tables += [(COLORS, self.value), (tuple(f"{each}_error" for each in COLORS), self.standard_error)]
+        for name in self.image.errors:
+            value, error = self.part(name)
+            tables.append((tuple(f"{name}.{each}" for each in COLORS), value))
+            tables.append((tuple(f"{name}.{each}_error" for each in COLORS), error))
+        found = {name: column for names, table in tables for name, column in zip(names, table.T, strict=True)}
+        return {**found, "samples": self.samples}
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the measurement by the extension: npz holds all of it, csv the table of `columns`.
+
+        Parameters
+        ----------
+        path
+            Where to write.
+
+        Raises
+        ------
+        SaveError
+            If the file cannot be written.
+        """
+        kind = Path(path).suffix.lower()
+        if kind == ".npz":
+            self.image.save(path)
+        elif kind == ".csv":
+            table = self.columns()
+            rows = zip(*(column.tolist() for column in table.values()), strict=True)
+            lines = (",".join(map(str, row)) + "\n" for row in ((*table,), *rows))
+            write_bytes(path, "".join(lines).encode())
+        else:
+            raise SaveError(f"{os.fspath(path)}: a measurement is saved as npz or csv")
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read an npz file of `save`.
+
+        Parameters
+        ----------
+        path
+            The file.
+
+        Raises
+        ------
+        SceneError
+            If it is missing, damaged, or something else.
+        """
+        image = Image.load(path)
+        try:
+            return cls(image)
+        except SceneError as error:
+            raise SceneError(f"{os.fspath(path)}: {error}") from None
+
+    def plot(self, levels: int = 8, axes: Any = None) -> Any:
+        """Plot the luminance of the values with matplotlib: false color and isolines over a plane of points.
+
+        Parameters
+        ----------
+        levels
+            Number of isolines, about.
+        axes
+            Axes of matplotlib to draw into; by default those of a new figure.
+
+        Returns
+        -------
+        Any
+            The axes.
+
+        Raises
+        ------
+        SceneError
+            If the points are on one line.
+        ImportError
+            If matplotlib is not installed. The message says how to install it.
+        """
+        from .plot import draw
+
+        return draw(self, levels, axes)
