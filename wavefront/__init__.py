@@ -56,7 +56,7 @@ from .lights import (
 from .lights.choice import LightSampler
 from .material_ball import ball_png
 from .materials import Material
-from .media import Medium
+from .media import HenyeyGreenstein, Isotropic, Medium, PhaseFunction, PhaseMix, Rayleigh
 from .render import render
 from .sampling import warp
 from .sampling.sampler import Sampler
@@ -139,11 +139,13 @@ __all__ = [
     "Frame",
     "Geometry",
     "HeightField",
+    "HenyeyGreenstein",
     "Image",
     "InfiniteLight",
     "Instance",
     "Interrupted",
     "Intersections",
+    "Isotropic",
     "Light",
     "LightRecord",
     "LightSample",
@@ -157,6 +159,8 @@ __all__ = [
     "Mix",
     "NormalMap",
     "OrenNayar",
+    "PhaseFunction",
+    "PhaseMix",
     "Plane",
     "Plastic",
     "PointLight",
@@ -164,6 +168,7 @@ __all__ = [
     "Points",
     "Principled",
     "Projector",
+    "Rayleigh",
     "Receiver",
     "Rectangle",
     "RegionMean",

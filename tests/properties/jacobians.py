@@ -19,7 +19,13 @@ from wavefront.bsdfs.albedo import gloss_tables
 from wavefront.bsdfs.sheen import _albedo_table as sheen_table
 
 Doubles = np.ndarray
-ROOMS = ("wavefront.sampling.", "wavefront.bsdfs.", "wavefront.lights.", "wavefront.guiding.")
+ROOMS = (
+    "wavefront.sampling.",
+    "wavefront.bsdfs.",
+    "wavefront.lights.",
+    "wavefront.guiding.",
+    "wavefront.media.",
+)
 ALONE = ("wavefront.arrays.vec", "wavefront.arrays.frame", "wavefront.sampling.filters")
 # functions that read the bits of float32 numbers, and what they compute
 OF_BITS = {"log": np.log, "exp": np.exp, "signs": lambda x: np.copysign(1.0, x)}

@@ -1,4 +1,4 @@
-"""Checks of BSDFs, lights and warps, for users and for the tests.
+"""Checks of BSDFs, lights, phase functions and warps, for users and for the tests.
 
 Examples
 --------
@@ -9,7 +9,8 @@ True
 
 from .bsdf import check_bsdf
 from .light import check_light
+from .phase import check_phase
 from .report import Check, Report
 from .warp import check_warp
 
-__all__ = ["Check", "Report", "check_bsdf", "check_light", "check_warp"]
+__all__ = ["Check", "Report", "check_bsdf", "check_light", "check_phase", "check_warp"]
