@@ -51,6 +51,7 @@ from .lights import (
     PointLights,
     Projector,
     Receiver,
+    Sky,
     SpotLight,
 )
 from .lights.choice import LightSampler
@@ -62,6 +63,7 @@ from .sampling import warp
 from .sampling.sampler import Sampler
 from .scene import Scene
 from .scene.lighting import studio
+from .scene.sun_position import sun_position
 from .session import Session
 from .shapes import (
     Box,
@@ -181,6 +183,7 @@ __all__ = [
     "ShadowCatcher",
     "Shape",
     "Sides",
+    "Sky",
     "Sphere",
     "Spheres",
     "SpotLight",
@@ -214,6 +217,7 @@ __all__ = [
     "save_animation",
     "srgb",
     "studio",
+    "sun_position",
     "testing",
     "turntable",
     "vec",

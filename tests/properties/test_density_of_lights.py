@@ -92,6 +92,16 @@ def images(draw):
     return record.compensated() if draw(st.booleans()) else record
 
 
+@st.composite
+def skies(draw):
+    """A sky of the CIE, turned, and what is left of it for light samples."""
+    type, up = draw(st.integers(1, 16)), draw(st.sampled_from(["x", "y", "z"]))
+    sun = np.eye(3)["xyz".index(up)] + [draw(st.floats(-0.5, 0.5)) for _ in range(3)]
+    record = wf.Sky.cie(type, sun, up, horizontal=(1, 2, 3)).record(np.zeros(3))
+    left = record.compensated()
+    return left if left.table.share and draw(st.booleans()) else record
+
+
 # Whether the direction of a sample is all that its density depends on, and with what tolerance
 KINDS = {
     "triangle": (triangles(), 1e-4),
@@ -104,6 +114,7 @@ KINDS = {
     "textured sphere": (textured_spheres(), 1e-4),
     "sun": (suns, 1e-4),
     "image": (images(), 1e-4),
+    "sky": (skies(), 1e-4),
     "constant": (st.just(ConstantEnvironment(RADIANCE)), 1e-4),
 }
 kinds = pytest.mark.parametrize("kind", KINDS)
@@ -113,7 +124,7 @@ def test_every_light_is_here() -> None:
     checked = {
         *("TriangleLights", "TwoSidedTriangleLights", "TexturedTriangleLights", "RectangleLights"),
         *("TwoSidedTexturedTriangleLights", "TwoSidedRectangleLights", "SphereLights", "SunLight"),
-        *("TexturedSphereLights", "ImageEnvironment", "ConstantEnvironment", "EnvironmentSum"),
+        *("TexturedSphereLights", "ImageEnvironment", "ConstantEnvironment", "EnvironmentSum", "SkyLight"),
         *("DirectionalLights", "PointLightRecord", "SpotLights", "PicturedLights"),
     }
     bases = {"LightRecord", "InfiniteLight", "DeltaLight", "PlanarLights"}
@@ -164,7 +175,9 @@ def test_samples_have_their_density(kind: str, data: st.DataObject, place, u: tu
     np.testing.assert_allclose(light.le(sample.wi), sample.radiance, rtol=1e-3)
 
 
-@pytest.mark.parametrize("kind", ["triangle", "two-sided rectangle", "sphere", "image", "sun", "constant"])
+@pytest.mark.parametrize(
+    "kind", ["triangle", "two-sided rectangle", "sphere", "image", "sky", "sun", "constant"]
+)
 @few
 @given(data=st.data(), place=places, height=st.floats(0.2, 1))
 def test_densities_integrate_to_one(kind: str, data: st.DataObject, place, height: float) -> None:

@@ -148,7 +148,7 @@ def test_two_environments_are_refused() -> None:
 
 @pytest.mark.parametrize("name", ["Studio", "", 3, ["even"]])
 def test_other_names_are_refused(name) -> None:
-    known = "studio, softbox, three_point, cloudy, even"
+    known = "studio, softbox, three_point, cloudy, daylight, even"
     with pytest.raises(wf.SceneError, match=f"lighting is .* must be auto, None or one of {known}"):
         wf.render("no such file.obj", 1, lighting=name)
     with pytest.raises(wf.SceneError, match=f"preset is .* one of {known}"):

@@ -8,6 +8,7 @@ from .infinite import EnvironmentSum, InfiniteLight
 from .point import PointLight, PointLightRecord, PointLights
 from .projector import Projector
 from .rectangle import RectangleLights, TwoSidedRectangleLights, first_of_pairs
+from .sky import Sky, SkyLight
 from .sphere import SphereLights
 from .spot import PicturedLights, SpotLight, SpotLights
 from .table import LightTable
@@ -36,6 +37,8 @@ __all__ = [
     "Projector",
     "Receiver",
     "RectangleLights",
+    "Sky",
+    "SkyLight",
     "SphereLights",
     "SpotLight",
     "SpotLights",

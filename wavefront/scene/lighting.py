@@ -19,7 +19,7 @@ from ..arrays.vec import Doubles
 from ..bsdfs import Diffuse
 from ..camera import Camera, upward
 from ..core.errors import SceneError
-from ..lights import Environment
+from ..lights import Environment, Light, Sky
 from ..materials import Material
 from ..shapes import Disk, Mesh
 from ..textures.image import Texture
@@ -139,13 +139,16 @@ PRESETS = {
     ),
     "cloudy": Preset(((-1, 0.1), (-0.35, 0.1), (0.12, 0.45), (1, 1.3))),
 }
-LIGHTINGS = (*PRESETS, "even")
+# A clear sky and the sun: direction from right, up and front; W·m⁻² from the sky, and from the sun that faces
+SUN, SKYLIGHT, SUNLIGHT = (-0.65, 0.62, 0.45), (0.45, 0.65, 1.0), (2.75, 2.45, 2.0)
+DAYLIGHT_GROUND = 0.3  # albedo
+LIGHTINGS = (*PRESETS, "daylight", "even")
 DEFAULT = "studio"
 FRONT = 0.35, 0.3, 1.0  # direction of the camera that light is relative to by default, where y is up
 STEEP = 1e-3  # sine between the view and the vertical below which a camera looks straight down
 
 
-def studio(preset: str = DEFAULT, *, up: ArrayLike = "y", camera: Camera | None = None) -> list[Environment]:
+def studio(preset: str = DEFAULT, *, up: ArrayLike = "y", camera: Camera | None = None) -> list[Light]:
     """Return the lights of a preset, to be put into a `Scene`.
 
     Parameters
@@ -153,8 +156,9 @@ def studio(preset: str = DEFAULT, *, up: ArrayLike = "y", camera: Camera | None 
     preset
         "studio": a large key light from the left, a weak fill from the right and a rim light from behind,
         before a dark gray gradient. "softbox": one large light before a darker one. "three_point": key, fill
-        and back light, smaller, with harder shadows. "cloudy": an overcast sky, brightest overhead. "even":
-        the same from all around.
+        and back light, smaller, with harder shadows. "cloudy": an overcast sky, brightest overhead.
+        "daylight": a clear blue sky and the sun, from the left and behind the camera. "even": the same from
+        all around.
     up
         Up direction of the scene: (3,), or the name of an axis, such as "z".
     camera
@@ -166,7 +170,7 @@ def studio(preset: str = DEFAULT, *, up: ArrayLike = "y", camera: Camera | None 
     Returns
     -------
     list
-        One `Environment`. Its light comes from infinity, so it suits scenes of any size.
+        One `Environment`, or one `Sky`. Its light comes from infinity, so it suits scenes of any size.
 
     Raises
     ------
@@ -184,6 +188,11 @@ def studio(preset: str = DEFAULT, *, up: ArrayLike = "y", camera: Camera | None 
     axes = _axes(up, camera)
     if preset == "even":
         return [Environment(1.0)]
+    if preset == "daylight":
+        sun = axes @ SUN
+        return [
+            Sky.cie(12, sun, axes[:, 1], horizontal=SKYLIGHT, direct_normal=SUNLIGHT, ground=DAYLIGHT_GROUND)
+        ]
     light = copy(_environment(preset, tuple(map(tuple, axes.tolist()))))
     light.backdrop = copy(light.backdrop)
     return [light]
@@ -216,13 +225,14 @@ def choose_preset(scene: Scene, lighting: str | None) -> str | None:
     Raises
     ------
     SceneError
-        If a preset is requested and the scene has an `Environment`.
+        If a preset is requested and the scene has an `Environment` or a `Sky`.
     """
     if lighting == "auto":
         return None if scene.emits else DEFAULT
-    if lighting is not None and any(isinstance(light, Environment) for light in scene.lights):
+    if lighting is not None and any(isinstance(light, Environment | Sky) for light in scene.lights):
         raise SceneError(
-            f"lighting={lighting!r} brings an Environment, and the scene has one; at most one is allowed"
+            f"lighting={lighting!r} brings an Environment, and the scene has one or a Sky; "
+            "at most one is allowed"
         )
     return lighting
 
@@ -287,7 +297,8 @@ def _ground(scene: Scene, preset: str | None, up: ArrayLike) -> Mesh:
     if preset is None:
         albedo = (OWN_LIGHT_GROUND,) * 3
     else:
-        albedo = PRESETS[preset].ground_albedo() if preset in PRESETS else (MOST_GROUND,) * 3
+        even = {"daylight": DAYLIGHT_GROUND, "even": MOST_GROUND}
+        albedo = PRESETS[preset].ground_albedo() if preset in PRESETS else (even[preset],) * 3
     texels = np.linspace(-1, 1, 129)
     rim = np.sqrt(texels[:, None] * texels[:, None] + texels * texels)
     alpha = smoothstep((1 - rim) / (1 - GROUND_FADE))

@@ -161,9 +161,9 @@ class RenderSettings(TypedDict, total=False):
         str | None,
         Setting(
             "auto",
-            '"studio", "softbox", "three_point", "cloudy" or "even": adds the light of that name to the '
-            'scene\'s own lights; `studio` describes them. "auto" adds "studio" to a scene without light, '
-            "and nothing to others. None adds nothing.",
+            '"studio", "softbox", "three_point", "cloudy", "daylight" or "even": adds the light of that name '
+            'to the scene\'s own lights; `studio` describes them. "auto" adds "studio" to a scene without '
+            "light, and nothing to others. None adds nothing.",
             option=f"light to add: {', '.join(LIGHTINGS)}, none, "
             f"or auto: {DEFAULT} for a scene without light",
             check=check_preset,

@@ -1,0 +1,389 @@
+"""The sky by day: standard distributions of its light, and the sun in it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..arrays.elementary import arcsin, sin_cos_turns
+from ..arrays.frame import Frame
+from ..arrays.soa import soa
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import Doubles, Floats, column, dot, f4
+from ..camera import upward
+from ..colors import rgb
+from ..core.errors import SceneError, finite_array, number
+from ..core.parameter import Parameter, Parametrized
+from ..film.aov_names import DEFAULT_GROUP, group_name
+from .base import Light, LightSample, Receiver
+from .directional import DirectionalLight, unit
+from .hosek_wilkie import hosek_wilkie_sky
+from .image import ImageEnvironment
+from .infinite import EnvironmentSum, InfiniteLight, at_infinity, turned
+from .sky_functions import WITHOUT_SUN, SkyFunction, cie_function, perez_function
+
+ROWS, COLUMNS = 128, 256  # of the table by which directions are drawn, and of the quadrature
+SUN_DIAMETER = 0.533  # degrees
+SOLAR_CONSTANT = 1367.0  # W·m⁻², that of Perez et al.
+
+
+@soa
+class SkyLight(InfiniteLight):
+    """A function of direction above the horizon, and even ground below it; drawn by a table of its values."""
+
+    function: SkyFunction
+    scale: Floats  # (3, 1) W·sr⁻¹·m⁻² for each unit of the function
+    ground: Floats  # (3, 1) W·sr⁻¹·m⁻²
+    up: Floats  # (3,) unit
+    sun: Floats  # (3,) unit
+    table: ImageEnvironment
+    takes_receiver: ClassVar[bool] = True
+
+    def compensated(self) -> Self:
+        """Draw directions by how much brighter than the mean they are."""
+        return replace(self, table=self.table.compensated())
+
+    def sample_li(self, point: Floats, u: Floats) -> LightSample:
+        """Draw a direction from the table."""
+        drawn = self.table.sample_li(point, u)
+        return at_infinity(drawn.wi, self.le(drawn.wi), drawn.pdf)
+
+    def pdf_li(self, point: Floats, wi: Floats) -> Floats:
+        """Return the density of the table."""
+        return self.table.pdf_li(point, wi)
+
+    def lighting(self, receiver: Receiver) -> Self:
+        """Return the light as it is sampled for the normals of opaque surfaces."""
+        return replace(self, table=self.table.lighting(receiver))
+
+    def le(self, wi: Floats, surface: SurfaceInteraction | None = None) -> Floats:
+        """Return the radiance in direction wi, (3, n)."""
+        height = dot(wi, column(self.up))
+        above = self.scale * _relative(self.function, wi, np.maximum(height, f4(0)), self.sun)
+        return np.where(height >= 0, above, self.ground)
+
+    def power(self, scene_radius: float) -> NDArray[np.float64]:
+        """4π times the mean radiance, through the disk of the scene; what light samples are to bring."""
+        return self.table.power(scene_radius)
+
+
+def _relative(function: SkyFunction, wi: Floats, height: Floats, sun: Floats) -> Floats:
+    """Return a sky's function (k, n) in directions (3, n) of this height, the cosine to the zenith (n,)."""
+    away = wi - column(sun)
+    half = f4(0.5) * np.sqrt(dot(away, away))  # sin(γ/2): accurate close to the sun
+    return function.at(height, f4(2) * arcsin(np.minimum(half, f4(1))), f4(1) - f4(2) * half * half)
+
+
+class Sky(Parametrized, Light):
+    """The light of the sky and the sun; made by `Sky.cie`, `Sky.perez` or `Sky.hosek_wilkie`.
+
+    The sky is infinitely far away. Above the horizon its radiance is the formula of the model, with no table
+    in between; below it is a level ground, lit by the sky and the sun. The sun is a disk of 0.533°.
+
+    Parameters
+    ----------
+    function
+        The relative radiance of the sky.
+    sun
+        (3,) direction from the scene to the sun, of any length.
+    up
+        Direction to the zenith: (3,), or the name of an axis, such as "z".
+    scale
+        W·sr⁻¹·m⁻² for each unit of the function; None for the diffuse irradiance of `horizontal`.
+    horizontal
+        Diffuse irradiance of a level plane under the free sky, W·m⁻², a color.
+    direct_normal
+        Irradiance by the sun alone of a surface that faces it, W·m⁻², a color; 0 for no disk.
+    ground
+        Albedo of the ground, a color.
+    group
+        Name of the light group, for `aovs="light_groups"`.
+
+    Attributes
+    ----------
+    diffuse_horizontal
+        (3,) irradiance of a level plane by the sky alone, W·m⁻².
+    direct_normal
+        (3,) irradiance by the sun of a surface that faces it, W·m⁻².
+    sun, up
+        (3,) unit vectors.
+
+    Notes
+    -----
+    Values follow the unit of what a sky is scaled to: with an illuminance in lux for `horizontal` and
+    `direct_normal`, radiances are luminances in cd·m⁻², and irradiances are illuminances.
+
+    Raises
+    ------
+    SceneError
+        If an argument is malformed, or the sun must be above the horizon and is not.
+
+    Examples
+    --------
+    >>> sky = wf.Sky.cie(12, sun=(1, 1, 0.5), horizontal=100, direct_normal=700)
+    >>> scene = wf.Scene([wf.Sphere((0, 0, 0), 1)], [sky])
+    """
+
+    group = Parameter(group_name)
+
+    def __init__(
+        self,
+        function: SkyFunction,
+        sun: ArrayLike,
+        up: ArrayLike = "y",
+        *,
+        scale: ArrayLike | None = None,
+        horizontal: ArrayLike = 1.0,
+        direct_normal: ArrayLike = 0.0,
+        ground: ArrayLike = 0.2,
+        group: str = DEFAULT_GROUP,
+    ) -> None:
+        self.sun, self.up = unit("Sky sun", sun), _zenith(up)
+        self.group = group
+        rotation = _rotation(self.up)
+        relative = _table(function, rotation, self.sun)
+        level = _level_irradiance(relative)
+        if scale is None:
+            due = rgb("Sky horizontal", horizontal)
+            if not (due.any() and level.all()):
+                raise SceneError(f"Sky horizontal is {horizontal!r}; it and the model's must be above 0")
+            scale = (due / level).astype(f4)
+        self.direct_normal = rgb("Sky direct_normal", direct_normal).astype(float).ravel()
+        shade = np.asarray(scale, f4).reshape(-1, 1) * np.ones((3, 1), f4)
+        self.diffuse_horizontal = (shade * level).ravel()
+        whole = self.diffuse_horizontal + self.direct_normal * max(float(self.sun @ self.up), 0.0)
+        below = (rgb("Sky ground", ground, high=1) * column(whole) / np.pi).astype(f4)
+        pixels = np.empty((ROWS, COLUMNS, 3), f4)
+        pixels[: ROWS // 2] = np.moveaxis(shade[:, :, None] * relative, 0, -1)
+        pixels[ROWS // 2 :] = below.ravel()
+        table = ImageEnvironment.of(pixels, "nearest", rotation)
+        self._light = SkyLight(function, shade, below, self.up.astype(f4), self.sun.astype(f4), table)
+
+    @classmethod
+    def cie(
+        cls,
+        type: int,
+        sun: ArrayLike | None = None,
+        up: ArrayLike = "y",
+        *,
+        horizontal: ArrayLike = 1.0,
+        direct_normal: ArrayLike = 0.0,
+        ground: ArrayLike = 0.2,
+        group: str = DEFAULT_GROUP,
+    ) -> Self:
+        """Return a standard general sky of the CIE.
+
+        Source: ISO 15469:2004 (CIE S 011/E:2003).
+
+        Parameters
+        ----------
+        type
+            1 to 5: overcast (1: the CIE's standard overcast sky; 5: the same all around), 6 to 10: partly
+            cloudy, 11 to 15: clear (12: the CIE's standard clear sky); 16: the traditional overcast sky,
+            whose luminance is (1 + 2 sin γ)/3 of that of the zenith at the height γ.
+        sun
+            (3,) direction to the sun, of any length. Types 1, 3, 5 and 16 do not depend on it.
+        up, horizontal, direct_normal, ground, group
+            As for `Sky`. The standard says nothing of the sun's own light.
+
+        Raises
+        ------
+        SceneError
+            If an argument is malformed, or the sun must be above the horizon and is not.
+
+        Examples
+        --------
+        >>> overcast = wf.Sky.cie(16, horizontal=1)
+        >>> (overcast.radiance([(0, 1, 0), (1, 0, 0)])[:, 0] * np.pi * 7 / 9).round(3)
+        array([1.   , 0.333])
+        """
+        function = cie_function(type)
+        zenith = _zenith(up)
+        if sun is None and type in WITHOUT_SUN:
+            sun = zenith
+        elif sun is None or (type not in WITHOUT_SUN and not unit("Sky sun", sun) @ zenith > 0):
+            raise SceneError(f"Sky sun is {sun!r}; a sky of type {type} needs one that is above the horizon")
+        return cls(
+            *(function, sun, up),
+            horizontal=horizontal,
+            direct_normal=direct_normal,
+            ground=ground,
+            group=group,
+        )
+
+    @classmethod
+    def perez(
+        cls,
+        direct_normal: float,
+        diffuse_horizontal: float,
+        sun: ArrayLike,
+        up: ArrayLike = "y",
+        *,
+        illuminance: tuple[float, float] | None = None,
+        extraterrestrial: float = SOLAR_CONSTANT,
+        disk: bool = True,
+        ground: ArrayLike = 0.2,
+        group: str = DEFAULT_GROUP,
+    ) -> Self:
+        """Return the sky of all weathers, from two measured irradiances, as weather files have them.
+
+        Parameters
+        ----------
+        direct_normal
+            Irradiance by the sun of a surface that faces it, W·m⁻², at least 0.
+        diffuse_horizontal
+            Irradiance of a level plane by the sky, W·m⁻², above 0.
+        sun
+            (3,) direction to the sun, of any length, above the horizon.
+        illuminance
+            The same two in lux. Sky and sun are then scaled to these; the irradiances give the distribution.
+        extraterrestrial
+            Irradiance of the sun outside of the atmosphere, W·m⁻²; over the year it varies by 3.3 %.
+        disk
+            Whether the sun itself is part of the light.
+        up, ground, group
+            As for `Sky`.
+
+        Raises
+        ------
+        SceneError
+            If an argument is malformed or out of its range.
+
+        Notes
+        -----
+        Source: R. Perez, R. Seals and J. Michalsky, All-Weather Model for Sky Luminance Distribution, Solar
+        Energy 50(3), 1993. For inputs that no weather has, the published coefficients lead to skies that
+        are negative or shine without bound: the brightness Δ is held in 0.01 to 0.6, b at -0.05 or below, and
+        luminance at 0 or above.
+
+        Examples
+        --------
+        >>> sky = wf.Sky.perez(650, 120, sun=(0.5, 0.6, 0.2))
+        >>> sky.diffuse_horizontal.round(3)
+        array([120., 120., 120.])
+        """
+        direct = number("Sky direct_normal", direct_normal, lambda x: x >= 0, "at least 0")
+        diffuse = number("Sky diffuse_horizontal", diffuse_horizontal, lambda x: x > 0, "above 0")
+        beyond = number("Sky extraterrestrial", extraterrestrial, lambda x: x > 0, "above 0")
+        height = float(unit("Sky sun", sun) @ _zenith(up))
+        if not height > 0:
+            raise SceneError(f"Sky sun is {sun!r}; it must be above the horizon")
+        scaled = (
+            (direct, diffuse) if illuminance is None else finite_array("Sky illuminance", illuminance, (2,))
+        )
+        return cls(
+            perez_function(direct, diffuse, min(height, 1.0), beyond),
+            sun,
+            up,
+            horizontal=scaled[1],
+            direct_normal=scaled[0] if disk else 0.0,
+            ground=ground,
+            group=group,
+        )
+
+    @classmethod
+    def hosek_wilkie(
+        cls,
+        turbidity: float,
+        ground_albedo: ArrayLike,
+        sun: ArrayLike,
+        up: ArrayLike = "y",
+        *,
+        scale: float = 1.0,
+        disk: bool = True,
+        group: str = DEFAULT_GROUP,
+    ) -> Self:
+        """Return a clear sky in color, with the data that the package `mitsuba` brings.
+
+        Source: L. Hošek and A. Wilkie, An Analytic Model for Full Spectral Sky-Dome Radiance, SIGGRAPH 2012,
+        and Adding a Solar-Radiance Function to the Hošek-Wilkie Skylight Model, IEEE CG&A 33(3), 2013.
+
+        Parameters
+        ----------
+        turbidity
+            How hazy the air is, 1 (pure air) to 10; about 3 on a clear day.
+        ground_albedo
+            Albedo of the ground, a color; the sky is brighter above a bright one.
+        sun
+            (3,) direction to the sun, of any length, above the horizon.
+        scale
+            Factor of sky and sun. With 1 they are in W·sr⁻¹·m⁻² of light: 683 times the luminance (Rec. 709)
+            of a radiance is cd·m⁻².
+        disk
+            Whether the sun itself is part of the light. It is even; the model's limb darkening is averaged.
+        up, group
+            As for `Sky`.
+
+        Raises
+        ------
+        SceneError
+            If an argument is malformed or out of its range, or `mitsuba` is not installed.
+        """
+        albedo = rgb("Sky ground_albedo", ground_albedo, high=1)
+        haze = number("Sky turbidity", turbidity, lambda x: 1 <= x <= 10, "from 1 to 10")
+        factor = number("Sky scale", scale, lambda x: x > 0, "above 0")
+        height = float(unit("Sky sun", sun) @ _zenith(up))
+        if not height > 0:
+            raise SceneError(f"Sky sun is {sun!r}; it must be above the horizon")
+        function, radiance, solar = hosek_wilkie_sky(haze, albedo, min(height, 1.0))
+        return cls(
+            function,
+            sun,
+            up,
+            scale=factor * radiance,
+            direct_normal=factor * solar if disk else 0.0,
+            ground=albedo,
+            group=group,
+        )
+
+    def radiance(self, directions: ArrayLike) -> Doubles:
+        """Return the radiance without the sun's disk, (n, 3), in directions (n, 3) of any length."""
+        given = finite_array("directions", directions, (None, 3))
+        length = np.sqrt((given * given).sum(1, keepdims=True))
+        if not length.all():
+            raise SceneError("directions must not be zero")
+        return self._light.le(np.ascontiguousarray((given / length).T, f4)).T.astype(float)
+
+    def scaled(self, factor: float) -> Self:
+        """Return the light: it has no length."""
+        return self
+
+    def record(self, center: NDArray[np.float64]) -> InfiniteLight:
+        """Return the sky, and the sun in it, as a record of one column."""
+        if not self.direct_normal.any():
+            return self._light
+        disk = DirectionalLight(-self.sun, self.direct_normal, angle=SUN_DIAMETER).record(center)
+        assert isinstance(disk, InfiniteLight)
+        return EnvironmentSum.of([self._light, disk])
+
+
+def _zenith(up: ArrayLike) -> NDArray[np.float64]:
+    return unit("Sky up", upward("Sky up", up))
+
+
+def _rotation(up: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the axes of the table, columns of (3, 3), of which the second is up."""
+    frame = Frame.from_normal(column(up))
+    return np.concatenate([frame.y, frame.z, frame.x], axis=1).astype(float)
+
+
+def _table(function: SkyFunction, rotation: NDArray[np.float64], sun: NDArray[np.float64]) -> Floats:
+    """Return the function (k, rows, COLUMNS) at the middles of the texels above the horizon."""
+    rows = ROWS // 2
+    level, high = sin_cos_turns((np.arange(rows) + 0.5) / (2 * ROWS))
+    across, along = sin_cos_turns(0.5 - (np.arange(COLUMNS) + 0.5) / COLUMNS)
+    x, z = (level[:, None] * part for part in (across, along))
+    local = np.stack([x, np.broadcast_to(high[:, None], x.shape), z]).reshape(3, -1)
+    wi = turned(rotation, local).astype(f4)
+    relative = _relative(function, wi, local[1].astype(f4), sun.astype(f4))
+    return np.broadcast_to(relative, (len(relative), wi.shape[1])).reshape(-1, rows, COLUMNS)
+
+
+def _level_irradiance(relative: Floats) -> Doubles:
+    """Return ∫ f·cos Z dω of a table (k, rows, COLUMNS): (k, 1)."""
+    _, edge = sin_cos_turns(np.arange(ROWS // 2 + 1) / (2 * ROWS))
+    weight = np.pi / COLUMNS * (edge[:-1] - edge[1:]) * (edge[:-1] + edge[1:])
+    return (relative.astype(float).sum(2) * weight).sum(1).reshape(-1, 1)

@@ -1,0 +1,104 @@
+"""Where the sun stands at a time and a place."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays.vec import Doubles
+from ..camera import upward
+from ..core.errors import SceneError, finite_array, number
+from .scene import turned_up
+
+
+def sun_position(
+    time: Any,
+    latitude: float,
+    longitude: float,
+    *,
+    altitude: float = 0.0,
+    up: ArrayLike = "y",
+    north: ArrayLike | None = None,
+) -> Doubles:
+    """Return the direction to the sun, by the solar position algorithm of pvlib (`pip install pvlib`).
+
+    Parameters
+    ----------
+    time
+        A time with its zone, such as "2026-06-21 12:00+02:00", a `datetime`, or several (n,), as pandas reads
+        them. Without a zone it is UTC.
+    latitude
+        Degrees, north positive.
+    longitude
+        Degrees, east positive.
+    altitude
+        Above sea level, m.
+    up
+        Direction to the zenith: (3,), or the name of an axis, such as "z".
+    north
+        (3,) direction to the north, of which the level part counts. By default it is -z where y is up, and y
+        where z is up, so that east is x.
+
+    Returns
+    -------
+    (3,) unit vector, or (n, 3) of several times, with the refraction of the air. It is below the horizon by
+    night.
+
+    Raises
+    ------
+    SceneError
+        If an argument is malformed or out of its range, or north is vertical.
+    ImportError
+        If pvlib is not installed.
+
+    Notes
+    -----
+    Source: I. Reda and A. Andreas, Solar Position Algorithm for Solar Radiation Applications, Solar Energy
+    76(5), 2004.
+
+    Examples
+    --------
+    >>> wf.sun_position("2026-06-21 12:00", latitude=48.1, longitude=11.6).round(2)  # doctest: +SKIP
+    array([-0.18,  0.9 ,  0.4 ])
+    """
+    place = (
+        number("latitude", latitude, lambda x: abs(x) <= 90, "from -90 to 90"),
+        number("longitude", longitude, lambda x: abs(x) <= 180, "from -180 to 180"),
+        number("altitude", altitude),
+    )
+    zenith, toward_north, east = horizon_axes(up, north)
+    try:
+        import pandas
+        from pvlib.solarposition import get_solarposition
+    except ImportError as error:
+        raise ImportError("sun_position needs pvlib: pip install pvlib") from error
+    try:
+        times = pandas.DatetimeIndex(np.atleast_1d(np.asarray(time, dtype=object)))
+    except (TypeError, ValueError) as error:
+        raise SceneError(f"time is {time!r}; it must be a time, or several: {error}") from error
+    found = get_solarposition(times, *place)
+    height, azimuth = (np.radians(found[name].to_numpy()) for name in ("apparent_elevation", "azimuth"))
+    along, across = np.cos(azimuth) * np.cos(height), np.sin(azimuth) * np.cos(height)
+    sun = np.outer(np.sin(height), zenith) + np.outer(along, toward_north) + np.outer(across, east)
+    return sun[0] if np.ndim(time) == 0 else sun
+
+
+def horizon_axes(up: ArrayLike, north: ArrayLike | None) -> tuple[Doubles, Doubles, Doubles]:
+    """Return the unit vectors (3,) to the zenith, the north and the east.
+
+    Raises
+    ------
+    SceneError
+        If one is malformed, or north is vertical.
+    """
+    turn = turned_up(upward("up", up))
+    zenith = turn[:, 1]
+    level = -turn[:, 2] if north is None else finite_array("north", north, (3,))
+    level = level - (level * zenith).sum() * zenith
+    length = np.sqrt((level * level).sum())
+    if not length > 1e-9 * max(1.0, np.abs(level).max()):
+        raise SceneError(f"north is {north!r}; it must not be vertical")
+    level = level / length
+    return zenith, level, np.cross(level, zenith)
