@@ -24,7 +24,7 @@ from .bsdfs import (
     ThinDielectric,
 )
 from .camera import Camera
-from .colors import srgb
+from .colors import exposure, from_photometric, srgb, to_photometric
 from .core.errors import Interrupted, RenderError, SaveError, SceneError
 from .core.html import register_preview
 from .core.suggestions import did_you_mean
@@ -43,6 +43,7 @@ from .lights import (
     DirectionalLight,
     Emitters,
     Environment,
+    IESLight,
     InfiniteLight,
     Light,
     LightRecord,
@@ -53,6 +54,7 @@ from .lights import (
     Receiver,
     Sky,
     SpotLight,
+    with_flux,
 )
 from .lights.choice import LightSampler
 from .material_ball import ball_png
@@ -142,6 +144,7 @@ __all__ = [
     "Geometry",
     "HeightField",
     "HenyeyGreenstein",
+    "IESLight",
     "Image",
     "InfiniteLight",
     "Instance",
@@ -193,8 +196,10 @@ __all__ = [
     "Viewer",
     "compare",
     "elementary",
+    "exposure",
     "from_mitsuba",
     "from_open3d",
+    "from_photometric",
     "from_pyvista",
     "from_trimesh",
     "grid_points",
@@ -219,10 +224,12 @@ __all__ = [
     "studio",
     "sun_position",
     "testing",
+    "to_photometric",
     "turntable",
     "vec",
     "view",
     "warp",
+    "with_flux",
     "write_dataset",
 ]
 

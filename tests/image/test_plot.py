@@ -33,7 +33,7 @@ def test_scalars_have_a_color_bar():
     assert np.array_equal(values, image.depth, equal_nan=True)
     assert count == 2
     values, count = drawn(image.plot("luminance"))
-    assert values == pytest.approx(image.rgb @ np.float32([0.2126, 0.7152, 0.0722]), rel=1e-5, abs=1e-7)
+    assert values == pytest.approx(683 * image.rgb @ np.float32([0.2126, 0.7152, 0.0722]), rel=1e-5, abs=1e-7)
     assert count == 2
     assert drawn(image.plot("counts"))[1] == 2
     assert drawn(image.plot("coverage.a.b"))[1] == 2

@@ -1,5 +1,6 @@
 """The densities of all lights, by differentiation at any u: from any point, by any size."""
 
+import luminaires
 import numpy as np
 import pytest
 from hypothesis import assume, given
@@ -125,7 +126,7 @@ def test_every_light_is_here() -> None:
         *("TriangleLights", "TwoSidedTriangleLights", "TexturedTriangleLights", "RectangleLights"),
         *("TwoSidedTexturedTriangleLights", "TwoSidedRectangleLights", "SphereLights", "SunLight"),
         *("TexturedSphereLights", "ImageEnvironment", "ConstantEnvironment", "EnvironmentSum", "SkyLight"),
-        *("DirectionalLights", "PointLightRecord", "SpotLights", "PicturedLights"),
+        *("DirectionalLights", "PointLightRecord", "SpotLights", "PicturedLights", "IESLights"),
     }
     bases = {"LightRecord", "InfiniteLight", "DeltaLight", "PlanarLights"}
     found = {kind.__name__ for kind in _subclasses(LightRecord) if kind.__module__.startswith("wavefront.")}
@@ -232,9 +233,14 @@ def test_tables_of_lights(first, second, place, choice: float, u: tuple[float, f
     assert table.pdf_li(light, point, sample.wi)[0] == pytest.approx(sample.pdf[0], rel=5e-3)
 
 
+@pytest.fixture(scope="module")
+def ies_file(tmp_path_factory):
+    return luminaires.write(tmp_path_factory.mktemp("luminaires"))
+
+
 @some
 @given(place=places, toward=places, u=points_of_the_square)
-def test_lights_that_no_ray_meets(place, toward, u: tuple[float, float]) -> None:
+def test_lights_that_no_ray_meets(ies_file, place, toward, u: tuple[float, float]) -> None:
     """One direction with the density 1, whatever u; no direction has a density."""
     assume(np.linalg.norm(toward) > 0.1)
     assume(np.linalg.norm(np.subtract(place, (3, 3, 3))) > 0.1)
@@ -244,11 +250,14 @@ def test_lights_that_no_ray_meets(place, toward, u: tuple[float, float]) -> None
         wf.SpotLight((3, 3, 3), 2, target=(0, 0, 0), angle=120),
         wf.Projector((3, 3, 3), np.ones((2, 3, 3)), target=(0, 0, 0), fov=90),
         wf.DirectionalLight(toward, 2),
+        wf.IESLight(ies_file, (3, 3, 3), target=toward),
     ]
     for light in some:
         record = light.record(np.zeros(3))
         sample, other = (record.sample_li(point, columns(*v).astype(f4)) for v in (u, u[::-1]))
-        assert sample.pdf[0] in ((0, 1) if isinstance(light, wf.SpotLight | wf.Projector) else (1,))
+        assert sample.pdf[0] in (
+            (0, 1) if isinstance(light, wf.SpotLight | wf.Projector | wf.IESLight) else (1,)
+        )
         assert (sample.wi == other.wi).all()
         assert not record.pdf_li(point, sample.wi).any()
         assert not record.le(sample.wi).any()

@@ -2,14 +2,19 @@
 
 from .color import is_color_name, named_rows, rgb, srgb
 from .colormaps import warn_of_colormap
+from .photometry import EFFICACY, exposure, from_photometric, to_photometric
 from .transfer import linear_to_srgb, srgb_to_linear
 
 __all__ = [
+    "EFFICACY",
+    "exposure",
+    "from_photometric",
     "is_color_name",
     "linear_to_srgb",
     "named_rows",
     "rgb",
     "srgb",
     "srgb_to_linear",
+    "to_photometric",
     "warn_of_colormap",
 ]

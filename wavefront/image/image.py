@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.vec import Floats, luminance
+from ..arrays.vec import Floats
 from ..camera import Camera
 from ..codecs import png_jpeg
 from ..codecs.display import Display
@@ -19,7 +19,7 @@ from ..codecs.image_data import ERROR, ImageData
 from ..codecs.images import read_picture, write_image
 from ..codecs.png_jpeg import Gamma
 from ..codecs.white_balance import WhiteBalance
-from ..colors import rgb
+from ..colors import EFFICACY, rgb, to_photometric
 from ..core.errors import SceneError, as_array, number, one_of
 from ..core.html import picture_html
 from ..core.suggestions import did_you_mean
@@ -149,6 +149,11 @@ class Image:
         return {
             name.removeprefix(prefix): layer for name, layer in self.layers.items() if name.startswith(prefix)
         }
+
+    @property
+    def luminance(self) -> NDArray[np.float32]:
+        """The luminance (H, W), cd/m²: 683 · (0.2126 R + 0.7152 G + 0.0722 B), see `to_photometric`."""
+        return to_photometric(self.rgb).astype(np.float32, copy=False)
 
     def __getattr__(self, name: str) -> NDArray[Any]:
         """Return a layer by its name."""
@@ -721,7 +726,7 @@ class Image:
         Parameters
         ----------
         name
-            "rgb", "luminance" (of rgb), an AOV, or "counts", "variance" or "standard_error".
+            "rgb", "luminance" (cd/m²), an AOV, or "counts", "variance" or "standard_error".
         axes
             Axes of matplotlib to draw into; by default those of a new figure.
 
@@ -739,12 +744,58 @@ class Image:
         """
         from . import plot
 
-        arrays = {**self._data().named(), "luminance": luminance(np.moveaxis(self.rgb, -1, 0))}
+        arrays = {**self._data().named(), "luminance": self.luminance}
         if name in AOVS and name not in arrays:
             raise SceneError(f"plot: the image has no layer {name!r}; render it with aovs=({name!r},)")
         values = arrays[one_of("layer", name, arrays)]
         table = self.names.get(name.removesuffix("_id"), {}) if name.endswith("_id") else None
         return plot.draw(name, self.to_uint8()[..., :3] if name == "rgb" else values, table, axes)
+
+    def false_color(
+        self,
+        limits: tuple[float, float] | None = None,
+        *,
+        log: bool = True,
+        efficacy: float = EFFICACY,
+        axes: Any = None,
+    ) -> Any:
+        """Plot the luminance in false color, with a scale in cd/m², with matplotlib; return the axes.
+
+        Parameters
+        ----------
+        limits
+            cd/m² at both ends of the scale; by default the brightest pixel, and a thousandth of it (or 0).
+        log
+            Whether the scale is logarithmic; otherwise it is linear.
+        efficacy
+            lm/W of white, as in `to_photometric`.
+        axes
+            Axes of matplotlib to draw into; by default those of a new figure.
+
+        Raises
+        ------
+        SceneError
+            If the limits do not increase, or begin at 0 or less on a logarithmic scale.
+        ImportError
+            If matplotlib is not installed. The message says how to install it.
+
+        Examples
+        --------
+        >>> sky = wf.Environment(wf.from_photometric(2000))  # cd/m²
+        >>> image = wf.render([wf.Sphere((0, 0, 0), 1), sky], size=(8, 8))
+        >>> image.false_color((10, 5000)).figure.savefig("luminance.png")
+        """
+        from . import plot
+
+        values = to_photometric(self.rgb, efficacy=efficacy)
+        if limits is None:
+            most = float(np.nanmax(values)) or 1.0
+            limits = (most / 1000 if log else 0.0, most)
+        low, high = (number("false_color limit", value) for value in limits)
+        if not low < high or (log and low <= 0):
+            least = " and be above 0" if log else ""
+            raise SceneError(f"false_color limits are {low:g} and {high:g}; they must increase{least}")
+        return plot.draw_scale("luminance", "cd/m²", values, (low, high), log, axes)
 
     def _data(self) -> ImageData:
         """Return all of the image as files hold it."""

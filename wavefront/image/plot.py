@@ -46,6 +46,22 @@ def draw(name: str, values: NDArray[Any], names: Mapping[int, str] | None, axes:
     return axes
 
 
+def draw_scale(
+    name: str, unit: str, values: NDArray[Any], limits: tuple[float, float], log: bool, axes: Any
+) -> Any:
+    """Draw numbers (H, W) between limits in false color, with a scale in a unit, and return the axes."""
+    pyplot = import_pyplot()
+    from matplotlib.colors import LogNorm, Normalize
+
+    axes = pyplot.subplots()[1] if axes is None else axes
+    axes.set_title(name)
+    axes.set_axis_off()
+    scale = (LogNorm if log else Normalize)(*limits, clip=True)
+    picture = axes.imshow(np.fmax(values, limits[0]), cmap="viridis", norm=scale, interpolation="nearest")
+    axes.figure.colorbar(picture, ax=axes, label=unit)
+    return axes
+
+
 def import_pyplot() -> Any:
     """Return matplotlib's pyplot.
 

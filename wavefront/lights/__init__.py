@@ -3,6 +3,8 @@
 from .base import DeltaLight, Emitters, Light, LightRecord, LightSample, Receiver
 from .directional import DirectionalLight, DirectionalLights, SunLight
 from .environment import ConstantEnvironment, Environment
+from .flux import with_flux
+from .ies import IESLight, IESLights
 from .image import ImageEnvironment
 from .infinite import EnvironmentSum, InfiniteLight
 from .point import PointLight, PointLightRecord, PointLights
@@ -24,6 +26,8 @@ __all__ = [
     "Emitters",
     "Environment",
     "EnvironmentSum",
+    "IESLight",
+    "IESLights",
     "ImageEnvironment",
     "InfiniteLight",
     "Light",
@@ -50,4 +54,5 @@ __all__ = [
     "TwoSidedTexturedTriangleLights",
     "TwoSidedTriangleLights",
     "first_of_pairs",
+    "with_flux",
 ]
