@@ -444,13 +444,26 @@ def test_point_light_over_a_mirror_lights_the_ceiling_as_from_its_image() -> Non
     assert_light(scene, tint * ALBEDO / np.pi * irradiance, max_bounces=2)
 
 
-@pytest.mark.parametrize("opacity", [1, 0.6])
-def test_directional_light_in_a_mirror_lights_the_floor(opacity: float) -> None:
+@pytest.mark.parametrize(("opacity", "copies"), [(1, 1), (0.6, 1), (1, 2)])
+def test_directional_light_in_a_mirror_lights_the_floor(opacity: float, copies: int) -> None:
+    """Of mirrors at one place only the first reflects."""
     material = wf.Material(wf.Mirror(0.8), alpha=opacity)
     mirror = wf.Rectangle((-1, 1, 0), (0, 0, 0.6), (0, 1, 0), material=material)
     sun = wf.DirectionalLight((-1, -1, 0), 3)
-    scene = wf.Scene([mirror, ground()], [sun], looks_at(0.5, 0, 0.3, 0.4))
+    scene = wf.Scene([*[mirror] * copies, ground()], [sun], looks_at(0.5, 0, 0.3, 0.4))
     assert_light(scene, opacity * 0.8 * ALBEDO / np.pi * 3 / np.sqrt(2), max_bounces=7)
+
+
+@pytest.mark.parametrize("tilt", [-0.15, 0.05])
+def test_directional_light_in_a_mirror_with_tilted_normals(tilt: float) -> None:
+    """Seen from the floor, the sun in the mirror has the radiance of the sun, however the normals are bent."""
+    flat = wf.Rectangle((-1, 1, 0), (0, 1, 0), (0, 0, 0.6))
+    normal, towards = np.array([np.cos(tilt), np.sin(tilt), 0]), np.array([-1, -1, 0]) / np.sqrt(2)
+    away = towards - 2 * (towards @ normal) * normal
+    mirror = wf.Mesh(flat.vertices, flat.faces, normals=np.tile(normal, (4, 1)), material=wf.Mirror(0.8))
+    seen = -1 - 1.5 * away[0] / away[1]
+    scene = wf.Scene([mirror, ground()], [wf.DirectionalLight(towards, 3)], looks_at(seen, 0, 0.3, 0.1))
+    assert_light(scene, 0.8 * ALBEDO / np.pi * 3 * -away[1], max_bounces=2)
 
 
 @pytest.mark.parametrize(("max_bounces", "crossings"), [(3, 1), (12, 6)])
