@@ -454,16 +454,20 @@ def test_directional_light_in_a_mirror_lights_the_floor(opacity: float, copies: 
     assert_light(scene, opacity * 0.8 * ALBEDO / np.pi * 3 / np.sqrt(2), max_bounces=7)
 
 
-@pytest.mark.parametrize("tilt", [-0.15, 0.05])
-def test_directional_light_in_a_mirror_with_tilted_normals(tilt: float) -> None:
-    """Seen from the floor, the sun in the mirror has the radiance of the sun, however the normals are bent."""
-    flat = wf.Rectangle((-1, 1, 0), (0, 1, 0), (0, 0, 0.6))
-    normal, towards = np.array([np.cos(tilt), np.sin(tilt), 0]), np.array([-1, -1, 0]) / np.sqrt(2)
+@pytest.mark.parametrize(("mirror_tilt", "floor_tilt"), [(-0.15, 0), (0.05, 0.3)])
+def test_directional_light_in_a_mirror_with_tilted_normals(mirror_tilt: float, floor_tilt: float) -> None:
+    """From the floor, the sun in the mirror has the radiance of the sun, however the normals are bent."""
+    flat, towards = wf.Rectangle((-1, 1, 0), (0, 1, 0), (0, 0, 0.6)), np.array([-1, -1, 0]) / np.sqrt(2)
+    normal = np.array([np.cos(mirror_tilt), np.sin(mirror_tilt), 0])
+    up = np.array([np.sin(floor_tilt), np.cos(floor_tilt), 0])
     away = towards - 2 * (towards @ normal) * normal
-    mirror = wf.Mesh(flat.vertices, flat.faces, normals=np.tile(normal, (4, 1)), material=wf.Mirror(0.8))
-    seen = -1 - 1.5 * away[0] / away[1]
-    scene = wf.Scene([mirror, ground()], [wf.DirectionalLight(towards, 3)], looks_at(seen, 0, 0.3, 0.1))
-    assert_light(scene, 0.8 * ALBEDO / np.pi * 3 * -away[1], max_bounces=2)
+    shapes = [
+        wf.Mesh(flat.vertices, flat.faces, normals=np.tile(normal, (4, 1)), material=wf.Mirror(0.8)),
+        wf.Mesh(ground().vertices, ground().faces, normals=np.tile(up, (4, 1)), material=wf.Diffuse(ALBEDO)),
+    ]
+    camera = looks_at(-1 - 1.5 * away[0] / away[1], 0, 0.3, 0.1)
+    scene = wf.Scene(shapes, [wf.DirectionalLight(towards, 3)], camera)
+    assert_light(scene, 0.8 * ALBEDO / np.pi * 3 * -(away @ up), max_bounces=2)
 
 
 @pytest.mark.parametrize(("max_bounces", "crossings"), [(3, 1), (12, 6)])
