@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from significance import Mean, render
+from significance import Mean, assert_same_images, render, repeat
 
 import wavefront as wf
 from wavefront.accel import make_accelerator
@@ -14,7 +14,7 @@ from wavefront.arrays.state import Hits, Rays
 from wavefront.compile.scene import compile_scene
 from wavefront.stages.interaction import interaction
 from wavefront.stages.intersect import intersect
-from wavefront.stages.normal_mapping import ensure_valid_reflection, perturb_normals
+from wavefront.stages.normal_mapping import ensure_valid_reflection, mirror_hidden, perturb_normals
 
 F4 = np.float32
 CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
@@ -318,7 +318,8 @@ def test_wave_size_and_workers_change_no_bit():
 # ---- light ----------------------------------------------------------------------------------------
 
 ROUGH = np.random.default_rng(1).random((64, 64, 3), F4)  # normals of every direction
-STRONG = wf.NormalMap(np.concatenate([ROUGH[..., :2], 0.5 + ROUGH[..., 2:] / 2], 2), 2.0)
+TURNED = np.concatenate([ROUGH[..., :2], 0.5 + ROUGH[..., 2:] / 2], 2)
+STRONG = wf.NormalMap(TURNED, 2.0)
 STEEP = wf.BumpMap(ROUGH[..., 0], 0.2)
 
 
@@ -445,6 +446,78 @@ def test_every_integrator_sees_the_same_normal_map():
     ]
     for mean in means[1:]:
         assert mean == pytest.approx(means[0], rel=0.01)
+
+
+# ---- as Mitsuba has it ----------------------------------------------------------------------------
+
+
+def shadowing(image):
+    """A normal map that shadows grazing light, and whose hidden normals are mirrored."""
+    normal_map = wf.NormalMap(image)
+    normal_map.shadows_grazing = normal_map.mirrors_hidden = True
+    return normal_map
+
+
+def test_hidden_normals_are_mirrored_at_the_smooth_one():
+    n = 10_000
+    smooth, perturbed = directions(n, 0), directions(n, 1)
+    wo = on_side(directions(n, 2), smooth, 1e-2)
+    perturbed *= np.sign((perturbed * smooth).sum(0))
+    found = mirror_hidden(wo, smooth, perturbed.copy())
+    hidden = (wo * perturbed).sum(0) <= 0
+    mirrored = 2 * (perturbed * smooth).sum(0) * smooth - perturbed
+    expected = np.where(hidden, mirrored, perturbed)
+    assert n / 8 < hidden.sum() < n / 2
+    clear = (wo * expected).sum(0) > 1e-3
+    assert clear.mean() > 0.99
+    assert found[:, clear] == pytest.approx(expected[:, clear], abs=1e-6)
+    assert ((found * wo).sum(0) > 0).all()
+
+
+@pytest.mark.parametrize("angle", [-1.4, -0.7, 0.0, 0.5, 1.0, 1.5])
+def test_grazing_light_is_shadowed(angle):
+    """The radiance of a tilted matte patch under the sun, beside that of the same map without shadows."""
+    code = [0.75, 0.5, 1]  # tan θ is 1/2 here
+    camera = wf.Camera.orthographic((0.5, 0.5, 3), (0.5, 0.5, 0), height=0.9, size=(4, 4))
+    sun = wf.DirectionalLight((-np.sin(angle), 0, -np.cos(angle)), 2.0)
+    seen = []
+    for normal_map in (shadowing(texel(code)), wf.NormalMap(texel(code)), None):
+        patch = square(material=wf.Material(wf.Diffuse(0.5), normal_map=normal_map))
+        beside = wf.Sphere(
+            (9, 9, 0), 1, material=wf.Material(wf.Diffuse(0.5), normal_map=shadowing(texel(code)))
+        )
+        seen.append(render(wf.Scene([patch, beside], [sun], camera), 1, max_bounces=1).rgb.mean())
+    left = 2 / (1 + np.sqrt(1 + 0.125 * 0.25 * np.tan(angle) ** 2))
+    tilted = max(np.cos(angle) + 0.5 * np.sin(angle), 0) / np.sqrt(1.25)
+    due = np.array([tilted * left, tilted, np.cos(angle)]) / np.pi
+    assert seen == pytest.approx(due, rel=2e-5, abs=1e-7)
+
+
+def beside_a_wall(bsdf, *lights, emission=None):
+    """A mapped floor, all of whose light comes from a low wall."""
+    material = wf.Material(bsdf, normal_map=shadowing(TURNED))
+    boards = [
+        wf.Rectangle((-2, 0, 2), (4, 0, 0), (0, 0, -4), material=material),
+        wf.Rectangle((-2, 0, -2), (4, 0, 0), (0, 1, 0), material=wf.Diffuse(0.9), emission=emission),
+    ]
+    camera = wf.Camera.look_at((0, 3, 0), (0, 0, 0), up=(0, 0, -1), fov=40, size=(16, 16))
+    return wf.Scene(boards, lights, camera)
+
+
+WAYS = [({"reuse": True}, 32), pytest.param({"guide": True}, 32, marks=pytest.mark.slow), ({}, 0)]
+
+
+@pytest.mark.parametrize("bsdf", [wf.Diffuse(1.0), wf.Conductor.named("silver", roughness=0.3)])
+@pytest.mark.parametrize(("options", "spp"), WAYS, ids=["reuse", "guide", "emission"])
+def test_light_from_a_wall_is_shadowed_however_it_is_found(bsdf, options, spp):
+    """The wall is lit by the sun; or it shines, so that light samples and BSDF samples find it."""
+    if options:
+        scene, bounces = beside_a_wall(bsdf, wf.DirectionalLight((0, 0, -1), 1)), 2
+        expected = repeat(scene, 64, runs=8, reuse=False, max_bounces=bounces, first_seed=100)
+    else:
+        scene, bounces, spp = beside_a_wall(bsdf, emission=1.0), 1, 16
+        expected = repeat(scene, 128, runs=8, integrator="naive", max_bounces=bounces, first_seed=100)
+    assert_same_images(repeat(scene, spp, runs=8, max_bounces=bounces, **options), expected, 0.02)
 
 
 # ---- complaints -----------------------------------------------------------------------------------

@@ -170,6 +170,7 @@ class SurfaceInteraction(SoA):
     tangent_frame: Floats | None = None  # (6, n) tangent and bitangent of normal maps, of any length
     tangent_frame1: Floats | None = None  # (6, n) the same for uv1
     throughput: Floats | None = None  # (3, n) of the paths; None unless a material is dispersive
+    unmapped: Floats | None = None  # (3, n) ns without a normal map; None unless one shadows grazing light
 
     def frame(self) -> Frame:
         """Return the shading frames, z = ns."""

@@ -71,6 +71,8 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         specular = specular.copy()
         specular[turned] = True  # light sampling cannot find these directions
     throughput = paths.throughput * sample.weight
+    if surface.unmapped is not None:
+        throughput *= shade.unshadowed(direction)
     if not (cos > 0).all():
         lost = np.flatnonzero(~(cos > 0))
         throughput[:, lost] *= f4(0) * cos.take(lost)  # NaN stays, so that it reaches the picture

@@ -17,6 +17,8 @@ def perturb_normals(scene: CompiledScene, surface: SurfaceInteraction) -> None:
     materials = scene.materials
     if not materials.normal_maps:
         return
+    if any(normal_map.shadows_grazing for normal_map in materials.normal_maps):
+        surface.unmapped = surface.ns
     surface.ns = surface.ns.copy()  # it may be ng itself
     normal_map_of = materials.normal_map_of.take(surface.material)
     for number, normal_map in enumerate(materials.normal_maps):
@@ -28,7 +30,25 @@ def perturb_normals(scene: CompiledScene, surface: SurfaceInteraction) -> None:
         which, normal = normal_map.perturbed(part, part.ns * side)
         normal *= side.take(which)
         wo, ng, smooth = (v.take(which, 1) for v in (part.wo, part.ng, part.ns))
-        surface.ns[:, lanes.take(which)] = ensure_valid_reflection(wo, ng, smooth, normal)
+        if normal_map.mirrors_hidden:
+            valid = mirror_hidden(wo, smooth, normal)
+        else:
+            valid = ensure_valid_reflection(wo, ng, smooth, normal)
+        surface.ns[:, lanes.take(which)] = valid
+        if surface.unmapped is not None and not normal_map.shadows_grazing:
+            surface.unmapped = surface.unmapped.copy()
+            surface.unmapped[:, lanes] = surface.ns[:, lanes]
+
+
+def mirror_hidden(wo: Floats, smooth: Floats, perturbed: Floats) -> Floats:
+    """Return perturbed normals (3, n), turned by half a turn about `smooth` where they face away from wo.
+
+    As `flip_invalid_normals` of Mitsuba 3 does.
+    """
+    away = np.flatnonzero(dot(wo, perturbed) <= 0)
+    normal, axis = perturbed.take(away, 1), smooth.take(away, 1)
+    perturbed[:, away] = axis * (f4(2) * dot(normal, axis)) - normal
+    return face_viewer(wo, perturbed)
 
 
 def ensure_valid_reflection(wo: Floats, ng: Floats, smooth: Floats, perturbed: Floats) -> Floats:

@@ -154,7 +154,8 @@ def add_shared(
     number_in = [
         tiles.grid(points.slot, np.flatnonzero(shining & (points.way == way))) for way in range(branches)
     ]
-    albedo = lit.albedo() if all(bsdf.lambertian for _, bsdf in lit.groups) else None
+    plain = lit.surface.unmapped is None and all(bsdf.lambertian for _, bsdf in lit.groups)
+    albedo = lit.albedo() if plain else None
     received = [np.zeros((3, slot.size), f4) for _ in sums]
     for some in spans(tiles.count, TILES_AT_ONCE):
         first = FirstPoints.of(scene, lit, albedo, lane_in[:, some])

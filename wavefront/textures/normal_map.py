@@ -21,6 +21,11 @@ class BaseNormalMap(ABC):
     """The interface of normal maps and bump maps, which the stage `perturb_normals` applies."""
 
     reads: tuple[str, ...]  # fields of `SurfaceInteraction` that `perturbed` needs
+    # normals that face away from the view are mirrored at those without the map; False: all normals are
+    # raised until the mirrored view is above the surface
+    mirrors_hidden: bool = False
+    # tilted normals shadow light that grazes the surface, as if they were those of microfacets
+    shadows_grazing: bool = False
 
     def scaled(self, factor: float) -> BaseNormalMap:
         """Return the map for a scene scaled by `factor`: itself, unless it has lengths."""

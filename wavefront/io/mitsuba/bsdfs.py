@@ -32,7 +32,6 @@ from .textures import bitmap, color, roughness, scalar
 
 LEAST_INDEX = 1e-6
 MAPPED = "use_shadowing_function flip_invalid_normals"
-NO_SHADOWING = "as with use_shadowing_function=false; Mitsuba's default is darker, 1 % in its test scenes"
 ONE_SIDED = ("diffuse", "conductor", "roughconductor", "plastic", "roughplastic")  # the back is black
 
 
@@ -200,12 +199,12 @@ def _blend(node: Node, job: Job) -> Material:
     return _named(node, Mix(one, two, scalar(node, "weight", 0.5, job)))
 
 
-@plugin("bumpmap", "bsdf", f"scale {MAPPED}", holds="bsdf texture", note=NO_SHADOWING)
+@plugin("bumpmap", "bsdf", f"scale {MAPPED}", holds="bsdf texture")
 def _bump(node: Node, job: Job) -> Material:
     return _mapped(node, job, lambda image: BumpMap(image, node.number("scale", 1.0)), "luminance")
 
 
-@plugin("normalmap", "bsdf", f"normalmap {MAPPED}", holds="bsdf", note=NO_SHADOWING)
+@plugin("normalmap", "bsdf", f"normalmap {MAPPED}", holds="bsdf")
 def _normal(node: Node, job: Job) -> Material:
     return _mapped(node, job, ShadingFrameMap, None)
 
@@ -220,8 +219,6 @@ def _inner(node: Node, job: Job) -> Material:
 
 def _mapped(node: Node, job: Job, make: Any, channel: Any) -> Material:
     """Return the material in a plugin, with a map of its normals."""
-    if node.flag("use_shadowing_function") or not node.flag("flip_invalid_normals", True):
-        node.lose("use_shadowing_function or flip_invalid_normals")
     material = copy(_inner(job.only(node, "bsdf"), job))
     image = job.only(node, "texture")
     if material.normal_map is not None:
@@ -237,7 +234,12 @@ def _mapped(node: Node, job: Job, make: Any, channel: Any) -> Material:
         if not isinstance(value, Texture):
             value = Texture(np.broadcast_to(value, 3).astype(np.float32).reshape(1, 1, 3), channel=channel)
         texture = value
-    material.normal_map = make(texture)
+    normal_map = make(texture)
+    normal_map.shadows_grazing = node.flag("use_shadowing_function", True)
+    normal_map.mirrors_hidden = node.flag("flip_invalid_normals", True)
+    if not normal_map.mirrors_hidden:
+        node.lose("flip_invalid_normals")
+    material.normal_map = normal_map
     material.derive()
     return material
 
