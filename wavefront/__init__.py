@@ -98,7 +98,7 @@ if TYPE_CHECKING:
     from .io.foreign import from_open3d, from_pyvista
     from .io.load import from_mitsuba, from_trimesh, load, load_mesh
     from .io.sources import LoadLimits
-    from .measuring import Measurement, grid_points, load_points, measure
+    from .measuring import Measurement, grid_points, load_points, measure, measure_flux
     from .viewer import Viewer, view
     from .views import render_many, turntable
 
@@ -113,7 +113,7 @@ _LATER = {  # what many programs do without is imported when they ask for it
     ".io.foreign": ("from_open3d", "from_pyvista"),
     ".io.load": ("from_mitsuba", "from_trimesh", "load", "load_mesh"),
     ".io.sources": ("LoadLimits",),
-    ".measuring": ("Measurement", "grid_points", "load_points", "measure"),
+    ".measuring": ("Measurement", "grid_points", "load_points", "measure", "measure_flux"),
     ".testing": ("testing",),
     ".viewer": ("Viewer", "view"),
     ".views": ("render_many", "turntable"),
@@ -209,6 +209,7 @@ __all__ = [
     "load_mesh",
     "load_points",
     "measure",
+    "measure_flux",
     "orbit",
     "register_accelerator",
     "register_executor",

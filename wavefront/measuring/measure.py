@@ -9,6 +9,7 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.vec import Doubles
 from ..camera import Sensors
 from ..core.errors import SceneError
 from ..film.aov_names import chosen_aovs
@@ -125,6 +126,10 @@ def lifted(scene: Scene, sensors: Sensors) -> Sensors:
     """Return sensors of irradiance above the surfaces that they may lie on; others as they are."""
     if sensors.sensor != "irradiance":
         return sensors
-    places = np.concatenate([sensors.points, scene.bounds])
-    size = float(np.linalg.norm(np.ptp(places, axis=0)))
-    return Sensors(sensors.points + LIFT * size * sensors.directions, sensors.directions)
+    lift = LIFT * size_of(scene, sensors.points)
+    return Sensors(sensors.points + lift * sensors.directions, sensors.directions)
+
+
+def size_of(scene: Scene, points: Doubles) -> float:
+    """Return the size of a scene with points (n, 3): the diagonal of the box around all, scene units."""
+    return float(np.linalg.norm(np.ptp(np.concatenate([points, scene.bounds]), axis=0)))

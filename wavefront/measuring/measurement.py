@@ -29,7 +29,7 @@ class Measurement:
     Attributes
     ----------
     value
-        (n, 3) mean of each channel: W·m⁻² (irradiance, fluence) or W·sr⁻¹·m⁻² (radiance).
+        (n, 3) mean of each channel: W·m⁻² (irradiance, fluence), W·sr⁻¹·m⁻² (radiance) or W (flux).
     standard_error
         (n, 3) of `value`; NaN for fewer than two samples.
     samples
@@ -37,7 +37,7 @@ class Measurement:
     points, normals
         (n, 3) of the sensors, scene units; what radiance has for directions are its normals.
     kind
-        "irradiance", "fluence" or "radiance".
+        "irradiance", "fluence", "radiance", "arriving flux" or "leaving flux".
     metadata
         The settings and results of the render.
     image
@@ -65,8 +65,8 @@ class Measurement:
         self.metadata = image.metadata
         self.kind: str = image.metadata["sensor"]
         self._count: int = image.metadata["points"]
-        self.value = self._rows(image.rgb)
-        self.standard_error = self._rows(image.standard_error)
+        self.value = self._light(image.rgb)
+        self.standard_error = self._light(image.standard_error)
         self.samples = self._rows(image.counts)
         self.points = self._rows(image.layers["position"])
         self.normals = self._rows(image.layers["normal"])
@@ -80,6 +80,11 @@ class Measurement:
     def _rows(self, values: Any) -> NDArray[Any]:
         """Return the values of pixels (rows, columns, ...) as those of the points (n, ...)."""
         return np.ascontiguousarray(values.reshape(-1, *values.shape[2:])[: self._count])
+
+    def _light(self, values: Any) -> NDArray[np.float32]:
+        """Return the light (n, 3) in pixels (rows, columns, 3), as power where the sensors are surfaces."""
+        scale = self.image.layers.get("scale")
+        return self._rows(values if scale is None else (values * scale[..., None]).astype(np.float32))
 
     def interval(self, confidence: float = 0.95) -> tuple[Doubles, Doubles]:
         """Return the confidence interval of each value: lower and upper limits, (n, 3) each.
@@ -127,7 +132,7 @@ class Measurement:
         if name not in self.image.errors:
             found = ", ".join(self.image.errors) or "no part"
             raise SceneError(f"{name!r} was not measured; there is {found}: measure(aovs=...) asks for parts")
-        return self._rows(self.image.layers[name]), self._rows(self.image.errors[name])
+        return self._light(self.image.layers[name]), self._light(self.image.errors[name])
 
     def merge(self, other: Measurement) -> Measurement:
         """Return the measurement of the samples of both, which `measure(samples=...)` took.

@@ -13,7 +13,13 @@ from ..image.plot import import_pyplot
 if TYPE_CHECKING:
     from .measurement import Measurement
 
-UNITS = {"irradiance": "W·m⁻²", "fluence": "W·m⁻²", "radiance": "W·sr⁻¹·m⁻²"}
+UNITS = {
+    "irradiance": "W·m⁻²",
+    "fluence": "W·m⁻²",
+    "radiance": "W·sr⁻¹·m⁻²",
+    "arriving flux": "W",
+    "leaving flux": "W",
+}
 
 
 def draw(found: Measurement, levels: int, axes: Any) -> Any:
