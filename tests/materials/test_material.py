@@ -135,5 +135,5 @@ def test_lengths_are_scaled() -> None:
     scaled = material.scaled(4.0)
     assert scaled.bsdf is material.bsdf
     assert scaled.normal_map.height == 2
-    assert scaled.interior.absorption.ravel().tolist() == [0.25, 0.5, 0]
+    assert scaled.interior.sigma_a.ravel().tolist() == [0.25, 0.5, 0]
     assert material.interior.absorption.ravel().tolist() == [1, 2, 0]

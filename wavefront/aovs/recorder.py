@@ -116,12 +116,12 @@ class SampleRecorder(PathRecorder):
         self._shade_awaited()
         first, self._begun = not self._begun, True
         if first and self._covered is not None:
-            self._covered[paths.slot] = hits.prim >= 0
+            self._covered[paths.slot] = hits.prim != -1
         if first and self._coverage is not None:
             self._coverage.record(scene, paths, hits)
         if not self._needs_surfaces(paths, first):
             return
-        ends = hits.prim >= 0
+        ends = hits.prim != -1
         ends[kept] = False
         if ends.any():
             self._awaited = AwaitedSurfaces(

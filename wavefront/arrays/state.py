@@ -119,6 +119,8 @@ class Paths(Rays):
     pdf: Floats  # (n,) density of the last BSDF sample, 1/sr; unused where specular
     specular: Bools  # (n,) the last direction is of a delta lobe or the camera: light sampling cannot find it
     roulette_scale: Floats  # (n,) throughput times this decides about roulette: see `stages.compact.roulette`
+    media: Any = None  # (4, n) stack of what the paths are inside of; None in scenes without a `MediaTable`
+    glow: Floats | None = None  # (3, n) light that media have sent since the last event; None where none does
     prev_vertex: Floats | None = None  # (3, n) where the paths last scattered; None where that is `origin`
     # what lights were sampled for there (lights/base.py); None where no light of the scene takes it
     left_receiver: Any = None
@@ -148,6 +150,11 @@ class Hits(SoA):
         """Lanes that hit a surface."""
         return np.flatnonzero(self.prim >= 0)
 
+    @property
+    def met(self) -> Ints:
+        """Lanes that hit a surface, or are scattered before by a medium, where `prim` is below -1."""
+        return np.flatnonzero(self.prim != -1)
+
 
 @soa
 class SurfaceInteraction(SoA):
@@ -171,6 +178,7 @@ class SurfaceInteraction(SoA):
     tangent_frame1: Floats | None = None  # (6, n) the same for uv1
     throughput: Floats | None = None  # (3, n) of the paths; None unless a material is dispersive
     unmapped: Floats | None = None  # (3, n) ns without a normal map; None unless one shadows grazing light
+    index_around: Floats | None = None  # (n,) of refraction, outside of the surfaces; None where it is 1
 
     def frame(self) -> Frame:
         """Return the shading frames, z = ns."""

@@ -7,6 +7,7 @@ from .diffuse import Diffuse
 from .disney import Disney
 from .mirror import Mirror
 from .mix import Mix
+from .null import NullSurface
 from .oren_nayar import OrenNayar
 from .plastic import Plastic
 from .principled import Principled
@@ -38,6 +39,7 @@ __all__ = [
     "Disney",
     "Mirror",
     "Mix",
+    "NullSurface",
     "OrenNayar",
     "Plastic",
     "Principled",

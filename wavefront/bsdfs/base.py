@@ -68,6 +68,7 @@ class Bsdf(Parametrized, ABC):
 
     transmissive: bool = False  # light can cross the surface
     dispersive: bool = False  # the indices of refraction of the channels differ
+    invisible: bool = False  # light passes as if there were no surface
     catches_shadows: bool = False  # the camera sees only shadows on it
     dimensions: int = 2  # rows of u that sample_f reads
     given_elsewhere: ClassVar[dict[str, str]] = MATERIAL_ARGUMENTS  # for messages
@@ -89,6 +90,11 @@ class Bsdf(Parametrized, ABC):
     def view_independent(self) -> bool:
         """True if no method uses wo, which is then not computed."""
         return False
+
+    @property
+    def encloses(self) -> bool:
+        """True if light that crosses the surface is inside of something else: not if it is a sheet."""
+        return self.transmissive and not getattr(self, "thin", False)
 
     @property
     def lambertian(self) -> bool:

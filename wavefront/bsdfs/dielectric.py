@@ -150,6 +150,8 @@ class Dielectric(RefractiveBsdf):
     def bind(self, surface: SurfaceInteraction) -> Self:
         """Return the BSDF bound to `surface`, with `eta` inverted where `wo` is inside."""
         bound = copy(super().bind(surface))
+        if surface.index_around is not None:
+            vars(bound)["ior"] = bound.ior / surface.index_around  # not by assignment, which would check it
         bound.eta = np.where(surface.back_facing, f4(1) / bound.ior, bound.ior)
         if self.has_film:
             bound.before = np.where(surface.back_facing, bound.ior, f4(1))

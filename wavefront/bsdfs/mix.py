@@ -61,6 +61,11 @@ class Mix(JointBsdf):
         self.dispersive = self.first.dispersive or self.second.dispersive
         self.specular = self.first.specular and self.second.specular
 
+    @property
+    def encloses(self) -> bool:
+        """True if one of both does."""
+        return self.first.encloses or self.second.encloses
+
     def bind(self, surface: SurfaceInteraction) -> Self:
         """Look up the weight, and the parameters of both BSDFs."""
         bound = copy(super().bind(surface))

@@ -40,6 +40,8 @@ class ThinDielectric(RefractiveBsdf):
     >>> pane = wf.Rectangle((-1, 0, 0), (2, 0, 0), (0, 2, 0), material=wf.ThinDielectric(1.5))
     """
 
+    thin = True
+
     def albedo(self, wo: Floats) -> Floats:
         """Return the tints of both sides, weighed by the reflectance of a smooth sheet."""
         return self.transmittance + (self.reflectance - self.transmittance) * self._reflected(wo[2])

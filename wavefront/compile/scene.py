@@ -11,6 +11,7 @@ from ..accel import Accelerator, Geometry, InstanceAccelerator
 from ..arrays.soa import soa
 from ..arrays.vec import Bools, Floats, Ints
 from ..camera import Camera
+from ..core.errors import SceneError
 from ..lights import InfiniteLight, LightTable
 from ..lights.choice import LightSamplerMaker
 from ..scene import Scene
@@ -33,6 +34,7 @@ from .materials import (
     number_materials,
     opacity_table,
 )
+from .media import MediaTable, media_of, media_table, phase_materials
 from .morton import MortonGrid
 from .scale import check_distance, check_lights, length_factor, scaled_shapes
 from .shape_numbers import ShapeNumbers, number_shapes
@@ -61,7 +63,8 @@ class CompiledScene:
     curved: CurvedTable  # k of them
     shape_numbers: ShapeNumbers  # which shapes of the user's scene the primitives belong to
     shape_names: tuple[str, ...]  # of those shapes
-    material_of: Ints  # (m + k,) material of each primitive
+    # (m + k,) material of each primitive; with media, those of phase functions and of a miss follow
+    material_of: Ints
     light_of: Ints  # (m + k + 1,) light of each primitive, and at the end that of a miss; -1 for none
     emissive: Bools  # (m + k + 1,) whether `light_of` names a light
     materials: MaterialTable
@@ -78,6 +81,7 @@ class CompiledScene:
     backdrop: InfiniteLight | None = None  # what they show of the environment; None for all of its light
     roulette_after: float = ROULETTE_AFTER  # scattering events before Russian roulette may end paths
     specular_surfaces: SpecularSurfaces | None = None  # for light tracing; None without it
+    media: MediaTable | None = None  # None where media only absorb, each behind its own surfaces
 
     @property
     def interpolates(self) -> bool:
@@ -145,6 +149,16 @@ def compile_scene(
     meshes += shared
     triangles, normals = gather_triangles(meshes, vertices)
     user_materials, material_of, replaced = number_materials(meshes, curved, instances)
+    around = None if scene.medium is None else scene.medium.scaled(scale)
+    filled = media_of(user_materials, around)
+    media = media_table(around, placed, user_materials, filled, center)
+    phases = phase_materials(filled)
+    user_materials += phases
+    if caustics and media is not None:
+        raise SceneError(
+            "caustics=True does not go with media that scatter, emit or overlap: paths from lights do not "
+            "follow them"
+        )
     lights, groups, light_of, environment = gather_lights(
         scene, scaled, scale, meshes, curved, vertices, center, (high - low) / 2, light_sampler, mis
     )
@@ -155,7 +169,6 @@ def compile_scene(
     del vertices
     has_alpha = find_alpha(user_materials, material_of, meshes, instances)
     nonscattering_lights = find_nonscattering_lights(user_materials, material_of, light_of, len(lights))
-    light_of = np.append(light_of, environment)
     weights = bool(attributes) or smooth
     shape_numbers = number_shapes(meshes, curved, instances, numbers)
     interchangeable = None if weights else same_as_next(material_of[:once], light_of[:once], shape_of)
@@ -173,6 +186,15 @@ def compile_scene(
         specular = find_specular_surfaces(
             triangles[:once], table_of_curved, material_of.take(whole), light_of.take(whole), groups_of
         )
+    absorption = absorption_table(user_materials)
+    if media is not None:
+        # events in media have the numbers from -2 down, so their entries are those before that of a miss
+        rows = np.arange(len(user_materials) - len(phases), len(user_materials))
+        material_of = np.concatenate([material_of, rows[::-1], [0]])
+        light_of = np.append(light_of, np.full(len(phases), -1))
+        has_alpha = np.append(has_alpha, np.zeros(len(phases), np.bool_))
+        absorption = None
+    light_of = np.append(light_of, environment)
     return CompiledScene(
         scale=scale,
         center=center,
@@ -188,7 +210,7 @@ def compile_scene(
         light_of=light_of,
         emissive=light_of >= 0,
         materials=groups_of,
-        absorption=absorption_table(user_materials),
+        absorption=absorption,
         opacities=opacity_table(user_materials, has_alpha),
         lights=lights,
         light_groups=groups,
@@ -197,5 +219,6 @@ def compile_scene(
         instances=table,
         shadow_catchers=find_shadow_catchers(user_materials),
         specular_surfaces=specular,
+        media=media,
         places=MortonGrid.over((high - low) / 2) if len(triangles) >= LARGE else None,
     )

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
 
 from ..aovs.recorder import add_to_slots
 from ..arrays.state import Contribution, Hits, Paths
-from ..arrays.vec import Floats, Ints, take
+from ..arrays.vec import Floats, Ints, highest, take
 from ..compile.scene import CompiledScene
 from ..sampling.sampler import Sampler
 from ..stages.alpha import alpha_pass_through
@@ -39,6 +42,8 @@ def intersect_and_compact(
         return paths, at_sensors(paths)
     hits, left = intersect(scene, paths), paths.exclude_prim
     paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce)
+    if paths.glow is not None:
+        paths = collect_glow(L, paths)
     emission = without_caustics(scene, paths, left, hits, emitted(scene, paths, hits))
     if bounce == 0:
         emission = show_background(scene, L, paths, hits, emission)
@@ -50,6 +55,15 @@ def intersect_and_compact(
     if paths.recorder is not None:
         paths.recorder.record_hits(bounce, scene, paths, hits, lanes, *kept)
     return kept
+
+
+def collect_glow(L: Floats, paths: Paths) -> Paths:
+    """Add what media have sent along paths to L; return the paths without it."""
+    assert paths.glow is not None
+    lanes = np.flatnonzero(highest(paths.glow) != 0)
+    glowing = replace(paths, throughput=np.ones_like(paths.glow), glow=None)
+    accumulate(L, glowing, Contribution(lanes, take(paths.glow, lanes), np.full(lanes.size, -1)))
+    return replace(paths, glow=None)
 
 
 def prepare_shading(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:

@@ -7,13 +7,14 @@ from typing import Any, Self, TypeAlias
 
 import numpy as np
 
+from ..arrays.vec import f4
 from ..bsdfs import Bsdf
 from ..core.errors import SceneError, number
 from ..core.html import preview_html
 from ..core.parameter import Parameter, Parametrized
 from ..core.suggestions import suggests_keywords
 from ..film.aov_names import DEFAULT_GROUP, group_name
-from ..media import Medium
+from ..media import BaseMedium
 from ..textures.normal_map import BaseNormalMap
 from ..textures.parameter import Color, Scalar, color
 from .alpha import Opacity, alpha_value
@@ -46,10 +47,16 @@ def _emission(name: str, value: Any) -> Any:
     return None if isinstance(radiance, np.ndarray) and not radiance.any() else radiance
 
 
-def _interior(name: str, value: Any) -> Medium | None:
-    if value is not None and not isinstance(value, Medium):
+def _interior(name: str, value: Any) -> BaseMedium | None:
+    if value is not None and not isinstance(value, BaseMedium):
         raise SceneError(f"{name} must be a Medium such as wf.Medium(absorption=1), got {value!r}")
     return value
+
+
+def _priority(name: str, value: Any) -> int | None:
+    if value is None:
+        return None
+    return int(number(name, value, lambda x: x == int(x) and abs(x) < 2**31, "a whole number below 2**31"))
 
 
 def _name(name: str, value: Any) -> str | None:
@@ -82,6 +89,11 @@ class Material(Parametrized):
         Name of the light group of the emission, for `aovs="light_groups"`.
     interior
         The `Medium` behind the surface. A ray that meets the surface from its back side has crossed it.
+    priority
+        A whole number, for shapes that overlap, such as a liquid and the glass around it: where they do,
+        there is only the one of the higher priority, and surfaces within it do not count. Indices of
+        refraction are then relative to vacuum, and not to what is around the shape. None: 0, and an index
+        relative to what is around.
     name
         The name of the material in `Image.names`; materials of files have that of the file.
 
@@ -107,6 +119,7 @@ class Material(Parametrized):
     normal_map = Parameter(_normal_map)
     emission = Parameter(_emission)
     interior = Parameter(_interior)
+    priority = Parameter(_priority)
     group = Parameter(group_name)
     name = Parameter(_name)
     opacity: Opacity | None
@@ -120,7 +133,8 @@ class Material(Parametrized):
         alpha_cutoff: float | None = None,
         normal_map: BaseNormalMap | None = None,
         emission: Color | None = None,
-        interior: Medium | None = None,
+        interior: BaseMedium | None = None,
+        priority: int | None = None,
         group: str = DEFAULT_GROUP,
         name: str | None = None,
     ) -> None:
@@ -130,6 +144,7 @@ class Material(Parametrized):
         self.normal_map = normal_map
         self.emission = emission
         self.interior = interior
+        self.priority = priority
         self.group = group
         self.name = name
         self.derive()
@@ -167,8 +182,14 @@ class Material(Parametrized):
 
     def derive(self) -> None:
         """Set the opacity."""
-        opacity = None if self.alpha is None else Opacity(self.alpha, self.alpha_cutoff)
+        alpha = np.zeros(1, f4) if self.bsdf.invisible else self.alpha
+        opacity = None if alpha is None else Opacity(alpha, self.alpha_cutoff)
         self.opacity = None if opacity is None or opacity.constant == 1 else opacity
+
+    @property
+    def encloses(self) -> bool:
+        """Whether light behind the surface is inside of something else than in front of it."""
+        return self.interior is not None or self.bsdf.encloses
 
     def scaled(self, factor: float) -> Self:
         """Return this material where lengths were multiplied by `factor`: itself if it has no lengths."""

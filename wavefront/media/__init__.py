@@ -1,6 +1,17 @@
 """Media: what fills the space inside shapes."""
 
+from .base import BaseMedium, Flight, MediumRecord
 from .medium import Medium
 from .phase import HenyeyGreenstein, Isotropic, PhaseFunction, PhaseMix, Rayleigh
 
-__all__ = ["HenyeyGreenstein", "Isotropic", "Medium", "PhaseFunction", "PhaseMix", "Rayleigh"]
+__all__ = [
+    "BaseMedium",
+    "Flight",
+    "HenyeyGreenstein",
+    "Isotropic",
+    "Medium",
+    "MediumRecord",
+    "PhaseFunction",
+    "PhaseMix",
+    "Rayleigh",
+]

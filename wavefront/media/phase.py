@@ -147,7 +147,8 @@ class Rayleigh(PhaseFunction):
         return np.clip(np.copysign(root - f4(1) / root, z), f4(-1), f4(1))
 
 
-def _phase(name: str, value: Any) -> PhaseFunction:
+def as_phase(name: str, value: Any) -> PhaseFunction:
+    """Return a phase function; raise a SceneError for anything else."""
     if not isinstance(value, PhaseFunction):
         raise SceneError(f"{name} must be a phase function such as wf.HenyeyGreenstein(0.8), got {value!r}")
     return value
@@ -179,8 +180,8 @@ class PhaseMix(PhaseFunction):
     0.62
     """
 
-    first = Parameter(_phase)
-    second = Parameter(_phase)
+    first = Parameter(as_phase)
+    second = Parameter(as_phase)
     weight = Parameter(_share)
 
     @suggests_keywords

@@ -53,13 +53,19 @@ class Dimension(IntEnum):
     GUIDE_DIRECTION = 2**20 + 1  # 2-D: direction from the table
     SPECULAR_SURFACE = 2**20 + 2  # 2-D: which primitive a path from a light begins at
     SPECULAR_POINT = 2**20 + 3  # 2-D: where on it
+    MEDIUM = 2**21  # 2-D: where a medium scatters, by channel and distance; repeats along the ray, up to 2²²
+    TRANSMITTANCE = 2**22  # of light samples through media; repeats along the ray, up to 2²³
 
 
 # At the first vertex: decisions whose points are the last two coordinates of the points of PIXEL. What they
 # bring is added, never multiplied, so both may use the same two.
 WITH_PIXEL = (Dimension.LIGHT_POINT, Dimension.DIRECTION)
 
-REPEATED = {Dimension.OPACITY: 2**20}  # decisions that repeat, and one past the last of their numbers
+REPEATED = {
+    Dimension.OPACITY: 2**20,
+    Dimension.MEDIUM: 2**22,
+    Dimension.TRANSMITTANCE: 2**23,
+}  # decisions that repeat, and one past the last of their numbers
 
 
 def numbers_of(dimension: Dimension) -> range:
@@ -120,18 +126,18 @@ class IndependentSampler(Sampler):
 
     def draw_1d(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Floats:
         """Return numbers in [0, 1), (n,)."""
-        word = self._hash(pixel, sample, bounce, dimension)
+        word = self.words(pixel, sample, bounce, dimension)
         return _high_fraction(word, np.empty(len(word), f4))
 
     def draw_2d(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Floats:
         """Return points in [0, 1)², (2, n)."""
-        word = self._hash(pixel, sample, bounce, dimension)
+        word = self.words(pixel, sample, bounce, dimension)
         out = np.empty((2, len(word)), f4)
         _fraction(word.astype(u4), out[1])  # the lower half of the word
         _high_fraction(word, out[0])
         return out
 
-    def _hash(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Longs:
+    def words(self, pixel: Words, sample: Words, bounce: int, dimension: int) -> Longs:
         """Return 64 random bits per lane, (n,)."""
         word = pixel.astype(u8)
         word <<= u8(32)

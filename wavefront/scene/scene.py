@@ -18,6 +18,7 @@ from ..core.errors import SceneError, finite_array, in_brief
 from ..core.plural import plural
 from ..core.suggestions import did_you_mean, suggests_keywords
 from ..lights import Environment, Light
+from ..media import BaseMedium
 from ..shapes import Instance, Mesh, PrimitiveArray, Shape
 from ..shapes.instance import instance_bounds, instance_hulls
 from .html import scene_html
@@ -58,6 +59,9 @@ class Scene:
     settings
         Settings of `render` by name, such as `spp` and `max_bounces`: those of the scene's file. They count
         where none are given for a render; `spp` not where `noise`, `seconds` or `samples` is given.
+    medium
+        A `Medium` that fills all space around the shapes, such as fog. It has no end, so no light at infinity
+        gets through what absorbs or scatters. None: nothing.
 
     Notes
     -----
@@ -88,12 +92,14 @@ class Scene:
         *,
         up: ArrayLike | None = None,
         settings: Mapping[str, Any] | None = None,
+        medium: BaseMedium | None = None,
     ) -> None:
         self.shapes = shapes
         self.lights = lights
         self.camera = camera
         self.up = up
         self.settings = dict(settings or {})
+        self.medium = medium
         self.accelerators = AcceleratorCache()  # of the last render, for the next one
         self.check()
 
@@ -143,6 +149,17 @@ class Scene:
     @up.setter
     def up(self, up: ArrayLike | None) -> None:
         self._up = None if up is None else upward("up", up)
+
+    @property
+    def medium(self) -> BaseMedium | None:
+        """What fills all space around the shapes; None for nothing."""
+        return self._medium
+
+    @medium.setter
+    def medium(self, medium: BaseMedium | None) -> None:
+        if medium is not None and not isinstance(medium, BaseMedium):
+            raise SceneError(f"medium must be a Medium such as wf.Medium(scattering=0.1), got {medium!r}")
+        self._medium = medium
 
     def vertical(self, up: ArrayLike = AUTO) -> NDArray[np.float64]:
         """Return the up direction (3,), of any length, given a vector, the name of an axis, or "auto"."""

@@ -13,15 +13,15 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays.state import Hits, Paths, Rays, SurfaceInteraction
-from ..arrays.vec import Floats, Ints, f4
+from ..arrays.vec import Floats, Ints, f4, take
 from ..compile.scene import CompiledScene
 from ..core.errors import RenderError
 from ..sampling.sampler import Dimension, Sampler, numbers_of
 from .interaction import interaction
 from .intersect import intersect
-from .medium import absorb
+from .medium import absorb, cross, fly
 from .shadow_catcher import catcher_lanes, shadow_opacity
-from .transmittance import continue_behind
+from .transmittance import continue_behind, opacities_at, passable
 
 COVERING = f4(0.5)  # opacity from which on a surface hides what is behind it, where nothing is random
 
@@ -30,6 +30,8 @@ def alpha_pass_through(
     scene: CompiledScene, paths: Paths, hits: Hits, sampler: Sampler, bounce: int
 ) -> tuple[Paths, Hits]:
     """Move paths on through the surfaces that they pass, to the first surface that they hit.
+
+    Media on the way may scatter them before.
 
     Afterwards `origin` is behind the last surface that a path has passed, and `prev_vertex` is where it
     scattered last. Each of the surfaces along a ray has a random number of its own.
@@ -40,42 +42,51 @@ def alpha_pass_through(
         If a ray meets more surfaces than there are random numbers for.
     """
     catches = bounce == 0 and scene.shadow_catchers is not None
-    if scene.opacities is None and not catches:
+    media, lanes = scene.media, np.arange(len(paths))
+    if scene.opacities is None and not catches and media is None:
         return paths, hits
-    lanes = _passable(scene, hits, np.arange(len(paths)), catches)
-    if not lanes.size:
-        return paths, hits
+    if media is None:
+        lanes = _passable(scene, paths, hits, lanes, catches)
+        if not lanes.size:
+            return paths, hits
     paths = replace(
         paths, origin=paths.origin.copy(), exclude_prim=paths.exclude_prim.copy(), prev_vertex=paths.origin
     )
+    if media is not None:
+        glow = np.zeros_like(paths.origin) if media.glows else None
+        paths = replace(paths, media=np.array(paths.media), throughput=np.array(paths.throughput), glow=glow)
     numbers = iter(numbers_of(Dimension.OPACITY))
     while lanes.size:
         dimension = next(numbers, None)
         if dimension is None:
             most = len(numbers_of(Dimension.OPACITY))
             raise RenderError(f"a ray meets more than {most} surfaces with an opacity below 1")
+        if media is not None:
+            lanes = fly(scene, paths, hits, lanes, sampler, bounce, dimension - Dimension.OPACITY)
+            lanes = _passable(scene, paths, hits, lanes, catches)
         here, at = paths.take(lanes), hits.take(lanes)
         surface = interaction(scene, here, at)
         u = sampler.draw_1d(here.pixel, here.sample, bounce, dimension)
         passing = np.flatnonzero(u >= _opacities(scene, here, at, surface, sampler, catches))
         lanes, here, surface = lanes.take(passing), here.take(passing), surface.take(passing)
         absorb(scene, here.throughput, at.take(passing), surface)
-        here = continue_behind(here, surface)
+        here = replace(continue_behind(here, surface), media=cross(scene, here.media, surface))
         paths.origin[:, lanes], paths.exclude_prim[lanes] = here.origin, here.exclude_prim
         paths.throughput[:, lanes] = here.throughput
         hits.put(lanes, intersect(scene, here))
-        lanes = _passable(scene, hits, lanes, catches)
+        if media is None:
+            lanes = _passable(scene, paths, hits, lanes, catches)
+        else:
+            paths.media[:, lanes] = here.media
     return paths, hits
 
 
-def _passable(scene: CompiledScene, hits: Hits, lanes: Ints, catches: bool) -> Ints:
+def _passable(scene: CompiledScene, paths: Paths, hits: Hits, lanes: Ints, catches: bool) -> Ints:
     """Return those of some lanes (k,) that hit a surface that they may pass; with `catches`, catchers too."""
-    passable = np.zeros(lanes.size, np.bool_)
-    if scene.opacities is not None:
-        passable = scene.opacities.has_alpha.take(hits.prim.take(lanes))  # a miss, -1, takes the last entry
+    found = passable(scene, hits, lanes, None if paths.media is None else take(paths.media, lanes))
     if catches:
-        passable[np.searchsorted(lanes, catcher_lanes(scene, hits, lanes))] = True
-    return lanes.compress(passable)
+        found[np.searchsorted(lanes, catcher_lanes(scene, hits, lanes))] = True
+    return lanes.compress(found)
 
 
 def _opacities(
@@ -88,7 +99,7 @@ def _opacities(
 ) -> Floats:
     """Return the opacities (n,) of surfaces, with `catches` those of shadows on catchers."""
     everything = np.arange(len(surface))
-    opacity: Floats = np.ones(everything.size, f4) if scene.opacities is None else scene.opacities.at(surface)
+    opacity = opacities_at(scene, surface, paths.media)
     lanes = catcher_lanes(scene, hits, everything) if catches else everything[:0]
     if lanes.size:
         opacity[lanes] *= shadow_opacity(scene, paths.take(lanes), surface.take(lanes), sampler)

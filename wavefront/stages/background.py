@@ -22,7 +22,7 @@ def show_background(
     """
     if scene.background is None:
         return emission if scene.backdrop is None else _before(scene.backdrop, paths, hits, emission)
-    missed = np.flatnonzero(hits.prim < 0)
+    missed = np.flatnonzero(hits.prim == -1)
     slot = take(paths.slot, missed)
     L[:, slot] += scene.background
     if paths.recorder is not None:

@@ -87,6 +87,7 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         pdf=sample.pdf,
         specular=specular,
         roulette_scale=roulette_scale,
+        media=shade.stacks(paths.media, cos_g),
         left_rough=~specular if bounce == 0 and paths.left_rough is not None else paths.left_rough,
         depth=None if paths.depth is None else _after(paths.depth, specular),
         met_rough=paths.met_rough,

@@ -64,8 +64,8 @@ def select(paths: Paths, lanes: Ints) -> Paths:
 def scattering_lanes(scene: CompiledScene, paths: Paths, hits: Hits, emission: Contribution) -> Ints:
     """Return the lanes (k,) of paths that met a surface, unless it is a light that scatters nothing."""
     if scene.nonscattering_lights is None:
-        return hits.found
-    found = hits.prim >= 0
+        return hits.met
+    found = hits.prim != -1
     found[emission.lanes.compress(scene.nonscattering_lights.take(emission.light))] = False
     return np.flatnonzero(found)
 

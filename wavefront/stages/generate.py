@@ -10,6 +10,7 @@ from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..sampling.filters import Filter, box
 from ..sampling.sampler import Dimension, Sampler
+from .inside import stacks_at
 from .sensors import receiver_of_camera
 
 HALF = np.full((2, 1), 0.5, f4)
@@ -43,6 +44,7 @@ def generate(
         pdf=broadcast(f4(1), n),
         specular=broadcast(np.True_, n),
         roulette_scale=broadcast(f4(1) if receiver is None else f4(1) / receiver.total, n),
+        media=stacks_at(scene, origin),
         left_rough=None if scene.specular_surfaces is None else broadcast(np.False_, n),
         receiver=receiver,
     )

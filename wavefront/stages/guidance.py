@@ -73,7 +73,10 @@ def mix_with_guide(
     weight, density, gain = sample.weight.copy(), sample.pdf.copy(), np.ones(len(paths), f4)
     good = valid[:n] & (pdf > 0)
     divisor = np.where(good, pdf, f4(1))
-    scale = np.where(good, np.abs(wi[2, :n]) / divisor, f4(0))
+    cos = np.abs(wi[2, :n])
+    if shade.volume is not None:
+        cos[shade.volume] = 1
+    scale = np.where(good, cos / divisor, f4(0))
     # delta lobes are drawn by the BSDF alone
     delta = specular[:n]
     weight[:, :n] = np.where(delta, weight[:, :n] / (f4(1) - share), f * scale)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..arrays.state import Hits, Paths, Rays, SurfaceInteraction
@@ -30,7 +32,27 @@ LIFT = f4(0.01)  # directions below the surface are raised to this cosine with `
 
 
 def interaction(scene: CompiledScene, rays: Rays, hits: Hits) -> SurfaceInteraction:
-    """Return the surface geometry at hits; every ray must have hit a surface."""
+    """Return the surface geometry at hits; every ray must have hit a surface, or be scattered by a medium.
+
+    In a medium the normal is the direction that the light leaves in, and there is no primitive.
+    """
+    if scene.media is None:
+        return _on_surfaces(scene, rays, hits)
+    surface = _on_surfaces(scene, rays, replace(hits, prim=np.maximum(hits.prim, 0)))
+    if isinstance(rays, Paths) and rays.media is not None:
+        surface.index_around = scene.media.index_around(rays.media, surface)
+    lanes = np.flatnonzero(hits.prim < 0)
+    if lanes.size:
+        wo = take(surface.wo, lanes)
+        surface.point[:, lanes] = take(rays.origin, lanes) - wo * hits.t.take(lanes)
+        surface.error[lanes], surface.back_facing[lanes] = 0, False
+        surface.ng[:, lanes] = surface.ns[:, lanes] = wo
+        surface.prim[lanes], surface.material[lanes] = -1, material_rows(scene, hits, lanes)
+    return surface
+
+
+def _on_surfaces(scene: CompiledScene, rays: Rays, hits: Hits) -> SurfaceInteraction:
+    """Return the surface geometry at hits on surfaces."""
     point = rays.origin + rays.direction * hits.t
     instances = _instances_of(scene, hits)
     error: Floats = POINT_ERROR * (highest(np.abs(point)) + hits.t)

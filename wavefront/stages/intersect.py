@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ..arrays.soa import soa
@@ -9,6 +11,7 @@ from ..arrays.state import Hits, Rays, SurfaceInteraction
 from ..arrays.vec import Bools, Floats, Ints, f4, positive, take
 from ..compile.scene import CompiledScene
 from ..lights import LightSample
+from ..sampling.steps import StepNumbers
 
 TARGET_ERROR = f4(2**-20)  # rounding of a sampled point on a light, relative to its distance
 
@@ -20,6 +23,8 @@ class ShadowRays(Rays):
     error: Floats  # (n,) bound on the rounding error of the points that they start from, scene units
     distance: Floats  # (n,) to the sampled point, scene units; inf for a light at infinity
     cos_light: Floats  # (n,) cosine between the ray and the light's normal; 1 where it has none
+    media: Any = None  # (4, n) as of `Paths`
+    steps: StepNumbers | None = None  # for media that need them
 
 
 def intersect(scene: CompiledScene, rays: Rays) -> Hits:

@@ -1,13 +1,18 @@
-"""Absorption along rays through media."""
+"""Rays through media: absorption, where light is scattered, and what paths are inside of."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
 from ..arrays.elementary import exp
-from ..arrays.state import Hits, SurfaceInteraction
-from ..arrays.vec import Floats
+from ..arrays.state import Hits, Paths, Rays, SurfaceInteraction
+from ..arrays.vec import Bools, Floats, Ints, take
+from ..compile.media import crossed
 from ..compile.scene import CompiledScene
+from ..sampling.sampler import Dimension, Sampler
+from ..sampling.steps import StepNumbers
 
 
 def absorb(scene: CompiledScene, throughput: Floats, hits: Hits, surface: SurfaceInteraction) -> None:
@@ -21,3 +26,76 @@ def absorb(scene: CompiledScene, throughput: Floats, hits: Hits, surface: Surfac
     lanes = np.flatnonzero(surface.back_facing)
     depth = scene.absorption.take(surface.material.take(lanes), 1) * hits.t.take(lanes)
     throughput[:, lanes] *= exp(-depth)
+
+
+def fly(
+    scene: CompiledScene, paths: Paths, hits: Hits, lanes: Ints, sampler: Sampler, bounce: int, segment: int
+) -> Ints:
+    """Let some lanes (k,) fly through their media, in place; return those that reach their surfaces.
+
+    Those that are scattered before have `MediaTable.event_of` in place of a primitive, at that distance.
+    """
+    media = scene.media
+    assert media is not None
+    assert paths.media is not None
+    medium = media.medium_in(take(paths.media, lanes))
+    inside = np.flatnonzero(medium >= 0)
+    reached = np.ones(lanes.size, np.bool_)
+    medium, some = medium.take(inside), lanes.take(inside)
+    address = take(paths.pixel, some), take(paths.sample, some), bounce, Dimension.MEDIUM + segment
+    u = sampler.draw_2d(*address)
+    steps = StepNumbers.of(sampler.seed, *address) if media.takes_steps else None
+    for record, rows, column in media.by_record(medium):
+        at = some.take(rows)
+        throughput, length = take(paths.throughput, at), take(hits.t, at)
+        flight = record.sample(
+            column,
+            take(paths.origin, at),
+            take(paths.direction, at),
+            length,
+            throughput,
+            take(u, rows),
+            None if steps is None else steps.take(rows),
+        )
+        if flight.light is not None and paths.glow is not None:
+            paths.glow[:, at] += throughput * flight.light
+        paths.throughput[:, at] = throughput * flight.weight
+        met = np.flatnonzero(flight.t < length)
+        hits.t[at.take(met)] = flight.t.take(met)
+        hits.prim[at.take(met)] = media.event_of.take(medium.take(rows.take(met)))
+        reached[inside.take(rows.take(met))] = False
+    return lanes.compress(reached)
+
+
+def transmitted(
+    scene: CompiledScene, rays: Rays, stack: Ints, length: Floats, steps: StepNumbers | None
+) -> Floats:
+    """Return what part of the light media let through over some lengths (n,) of rays, (3, n)."""
+    media = scene.media
+    assert media is not None
+    medium, part = media.medium_in(stack), np.ones_like(rays.direction)
+    inside = np.flatnonzero(medium >= 0)
+    for record, rows, column in media.by_record(medium.take(inside)):
+        at = inside.take(rows)
+        part[:, at] = record.transmittance(
+            column,
+            take(rays.origin, at),
+            take(rays.direction, at),
+            length.take(at),
+            None if steps is None else steps.take(at),
+        )
+    return part
+
+
+def hidden(scene: CompiledScene, stack: Ints | None, material: Ints) -> Bools:
+    """Return whether surfaces of materials (n,) are within something of a higher priority."""
+    if scene.media is None or stack is None or not scene.media.nested.any():
+        return np.zeros(material.size, np.bool_)
+    return scene.media.hidden(stack, material)
+
+
+def cross(scene: CompiledScene, stack: Any, surface: SurfaceInteraction) -> Any:
+    """Return stacks (4, n) behind surfaces; None where the scene needs none."""
+    if scene.media is None or stack is None:
+        return stack
+    return crossed(stack, scene.media.crossing(surface.material, surface.back_facing))

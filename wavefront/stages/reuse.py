@@ -444,7 +444,10 @@ def can_reuse(scene: CompiledScene) -> bool:
     """Return whether any path of a scene can be shared.
 
     Where surfaces with alpha and media are mixed none is: what gets through differs between channels then.
+    Nor is any where media scatter.
     """
+    if scene.media is not None:
+        return False
     mixed = scene.opacities is not None and scene.absorption is not None
     return not mixed and bool((shared_materials(scene) | glossy_materials(scene)).any())
 

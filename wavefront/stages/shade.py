@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -13,11 +14,13 @@ from ..arrays.state import Contribution, Hits, Paths, SurfaceInteraction
 from ..arrays.vec import ALL, TINY, Floats, Ints, Lanes, broadcast, column, dot, f4, highest, take
 from ..bsdfs import Bsdf, albedo_of, evaluated
 from ..compile.materials import MaterialTable
+from ..compile.media import crossed
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..lights import LightSample, Receiver
 from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
+from ..sampling.steps import StepNumbers
 from .interaction import interaction, offset_origin, origin_above
 from .intersect import ShadowRays, shadow_rays, visible
 from .transmittance import transmittance_along
@@ -51,6 +54,8 @@ class Shading:
     groups: list[tuple[Lanes, Bsdf]]
     guidance: Guidance | None = None  # of the lanes of `lit`; None where BSDFs alone choose directions
     receiver: Receiver | None = None  # what lights are sampled for; None where no light takes it
+    volume: Ints | None = None  # lanes within media, where there is no cosine; None in scenes without media
+    crossing: Ints | None = None  # (n,) what light that crosses the surfaces does to stacks; likewise
 
     def lit(self) -> Shading:
         """Return the lanes that need light sampling; the groups after them have only delta lobes."""
@@ -62,7 +67,8 @@ class Shading:
         first = slice(last.stop)
         parts = self.surface.take(first), self.frame.take(first), self.wo[:, first], self.start[:, first]
         receiver = None if self.receiver is None else self.receiver.take(first)
-        return Shading(*parts, groups, self.guidance, receiver)
+        crossing = None if self.crossing is None else self.crossing[first]
+        return Shading(*parts, groups, self.guidance, receiver, self.volume, crossing)
 
     def at(self, scene: CompiledScene, lanes: Ints) -> Shading:
         """Return the surfaces of some lanes (k,) of `lit`, in any order; a lane may occur again."""
@@ -93,13 +99,25 @@ class Shading:
         """Return |cosθ| (n,) of directions, known in both frames, and their cosine against `ng`, (n,).
 
         Where the two normals disagree on the side of a direction the first is 0, so that no light leaks
-        through. It is less by what tilted normals shadow.
+        through. It is less by what tilted normals shadow. Within media both are 1.
         """
         if self.surface.ns is self.surface.ng:
-            return np.abs(local[2]), local[2]
-        cos_g = dot(self.surface.ng, world)
-        cos = np.abs(local[2]) * (local[2] * cos_g > 0)
-        return cos if self.surface.unmapped is None else cos * self.unshadowed(world), cos_g
+            cos, cos_g = np.abs(local[2]), local[2]
+        else:
+            cos_g = dot(self.surface.ng, world)
+            cos = np.abs(local[2]) * (local[2] * cos_g > 0)
+            if self.surface.unmapped is not None:
+                cos = cos * self.unshadowed(world)
+        if self.volume is not None and self.volume.size:
+            cos_g = cos_g.copy()
+            cos[self.volume] = cos_g[self.volume] = 1
+        return cos, cos_g
+
+    def stacks(self, media: Any, cos_g: Floats) -> Any:
+        """Return the stacks (4, n) of rays that leave, given those of paths that come; see `cosines`."""
+        if media is None or self.crossing is None:
+            return media
+        return crossed(media, np.where(cos_g < 0, self.crossing, 0))
 
     def unshadowed(self, world: Floats) -> Floats:
         """Return the part (n,) of light along world directions (3, n) that tilted normals do not shadow.
@@ -182,7 +200,11 @@ def shading(scene: CompiledScene, surface: SurfaceInteraction) -> Shading:
     else:
         wo = frame.to_local(surface.wo)
     receiver = receiver_of(surface, groups) if scene.lights.takes_receiver else None
-    return Shading(surface, frame, wo, origin_above(surface), groups, receiver=receiver)
+    shade = Shading(surface, frame, wo, origin_above(surface), groups, receiver=receiver)
+    if scene.media is not None:
+        shade.volume = np.flatnonzero(surface.prim < 0)
+        shade.crossing = scene.media.crossing(surface.material, surface.back_facing)
+    return shade
 
 
 def receiver_of(surface: SurfaceInteraction, groups: list[tuple[Lanes, Bsdf]]) -> Receiver:
@@ -251,9 +273,14 @@ def direct(
     through = (lit & (cos_g < 0)).any()
     origin = offset_origin(shade.surface, cos_g) if through else shade.start
     rays = shadow_rays(shade.surface, origin, light, lanes)
+    if scene.media is not None and paths.media is not None:
+        rays.media = take(shade.stacks(paths.media[:, :n], cos_g), lanes)
+        if scene.media.takes_steps:
+            which = take(address[0], lanes), take(address[1], lanes)
+            rays.steps = StepNumbers.of(sampler.seed, *which, bounce, Dimension.TRANSMITTANCE)
     number = take(number, lanes)
     radiance = radiance_at_samples(scene, rays, light, lanes, number)
-    if scene.opacities is not None:
+    if scene.opacities is not None or scene.media is not None:
         radiance = radiance * transmittance_along(scene, rays)
     else:
         seen = np.flatnonzero(visible(scene, rays))

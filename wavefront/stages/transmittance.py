@@ -7,12 +7,12 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..arrays.state import Rays, SurfaceInteraction
-from ..arrays.vec import Floats, dot, f4
+from ..arrays.state import Hits, Rays, SurfaceInteraction
+from ..arrays.vec import ALL, Bools, Floats, Ints, Lanes, dot, f4, take
 from ..compile.scene import CompiledScene
-from .interaction import interaction, offset_origin
+from .interaction import interaction, material_rows, offset_origin
 from .intersect import ShadowRays, intersect, shadow_ray_length, visible
-from .medium import absorb
+from .medium import absorb, cross, hidden, transmitted
 
 AnyRays = TypeVar("AnyRays", bound=Rays)
 
@@ -22,27 +22,57 @@ def transmittance_along(scene: CompiledScene, rays: ShadowRays) -> Floats:
 
     Only rays that hit anything are traced on from surface to surface.
     """
-    assert scene.opacities is not None
     part = np.ones_like(rays.direction)
-    lanes = np.flatnonzero(~visible(scene, rays))
+    seen = visible(scene, rays)
+    if rays.media is not None:
+        lanes = np.flatnonzero(seen)
+        free = rays.take(lanes)
+        part[:, lanes] = transmitted(scene, free, free.media, free.distance, free.steps)
+    lanes = np.flatnonzero(~seen)
     rays = rays.take(lanes)
     while lanes.size:
         hits = intersect(scene, rays)
         between = hits.t < shadow_ray_length(rays)
-        has_alpha = scene.opacities.has_alpha.take(hits.prim)
-        part[:, lanes.compress(between & ~has_alpha)] = 0
-        met = np.flatnonzero(between & has_alpha)
+        passes = passable(scene, hits, ALL, rays.media)
+        part[:, lanes.compress(between & ~passes)] = 0
+        if rays.media is not None:
+            length = np.where(between, hits.t, rays.distance)
+            part[:, lanes] *= transmitted(scene, rays, rays.media, length, rays.steps)
+        met = np.flatnonzero(between & passes)
         lanes, rays, hits = lanes.take(met), rays.take(met), hits.take(met)
         surface = interaction(scene, rays, hits)
-        left = part.take(lanes, 1) * (f4(1) - scene.opacities.at(surface))
+        left = part.take(lanes, 1) * (f4(1) - opacities_at(scene, surface, rays.media))
         absorb(scene, left, hits, surface)
         part[:, lanes] = left
         rays = replace(
-            continue_behind(rays, surface), error=rays.error + surface.error, distance=rays.distance - hits.t
+            continue_behind(rays, surface),
+            error=rays.error + surface.error,
+            distance=rays.distance - hits.t,
+            media=cross(scene, rays.media, surface),
+            steps=None if rays.steps is None else rays.steps.again(),
         )
         on = np.flatnonzero(left.max(0) != 0)
         lanes, rays = lanes.take(on), rays.take(on)
     return part
+
+
+def passable(scene: CompiledScene, hits: Hits, lanes: Lanes, stack: Ints | None) -> Bools:
+    """Return whether some lanes (k,) hit surfaces that rays with stacks (4, k) may pass straight on."""
+    prim = take(hits.prim, lanes)
+    found: Bools = np.zeros(prim.size, np.bool_)
+    if scene.opacities is not None:
+        found = scene.opacities.has_alpha.take(prim)  # a miss, -1, takes the last entry
+    if stack is not None:
+        found |= hidden(scene, stack, material_rows(scene, hits, lanes)) & (prim >= 0)
+    return found
+
+
+def opacities_at(scene: CompiledScene, surface: SurfaceInteraction, stack: Ints | None) -> Floats:
+    """Return the opacities (n,) of surfaces to rays with stacks (4, n)."""
+    opacity: Floats = np.ones(len(surface), f4) if scene.opacities is None else scene.opacities.at(surface)
+    if stack is not None:
+        opacity[hidden(scene, stack, surface.material)] = 0
+    return opacity
 
 
 def continue_behind(rays: AnyRays, surface: SurfaceInteraction) -> AnyRays:

@@ -1,0 +1,239 @@
+"""The media of a scene: what each path is inside of, and how phase functions become materials."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays.soa import soa
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import Bools, Doubles, Floats, Ints, f4
+from ..bsdfs import Bsdf, BsdfSample
+from ..core.errors import SceneError, warn_caller
+from ..materials import Material
+from ..media import BaseMedium, MediumRecord, PhaseFunction
+from ..media.phase import deflected
+from ..shapes import Shape
+from ..textures.base import BaseTexture
+
+DEPTH = 4  # media that a path remembers, the last one that it entered first
+LOWEST = np.iinfo(np.intp).min  # priority of what is around all shapes
+
+
+class PhaseBsdf(Bsdf):
+    """A phase function as a BSDF, in a frame whose z axis is `wo`. There is no surface, and so no cosine."""
+
+    transmissive = True
+    view_independent = True
+
+    def __init__(self, phase: PhaseFunction) -> None:
+        self.phase = phase
+
+    def f(self, wo: Floats, wi: Floats) -> Floats:
+        """Return the phase function, (3, n)."""
+        return np.broadcast_to(self.pdf(wo, wi), wi.shape)
+
+    def pdf(self, wo: Floats, wi: Floats) -> Floats:
+        """Return the phase function, (n,): it is its own density."""
+        return self.phase.p(-wi[2])
+
+    def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
+        """Return both."""
+        pdf = self.pdf(wo, wi)
+        return np.broadcast_to(pdf, wi.shape), pdf
+
+    def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
+        """Draw directions from the phase function, of weight 1."""
+        wi = -deflected(self.phase.sample(u[0]), u[1])
+        n = wi.shape[1]
+        return BsdfSample(wi, np.ones((3, n), f4), self.pdf(wo, wi), np.zeros(n, np.bool_))
+
+    def albedo(self, wo: Floats) -> Floats:
+        """Return 1, (3, n)."""
+        return np.ones_like(wo)
+
+
+@soa
+class MediaTable:
+    """The media of a scene, and the entries of the stacks by which paths remember what they are inside of.
+
+    Each material that encloses anything has an entry: a number from 1 on. Entry 0 is what is around all
+    shapes. A stack (4, n) has the entries of the shapes around each path, the last one that it entered
+    first, and then 0. The entry of the highest priority is what is there; of equal ones it is the first.
+
+    Source: C. Schmidt and B. Budge, "Simple Nested Dielectrics in Ray Traced Images", Journal of Graphics
+    Tools 7(2), 2002.
+    """
+
+    entry_of: Ints  # (materials,) and (phase functions,) after them; 0 for those that enclose nothing
+    priority: Ints  # (entries,)
+    nested: Bools  # (entries,) whether the index of refraction of what is around counts
+    index: Floats  # (entries,) of refraction; 1 where `nested` is False
+    medium_of: Ints  # (entries,) number of the medium, -1 for none
+    records: tuple[MediumRecord, ...]  # one for each kind
+    record_of: Ints  # (media,) which record has it
+    column_of: Ints  # (media,) and in which column
+    event_of: Ints  # (media,) what stands for a primitive where a path is scattered: -2 − its phase function
+    scatters: Bools  # (media,)
+    glows: bool  # any does
+    bounds: Doubles  # (2, 3) corners of all that encloses anything, relative to the scene's center
+
+    @property
+    def takes_steps(self) -> bool:
+        """Whether a record needs numbers without end."""
+        return any(record.takes_steps for record in self.records)
+
+    def highest(self, stack: Ints) -> Ints:
+        """Return what there is inside of stacks (k, n): the entries (n,) of the highest priority."""
+        best = stack[0]
+        for entry in stack[1:]:
+            best = np.where(self.priority.take(entry) > self.priority.take(best), entry, best)
+        return best
+
+    def medium_in(self, stack: Ints) -> Ints:
+        """Return the medium (n,) inside of stacks (4, n), -1 for none."""
+        return self.medium_of.take(self.highest(stack))
+
+    def crossing(self, material: Ints, back_facing: Bools) -> Ints:
+        """Return what crossing surfaces does to stacks (n,): the entry put there, negative if taken."""
+        entry = self.entry_of.take(material)
+        return np.where(back_facing, -entry, entry)
+
+    def hidden(self, stack: Ints, material: Ints) -> Bools:
+        """Return whether surfaces (n,) are within something of a higher priority, which hides them."""
+        entry = self.entry_of.take(material)
+        around = self.highest(without(stack, entry))
+        return (entry > 0) & (self.priority.take(around) > self.priority.take(entry))
+
+    def index_around(self, stack: Ints, surface: SurfaceInteraction) -> Floats | None:
+        """Return the index of refraction outside of surfaces (n,); 1 where it does not count."""
+        if not self.nested.any():
+            return None
+        entry = self.entry_of.take(surface.material)
+        around = self.highest(np.where(surface.back_facing, without(stack, entry), stack))
+        return np.where(self.nested.take(entry), self.index.take(around), f4(1))
+
+    def by_record(self, medium: Ints) -> Iterator[tuple[MediumRecord, Ints, Ints]]:
+        """Yield each record that occurs among media (n,), the lanes (k,) that it has, and their columns."""
+        record_of = self.record_of.take(medium)
+        for number, record in enumerate(self.records):
+            lanes = np.flatnonzero(record_of == number)
+            if lanes.size:
+                yield record, lanes, self.column_of.take(medium.take(lanes))
+
+
+def crossed(stack: Ints, crossing: Ints) -> Ints:
+    """Return stacks (4, n) after `MediaTable.crossing` (n,)."""
+    enters = crossing > 0
+    if (enters & (stack[-1] != 0)).any():
+        warn_caller(f"paths are inside of more than {DEPTH} shapes; they forget the outermost")
+    out = without(stack, np.where(crossing < 0, -crossing, -1))
+    shifted = np.concatenate([crossing[None], stack[:-1]])
+    return np.where(enters, shifted, out)
+
+
+def without(stack: Ints, entry: Ints) -> Ints:
+    """Return stacks (4, n) without the last of these entries (n,) that was put there."""
+    out, gone = np.empty_like(stack), np.zeros(entry.size, np.bool_)
+    for row, values in enumerate(stack):
+        gone |= values == entry
+        below = stack[row + 1] if row + 1 < len(stack) else np.zeros_like(values)
+        out[row] = np.where(gone, below, values)
+    return out
+
+
+def media_of(materials: Sequence[Material], around: BaseMedium | None) -> list[BaseMedium]:
+    """Return the distinct media that need a `MediaTable`; none where absorption behind surfaces is all.
+
+    Parameters
+    ----------
+    materials
+        Those of the scene.
+    around
+        The medium of the scene.
+    """
+    inside = [material.interior for material in materials if material.interior is not None]
+    needed = around is not None or any(material.priority is not None for material in materials)
+    if not needed and not any(medium.scatters or medium.glows for medium in inside):
+        return []
+    return list({id(medium): medium for medium in [*inside, *([] if around is None else [around])]}.values())
+
+
+def phase_materials(media: Sequence[BaseMedium]) -> list[Material]:
+    """Return a material for each distinct phase function."""
+    distinct = {id(medium.phase): medium.phase for medium in media if medium.scatters}
+    return [Material(PhaseBsdf(phase)) for phase in distinct.values()]
+
+
+def media_table(
+    around: BaseMedium | None,
+    shapes: Sequence[Shape],
+    materials: Sequence[Material],
+    media: Sequence[BaseMedium],
+    center: NDArray[np.float64],
+) -> MediaTable | None:
+    """Return the table of the media of a scene; None if it needs none.
+
+    Parameters
+    ----------
+    around
+        The medium of the scene.
+    shapes, materials
+        What is rendered.
+    media
+        What `media_of` has returned.
+    center
+        (3,) of the scene.
+    """
+    priorities = [each.priority for each in materials]
+    if not media and all(each is None for each in priorities):
+        return None
+    phases = list(dict.fromkeys(id(medium.phase) for medium in media if medium.scatters))
+    entry_of, holders = np.zeros(len(materials) + len(phases), np.intp), list[Material]()
+    for row, material in enumerate(materials):
+        if material.encloses:
+            holders.append(material)
+            entry_of[row] = len(holders)
+    number = {id(medium): place for place, medium in enumerate(media)}
+    inside = [around, *(material.interior for material in holders)]
+    nested = np.array([False, *(material.priority is not None for material in holders)])
+    kinds = list(dict.fromkeys(type(medium) for medium in media))
+    records: list[MediumRecord] = []
+    record_of, column_of = np.zeros(len(media), np.intp), np.zeros(len(media), np.intp)
+    for place, kind in enumerate(kinds):
+        some = [each for each, medium in enumerate(media) if type(medium) is kind]
+        found = [media[each].record(center) for each in some]
+        records.append(type(found[0]).concatenate(found))
+        record_of[some], column_of[some] = place, np.arange(len(some))
+    boxes = [shape.bounds for shape in shapes if shape.material.encloses]
+    return MediaTable(
+        entry_of=entry_of,
+        priority=np.array([LOWEST, *(material.priority or 0 for material in holders)], np.intp),
+        nested=nested,
+        index=np.array([1, *map(_index, holders)], f4),
+        medium_of=np.array([-1 if each is None else number[id(each)] for each in inside], np.intp),
+        records=tuple(records),
+        record_of=record_of,
+        column_of=column_of,
+        event_of=np.array([-2 - phases.index(id(m.phase)) if m.scatters else 0 for m in media], np.intp),
+        scatters=np.array([medium.scatters for medium in media], np.bool_),
+        glows=any(medium.glows for medium in media),
+        bounds=np.stack([np.min(boxes, 0)[0], np.max(boxes, 0)[1]]) - center
+        if boxes
+        else np.array([[np.inf] * 3, [-np.inf] * 3]),
+    )
+
+
+def _index(material: Material) -> float:
+    """Return the index of refraction of what a material encloses, if it has a priority."""
+    index = getattr(material.bsdf, "ior", None)
+    if material.priority is None or index is None or material.bsdf.invisible:
+        return 1.0
+    if isinstance(index, BaseTexture) or np.size(index) != 1:
+        name = type(material.bsdf).__name__
+        raise SceneError(
+            f"Material priority is {material.priority}; the ior of its {name} must be one number"
+        )
+    return float(np.ravel(index)[0])

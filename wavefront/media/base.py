@@ -1,0 +1,108 @@
+"""The contract of every medium.
+
+A `BaseMedium` is what a material or a scene holds. For a render it gives a `MediumRecord`, which holds k
+media of one kind, a column each. A record is asked two things about n rays, each within one of its media:
+how far light gets (`sample`), and what part of it gets over a given length (`transmittance`). Positions are
+relative to the scene's center.
+
+Both follow the radiative transfer equation along a ray of direction ω,
+
+    dL/dt = −σt·L + σs·∫ p(ω, ω')·L(ω') dω' + ε
+
+with extinction σt = σa + σs, the phase function p, and the emission ε per unit of length.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays.soa import soa
+from ..arrays.state import SoA
+from ..arrays.vec import Floats, Ints, f4
+from ..core.parameter import Parametrized
+from ..sampling.steps import StepNumbers
+from .phase import PhaseFunction
+
+
+@soa
+class Flight(SoA):
+    """How far rays get in their media."""
+
+    t: Floats  # (n,) distance at which light is scattered, scene units; inf where it gets through
+    weight: Floats  # (3, n) of what comes from there, over the density of getting there
+    light: Floats | None = None  # (3, n) emitted on the way, as it arrives at the origin; None for none
+
+
+class BaseMedium(Parametrized, ABC):
+    """What fills the space inside shapes, or around them: absorbs, scatters and emits light."""
+
+    phase: PhaseFunction
+    scatters: bool  # anywhere, in any channel
+    glows: bool  # likewise for emission
+
+    @abstractmethod
+    def record(self, center: NDArray[np.float64]) -> MediumRecord:
+        """Return the medium as a record of one column, with positions relative to `center` (3,)."""
+
+    @abstractmethod
+    def scaled(self, factor: float) -> Self:
+        """Return this medium where lengths were multiplied by `factor`: itself if nothing changes."""
+
+
+class MediumRecord(SoA, ABC):
+    """The k media of one kind in a scene.
+
+    `number` (n,) is the column of each ray's medium, `origin` and `direction` (3, n) are the rays, and
+    `length` (n,) says how far they go in it, up to infinity. `steps` gives more random numbers, as many as
+    are needed; it is None unless a record of the scene `takes_steps`.
+    """
+
+    __slots__ = ()
+    takes_steps: ClassVar[bool] = False
+
+    @abstractmethod
+    def sample(
+        self,
+        number: Ints,
+        origin: Floats,
+        direction: Floats,
+        length: Floats,
+        throughput: Floats,
+        u: Floats,
+        steps: StepNumbers | None,
+    ) -> Flight:
+        """Choose with u (2, n) where light is scattered.
+
+        `throughput` (3, n) is that of the paths: it tells which channels matter. The mean of `weight`, where
+        light is scattered, is σs·transmittance·dt, and elsewhere the transmittance of the whole length.
+        """
+
+    @abstractmethod
+    def transmittance(
+        self,
+        number: Ints,
+        origin: Floats,
+        direction: Floats,
+        length: Floats,
+        steps: StepNumbers | None,
+    ) -> Floats:
+        """Return the part of the light that gets over the whole length, or an unbiased estimate, (3, n)."""
+
+
+def channel_shares(throughput: Floats) -> Floats:
+    """Return the probability (3, n) with which each channel decides about a distance.
+
+    It is the channel's part of the throughput (3, n), so that weights never raise the sum of the channels.
+    """
+    total: Any = throughput[0] + throughput[1] + throughput[2]
+    lit = (total > 0) & (total < np.inf)
+    return np.where(lit, throughput / np.where(lit, total, f4(1)), f4(1 / 3))
+
+
+def chosen_channel(values: Floats, shares: Floats, u: Floats) -> Floats:
+    """Return the values (3, n) of a channel, chosen with u (n,) by shares (3, n): (n,)."""
+    return np.where(u < shares[0], values[0], np.where(u < shares[0] + shares[1], values[1], values[2]))

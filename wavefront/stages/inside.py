@@ -1,0 +1,65 @@
+"""What paths are inside of where they begin."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays.state import Rays
+from ..arrays.vec import Floats, Ints, f4, take
+from ..compile.media import DEPTH
+from ..compile.scene import CompiledScene
+from .interaction import interaction
+from .intersect import intersect
+from .transmittance import continue_behind
+
+OUTWARD = np.array([[0.5337], [0.6129], [0.5827]], f4)  # any direction along which nothing is aligned
+MOST_SURFACES = 1 << 12  # on the way out of a scene
+
+
+def stacks_at(scene: CompiledScene, origin: Floats) -> Ints | None:
+    """Return what points (3, n) are inside of, (4, n); None where the scene needs no stacks.
+
+    A ray leads out of the scene from each: what it leaves without having entered it is around the point, the
+    innermost first.
+    """
+    media = scene.media
+    if media is None:
+        return None
+    n = origin.shape[1]
+    stack = np.zeros((DEPTH, n), np.intp)
+    low, high = media.bounds[:, :, None].astype(f4)
+    lanes = np.flatnonzero(((origin >= low) & (origin <= high)).all(0))
+    if not lanes.size:
+        return stack
+    start = take(origin, lanes)
+    alike = bool((start == start[:, :1]).all())  # such as those of a pinhole camera
+    found = _enclosing(scene, start[:, :1] if alike else start)
+    stack[:, lanes] = found
+    return stack
+
+
+def _enclosing(scene: CompiledScene, origin: Floats) -> Ints:
+    """Return the stacks (4, n) of points (3, n), by rays out of the scene."""
+    media, n = scene.media, origin.shape[1]
+    assert media is not None
+    stack, depth = np.zeros((DEPTH + 1, n), np.intp), np.zeros(n, np.intp)
+    open_ = np.zeros((media.priority.size, n), np.int32)  # entered on the way, and not left yet
+    rays = Rays(origin, np.repeat(OUTWARD / np.sqrt((OUTWARD**2).sum()), n, 1), np.full(n, -1, np.intp))
+    lanes = np.arange(n)
+    for _ in range(MOST_SURFACES):
+        hits = intersect(scene, rays)
+        met = hits.found
+        lanes, rays, hits = lanes.take(met), rays.take(met), hits.take(met)
+        if not lanes.size:
+            break
+        surface = interaction(scene, rays, hits)
+        entry = media.entry_of.take(surface.material)
+        open_[entry, lanes] += ~surface.back_facing
+        leaves = surface.back_facing & (entry > 0)
+        around = np.flatnonzero(leaves & (open_[entry, lanes] == 0))
+        open_[entry, lanes] -= leaves & (open_[entry, lanes] > 0)
+        at = lanes.take(around)
+        stack[np.minimum(depth.take(at), DEPTH), at] = entry.take(around)
+        depth[at] += 1
+        rays = continue_behind(rays, surface)
+    return stack[:DEPTH]
