@@ -51,6 +51,27 @@ def test_flux_through_a_sphere(tmp_path: Path, symmetry: str) -> None:
     assert wf.IESLight(path, (0, 0, 0), dimming=0.3, color="moccasin").lumens == pytest.approx(0.3 * full)
 
 
+@pytest.mark.slow
+def test_flux_that_is_measured_on_a_sphere(tmp_path: Path) -> None:
+    """All lumens of sources of several kinds arrive at a sphere around them, within 0.1 %."""
+    around = wf.Sphere((0, 0, 0), 1, material=wf.Diffuse(0))
+    sources = [
+        wf.IESLight(write(tmp_path), (0.1, 0, 0.05), lumens=800, direction=(1, 1, 0)),
+        wf.with_flux(wf.PointLight((0.1, 0.05, 0), "moccasin"), lumens=800),
+        wf.with_flux(wf.SpotLight((0, 0, 0), 1, direction=(1, 2, 3), angle=120), lumens=800),
+        wf.with_flux(wf.Sphere((0.1, 0, 0), 0.2, emission=1, material=wf.Diffuse(0)), lumens=800),
+    ]
+    for source in sources:
+        found = wf.measure_flux(
+            [around, source], around, side="back", spp=1 << 18, max_bounces=0, progress=False
+        )
+        error = float(wf.to_photometric(found.standard_error)[0])
+        seen = float(wf.to_photometric(found.value)[0])
+        assert error < 0.5, source
+        assert seen == pytest.approx(800, abs=4 * error + 800e-5), source  # and float32
+        assert seen == pytest.approx(800, rel=1e-3), source
+
+
 def test_flux_of_a_cosine(tmp_path: Path) -> None:
     """I₀·cosγ in fine steps is π·I₀ lumens."""
     gamma = np.arange(0, 90.5, 0.5)
