@@ -99,7 +99,18 @@ if TYPE_CHECKING:
     from .io.foreign import from_open3d, from_pyvista
     from .io.load import from_mitsuba, from_trimesh, load, load_mesh
     from .io.sources import LoadLimits
-    from .measuring import Measurement, grid_points, load_points, measure, measure_flux
+    from .measuring import (
+        DaylightCoefficients,
+        Measurement,
+        Weather,
+        Year,
+        daylight_coefficients,
+        grid_points,
+        load_points,
+        load_weather,
+        measure,
+        measure_flux,
+    )
     from .viewer import Viewer, view
     from .views import render_many, turntable
 
@@ -114,7 +125,18 @@ _LATER = {  # what many programs do without is imported when they ask for it
     ".io.foreign": ("from_open3d", "from_pyvista"),
     ".io.load": ("from_mitsuba", "from_trimesh", "load", "load_mesh"),
     ".io.sources": ("LoadLimits",),
-    ".measuring": ("Measurement", "grid_points", "load_points", "measure", "measure_flux"),
+    ".measuring": (
+        "DaylightCoefficients",
+        "Measurement",
+        "Weather",
+        "Year",
+        "daylight_coefficients",
+        "grid_points",
+        "load_points",
+        "load_weather",
+        "measure",
+        "measure_flux",
+    ),
     ".testing": ("testing",),
     ".viewer": ("Viewer", "view"),
     ".views": ("render_many", "turntable"),
@@ -132,6 +154,7 @@ __all__ = [
     "Comparison",
     "Conductor",
     "Cylinders",
+    "DaylightCoefficients",
     "DeltaLight",
     "Dielectric",
     "Diffuse",
@@ -196,7 +219,10 @@ __all__ = [
     "ThinDielectric",
     "VertexColors",
     "Viewer",
+    "Weather",
+    "Year",
     "compare",
+    "daylight_coefficients",
     "elementary",
     "exposure",
     "from_mitsuba",
@@ -210,6 +236,7 @@ __all__ = [
     "load",
     "load_mesh",
     "load_points",
+    "load_weather",
     "measure",
     "measure_flux",
     "orbit",

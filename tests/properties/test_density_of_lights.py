@@ -126,6 +126,7 @@ def test_every_light_is_here() -> None:
         *("TriangleLights", "TwoSidedTriangleLights", "TexturedTriangleLights", "RectangleLights"),
         *("TwoSidedTexturedTriangleLights", "TwoSidedRectangleLights", "SphereLights", "SunLight"),
         *("TexturedSphereLights", "ImageEnvironment", "ConstantEnvironment", "EnvironmentSum", "SkyLight"),
+        "PatchedEnvironment",
         *("DirectionalLights", "PointLightRecord", "SpotLights", "PicturedLights", "IESLights"),
     }
     bases = {"LightRecord", "InfiniteLight", "DeltaLight", "PlanarLights"}

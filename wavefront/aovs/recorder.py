@@ -13,6 +13,7 @@ import numpy as np
 from ..arrays.soa import soa
 from ..arrays.state import BounceDepth, Contribution, Hits, Paths
 from ..arrays.vec import Bools, Bytes, Floats, Ints, broadcast, f4, put, take
+from ..compile.light_groups import PATCHED, LightGroups
 from ..compile.scene import CompiledScene
 from ..core.errors import SceneError
 from ..film.aov_names import AOVS, CLAMPED, KEYED_AOVS
@@ -67,8 +68,10 @@ class SampleRecorder(PathRecorder):
             self._light[CLAMPED] = np.zeros((3, n), f4)
         self._groups = scene.light_groups if "light_groups" in wanted else None
         if self._groups is not None:
-            self._light.update((f"light_groups.{name}", np.zeros((3, n), f4)) for name in self._groups.names)
-            self.needs_directions = len(self._groups.environment) > 1  # to divide an environment
+            self._of_groups = np.zeros((len(self._groups.names), 3, n), f4)
+            parts = zip(self._groups.names, self._of_groups, strict=True)
+            self._light.update((f"light_groups.{name}", light) for name, light in parts)
+            self.needs_directions = self._groups.need_directions
         self._awaited: AwaitedSurfaces | None = None
         self._begun = False
         self._all_rough = True  # no first surface is specular
@@ -218,18 +221,36 @@ class SampleRecorder(PathRecorder):
         ):
             self._add("direct", np.flatnonzero(_is_direct(paths.depth, contribution)), slot, arriving)
         if self._groups is not None:
-            group = self._groups.of_light.take(contribution.light)
-            for number, name in enumerate(self._groups.names):
-                lanes = np.flatnonzero(group == number)
-                self._add(f"light_groups.{name}", lanes, slot, arriving)
-            mixed = np.flatnonzero(group < 0)
-            if mixed.size:
-                toward = contribution.wi
-                if toward is None:
-                    toward = take(paths.direction, contribution.lanes)
-                for name, part in self._groups.parts_of_environment(take(toward, mixed)):
-                    light = take(arriving, mixed) * part
-                    add_to_slots(self._light[f"light_groups.{name}"], slot.take(mixed), light)
+            self._record_groups(self._groups, paths, contribution, slot, arriving)
+
+    def _record_groups(
+        self, groups: LightGroups, paths: Paths, contribution: Contribution, slot: Ints, arriving: Floats
+    ) -> None:
+        """Record light (3, k) by groups; that of an environment of several ones is divided among them."""
+        group = groups.of_light.take(contribution.light)
+        toward = contribution.wi
+        if toward is None and groups.need_directions:
+            toward = take(paths.direction, contribution.lanes)
+        if groups.patches is not None:
+            assert toward is not None
+            group = np.where(group == PATCHED, groups.patches.number(toward), group)
+        known = np.flatnonzero(group >= 0)
+        if known.size == slot.size:
+            self._add_to_groups(group, slot, arriving)
+        elif known.size:
+            self._add_to_groups(group.take(known), slot.take(known), take(arriving, known))
+        mixed = np.flatnonzero(group < 0)
+        if mixed.size:
+            assert toward is not None
+            for name, part in groups.parts_of_environment(take(toward, mixed)):
+                light = take(arriving, mixed) * part
+                add_to_slots(self._light[f"light_groups.{name}"], slot.take(mixed), light)
+
+    def _add_to_groups(self, group: Ints, slot: Ints, arriving: Floats) -> None:
+        count, channels, n = self._of_groups.shape
+        sums = self._of_groups.reshape(count * channels * n)
+        for channel, values in enumerate(arriving):
+            np.add.at(sums, (group * channels + channel) * n + slot, values)
 
     def record_background(self, slot: Ints, color: Floats) -> None:
         """Record a background (3, 1) that has been added to slots (k,)."""

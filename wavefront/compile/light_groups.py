@@ -9,8 +9,10 @@ import numpy as np
 from ..arrays.soa import soa
 from ..arrays.vec import Floats, Ints
 from ..film.aov_names import group_name
-from ..lights import EnvironmentSum, InfiniteLight, Light
+from ..lights import EnvironmentSum, InfiniteLight, Light, PatchedEnvironment, SkyPatches
 from ..shapes import CurvedShape, Mesh
+
+PATCHED = -2  # the group of an environment whose patches are groups
 
 
 @soa
@@ -18,8 +20,14 @@ class LightGroups:
     """The group of each light of a scene, and of the parts of its environment."""
 
     names: tuple[str, ...]
-    of_light: Ints  # (lights,) number of the group; -1 of an environment of several groups
+    of_light: Ints  # (lights,) number of the group; -1 of an environment of several groups, PATCHED
     environment: tuple[tuple[str, InfiniteLight], ...]  # the groups of the environment, and what they send
+    patches: SkyPatches | None = None  # of an environment each of whose patches is a group, the first ones
+
+    @property
+    def need_directions(self) -> bool:
+        """Whether the group of light depends on where it comes from."""
+        return len(self.environment) > 1 or self.patches is not None
 
     def parts_of_environment(self, wi: Floats) -> Iterator[tuple[str, Floats]]:
         """Yield each group of the environment, and its part (3, n) of the radiance from wi (3, n)."""
@@ -75,6 +83,11 @@ class GroupNumbers:
     def groups(self) -> LightGroups:
         """Return the groups; the environment is the last light."""
         parts = tuple((name, EnvironmentSum.of(lights)) for name, lights in self._environment.items())
+        if len(parts) == 1 and isinstance(parts[0][1], PatchedEnvironment):
+            self.add(np.array([PATCHED]))
+            numbers = np.concatenate([np.zeros(0, np.intp), *self._of_light])
+            numbers = np.where(numbers >= 0, numbers + len(parts[0][1].names), numbers)
+            return LightGroups((*parts[0][1].names, *self._numbers), numbers, (), parts[0][1].patches)
         if parts:
             self.add(np.array([self._number(parts[0][0]) if len(parts) == 1 else -1]))
         return LightGroups(

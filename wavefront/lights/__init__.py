@@ -7,6 +7,7 @@ from .flux import with_flux
 from .ies import IESLight, IESLights
 from .image import ImageEnvironment
 from .infinite import EnvironmentSum, InfiniteLight
+from .patches import PatchedEnvironment, SkyPatches
 from .point import PointLight, PointLightRecord, PointLights
 from .projector import Projector
 from .rectangle import RectangleLights, TwoSidedRectangleLights, first_of_pairs
@@ -34,6 +35,7 @@ __all__ = [
     "LightRecord",
     "LightSample",
     "LightTable",
+    "PatchedEnvironment",
     "PicturedLights",
     "PointLight",
     "PointLightRecord",
@@ -43,6 +45,7 @@ __all__ = [
     "RectangleLights",
     "Sky",
     "SkyLight",
+    "SkyPatches",
     "SphereLights",
     "SpotLight",
     "SpotLights",

@@ -62,7 +62,7 @@ class SkyLight(InfiniteLight):
     def le(self, wi: Floats, surface: SurfaceInteraction | None = None) -> Floats:
         """Return the radiance in direction wi, (3, n)."""
         height = dot(wi, column(self.up))
-        above = self.scale * _relative(self.function, wi, np.maximum(height, f4(0)), self.sun)
+        above = self.scale * relative_radiance(self.function, wi, np.maximum(height, f4(0)), self.sun)
         return np.where(height >= 0, above, self.ground)
 
     def power(self, scene_radius: float) -> NDArray[np.float64]:
@@ -70,7 +70,7 @@ class SkyLight(InfiniteLight):
         return self.table.power(scene_radius)
 
 
-def _relative(function: SkyFunction, wi: Floats, height: Floats, sun: Floats) -> Floats:
+def relative_radiance(function: SkyFunction, wi: Floats, height: Floats, sun: Floats) -> Floats:
     """Return a sky's function (k, n) in directions (3, n) of this height, the cosine to the zenith (n,)."""
     away = wi - column(sun)
     half = f4(0.5) * np.sqrt(dot(away, away))  # sin(γ/2): accurate close to the sun
@@ -378,7 +378,7 @@ def _table(function: SkyFunction, rotation: NDArray[np.float64], sun: NDArray[np
     x, z = (level[:, None] * part for part in (across, along))
     local = np.stack([x, np.broadcast_to(high[:, None], x.shape), z]).reshape(3, -1)
     wi = turned(rotation, local).astype(f4)
-    relative = _relative(function, wi, local[1].astype(f4), sun.astype(f4))
+    relative = relative_radiance(function, wi, local[1].astype(f4), sun.astype(f4))
     return np.broadcast_to(relative, (len(relative), wi.shape[1])).reshape(-1, rows, COLUMNS)
 
 

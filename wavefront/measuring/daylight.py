@@ -1,0 +1,240 @@
+"""Daylight coefficients: what each patch of the sky brings to points, from which any sky follows."""
+
+from __future__ import annotations
+
+from copy import copy
+from itertools import pairwise
+from typing import Any, Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays.vec import Doubles, f4, luminance
+from ..camera import Sensors
+from ..core.errors import SceneError
+from ..io.to_scene import as_scene
+from ..lights import PatchedEnvironment, SkyPatches
+from ..scene import Scene
+from ..scene.sun_position import horizon_axes
+from ..settings import AUTO, RenderSettings, takes_settings, whole_number
+from .measure import lifted, measured
+from .weather import Weather, product
+from .year import Year
+
+BATCHES = 8  # independent parts of the samples, from whose scatter errors follow
+WAVE_VALUES = 1 << 22  # values of all groups of light in one wave
+PAIRS = 1 << 18  # of points and suns, looked at at once
+ALONG = 4  # squared: directions in which the sky is evaluated in each patch
+
+
+class DaylightCoefficients:
+    """What each patch of the sky brings to points, from `daylight_coefficients`.
+
+    Attributes
+    ----------
+    batches
+        (b, n, p) irradiance of n points by a radiance of 1 of each patch, from b independent parts of the
+        samples; the luminance of its color. Patch 0 is the ground, the others are as in `SkyPatches`.
+    direct
+        (b, n, p) the part that no surface has scattered.
+    patches
+        The division of the sky.
+    points, normals
+        (n, 3) as given.
+
+    Examples
+    --------
+    >>> canopy = wf.Scene([wf.Disk((0, 2, 0), (0, -1, 0), 1, material=wf.Diffuse(0.5))])
+    >>> found = wf.daylight_coefficients(canopy, [(0, 0, 0)], normals=(0, 1, 0), spp=256)
+    >>> isinstance(found, wf.DaylightCoefficients), found.value.shape
+    (True, (1, 146))
+    """
+
+    def __init__(
+        self, scene: Scene, points: Doubles, normals: Doubles, patches: SkyPatches, both: list[Doubles]
+    ) -> None:
+        self._scene, self.points, self.normals, self.patches = scene, points, normals, patches
+        self.batches, self.direct = both
+
+    @property
+    def value(self) -> Doubles:
+        """(n, p) W·m⁻² for each W·sr⁻¹·m⁻² of each patch."""
+        return np.asarray(self.batches.mean(0))
+
+    @property
+    def standard_error(self) -> Doubles:
+        """(n, p) of `value`."""
+        return np.asarray(self.batches.std(0, ddof=1) / np.sqrt(len(self.batches)))
+
+    def irradiance(self, radiance: ArrayLike) -> tuple[Doubles, Doubles]:
+        """Return the irradiance of each point, and its standard error, under skies.
+
+        Parameters
+        ----------
+        radiance
+            (p,) or (p, m) of each patch, W·sr⁻¹·m⁻², of one sky or of m. `sky_radiance` returns that of a
+            `Sky`.
+
+        Returns
+        -------
+        (n,) or (n, m), twice.
+
+        Raises
+        ------
+        SceneError
+            If it has another shape.
+        """
+        given = np.asarray(radiance, float)
+        if given.shape[:1] != (len(self.patches),) or given.ndim > 2:
+            raise SceneError(f"radiance has the shape {given.shape}; it must have a value for each patch")
+        each = np.stack([product(batch, given.reshape(len(given), -1)) for batch in self.batches])
+        shape = (len(self.points), *given.shape[1:])
+        error = each.std(0, ddof=1) / np.sqrt(len(each))
+        return each.mean(0).reshape(shape), error.reshape(shape)
+
+    def sky_radiance(self, sky: Any) -> Doubles:
+        """Return the mean radiance (p,) of each patch of a `Sky`, without the sun's disk; its luminance.
+
+        Means are weighed as on a level plane, so that its irradiance is kept.
+        """
+        directions = self.patches.directions(ALONG)
+        weights = self.patches.weights(ALONG)
+        above = (luminance(sky.radiance(directions.reshape(3, -1).T).T).reshape(weights.shape) * weights).sum(
+            1
+        )
+        below = luminance(sky.radiance([-self.patches.axes[:, 2]]).T)
+        return np.concatenate([below, above])
+
+    def annual(self, weather: Weather, *, ground: float = 0.2, efficacy: float = 1.0) -> Year:
+        """Return the light at the points in each hour of a weather file.
+
+        The sky of an hour is that of `Sky.perez`. The direct light of the sun comes from where the sun is, by
+        a ray from each point; what surfaces and glass make of the sun's light is that of the patch around it.
+
+        Parameters
+        ----------
+        weather
+            Irradiances and suns, from `load_weather`.
+        ground
+            Albedo of the ground beyond the scene.
+        efficacy
+            Factor of all light: with 110, about that of daylight in lm/W, irradiances in W·m⁻² become
+            illuminances in lux.
+
+        Raises
+        ------
+        SceneError
+            If an argument is out of its range.
+        """
+        sky, sun = weather.on_patches(self.patches, ground, ALONG)
+        scattered = self.batches - self.direct
+        beam = self.sunlight(weather) * efficacy
+        each = [
+            product(whole, sky * efficacy) + product(part, sun * efficacy) + beam
+            for whole, part in zip(self.batches, scattered, strict=True)
+        ]
+        return Year(np.stack(each).astype(f4), weather)
+
+    def sunlight(self, weather: Weather) -> Doubles:
+        """Return the irradiance (n, hours) of each point by the sun alone, W·m⁻², where nothing hides it."""
+        out = np.zeros((len(self.points), len(weather.direct_normal)))
+        cosine, height = product(self.normals, weather.sun.T), weather.height(self.patches)
+        lit = (cosine > 0) & (height > 0) & (weather.direct_normal > 0)
+        at, hour = np.nonzero(lit)
+        places = lifted(self._scene, Sensors(self.points, self.normals)).points
+        for start in range(0, at.size, PAIRS):
+            i, h = at[start : start + PAIRS], hour[start : start + PAIRS]
+            sensors = Sensors(places[i], weather.sun[h], "radiance")
+            seen = measured(self._scene, sensors, 1, {"max_bounces": 0, "progress": False}).value[:, 0]
+            out[i, h] = seen * cosine[i, h] * weather.direct_normal[h]
+        return out
+
+
+@takes_settings
+def daylight_coefficients(
+    scene: Any,
+    points: ArrayLike,
+    normals: ArrayLike,
+    *,
+    subdivision: int = 1,
+    north: ArrayLike | None = None,
+    spp: int = 1024,
+    **settings: Unpack[RenderSettings],
+) -> DaylightCoefficients:
+    """Measure what each patch of the sky brings to points; any sky is then a product of matrices.
+
+    All patches are measured at once: the sky is an environment of radiance 1, and light counts for the patch
+    that it comes from.
+
+    Parameters
+    ----------
+    scene
+        As for `render`. Its lights do not count; shapes that emit are refused.
+    points, normals
+        As for `measure`.
+    subdivision
+        1 for the 145 patches of Tregenza; n for the finer ones of Reinhart, n × n for each.
+    up
+        Direction to the zenith: (3,), or the name of an axis, such as "z"; y by default.
+    north
+        (3,) direction to the north, as for `sun_position`.
+    spp
+        Samples per point, at least 8.
+    {settings}
+
+    Returns
+    -------
+    DaylightCoefficients
+
+    Raises
+    ------
+    SceneError
+        If an argument or the scene is malformed, or a setting is one that it chooses itself.
+
+    Examples
+    --------
+    >>> canopy = wf.Scene([wf.Disk((0, 2, 0), (0, -1, 0), 1, material=wf.Diffuse(0.5))])
+    >>> found = wf.daylight_coefficients(canopy, [(0, 0, 0)], normals=(0, 1, 0), spp=1024)
+    >>> overcast = found.sky_radiance(wf.Sky.cie(16, horizontal=100))
+    >>> level, error = found.irradiance(overcast)
+    >>> bool(abs(level[0] - 77.2) < 1)  # the disk hides a quarter, and reflects 2 from the ground
+    True
+    """
+    for name in ("samples", "aovs", "noise", "seconds", "checkpoint"):
+        if name in settings:
+            raise SceneError(f"{name} is {settings[name]!r}; daylight_coefficients chooses it itself")
+    count = whole_number(BATCHES, 2**31)("spp", spp)
+    up = settings.get("up", AUTO)
+    zenith, toward_north, east = horizon_axes("y" if isinstance(up, str) and up == AUTO else up, north)
+    patches = SkyPatches.of(
+        whole_number(1, 16)("subdivision", subdivision), np.stack([toward_north, east, zenith], 1)
+    )
+    subject = copy(
+        as_scene(scene, settings.get("material"), settings.get("progress"), settings.get("smooth", AUTO))
+    )
+    subject.lights = []
+    if subject.emits:
+        raise SceneError("a shape of the scene emits; daylight coefficients are those of the sky alone")
+    subject.lights = [PatchedEnvironment(np.ones((3, 1), f4), patches=patches)]
+    sensors = Sensors(points, normals)
+    places = lifted(subject, sensors)
+    wave = max(256, WAVE_VALUES // (3 * len(patches)))
+    bounds = [count * batch // BATCHES for batch in range(BATCHES + 1)]
+    given = {"wave_size": wave, **settings, "up": AUTO, "aovs": ("light_groups",)}
+    both = [
+        np.stack(
+            [
+                _on_patches(subject, places, {**given, **bounces, "samples": range(*part)}, len(patches))
+                for part in pairwise(bounds)
+            ]
+        )
+        for bounces in ({}, {"max_bounces": 0})
+    ]
+    return DaylightCoefficients(subject, sensors.points, sensors.directions, patches, both)
+
+
+def _on_patches(scene: Scene, sensors: Sensors, settings: dict[str, Any], patches: int) -> Doubles:
+    """Return the luminance (n, p) of what each patch brings."""
+    found = measured(scene, sensors, None, settings)
+    parts = [found.part(f"light_groups.patch {number}")[0] for number in range(patches)]
+    return np.stack([luminance(part.T.astype(float)) for part in parts], 1)
