@@ -22,7 +22,17 @@ from typing import Any
 import numpy as np
 
 from wavefront.arrays.state import SurfaceInteraction
-from wavefront.bsdfs import Bsdf, Conductor, Dielectric, Diffuse, Disney, Mirror, Plastic, Principled
+from wavefront.bsdfs import (
+    Bsdf,
+    Conductor,
+    Dielectric,
+    Diffuse,
+    Disney,
+    Mirror,
+    Plastic,
+    Principled,
+    ThinDisney,
+)
 from wavefront.bsdfs.microfacet import Facets, alpha_of
 from wavefront.bsdfs.plastic import inner_reflectance
 
@@ -198,6 +208,13 @@ def compare(pairs: int = 10_000) -> list[Row]:
         rows += rough(
             mi, f"disney {clear}", ours, {**theirs, "spec_tint": 0.5, **whole}, pairs, densities=False
         )
+    sheet = {"roughness": 0.4, "anisotropic": 0.6, "flatness": 0.7, "sheen": 0.8, "sheen_tint": 0.4}
+    for clear, crossing in ((0.0, 0.0), (0.7, 1.2), (1.0, 0.0)):
+        lobes = {"spec_trans": clear, "diff_trans": crossing, "spec_tint": 0.5, "eta": 1.4}
+        theirs = {"type": "principledthin", "base_color": color, **lobes, **sheet}
+        parts = {"transmission": clear, "diffuse_transmission": crossing, "specular_tint": 0.5, "ior": 1.4}
+        ours = ThinDisney((0.9, 0.5, 0.1), **parts, **sheet)
+        rows += rough(mi, f"thin disney {clear}", ours, theirs, pairs)
     for distribution in ("ggx", "beckmann"):
         for first, second in ((0.3, None), (0.6, None), (1.0, None), (0.3, 0.6)):
             shape = {"distribution": distribution, "shadowing": "separable", "roughness_v": second}

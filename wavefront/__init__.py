@@ -23,6 +23,7 @@ from .bsdfs import (
     ShadowCatcher,
     Sides,
     ThinDielectric,
+    ThinDisney,
 )
 from .camera import Camera
 from .colors import exposure, from_photometric, srgb, to_photometric
@@ -217,6 +218,7 @@ __all__ = [
     "SpotLight",
     "Texture",
     "ThinDielectric",
+    "ThinDisney",
     "VertexColors",
     "Viewer",
     "Weather",

@@ -307,6 +307,18 @@ def test_principled() -> None:
     assert value(material("principled", specular=0.5).bsdf.ior) == pytest.approx([1.5])
 
 
+def test_thin_principled() -> None:
+    due = {"roughness": 0.6, "anisotropic": 0.45, "sheen": 0.9, "sheen_tint": 0.35, "flatness": 0.55}
+    names = {"eta": "ior", "spec_trans": "transmission", "diff_trans": "diffuse_transmission"}
+    names |= {"spec_tint": "specular_tint"}
+    given = dict(zip(names, (1.4, 0.7, 1.6, 0.65), strict=True))
+    made = material("principledthin", base_color=rgb(0.2, 0.3, 0.4), **due, **given).bsdf
+    assert isinstance(made, wf.ThinDisney)
+    assert value(made.base_color) == pytest.approx([0.2, 0.3, 0.4])
+    for name, number in {**due, **{names[key]: number for key, number in given.items()}}.items():
+        assert value(getattr(made, name)) == pytest.approx([number]), name
+
+
 def test_adapters() -> None:
     inner = {"type": "diffuse", "reflectance": 0.25}
     for kind, parameters in (("twosided", {}), ("mask", {"opacity": 0.5}), ("bumpmap", {"scale": 2.0})):

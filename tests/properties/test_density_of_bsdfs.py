@@ -28,6 +28,7 @@ from wavefront.bsdfs import (
     ShadowCatcher,
     Sides,
     ThinDielectric,
+    ThinDisney,
 )
 from wavefront.bsdfs.microfacet import Facets, alpha_of
 from wavefront.bsdfs.rough import RoughBsdf
@@ -92,6 +93,15 @@ KINDS = {
     Disney: st.builds(
         Disney, color, rough, part, anisotropic=part, ior=st.floats(1.1, 2), transmission=st.just(0.0) | part
     ),
+    ThinDisney: st.builds(
+        ThinDisney,
+        color,
+        rough,
+        anisotropic=part,
+        ior=st.floats(1.1, 2),
+        transmission=part,
+        diffuse_transmission=st.just(0.0) | st.floats(0.1, 2),
+    ),
     ByValue: st.builds(ByValue, part),
     Sides: st.builds(Sides, MATTE, st.none() | st.builds(Mirror, color)),
     Mix: st.builds(Mix, MATTE, SHINY | st.builds(Mirror, color), st.floats(0.1, 0.9)),
@@ -133,6 +143,8 @@ def facets_of(bsdf: Bsdf) -> list[Facets]:
     if isinstance(bsdf, Mix):
         return [*facets_of(bsdf.first), *facets_of(bsdf.second)]
     found = [bsdf.facets()] if isinstance(bsdf, RoughBsdf) else []
+    if isinstance(bsdf, ThinDisney):
+        found.append(bsdf.facets_through())
     coated = isinstance(bsdf, Principled)
     return [*found, Facets(alpha_of(bsdf.clearcoat_roughness))] if coated else found
 

@@ -5,6 +5,7 @@ from .conductor import Conductor
 from .dielectric import Dielectric
 from .diffuse import Diffuse
 from .disney import Disney
+from .disney_thin import ThinDisney
 from .mirror import Mirror
 from .mix import Mix
 from .null import NullSurface
@@ -25,6 +26,7 @@ ALL = (
     Plastic,
     Principled,
     Disney,
+    ThinDisney,
     Mix,
     Sides,
 )
@@ -46,6 +48,7 @@ __all__ = [
     "ShadowCatcher",
     "Sides",
     "ThinDielectric",
+    "ThinDisney",
     "albedo_of",
     "evaluated",
     "sampled",

@@ -24,7 +24,63 @@ COAT_F0 = f4(0.04)
 COAT_SHADOWS = Facets(np.full(1, 0.25, f4), separable=True)
 
 
-class Disney(RoughBsdf):
+class DisneyBase(RoughBsdf):
+    """What Disney's materials for solids and for thin sheets have in common."""
+
+    dimensions = 3
+
+    base_color = Parameter(color)
+    anisotropic = Parameter(scalar)
+    ior = Parameter(refractive_index)
+    transmission = Parameter(scalar)
+    specular_tint = Parameter(scalar)
+    sheen = Parameter(scalar)
+    sheen_tint = Parameter(scalar)
+    flatness = Parameter(scalar)
+
+    def derive(self) -> None:
+        """Set the direction of the facets."""
+        self.tangent = Tangent(np.zeros(1, f4)) if _used(self.anisotropic) else None
+
+    def facets(self) -> Facets:
+        """Return the microfacets, stretched by the aspect ratio √(1 − 0.9·anisotropic)."""
+        return self._facets_of(self.roughness)
+
+    def _facets_of(self, roughness: Floats) -> Facets:
+        alpha, aspect = roughness * roughness, np.sqrt(f4(1) - f4(0.9) * self.anisotropic)
+        tangent = None if isinstance(self.tangent, BaseTexture) else self.tangent
+        along, across = np.maximum(alpha / aspect, SMOOTH), np.maximum(alpha * aspect, SMOOTH)
+        return Facets(along, across, tangent, separable=True)
+
+    def _glossy(self, cos: Floats, reflected: Floats, cos_refracted: Floats) -> tuple[Floats, Floats]:
+        """Fresnel reflectance of a tinted dielectric, (3, n), and Schlick's weight of white, (n,)."""
+        weight = _fifth(np.where(self.ior > 1, cos, cos_refracted))
+        normal = ((self.ior - f4(1)) / (self.ior + f4(1))) ** 2
+        tinted = weight + (f4(1) - weight) * (self._hue() * normal)
+        return reflected + (tinted - reflected) * self.specular_tint, weight
+
+    def _hue(self) -> Floats:
+        bright = luminance(self.base_color)
+        return np.where(bright > 0, self.base_color / np.where(bright > 0, bright, f4(1)), f4(1))
+
+    def _matte(self, wo: Floats, wi: Floats, cos: Floats) -> Floats:
+        """Diffuse and retro-reflection, or approximate subsurface scattering, (3, n)."""
+        zi = np.abs(wi[2])
+        o, i = _fifth(wo[2]), _fifth(zi)
+        retro = f4(2) * self.roughness * cos * cos
+        diffuse = (f4(1) - f4(0.5) * o) * (f4(1) - f4(0.5) * i) + retro * (o + i + o * i * (retro - f4(1)))
+        half = f4(0.5) * retro - f4(1)
+        below = (f4(1) + half * o) * (f4(1) + half * i)
+        flat = f4(1.25) * (below * (f4(1) / np.maximum(wo[2] + zi, TINY) - f4(0.5)) + f4(0.5))
+        return self.base_color * ((diffuse + (flat - diffuse) * self.flatness) * INV_PI)
+
+    def _sheen(self, cos: Floats, part: Floats) -> Floats:
+        """Light that grazes cloth on a part of the surface, (3, n)."""
+        hue = f4(1) + (self._hue() - f4(1)) * self.sheen_tint
+        return hue * (self.sheen * part * _fifth(cos))
+
+
+class Disney(DisneyBase):
     """Disney's principled material, with the formulas of Mitsuba 3's `principled`.
 
     `Principled` has about the same parameters with glTF's formulas, which lose and gain less energy. This one
@@ -58,18 +114,9 @@ class Disney(RoughBsdf):
     >>> paint = wf.Disney((0.2, 0.1, 0.6), 0.4, clearcoat=1, flatness=0.5)
     """
 
-    dimensions = 3
     _behind: Bools | None = None  # (n,) wo is inside; unbound, it is outside
 
-    base_color = Parameter(color)
     metallic = Parameter(scalar)
-    anisotropic = Parameter(scalar)
-    ior = Parameter(refractive_index)
-    transmission = Parameter(scalar)
-    specular_tint = Parameter(scalar)
-    sheen = Parameter(scalar)
-    sheen_tint = Parameter(scalar)
-    flatness = Parameter(scalar)
     clearcoat = Parameter(scalar)
     clearcoat_gloss = Parameter(scalar)
 
@@ -99,8 +146,8 @@ class Disney(RoughBsdf):
 
     def derive(self) -> None:
         """Set whether light crosses the surface, and the direction of the facets."""
+        super().derive()
         self.transmissive = _used(self.transmission)
-        self.tangent = Tangent(np.zeros(1, f4)) if _used(self.anisotropic) else None
 
     def bind(self, surface: SurfaceInteraction) -> Self:
         """Return the BSDF bound to `surface`, with the side of `wo`."""
@@ -108,23 +155,18 @@ class Disney(RoughBsdf):
         bound._behind = surface.back_facing if self.transmissive else None
         return bound
 
-    def facets(self) -> Facets:
-        """Return the microfacets, stretched by the aspect ratio √(1 − 0.9·anisotropic)."""
-        alpha, aspect = self.roughness * self.roughness, np.sqrt(f4(1) - f4(0.9) * self.anisotropic)
-        tangent = None if isinstance(self.tangent, BaseTexture) else self.tangent
-        along, across = np.maximum(alpha / aspect, SMOOTH), np.maximum(alpha * aspect, SMOOTH)
-        return Facets(along, across, tangent, separable=True)
-
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
         """Return `f` and `pdf` of all lobes."""
         facets, (front, eta, clear, gloss, coat, matte) = self.facets(), self._lobes(wo)
         value, density, cos = facets.mirror_lobe(wo, wi)
         reflected, cos_refracted = fresnel_dielectric(cos, eta)
         opaque = (f4(1) - self.metallic) * (f4(1) - self.transmission) * front
-        tinted = self._tinted(np.where(self.ior > 1, cos, cos_refracted), reflected)
+        tinted = self._tinted(cos, reflected, cos_refracted)
         f = np.where(front > 0, tinted, clear * reflected) * value
         above = np.where(wi[2] > 0, front, f4(0))
-        f = f + self._matte(wo, wi, cos) * (opaque * above) + self._sheen(cos) * above
+        # Mitsuba evaluates the sheen where there is a diffuse base
+        some = (f4(1) - self.metallic) * (self.transmission < 1)
+        f = f + self._matte(wo, wi, cos) * (opaque * above) + self._sheen(cos, some) * above
         coat_value, coat_density = self._coat(wo, wi, cos)
         f = f + coat_value * above
         pdf = gloss * density * self._chance(reflected, clear, front) + coat * coat_density * above
@@ -170,35 +212,11 @@ class Disney(RoughBsdf):
         """Part of the light at facets that is reflected rather than transmitted, (n,)."""
         return f4(1) - np.where(front > 0, clear, f4(1)) * (f4(1) - reflected) * (clear > 0)
 
-    def _tinted(self, cos: Floats, reflected: Floats) -> Floats:
+    def _tinted(self, cos: Floats, reflected: Floats, cos_refracted: Floats) -> Floats:
         """Fresnel reflectance of metal and dielectric from the front, (3, n)."""
-        weight = _fifth(cos)
-        normal = ((self.ior - f4(1)) / (self.ior + f4(1))) ** 2
+        glossy, weight = self._glossy(cos, reflected, cos_refracted)
         metal = weight + (f4(1) - weight) * self.base_color
-        tinted = weight + (f4(1) - weight) * (self._hue() * normal)
-        glossy = reflected + (tinted - reflected) * self.specular_tint
         return glossy + (metal - glossy) * self.metallic
-
-    def _hue(self) -> Floats:
-        bright = luminance(self.base_color)
-        return np.where(bright > 0, self.base_color / np.where(bright > 0, bright, f4(1)), f4(1))
-
-    def _matte(self, wo: Floats, wi: Floats, cos: Floats) -> Floats:
-        """Diffuse and retro-reflection, or approximate subsurface scattering, (3, n)."""
-        zi = np.abs(wi[2])
-        o, i = _fifth(wo[2]), _fifth(zi)
-        retro = f4(2) * self.roughness * cos * cos
-        diffuse = (f4(1) - f4(0.5) * o) * (f4(1) - f4(0.5) * i) + retro * (o + i + o * i * (retro - f4(1)))
-        half = f4(0.5) * retro - f4(1)
-        below = (f4(1) + half * o) * (f4(1) + half * i)
-        flat = f4(1.25) * (below * (f4(1) / np.maximum(wo[2] + zi, TINY) - f4(0.5)) + f4(0.5))
-        return self.base_color * ((diffuse + (flat - diffuse) * self.flatness) * INV_PI)
-
-    def _sheen(self, cos: Floats) -> Floats:
-        hue = f4(1) + (self._hue() - f4(1)) * self.sheen_tint
-        # Mitsuba evaluates it where there is a diffuse base
-        some = (f4(1) - self.metallic) * (self.transmission < 1)
-        return hue * (self.sheen * some * _fifth(cos))
 
     def _coat_alpha2(self) -> Floats:
         return (f4(0.1) + (f4(0.001) - f4(0.1)) * self.clearcoat_gloss) ** 2

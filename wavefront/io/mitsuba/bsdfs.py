@@ -20,6 +20,7 @@ from ...bsdfs import (
     Plastic,
     Sides,
     ThinDielectric,
+    ThinDisney,
 )
 from ...core.errors import SceneError, number, one_of
 from ...materials import Material
@@ -32,6 +33,7 @@ from .textures import bitmap, color, roughness, scalar
 
 LEAST_INDEX = 1e-6
 MAPPED = "use_shadowing_function flip_invalid_normals"
+THIN = ("anisotropic", "sheen", "sheen_tint", "flatness")  # what principled and principledthin share
 ONE_SIDED = ("diffuse", "conductor", "roughconductor", "plastic", "roughplastic")  # the back is black
 
 
@@ -141,7 +143,6 @@ def _principled(node: Node, job: Job) -> Material:
             0.08 * number("specular", node.get("specular", 0.5), lambda x: 0 <= x <= 1, "in [0, 1]")
         )
         ior = float((1 + root) / (1 - root))
-    same = ("anisotropic", "sheen", "sheen_tint", "flatness", "clearcoat", "clearcoat_gloss")
     return _named(
         node,
         Disney(
@@ -151,7 +152,29 @@ def _principled(node: Node, job: Job) -> Material:
             ior=ior,
             transmission=scalar(node, "spec_trans", 0.0, job),
             specular_tint=scalar(node, "spec_tint", 0.0, job),
-            **{name: scalar(node, name, 0.0, job) for name in same},
+            **{name: scalar(node, name, 0.0, job) for name in (*THIN, "clearcoat", "clearcoat_gloss")},
+        ),
+    )
+
+
+@plugin(
+    "principledthin",
+    "bsdf",
+    "base_color roughness anisotropic spec_trans diff_trans eta spec_tint sheen sheen_tint flatness",
+    harmless="diffuse_reflectance_sampling_rate specular_reflectance_sampling_rate "
+    "specular_transmittance_sampling_rate diffuse_transmittance_sampling_rate",
+)
+def _principled_thin(node: Node, job: Job) -> Material:
+    return _named(
+        node,
+        ThinDisney(
+            color(node, "base_color", 0.5, job),
+            scalar(node, "roughness", 0.5, job),
+            ior=scalar(node, "eta", 1.5, job),
+            transmission=scalar(node, "spec_trans", 0.0, job),
+            diffuse_transmission=scalar(node, "diff_trans", 0.0, job),
+            specular_tint=scalar(node, "spec_tint", 0.0, job),
+            **{name: scalar(node, name, 0.0, job) for name in THIN},
         ),
     )
 
@@ -209,7 +232,7 @@ def _normal(node: Node, job: Job) -> Material:
     return _mapped(node, job, ShadingFrameMap, None)
 
 
-unsupported("circular hair measured measured_polarized polarizer pplastic principledthin retarder", "bsdf")
+unsupported("circular hair measured measured_polarized polarizer pplastic retarder", "bsdf")
 
 
 def _inner(node: Node, job: Job) -> Material:
