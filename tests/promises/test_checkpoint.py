@@ -599,12 +599,15 @@ OBJ = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nv 0 0 2\nf 1 2 3\nf 1 2 4\nf 2 3 4\n"
 
 
 @pytest.fixture
-def command(tmp_path: Path) -> list[str]:
-    """A command that renders for about a second, with a checkpoint."""
+def command(tmp_path: Path, request: pytest.FixtureRequest) -> list[str]:
+    """A command that renders, or measures, for about a second, with a checkpoint."""
     (tmp_path / "scene.obj").write_text(OBJ)
-    options = ["--size", "64x48", "--spp", "240", "--lighting", "studio", "--quiet", "--workers", "1"]
+    options = ["--spp", "240", "--lighting", "studio", "--quiet", "--workers", "1"]
     interval = ["--checkpoint", "out.wfck", "--checkpoint-interval", "0.02"]
-    return ["render", "scene.obj", "-o", "out.npy", *options, *interval]
+    if getattr(request, "param", "picture") == "sensors":
+        grid = ["--grid=-2,-2,2.5:4,0,0:0,4,0:60x40", "--normal", "0,0,-1"]
+        return ["measure", "scene.obj", "-o", "out.csv", *grid, *options, *interval]
+    return ["render", "scene.obj", "-o", "out.npy", "--size", "64x48", *options, *interval]
 
 
 def start(arguments: list[str], folder: Path) -> subprocess.Popen[str]:
@@ -636,8 +639,9 @@ def uninterrupted(command: list[str], folder: Path) -> bytes:
     process = start(plain, folder)
     assert process.communicate()[1] == ""
     assert process.returncode == 0
-    content = (folder / "out.npy").read_bytes()
-    (folder / "out.npy").unlink()
+    output = folder / command[command.index("-o") + 1]
+    content = output.read_bytes()
+    output.unlink()
     return content
 
 
@@ -648,7 +652,7 @@ def kill_and_resume(command: list[str], folder: Path, kills: int, seed: int) -> 
     of an uninterrupted render.
     """
     rng, samples, expected = random.Random(seed), [], uninterrupted(command, folder)
-    path = folder / "out.wfck"
+    path, output = folder / "out.wfck", folder / command[command.index("-o") + 1]
     while len(samples) < kills:
         before = written(path)
         process = start(command, folder)
@@ -658,24 +662,28 @@ def kill_and_resume(command: list[str], folder: Path, kills: int, seed: int) -> 
         process.kill()
         process.communicate()
         if process.returncode == 0:  # done: begin anew
-            assert (folder / "out.npy").read_bytes() == expected
+            assert output.read_bytes() == expected
             path.unlink()
             continue
         samples.append(wf.Image.load(path).metadata["samples"] if path.exists() else 0)
     process = start(["resume", "out.wfck"] if path.exists() else command, folder)
     assert process.communicate()[1] == ""
     assert process.returncode == 0
-    assert (folder / "out.npy").read_bytes() == expected
+    assert output.read_bytes() == expected
     return samples
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+@pytest.mark.parametrize(
+    "command", ["picture", pytest.param("sensors", marks=pytest.mark.slow)], indirect=True
+)
 def test_kill_9_costs_no_bit(command: list[str], tmp_path: Path) -> None:
     assert len(kill_and_resume(command, tmp_path, 3, seed=1)) == 3
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+@pytest.mark.parametrize("command", ["picture", "sensors"], indirect=True)
 def test_kill_9_at_fifty_moments_costs_no_bit(command, tmp_path, capsys):
     samples = kill_and_resume(command, tmp_path, 50, seed=2)
     with capsys.disabled():

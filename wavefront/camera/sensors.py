@@ -30,6 +30,8 @@ class Sensors(Camera):
         for fluence.
     kind
         "irradiance", W·m⁻², "fluence", W·m⁻², or "radiance", W·sr⁻¹·m⁻².
+    lift
+        How far sensors of irradiance are above their points, along their normals, scene units.
 
     Raises
     ------
@@ -37,7 +39,9 @@ class Sensors(Camera):
         If there is no point, an array is malformed, or a direction is zero or missing.
     """
 
-    def __init__(self, points: ArrayLike, directions: ArrayLike | None, kind: str = "irradiance") -> None:
+    def __init__(
+        self, points: ArrayLike, directions: ArrayLike | None, kind: str = "irradiance", lift: float = 0
+    ) -> None:
         self.sensor = one_of("kind", kind, KINDS)
         self.points = finite_array("points", points, (None, 3))
         count = len(self.points)
@@ -45,6 +49,7 @@ class Sensors(Camera):
             raise SceneError("points is empty; there must be at least one point")
         self.directions = self._unit_directions(directions)
         self.scatterings = int(kind != "radiance")
+        self.lift = lift
         rows = -(-count // MAX_SIDE)
         middle = (self.points.min(0) + self.points.max(0)) / 2
         super().__init__(middle, np.eye(3), Orthographic(1), (-(-count // rows), rows))
@@ -70,6 +75,11 @@ class Sensors(Camera):
         """Return what is measured, and at how many points."""
         return f"<Sensors: {self.sensor} at {len(self.points)} points>"
 
+    @property
+    def places(self) -> NDArray[np.float64]:
+        """(n, 3) where paths start, scene units."""
+        return self.points + self.lift * self.directions
+
     def layers(self) -> dict[str, NDArray[Any]]:
         """Return the points and directions as layers (rows, columns, 3) of the picture; NaN where none is."""
         width, rows = self.resolution
@@ -85,6 +95,7 @@ class Sensors(Camera):
         """Return the same sensors in a scene whose lengths were multiplied by `factor`."""
         sensors = copy(self)
         sensors.origin, sensors.points = self.origin * factor, self.points * factor
+        sensors.lift = self.lift * factor
         return sensors
 
     def resized(self, size: tuple[int, int]) -> NoReturn:
@@ -100,6 +111,8 @@ class Sensors(Camera):
     ) -> tuple[Floats, Floats]:
         """Return the points, and the directions to them from above: those of radiance as they look."""
         index = np.minimum(pixel, len(self.points) - 1)
-        origin = (self.points.take(index, 0) - center).T.astype(f4)
-        direction = self.directions.take(index, 0).T.astype(f4)
-        return origin, direction if self.sensor == "radiance" else -direction
+        point, direction = self.points.take(index, 0) - center, self.directions.take(index, 0)
+        if self.sensor == "radiance":
+            return point.T.astype(f4), direction.T.astype(f4)
+        above = point + self.lift * direction if self.lift else point
+        return above.T.astype(f4), -direction.T.astype(f4)

@@ -17,6 +17,7 @@ from ..version import VERSION
 from .command import COMMAND, Parser, add_command
 from .doctor_command import add_doctor_command
 from .info_command import add_info_command
+from .measure_command import add_measure_command
 from .messages import (
     ERROR,
     INTERRUPTED,
@@ -31,7 +32,7 @@ from .render_command import add_render_command, add_resume_command
 from .view_commands import add_dataset_command, add_turntable_command, add_view_command
 
 SHELLS = ("bash", "zsh")
-FILES = ("scene", "scenes", "output", "checkpoint", "pictures", "picture", "reference")
+FILES = ("scene", "scenes", "output", "checkpoint", "pictures", "picture", "reference", "points")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -70,6 +71,7 @@ def parser() -> argparse.ArgumentParser:
     add_turntable_command(commands)
     add_view_command(commands)
     add_dataset_command(commands)
+    add_measure_command(commands)
     add_resume_command(commands, top)
     add_merge_command(commands)
     add_info_command(commands)

@@ -29,7 +29,7 @@ from ..settings.checks import check_preset, check_view
 from ..settings.declaration import Setting
 from ..shapes.smoothing import check_smooth
 
-VECTORS = ("--origin", "--target", "--up", "--direction", "--view")
+VECTORS = ("--origin", "--target", "--up", "--direction", "--view", "--grid", "--normal")
 
 
 class Default:

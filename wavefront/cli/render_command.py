@@ -71,7 +71,7 @@ def add_resume_command(commands: Any, parser: argparse.ArgumentParser) -> None:
     command = add_command(
         commands,
         "resume",
-        "go on with a render that wavefront render --checkpoint began",
+        "go on with what wavefront render or measure --checkpoint began",
         ["wavefront resume out.wfck"],
     )
     command.add_argument("checkpoint", help="the file that --checkpoint named")

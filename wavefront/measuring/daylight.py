@@ -141,7 +141,7 @@ class DaylightCoefficients:
         cosine, height = product(self.normals, weather.sun.T), weather.height(self.patches)
         lit = (cosine > 0) & (height > 0) & (weather.direct_normal > 0)
         at, hour = np.nonzero(lit)
-        places = lifted(self._scene, Sensors(self.points, self.normals)).points
+        places = lifted(self._scene, Sensors(self.points, self.normals)).places
         for start in range(0, at.size, PAIRS):
             i, h = at[start : start + PAIRS], hour[start : start + PAIRS]
             sensors = Sensors(places[i], weather.sun[h], "radiance")

@@ -63,8 +63,8 @@ class SurfaceSensors(Sensors):
             np.bincount(owner, triangles.mean(1)[:, k] * double, counts.size) / total for k in range(3)
         ]
         at = np.where(counts[:, None] > 0, np.stack(middles, 1), spheres[:, :3])
-        super().__init__(at, (0, 0, side), "irradiance" if kind == "arriving" else "radiance")
-        self.triangles, self.spheres, self.side, self.lift, self._kind = triangles, spheres, side, lift, kind
+        super().__init__(at, (0, 0, side), "irradiance" if kind == "arriving" else "radiance", lift)
+        self.triangles, self.spheres, self.side, self._kind = triangles, spheres, side, kind
         self.normals = (
             np.where(double[:, None] > 0, cross, (0, 0, 1)) / np.where(double > 0, double, 1)[:, None]
         )
@@ -93,7 +93,6 @@ class SurfaceSensors(Sensors):
         """Return the same sensors in a scene whose lengths were multiplied by `factor`; areas stay."""
         sensors = super().scaled(factor)
         sensors.triangles, sensors.spheres = self.triangles * factor, self.spheres * factor
-        sensors.lift = self.lift * factor
         return sensors
 
     def pixel_rays(

@@ -90,15 +90,22 @@ def measure(
     subject = as_scene(
         scene, settings.get("material"), settings.get("progress"), settings.get("smooth", AUTO)
     )
-    sensors = lifted(subject, Sensors(points, normals, kind))
-    return measured(subject, sensors, spp, settings)
+    return measured(subject, sensors_for(subject, points, normals, kind), spp, settings)
 
 
-def measured(scene: Scene, sensors: Sensors, spp: int | None, settings: Mapping[str, Any]) -> Measurement:
-    """Return what sensors measure in a scene, with settings of `measure`."""
+def measured(
+    scene: Scene,
+    sensors: Sensors,
+    spp: int | None,
+    settings: Mapping[str, Any],
+    command: dict[str, Any] | None = None,
+) -> Measurement:
+    """Return what sensors measure in a scene, with settings of `measure`; `command` is for checkpoints."""
     subject = copy(scene)
     subject.settings = {name: value for name, value in scene.settings.items() if name not in REFUSED}
-    return Measurement(finish(Session(subject, spp, **sensor_settings(settings), camera=sensors)))
+    session = Session(subject, spp, **sensor_settings(settings), camera=sensors)
+    session.command = command
+    return Measurement(finish(session))
 
 
 def sensor_settings(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -122,12 +129,16 @@ def sensor_settings(given: Mapping[str, Any]) -> dict[str, Any]:
     return {**given, **fixed, "aovs": aovs, "lighting": None if lighting == AUTO else lighting}
 
 
+def sensors_for(scene: Scene, points: ArrayLike, normals: ArrayLike | None, kind: str) -> Sensors:
+    """Return the sensors of `measure`, above the surfaces that they may lie on."""
+    return lifted(scene, Sensors(points, normals, kind))
+
+
 def lifted(scene: Scene, sensors: Sensors) -> Sensors:
     """Return sensors of irradiance above the surfaces that they may lie on; others as they are."""
-    if sensors.sensor != "irradiance":
-        return sensors
-    lift = LIFT * size_of(scene, sensors.points)
-    return Sensors(sensors.points + lift * sensors.directions, sensors.directions)
+    sensors = copy(sensors)
+    sensors.lift = LIFT * size_of(scene, sensors.points) if sensors.sensor == "irradiance" else 0
+    return sensors
 
 
 def size_of(scene: Scene, points: Doubles) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
@@ -11,7 +10,8 @@ from numpy.typing import NDArray
 
 from ..arrays.vec import Doubles
 from ..core.errors import SaveError, SceneError, number
-from ..core.files import write_bytes
+from ..core.files import check_target, write_bytes
+from ..core.plural import plural
 from ..image import Image
 from ..statistics.student_t import t_quantile
 
@@ -72,10 +72,13 @@ class Measurement:
         self.normals = self._rows(image.layers["normal"])
 
     def __repr__(self) -> str:
+        """Return the summary."""
+        return f"<Measurement: {self.summary()}>"
+
+    def summary(self) -> str:
         """Return what was measured, at how many points, and the largest relative error."""
-        return (
-            f"<Measurement: {self.kind} at {self._count} points, error {self.metadata['noise']:.2%} at most>"
-        )
+        places = plural(self._count, "point")
+        return f"{self.kind} at {places}, estimated error {self.metadata['noise']:.2%} at most"
 
     def _rows(self, values: Any) -> NDArray[Any]:
         """Return the values of pixels (rows, columns, ...) as those of the points (n, ...)."""
@@ -178,16 +181,13 @@ class Measurement:
         SaveError
             If the file cannot be written.
         """
-        kind = Path(path).suffix.lower()
-        if kind == ".npz":
+        if file_kind(path) == ".npz":
             self.image.save(path)
-        elif kind == ".csv":
-            table = self.columns()
-            rows = zip(*(column.tolist() for column in table.values()), strict=True)
-            lines = (",".join(map(str, row)) + "\n" for row in ((*table,), *rows))
-            write_bytes(path, "".join(lines).encode())
-        else:
-            raise SaveError(f"{os.fspath(path)}: a measurement is saved as npz or csv")
+            return
+        table = self.columns()
+        rows = zip(*(column.astype(str).tolist() for column in table.values()), strict=True)
+        lines = (",".join(row) + "\n" for row in ((*table,), *rows))
+        write_bytes(path, "".join(lines).encode())
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
@@ -234,3 +234,17 @@ class Measurement:
         from .plot import draw
 
         return draw(self, levels, axes)
+
+
+def file_kind(path: str | os.PathLike[str]) -> str:
+    """Return the extension of a file to write a measurement to, ".npz" or ".csv".
+
+    Raises
+    ------
+    SaveError
+        If it is another, or the file cannot be written.
+    """
+    kind = check_target(path).suffix.lower()
+    if kind not in (".npz", ".csv"):
+        raise SaveError(f"{os.fspath(path)}: a measurement is saved as npz or csv")
+    return kind

@@ -1,0 +1,99 @@
+"""`wavefront measure`: the light at points."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from typing import Any
+
+from ..arrays.vec import Doubles
+from ..camera.sensors import KINDS
+from ..core.errors import Interrupted, RenderError, SaveError, SceneError
+from ..image import Image
+from ..measuring import Measurement, grid_points, load_points
+from ..measuring.measure import measured, sensors_for
+from ..measuring.measurement import file_kind
+from .command import SCENE_FILE, add_command
+from .messages import ERROR, INTERRUPTED, print_done, print_error, print_note
+from .options import add_settings, framing, read_scene, setting_values, size, vector
+from .outputs import save_elsewhere
+
+
+def add_measure_command(commands: Any) -> None:
+    """Add the command and its options to those of a parser."""
+    command = add_command(
+        commands,
+        "measure",
+        "measure the light that arrives at points of a scene file",
+        [
+            "wavefront measure room.glb --grid 0,0.8,0:0,0,3:4,0,0:8x6 --noise 0.01 -o desk.csv",
+            "wavefront measure room.glb --points sensors.csv --normal 0,1,0 --aov direct --aov indirect",
+        ],
+    )
+    command.add_argument("scenes", nargs=1, metavar="scene", help=SCENE_FILE)
+    command.add_argument("-o", "--output", default="out.csv", help="csv or npz file to write")
+    where = command.add_mutually_exclusive_group(required=True)
+    where.add_argument(
+        "--grid",
+        type=_grid,
+        metavar="CORNER:EDGE:EDGE:NxM",
+        help="N by M points in the middle of the cells of a parallelogram, of which the corner and two edges "
+        "are X,Y,Z; the normal is the cross product of the edges",
+    )
+    where.add_argument(
+        "--points", metavar="FILE", help="table with x, y, z of a point on each line, and a direction or none"
+    )
+    command.add_argument("--normal", type=vector, metavar="X,Y,Z", help="of all points, in place of others")
+    command.add_argument("--kind", choices=KINDS, default=KINDS[0], help="what is measured")
+    add_settings(command)
+    command.add_argument("--quiet", action="store_true", help="no progress bar")
+    command.set_defaults(run=_measure)
+
+
+def _grid(text: str) -> tuple[Doubles, Doubles]:
+    """Return the points and normals of CORNER:EDGE:EDGE:NxM."""
+    parts = text.split(":")
+    if len(parts) != 4:
+        raise SceneError(f"{text!r} is not CORNER:EDGE:EDGE:NxM, such as 0,0.8,0:0,0,3:4,0,0:8x6")
+    corner, edge_u, edge_v = (vector(part) for part in parts[:3])
+    return grid_points(corner, edge_u, edge_v, size(parts[3]))
+
+
+def _measure(options: argparse.Namespace) -> int:
+    """Measure and save; return the exit status."""
+    file_kind(options.output)
+    (path,), progress = options.scenes, False if options.quiet else None
+    if options.grid is not None:
+        points, normals = options.grid
+    else:
+        points, normals = load_points(os.path.join(options.folder, options.points))
+    normals = None if options.kind == "fluence" else normals if options.normal is None else options.normal
+    scene = read_scene(path, options, progress)
+    settings = {**framing(options), **setting_values(options), "progress": progress}
+    image: Image | None
+    status = 0
+    try:
+        command = {"arguments": options.arguments, "folder": options.folder}
+        sensors = sensors_for(scene, points, normals, options.kind)
+        image = measured(scene, sensors, settings.pop("spp", None), settings, command).image
+    except Interrupted as stop:
+        image, status = stop.image, INTERRUPTED
+        print_note(stop)
+    except RenderError as error:
+        image, status = error.image, ERROR
+        print_error(error)
+    return (image is not None and _save(Measurement(image), options.output)) or status
+
+
+def _save(found: Measurement, output: str) -> int:
+    """Save a measurement, if not where it was meant to go then elsewhere; return the exit status."""
+    try:
+        found.save(output)
+    except (SaveError, MemoryError) as error:
+        print_error(error)
+        place = save_elsewhere(found.save, output)
+        print_note(f"the measurement {f'was saved as {place}' if place else 'is lost'}")
+        return ERROR
+    seconds, spp = found.metadata["seconds"], found.metadata["spp"]
+    print_done(f"{output}: {found.summary()}, {spp:.4g} spp in {seconds:.1f} s")
+    return 0
