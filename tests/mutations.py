@@ -370,6 +370,7 @@ MUTATIONS: dict[str, Mutation] = {
     "obj": mutate_tokens,
     "mtl": mutate_tokens,
     "off": mutate_tokens,
+    "pbrt": mutate_tokens,
     "ply": mutate_ply,
     "stl": mutate_stl,
     "gltf": mutate_gltf,

@@ -35,7 +35,12 @@ SECONDS = 25  # for one file
 WORDS = b'0|-1|nan|inf|99999999999|1e400|/|//|\\|#|"|[|{|null|\x00|\xff| |\n|property|f |v |true|-'.split(
     b"|"
 )
-SCENES = {"s.mtl": "m.obj", "ball.xml": "s.xml", "m.serialized": "s.xml"}  # which refer to these files
+SCENES = {
+    "s.mtl": "m.obj",
+    "ball.xml": "s.xml",
+    "m.serialized": "s.xml",
+    "more.pbrt": "s.pbrt",
+}  # which refer to these files
 NUMBERS = (b"\xff\xff\xff\xff", b"\0\0\0\0", b"\xff\xff\xff\x7f", b"\0\0\0\x80")
 OBJ = "mtllib s.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvn 0 0 1\nusemtl m\nf 1/1/1 2/2/1 3/1/1\n"
 OBJ += "f -3//1 2 1/1\n"
@@ -56,6 +61,16 @@ value="8"/> <integer name="height" value="8"/> <rfilter type="tent"/> </film> <s
 <translate value="1 2 3"/> </transform> </shape> <shape type="cylinder"> <emitter type="area"> <spectrum
 name="radiance" value="400:1, 700:2"/> </emitter> </shape> <shape type="serialized"> <string name="filename"
 value="m.serialized"/> </shape> </scene>"""
+PBRT = """LookAt 0 1 5 0 1 0 0 1 0 Camera "perspective" "float fov" 40 Film "rgb"
+WorldBegin Texture "t" "spectrum" "imagemap" "string filename" "t.png" "float uscale" 2
+LightSource "infinite" "string filename" "t.square.exr" LightSource "distant" "blackbody L" 5000
+ObjectBegin "o" Material "coateddiffuse" "texture reflectance" "t" Shape "plymesh"
+"string filename" "ball.ply" ObjectEnd
+Translate 0 1 0 ObjectInstance "o" Rotate 9 0 1 0 ObjectInstance "o" Include "more.pbrt" """
+MORE = """AreaLightSource "diffuse" "rgb L" [ 1 2 3 ] "float power" 3 MakeNamedMaterial "m" "string type"
+"conductor"
+"spectrum eta" "metal-Au-eta" NamedMaterial "m" Shape "disk" "float radius" 2 Shape "sphere" "float zmax" .5
+Shape "trianglemesh" "point3 P" [ 0 0 0 1 0 0 1 1 0 0 1 0 ] "integer indices" [ 0 1 2 0 2 3 ]"""
 BALL = """<scene version="0.6.0"> <shape type="sphere"> <float name="radius" value="$r"/>
 <transform name="toWorld"> <matrix value="1 0 0 1 0 1 0 2 0 0 1 3 0 0 0 1"/> </transform> <bsdf type="mask">
 <bsdf type="diffuse"> <texture type="checkerboard" name="diffuseReflectance"> <float name="uscale" value="2"/>
@@ -75,6 +90,8 @@ def make_seeds(folder):
     (folder / "s.mtl").write_text(MTL)
     (folder / "s.xml").write_text(XML)
     (folder / "ball.xml").write_text(BALL)
+    (folder / "s.pbrt").write_text(PBRT)
+    (folder / "more.pbrt").write_text(MORE)
     packed = struct.pack("<I5sQQ", 0x1001, b"part\0", 3, 1) + np.eye(3, dtype="<f4").tobytes() * 2
     packed += np.array([0, 1, 2], "<u4").tobytes()
     (folder / "m.serialized").write_bytes(struct.pack("<HH", 0x041C, 4) + zlib.compress(packed))
@@ -87,6 +104,7 @@ def make_seeds(folder):
     build.glb(folder / "m.glb")
     for extension in ("png", "jpg", "exr", "hdr", "npy"):
         write_image(folder / f"t.{extension}", np.random.default_rng(0).random((9, 11, 3)))
+    write_image(folder / "t.square.exr", np.random.default_rng(0).random((8, 8, 3)))
     rgb = np.random.default_rng(1).random((9, 11, 3), np.float32)
     arrays = {"alpha": rgb[..., 0], "shape_id": np.arange(99, dtype=np.int32).reshape(9, 11)}
     metadata = {"background": "transparent", "noise": 0.1}

@@ -11,7 +11,7 @@ from ..core.suggestions import did_you_mean, meant
 from .messages import ERROR
 
 COMMAND = "command"  # the name of the first word in messages
-SCENE_FILE = "obj, ply, stl, off, glb, gltf, dae, 3mf or Mitsuba xml file"
+SCENE_FILE = "obj, ply, stl, off, glb, gltf, dae, 3mf, pbrt or Mitsuba xml file"
 PICTURE_FILE = "png, jpg, exr, hdr, npy or npz file"
 
 

@@ -169,11 +169,18 @@ def _read_mitsuba(files: SceneFiles, data: bytes, options: LoadOptions) -> Conte
     return Contents([], Places.once(0), scene.lights, scene.camera, scene.shapes, settings=scene.settings)
 
 
+def _read_pbrt(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
+    from .pbrt.scene import read_scene  # here, as programs that read no such scene need not pay for it
+
+    scene = read_scene(files, data, mesh_reader(files, options.strict), options.strict)
+    return Contents([], Places.once(0), scene.lights, scene.camera, scene.shapes, settings=scene.settings)
+
+
 def mesh_reader(files: SceneFiles, strict: bool) -> Callable[[Path], list[RawMesh]]:
     """Return a function that reads the meshes of an obj or ply file to which a scene refers."""
 
     def read_meshes(path: Path) -> list[RawMesh]:
-        kind = path.suffix.lower()
+        kind = Path(path.name.removesuffix(".gz")).suffix.lower()
         if kind not in (".obj", ".ply"):
             raise SceneError(f"{path}: extension is {kind!r}; it must be .obj or .ply")
         own, name = files.seen_from(path), os.fspath(path)
@@ -219,7 +226,18 @@ READERS: Registry[Reader] = Registry(
         ".dae": _read_dae,
         ".3mf": _read_3mf,
         ".xml": _read_mitsuba,
+        ".pbrt": _read_pbrt,
     },
     adapt=_from_scene,
 )
-PLAIN = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off", ".dae", ".xml")  # formats that are no archives
+PLAIN = (
+    ".obj",
+    ".ply",
+    ".stl",
+    ".glb",
+    ".gltf",
+    ".off",
+    ".dae",
+    ".xml",
+    ".pbrt",
+)  # formats that are no archives

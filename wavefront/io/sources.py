@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -20,6 +21,7 @@ PathLike = str | os.PathLike[str]
 
 MAX_TRIANGLES = 2**26  # of all meshes of a file by default
 ARCHIVES = (".npz", ".zip", ".gz", ".tar", ".7z", ".bz2", ".xz", ".zst")
+GZIPPED = (".ply.gz", ".pbrt.gz")  # the files of pbrt that may be packed
 SCHEMES = ("http:", "https:", "file:", "ftp:")
 
 
@@ -41,11 +43,11 @@ class LoadLimits:
     meshes
         Meshes of a file, one for each of its materials or primitives, before they are placed.
     instances
-        Meshes that the nodes of a glTF file, or the instances of a Mitsuba scene, place.
+        Meshes that the nodes of a glTF file, or the instances of a Mitsuba or pbrt scene, place.
     includes
-        Files that a Mitsuba scene includes, each counted as often as it is included.
+        Files that a Mitsuba or pbrt scene includes, each counted as often as it is included.
     unpacked_bytes
-        Size of the unpacked members of a 3mf file, the only archive that is read.
+        Size of the unpacked members of a 3mf file, and of each packed file of a pbrt scene (.ply.gz).
     memory_bytes
         Memory for all arrays and images, in bytes; 128 bytes for each byte of the files are added. It is
         compared with what headers claim, before any is allocated.
@@ -138,7 +140,7 @@ class SceneFiles:
             raise SceneError(
                 f"{source}: refers to {reference!r}; only files in its folder and the search paths are read"
             )
-        if name.lower().endswith(ARCHIVES):
+        if name.lower().endswith(ARCHIVES) and not name.lower().endswith(GZIPPED):
             raise SceneError(f"{source}: refers to {reference!r}; archives are not read")
         if name.startswith("/") or name[1:2] == ":":
             raise SceneError(f"{source}: refers to {reference!r}; an absolute path is not followed")
@@ -165,8 +167,16 @@ class SceneFiles:
         return files
 
     def read(self, path: PathLike) -> bytes:
-        """Return the content of a regular file of at most `limits.file_bytes`."""
+        """Return the content of a regular file of at most `limits.file_bytes`, unpacked if it is one of pbrt.
+
+        Raises
+        ------
+        SceneError
+            If it cannot be read, or a packed file is damaged or larger than `limits.unpacked_bytes`.
+        """
         data = read_bytes(path, self.limits.file_bytes)
+        if os.fspath(path).lower().endswith(GZIPPED):
+            data = _unpacked(os.fspath(path), data, self.limits.unpacked_bytes)
         self.budget.add_file(len(data))
         return data
 
@@ -183,6 +193,20 @@ class SceneFiles:
             return (folder / name).resolve()
         except (OSError, RuntimeError, ValueError) as error:
             raise SceneError(f"{self.scene}: refers to {reference!r}: {error}") from error
+
+
+def _unpacked(name: str, data: bytes, most: int) -> bytes:
+    """Return the content of a gzip file."""
+    unpacker = zlib.decompressobj(31)
+    try:
+        content = unpacker.decompress(data, most + 1)
+    except zlib.error as error:
+        raise SceneError(f"{name}: is no gzip file: {error}") from error
+    if len(content) > most:
+        raise SceneError(f"{name}: has more than {most} bytes unpacked (LoadLimits.unpacked_bytes)")
+    if not unpacker.eof:
+        raise SceneError(f"{name}: ends before its gzip stream does")
+    return content
 
 
 def _folder(path: PathLike) -> Path:

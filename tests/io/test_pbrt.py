@@ -1,0 +1,690 @@
+"""Scenes of pbrt: what becomes of each directive, type and parameter, and what is not honored."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+import wavefront as wf
+from wavefront.arrays.vec import luminance
+from wavefront.codecs.images import write_image
+from wavefront.io.pbrt.entities import TABLE
+from wavefront.io.pbrt.lights import sphere_to_square, square_to_sphere
+from wavefront.io.spectra import METALS
+
+BALL = 'Shape "sphere"\n'
+SQUARE = 'Shape "trianglemesh" "point3 P" [ 0 0 0 1 0 0 1 1 0 0 1 0 ] "integer indices" [ 0 1 2 0 2 3 ]\n'
+DOCS = Path(__file__).parents[2] / "docs" / "pbrt.md"
+
+
+def load(folder: Path, body: str, header: str = "", strict: bool = True) -> wf.Scene:
+    path = folder / "scene.pbrt"
+    path.write_text(f"{header}\nWorldBegin\n{body}\n")
+    return wf.load(path, strict=strict)
+
+
+def light(folder: Path, statement: str, header: str = "") -> Any:
+    (found,) = load(folder, f"{statement} {BALL}", header).lights
+    return found
+
+
+def shape(folder: Path, statement: str) -> Any:
+    (found,) = load(folder, statement).shapes
+    return found
+
+
+def material(folder: Path, statement: str) -> Any:
+    return shape(folder, f"{statement}\n{SQUARE}").material
+
+
+def at(texture: Any, u: float, v: float) -> Any:
+    surface = SimpleNamespace(uv=np.array([[u], [v]], np.float32))
+    return texture.at(surface)[..., 0]
+
+
+def rows(values: Any) -> Any:
+    return np.ravel(values).tolist()
+
+
+# ---- cameras, films and settings
+
+
+def raster(point: Any, matrix: Any, fov: float, window: Any, size: Any) -> Any:
+    """Return where pbrt sees a point: `matrix` takes the world to x right, y up and z ahead."""
+    x, y, z = (matrix @ [*point, 1])[:3]
+    scale = np.tan(np.radians(fov) / 2) * z if fov else 1
+    x0, x1, y0, y1 = window
+    return (x / scale - x0) / (x1 - x0) * size[0], (y1 - y / scale) / (y1 - y0) * size[1]
+
+
+TURN = np.array([[0, 0, 1, 2], [0, 1, 0, -1], [-1, 0, 0, 6], [0, 0, 0, 1.0]])
+STATED = "Transform [ 0 0 -1 0 0 1 0 0 1 0 0 0 2 -1 6 1 ]"
+
+
+@pytest.mark.parametrize("mirror", [False, True])
+@pytest.mark.parametrize(
+    ("camera", "size", "fov", "window"),
+    [
+        ('"perspective" "float fov" 50', (80, 40), 50, (-2, 2, -1, 1)),
+        ('"perspective"', (40, 80), 90, (-1, 1, -2, 2)),
+        ('"perspective" "float screenwindow" [ -1 .5 -.2 .7 ]', (50, 30), 90, (-1, 0.5, -0.2, 0.7)),
+        ('"perspective" "float frameaspectratio" 3', (50, 30), 90, (-3, 3, -1, 1)),
+        ('"orthographic" "float screenwindow" [ -4 2 -1 2 ]', (60, 30), None, (-4, 2, -1, 2)),
+    ],
+)
+def test_cameras_see_points_where_pbrt_does(
+    tmp_path: Path, camera: str, size: Any, fov: Any, window: Any, mirror: bool
+) -> None:
+    header = f"{'Scale -1 1 1' if mirror else ''} {STATED}"
+    header += f' Camera {camera} Film "rgb" "integer xresolution" {size[0]} "integer yresolution" {size[1]}'
+    if mirror:  # Transform replaces what is above it
+        header = header.replace("Transform", "ConcatTransform")
+    matrix = np.diag([-1 if mirror else 1, 1, 1, 1]) @ TURN
+    scene = load(tmp_path, "Translate .3 .2 -.1 " + SQUARE, header)
+    assert scene.camera is not None
+    pixels, _ = scene.camera.project(scene.shapes[0].vertices)
+    expected = [raster(p, matrix, fov, window, size) for p in ((0.3, 0.2, -0.1), (1.3, 0.2, -0.1))]
+    np.testing.assert_allclose(pixels[:2], expected, atol=1e-3)
+
+
+def test_a_lens_has_pbrts_radius_and_distance(tmp_path: Path) -> None:
+    scene = load(
+        tmp_path, BALL, 'Scale 2 2 2 Camera "perspective" "float lensradius" 3 "float focaldistance" 8'
+    )
+    lens = scene.camera.projection  # type: ignore[union-attr]
+    assert (lens.aperture, lens.focus) == (3, 4)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("header", "expected"),
+    [
+        ("", {"filter": "gaussian", "spp": 16, "max_bounces": 5}),
+        ('Sampler "zsobol" "integer pixelsamples" 64', {"spp": 64}),
+        ('Sampler "stratified" "integer xsamples" 3 "integer ysamples" 5', {"spp": 15}),
+        ('Integrator "path" "integer maxdepth" 9 "string lightsampler" "bvh"', {"max_bounces": 9}),
+        ('PixelFilter "box"', {"filter": "box"}),
+        ('PixelFilter "triangle" "float xradius" 1 "float yradius" 1', {"filter": "tent"}),
+        ('Option "seed" 4 Accelerator "bvh" TransformTimes 0 1 ColorSpace "srgb"', {}),
+    ],
+)
+def test_settings(tmp_path: Path, header: str, expected: dict[str, Any]) -> None:
+    found = load(tmp_path, BALL, header).settings
+    assert found == {"filter": "gaussian", "spp": 16, "max_bounces": 5} | expected
+
+
+@pytest.mark.parametrize(
+    ("film", "size", "window"),
+    [
+        ("", (1280, 720), None),
+        ('"integer xresolution" 20 "integer yresolution" 10', (20, 10), None),
+        ('"integer pixelbounds" [ 10 30 5 700 ]', (1280, 720), (10, 5, 30, 700)),
+        ('"float cropwindow" [ .25 .5 .5 1 ]', (1280, 720), (320, 360, 640, 720)),
+        ('"float cropwindow" [ 0 1 0 1 ]', (1280, 720), None),
+    ],
+)
+def test_films(tmp_path: Path, film: str, size: Any, window: Any) -> None:
+    camera = load(tmp_path, BALL, f'Camera "perspective" Film "rgb" {film}').camera
+    assert camera is not None
+    assert camera.resolution == size
+    assert camera.window == (window or (0, 0, *size))
+
+
+def test_iso_and_shutter_multiply_all_light(tmp_path: Path) -> None:
+    header = 'Camera "perspective" "float shutterclose" .5 Film "rgb" "float iso" 800'
+    assert rows(light(tmp_path, 'LightSource "point"', header).intensity) == [4, 4, 4]
+
+
+# ---- lights
+
+E = [0.5, 1, 2]
+RGB = "[ .5 1 2 ]"
+
+
+@pytest.mark.parametrize(
+    ("statement", "attribute", "expected"),
+    [
+        (f'LightSource "point" "rgb I" {RGB} "float scale" 3', "intensity", np.multiply(E, 3)),
+        ('LightSource "point" "float power" 4', "intensity", [1 / np.pi] * 3),
+        ('Translate 1 0 0 LightSource "point" "point3 from" [ 1 2 3 ]', "position", [2, 2, 3]),
+        ('Translate 1 0 0 LightSource "goniometric"', "position", [1, 0, 0]),
+        (f'LightSource "distant" "rgb L" {RGB} "float scale" 2', "irradiance", np.multiply(E, 2)),
+        ('LightSource "distant" "float illuminance" 7', "irradiance", [7, 7, 7]),
+        ('LightSource "distant" "point3 from" [ 0 0 2 ] "point3 to" [ 0 0 0 ]', "direction", [0, 0, -1]),
+        ('Rotate 90 1 0 0 LightSource "distant"', "direction", [0, -1, 0]),
+        (f'LightSource "infinite" "rgb L" {RGB}', "radiance", E),
+        ('LightSource "infinite" "float illuminance" 3', "radiance", [3 / np.pi] * 3),
+        ('LightSource "infinite" "spectrum L" "stdillum-D65"', "radiance", [1, 1, 1]),
+        ('LightSource "spot" "float conedeltaangle" 0', "angle", 60),
+        ('LightSource "spot" "float coneangle" 20 "float conedeltaangle" 0', "angle", 40),
+        (f'LightSource "spot" "rgb I" {RGB} "float conedeltaangle" 0', "intensity", E),
+        ('LightSource "spot" "point3 to" [ 0 3 0 ] "float conedeltaangle" 0', "direction", [0, 1, 0]),
+        (
+            'LightSource "spot" "float power" 1 "float coneangle" 60 "float conedeltaangle" 0',
+            "intensity",
+            [1 / np.pi] * 3,
+        ),
+        ('Attribute "light" "float scale" 5 LightSource "point"', "intensity", [5, 5, 5]),
+    ],
+)
+def test_lights(tmp_path: Path, statement: str, attribute: str, expected: Any) -> None:
+    np.testing.assert_allclose(
+        np.ravel(getattr(light(tmp_path, statement), attribute)), np.ravel(expected), rtol=1e-5, atol=1e-6
+    )
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        '"blackbody L" 3000',
+        '"spectrum L" [ 400 1 500 3 700 9 ]',
+        '"spectrum L" [ 7 ]',
+        '"spectrum L" "stdillum-A"',
+    ],
+)
+def test_light_of_a_spectrum_has_luminance_1(tmp_path: Path, given: str) -> None:
+    found = light(tmp_path, f'LightSource "distant" {given} "float scale" 2').irradiance
+    assert luminance(np.ravel(found)) == pytest.approx(2, rel=1e-5)
+    assert (found[0] > found[2]) == ("7 ]" not in given)
+
+
+def test_a_spot_that_falls_off_keeps_its_power(tmp_path: Path) -> None:
+    text = 'LightSource "spot" "float power" 2 "float coneangle" 50 "float conedeltaangle" 20'
+    with pytest.warns(UserWarning, match="light 'spot': the form of its falloff"):
+        (spot,) = load(tmp_path, f"{text} {BALL}", strict=False).lights
+    assert spot.record(np.zeros(3)).power(1)[0] == pytest.approx(2, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("area", "body", "emission", "two_sided"),
+    [
+        ('"rgb L" [ 1 2 3 ] "float scale" 2', SQUARE, [2, 4, 6], False),
+        ('"bool twosided" true', SQUARE, [1, 1, 1], True),
+        ('"float power" 5 "rgb L" [ 2 2 2 ]', f"Scale 2 2 2 {SQUARE}", [5 / (4 * np.pi)] * 3, False),
+        ('"float power" 5 "bool twosided" true', SQUARE, [5 / (2 * np.pi)] * 3, True),
+        ('"float power" 5', 'Shape "sphere" "float radius" 3', [5 / (36 * np.pi**2)] * 3, None),
+    ],
+)
+def test_area_lights(tmp_path: Path, area: str, body: str, emission: Any, two_sided: Any) -> None:
+    found = shape(tmp_path, f'AreaLightSource "diffuse" {area} {body}')
+    np.testing.assert_allclose(rows(found.emission), emission, rtol=1e-5)
+    assert getattr(found, "two_sided", None) == two_sided
+
+
+def test_area_lights_show_images(tmp_path: Path) -> None:
+    write_image(tmp_path / "a.exr", np.array([[[4, 0, 0]], [[0, 0, 2]]], np.float32))
+    found = shape(tmp_path, f'AreaLightSource "diffuse" "string filename" "a.exr" "float scale" 3 {SQUARE}')
+    assert at(found.emission, 0.5, 0.9).tolist() == [12, 0, 0]
+    assert found.uvs is not None
+
+
+def test_the_square_of_directions_is_that_of_pbrt() -> None:
+    # of EqualAreaSquareToSphere: the middle is z, the middles of the edges are the other axes, the corners -z
+    points = np.array([[0.5, 1, 0.5, 0, 0.5, 0], [0.5, 0.5, 1, 0.5, 0, 0]])
+    expected = [[0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, -1]]
+    np.testing.assert_allclose(square_to_sphere(*points).T, expected, atol=1e-12)
+    x, y = np.random.default_rng(1).random((2, 2000))
+    direction = square_to_sphere(x, y)
+    np.testing.assert_allclose((direction**2).sum(0), 1, atol=1e-12)
+    np.testing.assert_allclose(sphere_to_square(direction), [x, y], atol=1e-9)
+    assert (np.abs(direction.mean(1)) < 5 / np.sqrt(3 * 2000)).all()
+
+
+@pytest.mark.parametrize("header", ["", 'Camera "perspective"'])  # a camera without Scale -1 1 1 mirrors
+def test_environments_show_their_image_where_pbrt_does(tmp_path: Path, header: str) -> None:
+    size = 32
+    u, v = np.meshgrid(*2 * [(np.arange(size) + 0.5) / size])
+    image = square_to_sphere(u, v).transpose(1, 2, 0) * 0.4 + 0.5  # its colors are the directions
+    write_image(tmp_path / "e.exr", image.astype(np.float32))
+    turn = "Rotate 90 1 0 0"  # the light's z is the world's -y, and its y the world's z
+    text = f'{turn} LightSource "infinite" "string filename" "e.exr" "float scale" 2'
+    record = light(tmp_path, text, header).record(np.zeros(3))
+    x, y, z = world = square_to_sphere(*np.random.default_rng(2).random((2, 500)))
+    scene = np.stack([-x if header else x, y, z]).astype(np.float32)
+    expected = 2 * (np.stack([x, z, -y]) * 0.4 + 0.5)
+    np.testing.assert_allclose(record.le(scene), expected, atol=0.04)
+    assert world.shape == (3, 500)
+    lit = 'LightSource "infinite" "string filename" "e.exr" "float illuminance" 5'
+    record = light(tmp_path, lit).record(np.zeros(3))
+    up = square_to_sphere(*np.random.default_rng(3).random((2, 4000)))
+    found = luminance(record.le(up.astype(np.float32))) * np.maximum(up[2], 0)
+    # the scale of pbrt brings twice what is asked for, as it counts half of the sphere for all of it
+    assert found.mean() * 4 * np.pi == pytest.approx(2 * 5, abs=5 * found.std() / np.sqrt(4000) * 4 * np.pi)
+
+
+def test_projections_are_not_mirrored(tmp_path: Path) -> None:
+    write_image(tmp_path / "p.exr", np.array([[[9, 0, 0], [0, 9, 0]]], np.float32))
+    camera = 'LookAt 0 0 0 0 0 1 0 1 0 Camera "perspective"'
+    text = f'LightSource "projection" "string filename" "p.exr" "float fov" 60 {BALL}'
+    for header in (camera, "Scale -1 1 1 " + camera):
+        with pytest.warns(UserWarning, match="the fall of its light"):
+            scene = load(tmp_path, text, header, strict=False)
+        (lamp,) = scene.lights
+        assert scene.camera is not None
+        point = scene.camera.origin + scene.camera.rotation @ [
+            -0.3,
+            0,
+            -1,
+        ]  # left of the middle, for the camera
+        seen = lamp.record(np.zeros(3)).sample_li(point.astype(np.float32)[:, None], None).radiance
+        assert (seen[0] > seen[1]) == ("Scale" not in header)
+
+
+# ---- materials
+
+GRAY = '"rgb reflectance" [ .5 .5 .5 ]'
+
+
+@pytest.mark.parametrize(
+    ("statement", "kind", "expected"),
+    [
+        ("", wf.Diffuse, {"reflectance": 0.5}),
+        ('Material "diffuse" "rgb reflectance" [ .1 .2 .3 ]', wf.Diffuse, {"reflectance": [0.1, 0.2, 0.3]}),
+        ('Material "diffuse" "spectrum reflectance" [ 300 .25 900 .25 ]', wf.Diffuse, {"reflectance": 0.25}),
+        (
+            'Attribute "material" "rgb reflectance" [ .1 .1 .1 ] Material "diffuse"',
+            wf.Diffuse,
+            {"reflectance": 0.1},
+        ),
+        (
+            f'Material "coateddiffuse" {GRAY} "float thickness" 0',
+            wf.Plastic,
+            {"reflectance": 0.5, "roughness": 0},
+        ),
+        (
+            'Material "coateddiffuse" "float eta" 1.7 "float roughness" .0625',
+            wf.Plastic,
+            {"ior": 1.7, "roughness": 0.5},
+        ),
+        (
+            'Material "conductor"',
+            wf.Conductor,
+            {"eta": METALS["Cu"][0], "k": METALS["Cu"][1], "roughness": 0},
+        ),
+        ('Material "conductor" "spectrum eta" "metal-Au-eta"', wf.Conductor, {"eta": METALS["Au"][0]}),
+        ('Material "conductor" "spectrum k" "metal-CuZn-k"', wf.Conductor, {"k": [3.695, 2.765, 1.829]}),
+        (
+            'Material "conductor" "rgb reflectance" [ .25 .25 .25 ]',
+            wf.Conductor,
+            {"eta": 1, "k": 2 / np.sqrt(3)},
+        ),
+        (
+            """Material "conductor" "float uroughness" .0625 "float vroughness" .0016
+            "bool remaproughness" false""",
+            wf.Conductor,
+            {"roughness": 0.25, "roughness_v": 0.04},
+        ),
+        ('Material "dielectric"', wf.Dielectric, {"ior": 1.5, "roughness": 0}),
+        (
+            'Material "dielectric" "float eta" 1.3 "float roughness" .0625',
+            wf.Dielectric,
+            {"ior": 1.3, "roughness": 0.5},
+        ),
+        ('Material "thindielectric" "float eta" 1.4', wf.ThinDielectric, {"ior": 1.4}),
+        ('Material "mix" "string materials" [ "a" "b" ] "float amount" .3', wf.Mix, {"weight": 0.3}),
+    ],
+)
+def test_materials(tmp_path: Path, statement: str, kind: Any, expected: dict[str, Any]) -> None:
+    named = 'MakeNamedMaterial "a" "string type" "diffuse" MakeNamedMaterial "b" "string type" "conductor" '
+    found = material(tmp_path, (named if "mix" in statement else "") + statement).bsdf
+    assert type(found) is kind
+    for name, value in expected.items():
+        np.testing.assert_allclose(np.ravel(getattr(found, name)) - np.ravel(value), 0, atol=2e-4)
+
+
+def test_glass_disperses_by_its_abbe_number(tmp_path: Path) -> None:
+    red, green, blue = rows(material(tmp_path, 'Material "dielectric" "spectrum eta" "glass-F11"').bsdf.ior)
+    assert 1.77 < red < green < blue < 1.83
+    assert material(
+        tmp_path, 'Material "thindielectric" "spectrum eta" "glass-BK7"'
+    ).bsdf.ior == pytest.approx(1.518, abs=2e-3)
+
+
+def test_the_coat_of_a_diffuse_surface_takes_light(tmp_path: Path) -> None:
+    thick = material(tmp_path, f'Material "coateddiffuse" {GRAY} "float thickness" .1').bsdf
+    # light that enters from all sides goes through 1.146 times the thickness, on the way down and up
+    cos = np.sqrt(1 - (1 - np.linspace(0, 1, 100_001) ** 2) / 1.5**2)
+    c = np.linspace(0, 1, 100_001)
+    mean = np.trapezoid(2 * c / cos, c)
+    np.testing.assert_allclose(rows(thick.reflectance), 0.5 * np.exp(-0.2 * mean), rtol=1e-4)
+
+
+def test_bumps_opacity_and_media(tmp_path: Path) -> None:
+    write_image(tmp_path / "h.exr", np.random.default_rng(1).random((4, 4, 3)).astype(np.float32))
+    write_image(tmp_path / "n.exr", np.full((4, 4, 3), 0.5, np.float32))
+    image = 'Texture "h" "float" "imagemap" "string filename" "h.exr" "float scale" 3 '
+    bumps = material(tmp_path, image + 'Material "diffuse" "texture displacement" "h"').normal_map
+    assert isinstance(bumps, wf.BumpMap)
+    assert (bumps.texture.scale == 3).all()
+    assert isinstance(
+        material(tmp_path, 'Material "diffuse" "string normalmap" "n.exr"').normal_map, wf.NormalMap
+    )
+    body = image + 'Material "diffuse" ' + SQUARE.strip()
+    assert shape(tmp_path, body + '"float alpha" .25').material.alpha == np.float32(0.25)
+    assert at(shape(tmp_path, body + '"texture alpha" "h"').material.alpha, 0.5, 0.5) > 0
+    assert material(tmp_path, 'Material "interface"').alpha == 0
+    tea = """MakeNamedMedium "tea" "string type" "homogeneous" "rgb sigma_a" [ 1 2 3 ] "float sigma_s" 0
+    "float scale" 2"""
+    inside = shape(tmp_path, f'{tea} MediumInterface "tea" "" Material "dielectric" {BALL}').material.interior
+    assert rows(inside.absorption) == [2, 4, 6]
+
+
+# ---- textures
+
+
+@pytest.mark.parametrize(
+    ("textures", "point", "expected"),
+    [
+        ('Texture "t" "spectrum" "constant" "rgb value" [ .1 .2 .3 ]', (0, 0), [0.1, 0.2, 0.3]),
+        ('Texture "t" "spectrum" "checkerboard"', (0.5, 0.5), [1, 1, 1]),
+        ('Texture "t" "spectrum" "checkerboard" "float uscale" 4 "float vscale" 2', (0.3, 0.2), [0, 0, 0]),
+        ('Texture "t" "spectrum" "checkerboard" "float uscale" 4 "float vscale" 2', (0.3, 0.7), [1, 1, 1]),
+        ('Texture "t" "spectrum" "checkerboard" "float udelta" 1', (0.5, 0.5), [0, 0, 0]),
+        ('Texture "t" "spectrum" "checkerboard" "rgb tex1" [ .1 .2 .3 ]', (0.5, 0.5), [0.1, 0.2, 0.3]),
+        (
+            'Texture "t" "spectrum" "checkerboard" "texture tex2" "i" "float udelta" 1',
+            (0.25, 0.75),
+            [0.5, 0, 0],
+        ),
+        ('Texture "t" "spectrum" "mix" "rgb tex1" [ .2 0 0 ] "float amount" .25', (0, 0), [0.4, 0.25, 0.25]),
+        (
+            'Texture "t" "spectrum" "mix" "texture tex1" "i" "texture amount" "f"',
+            (0.25, 0.75),
+            [0.75, 0.5, 0.5],
+        ),
+        ('Texture "t" "spectrum" "scale" "texture tex" "i" "float scale" .5', (0.25, 0.75), [0.25, 0, 0]),
+        ('Texture "t" "spectrum" "scale" "texture tex" "i" "texture scale" "f"', (0.25, 0.75), [0.25, 0, 0]),
+        (
+            'Texture "t" "spectrum" "scale" "texture tex" "i" "float scale" 9',
+            (0.25, 0.75),
+            [1, 0, 0],
+        ),  # clamped
+        ('Texture "t" "spectrum" "imagemap" "string filename" "i.exr"', (0.75, 0.75), [0, 0.5, 0]),
+        ('Texture "t" "spectrum" "imagemap" "string filename" "i.exr"', (0.25, 0.25), [0, 0, 0.5]),
+        (
+            'Texture "t" "spectrum" "imagemap" "string filename" "i.exr" "bool invert" true',
+            (0.25, 0.25),
+            [1, 1, 0.5],
+        ),
+        (
+            'Texture "t" "spectrum" "imagemap" "string filename" "i.exr" "float uscale" .5',
+            (0.5, 0.75),
+            [0.5, 0, 0],
+        ),
+        (
+            'Texture "t" "spectrum" "imagemap" "string filename" "i.exr" "string wrap" "clamp"',
+            (9, 0.75),
+            [0, 0.5, 0],
+        ),
+        (
+            'Texture "t" "spectrum" "imagemap" "string filename" "i.exr" "string filter" "point"',
+            (0.1, 0.9),
+            [0.5, 0, 0],
+        ),
+        ('Texture "t" "spectrum" "imagemap" "string filename" "c.png"', (0.5, 0.5), [0.2158] * 3),
+        (
+            'Texture "t" "spectrum" "imagemap" "string filename" "c.png" "string encoding" "linear"',
+            (0, 0),
+            [0.502] * 3,
+        ),
+        (
+            'Texture "t" "spectrum" "imagemap" "string filename" "c.png" "string encoding" "gamma 2"',
+            (0, 0),
+            [0.252] * 3,
+        ),
+    ],
+)
+def test_textures(tmp_path: Path, textures: str, point: Any, expected: Any) -> None:
+    write_image(
+        tmp_path / "i.exr", np.array([[[0.5, 0, 0], [0, 0.5, 0]], [[0, 0, 0.5], [0, 0, 0]]], np.float32)
+    )
+    from PIL import Image
+
+    Image.fromarray(np.full((2, 2, 3), 128, np.uint8)).save(tmp_path / "c.png")
+    others = """Texture "i" "spectrum" "imagemap" "string filename" "i.exr"
+    Texture "f" "float" "constant" "float value" .5"""
+    found = material(
+        tmp_path, f'{others} {textures} Material "diffuse" "texture reflectance" "t"'
+    ).bsdf.reflectance
+    value = at(found, *point) if isinstance(found, wf.BaseTexture) else np.ravel(found)
+    np.testing.assert_allclose(np.broadcast_to(value, 3), expected, atol=1e-3)
+
+
+def test_textures_of_numbers_make_roughness(tmp_path: Path) -> None:
+    write_image(tmp_path / "r.exr", np.full((2, 2, 3), 0.0625, np.float32))
+    text = """Texture "r" "float" "imagemap" "string filename" "r.exr"
+    Material "conductor" "texture roughness" "r" """
+    assert at(material(tmp_path, text).bsdf.roughness, 0.5, 0.5) == pytest.approx(0.5)
+    assert at(
+        material(tmp_path, f'{text} "bool remaproughness" false').bsdf.roughness, 0, 0
+    ) == pytest.approx(0.25)
+
+
+# ---- shapes
+
+
+def area(mesh: Any) -> float:
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+def front(mesh: Any) -> Any:
+    """Return the normals of the fronts of the faces, and the middles of the faces."""
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+    return np.cross(b - a, c - a), (a + b + c) / 3
+
+
+@pytest.mark.parametrize(
+    ("statement", "expected"),
+    [
+        ('Shape "sphere" "float radius" 2 "float zmax" 1', 2 * np.pi * 2 * 3),
+        ('Shape "sphere" "float phimax" 90', np.pi),
+        ('Shape "disk" "float radius" 2 "float innerradius" 1', 3 * np.pi),
+        ('Shape "disk" "float phimax" 180', np.pi / 2),
+        ('Shape "cylinder" "float radius" 2 "float zmin" 0 "float zmax" 3', 12 * np.pi),
+        (SQUARE, 1),
+        ('Shape "bilinearmesh" "point3 P" [ 0 0 0 2 0 0 0 3 0 2 3 0 ]', 6),
+    ],
+)
+def test_areas(tmp_path: Path, statement: str, expected: float) -> None:
+    assert area(shape(tmp_path, statement)) == pytest.approx(expected, rel=2e-3)
+
+
+def test_whole_spheres_are_exact_and_stretched_ones_meshes(tmp_path: Path) -> None:
+    ball = shape(tmp_path, 'Translate 1 2 3 Rotate 30 1 0 0 Scale 2 2 2 Shape "sphere" "float radius" 3')
+    assert (ball.center.tolist(), ball.radius) == ([1, 2, 3], pytest.approx(6))
+    egg = shape(tmp_path, 'Scale 1 1 3 Shape "sphere"')
+    np.testing.assert_allclose(np.ptp(egg.vertices, axis=0), [2, 2, 6])
+    np.testing.assert_allclose((egg.vertices**2 / [1, 1, 9]).sum(1), 1)
+
+
+@pytest.mark.parametrize("before", ["", "Scale 1 1 -1", "Scale -1 1 1 Rotate 20 1 1 0"])
+@pytest.mark.parametrize(
+    "statement",
+    [
+        'Shape "sphere" "float zmax" .5',
+        'Shape "cylinder"',
+        SQUARE + '"normal N" [ 0 0 -1 0 0 -1 0 0 -1 0 0 -1 ]',
+    ],
+)
+def test_fronts_are_where_pbrt_has_them(tmp_path: Path, statement: str, before: str) -> None:
+    for reverse, sign in (("", 1), ("ReverseOrientation", -1)):
+        mesh = shape(tmp_path, f"{reverse} {before} {statement}")
+        normal, middle = front(mesh)
+        if "N" in statement:
+            matrix = shape(
+                tmp_path, f'{before} Shape "trianglemesh" "point3 P" [ 0 0 -1 1 0 0 0 1 0 ]'
+            ).vertices
+            middle = matrix[:1]  # the mesh itself has the origin on it: its front looks to -z
+        assert ((normal * middle).sum(1) * sign > 0).all()
+        if mesh.normals is not None:
+            assert ((normal * mesh.normals[mesh.faces[:, 0]]).sum(1) > 0).all()
+
+
+def test_meshes_take_normals_and_texture_coordinates(tmp_path: Path) -> None:
+    mesh = shape(tmp_path, SQUARE + '"point2 uv" [ 0 0 2 0 2 2 0 2 ] "normal N" [ 0 0 1 0 0 1 0 1 1 0 0 2 ]')
+    assert mesh.uvs.tolist() == [[0, 0], [2, 0], [2, 2], [0, 2]]
+    np.testing.assert_allclose(mesh.normals[2:], [[0, 0.5**0.5, 0.5**0.5], [0, 0, 1]])
+    assert shape(tmp_path, SQUARE).normals is None
+    board = 'Texture "t" "spectrum" "checkerboard" Material "diffuse" "texture reflectance" "t" '
+    assert shape(tmp_path, board + SQUARE).uvs.tolist() == [[0, 0], [1, 0], [1, 1]] * 2
+
+
+@pytest.mark.parametrize("name", ["ball.ply", "ball.ply.gz"])
+def test_ply_files(tmp_path: Path, name: str) -> None:
+    data = trimesh.creation.icosphere(subdivisions=1).export(file_type="ply")
+    (tmp_path / name).write_bytes(gzip.compress(data) if name.endswith("gz") else data)
+    mesh = shape(tmp_path, f'Translate 0 0 5 Shape "plymesh" "string filename" "{name}"')
+    assert (mesh.name, len(mesh.faces)) == ("ball", 80)
+    assert mesh.vertices[:, 2].mean() == pytest.approx(5)
+
+
+def test_loop_subdivision(tmp_path: Path) -> None:
+    solid = """Shape "loopsubdiv" "point3 P" [ 1 1 1 -1 -1 1 -1 1 -1 1 -1 -1 ]
+    "integer indices" [ 0 2 1 0 1 3 0 3 2 1 2 3 ]"""
+    assert len(shape(tmp_path, f'{solid} "integer levels" 2').faces) == 64
+
+
+def test_objects_are_placed_by_both_transforms(tmp_path: Path) -> None:
+    body = f"""Translate 1 0 0 ObjectBegin "o" Translate 0 1 0 {SQUARE} {BALL} ObjectEnd
+    Translate 0 0 1 ObjectInstance "o" """
+    scene = load(tmp_path, f'{body} Scale -2 1 1 ObjectInstance "o"')
+    assert all(isinstance(each, wf.Instance) for each in scene.shapes)
+    assert len({id(each.mesh) for each in scene.shapes}) == 2  # type: ignore[attr-defined]
+    flat = [each.to_mesh() for each in scene.shapes[:2]]  # type: ignore[attr-defined]
+    # each transform holds all that was in force where it was stated: 1 + 1 in x
+    assert [mesh.vertices[0].tolist() for mesh in flat] == [[2, 1, 1], [-1, 1, 1]]
+    assert (front(flat[0])[0][:, 2] > 0).all()
+    assert (front(flat[1])[0][:, 2] > 0).all()  # a reflection keeps the front
+
+
+# ---- what is not honored
+
+
+@pytest.mark.parametrize(
+    ("header", "body", "message"),
+    [
+        (
+            'Film "rgb" "string sensor" "canon_eos_5d" Camera "perspective"',
+            BALL,
+            "line 1: film 'rgb': sensor",
+        ),
+        (
+            'Film "rgb" "float maxcomponentvalue" 9 Camera "perspective"',
+            BALL,
+            "film 'rgb': maxcomponentvalue",
+        ),
+        ('Camera "realistic"', BALL, "camera 'realistic': a perspective camera in its place"),
+        ('Scale 1 1 2 Camera "perspective"', BALL, "camera 'perspective': a transform that scales unevenly"),
+        ('PixelFilter "mitchell"', BALL, "filter 'mitchell': the default in its place"),
+        ('PixelFilter "gaussian" "float sigma" 1', BALL, "filter 'gaussian': sigma"),
+        ('PixelFilter "triangle"', BALL, "filter 'triangle': its radius; 1 in its place"),
+        ('Integrator "bdpt"', BALL, "integrator 'bdpt': path tracing in its place"),
+        ('Integrator "randomwalk"', BALL, "integrator 'randomwalk': path tracing in its place"),
+        ('Integrator "path" "bool regularize" true', BALL, "integrator 'path': regularize"),
+        ('ColorSpace "rec2020"', BALL, "line 1: ColorSpace 'rec2020'; 'srgb' in its place"),
+        ('Option "forcediffuse" true', BALL, "line 1: Option 'forcediffuse'"),
+        ("", f'Shape "curve" {BALL}', "line 3: shape 'curve': left out"),
+        ("", f'Shape "disk" "float size" 2 {BALL}', "line 3: shape 'disk': size"),
+        ("", 'Shape "bilinearmesh" "point3 P" [ 0 0 0 1 0 0 0 1 0 1 1 1 ]', "the curvature of its patches"),
+        ("", f'Material "hair" {BALL}', "material 'hair': a gray Diffuse in its place"),
+        ("", f'Material "measured" "string filename" "x.bsdf" {BALL}', "material 'measured': a gray Diffuse"),
+        ("", f'Material "subsurface" {BALL}', "material 'subsurface': light below the surface"),
+        (
+            "",
+            f'Material "coatedconductor" {BALL}',
+            "material 'coatedconductor': the light between its layers",
+        ),
+        ("", f'Material "coateddiffuse" "float albedo" .5 {BALL}', "material 'coateddiffuse': albedo"),
+        (
+            "",
+            f'Material "coateddiffuse" "float uroughness" .5 {BALL}',
+            "material 'coateddiffuse': vroughness",
+        ),
+        (
+            "",
+            f'Material "diffusetransmission" {BALL}',
+            "material 'diffusetransmission': the light that it transmits",
+        ),
+        (
+            "",
+            f'MakeNamedMaterial "n" "string type" "diffuse" "float z" 1 NamedMaterial "n" {BALL}',
+            "'diffuse' 'n': z",
+        ),
+        (
+            "",
+            f'Texture "t" "float" "fbm" Material "diffuse" "texture displacement" "t" {BALL}',
+            "'fbm' 't': 0.5",
+        ),
+        (
+            "",
+            'Texture "t" "spectrum" "checkerboard" "string mapping" "planar" '
+            f'Material "diffuse" "texture reflectance" "t" {BALL}',
+            "texture 'checkerboard' 't': mapping 'planar'",
+        ),
+        (
+            "",
+            f'LightSource "infinite" "point3 portal" [ 0 0 0 1 0 0 1 1 0 0 1 0 ] {BALL}',
+            "light 'infinite': portal",
+        ),
+        (
+            "",
+            f'LightSource "distant" "spectrum L" "stdillum-F2" {BALL}',
+            "L 'stdillum-F2'; white in its place",
+        ),
+        (
+            "",
+            f'MakeNamedMedium "m" "string type" "cloud" MediumInterface "m" "" {BALL}',
+            "medium 'cloud' 'm': left out",
+        ),
+        (
+            "",
+            f'MakeNamedMedium "m" "string type" "homogeneous" MediumInterface "m" "" {BALL}',
+            "sigma_s; its absorption alone",
+        ),
+        (
+            "",
+            f'MakeNamedMedium "m" "string type" "homogeneous" MediumInterface "" "m" {BALL}',
+            "the medium 'm' outside",
+        ),
+        (
+            "",
+            f'AreaLightSource "diffuse" ObjectBegin "o" {SQUARE} ObjectEnd ObjectInstance "o"',
+            "shape 'trianglemesh': the light of a shape in an object",
+        ),
+    ],
+)
+def test_what_is_not_honored_is_one_warning(tmp_path: Path, header: str, body: str, message: str) -> None:
+    with pytest.warns(UserWarning, match="not honored") as caught:
+        load(tmp_path, body, header, strict=False)
+    assert [message in str(each.message) for each in caught] == [True]
+    assert "scene.pbrt: not honored: line " in str(caught[0].message)
+    with pytest.raises(wf.SceneError, match="not honored"):
+        load(tmp_path, body, header)
+
+
+def test_pictures_have_pbrts_brightness_and_sides(tmp_path: Path) -> None:
+    header = """LookAt 0 0 0 0 0 1 0 1 0 Camera "perspective" "float fov" 90 PixelFilter "box"
+    Film "rgb" "integer xresolution" 8 "integer yresolution" 8 "float iso" 50"""
+    body = """LightSource "distant" "point3 from" [ 0 0 -1 ] "point3 to" [ 0 0 0 ] "float illuminance" 3
+    Translate 0 0 1 Material "diffuse" "rgb reflectance" [ .5 0 0 ]
+    Shape "trianglemesh" "point3 P" [ 0 -2 0 2 -2 0 2 2 0 0 2 0 ] "integer indices" [ 0 1 2 0 2 3 ]
+    Material "diffuse" "rgb reflectance" [ 0 .5 0 ] Translate -2 0 0
+    Shape "trianglemesh" "point3 P" [ 0 -2 0 2 -2 0 2 2 0 0 2 0 ] "integer indices" [ 0 1 2 0 2 3 ]"""
+    for mirror in (False, True):
+        scene = load(tmp_path, body, ("Scale -1 1 1 " if mirror else "") + header)
+        red, green, _ = wf.render(scene, spp=1, progress=False).rgb.transpose(2, 0, 1)
+        if mirror:
+            red, green = green, red
+        np.testing.assert_allclose(red[:, 4:], 0.5 * 0.5 * 3 / np.pi, rtol=1e-5)
+        np.testing.assert_allclose(green[:, :4], 0.5 * 0.5 * 3 / np.pi, rtol=1e-5)
+
+
+def test_the_documentation_names_all_types() -> None:
+    text = DOCS.read_text()
+    assert [key for key in TABLE if f"`{key[1]}`" not in text] == []

@@ -1,0 +1,288 @@
+"""Scene files of pbrt: tokens, includes, the graphics state, and what is refused."""
+
+from __future__ import annotations
+
+import gzip
+import random
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wavefront as wf
+from wavefront.cli.command_line import main
+from wavefront.codecs.images import write_image
+from wavefront.core.errors import SceneError
+from wavefront.io.pbrt.parser import Statement, statements
+from wavefront.io.sources import SceneFiles
+
+BALL = 'Shape "sphere"\n'
+POINT = 'Shape "trianglemesh" "point3 P" [ 1 2 3  1 3 3  2 2 3 ]\n'  # the first vertex is (1, 2, 3)
+FULL = """Scale -1 1 1 LookAt 0 1 5 0 1 0 0 1 0
+Camera "perspective" "float fov" 40 "float lensradius" .1 "float focaldistance" [ 5 ]
+Film "rgb" "integer xresolution" 8 "integer yresolution" 6 "float iso" 200
+Sampler "halton" "integer pixelsamples" 2
+PixelFilter "box" Integrator "path" "integer maxdepth" 3
+WorldBegin # comment
+MakeNamedMaterial "red" "string type" "coateddiffuse" "rgb reflectance" [ .7 .1 .1 ] "float roughness" .1
+Texture "board" "spectrum" "checkerboard" "rgb tex1" [ 1 1 1 ] "float uscale" 4
+Texture "half" "spectrum" "scale" "texture tex" "board" "float scale" .5
+LightSource "infinite" "blackbody L" 5000 LightSource "distant" "spectrum L" [ 400 1 500 .5 700 2 ]
+ObjectBegin "pair" Material "diffuse" "texture reflectance" "half"
+Shape "disk" Translate 0 1 0 Shape "cylinder"
+ObjectEnd
+AttributeBegin Rotate 30 0 1 0 ObjectInstance "pair" Translate 2 0 0 ObjectInstance "pair" AttributeEnd
+AttributeBegin NamedMaterial "red" AreaLightSource "diffuse" "rgb L" [ 1 2 3 ] "bool twosided" true
+Shape "trianglemesh" "point3 P" [ 0 0 0 1 0 0 1 1 0 0 1 0 ] "integer indices" [ 0 1 2 0 2 3 ] AttributeEnd
+MakeNamedMedium "tea" "string type" "homogeneous" "rgb sigma_a" [ 1 2 3 ] "float sigma_s" 0
+MediumInterface "tea" "" Material "dielectric" "spectrum eta" "glass-BK7" Shape "sphere" "float radius" 2
+"""
+
+
+def parse(folder: Path, text: str) -> list[Statement]:
+    path = folder / "scene.pbrt"
+    return list(statements(SceneFiles(path), path, text.encode()))
+
+
+def load(folder: Path, body: str, header: str = "", **options: object) -> wf.Scene:
+    path = folder / "scene.pbrt"
+    path.write_text(f"{header}\nWorldBegin\n{body}\n")
+    options = {"strict": True} | options
+    return wf.load(path, **options)  # type: ignore[arg-type]
+
+
+def test_statements_have_their_words_numbers_and_parameters(tmp_path: Path) -> None:
+    text = (
+        '# a comment\nTranslate 1 -.5 2e1\n Texture "a \\"b\\"" "float" # c\n "imagemap" "string filename" '
+        '"x.png"\r\n "bool invert" true "bool b" [ "false" ] "rgb c" [ .1 # mid\n .2 .3 ] "integer n" 4'
+        ' "spectrum s" "metal-Au-k" "point3 P" [1 2 3\n4 5 6]'
+    )
+    move, texture = parse(tmp_path, text)
+    assert (move.name, move.numbers, move.place.rpartition("/")[2]) == (
+        "Translate",
+        [1, -0.5, 20],
+        "scene.pbrt line 2",
+    )
+    assert texture.words == ['a "b"', "float", "imagemap"]
+    values = {name: (each.type, list(each.values)) for name, each in texture.parameters.items()}
+    assert values == {
+        "filename": ("string", ["x.png"]),
+        "invert": ("bool", ["true"]),
+        "b": ("bool", ["false"]),
+        "c": ("rgb", [0.1, 0.2, 0.3]),
+        "n": ("integer", [4]),
+        "s": ("spectrum", ["metal-Au-k"]),
+        "P": ("point3", [1, 2, 3, 4, 5, 6]),
+    }
+    assert texture.parameters["c"].place.endswith("line 5")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("LookAt 1e200 0 0 0 0 0 0 1 0", "LookAt needs a number here, of at most 1e\\+100, not '1e200'"),
+        ('Camera "a" "integer n" 5000000000', "n is .*; it must be an integer of 32 bits"),
+        ("\nTranslat 1 2 3", "line 2: there is no statement 'Translat'; did you mean 'Translate'"),
+        ("Translate 1 2", "line 1: Translate needs a number here, .* not ''"),
+        ("Translate 1 2 nan", "Translate needs a number here, .* not 'nan'"),
+        ("Transform 1 2", "Transform needs 16 numbers in brackets, not 1"),
+        ("Transform [ 1 2 ]", "needs 16 numbers in brackets, not 2"),
+        ("Camera perspective", "Camera needs a string in quotes here, not 'perspective'"),
+        ('Camera "perspective', "line 1: the string has no end in its line"),
+        ('Camera "a\\x"', "has the unknown escape"),
+        ('Camera "a" "float" 1', "line 1: 'float' declares no parameter"),
+        ('Camera "a" "floats fov" 1', "declares no parameter"),
+        ('Camera "a"\n"float fov" [ 1', "line 2: the list of fov has no end"),
+        ('Camera "a" "float fov" [ 1 1_0 ]', "fov has '1.0' where a finite number must be"),
+        ('Camera "a" "float fov" "x"', "fov has '\"x\"' where a finite number must be"),
+        ('Camera "a" "float fov" 1e999', "fov has '1e999' where a finite number must be"),
+        ('Camera "a" "rgb c" [ 1 2 ]', "c has 2 numbers; a rgb has 3"),
+        ('Camera "a" "integer n" 1.5', "n is .*; it must be an integer"),
+        ('Camera "a" "bool b" 1', "b is .*; it must be true or false"),
+        ('Camera "a" "string s" 1', "s is .*; it must be a string in quotes"),
+        ('Camera "a" "float x" 1 "float x" 2', "x is given twice"),
+    ],
+)
+def test_malformed_text_is_refused_with_its_line(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(SceneError, match=message) as caught:
+        parse(tmp_path, text)
+    assert "scene.pbrt line " in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ('Camera "perspective"', "Camera must come before WorldBegin"),
+        ("AttributeEnd", "AttributeEnd has no AttributeBegin"),
+        ("AttributeBegin ObjectEnd", "ObjectEnd has no ObjectBegin"),
+        ("AttributeBegin", "line 3: AttributeBegin has no end"),
+        ('ObjectBegin "a" ObjectBegin "b"', "ObjectBegin is inside another object"),
+        ('ObjectBegin "a" ObjectInstance "a"', "ObjectInstance is inside an object"),
+        ('ObjectInstance "a"', "there is no object 'a'"),
+        ('ObjectBegin "a" ObjectEnd ObjectBegin "a"', "there is an object 'a' already"),
+        ('CoordSysTransform "a"', "there is no coordinate system 'a'"),
+        ("ActiveTransform Never", "ActiveTransform is 'Never'"),
+        ('Attribute "world" "float a" 1', "Attribute is for 'world'"),
+        ('Texture "t" "rgb" "constant"', "it must be of float or spectrum"),
+        ('Texture "t" "float" "constant" Texture "t" "float" "constant"', "a float texture 't' already"),
+        ('MakeNamedMaterial "m"', "MakeNamedMaterial 'm' has no type"),
+        (f'NamedMaterial "m" {BALL}', "shape 'sphere': there is no material 'm'"),
+        (f'Material "difuse" {BALL}', "material 'difuse': pbrt has no such material; did you mean 'diffuse'"),
+        (f'Material "diffuse" "texture reflectance" "t" {BALL}', "there is no spectrum texture 't'"),
+        (
+            'Texture "t" "spectrum" "scale" "texture tex" "t" '
+            f'Material "diffuse" "texture reflectance" "t" {BALL}',
+            "refers to itself",
+        ),
+        (f'Material "diffuse" "rgb reflectance" [ 1 2 3 ] {BALL}', "reflectance is .*; it must be in"),
+        ('Shape "sphere" "string radius" "a"', "radius is a string; it must be a float"),
+        ('Shape "sphere" "float radius" [ ]', "radius has no value"),
+        ('Shape "sphere" "float radius" -1', "radius is -1.*; it must be above 0"),
+        ('Shape "plymesh" "string filename" "no.ply"', "file 'no.ply' is missing"),
+        ('Shape "plymesh" "string filename" "../no.ply"', "outside its folder"),
+        ('Shape "trianglemesh"', "has no P"),
+        ('Shape "trianglemesh" "point3 P" [ 1 2 3 ]', "has 1 points and no indices"),
+        (POINT + '"integer indices" [ 0 1 ]', "has 2 indices; a face has 3"),
+        (POINT + '"integer indices" [ 0 1 7 ]', "face 0 uses vertex 7"),
+        (POINT + '"point2 uv" [ 0 1 ]', "uv has 1 rows; P has 3"),
+        ("Scale 1e200 1 1 Scale 1e200 1 1", "the transform has elements that are too large"),
+        ("Transform [ 1 0 0 1 0 1 0 0 0 0 1 0 0 0 0 1 ]", "the transform has the last row"),
+        ("Rotate 3 0 0 0", "Rotate: axis"),
+        ("LookAt 0 0 0 0 0 0 0 1 0", "LookAt: origin and target are both"),
+        ('LightSource "point" "spectrum I" [ 1 2 3 ]', "it must be pairs of wavelength and value"),
+        ('LightSource "point" "spectrum I" "no.spd"', "file 'no.spd' is missing"),
+        ('Scale 0 1 1 LightSource "infinite" "string filename" "e.exr"', "of its directions is singular"),
+        ('LightSource "sun"', "light 'sun': pbrt has no such light"),
+        ("", "has no shapes"),
+    ],
+)
+def test_wrong_scenes_are_refused_with_their_place(tmp_path: Path, body: str, message: str) -> None:
+    write_image(tmp_path / "e.exr", np.ones((2, 2, 3), np.float32))
+    with pytest.raises(SceneError, match=message) as caught:
+        load(tmp_path, body)
+    assert "scene.pbrt" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("steps", "expected"),
+    [
+        ("Translate 1 2 3", (2, 4, 6)),
+        ("Scale 2 3 4", (2, 6, 12)),
+        ("Rotate 90 0 0 1", (-2, 1, 3)),
+        ("Translate 1 0 0 Rotate 90 0 0 1", (-1, 1, 3)),
+        ("Translate 1 0 0 Identity", (1, 2, 3)),
+        ("Scale 9 9 9 Transform [ 1 0 0 0 0 1 0 0 0 0 1 0 5 6 7 1 ]", (6, 8, 10)),
+        ("Translate 1 0 0 ConcatTransform [ 0 1 0 0 -1 0 0 0 0 0 1 0 0 0 0 1 ]", (-1, 1, 3)),
+        ("LookAt 1 1 1 1 1 9 0 1 0", (0, 1, 2)),
+        ("LookAt 0 0 0 9 0 0 0 1 0", (-3, 2, 1)),  # z ahead, y up, x to the right of a left-handed space
+        ('Translate 1 0 0 CoordinateSystem "c" Identity CoordSysTransform "c"', (2, 2, 3)),
+        ("AttributeBegin Scale 9 9 9 AttributeEnd Translate 1 0 0", (2, 2, 3)),
+        ("TransformBegin Scale 9 9 9 TransformEnd Translate 1 0 0", (2, 2, 3)),
+        ("Translate 1 0 0 ActiveTransform All Translate 1 0 0", (3, 2, 3)),
+    ],
+)
+def test_transforms(tmp_path: Path, steps: str, expected: tuple[float, ...]) -> None:
+    (mesh,) = load(tmp_path, f"{steps} {POINT}").shapes
+    assert isinstance(mesh, wf.Mesh)
+    np.testing.assert_allclose(mesh.vertices[0], expected, atol=1e-12)
+
+
+def test_what_moves_stands_where_it_begins(tmp_path: Path) -> None:
+    body = f"Translate 1 0 0 ActiveTransform EndTime Translate 5 0 0 {POINT}"
+    with pytest.warns(
+        UserWarning, match="line 3: shape 'trianglemesh': its motion; it stands where it begins"
+    ):
+        (mesh,) = load(tmp_path, body, strict=False).shapes
+    assert mesh.vertices[0].tolist() == [2, 2, 3]
+
+
+def test_included_files_take_part_as_if_they_stood_there(tmp_path: Path) -> None:
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "move.pbrt").write_text("Translate 1 0 0")
+    (tmp_path / "more.pbrt.gz").write_bytes(gzip.compress(b'Include "sub/move.pbrt" Translate 1 0 0'))
+    for word, x in (("Include", 3), ("Import", 1)):  # an import keeps its graphics state to itself
+        (mesh,) = load(tmp_path, f'{word} "more.pbrt.gz" {POINT}').shapes
+        assert mesh.vertices[0].tolist() == [x, 2, 3]
+
+
+def test_bombs_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "self.pbrt").write_text('\nInclude "self.pbrt"')
+    with pytest.raises(
+        SceneError, match=r"self.pbrt line 2: files include each other; the limit is 15 levels"
+    ):
+        load(tmp_path, 'Include "self.pbrt"')
+    (tmp_path / "0.pbrt").write_text(BALL)
+    for i in range(1, 12):
+        (tmp_path / f"{i}.pbrt").write_text(f'Include "{i - 1}.pbrt"\n' * 10)
+    with pytest.raises(SceneError, match=r"line \d+: includes more than 1024 files.*LoadLimits.includes"):
+        load(tmp_path, 'Include "11.pbrt"')
+    (tmp_path / "big.pbrt.gz").write_bytes(gzip.compress(b" " * 10**6))
+    with pytest.raises(SceneError, match="more than 1000 bytes unpacked"):
+        load(tmp_path, 'Include "big.pbrt.gz"', limits=wf.LoadLimits(unpacked_bytes=1000))
+    for content, message in ((b"no", "is no gzip file"), (gzip.compress(b"#" * 99)[:-9], "ends before")):
+        (tmp_path / "bad.pbrt.gz").write_bytes(content)
+        with pytest.raises(SceneError, match=message):
+            load(tmp_path, 'Include "bad.pbrt.gz"')
+    limits = wf.LoadLimits(instances=5, triangles=200)
+    with pytest.raises(SceneError, match=r"more than 5 instances.*LoadLimits.instances"):
+        load(
+            tmp_path, f'ObjectBegin "a" {POINT} {POINT} ObjectEnd ' + 'ObjectInstance "a" ' * 3, limits=limits
+        )
+    with pytest.raises(SceneError, match=r"LoadLimits.triangles"):
+        load(tmp_path, POINT.replace("trianglemesh", "loopsubdiv") + '"integer levels" 16', limits=limits)
+    with pytest.raises(SceneError, match=r"LoadLimits.triangles"):
+        load(tmp_path, 'Shape "cylinder"', limits=limits)
+    with pytest.raises(SceneError, match="nested deeper than"):
+        load(tmp_path, "AttributeBegin " * 5000)
+
+
+def test_damaged_text_is_refused_with_its_line_or_gives_a_scene(tmp_path: Path) -> None:
+    rng, path = random.Random(3), tmp_path / "scene.pbrt"
+    words = FULL.split(" ")
+    tally = [0, 0]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        for _ in range(150):
+            if rng.random() < 0.5:
+                text = bytearray(FULL.encode())
+                for _ in range(rng.randrange(1, 3)):
+                    text[rng.randrange(len(text))] = rng.choice(b' "[]#-.0e9\nx\\\xff')
+                data = bytes(text)
+            else:
+                some = list(words)
+                for _ in range(1):
+                    at = rng.randrange(len(some))
+                    some[at : at + rng.randrange(3)] = rng.choices(
+                        [*words, "-1", "1e30", "0", "nan"], k=rng.randrange(3)
+                    )
+                data = " ".join(some).encode()
+            path.write_bytes(data)
+            try:
+                assert wf.load(path, progress=False).shapes
+                tally[0] += 1
+            except SceneError as error:
+                tally[1] += "scene.pbrt" in str(error)
+    assert min(tally) > 5
+    assert sum(tally) == 150
+
+
+def test_a_long_list_takes_no_longer_than_its_numbers(tmp_path: Path) -> None:
+    rows = np.random.default_rng(1).random((60_000, 3))
+    text = "\n".join(" ".join(map(str, row)) for row in rows.tolist())
+    begin = time.process_time()
+    np.array(text.split(), np.float64)
+    plain = time.process_time() - begin
+    begin = time.process_time()
+    parse(tmp_path, f'Shape "trianglemesh" "point3 P" [ {text} ]')
+    assert time.process_time() - begin < 5 * plain + 0.02
+
+
+def test_the_command_line_renders_a_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "scene.pbrt"
+    path.write_text(FULL)
+    assert main(["info", str(path)]) == 0
+    assert "camera" in capsys.readouterr().out
+    assert main(["render", str(path), "-o", str(tmp_path / "out.npy"), "--quiet"]) == 0
+    assert np.load(tmp_path / "out.npy").shape == (6, 8, 3)

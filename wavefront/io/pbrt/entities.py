@@ -1,0 +1,263 @@
+"""What statements make: their parameters, and the table of those that are converted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from ...arrays.vec import Doubles, luminance
+from ...bsdfs import Diffuse
+from ...core.errors import SceneError, in_brief, number, one_of
+from ...core.suggestions import did_you_mean
+from ...materials import Material
+from ...shapes.transform import Matrix
+from ..repair import RawMesh, warn
+from ..sources import SceneFiles
+from ..spectra import METALS, blackbody, read_spectrum, spectrum_rgb
+from .parser import NUMBERS, Parameter, placed
+
+NEUTRAL = ("stdillum-D65", "illum-acesD60")
+# of glasses: index at 587.6 nm and Abbe number, by Schott's and Hoya's data sheets
+GLASSES = {"BK7": (1.5168, 64.2), "BAF10": (1.67, 47.1), "FK51A": (1.4866, 84.5), "LASF9": (1.8503, 32.2)}
+GLASSES |= {"F5": (1.6727, 32.2), "F10": (1.7283, 28.4), "F11": (1.7847, 25.8)}
+BRASS = ((0.444, 0.527, 1.094), (3.695, 2.765, 1.829))  # CuZn, at 650, 550 and 450 nm
+
+
+def _dispersed(index: float, abbe: float) -> Doubles:
+    """Return the indices (3,) at 611, 549 and 464 nm by Cauchy's equation."""
+    steep = (index - 1) / abbe / (1 / 0.4861**2 - 1 / 0.6563**2)
+    return np.array([index + steep * (1 / at**2 - 1 / 0.5876**2) for at in (0.611, 0.549, 0.464)])
+
+
+# spectra of indices as RGB
+NAMED = {f"glass-{name}": _dispersed(*given) for name, given in GLASSES.items()}
+for _name, _both in (METALS | {"CuZn": BRASS}).items():
+    NAMED |= {f"metal-{_name}-eta": np.array(_both[0]), f"metal-{_name}-k": np.array(_both[1])}
+GRAY = Material(Diffuse(0.5))
+Converter = Callable[["Entity", "Job"], Any]
+TABLE: dict[tuple[str, str], Converter | None] = {}  # by kind and type; None: it is not supported
+# what stands for an entity that is not supported, and what the warning says of it
+INSTEAD: dict[str, tuple[Any, str]] = {
+    "material": (GRAY, "a gray Diffuse in its place"),
+    "texture": (0.5, "0.5 in its place"),
+    "filter": ({}, "the default in its place"),
+    "integrator": ({}, "path tracing in its place"),
+    "medium": (None, "left out"),
+    "shape": (None, "left out"),
+    "light": (None, "left out"),
+    "area light": (None, "left out"),
+}
+C = TypeVar("C", bound=Converter)
+
+
+def converts(kind: str, types: str) -> Callable[[C], C]:
+    """Put a function that converts entities into the table; the types are a list of words."""
+
+    def add(convert: C) -> C:
+        TABLE.update({(kind, name): convert for name in types.split()})
+        return convert
+
+    return add
+
+
+def unsupported(kind: str, types: str) -> None:
+    """Put types into the table that pbrt has, and that are not supported."""
+    TABLE.update({(kind, name): None for name in types.split()})
+
+
+@dataclass(eq=False)
+class Entity:
+    """A shape, a material, a light, ... with its parameters."""
+
+    kind: str
+    type: str
+    place: str  # file and line
+    values: dict[str, Parameter]
+    lost: dict[str, None]  # what is not honored, of all entities
+    matrix: Matrix = field(default_factory=lambda: np.eye(4))  # to the world, where it was stated
+    state: Any = None  # the graphics state of a shape
+    unread: set[str] = field(default_factory=set)
+    name: str = ""  # of named ones
+
+    @property
+    def label(self) -> str:
+        """Where it is, and what, for messages."""
+        named = f" {self.name!r}" if self.name else ""
+        return f"{self.place}: {self.kind} {self.type!r}{named}"
+
+    def lose(self, what: str) -> None:
+        """Note something that is not honored."""
+        self.lost[f"{self.label}: {what}"] = None
+
+    def get(self, name: str, types: tuple[str, ...]) -> Any:
+        """Return the values of a parameter, which must be of one of some types; None if it is absent."""
+        self.unread.discard(name)
+        given = self.values.get(name)
+        if given is None:
+            return None
+        if given.type not in types:
+            raise SceneError(f"{name} is a {given.type}; it must be a {' or '.join(types)}")
+        if not len(given.values):
+            raise SceneError(f"{name} has no value")
+        return given.values
+
+    def harmless(self, names: str) -> None:
+        """Note that parameters do not change the picture."""
+        self.unread -= set(names.split())
+
+    def array(self, name: str, types: tuple[str, ...]) -> Doubles | None:
+        """Return rows of numbers (n, k), or numbers (n,) of a type that is one number; None if absent."""
+        found = self.get(name, types)
+        count = NUMBERS[types[0]]
+        return None if found is None else found if count == 1 else found.reshape(-1, count)
+
+    def number(self, name: str, default: float, holds: Any = None, limit: str = "") -> float:
+        """Return a number."""
+        found = self.get(name, ("float", "integer"))
+        value = default if found is None else float(found[0])
+        return number(name, value) if holds is None else number(name, value, holds, limit)
+
+    def whole(self, name: str, default: int, least: int = 0, most: int = 2**31) -> int:
+        """Return a whole number."""
+        limit = f"a whole number from {least} to {most}"
+        return int(self.number(name, default, lambda x: x == int(x) and least <= x <= most, limit))
+
+    def flag(self, name: str, default: bool = False) -> bool:
+        """Return True or False."""
+        found = self.get(name, ("bool",))
+        return default if found is None else found[0] == "true"
+
+    def text(self, name: str, default: str = "") -> str:
+        """Return a string."""
+        found = self.get(name, ("string",))
+        return default if found is None else str(found[0])
+
+    def choice(self, name: str, default: str, choices: tuple[str, ...]) -> str:
+        """Return one of some strings."""
+        return str(one_of(name, self.text(name, default), choices))
+
+    def vector(self, name: str, default: tuple[float, ...]) -> Doubles:
+        """Return a point or vector, (3,)."""
+        found = self.array(name, ("point3", "vector3", "point", "vector"))
+        return np.array(default) if found is None else found[0]
+
+    def spectrum(self, name: str, default: Any, job: Job, use: str = "albedo") -> Any:
+        """Return a number, or a color (3,); `use` is "albedo", "light" or "unbounded".
+
+        Light of a spectrum or a black body has the luminance 1, as in pbrt; that of an rgb has its own.
+        """
+        types = ("rgb", "color", "spectrum", "blackbody", "float")
+        found = self.get(name, types)
+        if found is None:
+            return default
+        kind = self.values[name].type
+        if kind in ("rgb", "color", "float"):
+            color = np.array(found[: NUMBERS[kind]])
+            if (color < 0).any() or (use == "albedo" and (color > 1).any()):
+                raise SceneError(
+                    f"{name} is {in_brief(color.tolist())}; it must be "
+                    f"{'in [0, 1]' if use == 'albedo' else 'at least 0'}"
+                )
+            return float(color[0]) if kind == "float" else color
+        if kind == "blackbody":
+            color = blackbody(float(found[0]))
+        elif isinstance(found[0], str):
+            if use == "light" and "illum-" in found[0] and found[0] != "stdillum-A":
+                if found[0] not in NEUTRAL:
+                    self.lose(f"{name} {found[0]!r}; white in its place")
+                return np.ones(3)
+            if found[0] == "stdillum-A":
+                color = blackbody(2856.0)
+            elif found[0] in NAMED:
+                return NAMED[found[0]]
+            else:
+                path = job.find(found[0])
+                color = spectrum_rgb(
+                    read_spectrum(path, job.files.read(path)),
+                    emission=use == "light",
+                    bounded=use == "albedo",
+                )
+        elif len(found) == 1:
+            return np.ones(3) if use == "light" else float(found[0])
+        else:
+            if len(found) % 2:
+                raise SceneError(f"{name} has {len(found)} numbers; it must be pairs of wavelength and value")
+            pairs = found.reshape(-1, 2)
+            color = spectrum_rgb(pairs, emission=use == "light", bounded=use == "albedo")
+        bright = float(luminance(color))
+        return color / bright if use == "light" and bright > 0 else color
+
+
+@dataclass
+class Job:
+    """The conversion of one scene."""
+
+    files: SceneFiles
+    read_mesh: Callable[[Path], list[RawMesh]]
+    strict: bool
+    lost: dict[str, None] = field(default_factory=dict)
+    named: dict[tuple[str, str], Entity] = field(default_factory=dict)  # by kind and name
+    made: dict[Any, Any] = field(default_factory=dict)  # what was converted already
+    making: list[Entity] = field(default_factory=list)  # what refers to what is converted now
+    film: Any = None  # the size of the picture, and its crop
+    exposure: float = 1.0  # factor of all light, by the film
+    world: Matrix = field(default_factory=lambda: np.eye(4))  # to the space of the scene: may mirror
+    triangles: int = 0
+    instances: int = 0
+
+    def find(self, reference: str) -> Path:
+        """Return the path of a file that the scene names, which must exist."""
+        path = self.files.find(reference)
+        if not path.exists():
+            raise SceneError(f"file {reference!r} is missing")
+        return path
+
+    def convert(self, entity: Entity) -> Any:
+        """Return what becomes of an entity; the same object for the same entity."""
+        if entity not in self.made:
+            if entity in self.making:
+                raise SceneError(f"{entity.label}: refers to itself")
+            self.making.append(entity)
+            try:
+                with placed(entity.label):
+                    self.made[entity] = self._converted(entity)
+            finally:
+                self.making.pop()
+        return self.made[entity]
+
+    def refer(self, kind: str, name: str) -> Entity:
+        """Return a named entity."""
+        if (kind, name) not in self.named:
+            hint = did_you_mean(name, [each for of, each in self.named if of == kind])
+            raise SceneError(f"there is no {kind} {name!r}{hint}")
+        return self.named[kind, name]
+
+    def report(self) -> None:
+        """Warn of all that is not honored."""
+        if self.lost:
+            name = str(self.files.scene)
+            lines = (each.removeprefix(name).lstrip(", ") for each in self.lost)
+            warn(f"{name}: not honored: {'; '.join(lines)}", self.strict)
+
+    def _converted(self, entity: Entity) -> Any:
+        key = (entity.kind.removeprefix("float ").removeprefix("spectrum "), entity.type)
+        if key not in TABLE:
+            known = [name for kind, name in TABLE if kind == key[0]]
+            raise SceneError(f"pbrt has no such {key[0]}{did_you_mean(entity.type, known)}")
+        convert = TABLE[key]
+        if convert is None:
+            made, instead = INSTEAD[key[0]]
+            entity.lose(instead)
+            return made
+        entity.unread = set(entity.values)
+        if entity.kind == "shape":
+            entity.unread.discard("alpha")  # it is read with the material
+        made = convert(entity, self)
+        for name in entity.values:
+            if name in entity.unread:
+                entity.lose(name)
+        return made

@@ -1,0 +1,206 @@
+"""Lights of pbrt."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...arrays.elementary import arctan2, sin_cos, sin_cos_turns
+from ...arrays.vec import Doubles, Floats, luminance, spans
+from ...codecs.encoding import codes_to_linear
+from ...core.errors import SceneError
+from ...lights import DirectionalLight, Environment, PointLight, Projector, SpotLight
+from ...textures.image import Texture
+from .entities import Entity, Job, converts
+
+ROWS = 64  # of an environment that are looked up at once
+SUBPIXELS = 2  # of its pixels, in both directions
+
+
+def _strength(entity: Entity, name: str, job: Job) -> Doubles:
+    """Return a color times the scale of a light and the exposure of the film, (3,)."""
+    color = np.broadcast_to(entity.spectrum(name, 1.0, job, "light"), 3)
+    return np.asarray(color * (entity.number("scale", 1.0) * job.exposure))
+
+
+def _measured(entity: Entity, name: str, own: float) -> float:
+    """Return the factor by which a light gets the power or illuminance that is asked for."""
+    wanted = entity.number(name, -1.0)
+    return wanted / own if wanted > 0 and own > 0 else 1.0
+
+
+def _points(entity: Entity, job: Job) -> tuple[Doubles, Doubles]:
+    """Return "from" and "to" in the scene, (3,) each."""
+    matrix = job.world @ entity.matrix
+    ends = [entity.vector(name, default) for name, default in (("from", (0.0, 0, 0)), ("to", (0.0, 0, 1)))]
+    start, end = (matrix[:3, :3] @ point + matrix[:3, 3] for point in ends)
+    return start, end
+
+
+@converts("light", "point")
+def _point(entity: Entity, job: Job) -> PointLight:
+    intensity = _strength(entity, "I", job) * _measured(entity, "power", 4 * np.pi)
+    return PointLight(_points(entity, job)[0], intensity)
+
+
+@converts("light", "goniometric")
+def _goniometric(entity: Entity, job: Job) -> PointLight:
+    mean = 1.0
+    if entity.text("filename"):
+        entity.lose("how its light depends on the direction; the mean in its place")
+        mean = float(_pixels(entity, job).mean())
+    intensity = _strength(entity, "I", job) * (mean * _measured(entity, "power", 4 * np.pi * mean))
+    return PointLight((job.world @ entity.matrix)[:3, 3], intensity)
+
+
+@converts("light", "spot")
+def _spot(entity: Entity, job: Job) -> SpotLight:
+    start, end = _points(entity, job)
+    outer = entity.number("coneangle", 30.0, lambda x: 0 < x <= 90, "above 0 and at most 90 degrees")
+    inner = outer - entity.number("conedeltaangle", 5.0, lambda x: 0 <= x <= outer, f"in [0, {outer:g}]")
+    begin, last = (float(sin_cos(np.float64(np.radians(angle)))[1]) for angle in (inner, outer))
+    solid = 2 * np.pi * ((1 - begin) + (begin - last) / 2)
+    if begin > last:
+        entity.lose("the form of its falloff; one of the same power in its place")
+    # a square ramp has 1/3 of the full light where pbrt's smooth step has 1/2
+    cosine = 0.75 * begin + 0.25 * last
+    angle = float(np.degrees(arctan2(np.sqrt(np.float64(1 - cosine**2)), np.float64(cosine))))
+    return SpotLight(
+        start,
+        _strength(entity, "I", job) * _measured(entity, "power", solid),
+        target=end,
+        angle=2 * outer,
+        blend=float(np.clip(1 - angle / outer, 0, 1)),
+    )
+
+
+@converts("light", "projection")
+def _projection(entity: Entity, job: Job) -> Projector:
+    slide, matrix = _pixels(entity, job), job.world @ entity.matrix
+    height, width = slide.shape[:2]
+    if np.linalg.det(matrix[:3, :3]) > 0:  # pbrt's x is to the right in a space that is left-handed
+        slide = slide[:, ::-1]
+    sin, cos = sin_cos(np.float64(np.radians(entity.number("fov", 90.0)) / 2))
+    half = sin / cos * max(1, height / width)  # of the height
+    power = float(luminance(slide.mean((0, 1)))) * 4 * half * half * width / height
+    entity.lose("the fall of its light toward the edges of its picture")
+    return Projector(
+        matrix[:3, 3],
+        Texture(np.ascontiguousarray(slide)),
+        entity.number("scale", 1.0) * job.exposure * _measured(entity, "power", power),
+        direction=matrix[:3, 2],
+        fov=float(2 * np.degrees(arctan2(half, np.float64(1)))),
+        up=matrix[:3, 1],
+    )
+
+
+@converts("light", "distant")
+def _distant(entity: Entity, job: Job) -> DirectionalLight:
+    start, end = _points(entity, job)
+    return DirectionalLight(end - start, _strength(entity, "L", job) * _measured(entity, "illuminance", 1.0))
+
+
+@converts("light", "infinite")
+def _infinite(entity: Entity, job: Job) -> Environment:
+    if not entity.text("filename"):
+        return Environment(_strength(entity, "L", job) * _measured(entity, "illuminance", np.pi))
+    if "L" in entity.values:
+        raise SceneError("has L and filename; give one of them")
+    pixels = _pixels(entity, job)
+    size = len(pixels)
+    if pixels.shape[1] != size:
+        raise SceneError(f"its image has {pixels.shape[1]} × {size} pixels; it must be square (equal-area)")
+    # one lookup for each pixel, in the middle of it
+    at = (np.arange(size) + 0.5) / size
+    upward = np.maximum(square_to_sphere(*np.meshgrid(at, at))[2], 0)
+    own = float((luminance(pixels.transpose(2, 0, 1)) * upward).mean() * 2 * np.pi)
+    factor = entity.number("scale", 1.0) * job.exposure * _measured(entity, "illuminance", own)
+    axes = (job.world @ entity.matrix)[:3, :3]
+    if not np.linalg.svd(axes, compute_uv=False)[2] > 1e-12 * np.abs(axes).max():
+        raise SceneError(f"the transform of its directions is singular: {axes.tolist()}")
+    to_light = np.asarray(np.linalg.inv(axes), np.float64)
+    return Environment(_by_longitude(pixels, to_light) * np.float32(factor))
+
+
+@converts("area light", "diffuse")
+def _area(entity: Entity, job: Job) -> tuple[Any, float, bool]:
+    """Return the radiance, its luminance, and whether it leaves both sides."""
+    sides = entity.flag("twosided")
+    entity.number("power", -1.0)
+    if not entity.text("filename"):
+        radiance = _strength(entity, "L", job)
+        return radiance, float(luminance(np.broadcast_to(entity.spectrum("L", 1.0, job, "light"), 3))), sides
+    pixels, factor = _pixels(entity, job), entity.number("scale", 1.0) * job.exposure
+    return Texture(pixels, wrap="clamp", scale=factor), float(luminance(pixels.mean((0, 1)))), sides
+
+
+def _pixels(entity: Entity, job: Job) -> Floats:
+    """Return the linear colors of an image, (H, W, 3)."""
+    codes = job.files.image(job.find(entity.text("filename")))
+    pixels = codes_to_linear(codes) if codes.dtype.kind == "u" else codes.astype(np.float32)
+    pixels = pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, 2)
+    if not np.isfinite(pixels).all():
+        raise SceneError("its image has values that are not finite")
+    return np.maximum(pixels, 0)
+
+
+def square_to_sphere(x: Doubles, y: Doubles) -> Doubles:
+    """Return the directions (3, ...) of points of a square, from 0 to 1, where equal areas are solid angles.
+
+    Source: P. Clarberg 2008, "Fast Equal-Area Mapping of the (Hemi)Sphere Using SIMD".
+    """
+    u, v = 2 * x - 1, 2 * y - 1
+    inside = 1 - np.abs(u) - np.abs(v)
+    r = 1 - np.abs(inside)
+    turn = np.where(r > 0, (np.abs(v) - np.abs(u)) / np.where(r > 0, r, 1) + 1, 1) / 8
+    sin, cos = sin_cos_turns(turn)
+    level = r * np.sqrt(2 - r * r)
+    return np.stack(
+        [np.copysign(cos, u) * level, np.copysign(sin, v) * level, np.copysign(1 - r * r, inside)]
+    )
+
+
+def sphere_to_square(d: Doubles) -> tuple[Doubles, Doubles]:
+    """Return the points of that square for unit directions (3, ...)."""
+    x, y, z = np.abs(d)
+    r = np.sqrt(np.maximum(1 - z, 0))
+    phi = arctan2(y, x) * (2 / np.pi)
+    v = phi * r
+    u = r - v
+    below = d[2] < 0
+    u, v = np.where(below, 1 - v, u), np.where(below, 1 - u, v)
+    return (np.copysign(u, d[0]) + 1) / 2, (np.copysign(v, d[1]) + 1) / 2
+
+
+def _by_longitude(pixels: Floats, to_light: Doubles) -> Floats:
+    """Return an image of `Environment` (n, 2n, 3) of one that is equal-area (n, n, 3)."""
+    size = len(pixels)
+    # what is beyond an edge is turned about the middle of that edge
+    rows = np.concatenate([pixels[:1, ::-1], pixels, pixels[-1:, ::-1]])
+    padded = np.concatenate([rows[::-1, :1], rows, rows[::-1, -1:]], 1)
+    out = np.empty((size, 2 * size, 3), np.float32)
+    turns = (np.arange(2 * size * SUBPIXELS) + 0.5) / (2 * size * SUBPIXELS) - 0.5
+    across = sin_cos_turns(turns)
+    for part in spans(size, ROWS):
+        count = part.stop - part.start
+        heights = (
+            0.25 - (np.arange(count * SUBPIXELS) + 0.5) / (2 * size * SUBPIXELS) - part.start / (2 * size)
+        )
+        up, level = (each[:, None] for each in sin_cos_turns(heights))
+        x, z = -across[0] * level, across[1] * level
+        d = np.stack([row[0] * x + row[1] * up + row[2] * z for row in to_light])
+        found = _bilinear(padded, *sphere_to_square(d / np.sqrt(d[0] ** 2 + d[1] ** 2 + d[2] ** 2)), size)
+        out[part] = found.reshape(count, SUBPIXELS, 2 * size, SUBPIXELS, 3).mean((1, 3))
+    return out
+
+
+def _bilinear(padded: Floats, u: Doubles, v: Doubles, size: int) -> Floats:
+    """Return the colors (..., 3) at points of a square, of its image with one pixel more at each edge."""
+    x, y = u * size + 0.5, v * size + 0.5
+    column, row = (np.clip(np.floor(each).astype(np.intp), 0, size) for each in (x, y))
+    fx, fy = ((each - cell)[..., None].astype(np.float32) for each, cell in ((x, column), (y, row)))
+    upper = padded[row, column] * (1 - fx) + padded[row, column + 1] * fx
+    lower = padded[row + 1, column] * (1 - fx) + padded[row + 1, column + 1] * fx
+    blended: Floats = upper * (1 - fy) + lower * fy
+    return blended

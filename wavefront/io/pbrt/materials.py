@@ -1,0 +1,220 @@
+"""Materials of pbrt."""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import Any
+
+import numpy as np
+
+from ...bsdfs import Conductor, Dielectric, Diffuse, Mix, Plastic, Principled, ThinDielectric
+from ...core.errors import SceneError, number
+from ...materials import Material
+from ...media import Medium
+from ...textures.base import BaseTexture
+from ...textures.image import Texture
+from ...textures.normal_map import BumpMap, NormalMap
+from .entities import GRAY, NAMED, Entity, Job, converts, unsupported
+from .textures import Value, clipped, color, computed, fourth_root, scalar, square_root
+
+LEAST_INDEX = 1e-6
+
+
+def _albedo(entity: Entity, name: str, default: float, job: Job, factor: float = 1.0) -> Value:
+    """Return a reflectance times a factor."""
+    return clipped(color(entity, name, default, job), factor)
+
+
+def _roughness(entity: Entity, job: Job, prefix: str = "") -> dict[str, Value]:
+    """Return the roughness, α = roughness², along u and v."""
+    root = fourth_root if entity.flag("remaproughness", True) else square_root
+    names = [f"{prefix}{axis}roughness" for axis in ("u", "v")]
+    base = scalar(entity, f"{prefix}roughness", 0.0, job)
+    u, v = (scalar(entity, name, 0.0, job) if name in entity.values else base for name in names)
+    for value in (u, v):
+        if not isinstance(value, BaseTexture):
+            number("roughness", value, lambda x: x >= 0, "at least 0")
+    if u is v or (not isinstance(u, BaseTexture) and u == v):
+        return {"roughness": computed(root, u)}
+    return {"roughness": computed(root, u), "roughness_v": computed(root, v)}
+
+
+def _index(entity: Entity, name: str, job: Job, default: float = 1.5) -> Any:
+    """Return an index of refraction: a number, or one for each channel."""
+    value = np.maximum(entity.spectrum(name, default, job, "unbounded"), LEAST_INDEX)
+    return float(value) if np.ndim(value) == 0 else value
+
+
+def _made(entity: Entity, bsdf: Any, job: Job) -> Material:
+    """Return a material with the bumps of its entity."""
+    bumps: Any = None
+    file = entity.text("normalmap")
+    if file:
+        bumps = NormalMap(Texture(job.files.image(job.find(file)), srgb=False))
+    height = scalar(entity, "displacement", 0.0, job)
+    if isinstance(height, Texture) and not file:
+        heights = copy(height)
+        heights.srgb = False  # it is decoded all the same
+        bumps = BumpMap(heights)
+    elif isinstance(height, BaseTexture):
+        entity.lose("displacement")
+    return Material(bsdf, normal_map=bumps, name=entity.name or None)
+
+
+@converts("material", "diffuse")
+def _diffuse(entity: Entity, job: Job) -> Material:
+    return _made(entity, Diffuse(_albedo(entity, "reflectance", 0.5, job)), job)
+
+
+@converts("material", "coateddiffuse subsurface")
+def _coated_diffuse(entity: Entity, job: Job) -> Material:
+    entity.harmless("maxdepth nsamples")
+    below = entity.type == "subsurface"
+    if below:
+        entity.harmless("mfp sigma_a sigma_s scale name g")
+        entity.lose("light below the surface; a coated diffuse surface in its place")
+    ior = float(np.mean(_index(entity, "eta", job, 1.33 if below else 1.5)))
+    facets = _roughness(entity, job)
+    if facets.pop("roughness_v", None) is not None:
+        entity.lose("vroughness")
+    thick = 0.0 if below else _layer(entity, job)
+    # what the layer lets through on the way down and up, at the mean of 1/cos after refraction
+    mean = 2 * ior * ior * (1 - np.sqrt(1 - 1 / ior**2)) if ior > 1 else 2.0
+    base = _albedo(entity, "reflectance", 0.5, job, float(np.exp(-2 * mean * thick)))
+    return _made(entity, Plastic(base, ior=ior, nonlinear=True, **facets), job)
+
+
+def _layer(entity: Entity, job: Job) -> float:
+    """Return the thickness of what is between two layers, which only absorbs."""
+    for name in ("albedo", "g"):
+        value = color(entity, name, 0.0, job)
+        if isinstance(value, BaseTexture) or np.any(value):
+            entity.lose(name)
+    thick = scalar(entity, "thickness", 0.01, job)
+    if isinstance(thick, BaseTexture):
+        entity.lose("the texture thickness; 0.01 in its place")
+        return 0.01
+    return max(thick, 0.0)
+
+
+@converts("material", "conductor")
+def _conductor(entity: Entity, job: Job) -> Material:
+    eta, k = _metal(entity, job, "")
+    return _made(entity, Conductor(eta, k, **_roughness(entity, job)), job)
+
+
+@converts("material", "coatedconductor")
+def _coated_conductor(entity: Entity, job: Job) -> Material:
+    """Return a metal with a clear coat, which is as it would be in the coat."""
+    entity.harmless("maxdepth nsamples")
+    eta, k = _metal(entity, job, "conductor.")
+    _layer(entity, job)
+    coat, metal = (_roughness(entity, job, f"{name}.") for name in ("interface", "conductor"))
+    ior = float(np.mean(_index(entity, "interface.eta", job)))
+    entity.lose("the light between its layers; a metal with a clearcoat in its place")
+    base = computed(_reflectance, eta, k, ior, rising=False)
+    bsdf = Principled(base, 1.0, clearcoat=1.0, clearcoat_roughness=coat["roughness"], **metal)
+    return _made(entity, bsdf, job)
+
+
+def _reflectance(eta: Any, k: Any, ior: Any = 1.0) -> Any:
+    """Return the reflectance of a metal at normal incidence, in a clear material of index `ior`."""
+    n, k2 = eta / ior, (k / ior) ** 2
+    return ((n - 1) ** 2 + k2) / ((n + 1) ** 2 + k2)
+
+
+def _extinction(reflectance: Any) -> Any:
+    """Return k of a conductor of index 1 that has this reflectance."""
+    kept = np.clip(reflectance, 0, 0.9999)
+    return 2 * np.sqrt(kept) / np.sqrt(1 - kept)
+
+
+def _metal(entity: Entity, job: Job, prefix: str) -> tuple[Value, Value]:
+    """Return η and k, given as such or by a reflectance."""
+    if "reflectance" in entity.values:
+        if {f"{prefix}eta", f"{prefix}k"} & entity.values.keys():
+            raise SceneError(f"has reflectance, and {prefix}eta or {prefix}k; give one of them")
+        return 1.0, computed(_extinction, color(entity, "reflectance", 0.5, job))
+    eta, k = (
+        color(entity, f"{prefix}{name}", NAMED[f"metal-Cu-{name}"], job, "unbounded") for name in ("eta", "k")
+    )
+    return (eta if isinstance(eta, BaseTexture) else np.maximum(eta, LEAST_INDEX)), k
+
+
+@converts("material", "dielectric")
+def _dielectric(entity: Entity, job: Job) -> Material:
+    return _made(entity, Dielectric(_index(entity, "eta", job), **_roughness(entity, job)), job)
+
+
+@converts("material", "thindielectric")
+def _thin_dielectric(entity: Entity, job: Job) -> Material:
+    return _made(entity, ThinDielectric(float(np.mean(_index(entity, "eta", job)))), job)
+
+
+@converts("material", "diffusetransmission")
+def _diffuse_transmission(entity: Entity, job: Job) -> Material:
+    entity.harmless("transmittance")
+    entity.lose("the light that it transmits")
+    return _made(entity, Diffuse(_albedo(entity, "reflectance", 0.25, job, entity.number("scale", 1.0))), job)
+
+
+@converts("material", "mix")
+def _mix(entity: Entity, job: Job) -> Material:
+    names = entity.get("materials", ("string",)) or []
+    if len(names) != 2:
+        raise SceneError(f"materials names {len(names)} materials; it needs two")
+    first, second = (job.convert(job.refer("material", name)) for name in names)
+    if first.alpha is not None or second.alpha is not None:
+        raise SceneError("materials has an 'interface'; it cannot be mixed")
+    if first.normal_map is not None or second.normal_map is not None:
+        entity.lose("the bumps of its materials")
+    return _made(entity, Mix(first.bsdf, second.bsdf, scalar(entity, "amount", 0.5, job)), job)
+
+
+@converts("material", "interface none")
+def _interface(entity: Entity, job: Job) -> Material:
+    return Material(Diffuse(0), alpha=0.0, name=entity.name or None)
+
+
+unsupported("material", "hair measured")
+
+
+@converts("medium", "homogeneous")
+def _homogeneous(entity: Entity, job: Job) -> Medium | None:
+    entity.harmless("g")
+    if entity.text("preset"):
+        entity.lose("preset; left out")
+        return None
+    factor = entity.number("scale", 1.0)
+    absorbed, scattered = (
+        np.asarray(entity.spectrum(name, 1.0, job, "unbounded")) * factor for name in ("sigma_a", "sigma_s")
+    )
+    if np.any(scattered):
+        entity.lose("sigma_s; its absorption alone in its place")
+    return Medium(absorption=np.broadcast_to(absorbed, 3))
+
+
+unsupported("medium", "uniformgrid rgbgrid cloud nanovdb")
+
+
+def material_of(state: Any, alpha: Value, job: Job, label: Entity) -> Material:
+    """Return the material of a shape, with its opacity and its medium."""
+    given = state.material
+    if isinstance(given, str):
+        given = job.refer("material", given)
+    base: Material = GRAY if given is None else job.convert(given)
+    inside = job.convert(job.refer("medium", state.inside)) if state.inside else None
+    if state.outside and state.outside != state.inside:
+        label.lose(f"the medium {state.outside!r} outside")
+    if alpha is None and inside is None:
+        return base
+    key = (id(base), id(inside), alpha if not isinstance(alpha, BaseTexture) else id(alpha))
+    if key not in job.made:
+        made = copy(base)
+        made.interior = inside
+        if alpha is not None and base.alpha is None:
+            made.alpha = alpha
+        made.derive()
+        job.made[key] = made
+    found: Material = job.made[key]
+    return found

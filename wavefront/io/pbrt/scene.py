@@ -1,0 +1,329 @@
+"""Scenes of pbrt as scenes of this package: the statements in order, with their graphics state."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...arrays.vec import Doubles
+from ...core.errors import SceneError
+from ...scene import Scene
+from ...shapes.transform import Matrix, rotation, translation
+from ..mitsuba.transforms import looking
+from ..repair import RawMesh
+from ..sources import SceneFiles
+from . import lights, materials, textures  # noqa: F401  they fill the table
+from .entities import Entity, Job
+from .parser import Parameter, Statement, placed, statements
+from .shapes import instances, place
+from .views import exposure_of, mirror_of
+
+OPTIONS = ("Camera", "Film", "Sampler", "Integrator", "PixelFilter", "Accelerator", "WorldBegin")
+WORLD = "AttributeBegin AttributeEnd Attribute TransformBegin TransformEnd ReverseOrientation Material"
+WORLD_ONLY = f"{WORLD} NamedMaterial LightSource AreaLightSource Shape ObjectBegin ObjectEnd ObjectInstance"
+KINDS = {"Camera": "camera", "Film": "film", "Sampler": "sampler", "Integrator": "integrator"}
+TARGETS = ("shape", "light", "material", "medium", "texture")
+HARMLESS = "disablepixeljitter disabletexturefiltering disablewavelengthjitter msereferenceimage"
+HARMLESS += " msereferenceout rendercoordsys seed pixelstats wavefront displacementedgescale"
+MOST_OPEN = 4096  # attribute blocks inside each other
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """The graphics state: what is in force for the shapes that follow."""
+
+    matrices: Doubles = field(
+        default_factory=lambda: np.tile(np.eye(4), (2, 1, 1))
+    )  # when it begins and ends
+    active: tuple[int, ...] = (0, 1)  # which of them transforms change
+    reverse: bool = False
+    material: Any = None  # an entity, or the name of one
+    area: Entity | None = None
+    inside: str = ""
+    outside: str = ""
+    defaults: dict[str, dict[str, Parameter]] = field(default_factory=dict)  # by target of Attribute
+
+
+class Reader:
+    """Carries out the statements of a scene.
+
+    Parameters
+    ----------
+    job
+        What they go to.
+    """
+
+    def __init__(self, job: Job) -> None:
+        self.job, self.state, self.stack = job, State(), list[tuple[str, str, State]]()
+        self.spaces: dict[str, Doubles] = {}
+        self.options: dict[str, Entity] = {}
+        self.shapes: list[Entity] = []
+        self.lights: list[Entity] = []
+        self.objects: dict[str, list[Entity]] = {}
+        self.uses: dict[str, list[Matrix]] = {}
+        self.open_object: str | None = None
+        self.in_world = False
+
+    def run(self, statement: Statement) -> None:
+        """Carry out a statement.
+
+        Raises
+        ------
+        SceneError
+            If it cannot be where it is, or what it names is not there.
+        """
+        name = statement.name
+        if name in OPTIONS and self.in_world:
+            raise SceneError(f"{name} must come before WorldBegin")
+        if name in WORLD_ONLY.split() and not self.in_world:
+            raise SceneError(f"{name} must come after WorldBegin")
+        if name in TRANSFORMS:
+            self._transform(TRANSFORMS[name](statement.numbers), whole=name in ("Identity", "Transform"))
+        else:
+            getattr(self, f"_{name}")(statement)
+
+    def finish(self) -> Scene:
+        """Return the scene."""
+        job = self.job
+        if self.stack:
+            raise SceneError(f"{self.stack[-1][1]}: {self.stack[-1][0]} has no end")
+        camera, film = self.options.get("Camera"), self.options.get("Film")
+        settings = {
+            "filter": "gaussian",
+            "spp": 16,
+            "max_bounces": 5,
+        }  # what pbrt takes where nothing is stated
+        job.exposure = exposure_of(film, camera)
+        if camera is not None:
+            job.world = mirror_of(camera.matrix)
+            job.film = ((1280, 720), None) if film is None else job.convert(film)
+        for name in ("Sampler", "Integrator", "PixelFilter"):
+            if name in self.options:
+                settings |= job.convert(self.options[name])
+        found = [shape for entity in self.shapes for shape in place(entity, job)]
+        for name, matrices in self.uses.items():
+            for entity in self.objects[name]:
+                found += instances(entity, job, np.array(matrices))
+        lamps = [light for entity in self.lights if (light := job.convert(entity)) is not None]
+        view = None if camera is None else job.convert(camera)
+        job.report()
+        return Scene(found, lamps, view, settings=settings)
+
+    def _entity(self, kind: str, statement: Statement, target: str, type: str, name: str = "") -> Entity:
+        given = self.state.defaults.get(target, {}) | statement.parameters
+        return Entity(
+            kind, type, statement.place, given, self.job.lost, self._matrix(), self.state, name=name
+        )
+
+    def _matrix(self) -> Matrix:
+        matrix: Matrix = self.state.matrices[0]
+        return matrix
+
+    def _still(self, entity: Entity) -> Entity:
+        """Note if something moves while the shutter is open."""
+        if not np.array_equal(*self.state.matrices):
+            entity.lose("its motion; it stands where it begins")
+        return entity
+
+    def _set(self, **changes: Any) -> None:
+        self.state = replace(self.state, **changes)
+
+    def _transform(self, matrix: Matrix, whole: bool) -> None:
+        matrices = self.state.matrices.copy()
+        for i in self.state.active:
+            with np.errstate(over="ignore", invalid="ignore"):
+                matrices[i] = matrix if whole else matrices[i] @ matrix
+        if not np.isfinite(matrices).all() or (np.abs(matrices) > 1e100).any():
+            raise SceneError("the transform has elements that are too large")
+        if not (matrices[:, 3] == (0, 0, 0, 1)).all():
+            raise SceneError(
+                f"the transform has the last row {matrices[0, 3].tolist()}; it must be [0, 0, 0, 1]"
+            )
+        self._set(matrices=matrices)
+
+    def _push(self, statement: Statement) -> None:
+        if len(self.stack) == MOST_OPEN:
+            raise SceneError(f"blocks are nested deeper than {MOST_OPEN}")
+        self.stack.append((statement.name, statement.place, self.state))
+
+    def _pop(self, statement: Statement) -> None:
+        begin = statement.name.replace("End", "Begin")
+        if not self.stack or self.stack[-1][0] != begin:
+            raise SceneError(f"{statement.name} has no {begin}")
+        self.state = self.stack.pop()[2]
+
+    _AttributeBegin = _TransformBegin = _push
+    _AttributeEnd = _TransformEnd = _pop
+
+    def _WorldBegin(self, statement: Statement) -> None:
+        self.in_world = True
+        self._set(matrices=State().matrices, active=(0, 1))
+        self.spaces["world"] = self.state.matrices
+
+    def _CoordinateSystem(self, statement: Statement) -> None:
+        self.spaces[statement.words[0]] = self.state.matrices
+
+    def _CoordSysTransform(self, statement: Statement) -> None:
+        if statement.words[0] not in self.spaces:
+            raise SceneError(f"there is no coordinate system {statement.words[0]!r}")
+        self._set(matrices=self.spaces[statement.words[0]])
+
+    def _ActiveTransform(self, statement: Statement) -> None:
+        times = {"StartTime": (0,), "EndTime": (1,), "All": (0, 1)}
+        if statement.words[0] not in times:
+            raise SceneError(
+                f"ActiveTransform is {statement.words[0]!r}; it must be one of {', '.join(times)}"
+            )
+        self._set(active=times[statement.words[0]])
+
+    def _ReverseOrientation(self, statement: Statement) -> None:
+        self._set(reverse=not self.state.reverse)
+
+    def _Attribute(self, statement: Statement) -> None:
+        target = statement.words[0]
+        if target not in TARGETS:
+            raise SceneError(f"Attribute is for {target!r}; it must be one of {', '.join(TARGETS)}")
+        own = self.state.defaults.get(target, {}) | statement.parameters
+        self._set(defaults=self.state.defaults | {target: own})
+
+    def _ColorSpace(self, statement: Statement) -> None:
+        if statement.words[0] != "srgb":
+            self.job.lost[f"{statement.place}: ColorSpace {statement.words[0]!r}; 'srgb' in its place"] = None
+
+    def _Option(self, statement: Statement) -> None:
+        name, value = statement.words
+        if name.lower() not in HARMLESS.split() and value != "false":
+            self.job.lost[f"{statement.place}: Option {name!r}"] = None
+
+    def _TransformTimes(self, statement: Statement) -> None:
+        """Do nothing: what moves is noted."""
+
+    _Accelerator = _TransformTimes
+
+    def _option(self, statement: Statement) -> None:
+        kind = KINDS.get(statement.name, "filter")
+        entity = self._still(self._entity(kind, statement, "", statement.words[0]))
+        if statement.name == "Camera":
+            if abs(np.linalg.det(entity.matrix[:3, :3])) < 1e-300:
+                raise SceneError("the transform of the camera is singular")
+            entity.matrix = np.asarray(np.linalg.inv(entity.matrix), np.float64)
+            self.spaces["camera"] = np.tile(entity.matrix, (2, 1, 1))
+        self.options[statement.name] = entity
+
+    _Camera = _Film = _Sampler = _Integrator = _PixelFilter = _option
+
+    def _Texture(self, statement: Statement) -> None:
+        name, kind, type = statement.words
+        if kind not in ("float", "spectrum", "color"):
+            raise SceneError(f"the texture {name!r} is of {kind!r}; it must be of float or spectrum")
+        kind = f"{'spectrum' if kind == 'color' else kind} texture"
+        self._name(kind, name, self._entity(kind, statement, "texture", type, name))
+
+    def _name(self, kind: str, name: str, entity: Entity) -> None:
+        if self.job.named.setdefault((kind, name), entity) is not entity:
+            raise SceneError(f"there is a {kind} {name!r} already")
+
+    def _Material(self, statement: Statement) -> None:
+        self._set(material=self._entity("material", statement, "material", statement.words[0]))
+
+    def _MakeNamedMaterial(self, statement: Statement) -> None:
+        self._make(statement, "material")
+
+    def _MakeNamedMedium(self, statement: Statement) -> None:
+        self._make(statement, "medium")
+
+    def _make(self, statement: Statement, target: str) -> None:
+        """Note a named material or medium, whose type is a parameter."""
+        entity = self._entity(target, statement, target, "", statement.words[0])
+        entity.type = entity.text("type")
+        if not entity.type:
+            raise SceneError(f"{statement.name} {entity.name!r} has no type")
+        del entity.values["type"]
+        self._name(target, entity.name, entity)
+
+    def _NamedMaterial(self, statement: Statement) -> None:
+        self._set(material=statement.words[0])
+
+    def _MediumInterface(self, statement: Statement) -> None:
+        self._set(inside=statement.words[0], outside=statement.words[-1])
+
+    def _LightSource(self, statement: Statement) -> None:
+        self.lights.append(self._still(self._entity("light", statement, "light", statement.words[0])))
+
+    def _AreaLightSource(self, statement: Statement) -> None:
+        self._set(area=self._entity("area light", statement, "light", statement.words[0]))
+
+    def _Shape(self, statement: Statement) -> None:
+        entity = self._still(self._entity("shape", statement, "shape", statement.words[0]))
+        (self.shapes if self.open_object is None else self.objects[self.open_object]).append(entity)
+
+    def _ObjectBegin(self, statement: Statement) -> None:
+        name = statement.words[0]
+        if self.open_object is not None:
+            raise SceneError("ObjectBegin is inside another object")
+        if name in self.objects:
+            raise SceneError(f"there is an object {name!r} already")
+        self._push(statement)
+        self.open_object, self.objects[name] = name, []
+
+    def _ObjectEnd(self, statement: Statement) -> None:
+        self._pop(statement)
+        self.open_object = None
+
+    def _ObjectInstance(self, statement: Statement) -> None:
+        name = statement.words[0]
+        if self.open_object is not None:
+            raise SceneError("ObjectInstance is inside an object")
+        if name not in self.objects:
+            raise SceneError(f"there is no object {name!r}")
+        self.uses.setdefault(name, []).append(self._matrix())
+
+
+def read_scene(
+    files: SceneFiles, data: bytes, read_mesh: Callable[[Path], list[RawMesh]], strict: bool
+) -> Scene:
+    """Return the scene of a file.
+
+    Parameters
+    ----------
+    files
+        The files that it may read.
+    data
+        Its content.
+    read_mesh
+        Returns the meshes of a ply file.
+    strict
+        Raise an error for what is not honored, in place of a warning.
+
+    Raises
+    ------
+    SceneError
+        If it is malformed, or a file that it includes. The message names file and line.
+    """
+    reader = Reader(Job(files, read_mesh, strict))
+    for statement in statements(files, Path(os.fspath(files.scene)), data):
+        with placed(statement.place):
+            reader.run(statement)
+    with placed(os.fspath(files.scene)):
+        return reader.finish()
+
+
+def _look_at(numbers: list[float]) -> Matrix:
+    """Return the matrix to a camera, whose axes are right, up and ahead: a left-handed space."""
+    return np.asarray(np.linalg.inv(looking("LookAt", *np.reshape(numbers, (3, 3)))), np.float64)
+
+
+TRANSFORMS: dict[str, Callable[[list[float]], Matrix]] = {
+    "Identity": lambda numbers: np.eye(4),
+    "Translate": lambda numbers: translation("Translate", numbers),
+    "Scale": lambda numbers: np.diag([*numbers, 1.0]),
+    "Rotate": lambda numbers: rotation("Rotate", numbers[1:], numbers[0], (0, 0, 0)),
+    "LookAt": _look_at,
+    "Transform": lambda numbers: np.reshape(numbers, (4, 4)).T,
+    "ConcatTransform": lambda numbers: np.reshape(numbers, (4, 4)).T,
+}

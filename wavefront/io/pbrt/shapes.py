@@ -1,0 +1,281 @@
+"""Shapes of pbrt."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...arrays.elementary import arccos, sin_cos_turns
+from ...arrays.vec import Doubles
+from ...core.errors import SceneError
+from ...shapes import Instance, Mesh, Shape, Sphere
+from ...shapes.transform import Matrix
+from ...textures.base import BaseTexture
+from ..placing import in_range, moved_raw
+from ..repair import RawMesh, build
+from ..trimesh_import import import_trimesh
+from .entities import Entity, Job, converts, unsupported
+from .materials import material_of
+from .parser import placed
+from .textures import clipped, computed, product, scalar
+
+SIDES, RINGS = 128, 64  # of round shapes that are meshes
+ROUND = 1e-5  # relative difference of the scales along two axes that is taken for rounding
+POINTS, PAIRS, NORMALS = ("point3", "point"), ("point2", "float"), ("normal3", "normal")
+
+
+@converts("shape", "sphere")
+def _sphere(entity: Entity, job: Job) -> RawMesh:
+    radius = _radius(entity)
+    low, high = sorted(entity.number(f"z{end}", at * radius) for end, at in (("min", -1), ("max", 1)))
+    # polar angles in half turns, from the lower end to the upper one
+    begin, end = (float(arccos(np.clip(np.float64(z / radius), -1, 1))) / np.pi for z in (low, high))
+    turns = _turns(entity)
+
+    def point(u: Doubles, v: Doubles) -> tuple[Doubles, Doubles]:
+        sin, cos = sin_cos_turns((begin + (end - begin) * v) / 2)
+        around = sin_cos_turns(u * turns)
+        normal = np.stack([around[1] * sin, around[0] * sin, cos], 1)
+        return normal * radius, normal
+
+    return _grid("sphere", SIDES, RINGS, point)
+
+
+@converts("shape", "cylinder")
+def _cylinder(entity: Entity, job: Job) -> RawMesh:
+    radius, turns = _radius(entity), _turns(entity)
+    low, high = sorted((entity.number("zmin", -1.0), entity.number("zmax", 1.0)))
+
+    def point(u: Doubles, v: Doubles) -> tuple[Doubles, Doubles]:
+        sin, cos = sin_cos_turns(u * turns)
+        normal = np.stack([cos, sin, np.zeros_like(u)], 1)
+        return normal * radius + (low + (high - low) * v)[:, None] * (0, 0, 1), normal
+
+    return _grid("cylinder", SIDES, 1, point)
+
+
+@converts("shape", "disk")
+def _disk(entity: Entity, job: Job) -> RawMesh:
+    radius, turns, height = _radius(entity), _turns(entity), entity.number("height", 0.0)
+    inner = entity.number("innerradius", 0.0, lambda x: 0 <= x < radius, f"from 0 to below {radius:g}")
+
+    def point(u: Doubles, v: Doubles) -> tuple[Doubles, None]:
+        sin, cos = sin_cos_turns(u * turns)
+        size = radius + (inner - radius) * v
+        return np.stack([cos * size, sin * size, np.full_like(u, height)], 1), None
+
+    return _grid("disk", SIDES, 1, point)
+
+
+@converts("shape", "trianglemesh")
+def _triangle_mesh(entity: Entity, job: Job) -> RawMesh:
+    entity.harmless("faceIndices")
+    return _arrays(entity, 3)
+
+
+@converts("shape", "bilinearmesh")
+def _bilinear_mesh(entity: Entity, job: Job) -> RawMesh:
+    entity.harmless("faceIndices")
+    raw = _arrays(entity, 4)
+    patches = raw.faces.reshape(-1, 4)
+    a, b, c, d = (raw.vertices[patches[:, i]] for i in range(4))
+    size = np.abs(np.stack([b - a, c - a, d - a])).max((0, 2))
+    if (np.abs((np.cross(b - a, c - a) * (d - a)).sum(1)) > 1e-6 * size**3).any():
+        entity.lose("the curvature of its patches; two triangles for each")
+    if raw.uvs is None and len(patches) == 1:
+        raw.uvs = np.array([[0.0, 0], [1, 0], [0, 1], [1, 1]])[np.argsort(patches[0])]
+    return replace(raw, faces=patches[:, [0, 1, 3, 0, 3, 2]].reshape(-1, 3))
+
+
+@converts("shape", "plymesh")
+def _ply_mesh(entity: Entity, job: Job) -> RawMesh:
+    path = job.find(entity.text("filename"))
+    if path not in job.made:
+        raws = job.read_mesh(path)
+        if not raws:
+            raise SceneError(f"{path}: has no faces")
+        job.made[path] = _checked(raws[0])
+    return replace(job.made[path], name=path.name.partition(".")[0], colors=None)
+
+
+@converts("shape", "loopsubdiv")
+def _loop(entity: Entity, job: Job) -> RawMesh:
+    entity.harmless("scheme")
+    raw, levels = _arrays(entity, 3), entity.whole("levels", 3, 0, 16)
+    job.files.limits.check_triangles(entity.label, len(raw.faces) * 4**levels)
+    try:
+        vertices, faces = import_trimesh().remesh.subdivide_loop(raw.vertices, raw.faces, levels)
+    except (ValueError, IndexError) as error:
+        raise SceneError(f"cannot be subdivided: {error}") from error
+    return RawMesh("loopsubdiv", vertices, faces, smooth=True)
+
+
+unsupported("shape", "curve")
+
+
+def _radius(entity: Entity) -> float:
+    return entity.number("radius", 1.0, lambda x: x > 0, "above 0")
+
+
+def _turns(entity: Entity) -> float:
+    return entity.number("phimax", 360.0, lambda x: 0 < x <= 360, "above 0 and at most 360 degrees") / 360
+
+
+def _grid(name: str, columns: int, rows: int, point: Callable[[Doubles, Doubles], Any]) -> RawMesh:
+    """Return a surface over the unit square, whose front is on the side of ∂p/∂u × ∂p/∂v."""
+    u, v = (
+        each.ravel() for each in np.meshgrid(np.arange(columns + 1) / columns, np.arange(rows + 1) / rows)
+    )
+    vertices, normals = point(u, v)
+    corner = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).ravel()
+    above = corner + columns + 1
+    faces = np.stack([corner, corner + 1, above + 1, corner, above + 1, above], 1).reshape(-1, 3)
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    kept = np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-12 * np.square(np.abs(vertices).max())
+    return RawMesh(name, vertices, faces[kept], normals, np.stack([u, v], 1))
+
+
+def _arrays(entity: Entity, corners: int) -> RawMesh:
+    """Return the arrays of a shape, as they are; its faces have a number of corners."""
+    vertices = entity.array("P", POINTS)
+    if vertices is None:
+        raise SceneError("has no P")
+    indices = entity.get("indices", ("integer",))
+    if indices is None:
+        if len(vertices) != corners:
+            raise SceneError(f"has {len(vertices)} points and no indices")
+        indices = np.arange(corners)
+    if len(indices) % corners:
+        raise SceneError(f"has {len(indices)} indices; a face has {corners}")
+    raw = _checked(RawMesh(entity.type, vertices, indices.astype(np.intp).reshape(-1, corners)))
+    given = entity.get("uv", PAIRS)
+    if given is None:
+        given = entity.get("st", PAIRS)
+    raw.normals = entity.array("N", NORMALS)
+    if given is not None:
+        if len(given) % 2:
+            raise SceneError(f"uv has {len(given)} numbers; it must be pairs")
+        raw.uvs = given.reshape(-1, 2)
+    for name, rows in (("uv", raw.uvs), ("N", raw.normals)):
+        if rows is not None and len(rows) != len(vertices):
+            raise SceneError(f"{name} has {len(rows)} rows; P has {len(vertices)}")
+    return raw
+
+
+def _checked(raw: RawMesh) -> RawMesh:
+    """Return a mesh, if its faces use vertices that there are."""
+    bad = np.argwhere((raw.faces < 0) | (raw.faces >= len(raw.vertices)))
+    if len(bad):
+        i, j = bad[0]
+        raise SceneError(
+            f"face {i} uses vertex {raw.faces[i, j]}; it must be in [0, {len(raw.vertices) - 1}]"
+        )
+    return raw
+
+
+def place(entity: Entity, job: Job) -> list[Shape]:
+    """Return a shape where it stands in the scene."""
+    with placed(entity.label):
+        matrix = job.world @ entity.matrix
+        shape = _exact_sphere(entity, job, matrix) or _mesh(entity, job, matrix, entity.state.area)
+        return [] if shape is None else [shape]
+
+
+def instances(entity: Entity, job: Job, matrices: Matrix) -> list[Shape]:
+    """Return a shape of an object at each of several places, (n, 4, 4)."""
+    with placed(entity.label):
+        job.instances += len(matrices)
+        most = job.files.limits.instances
+        if job.instances > most:
+            raise SceneError(f"there are more than {most} instances; the limit is LoadLimits.instances")
+        if entity.state.area is not None:
+            entity.lose("the light of a shape in an object")
+        mesh = _mesh(entity, job, entity.matrix, None)
+        return [] if mesh is None else list(Instance.many(mesh, job.world @ matrices))
+
+
+def _exact_sphere(entity: Entity, job: Job, matrix: Matrix) -> Sphere | None:
+    """Return a sphere that needs no mesh: a whole one, without textures, that is not stretched."""
+    if entity.type != "sphere" or entity.values.keys() - {"radius"} or entity.state.reverse:
+        return None
+    scale = np.linalg.svd(matrix[:3, :3], compute_uv=False)
+    if np.ptp(scale) > ROUND * scale.max():
+        return None
+    radius, material = _radius(entity) * scale[0], material_of(entity.state, None, job, entity)
+    emission, _ = _emission(entity.state.area, 4 * np.pi * radius**2, job)
+    if has_textures(material) or isinstance(emission, BaseTexture):
+        return None
+    return Sphere(matrix[:3, 3], radius, material=material, emission=emission)
+
+
+def _mesh(entity: Entity, job: Job, matrix: Matrix, light: Entity | None) -> Mesh | None:
+    """Return the mesh of a shape, placed by a matrix, which may be an area light."""
+    raw = job.convert(entity)
+    if raw is None:
+        return None
+    if not in_range(matrix[None])[0]:
+        raise SceneError("is placed by a matrix whose elements are too large")
+    with np.errstate(over="ignore", invalid="ignore"):
+        raw = moved_raw(_facing(raw, entity.state.reverse), matrix)
+        a, b, c = (raw.vertices[raw.faces[:, i]] for i in range(3))
+        area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2 if light else 0.0
+    job.triangles += len(raw.faces)
+    job.files.limits.check_triangles(str(job.files.scene), job.triangles)
+    raw.material = material_of(entity.state, opacity(entity, job), job, entity)
+    raw.emission, raw.two_sided = _emission(light, area, job)
+    if raw.uvs is None and (has_textures(raw.material) or isinstance(raw.emission, BaseTexture)):
+        raw = _with_uvs(raw)
+    return build(entity.place, raw, job.strict)
+
+
+def opacity(entity: Entity, job: Job) -> Any:
+    """Return the opacity of a shape; None where none is given."""
+    return clipped(scalar(entity, "alpha", 1.0, job)) if "alpha" in entity.values else None
+
+
+def _emission(light: Entity | None, area: float, job: Job) -> tuple[Any, bool]:
+    """Return the radiance of an area light, and whether it leaves both sides; None if there is no light."""
+    found = None if light is None else job.convert(light)
+    if light is None or found is None:
+        return None, False
+    radiance, luminance, both = found
+    power = light.number("power", -1.0)
+    if power > 0 and luminance > 0 and area > 0:
+        radiance = computed(product, radiance, power / (luminance * area * np.pi * (2 if both else 1)))
+    return radiance, both
+
+
+def _facing(raw: RawMesh, reverse: bool) -> RawMesh:
+    """Return a mesh whose faces have their fronts where its normals are; `reverse` is ReverseOrientation."""
+    faces, normals = raw.faces, raw.normals
+    if normals is not None:
+        a, b, c = (raw.vertices[faces[:, i]] for i in range(3))
+        own = np.cross(b - a, c - a)
+        shading = normals[faces[:, 0]] + normals[faces[:, 1]] + normals[faces[:, 2]]
+        behind = (own * shading).sum(1) < 0
+        faces = np.where(behind[:, None], faces[:, ::-1], faces)
+    if reverse:
+        faces, normals = faces[:, ::-1], None if normals is None else -normals
+    return replace(raw, faces=faces, normals=normals)
+
+
+def _with_uvs(raw: RawMesh) -> RawMesh:
+    """Return a mesh with the texture coordinates that pbrt gives each triangle of one without."""
+    corners = raw.faces.ravel()
+    return replace(
+        raw,
+        vertices=raw.vertices[corners],
+        faces=np.arange(len(corners)).reshape(-1, 3),
+        normals=None if raw.normals is None else raw.normals[corners],
+        uvs=np.tile([[0.0, 0], [1, 0], [1, 1]], (len(raw.faces), 1)),
+    )
+
+
+def has_textures(thing: Any) -> bool:
+    """Return whether a material, or a part of one, is a texture."""
+    if isinstance(thing, BaseTexture):
+        return True
+    return hasattr(thing, "__dict__") and any(has_textures(part) for part in vars(thing).values())

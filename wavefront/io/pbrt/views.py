@@ -1,0 +1,151 @@
+"""Cameras, films, filters, samplers and integrators of pbrt: a camera, and settings of a render."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...arrays.elementary import arctan2, sin_cos
+from ...camera import Camera
+from ...camera.projection import Orthographic, Perspective, Projection
+from ...core.errors import SceneError
+from ...shapes.transform import Matrix
+from .entities import Entity, Job, converts, unsupported
+
+Settings = dict[str, Any]
+TALL = 1e-3  # relative difference of a pixel's sides that is taken for rounding
+
+
+def mirror_of(camera: Matrix) -> Matrix:
+    """Return the matrix that takes the world to the space of the scene.
+
+    In pbrt's camera space x is to the right, y up and z ahead, which is left-handed. So a camera that is only
+    turned and moved sees a mirrored world, unless `Scale -1 1 1` is above it; then nothing is mirrored.
+    """
+    return np.diag([-1.0 if np.linalg.det(camera[:3, :3]) > 0 else 1.0, 1, 1, 1])
+
+
+@converts("camera", "perspective orthographic realistic spherical")
+def _camera(entity: Entity, job: Job) -> Camera:
+    """Return a camera for the size and the crop of the film."""
+    (width, height), crop = job.film
+    entity.harmless("shutteropen shutterclose")
+    x0, x1, y0, y1 = _window(entity, width / height)
+    matrix = job.world @ entity.matrix
+    scale = np.linalg.norm(matrix[:3, :3], axis=0)
+    if np.ptp(scale) > TALL * scale.max():
+        entity.lose("a transform that scales unevenly")
+    axes, origin = matrix[:3, :3] / scale * (1, 1, -1), matrix[:3, 3]
+    lens: Projection
+    shape = (x1 - x0) / width / ((y1 - y0) / height)  # of a pixel
+    radius = entity.number("lensradius", 0.0)
+    if entity.type == "orthographic":
+        lens = Orthographic((y1 - y0) * scale[1])
+        origin = origin + axes[:, 0] * (x0 + x1) / 2 * scale[0] + axes[:, 1] * (y0 + y1) / 2 * scale[1]
+        entity.harmless("focaldistance")
+        if abs(shape - 1) > TALL:
+            entity.lose("pixels that are not square")
+        if radius:
+            entity.lose("lensradius")
+    else:
+        if entity.type != "perspective":
+            entity.lose("a perspective camera in its place")
+        angle = entity.number("fov", 90.0, lambda x: 0 < x < 180, "above 0 and below 180 degrees")
+        sin, cos = sin_cos(np.float64(np.radians(angle) / 2))
+        half = sin / cos * (y1 - y0) / 2
+        distance = entity.number("focaldistance", 1e6)
+        lens = Perspective(
+            float(2 * np.degrees(arctan2(half, np.float64(1)))),
+            shift=((x0 + x1) / 2 / (x1 - x0), (y0 + y1) / 2 / (y1 - y0)),
+            pixel_aspect=shape,
+            aperture=2 * radius * scale[0],
+            focus=distance * scale[2] if radius else None,
+        )
+    return Camera(origin, axes, lens, (width, height), crop)
+
+
+def _window(entity: Entity, aspect: float) -> tuple[float, ...]:
+    """Return the left, right, lower and upper edge of the screen: 1 is at half the angle of view."""
+    aspect = entity.number("frameaspectratio", aspect, lambda x: x > 0, "above 0")
+    given = entity.array("screenwindow", ("float",))
+    if given is None:
+        wide, high = max(aspect, 1.0), max(1 / aspect, 1.0)
+        return -wide, wide, -high, high
+    if len(given) != 4 or not (given[0] < given[1] and given[2] < given[3]):
+        raise SceneError(f"screenwindow is {given.tolist()}; it must be four numbers, min and max of x and y")
+    return tuple(given.tolist())
+
+
+def exposure_of(film: Entity | None, camera: Entity | None) -> float:
+    """Return the factor by which a film multiplies radiance."""
+    time = 1.0
+    if camera is not None:
+        time = camera.number("shutterclose", 1.0) - camera.number("shutteropen", 0.0)
+        if not time > 0:
+            raise SceneError(f"{camera.label}: is open for {time:g}; it must be above 0")
+    return time * (1.0 if film is None else film.number("iso", 100.0, lambda x: x > 0, "above 0") / 100)
+
+
+@converts("film", "rgb gbuffer spectral")
+def _film(entity: Entity, job: Job) -> tuple[tuple[int, int], tuple[int, ...] | None]:
+    """Return the size and the crop."""
+    entity.harmless("filename savefp16 diagonal coordinatesystem nbuckets lambdamin lambdamax iso")
+    size = (entity.whole("xresolution", 1280, 1, 2**16), entity.whole("yresolution", 720, 1, 2**16))
+    if entity.text("sensor", "cie1931") != "cie1931":
+        entity.lose("sensor; 'cie1931' in its place")
+    bounds, window = (entity.array(name, (kind,)) for name, kind in _CROPS)
+    if window is not None:
+        if len(window) != 4:
+            raise SceneError(f"cropwindow has {len(window)} numbers; it must have 4")
+        x, y = (np.ceil(np.clip(np.sort(window[i : i + 2]), 0, 1) * size[i // 2]) for i in (0, 2))
+        bounds = np.concatenate([x, y])
+    if bounds is None:
+        return size, None
+    if len(bounds) != 4:
+        raise SceneError(f"pixelbounds has {len(bounds)} numbers; it must have 4")
+    left, right, top, bottom = (int(each) for each in bounds)
+    crop = (max(left, 0), max(top, 0), min(right, size[0]), min(bottom, size[1]))
+    if crop[0] >= crop[2] or crop[1] >= crop[3]:
+        raise SceneError(f"its pixels end before they begin: {[left, right, top, bottom]}")
+    return size, None if crop == (0, 0, *size) else crop
+
+
+_CROPS = (("pixelbounds", "integer"), ("cropwindow", "float"))
+# radius of each filter in pixels: of pbrt if it is not given, and here
+RADII = {"box": (0.5, 0.5), "triangle": (2.0, 1.0), "gaussian": (1.5, 1.5)}
+
+
+@converts("filter", "box triangle gaussian")
+def _filter(entity: Entity, job: Job) -> Settings:
+    usual, own = RADII[entity.type]
+    if (entity.number("xradius", usual), entity.number("yradius", usual)) != (own, own):
+        entity.lose(f"its radius; {own:g} in its place")
+    if entity.type == "gaussian" and entity.number("sigma", 0.5) != 0.5:
+        entity.lose("sigma")
+    return {"filter": {"triangle": "tent"}.get(entity.type, entity.type)}
+
+
+unsupported("filter", "mitchell sinc")
+
+
+@converts("sampler", "halton independent paddedsobol pmj02bn sobol stratified zsobol")
+def _sampler(entity: Entity, job: Job) -> Settings:
+    entity.harmless("randomization seed jitter")
+    if entity.type == "stratified":
+        return {"spp": entity.whole("xsamples", 4, 1, 2**15) * entity.whole("ysamples", 4, 1, 2**15)}
+    return {"spp": entity.whole("pixelsamples", 16, 1)}
+
+
+@converts("integrator", "path simplepath volpath simplevolpath bdpt mlt sppm lightpath")
+def _integrator(entity: Entity, job: Job) -> Settings:
+    entity.harmless("lightsampler samplelights samplebsdf visualizestrategies visualizeweights")
+    if entity.type in ("bdpt", "mlt", "sppm", "lightpath"):
+        entity.lose("path tracing in its place")
+        entity.unread &= {"maxdepth"}
+    if entity.flag("regularize"):
+        entity.lose("regularize")
+    return {"max_bounces": entity.whole("maxdepth", 5, 0, 2**16)}
+
+
+unsupported("integrator", "ambientocclusion function randomwalk")
