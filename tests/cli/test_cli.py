@@ -8,6 +8,7 @@ from importlib.metadata import version
 import imageio.v3 as iio
 import numpy as np
 import pytest
+from luminaires import lm63
 
 import wavefront as wf
 from wavefront.cli import main, render_command
@@ -113,6 +114,17 @@ def test_info_names_what_the_file_holds(obj, capsys):
     assert "(-1, 0, -1) to (1, 2, 1)" in out
     assert "red" in out
     assert out.count("emits") == 1
+
+
+def test_info_of_a_luminaire(tmp_path, capsys):
+    path = tmp_path / "lamp.ies"
+    path.write_text(lm63([0, 90], [0, 45, 90], [[50, 50], [20, 20], [50, 50]]))
+    assert main(["info", str(path)]) == 0
+    said = f"{path}: luminaire of 219.9 lm, at most 50 cd, 9 × 2 angles\nwarnings: none\n"
+    assert capsys.readouterr().out == said
+    path.write_text("TILT=NONE\n1 x")
+    assert main(["info", str(path)]) == 2
+    assert "lamp.ies line 2: number of lamps, lumens per lamp is 'x'" in capsys.readouterr().err
 
 
 def test_version_and_help(capsys):

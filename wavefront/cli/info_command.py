@@ -11,9 +11,12 @@ from typing import Any
 import numpy as np
 
 from ..arrays.vec import Doubles
+from ..codecs.luminaires import EXTENSIONS as LUMINAIRES
+from ..codecs.luminaires import luminaire_texts, parsed_luminaire
 from ..core.parameter import brief
 from ..core.plural import plural
 from ..io.load import load
+from ..lights.ies import Web
 from ..materials import Material
 from ..scene.lighting import DEFAULT
 from ..scene.scene import FRAMING_VIEW, Scene
@@ -31,7 +34,7 @@ def add_info_command(commands: Any) -> None:
     command = add_command(
         commands,
         "info",
-        "say what a scene file holds: shapes, sizes, materials, textures, lights, and what is wrong with it",
+        "say what a file of a scene or luminaire holds: shapes, materials, lights, and what is wrong with it",
         ["wavefront info scene.glb"],
     )
     command.add_argument("scene", help=SCENE_FILE)
@@ -44,13 +47,25 @@ def _info(options: argparse.Namespace) -> int:
     """Say what a scene file holds; return the exit status."""
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always", UserWarning)
-        scene = load(options.scene, progress=False if options.quiet else None, **reading(options))
-    for line in _lines(options.scene, scene, [str(each.message) for each in found]):
-        print(line)
+        if options.scene.lower().endswith(LUMINAIRES):
+            lines = [_luminaire(options.scene)]
+        else:
+            scene = load(options.scene, progress=False if options.quiet else None, **reading(options))
+            lines = list(_lines(options.scene, scene))
+    print("\n".join([*lines, f"warnings: {len(found) or 'none'}", *(f"  {each.message}" for each in found)]))
     return 0
 
 
-def _lines(path: str, scene: Scene, messages: list[str]) -> Iterator[str]:
+def _luminaire(path: str) -> str:
+    """Return the line about a file of a luminaire."""
+    found = parsed_luminaire(*luminaire_texts(path))
+    size = " × ".join(map(str, found.candela.shape))
+    return (
+        f"{path}: luminaire of {Web(found).flux:.4g} lm, at most {found.candela.max():.4g} cd, {size} angles"
+    )
+
+
+def _lines(path: str, scene: Scene) -> Iterator[str]:
     """Yield the lines about a scene."""
     meshes = _distinct(shape.mesh if isinstance(shape, Instance) else shape for shape in scene.shapes)
     low, high = scene.bounds
@@ -84,8 +99,6 @@ def _lines(path: str, scene: Scene, messages: list[str]) -> Iterator[str]:
     yield "textures:" if textures else "textures: none"
     for texture in textures:
         yield f"  {texture!r}, {plural(texture.channels, 'channel')}, {'sRGB' if texture.srgb else 'linear'}"
-    yield f"warnings: {len(messages)}" if messages else "warnings: none"
-    yield from (f"  {message}" for message in messages)
 
 
 def _textures(thing: Any, seen: set[int]) -> Iterator[Texture]:
