@@ -5,6 +5,7 @@ hardly differs and cancels.
 """
 
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -61,8 +62,13 @@ def guidance(rng: np.random.Generator, n: int) -> Guidance:
     return Guidance(table, np.zeros(n, np.intp), rng.uniform(0, 0.8, n).astype(f4))
 
 
-def first_points(rng: np.random.Generator, guided: bool, center: np.ndarray) -> FirstPoints:
-    """Points near z = 0 that face up more or less; one of the tiles lacks a member."""
+def first_points(
+    rng: np.random.Generator, guided: bool, center: np.ndarray, bent: bool = False
+) -> FirstPoints:
+    """Points near z = 0 that face up more or less; one of the tiles lacks a member.
+
+    If they are bent, their geometric normals are not their shading normals.
+    """
     shape = (MEMBERS, TILES)
     present = np.ones(shape, bool)
     present[2, 1] = False
@@ -77,7 +83,7 @@ def first_points(rng: np.random.Generator, guided: bool, center: np.ndarray) -> 
         normal,
         None,
         rng.uniform(0.2, 1, (3, *shape)).astype(f4),
-        None,
+        directions(rng, MEMBERS * TILES) if bent else None,
         guidance(rng, MEMBERS * TILES) if guided else None,
     )
 
@@ -100,6 +106,8 @@ def one_connection(first: FirstPoints, target: SharedPoints, point: int, member:
     distance2 = float(away @ away)
     wi = away / np.sqrt(distance2)
     cos = max(float(first.normal[:, column].astype(float) @ wi), 0.0)
+    if first.ng is not None and first.ng[:, column].astype(float) @ wi <= 0:
+        cos = 0.0
     pdf = cos / np.pi
     if first.guidance is not None and cos > 0:
         share = float(first.guidance.share[column])
@@ -118,12 +126,12 @@ def blocked(start: np.ndarray, away: np.ndarray, center: np.ndarray) -> bool:
 
 
 @some
-@given(seed=number, guided=st.booleans())
-def test_connections(seed: int, guided: bool) -> None:
+@given(seed=number, guided=st.booleans(), bent=st.booleans())
+def test_connections(seed: int, guided: bool, bent: bool) -> None:
     """BSDF times cosine, density, geometry; a ray of the length of the distance."""
     rng = np.random.default_rng(seed)
     center = OPEN.center
-    first, points = first_points(rng, guided, center), shared_points(rng, 1, center)
+    first, points = first_points(rng, guided, center, bent), shared_points(rng, 1, center)
     target, there = points.take(np.array([0, 1])), np.array([True, seed % 2 == 0])
     found = connect(OPEN, first, target, there, 1)
     # where a guide is, directions below the surface have a density but no value
@@ -223,7 +231,9 @@ def test_paths_begin_anew_at_shared_points() -> None:
 def test_what_nobody_reaches_stays_with_its_path(monkeypatch: pytest.MonkeyPatch) -> None:
     """The others receive light times the throughput of their first points."""
     rng = np.random.default_rng(1)
-    lit = SimpleNamespace(groups=[(slice(0, 2), wf.Diffuse(0.5))], surface=range(2))
+    lit = SimpleNamespace(
+        groups=[(slice(0, 2), wf.Diffuse(0.5))], surface=MagicMock(unmapped=None, __len__=lambda _: 2)
+    )
     lit.albedo = lambda: np.ones((3, 2), f4)
     paths = SimpleNamespace(slot=np.array([1, 0]), throughput=rng.uniform(0.2, 1, (3, 2)).astype(f4))
     points = shared_points(rng, 1, OPEN.center).take(np.array([0, 1]))
