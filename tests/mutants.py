@@ -64,6 +64,15 @@ TESTS: dict[str, tuple[str, ...]] = {
         "tests/aovs/test_sampled_layers.py",
         "tests/denoising/test_denoising.py",
     ),
+    **dict.fromkeys(
+        ("wavefront/bsdfs/disney.py", "wavefront/bsdfs/disney_thin.py"),
+        (
+            "tests/bsdfs/test_disney.py",
+            "tests/bsdfs/test_bsdfs.py",
+            "tests/bsdfs/test_bsdf_models.py",
+            "tests/properties/test_density_of_bsdfs.py",
+        ),
+    ),
     "wavefront/bsdfs/channels.py": ("tests/bsdfs/test_channels.py",),
     "wavefront/bsdfs/thin_film.py": ("tests/bsdfs/test_thin_film.py",),
     "wavefront/film/light_sums.py": ("tests/integrators/test_caustics.py",),
@@ -79,6 +88,7 @@ DENSITIES = (
     "wavefront/bsdfs/dielectric.py",
     "wavefront/bsdfs/diffuse.py",
     "wavefront/bsdfs/disney.py",
+    "wavefront/bsdfs/disney_thin.py",
     "wavefront/bsdfs/microfacet.py",
     "wavefront/bsdfs/mirror.py",
     "wavefront/bsdfs/mix.py",
