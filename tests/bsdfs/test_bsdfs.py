@@ -92,10 +92,11 @@ EXAMPLES = {
         {"base_color": (0.3, 0.2, 0.1), "flatness": 0.7, "sheen": 0.1, "sheen_tint": 0.5, "roughness": 0.9},
     ],
     ThinDisney: [
-        {"base_color": (0.3, 0.2, 0.1)},
-        {"base_color": (0.9, 0.5, 0.1), "transmission": 1.0, "roughness": 0.7, "specular_tint": 0.5},
-        {"base_color": 0.3, "roughness": 0.4, "transmission": 0.6, "anisotropic": 0.8, "ior": 1.3},
+        {"base_color": 0.3, "roughness": 0.4, "transmission": 0.6, "diffuse_transmission": 2, "ior": 1.3},
+        {"base_color": 0.5, "transmission": 0.3, "diffuse_transmission": 0.4, "anisotropic": 0.6},
         {"base_color": 0.5, "diffuse_transmission": 1.4, "flatness": 0.7, "sheen": 0.1, "sheen_tint": 0.5},
+        {"base_color": (0.9, 0.5, 0.1), "transmission": 1.0, "roughness": 0.7, "specular_tint": 0.5},
+        {"base_color": (0.3, 0.2, 0.1)},
     ],
     Sides: [
         {"front": Diffuse((0.9, 0.5, 0.1))},

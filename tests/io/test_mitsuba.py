@@ -249,6 +249,10 @@ def test_facets_and_plastics() -> None:
     rough = material("roughplastic", alpha=0.25, distribution="ggx", specular_reflectance=0.5).bsdf
     assert (rough.roughness, rough.distribution, rough.nonlinear) == (0.5, "ggx", False)
     assert value(rough.specular_reflectance) == [0.5] * 3
+    with pytest.warns(UserWarning, match="alpha_u"):
+        assert value(material("roughplastic", False, alpha_u=0.25).bsdf.roughness) == pytest.approx(
+            [0.1**0.5]
+        )
 
 
 def test_backs_are_black_where_mitsuba_has_them_so() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import copy
 from typing import Any
 
@@ -33,7 +34,6 @@ from .textures import bitmap, color, roughness, scalar
 
 LEAST_INDEX = 1e-6
 MAPPED = "use_shadowing_function flip_invalid_normals"
-THIN = ("anisotropic", "sheen", "sheen_tint", "flatness")  # what principled and principledthin share
 ONE_SIDED = ("diffuse", "conductor", "roughconductor", "plastic", "roughplastic")  # the back is black
 
 
@@ -53,11 +53,6 @@ class ShadingFrameMap(NormalMap):
 
 def _named(node: Node, bsdf: Bsdf) -> Material:
     return Material(bsdf, name=node.id or None)
-
-
-@plugin("diffuse", "bsdf", "reflectance")
-def _diffuse(node: Node, job: Job) -> Material:
-    return _named(node, Diffuse(color(node, "reflectance", 0.5, job)))
 
 
 @plugin("conductor", "bsdf", "material eta k specular_reflectance")
@@ -85,98 +80,6 @@ def _conductor(node: Node, job: Job) -> Material:
     if isinstance(tint, BaseTexture) or np.any(np.asarray(tint) != 1):
         node.lose("specular_reflectance")
     return _named(node, Conductor(eta, k, **facets))
-
-
-@plugin("dielectric", "bsdf", "int_ior ext_ior specular_reflectance specular_transmittance")
-@plugin(
-    "roughdielectric",
-    "bsdf",
-    "int_ior ext_ior specular_reflectance specular_transmittance alpha alpha_u alpha_v distribution",
-    harmless="sample_visible",
-)
-@plugin("thindielectric", "bsdf", "int_ior ext_ior specular_reflectance specular_transmittance")
-def _dielectric(node: Node, job: Job) -> Material:
-    kind = ThinDielectric if node.plugin == "thindielectric" else Dielectric
-    return _named(
-        node,
-        kind(
-            _ior(node, "int_ior", "bk7") / _ior(node, "ext_ior", "air"),
-            reflectance=color(node, "specular_reflectance", 1.0, job),
-            transmittance=color(node, "specular_transmittance", 1.0, job),
-            **(_facets(node, job) if node.plugin == "roughdielectric" else {}),
-        ),
-    )
-
-
-@plugin("plastic", "bsdf", "diffuse_reflectance specular_reflectance nonlinear int_ior ext_ior")
-@plugin(
-    "roughplastic",
-    "bsdf",
-    "diffuse_reflectance specular_reflectance nonlinear int_ior ext_ior alpha distribution",
-    harmless="sample_visible",
-)
-def _plastic(node: Node, job: Job) -> Material:
-    return _named(
-        node,
-        Plastic(
-            color(node, "diffuse_reflectance", 0.5, job),
-            ior=_ior(node, "int_ior", "polypropylene") / _ior(node, "ext_ior", "air"),
-            specular_reflectance=color(node, "specular_reflectance", 1.0, job),
-            nonlinear=node.flag("nonlinear"),
-            **(_facets(node, job) if node.plugin == "roughplastic" else {}),
-        ),
-    )
-
-
-@plugin(
-    "principled",
-    "bsdf",
-    "base_color roughness metallic anisotropic spec_trans eta specular spec_tint sheen sheen_tint flatness "
-    "clearcoat clearcoat_gloss",
-    harmless="main_specular_sampling_rate clearcoat_sampling_rate diffuse_reflectance_sampling_rate",
-)
-def _principled(node: Node, job: Job) -> Material:
-    if "eta" in node.values:
-        ior = node.number("eta", 1.5)
-    else:
-        root = np.sqrt(
-            0.08 * number("specular", node.get("specular", 0.5), lambda x: 0 <= x <= 1, "in [0, 1]")
-        )
-        ior = float((1 + root) / (1 - root))
-    return _named(
-        node,
-        Disney(
-            color(node, "base_color", 0.5, job),
-            scalar(node, "roughness", 0.5, job),
-            scalar(node, "metallic", 0.0, job),
-            ior=ior,
-            transmission=scalar(node, "spec_trans", 0.0, job),
-            specular_tint=scalar(node, "spec_tint", 0.0, job),
-            **{name: scalar(node, name, 0.0, job) for name in (*THIN, "clearcoat", "clearcoat_gloss")},
-        ),
-    )
-
-
-@plugin(
-    "principledthin",
-    "bsdf",
-    "base_color roughness anisotropic spec_trans diff_trans eta spec_tint sheen sheen_tint flatness",
-    harmless="diffuse_reflectance_sampling_rate specular_reflectance_sampling_rate "
-    "specular_transmittance_sampling_rate diffuse_transmittance_sampling_rate",
-)
-def _principled_thin(node: Node, job: Job) -> Material:
-    return _named(
-        node,
-        ThinDisney(
-            color(node, "base_color", 0.5, job),
-            scalar(node, "roughness", 0.5, job),
-            ior=scalar(node, "eta", 1.5, job),
-            transmission=scalar(node, "spec_trans", 0.0, job),
-            diffuse_transmission=scalar(node, "diff_trans", 0.0, job),
-            specular_tint=scalar(node, "spec_tint", 0.0, job),
-            **{name: scalar(node, name, 0.0, job) for name in THIN},
-        ),
-    )
 
 
 @plugin("twosided", "bsdf", holds="bsdf", harmless="allow_transmission")
@@ -275,15 +178,92 @@ def _ior(node: Node, name: str, default: str) -> float:
     return number(name, value, lambda x: x > 0, "above 0")
 
 
+def _relative_index(node: Node, job: Job) -> dict[str, Any]:
+    inside = "polypropylene" if "plastic" in node.plugin else "bk7"
+    return {"ior": _ior(node, "int_ior", inside) / _ior(node, "ext_ior", "air")}
+
+
 def _facets(node: Node, job: Job) -> dict[str, Any]:
     """Return the parameters of microfacets."""
-    both = "alpha_u" in node.values or "alpha_v" in node.values
+    both = "plastic" not in node.plugin and bool({"alpha_u", "alpha_v"} & node.values.keys())
     facets: dict[str, Any] = {
         "roughness": roughness(node, "alpha_u" if both else "alpha", 0.1, job),
         "distribution": node.choice("distribution", "beckmann", ("beckmann", "ggx")),
         "shadowing": "separable",
     }
     return facets | ({"roughness_v": roughness(node, "alpha_v", 0.1, job)} if both else {})
+
+
+def _index_of_reflectance(node: Node, job: Job) -> dict[str, Any]:
+    """Return the index that eta gives, or specular, which is the normal reflectance over 0.08."""
+    if "eta" in node.values:
+        return {"ior": node.number("eta", 1.5)}
+    part = number("specular", node.get("specular", 0.5), lambda x: 0 <= x <= 1, "in [0, 1]")
+    root = np.sqrt(0.08 * part)
+    return {"ior": float((1 + root) / (1 - root))}
+
+
+# what a parameter, with others, becomes in a way of its own
+OTHERS: dict[str, Callable[[Node, Job], dict[str, Any]]] = {
+    "int_ior": _relative_index,
+    "distribution": _facets,
+    "specular": _index_of_reflectance,
+    "nonlinear": lambda node, job: {"nonlinear": node.flag("nonlinear")},
+}
+
+
+def _model(
+    name: str, make: Callable[..., Bsdf], colors: str, numbers: str = "", others: str = "", harmless: str = ""
+) -> None:
+    """Put a BSDF into the table of plugins; words are `ours=theirs:default`, or `name:default`."""
+
+    def split(words: str) -> list[tuple[str, str, float]]:
+        parts = [word.partition(":") for word in words.split()]
+        return [(names.partition("=")[0], names.rpartition("=")[2], float(to)) for names, _, to in parts]
+
+    def convert(node: Node, job: Job) -> Material:
+        found = {ours: color(node, theirs, default, job) for ours, theirs, default in split(colors)}
+        found |= {ours: scalar(node, theirs, default, job) for ours, theirs, default in split(numbers)}
+        for each in others.split():
+            found |= OTHERS[each](node, job) if each in OTHERS else {}
+        return _named(node, make(**found))
+
+    read = [theirs for _, theirs, _ in split(f"{colors} {numbers}")]
+    plugin(name, "bsdf", f"{' '.join(read)} {others}", harmless=harmless)(convert)
+
+
+INDEX, FACETS = "int_ior ext_ior", "alpha alpha_u alpha_v distribution"
+TINTS = "reflectance=specular_reflectance:1 transmittance=specular_transmittance:1"
+PLASTIC = "reflectance=diffuse_reflectance:0.5 specular_reflectance:1"
+SHEEN = "anisotropic:0 transmission=spec_trans:0 specular_tint=spec_tint:0 sheen:0 sheen_tint:0 flatness:0"
+_model("diffuse", Diffuse, "reflectance:0.5")
+_model("dielectric", Dielectric, TINTS, others=INDEX)
+_model("roughdielectric", Dielectric, TINTS, others=f"{INDEX} {FACETS}", harmless="sample_visible")
+_model("thindielectric", ThinDielectric, TINTS, others=INDEX)
+_model("plastic", Plastic, PLASTIC, others=f"nonlinear {INDEX}")
+_model(
+    "roughplastic",
+    Plastic,
+    PLASTIC,
+    others=f"nonlinear {INDEX} alpha distribution",
+    harmless="sample_visible",
+)
+_model(
+    "principled",
+    Disney,
+    "base_color:0.5",
+    f"roughness:0.5 metallic:0 {SHEEN} clearcoat:0 clearcoat_gloss:0",
+    "eta specular",
+    "main_specular_sampling_rate clearcoat_sampling_rate diffuse_reflectance_sampling_rate",
+)
+_model(
+    "principledthin",
+    ThinDisney,
+    "base_color:0.5",
+    f"roughness:0.5 ior=eta:1.5 {SHEEN} diffuse_transmission=diff_trans:0",
+    harmless="diffuse_reflectance_sampling_rate specular_reflectance_sampling_rate "
+    "diffuse_transmittance_sampling_rate specular_transmittance_sampling_rate",
+)
 
 
 def is_one_sided(node: Node) -> bool:
