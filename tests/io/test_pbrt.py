@@ -367,11 +367,23 @@ def test_bumps_opacity_and_media(tmp_path: Path) -> None:
     body = image + 'Material "diffuse" ' + SQUARE.strip()
     assert shape(tmp_path, body + '"float alpha" .25').material.alpha == np.float32(0.25)
     assert at(shape(tmp_path, body + '"texture alpha" "h"').material.alpha, 0.5, 0.5) > 0
-    assert material(tmp_path, 'Material "interface"').alpha == 0
-    tea = """MakeNamedMedium "tea" "string type" "homogeneous" "rgb sigma_a" [ 1 2 3 ] "float sigma_s" 0
-    "float scale" 2"""
-    inside = shape(tmp_path, f'{tea} MediumInterface "tea" "" Material "dielectric" {BALL}').material.interior
-    assert rows(inside.absorption) == [2, 4, 6]
+    assert isinstance(material(tmp_path, 'Material "interface"').bsdf, wf.NullSurface)
+
+
+def test_media_fill_shapes_and_space(tmp_path: Path) -> None:
+    tea = """MakeNamedMedium "tea" "string type" "homogeneous" "rgb sigma_a" [ 1 2 3 ] "rgb sigma_s" [ 4 5 6 ]
+    "float scale" 2 "float g" .5 "rgb Le" [ 1 1 2 ] "float Lescale" 3 """
+    inside = shape(tmp_path, f'{tea} MediumInterface "tea" "" Material "interface" {BALL}').material.interior
+    assert (rows(inside.sigma_a), rows(inside.sigma_s)) == ([2, 4, 6], [8, 10, 12])
+    assert rows(inside.glow) == [6, 12, 36]  # σa times Le, as in pbrt
+    assert inside.phase.g == 0.5
+    fog = 'MakeNamedMedium "fog" "string type" "homogeneous" MediumInterface "" "fog" Camera "perspective"'
+    scene = load(tmp_path, f'{tea} {SQUARE} MediumInterface "tea" "fog" {BALL}', fog)
+    assert scene.medium is not None
+    assert rows(scene.medium.sigma_s) == [1, 1, 1]  # type: ignore[attr-defined]
+    assert [each.material.interior is None for each in scene.shapes] == [True, False]
+    same = shape(tmp_path, f'{tea} MediumInterface "tea" {BALL}')  # the same on both sides
+    assert same.material.interior is None
 
 
 # ---- textures
@@ -641,11 +653,6 @@ def test_objects_are_placed_by_both_transforms(tmp_path: Path) -> None:
             "",
             f'MakeNamedMedium "m" "string type" "cloud" MediumInterface "m" "" {BALL}',
             "medium 'cloud' 'm': left out",
-        ),
-        (
-            "",
-            f'MakeNamedMedium "m" "string type" "homogeneous" MediumInterface "m" "" {BALL}',
-            "sigma_s; its absorption alone",
         ),
         (
             "",

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..camera import Camera
 from ..lights import Light
+from ..media import BaseMedium
 from ..shapes import Instance, Mesh, Shape
 from ..shapes.smoothing import AUTO
 from .placing import Places
@@ -25,6 +26,7 @@ class Contents:
     shapes: Sequence[Shape] = ()  # further ones, built already
     up: str | None = None  # the axis that is up by the format or the file; None where neither says
     settings: Mapping[str, Any] = field(default_factory=dict)  # as of `Scene`
+    medium: BaseMedium | None = None  # around the shapes
     flat: bool = False  # whether meshes without normals have flat facets by the format
 
     @classmethod

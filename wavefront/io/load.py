@@ -86,7 +86,14 @@ def load(
         name, contents = path_name(path), read(path, options)
         placed = place_shapes(name, contents.raws, contents.places, strict)
         shapes = _some(name, [*placed, *contents.shapes])
-        return Scene(shapes, contents.lights, contents.camera, up=contents.up, settings=contents.settings)
+        return Scene(
+            shapes,
+            contents.lights,
+            contents.camera,
+            up=contents.up,
+            settings=contents.settings,
+            medium=contents.medium,
+        )
 
 
 def load_mesh(

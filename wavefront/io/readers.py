@@ -169,11 +169,14 @@ def _read_mitsuba(files: SceneFiles, data: bytes, options: LoadOptions) -> Conte
     return Contents([], Places.once(0), scene.lights, scene.camera, scene.shapes, settings=scene.settings)
 
 
+PARTS = ("lights", "camera", "shapes", "settings", "medium")  # of a scene, that contents have, too
+
+
 def _read_pbrt(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
     from .pbrt.scene import read_scene  # here, as programs that read no such scene need not pay for it
 
     scene = read_scene(files, data, mesh_reader(files, options.strict), options.strict)
-    return Contents([], Places.once(0), scene.lights, scene.camera, scene.shapes, settings=scene.settings)
+    return replace(Contents.once([]), **{name: getattr(scene, name) for name in PARTS})
 
 
 def mesh_reader(files: SceneFiles, strict: bool) -> Callable[[Path], list[RawMesh]]:

@@ -206,6 +206,7 @@ class Job:
     film: Any = None  # the size of the picture, and its crop
     exposure: float = 1.0  # factor of all light, by the film
     world: Matrix = field(default_factory=lambda: np.eye(4))  # to the space of the scene: may mirror
+    around: Any = None  # the medium where the camera stands
     triangles: int = 0
     instances: int = 0
 
@@ -235,6 +236,10 @@ class Job:
             hint = did_you_mean(name, [each for of, each in self.named if of == kind])
             raise SceneError(f"there is no {kind} {name!r}{hint}")
         return self.named[kind, name]
+
+    def medium(self, name: str) -> Any:
+        """Return a medium by its name; None where there is none."""
+        return self.convert(self.refer("medium", name)) if name else None
 
     def report(self) -> None:
         """Warn of all that is not honored."""

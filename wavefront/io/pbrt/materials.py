@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ...bsdfs import Conductor, Dielectric, Diffuse, Mix, Plastic, Principled, ThinDielectric
+from ...bsdfs import Conductor, Dielectric, Diffuse, Mix, NullSurface, Plastic, Principled, ThinDielectric
 from ...core.errors import SceneError, number
 from ...materials import Material
-from ...media import Medium
+from ...media import HenyeyGreenstein, Medium
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.normal_map import BumpMap, NormalMap
@@ -164,7 +164,7 @@ def _mix(entity: Entity, job: Job) -> Material:
     if len(names) != 2:
         raise SceneError(f"materials names {len(names)} materials; it needs two")
     first, second = (job.convert(job.refer("material", name)) for name in names)
-    if first.alpha is not None or second.alpha is not None:
+    if first.bsdf.invisible or second.bsdf.invisible:
         raise SceneError("materials has an 'interface'; it cannot be mixed")
     if first.normal_map is not None or second.normal_map is not None:
         entity.lose("the bumps of its materials")
@@ -173,7 +173,7 @@ def _mix(entity: Entity, job: Job) -> Material:
 
 @converts("material", "interface none")
 def _interface(entity: Entity, job: Job) -> Material:
-    return Material(Diffuse(0), alpha=0.0, name=entity.name or None)
+    return Material(NullSurface(), name=entity.name or None)
 
 
 unsupported("material", "hair measured")
@@ -181,17 +181,18 @@ unsupported("material", "hair measured")
 
 @converts("medium", "homogeneous")
 def _homogeneous(entity: Entity, job: Job) -> Medium | None:
-    entity.harmless("g")
     if entity.text("preset"):
         entity.lose("preset; left out")
         return None
-    factor = entity.number("scale", 1.0)
-    absorbed, scattered = (
-        np.asarray(entity.spectrum(name, 1.0, job, "unbounded")) * factor for name in ("sigma_a", "sigma_s")
+    absorbed, scattered = (entity.spectrum(name, 1.0, job, "unbounded") for name in ("sigma_a", "sigma_s"))
+    glow = entity.spectrum("Le", 0.0, job, "light") * (entity.number("Lescale", 1.0) * job.exposure)
+    return Medium(
+        absorbed,
+        scattered,
+        phase=HenyeyGreenstein(entity.number("g", 0.0)),
+        scale=entity.number("scale", 1.0),
+        emission=glow * absorbed,
     )
-    if np.any(scattered):
-        entity.lose("sigma_s; its absorption alone in its place")
-    return Medium(absorption=np.broadcast_to(absorbed, 3))
 
 
 unsupported("medium", "uniformgrid rgbgrid cloud nanovdb")
@@ -203,8 +204,8 @@ def material_of(state: Any, alpha: Value, job: Job, label: Entity) -> Material:
     if isinstance(given, str):
         given = job.refer("material", given)
     base: Material = GRAY if given is None else job.convert(given)
-    inside = job.convert(job.refer("medium", state.inside)) if state.inside else None
-    if state.outside and state.outside != state.inside:
+    inside = job.medium(state.inside) if state.inside != state.outside else None
+    if state.outside not in ("", state.inside) and job.medium(state.outside) is not job.around:
         label.lose(f"the medium {state.outside!r} outside")
     if alpha is None and inside is None:
         return base
@@ -212,8 +213,7 @@ def material_of(state: Any, alpha: Value, job: Job, label: Entity) -> Material:
     if key not in job.made:
         made = copy(base)
         made.interior = inside
-        if alpha is not None and base.alpha is None:
-            made.alpha = alpha
+        made.alpha = alpha
         made.derive()
         job.made[key] = made
     found: Material = job.made[key]

@@ -101,6 +101,8 @@ class Reader:
         job.exposure = exposure_of(film, camera)
         if camera is not None:
             job.world = mirror_of(camera.matrix)
+            with placed(camera.label):
+                job.around = job.medium(camera.state.outside)
             job.film = ((1280, 720), None) if film is None else job.convert(film)
         for name in ("Sampler", "Integrator", "PixelFilter"):
             if name in self.options:
@@ -112,7 +114,7 @@ class Reader:
         lamps = [light for entity in self.lights if (light := job.convert(entity)) is not None]
         view = None if camera is None else job.convert(camera)
         job.report()
-        return Scene(found, lamps, view, settings=settings)
+        return Scene(found, lamps, view, settings=settings, medium=job.around)
 
     def _entity(self, kind: str, statement: Statement, target: str, type: str, name: str = "") -> Entity:
         given = self.state.defaults.get(target, {}) | statement.parameters
