@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from luminaires import GAMMA, SYMMETRIES, intensity, lm63, write
+from luminaires import GAMMA, intensity, lm63, write
 from scenes import ALBEDO, EYE, floor, probe
 from significance import measure, render
 
@@ -34,7 +34,7 @@ def arriving(light: wf.Light, points) -> np.ndarray:
     return sample.radiance.astype(float) * sample.pdf
 
 
-@pytest.mark.parametrize("symmetry", SYMMETRIES)
+@pytest.mark.parametrize("symmetry", ["axis", "90-270", "none"])
 def test_flux_through_a_sphere(tmp_path: Path, symmetry: str) -> None:
     """The lumens of the light are those that reach a sphere around it, within 0.1 %."""
     path, w = write(tmp_path, symmetry), sphere(400, 200)

@@ -149,7 +149,7 @@ def _lm63(name: str, lines: list[str], beside: list[str]) -> Photometry:
     kind = "CBA"[numbers.count("photometric type", 1, 3) - 1]
     numbers.take("units and size", 4, -MOST)
     ballast, lamp = numbers.take("ballast factors", 2)
-    numbers.take("input watts", 1)
+    numbers.take("input watts", 1, -MOST)
     factor *= ballast * (1 if lines[0].strip().endswith(WITHOUT_LAMP_FACTOR) else lamp)
     low, high = (0, 180) if kind == "C" else (-90, 90)
     vertical = numbers.angles("vertical angle", rows, low, high)
