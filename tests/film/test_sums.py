@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import wavefront as wf
+from wavefront.film import aov_sums
 from wavefront.film.picture_sums import empty_sums
 from wavefront.film.sums import Sums, bytes_per_pixel
 from wavefront.scheduling.accumulator import picture_memory
@@ -96,3 +97,24 @@ def test_the_memory_of_a_pixel_is_that_of_the_arrays(
     assert more == (size + 8 * channels) * 200
     sums = empty_sums((20, 10), layers, light_tracing)
     assert sum(array.nbytes for array in sums.arrays().values()) == pytest.approx((176 + size) * 200, abs=96)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.05, 0.4, 0.9])
+def test_zeros_that_are_left_out_change_no_bit(share: float, monkeypatch) -> None:
+    rng = np.random.default_rng(1)
+    parts = []
+    for _ in range(3):
+        lit = rng.random((1, 32, 20)) < share
+        parts.append((lit * np.exp(8 * rng.normal(size=(3, 32, 20)))).astype(np.float32))
+    found = []
+    for keep in (False, True):
+        if keep:
+            monkeypatch.setattr(aov_sums, "without_zeros", lambda radiance: radiance)
+        sums = aov_sums.RadianceSums(20)
+        for lanes, part in zip((slice(0, 20), slice(0, 20), np.arange(20)), parts, strict=True):
+            sums.add(lanes, part.copy())
+        found.append([sums.sums.high.tobytes(), sums.sums.low.tobytes(), sums.squares.tobytes()])
+    assert found[0] == found[1]
+    if share == 0.05:
+        monkeypatch.undo()
+        assert aov_sums.without_zeros(parts[0]).shape[1] < 16
