@@ -337,6 +337,11 @@ def test_materials(tmp_path: Path, statement: str, kind: Any, expected: dict[str
         np.testing.assert_allclose(np.ravel(getattr(found, name)) - np.ravel(value), 0, atol=2e-4)
 
 
+def test_attributes_need_not_be_read(tmp_path: Path) -> None:
+    text = 'Attribute "material" "rgb reflectance" [ .1 .1 .1 ] Material "dielectric"'
+    assert isinstance(material(tmp_path, text).bsdf, wf.Dielectric)  # without a warning
+
+
 def test_glass_disperses_by_its_abbe_number(tmp_path: Path) -> None:
     red, green, blue = rows(material(tmp_path, 'Material "dielectric" "spectrum eta" "glass-F11"').bsdf.ior)
     assert 1.77 < red < green < blue < 1.83
@@ -602,6 +607,12 @@ def test_objects_are_placed_by_both_transforms(tmp_path: Path) -> None:
         ('ColorSpace "rec2020"', BALL, "line 1: ColorSpace 'rec2020'; 'srgb' in its place"),
         ('Option "forcediffuse" true', BALL, "line 1: Option 'forcediffuse'"),
         ("", f'Shape "curve" {BALL}', "line 3: shape 'curve': left out"),
+        ("", f'{BALL} Shape "curve" Shape "curve"', "line 4: shape 'curve': left out"),
+        (
+            "",
+            f'{BALL} Shape "curve"\nShape "curve"\nShape "curve"',
+            "line 4: shape 'curve': left out (2 more)",
+        ),
         ("", f'Shape "disk" "float size" 2 {BALL}', "line 3: shape 'disk': size"),
         ("", 'Shape "bilinearmesh" "point3 P" [ 0 0 0 1 0 0 0 1 0 1 1 1 ]', "the curvature of its patches"),
         ("", f'Material "hair" {BALL}', "material 'hair': a gray Diffuse in its place"),

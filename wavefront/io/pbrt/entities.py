@@ -77,7 +77,7 @@ class Entity:
     type: str
     place: str  # file and line
     values: dict[str, Parameter]
-    lost: dict[str, None]  # what is not honored, of all entities
+    lost: dict[tuple[str, str], None]  # place of what is not honored, and what it is, of all entities
     matrix: Matrix = field(default_factory=lambda: np.eye(4))  # to the world, where it was stated
     state: Any = None  # the graphics state of a shape
     unread: set[str] = field(default_factory=set)
@@ -86,12 +86,15 @@ class Entity:
     @property
     def label(self) -> str:
         """Where it is, and what, for messages."""
-        named = f" {self.name!r}" if self.name else ""
-        return f"{self.place}: {self.kind} {self.type!r}{named}"
+        return f"{self.place}: {self._what}"
+
+    @property
+    def _what(self) -> str:
+        return f"{self.kind} {self.type!r}{f' {self.name!r}' if self.name else ''}"
 
     def lose(self, what: str) -> None:
         """Note something that is not honored."""
-        self.lost[f"{self.label}: {what}"] = None
+        self.lost[self.place, f"{self._what}: {what}"] = None
 
     def get(self, name: str, types: tuple[str, ...]) -> Any:
         """Return the values of a parameter, which must be of one of some types; None if it is absent."""
@@ -199,7 +202,7 @@ class Job:
     files: SceneFiles
     read_mesh: Callable[[Path], list[RawMesh]]
     strict: bool
-    lost: dict[str, None] = field(default_factory=dict)
+    lost: dict[tuple[str, str], None] = field(default_factory=dict)
     named: dict[tuple[str, str], Entity] = field(default_factory=dict)  # by kind and name
     made: dict[Any, Any] = field(default_factory=dict)  # what was converted already
     making: list[Entity] = field(default_factory=list)  # what refers to what is converted now
@@ -245,7 +248,13 @@ class Job:
         """Warn of all that is not honored."""
         if self.lost:
             name = str(self.files.scene)
-            lines = (each.removeprefix(name).lstrip(", ") for each in self.lost)
+            places: dict[str, list[str]] = {}
+            for place, what in self.lost:
+                places.setdefault(what, []).append(place.removeprefix(name).strip())
+            lines = (
+                f"{found[0]}: {what}{f' ({len(found) - 1} more)' if found[1:] else ''}"
+                for what, found in places.items()
+            )
             warn(f"{name}: not honored: {'; '.join(lines)}", self.strict)
 
     def _converted(self, entity: Entity) -> Any:
@@ -258,7 +267,7 @@ class Job:
             made, instead = INSTEAD[key[0]]
             entity.lose(instead)
             return made
-        entity.unread = set(entity.values)
+        entity.unread = {name for name, given in entity.values.items() if not given.optional}
         if entity.kind == "shape":
             entity.unread.discard("alpha")  # it is read with the material
         made = convert(entity, self)

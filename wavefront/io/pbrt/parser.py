@@ -54,6 +54,7 @@ class Parameter:
     type: str
     values: Any  # (n,) float64 of numbers, or a list of strings
     place: str
+    optional: bool = False  # of `Attribute`, which is for several statements
 
 
 @dataclass(frozen=True)

@@ -93,11 +93,7 @@ class Reader:
         if self.stack:
             raise SceneError(f"{self.stack[-1][1]}: {self.stack[-1][0]} has no end")
         camera, film = self.options.get("Camera"), self.options.get("Film")
-        settings = {
-            "filter": "gaussian",
-            "spp": 16,
-            "max_bounces": 5,
-        }  # what pbrt takes where nothing is stated
+        settings = {"filter": "gaussian", "spp": 16, "max_bounces": 5}  # of pbrt, where nothing is stated
         job.exposure = exposure_of(film, camera)
         if camera is not None:
             job.world = mirror_of(camera.matrix)
@@ -190,17 +186,19 @@ class Reader:
         target = statement.words[0]
         if target not in TARGETS:
             raise SceneError(f"Attribute is for {target!r}; it must be one of {', '.join(TARGETS)}")
-        own = self.state.defaults.get(target, {}) | statement.parameters
+        given = {name: replace(each, optional=True) for name, each in statement.parameters.items()}
+        own = self.state.defaults.get(target, {}) | given
         self._set(defaults=self.state.defaults | {target: own})
 
     def _ColorSpace(self, statement: Statement) -> None:
         if statement.words[0] != "srgb":
-            self.job.lost[f"{statement.place}: ColorSpace {statement.words[0]!r}; 'srgb' in its place"] = None
+            what = f"ColorSpace {statement.words[0]!r}; 'srgb' in its place"
+            self.job.lost[statement.place, what] = None
 
     def _Option(self, statement: Statement) -> None:
         name, value = statement.words
         if name.lower() not in HARMLESS.split() and value != "false":
-            self.job.lost[f"{statement.place}: Option {name!r}"] = None
+            self.job.lost[statement.place, f"Option {name!r}"] = None
 
     def _TransformTimes(self, statement: Statement) -> None:
         """Do nothing: what moves is noted."""
