@@ -72,6 +72,7 @@ EXTRAS = {
     "dask": Extra(("distributed",), "renders on a Dask cluster"),
     "plot": Extra(("matplotlib",), "Image.plot"),
     "video": Extra(("av",), "animations as mp4"),
+    "sky": Extra(("pvlib",), "sun_position and load_weather: where the sun stands"),
     "viewer": Extra(("viser",), "wf.view and wavefront view: a scene in the browser"),
     "completion": Extra(("shtab",), "completion of this command line in bash and zsh"),
 }
