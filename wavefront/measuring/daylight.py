@@ -30,17 +30,19 @@ ALONG = 4  # squared: directions in which the sky is evaluated in each patch
 class DaylightCoefficients:
     """What each patch of the sky brings to points, from `daylight_coefficients`.
 
-    Attributes
+    Parameters
     ----------
-    batches
-        (b, n, p) irradiance of n points by a radiance of 1 of each patch, from b independent parts of the
-        samples; the luminance of its color. Patch 0 is the ground, the others are as in `SkyPatches`.
-    direct
-        (b, n, p) the part that no surface has scattered.
+    scene
+        With the patched sky as its light.
+    points, normals
+        (n, 3) of the sensors.
     patches
         The division of the sky.
-    points, normals
-        (n, 3) as given.
+    batches
+        (b, n, p) irradiance of n points by a radiance of 1 of each patch, from b independent parts of the
+        samples; the luminance of its color. Patch 0 is the ground, the others are as in Radiance.
+    direct
+        (b, n, p) the part that no surface has scattered.
 
     Examples
     --------
@@ -51,10 +53,16 @@ class DaylightCoefficients:
     """
 
     def __init__(
-        self, scene: Scene, points: Doubles, normals: Doubles, patches: SkyPatches, both: list[Doubles]
+        self,
+        scene: Scene,
+        points: Doubles,
+        normals: Doubles,
+        patches: SkyPatches,
+        batches: Doubles,
+        direct: Doubles,
     ) -> None:
         self._scene, self.points, self.normals, self.patches = scene, points, normals, patches
-        self.batches, self.direct = both
+        self.batches, self.direct = batches, direct
 
     @property
     def value(self) -> Doubles:
@@ -230,7 +238,7 @@ def daylight_coefficients(
         )
         for bounces in ({}, {"max_bounces": 0})
     ]
-    return DaylightCoefficients(subject, sensors.points, sensors.directions, patches, both)
+    return DaylightCoefficients(subject, sensors.points, sensors.directions, patches, *both)
 
 
 def _on_patches(scene: Scene, sensors: Sensors, settings: dict[str, Any], patches: int) -> Doubles:

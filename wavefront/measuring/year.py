@@ -20,7 +20,7 @@ class Year:
     Errors are those of the coefficients; the model of the sky has its own, as does the weather. They come
     from estimates that each leave out one part of the samples (the jackknife), and so hold for all figures.
 
-    Attributes
+    Parameters
     ----------
     batches
         (b, n, h) irradiance, or illuminance, of n points in h hours, by b independent parts of the samples.
