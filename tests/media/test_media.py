@@ -288,9 +288,10 @@ def test_absorption_alone_is_as_before() -> None:
     np.testing.assert_allclose(one, two, rtol=1e-5)
 
 
-def test_caustics_are_refused() -> None:
-    with pytest.raises(wf.SceneError, match="caustics=True does not go with media"):
-        render(room(FOG), 1, caustics=True)
+@pytest.mark.parametrize("setting", ["caustics", "reuse"])
+def test_what_media_exclude_is_refused(setting: str) -> None:
+    with pytest.raises(wf.SceneError, match=f"{setting}=True does not go with media that scatter"):
+        render(room(FOG), 1, **{setting: True})
 
 
 def test_media_scale_with_the_scene() -> None:

@@ -18,7 +18,7 @@ from wavefront.integrators import training, tuning
 from wavefront.integrators.tuning import Run, Trial
 from wavefront.session import choice
 from wavefront.settings import SETTINGS
-from wavefront.settings.combinations import EXCLUSIONS, SETTING_OF, Exclusion, table
+from wavefront.settings.combinations import EXCLUSIONS, MEDIA, SETTING_OF, Exclusion, table
 
 CAMERA = wf.Camera.look_at((3, 2, 4), (0, 0, 0), fov=45, size=(8, 8))
 ANOTHER = "another integrator"
@@ -63,6 +63,7 @@ VALUES: dict[str, Any] = {  # of each setting, one that is not its default
     "progress": lambda done, total: None,
 }
 USUAL = {"size": (8, 8), "max_bounces": 4, "lighting": "cloudy", "workers": 1, "progress": False}
+OF_SETTINGS = [each for each in EXCLUSIONS if each.other != MEDIA]  # tests/media has those of scenes
 NAMED = {name for each in EXCLUSIONS for name in (each.one, each.other)}
 QUICK = [name for name in VALUES if name in NAMED and name != "guide"]
 
@@ -120,7 +121,7 @@ def test_help_has_each_pair_of_the_table() -> None:
                 assert other in SETTINGS[one].text.partition(sentence)[2].partition(".")[0].replace("`", "")
 
 
-@pytest.mark.parametrize("each", [each for each in EXCLUSIONS if each.refused], ids=named)
+@pytest.mark.parametrize("each", [each for each in OF_SETTINGS if each.refused], ids=named)
 def test_pairs_of_the_table_are_refused(each: Exclusion) -> None:
     """Before any work, with both values and the reason of the table, whichever is given first."""
     for names in ((each.one, each.other), (each.other, each.one)):
@@ -132,7 +133,7 @@ def test_pairs_of_the_table_are_refused(each: Exclusion) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:noise=")  # of one sample is unknown
-@pytest.mark.parametrize("each", [each for each in EXCLUSIONS if each.one == "reuse"], ids=named)
+@pytest.mark.parametrize("each", [each for each in OF_SETTINGS if each.one == "reuse"], ids=named)
 def test_auto_leaves_re_use_out(each: Exclusion, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where something else of the table is asked for, whatever a trial would say."""
 

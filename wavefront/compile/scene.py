@@ -11,7 +11,6 @@ from ..accel import Accelerator, Geometry, InstanceAccelerator
 from ..arrays.soa import soa
 from ..arrays.vec import Bools, Floats, Ints
 from ..camera import Camera
-from ..core.errors import SceneError
 from ..lights import InfiniteLight, LightTable
 from ..lights.choice import LightSamplerMaker
 from ..scene import Scene
@@ -154,11 +153,6 @@ def compile_scene(
     media = media_table(around, placed, user_materials, filled, center)
     phases = phase_materials(filled)
     user_materials += phases
-    if caustics and media is not None:
-        raise SceneError(
-            "caustics=True does not go with media that scatter, emit or overlap: paths from lights do not "
-            "follow them"
-        )
     lights, groups, light_of, environment = gather_lights(
         scene, scaled, scale, meshes, curved, vertices, center, (high - low) / 2, light_sampler, mis
     )

@@ -54,7 +54,7 @@ def caustics_hint(settings: Settings, prepared: PreparedScene) -> str | None:
         return None
     compiled = prepared.compiled
     lights, materials = compiled.lights, compiled.materials.groups
-    if not any(bsdf.specular for bsdf in materials):
+    if compiled.media is not None or not any(bsdf.specular for bsdf in materials):
         return None
     if (lights.delta_of & lights.chosen_from).any():
         return LOST_CAUSTICS

@@ -14,6 +14,7 @@ from ..integrators import INTEGRATORS, WITH_MIS
 from ..scene import Scene
 from ..scene.lighting import choose_ground, choose_preset, lighted
 from ..settings import AUTO, Settings
+from ..settings.combinations import MEDIA, check_combinations
 from .resuming import scene_fingerprint
 
 
@@ -71,6 +72,7 @@ class PreparedScene:
                 mis=INTEGRATORS.find(settings.values["integrator"]) in WITH_MIS,
                 caustics=settings.values["caustics"],
             )
+        check_combinations({**values, MEDIA: compiled.media is not None})
         self.compiled = replace(
             compiled, background=settings.background_color, roulette_after=settings.roulette_after
         )

@@ -25,6 +25,7 @@ class Exclusion:
 ONE_PATH = "light of shared paths comes from many paths at once"
 ANY_PIXEL = "paths from lights reach any pixel"
 ONLY_FULL = "only the paths of integrator='full' go on from surface to surface with light samples"
+MEDIA = "media that scatter"  # or emit, or overlap: known of a scene once it is compiled
 GIVEN = "samples are given by their numbers"
 EXCLUSIONS = (
     Exclusion("reuse", "clamp", f"a clamp limits what one path finds, and {ONE_PATH}"),
@@ -36,6 +37,8 @@ EXCLUSIONS = (
     Exclusion("reuse", "another integrator", ONLY_FULL),
     Exclusion("caustics", "another integrator", ONLY_FULL),
     Exclusion("branches", "another integrator", ONLY_FULL),
+    Exclusion("reuse", MEDIA, "points within media are not shared"),
+    Exclusion("caustics", MEDIA, "paths from lights do not follow them"),
     Exclusion("view", "camera", "a view is framed by a camera of its own"),
     Exclusion("fov", "camera", "a camera has a field of view of its own"),
     Exclusion("samples", "spp", GIVEN),
@@ -49,6 +52,7 @@ ASKED: dict[str, Callable[[Mapping[str, Any]], bool]] = {
     "guide": lambda values: values["guide"] is True,
     "caustics": lambda values: values["caustics"],
     "branches": lambda values: values["branches"] not in (1, AUTO),
+    MEDIA: lambda values: bool(values.get(MEDIA)),
     "filter": lambda values: FILTERS.find(values["filter"]) is not box,
     "light groups": lambda values: "light_groups" in values["aovs"],
     "another integrator": lambda values: INTEGRATORS.find(values["integrator"]) is not li_full,
@@ -94,6 +98,8 @@ def _both_ways() -> Iterator[Exclusion]:
 
 
 def _in_words(values: Mapping[str, Any], name: str) -> str:
+    if name == MEDIA:
+        return name
     setting = SETTING_OF.get(name, name)
     return f"{setting}={in_brief(SHOWN.get(setting, lambda value: value)(values[setting]))}"
 
