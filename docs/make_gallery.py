@@ -28,6 +28,8 @@ PICTURES = {  # size, samples per pixel, whether it is denoised, whether it has 
     "fruit": (1200, 14, True, True),
     "photograph": (1200, 14, True, True),
     "caustics": (1200, 32, True, True),
+    "fog": (1200, 64, True, False),
+    "milk": (600, 64, True, False),
     "cornell_box": (1200, 32, True, True),
     "course_spheres": (1200, 32, True, True),
     "spheres": (1200, 24, True, True),

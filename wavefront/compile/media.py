@@ -89,6 +89,8 @@ class MediaTable:
         """Return what there is inside of stacks (k, n): the entries (n,) of the highest priority."""
         best = stack[0]
         for entry in stack[1:]:
+            if not entry.any():  # nor has any row after it
+                break
             best = np.where(self.priority.take(entry) > self.priority.take(best), entry, best)
         return best
 
@@ -126,6 +128,8 @@ class MediaTable:
 
 def crossed(stack: Ints, crossing: Ints) -> Ints:
     """Return stacks (4, n) after `MediaTable.crossing` (n,)."""
+    if not crossing.any():
+        return stack
     enters = crossing > 0
     if (enters & (stack[-1] != 0)).any():
         warn_caller(f"paths are inside of more than {DEPTH} shapes; they forget the outermost")

@@ -64,6 +64,8 @@ def alpha_pass_through(
         if media is not None:
             lanes = fly(scene, paths, hits, lanes, sampler, bounce, dimension - Dimension.OPACITY)
             lanes = _passable(scene, paths, hits, lanes, catches)
+            if not lanes.size:
+                break
         here, at = paths.take(lanes), hits.take(lanes)
         surface = interaction(scene, here, at)
         u = sampler.draw_1d(here.pixel, here.sample, bounce, dimension)

@@ -40,6 +40,8 @@ def fly(
     assert paths.media is not None
     medium = media.medium_in(take(paths.media, lanes))
     inside = np.flatnonzero(medium >= 0)
+    if not inside.size:
+        return lanes
     reached = np.ones(lanes.size, np.bool_)
     medium, some = medium.take(inside), lanes.take(inside)
     address = take(paths.pixel, some), take(paths.sample, some), bounce, Dimension.MEDIUM + segment
