@@ -35,5 +35,5 @@ if __name__ == "__main__":
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--size", type=int, default=640)
     options = parser.parse_args()
-    wf.render(street(options.size), options.spp, max_bounces=8, clamp=2).save(options.output, exposure=1.5)
+    wf.render(street(options.size), options.spp, max_bounces=8).save(options.output, exposure=1.5)
     print(f"wrote {options.output}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from ..textures.base import BaseTexture
 
 DEPTH = 4  # media that a path remembers, the last one that it entered first
 LOWEST = np.iinfo(np.intp).min  # priority of what is around all shapes
+ENTRY = np.int16  # small: every path carries four
 
 
 class PhaseBsdf(Bsdf):
@@ -67,7 +69,7 @@ class MediaTable:
     Tools 7(2), 2002.
     """
 
-    entry_of: Ints  # (materials,) and (phase functions,) after them; 0 for those that enclose nothing
+    entry_of: NDArray[Any]  # (materials,) and (phase functions,) after them; 0 for those that enclose nothing
     priority: Ints  # (entries,)
     nested: Bools  # (entries,) whether the index of refraction of what is around counts
     index: Floats  # (entries,) of refraction; 1 where `nested` is False
@@ -85,7 +87,7 @@ class MediaTable:
         """Whether a record needs numbers without end."""
         return any(record.takes_steps for record in self.records)
 
-    def highest(self, stack: Ints) -> Ints:
+    def highest(self, stack: NDArray[Any]) -> NDArray[Any]:
         """Return what there is inside of stacks (k, n): the entries (n,) of the highest priority."""
         best = stack[0]
         for entry in stack[1:]:
@@ -94,22 +96,22 @@ class MediaTable:
             best = np.where(self.priority.take(entry) > self.priority.take(best), entry, best)
         return best
 
-    def medium_in(self, stack: Ints) -> Ints:
+    def medium_in(self, stack: NDArray[Any]) -> Ints:
         """Return the medium (n,) inside of stacks (4, n), -1 for none."""
         return self.medium_of.take(self.highest(stack))
 
-    def crossing(self, material: Ints, back_facing: Bools) -> Ints:
+    def crossing(self, material: Ints, back_facing: Bools) -> NDArray[Any]:
         """Return what crossing surfaces does to stacks (n,): the entry put there, negative if taken."""
         entry = self.entry_of.take(material)
         return np.where(back_facing, -entry, entry)
 
-    def hidden(self, stack: Ints, material: Ints) -> Bools:
+    def hidden(self, stack: NDArray[Any], material: Ints) -> Bools:
         """Return whether surfaces (n,) are within something of a higher priority, which hides them."""
         entry = self.entry_of.take(material)
         around = self.highest(without(stack, entry))
         return (entry > 0) & (self.priority.take(around) > self.priority.take(entry))
 
-    def index_around(self, stack: Ints, surface: SurfaceInteraction) -> Floats | None:
+    def index_around(self, stack: NDArray[Any], surface: SurfaceInteraction) -> Floats | None:
         """Return the index of refraction outside of surfaces (n,); 1 where it does not count."""
         if not self.nested.any():
             return None
@@ -126,19 +128,19 @@ class MediaTable:
                 yield record, lanes, self.column_of.take(medium.take(lanes))
 
 
-def crossed(stack: Ints, crossing: Ints) -> Ints:
+def crossed(stack: NDArray[Any], crossing: NDArray[Any]) -> NDArray[Any]:
     """Return stacks (4, n) after `MediaTable.crossing` (n,)."""
     if not crossing.any():
         return stack
     enters = crossing > 0
     if (enters & (stack[-1] != 0)).any():
         warn_caller(f"paths are inside of more than {DEPTH} shapes; they forget the outermost")
-    out = without(stack, np.where(crossing < 0, -crossing, -1))
+    out = without(stack, np.where(crossing < 0, -crossing, ENTRY(-1)))
     shifted = np.concatenate([crossing[None], stack[:-1]])
     return np.where(enters, shifted, out)
 
 
-def without(stack: Ints, entry: Ints) -> Ints:
+def without(stack: NDArray[Any], entry: NDArray[Any]) -> NDArray[Any]:
     """Return stacks (4, n) without the last of these entries (n,) that was put there."""
     out, gone = np.empty_like(stack), np.zeros(entry.size, np.bool_)
     for row, values in enumerate(stack):
@@ -195,11 +197,16 @@ def media_table(
     if not media and all(each is None for each in priorities):
         return None
     phases = list(dict.fromkeys(id(medium.phase) for medium in media if medium.scatters))
-    entry_of, holders = np.zeros(len(materials) + len(phases), np.intp), list[Material]()
+    entry_of, holders = np.zeros(len(materials) + len(phases), ENTRY), list[Material]()
     for row, material in enumerate(materials):
         if material.encloses:
             holders.append(material)
             entry_of[row] = len(holders)
+    if len(holders) > np.iinfo(ENTRY).max:
+        raise SceneError(
+            f"{len(holders)} materials enclose something in a scene with media; "
+            f"there may be {np.iinfo(ENTRY).max}"
+        )
     number = {id(medium): place for place, medium in enumerate(media)}
     inside = [around, *(material.interior for material in holders)]
     nested = np.array([False, *(material.priority is not None for material in holders)])

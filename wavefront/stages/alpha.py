@@ -68,10 +68,13 @@ def alpha_pass_through(
                 break
         here, at = paths.take(lanes), hits.take(lanes)
         surface = interaction(scene, here, at)
-        u = sampler.draw_1d(here.pixel, here.sample, bounce, dimension)
-        passing = np.flatnonzero(u >= _opacities(scene, here, at, surface, sampler, catches))
-        lanes, here, surface = lanes.take(passing), here.take(passing), surface.take(passing)
-        absorb(scene, here.throughput, at.take(passing), surface)
+        opacity = _opacities(scene, here, at, surface, sampler, catches)
+        if opacity.any():
+            u = sampler.draw_1d(here.pixel, here.sample, bounce, dimension)
+            passing = np.flatnonzero(u >= opacity)
+            lanes, here, at = lanes.take(passing), here.take(passing), at.take(passing)
+            surface = surface.take(passing)
+        absorb(scene, here.throughput, at, surface)
         here = replace(continue_behind(here, surface), media=cross(scene, here.media, surface))
         paths.origin[:, lanes], paths.exclude_prim[lanes] = here.origin, here.exclude_prim
         paths.throughput[:, lanes] = here.throughput

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays.state import Rays
-from ..arrays.vec import Floats, Ints, f4, take
-from ..compile.media import DEPTH
+from ..arrays.vec import Floats, f4, take
+from ..compile.media import DEPTH, ENTRY
 from ..compile.scene import CompiledScene
 from .interaction import interaction
 from .intersect import intersect
@@ -16,7 +19,7 @@ OUTWARD = np.array([[0.5337], [0.6129], [0.5827]], f4)  # any direction along wh
 MOST_SURFACES = 1 << 12  # on the way out of a scene
 
 
-def stacks_at(scene: CompiledScene, origin: Floats) -> Ints | None:
+def stacks_at(scene: CompiledScene, origin: Floats) -> Any:
     """Return what points (3, n) are inside of, (4, n); None where the scene needs no stacks.
 
     A ray leads out of the scene from each: what it leaves without having entered it is around the point, the
@@ -26,7 +29,7 @@ def stacks_at(scene: CompiledScene, origin: Floats) -> Ints | None:
     if media is None:
         return None
     n = origin.shape[1]
-    stack = np.zeros((DEPTH, n), np.intp)
+    stack = np.zeros((DEPTH, n), ENTRY)
     low, high = media.bounds[:, :, None].astype(f4)
     lanes = np.flatnonzero(((origin >= low) & (origin <= high)).all(0))
     if not lanes.size:
@@ -38,11 +41,11 @@ def stacks_at(scene: CompiledScene, origin: Floats) -> Ints | None:
     return stack
 
 
-def _enclosing(scene: CompiledScene, origin: Floats) -> Ints:
+def _enclosing(scene: CompiledScene, origin: Floats) -> NDArray[Any]:
     """Return the stacks (4, n) of points (3, n), by rays out of the scene."""
     media, n = scene.media, origin.shape[1]
     assert media is not None
-    stack, depth = np.zeros((DEPTH + 1, n), np.intp), np.zeros(n, np.intp)
+    stack, depth = np.zeros((DEPTH + 1, n), ENTRY), np.zeros(n, np.intp)
     open_ = np.zeros((media.priority.size, n), np.int32)  # entered on the way, and not left yet
     rays = Rays(origin, np.repeat(OUTWARD / np.sqrt((OUTWARD**2).sum()), n, 1), np.full(n, -1, np.intp))
     lanes = np.arange(n)

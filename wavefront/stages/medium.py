@@ -70,7 +70,7 @@ def fly(
 
 
 def transmitted(
-    scene: CompiledScene, rays: Rays, stack: Ints, length: Floats, steps: StepNumbers | None
+    scene: CompiledScene, rays: Rays, stack: Any, length: Floats, steps: StepNumbers | None
 ) -> Floats:
     """Return what part of the light media let through over some lengths (n,) of rays, (3, n)."""
     media = scene.media
@@ -89,7 +89,7 @@ def transmitted(
     return part
 
 
-def hidden(scene: CompiledScene, stack: Ints | None, material: Ints) -> Bools:
+def hidden(scene: CompiledScene, stack: Any, material: Ints) -> Bools:
     """Return whether surfaces of materials (n,) are within something of a higher priority."""
     if scene.media is None or stack is None or not scene.media.nested.any():
         return np.zeros(material.size, np.bool_)

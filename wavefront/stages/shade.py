@@ -14,7 +14,7 @@ from ..arrays.state import Contribution, Hits, Paths, SurfaceInteraction
 from ..arrays.vec import ALL, TINY, Floats, Ints, Lanes, broadcast, column, dot, f4, highest, take
 from ..bsdfs import Bsdf, albedo_of, evaluated
 from ..compile.materials import MaterialTable
-from ..compile.media import crossed
+from ..compile.media import ENTRY, crossed
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..lights import LightSample, Receiver
@@ -55,7 +55,7 @@ class Shading:
     guidance: Guidance | None = None  # of the lanes of `lit`; None where BSDFs alone choose directions
     receiver: Receiver | None = None  # what lights are sampled for; None where no light takes it
     volume: Ints | None = None  # lanes within media, where there is no cosine; None in scenes without media
-    crossing: Ints | None = None  # (n,) what light that crosses the surfaces does to stacks; likewise
+    crossing: Any = None  # (n,) what light that crosses the surfaces does to stacks; likewise
 
     def lit(self) -> Shading:
         """Return the lanes that need light sampling; the groups after them have only delta lobes."""
@@ -117,7 +117,7 @@ class Shading:
         """Return the stacks (4, n) of rays that leave, given those of paths that come; see `cosines`."""
         if media is None or self.crossing is None:
             return media
-        return crossed(media, np.where(cos_g < 0, self.crossing, 0))
+        return crossed(media, np.where(cos_g < 0, self.crossing, ENTRY(0)))
 
     def unshadowed(self, world: Floats) -> Floats:
         """Return the part (n,) of light along world directions (3, n) that tilted normals do not shadow.

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..arrays.state import Hits, Rays, SurfaceInteraction
-from ..arrays.vec import ALL, Bools, Floats, Ints, Lanes, dot, f4, take
+from ..arrays.vec import ALL, Bools, Floats, Lanes, dot, f4, take
 from ..compile.scene import CompiledScene
 from .interaction import interaction, material_rows, offset_origin
 from .intersect import ShadowRays, intersect, shadow_ray_length, visible
@@ -56,7 +56,7 @@ def transmittance_along(scene: CompiledScene, rays: ShadowRays) -> Floats:
     return part
 
 
-def passable(scene: CompiledScene, hits: Hits, lanes: Lanes, stack: Ints | None) -> Bools:
+def passable(scene: CompiledScene, hits: Hits, lanes: Lanes, stack: Any) -> Bools:
     """Return whether some lanes (k,) hit surfaces that rays with stacks (4, k) may pass straight on."""
     prim = take(hits.prim, lanes)
     found: Bools = np.zeros(prim.size, np.bool_)
@@ -67,7 +67,7 @@ def passable(scene: CompiledScene, hits: Hits, lanes: Lanes, stack: Ints | None)
     return found
 
 
-def opacities_at(scene: CompiledScene, surface: SurfaceInteraction, stack: Ints | None) -> Floats:
+def opacities_at(scene: CompiledScene, surface: SurfaceInteraction, stack: Any) -> Floats:
     """Return the opacities (n,) of surfaces to rays with stacks (4, n)."""
     opacity: Floats = np.ones(len(surface), f4) if scene.opacities is None else scene.opacities.at(surface)
     if stack is not None:
