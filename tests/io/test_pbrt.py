@@ -345,6 +345,10 @@ def test_attributes_need_not_be_read(tmp_path: Path) -> None:
 def test_glass_disperses_by_its_abbe_number(tmp_path: Path) -> None:
     red, green, blue = rows(material(tmp_path, 'Material "dielectric" "spectrum eta" "glass-F11"').bsdf.ior)
     assert 1.77 < red < green < blue < 1.83
+    lines = 1 / np.square([0.4861, 0.6563, 0.464, 0.611])  # F and C, between which Abbe's number is defined
+    assert blue - red == pytest.approx(
+        0.7847 / 25.8 * (lines[2] - lines[3]) / (lines[0] - lines[1]), rel=1e-3
+    )
     assert material(
         tmp_path, 'Material "thindielectric" "spectrum eta" "glass-BK7"'
     ).bsdf.ior == pytest.approx(1.518, abs=2e-3)
@@ -399,6 +403,7 @@ def test_media_fill_shapes_and_space(tmp_path: Path) -> None:
     [
         ('Texture "t" "spectrum" "constant" "rgb value" [ .1 .2 .3 ]', (0, 0), [0.1, 0.2, 0.3]),
         ('Texture "t" "spectrum" "checkerboard"', (0.5, 0.5), [1, 1, 1]),
+        ('Texture "t" "spectrum" "checkerboard"', (0.99, 0.99), [1, 1, 1]),
         ('Texture "t" "spectrum" "checkerboard" "float uscale" 4 "float vscale" 2', (0.3, 0.2), [0, 0, 0]),
         ('Texture "t" "spectrum" "checkerboard" "float uscale" 4 "float vscale" 2', (0.3, 0.7), [1, 1, 1]),
         ('Texture "t" "spectrum" "checkerboard" "float udelta" 1', (0.5, 0.5), [0, 0, 0]),
@@ -470,6 +475,21 @@ def test_textures(tmp_path: Path, textures: str, point: Any, expected: Any) -> N
     ).bsdf.reflectance
     value = at(found, *point) if isinstance(found, wf.BaseTexture) else np.ravel(found)
     np.testing.assert_allclose(np.broadcast_to(value, 3), expected, atol=1e-3)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5])
+def test_no_point_changes_the_texture_of_another(tmp_path: Path, count: int) -> None:
+    write_image(tmp_path / "i.exr", np.random.default_rng(1).random((4, 4, 3)).astype(np.float32) * 0.5)
+    text = """Texture "i" "spectrum" "imagemap" "string filename" "i.exr"
+    Texture "f" "float" "imagemap" "string filename" "i.exr"
+    Texture "g" "float" "scale" "texture tex" "f" "texture scale" "f"
+    Texture "t" "spectrum" "mix" "rgb tex1" [ .1 .2 .3 ] "texture tex2" "i" "texture amount" "g"
+    Material "conductor" "texture reflectance" "t" "texture roughness" "g" """
+    bsdf = material(tmp_path, text).bsdf
+    uv = np.random.default_rng(2).random((2, count), np.float32)
+    for texture in (bsdf.k, bsdf.roughness):
+        alone = [at(texture, *point) for point in uv.T]
+        np.testing.assert_array_equal(texture.at(SimpleNamespace(uv=uv)).T, alone)
 
 
 def test_textures_of_numbers_make_roughness(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -111,23 +112,20 @@ class _Reader:
                 yield Statement("AttributeEnd", statement.place, [], [], {})
 
 
-class placed:
-    """Gives errors a place, unless they have one."""
-
-    def __init__(self, place: str) -> None:
-        self._place = place
-
-    def __enter__(self) -> None:
-        """Do nothing."""
-
-    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        """Raise the error anew, with its place."""
-        if isinstance(error, SceneError) and not isinstance(error, PlacedError):
-            raise PlacedError(f"{self._place}: {error}") from error
-
-
 class PlacedError(SceneError):
     """An error whose message names file and line."""
+
+
+@contextmanager
+def placed(place: str) -> Iterator[None]:
+    """Give errors a place, unless they have one."""
+    try:
+        yield
+    except PlacedError:
+        raise
+    except SceneError as error:
+        name = place.rpartition(" line ")[0]
+        raise PlacedError(f"{place}: {str(error).removeprefix(f'{name}: ')}") from error
 
 
 class _Text:

@@ -16,7 +16,6 @@ from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from .entities import Entity, Job, converts, unsupported
 
-COLORS = ("rgb", "color", "spectrum", "blackbody", "float")
 Value = Any  # a number, a color (3,) or a texture
 
 
@@ -24,11 +23,15 @@ class Computed(BaseTexture):
     """A function of textures and constants, such as their product."""
 
     def __init__(self, function: Callable[..., Any], *parts: Any, limits: tuple[float, ...] = ()) -> None:
-        self.function, self.parts, self._limits = function, parts, limits
+        self.function, self._limits = function, limits
+        self.parts = [
+            part if isinstance(part, BaseTexture) else np.asarray(part, f4).reshape(-1, 1)  # (1, 1) or (3, 1)
+            for part in parts
+        ]
         textures = [part for part in parts if isinstance(part, BaseTexture)]
-        self.reads = tuple(dict.fromkeys(field for each in textures for field in each.reads)) or ("uv",)
-        self.scalar = all(each.scalar for each in textures) and all(
-            np.ndim(part) == 0 for part in parts if not isinstance(part, BaseTexture)
+        self.reads = tuple(dict.fromkeys(field for each in textures for field in each.reads))
+        self.scalar = all(
+            part.scalar if isinstance(part, BaseTexture) else np.ndim(part) == 0 for part in parts
         )
 
     def __repr__(self) -> str:
@@ -42,12 +45,10 @@ class Computed(BaseTexture):
     def at(self, surface: SurfaceInteraction) -> Floats:
         """Return the values of the function, (n,) or (3, n)."""
         assert surface.uv is not None
-        found = [part.at(surface) if isinstance(part, BaseTexture) else part for part in self.parts]
-        value = self.function(
-            *(np.reshape(each, (3, 1)) if np.shape(each) == (3,) else each for each in found)
-        )
-        size = surface.uv.shape[1]
-        return np.broadcast_to(value, (size,) if self.scalar else (3, size)).astype(f4)
+        found = (part.at(surface) if isinstance(part, BaseTexture) else part for part in self.parts)
+        values = self.function(*(np.atleast_2d(each) for each in found))
+        values = np.broadcast_to(values, (len(values), surface.uv.shape[1])).astype(f4)
+        return values[0] if self.scalar else np.broadcast_to(values, (3, values.shape[1]))
 
 
 def product(a: Any, b: Any) -> Any:
