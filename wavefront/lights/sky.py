@@ -201,13 +201,12 @@ class Sky(Parametrized, Light):
         array([1.   , 0.333])
         """
         function = cie_function(type)
-        zenith = _zenith(up)
-        if sun is None and type in WITHOUT_SUN:
-            sun = zenith
-        elif sun is None or (type not in WITHOUT_SUN and not unit("Sky sun", sun) @ zenith > 0):
-            raise SceneError(f"Sky sun is {sun!r}; a sky of type {type} needs one that is above the horizon")
+        if type not in WITHOUT_SUN:
+            _height(sun, up)
         return cls(
-            *(function, sun, up),
+            function,
+            _zenith(up) if sun is None else sun,
+            up,
             horizontal=horizontal,
             direct_normal=direct_normal,
             ground=ground,
@@ -268,14 +267,11 @@ class Sky(Parametrized, Light):
         direct = number("Sky direct_normal", direct_normal, lambda x: x >= 0, "at least 0")
         diffuse = number("Sky diffuse_horizontal", diffuse_horizontal, lambda x: x > 0, "above 0")
         beyond = number("Sky extraterrestrial", extraterrestrial, lambda x: x > 0, "above 0")
-        height = float(unit("Sky sun", sun) @ _zenith(up))
-        if not height > 0:
-            raise SceneError(f"Sky sun is {sun!r}; it must be above the horizon")
         scaled = (
             (direct, diffuse) if illuminance is None else finite_array("Sky illuminance", illuminance, (2,))
         )
         return cls(
-            perez_function(direct, diffuse, min(height, 1.0), beyond),
+            perez_function(direct, diffuse, _height(sun, up), beyond),
             sun,
             up,
             horizontal=scaled[1],
@@ -325,10 +321,7 @@ class Sky(Parametrized, Light):
         albedo = rgb("Sky ground_albedo", ground_albedo, high=1)
         haze = number("Sky turbidity", turbidity, lambda x: 1 <= x <= 10, "from 1 to 10")
         factor = number("Sky scale", scale, lambda x: x > 0, "above 0")
-        height = float(unit("Sky sun", sun) @ _zenith(up))
-        if not height > 0:
-            raise SceneError(f"Sky sun is {sun!r}; it must be above the horizon")
-        function, radiance, solar = hosek_wilkie_sky(haze, albedo, min(height, 1.0))
+        function, radiance, solar = hosek_wilkie_sky(haze, albedo, _height(sun, up))
         return cls(
             function,
             sun,
@@ -362,6 +355,14 @@ class Sky(Parametrized, Light):
 
 def _zenith(up: ArrayLike) -> NDArray[np.float64]:
     return unit("Sky up", upward("Sky up", up))
+
+
+def _height(sun: ArrayLike | None, up: ArrayLike) -> float:
+    """Return the cosine of the sun's angle from the zenith, above 0."""
+    height = 0.0 if sun is None else float(unit("Sky sun", sun) @ _zenith(up))
+    if not height > 0:
+        raise SceneError(f"Sky sun is {sun!r}; such a sky needs one that is above the horizon")
+    return min(height, 1.0)
 
 
 def _rotation(up: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.elementary import sin_cos_turns
 from ..arrays.vec import Doubles
 from ..camera import upward
 from ..core.errors import SceneError, finite_array, number
@@ -79,9 +80,10 @@ def sun_position(
     except (TypeError, ValueError) as error:
         raise SceneError(f"time is {time!r}; it must be a time, or several: {error}") from error
     found = get_solarposition(times, *place)
-    height, azimuth = (np.radians(found[name].to_numpy()) for name in ("apparent_elevation", "azimuth"))
-    along, across = np.cos(azimuth) * np.cos(height), np.sin(azimuth) * np.cos(height)
-    sun = np.outer(np.sin(height), zenith) + np.outer(along, toward_north) + np.outer(across, east)
+    (high, level), (across, along) = (
+        sin_cos_turns(found[name].to_numpy() / 360) for name in ("apparent_elevation", "azimuth")
+    )
+    sun = np.outer(high, zenith) + np.outer(level * along, toward_north) + np.outer(level * across, east)
     return sun[0] if np.ndim(time) == 0 else sun
 
 
