@@ -572,6 +572,30 @@ def test_meshes_take_normals_and_texture_coordinates(tmp_path: Path) -> None:
     assert shape(tmp_path, board + SQUARE).uvs.tolist() == [[0, 0], [1, 0], [1, 1]] * 2
 
 
+def turn(x: Any, y: Any) -> Any:
+    return np.arctan2(y, x) / (2 * np.pi) % 1
+
+
+@pytest.mark.parametrize(
+    ("statement", "expected"),
+    [
+        ('Shape "sphere" "float zmax" .5', lambda x, y, z: (turn(x, y), (1 - np.arccos(z) / np.pi) * 1.5)),
+        ('Shape "sphere" "float phimax" 180', lambda x, y, z: (2 * turn(x, y), 1 - np.arccos(z) / np.pi)),
+        ('Shape "disk" "float innerradius" .5', lambda x, y, z: (turn(x, y), 2 - 2 * np.hypot(x, y))),
+        ('Shape "cylinder" "float zmax" 3', lambda x, y, z: (turn(x, y), (z + 1) / 4)),
+        ('Shape "bilinearmesh" "point3 P" [ 0 0 0 1 0 0 0 1 0 1 1 0 ]', lambda x, y, z: (x, y)),
+    ],
+)
+def test_texture_coordinates(tmp_path: Path, statement: str, expected: Any) -> None:
+    mesh = shape(tmp_path, statement)
+    with np.errstate(invalid="ignore"):
+        found = np.stack(expected(*np.clip(mesh.vertices, -1 if "sphere" in statement else -9, 9).T), 1)
+    seam = (np.abs(mesh.uvs[:, 0] - 0.5) > 0.49) | (np.hypot(*mesh.vertices.T[:2]) < 1e-9)  # u may be 0 or 1
+    inner = ~seam | ("bilinear" in statement)
+    np.testing.assert_allclose(mesh.uvs[inner], found[inner], atol=1e-6)
+    assert inner.any()
+
+
 @pytest.mark.parametrize("name", ["ball.ply", "ball.ply.gz"])
 def test_ply_files(tmp_path: Path, name: str) -> None:
     data = trimesh.creation.icosphere(subdivisions=1).export(file_type="ply")

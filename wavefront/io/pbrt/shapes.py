@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...arrays.elementary import arccos, sin_cos_turns
-from ...arrays.vec import Doubles
+from ...arrays.vec import Doubles, Ints
 from ...core.errors import SceneError
 from ...shapes import Instance, Mesh, Shape, Sphere
 from ...shapes.transform import Matrix
@@ -85,8 +85,10 @@ def _bilinear_mesh(entity: Entity, job: Job) -> RawMesh:
     size = np.abs(np.stack([b - a, c - a, d - a])).max((0, 2))
     if (np.abs((np.cross(b - a, c - a) * (d - a)).sum(1)) > 1e-6 * size**3).any():
         entity.lose("the curvature of its patches; two triangles for each")
-    if raw.uvs is None and len(patches) == 1:
-        raw.uvs = np.array([[0.0, 0], [1, 0], [0, 1], [1, 1]])[np.argsort(patches[0])]
+    if raw.uvs is None:
+        corners = patches.ravel()
+        raw = _corners_apart(raw, corners, np.tile([[0.0, 0], [1, 0], [0, 1], [1, 1]], (len(patches), 1)))
+        patches = np.arange(len(corners)).reshape(-1, 4)
     return replace(raw, faces=patches[:, [0, 1, 3, 0, 3, 2]].reshape(-1, 3))
 
 
@@ -227,7 +229,9 @@ def _mesh(entity: Entity, job: Job, matrix: Matrix, light: Entity | None) -> Mes
     raw.material = material_of(entity.state, opacity(entity, job), job, entity)
     raw.emission, raw.two_sided = _emission(light, area, job)
     if raw.uvs is None and (has_textures(raw.material) or isinstance(raw.emission, BaseTexture)):
-        raw = _with_uvs(raw)
+        uvs = np.tile([[0.0, 0], [1, 0], [1, 1]], (len(raw.faces), 1))  # of each triangle, as in pbrt
+        raw = _corners_apart(raw, raw.faces.ravel(), uvs)
+        raw.faces = np.arange(len(uvs)).reshape(-1, 3)
     return build(entity.place, raw, job.strict)
 
 
@@ -262,16 +266,10 @@ def _facing(raw: RawMesh, reverse: bool) -> RawMesh:
     return replace(raw, faces=faces, normals=normals)
 
 
-def _with_uvs(raw: RawMesh) -> RawMesh:
-    """Return a mesh with the texture coordinates that pbrt gives each triangle of one without."""
-    corners = raw.faces.ravel()
-    return replace(
-        raw,
-        vertices=raw.vertices[corners],
-        faces=np.arange(len(corners)).reshape(-1, 3),
-        normals=None if raw.normals is None else raw.normals[corners],
-        uvs=np.tile([[0.0, 0], [1, 0], [1, 1]], (len(raw.faces), 1)),
-    )
+def _corners_apart(raw: RawMesh, corners: Ints, uvs: Doubles) -> RawMesh:
+    """Return a mesh with a vertex for each corner (n,) of its faces, and texture coordinates (n, 2)."""
+    normals = None if raw.normals is None else raw.normals[corners]
+    return replace(raw, vertices=raw.vertices[corners], normals=normals, uvs=uvs)
 
 
 def has_textures(thing: Any) -> bool:
