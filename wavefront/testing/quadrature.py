@@ -130,7 +130,8 @@ class DensityIntegrator:
             peak[part] = values.max((1, 2))
             along_a, along_b = (np.abs(np.diff(values, axis=k)).sum((1, 2)) for k in (1, 2))
             across[part] = along_a >= along_b
-            edge[part] = np.where((values == 0).any((1, 2)), 0.02 * peak[part] * area, 0)
+            beyond = (values <= 1e-3 * peak[part, None, None]).any((1, 2))  # a broad lobe may be there, too
+            edge[part] = np.where(beyond, 0.02 * peak[part] * area, 0)
         return out, peak, across, edge
 
     def _highest(self, home: Ints, boxes: int) -> Doubles:
